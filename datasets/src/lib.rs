@@ -1,0 +1,1 @@
+//! Generators, readers and writers of data sets.

@@ -1,0 +1,55 @@
+//! One-dimensional lookup from scalar to colour (thesis section 3.2.5): scalars are interpolated first and mapped then, so a
+//! colour map stays sharp inside large triangles.
+
+/// Linear RGBA.
+pub type Rgba = [f32; 4];
+
+/// How a scalar becomes a colour: linear interpolation between evenly spaced colours over `range`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ColorMap {
+    /// At least one colour, evenly spaced over `range`; linear RGB, alpha is opacity.
+    pub colors: Vec<Rgba>,
+    /// Scalars at the first and the last colour. Values outside get the end colours.
+    pub range: [f32; 2],
+    /// Logarithmic in the scalar (both ends of `range` must be positive).
+    pub log: bool,
+    /// Colour of NaN scalars.
+    pub nan_color: Rgba,
+}
+
+impl ColorMap {
+    /// A linear map over `range`. An empty list becomes white.
+    pub fn new(colors: Vec<Rgba>, range: [f32; 2]) -> Self {
+        let colors = if colors.is_empty() { vec![[1.0; 4]] } else { colors };
+        ColorMap { colors, range, log: false, nan_color: [1.0, 0.0, 1.0, 1.0] }
+    }
+
+    /// Colour of `scalar`.
+    #[inline]
+    pub fn lookup(&self, scalar: f32) -> Rgba {
+        if scalar.is_nan() {
+            return self.nan_color;
+        }
+        let [a, b] = self.range;
+        let t = if self.log { (scalar / a).ln() / (b / a).ln() } else { (scalar - a) / (b - a) };
+        // A range of zero width gives NaN or infinity here: step at the value.
+        let t = if t.is_nan() { 0.5 } else { t.clamp(0.0, 1.0) };
+        let x = t * (self.colors.len() - 1) as f32;
+        let i = (x as usize).min(self.colors.len() - 1);
+        let j = (i + 1).min(self.colors.len() - 1);
+        let f = x - i as f32;
+        std::array::from_fn(|c| self.colors[i][c] + (self.colors[j][c] - self.colors[i][c]) * f)
+    }
+}
+
+/// sRGB-encoded component (0..=1) to linear (IEC 61966-2-1).
+#[inline]
+pub fn srgb_to_linear(v: f32) -> f32 {
+    if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Linear component to sRGB-encoded (IEC 61966-2-1).
+#[inline]
+pub fn linear_to_srgb(v: f32) -> f32 {
+    if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
+}

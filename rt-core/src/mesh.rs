@@ -1,0 +1,200 @@
+//! Indexed triangle meshes with attributes, and what is wrong with them.
+
+use crate::math::Aabb;
+use glam::{DVec3, Vec2, Vec3};
+
+/// Whether an [`Attribute`] has one value per vertex or one per triangle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PerElement {
+    /// One value per entry of [`TriMesh::positions`], interpolated across a triangle.
+    Vertex,
+    /// One value per entry of [`TriMesh::indices`], constant on a triangle.
+    Face,
+}
+
+/// Values on the vertices or the triangles of a mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Attribute<T> {
+    /// What the values belong to.
+    pub per: PerElement,
+    /// One value per element.
+    pub values: Vec<T>,
+}
+
+impl<T> Attribute<T> {
+    /// One value per vertex.
+    pub fn per_vertex(values: Vec<T>) -> Self {
+        Attribute { per: PerElement::Vertex, values }
+    }
+    /// One value per triangle.
+    pub fn per_face(values: Vec<T>) -> Self {
+        Attribute { per: PerElement::Face, values }
+    }
+}
+
+/// Indexed triangles. World position of vertex i is `origin + positions[i]` (f64 sum), so data with large
+/// coordinates keeps its precision: see [`TriMesh::from_f64_positions`].
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TriMesh {
+    /// World position of the mesh's coordinate origin.
+    pub origin: DVec3,
+    /// Vertex positions relative to `origin`.
+    pub positions: Vec<Vec3>,
+    /// Three vertex indices per triangle, counter-clockwise seen from outside.
+    pub indices: Vec<[u32; 3]>,
+    /// Shading normals; need not have unit length. Without them the geometric normal is used.
+    pub normals: Option<Attribute<Vec3>>,
+    /// Linear RGBA in 0..=1; replaces the material's base colour, alpha multiplies its opacity.
+    pub colors: Option<Attribute<[f32; 4]>>,
+    /// Scalars that the material's [`crate::colormap::ColorMap`] turns into colour after interpolation (thesis section 3.2.5).
+    pub scalars: Option<Attribute<f32>>,
+    /// Texture coordinates, one per vertex.
+    pub texcoords: Option<Vec<Vec2>>,
+}
+
+/// Why a mesh cannot be used at all. Repairable faults are counted in [`MeshReport`] instead.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum MeshError {
+    /// An attribute has the wrong number of values.
+    #[error("mesh attribute `{field}` has {found} values; give one per {per}, {expected} in all")]
+    AttributeLength {
+        /// Which attribute.
+        field: &'static str,
+        /// "vertex" or "triangle".
+        per: &'static str,
+        /// How many are needed.
+        expected: usize,
+        /// How many there are.
+        found: usize,
+    },
+    /// More triangles or vertices than 32-bit ids can name.
+    #[error("mesh has {found} {what}; at most {limit} fit in one mesh: split it into several")]
+    TooLarge {
+        /// "triangles" or "vertices".
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+        /// The most that fit.
+        limit: usize,
+    },
+}
+
+/// What [`TriMesh::validate`] found. Triangles named here are left out when building; the rest is rendered.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct MeshReport {
+    /// Triangles in the mesh.
+    pub triangles: usize,
+    /// Triangles with a vertex index past the end.
+    pub index_out_of_range: usize,
+    /// Triangles with a NaN or infinite vertex.
+    pub non_finite: usize,
+    /// Triangles with zero area (kept: they are never hit except exactly edge-on, and cost little).
+    pub zero_area: usize,
+}
+
+impl MeshReport {
+    /// Triangles that cannot be rendered.
+    pub fn skipped(&self) -> usize {
+        self.index_out_of_range + self.non_finite
+    }
+}
+
+impl TriMesh {
+    /// A mesh without attributes.
+    pub fn new(positions: Vec<Vec3>, indices: Vec<[u32; 3]>) -> Self {
+        TriMesh { positions, indices, ..Default::default() }
+    }
+
+    /// A mesh from f64 positions: `origin` becomes the centre of their bounds, rounded so that it is exact in f32
+    /// steps, and positions are stored relative to it. Keeps sub-millimetre detail in planet-sized coordinates.
+    pub fn from_f64_positions(positions: &[DVec3], indices: Vec<[u32; 3]>) -> Self {
+        let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for p in positions.iter().filter(|p| p.is_finite()) {
+            lo = lo.min(*p);
+            hi = hi.max(*p);
+        }
+        let center = 0.5 * lo + 0.5 * hi;
+        // Coordinates that straddle zero lose nothing in f32: keep the origin at 0 so that they are not changed.
+        let far = center.abs().max_element() > (hi - lo).max_element();
+        let origin = if center.is_finite() && far { center.as_vec3().as_dvec3() } else { DVec3::ZERO };
+        let positions = positions.iter().map(|p| (*p - origin).as_vec3()).collect();
+        TriMesh { origin, positions, indices, ..Default::default() }
+    }
+
+    /// Number of triangles.
+    pub fn num_triangles(&self) -> usize {
+        self.indices.len()
+    }
+
+    /// Bounds of the finite positions, relative to `origin`.
+    pub fn bounds(&self) -> Aabb {
+        Aabb::from_points(self.positions.iter().filter(|p| p.is_finite()))
+    }
+
+    /// The corners of triangle `i`, relative to `origin`. Panics when `i` or one of its indices is out of range.
+    #[inline]
+    pub fn triangle(&self, i: usize) -> [Vec3; 3] {
+        self.indices[i].map(|k| self.positions[k as usize])
+    }
+
+    /// Checks the lengths of the attributes and the number of triangles.
+    pub fn check(&self) -> Result<(), MeshError> {
+        fn len<T>(
+            field: &'static str,
+            a: &Option<Attribute<T>>,
+            vertices: usize,
+            faces: usize,
+        ) -> Result<(), MeshError> {
+            let Some(a) = a else { return Ok(()) };
+            let (per, expected) = match a.per {
+                PerElement::Vertex => ("vertex", vertices),
+                PerElement::Face => ("triangle", faces),
+            };
+            let found = a.values.len();
+            if found == expected { Ok(()) } else { Err(MeshError::AttributeLength { field, per, expected, found }) }
+        }
+        let (v, f) = (self.positions.len(), self.indices.len());
+        const LIMIT: usize = (u32::MAX - 1) as usize;
+        for (what, found) in [("vertices", v), ("triangles", f)] {
+            if found > LIMIT {
+                return Err(MeshError::TooLarge { what, found, limit: LIMIT });
+            }
+        }
+        len("normals", &self.normals, v, f)?;
+        len("colors", &self.colors, v, f)?;
+        len("scalars", &self.scalars, v, f)?;
+        if let Some(t) = &self.texcoords
+            && t.len() != v
+        {
+            return Err(MeshError::AttributeLength {
+                field: "texcoords",
+                per: "vertex",
+                expected: v,
+                found: t.len(),
+            });
+        }
+        Ok(())
+    }
+
+    /// True when triangle `i` can be built: indices in range, all coordinates finite.
+    #[inline]
+    pub fn is_renderable(&self, i: usize) -> bool {
+        self.indices[i].iter().all(|&k| self.positions.get(k as usize).is_some_and(|p| p.is_finite()))
+    }
+
+    /// Counts the triangles that will be left out or can never be hit.
+    pub fn validate(&self) -> MeshReport {
+        let mut r = MeshReport { triangles: self.indices.len(), ..Default::default() };
+        for (i, t) in self.indices.iter().enumerate() {
+            if t.iter().any(|&k| k as usize >= self.positions.len()) {
+                r.index_out_of_range += 1;
+            } else if !self.is_renderable(i) {
+                r.non_finite += 1;
+            } else {
+                let [a, b, c] = self.triangle(i).map(|p| p.as_dvec3());
+                r.zero_area += ((b - a).cross(c - a) == DVec3::ZERO) as usize;
+            }
+        }
+        r
+    }
+}
