@@ -22,6 +22,14 @@ impl BuildQuality {
     pub const ALL: [BuildQuality; 4] =
         [BuildQuality::Fastest, BuildQuality::Fast, BuildQuality::Balanced, BuildQuality::Best];
 
+    /// Bins per axis of the SAH builder.
+    pub(crate) fn bins(self) -> usize {
+        match self {
+            BuildQuality::Fastest | BuildQuality::Fast => 8,
+            BuildQuality::Balanced | BuildQuality::Best => 16,
+        }
+    }
+
     /// The name used on command lines and in records.
     pub fn name(self) -> &'static str {
         match self {

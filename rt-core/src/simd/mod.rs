@@ -1,6 +1,16 @@
-//! Instruction sets.
+//! Instruction sets, and the few places where speed needs `unsafe`.
+#![allow(
+    unsafe_code,
+    reason = "one of the workspace's rooms for unsafe code: each block says why it is sound"
+)]
+
+pub(crate) mod huge_pages;
+mod prefetch;
+mod stack;
 
 use fearless_simd::Level;
+pub(crate) use prefetch::prefetch;
+pub(crate) use stack::Stack;
 
 /// An instruction set the kernels can be limited to, for tests and for measurements against peers at the same level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
