@@ -90,8 +90,12 @@ fn packets_equal_single_rays_bit_for_bit_at_every_level() {
             for (i, r) in rays.iter().enumerate() {
                 single[i / LANES].set(i % LANES, world.closest(r));
             }
-            assert!(single == coherent, "{name} {simd:?}: packets differ from single rays");
-            assert!(single == sorted, "{name} {simd:?}: sorted rays differ from single rays");
+            for (what, found) in [("packet", &coherent), ("sorted", &sorted)] {
+                for (i, r) in rays.iter().enumerate() {
+                    let (a, b) = (single[i / LANES].get(i % LANES), found[i / LANES].get(i % LANES));
+                    assert_eq!(a, b, "{name} {simd:?}: single ray (left) and {what} (right) differ for ray {i}, {r:?}");
+                }
+            }
             match &reference {
                 None => reference = Some(single.clone()),
                 Some(r) => assert!(*r == single, "{name}: {simd:?} differs from the first level"),

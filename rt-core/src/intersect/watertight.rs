@@ -8,7 +8,7 @@
 //! No fused multiply-add anywhere: every instruction set then gives the same bits, in packets and for single rays, and the products above stay
 //! equal on both sides of an edge.
 
-use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask};
+use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask};
 
 /// Axis order and shear that turn a ray's direction into +z.
 #[derive(Debug, Clone, Copy)]
@@ -66,6 +66,7 @@ pub(crate) fn test<S, V, const EXACT: bool>(
 where
     S: Simd,
     V: SimdFloat<S, Element = f32> + Lanes<S>,
+    V::Mask: Select<V>,
 {
     let zero = V::splat(simd, 0.0);
     let (ax, ay) = (a[0] - sx * a[2], a[1] - sy * a[2]);
@@ -77,9 +78,10 @@ where
     if EXACT {
         let undecided = u.simd_eq(zero) | v.simd_eq(zero) | w.simd_eq(zero);
         if undecided.any_true() {
-            u = exact(simd, cx, by, cy, bx);
-            v = exact(simd, ax, cy, ay, cx);
-            w = exact(simd, bx, ay, by, ax);
+            // Only those lanes: the others keep the bits they would have in any other company.
+            u = undecided.select(exact(simd, cx, by, cy, bx), u);
+            v = undecided.select(exact(simd, ax, cy, ay, cx), v);
+            w = undecided.select(exact(simd, bx, ay, by, ax), w);
         }
     }
     // All of one sign, zeros included.
