@@ -1,0 +1,3 @@
+//! Generators: every data set of the thesis as a deterministic function of its size.
+
+pub mod wavelet;
