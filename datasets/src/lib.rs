@@ -2,5 +2,6 @@
 #![forbid(unsafe_code)]
 
 pub mod generate;
+pub mod isosurface;
 #[cfg(test)]
 mod testing;
