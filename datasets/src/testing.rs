@@ -1,0 +1,31 @@
+//! What the tests of several modules share.
+
+use rayon::ThreadPoolBuilder;
+use std::collections::HashMap;
+
+/// CRC-32 of the values' little-endian bytes: what `zlib.crc32(array)` gives in Python.
+pub(crate) fn crc32_f32(values: &[f32]) -> u32 {
+    let mut crc = flate2::Crc::new();
+    for v in values {
+        crc.update(&v.to_le_bytes());
+    }
+    crc.sum()
+}
+
+/// Runs `f` on a pool of its own with exactly `threads` threads.
+pub(crate) fn with_threads<T: Send>(threads: usize, f: impl FnOnce() -> T + Send) -> T {
+    ThreadPoolBuilder::new().num_threads(threads).build().expect("a thread pool").install(f)
+}
+
+/// How often each directed edge occurs; a closed, consistently oriented surface has each edge once per direction.
+pub(crate) fn open_or_flipped_edges(indices: &[[u32; 3]]) -> usize {
+    let mut balance: HashMap<(u32, u32), (u32, u32)> = HashMap::new();
+    for t in indices {
+        for e in 0..3 {
+            let (a, b) = (t[e], t[(e + 1) % 3]);
+            let entry = balance.entry((a.min(b), a.max(b))).or_default();
+            if a < b { entry.0 += 1 } else { entry.1 += 1 }
+        }
+    }
+    balance.values().filter(|&&uses| uses != (1, 1)).count()
+}
