@@ -70,7 +70,7 @@ pub(crate) const STEPS: &[Step] = &[
     },
     Step {
         name: "deny",
-        tells: "cargo-deny agrees (advisories, sources, duplicates); needs cargo-deny and its advisory database",
+        tells: "cargo-deny agrees, also about sources, duplicates and other platforms; needs cargo-deny",
         action: Action::Call(runner::cargo_deny),
     },
     Step {
