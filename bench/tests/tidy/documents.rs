@@ -105,6 +105,12 @@ fn the_book_is_complete() {
     }
     let compiled =
         files().into_iter().find(|f| f.path == "bench/src/book.rs").expect("bench/src/book.rs is missing");
+    let lib =
+        files().into_iter().find(|f| f.path == "bench/src/lib.rs").expect("bench/src/lib.rs is missing");
+    assert!(
+        lib.code.contains("mod book;"),
+        "bench/src/lib.rs: add `mod book;`, or the book's examples are not compiled"
+    );
     for chapter in chapters.iter().filter(|c| has_rust_examples(c)) {
         let include = format!("\"../../{}\"", chapter.path);
         assert!(
