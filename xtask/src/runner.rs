@@ -190,7 +190,9 @@ pub(crate) fn report_peers(context: &Context<'_>) -> Outcome {
 /// and its advisory database comes from github.com, which CI cannot reach. The `licences` step checks the same lists.
 pub(crate) fn cargo_deny(context: &Context<'_>) -> Outcome {
     if first_line_of("cargo", &["deny", "--version"]).is_none() {
-        return Outcome::NotRun("cargo-deny is not installed (`cargo install --locked cargo-deny`)".to_owned());
+        return Outcome::NotRun(
+            "cargo-deny is not installed (`cargo install --locked cargo-deny`)".to_owned(),
+        );
     }
     let args = ["deny", "--all-features", "check", "licenses", "bans", "sources"];
     println!("cargo {}", args.join(" "));
