@@ -1,5 +1,17 @@
 //! Geometry that is not a triangle mesh: anything that can bound its primitives and intersect a ray with one of them.
 
+mod cylinder;
+mod error;
+mod frustum;
+mod rounded_cone;
+mod sphere;
+mod tube;
+
+pub use cylinder::Cylinders;
+pub use error::{ShapeError, ShapeReport};
+pub use sphere::Spheres;
+pub use tube::Tubes;
+
 use crate::math::Aabb;
 use crate::ray::Ray;
 use glam::{DVec3, Vec3};
@@ -56,4 +68,72 @@ pub trait Shape: Send + Sync {
 
     /// The surface at a hit this shape reported for `ray`.
     fn surface(&self, prim: u32, hit: &ShapeHit, ray: &Ray) -> ShapeSurface;
+}
+
+/// One radius for all elements, or one for each.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Radii {
+    /// The same for all.
+    Common(f32),
+    /// One per sphere, or per point of a polyline.
+    Each(Vec<f32>),
+}
+
+impl Radii {
+    #[inline]
+    fn get(&self, i: usize) -> f32 {
+        match self {
+            Radii::Common(r) => *r,
+            Radii::Each(r) => r[i],
+        }
+    }
+
+    fn check(&self, shape: &'static str, per: &'static str, expected: usize) -> Result<(), ShapeError> {
+        match self {
+            Radii::Common(_) => Ok(()),
+            Radii::Each(r) => error::check_length(shape, "radii", per, expected, r.len()),
+        }
+    }
+}
+
+/// Splits f64 positions into an origin and f32 offsets from it, so that small detail far from zero survives. The origin is
+/// the middle of the finite positions, or zero when they straddle it (then nothing is lost by f32 offsets from zero).
+pub fn relative_positions(points: &[DVec3]) -> (DVec3, Vec<Vec3>) {
+    let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for p in points.iter().filter(|p| p.is_finite()) {
+        lo = lo.min(*p);
+        hi = hi.max(*p);
+    }
+    let center = 0.5 * lo + 0.5 * hi;
+    let far = center.abs().max_element() > (hi - lo).max_element();
+    let origin = if center.is_finite() && far { center.as_vec3().as_dvec3() } else { DVec3::ZERO };
+    (origin, points.iter().map(|p| (*p - origin).as_vec3()).collect())
+}
+
+/// The box with corners `lo` and `hi` in f64, rounded outwards to f32; empty when a corner is not finite.
+pub(crate) fn outward_box(lo: DVec3, hi: DVec3) -> Aabb {
+    let (min, max) = (lo.as_vec3(), hi.as_vec3());
+    if !(min.is_finite() && max.is_finite()) {
+        return Aabb::EMPTY;
+    }
+    // One step beyond the rounded value: a box that merely touches its surface invites rays through the gap of one ulp
+    // that a traversal's own rounding leaves (notes of the watertight triangle tests).
+    Aabb::new(
+        Vec3::new(min.x.next_down(), min.y.next_down(), min.z.next_down()),
+        Vec3::new(max.x.next_up(), max.y.next_up(), max.z.next_up()),
+    )
+}
+
+/// `p` rounded to f32 and a bound on its distance from the true surface, when `p` itself is off by at most `error`.
+pub(crate) fn rounded_point(p: DVec3, error: f64) -> (Vec3, f32) {
+    let point = p.as_vec3();
+    // Each component moved by at most half an ulp (2⁻²⁴ relative); √3 of them together, and f32::MIN_POSITIVE for subnormals.
+    let rounding = 3f64.sqrt() * (-24f64).exp2() * p.abs().max_element() + f64::from(f32::MIN_POSITIVE);
+    (point, ((rounding + error) as f32).next_up())
+}
+
+/// Whether the f32 parameter `t` lies in the ray's `[t_min, t_max)`; false for NaN.
+#[inline]
+pub(crate) fn in_range(t: f32, ray: &Ray) -> bool {
+    t >= ray.t_min && t < ray.t_max
 }
