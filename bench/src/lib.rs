@@ -12,6 +12,7 @@
 //! `unsafe` lives in `peers/embree` alone: a C library cannot be called without it.
 #![deny(unsafe_code)]
 
+mod book;
 pub mod clock;
 pub mod experiments;
 pub mod machine;
