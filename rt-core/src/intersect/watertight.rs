@@ -98,8 +98,9 @@ where
     Some(Candidate { inside, t, u: v * scale, v: w * scale })
 }
 
-/// p·q − r·s from exact f64 products, rounded to f32: zero only when the difference is.
-#[inline(always)]
+/// p·q − r·s from exact f64 products, rounded to f32: zero only when the difference is. Out of line and in scalar code: it runs for one ray in
+/// thousands.
+#[inline(never)]
 fn exact<S: Simd, V: SimdFloat<S, Element = f32> + Lanes<S>>(simd: S, p: V, q: V, r: V, s: V) -> V {
     let (p, q, r, s) = (p.lanes(), q.lanes(), r.lanes(), s.lanes());
     V::from_fn(simd, |i| {

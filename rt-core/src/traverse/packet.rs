@@ -13,9 +13,31 @@ use crate::accel::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE};
 use crate::accel::{Unit, WideBvh, triangles};
 use crate::intersect::watertight::{dominant_axis, test};
 use crate::ray::{HitBlock, LANES, RayBlock};
-use crate::simd::{Stack, prefetch};
+use crate::simd::{Stack, StackMemory, prefetch};
 use crate::stats::{Work, count};
 use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask, f32x4, f32x8, f32x16, mask32x16, u32x16};
+
+/// `[f(0), f(1), f(2)]` written out. Closures handed to library functions such as `array::from_fn` are compiled without the instruction set of
+/// the function around them, and every vector operation in them becomes a call (measured: half the speed).
+macro_rules! three {
+    (|$i:ident| $e:expr) => {{
+        [
+            {
+                let $i = 0usize;
+                $e
+            },
+            {
+                let $i = 1usize;
+                $e
+            },
+            {
+                let $i = 2usize;
+                $e
+            },
+        ]
+    }};
+}
+pub(crate) use three;
 
 /// Groups of sixteen rays in a packet, at most.
 pub(crate) const GROUPS: usize = 16;
@@ -28,6 +50,8 @@ pub(crate) struct Packet {
     origin: [[Row; 3]; GROUPS],
     /// Shears of the triangle test: x, y, z.
     shear: [[Row; 3]; GROUPS],
+    /// Reciprocal directions, for packets without a common origin.
+    rcp: [[Row; 3]; GROUPS],
     t_min: [Row; GROUPS],
     /// Closest hit so far; starts as the ray's limit.
     pub(crate) t: [Row; GROUPS],
@@ -58,6 +82,7 @@ impl Packet {
         Box::new(Packet {
             origin: [[[0.0; LANES]; 3]; GROUPS],
             shear: [[[0.0; LANES]; 3]; GROUPS],
+            rcp: [[[0.0; LANES]; 3]; GROUPS],
             t_min: [[0.0; LANES]; GROUPS],
             t: [[0.0; LANES]; GROUPS],
             u: [[0.0; LANES]; GROUPS],
@@ -132,7 +157,7 @@ impl Packet {
             let d = [lane(&b.dx), lane(&b.dy), lane(&b.dz)];
             let o = [lane(&b.ox), lane(&b.oy), lane(&b.oz)];
             // Dominant axis: at least as large as the axes after it, larger than those before it (ties go to the lower axis).
-            let abs = d.map(|x| x.abs());
+            let abs = [d[0].abs(), d[1].abs(), d[2].abs()];
             let mut same = abs[kz].simd_gt(v(0.0));
             for a in 0..3 {
                 if a < kz {
@@ -143,6 +168,7 @@ impl Packet {
             }
             for a in 0..3 {
                 let rcp = one / abs[a].max(v(super::single::MIN_COMPONENT)).copysign(d[a]);
+                rcp.store_slice(&mut self.rcp[g][a]);
                 let (lo, hi) = (rcp.reduce_min(), rcp.reduce_max());
                 if (lo < 0.0) != (r0[a] < 0.0) || (hi < 0.0) != (r0[a] < 0.0) {
                     return false;
@@ -218,57 +244,65 @@ impl Packet {
     /// Traces the loaded rays against a triangle hierarchy.
     pub(crate) fn trace<S: Simd, const EXACT: bool, const ANY: bool>(&mut self, simd: S, bvh: &WideBvh) {
         if self.common_origin {
-            self.walk(simd, bvh, &mut Triangles::<EXACT, ANY, true>);
+            if std::env::var_os("SLAB").is_some() {
+                self.walk::<S, _, true>(simd, bvh, &mut Triangles::<EXACT, ANY, true>);
+            } else {
+                self.walk::<S, _, false>(simd, bvh, &mut Triangles::<EXACT, ANY, true>);
+            }
         } else {
-            self.walk(simd, bvh, &mut Triangles::<EXACT, ANY, false>);
+            self.walk::<S, _, true>(simd, bvh, &mut Triangles::<EXACT, ANY, false>);
         }
     }
 
     /// The leaves of a hierarchy that some group of the packet may reach before its limit, with the distance to the leaf's box.
     pub(crate) fn collect<S: Simd>(&mut self, simd: S, bvh: &WideBvh, out: &mut Vec<(f32, ChildRef)>) {
-        self.walk(simd, bvh, &mut Collect(out));
+        self.walk::<S, _, false>(simd, bvh, &mut Collect(out));
     }
 
     #[inline(never)]
-    fn walk<S: Simd, L: PacketLeaf<S>>(&mut self, simd: S, bvh: &WideBvh, leaves: &mut L) {
+    fn walk<S: Simd, L: PacketLeaf<S>, const SLAB: bool>(&mut self, simd: S, bvh: &WideBvh, leaves: &mut L) {
         simd.vectorize(
             #[inline(always)]
-            || self.walk_body(simd, bvh, leaves),
+            || self.walk_body::<S, L, SLAB>(simd, bvh, leaves),
         );
     }
 
     #[inline(always)]
-    fn walk_body<S: Simd, L: PacketLeaf<S>>(&mut self, simd: S, bvh: &WideBvh, leaves: &mut L) {
+    fn walk_body<S: Simd, L: PacketLeaf<S>, const SLAB: bool>(
+        &mut self,
+        simd: S,
+        bvh: &WideBvh,
+        leaves: &mut L,
+    ) {
         if self.groups == 0 {
             return;
         }
         let units = bvh.units.as_slice();
         let v8 = |x: f32| f32x8::splat(simd, x);
-        let row = |r: &Row| f32x16::from_slice(simd, r);
+
         let [nx, ny, nz] = self.near;
 
         // ---- Bounds of the whole packet, for eight boxes at a time.
-        let rcp_lo: [f32x16<S>; 3] = std::array::from_fn(|a| row(&self.rcp_lo[a]));
-        let rcp_hi: [f32x16<S>; 3] = std::array::from_fn(|a| row(&self.rcp_hi[a]));
-        let o_near: [f32x16<S>; 3] = std::array::from_fn(|a| row(&self.origin_near[a]));
-        let o_far: [f32x16<S>; 3] = std::array::from_fn(|a| row(&self.origin_far[a]));
-        let all_lo: [f32x8<S>; 3] = std::array::from_fn(|a| v8(rcp_lo[a].reduce_min()));
-        let all_hi: [f32x8<S>; 3] = std::array::from_fn(|a| v8(rcp_hi[a].reduce_max()));
-        let positive: [bool; 3] = std::array::from_fn(|a| self.near[a] & 1 == 0);
-        let all_near: [f32x8<S>; 3] = std::array::from_fn(|a| {
-            v8(if positive[a] { o_near[a].reduce_max() } else { o_near[a].reduce_min() })
-        });
-        let all_far: [f32x8<S>; 3] = std::array::from_fn(|a| {
-            v8(if positive[a] { o_far[a].reduce_min() } else { o_far[a].reduce_max() })
-        });
-        let group_t_min = row(&self.group_t_min);
+        let rcp_lo: [f32x16<S>; 3] = three!(|a| load_row(simd, &self.rcp_lo[a]));
+        let rcp_hi: [f32x16<S>; 3] = three!(|a| load_row(simd, &self.rcp_hi[a]));
+        let o_near: [f32x16<S>; 3] = three!(|a| load_row(simd, &self.origin_near[a]));
+        let o_far: [f32x16<S>; 3] = three!(|a| load_row(simd, &self.origin_far[a]));
+        let all_lo: [f32x8<S>; 3] = three!(|a| v8(rcp_lo[a].reduce_min()));
+        let all_hi: [f32x8<S>; 3] = three!(|a| v8(rcp_hi[a].reduce_max()));
+        let positive = self.near.map(|row| row & 1 == 0);
+        let all_near: [f32x8<S>; 3] =
+            three!(|a| { v8(if positive[a] { o_near[a].reduce_max() } else { o_near[a].reduce_min() }) });
+        let all_far: [f32x8<S>; 3] =
+            three!(|a| { v8(if positive[a] { o_far[a].reduce_min() } else { o_far[a].reduce_max() }) });
+        let group_t_min = load_row(simd, &self.group_t_min);
         let all_t_min = v8(group_t_min.reduce_min().max(0.0));
-        let mut group_t = row(&self.group_t);
+        let mut group_t = load_row(simd, &self.group_t);
         let mut all_t = group_t.reduce_max();
         let slack8 = v8(BOX_SLACK);
         let slack16 = f32x16::splat(simd, BOX_SLACK);
 
-        let mut stack: Stack<Entry, STACK_SIZE> = Stack::new();
+        let mut memory = StackMemory::<Entry, STACK_SIZE>::new();
+        let mut stack = Stack::empty(&mut memory);
         let mut node_at = 0;
         let mut groups = self.groups;
         'nodes: loop {
@@ -276,16 +310,18 @@ impl Packet {
             count(Work::Nodes, 1);
             let node: &[Unit; NODE_UNITS] =
                 units[node_at..node_at + NODE_UNITS].try_into().expect("a slice of that length");
-            let near8 = |r: usize, a: usize| {
-                let p = f32x8::from_slice(simd, &node[r & 7].0) - all_near[a];
-                (p * all_lo[a]).min(p * all_hi[a])
-            };
-            let far8 = |r: usize, a: usize| {
-                let p = f32x8::from_slice(simd, &node[r & 7].0) - all_far[a];
-                (p * all_lo[a]).max(p * all_hi[a])
-            };
-            let near = near8(nx, 0).max(near8(ny, 1)).max(near8(nz, 2).max(all_t_min));
-            let far = far8(nx ^ 1, 0).min(far8(ny ^ 1, 1)).min(far8(nz ^ 1, 2)) * slack8;
+            let planes8: [f32x8<S>; 6] = [
+                f32x8::from_slice(simd, &node[nx & 7].0),
+                f32x8::from_slice(simd, &node[ny & 7].0),
+                f32x8::from_slice(simd, &node[nz & 7].0),
+                f32x8::from_slice(simd, &node[(nx ^ 1) & 7].0),
+                f32x8::from_slice(simd, &node[(ny ^ 1) & 7].0),
+                f32x8::from_slice(simd, &node[(nz ^ 1) & 7].0),
+            ];
+            let n: [f32x8<S>; 3] = three!(|a| nearest(planes8[a], all_near[a], all_lo[a], all_hi[a]));
+            let f: [f32x8<S>; 3] = three!(|a| farthest(planes8[a + 3], all_far[a], all_lo[a], all_hi[a]));
+            let near = n[0].max(n[1]).max(n[2].max(all_t_min));
+            let far = f[0].min(f[1]).min(f[2]) * slack8;
             let mut mask = near.simd_le(far.min(v8(all_t))).to_bitmask() as u32;
             if mask != 0 {
                 let near: [f32; 8] = near.to_array();
@@ -311,17 +347,24 @@ impl Packet {
                 let node: &[Unit; NODE_UNITS] =
                     units[at..at + NODE_UNITS].try_into().expect("a slice of that length");
                 count(Work::GroupBoxes, 1);
-                let near16 = |r: usize, a: usize| {
-                    let p = f32x16::splat(simd, node[r & 7].0[slot]) - o_near[a];
-                    (p * rcp_lo[a]).min(p * rcp_hi[a])
-                };
-                let far16 = |r: usize, a: usize| {
-                    let p = f32x16::splat(simd, node[r & 7].0[slot]) - o_far[a];
-                    (p * rcp_lo[a]).max(p * rcp_hi[a])
-                };
-                let near = near16(nx, 0).max(near16(ny, 1)).max(near16(nz, 2).max(group_t_min));
-                let far = far16(nx ^ 1, 0).min(far16(ny ^ 1, 1)).min(far16(nz ^ 1, 2)) * slack16;
-                let reached = near.simd_le(far.min(group_t)).to_bitmask() as u16 & parent;
+                let planes: [f32; 6] = [
+                    node[nx & 7].0[slot],
+                    node[ny & 7].0[slot],
+                    node[nz & 7].0[slot],
+                    node[(nx ^ 1) & 7].0[slot],
+                    node[(ny ^ 1) & 7].0[slot],
+                    node[(nz ^ 1) & 7].0[slot],
+                ];
+                let n: [f32x16<S>; 3] =
+                    three!(|a| nearest(f32x16::splat(simd, planes[a]), o_near[a], rcp_lo[a], rcp_hi[a]));
+                let f: [f32x16<S>; 3] =
+                    three!(|a| farthest(f32x16::splat(simd, planes[a + 3]), o_far[a], rcp_lo[a], rcp_hi[a]));
+                let near = n[0].max(n[1]).max(n[2].max(group_t_min));
+                let far = f[0].min(f[1]).min(f[2]) * slack16;
+                let mut reached = near.simd_le(far.min(group_t)).to_bitmask() as u16 & parent;
+                if SLAB {
+                    reached = self.exact_slabs(simd, &planes, reached);
+                }
                 if reached == 0 {
                     continue;
                 }
@@ -338,9 +381,9 @@ impl Packet {
                     while rest != 0 {
                         let g = rest.trailing_zeros() as usize & 15;
                         rest &= rest - 1;
-                        self.group_t[g] = row(&self.t[g]).reduce_max();
+                        self.group_t[g] = load_row(simd, &self.t[g]).reduce_max();
                     }
-                    group_t = row(&self.group_t);
+                    group_t = load_row(simd, &self.group_t);
                     all_t = group_t.reduce_max();
                     if all_t < 0.0 {
                         break 'nodes;
@@ -348,6 +391,31 @@ impl Packet {
                 }
             }
         }
+    }
+
+    /// Of the groups in `reached`, those with a ray that meets the box. The intervals of rays with different origins or diverging directions say
+    /// little far away; this test is each ray's own.
+    #[inline(always)]
+    fn exact_slabs<S: Simd>(&self, simd: S, planes: &[f32; 6], reached: u16) -> u16 {
+        let mut kept = 0;
+        let mut rest = reached;
+        let p: [f32x16<S>; 3] = three!(|a| f32x16::splat(simd, planes[a]));
+        let q: [f32x16<S>; 3] = three!(|a| f32x16::splat(simd, planes[a + 3]));
+        while rest != 0 {
+            let g = rest.trailing_zeros() as usize & 15;
+            rest &= rest - 1;
+            count(Work::GroupBoxes, 1);
+            let o: [f32x16<S>; 3] = three!(|a| load_row(simd, &self.origin[g][a]));
+            let rcp: [f32x16<S>; 3] = three!(|a| load_row(simd, &self.rcp[g][a]));
+            let n: [f32x16<S>; 3] = three!(|a| (p[a] - o[a]) * rcp[a]);
+            let f: [f32x16<S>; 3] = three!(|a| (q[a] - o[a]) * rcp[a]);
+            let near = n[0].max(n[1]).max(n[2].max(load_row(simd, &self.t_min[g])));
+            let far =
+                (f[0].min(f[1]).min(f[2]) * f32x16::splat(simd, BOX_SLACK)).min(load_row(simd, &self.t[g]));
+            let hit = near.simd_le(far).to_bitmask() as u16 & self.active[g];
+            kept |= ((hit != 0) as u16) << g;
+        }
+        kept
     }
 
     /// The triangles of a leaf against the groups that reached it. Returns the groups with new hits.
@@ -375,21 +443,37 @@ impl Packet {
         let v = |x: f32| f32x16::splat(simd, x);
         let mut changed = 0u16;
         for j in 0..leaf.count() {
-            let corner: [f32x16<S>; 9] = std::array::from_fn(|k| v(corners[k][j & 3]));
+            let corner = |k: usize| f32x16::splat(simd, corners[k][j & 3]);
+            let corner: [f32x16<S>; 9] = [
+                corner(0),
+                corner(1),
+                corner(2),
+                corner(3),
+                corner(4),
+                corner(5),
+                corner(6),
+                corner(7),
+                corner(8),
+            ];
             let id = u32x16::splat(simd, ids[j & 3]);
             let mut rest = reached;
             while rest != 0 {
                 let g = rest.trailing_zeros() as usize & 15;
                 rest &= rest - 1;
                 count(Work::Primitives, 1);
-                let [sx, sy, sz] = [0, 1, 2].map(|k| f32x16::from_slice(simd, &self.shear[g][k]));
-                let at = |vertex: usize| -> [f32x16<S>; 3] {
-                    std::array::from_fn(|k| {
-                        let c = corner[3 * vertex + k];
-                        if COMMON { c } else { c - f32x16::from_slice(simd, &self.origin[g][self.axes[k]]) }
-                    })
-                };
-                let Some(c) = test::<S, f32x16<S>, EXACT>(simd, at(0), at(1), at(2), sx, sy, sz) else {
+                let [sx, sy, sz]: [f32x16<S>; 3] = three!(|k| f32x16::from_slice(simd, &self.shear[g][k]));
+                let (mut a, mut b, mut c) = (
+                    [corner[0], corner[1], corner[2]],
+                    [corner[3], corner[4], corner[5]],
+                    [corner[6], corner[7], corner[8]],
+                );
+                if !COMMON {
+                    let o: [f32x16<S>; 3] = three!(|k| load_row(simd, &self.origin[g][self.axes[k]]));
+                    a = three!(|k| a[k] - o[k]);
+                    b = three!(|k| b[k] - o[k]);
+                    c = three!(|k| c[k] - o[k]);
+                }
+                let Some(c) = test::<S, f32x16<S>, EXACT>(simd, a, b, c, sx, sy, sz) else {
                     continue;
                 };
                 let best = f32x16::from_slice(simd, &self.t[g]);
@@ -412,12 +496,9 @@ impl Packet {
                     self.active[g] &= !bits;
                     ok.select(v(-1.0), best).store_slice(&mut self.t[g]);
                 } else {
-                    let keep = |row: &mut Row, new: f32x16<S>| {
-                        ok.select(new, f32x16::from_slice(simd, row)).store_slice(row)
-                    };
-                    keep(&mut self.t[g], c.t);
-                    keep(&mut self.u[g], c.u);
-                    keep(&mut self.v[g], c.v);
+                    ok.select(c.t, best).store_slice(&mut self.t[g]);
+                    ok.select(c.u, load_row(simd, &self.u[g])).store_slice(&mut self.u[g]);
+                    ok.select(c.v, load_row(simd, &self.v[g])).store_slice(&mut self.v[g]);
                     let old = u32x16::from_slice(simd, &self.prim[g]);
                     ok.select(id, old).store_slice(&mut self.prim[g]);
                 }
@@ -468,6 +549,26 @@ impl<S: Simd> PacketLeaf<S> for Collect<'_> {
         self.0.push((distance, leaf));
         0
     }
+}
+
+/// Smallest distance to a plane over intervals of origins (`o` is the end that makes it smallest) and reciprocal directions.
+#[inline(always)]
+fn nearest<S: Simd, V: SimdFloat<S, Element = f32>>(plane: V, o: V, rcp_lo: V, rcp_hi: V) -> V {
+    let p = plane - o;
+    (p * rcp_lo).min(p * rcp_hi)
+}
+
+/// Largest distance, likewise.
+#[inline(always)]
+fn farthest<S: Simd, V: SimdFloat<S, Element = f32>>(plane: V, o: V, rcp_lo: V, rcp_hi: V) -> V {
+    let p = plane - o;
+    (p * rcp_lo).max(p * rcp_hi)
+}
+
+/// One row of a packet as a vector.
+#[inline(always)]
+fn load_row<S: Simd>(simd: S, row: &Row) -> f32x16<S> {
+    f32x16::from_slice(simd, row)
 }
 
 /// A child to visit, by the place where its box stands: the node's unit times eight plus the slot.
