@@ -4,10 +4,12 @@
 pub mod accel;
 pub mod colormap;
 pub mod grid;
+mod grid_walk;
 mod intersect;
 pub mod math;
 pub mod mesh;
 pub mod ray;
+mod ray_cubic;
 pub mod shapes;
 pub mod simd;
 pub mod stats;
