@@ -15,6 +15,8 @@ pub mod simd;
 pub mod stats;
 #[cfg(test)]
 pub(crate) mod test_shapes;
+pub mod transfer_function;
 mod traverse;
+pub mod volume;
 
 pub use glam;
