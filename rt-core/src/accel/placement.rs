@@ -2,7 +2,8 @@
 
 use super::blas::LocalFrame;
 use crate::math::{Aabb, max_abs};
-use crate::ray::{LANES, Ray, RayBlock};
+use crate::ray::{Ray, RayBlock};
+use fearless_simd::{Simd, SimdBase, SimdMask, f32x16};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
 /// Beyond this many radii from the geometry a ray's origin is first moved along the ray in f64: there, f32 coordinates relative to the
@@ -89,15 +90,26 @@ impl Placement {
     }
 
     /// True when these rays need no transformation: local and render space agree and no origin is far away.
-    #[inline]
-    pub(crate) fn accepts_blocks(&self, rays: &[RayBlock]) -> bool {
+    #[inline(never)]
+    pub(crate) fn accepts_blocks<S: Simd>(&self, simd: S, rays: &[RayBlock]) -> bool {
         if !self.identity {
             return false;
         }
-        let (c, limit) = (self.center_f32, self.near_f32);
-        let within =
-            |row: &[f32; LANES], c: f32| row.iter().fold(0f32, |m, &o| m.max((o - c).abs())) <= limit;
-        rays.iter().all(|r| within(&r.ox, c.x) && within(&r.oy, c.y) && within(&r.oz, c.z))
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let limit = f32x16::splat(simd, self.near_f32);
+                let mut largest = f32x16::splat(simd, 0.0);
+                for r in rays {
+                    for (row, c) in
+                        [(&r.ox, self.center_f32.x), (&r.oy, self.center_f32.y), (&r.oz, self.center_f32.z)]
+                    {
+                        largest = largest.max((f32x16::from_slice(simd, row) - f32x16::splat(simd, c)).abs());
+                    }
+                }
+                largest.simd_le(limit).all_true()
+            },
+        )
     }
 
     /// The ray in local space, and how far along it its origin was moved (in units of its direction: `t` is the same in both spaces).

@@ -201,7 +201,7 @@ impl World {
         let placement = &self.placements[instance as usize];
         let blas = &self.blas[placement.geometry];
         let alone = self.placements.len() == 1;
-        if alone && placement.accepts_blocks(rays) {
+        if alone && placement.accepts_blocks(simd, rays) {
             blas_blocks::<S, EXACT, ANY>(simd, blas, rays, hits, instance, &mut scratch.inner);
             return;
         }
