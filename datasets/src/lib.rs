@@ -7,3 +7,4 @@ pub mod model;
 pub mod read;
 #[cfg(test)]
 mod testing;
+pub mod write;

@@ -7,6 +7,7 @@
 pub mod array;
 pub mod cells;
 pub mod coloring;
+pub(crate) mod from_core;
 pub mod grid;
 pub mod lines;
 mod merge;
