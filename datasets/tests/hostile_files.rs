@@ -16,8 +16,10 @@ fn read_and_use(name: &str, bytes: &[u8]) -> Result<Opened, ReadError> {
         Ok(o) => use_all(o),
         Err(e) => {
             let text = e.to_string();
-            assert!(text.contains(name), "the error does not name the file: {text}");
-            assert!(text.contains("; ") || matches!(e, ReadError::Io { .. }), "no cure in: {text}");
+            // A damaged name of another file gives the error of that one.
+            let named = text.contains(name) || matches!(e, ReadError::Io { .. });
+            assert!(named, "the error does not name the file: {text}");
+            assert!(text.contains("; "), "no cure in: {text}");
         }
     }
     opened
@@ -187,7 +189,7 @@ fn declared_sizes_beyond_the_file_are_refused_before_memory_is_taken() {
     refused(
         "a.vtk",
         b"# vtk DataFile Version 3.0\nx\nBINARY\nDATASET POLYDATA\nPOINTS 999999999999 float\n0000",
-        &["byte", "999999999999", "truncated"],
+        &["at byte 79", "2999999999997 coordinates", "truncated"],
     );
     refused(
         "a.vtk",

@@ -27,10 +27,7 @@ pub fn read(path: &Path) -> Result<Opened, ReadError> {
 /// Reads the content of a file; other files are looked for beside `path`.
 pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
     let fault = |f: Fault| f.in_file(path, FORMAT);
-    let gltf = gltf::Gltf::from_slice(bytes).map_err(|e| {
-        let cure = "check it with the Khronos glTF validator; compressed meshes (Draco, meshopt) must be unpacked first";
-        fault(Fault::new(At::Field("the JSON part".into()), e.to_string(), cure))
-    })?;
+    let gltf = checked(bytes).map_err(fault)?;
     let buffers = buffers(path, &gltf)?;
     let mut reader = Reader {
         buffers,
@@ -82,6 +79,24 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
     }
     let Reader { scene, warnings, .. } = reader;
     Ok(Opened { format: FORMAT, content: Content::Scene(scene), warnings, time_steps: Vec::new() })
+}
+
+/// The scene after the crate's own checks. Those index the accessors of primitives before they are checked (gltf-json
+/// 1.4.1, mesh.rs), so that is done here first.
+fn checked(bytes: &[u8]) -> Result<gltf::Gltf, Fault> {
+    let fault = |e: gltf::Error| {
+        let cure = "check it with the Khronos glTF validator; compressed meshes (Draco, meshopt) must be unpacked first";
+        Fault::new(At::Field("the JSON part".into()), e.to_string(), cure)
+    };
+    let gltf::Gltf { document, blob } = gltf::Gltf::from_slice_without_validation(bytes).map_err(fault)?;
+    let json = document.as_json();
+    let accessors = json.accessors.len();
+    let attributes = json.meshes.iter().flat_map(|m| &m.primitives).flat_map(|p| p.attributes.values());
+    if let Some(bad) = attributes.map(|a| a.value()).find(|&a| a >= accessors) {
+        return Err(Fault::field("meshes", format!("accessor {bad} of {accessors}")));
+    }
+    let document = gltf::Document::from_json(document.into_json()).map_err(fault)?;
+    Ok(gltf::Gltf { document, blob })
 }
 
 /// The bytes of every buffer.
@@ -145,7 +160,13 @@ impl Reader {
                 } else if let Some(t) = texture_of_image[image.index()] {
                     material.base_color_texture = Some(t);
                 } else {
-                    match self.picture(path, &image) {
+                    let json = &gltf.as_json().images[image.index()];
+                    // The crate takes a picture without a source for granted not to be.
+                    let has_source =
+                        json.uri.is_some() || json.buffer_view.is_some() && json.mime_type.is_some();
+                    let picture =
+                        if has_source { self.picture(path, &image) } else { Err("it names no data".into()) };
+                    match picture {
                         Ok(texture) => {
                             let t = self.scene.textures.len();
                             self.scene.textures.push(texture);
