@@ -163,8 +163,13 @@ fn every_truncation_is_survived() {
     assert_memory_is_bounded();
 }
 
+/// Cases per run: enough to find a new fault in days of CI, quick enough for every change. `PROPTEST_CASES` overrides.
+fn cases() -> u32 {
+    std::env::var("PROPTEST_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(1500)
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 4000, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn every_damage_is_survived(which in any::<prop::sample::Index>(), damages in prop::collection::vec(damage(), 1..4)) {

@@ -1,9 +1,11 @@
 //! Files written by the real VTK are read as VTK reads them, and VTK reads the files written here.
 
+mod sample_files;
 mod vtk_python;
 
 use datasets::model::{DataArray, Dataset, ScalarType};
 use datasets::read::{Content, Opened, ReadError, open};
+use datasets::write::{Encoding, VtkOptions, write_ply, write_vtk};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -182,4 +184,95 @@ fn check_series_and_blocks(dir: &Path) {
     let (mesh, report) = blocks.dataset().unwrap().to_trimesh(Some("p_f32")).unwrap();
     assert_eq!(report.blocks_without_array, 0);
     assert!(mesh.num_triangles() > 296 && mesh.scalars.is_some());
+}
+
+/// What VTK must say about a file with this data.
+fn description(data: &Dataset) -> serde_json::Map<String, Value> {
+    let (points, cells) = data.counts();
+    let a = data.attributes().unwrap();
+    let mut arrays = serde_json::Map::new();
+    for (of, list) in [("point", &a.point), ("cell", &a.cell), ("field", &a.field)] {
+        for x in list {
+            let values = || (0..x.values.len()).map(|i| x.values.get_f64(i));
+            let e = serde_json::json!({
+                "components": x.components, "values": x.values.len(), "sum": values().sum::<f64>(), "weighted": weighted(values()),
+            });
+            arrays.insert(format!("{of}:{}", x.name), e);
+        }
+    }
+    for (name, texts) in &a.text {
+        arrays.insert(format!("field:{name}"), serde_json::json!({ "text": texts }));
+    }
+    let mut out = serde_json::Map::new();
+    out.insert("kind".into(), data.kind().into());
+    out.insert("points".into(), points.into());
+    out.insert("cells".into(), cells.into());
+    out.insert("arrays".into(), arrays.into());
+    out
+}
+
+#[test]
+fn vtk_reads_every_file_that_is_written_here() {
+    let Some(python) = vtk_python::find() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let mut written: Vec<(std::path::PathBuf, Dataset)> = Vec::new();
+    for (extension, data) in sample_files::data_sets() {
+        for (i, options) in options().into_iter().enumerate() {
+            let path = dir.path().join(format!("ours_{i}.{extension}"));
+            write_vtk(&path, &data, options).unwrap();
+            written.push((path, data.clone()));
+        }
+    }
+    let (mesh, _) = sample_files::data_sets()[2].1.to_trimesh(None).unwrap();
+    let ply = dir.path().join("ours.ply");
+    write_ply(&ply, &mesh).unwrap();
+
+    let mut args: Vec<&std::ffi::OsStr> = vec!["check".as_ref(), ply.as_os_str()];
+    args.extend(written.iter().map(|(p, _)| p.as_os_str()));
+    let report: Value = serde_json::from_str(&vtk_python::run(&python, &args)).unwrap();
+    for (path, data) in &written {
+        let file = path.file_name().unwrap().to_str().unwrap();
+        let theirs = &report["files"][file];
+        assert_eq!(theirs["errors"], 0, "{file}: VTK reports errors");
+        for (key, ours) in description(data) {
+            if key != "arrays" {
+                assert_eq!(theirs[&key], ours, "{file} {key}");
+                continue;
+            }
+            for (name, e) in ours.as_object().unwrap() {
+                let t = &theirs["arrays"][name];
+                assert_eq!(t.get("text"), e.get("text"), "{file} {name}");
+                assert_eq!(
+                    (&t["components"], &t["values"]),
+                    (&e["components"], &e["values"]),
+                    "{file} {name}"
+                );
+                for sum in ["sum", "weighted"] {
+                    if let (Some(found), Some(expected)) = (t[sum].as_f64(), e[sum].as_f64()) {
+                        assert_close(
+                            found,
+                            expected,
+                            expected.abs().max(1.0),
+                            &format!("{file} {name} {sum}"),
+                        );
+                    }
+                }
+            }
+        }
+        // Ours of ours is the same again, bit for bit.
+        let Content::Data(again) = open(path).unwrap().content else { panic!() };
+        assert_eq!(&again, data, "{file}");
+        let (mesh, _) = data.to_trimesh(None).unwrap();
+        assert_eq!(theirs["surface_triangles"], mesh.num_triangles(), "{file}");
+    }
+    assert_eq!(report["files"]["ours.ply"]["surface_triangles"], mesh.num_triangles());
+    println!("VTK {} read {} files written here", report["vtk"], written.len() + 1);
+}
+
+fn options() -> [VtkOptions; 3] {
+    [
+        VtkOptions { encoding: Encoding::Ascii, compress: false },
+        VtkOptions { encoding: Encoding::Base64, compress: false },
+        VtkOptions { encoding: Encoding::Base64, compress: true },
+    ]
 }

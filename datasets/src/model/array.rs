@@ -205,6 +205,7 @@ impl Values {
 
     /// The values written in `words`, or the first word that is not one.
     /// Integers may be written with a fraction or exponent (`3.0`) if the value is whole, as some programs do.
+    #[allow(clippy::unnecessary_cast, reason = "the macro covers f64 too")]
     pub fn from_words<'a>(kind: ScalarType, words: impl Iterator<Item = &'a str>) -> Result<Self, &'a str> {
         with_type!(kind, T, wrap => {
             let mut out = Vec::new();

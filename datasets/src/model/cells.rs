@@ -51,7 +51,7 @@ impl Cells {
 
     /// Cells of `n` points each; a remainder is dropped.
     pub fn uniform(n: usize, mut connectivity: Vec<u32>) -> Self {
-        let count = if n == 0 { 0 } else { connectivity.len() / n };
+        let count = connectivity.len().checked_div(n).unwrap_or(0);
         connectivity.truncate(count * n);
         Cells { offsets: (0..=count).map(|i| i * n).collect(), connectivity }
     }

@@ -43,6 +43,7 @@ pub struct Opened {
 
 /// Data with arrays, or meshes with materials.
 #[derive(Debug, Clone)]
+#[expect(clippy::large_enum_variant, reason = "there is one of it per file")]
 pub enum Content {
     /// From scientific formats.
     Data(Dataset),

@@ -185,18 +185,12 @@ impl Header {
         let mut spacing = DVec3::ONE;
         let mut direction = DMat3::IDENTITY;
         if let Some(text) = self.get(&["space directions"]) {
-            let mut column = 0;
-            for v in vectors(text)
-                .map_err(|w| Fault::field("field `space directions`", w))?
-                .into_iter()
-                .skip(first)
-                .flatten()
-            {
-                if column < 3 && v.length() > 0.0 {
+            let axes = vectors(text).map_err(|w| Fault::field("field `space directions`", w))?;
+            for (column, v) in axes.into_iter().skip(first).flatten().take(3).enumerate() {
+                if v.length() > 0.0 {
                     spacing[column] = v.length();
                     *direction.col_mut(column) = v / v.length();
                 }
-                column += 1;
             }
         } else if self.get(&["spacings"]).is_some() {
             for (a, w) in words("spacings").skip(first).take(3).enumerate() {

@@ -19,7 +19,12 @@ pub fn read(path: &Path) -> Result<Opened, ReadError> {
 /// Reads the content of an `.obj` file; other files are looked for beside `path`.
 pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
     let warnings = RefCell::new(Vec::new());
-    let options = tobj::LoadOptions { single_index: true, ..Default::default() };
+    let options = tobj::LoadOptions {
+        single_index: true,
+        ignore_points: true,
+        ignore_lines: true,
+        ..Default::default()
+    };
     let load_material = |name: &Path| {
         let file = beside(path, &name.to_string_lossy());
         match std::fs::read(&file) {
@@ -40,10 +45,13 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
         Ok(list) => list.iter().for_each(|m| add_material(m, path, &mut scene, &mut warnings)),
         Err(e) => warnings.push(format!("materials left out: {e}")),
     }
-    let (mut not_faces, mut fanned) = (0, 0);
+    // Points and lines would spoil the attributes of the faces around them, so `tobj` skips them: count them here.
+    let not_faces =
+        bytes.split(|&b| b == b'\n').filter(|l| l.starts_with(b"l ") || l.starts_with(b"p ")).count();
+    let mut fanned = 0;
     for model in models {
         let material = model.mesh.material_id.filter(|&m| m < scene.materials.len());
-        let mesh = triangles(&model.mesh, &mut not_faces, &mut fanned);
+        let mesh = triangles(&model, &mut fanned, &mut warnings);
         if let Err(e) = mesh.check() {
             let at = At::Field(format!("object `{}`", model.name));
             return Err(Fault::new(at, e.to_string(), BROKEN).in_file(path, FORMAT));
@@ -61,7 +69,8 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
     Ok(Opened { format: FORMAT, content: Content::Scene(scene), warnings, time_steps: Vec::new() })
 }
 
-fn triangles(m: &tobj::Mesh, not_faces: &mut usize, fanned: &mut usize) -> TriMesh {
+fn triangles(model: &tobj::Model, fanned: &mut usize, warnings: &mut Vec<String>) -> TriMesh {
+    let m = &model.mesh;
     let positions: Vec<DVec3> = m.positions.as_chunks::<3>().0.iter().map(|&p| DVec3::from(p)).collect();
     let mut indices = Vec::new();
     let (mut at, mut corners) = (0, Vec::new());
@@ -72,10 +81,7 @@ fn triangles(m: &tobj::Mesh, not_faces: &mut usize, fanned: &mut usize) -> TriMe
     for n in arities.chain(all_triangles) {
         let Some(ids) = m.indices.get(at..at + n) else { break };
         at += n;
-        if n < 3 {
-            *not_faces += 1;
-            continue;
-        }
+
         corners.clear();
         corners.extend(ids.iter().map(|&k| positions.get(k as usize).copied().unwrap_or(DVec3::NAN)));
         let division = triangulate(&corners, |t| indices.push(t.map(|k| ids[k])));
@@ -95,6 +101,17 @@ fn triangles(m: &tobj::Mesh, not_faces: &mut usize, fanned: &mut usize) -> TriMe
     if m.vertex_color.len() == 3 * vertices && vertices > 0 {
         let colors = m.vertex_color.as_chunks::<3>().0.iter().map(|c| narrow(c).extend(1.0).to_array());
         mesh.colors = Some(Attribute::per_vertex(colors.collect()));
+    }
+
+    for (what, found, expected) in [
+        ("normals", m.normals.len(), 3 * vertices),
+        ("texture coordinates", m.texcoords.len(), 2 * vertices),
+        ("colours", m.vertex_color.len(), 3 * vertices),
+    ] {
+        if found != 0 && found != expected {
+            warnings
+                .push(format!("object `{}`: {what} left out: only some of its faces have them", model.name));
+        }
     }
     mesh
 }

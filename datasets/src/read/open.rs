@@ -52,7 +52,7 @@ pub fn open(path: impl AsRef<Path>) -> Result<Opened, ReadError> {
         (Some(f), _) | (None, Some(f)) => f,
         (None, None) => {
             // Binary files called .bin, .dat and so on: PLOT3D if the sizes add up.
-            if !head.is_empty() && plot3d::looks_like_grid(&read_bytes(path)?) {
+            if !head.is_empty() && plot3d::looks_like_plot3d(&read_bytes(path)?) {
                 Format::Plot3d
             } else {
                 return Err(unknown(path, &head));

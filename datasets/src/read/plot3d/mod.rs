@@ -52,7 +52,15 @@ pub fn read(path: &Path, options: &Plot3dOptions) -> Result<Opened, ReadError> {
             );
         }
     }
-    let mut blocks = grid_blocks(&read_bytes(&path)?, options).map_err(|f| f.in_file(&path, FORMAT))?;
+
+    let bytes = read_bytes(&path)?;
+    let mut blocks = grid_blocks(&bytes, options).map_err(|mut f| {
+        if !is_text(&bytes) && find(Role::Solution, &bytes, options).is_ok() {
+            f.what = "it is a solution, and there is no grid beside it".into();
+            f.cure = "put the grid beside it (nameq.bin goes with namexyz.bin, name.q with name.xyz), or open the grid".into();
+        }
+        f.in_file(&path, FORMAT)
+    })?;
     match &solution {
         None => warnings.push("no solution file beside the grid: it has no flow variables".into()),
         Some(q) => {
@@ -92,9 +100,9 @@ fn opened(mut blocks: Vec<StructuredGrid>, warnings: Vec<String>) -> Opened {
     Opened { format: FORMAT, content: Content::Data(data), warnings, time_steps: Vec::new() }
 }
 
-/// True when `bytes` have the size of a PLOT3D grid.
-pub(crate) fn looks_like_grid(bytes: &[u8]) -> bool {
-    find(Role::Grid, bytes, &Plot3dOptions::default()).is_ok()
+/// True when `bytes` have the size of a binary PLOT3D grid or solution.
+pub(crate) fn looks_like_plot3d(bytes: &[u8]) -> bool {
+    [Role::Grid, Role::Solution].into_iter().any(|r| find(r, bytes, &Plot3dOptions::default()).is_ok())
 }
 
 /// The existing file beside `path` whose name follows from it: by the end of the stem, or by the extension.

@@ -151,7 +151,7 @@ impl<'a> XmlFile<'a> {
             }
             other => return Err(bad_attribute(node, "format", other, "ascii, binary or appended")),
         };
-        if values.len() % components != 0 {
+        if !values.len().is_multiple_of(components) {
             let what = format!("{} values do not make whole tuples of {components}", values.len());
             return Err(Fault::new(place(), what, BROKEN));
         }
@@ -159,7 +159,7 @@ impl<'a> XmlFile<'a> {
     }
 
     fn typed(&self, kind: ScalarType, bytes: Vec<u8>, e: Encoding, name: &str) -> Result<Values, Fault> {
-        if bytes.len() % kind.size() != 0 {
+        if !bytes.len().is_multiple_of(kind.size()) {
             let what = format!("{} bytes are no whole number of {} values", bytes.len(), kind.vtk_name());
             return Err(Fault::field(format!("array `{name}`"), what));
         }
