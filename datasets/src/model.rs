@@ -11,6 +11,7 @@ pub(crate) mod from_core;
 pub mod grid;
 pub mod lines;
 mod merge;
+mod outer_faces;
 pub mod polygon;
 pub mod surface;
 

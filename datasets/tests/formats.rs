@@ -429,3 +429,28 @@ fn legacy_binary_and_text_mean_what_they_say() {
     assert_eq!(g.attributes.cell_array("id").unwrap().values, Values::I32(vec![7, 8]));
     assert_eq!(g.attributes.point_scalars.as_deref(), Some("s"));
 }
+
+#[test]
+fn copies_of_other_processes_close_no_hole_and_open_none() {
+    // Three hexahedra in a row; the last is another process's (bit 1), then hidden (bit 32).
+    let mut d = datasets::model::UnstructuredGrid::default();
+    let mut points = Vec::new();
+    for x in 0..4 {
+        for [y, z] in [[0.0f32, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]] {
+            points.push([x as f32, y, z]);
+        }
+    }
+    d.points = datasets::model::Points::F32(points);
+    (0..3u32).for_each(|c| d.cells.push(4 * c..4 * c + 8));
+    d.types = vec![12; 3];
+    for (ghost, triangles) in [(0u8, 28), (1, 18), (32, 20)] {
+        d.attributes.cell =
+            vec![datasets::model::DataArray::new("vtkGhostType", 1, Values::U8(vec![0, 0, ghost]))];
+        let (mesh, report) = Dataset::UnstructuredGrid(d.clone()).to_trimesh(None).unwrap();
+        assert_eq!(
+            (mesh.num_triangles(), report.ghost_cells),
+            (triangles, usize::from(ghost > 0)),
+            "ghost {ghost}"
+        );
+    }
+}

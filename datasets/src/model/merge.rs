@@ -1,7 +1,7 @@
 //! Pieces of one data set put together again.
 
 use super::{
-    Attributes, DataArray, Dataset, ModelError, Points, PolyData, UnstructuredGrid, extent_dims,
+    Attributes, DataArray, Dataset, ModelError, Points, PolyData, UnstructuredGrid, Values, extent_dims,
     lattice_counts,
 };
 
@@ -105,8 +105,7 @@ fn merge_poly(pieces: &[Dataset], warnings: &mut Vec<String>) -> Dataset {
     let all = attributes_of(pieces);
     let lists: Vec<&[DataArray]> = all.iter().map(|a| a.cell.as_slice()).collect();
     let cell = join_arrays(&lists, "cell", warnings, |arrays| {
-        let mut out =
-            DataArray { values: super::Values::empty(arrays[0].values.kind()), ..arrays[0].clone() };
+        let mut out = DataArray { values: Values::empty(arrays[0].values.kind()), ..arrays[0].clone() };
         for class in 0..4 {
             for (a, d) in arrays.iter().zip(&parts) {
                 let sizes = [d.verts.len(), d.lines.len(), d.polys.len(), d.strips.len()];
@@ -219,7 +218,12 @@ fn merge_lattices(mut pieces: Vec<Dataset>, warnings: &mut Vec<String>) -> Resul
             });
             super::array::IntoValues::into_values(picked.collect::<Option<Vec<_>>>()?)
         });
-        Some(DataArray { values, ..joined })
+        let mut out = DataArray { values, ..joined };
+        // Every point and cell is here once now: none is a copy of another process's any more (bit 1).
+        if let ("vtkGhostType", Values::U8(v)) = (out.name.as_str(), &mut out.values) {
+            v.iter_mut().for_each(|g| *g &= !1);
+        }
+        Some(out)
     };
     let lists: Vec<&[DataArray]> = all.iter().map(|a| a.point.as_slice()).collect();
     let point = join_arrays(&lists, "point", warnings, |a| gather(&points_from, a));

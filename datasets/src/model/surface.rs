@@ -1,5 +1,6 @@
 //! The outer surface of any data set as one triangle mesh.
 
+use super::outer_faces::{Faces, OuterFaces};
 use super::polygon::{Division, triangulate};
 use super::{
     Attributes, CellType, Cells, ColorBy, DataArray, Dataset, ModelError, PolyData, UnstructuredGrid,
@@ -7,7 +8,6 @@ use super::{
 };
 use glam::{DVec3, Vec2, Vec3};
 use rt_core::mesh::{Attribute, MeshError, TriMesh};
-use std::collections::HashMap;
 
 /// What became of the cells, so that nothing is lost unseen.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -90,8 +90,10 @@ impl Dataset {
     }
 }
 
-/// `vtkGhostType` bits for cells: 1 = another process has it, 32 = hidden (vtkDataSetAttributes.h).
-pub(super) const HIDDEN_CELL: u8 = 1 | 32;
+/// `vtkGhostType` bits for cells (vtkDataSetAttributes.h): another process has it too.
+const COPIED_CELL: u8 = 1;
+/// Hidden.
+const HIDDEN_CELL: u8 = 32;
 /// `vtkGhostType` bit for points: 2 = hidden.
 const HIDDEN_POINT: u8 = 2;
 
@@ -202,6 +204,10 @@ impl Builder {
 
     /// One polygon of `cell`. Ids must be in range.
     fn polygon(&mut self, ids: &[u32], cell: usize, at: &dyn Fn(usize) -> DVec3, from: &Source<'_>) {
+        if let [a, b, c] = *ids {
+            let corners = [a, b, c].map(|k| self.vertex(k as usize, at(k as usize), from));
+            return self.triangle(corners, cell, from);
+        }
         let corners: Vec<DVec3> = ids.iter().map(|&k| at(k as usize)).collect();
         let mut triangles = Vec::with_capacity(ids.len());
         match triangulate(&corners, |t| triangles.push(t)) {
@@ -261,15 +267,8 @@ impl Builder {
         let hidden = Hidden::new(&d.attributes);
         let at = |i: usize| d.points.get(i);
 
-        // First pass: how many cells share each face of the solid cells.
-        let mut shared: HashMap<FaceKey, u32> = HashMap::new();
-        let mut face = Vec::new();
-        for cell in 0..d.cells.len() {
-            if !hidden.cell(cell) {
-                each_solid_face(d, cell, &mut face, |ids| *shared.entry(face_key(ids)).or_insert(0) += 1);
-            }
-        }
-        // Second pass, in cell order so that the result does not depend on the hash: emit what is seen once.
+        let outside = OuterFaces::find(d, &hidden);
+        let mut outer: Vec<Vec<u32>> = Vec::new();
         for cell in 0..d.cells.len() {
             let ids = d.cells.get(cell);
             let kind = CellType::of(d.types[cell]);
@@ -302,13 +301,7 @@ impl Builder {
                     _ => self.report.too_few_points += 1,
                 },
                 CellType::Solid(_) | CellType::Polyhedron => {
-                    let mut outer: Vec<Vec<u32>> = Vec::new();
-                    let complete = each_solid_face(d, cell, &mut face, |ids| {
-                        if shared.get(&face_key(ids)) == Some(&1) {
-                            outer.push(ids.to_vec());
-                        }
-                    });
-                    match complete {
+                    match outside.of_cell(d, cell, &mut outer) {
                         Faces::Complete => {}
                         Faces::TooFewPoints => self.report.too_few_points += 1,
                         Faces::BadIds => self.report.bad_ids += 1,
@@ -365,7 +358,7 @@ impl Builder {
         let stride = [1, dims[0], dims[0] * dims[1]];
         let cell_stride = [1, cells[0], cells[0] * cells[1]];
         let blank = |cell: usize, low: usize| {
-            hidden.cell(cell)
+            hidden.blanked(cell)
                 || hidden.any_points()
                     && (0..8).any(|c: usize| {
                         let step = (0..3)
@@ -386,7 +379,7 @@ impl Builder {
                     }
                     let cell = i + cell_stride[1] * j + cell_stride[2] * k;
                     let low = i + stride[1] * j + stride[2] * k;
-                    if blank(cell, low) {
+                    if hidden.cell(cell) || blank(cell, low) {
                         self.report.ghost_cells += 1;
                         continue;
                     }
@@ -467,65 +460,18 @@ impl<'a> Hidden<'a> {
     fn any_points(&self) -> bool {
         self.points.is_some()
     }
+    /// Not to be drawn: hidden, or another process draws it.
     pub(super) fn cell(&self, i: usize) -> bool {
-        self.cells.is_some_and(|a| a.get(i, 0) as u8 & HIDDEN_CELL != 0)
+        self.has(i, HIDDEN_CELL | COPIED_CELL)
+    }
+    /// Hidden: as if it were not there.
+    pub(super) fn blanked(&self, i: usize) -> bool {
+        self.has(i, HIDDEN_CELL)
+    }
+    fn has(&self, i: usize, bits: u8) -> bool {
+        self.cells.is_some_and(|a| a.get(i, 0) as u8 & bits != 0)
     }
     fn point(&self, i: usize) -> bool {
         self.points.is_some_and(|a| a.get(i, 0) as u8 & HIDDEN_POINT != 0)
     }
-}
-
-/// A face whichever way round and wherever it starts: number of corners and the four smallest ids.
-type FaceKey = (u32, [u32; 4]);
-
-fn face_key(ids: &[u32]) -> FaceKey {
-    let mut smallest = [u32::MAX; 4];
-    for &id in ids {
-        if let Some(at) = smallest.iter().position(|&s| id < s) {
-            smallest[at..].rotate_right(1);
-            smallest[at] = id;
-        }
-    }
-    (ids.len() as u32, smallest)
-}
-
-enum Faces {
-    Complete,
-    TooFewPoints,
-    BadIds,
-}
-
-/// Calls `f` with the point ids of each face of a solid cell; other cells have none.
-fn each_solid_face(
-    d: &UnstructuredGrid,
-    cell: usize,
-    face: &mut Vec<u32>,
-    mut f: impl FnMut(&[u32]),
-) -> Faces {
-    let ids = d.cells.get(cell);
-    match CellType::of(d.types[cell]) {
-        CellType::Solid(faces) => {
-            let needed = 1 + faces.iter().flat_map(|f| f.iter()).copied().max().unwrap_or(0) as usize;
-            if ids.len() < needed {
-                return Faces::TooFewPoints;
-            }
-            for corners in faces {
-                face.clear();
-                face.extend(corners.iter().map(|&c| ids[c as usize]));
-                f(face);
-            }
-        }
-        CellType::Polyhedron => {
-            let Some(range) = d.faces_of_cell.get(cell) else { return Faces::TooFewPoints };
-            for i in range.clone() {
-                let ids = d.polyhedron_faces.get(i);
-                if ids.iter().any(|&k| k as usize >= d.points.len()) {
-                    return Faces::BadIds;
-                }
-                f(ids);
-            }
-        }
-        _ => {}
-    }
-    Faces::Complete
 }
