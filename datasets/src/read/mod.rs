@@ -9,7 +9,7 @@ pub mod gltf;
 pub mod mhd;
 pub mod nrrd;
 pub mod obj;
-pub mod open;
+mod open;
 pub(crate) mod percent;
 pub mod plot3d;
 pub mod ply;
@@ -21,7 +21,7 @@ pub mod vtk_legacy;
 pub mod vtk_xml;
 
 pub use error::{At, ReadError};
-pub use open::open;
+pub use open::{KNOWN, open};
 pub use scene::{SceneMesh, SceneModel, SurfaceMaterial, Texture};
 
 use crate::model::{Dataset, ModelError, SurfaceReport};
