@@ -1,7 +1,7 @@
 //! Files written by the real VTK are read as VTK reads them, and VTK reads the files written here.
 
+mod peer;
 mod sample_files;
-mod vtk_python;
 
 use datasets::model::{DataArray, Dataset, ScalarType};
 use datasets::read::{Content, Opened, ReadError, open};
@@ -9,6 +9,9 @@ use datasets::write::{Encoding, VtkOptions, write_ply, write_vtk};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
+
+/// Writes files with VTK and reads them with it.
+const SCRIPT: &str = include_str!("vtk_files/write_all.py");
 
 /// The number that shows any value out of place, as the script computes it.
 fn weighted(values: impl Iterator<Item = f64>) -> f64 {
@@ -138,9 +141,9 @@ fn lattice(d: [usize; 3], at: impl Fn(usize, usize, usize) -> [f64; 3]) -> Vec<[
 
 #[test]
 fn every_file_that_vtk_writes_is_read_as_vtk_reads_it() {
-    let Some(python) = vtk_python::find() else { return };
+    let Some(python) = peer::python_with_vtk("vtk_reads_and_writes") else { return };
     let dir = tempfile::tempdir().unwrap();
-    vtk_python::run(&python, &["write".as_ref(), dir.path().as_os_str()]);
+    peer::run(&python, SCRIPT, &["write", dir.path().to_str().unwrap()]);
     let text = std::fs::read_to_string(dir.path().join("expected.json")).unwrap();
     let all: Value = serde_json::from_str(&text).unwrap();
     let files = all["files"].as_object().unwrap();
@@ -213,7 +216,7 @@ fn description(data: &Dataset) -> serde_json::Map<String, Value> {
 
 #[test]
 fn vtk_reads_every_file_that_is_written_here() {
-    let Some(python) = vtk_python::find() else { return };
+    let Some(python) = peer::python_with_vtk("vtk_reads_and_writes") else { return };
     let dir = tempfile::tempdir().unwrap();
     let mut written: Vec<(std::path::PathBuf, Dataset)> = Vec::new();
     for (extension, data) in sample_files::data_sets() {
@@ -227,9 +230,9 @@ fn vtk_reads_every_file_that_is_written_here() {
     let ply = dir.path().join("ours.ply");
     write_ply(&ply, &mesh).unwrap();
 
-    let mut args: Vec<&std::ffi::OsStr> = vec!["check".as_ref(), ply.as_os_str()];
-    args.extend(written.iter().map(|(p, _)| p.as_os_str()));
-    let report: Value = serde_json::from_str(&vtk_python::run(&python, &args)).unwrap();
+    let mut args: Vec<&str> = vec!["check", ply.to_str().unwrap()];
+    args.extend(written.iter().map(|(p, _)| p.to_str().unwrap()));
+    let report: Value = serde_json::from_str(&peer::run(&python, SCRIPT, &args)).unwrap();
     for (path, data) in &written {
         let file = path.file_name().unwrap().to_str().unwrap();
         let theirs = &report["files"][file];
