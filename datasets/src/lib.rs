@@ -3,5 +3,8 @@
 
 pub mod generate;
 pub mod isosurface;
+pub mod model;
+pub mod read;
 #[cfg(test)]
 mod testing;
+pub mod write;
