@@ -1,7 +1,11 @@
 //! Generators, readers and writers of data sets.
 #![forbid(unsafe_code)]
 
+mod atomic_file;
+#[cfg(feature = "cli")]
+pub mod cli;
 pub mod generate;
+pub mod image_io;
 pub mod isosurface;
 #[cfg(test)]
 mod testing;
