@@ -151,7 +151,11 @@ impl TriMesh {
                 PerElement::Face => ("triangle", faces),
             };
             let found = a.values.len();
-            if found == expected { Ok(()) } else { Err(MeshError::AttributeLength { field, per, expected, found }) }
+            if found == expected {
+                Ok(())
+            } else {
+                Err(MeshError::AttributeLength { field, per, expected, found })
+            }
         }
         let (v, f) = (self.positions.len(), self.indices.len());
         const LIMIT: usize = (u32::MAX - 1) as usize;

@@ -1,1 +1,174 @@
-fn main() {}
+//! Set-up and checks of the workspace, as one small program without dependencies.
+//!
+//! The steps are a list in [`plan`]; [`runner`] runs them and prints what each cost; [`peers`] finds and installs the
+//! software of others that some tests compare with; [`licences`] checks what we link against.
+
+mod licences;
+mod peers;
+mod plan;
+mod runner;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+const HELP: &str = "\
+Set-up and checks of the workspace.
+
+cargo xtask test [--require-peers] [--no-install] [--only NAME,...]
+    Installs what is missing (see `setup`), then runs every check and every test.
+    Without peers the tests that need them say so and pass; the summary repeats what was not run.
+      --require-peers   a missing peer is an error, and no test may skip itself (what CI uses)
+      --no-install      install nothing; use what is there
+      --only NAME,...   run only these steps (names as in `ci-list`)
+
+cargo xtask setup
+    Installs the peers: Debian packages with apt-get (as root or through sudo), Python wheels in target/peers/venv.
+    Where it may not install, it says what it would have installed.
+
+cargo xtask ci-list
+    Prints the steps and their commands without running them.
+
+Exit status: 0 all passed, 1 a step failed, 2 the command line was wrong, 3 a required peer is missing.
+";
+
+/// What the command line asks for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Command {
+    Help,
+    Setup,
+    CiList,
+    Test(TestOptions),
+}
+
+/// Options of `cargo xtask test`.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+struct TestOptions {
+    /// A missing peer is an error, and tests may not skip themselves.
+    require_peers: bool,
+    /// Whether missing peers may be installed.
+    keep_machine: bool,
+    /// Names of the steps to run; empty means all.
+    only: Vec<String>,
+}
+
+/// How the program ends: the only place where exit codes have numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Exit {
+    Success = 0,
+    StepFailed = 1,
+    Usage = 2,
+    PeerMissing = 3,
+}
+
+fn parse(args: &[String]) -> Result<Command, String> {
+    let (command, rest) = match args.split_first() {
+        None => return Ok(Command::Help),
+        Some((c, rest)) => (c.as_str(), rest),
+    };
+    let no_options = |c: Command| match rest.first() {
+        None => Ok(c),
+        Some(extra) => Err(format!("`{command}` takes no options, but was given `{extra}`")),
+    };
+    match command {
+        "help" | "--help" | "-h" => Ok(Command::Help),
+        "setup" => no_options(Command::Setup),
+        "ci-list" => no_options(Command::CiList),
+        "test" => {
+            let mut options = TestOptions::default();
+            let mut rest = rest.iter();
+            while let Some(arg) = rest.next() {
+                match arg.as_str() {
+                    "--require-peers" => options.require_peers = true,
+                    "--no-install" => options.keep_machine = true,
+                    "--only" => {
+                        let names =
+                            rest.next().ok_or("`--only` needs step names, as in `--only fmt,clippy`")?;
+                        for name in names.split(',') {
+                            if !plan::STEPS.iter().any(|s| s.name == name) {
+                                let known: Vec<_> = plan::STEPS.iter().map(|s| s.name).collect();
+                                return Err(format!(
+                                    "`--only {name}`: no such step; there are {}",
+                                    known.join(", ")
+                                ));
+                            }
+                            options.only.push(name.to_owned());
+                        }
+                    }
+                    other => return Err(format!("`test` does not know `{other}`; see `cargo xtask help`")),
+                }
+            }
+            Ok(Command::Test(options))
+        }
+        other => Err(format!("no command `{other}`; there are test, setup, ci-list and help")),
+    }
+}
+
+/// The root of the workspace: the folder above xtask.
+fn workspace_root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("xtask lies inside the workspace").to_owned()
+}
+
+fn main() -> ExitCode {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let exit = match parse(&args) {
+        Err(message) => {
+            eprintln!("error: {message}");
+            Exit::Usage
+        }
+        Ok(Command::Help) => {
+            print!("{HELP}");
+            Exit::Success
+        }
+        Ok(Command::CiList) => {
+            runner::list();
+            Exit::Success
+        }
+        Ok(Command::Setup) => {
+            let found = peers::set_up(&workspace_root(), peers::Install::Allowed);
+            print!("{}", found.describe());
+            if found.missing().is_empty() { Exit::Success } else { Exit::PeerMissing }
+        }
+        Ok(Command::Test(options)) => runner::run(&workspace_root(), &options),
+    };
+    ExitCode::from(exit as u8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parsed(line: &str) -> Result<Command, String> {
+        parse(&line.split_whitespace().map(str::to_owned).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn options_of_test_are_read() {
+        let options = TestOptions {
+            require_peers: true,
+            keep_machine: true,
+            only: vec!["fmt".to_owned(), "clippy".to_owned()],
+        };
+        assert_eq!(parsed("test --require-peers --no-install --only fmt,clippy"), Ok(Command::Test(options)));
+        assert_eq!(parsed("test"), Ok(Command::Test(TestOptions::default())));
+        assert_eq!(parsed(""), Ok(Command::Help));
+    }
+
+    #[test]
+    fn wrong_options_are_refused_with_the_cure() {
+        for (line, cure) in [
+            ("tset", "setup"),
+            ("test --require-peer", "cargo xtask help"),
+            ("test --only fmt,clipy", "clippy"),
+            ("test --only", "--only fmt"),
+            ("setup now", "takes no options"),
+        ] {
+            let message = parsed(line).expect_err(line);
+            assert!(message.contains(cure), "{line}: {message}");
+        }
+    }
+
+    #[test]
+    fn the_workspace_root_has_the_product() {
+        assert!(workspace_root().join("rt-core/Cargo.toml").is_file());
+    }
+}

@@ -1,0 +1,20 @@
+//! Compiles and runs the Rust examples of the book (docs/src) as documentation tests, so that none can rot.
+//!
+//! bench does this because it may use every member, as an example may. A chapter with examples that is missing here
+//! is found by the test `the_book_is_complete`.
+
+macro_rules! chapters {
+    ($($name:ident $path:literal)*) => {
+        $(
+            #[cfg(doctest)]
+            #[doc = include_str!($path)]
+            mod $name {}
+        )*
+    };
+}
+
+chapters! {
+    rt_core_embedding "../../docs/src/rt-core/embedding.md"
+    rt_core_geometry "../../docs/src/rt-core/geometry.md"
+    numerical_methods "../../docs/src/numerical_methods.md"
+}

@@ -1,0 +1,446 @@
+//! A mesh built by Embree, and rays through it.
+
+#![expect(unsafe_code, reason = "Embree is a C library")]
+
+use super::abi::{self, Arguments4, Context3, Handle, HitN, Queries, RayHitN, RayN, Valid};
+use super::library::Embree;
+use crate::clock;
+use crate::peers::{BuildCost, PeerError, Tracer, require_clean};
+use crate::rays::{HitBlock, LANES, MISS, RayBlock};
+use core::ffi::{c_int, c_void};
+use rt_core::mesh::TriMesh;
+use std::ffi::CString;
+use std::sync::atomic::{AtomicI64, Ordering};
+
+/// `RTCBuildQuality`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Quality {
+    /// Morton order.
+    Low,
+    /// Binned surface-area heuristic.
+    #[default]
+    Medium,
+    /// With spatial splits.
+    High,
+}
+
+impl Quality {
+    /// From fastest to best.
+    pub const ALL: [Quality; 3] = [Quality::Low, Quality::Medium, Quality::High];
+
+    /// Name in the tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Quality::Low => "low",
+            Quality::Medium => "medium",
+            Quality::High => "high",
+        }
+    }
+}
+
+/// How a scene is built.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Options {
+    /// Effort of the builder.
+    pub quality: Quality,
+    /// `RTC_SCENE_FLAG_ROBUST`: Pluecker edge tests and conservative boxes.
+    pub robust: bool,
+    /// `RTC_SCENE_FLAG_COMPACT`: less memory.
+    pub compact: bool,
+    /// Threads of the builder; 0 is all.
+    pub threads: usize,
+    /// The most modern instructions allowed: `sse4.2`, `avx2`, …; all when `None`.
+    pub max_isa: Option<&'static str>,
+}
+
+impl Options {
+    fn device_configuration(&self) -> String {
+        let mut s = format!("threads={},set_affinity=0", self.threads);
+        if let Some(isa) = self.max_isa {
+            s += &format!(",max_isa={isa}");
+        }
+        s
+    }
+}
+
+/// Bytes held now, and the most so far.
+#[derive(Default)]
+struct Memory {
+    now: AtomicI64,
+    peak: AtomicI64,
+}
+
+/// # Safety
+/// `user` points to a [`Memory`] that outlives the device.
+unsafe extern "C" fn monitor(user: *mut c_void, bytes: isize, _post: bool) -> bool {
+    // SAFETY: the caller's promise; only shared access through atomics.
+    let m = unsafe { &*user.cast::<Memory>() };
+    let now = m.now.fetch_add(bytes as i64, Ordering::Relaxed) + bytes as i64;
+    m.peak.fetch_max(now, Ordering::Relaxed);
+    true
+}
+
+/// A built scene. Holds copies of the mesh's arrays, which Embree reads while tracing.
+pub struct EmbreeScene {
+    embree: Embree,
+    device: Handle,
+    scene: Handle,
+    options: Options,
+    /// What building cost. Memory as Embree's monitor counts it; the input arrays are not in it.
+    pub cost: BuildCost,
+    /// Shared with Embree until the scene is released; padded, since Embree reads 16 bytes at the last vertex.
+    _positions: Vec<f32>,
+    _indices: Vec<u32>,
+    _memory: Box<Memory>,
+}
+
+// SAFETY: a committed scene is only read by queries, which Embree allows from any thread at the same time, and it may
+// be released from any thread. The pointers are not used for anything else, and the counters are atomic.
+unsafe impl Send for EmbreeScene {}
+// SAFETY: as above.
+unsafe impl Sync for EmbreeScene {}
+
+impl EmbreeScene {
+    /// Builds a mesh.
+    pub fn build(embree: &Embree, mesh: &TriMesh, options: &Options) -> Result<EmbreeScene, PeerError> {
+        require_clean(mesh)?;
+        let calls = embree.calls;
+        let failed = |code: c_int, doing: &'static str| PeerError::Failed {
+            name: embree.name(),
+            error: abi::error_name(code),
+            doing,
+        };
+        let config = CString::new(options.device_configuration()).map_err(|_| failed(2, "configuring"))?;
+        let mut positions: Vec<f32> = Vec::with_capacity(mesh.positions.len() * 3 + 4);
+        positions.extend(mesh.positions.iter().flat_map(|p| p.to_array()));
+        positions.extend([0.0; 4]);
+        let indices: Vec<u32> = mesh.indices.iter().flatten().copied().collect();
+        let memory = Box::<Memory>::default();
+
+        // SAFETY: functions are called as the headers say. The configuration outlives the call; the monitor's data is
+        // boxed, lives in `self` and is dropped after the device; the arrays have the counts and strides given, all
+        // indices are below the vertex count (`require_clean`), and they live in `self` until the scene is released.
+        // The geometry's reference is given to the scene. Handles are released once, in `Drop` or below on failure.
+        let (device, scene, time) = unsafe {
+            let device = (calls.new_device)(config.as_ptr());
+            if device.is_null() {
+                return Err(failed((calls.get_device_error)(device), "making a device"));
+            }
+            (calls.set_memory_monitor)(device, monitor, (&raw const *memory).cast_mut().cast());
+            let scene = (calls.new_scene)(device);
+            let mut flags = 0;
+            flags |= if options.robust { abi::SCENE_FLAG_ROBUST } else { 0 };
+            flags |= if options.compact { abi::SCENE_FLAG_COMPACT } else { 0 };
+            (calls.set_scene_flags)(scene, flags);
+            let quality = options.quality as c_int;
+            (calls.set_scene_build_quality)(scene, quality);
+            let geometry = (calls.new_geometry)(device, abi::GEOMETRY_TYPE_TRIANGLE);
+            (calls.set_geometry_build_quality)(geometry, quality);
+            let share = calls.set_shared_geometry_buffer;
+            let (vertices, triangles) = (mesh.positions.len(), mesh.indices.len());
+            let (v, i) = (positions.as_ptr().cast(), indices.as_ptr().cast());
+            share(geometry, abi::BUFFER_TYPE_VERTEX, 0, abi::FORMAT_FLOAT3, v, 0, 12, vertices);
+            share(geometry, abi::BUFFER_TYPE_INDEX, 0, abi::FORMAT_UINT3, i, 0, 12, triangles);
+            (calls.commit_geometry)(geometry);
+            (calls.attach_geometry)(scene, geometry);
+            (calls.release_geometry)(geometry);
+            let ((), time) = clock::measure(|| (calls.commit_scene)(scene));
+            let error = (calls.get_device_error)(device);
+            if error != 0 {
+                (calls.release_scene)(scene);
+                (calls.release_device)(device);
+                return Err(failed(error, "building a scene"));
+            }
+            (device, scene, time)
+        };
+        let bytes = |m: &AtomicI64| m.load(Ordering::Relaxed).max(0) as u64;
+        let cost = BuildCost {
+            wall_secs: time.wall_secs,
+            cpu_secs: time.process_cpu_secs,
+            bytes: bytes(&memory.now),
+            peak_bytes: Some(bytes(&memory.peak)),
+        };
+        Ok(EmbreeScene {
+            embree: embree.clone(),
+            device,
+            scene,
+            options: options.clone(),
+            cost,
+            _positions: positions,
+            _indices: indices,
+            _memory: memory,
+        })
+    }
+
+    /// A way to send rays: 1, 4, 8 or 16 at a time, marked as coherent or not. Panics on another width.
+    pub fn view(&self, width: usize, coherent: bool) -> View<'_> {
+        assert!([1, 4, 8, 16].contains(&width), "Embree has packets of 1, 4, 8 and 16 rays, not {width}");
+        View { scene: self, width, coherent }
+    }
+
+    /// # Safety
+    /// `packet` holds N rays with `N` of 1, 4, 8, 16.
+    #[inline(always)]
+    unsafe fn query<const N: usize, const OCCLUDED: bool>(
+        &self,
+        valid: &Valid<N>,
+        packet: &mut RayHitN<N>,
+        flags: &mut Flags,
+    ) {
+        let rays: *mut c_void = (&raw mut *packet).cast();
+        let (valid, scene) = (valid.0.as_ptr(), self.scene);
+        // SAFETY: the scene is committed; the packet and the valid mask are aligned to 64 bytes and have the layout
+        // of width N (tested in `abi`; occlusion queries take the ray part, which comes first); the context or the
+        // arguments live through the call and have no callbacks.
+        unsafe {
+            match &self.embree.calls.queries {
+                Queries::V3 { intersect, occluded } => {
+                    let (f, context) = (if OCCLUDED { occluded } else { intersect }, &raw mut flags.context3);
+                    match N {
+                        1 => (f.one)(scene, context, rays),
+                        4 => (f.four)(valid, scene, context, rays),
+                        8 => (f.eight)(valid, scene, context, rays),
+                        _ => (f.sixteen)(valid, scene, context, rays),
+                    }
+                }
+                Queries::V4 { intersect, occluded } => {
+                    let (f, arguments) = (if OCCLUDED { occluded } else { intersect }, &raw mut flags.arguments4);
+                    match N {
+                        1 => (f.one)(scene, rays, arguments),
+                        4 => (f.four)(valid, scene, rays, arguments),
+                        8 => (f.eight)(valid, scene, rays, arguments),
+                        _ => (f.sixteen)(valid, scene, rays, arguments),
+                    }
+                }
+            }
+        }
+    }
+
+    fn closest_n<const N: usize>(&self, rays: &[RayBlock], hits: &mut [HitBlock], coherent: bool) {
+        let (mut q, mut flags) = (RayHitN::<N>::unused(), Flags::new(coherent));
+        for (r, h) in rays.iter().zip(hits) {
+            for from in (0..LANES).step_by(N) {
+                let valid = q.load(r, from);
+                if N == 1 && valid.0[0] == 0 {
+                    h.prim[from] = MISS;
+                    continue;
+                }
+                // SAFETY: `closest` and `occluded` choose N from 1, 4, 8, 16, and `load` filled all lanes.
+                unsafe { self.query::<N, false>(&valid, &mut q, &mut flags) };
+                let to = from..from + N;
+                h.t[to.clone()].copy_from_slice(&q.ray.tfar);
+                h.u[to.clone()].copy_from_slice(&q.hit.u);
+                h.v[to.clone()].copy_from_slice(&q.hit.v);
+                for l in 0..N {
+                    h.prim[from + l] = if q.hit.geom_id[l] == abi::INVALID_ID { MISS } else { q.hit.prim_id[l] };
+                }
+            }
+        }
+    }
+
+    fn occluded_n<const N: usize>(&self, rays: &[RayBlock], masks: &mut [u16], coherent: bool) {
+        let (mut q, mut flags) = (RayHitN::<N>::unused(), Flags::new(coherent));
+        for (r, m) in rays.iter().zip(masks) {
+            *m = 0;
+            for from in (0..LANES).step_by(N) {
+                let valid = q.load(r, from);
+                if N == 1 && valid.0[0] == 0 {
+                    continue;
+                }
+                // SAFETY: as in `closest_n`.
+                unsafe { self.query::<N, true>(&valid, &mut q, &mut flags) };
+                // An occluded ray's end is set to -infinity; an empty lane's was negative before.
+                for l in 0..N {
+                    *m |= u16::from(q.ray.tfar[l] < 0.0 && valid.0[l] != 0) << (from + l);
+                }
+            }
+        }
+    }
+}
+
+impl Drop for EmbreeScene {
+    fn drop(&mut self) {
+        // SAFETY: both handles are valid and released here only; the arrays and the monitor's data are dropped after.
+        unsafe {
+            (self.embree.calls.release_scene)(self.scene);
+            (self.embree.calls.release_device)(self.device);
+        }
+    }
+}
+
+/// Coherence hints in the form of either version.
+struct Flags {
+    context3: Context3,
+    arguments4: Arguments4,
+}
+
+impl Flags {
+    fn new(coherent: bool) -> Flags {
+        let null = core::ptr::null_mut();
+        Flags {
+            context3: Context3 {
+                flags: if coherent { abi::COHERENT_3 } else { 0 },
+                filter: null,
+                inst_id: abi::INVALID_ID,
+                min_width_distance_factor: 0.0,
+            },
+            arguments4: Arguments4 {
+                flags: if coherent { abi::COHERENT_4 } else { 0 },
+                feature_mask: u32::MAX,
+                context: null,
+                filter: null,
+                callback: null,
+                min_width_distance_factor: 0.0,
+            },
+        }
+    }
+}
+
+impl<const N: usize> RayHitN<N> {
+    /// A packet whose constant fields are set: queries do not change them.
+    fn unused() -> Self {
+        let (f, zero, all) = ([0.0; N], [0; N], [u32::MAX; N]);
+        let ray = RayN {
+            org_x: f,
+            org_y: f,
+            org_z: f,
+            tnear: f,
+            dir_x: f,
+            dir_y: f,
+            dir_z: f,
+            time: f,
+            tfar: f,
+            mask: all,
+            id: zero,
+            flags: zero,
+        };
+        let hit = HitN { normal: [f; 3], u: f, v: f, prim_id: all, geom_id: all, instance: [all; _] };
+        RayHitN { ray, hit }
+    }
+
+    /// Copies lanes `from..from + N` of a block and forgets earlier hits.
+    #[inline(always)]
+    fn load(&mut self, r: &RayBlock, from: usize) -> Valid<N> {
+        let q = &mut self.ray;
+        let part = |row: &[f32; LANES]| -> [f32; N] { core::array::from_fn(|l| row[from + l]) };
+        (q.org_x, q.org_y, q.org_z) = (part(&r.ox), part(&r.oy), part(&r.oz));
+        (q.dir_x, q.dir_y, q.dir_z) = (part(&r.dx), part(&r.dy), part(&r.dz));
+        (q.tnear, q.tfar) = (part(&r.tmin), part(&r.tmax));
+        self.hit.geom_id = [abi::INVALID_ID; N];
+        Valid(core::array::from_fn(|l| if r.tmax[from + l] >= 0.0 { -1 } else { 0 }))
+    }
+}
+
+/// A scene with a packet width and a coherence hint.
+pub struct View<'a> {
+    scene: &'a EmbreeScene,
+    width: usize,
+    coherent: bool,
+}
+
+impl Tracer for View<'_> {
+    fn name(&self) -> String {
+        let o = &self.scene.options;
+        let mut s = format!("{}, {}", self.scene.embree.name(), o.quality.name());
+        s += if o.robust { ", robust" } else { "" };
+        s += if o.compact { ", compact" } else { "" };
+        s += &o.max_isa.map_or(String::new(), |isa| format!(", {isa}"));
+        s += &match (self.width, self.coherent) {
+            (1, _) => ", single rays".to_string(),
+            (n, true) => format!(", packets of {n}, coherent"),
+            (n, false) => format!(", packets of {n}, incoherent"),
+        };
+        s
+    }
+
+    fn closest(&self, rays: &[RayBlock], hits: &mut [HitBlock]) {
+        match self.width {
+            1 => self.scene.closest_n::<1>(rays, hits, self.coherent),
+            4 => self.scene.closest_n::<4>(rays, hits, self.coherent),
+            8 => self.scene.closest_n::<8>(rays, hits, self.coherent),
+            _ => self.scene.closest_n::<16>(rays, hits, self.coherent),
+        }
+    }
+
+    fn occluded(&self, rays: &[RayBlock], masks: &mut [u16]) {
+        match self.width {
+            1 => self.scene.occluded_n::<1>(rays, masks, self.coherent),
+            4 => self.scene.occluded_n::<4>(rays, masks, self.coherent),
+            8 => self.scene.occluded_n::<8>(rays, masks, self.coherent),
+            _ => self.scene.occluded_n::<16>(rays, masks, self.coherent),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::peers::embree::Version;
+    use crate::peers::testing;
+
+    /// Runs a check with each version that is installed; says so where none is.
+    fn with_each(check: impl Fn(&Embree)) {
+        for version in [Version::V3, Version::V4] {
+            match Embree::load(version) {
+                Ok(e) => check(&e),
+                Err(e) => eprintln!("not checked: {e}"),
+            }
+        }
+    }
+
+    #[test]
+    fn every_width_and_hint_agrees_with_brute_force() {
+        let mesh = testing::mesh();
+        with_each(|embree| {
+            for robust in [false, true] {
+                let options = Options { robust, threads: 1, ..Options::default() };
+                let scene = EmbreeScene::build(embree, &mesh, &options).unwrap();
+                for (width, coherent) in [(1, false), (4, true), (8, true), (8, false), (16, true), (16, false)] {
+                    testing::agrees_with_brute_force(&scene.view(width, coherent));
+                }
+            }
+        });
+    }
+
+    #[test]
+    fn every_quality_and_instruction_set_agrees_with_brute_force() {
+        let mesh = testing::mesh();
+        with_each(|embree| {
+            for quality in Quality::ALL {
+                for max_isa in [None, Some("avx2"), Some("sse4.2")] {
+                    let options = Options { quality, max_isa, compact: true, threads: 2, ..Options::default() };
+                    let scene = EmbreeScene::build(embree, &mesh, &options).unwrap();
+                    testing::agrees_with_brute_force(&scene.view(16, true));
+                }
+            }
+        });
+    }
+
+    #[test]
+    fn memory_and_time_of_a_build_are_counted() {
+        let mesh = testing::mesh();
+        with_each(|embree| {
+            let options = Options { threads: 1, ..Options::default() };
+            let cost = EmbreeScene::build(embree, &mesh, &options).unwrap().cost;
+            let per_triangle = cost.bytes as f64 / mesh.num_triangles() as f64;
+            assert!((20.0..2000.0).contains(&per_triangle), "{cost:?}");
+            assert!(cost.peak_bytes.unwrap() >= cost.bytes && cost.wall_secs > 0.0, "{cost:?}");
+        });
+    }
+
+    #[test]
+    fn an_index_past_the_end_never_reaches_embree() {
+        let mut mesh = testing::mesh();
+        mesh.indices[7][1] = 1_000_000;
+        with_each(|embree| {
+            let e = EmbreeScene::build(embree, &mesh, &Options::default()).err().unwrap();
+            assert_eq!(e, PeerError::Mesh { count: 1 });
+        });
+    }
+
+    #[test]
+    fn options_become_a_device_configuration() {
+        let o = Options { threads: 3, max_isa: Some("avx2"), ..Options::default() };
+        assert_eq!(o.device_configuration(), "threads=3,set_affinity=0,max_isa=avx2");
+    }
+}

@@ -1,0 +1,276 @@
+//! The ray sets that all tracers are timed on.
+//!
+//! Rays are made once, by one exact rule from one set of hits, and stored; every tracer then gets the same bits in
+//! the same order. Blocks of 16 rays as structure of arrays: 16 primary rays are a 4 x 4 block of pixels and 256
+//! are 16 x 16, because pixels go in Morton order. Hit points are computed in f64 from the triangle that was hit,
+//! so that secondary rays do not depend on the tracer that found it.
+
+use glam::{DVec3, Vec3};
+use rt_core::mesh::TriMesh;
+
+/// Rays per block.
+pub const LANES: usize = 16;
+/// [`HitBlock::prim`] of a ray without a hit.
+pub const MISS: u32 = u32::MAX;
+
+/// 16 rays. A lane with `tmax < 0` is empty.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C, align(64))]
+pub struct RayBlock {
+    /// Origins, x.
+    pub ox: [f32; LANES],
+    /// Origins, y.
+    pub oy: [f32; LANES],
+    /// Origins, z.
+    pub oz: [f32; LANES],
+    /// Directions, x; the directions have unit length up to rounding.
+    pub dx: [f32; LANES],
+    /// Directions, y.
+    pub dy: [f32; LANES],
+    /// Directions, z.
+    pub dz: [f32; LANES],
+    /// Nearest distance that counts.
+    pub tmin: [f32; LANES],
+    /// Farthest distance that counts.
+    pub tmax: [f32; LANES],
+}
+
+/// The closest hits of a [`RayBlock`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C, align(64))]
+pub struct HitBlock {
+    /// Distances; meaningless without a hit.
+    pub t: [f32; LANES],
+    /// Triangle numbers, [`MISS`] without a hit.
+    pub prim: [u32; LANES],
+    /// First barycentric coordinates (weight of the second vertex), where the tracer computes them.
+    pub u: [f32; LANES],
+    /// Second barycentric coordinates (weight of the third vertex).
+    pub v: [f32; LANES],
+}
+
+impl HitBlock {
+    /// No hits.
+    pub const NONE: HitBlock =
+        HitBlock { t: [f32::INFINITY; LANES], prim: [MISS; LANES], u: [0.0; LANES], v: [0.0; LANES] };
+}
+
+/// One ray as f64 numbers, before it is rounded into a block.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ray64 {
+    /// Origin.
+    pub origin: DVec3,
+    /// Direction.
+    pub direction: DVec3,
+    /// Farthest distance that counts.
+    pub tmax: f64,
+}
+
+/// A list of rays in blocks.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct RaySet {
+    /// Number of rays, without empty lanes.
+    pub len: usize,
+    /// The rays; only the last block has empty lanes.
+    pub blocks: Vec<RayBlock>,
+}
+
+impl RaySet {
+    /// Rounds rays to f32 and packs them. Empty lanes repeat a ray's numbers, with `tmax` -1.
+    pub fn pack(rays: impl IntoIterator<Item = Ray64>) -> RaySet {
+        let mut set = RaySet::default();
+        for r in rays {
+            let lane = set.len % LANES;
+            let (o, d) = (r.origin.as_vec3(), r.direction.as_vec3());
+            if lane == 0 {
+                let s = |x: f32| [x; LANES];
+                let (ox, oy, oz, dx, dy, dz) = (s(o.x), s(o.y), s(o.z), s(d.x), s(d.y), s(d.z));
+                set.blocks.push(RayBlock { ox, oy, oz, dx, dy, dz, tmin: s(0.0), tmax: s(-1.0) });
+            }
+            let last = set.blocks.len() - 1;
+            let b = &mut set.blocks[last];
+            (b.ox[lane], b.oy[lane], b.oz[lane]) = (o.x, o.y, o.z);
+            (b.dx[lane], b.dy[lane], b.dz[lane]) = (d.x, d.y, d.z);
+            b.tmax[lane] = r.tmax as f32;
+            set.len += 1;
+        }
+        set
+    }
+
+    /// Origin and direction of ray `i` as they were rounded.
+    pub fn ray(&self, i: usize) -> (Vec3, Vec3) {
+        let (b, l) = (&self.blocks[i / LANES], i % LANES);
+        (Vec3::new(b.ox[l], b.oy[l], b.oz[l]), Vec3::new(b.dx[l], b.dy[l], b.dz[l]))
+    }
+}
+
+/// A square pinhole picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    /// Name in the tables.
+    pub name: &'static str,
+    /// Eye, in the mesh's coordinates.
+    pub eye: DVec3,
+    /// Unit vectors: right, up, into the picture.
+    pub axes: [DVec3; 3],
+    /// Tangent of half the field of view.
+    pub tan_half_fov: f64,
+    /// Half the diagonal of the mesh's bounds: the unit of distances.
+    pub radius: f64,
+}
+
+impl View {
+    /// The whole mesh, filling a field of view of 30 degrees.
+    pub fn orbit(mesh: &TriMesh) -> View {
+        let (center, radius) = center_and_radius(mesh);
+        let distance = radius / (15f64.to_radians()).sin();
+        View::looking("orbit", center, DVec3::new(1.0, 0.7, 1.3).normalize() * distance, DVec3::ZERO, radius)
+    }
+
+    /// Close to the surface, so that nearly every pixel shows it.
+    pub fn close(mesh: &TriMesh) -> View {
+        let (center, radius) = center_and_radius(mesh);
+        let eye = DVec3::new(0.9, 0.5, 1.0).normalize() * radius * 1.15;
+        View::looking("close", center, eye, DVec3::new(0.1, 0.12, 0.05) * radius, radius)
+    }
+
+    fn looking(name: &'static str, center: DVec3, eye: DVec3, target: DVec3, radius: f64) -> View {
+        let forward = (target - eye).normalize();
+        let right = forward.cross(DVec3::Y).normalize();
+        let up = right.cross(forward);
+        let tan_half_fov = 15f64.to_radians().tan();
+        View { name, eye: center + eye, axes: [right, up, forward], tan_half_fov, radius }
+    }
+
+    /// Where the point light stands: above the viewer's right shoulder.
+    pub fn light(&self) -> DVec3 {
+        self.eye + self.axes[0] * self.radius * 0.5 + self.axes[1] * self.radius * 0.7
+    }
+
+    /// One ray through the centre of each of `size` x `size` pixels, in Morton order. `size` is a power of two.
+    pub fn primary(&self, size: u32) -> RaySet {
+        assert!(size.is_power_of_two() && size <= 1 << 15, "Morton order needs a power of two, not {size}");
+        let [right, up, forward] = self.axes;
+        RaySet::pack((0..size * size).map(|i| {
+            let (x, y) = morton(i);
+            let sx = ((f64::from(x) + 0.5) / f64::from(size) * 2.0 - 1.0) * self.tan_half_fov;
+            let sy = (1.0 - (f64::from(y) + 0.5) / f64::from(size) * 2.0) * self.tan_half_fov;
+            let direction = (forward + right * sx + up * sy).normalize();
+            Ray64 { origin: self.eye, direction, tmax: f64::INFINITY }
+        }))
+    }
+}
+
+/// A point on the surface, in f64, with the geometric normal on the side the ray came from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfacePoint {
+    /// The point, moved off the surface by 2e-5 of the mesh's radius so that no tracer's own offset rule matters.
+    pub origin: DVec3,
+    /// Unit normal.
+    pub normal: DVec3,
+}
+
+/// The points that rays hit, from the triangle numbers a tracer found. Rays without a hit give none.
+pub fn surface_points(mesh: &TriMesh, rays: &RaySet, hits: &[HitBlock], radius: f64) -> Vec<SurfacePoint> {
+    let mut points = vec![];
+    for i in 0..rays.len {
+        let prim = hits[i / LANES].prim[i % LANES];
+        if prim == MISS {
+            continue;
+        }
+        let (o, d) = rays.ray(i);
+        let (o, d) = (o.as_dvec3(), d.as_dvec3());
+        let [a, b, c] = mesh.triangle(prim as usize).map(|p| p.as_dvec3());
+        let mut normal = (b - a).cross(c - a).normalize_or_zero();
+        if normal == DVec3::ZERO {
+            continue;
+        }
+        if normal.dot(d) > 0.0 {
+            normal = -normal;
+        }
+        // Distance to the triangle's plane. Edge-on, where that is 0/0, the stored distance serves.
+        let (height, slope) = (normal.dot(a - o), normal.dot(d));
+        let t = if slope.abs() > 1e-9 { height / slope } else { f64::from(hits[i / LANES].t[i % LANES]) };
+        points.push(SurfacePoint { origin: o + d * t + normal * (radius * 2e-5), normal });
+    }
+    points
+}
+
+/// One shadow ray per point, from the point to the light.
+pub fn shadow(points: &[SurfacePoint], light: DVec3) -> RaySet {
+    RaySet::pack(points.iter().map(|p| {
+        let to_light = light - p.origin;
+        let tmax = to_light.length();
+        Ray64 { origin: p.origin, direction: to_light / tmax, tmax }
+    }))
+}
+
+/// The same shadow rays from the light to the points: one common origin, which packets can use.
+pub fn shadow_from_light(points: &[SurfacePoint], light: DVec3) -> RaySet {
+    RaySet::pack(points.iter().map(|p| {
+        let to_point = p.origin - light;
+        let distance = to_point.length();
+        // Stops just short of the point, so that its own surface does not count.
+        Ray64 { origin: light, direction: to_point / distance, tmax: distance * (1.0 - 1e-5) }
+    }))
+}
+
+/// Eight cosine-weighted rays per point into the half space above it, stratified 4 x 2, without an end.
+pub fn ambient_occlusion(points: &[SurfacePoint]) -> RaySet {
+    RaySet::pack(points.iter().enumerate().flat_map(|(i, p)| {
+        let (tx, ty) = p.normal.any_orthonormal_pair();
+        let seed = hash(i as u32);
+        let p = *p;
+        (0..8u32).map(move |k| {
+            let a = (f64::from(k & 3) + unit(seed ^ (2 * k + 1))) / 4.0;
+            let b = (f64::from(k >> 2) + unit(seed ^ (2 * k + 2).wrapping_mul(0x9e37_79b9))) / 2.0;
+            let (sin, cos) = (a * std::f64::consts::TAU).sin_cos();
+            let direction = (tx * cos + ty * sin) * b.sqrt() + p.normal * (1.0 - b).sqrt();
+            Ray64 { origin: p.origin, direction, tmax: f64::INFINITY }
+        })
+    }))
+}
+
+/// Rays from random places inside the mesh's bounds in random directions: no two have anything in common.
+pub fn incoherent(mesh: &TriMesh, count: usize) -> RaySet {
+    let bounds = mesh.bounds();
+    let (lo, hi) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
+    RaySet::pack((0..count as u32).map(|i| {
+        let r = |k: u32| unit(hash(i).wrapping_add(k.wrapping_mul(0x9e37_79b9)));
+        let origin = lo + (hi - lo) * DVec3::new(r(1), r(2), r(3));
+        let z = 2.0 * r(4) - 1.0;
+        let (sin, cos) = (r(5) * std::f64::consts::TAU).sin_cos();
+        let s = (1.0 - z * z).sqrt();
+        Ray64 { origin, direction: DVec3::new(s * cos, s * sin, z), tmax: f64::INFINITY }
+    }))
+}
+
+fn center_and_radius(mesh: &TriMesh) -> (DVec3, f64) {
+    let b = mesh.bounds();
+    let (lo, hi) = (b.min.as_dvec3(), b.max.as_dvec3());
+    ((lo + hi) * 0.5, (hi - lo).length() * 0.5)
+}
+
+/// Even and odd bits of an index: x and y along a Z-order curve.
+fn morton(i: u32) -> (u32, u32) {
+    let even = |x: u32| {
+        let x = x & 0x5555_5555;
+        let x = (x | x >> 1) & 0x3333_3333;
+        let x = (x | x >> 2) & 0x0f0f_0f0f;
+        let x = (x | x >> 4) & 0x00ff_00ff;
+        (x | x >> 8) & 0xffff
+    };
+    (even(i), even(i >> 1))
+}
+
+/// A 32-bit mixer (Wellons, "Prospecting for hash functions", lowbias32).
+fn hash(x: u32) -> u32 {
+    let x = (x ^ x >> 16).wrapping_mul(0x7feb_352d);
+    let x = (x ^ x >> 15).wrapping_mul(0x846c_a68b);
+    x ^ x >> 16
+}
+
+/// A number in 0..1 from a seed.
+fn unit(seed: u32) -> f64 {
+    f64::from(hash(seed)) / 4_294_967_296.0
+}

@@ -1,0 +1,295 @@
+//! What a measurement leaves behind: one JSON object and one CSV table.
+//!
+//! A record explains itself: every column has a unit and a meaning, the machine and the program's version are in it,
+//! and what could not be measured is named in `missing` with the cure. Reports are made from records alone, so old
+//! ones can be shown again.
+
+use crate::machine::Machine;
+use crate::plot::Plot;
+use crate::runner::Ratio;
+use anyhow::Context as _;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use std::path::{Path, PathBuf};
+
+/// Version of the record's form; a reader refuses others.
+pub const SCHEMA: &str = "bench-record/1";
+
+/// A column of [`Record::rows`].
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Column {
+    /// Key in the rows and head of the CSV column.
+    pub name: String,
+    /// Unit; empty for names and counts.
+    pub unit: String,
+    /// What it says.
+    pub meaning: String,
+}
+
+/// One row: a value for some or all of the columns.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Row(pub Map<String, Value>);
+
+impl Row {
+    /// An empty row.
+    pub fn new() -> Row {
+        Row::default()
+    }
+    /// The row with a value more. Numbers that are not finite become null, which is what JSON has for them.
+    pub fn with(mut self, column: &str, value: impl Into<Value>) -> Row {
+        self.0.insert(column.to_string(), value.into());
+        self
+    }
+    /// A number, when the column holds one.
+    pub fn number(&self, column: &str) -> Option<f64> {
+        self.0.get(column)?.as_f64()
+    }
+    /// A text, when the column holds one.
+    pub fn text(&self, column: &str) -> Option<&str> {
+        self.0.get(column)?.as_str()
+    }
+}
+
+/// A PNG picture beside the record.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Picture {
+    /// Short name; part of the file name.
+    pub name: String,
+    /// What it shows.
+    pub caption: String,
+    /// The file; beside the record, not inside the JSON.
+    #[serde(skip)]
+    pub png: Vec<u8>,
+}
+
+/// One experiment's outcome.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Record {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// The experiment, as on the command line.
+    pub id: String,
+    /// What it shows.
+    pub title: String,
+    /// Chapter of the dissertation.
+    pub chapter: u8,
+    /// The short form, with smaller data and fewer rounds.
+    pub quick: bool,
+    /// Where and when.
+    pub machine: Machine,
+    /// Wall time of the whole experiment, data and builds included.
+    pub elapsed_secs: f64,
+    /// How to read the rows.
+    pub columns: Vec<Column>,
+    /// The measurements.
+    pub rows: Vec<Row>,
+    /// Comparisons, above 1 where we are faster.
+    pub ratios: Vec<Ratio>,
+    /// What was measured how, in sentences.
+    pub notes: Vec<String>,
+    /// What could not be measured, and the cure.
+    pub missing: Vec<String>,
+    /// Plots of the rows.
+    pub plots: Vec<Plot>,
+    /// Pictures.
+    pub pictures: Vec<Picture>,
+}
+
+impl Record {
+    /// An empty record of an experiment on this machine.
+    pub fn new(id: &str, title: &str, chapter: u8, quick: bool, machine: Machine) -> Record {
+        Record {
+            schema: SCHEMA.into(),
+            id: id.into(),
+            title: title.into(),
+            chapter,
+            quick,
+            machine,
+            elapsed_secs: 0.0,
+            columns: vec![],
+            rows: vec![],
+            ratios: vec![],
+            notes: vec![],
+            missing: vec![],
+            plots: vec![],
+            pictures: vec![],
+        }
+    }
+
+    /// Names a column. The order of the calls is the order in the table.
+    pub fn column(&mut self, name: &str, unit: &str, meaning: &str) {
+        self.columns.push(Column { name: name.into(), unit: unit.into(), meaning: meaning.into() });
+    }
+
+    /// Columns that rows use and nobody explained, once each: a mistake of the experiment.
+    pub fn unexplained_columns(&self) -> Vec<&str> {
+        let known = |k: &str| self.columns.iter().any(|c| c.name == k);
+        let mut unknown: Vec<&str> =
+            self.rows.iter().flat_map(|r| r.0.keys()).map(String::as_str).filter(|k| !known(k)).collect();
+        unknown.sort_unstable();
+        unknown.dedup();
+        unknown
+    }
+
+    /// The table as CSV (RFC 4180): comment lines with the machine, a head, one line per row.
+    pub fn to_csv(&self) -> String {
+        let m = &self.machine;
+        let mut s = format!("# {} {}: {}\n", self.schema, self.id, one_line(&self.title));
+        let form = if self.quick { "quick" } else { "full" };
+        s += &format!("# {form}, {}, {}, {} cores, {}, version {}", m.date, m.cpu, m.cores, m.simd, m.version);
+        s += &m.commit.as_ref().map_or("\n".into(), |c| format!(", commit {c}\n"));
+        let head = |c: &Column| if c.unit.is_empty() { c.name.clone() } else { format!("{} [{}]", c.name, c.unit) };
+        s += &self.columns.iter().map(|c| csv_field(&head(c))).collect::<Vec<_>>().join(",");
+        s += "\n";
+        for row in &self.rows {
+            let cell = |c: &Column| match row.0.get(&c.name) {
+                None | Some(Value::Null) => String::new(),
+                Some(Value::String(t)) => csv_field(t),
+                Some(v) => csv_field(&v.to_string()),
+            };
+            s += &self.columns.iter().map(cell).collect::<Vec<_>>().join(",");
+            s += "\n";
+        }
+        s
+    }
+
+    /// Writes `ID.json`, `ID.csv` and `ID.PICTURE.png` into a directory, which is made when it is not there.
+    pub fn write(&self, dir: &Path) -> anyhow::Result<PathBuf> {
+        std::fs::create_dir_all(dir).with_context(|| {
+            format!("cannot make the directory `{}` for records; name another with --out", dir.display())
+        })?;
+        let write = |name: String, bytes: &[u8]| {
+            let path = dir.join(name);
+            std::fs::write(&path, bytes).with_context(|| format!("cannot write `{}`", path.display()))
+        };
+        for p in &self.pictures {
+            write(self.picture_file(p), &p.png)?;
+        }
+        write(format!("{}.csv", self.id), self.to_csv().as_bytes())?;
+        let json = serde_json::to_string_pretty(self).context("cannot write the record as JSON")?;
+        write(format!("{}.json", self.id), json.as_bytes())?;
+        Ok(dir.join(format!("{}.json", self.id)))
+    }
+
+    /// Reads a record back, with the pictures beside it. A picture that is gone leaves an empty one.
+    pub fn read(path: &Path) -> anyhow::Result<Record> {
+        let text =
+            std::fs::read_to_string(path).with_context(|| format!("cannot read the record `{}`", path.display()))?;
+        let mut r: Record = serde_json::from_str(&text)
+            .with_context(|| format!("`{}` is not a record of form {SCHEMA}", path.display()))?;
+        anyhow::ensure!(
+            r.schema == SCHEMA,
+            "`{}` has form `{}`, this program reads `{SCHEMA}`: measure again, or use the version that wrote it ({})",
+            path.display(),
+            r.schema,
+            r.machine.version
+        );
+        let dir = path.parent().unwrap_or(Path::new("."));
+        for i in 0..r.pictures.len() {
+            r.pictures[i].png = std::fs::read(dir.join(r.picture_file(&r.pictures[i]))).unwrap_or_default();
+        }
+        Ok(r)
+    }
+
+    fn picture_file(&self, p: &Picture) -> String {
+        format!("{}.{}.png", self.id, crate::machine::slug(&p.name))
+    }
+}
+
+/// All records of a directory, by name. Files that are not records are left alone; a broken record is an error.
+pub fn read_dir(dir: &Path) -> anyhow::Result<Vec<Record>> {
+    let entries = std::fs::read_dir(dir).with_context(|| {
+        format!("cannot read the directory `{}`; `bench run ID` writes records, `bench list` names them", dir.display())
+    })?;
+    let mut paths: Vec<PathBuf> =
+        entries.flatten().map(|e| e.path()).filter(|p| p.extension().is_some_and(|e| e == "json")).collect();
+    paths.sort();
+    paths.iter().map(|p| Record::read(p)).collect()
+}
+
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn csv_field(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plot::{Axis, Kind, Scale, Series};
+
+    pub(crate) fn sample() -> Record {
+        let mut r = Record::new("fig0.0", "A title, with \"quotes\"", 4, true, Machine::describe());
+        r.column("mesh", "", "name of the mesh");
+        r.column("time", "ms", "median");
+        r.rows.push(Row::new().with("mesh", "wave, 1 \"M\"").with("time", 1.5));
+        r.rows.push(Row::new().with("mesh", "wave").with("time", f64::NAN));
+        r.ratios.push(Ratio {
+            name: "ours".into(),
+            rival: "theirs".into(),
+            value: 2.0,
+            spread: 0.1,
+            low: 1.9,
+            high: 2.2,
+            rounds: 5,
+        });
+        r.missing.push("Embree 4 is not installed".into());
+        r.plots.push(Plot {
+            title: "t".into(),
+            kind: Kind::Lines,
+            x: Axis { label: "triangles".into(), unit: "".into(), scale: Scale::Log },
+            y: Axis { label: "time".into(), unit: "s".into(), scale: Scale::Linear },
+            categories: vec![],
+            series: vec![Series::new("a", vec![(1.0, 2.0), (10.0, 4.0)])],
+        });
+        r.pictures.push(Picture { name: "The view".into(), caption: "c".into(), png: vec![1, 2, 3] });
+        r
+    }
+
+    #[test]
+    fn a_record_read_back_is_the_same() {
+        let dir = tempfile::tempdir().unwrap();
+        let r = sample();
+        let path = r.write(dir.path()).unwrap();
+        assert_eq!(Record::read(&path).unwrap(), r);
+        assert_eq!(read_dir(dir.path()).unwrap(), vec![r]);
+        assert!(dir.path().join("fig0.0.the-view.png").exists());
+    }
+
+    #[test]
+    fn csv_quotes_commas_and_leaves_missing_numbers_empty() {
+        let csv = sample().to_csv();
+        let lines: Vec<&str> = csv.lines().filter(|l| !l.starts_with('#')).collect();
+        assert_eq!(lines, ["mesh,time [ms]", "\"wave, 1 \"\"M\"\"\",1.5", "wave,"]);
+    }
+
+    #[test]
+    fn a_column_nobody_explained_is_found() {
+        let mut r = sample();
+        assert!(r.unexplained_columns().is_empty());
+        r.rows.push(Row::new().with("leaks", 3));
+        assert_eq!(r.unexplained_columns(), ["leaks"]);
+    }
+
+    #[test]
+    fn a_record_of_another_form_is_refused_with_the_file_and_the_form() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut r = sample();
+        r.schema = "bench-record/99".into();
+        let e = Record::read(&r.write(dir.path()).unwrap()).unwrap_err().to_string();
+        assert!(e.contains("fig0.0.json") && e.contains("bench-record/99"), "{e}");
+    }
+
+    #[test]
+    fn a_directory_that_is_not_there_is_named() {
+        let e = read_dir(Path::new("no/such/dir")).unwrap_err().to_string();
+        assert!(e.contains("no/such/dir") && e.contains("bench list"), "{e}");
+    }
+}

@@ -1,0 +1,230 @@
+//! One HTML page that shows a set of records.
+//!
+//! The page refers to nothing outside itself (no scripts, fonts or style sheets from elsewhere; pictures are data
+//! URIs), so that it can be mailed, archived and opened without a network.
+
+mod table;
+
+use crate::plot::escape;
+use crate::record::Record;
+use crate::runner::Ratio;
+use std::collections::BTreeMap;
+
+/// The whole page. Records are shown by chapter, then by id.
+///
+/// ```
+/// use bench::{machine::Machine, record::Record, report};
+/// let page = report::page(&[Record::new("fig4.7", "Build time", 4, true, Machine::describe())]);
+/// assert!(page.starts_with("<!doctype html>") && page.contains("id=\"fig4.7\""));
+/// ```
+pub fn page(records: &[Record]) -> String {
+    let mut by_chapter: BTreeMap<u8, Vec<&Record>> = BTreeMap::new();
+    for r in records {
+        by_chapter.entry(r.chapter).or_default().push(r);
+    }
+    for chapter in by_chapter.values_mut() {
+        chapter.sort_by(|a, b| natural(&a.id).cmp(&natural(&b.id)));
+    }
+
+    let mut s = String::from("<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">");
+    s += "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>Measurements</title>";
+    s += &format!("<style>{}</style></head><body>\n", include_str!("page.css"));
+    s += "<h1>Measurements</h1>\n<p>The tables and figures of <cite>Parallel Ray Tracing in Scientific \
+          Visualization</cite> (Brownlee, 2012), measured again, and what accuracy costs in time. Ratios are \
+          <em>rival’s time / our time</em>: above 1 we are faster.</p>\n";
+    s += &machines(records);
+    s += "<nav><h2>Contents</h2>";
+    for (chapter, list) in &by_chapter {
+        s += &format!("<h3>Chapter {chapter}: {}</h3><ul>", chapter_title(*chapter));
+        for r in list {
+            let (id, title) = (escape(&r.id), escape(&r.title));
+            let gaps = if r.missing.is_empty() { "" } else { " <span class=\"gap\">(with gaps)</span>" };
+            s += &format!("<li><a href=\"#{id}\">{id}</a> {title}{gaps}</li>");
+        }
+        s += "</ul>";
+    }
+    s += "</nav>\n";
+    for (chapter, list) in &by_chapter {
+        s += &format!("<h2>Chapter {chapter}: {}</h2>\n", chapter_title(*chapter));
+        for r in list {
+            s += &section(r);
+        }
+    }
+    s + "</body></html>\n"
+}
+
+fn section(r: &Record) -> String {
+    let id = escape(&r.id);
+    let mut s = format!("<section id=\"{id}\"><h3>{id}: {}</h3>\n", escape(&r.title));
+    let form = if r.quick { "Quick form: smaller data, fewer rounds. " } else { "" };
+    s += &format!("<p class=\"when\">{form}{}, took {:.1} s.</p>\n", escape(&r.machine.date), r.elapsed_secs);
+    if !r.machine.optimised {
+        s += "<p class=\"missing\">Measured with a debug build: these times mean nothing. Use --release.</p>\n";
+    }
+    for m in &r.missing {
+        s += &format!("<p class=\"missing\">Missing: {}</p>\n", escape(m));
+    }
+    for n in &r.notes {
+        s += &format!("<p>{}</p>\n", escape(n));
+    }
+    for p in &r.plots {
+        s += &format!("<figure>{}</figure>\n", p.to_svg());
+    }
+    for p in r.pictures.iter().filter(|p| !p.png.is_empty()) {
+        let (name, caption) = (escape(&p.name), escape(&p.caption));
+        let data = base64(&p.png);
+        s += "<figure class=\"picture\">";
+        s += &format!("<img alt=\"{name}\" src=\"data:image/png;base64,{data}\"><figcaption>{caption}</figcaption>");
+        s += "</figure>\n";
+    }
+    s += &ratios(&r.ratios);
+    s += &table::rows(r);
+    s + "</section>\n"
+}
+
+fn ratios(ratios: &[Ratio]) -> String {
+    if ratios.is_empty() {
+        return String::new();
+    }
+    let mut s = String::from(
+        "<div class=\"scroll\"><table><thead><tr><th>ours</th><th>rival</th><th class=\"n\">rival / ours</th>\
+         <th class=\"n\">spread</th><th class=\"n\">lowest to highest</th><th class=\"n\">rounds</th></tr></thead><tbody>",
+    );
+    for r in ratios {
+        let class = if r.value >= 1.0 { "faster" } else { "slower" };
+        s += &format!(
+            "<tr><td>{}</td><td>{}</td><td class=\"n {class}\">{:.2}</td><td class=\"n\">{:.2}</td>\
+             <td class=\"n\">{:.2} to {:.2}</td><td class=\"n\">{}</td></tr>",
+            escape(&r.name),
+            escape(&r.rival),
+            r.value,
+            r.spread,
+            r.low,
+            r.high,
+            r.rounds
+        );
+    }
+    s + "</tbody></table></div>\n"
+}
+
+fn machines(records: &[Record]) -> String {
+    let mut lines: Vec<String> = records
+        .iter()
+        .map(|r| {
+            let m = &r.machine;
+            let commit = m.commit.as_ref().map_or(String::new(), |c| format!(", commit {c}"));
+            let memory = m.memory_gib;
+            format!(
+                "{}, {} cores, {}, {memory:.0} GiB, {}; version {}{commit}",
+                m.cpu, m.cores, m.simd, m.os, m.version
+            )
+        })
+        .collect();
+    lines.sort();
+    lines.dedup();
+    lines.iter().map(|l| format!("<p class=\"machine\">{}</p>\n", escape(l))).collect()
+}
+
+fn chapter_title(chapter: u8) -> &'static str {
+    match chapter {
+        3 => "ray tracing inside visualization programs",
+        4 => "ray tracing inside OpenGL programs",
+        5 => "optics: schlieren, shadowgraphs, interferograms",
+        _ => "further measurements",
+    }
+}
+
+/// Sorts `fig4.10` behind `fig4.9`.
+fn natural(id: &str) -> Vec<(String, u32)> {
+    let mut parts = vec![];
+    let mut rest = id;
+    while !rest.is_empty() {
+        let digits = rest.find(|c: char| c.is_ascii_digit()).unwrap_or(rest.len());
+        let end = rest[digits..].find(|c: char| !c.is_ascii_digit()).map_or(rest.len(), |e| digits + e);
+        parts.push((rest[..digits].to_string(), rest[digits..end].parse().unwrap_or(0)));
+        rest = &rest[end..];
+    }
+    parts
+}
+
+/// RFC 4648, with padding.
+fn base64(bytes: &[u8]) -> String {
+    const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut s = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for chunk in bytes.chunks(3) {
+        let b = [chunk[0], *chunk.get(1).unwrap_or(&0), *chunk.get(2).unwrap_or(&0)];
+        let word = u32::from(b[0]) << 16 | u32::from(b[1]) << 8 | u32::from(b[2]);
+        for k in 0..4 {
+            let digit = ALPHABET[(word >> (18 - 6 * k)) as usize & 63] as char;
+            s.push(if k <= chunk.len() { digit } else { '=' });
+        }
+    }
+    s
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::Machine;
+    use crate::plot::{Axis, Plot, Series};
+    use crate::record::{Picture, Row};
+
+    fn records() -> Vec<Record> {
+        let mut r = Record::new("fig4.10", "Time <of> a frame & more", 4, true, Machine::describe());
+        r.column("mesh", "", "which");
+        r.column("time", "ms", "median");
+        r.rows.push(Row::new().with("mesh", "<script>alert(1)</script>").with("time", 12.345678));
+        let mut p = Plot::lines("p", Axis::log("x", ""), Axis::log("y", "s"));
+        p.series.push(Series::new("a", vec![(1.0, 1.0), (2.0, 3.0)]));
+        r.plots.push(p);
+        r.pictures.push(Picture { name: "v".into(), caption: "view".into(), png: b"\x89PNG".to_vec() });
+        r.missing.push("Embree 4: not installed".into());
+        vec![r, Record::new("fig4.9", "Earlier", 4, false, Machine::describe())]
+    }
+
+    #[test]
+    fn page_refers_to_nothing_outside_itself() {
+        let page = page(&records());
+        for attribute in ["src=\"", "href=\"", "url("] {
+            for (i, _) in page.match_indices(attribute) {
+                let target = &page[i + attribute.len()..];
+                let inside = target.starts_with("data:") || target.starts_with('#');
+                assert!(inside, "{}", &target[..target.len().min(60)]);
+            }
+        }
+        assert!(!page.contains("<script") && !page.contains("@import") && !page.contains("<link"));
+        assert!(page.contains("data:image/png;base64,iVBORw=="));
+    }
+
+    #[test]
+    fn page_is_well_formed() {
+        // The page is written so that, doctype and void tags aside, it is XML: then nothing is left open.
+        let page = page(&records()).replace("<!doctype html>", "");
+        let mut closed = String::new();
+        let mut rest = page.as_str();
+        while let Some(i) = rest.find(['<']) {
+            let end = i + rest[i..].find('>').expect("every tag ends") + 1;
+            let tag = &rest[i..end];
+            let void = ["<meta", "<img", "<br"].iter().any(|v| tag.starts_with(v));
+            closed += &rest[..i];
+            closed += &if void { tag.replace('>', "/>") } else { tag.to_string() };
+            rest = &rest[end..];
+        }
+        closed += rest;
+        roxmltree::Document::parse(&closed).unwrap_or_else(|e| panic!("{e}\n{closed}"));
+    }
+
+    #[test]
+    fn gaps_are_shown_and_figures_are_in_order() {
+        let page = page(&records());
+        assert!(page.contains("Missing: Embree 4: not installed"));
+        let place = |id: &str| page.find(&format!("<section id=\"{id}\"")).unwrap();
+        assert!(place("fig4.9") < place("fig4.10"), "9 comes before 10");
+    }
+
+    #[test]
+    fn base64_pads_every_length() {
+        let got: Vec<String> = ["", "f", "fo", "foo", "foob"].map(|t| base64(t.as_bytes())).to_vec();
+        assert_eq!(got, ["", "Zg==", "Zm8=", "Zm9v", "Zm9vYg=="]);
+    }
+}

@@ -1,0 +1,350 @@
+//! Timing variants against each other on a machine that others use too.
+//!
+//! Variants run in turns, one run each per round, in an order that changes from round to round, so that a slow
+//! minute of the machine falls on all of them. A ratio is taken inside each round and the median over the rounds is
+//! reported: what the neighbours do cancels (two runs of one round see nearly the same machine), which it would not
+//! in a ratio of two medians.
+
+use crate::clock::{self, Clock, Sample};
+use crate::stats::Summary;
+use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
+use serde::{Deserialize, Serialize};
+use std::time::Instant;
+
+/// How often and how long to measure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Schedule {
+    /// Rounds that are not counted: caches, page tables and clock frequency settle.
+    pub warmup_rounds: u32,
+    /// Rounds that are counted, at most.
+    pub rounds: u32,
+    /// No new round starts after this many seconds, but at least `min_rounds` are counted.
+    pub budget_secs: f64,
+    /// Rounds that are counted whatever the budget says.
+    pub min_rounds: u32,
+    /// Which clock comparisons are made by.
+    pub clock: Clock,
+    /// Bind the calling thread to one core per round, another in the next round. Only for work on one thread.
+    pub pin: bool,
+}
+
+impl Schedule {
+    /// For work on one thread: 7 rounds by thread CPU time, pinned.
+    pub fn one_thread() -> Schedule {
+        let clock = Clock::ThreadCpu;
+        Schedule { warmup_rounds: 1, rounds: 7, budget_secs: 120.0, min_rounds: 3, clock, pin: true }
+    }
+
+    /// For work on several threads: 7 rounds by the wall clock.
+    pub fn all_threads() -> Schedule {
+        Schedule { clock: Clock::Wall, pin: false, ..Schedule::one_thread() }
+    }
+
+    /// Few rounds within `budget_secs`, for `--quick`.
+    pub fn quick(self, budget_secs: f64) -> Schedule {
+        Schedule { rounds: 3, min_rounds: 1, budget_secs, ..self }
+    }
+}
+
+/// One of the things compared.
+pub struct Variant<'a> {
+    /// What the rows and ratios call it.
+    pub name: String,
+    /// Does the work once and returns a number that must be the same every time, such as the hits counted: a variant
+    /// that skips work is found out, and the compiler cannot remove it.
+    pub run: Box<dyn FnMut() -> u64 + 'a>,
+}
+
+impl<'a> Variant<'a> {
+    /// A named closure.
+    pub fn new(name: impl Into<String>, run: impl FnMut() -> u64 + 'a) -> Self {
+        Variant { name: name.into(), run: Box::new(run) }
+    }
+}
+
+/// The samples of one variant, one per counted round.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Timed {
+    /// Name of the variant.
+    pub name: String,
+    /// One per round, in order.
+    pub samples: Vec<Sample>,
+    /// What the variant returned, the same in every round.
+    pub check: u64,
+}
+
+impl Timed {
+    /// Median and spread by a clock.
+    pub fn summary(&self, clock: Clock) -> Summary {
+        let times: Vec<f64> = self.samples.iter().map(|s| s.by(clock)).collect();
+        Summary::of(&times).unwrap_or(Summary {
+            median: f64::NAN,
+            low: f64::NAN,
+            high: f64::NAN,
+            quartile_1: f64::NAN,
+            quartile_3: f64::NAN,
+        })
+    }
+}
+
+/// How much longer a rival took: above 1 we are faster.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Ratio {
+    /// What was compared, ours.
+    pub name: String,
+    /// What it was compared with.
+    pub rival: String,
+    /// Median over the rounds of (rival's time / our time).
+    pub value: f64,
+    /// Interquartile range of the rounds' ratios.
+    pub spread: f64,
+    /// Smallest ratio of a round.
+    pub low: f64,
+    /// Largest ratio of a round.
+    pub high: f64,
+    /// Number of rounds.
+    pub rounds: usize,
+}
+
+/// All variants of one comparison.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Timings {
+    /// Clock that [`Timings::ratio`] uses.
+    pub clock: Clock,
+    /// In the order the variants were given.
+    pub variants: Vec<Timed>,
+}
+
+impl Timings {
+    /// The variant of that name.
+    pub fn get(&self, name: &str) -> Option<&Timed> {
+        self.variants.iter().find(|v| v.name == name)
+    }
+
+    /// Median and spread of a variant by the comparison's clock.
+    pub fn summary(&self, name: &str) -> Option<Summary> {
+        self.get(name).map(|v| v.summary(self.clock))
+    }
+
+    /// How much longer `rival` took than `ours`. `None` when one of them was not run.
+    pub fn ratio(&self, ours: &str, rival: &str) -> Option<Ratio> {
+        let (a, b) = (self.get(ours)?, self.get(rival)?);
+        let per_round: Vec<f64> =
+            a.samples.iter().zip(&b.samples).map(|(x, y)| y.by(self.clock) / x.by(self.clock)).collect();
+        let s = Summary::of(&per_round)?;
+        Some(Ratio {
+            name: ours.to_string(),
+            rival: rival.to_string(),
+            value: s.median,
+            spread: s.interquartile_range(),
+            low: s.low,
+            high: s.high,
+            rounds: per_round.len(),
+        })
+    }
+}
+
+/// Why a comparison cannot be trusted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unstable {
+    /// The variant.
+    pub variant: String,
+    /// What it returned first.
+    pub first: u64,
+    /// What it returned later.
+    pub later: u64,
+}
+
+impl std::fmt::Display for Unstable {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Unstable { variant, first, later } = self;
+        write!(
+            f,
+            "`{variant}` returned {first} in its first run and {later} in a later one: it does not do the same work \
+             each time, so its times cannot be compared; make its result depend on its input alone"
+        )
+    }
+}
+
+impl std::error::Error for Unstable {}
+
+/// The order of round `round` for `n` variants: rotated, and reversed in every second round, so that each variant
+/// runs first, last, and after each of its neighbours equally often.
+fn order(n: usize, round: usize) -> Vec<usize> {
+    let mut o: Vec<usize> = (0..n).map(|i| (i + round / 2) % n.max(1)).collect();
+    if round % 2 == 1 {
+        o.reverse();
+    }
+    o
+}
+
+/// Runs the variants in turns as `schedule` says.
+///
+/// ```
+/// use bench::runner::{Schedule, Variant, interleave};
+/// let sum = |n: u64| (0..n).fold(0u64, |a, i| a ^ std::hint::black_box(i));
+/// let timings = interleave(&Schedule::one_thread(), &mut [
+///     Variant::new("short", move || sum(10_000)),
+///     Variant::new("long", move || sum(100_000)),
+/// ]).unwrap();
+/// assert!(timings.ratio("short", "long").unwrap().value > 2.0);
+/// ```
+pub fn interleave(schedule: &Schedule, variants: &mut [Variant<'_>]) -> Result<Timings, Unstable> {
+    let cores = Cores::of_this_thread(schedule.pin);
+    let mut timed: Vec<Timed> = Vec::with_capacity(variants.len());
+    let start = Instant::now();
+
+    // Warm-up: also the runs that later ones are checked against.
+    let mut firsts: Vec<Option<u64>> = vec![None; variants.len()];
+    for round in 0..schedule.warmup_rounds as usize {
+        cores.pin(round);
+        for i in order(variants.len(), round) {
+            check(&variants[i].name, &mut firsts[i], (variants[i].run)())?;
+        }
+    }
+    for v in variants.iter() {
+        timed.push(Timed { name: v.name.clone(), samples: vec![], check: 0 });
+    }
+
+    // Counted rounds.
+    let start_counted = start.elapsed().as_secs_f64();
+    for round in 0..schedule.rounds.max(1) as usize {
+        let spent_secs = start.elapsed().as_secs_f64();
+        let round_secs = if round == 0 { 0.0 } else { (spent_secs - start_counted) / round as f64 };
+        if round >= schedule.min_rounds.max(1) as usize && spent_secs + round_secs > schedule.budget_secs {
+            break;
+        }
+        cores.pin(round);
+        for i in order(variants.len(), round) {
+            let (value, sample) = clock::measure(|| (variants[i].run)());
+            check(&variants[i].name, &mut firsts[i], value)?;
+            timed[i].samples.push(sample);
+            timed[i].check = value;
+        }
+    }
+    Ok(Timings { clock: schedule.clock, variants: timed })
+}
+
+fn check(variant: &str, first: &mut Option<u64>, value: u64) -> Result<(), Unstable> {
+    match *first.get_or_insert(value) {
+        first if first == value => Ok(()),
+        first => Err(Unstable { variant: variant.to_string(), first, later: value }),
+    }
+}
+
+/// The cores this thread may run on, given back when dropped.
+struct Cores {
+    allowed: Option<CpuSet>,
+    ids: Vec<usize>,
+}
+
+impl Cores {
+    fn of_this_thread(pin: bool) -> Cores {
+        let allowed = if pin { sched_getaffinity(None).ok() } else { None };
+        let ids = allowed.map_or(vec![], |set| (0..CpuSet::MAX_CPU).filter(|&c| set.is_set(c)).collect());
+        Cores { allowed, ids }
+    }
+
+    /// Where pinning is not permitted the times only scatter more, so a refusal is not an error.
+    fn pin(&self, round: usize) {
+        if !self.ids.is_empty() {
+            let mut set = CpuSet::new();
+            set.set(self.ids[round % self.ids.len()]);
+            sched_setaffinity(None, &set).ok();
+        }
+    }
+}
+
+impl Drop for Cores {
+    fn drop(&mut self) {
+        if let Some(set) = &self.allowed {
+            sched_setaffinity(None, set).ok();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::RefCell;
+
+    fn timings(a: &[f64], b: &[f64]) -> Timings {
+        let timed = |name: &str, t: &[f64]| Timed {
+            name: name.into(),
+            samples: t.iter().map(|&s| Sample { wall_secs: s, ..Default::default() }).collect(),
+            check: 0,
+        };
+        Timings { clock: Clock::Wall, variants: vec![timed("ours", a), timed("rival", b)] }
+    }
+
+    #[test]
+    fn a_slow_round_of_the_machine_cancels_in_the_ratio() {
+        // Round 3 ran on a machine ten times as slow; a ratio of means would be off, the median of ratios is not.
+        let r = timings(&[1.0, 1.0, 10.0], &[2.0, 2.0, 20.0]).ratio("ours", "rival").unwrap();
+        assert_eq!((r.value, r.spread, r.rounds), (2.0, 0.0, 3));
+    }
+
+    #[test]
+    fn ratio_is_above_one_when_the_rival_is_slower() {
+        let t = timings(&[1.0, 1.0, 1.0], &[3.0, 4.0, 5.0]);
+        let r = t.ratio("ours", "rival").unwrap();
+        assert_eq!((r.value, r.low, r.high), (4.0, 3.0, 5.0));
+        assert!((t.ratio("rival", "ours").unwrap().value - 0.25).abs() < 1e-15);
+        assert_eq!(t.ratio("ours", "absent"), None);
+    }
+
+    #[test]
+    fn every_variant_runs_once_per_round_and_takes_every_place() {
+        let log = RefCell::new(vec![]);
+        let plan = Schedule { warmup_rounds: 0, rounds: 6, ..Schedule::all_threads() };
+        let mut v: Vec<Variant<'_>> = (0..3)
+            .map(|i| {
+                let log = &log;
+                Variant::new(format!("v{i}"), move || {
+                    log.borrow_mut().push(i);
+                    7
+                })
+            })
+            .collect();
+        let t = interleave(&plan, &mut v).unwrap();
+        assert!(t.variants.iter().all(|v| v.samples.len() == 6 && v.check == 7));
+        drop(v);
+        let log = log.into_inner();
+        let rounds: Vec<&[i32]> = log.chunks(3).collect();
+        for place in 0..3 {
+            for variant in 0..3 {
+                assert_eq!(rounds.iter().filter(|r| r[place] == variant).count(), 2, "{rounds:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn budget_stops_early_but_never_below_the_minimum() {
+        let nap = || {
+            std::thread::sleep(std::time::Duration::from_millis(5));
+            1
+        };
+        let plan = Schedule { warmup_rounds: 0, rounds: 1000, budget_secs: 0.0, min_rounds: 2, ..Schedule::all_threads() };
+        let t = interleave(&plan, &mut [Variant::new("nap", nap)]).unwrap();
+        assert_eq!(t.variants[0].samples.len(), 2);
+    }
+
+    #[test]
+    fn a_variant_that_does_other_work_later_is_refused() {
+        let mut n = 0;
+        let e = interleave(&Schedule::all_threads(), &mut [Variant::new("drifting", || {
+            n += 1;
+            n
+        })])
+        .unwrap_err();
+        assert_eq!((e.first, e.later), (1, 2));
+        assert!(e.to_string().contains("`drifting` returned 1"));
+    }
+
+    #[test]
+    fn pinning_is_undone_afterwards() {
+        let before = sched_getaffinity(None).unwrap();
+        interleave(&Schedule::one_thread(), &mut [Variant::new("x", || 1)]).unwrap();
+        assert_eq!(sched_getaffinity(None).unwrap(), before);
+    }
+}

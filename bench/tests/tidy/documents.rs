@@ -1,0 +1,229 @@
+//! What the documents say must be there: linked files, chapters, named tests, experiments.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::Command;
+
+use crate::tree::{File, files, root, words};
+
+/// Files that documents link to and that are still to be made, and by what.
+const PENDING: &[(&str, &str)] =
+    &[("docs/src/img/wavelet.png", "the picture of the README, made by the first release of the renderer")];
+
+fn documents() -> Vec<File> {
+    files().into_iter().filter(|f| f.path.ends_with(".md")).collect()
+}
+
+fn document(path: &str) -> File {
+    documents().into_iter().find(|f| f.path == path).unwrap_or_else(|| panic!("{path} is missing"))
+}
+
+/// The lines of a document outside its code blocks, with their numbers.
+fn prose(file: &File) -> impl Iterator<Item = (usize, &str)> {
+    let mut in_code = false;
+    file.text.lines().enumerate().filter_map(move |(i, line)| {
+        let fence = line.trim_start().starts_with("```");
+        in_code ^= fence;
+        (!in_code && !fence).then_some((i + 1, line))
+    })
+}
+
+// ---- Links ------------------------------------------------------------------------------------------------------
+
+/// Relative links of a document: line number and path from the workspace root.
+fn links(file: &File) -> Vec<(usize, String)> {
+    let folder = file.path.rsplit_once('/').map_or("", |(folder, _)| folder);
+    let mut found = Vec::new();
+    for (line_number, line) in prose(file) {
+        for (at, _) in line.match_indices("](") {
+            let target = line[at + 2..].split(')').next().unwrap_or_default();
+            let path = target.split('#').next().unwrap_or_default();
+            if path.is_empty() || path.contains("://") || path.starts_with("mailto:") {
+                continue;
+            }
+            found.push((line_number, normalized(folder, path)));
+        }
+    }
+    found
+}
+
+/// `path` seen from `folder`, without `.` and `..`.
+fn normalized(folder: &str, path: &str) -> String {
+    let mut parts: Vec<&str> = folder.split('/').filter(|p| !p.is_empty()).collect();
+    for part in path.split('/') {
+        match part {
+            "" | "." => {}
+            ".." => drop(parts.pop()),
+            name => parts.push(name),
+        }
+    }
+    parts.join("/")
+}
+
+fn dead_links(file: &File, exists: impl Fn(&str) -> bool) -> Vec<String> {
+    let dead = links(file).into_iter().filter(|(_, target)| !exists(target));
+    dead.map(|(line, target)| format!("{}:{line}: there is no {target}", file.path)).collect()
+}
+
+#[test]
+fn links_lead_somewhere() {
+    let pending = |path: &str| PENDING.iter().any(|(p, _)| *p == path);
+    let exists = |path: &str| root().join(path).exists() || pending(path);
+    let faults: Vec<_> = documents().iter().flat_map(|d| dead_links(d, exists)).collect();
+    assert!(faults.is_empty(), "\n{}", faults.join("\n"));
+    for (path, what) in PENDING {
+        assert!(!root().join(path).exists(), "{path} ({what}) is there now: take it out of PENDING");
+    }
+}
+
+#[test]
+fn planted_dead_links_are_found() {
+    let text =
+        "[a](../here.md#part) ![b](gone.png)\n```\n[c](code.md)\n```\n[d](https://example.org) [e](#top)\n";
+    let faults = dead_links(&File::new("docs/src/x.md", text), |path| path == "docs/here.md");
+    assert_eq!(faults, ["docs/src/x.md:1: there is no docs/src/gone.png"]);
+}
+
+// ---- The book ---------------------------------------------------------------------------------------------------
+
+/// Chapters that SUMMARY.md lists, or that exist, or whose examples are compiled: all by path from docs/src.
+#[test]
+fn the_book_is_complete() {
+    let summary: BTreeSet<String> =
+        links(&document("docs/src/SUMMARY.md")).into_iter().map(|(_, p)| p).collect();
+    let chapters = documents()
+        .into_iter()
+        .filter(|d| d.path.starts_with("docs/src/") && !d.path.ends_with("SUMMARY.md"));
+    let chapters: Vec<File> = chapters.collect();
+    assert!(chapters.len() > 5, "the book was not found");
+    for chapter in &chapters {
+        assert!(
+            summary.contains(&chapter.path),
+            "{} is not in SUMMARY.md, so nobody will find it",
+            chapter.path
+        );
+    }
+    let compiled =
+        files().into_iter().find(|f| f.path == "bench/src/book.rs").expect("bench/src/book.rs is missing");
+    let lib =
+        files().into_iter().find(|f| f.path == "bench/src/lib.rs").expect("bench/src/lib.rs is missing");
+    assert!(
+        lib.code.contains("mod book;"),
+        "bench/src/lib.rs: add `mod book;`, or the book's examples are not compiled"
+    );
+    for chapter in chapters.iter().filter(|c| has_rust_examples(c)) {
+        let include = format!("\"../../{}\"", chapter.path);
+        assert!(
+            compiled.text.contains(&include),
+            "{}: its Rust examples are not compiled; add it to bench/src/book.rs",
+            chapter.path
+        );
+    }
+}
+
+fn has_rust_examples(file: &File) -> bool {
+    file.text.lines().any(|l| l.trim_start().starts_with("```rust"))
+}
+
+// ---- Invariants and their tests -----------------------------------------------------------------------------------
+
+/// Faults in the paragraphs of a document that begin with `**Invariant:**`. Each ends in `*Test:*` with the names of
+/// test functions in backticks, or in `*Not tested yet:*` with the reason.
+fn untested_invariants(document: &File, is_test: impl Fn(&str) -> bool) -> (usize, Vec<String>) {
+    let mut faults = Vec::new();
+    let paragraphs = document.text.split("\n\n").filter(|p| p.contains("**Invariant:**"));
+    let paragraphs: Vec<&str> = paragraphs.collect();
+    for paragraph in &paragraphs {
+        let head: String = paragraph.trim().chars().take(80).collect();
+        if let Some((_, names)) = paragraph.split_once("*Test:*") {
+            let names: Vec<&str> = names.split('`').skip(1).step_by(2).collect();
+            if names.is_empty() {
+                faults.push(format!("`{head}...`: `*Test:*` names no test"));
+            }
+            let missing = names.iter().filter(|n| !is_test(n));
+            faults.extend(missing.map(|n| format!("`{head}...`: there is no test `{n}`")));
+        } else if !paragraph.contains("*Not tested yet:*") {
+            faults.push(format!("`{head}...`: neither `*Test:*` nor `*Not tested yet:*`"));
+        }
+    }
+    (paragraphs.len(), faults)
+}
+
+#[test]
+fn invariants_name_their_tests() {
+    let sources: Vec<File> = files().into_iter().filter(File::is_rust).collect();
+    let is_test = |name: &str| {
+        let head = format!("fn {name}(");
+        sources.iter().any(|f| f.code.lines().any(|l| l.trim_start().starts_with(&head)))
+    };
+    let (count, faults) = untested_invariants(&document("ARCHITECTURE.md"), is_test);
+    assert!(count >= 8, "only {count} invariants were found");
+    assert!(faults.is_empty(), "ARCHITECTURE.md:\n{}", faults.join("\n"));
+}
+
+#[test]
+fn planted_untested_invariants_are_found() {
+    let text = "**Invariant:** A. *Test:* `real`, `gone`\n\n**Invariant:** B.\n\n**Invariant:** C. *Not tested yet:* why.\n\n\
+                **Invariant:** D. *Test:* soon\n\nText.\n";
+    let (count, faults) = untested_invariants(&File::new("A.md", text), |name| name == "real");
+    assert_eq!(count, 4);
+    assert_eq!(faults.len(), 3, "{faults:?}");
+    assert!(
+        faults[0].contains("`gone`") && faults[1].contains("B.") && faults[2].contains("D."),
+        "{faults:?}"
+    );
+}
+
+// ---- Experiments ------------------------------------------------------------------------------------------------
+
+/// Ids in `bench -- run ID` in a document.
+fn experiment_ids(file: &File) -> Vec<String> {
+    let commands = file.text.match_indices("-p bench -- run ").map(|(at, m)| &file.text[at + m.len()..]);
+    let id = |rest: &str| {
+        rest.chars().take_while(|c| c.is_alphanumeric() || "_-".contains(*c)).collect::<String>()
+    };
+    // `run ID` stands for any of them.
+    commands.map(id).filter(|i| !i.is_empty() && i != "ID").collect()
+}
+
+#[test]
+fn experiments_in_the_documents_exist() {
+    use std::io::Write as _;
+    let output = Command::new(env!("CARGO_BIN_EXE_bench")).arg("list").output().expect("bench starts");
+    let listed = String::from_utf8_lossy(&output.stdout).into_owned();
+    if listed.trim().is_empty() {
+        writeln!(std::io::stderr(), "skipped: bench lists no experiments yet")
+            .expect("stderr can be written");
+        return;
+    }
+    for document in documents() {
+        for id in experiment_ids(&document) {
+            assert!(
+                words(&listed, &id).next().is_some(),
+                "{}: `bench -- run {id}`, but `bench -- list` has no such experiment",
+                document.path
+            );
+        }
+    }
+}
+
+#[test]
+fn planted_experiments_are_read() {
+    let text =
+        "`cargo run --release -p bench -- run fig3_5` and `-p bench -- run ID`, -p bench -- run accuracy-ao.";
+    assert_eq!(experiment_ids(&File::new("a.md", text)), ["fig3_5", "accuracy-ao"]);
+}
+
+// ---- Change log -------------------------------------------------------------------------------------------------
+
+#[test]
+fn the_changelog_has_a_place_for_what_is_new() {
+    let log = document("CHANGELOG.md").text;
+    let version = format!("## [{}]", env!("CARGO_PKG_VERSION"));
+    assert!(
+        log.contains("## [Unreleased]") || log.contains(&version),
+        "CHANGELOG.md has neither [Unreleased] nor {version}"
+    );
+    assert!(Path::new(&root()).join("LICENSE-MIT").is_file(), "LICENSE-MIT is missing");
+    assert!(root().join("LICENSE-APACHE").is_file(), "LICENSE-APACHE is missing");
+}

@@ -1,0 +1,160 @@
+//! What the Cargo.toml files may say: which member may use which, and where versions stand.
+
+use std::collections::BTreeMap;
+use std::process::Command;
+
+use crate::tree::{File, root};
+
+/// When an arrow may be drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum May {
+    /// Always.
+    Use,
+    /// Only as an optional dependency (or in tests): the member must build without it.
+    UseBehindAFeature,
+}
+
+/// The arrows of ARCHITECTURE.md. A new line here is a decision; record it there.
+const ARROWS: &[(&str, May, &[&str])] = &[
+    ("rt-core", May::Use, &[]),
+    ("datasets", May::Use, &["rt-core"]),
+    ("schlieren", May::Use, &["rt-core", "datasets"]),
+    ("composite", May::UseBehindAFeature, &["rt-core", "datasets"]),
+    ("gluray", May::Use, &["rt-core", "composite", "datasets"]),
+    ("vtk-bridge", May::Use, &["rt-core"]),
+    ("vtk-bridge", May::UseBehindAFeature, &["datasets"]),
+    ("bench", May::Use, &["rt-core", "datasets", "schlieren", "composite", "gluray", "vtk-bridge"]),
+];
+
+/// A dependency of one member on another.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Arrow {
+    from: String,
+    to: String,
+    /// Optional, or in tests only.
+    weak: bool,
+}
+
+/// The members, with their arrows, as cargo sees them.
+fn members() -> BTreeMap<String, Vec<Arrow>> {
+    let output = Command::new(env!("CARGO"))
+        .args(["metadata", "--no-deps", "--offline", "--format-version", "1"])
+        .current_dir(root())
+        .output()
+        .expect("cargo runs");
+    assert!(output.status.success(), "cargo metadata: {}", String::from_utf8_lossy(&output.stderr));
+    let metadata: serde_json::Value =
+        serde_json::from_slice(&output.stdout).expect("cargo metadata prints JSON");
+    let packages = metadata["packages"].as_array().expect("packages");
+    let text = |v: &serde_json::Value| v.as_str().unwrap_or_default().to_owned();
+    let arrow = |from: &str, d: &serde_json::Value| Arrow {
+        from: from.to_owned(),
+        to: text(&d["name"]),
+        weak: d["optional"] == true || d["kind"] == "dev",
+    };
+    let own = |d: &&serde_json::Value| !d["path"].is_null();
+    packages
+        .iter()
+        .map(|p| {
+            let name = text(&p["name"]);
+            let dependencies = p["dependencies"].as_array().expect("dependencies");
+            let arrows = dependencies.iter().filter(own).map(|d| arrow(&name, d)).collect();
+            (name, arrows)
+        })
+        .collect()
+}
+
+fn fault(arrow: &Arrow) -> Option<String> {
+    let Arrow { from, to, weak } = arrow;
+    let rules = || ARROWS.iter().filter(|(f, _, targets)| f == from && targets.contains(&to.as_str()));
+    if rules().any(|(_, may, _)| *may == May::Use || *weak) {
+        return None;
+    }
+    Some(match rules().next() {
+        Some(_) => format!("{from} may use {to} only behind a feature (`optional = true`)"),
+        None => format!("{from} may not use {to}: ARCHITECTURE.md has no such arrow"),
+    })
+}
+
+#[test]
+fn arrows_point_down() {
+    let members = members();
+    let known: Vec<&str> = ARROWS.iter().map(|(f, ..)| *f).collect();
+    for name in members.keys() {
+        assert!(
+            known.contains(&name.as_str()),
+            "member {name} has no line in ARROWS and none in ARCHITECTURE.md"
+        );
+    }
+    let faults: Vec<_> = members.values().flatten().filter_map(fault).collect();
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+    assert!(members["bench"].iter().any(|a| a.to == "rt-core"), "bench's arrows were not read");
+}
+
+#[test]
+fn planted_arrows_are_found() {
+    let arrow = |from: &str, to: &str, weak| Arrow { from: from.to_owned(), to: to.to_owned(), weak };
+    assert!(fault(&arrow("rt-core", "datasets", false)).is_some_and(|f| f.contains("no such arrow")));
+    assert!(fault(&arrow("rt-core", "datasets", true)).is_some(), "not even in its tests");
+    assert!(fault(&arrow("datasets", "bench", true)).is_some(), "nothing depends on bench");
+    assert!(fault(&arrow("composite", "rt-core", false)).is_some_and(|f| f.contains("feature")));
+    assert_eq!(fault(&arrow("composite", "rt-core", true)), None);
+    assert_eq!(fault(&arrow("gluray", "composite", false)), None);
+}
+
+// ---- Versions, lints and licences stand in the root, once -------------------------------------------------------
+
+/// What a member's Cargo.toml must inherit, and the dependencies that do not.
+fn not_inherited(manifest: &File) -> Vec<String> {
+    let mut faults = Vec::new();
+    for key in ["version", "edition", "rust-version", "license"] {
+        if !manifest.text.lines().any(|l| l == format!("{key}.workspace = true")) {
+            faults.push(format!("{}: `{key}.workspace = true` is missing", manifest.path));
+        }
+    }
+    if !manifest.text.contains("[lints]\nworkspace = true") {
+        faults.push(format!("{}: `[lints] workspace = true` is missing", manifest.path));
+    }
+    let mut in_dependencies = false;
+    for (number, line) in manifest.text.lines().enumerate() {
+        if line.starts_with('[') {
+            in_dependencies = line.trim_end_matches(']').ends_with("dependencies");
+        } else if in_dependencies
+            && line.contains('=')
+            && !line.starts_with('#')
+            && !line.contains("workspace = true")
+        {
+            faults.push(format!(
+                "{}:{}: `{line}`: versions stand in the root, [workspace.dependencies]; write `NAME.workspace = true`",
+                manifest.path,
+                number + 1
+            ));
+        }
+    }
+    faults
+}
+
+#[test]
+fn versions_stand_in_the_root() {
+    let read =
+        |path: &str| std::fs::read_to_string(root().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"));
+    let manifests = members().into_keys().map(|m| format!("{m}/Cargo.toml"));
+    let faults: Vec<_> = manifests.flat_map(|path| not_inherited(&File::new(&path, &read(&path)))).collect();
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+    assert!(
+        !read("xtask/Cargo.toml").contains("dependencies]"),
+        "xtask starts in seconds because it has no dependencies"
+    );
+}
+
+#[test]
+fn planted_versions_are_found() {
+    let good = "[package]\nversion.workspace = true\nedition.workspace = true\nrust-version.workspace = true\n\
+                license.workspace = true\n[dependencies]\n# glam = \"0.1\"\nglam.workspace = true\n\
+                [lints]\nworkspace = true\n";
+    assert_eq!(not_inherited(&File::new("m/Cargo.toml", good)), Vec::<String>::new());
+    let bad = good.replace("glam.workspace = true", "glam = \"0.34\"").replace("edition.", "#");
+    let faults = not_inherited(&File::new("m/Cargo.toml", &bad));
+    assert_eq!(faults.len(), 2, "{faults:?}");
+    assert!(faults[1].starts_with("m/Cargo.toml:8: `glam"), "{faults:?}");
+}

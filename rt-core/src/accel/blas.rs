@@ -1,0 +1,178 @@
+//! The structure of one geometry, in coordinates chosen for precision.
+//!
+//! Local space is object space moved to the geometry's centre when it lies far from zero, and scaled by a power of two when it is tiny or huge.
+//! Both are exact for the data: f32 positions near one another differ exactly, and a power of two changes only exponents. What is gained: rays
+//! that start near the geometry have small coordinates, and products of three lengths in the triangle test neither overflow nor underflow.
+
+use super::build::{LeafWriter, PrimRef, build_wide};
+use super::options::BuildOptions;
+use super::triangles::{ClosestTri, TriBvh};
+use super::wide::{ChildRef, Unit, WideBvh, write_id_leaf};
+use crate::math::{Aabb, exp2i};
+use crate::mesh::TriMesh;
+use crate::ray::Ray;
+use crate::shapes::Shape;
+use crate::traverse::single::{LeafTest, RaySetup, traverse};
+use fearless_simd::Simd;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Local = (object − center) · scale, where object space is the geometry's own f64 coordinates before the instance's transform.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct LocalFrame {
+    pub(crate) center: DVec3,
+    pub(crate) scale: f64,
+}
+
+impl LocalFrame {
+    /// The frame for positions `bounds` relative to `origin`.
+    pub(crate) fn choose(origin: DVec3, bounds: Aabb) -> Self {
+        if bounds.is_empty() {
+            return LocalFrame { center: origin, scale: 1.0 };
+        }
+        let (center, size) = (bounds.center(), bounds.extent().max_element());
+        // Within four sizes of zero at most two bits are at stake; leave the numbers as they are.
+        let far = center.abs().max_element() > 4.0 * size;
+        let shift = if far { center.as_dvec3() } else { DVec3::ZERO };
+        let reach = if far { size } else { bounds.min.abs().max(bounds.max.abs()).max_element() };
+        // The triangle test multiplies three lengths: with these limits it stays between 1e-27 and 1e27.
+        let scale = if reach > 0.0 && !(1e-6..=1e9).contains(&reach) {
+            exp2i(-(reach.log2().round() as i32)) as f64
+        } else {
+            1.0
+        };
+        LocalFrame { center: origin + shift, scale }
+    }
+
+    /// A position given relative to `origin`, in local space.
+    #[inline]
+    pub(crate) fn local(&self, origin: DVec3, p: Vec3) -> Vec3 {
+        ((p.as_dvec3() + (origin - self.center)) * self.scale).as_vec3()
+    }
+}
+
+/// What the leaves hold.
+pub(crate) enum Content {
+    Triangles(TriBvh),
+    Shape { bvh: WideBvh, shape: Arc<dyn Shape> },
+}
+
+/// One geometry's structure.
+pub(crate) struct Blas {
+    pub(crate) frame: LocalFrame,
+    pub(crate) content: Content,
+    pub(crate) primitives: usize,
+    pub(crate) skipped: usize,
+}
+
+pub(crate) struct IdWriter;
+
+impl LeafWriter for IdWriter {
+    const UNITS: usize = 1;
+    fn write(&self, prims: impl ExactSizeIterator<Item = u32> + Clone, out: &mut [Unit]) {
+        write_id_leaf(out, prims);
+    }
+}
+
+/// The numbers in an id leaf.
+#[inline(always)]
+pub(crate) fn leaf_ids(units: &[Unit], leaf: ChildRef) -> &[u32] {
+    &units[leaf.unit()].bits()[..leaf.count()]
+}
+
+impl Blas {
+    pub(crate) fn for_mesh(mesh: &TriMesh, options: &BuildOptions) -> Blas {
+        let frame = LocalFrame::choose(mesh.origin, mesh.bounds());
+        let tris = TriBvh::build(mesh, &frame, options.quality);
+        let skipped = tris.skipped;
+        Blas { frame, primitives: mesh.indices.len() - skipped, skipped, content: Content::Triangles(tris) }
+    }
+
+    pub(crate) fn for_shape(shape: Arc<dyn Shape>, options: &BuildOptions) -> Blas {
+        let n = shape.num_primitives();
+        let refs: Vec<PrimRef> = (0..n as u32)
+            .into_par_iter()
+            .with_min_len(1 << 12)
+            .filter_map(|i| {
+                let b = shape.bounds(i);
+                (!b.is_empty() && b.min.is_finite() && b.max.is_finite()).then(|| PrimRef::new(b, i))
+            })
+            .collect();
+        let primitives = refs.len();
+        let bvh = build_wide(refs, &IdWriter, options.quality.bins());
+        let frame = LocalFrame { center: shape.origin(), scale: 1.0 };
+        Blas { frame, primitives, skipped: n - primitives, content: Content::Shape { bvh, shape } }
+    }
+
+    pub(crate) fn bvh(&self) -> &WideBvh {
+        match &self.content {
+            Content::Triangles(t) => &t.bvh,
+            Content::Shape { bvh, .. } => bvh,
+        }
+    }
+
+    /// The closest hit of a local-space ray below `t_max`.
+    pub(crate) fn closest<S: Simd, const EXACT: bool>(&self, simd: S, ray: &Ray, t_max: f32) -> ClosestTri {
+        let setup = RaySetup::new(ray);
+        match &self.content {
+            Content::Triangles(tris) => tris.closest::<S, EXACT>(simd, &setup, t_max),
+            Content::Shape { bvh, shape } => {
+                let best = ClosestTri { t: t_max, u: 0.0, v: 0.0, prim: 0, found: false };
+                let mut leaves = ShapeLeaf { shape: &**shape, ray: *ray, best };
+                traverse::<S, _, true, true>(simd, bvh, &setup, t_max, &mut leaves);
+                leaves.best
+            }
+        }
+    }
+
+    /// Whether anything blocks a local-space ray below `t_max`.
+    pub(crate) fn occluded<S: Simd, const EXACT: bool>(&self, simd: S, ray: &Ray, t_max: f32) -> bool {
+        let setup = RaySetup::new(ray);
+        match &self.content {
+            Content::Triangles(tris) => tris.occluded::<S, EXACT>(simd, &setup, t_max),
+            Content::Shape { bvh, shape } => {
+                let mut leaves = ShapeAny { shape: &**shape, ray: Ray { t_max, ..*ray }, found: false };
+                traverse::<S, _, true, false>(simd, bvh, &setup, t_max, &mut leaves);
+                leaves.found
+            }
+        }
+    }
+}
+
+struct ShapeLeaf<'a> {
+    shape: &'a dyn Shape,
+    ray: Ray,
+    best: ClosestTri,
+}
+
+impl<S: Simd> LeafTest<S> for ShapeLeaf<'_> {
+    #[inline(always)]
+    fn test(&mut self, _: S, units: &[Unit], leaf: ChildRef, t_max: &mut f32) -> bool {
+        for &prim in leaf_ids(units, leaf) {
+            // Up to and including the best so far: a tie goes to the lower number, as with triangles.
+            let ray = Ray { t_max: self.best.t.next_up(), ..self.ray };
+            let Some(h) = self.shape.closest(prim, &ray) else { continue };
+            let b = &mut self.best;
+            if h.t < b.t || (h.t == b.t && prim < b.prim) {
+                *b = ClosestTri { t: h.t, u: h.u, v: h.v, prim, found: true };
+                *t_max = h.t;
+            }
+        }
+        false
+    }
+}
+
+struct ShapeAny<'a> {
+    shape: &'a dyn Shape,
+    ray: Ray,
+    found: bool,
+}
+
+impl<S: Simd> LeafTest<S> for ShapeAny<'_> {
+    #[inline(always)]
+    fn test(&mut self, _: S, units: &[Unit], leaf: ChildRef, _: &mut f32) -> bool {
+        self.found = leaf_ids(units, leaf).iter().any(|&prim| self.shape.occluded(prim, &self.ray));
+        self.found
+    }
+}

@@ -1,0 +1,19 @@
+//! Acceleration structures: how rays find primitives.
+
+mod blas;
+#[cfg(test)]
+mod brute_force;
+mod build;
+mod options;
+mod placement;
+mod streams;
+pub(crate) mod triangles;
+pub(crate) mod wide;
+mod world;
+
+pub use options::{BuildOptions, BuildQuality, BuildReport, Robustness};
+pub(crate) use wide::{Unit, WideBvh};
+pub use world::{BuildError, Geometry, Instance, World};
+
+#[cfg(test)]
+mod tests;

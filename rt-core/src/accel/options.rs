@@ -1,0 +1,92 @@
+//! How to build an acceleration structure, and what came of it.
+
+use std::time::Duration;
+
+/// What the build spends to make rays faster (thesis section 4.1.2: approximate builds for changing geometry, full builds for
+/// exploring). The measured trade-off is bench's experiment `accuracy-build`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum BuildQuality {
+    /// obvhs' PLOC along a Morton curve, without optimisation: for geometry that changes every frame.
+    Fastest,
+    /// Binned SAH with few bins.
+    Fast,
+    /// Binned SAH over all three axes.
+    #[default]
+    Balanced,
+    /// Balanced, then obvhs' reinsertion optimiser: for geometry that is explored for long.
+    Best,
+}
+
+impl BuildQuality {
+    /// Every preset, from fast to good: tests and benchmarks loop over it.
+    pub const ALL: [BuildQuality; 4] =
+        [BuildQuality::Fastest, BuildQuality::Fast, BuildQuality::Balanced, BuildQuality::Best];
+
+    /// Bins per axis of the SAH builder.
+    pub(crate) fn bins(self) -> usize {
+        match self {
+            BuildQuality::Fastest | BuildQuality::Fast => 8,
+            BuildQuality::Balanced | BuildQuality::Best => 16,
+        }
+    }
+
+    /// The name used on command lines and in records.
+    pub fn name(self) -> &'static str {
+        match self {
+            BuildQuality::Fastest => "fastest",
+            BuildQuality::Fast => "fast",
+            BuildQuality::Balanced => "balanced",
+            BuildQuality::Best => "best",
+        }
+    }
+}
+
+/// What happens to rays through shared edges and vertices.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum Robustness {
+    /// Plain f32: about one ray in a thousand aimed exactly at an edge slips through.
+    Fast,
+    /// No ray passes between two triangles that share an edge or a vertex (Woop, Benthin and Wald 2013, with conservative boxes
+    /// after Ize 2013).
+    #[default]
+    Watertight,
+}
+
+impl Robustness {
+    /// Both modes.
+    pub const ALL: [Robustness; 2] = [Robustness::Fast, Robustness::Watertight];
+
+    /// The name used on command lines and in records.
+    pub fn name(self) -> &'static str {
+        match self {
+            Robustness::Fast => "fast",
+            Robustness::Watertight => "watertight",
+        }
+    }
+}
+
+/// Options of [`crate::accel::World::build`].
+#[derive(Debug, Clone, Copy, Default)]
+pub struct BuildOptions {
+    /// Build time against ray time.
+    pub quality: BuildQuality,
+    /// Edge and vertex behaviour.
+    pub robustness: Robustness,
+    /// Instruction set of the traversal kernels; `None` for the best this machine has.
+    pub simd: Option<crate::simd::SimdLevel>,
+}
+
+/// What a build did: phases, sizes, and what it had to leave out.
+#[derive(Debug, Clone, Default)]
+pub struct BuildReport {
+    /// Time from input to traversable structure.
+    pub total: Duration,
+    /// Named phases in order.
+    pub phases: Vec<(&'static str, Duration)>,
+    /// Primitives that can be hit.
+    pub primitives: usize,
+    /// Primitives left out because of NaN, infinite or out-of-range input.
+    pub skipped: usize,
+    /// Bytes of nodes and leaves.
+    pub bytes: usize,
+}

@@ -1,0 +1,127 @@
+//! Where an instance stands: from render space to a geometry's local space and back.
+
+use super::blas::LocalFrame;
+use crate::math::Aabb;
+use crate::ray::{LANES, Ray, RayBlock};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
+
+/// Beyond this many radii from the geometry a ray's origin is first moved along the ray in f64: there, f32 coordinates relative to the
+/// geometry would be coarser than 4·10⁻⁶ of its size.
+const FAR_RADII: f64 = 64.0;
+
+/// The way into one instance's local space.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Placement {
+    /// Index of the geometry.
+    pub(crate) geometry: usize,
+    local_from_render: DAffine3,
+    /// Local and render space are the same.
+    identity: bool,
+    /// Sphere around the local bounds.
+    center: DVec3,
+    radius: f64,
+    /// Bounds in render space.
+    pub(crate) bounds: Aabb,
+}
+
+impl Placement {
+    /// `world_origin` is the world position of render space's origin; `local_bounds` are the geometry's. `None` when the transform cannot be
+    /// inverted.
+    pub(crate) fn new(
+        geometry: usize,
+        world_from_object: &DAffine3,
+        frame: &LocalFrame,
+        local_bounds: Aabb,
+        world_origin: DVec3,
+    ) -> Option<Placement> {
+        let inverse = world_from_object.inverse();
+        let det = world_from_object.matrix3.determinant();
+        if !(det.is_finite() && det != 0.0 && inverse.is_finite() && world_from_object.is_finite()) {
+            return None;
+        }
+        // local = (inverse(render + world_origin) − center) · scale
+        let local_from_render = DAffine3 {
+            matrix3: inverse.matrix3 * frame.scale,
+            translation: (inverse.transform_point3(world_origin) - frame.center) * frame.scale,
+        };
+        let identity =
+            local_from_render.matrix3 == DMat3::IDENTITY && local_from_render.translation == DVec3::ZERO;
+        let (center, radius) = if local_bounds.is_empty() {
+            (DVec3::ZERO, 0.0)
+        } else {
+            let (lo, hi) = (local_bounds.min.as_dvec3(), local_bounds.max.as_dvec3());
+            (0.5 * (lo + hi), 0.5 * (hi - lo).length())
+        };
+        let bounds = if identity || local_bounds.is_empty() {
+            local_bounds
+        } else {
+            let render_from_local = |p: Vec3| {
+                let object = p.as_dvec3() / frame.scale + frame.center;
+                world_from_object.transform_point3(object) - world_origin
+            };
+            let mut b = Aabb::EMPTY;
+            for c in local_bounds.corners() {
+                let p = render_from_local(c);
+                b = b.union(Aabb::new(round_down(p), round_up(p)));
+            }
+            b
+        };
+        Some(Placement { geometry, local_from_render, identity, center, radius, bounds })
+    }
+
+    /// True when these rays need no transformation: local and render space agree and no origin is far away.
+    #[inline]
+    pub(crate) fn accepts_blocks(&self, rays: &[RayBlock]) -> bool {
+        if !self.identity {
+            return false;
+        }
+        // In f32, with a margin that covers its rounding.
+        let (c, limit) = (self.center.as_vec3(), (0.99 * FAR_RADII * self.radius) as f32);
+        let within =
+            |row: &[f32; LANES], c: f32| row.iter().fold(0f32, |m, &o| m.max((o - c).abs())) <= limit;
+        rays.iter().all(|r| within(&r.ox, c.x) && within(&r.oy, c.y) && within(&r.oz, c.z))
+    }
+
+    /// The ray in local space, and how far along it its origin was moved (in units of its direction: `t` is the same in both spaces).
+    #[inline]
+    pub(crate) fn enter(&self, ray: &Ray) -> (Ray, f64) {
+        let near = |o: DVec3| (o - self.center).abs().max_element() <= FAR_RADII * self.radius;
+        if self.identity && near(ray.origin.as_dvec3()) {
+            return (*ray, 0.0);
+        }
+        let o = self.local_from_render.transform_point3(ray.origin.as_dvec3());
+        let d = self.local_from_render.transform_vector3(ray.dir.as_dvec3());
+        let moved = if near(o) { 0.0 } else { distance_to_sphere(o, d, self.center, self.radius) };
+        // A moved ray starts before the geometry, so that nothing of it is lost when t_min lies behind.
+        let limits = |t: f32| if moved == 0.0 { t } else { (t as f64 - moved) as f32 };
+        let local = Ray {
+            origin: (o + d * moved).as_vec3(),
+            dir: d.as_vec3(),
+            t_min: limits(ray.t_min).max(0.0),
+            t_max: limits(ray.t_max),
+        };
+        (local, moved)
+    }
+}
+
+/// The parameter just before the line meets the sphere, or of its closest approach when it does not; at least 0.
+pub(crate) fn distance_to_sphere(o: DVec3, d: DVec3, center: DVec3, radius: f64) -> f64 {
+    let dd = d.length_squared();
+    if dd == 0.0 {
+        return 0.0;
+    }
+    let along = (center - o).dot(d) / dd;
+    (along - 2.0 * radius / dd.sqrt()).max(0.0)
+}
+
+/// The largest f32 point not above `p` in any axis.
+pub(crate) fn round_down(p: DVec3) -> Vec3 {
+    let f = p.as_vec3();
+    Vec3::from_array(std::array::from_fn(|a| if f[a] as f64 > p[a] { f[a].next_down() } else { f[a] }))
+}
+
+/// The smallest f32 point not below `p` in any axis.
+pub(crate) fn round_up(p: DVec3) -> Vec3 {
+    let f = p.as_vec3();
+    Vec3::from_array(std::array::from_fn(|a| if (f[a] as f64) < p[a] { f[a].next_up() } else { f[a] }))
+}

@@ -1,0 +1,427 @@
+//! Many rays in one call: packets for rays that go the same way, sorting for rays that do not.
+
+use super::blas::{Blas, Content, leaf_ids};
+use super::options::Robustness;
+use super::placement::Placement;
+use super::wide::ChildRef;
+use super::world::World;
+use crate::ray::{HitBlock, LANES, NO_HIT, Ray, RayBlock};
+use crate::stats::{Work, count};
+use crate::traverse::packet::{GROUPS, Packet};
+use fearless_simd::{Simd, dispatch};
+use std::cell::RefCell;
+
+/// Blocks that are sorted by direction together.
+const SORT_BLOCKS: usize = 256;
+
+/// Per-thread buffers: a packet is 24 KiB, too much to clear for every call.
+struct Scratch {
+    /// Packets against instances' boxes and against triangles.
+    outer: Box<Packet>,
+    inner: Box<Packet>,
+    /// A packet's rays in an instance's local space, and how far their origins were moved.
+    local: Vec<RayBlock>,
+    moved: Vec<[f64; LANES]>,
+    local_hits: Vec<HitBlock>,
+    candidates: Vec<(f32, ChildRef)>,
+    order: Vec<(f32, u32)>,
+    sort: SortBuffers,
+}
+
+#[derive(Default)]
+struct SortBuffers {
+    /// Sorted place of each ray, as block · 16 + lane in the caller's arrays.
+    source: Vec<u32>,
+    keys: Vec<u16>,
+    rays: Vec<RayBlock>,
+    hits: Vec<HitBlock>,
+}
+
+thread_local! {
+    static SCRATCH: RefCell<Scratch> = RefCell::new(Scratch {
+        outer: Packet::new(),
+        inner: Packet::new(),
+        local: Vec::new(),
+        moved: Vec::new(),
+        local_hits: Vec::new(),
+        candidates: Vec::new(),
+        order: Vec::new(),
+        sort: SortBuffers::default(),
+    });
+}
+
+impl World {
+    /// The closest hits of many rays, in order. Neighbouring rays should be similar (a tile of pixels, rays to one light): they are
+    /// traced as packets of up to 256, cut where rays differ too much. Lanes with `t_max <= t_min` are left alone as misses.
+    ///
+    /// The answers are those of [`World::closest`], bit for bit. Rays beyond the shorter of the two slices are not traced.
+    pub fn closest_coherent(&self, rays: &[RayBlock], hits: &mut [HitBlock]) {
+        self.with_scratch::<false>(rays, hits, false);
+    }
+
+    /// Occlusion of many similar rays: bit `lane` of `out[block]` is set when that ray is blocked.
+    pub fn occluded_coherent(&self, rays: &[RayBlock], out: &mut [u16]) {
+        self.occluded_stream(rays, out, false);
+    }
+
+    /// As [`World::closest_coherent`] for rays in any direction (ambient occlusion, glossy and path tracing): they are reordered by
+    /// direction inside, and the answers come back in the caller's order. Best with a thousand rays or more from nearby points.
+    pub fn closest_incoherent(&self, rays: &[RayBlock], hits: &mut [HitBlock]) {
+        self.with_scratch::<false>(rays, hits, true);
+    }
+
+    /// As [`World::occluded_coherent`] for rays in any direction.
+    pub fn occluded_incoherent(&self, rays: &[RayBlock], out: &mut [u16]) {
+        self.occluded_stream(rays, out, true);
+    }
+
+    fn occluded_stream(&self, rays: &[RayBlock], out: &mut [u16], sort: bool) {
+        let mut hits = [HitBlock::MISS; SORT_BLOCKS];
+        for (rays, out) in rays.chunks(SORT_BLOCKS).zip(out.chunks_mut(SORT_BLOCKS)) {
+            let hits = &mut hits[..rays.len().min(out.len())];
+            self.with_scratch::<true>(rays, hits, sort);
+            for (o, h) in out.iter_mut().zip(hits) {
+                *o = (0..LANES).fold(0, |m, l| m | ((h.prim[l] != NO_HIT) as u16) << l);
+            }
+        }
+    }
+
+    fn with_scratch<const ANY: bool>(&self, rays: &[RayBlock], hits: &mut [HitBlock], sort: bool) {
+        SCRATCH.with_borrow_mut(|scratch| match self.robustness {
+            Robustness::Fast => {
+                dispatch!(self.level, simd => self.stream::<_, false, ANY>(simd, rays, hits, sort, scratch))
+            }
+            Robustness::Watertight => {
+                dispatch!(self.level, simd => self.stream::<_, true, ANY>(simd, rays, hits, sort, scratch))
+            }
+        });
+    }
+
+    fn stream<S: Simd, const EXACT: bool, const ANY: bool>(
+        &self,
+        simd: S,
+        rays: &[RayBlock],
+        hits: &mut [HitBlock],
+        sort: bool,
+        scratch: &mut Scratch,
+    ) {
+        if !sort {
+            for (r, h) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {
+                self.blocks::<S, EXACT, ANY>(simd, &r[..h.len()], h, scratch);
+            }
+            return;
+        }
+        for (r, h) in rays.chunks(SORT_BLOCKS).zip(hits.chunks_mut(SORT_BLOCKS)) {
+            let mut buffers = std::mem::take(&mut scratch.sort);
+            let classes = buffers.sort(&r[..h.len()]);
+            let mut first = 0;
+            for n in classes {
+                // A class starts a new block, so no packet mixes classes.
+                let last = first + n.div_ceil(LANES);
+                for at in (first..last).step_by(GROUPS) {
+                    let end = last.min(at + GROUPS);
+                    let (r, h) = (&buffers.rays[at..end], &mut buffers.hits[at..end]);
+                    self.blocks::<S, EXACT, ANY>(simd, r, h, scratch);
+                }
+                first = last;
+            }
+            buffers.scatter(h);
+            scratch.sort = buffers;
+        }
+    }
+
+    /// At most sixteen blocks.
+    fn blocks<S: Simd, const EXACT: bool, const ANY: bool>(
+        &self,
+        simd: S,
+        rays: &[RayBlock],
+        hits: &mut [HitBlock],
+        scratch: &mut Scratch,
+    ) {
+        hits.fill(HitBlock::MISS);
+        if let [only] = self.placements.as_slice() {
+            let blas = &self.blas[only.geometry];
+            if let Content::Triangles(_) = blas.content {
+                self.instance_blocks::<S, EXACT, ANY>(simd, 0, rays, hits, scratch);
+                return;
+            }
+        }
+        // ---- Several instances: those whose boxes the packet meets, nearest first.
+        scratch.candidates.clear();
+        if self.placements.len() > 1 && scratch.outer.load(simd, rays) {
+            scratch.outer.collect(simd, &self.tlas, &mut scratch.candidates);
+            let mut order = std::mem::take(&mut scratch.order);
+            order.clear();
+            for &(distance, leaf) in &scratch.candidates {
+                order.extend(leaf_ids(&self.tlas.units, leaf).iter().map(|&i| (distance, i)));
+            }
+            order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            for &(_, instance) in &order {
+                self.instance_blocks::<S, EXACT, ANY>(simd, instance, rays, hits, scratch);
+            }
+            scratch.order = order;
+            return;
+        }
+        self.one_by_one::<S, EXACT, ANY>(simd, rays, hits);
+    }
+
+    fn one_by_one<S: Simd, const EXACT: bool, const ANY: bool>(
+        &self,
+        simd: S,
+        rays: &[RayBlock],
+        hits: &mut [HitBlock],
+    ) {
+        for (r, h) in rays.iter().zip(hits) {
+            for lane in 0..LANES {
+                let ray = r.get(lane);
+                if !ray.is_valid() {
+                    continue;
+                }
+                count(Work::Fallbacks, 1);
+                if ANY {
+                    if self.occluded_in::<S, EXACT>(simd, &ray) {
+                        h.prim[lane] = 0;
+                    }
+                } else {
+                    h.set(lane, self.closest_in::<S, EXACT>(simd, &ray));
+                }
+            }
+        }
+    }
+
+    /// One instance against blocks whose closest hits so far are in `hits`; merges the nearer ones.
+    fn instance_blocks<S: Simd, const EXACT: bool, const ANY: bool>(
+        &self,
+        simd: S,
+        instance: u32,
+        rays: &[RayBlock],
+        hits: &mut [HitBlock],
+        scratch: &mut Scratch,
+    ) {
+        let placement = &self.placements[instance as usize];
+        let blas = &self.blas[placement.geometry];
+        let alone = self.placements.len() == 1;
+        if alone && placement.accepts_blocks(rays) {
+            blas_blocks::<S, EXACT, ANY>(simd, blas, rays, hits, instance, &mut scratch.inner);
+            return;
+        }
+        let n = rays.len();
+        scratch.local.resize(n, RayBlock::INACTIVE);
+        scratch.moved.resize(n, [0.0; LANES]);
+        scratch.local_hits.resize(n, HitBlock::MISS);
+        enter_blocks(placement, rays, hits, ANY, &mut scratch.local, &mut scratch.moved);
+        let local_hits = &mut scratch.local_hits[..n];
+        local_hits.fill(HitBlock::MISS);
+        blas_blocks::<S, EXACT, ANY>(
+            simd,
+            blas,
+            &scratch.local[..n],
+            local_hits,
+            instance,
+            &mut scratch.inner,
+        );
+        for ((h, new), moved) in hits.iter_mut().zip(local_hits).zip(&scratch.moved) {
+            for lane in 0..LANES {
+                let Some(mut c) = new.get(lane) else { continue };
+                if moved[lane] != 0.0 {
+                    c.t = (c.t as f64 + moved[lane]) as f32;
+                }
+                let better = c.t < h.t[lane] || (c.t == h.t[lane] && instance < h.instance[lane]);
+                if ANY || better {
+                    h.set(lane, Some(c));
+                }
+            }
+        }
+    }
+}
+
+/// The rays in an instance's local space, limited to what is nearer than `hits`.
+fn enter_blocks(
+    placement: &Placement,
+    rays: &[RayBlock],
+    hits: &[HitBlock],
+    any: bool,
+    local: &mut [RayBlock],
+    moved: &mut [[f64; LANES]],
+) {
+    for (((r, h), out), moved) in rays.iter().zip(hits).zip(local).zip(moved) {
+        for lane in 0..LANES {
+            let mut ray = r.get(lane);
+            let found = h.prim[lane] != NO_HIT;
+            if found {
+                // One step beyond the best: a tie may go to this instance. Blocked shadow rays are finished.
+                ray.t_max = if any { -1.0 } else { h.t[lane].next_up().min(ray.t_max) };
+            }
+            if !ray.is_valid() {
+                out.t_max[lane] = -1.0;
+                out.t_min[lane] = 0.0;
+                continue;
+            }
+            let (l, m) = placement.enter(&ray);
+            out.set(lane, &l);
+            moved[lane] = m;
+        }
+    }
+}
+
+/// Blocks in local space against one geometry: as one packet when the rays agree in octant and dominant axis, else in smaller packets, else one by
+/// one.
+fn blas_blocks<S: Simd, const EXACT: bool, const ANY: bool>(
+    simd: S,
+    blas: &Blas,
+    rays: &[RayBlock],
+    hits: &mut [HitBlock],
+    instance: u32,
+    packet: &mut Packet,
+) {
+    let Content::Triangles(tris) = &blas.content else {
+        singles::<S, EXACT, ANY>(simd, blas, rays, hits, instance);
+        return;
+    };
+    // Sizes 16, then 4, then 1.
+    for (r, h) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {
+        if packet.load(simd, r) {
+            packet.trace::<S, EXACT, ANY>(simd, &tris.bvh);
+            packet.store::<ANY>(h, instance);
+            continue;
+        }
+        for (r, h) in r.chunks(4).zip(h.chunks_mut(4)) {
+            if packet.load(simd, r) {
+                packet.trace::<S, EXACT, ANY>(simd, &tris.bvh);
+                packet.store::<ANY>(h, instance);
+                continue;
+            }
+            for (r, h) in r.chunks(1).zip(h.chunks_mut(1)) {
+                if packet.load(simd, r) {
+                    packet.trace::<S, EXACT, ANY>(simd, &tris.bvh);
+                    packet.store::<ANY>(h, instance);
+                } else {
+                    singles::<S, EXACT, ANY>(simd, blas, r, h, instance);
+                }
+            }
+        }
+    }
+}
+
+fn singles<S: Simd, const EXACT: bool, const ANY: bool>(
+    simd: S,
+    blas: &Blas,
+    rays: &[RayBlock],
+    hits: &mut [HitBlock],
+    instance: u32,
+) {
+    for (r, h) in rays.iter().zip(hits) {
+        for lane in 0..LANES {
+            let ray: Ray = r.get(lane);
+            if !ray.is_valid() {
+                continue;
+            }
+            count(Work::Fallbacks, 1);
+            if ANY {
+                if blas.occluded::<S, EXACT>(simd, &ray, ray.t_max) {
+                    h.prim[lane] = 0;
+                }
+            } else {
+                let c = blas.closest::<S, EXACT>(simd, &ray, ray.t_max);
+                if c.found {
+                    (h.t[lane], h.u[lane], h.v[lane]) = (c.t, c.u, c.v);
+                    (h.prim[lane], h.instance[lane]) = (c.prim, instance);
+                }
+            }
+        }
+    }
+}
+
+/// Cells per octant and dominant axis: 2 × 2 over the two slopes.
+const CELLS: usize = 4;
+const CLASSES: usize = 24;
+
+impl SortBuffers {
+    /// Sorts the active rays by direction. Returns the number of rays in each class (octant and dominant axis); a class's rays begin a new
+    /// block in `rays`, ordered by cell and then as given.
+    fn sort(&mut self, blocks: &[RayBlock]) -> [usize; CLASSES] {
+        const KEYS: usize = CLASSES * CELLS;
+        let mut counts = [0u32; KEYS + 1];
+        self.keys.clear();
+        for b in blocks {
+            for lane in 0..LANES {
+                let key = if b.t_max[lane] > b.t_min[lane] {
+                    direction_key([b.dx[lane], b.dy[lane], b.dz[lane]])
+                } else {
+                    KEYS
+                };
+                counts[key] += 1;
+                self.keys.push(key as u16);
+            }
+        }
+        // ---- Places: cells in order, classes rounded up to whole blocks.
+        let mut classes = [0usize; CLASSES];
+        let mut place = [0u32; KEYS + 1];
+        let mut next = 0u32;
+        for class in 0..CLASSES {
+            next = next.next_multiple_of(LANES as u32);
+            for cell in 0..CELLS {
+                let k = class * CELLS + cell;
+                place[k] = next;
+                next += counts[k];
+                classes[class] += counts[k] as usize;
+            }
+        }
+        let total = (next as usize).div_ceil(LANES);
+        self.rays.clear();
+        self.rays.resize(total, RayBlock::INACTIVE);
+        self.hits.resize(total.max(self.hits.len()), HitBlock::MISS);
+        self.source.clear();
+        self.source.resize(self.keys.len(), u32::MAX);
+        for (i, &key) in self.keys.iter().enumerate() {
+            if key as usize == KEYS {
+                continue;
+            }
+            let to = place[key as usize] as usize;
+            place[key as usize] += 1;
+            let (from, lane) = (&blocks[i / LANES], i % LANES);
+            let (out, slot) = (&mut self.rays[to / LANES], to % LANES);
+            out.ox[slot] = from.ox[lane];
+            out.oy[slot] = from.oy[lane];
+            out.oz[slot] = from.oz[lane];
+            out.dx[slot] = from.dx[lane];
+            out.dy[slot] = from.dy[lane];
+            out.dz[slot] = from.dz[lane];
+            out.t_min[slot] = from.t_min[lane];
+            out.t_max[slot] = from.t_max[lane];
+            self.source[i] = to as u32;
+        }
+        classes
+    }
+
+    /// Puts the answers where the caller's rays were.
+    fn scatter(&self, out: &mut [HitBlock]) {
+        for (block, sources) in out.iter_mut().zip(self.source.chunks(LANES)) {
+            for (lane, &s) in sources.iter().enumerate() {
+                if s == u32::MAX {
+                    block.set(lane, None);
+                    continue;
+                }
+                let (h, slot) = (&self.hits[s as usize / LANES], s as usize % LANES);
+                block.t[lane] = h.t[slot];
+                block.u[lane] = h.u[slot];
+                block.v[lane] = h.v[slot];
+                block.prim[lane] = h.prim[slot];
+                block.instance[lane] = h.instance[slot];
+            }
+        }
+    }
+}
+
+/// Class (dominant axis and octant) times the number of cells, plus the cell of the slopes. NaN falls into some class; it is sorted out later.
+#[inline(always)]
+fn direction_key(d: [f32; 3]) -> usize {
+    let kz = crate::intersect::watertight::dominant_axis(d);
+    let (kx, ky) = ([1, 2, 0][kz], [2, 0, 1][kz]);
+    let octant = (d[0].is_sign_negative() as usize)
+        | (d[1].is_sign_negative() as usize) << 1
+        | (d[2].is_sign_negative() as usize) << 2;
+    let half = 0.5 * d[kz].abs();
+    let cell = (d[kx].abs() > half) as usize | ((d[ky].abs() > half) as usize) << 1;
+    (kz * 8 + octant) * CELLS + cell
+}

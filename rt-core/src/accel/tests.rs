@@ -1,0 +1,126 @@
+//! The traversal against the brute-force reference, on every preset, instruction set and robustness mode.
+
+use super::*;
+use crate::mesh::TriMesh;
+use crate::ray::{HitBlock, LANES, NO_HIT, Ray, RayBlock};
+use crate::simd::SimdLevel;
+use crate::test_shapes::{Random, noise_soup, sphere};
+use glam::Vec3;
+
+/// Every combination of options.
+pub(crate) fn all_options() -> Vec<BuildOptions> {
+    let mut all = Vec::new();
+    for quality in BuildQuality::ALL {
+        for robustness in Robustness::ALL {
+            for simd in SimdLevel::available() {
+                all.push(BuildOptions { quality, robustness, simd: Some(simd) });
+            }
+        }
+    }
+    all
+}
+
+fn random_rays(n: usize, seed: u64, spread: f32) -> Vec<Ray> {
+    let mut r = Random::new(seed);
+    (0..n)
+        .map(|_| {
+            let o = r.direction() * 3.0;
+            let target = r.direction() * spread * r.unit();
+            Ray::new(o, target - o)
+        })
+        .collect()
+}
+
+#[test]
+fn closest_hits_equal_brute_force() {
+    let mesh = noise_soup(600, 7);
+    let rays = random_rays(1500, 3, 1.0);
+    let expected: Vec<_> = rays.iter().map(|r| brute_force::closest(&mesh, r)).collect();
+    assert!(expected.iter().filter(|e| e.is_some()).count() > 200, "the rays must hit something");
+    for options in all_options() {
+        let world = World::from_mesh(mesh.clone(), &options).expect("a valid mesh");
+        for (ray, e) in rays.iter().zip(&expected) {
+            match (world.closest(ray), e) {
+                (None, None) => {}
+                (Some(h), Some((t, prim))) => {
+                    assert!((h.t as f64 - t).abs() <= 4e-6 * t, "{options:?} {ray:?}: t {} is not {t}", h.t);
+                    assert_eq!(h.prim, *prim, "{options:?} {ray:?}");
+                    // The hit point from the barycentrics is the point on the ray.
+                    let [a, b, c] = mesh.triangle(h.prim as usize);
+                    let p = a + (b - a) * h.u + (c - a) * h.v;
+                    assert!((p - ray.at(h.t)).length() < 1e-4, "{options:?}: {p} is not {}", ray.at(h.t));
+                }
+                (found, _) => panic!("{options:?} {ray:?}: found {found:?}, expected {e:?}"),
+            }
+            assert_eq!(world.occluded(ray), e.is_some(), "{options:?} {ray:?}");
+        }
+    }
+}
+
+/// Tiles of a camera (one origin), the same rays reversed (many origins), and rays in all directions.
+fn ray_sets() -> Vec<(&'static str, Vec<Ray>)> {
+    let eye = Vec3::new(0.3, -2.0, 2.9);
+    let mut camera = Vec::new();
+    for tile in 0..16 {
+        for i in 0..256 {
+            let (x, y) = ((tile % 4) * 16 + i % 16, (tile / 4) * 16 + i / 16);
+            let target = Vec3::new(x as f32 / 32.0 - 1.0, y as f32 / 32.0 - 1.0, 0.1);
+            camera.push(Ray::new(eye, target - eye));
+        }
+    }
+    let reversed =
+        camera.iter().map(|r| Ray { origin: r.at(1.9), dir: -r.dir, t_min: 0.01, t_max: 1.9 }).collect();
+    vec![("camera", camera), ("reversed", reversed), ("all directions", random_rays(2000, 11, 1.2))]
+}
+
+#[test]
+fn packets_equal_single_rays_bit_for_bit_at_every_level() {
+    let mesh = sphere(4);
+    for (name, rays) in ray_sets() {
+        let blocks = RayBlock::from_rays(&rays);
+        let mut reference: Option<Vec<HitBlock>> = None;
+        for simd in SimdLevel::available() {
+            let options = BuildOptions { simd: Some(simd), ..Default::default() };
+            let world = World::from_mesh(mesh.clone(), &options).expect("a valid mesh");
+            let mut coherent = vec![HitBlock::MISS; blocks.len()];
+            let mut sorted = coherent.clone();
+            let mut single = coherent.clone();
+            world.closest_coherent(&blocks, &mut coherent);
+            world.closest_incoherent(&blocks, &mut sorted);
+            for (i, r) in rays.iter().enumerate() {
+                single[i / LANES].set(i % LANES, world.closest(r));
+            }
+            for (what, found) in [("packet", &coherent), ("sorted", &sorted)] {
+                for (i, r) in rays.iter().enumerate() {
+                    let (a, b) = (single[i / LANES].get(i % LANES), found[i / LANES].get(i % LANES));
+                    assert_eq!(a, b, "{name} {simd:?}: single ray (left) and {what} (right) differ for ray {i}, {r:?}");
+                }
+            }
+            match &reference {
+                None => reference = Some(single.clone()),
+                Some(r) => assert!(*r == single, "{name}: {simd:?} differs from the first level"),
+            }
+            let (mut a, mut b) = (vec![0u16; blocks.len()], vec![0u16; blocks.len()]);
+            world.occluded_coherent(&blocks, &mut a);
+            world.occluded_incoherent(&blocks, &mut b);
+            for (i, h) in single.iter().enumerate() {
+                let expected = (0..LANES).fold(0, |m, l| m | ((h.prim[l] != NO_HIT) as u16) << l);
+                assert_eq!((a[i], b[i]), (expected, expected), "{name} {simd:?}: occlusion of block {i}");
+            }
+        }
+    }
+}
+
+#[test]
+fn empty_worlds_and_missing_rays() {
+    for options in all_options() {
+        let empty = World::build(Vec::new(), Vec::new(), &options).expect("nothing is allowed");
+        let ray = Ray::new(Vec3::ZERO, Vec3::Z);
+        assert_eq!(empty.closest(&ray), None);
+        let no_triangles = World::from_mesh(TriMesh::default(), &options).expect("no triangles are allowed");
+        assert_eq!(no_triangles.closest(&ray), None);
+        let mut hits = [HitBlock::MISS; 3];
+        no_triangles.closest_coherent(&RayBlock::from_rays(&[ray; 40]), &mut hits);
+        assert!(hits.iter().all(|h| h.prim == [NO_HIT; LANES]));
+    }
+}

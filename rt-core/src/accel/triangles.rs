@@ -1,0 +1,204 @@
+//! Triangles in leaves: four to a leaf, their vertices stored in it.
+
+use super::blas::LocalFrame;
+use super::build::{LeafWriter, MAX_PRIMS, PrimRef, build_wide};
+use super::options::BuildQuality;
+use super::wide::{ChildRef, LEAF_SIZE, Unit, WideBvh};
+use crate::intersect::watertight::{Shear, test};
+use crate::math::Aabb;
+use crate::mesh::TriMesh;
+use crate::stats::{Work, count};
+use crate::traverse::single::{LeafTest, RaySetup, traverse};
+use fearless_simd::{Simd, SimdBase, SimdMask, f32x4};
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// Units of a leaf: nine rows of four floats (x, y, z of the first, second and third vertices) and a row of four triangle numbers.
+pub(crate) const TRI_LEAF_UNITS: usize = 5;
+
+/// Row `row` (0..=8) of a leaf: one coordinate of one vertex of the four triangles.
+#[inline(always)]
+pub(crate) fn row(leaf: &[f32; 8 * TRI_LEAF_UNITS], row: usize) -> &[f32] {
+    &leaf[4 * row..4 * row + 4]
+}
+
+/// The leaf's floats.
+#[inline(always)]
+pub(crate) fn leaf_floats(units: &[Unit], leaf: ChildRef) -> &[f32; 8 * TRI_LEAF_UNITS] {
+    let at = leaf.unit();
+    let leaf: &[Unit; TRI_LEAF_UNITS] =
+        units[at..at + TRI_LEAF_UNITS].try_into().expect("a slice of that length");
+    bytemuck::cast_ref(leaf)
+}
+
+/// The four triangle numbers of a leaf; unused places repeat the last.
+#[inline(always)]
+pub(crate) fn leaf_ids(leaf: &[f32; 8 * TRI_LEAF_UNITS]) -> [u32; 4] {
+    std::array::from_fn(|i| leaf[36 + i].to_bits())
+}
+
+struct TriWriter<'m> {
+    mesh: &'m TriMesh,
+    frame: &'m LocalFrame,
+    /// Positions are stored as they are.
+    plain: bool,
+}
+
+impl TriWriter<'_> {
+    #[inline]
+    fn triangle(&self, i: u32) -> [Vec3; 3] {
+        let corners = self.mesh.triangle(i as usize);
+        if self.plain { corners } else { corners.map(|p| self.frame.local(self.mesh.origin, p)) }
+    }
+}
+
+impl LeafWriter for TriWriter<'_> {
+    const UNITS: usize = TRI_LEAF_UNITS;
+
+    fn write(&self, prims: impl ExactSizeIterator<Item = u32> + Clone, out: &mut [Unit]) {
+        let floats: &mut [f32] = bytemuck::cast_slice_mut(out);
+        let mut last = 0;
+        let mut prims = prims;
+        for slot in 0..LEAF_SIZE {
+            // Unused places repeat the last triangle's first vertex: no area, never hit.
+            let next = prims.next();
+            let id = next.unwrap_or(last);
+            let corners = self.triangle(id);
+            for (vertex, corner) in corners.iter().enumerate() {
+                let p = if next.is_some() { *corner } else { corners[0] };
+                for axis in 0..3 {
+                    floats[4 * (3 * vertex + axis) + slot] = p[axis];
+                }
+            }
+            floats[36 + slot] = f32::from_bits(id);
+            last = id;
+        }
+    }
+}
+
+/// A hierarchy over a mesh's triangles, in the mesh's object space.
+pub(crate) struct TriBvh {
+    pub(crate) bvh: WideBvh,
+    pub(crate) skipped: usize,
+}
+
+impl TriBvh {
+    pub(crate) fn build(mesh: &TriMesh, frame: &LocalFrame, quality: BuildQuality) -> TriBvh {
+        debug_assert!(mesh.indices.len() < MAX_PRIMS, "checked by the caller");
+        let plain = frame.center == mesh.origin && frame.scale == 1.0;
+        let writer = TriWriter { mesh, frame, plain };
+        let refs: Vec<PrimRef> = (0..mesh.indices.len() as u32)
+            .into_par_iter()
+            .with_min_len(1 << 14)
+            .filter(|&i| mesh.is_renderable(i as usize))
+            .map(|i| PrimRef::new(Aabb::from_points(&writer.triangle(i)), i))
+            .collect();
+        let skipped = mesh.indices.len() - refs.len();
+        TriBvh { bvh: build_wide(refs, &writer, quality.bins()), skipped }
+    }
+
+    #[inline(always)]
+    pub(crate) fn closest<S: Simd, const EXACT: bool>(
+        &self,
+        simd: S,
+        ray: &RaySetup,
+        t_max: f32,
+    ) -> ClosestTri {
+        let mut leaves = ClosestLeaf::<EXACT>::new(ray, t_max);
+        traverse::<S, _, EXACT, true>(simd, &self.bvh, ray, t_max, &mut leaves);
+        leaves.best
+    }
+
+    #[inline(always)]
+    pub(crate) fn occluded<S: Simd, const EXACT: bool>(&self, simd: S, ray: &RaySetup, t_max: f32) -> bool {
+        let mut leaves = AnyLeaf::<EXACT> { ray: *ray, found: false };
+        traverse::<S, _, EXACT, false>(simd, &self.bvh, ray, t_max, &mut leaves);
+        leaves.found
+    }
+}
+
+/// The closest triangle so far.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ClosestTri {
+    pub(crate) t: f32,
+    pub(crate) u: f32,
+    pub(crate) v: f32,
+    pub(crate) prim: u32,
+    pub(crate) found: bool,
+}
+
+/// The four triangles of a leaf against a ray: candidate lanes, if any.
+#[inline(always)]
+fn test_leaf<S: Simd, const EXACT: bool>(
+    simd: S,
+    leaf: &[f32; 8 * TRI_LEAF_UNITS],
+    ray: &RaySetup,
+) -> Option<crate::intersect::watertight::Candidate<f32x4<S>, fearless_simd::mask32x4<S>>> {
+    let Shear { kx, ky, kz, sx, sy, sz } = ray.shear;
+    let vertex = |first: usize| {
+        [kx, ky, kz].map(|axis| {
+            f32x4::from_slice(simd, row(leaf, first + axis)) - f32x4::splat(simd, ray.origin[axis])
+        })
+    };
+    let s = |v: f32| f32x4::splat(simd, v);
+    test::<S, f32x4<S>, EXACT>(simd, vertex(0), vertex(3), vertex(6), s(sx), s(sy), s(sz))
+}
+
+struct ClosestLeaf<const EXACT: bool> {
+    ray: RaySetup,
+    best: ClosestTri,
+}
+
+impl<const EXACT: bool> ClosestLeaf<EXACT> {
+    #[inline(always)]
+    fn new(ray: &RaySetup, t_max: f32) -> Self {
+        // Number 0 with t_max: nothing at exactly t_max can win the tie, which makes the range half-open.
+        ClosestLeaf { ray: *ray, best: ClosestTri { t: t_max, u: 0.0, v: 0.0, prim: 0, found: false } }
+    }
+}
+
+impl<S: Simd, const EXACT: bool> LeafTest<S> for ClosestLeaf<EXACT> {
+    #[inline(always)]
+    fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, t_max: &mut f32) -> bool {
+        count(Work::Primitives, 1);
+        let floats = leaf_floats(units, leaf);
+        let Some(c) = test_leaf::<S, EXACT>(simd, floats, &self.ray) else { return false };
+        let in_range = c.inside
+            & c.t.simd_ge(f32x4::splat(simd, self.ray.t_min))
+            & c.t.simd_le(f32x4::splat(simd, self.best.t));
+        let mut mask = in_range.to_bitmask() as u32;
+        if mask == 0 {
+            return false;
+        }
+        let (t, u, v) = (c.t.to_array(), c.u.to_array(), c.v.to_array());
+        let ids = leaf_ids(floats);
+        while mask != 0 {
+            let i = mask.trailing_zeros() as usize & 3;
+            mask &= mask - 1;
+            let b = &mut self.best;
+            if t[i] < b.t || (t[i] == b.t && ids[i] < b.prim) {
+                *b = ClosestTri { t: t[i], u: u[i], v: v[i], prim: ids[i], found: true };
+                *t_max = t[i];
+            }
+        }
+        false
+    }
+}
+
+struct AnyLeaf<const EXACT: bool> {
+    ray: RaySetup,
+    found: bool,
+}
+
+impl<S: Simd, const EXACT: bool> LeafTest<S> for AnyLeaf<EXACT> {
+    #[inline(always)]
+    fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, t_max: &mut f32) -> bool {
+        count(Work::Primitives, 1);
+        let Some(c) = test_leaf::<S, EXACT>(simd, leaf_floats(units, leaf), &self.ray) else { return false };
+        let hit = c.inside
+            & c.t.simd_ge(f32x4::splat(simd, self.ray.t_min))
+            & c.t.simd_lt(f32x4::splat(simd, *t_max));
+        self.found = hit.any_true();
+        self.found
+    }
+}

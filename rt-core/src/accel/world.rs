@@ -1,0 +1,372 @@
+//! The two-level structure that rays are traced against: instances of geometries.
+
+use super::blas::{Blas, IdWriter, leaf_ids};
+use super::build::{MAX_PRIMS, PrimRef, build_wide};
+use super::options::{BuildOptions, BuildReport, Robustness};
+use super::placement::{Placement, distance_to_sphere};
+use super::wide::{ChildRef, Unit, WideBvh};
+use crate::math::{Aabb, exp2i, max_abs};
+use crate::mesh::{MeshError, TriMesh};
+use crate::ray::{Hit, Ray};
+use crate::shapes::Shape;
+use crate::simd::SimdLevel;
+use crate::traverse::single::{LeafTest, RaySetup, traverse};
+use fearless_simd::{Level, Simd, dispatch};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Something rays can hit, shared between instances.
+#[derive(Clone)]
+pub enum Geometry {
+    /// Triangles.
+    Mesh(Arc<TriMesh>),
+    /// Spheres, tubes, isosurfaces, user geometry.
+    Shape(Arc<dyn Shape>),
+}
+
+/// A geometry placed in the world.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Instance {
+    /// Index of the geometry.
+    pub geometry: usize,
+    /// Object to world; may mirror and scale unevenly, must be invertible.
+    pub world_from_object: DAffine3,
+}
+
+/// Why a world could not be built.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum BuildError {
+    /// A mesh is unusable.
+    #[error("geometry {geometry}: {source}")]
+    Mesh {
+        /// Index of the geometry.
+        geometry: usize,
+        /// What is wrong with it.
+        source: MeshError,
+    },
+    /// An instance names a geometry that does not exist.
+    #[error("instance {instance} uses geometry {geometry}, but there are only {count}")]
+    NoSuchGeometry {
+        /// Index of the instance.
+        instance: usize,
+        /// The geometry it names.
+        geometry: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// An instance's transform cannot be inverted.
+    #[error(
+        "instance {instance}: its transform has determinant {determinant}; give one that is finite and not singular, or leave the instance out"
+    )]
+    SingularTransform {
+        /// Index of the instance.
+        instance: usize,
+        /// The determinant found.
+        determinant: f64,
+    },
+}
+
+/// Instances of geometries, ready for rays.
+pub struct World {
+    geometries: Vec<Geometry>,
+    instances: Vec<Instance>,
+    origin: DVec3,
+    bounds: Aabb,
+    report: BuildReport,
+    pub(super) blas: Vec<Blas>,
+    pub(super) placements: Vec<Placement>,
+    pub(super) tlas: WideBvh,
+    pub(super) robustness: Robustness,
+    pub(super) level: Level,
+}
+
+impl World {
+    /// Builds the acceleration structures.
+    pub fn build(
+        geometries: Vec<Geometry>,
+        instances: Vec<Instance>,
+        options: &BuildOptions,
+    ) -> Result<World, BuildError> {
+        let start = Instant::now();
+        let mut phases = Vec::new();
+        for (i, inst) in instances.iter().enumerate() {
+            if inst.geometry >= geometries.len() {
+                let count = geometries.len();
+                return Err(BuildError::NoSuchGeometry { instance: i, geometry: inst.geometry, count });
+            }
+        }
+        for (i, g) in geometries.iter().enumerate() {
+            if let Geometry::Mesh(m) = g {
+                m.check().map_err(|source| BuildError::Mesh { geometry: i, source })?;
+                if m.indices.len() >= MAX_PRIMS {
+                    let source = MeshError::TooLarge {
+                        what: "triangles",
+                        found: m.indices.len(),
+                        limit: MAX_PRIMS - 1,
+                    };
+                    return Err(BuildError::Mesh { geometry: i, source });
+                }
+            }
+        }
+        let blas: Vec<Blas> = geometries
+            .iter()
+            .map(|g| match g {
+                Geometry::Mesh(m) => Blas::for_mesh(m, options),
+                Geometry::Shape(s) => Blas::for_shape(s.clone(), options),
+            })
+            .collect();
+        phases.push(("geometries", start.elapsed()));
+
+        // ---- Render space: world space, moved when everything is far from zero.
+        let origin = choose_origin(&instances, &blas);
+        let placements = instances
+            .iter()
+            .enumerate()
+            .map(|(i, inst)| {
+                let b = &blas[inst.geometry];
+                Placement::new(inst.geometry, &inst.world_from_object, &b.frame, b.bvh().bounds, origin)
+                    .ok_or(BuildError::SingularTransform {
+                        instance: i,
+                        determinant: inst.world_from_object.matrix3.determinant(),
+                    })
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let refs = placements
+            .iter()
+            .enumerate()
+            .filter(|(_, p)| !p.bounds.is_empty() && p.bounds.min.is_finite() && p.bounds.max.is_finite())
+            .map(|(i, p)| PrimRef::new(p.bounds, i as u32))
+            .collect();
+        let tlas = build_wide(refs, &IdWriter, 16);
+        phases.push(("instances", start.elapsed() - phases[0].1));
+        let report = BuildReport {
+            total: start.elapsed(),
+            phases,
+            primitives: blas.iter().map(|b| b.primitives).sum(),
+            skipped: blas.iter().map(|b| b.skipped).sum(),
+            bytes: (tlas.units.len() + blas.iter().map(|b| b.bvh().units.len()).sum::<usize>())
+                * size_of::<Unit>(),
+        };
+        Ok(World {
+            geometries,
+            instances,
+            origin,
+            bounds: tlas.bounds,
+            report,
+            blas,
+            placements,
+            tlas,
+            robustness: options.robustness,
+            level: SimdLevel::resolve(options.simd),
+        })
+    }
+
+    /// A world of one mesh at its place.
+    pub fn from_mesh(mesh: impl Into<Arc<TriMesh>>, options: &BuildOptions) -> Result<World, BuildError> {
+        let instance = Instance { geometry: 0, world_from_object: DAffine3::IDENTITY };
+        World::build(vec![Geometry::Mesh(mesh.into())], vec![instance], options)
+    }
+
+    /// World position of render space's origin: `world = origin + render`.
+    pub fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    /// Bounds of everything, in render space; empty for an empty world.
+    pub fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
+    /// The geometries as given.
+    pub fn geometries(&self) -> &[Geometry] {
+        &self.geometries
+    }
+
+    /// The instances as given.
+    pub fn instances(&self) -> &[Instance] {
+        &self.instances
+    }
+
+    /// What the build did.
+    pub fn report(&self) -> &BuildReport {
+        &self.report
+    }
+
+    /// Edge behaviour of this world.
+    pub fn robustness(&self) -> Robustness {
+        self.robustness
+    }
+
+    /// Render-space point of a world point.
+    pub fn render_from_world(&self, p: DVec3) -> Vec3 {
+        (p - self.origin).as_vec3()
+    }
+
+    /// A render-space ray from f64 world coordinates. When the origin is far outside the bounds it is first moved along the ray,
+    /// in f64, to where the ray can first meet them, so that a camera 10⁹ away loses nothing. Returns the ray and how far its
+    /// origin was moved (add it to a hit's `t`). `dir` need not be of unit length.
+    pub fn ray_from_world(&self, origin: DVec3, dir: DVec3) -> (Ray, f64) {
+        let o = origin - self.origin;
+        let moved = if self.bounds.is_empty() {
+            0.0
+        } else {
+            let (center, radius) = (self.bounds.center().as_dvec3(), self.bounds.radius() as f64);
+            let far = (o - center).abs().max_element() > 64.0 * radius;
+            if far { distance_to_sphere(o, dir, center, radius) } else { 0.0 }
+        };
+        (Ray::new((o + dir * moved).as_vec3(), dir.as_vec3()), moved)
+    }
+
+    /// The closest hit along `ray`. Ties (coplanar layers) go to the lowest instance, then the lowest primitive.
+    pub fn closest(&self, ray: &Ray) -> Option<Hit> {
+        if !ray.is_valid() {
+            return None;
+        }
+        let (ray, unit) = with_ordinary_length(ray);
+        let hit = match self.robustness {
+            Robustness::Fast => dispatch!(self.level, simd => self.closest_in::<_, false>(simd, &ray)),
+            Robustness::Watertight => dispatch!(self.level, simd => self.closest_in::<_, true>(simd, &ray)),
+        };
+        hit.map(|h| Hit { t: h.t * unit, ..h })
+    }
+
+    /// Whether anything lies within `[t_min, t_max)` of `ray`.
+    pub fn occluded(&self, ray: &Ray) -> bool {
+        if !ray.is_valid() {
+            return false;
+        }
+        let (ray, _) = with_ordinary_length(ray);
+        match self.robustness {
+            Robustness::Fast => dispatch!(self.level, simd => self.occluded_in::<_, false>(simd, &ray)),
+            Robustness::Watertight => dispatch!(self.level, simd => self.occluded_in::<_, true>(simd, &ray)),
+        }
+    }
+
+    pub(crate) fn closest_in<S: Simd, const EXACT: bool>(&self, simd: S, ray: &Ray) -> Option<Hit> {
+        let mut leaves = InstanceClosest::<EXACT> { world: self, ray: *ray, best: None };
+        match self.placements.len() {
+            0 => return None,
+            1 => {
+                let mut t_max = ray.t_max;
+                leaves.try_instance(simd, 0, &mut t_max);
+            }
+            _ => {
+                let setup = RaySetup::new(ray);
+                traverse::<S, _, true, true>(simd, &self.tlas, &setup, ray.t_max, &mut leaves);
+            }
+        }
+        leaves.best
+    }
+
+    pub(crate) fn occluded_in<S: Simd, const EXACT: bool>(&self, simd: S, ray: &Ray) -> bool {
+        let mut leaves = InstanceAny::<EXACT> { world: self, ray: *ray, found: false };
+        match self.placements.len() {
+            0 => return false,
+            1 => leaves.found = self.instance_occluded::<S, EXACT>(simd, 0, ray),
+            _ => {
+                let setup = RaySetup::new(ray);
+                traverse::<S, _, true, false>(simd, &self.tlas, &setup, ray.t_max, &mut leaves);
+            }
+        }
+        leaves.found
+    }
+
+    fn instance_occluded<S: Simd, const EXACT: bool>(&self, simd: S, instance: usize, ray: &Ray) -> bool {
+        let p = &self.placements[instance];
+        let (local, _) = p.enter(ray);
+        local.t_max > local.t_min && self.blas[p.geometry].occluded::<S, EXACT>(simd, &local, local.t_max)
+    }
+}
+
+/// Rays whose direction is neither tiny nor huge pass unchanged; others are scaled by a power of two. The second value turns the scaled
+/// ray's `t` back.
+fn with_ordinary_length(ray: &Ray) -> (Ray, f32) {
+    let m = max_abs(ray.dir);
+    if (1e-4..=1e4).contains(&m) {
+        return (*ray, 1.0);
+    }
+    let e = (m.log2().round() as i32).clamp(-125, 125);
+    let k = exp2i(-e);
+    (Ray { dir: ray.dir * k, t_min: ray.t_min / k, t_max: ray.t_max / k, ..*ray }, k)
+}
+
+/// Zero, or the middle of the world's bounds when they lie more than four sizes away from it. A single geometry without rotation gets its own
+/// centre, so that its local space and render space coincide.
+fn choose_origin(instances: &[Instance], blas: &[Blas]) -> DVec3 {
+    if let [only] = instances
+        && only.world_from_object.matrix3 == DMat3::IDENTITY
+        && only.world_from_object.is_finite()
+    {
+        return blas[only.geometry].frame.center + only.world_from_object.translation;
+    }
+    let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for inst in instances {
+        let b = &blas[inst.geometry];
+        let bounds = b.bvh().bounds;
+        if bounds.is_empty() {
+            continue;
+        }
+        for c in bounds.corners() {
+            let p = inst.world_from_object.transform_point3(c.as_dvec3() / b.frame.scale + b.frame.center);
+            lo = lo.min(p);
+            hi = hi.max(p);
+        }
+    }
+    let center = 0.5 * lo + 0.5 * hi;
+    let far = center.abs().max_element() > 4.0 * (hi - lo).max_element();
+    if center.is_finite() && far { center.as_vec3().as_dvec3() } else { DVec3::ZERO }
+}
+
+struct InstanceClosest<'w, const EXACT: bool> {
+    world: &'w World,
+    ray: Ray,
+    best: Option<Hit>,
+}
+
+impl<const EXACT: bool> InstanceClosest<'_, EXACT> {
+    fn try_instance<S: Simd>(&mut self, simd: S, instance: u32, t_max: &mut f32) {
+        let p = &self.world.placements[instance as usize];
+        // One step beyond the best so far: a tie may go to this instance.
+        let limit = if self.best.is_some() { t_max.next_up() } else { *t_max };
+        let (local, moved) = p.enter(&Ray { t_max: limit, ..self.ray });
+        if !(local.t_max > local.t_min) {
+            return;
+        }
+        let c = self.world.blas[p.geometry].closest::<S, EXACT>(simd, &local, local.t_max);
+        if !c.found {
+            return;
+        }
+        let t = if moved == 0.0 { c.t } else { (c.t as f64 + moved) as f32 };
+        let better = self.best.is_none_or(|b| t < b.t || (t == b.t && instance < b.instance));
+        if better {
+            self.best = Some(Hit { t, u: c.u, v: c.v, prim: c.prim, instance });
+            *t_max = t;
+        }
+    }
+}
+
+impl<S: Simd, const EXACT: bool> LeafTest<S> for InstanceClosest<'_, EXACT> {
+    fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, t_max: &mut f32) -> bool {
+        for &i in leaf_ids(units, leaf) {
+            self.try_instance(simd, i, t_max);
+        }
+        false
+    }
+}
+
+struct InstanceAny<'w, const EXACT: bool> {
+    world: &'w World,
+    ray: Ray,
+    found: bool,
+}
+
+impl<S: Simd, const EXACT: bool> LeafTest<S> for InstanceAny<'_, EXACT> {
+    fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, _: &mut f32) -> bool {
+        let (world, ray) = (self.world, self.ray);
+        self.found = leaf_ids(units, leaf)
+            .iter()
+            .any(|&i| world.instance_occluded::<S, EXACT>(simd, i as usize, &ray));
+        self.found
+    }
+}

@@ -1,0 +1,3 @@
+//! Ray-triangle tests.
+
+pub(crate) mod watertight;

@@ -1,0 +1,130 @@
+//! Ray-triangle test in a sheared space (Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2013).
+//!
+//! The triangle is moved to the ray's origin and sheared so that the ray becomes the z axis; three 2-D edge functions then decide on which
+//! side of each edge the origin lies. Two triangles that share an edge evaluate the same products for it with opposite signs, and rounding is
+//! monotone: fl(a·b) − fl(c·d) has the sign of the exact value or is zero. A zero is decided by the exact products in f64. So a ray never
+//! passes between them.
+//!
+//! No fused multiply-add anywhere: every instruction set then gives the same bits, in packets and for single rays, and the products above stay
+//! equal on both sides of an edge.
+
+use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask};
+
+/// Axis order and shear that turn a ray's direction into +z.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Shear {
+    pub(crate) kx: usize,
+    pub(crate) ky: usize,
+    pub(crate) kz: usize,
+    pub(crate) sx: f32,
+    pub(crate) sy: f32,
+    pub(crate) sz: f32,
+}
+
+/// The axis with the largest component; ties go to the lower axis.
+#[inline(always)]
+pub(crate) fn dominant_axis(d: [f32; 3]) -> usize {
+    let a = d.map(f32::abs);
+    let xy = if a[0] >= a[1] { 0 } else { 1 };
+    if a[xy] >= a[2] { xy } else { 2 }
+}
+
+impl Shear {
+    #[inline(always)]
+    pub(crate) fn new(d: [f32; 3]) -> Self {
+        let kz = dominant_axis(d);
+        // The paper swaps kx and ky for negative d[kz] to keep the winding; both windings are hits here, so nothing depends on it.
+        let (kx, ky) = ([1, 2, 0][kz], [2, 0, 1][kz]);
+        let sz = 1.0 / d[kz];
+        Shear { kx, ky, kz, sx: d[kx] * sz, sy: d[ky] * sz, sz }
+    }
+}
+
+/// Lanes that may be hits: the ray passes inside the edges at a finite `t`.
+pub(crate) struct Candidate<V, M> {
+    pub(crate) inside: M,
+    /// Ray parameter.
+    pub(crate) t: V,
+    /// Barycentric weight of the second vertex.
+    pub(crate) u: V,
+    /// Barycentric weight of the third vertex.
+    pub(crate) v: V,
+}
+
+/// Tests lanes of (triangle, ray) pairs. `a`, `b`, `c` are the vertices minus the ray's origin in axis order kx, ky, kz. `None` when no lane
+/// passes the edge tests. `EXACT` decides zeros in f64 (watertight).
+#[inline(always)]
+pub(crate) fn test<S, V, const EXACT: bool>(
+    simd: S,
+    a: [V; 3],
+    b: [V; 3],
+    c: [V; 3],
+    sx: V,
+    sy: V,
+    sz: V,
+) -> Option<Candidate<V, V::Mask>>
+where
+    S: Simd,
+    V: SimdFloat<S, Element = f32> + Lanes<S>,
+    V::Mask: Select<V>,
+{
+    let zero = V::splat(simd, 0.0);
+    let (ax, ay) = (a[0] - sx * a[2], a[1] - sy * a[2]);
+    let (bx, by) = (b[0] - sx * b[2], b[1] - sy * b[2]);
+    let (cx, cy) = (c[0] - sx * c[2], c[1] - sy * c[2]);
+    let mut u = cx * by - cy * bx;
+    let mut v = ax * cy - ay * cx;
+    let mut w = bx * ay - by * ax;
+    if EXACT {
+        let undecided = u.simd_eq(zero) | v.simd_eq(zero) | w.simd_eq(zero);
+        if undecided.any_true() {
+            // Only those lanes: the others keep the bits they would have in any other company.
+            u = undecided.select(exact(simd, cx, by, cy, bx), u);
+            v = undecided.select(exact(simd, ax, cy, ay, cx), v);
+            w = undecided.select(exact(simd, bx, ay, by, ax), w);
+        }
+    }
+    // All of one sign, zeros included.
+    let lowest = u.min(v).min(w);
+    let highest = u.max(v).max(w);
+    let inside = lowest.simd_ge(zero) | highest.simd_le(zero);
+    if !inside.any_true() {
+        return None;
+    }
+    let det = u + v + w;
+    let inside = inside & det.simd_ne(zero);
+    let t = (u * a[2] + v * b[2] + w * c[2]) * sz / det;
+    let scale = V::splat(simd, 1.0) / det;
+    Some(Candidate { inside, t, u: v * scale, v: w * scale })
+}
+
+/// p·q − r·s from exact f64 products, rounded to f32: zero only when the difference is.
+#[inline(always)]
+fn exact<S: Simd, V: SimdFloat<S, Element = f32> + Lanes<S>>(simd: S, p: V, q: V, r: V, s: V) -> V {
+    let (p, q, r, s) = (p.lanes(), q.lanes(), r.lanes(), s.lanes());
+    V::from_fn(simd, |i| {
+        let d = p.as_ref()[i] as f64 * q.as_ref()[i] as f64 - r.as_ref()[i] as f64 * s.as_ref()[i] as f64;
+        let f = d as f32;
+        // The cast may flush a tiny difference to zero, which would claim a tie that is not there.
+        if f == 0.0 && d != 0.0 { f32::MIN_POSITIVE.copysign(d as f32) } else { f }
+    })
+}
+
+/// A vector as its lanes.
+pub(crate) trait Lanes<S> {
+    type Array: AsRef<[f32]>;
+    fn lanes(self) -> Self::Array;
+}
+
+macro_rules! lanes {
+    ($($v:ident $n:literal),*) => {$(
+        impl<S: Simd> Lanes<S> for fearless_simd::$v<S> {
+            type Array = [f32; $n];
+            #[inline(always)]
+            fn lanes(self) -> [f32; $n] {
+                self.to_array()
+            }
+        }
+    )*};
+}
+lanes!(f32x4 4, f32x16 16);

@@ -1,0 +1,139 @@
+//! Geometry that is not a triangle mesh: anything that can bound its primitives and intersect a ray with one of them.
+
+mod cylinder;
+mod error;
+mod frustum;
+mod rounded_cone;
+mod sphere;
+mod tube;
+
+pub use cylinder::Cylinders;
+pub use error::{ShapeError, ShapeReport};
+pub use sphere::Spheres;
+pub use tube::Tubes;
+
+use crate::math::Aabb;
+use crate::ray::Ray;
+use glam::{DVec3, Vec3};
+
+/// What [`Shape::closest`] found on one primitive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShapeHit {
+    /// Ray parameter, `t_min <= t < t_max`.
+    pub t: f32,
+    /// First surface coordinate (its meaning is the shape's).
+    pub u: f32,
+    /// Second surface coordinate.
+    pub v: f32,
+}
+
+/// A point on a shape, for shading and for starting secondary rays; in the shape's object space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShapeSurface {
+    /// The point, projected back onto the surface so that its error does not grow with the ray's length.
+    pub point: Vec3,
+    /// Bound on the distance between `point` and the true surface.
+    pub point_error: f32,
+    /// Unit normal, outward where the shape has an outside.
+    pub normal: Vec3,
+    /// Scalar for the material's colour map, when the shape carries one.
+    pub scalar: Option<f32>,
+    /// Linear RGBA, when the shape carries colours.
+    pub color: Option<[f32; 4]>,
+}
+
+/// Geometry made of primitives numbered `0..num_primitives()`: the door for user-defined geometry.
+///
+/// Object space is f32 relative to [`Shape::origin`]. Implementations must be deterministic: the same ray and primitive
+/// give the same bits every time.
+pub trait Shape: Send + Sync {
+    /// How many primitives.
+    fn num_primitives(&self) -> usize;
+
+    /// World position (before the instance's transform) of object space's origin.
+    fn origin(&self) -> DVec3 {
+        DVec3::ZERO
+    }
+
+    /// A box that contains primitive `prim`. An empty or non-finite box leaves the primitive out (it is counted).
+    fn bounds(&self, prim: u32) -> Aabb;
+
+    /// The first intersection of `ray` with primitive `prim` within `[t_min, t_max)`.
+    fn closest(&self, prim: u32, ray: &Ray) -> Option<ShapeHit>;
+
+    /// Whether anything of primitive `prim` lies within `[t_min, t_max)`.
+    fn occluded(&self, prim: u32, ray: &Ray) -> bool {
+        self.closest(prim, ray).is_some()
+    }
+
+    /// The surface at a hit this shape reported for `ray`.
+    fn surface(&self, prim: u32, hit: &ShapeHit, ray: &Ray) -> ShapeSurface;
+}
+
+/// One radius for all elements, or one for each.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Radii {
+    /// The same for all.
+    Common(f32),
+    /// One per sphere, or per point of a polyline.
+    Each(Vec<f32>),
+}
+
+impl Radii {
+    #[inline]
+    fn get(&self, i: usize) -> f32 {
+        match self {
+            Radii::Common(r) => *r,
+            Radii::Each(r) => r[i],
+        }
+    }
+
+    fn check(&self, shape: &'static str, per: &'static str, expected: usize) -> Result<(), ShapeError> {
+        match self {
+            Radii::Common(_) => Ok(()),
+            Radii::Each(r) => error::check_length(shape, "radii", per, expected, r.len()),
+        }
+    }
+}
+
+/// Splits f64 positions into an origin and f32 offsets from it, so that small detail far from zero survives. The origin is
+/// the middle of the finite positions, or zero when they straddle it (then nothing is lost by f32 offsets from zero).
+pub fn relative_positions(points: &[DVec3]) -> (DVec3, Vec<Vec3>) {
+    let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for p in points.iter().filter(|p| p.is_finite()) {
+        lo = lo.min(*p);
+        hi = hi.max(*p);
+    }
+    let center = 0.5 * lo + 0.5 * hi;
+    let far = center.abs().max_element() > (hi - lo).max_element();
+    let origin = if center.is_finite() && far { center.as_vec3().as_dvec3() } else { DVec3::ZERO };
+    (origin, points.iter().map(|p| (*p - origin).as_vec3()).collect())
+}
+
+/// The box with corners `lo` and `hi` in f64, rounded outwards to f32; empty when a corner is not finite.
+pub(crate) fn outward_box(lo: DVec3, hi: DVec3) -> Aabb {
+    let (min, max) = (lo.as_vec3(), hi.as_vec3());
+    if !(min.is_finite() && max.is_finite()) {
+        return Aabb::EMPTY;
+    }
+    // One step beyond the rounded value: a box that merely touches its surface invites rays through the gap of one ulp
+    // that a traversal's own rounding leaves (notes of the watertight triangle tests).
+    Aabb::new(
+        Vec3::new(min.x.next_down(), min.y.next_down(), min.z.next_down()),
+        Vec3::new(max.x.next_up(), max.y.next_up(), max.z.next_up()),
+    )
+}
+
+/// `p` rounded to f32 and a bound on its distance from the true surface, when `p` itself is off by at most `error`.
+pub(crate) fn rounded_point(p: DVec3, error: f64) -> (Vec3, f32) {
+    let point = p.as_vec3();
+    // Each component moved by at most half an ulp (2⁻²⁴ relative); √3 of them together, and f32::MIN_POSITIVE for subnormals.
+    let rounding = 3f64.sqrt() * (-24f64).exp2() * p.abs().max_element() + f64::from(f32::MIN_POSITIVE);
+    (point, ((rounding + error) as f32).next_up())
+}
+
+/// Whether the f32 parameter `t` lies in the ray's `[t_min, t_max)`; false for NaN.
+#[inline]
+pub(crate) fn in_range(t: f32, ray: &Ray) -> bool {
+    t >= ray.t_min && t < ray.t_max
+}

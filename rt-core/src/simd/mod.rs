@@ -1,0 +1,84 @@
+//! Instruction sets, and the few places where speed needs `unsafe`.
+#![allow(
+    unsafe_code,
+    reason = "one of the workspace's rooms for unsafe code: each block says why it is sound"
+)]
+
+pub(crate) mod huge_pages;
+mod prefetch;
+mod stack;
+
+use fearless_simd::Level;
+pub(crate) use prefetch::prefetch;
+pub(crate) use stack::Stack;
+
+/// An instruction set the kernels can be limited to, for tests and for measurements against peers at the same level.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum SimdLevel {
+    /// 128-bit, the x86-64 baseline.
+    Sse2,
+    /// 128-bit with the instructions of x86-64-v2.
+    Sse42,
+    /// 256-bit (x86-64-v3).
+    Avx2,
+    /// 512-bit (Ice Lake and Zen 4 onwards).
+    Avx512,
+    /// 128-bit on ARM.
+    Neon,
+}
+
+impl SimdLevel {
+    /// The levels this machine can run, lowest first. Empty on a machine without any.
+    pub fn available() -> Vec<SimdLevel> {
+        let _level = Level::new();
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        {
+            [
+                (SimdLevel::Sse2, _level.as_sse2().is_some()),
+                (SimdLevel::Sse42, _level.as_sse4_2().is_some()),
+                (SimdLevel::Avx2, _level.as_avx2().is_some()),
+                (SimdLevel::Avx512, _level.as_avx512().is_some()),
+            ]
+            .into_iter()
+            .filter_map(|(l, ok)| ok.then_some(l))
+            .collect()
+        }
+        #[cfg(target_arch = "aarch64")]
+        {
+            vec![SimdLevel::Neon]
+        }
+        #[cfg(not(any(target_arch = "x86", target_arch = "x86_64", target_arch = "aarch64")))]
+        {
+            Vec::new()
+        }
+    }
+
+    /// The name used on command lines and in records.
+    pub fn name(self) -> &'static str {
+        match self {
+            SimdLevel::Sse2 => "sse2",
+            SimdLevel::Sse42 => "sse4.2",
+            SimdLevel::Avx2 => "avx2",
+            SimdLevel::Avx512 => "avx512",
+            SimdLevel::Neon => "neon",
+        }
+    }
+
+    /// The level as fearless_simd knows it; the machine's best where this one is not available.
+    pub(crate) fn resolve(wanted: Option<SimdLevel>) -> Level {
+        let best = Level::new();
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        let limited = match wanted {
+            Some(SimdLevel::Sse2) => best.as_sse2().map(Level::Sse2),
+            Some(SimdLevel::Sse42) => best.as_sse4_2().map(Level::Sse4_2),
+            Some(SimdLevel::Avx2) => best.as_avx2().map(Level::Avx2),
+            _ => None,
+        };
+        #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+        let limited = {
+            let _ = wanted;
+            None
+        };
+        limited.unwrap_or(best)
+    }
+}

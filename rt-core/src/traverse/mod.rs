@@ -1,0 +1,4 @@
+//! Traversal of the 8-wide hierarchy.
+
+pub(crate) mod packet;
+pub(crate) mod single;

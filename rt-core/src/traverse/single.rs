@@ -1,0 +1,157 @@
+//! One ray at a time: eight boxes per step, nearest child first.
+
+use crate::accel::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE};
+use crate::accel::{Unit, WideBvh};
+use crate::intersect::watertight::Shear;
+use crate::ray::Ray;
+use crate::simd::{Stack, prefetch};
+use crate::stats::{Work, count};
+use fearless_simd::{Simd, SimdBase, SimdMask, f32x8};
+
+/// Relative widening of a box's far distance so that rounding never closes it: 1 + 2γ₃ (Ize, "Robust BVH Ray Traversal", JCGT 2013).
+pub(crate) const BOX_SLACK: f32 = 1.0 + 2.0 * crate::math::gamma(3);
+
+/// Smallest direction component as it enters a reciprocal: keeps 0·∞ out of the slab test while a ray in a box plane still counts as inside.
+pub(crate) const MIN_COMPONENT: f32 = 1e-18;
+
+/// What a ray needs in every step, computed once.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RaySetup {
+    pub(crate) origin: [f32; 3],
+    pub(crate) rcp: [f32; 3],
+    /// Row of the plane the ray meets first, per axis; the other one is that row with the lowest bit flipped.
+    pub(crate) near: [usize; 3],
+    pub(crate) shear: Shear,
+    pub(crate) t_min: f32,
+}
+
+/// 1/d with tiny components replaced, keeping the sign of zero.
+#[inline(always)]
+pub(crate) fn safe_reciprocal(d: f32) -> f32 {
+    1.0 / d.abs().max(MIN_COMPONENT).copysign(d)
+}
+
+impl RaySetup {
+    #[inline(always)]
+    pub(crate) fn new(ray: &Ray) -> Self {
+        let d = ray.dir.to_array();
+        let rcp = d.map(safe_reciprocal);
+        // Near planes follow the sign of the reciprocal, so that -0.0 and +0.0 agree with it.
+        let near = std::array::from_fn(|a| 2 * a + (rcp[a] < 0.0) as usize);
+        RaySetup { origin: ray.origin.to_array(), rcp, near, shear: Shear::new(d), t_min: ray.t_min }
+    }
+}
+
+/// What happens at a leaf.
+pub(crate) trait LeafTest<S: Simd> {
+    /// Tests the primitives of `leaf`; lowers `t_max` to the closest hit so far. Returns true when the search is over.
+    fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, t_max: &mut f32) -> bool;
+}
+
+/// Walks the leaves whose boxes the ray meets before `t_max`. `CONSERVATIVE` widens boxes by their rounding error; `ORDERED` goes to the nearest
+/// child first (any-hit queries do not care).
+///
+/// Never inlined: one body per instruction set, leaf kind and mode. Inlined into its callers it multiplied the compile time by thirty.
+#[inline(never)]
+pub(crate) fn traverse<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, const ORDERED: bool>(
+    simd: S,
+    bvh: &WideBvh,
+    ray: &RaySetup,
+    t_max: f32,
+    leaves: &mut L,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || traverse_body::<S, L, CONSERVATIVE, ORDERED>(simd, bvh, ray, t_max, leaves),
+    );
+}
+
+#[inline(always)]
+fn traverse_body<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, const ORDERED: bool>(
+    simd: S,
+    bvh: &WideBvh,
+    ray: &RaySetup,
+    mut t_max: f32,
+    leaves: &mut L,
+) {
+    let units = bvh.units.as_slice();
+    let origin = ray.origin.map(|v| f32x8::splat(simd, v));
+    let rcp = ray.rcp.map(|v| f32x8::splat(simd, v));
+    let t_min = f32x8::splat(simd, ray.t_min);
+    let slack = f32x8::splat(simd, BOX_SLACK);
+    let [nx, ny, nz] = ray.near;
+    // Distance in the high half, so that integer order is order of distance; t_min >= 0 keeps it non-negative.
+    let mut stack: Stack<u64, STACK_SIZE> = Stack::new();
+    let mut current = ChildRef::node(0);
+    loop {
+        if current.is_leaf() {
+            count(Work::Leaves, 1);
+            if leaves.test(simd, units, current, &mut t_max) {
+                return;
+            }
+        } else {
+            count(Work::Nodes, 1);
+            let at = current.unit();
+            let node: &[Unit; NODE_UNITS] =
+                units[at..at + NODE_UNITS].try_into().expect("a slice of that length");
+            let plane = |row: usize, axis: usize| {
+                (f32x8::from_slice(simd, &node[row & 7].0) - origin[axis]) * rcp[axis]
+            };
+            let near = plane(nx, 0).max(plane(ny, 1)).max(plane(nz, 2).max(t_min));
+            let far = plane(nx ^ 1, 0).min(plane(ny ^ 1, 1)).min(plane(nz ^ 1, 2));
+            let far = if CONSERVATIVE { far * slack } else { far };
+            let hit = near.simd_le(far.min(f32x8::splat(simd, t_max)));
+            let mut mask = hit.to_bitmask() as u32;
+            if mask != 0 {
+                let refs = node[CHILD_ROW].bits();
+                let first = mask.trailing_zeros() as usize;
+                mask &= mask - 1;
+                if mask == 0 {
+                    current = ChildRef(refs[first & 7]);
+                    prefetch::<4>(units, current.unit());
+                    continue;
+                }
+                let near: [f32; 8] = near.to_array();
+                let entry = |i: usize| {
+                    let child = refs[i & 7];
+                    prefetch::<4>(units, ChildRef(child).unit());
+                    ((near[i & 7].to_bits() as u64) << 32) | child as u64
+                };
+                if !ORDERED {
+                    current = ChildRef(entry(first) as u32);
+                    while mask != 0 {
+                        stack.push(entry(mask.trailing_zeros() as usize));
+                        mask &= mask - 1;
+                    }
+                    continue;
+                }
+                let (mut e0, mut e1) = (entry(first), entry(mask.trailing_zeros() as usize));
+                mask &= mask - 1;
+                if e1 < e0 {
+                    (e0, e1) = (e1, e0);
+                }
+                if mask == 0 {
+                    stack.push(e1);
+                    current = ChildRef(e0 as u32);
+                    continue;
+                }
+                let base = stack.len();
+                stack.push(e1);
+                stack.push(e0);
+                while mask != 0 {
+                    stack.push(entry(mask.trailing_zeros() as usize));
+                    mask &= mask - 1;
+                }
+                stack.sort_descending_from(base);
+            }
+        }
+        // ---- Next entry that still lies before the closest hit.
+        loop {
+            let Some(e) = stack.pop() else { return };
+            if f32::from_bits((e >> 32) as u32) <= t_max {
+                current = ChildRef(e as u32);
+                break;
+            }
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! What the shape tests share: a small deterministic generator and the closest hit by trying every primitive.
+#![allow(dead_code, reason = "each test binary uses its own part")]
+
+use glam::Vec3;
+use rt_core::ray::Ray;
+use rt_core::shapes::{Shape, ShapeHit};
+
+/// SplitMix64 (Steele, Lea and Flood 2014): the same numbers on every machine.
+pub(crate) struct Random(u64);
+
+impl Random {
+    pub(crate) fn new(seed: u64) -> Self {
+        Random(seed)
+    }
+
+    pub(crate) fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    /// Uniform in 0..1.
+    pub(crate) fn unit(&mut self) -> f32 {
+        (self.bits() >> 40) as f32 * (-24f32).exp2()
+    }
+
+    /// Uniform in lo..hi.
+    pub(crate) fn range(&mut self, lo: f32, hi: f32) -> f32 {
+        lo + (hi - lo) * self.unit()
+    }
+
+    /// Uniform in a cube of -1..1.
+    pub(crate) fn cube(&mut self) -> Vec3 {
+        Vec3::new(self.range(-1.0, 1.0), self.range(-1.0, 1.0), self.range(-1.0, 1.0))
+    }
+
+    /// Uniform on the unit sphere.
+    pub(crate) fn unit_vector(&mut self) -> Vec3 {
+        loop {
+            let v = self.cube();
+            let n = v.length();
+            if n > 0.01 && n <= 1.0 {
+                return v / n;
+            }
+        }
+    }
+}
+
+/// The closest hit over all primitives whose bounds are not empty and are met by the ray; ties to the lower primitive.
+pub(crate) fn closest(shape: &dyn Shape, ray: &Ray) -> Option<(u32, ShapeHit)> {
+    let mut best: Option<(u32, ShapeHit)> = None;
+    for prim in 0..shape.num_primitives() as u32 {
+        let b = shape.bounds(prim);
+        if b.is_empty() || !meets_box(ray, b.min, b.max) {
+            continue;
+        }
+        let t_max = best.map_or(ray.t_max, |(_, h)| h.t);
+        if let Some(h) = shape.closest(prim, &Ray { t_max, ..*ray }) {
+            best = Some((prim, h));
+        }
+    }
+    best
+}
+
+/// Slab test in f64.
+fn meets_box(ray: &Ray, min: Vec3, max: Vec3) -> bool {
+    let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
+    let (mut near, mut far) = (f64::from(ray.t_min), f64::from(ray.t_max));
+    for a in 0..3 {
+        let (lo, hi) = (f64::from(min[a]) - o[a], f64::from(max[a]) - o[a]);
+        if d[a] == 0.0 {
+            if lo > 0.0 || hi < 0.0 {
+                return false;
+            }
+        } else {
+            let (x, y) = (lo / d[a], hi / d[a]);
+            near = near.max(x.min(y));
+            far = far.min(x.max(y));
+        }
+    }
+    near <= far
+}

@@ -1,0 +1,136 @@
+//! The steps of `cargo xtask test`, in order. To add, drop or change a check, edit this list.
+//!
+//! The order is cheap before dear, so that a misplaced comma is reported after seconds and not after minutes.
+//! All steps share one target directory and one set of features, so that nothing is compiled twice without need:
+//! `clippy` and `api-docs` check, `tests` and `book-and-doc-tests` build with the dev profile, `main-job` with release.
+
+use crate::runner::{Context, Outcome};
+use crate::{licences, runner};
+
+/// One check.
+#[derive(Debug)]
+pub(crate) struct Step {
+    /// Name in the summary and for `--only`.
+    pub(crate) name: &'static str,
+    /// What a green step tells.
+    pub(crate) tells: &'static str,
+    /// What is done.
+    pub(crate) action: Action,
+}
+
+/// What a step does.
+#[derive(Debug)]
+pub(crate) enum Action {
+    /// Runs cargo in the workspace root; passes when it exits with 0.
+    Cargo {
+        /// Arguments of cargo.
+        args: &'static [&'static str],
+        /// Environment variables set for this command only.
+        env: &'static [(&'static str, &'static str)],
+    },
+    /// Calls a function of this program.
+    Call(fn(&Context<'_>) -> Outcome),
+}
+
+const fn cargo(args: &'static [&'static str]) -> Action {
+    Action::Cargo { args, env: &[] }
+}
+
+/// All steps, in the order they run.
+pub(crate) const STEPS: &[Step] = &[
+    Step {
+        name: "tools",
+        tells: "the compiler is new enough; rustfmt and clippy are there",
+        action: Action::Call(runner::check_tools),
+    },
+    Step {
+        name: "peers",
+        tells: "the software that tests compare with is installed",
+        action: Action::Call(runner::report_peers),
+    },
+    Step {
+        name: "fmt",
+        tells: "every source file is formatted",
+        action: cargo(&["fmt", "--all", "--", "--check"]),
+    },
+    Step {
+        name: "fmt-xtask",
+        tells: "so is this program",
+        action: cargo(&["fmt", "--manifest-path", "xtask/Cargo.toml", "--", "--check"]),
+    },
+    Step {
+        name: "xtask",
+        tells: "this program passes its own tests",
+        action: cargo(&["test", "--quiet", "--manifest-path", "xtask/Cargo.toml"]),
+    },
+    Step {
+        name: "licences",
+        tells: "every package we build with has a licence that deny.toml allows, and none is banned",
+        action: Action::Call(licences::check),
+    },
+    Step {
+        name: "deny",
+        tells: "cargo-deny agrees, also about sources, duplicates and other platforms; needs cargo-deny",
+        action: Action::Call(runner::cargo_deny),
+    },
+    Step {
+        name: "clippy",
+        tells: "no warnings, with all features, in tests, examples and benches too",
+        action: cargo(&["clippy", "--workspace", "--all-targets", "--all-features", "--", "-D", "warnings"]),
+    },
+    Step {
+        name: "clippy-xtask",
+        tells: "nor in this program",
+        action: cargo(&[
+            "clippy",
+            "--manifest-path",
+            "xtask/Cargo.toml",
+            "--all-targets",
+            "--",
+            "-D",
+            "warnings",
+        ]),
+    },
+    Step {
+        name: "tests",
+        tells: "unit and integration tests of all members pass, with the peers that were found",
+        action: cargo(&["test", "--workspace", "--no-fail-fast", "--lib", "--bins", "--tests", "--examples"]),
+    },
+    Step {
+        name: "book-and-doc-tests",
+        tells: "the examples in the documentation and in the book compile and hold",
+        action: cargo(&["test", "--workspace", "--no-fail-fast", "--doc"]),
+    },
+    Step {
+        name: "counters",
+        tells: "rt-core's unit tests also pass with the counters of the traversal loops compiled in",
+        action: cargo(&["test", "-p", "rt-core", "--features", "stats", "--lib"]),
+    },
+    Step {
+        name: "api-docs",
+        tells: "the documentation builds without broken links",
+        action: Action::Cargo {
+            args: &["doc", "--workspace", "--no-deps", "--all-features"],
+            env: &[("RUSTDOCFLAGS", "-D warnings")],
+        },
+    },
+    Step {
+        name: "main-job",
+        tells: "the release build that users run starts and lists its experiments",
+        action: cargo(&["run", "--release", "-p", "bench", "--", "list"]),
+    },
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn step_names_are_unique_words() {
+        for (i, step) in STEPS.iter().enumerate() {
+            assert!(step.name.chars().all(|c| c.is_ascii_lowercase() || c == '-'), "{}", step.name);
+            assert!(STEPS[..i].iter().all(|other| other.name != step.name), "{} twice", step.name);
+            assert!(!step.tells.is_empty(), "{} tells nothing", step.name);
+        }
+    }
+}
