@@ -9,3 +9,4 @@ pub mod image_io;
 pub mod isosurface;
 #[cfg(test)]
 mod testing;
+pub mod view;
