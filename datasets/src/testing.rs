@@ -29,3 +29,9 @@ pub(crate) fn open_or_flipped_edges(indices: &[[u32; 3]]) -> usize {
     }
     balance.values().filter(|&&uses| uses != (1, 1)).count()
 }
+
+/// Volume enclosed by a closed mesh; positive when triangles are counter-clockwise seen from outside.
+pub(crate) fn volume(mesh: &rt_core::mesh::TriMesh) -> f64 {
+    let t = (0..mesh.num_triangles()).map(|i| mesh.triangle(i).map(|p| p.as_dvec3()));
+    t.map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
+}

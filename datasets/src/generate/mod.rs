@@ -1,4 +1,16 @@
 //! Generators: every data set of the thesis as a deterministic function of its size.
+//!
+//! (The module is called `generate` because `gen` is a keyword.) Nothing here needs a file; random numbers come from
+//! [`random`], so the same parameters give the same data on every machine and any number of threads.
 
+pub mod impact;
+pub mod mixing_layer;
 pub mod nested_wavelet;
+mod noise;
+pub mod plasma;
+pub mod polylines;
+pub mod random;
+pub mod shapes;
+pub mod star_field_lines;
+pub mod streamline;
 pub mod wavelet;

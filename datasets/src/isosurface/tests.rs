@@ -1,6 +1,6 @@
 use super::*;
 use crate::generate::wavelet::Wavelet;
-use crate::testing::{open_or_flipped_edges, with_threads};
+use crate::testing::{open_or_flipped_edges, volume, with_threads};
 use glam::UVec3;
 
 /// A grid of `n`³ points around zero with spacing 1 whose values come from the position.
@@ -26,11 +26,6 @@ fn noise(n: u32, seed: u32) -> Grid {
         }
     }
     grid
-}
-
-fn volume(mesh: &TriMesh) -> f64 {
-    let t = (0..mesh.num_triangles()).map(|i| mesh.triangle(i).map(|p| p.as_dvec3()));
-    t.map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
 }
 
 #[test]

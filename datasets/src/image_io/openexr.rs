@@ -1,0 +1,184 @@
+//! OpenEXR through the `exr` crate: all planes of a picture as 32-bit channels of one part, ZIP-compressed without loss.
+//!
+//! Metadata entries are custom attributes of the same name; the unit of plane `depth.Z` is the text attribute
+//! `unit.depth.Z`. Texts are written as UTF-8.
+
+use super::{ImageError, Metadata, MetadataValue, Picture, Plane, format_error, io_error};
+use crate::atomic_file::write_atomically;
+use exr::meta::attribute::AttributeValue;
+use exr::prelude::{
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, ReadChannels, ReadLayers,
+    Text, WritableImage,
+};
+use std::io::Cursor;
+use std::path::Path;
+
+const UNIT_PREFIX: &str = "unit.";
+/// Longest attribute or channel name that every OpenEXR reader accepts.
+const MAX_NAME_BYTES: usize = 255;
+
+/// Writes all planes and the metadata. The file appears whole or not at all.
+pub fn write_exr(path: &Path, picture: &Picture) -> Result<(), ImageError> {
+    picture.check()?;
+    if picture.planes.is_empty() || picture.width == 0 || picture.height == 0 {
+        let size = format!("{}x{} with {} planes", picture.width, picture.height, picture.planes.len());
+        return Err(format_error(
+            path,
+            format!("OpenEXR cannot hold a picture of {size}; add pixels and a plane"),
+        ));
+    }
+    let mut attributes = LayerAttributes::default();
+    let units = picture.planes.iter().filter(|p| !p.unit.is_empty());
+    let units = units.map(|p| (format!("{UNIT_PREFIX}{}", p.name), MetadataValue::Text(p.unit.clone())));
+    for (key, value) in picture.metadata.clone().into_iter().chain(units) {
+        let value = match value {
+            MetadataValue::Text(t) => AttributeValue::Text(text(&t)),
+            MetadataValue::Number(n) => AttributeValue::F64(n),
+        };
+        attributes.other.insert(name(path, &key)?, value);
+    }
+    let mut channels = Vec::new();
+    for p in &picture.planes {
+        channels.push(AnyChannel::new(name(path, &p.name)?, FlatSamples::F32(p.samples.clone())));
+    }
+    let size = (picture.width as usize, picture.height as usize);
+    let layer = Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, AnyChannels::sort(channels.into()));
+    let mut bytes = Cursor::new(Vec::new());
+    Image::from_layer(layer).write().to_buffered(&mut bytes).map_err(|e| format_error(path, e))?;
+    write_atomically(path, |w| w.write_all(bytes.get_ref())).map_err(io_error(path, "write"))
+}
+
+/// Reads the channels of the first part that has any, 16-bit and integer channels as f32. Planes come sorted by name, as
+/// the format stores them; [`Picture`]s that differ in the order of planes hold the same.
+pub fn read_exr(path: &Path) -> Result<Picture, ImageError> {
+    let bytes = std::fs::read(path).map_err(io_error(path, "read"))?;
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(|e| format_error(path, format!("not a readable OpenEXR file: {e}")))?;
+    let layer = image.layer_data;
+    let size =
+        |n: usize| u32::try_from(n).map_err(|_| format_error(path, format!("{n} pixels along one side")));
+    let mut picture = Picture::new(size(layer.size.0)?, size(layer.size.1)?);
+    let mut entries: Metadata = layer.attributes.other.iter().filter_map(metadata_entry).collect();
+    for channel in &layer.channel_data.list {
+        let name = string(&channel.name);
+        let unit = match entries.remove(&format!("{UNIT_PREFIX}{name}")) {
+            Some(MetadataValue::Text(unit)) => unit,
+            _ => String::new(),
+        };
+        if channel.sampling.0 != 1 || channel.sampling.1 != 1 {
+            let reason = format!("channel `{name}` is subsampled; save it at full resolution");
+            return Err(format_error(path, reason));
+        }
+        let samples = channel.sample_data.values_as_f32().collect();
+        picture.planes.push(Plane { name, unit, samples });
+    }
+    picture.metadata = entries;
+    picture.check()?;
+    Ok(picture)
+}
+
+fn metadata_entry((key, value): (&Text, &AttributeValue)) -> Option<(String, MetadataValue)> {
+    let value = match value {
+        AttributeValue::Text(t) => MetadataValue::Text(string(t)),
+        AttributeValue::F64(n) => MetadataValue::Number(*n),
+        AttributeValue::F32(n) => MetadataValue::Number(*n as f64),
+        AttributeValue::I32(n) => MetadataValue::Number(*n as f64),
+        _ => return None,
+    };
+    Some((string(key), value))
+}
+
+fn text(s: &str) -> Text {
+    Text::from_slice_unchecked(s.as_bytes())
+}
+
+/// A name of a channel or an attribute: not empty, without the terminating zero, short.
+fn name(path: &Path, s: &str) -> Result<Text, ImageError> {
+    if s.is_empty() || s.contains('\0') || s.len() > MAX_NAME_BYTES {
+        let reason = format!(
+            "`{}` cannot name a plane or a metadata entry: 1 to {MAX_NAME_BYTES} bytes, no zero",
+            s.escape_debug()
+        );
+        return Err(format_error(path, reason));
+    }
+    Ok(text(s))
+}
+
+fn string(t: &Text) -> String {
+    String::from_utf8_lossy(t.bytes()).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn picture() -> Picture {
+        let mut p = Picture::new(5, 3);
+        let ramp = |k: f32| (0..15).map(|i| i as f32 * k - 2.0).collect::<Vec<f32>>();
+        p.add("R", "", ramp(0.1)).unwrap();
+        p.add("deflection.X", "rad", ramp(1e-7)).unwrap();
+        let odd = [f32::INFINITY, f32::NEG_INFINITY, f32::MIN_POSITIVE / 4.0, -0.0, 16_777_217.0];
+        p.add("depth.Z", "m", odd.into_iter().cycle().take(15).collect()).unwrap();
+        p.metadata.insert("command_line".into(), "render --größe 3 \"a b\"".into());
+        p.metadata.insert("elapsed_secs".into(), 0.125.into());
+        p
+    }
+
+    #[test]
+    fn planes_units_and_metadata_come_back_bit_for_bit() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("p.exr");
+        write_exr(&path, &picture()).unwrap();
+        let back = read_exr(&path).unwrap();
+        assert_eq!(back, picture());
+        for (a, b) in back.planes.iter().zip(&picture().planes) {
+            let bits = |p: &Plane| p.samples.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+            assert_eq!(bits(a), bits(b), "{}", a.name);
+        }
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1, "no temporary file is left");
+    }
+
+    #[test]
+    fn nan_payloads_do_not_panic() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("nan.exr");
+        let mut p = Picture::new(1, 2);
+        p.add("Y", "", vec![f32::NAN, 1.0]).unwrap();
+        write_exr(&path, &p).unwrap();
+        let back = read_exr(&path).unwrap();
+        assert!(back.planes[0].samples[0].is_nan());
+    }
+
+    #[test]
+    fn broken_files_are_errors_that_name_the_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("p.exr");
+        write_exr(&path, &picture()).unwrap();
+        let whole = std::fs::read(&path).unwrap();
+        for cut in [0, 3, 20, whole.len() / 2, whole.len() - 1] {
+            std::fs::write(&path, &whole[..cut]).unwrap();
+            let message = read_exr(&path).unwrap_err().to_string();
+            assert!(message.contains("p.exr"), "{cut}: {message}");
+        }
+        assert!(read_exr(&dir.path().join("absent.exr")).unwrap_err().to_string().contains("absent.exr"));
+    }
+
+    #[test]
+    fn impossible_pictures_are_refused() {
+        let path = Path::new("never-written.exr");
+        assert!(write_exr(path, &Picture::new(4, 4)).is_err(), "no planes");
+        let mut empty = Picture::new(0, 4);
+        empty.add("Y", "", vec![]).unwrap();
+        assert!(write_exr(path, &empty).is_err(), "no pixels");
+        let mut zero = Picture::new(1, 1);
+        zero.add("a\0b", "", vec![0.0]).unwrap();
+        assert!(write_exr(path, &zero).unwrap_err().to_string().contains("a\\0b"));
+        assert!(!path.exists());
+    }
+}
