@@ -7,53 +7,7 @@
 
 use glam::{DVec3, Vec3};
 use rt_core::mesh::TriMesh;
-
-/// Rays per block.
-pub const LANES: usize = 16;
-/// [`HitBlock::prim`] of a ray without a hit.
-pub const MISS: u32 = u32::MAX;
-
-/// 16 rays. A lane with `tmax < 0` is empty.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[repr(C, align(64))]
-pub struct RayBlock {
-    /// Origins, x.
-    pub ox: [f32; LANES],
-    /// Origins, y.
-    pub oy: [f32; LANES],
-    /// Origins, z.
-    pub oz: [f32; LANES],
-    /// Directions, x; the directions have unit length up to rounding.
-    pub dx: [f32; LANES],
-    /// Directions, y.
-    pub dy: [f32; LANES],
-    /// Directions, z.
-    pub dz: [f32; LANES],
-    /// Nearest distance that counts.
-    pub tmin: [f32; LANES],
-    /// Farthest distance that counts.
-    pub tmax: [f32; LANES],
-}
-
-/// The closest hits of a [`RayBlock`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[repr(C, align(64))]
-pub struct HitBlock {
-    /// Distances; meaningless without a hit.
-    pub t: [f32; LANES],
-    /// Triangle numbers, [`MISS`] without a hit.
-    pub prim: [u32; LANES],
-    /// First barycentric coordinates (weight of the second vertex), where the tracer computes them.
-    pub u: [f32; LANES],
-    /// Second barycentric coordinates (weight of the third vertex).
-    pub v: [f32; LANES],
-}
-
-impl HitBlock {
-    /// No hits.
-    pub const NONE: HitBlock =
-        HitBlock { t: [f32::INFINITY; LANES], prim: [MISS; LANES], u: [0.0; LANES], v: [0.0; LANES] };
-}
+pub use rt_core::ray::{HitBlock, LANES, NO_HIT, RayBlock};
 
 /// One ray as f64 numbers, before it is rounded into a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,7 +17,7 @@ pub struct Ray64 {
     /// Direction.
     pub direction: DVec3,
     /// Farthest distance that counts.
-    pub tmax: f64,
+    pub t_max: f64,
 }
 
 /// A list of rays in blocks.
@@ -76,7 +30,7 @@ pub struct RaySet {
 }
 
 impl RaySet {
-    /// Rounds rays to f32 and packs them. Empty lanes repeat a ray's numbers, with `tmax` -1.
+    /// Rounds rays to f32 and packs them. Empty lanes repeat a ray's numbers, with `t_max` -1.
     pub fn pack(rays: impl IntoIterator<Item = Ray64>) -> RaySet {
         let mut set = RaySet::default();
         for r in rays {
@@ -85,13 +39,13 @@ impl RaySet {
             if lane == 0 {
                 let s = |x: f32| [x; LANES];
                 let (ox, oy, oz, dx, dy, dz) = (s(o.x), s(o.y), s(o.z), s(d.x), s(d.y), s(d.z));
-                set.blocks.push(RayBlock { ox, oy, oz, dx, dy, dz, tmin: s(0.0), tmax: s(-1.0) });
+                set.blocks.push(RayBlock { ox, oy, oz, dx, dy, dz, t_min: s(0.0), t_max: s(-1.0) });
             }
             let last = set.blocks.len() - 1;
             let b = &mut set.blocks[last];
             (b.ox[lane], b.oy[lane], b.oz[lane]) = (o.x, o.y, o.z);
             (b.dx[lane], b.dy[lane], b.dz[lane]) = (d.x, d.y, d.z);
-            b.tmax[lane] = r.tmax as f32;
+            b.t_max[lane] = r.t_max as f32;
             set.len += 1;
         }
         set
@@ -156,7 +110,7 @@ impl View {
             let sx = ((f64::from(x) + 0.5) / f64::from(size) * 2.0 - 1.0) * self.tan_half_fov;
             let sy = (1.0 - (f64::from(y) + 0.5) / f64::from(size) * 2.0) * self.tan_half_fov;
             let direction = (forward + right * sx + up * sy).normalize();
-            Ray64 { origin: self.eye, direction, tmax: f64::INFINITY }
+            Ray64 { origin: self.eye, direction, t_max: f64::INFINITY }
         }))
     }
 }
@@ -175,7 +129,7 @@ pub fn surface_points(mesh: &TriMesh, rays: &RaySet, hits: &[HitBlock], radius: 
     let mut points = vec![];
     for i in 0..rays.len {
         let prim = hits[i / LANES].prim[i % LANES];
-        if prim == MISS {
+        if prim == NO_HIT {
             continue;
         }
         let (o, d) = rays.ray(i);
@@ -200,8 +154,8 @@ pub fn surface_points(mesh: &TriMesh, rays: &RaySet, hits: &[HitBlock], radius: 
 pub fn shadow(points: &[SurfacePoint], light: DVec3) -> RaySet {
     RaySet::pack(points.iter().map(|p| {
         let to_light = light - p.origin;
-        let tmax = to_light.length();
-        Ray64 { origin: p.origin, direction: to_light / tmax, tmax }
+        let t_max = to_light.length();
+        Ray64 { origin: p.origin, direction: to_light / t_max, t_max }
     }))
 }
 
@@ -211,7 +165,7 @@ pub fn shadow_from_light(points: &[SurfacePoint], light: DVec3) -> RaySet {
         let to_point = p.origin - light;
         let distance = to_point.length();
         // Stops just short of the point, so that its own surface does not count.
-        Ray64 { origin: light, direction: to_point / distance, tmax: distance * (1.0 - 1e-5) }
+        Ray64 { origin: light, direction: to_point / distance, t_max: distance * (1.0 - 1e-5) }
     }))
 }
 
@@ -226,7 +180,7 @@ pub fn ambient_occlusion(points: &[SurfacePoint]) -> RaySet {
             let b = (f64::from(k >> 2) + unit(seed ^ (2 * k + 2).wrapping_mul(0x9e37_79b9))) / 2.0;
             let (sin, cos) = (a * std::f64::consts::TAU).sin_cos();
             let direction = (tx * cos + ty * sin) * b.sqrt() + p.normal * (1.0 - b).sqrt();
-            Ray64 { origin: p.origin, direction, tmax: f64::INFINITY }
+            Ray64 { origin: p.origin, direction, t_max: f64::INFINITY }
         })
     }))
 }
@@ -241,7 +195,7 @@ pub fn incoherent(mesh: &TriMesh, count: usize) -> RaySet {
         let z = 2.0 * r(4) - 1.0;
         let (sin, cos) = (r(5) * std::f64::consts::TAU).sin_cos();
         let s = (1.0 - z * z).sqrt();
-        Ray64 { origin, direction: DVec3::new(s * cos, s * sin, z), tmax: f64::INFINITY }
+        Ray64 { origin, direction: DVec3::new(s * cos, s * sin, z), t_max: f64::INFINITY }
     }))
 }
 

@@ -7,7 +7,7 @@ pub mod brute_force;
 pub mod embree;
 pub mod obvhs;
 
-use crate::rays::{HitBlock, LANES, MISS, RayBlock, RaySet};
+use crate::rays::{HitBlock, LANES, NO_HIT, RayBlock, RaySet};
 use rayon::prelude::*;
 use rt_core::mesh::TriMesh;
 
@@ -106,7 +106,7 @@ pub fn occluded_all(tracer: &dyn Tracer, rays: &RaySet, masks: &mut [u16], threa
 
 /// Number of rays with a hit.
 pub fn count_hits(rays: &RaySet, hits: &[HitBlock]) -> u64 {
-    (0..rays.len).filter(|i| hits[i / LANES].prim[i % LANES] != MISS).count() as u64
+    (0..rays.len).filter(|i| hits[i / LANES].prim[i % LANES] != NO_HIT).count() as u64
 }
 
 /// Number of rays with something on them.
@@ -155,10 +155,10 @@ pub(crate) mod testing {
             let mesh = mesh();
             let exact = brute_force::BruteForce::new(&mesh);
             let case = |kind, rays: RaySet| {
-                let mut hits = vec![HitBlock::NONE; rays.blocks.len()];
+                let mut hits = vec![HitBlock::MISS; rays.blocks.len()];
                 closest_all(&exact, &rays, &mut hits, 2);
                 // Something is on a ray exactly when there is a closest hit.
-                let lane = |h: &HitBlock, l: usize| u16::from(h.prim[l] != MISS) << l;
+                let lane = |h: &HitBlock, l: usize| u16::from(h.prim[l] != NO_HIT) << l;
                 let masks = hits.iter().map(|h| (0..LANES).fold(0, |m, l| m | lane(h, l))).collect();
                 Case { kind, rays, hits, masks }
             };
@@ -182,7 +182,7 @@ pub(crate) mod testing {
     pub(crate) fn agrees_with_brute_force(tracer: &dyn Tracer) {
         for Case { kind, rays, hits, masks } in cases() {
             let what = format!("{}, {kind}", tracer.name());
-            let mut got = vec![HitBlock::NONE; rays.blocks.len()];
+            let mut got = vec![HitBlock::MISS; rays.blocks.len()];
             let mut got_masks = vec![0; rays.blocks.len()];
             closest_all(tracer, rays, &mut got, 2);
             occluded_all(tracer, rays, &mut got_masks, 2);
@@ -190,7 +190,7 @@ pub(crate) mod testing {
             for i in 0..rays.len {
                 let (b, l) = (i / LANES, i % LANES);
                 let (w, g) = (&hits[b], &got[b]);
-                let same = match (w.prim[l] == MISS, g.prim[l] == MISS) {
+                let same = match (w.prim[l] == NO_HIT, g.prim[l] == NO_HIT) {
                     (true, true) => true,
                     (false, false) => (w.t[l] - g.t[l]).abs() < 1e-4 * w.t[l].max(1.0),
                     _ => false,
