@@ -1,1 +1,5 @@
-fn main() {}
+//! `bench`: every table and figure of the dissertation, and error against time. See `bench --help`.
+
+fn main() -> std::process::ExitCode {
+    bench::cli::main()
+}

@@ -23,6 +23,18 @@ pub trait Tracer: Sync {
     fn occluded(&self, rays: &[RayBlock], masks: &mut [u16]);
 }
 
+impl<T: Tracer + ?Sized> Tracer for &T {
+    fn name(&self) -> String {
+        (**self).name()
+    }
+    fn closest(&self, rays: &[RayBlock], hits: &mut [HitBlock]) {
+        (**self).closest(rays, hits);
+    }
+    fn occluded(&self, rays: &[RayBlock], masks: &mut [u16]) {
+        (**self).occluded(rays, masks);
+    }
+}
+
 /// What building cost.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct BuildCost {
@@ -58,7 +70,9 @@ pub enum PeerError {
         reason: String,
     },
     /// The mesh has triangles that no peer accepts.
-    #[error("the mesh has {count} triangles with missing or non-finite vertices; peers need a clean mesh: remove them")]
+    #[error(
+        "the mesh has {count} triangles with missing or non-finite vertices; peers need a clean mesh: remove them"
+    )]
     Mesh {
         /// How many.
         count: usize,
@@ -100,7 +114,10 @@ pub fn occluded_all(tracer: &dyn Tracer, rays: &RaySet, masks: &mut [u16], threa
     if threads == 1 {
         rays.blocks.chunks(CHUNK).zip(masks.chunks_mut(CHUNK)).for_each(|(r, m)| tracer.occluded(r, m));
     } else {
-        rays.blocks.par_chunks(CHUNK).zip(masks.par_chunks_mut(CHUNK)).for_each(|(r, m)| tracer.occluded(r, m));
+        rays.blocks
+            .par_chunks(CHUNK)
+            .zip(masks.par_chunks_mut(CHUNK))
+            .for_each(|(r, m)| tracer.occluded(r, m));
     }
 }
 
@@ -127,7 +144,8 @@ pub(crate) mod testing {
     pub(crate) fn mesh() -> TriMesh {
         let (n, m) = (48u32, 24u32);
         let point = |i: u32, j: u32| {
-            let (a, b) = (i as f32 / n as f32 * std::f32::consts::TAU, j as f32 / m as f32 * std::f32::consts::TAU);
+            let (a, b) =
+                (i as f32 / n as f32 * std::f32::consts::TAU, j as f32 / m as f32 * std::f32::consts::TAU);
             let r = 1.0 + 0.35 * (b + 0.3 * (5.0 * a).sin()).cos();
             Vec3::new(r * a.cos(), 0.35 * b.sin() + 0.1 * (3.0 * a).sin(), r * a.sin())
         };

@@ -86,7 +86,9 @@ impl Obvhs {
             let triangles: Vec<RtTriangle> = leaf_order.collect();
             (bvh, triangles)
         });
-        let bytes = size_of_val(&bvh.nodes[..]) + size_of_val(&bvh.primitive_indices[..]) + size_of_val(&triangles[..]);
+        let bytes = size_of_val(&bvh.nodes[..])
+            + size_of_val(&bvh.primitive_indices[..])
+            + size_of_val(&triangles[..]);
         let cost = BuildCost {
             wall_secs: time.wall_secs,
             cpu_secs: time.process_cpu_secs,

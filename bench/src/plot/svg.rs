@@ -294,7 +294,10 @@ mod tests {
         let names: Vec<String> = (0..5).map(|i| format!("category with a long name {i}")).collect();
         let mut p = Plot::bars("ratios", Axis::linear("ratio", ""), names);
         for k in 0..9 {
-            p.series.push(Series::new(format!("s{k}"), (0..5).map(|i| (i as f64, 0.2 + (i * k) as f64)).collect()));
+            p.series.push(Series::new(
+                format!("s{k}"),
+                (0..5).map(|i| (i as f64, 0.2 + (i * k) as f64)).collect(),
+            ));
         }
         let svg = p.to_svg();
         no_number_is_nan(&svg);

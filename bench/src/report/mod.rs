@@ -74,7 +74,9 @@ fn section(r: &Record) -> String {
         let (name, caption) = (escape(&p.name), escape(&p.caption));
         let data = base64(&p.png);
         s += "<figure class=\"picture\">";
-        s += &format!("<img alt=\"{name}\" src=\"data:image/png;base64,{data}\"><figcaption>{caption}</figcaption>");
+        s += &format!(
+            "<img alt=\"{name}\" src=\"data:image/png;base64,{data}\"><figcaption>{caption}</figcaption>"
+        );
         s += "</figure>\n";
     }
     s += &ratios(&r.ratios);

@@ -204,7 +204,8 @@ impl EmbreeScene {
                     }
                 }
                 Queries::V4 { intersect, occluded } => {
-                    let (f, arguments) = (if OCCLUDED { occluded } else { intersect }, &raw mut flags.arguments4);
+                    let (f, arguments) =
+                        (if OCCLUDED { occluded } else { intersect }, &raw mut flags.arguments4);
                     match N {
                         1 => (f.one)(scene, rays, arguments),
                         4 => (f.four)(valid, scene, rays, arguments),
@@ -232,7 +233,8 @@ impl EmbreeScene {
                 h.u[to.clone()].copy_from_slice(&q.hit.u);
                 h.v[to.clone()].copy_from_slice(&q.hit.v);
                 for l in 0..N {
-                    h.prim[from + l] = if q.hit.geom_id[l] == abi::INVALID_ID { NO_HIT } else { q.hit.prim_id[l] };
+                    h.prim[from + l] =
+                        if q.hit.geom_id[l] == abi::INVALID_ID { NO_HIT } else { q.hit.prim_id[l] };
                 }
             }
         }
@@ -395,7 +397,9 @@ mod tests {
             for robust in [false, true] {
                 let options = Options { robust, threads: 1, ..Options::default() };
                 let scene = EmbreeScene::build(embree, &mesh, &options).unwrap();
-                for (width, coherent) in [(1, false), (4, true), (8, true), (8, false), (16, true), (16, false)] {
+                for (width, coherent) in
+                    [(1, false), (4, true), (8, true), (8, false), (16, true), (16, false)]
+                {
                     testing::agrees_with_brute_force(&scene.view(width, coherent));
                 }
             }
@@ -408,7 +412,8 @@ mod tests {
         with_each(|embree| {
             for quality in Quality::ALL {
                 for max_isa in [None, Some("avx2"), Some("sse4.2")] {
-                    let options = Options { quality, max_isa, compact: true, threads: 2, ..Options::default() };
+                    let options =
+                        Options { quality, max_isa, compact: true, threads: 2, ..Options::default() };
                     let scene = EmbreeScene::build(embree, &mesh, &options).unwrap();
                     testing::agrees_with_brute_force(&scene.view(16, true));
                 }
