@@ -51,6 +51,20 @@ impl RaySet {
         set
     }
 
+    /// About `limit` of the rays, spread evenly: every n-th run of 1024, so that neighbours stay together. All when
+    /// there are fewer.
+    pub fn thinned(self, limit: usize) -> RaySet {
+        const RUN: usize = 64;
+        let step = self.len.div_ceil(limit.max(1)).max(1);
+        if step == 1 {
+            return self;
+        }
+        let kept: Vec<RayBlock> = self.blocks.chunks(RUN).step_by(step).flatten().copied().collect();
+        // The last block, which may have empty lanes, is left out unless its run is kept whole.
+        let whole: Vec<RayBlock> = kept.into_iter().filter(|b| b.t_max[LANES - 1] >= 0.0).collect();
+        RaySet { len: whole.len() * LANES, blocks: whole }
+    }
+
     /// Origin and direction of ray `i` as they were rounded.
     pub fn ray(&self, i: usize) -> (Vec3, Vec3) {
         let (b, l) = (&self.blocks[i / LANES], i % LANES);
@@ -227,4 +241,80 @@ fn hash(x: u32) -> u32 {
 /// A number in 0..1 from a seed.
 fn unit(seed: u32) -> f64 {
     f64::from(hash(seed)) / 4_294_967_296.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn square() -> TriMesh {
+        let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+        let positions = corners.map(|[x, y]| Vec3::new(x, y, 0.25 * x)).to_vec();
+        TriMesh::new(positions, vec![[0, 1, 2], [0, 2, 3]])
+    }
+
+    #[test]
+    fn sixteen_primary_rays_are_a_square_of_pixels() {
+        let view = View::orbit(&square());
+        let rays = view.primary(32);
+        assert_eq!((rays.len, rays.blocks.len()), (1024, 64));
+        let pixel = |i: usize| {
+            let d = rays.ray(i).1.as_dvec3();
+            let [right, up, forward] = view.axes;
+            let (x, y) = (d.dot(right) / d.dot(forward), d.dot(up) / d.dot(forward));
+            let index = |s: f64| ((s / view.tan_half_fov + 1.0) * 16.0).floor() as i32;
+            (index(x), index(-y))
+        };
+        let first: Vec<(i32, i32)> = (0..16).map(pixel).collect();
+        assert!(first.iter().all(|p| (0..4).contains(&p.0) && (0..4).contains(&p.1)), "{first:?}");
+        assert_eq!(pixel(1023), (31, 31));
+    }
+
+    #[test]
+    fn empty_lanes_are_marked_and_not_counted() {
+        let ray = Ray64 { origin: DVec3::X, direction: DVec3::Y, t_max: 5.0 };
+        let set = RaySet::pack(vec![ray; 18]);
+        assert_eq!((set.len, set.blocks.len()), (18, 2));
+        assert_eq!(set.blocks[1].t_max[..3], [5.0, 5.0, -1.0]);
+        assert_eq!(RaySet::pack(vec![]), RaySet::default());
+    }
+
+    #[test]
+    fn thinning_keeps_neighbours_and_whole_blocks() {
+        let ray = |i: usize| Ray64 { origin: DVec3::X * i as f64, direction: DVec3::Y, t_max: 1.0 };
+        let set = RaySet::pack((0..10_000).map(ray));
+        let thin = set.clone().thinned(3000);
+        assert!((2000..=4096).contains(&thin.len) && thin.len % LANES == 0, "{}", thin.len);
+        assert_eq!(thin.ray(1023).0.x, 1023.0);
+        assert_eq!(thin.ray(1024).0.x, 4096.0);
+        assert_eq!(set.clone().thinned(10_000), set);
+    }
+
+    #[test]
+    fn secondary_rays_start_off_the_surface_on_the_side_of_the_viewer() {
+        let mesh = square();
+        let (origin, direction) = (DVec3::new(0.3, 0.2, 4.0), DVec3::NEG_Z);
+        let rays = RaySet::pack([Ray64 { origin, direction, t_max: 9.0 }]);
+        let mut hits = [HitBlock::MISS];
+        hits[0].prim[0] = 0;
+        let points = surface_points(&mesh, &rays, &hits, 1.0);
+        let p = points[0];
+        // The plane is z = x/4; the hit is at (0.3, 0.2, 0.075).
+        let height = (p.origin.z - 0.25 * p.origin.x) / (1.0f64 + 0.0625).sqrt();
+        assert!((height - 2e-5).abs() < 1e-9, "{height}");
+        assert!(p.normal.z > 0.0 && (p.normal.length() - 1.0).abs() < 1e-12);
+        let light = DVec3::new(0.0, 0.0, 10.0);
+        let (o, d) = shadow(&points, light).ray(0);
+        assert!((o + d * 10.0 - light.as_vec3()).length() < 0.2);
+        let (o, d) = shadow_from_light(&points, light).ray(0);
+        assert!(o == light.as_vec3() && d.z < 0.0);
+        let ao = ambient_occlusion(&points);
+        assert_eq!(ao.len, 8);
+        assert!((0..8).all(|i| ao.ray(i).1.as_dvec3().dot(p.normal) > 0.0));
+    }
+
+    #[test]
+    fn rays_are_the_same_every_time() {
+        assert_eq!(incoherent(&square(), 100), incoherent(&square(), 100));
+    }
 }
