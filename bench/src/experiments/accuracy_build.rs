@@ -55,6 +55,7 @@ fn scene(
     let view = View::orbit(mesh);
     let kinds = [Kind::Primary, Kind::AmbientOcclusion];
     for (kind, rays) in compare::make_rays(mesh, &view, pixels, &kinds, &built[0].1.view(Mode::Coherent)) {
+        let rays = if context.quick { rays.thinned(1 << 18) } else { rays };
         context.say(format!("{name}: {} rays", kind.name()));
         let mode = if kind.coherent() { Mode::Coherent } else { Mode::Incoherent };
         let contenders: Vec<Contender<'_>> = built
@@ -88,7 +89,7 @@ fn scene(
 /// Time to the n-th frame, build included: where lines cross, the better build has paid for itself.
 fn plot(record: &Record, mesh: &str) -> Plot {
     let title =
-        format!("{mesh}: build, then frames of primary and 8 ambient-occlusion rays, one thread tracing");
+        format!("{mesh}: build, then frames of these primary and ambient-occlusion rays, one thread tracing");
     let mut plot = Plot::lines(&title, Axis::log("frames", ""), Axis::log("total time", "s"));
     for quality in BuildQuality::ALL {
         let rows = || {
