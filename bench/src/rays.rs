@@ -284,7 +284,7 @@ mod tests {
         let ray = |i: usize| Ray64 { origin: DVec3::X * i as f64, direction: DVec3::Y, t_max: 1.0 };
         let set = RaySet::pack((0..10_000).map(ray));
         let thin = set.clone().thinned(3000);
-        assert!((2000..=4096).contains(&thin.len) && thin.len % LANES == 0, "{}", thin.len);
+        assert!((2000..=4096).contains(&thin.len) && thin.len.is_multiple_of(LANES), "{}", thin.len);
         assert_eq!(thin.ray(1023).0.x, 1023.0);
         assert_eq!(thin.ray(1024).0.x, 4096.0);
         assert_eq!(set.clone().thinned(10_000), set);

@@ -206,7 +206,7 @@ fn stroke(i: usize) -> String {
 }
 
 fn fill(i: usize) -> (&'static str, f64) {
-    (COLORS[i % COLORS.len()], if i / COLORS.len() % 2 == 0 { 0.9 } else { 0.45 })
+    (COLORS[i % COLORS.len()], if (i / COLORS.len()).is_multiple_of(2) { 0.9 } else { 0.45 })
 }
 
 /// A mark of its own shape for each series.
