@@ -13,9 +13,12 @@
 #![deny(unsafe_code)]
 
 mod book;
+pub mod cli;
 pub mod clock;
 pub mod experiments;
 pub mod machine;
+pub mod meshes;
+pub mod ours;
 pub mod peers;
 pub mod plot;
 pub mod rays;

@@ -206,7 +206,7 @@ fn stroke(i: usize) -> String {
 }
 
 fn fill(i: usize) -> (&'static str, f64) {
-    (COLORS[i % COLORS.len()], if i / COLORS.len() % 2 == 0 { 0.9 } else { 0.45 })
+    (COLORS[i % COLORS.len()], if (i / COLORS.len()).is_multiple_of(2) { 0.9 } else { 0.45 })
 }
 
 /// A mark of its own shape for each series.
@@ -294,7 +294,10 @@ mod tests {
         let names: Vec<String> = (0..5).map(|i| format!("category with a long name {i}")).collect();
         let mut p = Plot::bars("ratios", Axis::linear("ratio", ""), names);
         for k in 0..9 {
-            p.series.push(Series::new(format!("s{k}"), (0..5).map(|i| (i as f64, 0.2 + (i * k) as f64)).collect()));
+            p.series.push(Series::new(
+                format!("s{k}"),
+                (0..5).map(|i| (i as f64, 0.2 + (i * k) as f64)).collect(),
+            ));
         }
         let svg = p.to_svg();
         no_number_is_nan(&svg);
