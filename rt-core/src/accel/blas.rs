@@ -70,8 +70,8 @@ pub(crate) struct IdWriter;
 
 impl LeafWriter for IdWriter {
     const UNITS: usize = 1;
-    fn write(&self, prims: impl ExactSizeIterator<Item = u32> + Clone, out: &mut [Unit]) {
-        write_id_leaf(out, prims);
+    fn write(&self, prims: &[u32], out: &mut [Unit]) {
+        write_id_leaf(out, prims.iter().copied());
     }
 }
 

@@ -11,6 +11,12 @@ const MAX_BINS: usize = 16;
 /// Sets at least this large are binned in parallel, in pieces of this size (fixed, so that the tree does not depend on the threads).
 const PARALLEL_CHUNK: usize = 1 << 16;
 
+/// Leaf tests that `n` primitives cost.
+#[inline(always)]
+pub(crate) fn leaf_tests(n: usize) -> f32 {
+    n.div_ceil(LEAF_SIZE) as f32
+}
+
 /// A way to cut a set in two.
 #[derive(Debug, Clone, Copy)]
 struct Cut {
@@ -45,14 +51,22 @@ impl BinMap {
     }
 }
 
-struct Bins {
+/// Boxes and numbers of primitives per axis and bin.
+pub(crate) struct Bins {
     boxes: [[Box4; MAX_BINS]; 3],
     counts: [[u32; MAX_BINS]; 3],
 }
 
 impl Bins {
-    fn empty() -> Self {
+    pub(crate) fn empty() -> Self {
         Bins { boxes: [[Box4::EMPTY; MAX_BINS]; 3], counts: [[0; MAX_BINS]; 3] }
+    }
+
+    fn clear(&mut self, bins: usize) {
+        for axis in 0..3 {
+            self.boxes[axis][..bins].fill(Box4::EMPTY);
+            self.counts[axis][..bins].fill(0);
+        }
     }
 
     #[inline]
@@ -80,7 +94,7 @@ impl Bins {
     /// The cut with the smallest cost area(left)·tests(left) + area(right)·tests(right); `None` when all primitives share one bin in
     /// every axis.
     fn best_cut(&self, bins: usize) -> Option<Cut> {
-        let tests = |n: u32| n.div_ceil(LEAF_SIZE as u32) as f32;
+        let tests = |n: u32| leaf_tests(n as usize);
         let mut best: Option<(f32, Cut)> = None;
         for axis in 0..3 {
             let (boxes, counts) = (&self.boxes[axis], &self.counts[axis]);
@@ -119,23 +133,28 @@ pub(crate) struct Split<'a> {
 
 /// Cuts `refs` (at least two) at the best place. Primitives that no cut separates (duplicates) are halved by position, so the depth of
 /// the tree stays logarithmic. `max_bins` is at most 16.
-pub(crate) fn split<'a>(refs: &'a mut [PrimRef], bounds: &SetBounds, max_bins: usize) -> Split<'a> {
+pub(crate) fn split<'a>(
+    refs: &'a mut [PrimRef],
+    bounds: &SetBounds,
+    max_bins: usize,
+    bins: &mut Bins,
+) -> Split<'a> {
     let n = refs.len();
-    let num_bins = max_bins.min(MAX_BINS).min(4 + n / 4);
+    let num_bins = (4 + n / 16).min(max_bins).min(MAX_BINS);
     let map = BinMap::new(bounds, num_bins);
-    let bins = if n >= 2 * PARALLEL_CHUNK {
-        refs.par_chunks(PARALLEL_CHUNK)
+    if n >= 2 * PARALLEL_CHUNK {
+        *bins = refs
+            .par_chunks(PARALLEL_CHUNK)
             .map(|chunk| {
                 let mut b = Bins::empty();
                 b.add_all(chunk, &map);
                 b
             })
-            .reduce(Bins::empty, Bins::merge)
+            .reduce(Bins::empty, Bins::merge);
     } else {
-        let mut b = Bins::empty();
-        b.add_all(refs, &map);
-        b
-    };
+        bins.clear(num_bins);
+        bins.add_all(refs, &map);
+    }
     let Some(cut) = bins.best_cut(num_bins) else { return halve(refs) };
 
     // Partition in place, gathering both sides' bounds on the way.
