@@ -100,7 +100,7 @@ impl Blas {
             })
             .collect();
         let primitives = refs.len();
-        let bvh = build_wide(refs, &IdWriter, options.quality.bins());
+        let bvh = build_wide(refs, &IdWriter, options.quality.effort());
         let frame = LocalFrame { center: shape.origin(), scale: 1.0 };
         Blas { frame, primitives, skipped: n - primitives, content: Content::Shape { bvh, shape } }
     }

@@ -89,14 +89,18 @@ impl TriBvh {
         debug_assert!(mesh.indices.len() < MAX_PRIMS, "checked by the caller");
         let plain = frame.center == mesh.origin && frame.scale == 1.0;
         let writer = TriWriter { mesh, frame, plain };
-        let refs: Vec<PrimRef> = (0..mesh.indices.len() as u32)
+        // Nearly always every triangle can be built: collect in place and throw out the few others afterwards.
+        let mut refs: Vec<PrimRef> = (0..mesh.indices.len() as u32)
             .into_par_iter()
             .with_min_len(1 << 14)
-            .filter(|&i| mesh.is_renderable(i as usize))
-            .map(|i| PrimRef::new(Aabb::from_points(&writer.triangle(i)), i))
+            .map(|i| {
+                let usable = mesh.is_renderable(i as usize);
+                PrimRef::new(if usable { Aabb::from_points(&writer.triangle(i)) } else { Aabb::EMPTY }, i)
+            })
             .collect();
+        refs.retain(|r| !r.is_empty());
         let skipped = mesh.indices.len() - refs.len();
-        TriBvh { bvh: build_wide(refs, &writer, quality.bins()), skipped }
+        TriBvh { bvh: build_wide(refs, &writer, quality.effort()), skipped }
     }
 
     /// The closest hit of a local-space ray. Set-up and traversal in one body: called once per ray, the call chain around a traversal used to take

@@ -36,7 +36,7 @@ pub(crate) struct BinaryTree {
 impl BinaryTree {
     /// Room for a tree over `prims` primitives. Leaves hold more than three on average.
     pub(crate) fn with_room_for(prims: usize) -> BinaryTree {
-        BinaryTree { nodes: Vec::with_capacity(prims * 5 / 8 + 8), ids: Vec::new(), depth: 0 }
+        BinaryTree { nodes: Vec::with_capacity(prims * 5 / 8 + 8), ids: vec![0; prims], depth: 0 }
     }
 
     /// Makes room for the root.
@@ -44,10 +44,17 @@ impl BinaryTree {
         self.nodes.push(NEW);
     }
 
+    /// Makes `node` a leaf of `refs`, which are the fragment's primitives from place `first` on. Ascending numbers: with ties in t the
+    /// first of a leaf wins, whatever the order of partitioning.
     #[inline]
-    pub(crate) fn make_leaf(&mut self, node: usize, first: usize, count: usize) {
+    pub(crate) fn make_leaf(&mut self, node: usize, first: usize, refs: &[PrimRef]) {
         let n = &mut self.nodes[node];
-        (n.first, n.count) = (first as u32, count as u32);
+        (n.first, n.count) = (first as u32, refs.len() as u32);
+        let ids = &mut self.ids[first..first + refs.len()];
+        for (id, r) in ids.iter_mut().zip(refs) {
+            *id = r.id();
+        }
+        sort4(ids);
     }
 
     /// Makes room for the two children of `node` and returns the left one's number.
@@ -57,15 +64,6 @@ impl BinaryTree {
         self.nodes.extend([NEW, NEW]);
         self.nodes[node].first = left as u32;
         left
-    }
-
-    /// Reads the leaves' primitives out of `refs`, whose order the leaves' `first` refers to. Ascending numbers: with ties in t the
-    /// first of a leaf wins, whatever the order of partitioning.
-    pub(crate) fn take_ids(&mut self, refs: &[PrimRef]) {
-        self.ids = refs.iter().map(PrimRef::id).collect();
-        for leaf in self.nodes.iter().filter(|n| n.is_leaf()) {
-            sort4(&mut self.ids[leaf.first as usize..][..leaf.count as usize]);
-        }
     }
 
     /// The surface area heuristic's cost relative to the root's area: expected nodes and leaves a ray through the root's box meets.

@@ -13,5 +13,6 @@ mod prim_ref;
 mod sah_tree;
 mod wide_builder;
 
+pub(crate) use binned_sah::SahEffort;
 pub(crate) use prim_ref::{MAX_PRIMS, PrimRef};
 pub(crate) use wide_builder::{LeafWriter, build_wide};

@@ -1,7 +1,7 @@
 //! A fragment's binary tree by the surface area heuristic, top down: bins for large sets, every cut of the sorted order for small ones.
 
 use super::binary_tree::BinaryTree;
-use super::binned_sah::{Bins, halve, leaf_tests, split};
+use super::binned_sah::{Bins, SahEffort, halve, leaf_tests, split_into};
 use super::prim_ref::{Box4, PrimRef, SetBounds};
 use crate::accel::wide::LEAF_SIZE;
 
@@ -11,51 +11,65 @@ const SWEEP: usize = 8;
 /// peel off one primitive at a time; halving bounds the depth by this plus log2 of the count, and with it the traversal stack.
 const MAX_COST_DEPTH: usize = 40;
 
-/// The tree over `refs` (at least one), reordered into leaves. `max_bins` per axis is at most 16; 0 only halves.
-pub(crate) fn sah_tree(refs: &mut [PrimRef], bounds: &SetBounds, max_bins: usize) -> BinaryTree {
+/// The tree over `refs` (at least one), whose order is lost.
+pub(crate) fn sah_tree(refs: &mut [PrimRef], bounds: &SetBounds, effort: SahEffort) -> BinaryTree {
     let mut builder =
-        SahTree { tree: BinaryTree::with_room_for(refs.len()), bins: Box::new(Bins::empty()), max_bins };
+        SahTree { tree: BinaryTree::with_room_for(refs.len()), bins: Box::new(Bins::empty()), effort };
+    let mut copy = refs.to_vec();
     builder.tree.add_root();
-    builder.build(0, refs, bounds, 0, 1);
-    builder.tree.take_ids(refs);
+    builder.build(0, refs, &mut copy, bounds, 0, 1);
     builder.tree
 }
 
 struct SahTree {
     tree: BinaryTree,
     bins: Box<Bins>,
-    max_bins: usize,
+    effort: SahEffort,
 }
 
 impl SahTree {
-    /// Fills `node` with `refs`, which start at place `first` of the fragment.
-    fn build(&mut self, node: usize, refs: &mut [PrimRef], bounds: &SetBounds, first: usize, depth: usize) {
+    /// Fills `node` with `refs`, which are the fragment's primitives from place `first` on; `spare` is as long.
+    fn build(
+        &mut self,
+        node: usize,
+        refs: &mut [PrimRef],
+        spare: &mut [PrimRef],
+        bounds: &SetBounds,
+        first: usize,
+        depth: usize,
+    ) {
         self.tree.nodes[node].bounds = bounds.aabb();
         self.tree.depth = self.tree.depth.max(depth);
         let n = refs.len();
         if n <= LEAF_SIZE {
-            self.tree.make_leaf(node, first, n);
+            self.tree.make_leaf(node, first, refs);
             return;
         }
-        let s = if self.max_bins == 0 || depth > MAX_COST_DEPTH {
-            halve(refs)
-        } else if n <= SWEEP {
-            let at = sweep(refs);
-            let (left, right) = refs.split_at_mut(at);
-            let (left_bounds, right_bounds) = (SetBounds::of(left), SetBounds::of(right));
-            super::binned_sah::Split { left, left_bounds, right, right_bounds }
-        } else {
-            split(refs, bounds, self.max_bins, &mut self.bins)
-        };
         let child = self.tree.open(node);
-        let middle = first + s.left.len();
-        self.build(child, s.left, &s.left_bounds, first, depth + 1);
-        self.build(child + 1, s.right, &s.right_bounds, middle, depth + 1);
+        let by_cost = self.effort != SahEffort::HALVE && depth <= MAX_COST_DEPTH;
+        if by_cost && n <= SWEEP {
+            // Both sides are leaves or one is left to sweep: no need for the boxes of the centres.
+            let (at, bounds) = sweep(refs);
+            let (left, right) = refs.split_at_mut(at);
+            self.build(child, left, spare, &bounds[0], first, depth + 1);
+            self.build(child + 1, right, spare, &bounds[1], first + at, depth + 1);
+            return;
+        }
+        let cut = by_cost.then(|| split_into(refs, spare, bounds, self.effort, &mut self.bins)).flatten();
+        // The cut moved everything to `spare`; halves stay where they are.
+        let (s, spare) = match cut {
+            Some(s) => (s, refs),
+            None => (halve(refs), spare),
+        };
+        let at = s.left.len();
+        let (spare_left, spare_right) = spare.split_at_mut(at);
+        self.build(child, s.left, spare_left, &s.left_bounds, first, depth + 1);
+        self.build(child + 1, s.right, spare_right, &s.right_bounds, first + at, depth + 1);
     }
 }
 
-/// Sorts `refs` (two to eight) along the axis with the cheapest cut and returns how many go left.
-fn sweep(refs: &mut [PrimRef]) -> usize {
+/// Sorts `refs` (two to eight) along the axis with the cheapest cut; returns how many go left and the boxes of both sides.
+fn sweep(refs: &mut [PrimRef]) -> (usize, [SetBounds; 2]) {
     let n = refs.len();
     let mut copy = [refs[0]; SWEEP];
     copy[..n].copy_from_slice(refs);
@@ -90,7 +104,8 @@ fn sweep(refs: &mut [PrimRef]) -> usize {
     for (p, o) in refs.iter_mut().zip(best.2) {
         *p = copy[o as usize & (SWEEP - 1)];
     }
-    best.1
+    let (left, right) = refs.split_at(best.1);
+    (best.1, [left, right].map(SetBounds::of))
 }
 
 /// Bits that compare as unsigned integers like the numbers themselves (no NaN).

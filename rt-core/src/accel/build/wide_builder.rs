@@ -5,7 +5,7 @@
 //! fragments are fixed, so the tree is the same for any number of threads.
 
 use super::binary_tree::BinaryTree;
-use super::binned_sah::{Bins, Split, halve, split};
+use super::binned_sah::{SahEffort, Split, halve, split};
 use super::collapse::{NO_CHILD, WidePlan, plan};
 use super::prim_ref::{PrimRef, SetBounds};
 use super::sah_tree::sah_tree;
@@ -44,18 +44,18 @@ enum TopNode {
     Fragment(Fragment),
 }
 
-/// Builds a hierarchy over `refs`; `bins` per axis decides between speed and quality (4 to 16; 0 only halves).
-pub(crate) fn build_wide<W: LeafWriter>(mut refs: Vec<PrimRef>, writer: &W, bins: usize) -> WideBvh {
+/// Builds a hierarchy over `refs`; `effort` decides between speed and quality.
+pub(crate) fn build_wide<W: LeafWriter>(mut refs: Vec<PrimRef>, writer: &W, effort: SahEffort) -> WideBvh {
     if refs.is_empty() {
         let mut units = vec![Unit::ZERO; NODE_UNITS];
         write_node(&mut units, &[]);
         return WideBvh { units, bounds: Aabb::EMPTY, depth: 1 };
     }
     let bounds = refs.par_chunks(1 << 16).map(SetBounds::of).reduce(|| SetBounds::EMPTY, |a, b| a.union(&b));
-    let mut root = open_top(fragments(&mut refs, &bounds, bins, 0));
+    let mut root = open_top(fragments(&mut refs, &bounds, effort, 0));
     if root.depth() > MAX_DEPTH {
         // Deeper than the traversal stack: only halving then, which is logarithmic whatever the input.
-        root = open_top(fragments(&mut refs, &bounds, 0, 0));
+        root = open_top(fragments(&mut refs, &bounds, SahEffort::HALVE, 0));
     }
     // The boxes are in the trees now: 32 bytes a primitive less while the arena is written.
     drop(refs);
@@ -73,20 +73,21 @@ pub(crate) fn build_wide<W: LeafWriter>(mut refs: Vec<PrimRef>, writer: &W, bins
 }
 
 /// Cuts sets down to fragments, both sides of each cut in parallel, and plans these.
-fn fragments(refs: &mut [PrimRef], bounds: &SetBounds, bins: usize, depth: usize) -> Top {
+fn fragments(refs: &mut [PrimRef], bounds: &SetBounds, effort: SahEffort, depth: usize) -> Top {
     if refs.len() <= FRAGMENT {
-        let tree = sah_tree(refs, bounds, bins);
+        let tree = sah_tree(refs, bounds, effort);
         let plan = plan(&tree);
         return Top::Fragment(Fragment { tree, plan });
     }
-    let Split { left, left_bounds, right, right_bounds } = if bins == 0 || depth >= MAX_LARGE_CUTS {
-        halve(refs)
-    } else {
-        split(refs, bounds, bins, &mut Bins::empty())
-    };
+    let Split { left, left_bounds, right, right_bounds } =
+        if effort == SahEffort::HALVE || depth >= MAX_LARGE_CUTS {
+            halve(refs)
+        } else {
+            split(refs, bounds, effort)
+        };
     let (l, r) = rayon::join(
-        || fragments(left, &left_bounds, bins, depth + 1),
-        || fragments(right, &right_bounds, bins, depth + 1),
+        || fragments(left, &left_bounds, effort, depth + 1),
+        || fragments(right, &right_bounds, effort, depth + 1),
     );
     Top::Cut(Box::new([l, r]), bounds.aabb())
 }
