@@ -82,15 +82,6 @@ impl ChildRef {
     pub(crate) fn count(self) -> usize {
         ((self.0 >> 29) & 3) as usize + 1
     }
-
-    /// The same child in an arena that starts `base` units later.
-    pub(crate) fn shifted(self, base: usize) -> Self {
-        if self == Self::NONE {
-            return self;
-        }
-        debug_assert!(self.unit() + base < Self::MAX_UNITS, "arena too large");
-        ChildRef(self.0 + base as u32)
-    }
 }
 
 /// A hierarchy; the root node is at unit 0.
