@@ -3,6 +3,7 @@
 
 use super::prim_ref::{Box4, PrimRef, SetBounds};
 use crate::accel::wide::LEAF_SIZE;
+use fearless_simd::{Level, Simd, dispatch};
 use glam::Vec4;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -71,57 +72,48 @@ impl BinMap {
 }
 
 /// Boxes and numbers of primitives per axis and bin.
-pub(crate) struct Bins {
+struct Bins {
     boxes: [[Box4; MAX_BINS]; 3],
     counts: [[u32; MAX_BINS]; 3],
 }
 
 impl Bins {
-    pub(crate) fn empty() -> Self {
+    fn empty() -> Self {
         Bins { boxes: [[Box4::EMPTY; MAX_BINS]; 3], counts: [[0; MAX_BINS]; 3] }
     }
 
-    fn clear(&mut self, bins: usize) {
-        for axis in 0..3 {
+    #[inline(always)]
+    fn clear(&mut self, bins: usize, axes: Range<usize>) {
+        for axis in axes {
             self.boxes[axis][..bins].fill(Box4::EMPTY);
             self.counts[axis][..bins].fill(0);
         }
     }
 
-    #[inline]
-    fn add_all(&mut self, refs: &[PrimRef], map: &BinMap, axes: Range<usize>) {
-        for p in refs {
-            self.add(p, map, axes.clone());
-        }
-    }
-
     #[inline(always)]
-    fn add(&mut self, p: &PrimRef, map: &BinMap, axes: Range<usize>) {
+    fn add<S: Simd>(&mut self, simd: S, p: &PrimRef, map: &BinMap, axes: Range<usize>) {
         let b = map.bins(p);
         for axis in axes {
             let i = b[axis] as usize & (MAX_BINS - 1);
-            self.boxes[axis][i].grow(p);
+            self.boxes[axis][i].grow(simd, p);
             self.counts[axis][i] += 1;
         }
     }
 
-    fn add_bins(&mut self, o: &Bins, bins: usize) {
-        for axis in 0..3 {
+    #[inline(always)]
+    fn add_bins<S: Simd>(&mut self, simd: S, o: &Bins, bins: usize, axes: Range<usize>) {
+        for axis in axes {
             for i in 0..bins {
-                self.boxes[axis][i].union(&o.boxes[axis][i]);
+                self.boxes[axis][i].union(simd, &o.boxes[axis][i]);
                 self.counts[axis][i] += o.counts[axis][i];
             }
         }
     }
 
-    fn merge(mut self, o: Bins) -> Bins {
-        self.add_bins(&o, MAX_BINS);
-        self
-    }
-
     /// The cut with the smallest cost area(left)·tests(left) + area(right)·tests(right); `None` when all primitives share one bin in
     /// every axis.
-    fn best_cut(&self, bins: usize, axes: Range<usize>) -> Option<Cut> {
+    #[inline(always)]
+    fn best_cut<S: Simd>(&self, simd: S, bins: usize, axes: Range<usize>) -> Option<Cut> {
         let tests = |n: u32| leaf_tests(n as usize);
         let mut best: Option<(f32, Cut)> = None;
         for axis in axes {
@@ -130,13 +122,13 @@ impl Bins {
             let mut right_cost = [0f32; MAX_BINS];
             let (mut acc, mut n) = (Box4::EMPTY, 0);
             for i in (1..bins).rev() {
-                acc.union(&boxes[i]);
+                acc.union(simd, &boxes[i]);
                 n += counts[i];
                 right_cost[i] = if n > 0 { acc.half_area() * tests(n) } else { f32::INFINITY };
             }
             let (mut acc, mut n) = (Box4::EMPTY, 0);
             for i in 0..bins - 1 {
-                acc.union(&boxes[i]);
+                acc.union(simd, &boxes[i]);
                 n += counts[i];
                 if n == 0 {
                     continue;
@@ -148,6 +140,18 @@ impl Bins {
             }
         }
         best.map(|(_, cut)| cut)
+    }
+
+    #[inline(always)]
+    fn best_plane<S: Simd>(&self, simd: S, map: BinMap, bins: usize, axes: Range<usize>) -> Option<Plane> {
+        let cut = self.best_cut(simd, bins, axes)?;
+        let (left, right) = self.boxes[cut.axis][..bins].split_at(cut.bin as usize + 1);
+        let boxes = [left, right].map(|side| {
+            let mut b = Box4::EMPTY;
+            side.iter().for_each(|bin| b.union(simd, bin));
+            b
+        });
+        Some(Plane { map, cut, boxes })
     }
 }
 
@@ -162,15 +166,10 @@ pub(crate) struct Split<'a> {
 /// Effort of a search for cuts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct SahEffort {
-    /// Most bins per axis, 4 to 16; 0 halves sets by position instead of searching.
+    /// Most bins per axis, 4 to 16.
     pub(crate) bins: usize,
     /// Looks at the longest axis alone: a third of the work.
     pub(crate) longest_axis_only: bool,
-}
-
-impl SahEffort {
-    /// No search: the depth is logarithmic whatever the input.
-    pub(crate) const HALVE: SahEffort = SahEffort { bins: 0, longest_axis_only: false };
 }
 
 /// A cut and how to apply it.
@@ -188,77 +187,113 @@ impl Plane {
     }
 }
 
+/// Room for a search, and the instructions to use. Every level gives the same cuts: there are only minima, and arithmetic without fused
+/// operations.
+pub(crate) struct SearchSpace {
+    level: Level,
+    even: Bins,
+    odd: Bins,
+}
+
+impl SearchSpace {
+    pub(crate) fn new(level: Level) -> Box<SearchSpace> {
+        Box::new(SearchSpace { level, even: Bins::empty(), odd: Bins::empty() })
+    }
+
+    /// Fills `self.even`.
+    #[inline(always)]
+    fn fill<S: Simd>(&mut self, simd: S, refs: &[PrimRef], map: &BinMap, bins: usize, axes: Range<usize>) {
+        self.even.clear(bins, axes.clone());
+        if refs.len() < TWO_SETS {
+            for p in refs {
+                self.even.add(simd, p, map, axes.clone());
+            }
+            return;
+        }
+        self.odd.clear(bins, axes.clone());
+        let (pairs, rest) = refs.as_chunks::<2>();
+        for [a, b] in pairs {
+            self.even.add(simd, a, map, axes.clone());
+            self.odd.add(simd, b, map, axes.clone());
+        }
+        for p in rest {
+            self.even.add(simd, p, map, axes.clone());
+        }
+        self.even.add_bins(simd, &self.odd, bins, axes);
+    }
+}
+
 /// The best place to cut `refs`; `None` for primitives that no cut separates (duplicates).
 fn find_plane(
     refs: &[PrimRef],
     bounds: &SetBounds,
     effort: SahEffort,
-    bins: &mut [Bins; 2],
+    space: &mut SearchSpace,
 ) -> Option<Plane> {
-    let n = refs.len();
-    let num_bins = (4 + n / 16).min(effort.bins).min(MAX_BINS);
-    let map = BinMap::new(bounds, num_bins);
-    let axes = if effort.longest_axis_only { map.longest_axis() } else { 0..3 };
-    if n >= 2 * PARALLEL_CHUNK {
-        bins[0] = refs
-            .par_chunks(PARALLEL_CHUNK)
-            .map(|chunk| {
-                let mut b = Bins::empty();
-                b.add_all(chunk, &map, axes.clone());
-                b
-            })
-            .reduce(Bins::empty, Bins::merge);
-    } else {
-        let [even, odd] = bins;
-        even.clear(num_bins);
-        if n < TWO_SETS {
-            even.add_all(refs, &map, axes.clone());
-        } else {
-            odd.clear(num_bins);
-            let (pairs, rest) = refs.as_chunks::<2>();
-            for [a, b] in pairs {
-                even.add(a, &map, axes.clone());
-                odd.add(b, &map, axes.clone());
+    if refs.len() >= 2 * PARALLEL_CHUNK {
+        let level = space.level;
+        return dispatch!(level, simd => find_plane_of_many(simd, refs, bounds, effort, level));
+    }
+    dispatch!(space.level, simd => find_plane_of_few(simd, refs, bounds, effort, space))
+}
+
+/// Bins and axes to look at.
+#[inline(always)]
+fn search(n: usize, bounds: &SetBounds, effort: SahEffort) -> (BinMap, usize, Range<usize>) {
+    let bins = (4 + n / 16).min(effort.bins).min(MAX_BINS);
+    let map = BinMap::new(bounds, bins);
+    (map, bins, if effort.longest_axis_only { map.longest_axis() } else { 0..3 })
+}
+
+#[inline(always)]
+fn find_plane_of_few<S: Simd>(
+    simd: S,
+    refs: &[PrimRef],
+    bounds: &SetBounds,
+    effort: SahEffort,
+    space: &mut SearchSpace,
+) -> Option<Plane> {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let (map, bins, axes) = search(refs.len(), bounds, effort);
+            // With the axes known here the loops over them unroll.
+            match (axes.len(), axes.start) {
+                (3, _) => space.fill(simd, refs, &map, bins, 0..3),
+                (_, 0) => space.fill(simd, refs, &map, bins, 0..1),
+                (_, 1) => space.fill(simd, refs, &map, bins, 1..2),
+                _ => space.fill(simd, refs, &map, bins, 2..3),
             }
-            even.add_all(rest, &map, axes.clone());
-            even.add_bins(odd, num_bins);
-        }
-    }
-    let cut = bins[0].best_cut(num_bins, axes)?;
-    let (left, right) = bins[0].boxes[cut.axis][..num_bins].split_at(cut.bin as usize + 1);
-    let boxes = [left, right].map(|side| {
-        let mut b = Box4::EMPTY;
-        side.iter().for_each(|bin| b.union(bin));
-        b
-    });
-    Some(Plane { map, cut, boxes })
+            space.even.best_plane(simd, map, bins, axes)
+        },
+    )
 }
 
-/// Cuts `refs` (at least two) at the best place, reordering them. Primitives that no cut separates are halved by position, so the depth
-/// of the tree stays logarithmic. For sets too large to copy: see [`split_into`].
-pub(crate) fn split<'a>(refs: &'a mut [PrimRef], bounds: &SetBounds, effort: SahEffort) -> Split<'a> {
-    let Some(plane) = find_plane(refs, bounds, effort, &mut [Bins::empty(), Bins::empty()]) else {
-        return halve(refs);
+fn find_plane_of_many<S: Simd>(
+    simd: S,
+    refs: &[PrimRef],
+    bounds: &SetBounds,
+    effort: SahEffort,
+    level: Level,
+) -> Option<Plane> {
+    let (map, bins, axes) = search(refs.len(), bounds, effort);
+    let fill = |chunk| {
+        let mut space = SearchSpace::new(level);
+        simd.vectorize(
+            #[inline(always)]
+            || space.fill(simd, chunk, &map, bins, axes.clone()),
+        );
+        space
     };
-    let (mut left_bounds, mut right_bounds) = (SetBounds::EMPTY, SetBounds::EMPTY);
-    let (mut i, mut j) = (0, refs.len());
-    while i < j {
-        if plane.is_left(&refs[i]) {
-            left_bounds.grow_centers(&refs[i]);
-            i += 1;
-        } else {
-            j -= 1;
-            refs.swap(i, j);
-            right_bounds.grow_centers(&refs[j]);
-        }
-    }
-    left_bounds.set_box(plane.boxes[0]);
-    right_bounds.set_box(plane.boxes[1]);
-    let (left, right) = refs.split_at_mut(i);
-    Split { left, left_bounds, right, right_bounds }
+    let all = refs.par_chunks(PARALLEL_CHUNK).map(fill).reduce_with(|mut a, b| {
+        a.even.add_bins(simd, &b.even, bins, axes.clone());
+        a
+    })?;
+    all.even.best_plane(simd, map, bins, axes)
 }
 
-/// The same out of place: on success the two sides are the parts of `to`; `None` when no cut separates the primitives.
+/// Cuts `from` (at least two) at the best place: the two sides are the parts of `to`, which is as long. `None` when no cut separates the
+/// primitives.
 ///
 /// Every primitive is written to both ends and only one end moves on: no branch depends on the data, which a processor would guess wrong
 /// half the time (a third of the build went into that).
@@ -267,9 +302,9 @@ pub(crate) fn split_into<'a>(
     to: &'a mut [PrimRef],
     bounds: &SetBounds,
     effort: SahEffort,
-    bins: &mut [Bins; 2],
+    space: &mut SearchSpace,
 ) -> Option<Split<'a>> {
-    let plane = find_plane(from, bounds, effort, bins)?;
+    let plane = find_plane(from, bounds, effort, space)?;
     let to = &mut to[..from.len()];
     let mut i = 0;
     for (done, p) in from.iter().enumerate() {

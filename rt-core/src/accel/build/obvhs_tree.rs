@@ -19,7 +19,7 @@ use obvhs::bvh2::{Bvh2, node::Bvh2Node};
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 /// Deeper trees are refused.
-const MAX_BINARY_DEPTH: usize = 64;
+pub(super) const MAX_BINARY_DEPTH: usize = 50;
 /// Boxes with more than this half area are refused: sums and products of a few of them must stay finite.
 const LARGEST_HALF_AREA: f32 = 1e30;
 

@@ -1,18 +1,18 @@
 //! What a builder knows of a primitive: its box and its number.
 
 use crate::math::Aabb;
+use fearless_simd::{Simd, SimdBase, f32x8};
 use glam::Vec4;
 
 /// Box and number of a primitive in 32 bytes.
 ///
-/// The number sits in the low box's fourth lane with bit 30 set, so that it reads as an ordinary float: a plain small integer would be
-/// a denormal, and vector additions that touch denormals are a hundred times slower on some machines.
+/// Low corner, number, negative high corner, −2: with the high corner negated, one minimum over eight lanes grows a box.
+///
+/// The number has bit 30 set, so that it reads as an ordinary float: a plain small integer would be a denormal, and vector additions that
+/// touch denormals are a hundred times slower on some machines.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(32))]
-pub(crate) struct PrimRef {
-    lo: Vec4,
-    hi: Vec4,
-}
+pub(crate) struct PrimRef([f32; 8]);
 
 const TAG: u32 = 1 << 30;
 
@@ -22,28 +22,39 @@ pub(crate) const MAX_PRIMS: usize = 0x3f80_0000;
 impl PrimRef {
     pub(crate) fn new(b: Aabb, id: u32) -> Self {
         debug_assert!((id as usize) < MAX_PRIMS, "primitive number {id} too large");
-        PrimRef { lo: b.min.extend(f32::from_bits(TAG | id)), hi: b.max.extend(2.0) }
+        let (lo, hi) = (b.min, b.max);
+        PrimRef([lo.x, lo.y, lo.z, f32::from_bits(TAG | id), -hi.x, -hi.y, -hi.z, -2.0])
     }
 
     #[inline(always)]
     pub(crate) fn id(&self) -> u32 {
-        self.lo.w.to_bits() & !TAG
+        self.0[3].to_bits() & !TAG
     }
 
     /// Made from an empty box: nothing to build.
     #[inline(always)]
     pub(crate) fn is_empty(&self) -> bool {
-        self.lo.x > self.hi.x
+        self.0[0] > -self.0[4]
     }
 
     pub(crate) fn bounds(&self) -> Aabb {
-        Aabb::new(self.lo.truncate(), self.hi.truncate())
+        Aabb::new(self.lo().truncate(), self.hi().truncate())
+    }
+
+    #[inline(always)]
+    fn lo(&self) -> Vec4 {
+        Vec4::from_slice(&self.0[..4])
+    }
+
+    #[inline(always)]
+    fn hi(&self) -> Vec4 {
+        -Vec4::from_slice(&self.0[4..])
     }
 
     /// Twice the centre; the fourth lane is meaningless.
     #[inline(always)]
     pub(crate) fn center2(&self) -> Vec4 {
-        self.lo + self.hi
+        self.lo() - Vec4::from_slice(&self.0[4..])
     }
 }
 
@@ -67,8 +78,8 @@ impl SetBounds {
     #[inline(always)]
     pub(crate) fn grow(&mut self, p: &PrimRef) {
         let c = p.center2();
-        self.lo = self.lo.min(p.lo);
-        self.hi = self.hi.max(p.hi);
+        self.lo = self.lo.min(p.lo());
+        self.hi = self.hi.max(p.hi());
         self.center2_lo = self.center2_lo.min(c);
         self.center2_hi = self.center2_hi.max(c);
     }
@@ -83,7 +94,7 @@ impl SetBounds {
 
     #[inline(always)]
     pub(crate) fn set_box(&mut self, b: Box4) {
-        (self.lo, self.hi) = (b.lo, b.hi);
+        (self.lo, self.hi) = (Vec4::from_slice(&b.0[..4]), -Vec4::from_slice(&b.0[4..]));
     }
 
     pub(crate) fn union(&self, o: &SetBounds) -> SetBounds {
@@ -108,32 +119,29 @@ impl SetBounds {
     }
 }
 
-/// Box alone, four lanes: what a bin accumulates.
+/// Box alone, laid out like a [`PrimRef`]: what a bin accumulates.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Box4 {
-    lo: Vec4,
-    hi: Vec4,
-}
+#[repr(C, align(32))]
+pub(crate) struct Box4([f32; 8]);
 
 impl Box4 {
-    pub(crate) const EMPTY: Box4 = Box4 { lo: Vec4::INFINITY, hi: Vec4::NEG_INFINITY };
+    pub(crate) const EMPTY: Box4 = Box4([f32::INFINITY; 8]);
 
     #[inline(always)]
-    pub(crate) fn grow(&mut self, p: &PrimRef) {
-        self.lo = self.lo.min(p.lo);
-        self.hi = self.hi.max(p.hi);
+    pub(crate) fn grow<S: Simd>(&mut self, simd: S, p: &PrimRef) {
+        f32x8::from_slice(simd, &self.0).min(f32x8::from_slice(simd, &p.0)).store_slice(&mut self.0);
     }
 
     #[inline(always)]
-    pub(crate) fn union(&mut self, o: &Box4) {
-        self.lo = self.lo.min(o.lo);
-        self.hi = self.hi.max(o.hi);
+    pub(crate) fn union<S: Simd>(&mut self, simd: S, o: &Box4) {
+        f32x8::from_slice(simd, &self.0).min(f32x8::from_slice(simd, &o.0)).store_slice(&mut self.0);
     }
 
     /// Half the surface area; only called on boxes that hold something.
     #[inline(always)]
     pub(crate) fn half_area(&self) -> f32 {
-        let e = self.hi - self.lo;
-        e.x * e.y + e.y * e.z + e.z * e.x
+        let [lx, ly, lz, _, hx, hy, hz, _] = self.0;
+        let (x, y, z) = (-hx - lx, -hy - ly, -hz - lz);
+        x * y + y * z + z * x
     }
 }

@@ -1,33 +1,38 @@
 //! A fragment's binary tree by the surface area heuristic, top down: bins for large sets, every cut of the sorted order for small ones.
 
 use super::binary_tree::BinaryTree;
-use super::binned_sah::{Bins, SahEffort, halve, leaf_tests, split_into};
+use super::binned_sah::{SahEffort, SearchSpace, halve, leaf_tests, split_into};
 use super::prim_ref::{Box4, PrimRef, SetBounds};
 use crate::accel::wide::LEAF_SIZE;
+use fearless_simd::{Level, Simd, dispatch};
 use glam::Vec4;
+use std::ops::Range;
 
 /// Sets up to this size are cut by trying every place along each axis.
 const SWEEP: usize = 8;
 /// Below this depth sets are halved instead of cut by cost. Cost-driven cuts of adversarial input (sizes that grow like 2^k) can
 /// peel off one primitive at a time; halving bounds the depth by this plus log2 of the count, and with it the traversal stack.
-const MAX_COST_DEPTH: usize = 40;
+pub(super) const MAX_COST_DEPTH: usize = 36;
 
-/// The tree over `refs` (at least one), whose order is lost.
-pub(crate) fn sah_tree(refs: &mut [PrimRef], bounds: &SetBounds, effort: SahEffort) -> BinaryTree {
-    let mut builder = SahTree {
-        tree: BinaryTree::with_room_for(refs.len()),
-        bins: Box::new([Bins::empty(), Bins::empty()]),
-        effort,
-    };
-    let mut copy = refs.to_vec();
+/// The tree over `refs` (at least one), whose order is lost; `spare` is as long.
+pub(crate) fn sah_tree(
+    refs: &mut [PrimRef],
+    spare: &mut [PrimRef],
+    bounds: &SetBounds,
+    effort: SahEffort,
+    level: Level,
+) -> BinaryTree {
+    let tree = BinaryTree::with_room_for(refs.len());
+    let mut builder = SahTree { tree, space: SearchSpace::new(level), level, effort };
     builder.tree.add_root();
-    builder.build(0, refs, &mut copy, bounds, 0, 1);
+    builder.build(0, refs, spare, bounds, 0, 1);
     builder.tree
 }
 
 struct SahTree {
     tree: BinaryTree,
-    bins: Box<[Bins; 2]>,
+    space: Box<SearchSpace>,
+    level: Level,
     effort: SahEffort,
 }
 
@@ -50,16 +55,17 @@ impl SahTree {
             return;
         }
         let child = self.tree.open(node);
-        let by_cost = self.effort != SahEffort::HALVE && depth <= MAX_COST_DEPTH;
+        let by_cost = depth <= MAX_COST_DEPTH;
         if by_cost && n <= SWEEP {
             // Both sides are leaves or one is left to sweep: no need for the boxes of the centres.
-            let (at, bounds) = sweep(refs);
+            let axes = if self.effort.longest_axis_only { longest_axis(bounds) } else { 0..3 };
+            let (at, bounds) = dispatch!(self.level, simd => sweep(simd, refs, axes));
             let (left, right) = refs.split_at_mut(at);
             self.build(child, left, spare, &bounds[0], first, depth + 1);
             self.build(child + 1, right, spare, &bounds[1], first + at, depth + 1);
             return;
         }
-        let cut = by_cost.then(|| split_into(refs, spare, bounds, self.effort, &mut self.bins)).flatten();
+        let cut = by_cost.then(|| split_into(refs, spare, bounds, self.effort, &mut self.space)).flatten();
         // The cut moved everything to `spare`; halves stay where they are.
         let (s, spare) = match cut {
             Some(s) => (s, refs),
@@ -72,24 +78,39 @@ impl SahTree {
     }
 }
 
+fn longest_axis(bounds: &SetBounds) -> Range<usize> {
+    let e = bounds.aabb().extent();
+    let axis = if e.x >= e.y && e.x >= e.z { 0 } else { 1 + (e.z > e.y) as usize };
+    axis..axis + 1
+}
+
 /// Sorts `refs` (two to eight) along the axis with the cheapest cut; returns how many go left and the boxes of both sides.
-fn sweep(refs: &mut [PrimRef]) -> (usize, [SetBounds; 2]) {
+#[inline(always)]
+fn sweep<S: Simd>(simd: S, refs: &mut [PrimRef], axes: Range<usize>) -> (usize, [SetBounds; 2]) {
+    simd.vectorize(
+        #[inline(always)]
+        || sweep_body(simd, refs, axes),
+    )
+}
+
+#[inline(always)]
+fn sweep_body<S: Simd>(simd: S, refs: &mut [PrimRef], axes: Range<usize>) -> (usize, [SetBounds; 2]) {
     let n = refs.len();
     let mut copy = [refs[0]; SWEEP];
     copy[..n].copy_from_slice(refs);
     let sorted = orders(&copy, n);
-    let mut best = (f32::INFINITY, n / 2, 0);
-    for axis in 0..3 {
+    let mut best = (f32::INFINITY, n / 2, axes.start);
+    for axis in axes {
         let at = |i: usize| &copy[sorted[i][axis] as usize & (SWEEP - 1)];
         let mut right_cost = [0f32; SWEEP];
         let mut acc = Box4::EMPTY;
         for i in (1..n).rev() {
-            acc.grow(at(i));
+            acc.grow(simd, at(i));
             right_cost[i] = acc.half_area() * leaf_tests(n - i);
         }
         let mut acc = Box4::EMPTY;
         for i in 1..n {
-            acc.grow(at(i - 1));
+            acc.grow(simd, at(i - 1));
             let cost = acc.half_area() * leaf_tests(i) + right_cost[i];
             if cost < best.0 {
                 best = (cost, i, axis);

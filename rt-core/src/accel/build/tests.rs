@@ -12,6 +12,7 @@ use crate::math::Aabb;
 use crate::mesh::TriMesh;
 use crate::ray::Ray;
 use crate::test_shapes::{Random, noise_soup, sphere};
+use fearless_simd::Level;
 use glam::Vec3;
 use std::sync::Arc;
 use std::time::Instant;
@@ -211,7 +212,7 @@ fn refs_of(mesh: &TriMesh) -> (Vec<PrimRef>, SetBounds) {
 #[test]
 fn reinsertion_lowers_the_cost() {
     let (mut refs, bounds) = refs_of(&noise_soup(5000, 6));
-    let sah = sah_tree(&mut refs, &bounds, THOROUGH);
+    let sah = sah_tree(&mut refs.clone(), &mut refs, &bounds, THOROUGH, Level::new());
     let better = reinsert(&sah, &[1.0, 0.5, 0.5]).expect("ordinary boxes");
     assert!(better.cost() < 0.98 * sah.cost(), "{} from {}", better.cost(), sah.cost());
     let mut ids = better.ids.clone();
@@ -230,7 +231,10 @@ fn what_obvhs_cannot_take_is_built_by_sah_and_noted() {
         .collect();
     let bounds = SetBounds::of(&refs);
     assert!(ploc_tree(&refs, &bounds).is_none());
-    assert!(reinsert(&sah_tree(&mut refs.clone(), &bounds, THOROUGH), &[1.0]).is_none());
+    assert!(
+        reinsert(&sah_tree(&mut refs.clone(), &mut refs.clone(), &bounds, THOROUGH, Level::new()), &[1.0])
+            .is_none()
+    );
     refs.sort_unstable_by_key(PrimRef::id);
     for method in [Method::Ploc, Method::Reinsertion] {
         let mut notes = Vec::new();

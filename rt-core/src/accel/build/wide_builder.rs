@@ -5,18 +5,27 @@
 //! fragments are fixed, so the tree is the same for any number of threads.
 
 use super::binary_tree::BinaryTree;
-use super::binned_sah::{SahEffort, Split, halve, split};
+use super::binned_sah::{SahEffort, SearchSpace, Split, halve, split_into};
 use super::collapse::{NO_CHILD, WidePlan, plan};
-use super::obvhs_tree::{ploc_tree, reinsert};
+use super::obvhs_tree::{MAX_BINARY_DEPTH, ploc_tree, reinsert};
 use super::prim_ref::{PrimRef, SetBounds};
-use super::sah_tree::sah_tree;
+use super::sah_tree::{MAX_COST_DEPTH, sah_tree};
 use crate::accel::wide::{ChildRef, LEAF_SIZE, MAX_DEPTH, NODE_UNITS, Unit, WIDTH, WideBvh, write_node};
 use crate::math::Aabb;
 use crate::simd::huge_pages;
+use fearless_simd::Level;
 use rayon::prelude::*;
 
 /// Cuts above the fragments that follow the costs; sets further down are halved.
-const MAX_LARGE_CUTS: usize = 40;
+const MAX_LARGE_CUTS: usize = 20;
+/// Levels of a fragment's binary tree.
+const FRAGMENT_DEPTH: usize = MAX_COST_DEPTH + MAX_FRAGMENT_LOG2 as usize;
+/// Largest size of a fragment, as a power of two.
+const MAX_FRAGMENT_LOG2: u32 = 16;
+
+// Whatever the input, no path is longer than the traversal stack allows: sets of up to 2^30 primitives are halved down to fragments of 2^14.
+const _: () =
+    assert!(MAX_LARGE_CUTS + 16 + FRAGMENT_DEPTH <= MAX_DEPTH && MAX_BINARY_DEPTH <= FRAGMENT_DEPTH);
 
 /// How to make the binary tree of a fragment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,15 +47,11 @@ pub(crate) struct Recipe {
 }
 
 impl Recipe {
-    /// Logarithmic depth whatever the input, and no regard for ray time.
-    const HALVE: Recipe = Recipe { method: Method::Sah, effort: SahEffort::HALVE };
-
     /// Sets up to this size are built by one task into one fragment.
     fn fragment(self) -> usize {
         match self.method {
-            Method::Sah => 1 << 14,
-            Method::Ploc => 1 << 14,
-            Method::Reinsertion => 1 << 16,
+            Method::Sah | Method::Ploc => 1 << 14,
+            Method::Reinsertion => 1 << MAX_FRAGMENT_LOG2,
         }
     }
 }
@@ -76,16 +81,22 @@ struct Fragment {
 }
 
 impl Fragment {
-    fn new(refs: &mut [PrimRef], bounds: &SetBounds, recipe: Recipe) -> Fragment {
+    fn new(
+        refs: &mut [PrimRef],
+        spare: &mut [PrimRef],
+        bounds: &SetBounds,
+        recipe: Recipe,
+        level: Level,
+    ) -> Fragment {
         let mut fell_back = false;
         let tree = match recipe.method {
-            Method::Sah => sah_tree(refs, bounds, recipe.effort),
+            Method::Sah => sah_tree(refs, spare, bounds, recipe.effort, level),
             Method::Ploc => ploc_tree(refs, bounds).unwrap_or_else(|| {
                 fell_back = true;
-                sah_tree(refs, bounds, recipe.effort)
+                sah_tree(refs, spare, bounds, recipe.effort, level)
             }),
             Method::Reinsertion => {
-                let tree = sah_tree(refs, bounds, recipe.effort);
+                let tree = sah_tree(refs, spare, bounds, recipe.effort, level);
                 reinsert(&tree, &REINSERTION_PASSES).unwrap_or_else(|| {
                     fell_back = true;
                     tree
@@ -116,22 +127,17 @@ pub(crate) fn build_wide<W: LeafWriter>(
         return WideBvh { units, bounds: Aabb::EMPTY, depth: 1 };
     }
     let bounds = refs.par_chunks(1 << 16).map(SetBounds::of).reduce(|| SetBounds::EMPTY, |a, b| a.union(&b));
-    let mut root = open_top(fragments(&mut refs, &bounds, recipe, 0));
+    let level = Level::new();
+    let mut spare = refs.clone();
+    let root = open_top(fragments(&mut refs, &mut spare, &bounds, recipe, level, 0));
     let (fallbacks, all) = root.fallbacks();
     if fallbacks > 0 {
         notes.push(format!(
             "{fallbacks} of {all} parts built by the surface area heuristic alone: obvhs does not take their sizes or makes too deep a tree"
         ));
     }
-    if root.depth() > MAX_DEPTH {
-        notes.push(format!(
-            "primitives halved by position: cuts by cost gave {} levels, at most {MAX_DEPTH} fit the traversal stack",
-            root.depth()
-        ));
-        root = open_top(fragments(&mut refs, &bounds, Recipe::HALVE, 0));
-    }
-    // The boxes are in the trees now: 32 bytes a primitive less while the arena is written.
-    drop(refs);
+    // The boxes are in the trees now: 64 bytes a primitive less while the arena is written.
+    drop((refs, spare));
     // A tree of one leaf still gets a node, so that traversal always starts at one.
     let root = match root {
         TopNode::Fragment(f) if f.plan.nodes.is_empty() => {
@@ -140,26 +146,37 @@ pub(crate) fn build_wide<W: LeafWriter>(
         node => node,
     };
     let depth = root.depth();
+    debug_assert!(depth <= MAX_DEPTH, "depth {depth} is bounded by construction");
     let mut units = huge_pages::zeroed_units(root.units::<W>());
     root.write(writer, 0, &mut units);
     WideBvh { units, bounds: bounds.aabb(), depth }
 }
 
-/// Cuts sets down to fragments, both sides of each cut in parallel, and plans these.
-fn fragments(refs: &mut [PrimRef], bounds: &SetBounds, recipe: Recipe, depth: usize) -> Top {
+/// Cuts sets down to fragments, both sides of each cut in parallel, and plans these. `spare` is as long as `refs`.
+fn fragments(
+    refs: &mut [PrimRef],
+    spare: &mut [PrimRef],
+    bounds: &SetBounds,
+    recipe: Recipe,
+    level: Level,
+    depth: usize,
+) -> Top {
     if refs.len() <= recipe.fragment() {
-        return Top::Fragment(Fragment::new(refs, bounds, recipe));
+        return Top::Fragment(Fragment::new(refs, spare, bounds, recipe, level));
     }
-    let effort = recipe.effort;
-    let Split { left, left_bounds, right, right_bounds } =
-        if effort == SahEffort::HALVE || depth >= MAX_LARGE_CUTS {
-            halve(refs)
-        } else {
-            split(refs, bounds, effort)
-        };
+    let by_cost = depth < MAX_LARGE_CUTS;
+    let cut = by_cost
+        .then(|| split_into(refs, spare, bounds, recipe.effort, &mut SearchSpace::new(level)))
+        .flatten();
+    // The cut moved everything to `spare`; halves stay where they are.
+    let (Split { left, left_bounds, right, right_bounds }, spare) = match cut {
+        Some(s) => (s, refs),
+        None => (halve(refs), spare),
+    };
+    let (spare_left, spare_right) = spare.split_at_mut(left.len());
     let (l, r) = rayon::join(
-        || fragments(left, &left_bounds, recipe, depth + 1),
-        || fragments(right, &right_bounds, recipe, depth + 1),
+        || fragments(left, spare_left, &left_bounds, recipe, level, depth + 1),
+        || fragments(right, spare_right, &right_bounds, recipe, level, depth + 1),
     );
     Top::Cut(Box::new([l, r]), bounds.aabb())
 }
