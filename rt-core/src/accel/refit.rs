@@ -1,8 +1,8 @@
 //! Moving the vertices of a mesh without building its tree anew.
 //!
 //! Leaves get the new vertices and boxes are recomputed from the bottom up; which triangles share a leaf stays. A time step of a deforming mesh
-//! then costs about a tenth of a build, and rays become slower the further the vertices move from where the tree was built: the report says
-//! by how much to expect.
+//! then costs a seventh of a build (42 ms of CPU against 290 for 1 M triangles), and rays become slower the further the vertices move from
+//! where the tree was built: the report says how much to expect.
 
 use super::blas::{Blas, Content, LocalFrame};
 use super::build::LeafWriter;
@@ -24,8 +24,9 @@ pub struct RefitReport {
     pub unusable: usize,
     /// Triangles that could be hit, but were left out when the tree was built. Only a new build brings them in.
     pub absent: usize,
-    /// Expected box and leaf tests of a ray that meets the mesh (the surface area heuristic's cost), relative to when the tree was built. A new
-    /// build pays off from about 1.5 to 2 on.
+    /// Expected box and leaf tests of a ray that meets the mesh (the surface area heuristic's cost), relative to when the tree was built.
+    /// Predicts single rays well: 1 M triangles twisted until this was 1.14, 1.32, 1.57, 1.89 took 1.15, 1.33, 1.47, 1.69 times as long as in
+    /// a new tree, coherent packets 1.04, 1.16, 1.26, 1.37 times.
     pub cost_growth: f64,
 }
 

@@ -4,7 +4,8 @@
 //! surface leaves many nodes half empty; choosing by dynamic programming over "the cheapest way to stand for this subtree with at most i
 //! roots" is optimal for the given binary tree (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide
 //! BVHs", HPG 2017, section 3). Leaves are what the builder made them, so the cost is the summed surface of the wide nodes alone.
-//! Measured on nested isosurfaces (1 M triangles): 4.1 children a node by greedy opening, 5.9 by this.
+//! Measured on nested isosurfaces (1 M triangles, balanced preset): 5.95 children a node and 3.66 triangles a leaf, 56 bytes a triangle; greedy
+//! opening with the leaves of that time took 63.6. Rays take the same time with both (0.98 to 1.05, geometric mean 1.00).
 
 use super::binary_tree::BinaryTree;
 use crate::accel::wide::WIDTH;
