@@ -253,6 +253,7 @@ mod tests {
             y: Axis { label: "time".into(), unit: "s".into(), scale: Scale::Linear },
             categories: vec![],
             series: vec![Series::new("a", vec![(1.0, 2.0), (10.0, 4.0)])],
+            mark: Some(1.0),
         });
         r.pictures.push(Picture { name: "The view".into(), caption: "c".into(), png: vec![1, 2, 3] });
         r

@@ -141,6 +141,7 @@ fn plots(record: &mut Record) {
             Axis::linear("ratio, above 1 rt-core is faster", ""),
             kinds.clone(),
         );
+        plot.mark = Some(1.0);
         for (kind, ratio) in list {
             let rival = family(&ratio.rival);
             let x = kinds.iter().position(|k| *k == kind).unwrap_or(0) as f64;
