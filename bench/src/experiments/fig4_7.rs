@@ -73,7 +73,7 @@ fn measure(
     let builders = builders(mesh, installed, slow_too);
     let mut costs: Vec<Vec<BuildCost>> = vec![vec![]; builders.len()];
     for round in 0..rounds {
-        context.say(format!("{} triangles, round {} of {rounds}", mesh.num_triangles(), round + 1));
+        context.say(format!("{} triangles, round {} of {rounds}", mesh.num_triangles(), round + 1))?;
         for i in 0..builders.len() {
             let i = (i + round) % builders.len();
             costs[i].push(builders[i].1()?);

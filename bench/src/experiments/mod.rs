@@ -65,19 +65,19 @@ pub fn find(id: &str) -> Option<&'static Experiment> {
 pub struct Context<'a> {
     /// Smaller data and fewer rounds: done within a minute on two cores.
     pub quick: bool,
-    /// Told what is being done.
-    pub progress: &'a mut dyn FnMut(&str),
+    /// Told what is done next; an error stops the experiment there.
+    pub progress: &'a mut dyn FnMut(&str) -> anyhow::Result<()>,
     wavelets: BTreeMap<Size, Arc<TriMesh>>,
 }
 
 impl<'a> Context<'a> {
     /// A context.
-    pub fn new(quick: bool, progress: &'a mut dyn FnMut(&str)) -> Context<'a> {
+    pub fn new(quick: bool, progress: &'a mut dyn FnMut(&str) -> anyhow::Result<()>) -> Context<'a> {
         Context { quick, progress, wavelets: BTreeMap::new() }
     }
 
-    fn say(&mut self, what: impl AsRef<str>) {
-        (self.progress)(what.as_ref());
+    fn say(&mut self, what: impl AsRef<str>) -> anyhow::Result<()> {
+        (self.progress)(what.as_ref())
     }
 
     /// The wavelet surfaces of a size. Those up to 4 million triangles are kept for the next experiment.
@@ -85,7 +85,7 @@ impl<'a> Context<'a> {
         if let Some(m) = self.wavelets.get(&size) {
             return Ok(m.clone());
         }
-        self.say(format!("making the wavelet surfaces of {} triangles", size.name()));
+        self.say(format!("making the wavelet surfaces of {} triangles", size.name()))?;
         let mesh = meshes::wavelet(size)?;
         if size <= Size::M4 {
             self.wavelets.insert(size, mesh.clone());

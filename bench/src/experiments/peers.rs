@@ -96,7 +96,7 @@ fn scene(
             if rays.len == 0 {
                 continue;
             }
-            context.say(format!("{full_name}, {}: {} rays", view.name, kind.name()));
+            context.say(format!("{full_name}, {}: {} rays", view.name, kind.name()))?;
             let contenders = lineup.contenders(kind, !context.quick);
             let schedule = context.schedule(Schedule::one_thread(), 2.5);
             let timings = compare::time(&schedule, kind, &rays, &contenders)?;
