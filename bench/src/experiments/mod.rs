@@ -10,7 +10,7 @@ mod peers;
 use crate::machine::Machine;
 use crate::record::Record;
 use crate::{meshes, runner};
-use anyhow::Context as _;
+use datasets::cli::Interrupted;
 use datasets::generate::nested_wavelet::Size;
 use rt_core::mesh::TriMesh;
 use std::collections::BTreeMap;
@@ -105,7 +105,10 @@ pub fn run(experiment: &Experiment, context: &mut Context<'_>) -> anyhow::Result
     let machine = Machine::describe();
     let Experiment { id, chapter, title, run } = *experiment;
     let mut record = Record::new(id, title, chapter, context.quick, machine);
-    run(context, &mut record).with_context(|| format!("experiment `{id}` failed"))?;
+    // Ctrl-C is no failure of the experiment.
+    run(context, &mut record).map_err(|e| {
+        if e.is::<Interrupted>() { e } else { e.context(format!("experiment `{id}` failed")) }
+    })?;
     record.elapsed_secs = start.elapsed().as_secs_f64();
     let unexplained = record.unexplained_columns();
     anyhow::ensure!(unexplained.is_empty(), "experiment `{id}` does not explain its columns {unexplained:?}");
