@@ -6,7 +6,7 @@ mod report;
 mod run;
 
 use clap::{Args, Parser, Subcommand};
-use std::io::Write as _;
+use datasets::cli::{CommonArgs, CompletionsArgs, run_main};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -20,18 +20,7 @@ struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
     #[command(flatten)]
-    common: Common,
-}
-
-/// Options of every command.
-#[derive(Debug, Clone, Copy, Args)]
-struct Common {
-    /// No progress on standard error
-    #[arg(long, short, global = true)]
-    quiet: bool,
-    /// The result as JSON on standard output
-    #[arg(long, global = true)]
-    json: bool,
+    common: CommonArgs,
 }
 
 #[derive(Debug, Subcommand)]
@@ -44,6 +33,8 @@ enum Command {
     Report(ReportArgs),
     /// Says which other ray tracers are found and how to get the others; `bench run peers` measures them
     Peers,
+    /// Prints a completion script for a shell
+    Completions(CompletionsArgs),
 }
 
 /// Options of `bench run`.
@@ -73,23 +64,9 @@ struct ReportArgs {
     out: Option<PathBuf>,
 }
 
-/// A mistake on the command line, as opposed to a failure of what it asked for.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-struct UsageError(String);
-
-/// Runs the program. Exit codes: 0 done, 1 failed, 2 wrong usage.
+/// Runs the program. Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted.
 pub fn main() -> ExitCode {
-    // clap prints its own errors and ends with 2.
-    let cli = Cli::parse();
-    match execute(cli) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(e) if is_broken_pipe(&e) => ExitCode::SUCCESS,
-        Err(e) => {
-            eprintln!("error: {e:#}");
-            ExitCode::from(if e.is::<UsageError>() { 2 } else { 1 })
-        }
-    }
+    run_main(|| execute(Cli::try_parse()?))
 }
 
 fn execute(cli: Cli) -> anyhow::Result<()> {
@@ -98,22 +75,10 @@ fn execute(cli: Cli) -> anyhow::Result<()> {
         None => run::everything_quick(common),
         Some(Command::List) => list::list(common),
         Some(Command::Run(args)) => run::run(common, &args),
-        Some(Command::Report(args)) => report::report(&args),
+        Some(Command::Report(args)) => report::report(common, &args),
         Some(Command::Peers) => peers::peers(common),
+        Some(Command::Completions(args)) => args.print::<Cli>(),
     }
-}
-
-/// A reader that closes early (`bench list | head`) is no failure.
-fn is_broken_pipe(e: &anyhow::Error) -> bool {
-    e.chain().any(|c| {
-        c.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
-    })
-}
-
-/// A line on standard output.
-fn print(line: &str) -> anyhow::Result<()> {
-    writeln!(std::io::stdout().lock(), "{line}")?;
-    Ok(())
 }
 
 /// Where records and reports go unless told otherwise: the build folder that this program lies in.

@@ -10,7 +10,7 @@ mod peers;
 use crate::machine::Machine;
 use crate::record::Record;
 use crate::{meshes, runner};
-use anyhow::Context as _;
+use datasets::cli::Interrupted;
 use datasets::generate::nested_wavelet::Size;
 use rt_core::mesh::TriMesh;
 use std::collections::BTreeMap;
@@ -65,19 +65,19 @@ pub fn find(id: &str) -> Option<&'static Experiment> {
 pub struct Context<'a> {
     /// Smaller data and fewer rounds: done within a minute on two cores.
     pub quick: bool,
-    /// Told what is being done.
-    pub progress: &'a mut dyn FnMut(&str),
+    /// Told what is done next; an error stops the experiment there.
+    pub progress: &'a mut dyn FnMut(&str) -> anyhow::Result<()>,
     wavelets: BTreeMap<Size, Arc<TriMesh>>,
 }
 
 impl<'a> Context<'a> {
     /// A context.
-    pub fn new(quick: bool, progress: &'a mut dyn FnMut(&str)) -> Context<'a> {
+    pub fn new(quick: bool, progress: &'a mut dyn FnMut(&str) -> anyhow::Result<()>) -> Context<'a> {
         Context { quick, progress, wavelets: BTreeMap::new() }
     }
 
-    fn say(&mut self, what: impl AsRef<str>) {
-        (self.progress)(what.as_ref());
+    fn say(&mut self, what: impl AsRef<str>) -> anyhow::Result<()> {
+        (self.progress)(what.as_ref())
     }
 
     /// The wavelet surfaces of a size. Those up to 4 million triangles are kept for the next experiment.
@@ -85,7 +85,7 @@ impl<'a> Context<'a> {
         if let Some(m) = self.wavelets.get(&size) {
             return Ok(m.clone());
         }
-        self.say(format!("making the wavelet surfaces of {} triangles", size.name()));
+        self.say(format!("making the wavelet surfaces of {} triangles", size.name()))?;
         let mesh = meshes::wavelet(size)?;
         if size <= Size::M4 {
             self.wavelets.insert(size, mesh.clone());
@@ -105,7 +105,10 @@ pub fn run(experiment: &Experiment, context: &mut Context<'_>) -> anyhow::Result
     let machine = Machine::describe();
     let Experiment { id, chapter, title, run } = *experiment;
     let mut record = Record::new(id, title, chapter, context.quick, machine);
-    run(context, &mut record).with_context(|| format!("experiment `{id}` failed"))?;
+    // Ctrl-C is no failure of the experiment.
+    run(context, &mut record).map_err(|e| {
+        if e.is::<Interrupted>() { e } else { e.context(format!("experiment `{id}` failed")) }
+    })?;
     record.elapsed_secs = start.elapsed().as_secs_f64();
     let unexplained = record.unexplained_columns();
     anyhow::ensure!(unexplained.is_empty(), "experiment `{id}` does not explain its columns {unexplained:?}");
