@@ -22,6 +22,7 @@ use crate::light::Light;
 use crate::material::{ColorSource, Material, SurfaceModel};
 use crate::mesh::{Attribute, PerElement, TriMesh};
 use crate::shapes::Shape;
+use crate::volume::Volume;
 use glam::DAffine3;
 use std::sync::Arc;
 
@@ -77,6 +78,15 @@ pub struct AmbientOcclusion {
     pub rays: u32,
 }
 
+/// A volume placed in the world. Where volumes overlap, their media mix.
+#[derive(Clone)]
+pub struct PlacedVolume {
+    /// The medium.
+    pub volume: Arc<Volume>,
+    /// Object to world. Extinction is per object-space length: a volume scaled up is thicker, not denser.
+    pub world_from_object: DAffine3,
+}
+
 /// Everything that is drawn. Materials, lights and appearances may change between frames; the world is built once.
 #[derive(Clone)]
 pub struct Scene {
@@ -94,6 +104,8 @@ pub struct Scene {
     pub background: Background,
     /// Ambient occlusion; `None` for none.
     pub ambient_occlusion: Option<AmbientOcclusion>,
+    /// Direct volume rendering, in front of, between and behind surfaces. Volumes cast no shadows and have no depth.
+    pub volumes: Vec<PlacedVolume>,
     geometry_has_alpha: Vec<bool>,
 }
 
@@ -166,6 +178,7 @@ impl Scene {
             environment: None,
             background: Background::Transparent,
             ambient_occlusion: None,
+            volumes: Vec::new(),
             geometry_has_alpha,
         }
     }
@@ -211,6 +224,14 @@ impl Scene {
                     "0".into(),
                     "at least 1; leave ambient occlusion out to have none",
                 ));
+            }
+        }
+        for (index, v) in self.volumes.iter().enumerate() {
+            let determinant = v.world_from_object.matrix3.determinant();
+            if !(v.world_from_object.is_finite() && determinant != 0.0 && determinant.is_finite()) {
+                let (field, value, rule) =
+                    ("world_from_object", format!("{:?}", v.world_from_object), "finite and invertible");
+                return Err(SceneError::OutOfRange { what: "volume", index, field, value, rule });
             }
         }
         for (appearance, a) in self.appearances.iter().enumerate() {
@@ -329,6 +350,7 @@ pub(crate) fn requirements(scene: &Scene) -> Effects {
         )
         .with_if(dielectric, Effects::REFRACTION)
         .with_if(transparent, Effects::TRANSPARENCY)
+        .with_if(!scene.volumes.is_empty(), Effects::VOLUMES)
 }
 
 fn check_light(l: &Light) -> Result<(), (&'static str, String, &'static str)> {
@@ -391,6 +413,7 @@ pub struct SceneBuilder {
     appearances: Vec<Appearance>,
     materials: Vec<Material>,
     lights: Vec<Light>,
+    volumes: Vec<PlacedVolume>,
     /// Light from infinitely far.
     pub environment: Option<Environment>,
     /// What fills uncovered pixels.
@@ -448,6 +471,11 @@ impl SceneBuilder {
         self.lights.push(light);
     }
 
+    /// Adds a volume at its place.
+    pub fn volume(&mut self, volume: impl Into<Arc<Volume>>) {
+        self.volumes.push(PlacedVolume { volume: volume.into(), world_from_object: DAffine3::IDENTITY });
+    }
+
     /// Builds the world and checks everything.
     pub fn build(self) -> Result<Scene, SceneError> {
         let world = World::build(self.geometries, self.instances, &self.build_options)?;
@@ -458,6 +486,7 @@ impl SceneBuilder {
         scene.environment = self.environment;
         scene.background = self.background;
         scene.ambient_occlusion = self.ambient_occlusion;
+        scene.volumes = self.volumes;
         scene.check()?;
         Ok(scene)
     }

@@ -139,7 +139,8 @@ fn shadow_rays_find_no_false_blockers_at_any_scale_or_offset() {
             let without = draw(&s, &camera, RenderOptions { effects: Some(Effects::NONE), ..options(96) });
             assert!(with.report.rays.shadow > 2000, "scale {scale} offset {offset}: {:?}", with.report.rays);
             assert_eq!(with.report.rays.shadow_blocked, 0, "scale {scale} offset {offset}");
-            assert_eq!(difference(&with, &without), 0.0);
+            // The loops without and with rays take the normal in f32 and in f64.
+            assert!(difference(&with, &without) < 1e-6);
         }
     }
 }

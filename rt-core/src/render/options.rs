@@ -4,6 +4,7 @@ use super::RenderError;
 use crate::effects::Effects;
 use crate::frame::Layers;
 use crate::sampler::Sampling;
+use crate::volume::VolumeQuality;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -51,6 +52,8 @@ pub struct RenderOptions {
     /// Depth, distance, normal and ids belong to the first surface of at least this opacity: 0 for any surface that is not
     /// invisible, 1 for opaque surfaces only, as OpenGL's depth buffer has it.
     pub depth_min_opacity: f32,
+    /// Accuracy of direct volume rendering.
+    pub volume_quality: VolumeQuality,
     /// Stop when this much time has passed. The first sample of every pixel is always finished.
     pub time_limit: Option<Duration>,
     /// Stop when the standard error of a pixel (root mean square over the picture, luminance) is estimated below this, in 8-bit
@@ -78,6 +81,7 @@ impl RenderOptions {
             max_bounces: 8,
             min_contribution: 1.0 / 1024.0,
             depth_min_opacity: 0.0,
+            volume_quality: VolumeQuality::default(),
             time_limit: None,
             max_error_levels: None,
             cancel: None,

@@ -24,12 +24,25 @@ pub(super) fn plan(scene: &Scene, camera: &Camera, options: &RenderOptions) -> R
     if path {
         needed = needed.without(Effects::AMBIENT_OCCLUSION) | Effects::PATH_TRACING;
     }
+    if path && needed.contains(Effects::VOLUMES) {
+        return Err(RenderError::Unsupported {
+            what: "path tracing",
+            with: "with volumes",
+            cure: "leave the volumes out of the scene, or path tracing out of the options",
+        });
+    }
     let asked_all = asked.map(|e| e.with_if(path, Effects::PATH_TRACING)).unwrap_or(needed);
     let effects = asked_all.intersection(needed);
     for (effect, name) in Effects::ALL {
         if asked.is_some() && asked_all.contains(effect) && !needed.contains(effect) {
             warnings.push(format!("{name} changes no pixel: {}", why_not_needed(effect, path)));
         }
+    }
+    if effects.contains(Effects::VOLUMES) && effects.intersects(Effects::SHADOWS | Effects::AMBIENT_OCCLUSION)
+    {
+        warnings.push(
+            "volumes cast no shadows and no ambient occlusion: light rays pass through them undimmed".into(),
+        );
     }
     let left_out = needed.without(effects);
     for (effect, name) in Effects::ALL {

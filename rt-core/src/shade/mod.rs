@@ -16,6 +16,7 @@ mod shadow;
 mod specular;
 mod stage;
 mod tile;
+mod volumes;
 mod wave;
 
 pub(crate) use stage::Stage;
@@ -24,7 +25,7 @@ pub(crate) use tile::{TILE, TileArea, TileLayers};
 use crate::effects::Effects;
 use crate::frame::Layers;
 use crate::material::SurfaceModel;
-use crate::ray::{HitBlock, LANES, RayBlock};
+use crate::ray::{HitBlock, LANES, Ray, RayBlock};
 use crate::ray_stats::RayStats;
 use crate::surface::SurfacePoint;
 use glam::Vec3;
@@ -68,6 +69,8 @@ pub(crate) struct Workspace {
     hits: Vec<HitBlock>,
     points: Vec<Point>,
     light_rays: LightRays,
+    /// One ray in the object spaces of all volumes.
+    along: Vec<Ray>,
     /// Premultiplied RGBA of this sample.
     pixels: Vec<[f32; 4]>,
 }
@@ -225,7 +228,7 @@ fn trace_geometry_layers(
             if !transparent || s.opacity > 0.0 && s.opacity >= stage.options.depth_min_opacity {
                 out.record(stage, area, state.slot, &ray, &hit, &s);
             } else {
-                let ray = crate::ray::Ray { t_min: s.t_behind(&ray, hit.t), ..ray };
+                let ray = Ray { t_min: s.t_behind(&ray, hit.t), ..ray };
                 if ray.is_valid() {
                     work.behind.push(&ray, state);
                     stats.transparency += 1;
@@ -257,7 +260,20 @@ fn meet_surfaces(
             continue;
         }
         let ray = block.get(lane);
-        let Some(hit) = work.hits[i / LANES].get(lane) else {
+        let hit = work.hits[i / LANES].get(lane);
+        if !stage.volumes.is_empty() {
+            let t_end = hit.map_or(ray.t_max, |h| h.t);
+            volumes::cross(
+                stage,
+                &ray,
+                t_end,
+                &mut work.current.states[i],
+                &mut work.pixels,
+                &mut work.along,
+                stats,
+            );
+        }
+        let Some(hit) = hit else {
             add_miss(stage, area, &work.current.states[i], ray.dir, &mut work.pixels);
             continue;
         };
@@ -397,7 +413,7 @@ fn send_behind(stage: &Stage<'_>, work: &mut Workspace, stats: &mut RayStats) {
         let left = 1.0 - p.surface.opacity;
         let throughput = state.throughput * left;
         let ray = work.current.ray(p.lane as usize);
-        let ray = crate::ray::Ray { t_min: p.surface.t_behind(&ray, p.t), ..ray };
+        let ray = Ray { t_min: p.surface.t_behind(&ray, p.t), ..ray };
         if throughput.max_element() < stage.options.min_contribution || !ray.is_valid() {
             continue;
         }

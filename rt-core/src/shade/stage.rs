@@ -5,12 +5,14 @@ use crate::camera::Camera;
 use crate::effects::Effects;
 use crate::environment::{Background, MeanRadiance};
 use crate::light::{LightKind, PlacedLight};
+use crate::math::Aabb;
 use crate::ray::{Hit, Ray};
 use crate::render::RenderOptions;
 use crate::sampler::Sampler;
 use crate::scene::Scene;
 use crate::surface::{Placed, SurfacePoint};
-use glam::{DVec3, Vec3};
+use crate::volume::Volume;
+use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
 /// Everything that is the same for all rays of a frame.
@@ -26,6 +28,10 @@ pub(crate) struct Stage<'a> {
     /// Radiance of the ambient lights alone.
     pub(crate) ambient: Vec3,
     pub(crate) camera_rays: CameraRays,
+    /// Volumes with the way into their object space.
+    pub(crate) volumes: Vec<(&'a Volume, DAffine3)>,
+    /// World position of render space's origin.
+    pub(crate) origin: DVec3,
     /// Render-space up of the picture, for gradient backgrounds seen in mirrors.
     up: Vec3,
 }
@@ -37,7 +43,28 @@ impl<'a> Stage<'a> {
         options: &'a RenderOptions,
         effects: Effects,
     ) -> Stage<'a> {
-        let origin = scene.world.origin();
+        // Without surfaces, render space can be where the volumes are.
+        let origin = match scene.volumes.first() {
+            Some(v) if scene.world.bounds().is_empty() => {
+                v.world_from_object.transform_point3(v.volume.origin())
+            }
+            _ => scene.world.origin(),
+        };
+        let mut bounds = scene.world.bounds();
+        let mut volumes = Vec::new();
+        if effects.contains(Effects::VOLUMES) {
+            for v in &scene.volumes {
+                let to_world = v.world_from_object * DAffine3::from_translation(v.volume.origin());
+                let render_from_object = DAffine3::from_translation(-origin) * to_world;
+                let corners = v
+                    .volume
+                    .bounds()
+                    .corners()
+                    .map(|c| render_from_object.transform_point3(c.as_dvec3()).as_vec3());
+                bounds = bounds.union(Aabb::from_points(&corners));
+                volumes.push((&*v.volume, render_from_object.inverse()));
+            }
+        }
         let world_from_view = camera.world_from_view();
         let eye = camera.eye().unwrap_or_else(|| camera.world_ray([0.0, 0.0]).0);
         let lights = scene
@@ -58,12 +85,9 @@ impl<'a> Stage<'a> {
             lights,
             mean_radiance: MeanRadiance::new(scene.environment.as_ref(), ambient),
             ambient,
-            camera_rays: CameraRays::new(
-                camera,
-                origin,
-                scene.world.bounds(),
-                effects.contains(Effects::DEPTH_OF_FIELD),
-            ),
+            camera_rays: CameraRays::new(camera, origin, bounds, effects.contains(Effects::DEPTH_OF_FIELD)),
+            volumes,
+            origin,
             up: world_from_view.y_axis.as_vec3(),
         }
     }
@@ -132,7 +156,7 @@ impl<'a> Stage<'a> {
     /// surface's plane, so neither the f32 ray nor its hit parameter limits the accuracy.
     pub(crate) fn exact_depth(&self, ndc: [f64; 2], ray: &Ray, hit: &Hit) -> (f32, f32) {
         let (origin, dir) = self.camera.world_ray(ndc);
-        let (on_surface, n) = self.placed(hit).plane(ray, hit, self.scene.world.origin());
+        let (on_surface, n) = self.placed(hit).plane(ray, hit, self.origin);
         let along = n.dot(dir);
         let t = n.dot(on_surface - origin) / along;
         let on_ray = origin + dir * t;
