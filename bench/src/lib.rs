@@ -12,9 +12,13 @@
 //! `unsafe` lives in `peers/embree` alone: a C library cannot be called without it.
 #![deny(unsafe_code)]
 
+mod book;
+pub mod cli;
 pub mod clock;
 pub mod experiments;
 pub mod machine;
+pub mod meshes;
+pub mod ours;
 pub mod peers;
 pub mod plot;
 pub mod rays;

@@ -32,7 +32,8 @@ impl Machine {
     /// Asks the system.
     pub fn describe() -> Machine {
         let read = |p: &str| std::fs::read_to_string(p).unwrap_or_default();
-        let memory_kib = field(&read("/proc/meminfo"), "MemTotal").and_then(|v| leading_number(&v)).unwrap_or(0.0);
+        let memory_kib =
+            field(&read("/proc/meminfo"), "MemTotal").and_then(|v| leading_number(&v)).unwrap_or(0.0);
         let secs = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
         let kernel = read("/proc/sys/kernel/osrelease");
         Machine {
@@ -84,7 +85,8 @@ fn leading_number(text: &str) -> Option<f64> {
 
 fn commit() -> Option<String> {
     let git = |args: &[&str]| {
-        let out = std::process::Command::new("git").args(args).stderr(std::process::Stdio::null()).output().ok()?;
+        let out =
+            std::process::Command::new("git").args(args).stderr(std::process::Stdio::null()).output().ok()?;
         out.status.success().then(|| String::from_utf8_lossy(&out.stdout).trim().to_string())
     };
     let head = git(&["rev-parse", "--short=12", "HEAD"])?;

@@ -7,53 +7,7 @@
 
 use glam::{DVec3, Vec3};
 use rt_core::mesh::TriMesh;
-
-/// Rays per block.
-pub const LANES: usize = 16;
-/// [`HitBlock::prim`] of a ray without a hit.
-pub const MISS: u32 = u32::MAX;
-
-/// 16 rays. A lane with `tmax < 0` is empty.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[repr(C, align(64))]
-pub struct RayBlock {
-    /// Origins, x.
-    pub ox: [f32; LANES],
-    /// Origins, y.
-    pub oy: [f32; LANES],
-    /// Origins, z.
-    pub oz: [f32; LANES],
-    /// Directions, x; the directions have unit length up to rounding.
-    pub dx: [f32; LANES],
-    /// Directions, y.
-    pub dy: [f32; LANES],
-    /// Directions, z.
-    pub dz: [f32; LANES],
-    /// Nearest distance that counts.
-    pub tmin: [f32; LANES],
-    /// Farthest distance that counts.
-    pub tmax: [f32; LANES],
-}
-
-/// The closest hits of a [`RayBlock`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[repr(C, align(64))]
-pub struct HitBlock {
-    /// Distances; meaningless without a hit.
-    pub t: [f32; LANES],
-    /// Triangle numbers, [`MISS`] without a hit.
-    pub prim: [u32; LANES],
-    /// First barycentric coordinates (weight of the second vertex), where the tracer computes them.
-    pub u: [f32; LANES],
-    /// Second barycentric coordinates (weight of the third vertex).
-    pub v: [f32; LANES],
-}
-
-impl HitBlock {
-    /// No hits.
-    pub const NONE: HitBlock =
-        HitBlock { t: [f32::INFINITY; LANES], prim: [MISS; LANES], u: [0.0; LANES], v: [0.0; LANES] };
-}
+pub use rt_core::ray::{HitBlock, LANES, NO_HIT, RayBlock};
 
 /// One ray as f64 numbers, before it is rounded into a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,7 +17,7 @@ pub struct Ray64 {
     /// Direction.
     pub direction: DVec3,
     /// Farthest distance that counts.
-    pub tmax: f64,
+    pub t_max: f64,
 }
 
 /// A list of rays in blocks.
@@ -76,7 +30,7 @@ pub struct RaySet {
 }
 
 impl RaySet {
-    /// Rounds rays to f32 and packs them. Empty lanes repeat a ray's numbers, with `tmax` -1.
+    /// Rounds rays to f32 and packs them. Empty lanes repeat a ray's numbers, with `t_max` -1.
     pub fn pack(rays: impl IntoIterator<Item = Ray64>) -> RaySet {
         let mut set = RaySet::default();
         for r in rays {
@@ -85,16 +39,30 @@ impl RaySet {
             if lane == 0 {
                 let s = |x: f32| [x; LANES];
                 let (ox, oy, oz, dx, dy, dz) = (s(o.x), s(o.y), s(o.z), s(d.x), s(d.y), s(d.z));
-                set.blocks.push(RayBlock { ox, oy, oz, dx, dy, dz, tmin: s(0.0), tmax: s(-1.0) });
+                set.blocks.push(RayBlock { ox, oy, oz, dx, dy, dz, t_min: s(0.0), t_max: s(-1.0) });
             }
             let last = set.blocks.len() - 1;
             let b = &mut set.blocks[last];
             (b.ox[lane], b.oy[lane], b.oz[lane]) = (o.x, o.y, o.z);
             (b.dx[lane], b.dy[lane], b.dz[lane]) = (d.x, d.y, d.z);
-            b.tmax[lane] = r.tmax as f32;
+            b.t_max[lane] = r.t_max as f32;
             set.len += 1;
         }
         set
+    }
+
+    /// About `limit` of the rays, spread evenly: every n-th run of 1024, so that neighbours stay together. All when
+    /// there are fewer.
+    pub fn thinned(self, limit: usize) -> RaySet {
+        const RUN: usize = 64;
+        let step = self.len.div_ceil(limit.max(1)).max(1);
+        if step == 1 {
+            return self;
+        }
+        let kept: Vec<RayBlock> = self.blocks.chunks(RUN).step_by(step).flatten().copied().collect();
+        // The last block, which may have empty lanes, is left out unless its run is kept whole.
+        let whole: Vec<RayBlock> = kept.into_iter().filter(|b| b.t_max[LANES - 1] >= 0.0).collect();
+        RaySet { len: whole.len() * LANES, blocks: whole }
     }
 
     /// Origin and direction of ray `i` as they were rounded.
@@ -156,7 +124,7 @@ impl View {
             let sx = ((f64::from(x) + 0.5) / f64::from(size) * 2.0 - 1.0) * self.tan_half_fov;
             let sy = (1.0 - (f64::from(y) + 0.5) / f64::from(size) * 2.0) * self.tan_half_fov;
             let direction = (forward + right * sx + up * sy).normalize();
-            Ray64 { origin: self.eye, direction, tmax: f64::INFINITY }
+            Ray64 { origin: self.eye, direction, t_max: f64::INFINITY }
         }))
     }
 }
@@ -175,7 +143,7 @@ pub fn surface_points(mesh: &TriMesh, rays: &RaySet, hits: &[HitBlock], radius: 
     let mut points = vec![];
     for i in 0..rays.len {
         let prim = hits[i / LANES].prim[i % LANES];
-        if prim == MISS {
+        if prim == NO_HIT {
             continue;
         }
         let (o, d) = rays.ray(i);
@@ -200,8 +168,8 @@ pub fn surface_points(mesh: &TriMesh, rays: &RaySet, hits: &[HitBlock], radius: 
 pub fn shadow(points: &[SurfacePoint], light: DVec3) -> RaySet {
     RaySet::pack(points.iter().map(|p| {
         let to_light = light - p.origin;
-        let tmax = to_light.length();
-        Ray64 { origin: p.origin, direction: to_light / tmax, tmax }
+        let t_max = to_light.length();
+        Ray64 { origin: p.origin, direction: to_light / t_max, t_max }
     }))
 }
 
@@ -211,7 +179,7 @@ pub fn shadow_from_light(points: &[SurfacePoint], light: DVec3) -> RaySet {
         let to_point = p.origin - light;
         let distance = to_point.length();
         // Stops just short of the point, so that its own surface does not count.
-        Ray64 { origin: light, direction: to_point / distance, tmax: distance * (1.0 - 1e-5) }
+        Ray64 { origin: light, direction: to_point / distance, t_max: distance * (1.0 - 1e-5) }
     }))
 }
 
@@ -226,7 +194,7 @@ pub fn ambient_occlusion(points: &[SurfacePoint]) -> RaySet {
             let b = (f64::from(k >> 2) + unit(seed ^ (2 * k + 2).wrapping_mul(0x9e37_79b9))) / 2.0;
             let (sin, cos) = (a * std::f64::consts::TAU).sin_cos();
             let direction = (tx * cos + ty * sin) * b.sqrt() + p.normal * (1.0 - b).sqrt();
-            Ray64 { origin: p.origin, direction, tmax: f64::INFINITY }
+            Ray64 { origin: p.origin, direction, t_max: f64::INFINITY }
         })
     }))
 }
@@ -241,7 +209,7 @@ pub fn incoherent(mesh: &TriMesh, count: usize) -> RaySet {
         let z = 2.0 * r(4) - 1.0;
         let (sin, cos) = (r(5) * std::f64::consts::TAU).sin_cos();
         let s = (1.0 - z * z).sqrt();
-        Ray64 { origin, direction: DVec3::new(s * cos, s * sin, z), tmax: f64::INFINITY }
+        Ray64 { origin, direction: DVec3::new(s * cos, s * sin, z), t_max: f64::INFINITY }
     }))
 }
 
@@ -273,4 +241,80 @@ fn hash(x: u32) -> u32 {
 /// A number in 0..1 from a seed.
 fn unit(seed: u32) -> f64 {
     f64::from(hash(seed)) / 4_294_967_296.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn square() -> TriMesh {
+        let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+        let positions = corners.map(|[x, y]| Vec3::new(x, y, 0.25 * x)).to_vec();
+        TriMesh::new(positions, vec![[0, 1, 2], [0, 2, 3]])
+    }
+
+    #[test]
+    fn sixteen_primary_rays_are_a_square_of_pixels() {
+        let view = View::orbit(&square());
+        let rays = view.primary(32);
+        assert_eq!((rays.len, rays.blocks.len()), (1024, 64));
+        let pixel = |i: usize| {
+            let d = rays.ray(i).1.as_dvec3();
+            let [right, up, forward] = view.axes;
+            let (x, y) = (d.dot(right) / d.dot(forward), d.dot(up) / d.dot(forward));
+            let index = |s: f64| ((s / view.tan_half_fov + 1.0) * 16.0).floor() as i32;
+            (index(x), index(-y))
+        };
+        let first: Vec<(i32, i32)> = (0..16).map(pixel).collect();
+        assert!(first.iter().all(|p| (0..4).contains(&p.0) && (0..4).contains(&p.1)), "{first:?}");
+        assert_eq!(pixel(1023), (31, 31));
+    }
+
+    #[test]
+    fn empty_lanes_are_marked_and_not_counted() {
+        let ray = Ray64 { origin: DVec3::X, direction: DVec3::Y, t_max: 5.0 };
+        let set = RaySet::pack(vec![ray; 18]);
+        assert_eq!((set.len, set.blocks.len()), (18, 2));
+        assert_eq!(set.blocks[1].t_max[..3], [5.0, 5.0, -1.0]);
+        assert_eq!(RaySet::pack(vec![]), RaySet::default());
+    }
+
+    #[test]
+    fn thinning_keeps_neighbours_and_whole_blocks() {
+        let ray = |i: usize| Ray64 { origin: DVec3::X * i as f64, direction: DVec3::Y, t_max: 1.0 };
+        let set = RaySet::pack((0..10_000).map(ray));
+        let thin = set.clone().thinned(3000);
+        assert!((2000..=4096).contains(&thin.len) && thin.len.is_multiple_of(LANES), "{}", thin.len);
+        assert_eq!(thin.ray(1023).0.x, 1023.0);
+        assert_eq!(thin.ray(1024).0.x, 4096.0);
+        assert_eq!(set.clone().thinned(10_000), set);
+    }
+
+    #[test]
+    fn secondary_rays_start_off_the_surface_on_the_side_of_the_viewer() {
+        let mesh = square();
+        let (origin, direction) = (DVec3::new(0.3, 0.2, 4.0), DVec3::NEG_Z);
+        let rays = RaySet::pack([Ray64 { origin, direction, t_max: 9.0 }]);
+        let mut hits = [HitBlock::MISS];
+        hits[0].prim[0] = 0;
+        let points = surface_points(&mesh, &rays, &hits, 1.0);
+        let p = points[0];
+        // The plane is z = x/4; the hit is at (0.3, 0.2, 0.075).
+        let height = (p.origin.z - 0.25 * p.origin.x) / (1.0f64 + 0.0625).sqrt();
+        assert!((height - 2e-5).abs() < 1e-9, "{height}");
+        assert!(p.normal.z > 0.0 && (p.normal.length() - 1.0).abs() < 1e-12);
+        let light = DVec3::new(0.0, 0.0, 10.0);
+        let (o, d) = shadow(&points, light).ray(0);
+        assert!((o + d * 10.0 - light.as_vec3()).length() < 0.2);
+        let (o, d) = shadow_from_light(&points, light).ray(0);
+        assert!(o == light.as_vec3() && d.z < 0.0);
+        let ao = ambient_occlusion(&points);
+        assert_eq!(ao.len, 8);
+        assert!((0..8).all(|i| ao.ray(i).1.as_dvec3().dot(p.normal) > 0.0));
+    }
+
+    #[test]
+    fn rays_are_the_same_every_time() {
+        assert_eq!(incoherent(&square(), 100), incoherent(&square(), 100));
+    }
 }

@@ -52,13 +52,32 @@ pub struct Variant<'a> {
     pub name: String,
     /// Does the work once and returns a number that must be the same every time, such as the hits counted: a variant
     /// that skips work is found out, and the compiler cannot remove it.
-    pub run: Box<dyn FnMut() -> u64 + 'a>,
+    run: Box<dyn FnMut() -> u64 + 'a>,
+    /// Gives that number after the clock has stopped, where finding it is work of its own.
+    check: Option<Box<dyn FnMut() -> u64 + 'a>>,
 }
 
 impl<'a> Variant<'a> {
-    /// A named closure.
+    /// A named closure that returns its own check.
     pub fn new(name: impl Into<String>, run: impl FnMut() -> u64 + 'a) -> Self {
-        Variant { name: name.into(), run: Box::new(run) }
+        Variant { name: name.into(), run: Box::new(run), check: None }
+    }
+
+    /// A named closure whose result `check` inspects outside the measured time.
+    pub fn checked(
+        name: impl Into<String>,
+        mut run: impl FnMut() + 'a,
+        check: impl FnMut() -> u64 + 'a,
+    ) -> Self {
+        let run = move || {
+            run();
+            0
+        };
+        Variant { name: name.into(), run: Box::new(run), check: Some(Box::new(check)) }
+    }
+
+    fn result(&mut self, returned: u64) -> u64 {
+        self.check.as_mut().map_or(returned, |c| c())
     }
 }
 
@@ -199,7 +218,9 @@ pub fn interleave(schedule: &Schedule, variants: &mut [Variant<'_>]) -> Result<T
     for round in 0..schedule.warmup_rounds as usize {
         cores.pin(round);
         for i in order(variants.len(), round) {
-            check(&variants[i].name, &mut firsts[i], (variants[i].run)())?;
+            let returned = (variants[i].run)();
+            let value = variants[i].result(returned);
+            check(&variants[i].name, &mut firsts[i], value)?;
         }
     }
     for v in variants.iter() {
@@ -216,7 +237,8 @@ pub fn interleave(schedule: &Schedule, variants: &mut [Variant<'_>]) -> Result<T
         }
         cores.pin(round);
         for i in order(variants.len(), round) {
-            let (value, sample) = clock::measure(|| (variants[i].run)());
+            let (returned, sample) = clock::measure(|| (variants[i].run)());
+            let value = variants[i].result(returned);
             check(&variants[i].name, &mut firsts[i], value)?;
             timed[i].samples.push(sample);
             timed[i].check = value;
@@ -324,7 +346,13 @@ mod tests {
             std::thread::sleep(std::time::Duration::from_millis(5));
             1
         };
-        let plan = Schedule { warmup_rounds: 0, rounds: 1000, budget_secs: 0.0, min_rounds: 2, ..Schedule::all_threads() };
+        let plan = Schedule {
+            warmup_rounds: 0,
+            rounds: 1000,
+            budget_secs: 0.0,
+            min_rounds: 2,
+            ..Schedule::all_threads()
+        };
         let t = interleave(&plan, &mut [Variant::new("nap", nap)]).unwrap();
         assert_eq!(t.variants[0].samples.len(), 2);
     }
@@ -332,13 +360,28 @@ mod tests {
     #[test]
     fn a_variant_that_does_other_work_later_is_refused() {
         let mut n = 0;
-        let e = interleave(&Schedule::all_threads(), &mut [Variant::new("drifting", || {
-            n += 1;
-            n
-        })])
+        let e = interleave(
+            &Schedule::all_threads(),
+            &mut [Variant::new("drifting", || {
+                n += 1;
+                n
+            })],
+        )
         .unwrap_err();
         assert_eq!((e.first, e.later), (1, 2));
         assert!(e.to_string().contains("`drifting` returned 1"));
+    }
+
+    #[test]
+    fn checking_is_not_timed() {
+        let slow_check = || {
+            std::thread::sleep(std::time::Duration::from_millis(20));
+            5
+        };
+        let mut v = [Variant::checked("x", || (), slow_check)];
+        let t = interleave(&Schedule { rounds: 2, ..Schedule::all_threads() }, &mut v).unwrap();
+        assert_eq!(t.variants[0].check, 5);
+        assert!(t.summary("x").unwrap().high < 0.01, "{t:?}");
     }
 
     #[test]

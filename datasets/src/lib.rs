@@ -20,6 +20,9 @@ pub mod colormaps;
 pub mod generate;
 pub mod image_io;
 pub mod isosurface;
+pub mod model;
+pub mod read;
 #[cfg(test)]
 mod testing;
 pub mod view;
+pub mod write;

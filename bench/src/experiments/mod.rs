@@ -1,1 +1,131 @@
-//! x
+//! The experiments, one file each, named after the table or figure.
+
+mod accuracy_build;
+mod accuracy_robust;
+mod compare;
+mod fig4_7;
+mod lineup;
+mod peers;
+
+use crate::machine::Machine;
+use crate::record::Record;
+use crate::{meshes, runner};
+use datasets::cli::Interrupted;
+use datasets::generate::nested_wavelet::Size;
+use rt_core::mesh::TriMesh;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// One experiment.
+pub struct Experiment {
+    /// Name on the command line: the dissertation's figure or table, or the question.
+    pub id: &'static str,
+    /// Chapter of the dissertation that it belongs to.
+    pub chapter: u8,
+    /// What it shows.
+    pub title: &'static str,
+    run: fn(&mut Context<'_>, &mut Record) -> anyhow::Result<()>,
+}
+
+/// All experiments, in the order of the report.
+pub const ALL: &[Experiment] = &[
+    Experiment {
+        id: "fig4.7",
+        chapter: 4,
+        title: "Time to build the acceleration structure, by preset, against the number of triangles",
+        run: fig4_7::run,
+    },
+    Experiment {
+        id: "accuracy-build",
+        chapter: 4,
+        title: "What a better build costs and what rays gain by it",
+        run: accuracy_build::run,
+    },
+    Experiment {
+        id: "accuracy-robust",
+        chapter: 4,
+        title: "Rays that slip through closed surfaces, and what preventing it costs",
+        run: accuracy_robust::run,
+    },
+    Experiment {
+        id: "peers",
+        chapter: 4,
+        title: "Rays per second, builds and memory against Embree 3, Embree 4 and obvhs",
+        run: peers::run,
+    },
+];
+
+/// The experiment of that id.
+pub fn find(id: &str) -> Option<&'static Experiment> {
+    ALL.iter().find(|e| e.id.eq_ignore_ascii_case(id))
+}
+
+/// What experiments share in one run of the program.
+pub struct Context<'a> {
+    /// Smaller data and fewer rounds: done within a minute on two cores.
+    pub quick: bool,
+    /// Told what is done next; an error stops the experiment there.
+    pub progress: &'a mut dyn FnMut(&str) -> anyhow::Result<()>,
+    wavelets: BTreeMap<Size, Arc<TriMesh>>,
+}
+
+impl<'a> Context<'a> {
+    /// A context.
+    pub fn new(quick: bool, progress: &'a mut dyn FnMut(&str) -> anyhow::Result<()>) -> Context<'a> {
+        Context { quick, progress, wavelets: BTreeMap::new() }
+    }
+
+    fn say(&mut self, what: impl AsRef<str>) -> anyhow::Result<()> {
+        (self.progress)(what.as_ref())
+    }
+
+    /// The wavelet surfaces of a size. Those up to 4 million triangles are kept for the next experiment.
+    fn wavelet(&mut self, size: Size) -> anyhow::Result<Arc<TriMesh>> {
+        if let Some(m) = self.wavelets.get(&size) {
+            return Ok(m.clone());
+        }
+        self.say(format!("making the wavelet surfaces of {} triangles", size.name()))?;
+        let mesh = meshes::wavelet(size)?;
+        if size <= Size::M4 {
+            self.wavelets.insert(size, mesh.clone());
+        }
+        Ok(mesh)
+    }
+
+    /// `full`, or its short form that measures for about `quick_secs`.
+    fn schedule(&self, full: runner::Schedule, quick_secs: f64) -> runner::Schedule {
+        if self.quick { full.quick(quick_secs) } else { full }
+    }
+}
+
+/// Runs one experiment and gives its record.
+pub fn run(experiment: &Experiment, context: &mut Context<'_>) -> anyhow::Result<Record> {
+    let start = Instant::now();
+    let machine = Machine::describe();
+    let Experiment { id, chapter, title, run } = *experiment;
+    let mut record = Record::new(id, title, chapter, context.quick, machine);
+    // Ctrl-C is no failure of the experiment.
+    run(context, &mut record).map_err(|e| {
+        if e.is::<Interrupted>() { e } else { e.context(format!("experiment `{id}` failed")) }
+    })?;
+    record.elapsed_secs = start.elapsed().as_secs_f64();
+    let unexplained = record.unexplained_columns();
+    anyhow::ensure!(unexplained.is_empty(), "experiment `{id}` does not explain its columns {unexplained:?}");
+    Ok(record)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ids_are_unique_and_found_in_any_case() {
+        for (i, e) in ALL.iter().enumerate() {
+            assert!(ALL[..i].iter().all(|o| o.id != e.id), "{} twice", e.id);
+            assert_eq!(find(&e.id.to_uppercase()).map(|f| f.id), Some(e.id));
+            assert!((3..=5).contains(&e.chapter) && !e.title.is_empty());
+        }
+        assert!(find("fig9.9").is_none());
+    }
+}

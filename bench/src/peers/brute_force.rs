@@ -1,7 +1,7 @@
 //! Every triangle against every ray in f64: slow, short, and what fast tracers are checked against.
 
 use super::Tracer;
-use crate::rays::{HitBlock, LANES, MISS, RayBlock};
+use crate::rays::{HitBlock, LANES, NO_HIT, RayBlock};
 use glam::DVec3;
 use rt_core::mesh::TriMesh;
 
@@ -43,7 +43,7 @@ impl BruteForce {
     fn lane(&self, r: &RayBlock, l: usize) -> Option<(f64, u32, f64, f64)> {
         let o = DVec3::new(r.ox[l].into(), r.oy[l].into(), r.oz[l].into());
         let d = DVec3::new(r.dx[l].into(), r.dy[l].into(), r.dz[l].into());
-        self.closest_hit(o, d, r.tmin[l].into(), r.tmax[l].into())
+        self.closest_hit(o, d, r.t_min[l].into(), r.t_max[l].into())
     }
 }
 
@@ -57,7 +57,7 @@ impl Tracer for BruteForce {
             for l in 0..LANES {
                 (h.t[l], h.prim[l], h.u[l], h.v[l]) = match self.lane(r, l) {
                     Some((t, prim, u, v)) => (t as f32, prim, u as f32, v as f32),
-                    None => (f32::INFINITY, MISS, 0.0, 0.0),
+                    None => (f32::INFINITY, NO_HIT, 0.0, 0.0),
                 };
             }
         }

@@ -7,7 +7,7 @@ pub mod brute_force;
 pub mod embree;
 pub mod obvhs;
 
-use crate::rays::{HitBlock, LANES, MISS, RayBlock, RaySet};
+use crate::rays::{HitBlock, LANES, NO_HIT, RayBlock, RaySet};
 use rayon::prelude::*;
 use rt_core::mesh::TriMesh;
 
@@ -21,6 +21,18 @@ pub trait Tracer: Sync {
 
     /// Whether anything lies on each ray: bit i of a block's mask is lane i. Bits of empty lanes are 0.
     fn occluded(&self, rays: &[RayBlock], masks: &mut [u16]);
+}
+
+impl<T: Tracer + ?Sized> Tracer for &T {
+    fn name(&self) -> String {
+        (**self).name()
+    }
+    fn closest(&self, rays: &[RayBlock], hits: &mut [HitBlock]) {
+        (**self).closest(rays, hits);
+    }
+    fn occluded(&self, rays: &[RayBlock], masks: &mut [u16]) {
+        (**self).occluded(rays, masks);
+    }
 }
 
 /// What building cost.
@@ -58,7 +70,9 @@ pub enum PeerError {
         reason: String,
     },
     /// The mesh has triangles that no peer accepts.
-    #[error("the mesh has {count} triangles with missing or non-finite vertices; peers need a clean mesh: remove them")]
+    #[error(
+        "the mesh has {count} triangles with missing or non-finite vertices; peers need a clean mesh: remove them"
+    )]
     Mesh {
         /// How many.
         count: usize,
@@ -100,13 +114,16 @@ pub fn occluded_all(tracer: &dyn Tracer, rays: &RaySet, masks: &mut [u16], threa
     if threads == 1 {
         rays.blocks.chunks(CHUNK).zip(masks.chunks_mut(CHUNK)).for_each(|(r, m)| tracer.occluded(r, m));
     } else {
-        rays.blocks.par_chunks(CHUNK).zip(masks.par_chunks_mut(CHUNK)).for_each(|(r, m)| tracer.occluded(r, m));
+        rays.blocks
+            .par_chunks(CHUNK)
+            .zip(masks.par_chunks_mut(CHUNK))
+            .for_each(|(r, m)| tracer.occluded(r, m));
     }
 }
 
 /// Number of rays with a hit.
 pub fn count_hits(rays: &RaySet, hits: &[HitBlock]) -> u64 {
-    (0..rays.len).filter(|i| hits[i / LANES].prim[i % LANES] != MISS).count() as u64
+    (0..rays.len).filter(|i| hits[i / LANES].prim[i % LANES] != NO_HIT).count() as u64
 }
 
 /// Number of rays with something on them.
@@ -127,7 +144,8 @@ pub(crate) mod testing {
     pub(crate) fn mesh() -> TriMesh {
         let (n, m) = (48u32, 24u32);
         let point = |i: u32, j: u32| {
-            let (a, b) = (i as f32 / n as f32 * std::f32::consts::TAU, j as f32 / m as f32 * std::f32::consts::TAU);
+            let (a, b) =
+                (i as f32 / n as f32 * std::f32::consts::TAU, j as f32 / m as f32 * std::f32::consts::TAU);
             let r = 1.0 + 0.35 * (b + 0.3 * (5.0 * a).sin()).cos();
             Vec3::new(r * a.cos(), 0.35 * b.sin() + 0.1 * (3.0 * a).sin(), r * a.sin())
         };
@@ -155,10 +173,10 @@ pub(crate) mod testing {
             let mesh = mesh();
             let exact = brute_force::BruteForce::new(&mesh);
             let case = |kind, rays: RaySet| {
-                let mut hits = vec![HitBlock::NONE; rays.blocks.len()];
+                let mut hits = vec![HitBlock::MISS; rays.blocks.len()];
                 closest_all(&exact, &rays, &mut hits, 2);
                 // Something is on a ray exactly when there is a closest hit.
-                let lane = |h: &HitBlock, l: usize| u16::from(h.prim[l] != MISS) << l;
+                let lane = |h: &HitBlock, l: usize| u16::from(h.prim[l] != NO_HIT) << l;
                 let masks = hits.iter().map(|h| (0..LANES).fold(0, |m, l| m | lane(h, l))).collect();
                 Case { kind, rays, hits, masks }
             };
@@ -182,7 +200,7 @@ pub(crate) mod testing {
     pub(crate) fn agrees_with_brute_force(tracer: &dyn Tracer) {
         for Case { kind, rays, hits, masks } in cases() {
             let what = format!("{}, {kind}", tracer.name());
-            let mut got = vec![HitBlock::NONE; rays.blocks.len()];
+            let mut got = vec![HitBlock::MISS; rays.blocks.len()];
             let mut got_masks = vec![0; rays.blocks.len()];
             closest_all(tracer, rays, &mut got, 2);
             occluded_all(tracer, rays, &mut got_masks, 2);
@@ -190,7 +208,7 @@ pub(crate) mod testing {
             for i in 0..rays.len {
                 let (b, l) = (i / LANES, i % LANES);
                 let (w, g) = (&hits[b], &got[b]);
-                let same = match (w.prim[l] == MISS, g.prim[l] == MISS) {
+                let same = match (w.prim[l] == NO_HIT, g.prim[l] == NO_HIT) {
                     (true, true) => true,
                     (false, false) => (w.t[l] - g.t[l]).abs() < 1e-4 * w.t[l].max(1.0),
                     _ => false,

@@ -6,7 +6,7 @@
 
 use super::{BuildCost, PeerError, Tracer, require_clean};
 use crate::clock;
-use crate::rays::{HitBlock, LANES, MISS, RayBlock};
+use crate::rays::{HitBlock, LANES, NO_HIT, RayBlock};
 use glam::Vec3A;
 use obvhs::BvhBuildParams;
 use obvhs::cwbvh::{CwBvh, builder::build_cwbvh_from_tris};
@@ -86,7 +86,9 @@ impl Obvhs {
             let triangles: Vec<RtTriangle> = leaf_order.collect();
             (bvh, triangles)
         });
-        let bytes = size_of_val(&bvh.nodes[..]) + size_of_val(&bvh.primitive_indices[..]) + size_of_val(&triangles[..]);
+        let bytes = size_of_val(&bvh.nodes[..])
+            + size_of_val(&bvh.primitive_indices[..])
+            + size_of_val(&triangles[..]);
         let cost = BuildCost {
             wall_secs: time.wall_secs,
             cpu_secs: time.process_cpu_secs,
@@ -99,7 +101,7 @@ impl Obvhs {
 
 fn ray(r: &RayBlock, l: usize) -> Ray {
     let origin = Vec3A::new(r.ox[l], r.oy[l], r.oz[l]);
-    Ray::new(origin, Vec3A::new(r.dx[l], r.dy[l], r.dz[l]), r.tmin[l], r.tmax[l])
+    Ray::new(origin, Vec3A::new(r.dx[l], r.dy[l], r.dz[l]), r.t_min[l], r.t_max[l])
 }
 
 impl Tracer for Obvhs {
@@ -110,8 +112,8 @@ impl Tracer for Obvhs {
     fn closest(&self, rays: &[RayBlock], hits: &mut [HitBlock]) {
         for (r, h) in rays.iter().zip(hits) {
             for l in 0..LANES {
-                h.prim[l] = MISS;
-                if r.tmax[l] < 0.0 {
+                h.prim[l] = NO_HIT;
+                if r.t_max[l] < 0.0 {
                     continue;
                 }
                 let mut hit = RayHit::none();
@@ -126,7 +128,7 @@ impl Tracer for Obvhs {
     fn occluded(&self, rays: &[RayBlock], masks: &mut [u16]) {
         for (r, m) in rays.iter().zip(masks) {
             *m = 0;
-            for l in (0..LANES).filter(|&l| r.tmax[l] >= 0.0) {
+            for l in (0..LANES).filter(|&l| r.t_max[l] >= 0.0) {
                 let miss = self.bvh.ray_traverse_miss(ray(r, l), |ray, i| self.triangles[i].intersect(ray));
                 *m |= u16::from(!miss) << l;
             }

@@ -13,9 +13,16 @@ pub(super) struct Mapping {
 
 impl Mapping {
     /// Covers all values that the scale can show, widened to whole ticks. `zero` makes a linear scale begin at 0.
-    pub(super) fn covering(values: impl Iterator<Item = f64>, scale: Scale, zero: bool, from: f64, to: f64) -> Self {
+    pub(super) fn covering(
+        values: impl Iterator<Item = f64>,
+        scale: Scale,
+        zero: bool,
+        from: f64,
+        to: f64,
+    ) -> Self {
         let shown = values.filter(|v| v.is_finite() && (scale == Scale::Linear || *v > 0.0));
-        let (mut low, mut high) = shown.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        let (mut low, mut high) =
+            shown.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         if low > high {
             (low, high) = (1.0, 10.0);
         }
@@ -93,7 +100,16 @@ fn nice_step(span: f64) -> f64 {
     let raw = span / 5.0;
     let power = 10f64.powf(raw.log10().floor());
     let m = raw / power;
-    power * if m < 1.5 { 1.0 } else if m < 3.5 { 2.0 } else if m < 7.5 { 5.0 } else { 10.0 }
+    power
+        * if m < 1.5 {
+            1.0
+        } else if m < 3.5 {
+            2.0
+        } else if m < 7.5 {
+            5.0
+        } else {
+            10.0
+        }
 }
 
 /// A short label: `0.03`, `250`, `1.5 k`, `16 M`, `2e-7`.
@@ -125,7 +141,8 @@ mod tests {
 
     #[test]
     fn labels_are_short_and_exact() {
-        let got: Vec<String> = [0.0, 0.03, 2.5, 250.0, 1500.0, 16e6, 64_000.0, 2e-7, -0.2].map(label).to_vec();
+        let got: Vec<String> =
+            [0.0, 0.03, 2.5, 250.0, 1500.0, 16e6, 64_000.0, 2e-7, -0.2].map(label).to_vec();
         assert_eq!(got, ["0", "0.03", "2.5", "250", "1500", "16 M", "64 k", "2e-7", "-0.2"]);
     }
 

@@ -23,7 +23,7 @@ pub fn page(records: &[Record]) -> String {
         by_chapter.entry(r.chapter).or_default().push(r);
     }
     for chapter in by_chapter.values_mut() {
-        chapter.sort_by(|a, b| natural(&a.id).cmp(&natural(&b.id)));
+        chapter.sort_by_key(|r| natural(&r.id));
     }
 
     let mut s = String::from("<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">");
@@ -74,7 +74,9 @@ fn section(r: &Record) -> String {
         let (name, caption) = (escape(&p.name), escape(&p.caption));
         let data = base64(&p.png);
         s += "<figure class=\"picture\">";
-        s += &format!("<img alt=\"{name}\" src=\"data:image/png;base64,{data}\"><figcaption>{caption}</figcaption>");
+        s += &format!(
+            "<img alt=\"{name}\" src=\"data:image/png;base64,{data}\"><figcaption>{caption}</figcaption>"
+        );
         s += "</figure>\n";
     }
     s += &ratios(&r.ratios);

@@ -112,12 +112,13 @@ impl Blas {
         }
     }
 
-    /// The closest hit of a local-space ray below `t_max`.
-    pub(crate) fn closest<S: Simd, const EXACT: bool>(&self, simd: S, ray: &Ray, t_max: f32) -> ClosestTri {
-        let setup = RaySetup::new(ray);
+    /// The closest hit of a local-space ray.
+    #[inline]
+    pub(crate) fn closest<S: Simd, const EXACT: bool>(&self, simd: S, ray: &Ray) -> ClosestTri {
         match &self.content {
-            Content::Triangles(tris) => tris.closest::<S, EXACT>(simd, &setup, t_max),
+            Content::Triangles(tris) => tris.closest::<S, EXACT>(simd, ray),
             Content::Shape { bvh, shape } => {
+                let (setup, t_max) = (RaySetup::new(ray), ray.t_max);
                 let best = ClosestTri { t: t_max, u: 0.0, v: 0.0, prim: 0, found: false };
                 let mut leaves = ShapeLeaf { shape: &**shape, ray: *ray, best };
                 traverse::<S, _, true, true>(simd, bvh, &setup, t_max, &mut leaves);
@@ -126,14 +127,14 @@ impl Blas {
         }
     }
 
-    /// Whether anything blocks a local-space ray below `t_max`.
-    pub(crate) fn occluded<S: Simd, const EXACT: bool>(&self, simd: S, ray: &Ray, t_max: f32) -> bool {
-        let setup = RaySetup::new(ray);
+    /// Whether anything blocks a local-space ray.
+    #[inline]
+    pub(crate) fn occluded<S: Simd, const EXACT: bool>(&self, simd: S, ray: &Ray) -> bool {
         match &self.content {
-            Content::Triangles(tris) => tris.occluded::<S, EXACT>(simd, &setup, t_max),
+            Content::Triangles(tris) => tris.occluded::<S, EXACT>(simd, ray),
             Content::Shape { bvh, shape } => {
-                let mut leaves = ShapeAny { shape: &**shape, ray: Ray { t_max, ..*ray }, found: false };
-                traverse::<S, _, true, false>(simd, bvh, &setup, t_max, &mut leaves);
+                let mut leaves = ShapeAny { shape: &**shape, ray: *ray, found: false };
+                traverse::<S, _, true, false>(simd, bvh, &RaySetup::new(ray), ray.t_max, &mut leaves);
                 leaves.found
             }
         }

@@ -1,8 +1,9 @@
 //! Where an instance stands: from render space to a geometry's local space and back.
 
 use super::blas::LocalFrame;
-use crate::math::Aabb;
-use crate::ray::{LANES, Ray, RayBlock};
+use crate::math::{Aabb, max_abs};
+use crate::ray::{Ray, RayBlock};
+use fearless_simd::{Simd, SimdBase, SimdMask, f32x16};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
 /// Beyond this many radii from the geometry a ray's origin is first moved along the ray in f64: there, f32 coordinates relative to the
@@ -20,6 +21,9 @@ pub(crate) struct Placement {
     /// Sphere around the local bounds.
     center: DVec3,
     radius: f64,
+    /// The centre, and the distance up to which an origin is near, in f32 with a margin that covers its rounding.
+    center_f32: Vec3,
+    near_f32: f32,
     /// Bounds in render space.
     pub(crate) bounds: Aabb,
 }
@@ -66,29 +70,55 @@ impl Placement {
             }
             b
         };
-        Some(Placement { geometry, local_from_render, identity, center, radius, bounds })
+        let (center_f32, near_f32) = (center.as_vec3(), (0.99 * FAR_RADII * radius) as f32);
+        Some(Placement {
+            geometry,
+            local_from_render,
+            identity,
+            center,
+            radius,
+            center_f32,
+            near_f32,
+            bounds,
+        })
+    }
+
+    /// True when this ray needs no transformation.
+    #[inline]
+    pub(crate) fn accepts(&self, ray: &Ray) -> bool {
+        self.identity && max_abs(ray.origin - self.center_f32) <= self.near_f32
     }
 
     /// True when these rays need no transformation: local and render space agree and no origin is far away.
-    #[inline]
-    pub(crate) fn accepts_blocks(&self, rays: &[RayBlock]) -> bool {
+    #[inline(never)]
+    pub(crate) fn accepts_blocks<S: Simd>(&self, simd: S, rays: &[RayBlock]) -> bool {
         if !self.identity {
             return false;
         }
-        // In f32, with a margin that covers its rounding.
-        let (c, limit) = (self.center.as_vec3(), (0.99 * FAR_RADII * self.radius) as f32);
-        let within =
-            |row: &[f32; LANES], c: f32| row.iter().fold(0f32, |m, &o| m.max((o - c).abs())) <= limit;
-        rays.iter().all(|r| within(&r.ox, c.x) && within(&r.oy, c.y) && within(&r.oz, c.z))
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let limit = f32x16::splat(simd, self.near_f32);
+                let mut largest = f32x16::splat(simd, 0.0);
+                for r in rays {
+                    for (row, c) in
+                        [(&r.ox, self.center_f32.x), (&r.oy, self.center_f32.y), (&r.oz, self.center_f32.z)]
+                    {
+                        largest = largest.max((f32x16::from_slice(simd, row) - f32x16::splat(simd, c)).abs());
+                    }
+                }
+                largest.simd_le(limit).all_true()
+            },
+        )
     }
 
     /// The ray in local space, and how far along it its origin was moved (in units of its direction: `t` is the same in both spaces).
     #[inline]
     pub(crate) fn enter(&self, ray: &Ray) -> (Ray, f64) {
-        let near = |o: DVec3| (o - self.center).abs().max_element() <= FAR_RADII * self.radius;
-        if self.identity && near(ray.origin.as_dvec3()) {
+        if self.accepts(ray) {
             return (*ray, 0.0);
         }
+        let near = |o: DVec3| (o - self.center).abs().max_element() <= FAR_RADII * self.radius;
         let o = self.local_from_render.transform_point3(ray.origin.as_dvec3());
         let d = self.local_from_render.transform_vector3(ray.dir.as_dvec3());
         let moved = if near(o) { 0.0 } else { distance_to_sphere(o, d, self.center, self.radius) };

@@ -201,7 +201,7 @@ impl World {
         let placement = &self.placements[instance as usize];
         let blas = &self.blas[placement.geometry];
         let alone = self.placements.len() == 1;
-        if alone && placement.accepts_blocks(rays) {
+        if alone && placement.accepts_blocks(simd, rays) {
             blas_blocks::<S, EXACT, ANY>(simd, blas, rays, hits, instance, &mut scratch.inner);
             return;
         }
@@ -318,11 +318,11 @@ fn singles<S: Simd, const EXACT: bool, const ANY: bool>(
             }
             count(Work::Fallbacks, 1);
             if ANY {
-                if blas.occluded::<S, EXACT>(simd, &ray, ray.t_max) {
+                if blas.occluded::<S, EXACT>(simd, &ray) {
                     h.prim[lane] = 0;
                 }
             } else {
-                let c = blas.closest::<S, EXACT>(simd, &ray, ray.t_max);
+                let c = blas.closest::<S, EXACT>(simd, &ray);
                 if c.found {
                     (h.t[lane], h.u[lane], h.v[lane]) = (c.t, c.u, c.v);
                     (h.prim[lane], h.instance[lane]) = (c.prim, instance);

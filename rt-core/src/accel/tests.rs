@@ -93,7 +93,10 @@ fn packets_equal_single_rays_bit_for_bit_at_every_level() {
             for (what, found) in [("packet", &coherent), ("sorted", &sorted)] {
                 for (i, r) in rays.iter().enumerate() {
                     let (a, b) = (single[i / LANES].get(i % LANES), found[i / LANES].get(i % LANES));
-                    assert_eq!(a, b, "{name} {simd:?}: single ray (left) and {what} (right) differ for ray {i}, {r:?}");
+                    assert_eq!(
+                        a, b,
+                        "{name} {simd:?}: single ray (left) and {what} (right) differ for ray {i}, {r:?}"
+                    );
                 }
             }
             match &reference {

@@ -244,6 +244,12 @@ impl World {
     }
 
     pub(crate) fn closest_in<S: Simd, const EXACT: bool>(&self, simd: S, ray: &Ray) -> Option<Hit> {
+        if let [only] = self.placements.as_slice()
+            && only.accepts(ray)
+        {
+            let c = self.blas[only.geometry].closest::<S, EXACT>(simd, ray);
+            return c.found.then_some(Hit { t: c.t, u: c.u, v: c.v, prim: c.prim, instance: 0 });
+        }
         let mut leaves = InstanceClosest::<EXACT> { world: self, ray: *ray, best: None };
         match self.placements.len() {
             0 => return None,
@@ -260,6 +266,11 @@ impl World {
     }
 
     pub(crate) fn occluded_in<S: Simd, const EXACT: bool>(&self, simd: S, ray: &Ray) -> bool {
+        if let [only] = self.placements.as_slice()
+            && only.accepts(ray)
+        {
+            return self.blas[only.geometry].occluded::<S, EXACT>(simd, ray);
+        }
         let mut leaves = InstanceAny::<EXACT> { world: self, ray: *ray, found: false };
         match self.placements.len() {
             0 => return false,
@@ -275,7 +286,7 @@ impl World {
     fn instance_occluded<S: Simd, const EXACT: bool>(&self, simd: S, instance: usize, ray: &Ray) -> bool {
         let p = &self.placements[instance];
         let (local, _) = p.enter(ray);
-        local.t_max > local.t_min && self.blas[p.geometry].occluded::<S, EXACT>(simd, &local, local.t_max)
+        local.t_max > local.t_min && self.blas[p.geometry].occluded::<S, EXACT>(simd, &local)
     }
 }
 
@@ -333,7 +344,7 @@ impl<const EXACT: bool> InstanceClosest<'_, EXACT> {
         if !(local.t_max > local.t_min) {
             return;
         }
-        let c = self.world.blas[p.geometry].closest::<S, EXACT>(simd, &local, local.t_max);
+        let c = self.world.blas[p.geometry].closest::<S, EXACT>(simd, &local);
         if !c.found {
             return;
         }

@@ -3,12 +3,15 @@
 mod cylinder;
 mod error;
 mod frustum;
+mod isosurface;
 mod rounded_cone;
 mod sphere;
 mod tube;
 
 pub use cylinder::Cylinders;
 pub use error::{ShapeError, ShapeReport};
+pub(crate) use isosurface::smooth_gradient;
+pub use isosurface::{Isosurface, IsosurfaceNormals, IsosurfaceOptions, IsosurfaceReport};
 pub use sphere::Spheres;
 pub use tube::Tubes;
 

@@ -17,6 +17,16 @@ use glam::{DVec3, Vec3};
 
 /// Polylines as tubes. `u` of a hit runs from 0 at a segment's first point to 1 at its second, linearly along the cone and constant on
 /// the round ends; `v` is 0.
+///
+/// ```
+/// use rt_core::{glam::Vec3, ray::Ray, shapes::{Radii, Shape, Tubes}};
+/// // Two polylines, of three points and of two.
+/// let points = vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Z * 9.0, Vec3::Z * 8.0];
+/// let tubes = Tubes::new(points, &[0, 3, 5], Radii::Common(0.25)).unwrap();
+/// assert_eq!(tubes.num_primitives(), 3);
+/// let hit = tubes.closest(0, &Ray::new(Vec3::new(0.5, 0.0, -2.0), Vec3::Z)).unwrap();
+/// assert_eq!((hit.t, hit.u), (1.75, 0.5));
+/// ```
 #[derive(Debug, Clone)]
 pub struct Tubes {
     origin: DVec3,

@@ -10,7 +10,7 @@ mod stack;
 
 use fearless_simd::Level;
 pub(crate) use prefetch::prefetch;
-pub(crate) use stack::Stack;
+pub(crate) use stack::{Stack, StackMemory};
 
 /// An instruction set the kernels can be limited to, for tests and for measurements against peers at the same level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

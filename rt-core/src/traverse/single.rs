@@ -1,10 +1,11 @@
 //! One ray at a time: eight boxes per step, nearest child first.
 
+use super::packet::three;
 use crate::accel::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE};
 use crate::accel::{Unit, WideBvh};
 use crate::intersect::watertight::Shear;
 use crate::ray::Ray;
-use crate::simd::{Stack, prefetch};
+use crate::simd::{Stack, StackMemory, prefetch};
 use crate::stats::{Work, count};
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x8};
 
@@ -67,7 +68,7 @@ pub(crate) fn traverse<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, const 
 }
 
 #[inline(always)]
-fn traverse_body<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, const ORDERED: bool>(
+pub(crate) fn traverse_body<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, const ORDERED: bool>(
     simd: S,
     bvh: &WideBvh,
     ray: &RaySetup,
@@ -75,13 +76,16 @@ fn traverse_body<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, const ORDERE
     leaves: &mut L,
 ) {
     let units = bvh.units.as_slice();
-    let origin = ray.origin.map(|v| f32x8::splat(simd, v));
-    let rcp = ray.rcp.map(|v| f32x8::splat(simd, v));
+    let origin: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.origin[a]));
+    let rcp: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.rcp[a]));
     let t_min = f32x8::splat(simd, ray.t_min);
-    let slack = f32x8::splat(simd, BOX_SLACK);
+    // The slack enters the far planes' reciprocals, which costs nothing in the loop. Far distances below zero never matter: t_min is not below.
+    let slack = f32x8::splat(simd, if CONSERVATIVE { BOX_SLACK } else { 1.0 });
+    let rcp_far: [f32x8<S>; 3] = three!(|a| rcp[a] * slack);
     let [nx, ny, nz] = ray.near;
     // Distance in the high half, so that integer order is order of distance; t_min >= 0 keeps it non-negative.
-    let mut stack: Stack<u64, STACK_SIZE> = Stack::new();
+    let mut memory = StackMemory::<u64, STACK_SIZE>::new();
+    let mut stack = Stack::empty(&mut memory);
     let mut current = ChildRef::node(0);
     loop {
         if current.is_leaf() {
@@ -94,12 +98,15 @@ fn traverse_body<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, const ORDERE
             let at = current.unit();
             let node: &[Unit; NODE_UNITS] =
                 units[at..at + NODE_UNITS].try_into().expect("a slice of that length");
-            let plane = |row: usize, axis: usize| {
-                (f32x8::from_slice(simd, &node[row & 7].0) - origin[axis]) * rcp[axis]
+            let plane = |row: usize, axis: usize, rcp: f32x8<S>| {
+                (f32x8::from_slice(simd, &node[row & 7].0) - origin[axis]) * rcp
             };
-            let near = plane(nx, 0).max(plane(ny, 1)).max(plane(nz, 2).max(t_min));
-            let far = plane(nx ^ 1, 0).min(plane(ny ^ 1, 1)).min(plane(nz ^ 1, 2));
-            let far = if CONSERVATIVE { far * slack } else { far };
+            let near = plane(nx, 0, rcp[0]).max(plane(ny, 1, rcp[1])).max(plane(nz, 2, rcp[2]).max(t_min));
+            let far = plane(nx ^ 1, 0, rcp_far[0]).min(plane(ny ^ 1, 1, rcp_far[1])).min(plane(
+                nz ^ 1,
+                2,
+                rcp_far[2],
+            ));
             let hit = near.simd_le(far.min(f32x8::splat(simd, t_max)));
             let mut mask = hit.to_bitmask() as u32;
             if mask != 0 {

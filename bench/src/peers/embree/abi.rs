@@ -166,7 +166,10 @@ mod tests {
         assert_eq!(offset_of!(RayN<1>, tfar), 32);
         assert_eq!((offset_of!(RayN<8>, dir_x), offset_of!(RayN<8>, tfar)), (128, 256));
         assert_eq!((offset_of!(RayHitN<1>, hit), offset_of!(RayHitN<8>, hit)), (48, 384));
-        assert_eq!((offset_of!(HitN<1>, u), offset_of!(HitN<1>, prim_id), offset_of!(HitN<1>, instance)), (12, 20, 28));
+        assert_eq!(
+            (offset_of!(HitN<1>, u), offset_of!(HitN<1>, prim_id), offset_of!(HitN<1>, instance)),
+            (12, 20, 28)
+        );
         assert_eq!((offset_of!(HitN<16>, geom_id), offset_of!(HitN<16>, instance)), (384, 448));
         assert_eq!((align_of::<RayHitN<1>>(), align_of::<Valid<16>>()), (64, 64));
         assert_eq!((offset_of!(Context3, filter), offset_of!(Context3, inst_id)), (8, 16));

@@ -48,7 +48,7 @@ impl Version {
 pub struct Embree {
     pub(super) calls: Calls,
     /// `3.13.5`.
-    pub(super) version: String,
+    version: String,
     /// The file that was loaded, or the name the system's loader resolved.
     path: String,
 }
@@ -117,6 +117,11 @@ impl Embree {
         format!("Embree {}", self.version)
     }
 
+    /// `4.4.0`.
+    pub fn version(&self) -> &str {
+        &self.version
+    }
+
     /// The file that was loaded.
     pub fn path(&self) -> &str {
         &self.path
@@ -160,8 +165,12 @@ unsafe fn calls(library: &libloading::Library, version: Version) -> Result<Calls
         attach_geometry: symbol!("rtcAttachGeometry"),
         set_shared_geometry_buffer: symbol!("rtcSetSharedGeometryBuffer"),
         queries: match version {
-            Version::V3 => Queries::V3 { intersect: widths!("rtcIntersect"), occluded: widths!("rtcOccluded") },
-            Version::V4 => Queries::V4 { intersect: widths!("rtcIntersect"), occluded: widths!("rtcOccluded") },
+            Version::V3 => {
+                Queries::V3 { intersect: widths!("rtcIntersect"), occluded: widths!("rtcOccluded") }
+            }
+            Version::V4 => {
+                Queries::V4 { intersect: widths!("rtcIntersect"), occluded: widths!("rtcOccluded") }
+            }
         },
     })
 }
@@ -243,7 +252,8 @@ mod tests {
 
     #[test]
     fn not_found_says_where_and_how_to_get_it() {
-        let e = PeerError::NotFound { name: "Embree 4".into(), looked_in: "x".into(), cure: Version::V4.cure() };
+        let e =
+            PeerError::NotFound { name: "Embree 4".into(), looked_in: "x".into(), cure: Version::V4.cure() };
         let text = e.to_string();
         assert!(text.contains("pip install embreex") && text.contains("RTSV_EMBREE4"), "{text}");
     }

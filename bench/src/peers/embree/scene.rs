@@ -6,7 +6,7 @@ use super::abi::{self, Arguments4, Context3, Handle, HitN, Queries, RayHitN, Ray
 use super::library::Embree;
 use crate::clock;
 use crate::peers::{BuildCost, PeerError, Tracer, require_clean};
-use crate::rays::{HitBlock, LANES, MISS, RayBlock};
+use crate::rays::{HitBlock, LANES, NO_HIT, RayBlock};
 use core::ffi::{c_int, c_void};
 use rt_core::mesh::TriMesh;
 use std::ffi::CString;
@@ -204,7 +204,8 @@ impl EmbreeScene {
                     }
                 }
                 Queries::V4 { intersect, occluded } => {
-                    let (f, arguments) = (if OCCLUDED { occluded } else { intersect }, &raw mut flags.arguments4);
+                    let (f, arguments) =
+                        (if OCCLUDED { occluded } else { intersect }, &raw mut flags.arguments4);
                     match N {
                         1 => (f.one)(scene, rays, arguments),
                         4 => (f.four)(valid, scene, rays, arguments),
@@ -222,7 +223,7 @@ impl EmbreeScene {
             for from in (0..LANES).step_by(N) {
                 let valid = q.load(r, from);
                 if N == 1 && valid.0[0] == 0 {
-                    h.prim[from] = MISS;
+                    h.prim[from] = NO_HIT;
                     continue;
                 }
                 // SAFETY: `closest` and `occluded` choose N from 1, 4, 8, 16, and `load` filled all lanes.
@@ -232,7 +233,8 @@ impl EmbreeScene {
                 h.u[to.clone()].copy_from_slice(&q.hit.u);
                 h.v[to.clone()].copy_from_slice(&q.hit.v);
                 for l in 0..N {
-                    h.prim[from + l] = if q.hit.geom_id[l] == abi::INVALID_ID { MISS } else { q.hit.prim_id[l] };
+                    h.prim[from + l] =
+                        if q.hit.geom_id[l] == abi::INVALID_ID { NO_HIT } else { q.hit.prim_id[l] };
                 }
             }
         }
@@ -325,9 +327,9 @@ impl<const N: usize> RayHitN<N> {
         let part = |row: &[f32; LANES]| -> [f32; N] { core::array::from_fn(|l| row[from + l]) };
         (q.org_x, q.org_y, q.org_z) = (part(&r.ox), part(&r.oy), part(&r.oz));
         (q.dir_x, q.dir_y, q.dir_z) = (part(&r.dx), part(&r.dy), part(&r.dz));
-        (q.tnear, q.tfar) = (part(&r.tmin), part(&r.tmax));
+        (q.tnear, q.tfar) = (part(&r.t_min), part(&r.t_max));
         self.hit.geom_id = [abi::INVALID_ID; N];
-        Valid(core::array::from_fn(|l| if r.tmax[from + l] >= 0.0 { -1 } else { 0 }))
+        Valid(core::array::from_fn(|l| if r.t_max[from + l] >= 0.0 { -1 } else { 0 }))
     }
 }
 
@@ -395,7 +397,9 @@ mod tests {
             for robust in [false, true] {
                 let options = Options { robust, threads: 1, ..Options::default() };
                 let scene = EmbreeScene::build(embree, &mesh, &options).unwrap();
-                for (width, coherent) in [(1, false), (4, true), (8, true), (8, false), (16, true), (16, false)] {
+                for (width, coherent) in
+                    [(1, false), (4, true), (8, true), (8, false), (16, true), (16, false)]
+                {
                     testing::agrees_with_brute_force(&scene.view(width, coherent));
                 }
             }
@@ -408,7 +412,8 @@ mod tests {
         with_each(|embree| {
             for quality in Quality::ALL {
                 for max_isa in [None, Some("avx2"), Some("sse4.2")] {
-                    let options = Options { quality, max_isa, compact: true, threads: 2, ..Options::default() };
+                    let options =
+                        Options { quality, max_isa, compact: true, threads: 2, ..Options::default() };
                     let scene = EmbreeScene::build(embree, &mesh, &options).unwrap();
                     testing::agrees_with_brute_force(&scene.view(16, true));
                 }

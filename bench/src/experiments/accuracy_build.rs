@@ -1,0 +1,108 @@
+//! What a better build costs and what rays gain by it: the dissertation's choice between approximate and full builds
+//! (section 4.1.2), with the number of frames after which the better build has paid for itself.
+
+use super::Context;
+use super::compare::{self, Contender, Kind};
+use crate::meshes;
+use crate::ours::{Mode, Ours};
+use crate::plot::{Axis, Plot, Point, Series};
+use crate::rays::View;
+use crate::record::{Record, Row};
+use crate::runner::{Ratio, Schedule};
+use datasets::generate::nested_wavelet::Size;
+use rt_core::accel::{BuildOptions, BuildQuality};
+use rt_core::mesh::TriMesh;
+use std::sync::Arc;
+
+pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
+    compare::explain_columns(record);
+    record.column("preset", "", "quality of the build");
+    record.column("build", "s", "fastest of the builds, wall time, all threads");
+    record.column("bytes_per_triangle", "B", "memory of the structure, without the input mesh");
+    record.notes.push(
+        "Every preset gives the same picture; only the time differs. A ratio is the time of the fastest build’s rays \
+         divided by the preset’s: above 1 the better structure pays."
+            .into(),
+    );
+    let (size, pixels) = if context.quick { (Size::M1, 512) } else { (Size::M4, 1024) };
+    let pipes = meshes::pipes(if context.quick { 600 } else { 2600 });
+    let scenes = [(format!("wavelet {}", size.name()), context.wavelet(size)?), ("pipes".into(), pipes)];
+    for (name, mesh) in &scenes {
+        scene(context, record, name, mesh, pixels)?;
+    }
+    for (name, _) in &scenes {
+        record.plots.push(plot(record, name));
+    }
+    Ok(())
+}
+
+fn scene(
+    context: &mut Context<'_>,
+    record: &mut Record,
+    name: &str,
+    mesh: &Arc<TriMesh>,
+    pixels: u32,
+) -> anyhow::Result<()> {
+    let mut built: Vec<(BuildQuality, Ours)> = vec![];
+    for quality in BuildQuality::ALL {
+        context.say(format!("{name}: building, {}", quality.name()))?;
+        let options = BuildOptions { quality, ..Default::default() };
+        let first = Ours::build(mesh, &options)?.cost;
+        let mut ours = Ours::build(mesh, &options)?;
+        ours.cost.wall_secs = ours.cost.wall_secs.min(first.wall_secs);
+        built.push((quality, ours));
+    }
+    let view = View::orbit(mesh);
+    let kinds = [Kind::Primary, Kind::AmbientOcclusion];
+    for (kind, rays) in compare::make_rays(mesh, &view, pixels, &kinds, &built[0].1.view(Mode::Coherent)) {
+        let rays = if context.quick { rays.thinned(1 << 18) } else { rays };
+        context.say(format!("{name}: {} rays", kind.name()))?;
+        let mode = if kind.coherent() { Mode::Coherent } else { Mode::Incoherent };
+        let contenders: Vec<Contender<'_>> = built
+            .iter()
+            .map(|(quality, ours)| Contender {
+                tracer_name: quality.name().into(),
+                mode: mode.name().into(),
+                tracer: Box::new(ours.view(mode)),
+            })
+            .collect();
+        let schedule = context.schedule(Schedule::one_thread(), 3.0);
+        let timings = compare::time(&schedule, kind, &rays, &contenders)?;
+        let base =
+            Row::new().with("mesh", name).with("triangles", mesh.num_triangles()).with("view", view.name);
+        let rows = compare::rows(&base.with("simd", "best"), kind, &rays, &contenders, &timings);
+        for (row, (quality, ours)) in rows.into_iter().zip(&built) {
+            let row = row.with("tracer", "rt-core watertight").with("preset", quality.name());
+            let bytes = ours.cost.bytes as f64 / mesh.num_triangles() as f64;
+            record.rows.push(row.with("build", ours.cost.wall_secs).with("bytes_per_triangle", bytes));
+        }
+        for c in &contenders[1..] {
+            if let Some(r) = timings.ratio(&c.name(), &contenders[0].name()) {
+                let name = format!("{name}, {}: {}", kind.name(), c.tracer_name);
+                record.ratios.push(Ratio { name, rival: contenders[0].tracer_name.clone(), ..r });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Time to the n-th frame, build included: where lines cross, the better build has paid for itself.
+fn plot(record: &Record, mesh: &str) -> Plot {
+    let title =
+        format!("{mesh}: build, then frames of these primary and ambient-occlusion rays, one thread tracing");
+    let mut plot = Plot::lines(&title, Axis::log("frames", ""), Axis::log("total time", "s"));
+    for quality in BuildQuality::ALL {
+        let rows = || {
+            record
+                .rows
+                .iter()
+                .filter(|r| r.text("mesh") == Some(mesh) && r.text("preset") == Some(quality.name()))
+        };
+        let frame_secs: f64 = rows().filter_map(|r| r.number("time")).sum::<f64>() / 1e3;
+        let Some(build_secs) = rows().find_map(|r| r.number("build")) else { continue };
+        let frames = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0];
+        let point = |n: &f64| Point { x: *n, y: build_secs + n * frame_secs, range: None };
+        plot.series.push(Series { name: quality.name().into(), points: frames.iter().map(point).collect() });
+    }
+    plot
+}

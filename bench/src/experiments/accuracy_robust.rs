@@ -1,0 +1,238 @@
+//! Leaks: rays from inside closed surfaces, aimed exactly at vertices and edges, that come out; and what not leaking
+//! costs in time.
+//!
+//! From inside a closed surface every ray must hit. Rays are aimed at mesh vertices, at points on edges, and in random
+//! directions; a miss is a leak. Nothing else is judged here: which triangle answers is a matter for the
+//! comparison with brute force in the tests.
+
+use super::Context;
+use super::lineup::Installed;
+use crate::meshes::{self, Random};
+use crate::ours::{Mode, Ours};
+use crate::peers::embree::{EmbreeScene, Options};
+use crate::peers::obvhs::{Obvhs, Preset};
+use crate::peers::{Tracer, count_hits};
+use crate::plot::{Axis, Plot, Series};
+use crate::rays::{HitBlock, RaySet};
+use crate::record::{Record, Row};
+use crate::{clock, rays};
+use glam::DVec3;
+use rayon::prelude::*;
+use rt_core::accel::{BuildOptions, Robustness};
+use rt_core::mesh::TriMesh;
+use std::sync::Arc;
+
+/// Rays per batch: generated, traced and counted by one thread.
+const BATCH: usize = 1 << 16;
+
+/// A closed mesh and a ball inside it that rays start from.
+struct Case {
+    name: &'static str,
+    mesh: Arc<TriMesh>,
+    center: DVec3,
+    radius: f64,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Aim {
+    Vertices,
+    Edges,
+    Random,
+}
+
+impl Aim {
+    const ALL: [Aim; 3] = [Aim::Vertices, Aim::Edges, Aim::Random];
+    fn name(self) -> &'static str {
+        match self {
+            Aim::Vertices => "vertices",
+            Aim::Edges => "edges",
+            Aim::Random => "anywhere",
+        }
+    }
+}
+
+pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
+    record.column("tracer", "", "who traced the rays");
+    record.column(
+        "robustness",
+        "",
+        "rt-core: fast or watertight; Embree: fast or robust; obvhs has one mode",
+    );
+    record.column("mesh", "", "closed mesh");
+    record.column("triangles", "", "triangles of the mesh");
+    record.column("aim", "", "what the rays are aimed at, from inside");
+    record.column("rays", "", "number of rays");
+    record.column("leaks", "", "rays that came out");
+    record.column("seconds", "s", "CPU time of tracing them, all threads together, without making them");
+    let installed = Installed::find();
+    record.missing.extend(installed.missing.iter().cloned());
+    // 12 combinations of mesh and aim: 10^8 rays for each of our modes in full.
+    let (per_combination, rivals) =
+        if context.quick { (4 * BATCH, 2 * BATCH) } else { (128 * BATCH, 32 * BATCH) };
+    record.notes.push(format!(
+        "Every ray starts inside a closed surface, so every miss is a leak. rt-core traces {} rays in each mode, its \
+         rivals {}: half from random points one at a time, half from common points as packets. The meshes are a \
+         sphere at the origin, the same far from it, a crumpled one, and a globe with needle triangles.",
+        12 * per_combination,
+        12 * rivals
+    ));
+
+    let level = if context.quick { 5 } else { 7 };
+    let far = DVec3::new(1000.0, 700.0, -1300.0);
+    let sphere = |crumple, center| Arc::new(meshes::crumpled_sphere(level, crumple, center));
+    let cases = [
+        Case { name: "sphere", mesh: sphere(0.0, DVec3::ZERO), center: DVec3::ZERO, radius: 0.7 },
+        Case { name: "sphere far away", mesh: sphere(0.0, far), center: far, radius: 0.7 },
+        Case { name: "crumpled sphere", mesh: sphere(0.02, DVec3::ZERO), center: DVec3::ZERO, radius: 0.5 },
+        Case { name: "globe", mesh: Arc::new(meshes::globe(1000, 60)), center: DVec3::ZERO, radius: 0.7 },
+    ];
+    for case in &cases {
+        let base = Row::new().with("mesh", case.name).with("triangles", case.mesh.num_triangles());
+        for robustness in Robustness::ALL {
+            let options = BuildOptions { robustness, ..Default::default() };
+            let ours = Ours::build(&case.mesh, &options)?;
+            let base = base.clone().with("tracer", "rt-core").with("robustness", robustness.name());
+            let views: [&dyn Tracer; 2] = [&ours.view(Mode::Single), &ours.view(Mode::Coherent)];
+            context.say(format!("{}: rt-core, {}", case.name, robustness.name()))?;
+            record.rows.extend(shoot(case, &base, views, per_combination));
+        }
+        for e in &installed.embree {
+            for robust in [false, true] {
+                let options = Options { robust, ..Default::default() };
+                let scene = EmbreeScene::build(e, &case.mesh, &options)?;
+                let name = if robust { "robust" } else { "fast" };
+                context.say(format!("{}: {}, {name}", case.name, e.name()))?;
+                let base = base.clone().with("tracer", e.name()).with("robustness", name);
+                record.rows.extend(shoot(
+                    case,
+                    &base,
+                    [&scene.view(1, false), &scene.view(16, true)],
+                    rivals,
+                ));
+            }
+        }
+        context.say(format!("{}: obvhs", case.name))?;
+        let peer = Obvhs::build(&case.mesh, Preset::Medium)?;
+        let base = base.clone().with("tracer", "obvhs").with("robustness", "only");
+        record.rows.extend(shoot(case, &base, [&peer, &peer], rivals));
+    }
+    record.plots.push(plot(record));
+    Ok(())
+}
+
+/// One row per aim. `alone` and `packets` are ways into the same tracer, for batches of either sort.
+fn shoot(case: &Case, base: &Row, [alone, packets]: [&dyn Tracer; 2], count: usize) -> Vec<Row> {
+    let row = |aim: Aim| {
+        let (leaks, secs) = (0..count / BATCH)
+            .into_par_iter()
+            .map(|batch| {
+                let rays = aimed(case, aim, batch as u64);
+                let mut hits = vec![HitBlock::MISS; rays.blocks.len()];
+                let tracer = if batch % 2 == 0 { alone } else { packets };
+                let ((), time) = clock::measure(|| tracer.closest(&rays.blocks, &mut hits));
+                (rays.len as u64 - count_hits(&rays, &hits), time.thread_cpu_secs)
+            })
+            .reduce(|| (0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+        let rays = count / BATCH * BATCH;
+        base.clone().with("aim", aim.name()).with("rays", rays).with("leaks", leaks).with("seconds", secs)
+    };
+    Aim::ALL.iter().map(|&a| row(a)).collect()
+}
+
+/// A batch of rays from inside, the same for every tracer: even batches from random points at random triangles, odd
+/// ones from one point at triangles in the mesh's order, so that neighbouring rays go the same way and packets are
+/// used. Origins are rounded to f32 first, so that the direction is the difference of the numbers the tracer sees.
+fn aimed(case: &Case, aim: Aim, batch: u64) -> RaySet {
+    let mut random = Random::new(batch << 8 | aim as u64);
+    let (mesh, packets) = (&case.mesh, batch % 2 == 1);
+    let point = |random: &mut Random| {
+        let inside = random.direction() * random.unit().cbrt() * case.radius;
+        (case.center + inside).as_vec3().as_dvec3()
+    };
+    let (common, first) = (point(&mut random), random.below(mesh.num_triangles()));
+    RaySet::pack((0..BATCH).map(|i| {
+        let origin = if packets { common } else { point(&mut random) };
+        let triangle = if packets { first + i / 3 } else { random.below(mesh.num_triangles()) };
+        let corners = mesh.triangle(triangle % mesh.num_triangles()).map(|p| p.as_dvec3());
+        let direction = match aim {
+            Aim::Vertices => corners[random.below(3)] - origin,
+            Aim::Edges => {
+                let k = random.below(3);
+                // The point is rounded to f32, as an application's would be.
+                let point = corners[k].lerp(corners[(k + 1) % 3], random.unit());
+                point.as_vec3().as_dvec3() - origin
+            }
+            Aim::Random => random.direction(),
+        };
+        rays::Ray64 { origin, direction, t_max: f64::INFINITY }
+    }))
+}
+
+/// Leaks per million rays, by aim.
+fn plot(record: &Record) -> Plot {
+    let categories = Aim::ALL.map(|a| a.name().to_string()).to_vec();
+    let title = "Rays that leak through closed surfaces (none drawn where none leaked)";
+    let mut plot = Plot::bars(title, Axis::log("leaks per million rays", ""), categories);
+    let mut names: Vec<(String, String)> = vec![];
+    for r in &record.rows {
+        let key =
+            (r.text("tracer").unwrap_or("").to_string(), r.text("robustness").unwrap_or("").to_string());
+        if !names.contains(&key) {
+            names.push(key);
+        }
+    }
+    for (tracer, robustness) in names {
+        let per_million = |aim: Aim| {
+            let rows = || {
+                record.rows.iter().filter(|r| {
+                    r.text("tracer") == Some(&tracer)
+                        && r.text("robustness") == Some(&robustness)
+                        && r.text("aim") == Some(aim.name())
+                })
+            };
+            let sum = |column: &str| rows().filter_map(|r| r.number(column)).sum::<f64>();
+            1e6 * sum("leaks") / sum("rays").max(1.0)
+        };
+        let points = Aim::ALL.iter().enumerate().map(|(i, &a)| (i as f64, per_million(a))).collect();
+        plot.series.push(Series::new(format!("{tracer} {robustness}"), points));
+    }
+    plot
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::peers::brute_force::BruteForce;
+    use crate::peers::closest_all;
+
+    /// The oracle itself must not leak: f64 edge functions from the same numbers.
+    #[test]
+    fn brute_force_sees_no_leak_where_aim_is_exact() {
+        let mesh = Arc::new(meshes::crumpled_sphere(1, 0.02, DVec3::ZERO));
+        let case = Case { name: "", mesh, center: DVec3::ZERO, radius: 0.4 };
+        let exact = BruteForce::new(&case.mesh);
+        for aim in Aim::ALL {
+            let mut rays = aimed(&case, aim, 0);
+            rays.blocks.truncate(100);
+            rays.len = 1600;
+            let mut hits = vec![HitBlock::MISS; rays.blocks.len()];
+            closest_all(&exact, &rays, &mut hits, 1);
+            assert_eq!(count_hits(&rays, &hits), rays.len as u64, "{}", aim.name());
+        }
+    }
+
+    #[test]
+    fn watertight_rt_core_does_not_leak_and_the_rows_say_so() {
+        let mesh = Arc::new(meshes::crumpled_sphere(3, 0.02, DVec3::ZERO));
+        let case = Case { name: "crumpled", mesh, center: DVec3::ZERO, radius: 0.5 };
+        let ours = Ours::build(&case.mesh, &BuildOptions::default()).unwrap();
+        let rows =
+            shoot(&case, &Row::new(), [&ours.view(Mode::Single), &ours.view(Mode::Coherent)], 2 * BATCH);
+        assert_eq!(rows.len(), 3);
+        for r in rows {
+            assert_eq!(r.number("leaks"), Some(0.0), "{r:?}");
+            assert_eq!(r.number("rays"), Some(2.0 * BATCH as f64));
+            assert!(r.number("seconds").unwrap() > 0.0);
+        }
+    }
+}

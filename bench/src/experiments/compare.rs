@@ -1,0 +1,155 @@
+//! Timing tracers on the same rays.
+
+use crate::peers::{Tracer, closest_all, count_hits, count_occluded, occluded_all};
+use crate::rays::{self, HitBlock, RaySet, View};
+use crate::record::{Record, Row};
+use crate::runner::{Schedule, Timings, Unstable, Variant, interleave};
+use rt_core::mesh::TriMesh;
+use std::cell::RefCell;
+
+/// What rays are for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Primary,
+    Shadow,
+    ShadowFromLight,
+    AmbientOcclusion,
+    Incoherent,
+}
+
+impl Kind {
+    pub(super) const ALL: [Kind; 5] =
+        [Kind::Primary, Kind::Shadow, Kind::ShadowFromLight, Kind::AmbientOcclusion, Kind::Incoherent];
+
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Kind::Primary => "primary",
+            Kind::Shadow => "shadow",
+            Kind::ShadowFromLight => "shadow, from the light",
+            Kind::AmbientOcclusion => "ambient occlusion",
+            Kind::Incoherent => "incoherent",
+        }
+    }
+
+    /// Rays that only ask whether anything is in the way.
+    fn occlusion(self) -> bool {
+        matches!(self, Kind::Shadow | Kind::ShadowFromLight | Kind::AmbientOcclusion)
+    }
+
+    /// Neighbouring rays go the same way.
+    pub(super) fn coherent(self) -> bool {
+        matches!(self, Kind::Primary | Kind::Shadow | Kind::ShadowFromLight)
+    }
+}
+
+/// Makes the rays of a kind for a view of `size` x `size` pixels; `tracer` finds the surface they start on.
+pub(super) fn make_rays(
+    mesh: &TriMesh,
+    view: &View,
+    size: u32,
+    kinds: &[Kind],
+    tracer: &dyn Tracer,
+) -> Vec<(Kind, RaySet)> {
+    let primary = view.primary(size);
+    let mut hits = vec![HitBlock::MISS; primary.blocks.len()];
+    closest_all(tracer, &primary, &mut hits, 0);
+    let points = rays::surface_points(mesh, &primary, &hits, view.radius);
+    let make = |kind: Kind| match kind {
+        Kind::Primary => primary.clone(),
+        Kind::Shadow => rays::shadow(&points, view.light()),
+        Kind::ShadowFromLight => rays::shadow_from_light(&points, view.light()),
+        Kind::AmbientOcclusion => rays::ambient_occlusion(&points),
+        Kind::Incoherent => rays::incoherent(mesh, (size * size) as usize),
+    };
+    kinds.iter().map(|&k| (k, make(k))).collect()
+}
+
+/// One of the tracers compared.
+pub(super) struct Contender<'a> {
+    /// Name of the tracer with its build: rivals are compared by their best mode.
+    pub(super) tracer_name: String,
+    /// How rays are sent.
+    pub(super) mode: String,
+    pub(super) tracer: Box<dyn Tracer + 'a>,
+}
+
+impl Contender<'_> {
+    pub(super) fn name(&self) -> String {
+        format!("{}, {}", self.tracer_name, self.mode)
+    }
+}
+
+/// Traces `rays` with every contender in turns, on one thread.
+pub(super) fn time(
+    schedule: &Schedule,
+    kind: Kind,
+    rays: &RaySet,
+    contenders: &[Contender<'_>],
+) -> Result<Timings, Unstable> {
+    // One buffer for all, so that it is warm for all: contenders take turns.
+    let hits = RefCell::new(vec![HitBlock::MISS; rays.blocks.len()]);
+    let masks = RefCell::new(vec![0u16; rays.blocks.len()]);
+    let mut variants: Vec<Variant<'_>> = contenders
+        .iter()
+        .map(|c| {
+            let tracer = &*c.tracer;
+            let (hits, masks) = (&hits, &masks);
+            if kind.occlusion() {
+                let run = move || occluded_all(tracer, rays, &mut masks.borrow_mut(), 1);
+                Variant::checked(c.name(), run, move || count_occluded(&masks.borrow()))
+            } else {
+                let run = move || closest_all(tracer, rays, &mut hits.borrow_mut(), 1);
+                Variant::checked(c.name(), run, move || count_hits(rays, &hits.borrow()))
+            }
+        })
+        .collect();
+    interleave(schedule, &mut variants)
+}
+
+/// Explains the columns that [`rows`] fills.
+pub(super) fn explain_columns(record: &mut Record) {
+    record.column("mesh", "", "name of the mesh");
+    record.column("triangles", "", "triangles of the mesh");
+    record.column("view", "", "orbit: the whole mesh; close: nearly every pixel shows it");
+    record.column("rays", "", "what the rays are for");
+    record.column("count", "", "number of rays");
+    record.column("tracer", "", "who traced them, with build and edge behaviour");
+    record.column("mode", "", "how the rays were sent");
+    record.column("simd", "", "widest instructions allowed");
+    record.column("time", "ms", "median over the rounds, one thread, CPU time");
+    record.column("time_low", "ms", "fastest round");
+    record.column("time_high", "ms", "slowest round");
+    record.column("rate", "Mray/s", "rays by median time");
+    record.column("hits", "", "rays with a hit, or with something on them");
+}
+
+/// One row per contender.
+pub(super) fn rows(
+    base: &Row,
+    kind: Kind,
+    rays: &RaySet,
+    contenders: &[Contender<'_>],
+    timings: &Timings,
+) -> Vec<Row> {
+    let row = |c: &Contender<'_>| {
+        let timed = timings.get(&c.name())?;
+        let s = timed.summary(timings.clock);
+        let row = base.clone().with("rays", kind.name()).with("count", rays.len);
+        let row = row.with("tracer", c.tracer_name.as_str()).with("mode", c.mode.as_str());
+        let row =
+            row.with("time", s.median * 1e3).with("time_low", s.low * 1e3).with("time_high", s.high * 1e3);
+        Some(row.with("rate", rays.len as f64 / s.median / 1e6).with("hits", timed.check))
+    };
+    contenders.iter().filter_map(row).collect()
+}
+
+/// The name of a tracer's fastest mode.
+pub(super) fn best_mode(
+    tracer_name: &str,
+    contenders: &[Contender<'_>],
+    timings: &Timings,
+) -> Option<String> {
+    let median = |name: &str| timings.summary(name).map_or(f64::INFINITY, |s| s.median);
+    let names = contenders.iter().filter(|c| c.tracer_name == tracer_name).map(Contender::name);
+    names.min_by(|a, b| median(a).total_cmp(&median(b)))
+}

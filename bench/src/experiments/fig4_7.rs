@@ -1,0 +1,159 @@
+//! Figure 4.7: build time against the number of triangles, for fast and for careful builds; with the peers' builds.
+
+use super::Context;
+use super::lineup::Installed;
+use crate::meshes;
+use crate::ours::Ours;
+use crate::peers::BuildCost;
+use crate::peers::embree::{EmbreeScene, Options, Quality};
+use crate::peers::obvhs::{Obvhs, Preset};
+use crate::plot::{Axis, Plot, Point, Series};
+use crate::record::{Record, Row};
+use crate::stats::Summary;
+use datasets::generate::nested_wavelet::Size;
+use rt_core::accel::{BuildOptions, BuildQuality};
+use rt_core::mesh::TriMesh;
+use std::sync::Arc;
+
+/// A way to build, by name.
+type Builder<'a> = (String, Box<dyn Fn() -> anyhow::Result<BuildCost> + 'a>);
+
+pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
+    record.column("triangles", "", "triangles of the wavelet surfaces");
+    record.column("builder", "", "tracer and preset");
+    record.column("threads", "", "threads that build");
+    record.column("time", "s", "median over the rounds, wall time");
+    record.column("time_low", "s", "fastest round");
+    record.column("time_high", "s", "slowest round");
+    record.column("cpu", "s", "median CPU time of all threads");
+    record.column("rate", "Mtriangle/s", "triangles by median time");
+    record.column("bytes_per_triangle", "B", "memory of the structure, without the input mesh");
+    record.column(
+        "peak_bytes_per_triangle",
+        "B",
+        "the most held while building, where the tracer reports it",
+    );
+    let installed = Installed::find();
+    record.missing.extend(installed.missing.iter().cloned());
+    record.notes.push(
+        "Wall time from triangles in memory to a structure that rays can use, on all threads. The dissertation’s \
+         builds took under 1 s for 1 million triangles (approximate) to over 60 s for 256 million, on one 8-core \
+         node (2012)."
+            .into(),
+    );
+    if context.quick {
+        for points in [51, 101] {
+            let mesh = meshes::coarse_wavelet(points)?;
+            measure(context, record, &installed, &mesh, 3, false)?;
+        }
+        let mesh = context.wavelet(Size::M1)?;
+        measure(context, record, &installed, &mesh, 2, false)?;
+    } else {
+        for size in Size::ALL {
+            if fits_in_memory(size, record) {
+                let mesh = context.wavelet(size)?;
+                // Slow builders drop out where they would take minutes each.
+                measure(context, record, &installed, &mesh, 3, size <= Size::M4)?;
+            }
+        }
+    }
+    record.plots.push(plot(record));
+    Ok(())
+}
+
+/// Builds one mesh with everyone, in turns.
+fn measure(
+    context: &mut Context<'_>,
+    record: &mut Record,
+    installed: &Installed,
+    mesh: &Arc<TriMesh>,
+    rounds: usize,
+    slow_too: bool,
+) -> anyhow::Result<()> {
+    let builders = builders(mesh, installed, slow_too);
+    let mut costs: Vec<Vec<BuildCost>> = vec![vec![]; builders.len()];
+    for round in 0..rounds {
+        context.say(format!("{} triangles, round {} of {rounds}", mesh.num_triangles(), round + 1))?;
+        for i in 0..builders.len() {
+            let i = (i + round) % builders.len();
+            costs[i].push(builders[i].1()?);
+        }
+    }
+    for ((name, _), costs) in builders.iter().zip(&costs) {
+        record.rows.push(row(name, mesh, costs));
+    }
+    Ok(())
+}
+
+fn builders<'a>(mesh: &'a Arc<TriMesh>, installed: &'a Installed, slow_too: bool) -> Vec<Builder<'a>> {
+    let mut list: Vec<Builder<'a>> = vec![];
+    for quality in BuildQuality::ALL {
+        let options = BuildOptions { quality, ..Default::default() };
+        let build = move || Ok(Ours::build(mesh, &options)?.cost);
+        list.push((format!("rt-core {}", quality.name()), Box::new(build)));
+    }
+    for e in &installed.embree {
+        for quality in Quality::ALL {
+            if quality != Quality::High || slow_too {
+                let options = Options { quality, robust: true, ..Default::default() };
+                let build = move || Ok(EmbreeScene::build(e, mesh, &options)?.cost);
+                list.push((format!("{} {}", e.name(), quality.name()), Box::new(build)));
+            }
+        }
+    }
+    let presets = if slow_too { &Preset::ALL[..] } else { &[Preset::Fastest, Preset::Medium] };
+    for &preset in presets {
+        let build = move || Ok(Obvhs::build(mesh, preset)?.cost);
+        list.push((format!("obvhs {}", preset.name()), Box::new(build)));
+    }
+    list
+}
+
+fn row(name: &str, mesh: &TriMesh, costs: &[BuildCost]) -> Row {
+    let n = mesh.num_triangles() as f64;
+    let of = |f: &dyn Fn(&BuildCost) -> f64| Summary::of(&costs.iter().map(f).collect::<Vec<_>>());
+    let row = Row::new().with("triangles", mesh.num_triangles()).with("builder", name);
+    let row = row.with("threads", rayon::current_num_threads());
+    let (Some(wall), Some(cpu), Some(cost)) = (of(&|c| c.wall_secs), of(&|c| c.cpu_secs), costs.last())
+    else {
+        return row;
+    };
+    row.with("time", wall.median)
+        .with("time_low", wall.low)
+        .with("time_high", wall.high)
+        .with("cpu", cpu.median)
+        .with("rate", n / wall.median / 1e6)
+        .with("bytes_per_triangle", cost.bytes as f64 / n)
+        .with("peak_bytes_per_triangle", cost.peak_bytes.map(|b| b as f64 / n))
+}
+
+/// The largest sizes need up to 400 bytes per triangle while building; a machine without them reports it.
+fn fits_in_memory(size: Size, record: &mut Record) -> bool {
+    let needed_gib = size.triangles() as f64 * 400.0 / (1u64 << 30) as f64;
+    let there_gib = record.machine.memory_gib;
+    let fits = there_gib == 0.0 || needed_gib < 0.8 * there_gib;
+    if !fits {
+        record.missing.push(format!(
+            "{} triangles: building needs about {needed_gib:.0} GiB and this machine has {there_gib:.0} GiB",
+            size.name()
+        ));
+    }
+    fits
+}
+
+fn plot(record: &Record) -> Plot {
+    let mut plot = Plot::lines("Build time", Axis::log("triangles", ""), Axis::log("time", "s"));
+    for row in &record.rows {
+        let number = |c: &str| row.number(c);
+        let (Some(name), Some(x), Some(y)) = (row.text("builder"), number("triangles"), number("time"))
+        else {
+            continue;
+        };
+        let point = Point { x, y, range: number("time_low").zip(number("time_high")) };
+        match plot.series.iter_mut().find(|s| s.name == name) {
+            Some(s) => s.points.push(point),
+            None => plot.series.push(Series { name: name.into(), points: vec![point] }),
+        }
+    }
+    plot
+}

@@ -1,0 +1,160 @@
+//! Every tracer there is, built for one mesh.
+
+use super::compare::{Contender, Kind};
+use crate::ours::{Mode, Ours};
+use crate::peers::BuildCost;
+use crate::peers::embree::{Embree, EmbreeScene, Options, Version};
+use crate::peers::obvhs::{Obvhs, Preset};
+use rt_core::accel::{BuildOptions, Robustness};
+use rt_core::mesh::TriMesh;
+use rt_core::simd::SimdLevel;
+use std::sync::Arc;
+
+/// The widest instructions everyone may use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Isa {
+    Best,
+    Avx2,
+    Sse42,
+}
+
+impl Isa {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Isa::Best => "best",
+            Isa::Avx2 => "AVX2",
+            Isa::Sse42 => "SSE4.2",
+        }
+    }
+
+    fn ours(self) -> Option<SimdLevel> {
+        match self {
+            Isa::Best => None,
+            Isa::Avx2 => Some(SimdLevel::Avx2),
+            Isa::Sse42 => Some(SimdLevel::Sse42),
+        }
+    }
+
+    fn embree(self) -> Option<&'static str> {
+        match self {
+            Isa::Best => None,
+            Isa::Avx2 => Some("avx2"),
+            Isa::Sse42 => Some("sse4.2"),
+        }
+    }
+
+    /// Packet widths that Embree has kernels for at this level; others it takes apart.
+    fn embree_widths(self) -> &'static [usize] {
+        match self {
+            Isa::Best => &[16, 8],
+            Isa::Avx2 => &[8],
+            Isa::Sse42 => &[4],
+        }
+    }
+}
+
+/// All tracers of one mesh.
+pub(super) struct Lineup {
+    isa: Isa,
+    pub(super) ours: Vec<(String, Ours)>,
+    embree: Vec<(String, EmbreeScene)>,
+    obvhs: Option<(String, Obvhs)>,
+}
+
+/// The peers that are installed, and what to say about those that are not.
+pub(super) struct Installed {
+    pub(super) embree: Vec<Embree>,
+    pub(super) missing: Vec<String>,
+}
+
+impl Installed {
+    pub(super) fn find() -> Installed {
+        let mut found = Installed { embree: vec![], missing: vec![] };
+        for version in [Version::V3, Version::V4] {
+            match Embree::load(version) {
+                Ok(e) => found.embree.push(e),
+                Err(e) => found.missing.push(e.to_string()),
+            }
+        }
+        found
+    }
+}
+
+impl Lineup {
+    /// Builds each tracer, fast and watertight or robust. obvhs, whose instructions are chosen by the compiler,
+    /// takes part at the best level only.
+    pub(super) fn build(
+        mesh: &Arc<TriMesh>,
+        installed: &Installed,
+        isa: Isa,
+        say: &mut dyn FnMut(&str) -> anyhow::Result<()>,
+    ) -> anyhow::Result<Lineup> {
+        let mut lineup = Lineup { isa, ours: vec![], embree: vec![], obvhs: None };
+        for robustness in [Robustness::Watertight, Robustness::Fast] {
+            say("building rt-core")?;
+            let options = BuildOptions { robustness, simd: isa.ours(), ..Default::default() };
+            lineup.ours.push((format!("rt-core {}", robustness.name()), Ours::build(mesh, &options)?));
+        }
+        for e in &installed.embree {
+            say(&format!("building {}", e.name()))?;
+            for robust in [true, false] {
+                let options = Options { robust, max_isa: isa.embree(), ..Options::default() };
+                let kind = if robust { "robust" } else { "fast" };
+                lineup.embree.push((format!("{} {kind}", e.name()), EmbreeScene::build(e, mesh, &options)?));
+            }
+        }
+        if isa == Isa::Best {
+            say("building obvhs")?;
+            lineup.obvhs = Some(("obvhs CWBVH".into(), Obvhs::build(mesh, Preset::Medium)?));
+        }
+        Ok(lineup)
+    }
+
+    /// Everyone in the modes that suit the rays. `all_modes` adds those that usually do not win.
+    pub(super) fn contenders(&self, kind: Kind, all_modes: bool) -> Vec<Contender<'_>> {
+        let mut list: Vec<Contender<'_>> = vec![];
+        for (name, ours) in &self.ours {
+            let suited = if kind.coherent() { Mode::Coherent } else { Mode::Incoherent };
+            let modes = if all_modes { vec![suited, Mode::Single] } else { vec![suited] };
+            list.extend(modes.into_iter().map(|mode| Contender {
+                tracer_name: name.clone(),
+                mode: mode.name().into(),
+                tracer: Box::new(ours.view(mode)),
+            }));
+        }
+        for (name, scene) in &self.embree {
+            let hint = if kind.coherent() { "coherent" } else { "incoherent" };
+            let widths = self.isa.embree_widths();
+            let widths = if all_modes { widths } else { &widths[..1] };
+            list.extend(widths.iter().map(|&width| Contender {
+                tracer_name: name.clone(),
+                mode: format!("packets of {width}, {hint}"),
+                tracer: Box::new(scene.view(width, kind.coherent())),
+            }));
+            if all_modes || !kind.coherent() {
+                list.push(Contender {
+                    tracer_name: name.clone(),
+                    mode: "single rays".into(),
+                    tracer: Box::new(scene.view(1, kind.coherent())),
+                });
+            }
+        }
+        if let Some((name, obvhs)) = &self.obvhs {
+            let (tracer_name, mode) = (name.clone(), "single rays".into());
+            list.push(Contender { tracer_name, mode, tracer: Box::new(obvhs) });
+        }
+        list
+    }
+
+    /// What each build cost.
+    pub(super) fn costs(&self) -> Vec<(&str, BuildCost)> {
+        let ours = self.ours.iter().map(|(n, o)| (n.as_str(), o.cost));
+        let embree = self.embree.iter().map(|(n, s)| (n.as_str(), s.cost));
+        ours.chain(embree).chain(self.obvhs.iter().map(|(n, o)| (n.as_str(), o.cost))).collect()
+    }
+
+    /// The names of the rivals.
+    pub(super) fn rivals(&self) -> Vec<&str> {
+        self.costs().into_iter().map(|(n, _)| n).filter(|n| !n.starts_with("rt-core")).collect()
+    }
+}

@@ -1,0 +1,161 @@
+//! Ours against Embree 3, Embree 4 and obvhs: same mesh, same rays, one process, in turns.
+//!
+//! Our watertight mode is compared with everyone's modes, also with those that are not robust; each rival enters with
+//! the packet width that was fastest for it.
+
+use super::Context;
+use super::compare::{self, Kind};
+use super::lineup::{Installed, Isa, Lineup};
+use crate::meshes;
+use crate::plot::{Axis, Plot, Point, Series};
+use crate::rays::View;
+use crate::record::{Record, Row};
+use crate::runner::{Ratio, Schedule};
+use datasets::generate::nested_wavelet::Size;
+use rt_core::mesh::TriMesh;
+use std::sync::Arc;
+
+const OURS: &str = "rt-core watertight";
+const OURS_FAST: &str = "rt-core fast";
+
+pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
+    compare::explain_columns(record);
+    record.column("build", "s", "build on all threads, wall time");
+    record.column("build_cpu", "s", "build, CPU time of all threads");
+    record.column("bytes_per_triangle", "B", "memory of the structure, without the input mesh");
+    record.column(
+        "peak_bytes_per_triangle",
+        "B",
+        "the most held while building, where the tracer reports it",
+    );
+    let installed = Installed::find();
+    record.missing.extend(installed.missing.iter().cloned());
+    record.notes.push(
+        "One thread traces; every tracer gets the same rays in the same order, in turns within one process. A rival's \
+         time is that of its fastest mode. rt-core uses its packet entry point for rays that go the same way and its \
+         sorting entry point for the others, whichever is faster. obvhs is compiled for the baseline instruction set \
+         and computes no barycentric coordinates."
+            .into(),
+    );
+
+    let scenes: Vec<(&str, Arc<TriMesh>, Isa)> = if context.quick {
+        let w1 = context.wavelet(Size::M1)?;
+        vec![("wavelet 1M", w1, Isa::Best), ("pipes", meshes::pipes(600), Isa::Best)]
+    } else {
+        let (w1, w16, pipes) = (context.wavelet(Size::M1)?, context.wavelet(Size::M16)?, meshes::pipes(2600));
+        vec![
+            ("wavelet 1M", w1.clone(), Isa::Best),
+            ("wavelet 1M", w1.clone(), Isa::Avx2),
+            ("wavelet 1M", w1, Isa::Sse42),
+            ("wavelet 16M", w16, Isa::Best),
+            ("pipes", pipes.clone(), Isa::Best),
+            ("pipes", pipes, Isa::Avx2),
+        ]
+    };
+    for (name, mesh, isa) in scenes {
+        scene(context, record, &installed, name, &mesh, isa)?;
+    }
+    plots(record);
+    Ok(())
+}
+
+fn scene(
+    context: &mut Context<'_>,
+    record: &mut Record,
+    installed: &Installed,
+    name: &str,
+    mesh: &Arc<TriMesh>,
+    isa: Isa,
+) -> anyhow::Result<()> {
+    let full_name = if isa == Isa::Best { name.to_string() } else { format!("{name}, {}", isa.name()) };
+    let lineup = Lineup::build(mesh, installed, isa, &mut |s| context.say(format!("{full_name}: {s}")))?;
+    let base = Row::new().with("mesh", name).with("triangles", mesh.num_triangles()).with("simd", isa.name());
+
+    // ---- Builds. Each was built once; fig4.7 measures build times in turns.
+    for (tracer, cost) in lineup.costs() {
+        let per_triangle = |bytes: u64| bytes as f64 / mesh.num_triangles() as f64;
+        let row = base.clone().with("tracer", tracer).with("build", cost.wall_secs);
+        let row = row.with("build_cpu", cost.cpu_secs).with("bytes_per_triangle", per_triangle(cost.bytes));
+        record.rows.push(row.with("peak_bytes_per_triangle", cost.peak_bytes.map(per_triangle)));
+    }
+
+    // ---- Rays.
+    let size = if context.quick { 512 } else { 1024 };
+    let views = [View::orbit(mesh), View::close(mesh)];
+    let views = if context.quick && name != "wavelet 1M" { &views[..1] } else { &views[..] };
+    for view in views {
+        let kinds = if context.quick {
+            &[Kind::Primary, Kind::Shadow, Kind::AmbientOcclusion][..]
+        } else {
+            &Kind::ALL
+        };
+        let watertight = lineup.ours[0].1.view(crate::ours::Mode::Coherent);
+        for (kind, rays) in compare::make_rays(mesh, view, size, kinds, &watertight) {
+            // Eight ambient-occlusion rays per pixel are too many for the quick form.
+            let rays = if context.quick { rays.thinned(1 << 18) } else { rays };
+            if rays.len == 0 {
+                continue;
+            }
+            context.say(format!("{full_name}, {}: {} rays", view.name, kind.name()))?;
+            let contenders = lineup.contenders(kind, !context.quick);
+            let schedule = context.schedule(Schedule::one_thread(), 2.5);
+            let timings = compare::time(&schedule, kind, &rays, &contenders)?;
+            let base = base.clone().with("view", view.name);
+            record.rows.extend(compare::rows(&base, kind, &rays, &contenders, &timings));
+            let what = format!("{full_name}, {}, {}", view.name, kind.name());
+            for rival in lineup.rivals() {
+                let Some(best) = compare::best_mode(rival, &contenders, &timings) else { continue };
+                let ours: &[&str] = if rival.ends_with("robust") { &[OURS] } else { &[OURS, OURS_FAST] };
+                for tracer in ours {
+                    // Ours is the suited mode, listed first; only rivals have the best picked for them.
+                    let Some(c) = contenders.iter().find(|c| c.tracer_name == *tracer) else { continue };
+                    if let Some(r) = timings.ratio(&c.name(), &best) {
+                        record.ratios.push(Ratio { name: format!("{what}: {tracer}"), ..r });
+                    }
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Ratios of our watertight mode as bars, one plot per mesh and view.
+fn plots(record: &mut Record) {
+    let mut groups: Vec<(String, Vec<(String, Ratio)>)> = vec![];
+    for r in &record.ratios {
+        let Some(what) = r.name.strip_suffix(&format!(": {OURS}")) else { continue };
+        // "mesh, view, rays"; the rays' name may have a comma of its own.
+        let kind = Kind::ALL.iter().map(|k| k.name()).filter(|k| what.ends_with(k)).max_by_key(|k| k.len());
+        let Some(kind) = kind else { continue };
+        let scene = what.trim_end_matches(kind).trim_end_matches(", ").to_string();
+        match groups.iter_mut().find(|(s, _)| *s == scene) {
+            Some((_, list)) => list.push((kind.to_string(), r.clone())),
+            None => groups.push((scene, vec![(kind.to_string(), r.clone())])),
+        }
+    }
+    for (scene, list) in groups {
+        let mut kinds: Vec<String> = list.iter().map(|(k, _)| k.clone()).collect();
+        kinds.dedup();
+        let mut plot = Plot::bars(
+            &format!("{scene}: rival’s time / rt-core’s time (watertight)"),
+            Axis::linear("ratio, above 1 rt-core is faster", ""),
+            kinds.clone(),
+        );
+        plot.mark = Some(1.0);
+        for (kind, ratio) in list {
+            let rival = family(&ratio.rival);
+            let x = kinds.iter().position(|k| *k == kind).unwrap_or(0) as f64;
+            let point = Point { x, y: ratio.value, range: Some((ratio.low, ratio.high)) };
+            match plot.series.iter_mut().find(|s| s.name == rival) {
+                Some(s) => s.points.push(point),
+                None => plot.series.push(Series { name: rival, points: vec![point] }),
+            }
+        }
+        record.plots.push(plot);
+    }
+}
+
+/// A rival's name without its mode.
+fn family(rival: &str) -> String {
+    rival.split(", ").next().unwrap_or(rival).to_string()
+}

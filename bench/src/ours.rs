@@ -1,0 +1,160 @@
+//! rt-core behind the interface of the peers.
+
+use crate::peers::{BuildCost, Tracer};
+use crate::{clock, rays};
+use glam::Vec3;
+use rays::{HitBlock, LANES, RayBlock};
+use rt_core::accel::{BuildError, BuildOptions, World};
+use rt_core::mesh::TriMesh;
+use std::sync::Arc;
+
+/// Which of the world's entry points rays go through.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mode {
+    /// One ray a call.
+    Single,
+    /// Packets of rays that go the same way.
+    Coherent,
+    /// Rays in any direction, sorted inside.
+    Incoherent,
+}
+
+impl Mode {
+    /// Name in the tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Mode::Single => "single rays",
+            Mode::Coherent => "coherent",
+            Mode::Incoherent => "incoherent",
+        }
+    }
+}
+
+/// A built world.
+pub struct Ours {
+    /// The world.
+    pub world: World,
+    options: BuildOptions,
+    /// What building cost; the peak is not counted inside rt-core.
+    pub cost: BuildCost,
+    /// Render space minus the mesh's coordinates; zero unless the mesh lies far from zero.
+    shift: Vec3,
+}
+
+impl Ours {
+    /// Builds on rayon's current pool.
+    pub fn build(mesh: &Arc<TriMesh>, options: &BuildOptions) -> Result<Ours, BuildError> {
+        let (world, time) = clock::measure(|| World::from_mesh(mesh.clone(), options));
+        let world = world?;
+        let cost = BuildCost {
+            wall_secs: time.wall_secs,
+            cpu_secs: time.process_cpu_secs,
+            bytes: world.report().bytes as u64,
+            peak_bytes: None,
+        };
+        let shift = (mesh.origin - world.origin()).as_vec3();
+        Ok(Ours { world, options: *options, cost, shift })
+    }
+
+    /// A way to send rays.
+    pub fn view(&self, mode: Mode) -> View<'_> {
+        View { ours: self, mode }
+    }
+
+    /// `rt-core, balanced, watertight`, and the instruction set when it is limited.
+    pub fn name(&self) -> String {
+        let o = &self.options;
+        let simd = o.simd.map_or(String::new(), |s| format!(", {}", s.name()));
+        format!("rt-core, {}, {}{simd}", o.quality.name(), o.robustness.name())
+    }
+}
+
+/// A world with an entry point.
+pub struct View<'a> {
+    ours: &'a Ours,
+    mode: Mode,
+}
+
+impl View<'_> {
+    /// Rays in render space: as they are, unless the mesh was moved.
+    fn shifted<T>(&self, rays: &[RayBlock], then: impl FnOnce(&[RayBlock]) -> T) -> T {
+        let s = self.ours.shift;
+        if s == Vec3::ZERO {
+            return then(rays);
+        }
+        let mut moved = rays.to_vec();
+        for r in &mut moved {
+            for l in 0..LANES {
+                (r.ox[l], r.oy[l], r.oz[l]) = (r.ox[l] + s.x, r.oy[l] + s.y, r.oz[l] + s.z);
+            }
+        }
+        then(&moved)
+    }
+}
+
+impl Tracer for View<'_> {
+    fn name(&self) -> String {
+        format!("{}, {}", self.ours.name(), self.mode.name())
+    }
+
+    fn closest(&self, rays: &[RayBlock], hits: &mut [HitBlock]) {
+        let world = &self.ours.world;
+        self.shifted(rays, |rays| match self.mode {
+            Mode::Coherent => world.closest_coherent(rays, hits),
+            Mode::Incoherent => world.closest_incoherent(rays, hits),
+            Mode::Single => {
+                for (r, h) in rays.iter().zip(hits) {
+                    for l in 0..LANES {
+                        h.set(l, world.closest(&r.get(l)));
+                    }
+                }
+            }
+        });
+    }
+
+    fn occluded(&self, rays: &[RayBlock], masks: &mut [u16]) {
+        let world = &self.ours.world;
+        self.shifted(rays, |rays| match self.mode {
+            Mode::Coherent => world.occluded_coherent(rays, masks),
+            Mode::Incoherent => world.occluded_incoherent(rays, masks),
+            Mode::Single => {
+                for (r, m) in rays.iter().zip(masks) {
+                    *m = (0..LANES).fold(0, |m, l| m | u16::from(world.occluded(&r.get(l))) << l);
+                }
+            }
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::peers::testing;
+    use rt_core::accel::{BuildQuality, Robustness};
+    use rt_core::simd::SimdLevel;
+
+    #[test]
+    fn every_mode_level_and_robustness_agrees_with_brute_force() {
+        let mesh = Arc::new(testing::mesh());
+        let levels = SimdLevel::available().into_iter().map(Some).chain([None]);
+        for simd in levels {
+            for robustness in Robustness::ALL {
+                let options = BuildOptions { robustness, simd, ..Default::default() };
+                let ours = Ours::build(&mesh, &options).unwrap();
+                for mode in [Mode::Single, Mode::Coherent, Mode::Incoherent] {
+                    testing::agrees_with_brute_force(&ours.view(mode));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_quality_agrees_with_brute_force() {
+        let mesh = Arc::new(testing::mesh());
+        for quality in BuildQuality::ALL {
+            let ours = Ours::build(&mesh, &BuildOptions { quality, ..Default::default() }).unwrap();
+            assert!(ours.cost.bytes > 0 && ours.cost.wall_secs > 0.0);
+            testing::agrees_with_brute_force(&ours.view(Mode::Coherent));
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! Choosing what a surface, line or point set is coloured by.
+
+use super::{Attributes, DataArray, Dataset, ModelError, Values};
+
+/// An array and what to take of it. Written `pressure`, `velocity` (length of the vector), `velocity:x` or `velocity:0`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ColorBy {
+    /// Name of the array.
+    pub name: String,
+    /// Which component; `None` is the length of the tuple.
+    pub component: Option<usize>,
+    /// True when the array belongs to points, false when it belongs to cells.
+    pub per_point: bool,
+}
+
+impl ColorBy {
+    /// Finds `wish` in `data` (in its blocks if it has some), point arrays first. A name that contains a colon is
+    /// tried as it stands before it is split.
+    pub fn find(data: &Dataset, wish: &str) -> Result<ColorBy, ModelError> {
+        let leaves = data.leaves();
+        let attributes: Vec<&Attributes> = leaves.iter().filter_map(|d| d.attributes()).collect();
+        let lookup = |name: &str| {
+            let point = attributes.iter().find_map(|a| a.point_array(name)).map(|a| (a, true));
+            point.or_else(|| attributes.iter().find_map(|a| a.cell_array(name)).map(|a| (a, false)))
+        };
+        if let Some((_, per_point)) = lookup(wish) {
+            return Ok(ColorBy { name: wish.into(), component: None, per_point });
+        }
+        if let Some((name, suffix)) = wish.rsplit_once(':')
+            && let Some((array, per_point)) = lookup(name)
+        {
+            let component = match suffix.to_ascii_lowercase().as_str() {
+                "magnitude" => None,
+                "x" => Some(0),
+                "y" => Some(1),
+                "z" => Some(2),
+                digits => Some(digits.parse().unwrap_or(usize::MAX)),
+            };
+            if component.is_some_and(|c| c >= array.components) {
+                let (name, components) = (name.to_string(), array.components);
+                return Err(ModelError::NoComponent { name, asked: wish.into(), components });
+            }
+            return Ok(ColorBy { name: name.into(), component, per_point });
+        }
+        let mut names: Vec<String> = Vec::new();
+        for a in &attributes {
+            for (arrays, of) in [(&a.point, "points"), (&a.cell, "cells")] {
+                for array in arrays {
+                    let entry = format!("`{}` ({of})", array.name);
+                    if !names.contains(&entry) {
+                        names.push(entry);
+                    }
+                }
+            }
+        }
+        let available = if names.is_empty() { "no arrays at all".into() } else { names.join(", ") };
+        Err(ModelError::NoArray { name: wish.into(), kind: data.kind(), available })
+    }
+
+    /// The array in `attributes`, if it is there and has the component.
+    pub fn array<'a>(&self, attributes: &'a Attributes) -> Option<&'a DataArray> {
+        let a = if self.per_point {
+            attributes.point_array(&self.name)
+        } else {
+            attributes.cell_array(&self.name)
+        };
+        a.filter(|a| self.component.is_none_or(|c| c < a.components))
+    }
+
+    /// Value of tuple `i` of an array from [`Self::array`].
+    pub fn value(&self, array: &DataArray, i: usize) -> f32 {
+        match self.component {
+            Some(c) => array.get(i, c) as f32,
+            None => array.magnitude(i) as f32,
+        }
+    }
+
+    /// True when the values are colours already: 8 bits, three or four components (VTK's "direct scalars").
+    pub fn is_direct_color(&self, array: &DataArray) -> bool {
+        self.component.is_none() && matches!(array.values, Values::U8(_)) && matches!(array.components, 3 | 4)
+    }
+}
+
+/// Tuple `i` of an 8-bit sRGB(A) array as linear RGBA (IEC 61966-2-1).
+pub(crate) fn linear_from_srgb8(array: &DataArray, i: usize) -> [f32; 4] {
+    std::array::from_fn(|c| {
+        if c >= array.components {
+            return 1.0;
+        }
+        let v = (array.get(i, c) / 255.0) as f32;
+        if c == 3 { v } else { linear_from_srgb(v) }
+    })
+}
+
+/// The sRGB decoding curve for one channel in 0..=1.
+pub(crate) fn linear_from_srgb(v: f32) -> f32 {
+    if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+}

@@ -1,0 +1,388 @@
+//! glTF 2.0 (`.gltf` with its buffers, `.glb`): triangles, transforms, vertex colours, base colour, metallic-roughness.
+//!
+//! The crate `gltf` checks the JSON; accessors are decoded here, because every offset and count has to be checked against
+//! the buffers. Not read: animation, skins, morph targets, cameras, lights, compressed meshes.
+
+use super::base64::Decoder;
+use super::error::{At, BROKEN, Fault, TRUNCATED, beside, fits, read_bytes};
+use super::percent::decoded;
+use super::scene::{SceneMesh, SceneModel, SurfaceMaterial, decode_texture};
+use super::{Content, Opened, ReadError};
+use glam::{DMat3, DMat4, DVec3, Vec2, Vec3};
+use gltf::accessor::{DataType, Dimensions};
+use gltf::mesh::{Mode, Semantic};
+use rt_core::mesh::{Attribute, TriMesh};
+use std::path::Path;
+
+pub(crate) const FORMAT: &str = "glTF";
+
+/// One mesh may appear many times; scenes with more triangles than this in all are refused.
+const MAX_TRIANGLES: usize = 1 << 28;
+
+/// Reads a `.gltf` or `.glb` file with the files it names.
+pub fn read(path: &Path) -> Result<Opened, ReadError> {
+    read_from_bytes(path, &read_bytes(path)?)
+}
+
+/// Reads the content of a file; other files are looked for beside `path`.
+pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
+    let fault = |f: Fault| f.in_file(path, FORMAT);
+    let gltf = checked(bytes).map_err(fault)?;
+    let buffers = buffers(path, &gltf)?;
+    let mut reader = Reader {
+        buffers,
+        scene: SceneModel::default(),
+        warnings: Vec::new(),
+        triangles: 0,
+        visited: Vec::new(),
+    };
+    reader.visited.resize(gltf.nodes().len(), false);
+    reader.materials(path, &gltf);
+    // Without a scene all nodes that are nobody's child are shown.
+    let roots: Vec<gltf::Node<'_>> = match gltf.default_scene().or_else(|| gltf.scenes().next()) {
+        Some(scene) => scene.nodes().collect(),
+        None => {
+            let mut is_child = vec![false; gltf.nodes().len()];
+            gltf.nodes().flat_map(|n| n.children()).for_each(|c| is_child[c.index()] = true);
+            gltf.nodes().filter(|n| !is_child[n.index()]).collect()
+        }
+    };
+    let mut stack: Vec<(gltf::Node<'_>, DMat4)> =
+        roots.into_iter().rev().map(|n| (n, DMat4::IDENTITY)).collect();
+    while let Some((node, parent)) = stack.pop() {
+        // glTF demands trees; a node met twice would make loops.
+        if std::mem::replace(&mut reader.visited[node.index()], true) {
+            let what = format!("node {} has two parents", node.index());
+            return Err(fault(Fault::field("nodes", what)));
+        }
+        let local = DMat4::from_cols_array(
+            &node
+                .transform()
+                .matrix()
+                .as_flattened()
+                .iter()
+                .map(|&x| f64::from(x))
+                .collect::<Vec<_>>()
+                .try_into()
+                .unwrap_or([0.0; 16]),
+        );
+        let world_from_node = parent * local;
+        if let Some(mesh) = node.mesh() {
+            reader.mesh(&mesh, node.name(), world_from_node).map_err(fault)?;
+        }
+        stack.extend(node.children().map(|c| (c, world_from_node)));
+    }
+    for (what, n) in [("animations", gltf.animations().len()), ("skins", gltf.skins().len())] {
+        if n > 0 {
+            reader.warnings.push(format!("{n} {what} left out: the rest pose is shown"));
+        }
+    }
+    let Reader { scene, warnings, .. } = reader;
+    Ok(Opened { format: FORMAT, content: Content::Scene(scene), warnings, time_steps: Vec::new() })
+}
+
+/// The scene after the crate's own checks. Those index the accessors of primitives before they are checked (gltf-json
+/// 1.4.1, mesh.rs), so that is done here first.
+fn checked(bytes: &[u8]) -> Result<gltf::Gltf, Fault> {
+    let fault = |e: gltf::Error| {
+        let cure = "check it with the Khronos glTF validator; compressed meshes (Draco, meshopt) must be unpacked first";
+        Fault::new(At::Field("the JSON part".into()), e.to_string(), cure)
+    };
+    let gltf::Gltf { document, blob } = gltf::Gltf::from_slice_without_validation(bytes).map_err(fault)?;
+    let json = document.as_json();
+    let accessors = json.accessors.len();
+    let attributes = json.meshes.iter().flat_map(|m| &m.primitives).flat_map(|p| p.attributes.values());
+    if let Some(bad) = attributes.map(|a| a.value()).find(|&a| a >= accessors) {
+        return Err(Fault::field("meshes", format!("accessor {bad} of {accessors}")));
+    }
+    let document = gltf::Document::from_json(document.into_json()).map_err(fault)?;
+    Ok(gltf::Gltf { document, blob })
+}
+
+/// The bytes of every buffer.
+fn buffers(path: &Path, gltf: &gltf::Gltf) -> Result<Vec<Vec<u8>>, ReadError> {
+    gltf.buffers()
+        .map(|b| match b.source() {
+            gltf::buffer::Source::Bin => Ok(gltf.blob.clone().unwrap_or_default()),
+            gltf::buffer::Source::Uri(uri) => resource(path, uri),
+        })
+        .collect()
+}
+
+/// What a URI names: data inside it, or a file beside `path`.
+fn resource(path: &Path, uri: &str) -> Result<Vec<u8>, ReadError> {
+    if let Some(data) = uri.strip_prefix("data:") {
+        let fault = |what: &str| Fault::field("a data URI", what).in_file(path, FORMAT);
+        let Some((_, text)) = data.split_once(";base64,") else { return Err(fault("it is not base64")) };
+        let mut out = Vec::new();
+        return match Decoder::new(text.as_bytes()).fill(&mut out, usize::MAX) {
+            Ok(()) => Ok(out),
+            Err(bad) => Err(fault(&format!("byte {:#04x} is not base64", bad.byte))),
+        };
+    }
+    read_bytes(&beside(path, &decoded(uri)))
+}
+
+struct Reader {
+    buffers: Vec<Vec<u8>>,
+    scene: SceneModel,
+    warnings: Vec<String>,
+    triangles: usize,
+    visited: Vec<bool>,
+}
+
+impl Reader {
+    fn materials(&mut self, path: &Path, gltf: &gltf::Gltf) {
+        let mut texture_of_image: Vec<Option<usize>> = vec![None; gltf.images().len()];
+        for m in gltf.materials() {
+            let pbr = m.pbr_metallic_roughness();
+            let strength = m.emissive_strength().unwrap_or(1.0);
+            let mut material = SurfaceMaterial {
+                name: m.name().unwrap_or("").into(),
+                base_color: pbr.base_color_factor(),
+                base_color_texture: None,
+                metallic: pbr.metallic_factor(),
+                roughness: pbr.roughness_factor(),
+                emissive: m.emissive_factor().map(|e| e * strength),
+                ior: m.ior().unwrap_or(1.5),
+                double_sided: m.double_sided(),
+            };
+            if m.alpha_mode() == gltf::material::AlphaMode::Opaque {
+                material.base_color[3] = 1.0;
+            }
+            if let Some(info) = pbr.base_color_texture() {
+                let image = info.texture().source();
+                if info.tex_coord() != 0 {
+                    self.warnings.push(format!(
+                        "material `{}` uses a second set of texture coordinates: picture left out",
+                        material.name
+                    ));
+                } else if let Some(t) = texture_of_image[image.index()] {
+                    material.base_color_texture = Some(t);
+                } else {
+                    let json = &gltf.as_json().images[image.index()];
+                    // The crate takes a picture without a source for granted not to be.
+                    let has_source =
+                        json.uri.is_some() || json.buffer_view.is_some() && json.mime_type.is_some();
+                    let picture =
+                        if has_source { self.picture(path, &image) } else { Err("it names no data".into()) };
+                    match picture {
+                        Ok(texture) => {
+                            let t = self.scene.textures.len();
+                            self.scene.textures.push(texture);
+                            texture_of_image[image.index()] = Some(t);
+                            material.base_color_texture = Some(t);
+                        }
+                        Err(e) => self.warnings.push(format!("picture {} left out: {e}", image.index())),
+                    }
+                }
+            }
+            let others = [
+                (pbr.metallic_roughness_texture().is_some(), "metallic-roughness"),
+                (m.normal_texture().is_some(), "normal"),
+                (m.emissive_texture().is_some(), "emissive"),
+                (m.occlusion_texture().is_some(), "occlusion"),
+            ];
+            for (_, what) in others.iter().filter(|(used, _)| *used) {
+                self.warnings.push(format!("material `{}`: {what} picture left out", material.name));
+            }
+            self.scene.materials.push(material);
+        }
+    }
+
+    fn picture(&self, path: &Path, image: &gltf::Image<'_>) -> Result<super::Texture, String> {
+        let name = image.name().unwrap_or("").to_string();
+        match image.source() {
+            gltf::image::Source::Uri { uri, .. } => {
+                let bytes = resource(path, uri).map_err(|e| e.to_string())?;
+                decode_texture(&name, &bytes, false)
+            }
+            gltf::image::Source::View { view, .. } => {
+                let buffer = &self.buffers[view.buffer().index()];
+                let end = view.offset().checked_add(view.length());
+                let bytes =
+                    end.and_then(|end| buffer.get(view.offset()..end)).ok_or("it lies outside its buffer")?;
+                decode_texture(&name, bytes, false)
+            }
+        }
+    }
+
+    fn mesh(
+        &mut self,
+        mesh: &gltf::Mesh<'_>,
+        node_name: Option<&str>,
+        world_from_node: DMat4,
+    ) -> Result<(), Fault> {
+        for primitive in mesh.primitives() {
+            let name = node_name.or(mesh.name()).unwrap_or("").to_string();
+            if let Some(built) = self.primitive(&primitive, &name, world_from_node)? {
+                self.triangles = self.triangles.saturating_add(built.num_triangles());
+                if self.triangles > MAX_TRIANGLES {
+                    let what = format!("more than {MAX_TRIANGLES} triangles in all instances");
+                    return Err(Fault::new(
+                        At::Field("the scene".into()),
+                        what,
+                        "split the scene into several files",
+                    ));
+                }
+                let material = primitive.material().index();
+                self.scene.meshes.push(SceneMesh { name, mesh: built, material });
+            }
+        }
+        Ok(())
+    }
+
+    fn primitive(
+        &mut self,
+        p: &gltf::Primitive<'_>,
+        name: &str,
+        world_from_node: DMat4,
+    ) -> Result<Option<TriMesh>, Fault> {
+        let mode = p.mode();
+        if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
+            self.warnings.push(format!("`{name}`: {mode:?} left out: only triangles are read"));
+            return Ok(None);
+        }
+        let Some(accessor) = p.get(&Semantic::Positions) else { return Ok(None) };
+        let place = format!("positions of `{name}`");
+        let positions: Vec<DVec3> = self
+            .tuples::<3>(&accessor, &place)?
+            .iter()
+            .map(|p| world_from_node.transform_point3(DVec3::from(p.map(f64::from))))
+            .collect();
+        let n = positions.len();
+
+        let ids: Vec<u32> = match p.indices() {
+            Some(a) => self.indices(&a, name)?,
+            None => (0..n as u32).collect(),
+        };
+        let mut triangles: Vec<[u32; 3]> = match mode {
+            Mode::Triangles => ids.as_chunks::<3>().0.to_vec(),
+            Mode::TriangleStrip => {
+                let turned = |(i, w): (usize, &[u32])| {
+                    if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] }
+                };
+                ids.windows(3).enumerate().map(turned).collect()
+            }
+            _ => ids.windows(2).skip(1).map(|w| [ids[0], w[0], w[1]]).collect(),
+        };
+        let before = triangles.len();
+        triangles.retain(|t| t.iter().all(|&k| (k as usize) < n));
+        if triangles.len() < before {
+            let dropped = before - triangles.len();
+            self.warnings.push(format!(
+                "`{name}`: {dropped} triangles left out: they name vertices that do not exist"
+            ));
+        }
+        // A mirror turns triangles inside out (glTF 2.0, section 3.7.4).
+        if world_from_node.determinant() < 0.0 {
+            triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        }
+        let mut mesh = TriMesh::from_f64_positions(&positions, triangles);
+
+        let one_per_vertex = |found: usize, what: &str| {
+            if found == n {
+                Ok(())
+            } else {
+                Err(Fault::field(format!("{what} of `{name}`"), format!("{found} values for {n} vertices")))
+            }
+        };
+        if let Some(a) = p.get(&Semantic::Normals) {
+            let normals = self.tuples::<3>(&a, &format!("normals of `{name}`"))?;
+            one_per_vertex(normals.len(), "normals")?;
+            // Normals go with the inverse transpose; the cofactors are that without a division that may fail.
+            let m = DMat3::from_mat4(world_from_node);
+            let cofactors = DMat3::from_cols(
+                m.y_axis.cross(m.z_axis),
+                m.z_axis.cross(m.x_axis),
+                m.x_axis.cross(m.y_axis),
+            );
+            let sign = if world_from_node.determinant() < 0.0 { -1.0 } else { 1.0 };
+            let turned = normals
+                .iter()
+                .map(|v| (sign * (cofactors * DVec3::from(v.map(f64::from)))).normalize_or_zero().as_vec3());
+            mesh.normals = Some(Attribute::per_vertex(turned.collect::<Vec<Vec3>>()));
+        }
+        if let Some(a) = p.get(&Semantic::TexCoords(0)) {
+            let t = self.tuples::<2>(&a, &format!("texture coordinates of `{name}`"))?;
+            one_per_vertex(t.len(), "texture coordinates")?;
+            mesh.texcoords = Some(t.into_iter().map(Vec2::from).collect());
+        }
+        if let Some(a) = p.get(&Semantic::Colors(0)) {
+            let place = format!("colours of `{name}`");
+            let colors: Vec<[f32; 4]> = if a.dimensions() == Dimensions::Vec4 {
+                self.tuples::<4>(&a, &place)?
+            } else {
+                self.tuples::<3>(&a, &place)?.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect()
+            };
+            one_per_vertex(colors.len(), "colours")?;
+            mesh.colors = Some(Attribute::per_vertex(colors));
+        }
+        mesh.check().map_err(|e| Fault::field(format!("mesh `{name}`"), e.to_string()))?;
+        Ok(Some(mesh))
+    }
+
+    /// Start, stride and number of the elements of an accessor, all inside its buffer.
+    fn elements<'a>(&'a self, a: &gltf::Accessor<'_>, place: &str) -> Result<Vec<&'a [u8]>, Fault> {
+        let at = || At::Field(place.to_string());
+        if a.sparse().is_some() {
+            let cure = "write the file without sparse accessors";
+            return Err(Fault::unsupported(at(), "a sparse accessor", cure));
+        }
+        let Some(view) = a.view() else {
+            return Err(Fault::new(at(), "the accessor has no buffer view", BROKEN));
+        };
+        let size = a.size();
+        let stride = view.stride().unwrap_or(size).max(1);
+        let buffer = &self.buffers[view.buffer().index()];
+        let end = view.offset().checked_add(view.length());
+        let bytes = end.and_then(|end| buffer.get(view.offset()..end)).and_then(|b| b.get(a.offset()..));
+        let Some(bytes) = bytes else {
+            let what = format!("it lies outside its buffer of {} bytes", buffer.len());
+            return Err(Fault::new(at(), what, TRUNCATED));
+        };
+        let count = a.count();
+        // The last element need not be followed by a whole stride.
+        let needed = (count as u64)
+            .saturating_sub(1)
+            .checked_mul(stride as u64)
+            .and_then(|n| n.checked_add(size as u64))
+            .unwrap_or(u64::MAX);
+        fits(if count == 0 { 0 } else { needed }, 1, bytes.len(), at(), "bytes of elements")?;
+        Ok((0..count).map(|i| &bytes[i * stride..i * stride + size]).collect())
+    }
+
+    /// The elements as `N` floats each; integers are fractions of their largest value when the file says so.
+    fn tuples<const N: usize>(&self, a: &gltf::Accessor<'_>, place: &str) -> Result<Vec<[f32; N]>, Fault> {
+        if a.dimensions().multiplicity() != N {
+            let what = format!("{:?} instead of {N} components", a.dimensions());
+            return Err(Fault::field(place, what));
+        }
+        let kind = a.data_type();
+        let scale = |max: f32| if a.normalized() { 1.0 / max } else { 1.0 };
+        let value = |b: &[u8], c: usize| match kind {
+            DataType::F32 => f32::from_le_bytes([b[4 * c], b[4 * c + 1], b[4 * c + 2], b[4 * c + 3]]),
+            DataType::U8 => f32::from(b[c]) * scale(255.0),
+            DataType::I8 => f32::from(b[c] as i8) * scale(127.0),
+            DataType::U16 => f32::from(u16::from_le_bytes([b[2 * c], b[2 * c + 1]])) * scale(65535.0),
+            DataType::I16 => f32::from(i16::from_le_bytes([b[2 * c], b[2 * c + 1]])) * scale(32767.0),
+            DataType::U32 => u32::from_le_bytes([b[4 * c], b[4 * c + 1], b[4 * c + 2], b[4 * c + 3]]) as f32,
+        };
+        Ok(self.elements(a, place)?.into_iter().map(|b| std::array::from_fn(|c| value(b, c))).collect())
+    }
+
+    fn indices(&self, a: &gltf::Accessor<'_>, name: &str) -> Result<Vec<u32>, Fault> {
+        let place = format!("indices of `{name}`");
+        let kind = a.data_type();
+        if a.dimensions() != Dimensions::Scalar
+            || !matches!(kind, DataType::U8 | DataType::U16 | DataType::U32)
+        {
+            return Err(Fault::field(
+                place,
+                format!("{kind:?} {:?} instead of unsigned numbers", a.dimensions()),
+            ));
+        }
+        let value = |b: &[u8]| b.iter().rev().fold(0u32, |n, &x| n << 8 | u32::from(x));
+        Ok(self.elements(a, &place)?.into_iter().map(value).collect())
+    }
+}

@@ -1,0 +1,148 @@
+//! Wavefront OBJ with its materials (MTL), by way of the crate `tobj`.
+
+use super::error::{At, BROKEN, Fault, beside, read_bytes};
+use super::scene::{SceneMesh, SceneModel, SurfaceMaterial, decode_texture};
+use super::{Content, Opened, ReadError};
+use crate::model::polygon::{Division, triangulate};
+use glam::{DVec3, Vec2, Vec3};
+use rt_core::mesh::{Attribute, TriMesh};
+use std::cell::RefCell;
+use std::path::Path;
+
+pub(crate) const FORMAT: &str = "OBJ";
+
+/// Reads a `.obj` file, the material files it names and the pictures those name.
+pub fn read(path: &Path) -> Result<Opened, ReadError> {
+    read_from_bytes(path, &read_bytes(path)?)
+}
+
+/// Reads the content of an `.obj` file; other files are looked for beside `path`.
+pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
+    let warnings = RefCell::new(Vec::new());
+    let options = tobj::LoadOptions {
+        single_index: true,
+        ignore_points: true,
+        ignore_lines: true,
+        ..Default::default()
+    };
+    let load_material = |name: &Path| {
+        let file = beside(path, &name.to_string_lossy());
+        match std::fs::read(&file) {
+            Ok(text) => tobj::load_mtl_buf(&mut text.as_slice()),
+            Err(e) => {
+                warnings.borrow_mut().push(format!("materials of {} left out: {e}", file.display()));
+                tobj::load_mtl_buf(&mut [].as_slice())
+            }
+        }
+    };
+    let mut text = bytes;
+    let (models, materials) = tobj::load_obj_buf(&mut text, &options, load_material).map_err(|e| {
+        Fault::new(At::Field("the OBJ text".into()), e.to_string(), BROKEN).in_file(path, FORMAT)
+    })?;
+    let mut warnings = warnings.into_inner();
+    let mut scene = SceneModel::default();
+    match materials {
+        Ok(list) => list.iter().for_each(|m| add_material(m, path, &mut scene, &mut warnings)),
+        Err(e) => warnings.push(format!("materials left out: {e}")),
+    }
+    // Points and lines would spoil the attributes of the faces around them, so `tobj` skips them: count them here.
+    let not_faces =
+        bytes.split(|&b| b == b'\n').filter(|l| l.starts_with(b"l ") || l.starts_with(b"p ")).count();
+    let mut fanned = 0;
+    for model in models {
+        let material = model.mesh.material_id.filter(|&m| m < scene.materials.len());
+        let mesh = triangles(&model, &mut fanned, &mut warnings);
+        if let Err(e) = mesh.check() {
+            let at = At::Field(format!("object `{}`", model.name));
+            return Err(Fault::new(at, e.to_string(), BROKEN).in_file(path, FORMAT));
+        }
+        if mesh.num_triangles() > 0 {
+            scene.meshes.push(SceneMesh { name: model.name, mesh, material });
+        }
+    }
+    if not_faces > 0 {
+        warnings.push(format!("{not_faces} points and lines left out: only faces are read"));
+    }
+    if fanned > 0 {
+        warnings.push(format!("{fanned} faces cross themselves or are too large, and were divided as a fan"));
+    }
+    Ok(Opened { format: FORMAT, content: Content::Scene(scene), warnings, time_steps: Vec::new() })
+}
+
+fn triangles(model: &tobj::Model, fanned: &mut usize, warnings: &mut Vec<String>) -> TriMesh {
+    let m = &model.mesh;
+    let positions: Vec<DVec3> = m.positions.as_chunks::<3>().0.iter().map(|&p| DVec3::from(p)).collect();
+    let mut indices = Vec::new();
+    let (mut at, mut corners) = (0, Vec::new());
+    // Without arities all faces are triangles.
+    let arities = m.face_arities.iter().map(|&n| n as usize);
+    let all_triangles =
+        std::iter::repeat_n(3, if m.face_arities.is_empty() { m.indices.len() / 3 } else { 0 });
+    for n in arities.chain(all_triangles) {
+        let Some(ids) = m.indices.get(at..at + n) else { break };
+        at += n;
+
+        corners.clear();
+        corners.extend(ids.iter().map(|&k| positions.get(k as usize).copied().unwrap_or(DVec3::NAN)));
+        let division = triangulate(&corners, |t| indices.push(t.map(|k| ids[k])));
+        *fanned += usize::from(division == Division::Fanned);
+    }
+    let mut mesh = TriMesh::from_f64_positions(&positions, indices);
+    let vertices = positions.len();
+    let narrow = |c: &[f64; 3]| Vec3::new(c[0] as f32, c[1] as f32, c[2] as f32);
+    if m.normals.len() == 3 * vertices && vertices > 0 {
+        let normals = m.normals.as_chunks::<3>().0.iter().map(narrow);
+        mesh.normals = Some(Attribute::per_vertex(normals.collect()));
+    }
+    if m.texcoords.len() == 2 * vertices && vertices > 0 {
+        let pairs = m.texcoords.as_chunks::<2>().0.iter();
+        mesh.texcoords = Some(pairs.map(|t| Vec2::new(t[0] as f32, t[1] as f32)).collect());
+    }
+    if m.vertex_color.len() == 3 * vertices && vertices > 0 {
+        let colors = m.vertex_color.as_chunks::<3>().0.iter().map(|c| narrow(c).extend(1.0).to_array());
+        mesh.colors = Some(Attribute::per_vertex(colors.collect()));
+    }
+
+    for (what, found, expected) in [
+        ("normals", m.normals.len(), 3 * vertices),
+        ("texture coordinates", m.texcoords.len(), 2 * vertices),
+        ("colours", m.vertex_color.len(), 3 * vertices),
+    ] {
+        if found != 0 && found != expected {
+            warnings
+                .push(format!("object `{}`: {what} left out: only some of its faces have them", model.name));
+        }
+    }
+    mesh
+}
+
+fn add_material(m: &tobj::Material, path: &Path, scene: &mut SceneModel, warnings: &mut Vec<String>) {
+    let color = |c: Option<[f64; 3]>, default: f32| c.map_or([default; 3], |c| c.map(|x| x as f32));
+    let extra = |name: &str| m.unknown_param.get(name).and_then(|v| v.trim().parse::<f32>().ok());
+    let [r, g, b] = color(m.diffuse, 0.8);
+    // Blinn-Phong exponent to GGX roughness: alpha² = 2/(n+2) (Walter et al. 2007, section 5.1) and roughness² = alpha.
+    let from_exponent = m.shininess.map(|n| (2.0 / (n.max(0.0) as f32 + 2.0)).powf(0.25));
+    let mut material = SurfaceMaterial {
+        name: m.name.clone(),
+        base_color: [r, g, b, m.dissolve.map_or(1.0, |d| d as f32)],
+        metallic: extra("Pm").unwrap_or(0.0),
+        roughness: extra("Pr").or(from_exponent).unwrap_or(1.0),
+        emissive: color(m.emissive, 0.0),
+        ior: m.optical_density.map_or(1.5, |n| n as f32),
+        ..Default::default()
+    };
+    if let Some(name) = &m.diffuse_texture {
+        // Options such as `-s 1 1 1` may come before the name.
+        let file = beside(path, name.split_whitespace().next_back().unwrap_or(name));
+        let picture =
+            std::fs::read(&file).map_err(|e| e.to_string()).and_then(|b| decode_texture(name, &b, true));
+        match picture {
+            Ok(t) => {
+                material.base_color_texture = Some(scene.textures.len());
+                scene.textures.push(t);
+            }
+            Err(e) => warnings.push(format!("picture {} left out: {e}", file.display())),
+        }
+    }
+    scene.materials.push(material);
+}

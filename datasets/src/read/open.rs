@@ -1,0 +1,140 @@
+//! Finding out what a file is: by its first bytes, else by the ending of its name.
+
+use super::error::{io_error, read_bytes};
+use super::{Opened, ReadError, gltf, mhd, nrrd, obj, plot3d, ply, raw, stl, vtk_legacy, vtk_xml};
+use std::io::Read;
+use std::path::Path;
+
+/// The formats there are, for messages.
+pub const KNOWN: &str = "VTK XML (.vti .vtp .vtu .vtr .vts, their parallel forms, .pvd, .vtm), VTK legacy (.vtk), \
+                         PLOT3D (.xyz .x .g .q .bin), NRRD (.nrrd .nhdr), MetaImage (.mhd .mha), raw with TOML (.raw), OBJ, glTF, PLY, STL";
+
+/// Bytes looked at.
+const HEAD_BYTES: u64 = 1024;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Format {
+    VtkXml,
+    VtkLegacy,
+    Plot3d,
+    Nrrd,
+    MetaImage,
+    Raw,
+    Obj,
+    Gltf,
+    Ply,
+    Stl,
+}
+
+/// Reads a file of any format that this crate knows. The content decides; where it does not tell (OBJ, raw, PLOT3D), the
+/// ending of the name does. A name that contradicts the content gives a warning, not an error.
+///
+/// ```
+/// let dir = tempfile::tempdir()?;
+/// let path = dir.path().join("triangle.stl");
+/// std::fs::write(&path, "solid t\n facet normal 0 0 1\n outer loop\n vertex 0 0 0\n vertex 1 0 0\n vertex 0 1 0\n \
+///                        endloop\n endfacet\nendsolid t\n")?;
+/// let opened = datasets::read::open(&path)?;
+/// let (mesh, report) = opened.dataset()?.to_trimesh(None)?;
+/// assert_eq!((opened.format, mesh.num_triangles(), report.dropped()), ("STL", 1, 0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn open(path: impl AsRef<Path>) -> Result<Opened, ReadError> {
+    let path = path.as_ref();
+    let mut head = Vec::new();
+    let file = std::fs::File::open(path).map_err(|e| io_error(path, e))?;
+    let length = file.metadata().map_err(|e| io_error(path, e))?.len();
+    file.take(HEAD_BYTES).read_to_end(&mut head).map_err(|e| io_error(path, e))?;
+
+    let by_content = from_content(&head, length);
+    let by_name = from_name(path);
+    let format = match (by_content, by_name) {
+        (Some(f), _) | (None, Some(f)) => f,
+        (None, None) => {
+            // Binary files called .bin, .dat and so on: PLOT3D if the sizes add up.
+            if !head.is_empty() && plot3d::looks_like_plot3d(&read_bytes(path)?) {
+                Format::Plot3d
+            } else {
+                return Err(unknown(path, &head));
+            }
+        }
+    };
+    let mut opened = match format {
+        Format::VtkXml => vtk_xml::read(path),
+        Format::VtkLegacy => vtk_legacy::read(path),
+        Format::Plot3d => plot3d::read(path, &plot3d::Plot3dOptions::default()),
+        Format::Nrrd => nrrd::read(path),
+        Format::MetaImage => mhd::read(path),
+        Format::Raw => raw::read(path),
+        Format::Obj => obj::read(path),
+        Format::Gltf => gltf::read(path),
+        Format::Ply => ply::read(path),
+        Format::Stl => stl::read(path),
+    }?;
+    if let (Some(content), Some(name)) = (by_content, by_name)
+        && content != name
+    {
+        opened.warnings.push(format!("the name says {name:?}, the content is {}", opened.format));
+    }
+    Ok(opened)
+}
+
+fn from_content(head: &[u8], length: u64) -> Option<Format> {
+    let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
+    let contains = |what: &[u8]| text.windows(what.len()).any(|w| w == what);
+    if text.to_ascii_lowercase().starts_with(b"# vtk datafile") {
+        Some(Format::VtkLegacy)
+    } else if text.starts_with(b"<") && contains(b"<VTKFile") {
+        Some(Format::VtkXml)
+    } else if text.starts_with(b"NRRD000") {
+        Some(Format::Nrrd)
+    } else if text.starts_with(b"ply\n") || text.starts_with(b"ply\r") {
+        Some(Format::Ply)
+    } else if text.starts_with(b"glTF") || text.starts_with(b"{") && contains(b"\"asset\"") {
+        Some(Format::Gltf)
+    } else if text.starts_with(b"ObjectType") || text.starts_with(b"NDims") && contains(b"DimSize") {
+        Some(Format::MetaImage)
+    } else if text.starts_with(b"solid") && contains(b"facet") || stl_size(head, length) {
+        Some(Format::Stl)
+    } else {
+        None
+    }
+}
+
+/// True when the number of triangles in the header of a binary STL file explains its length.
+fn stl_size(head: &[u8], length: u64) -> bool {
+    let n = head.get(80..84).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes);
+    n.is_some_and(|n| n > 0 && 84 + 50 * u64::from(n) == length)
+}
+
+fn from_name(path: &Path) -> Option<Format> {
+    let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+    Some(match extension.as_str() {
+        "vti" | "vtp" | "vtu" | "vtr" | "vts" | "pvti" | "pvtp" | "pvtu" | "pvtr" | "pvts" | "pvd"
+        | "vtm" => Format::VtkXml,
+        "vtk" => Format::VtkLegacy,
+        "xyz" | "x" | "g" | "grid" | "p3d" | "q" | "sol" => Format::Plot3d,
+        "nrrd" | "nhdr" => Format::Nrrd,
+        "mhd" | "mha" => Format::MetaImage,
+        "raw" | "toml" => Format::Raw,
+        "obj" => Format::Obj,
+        "gltf" | "glb" => Format::Gltf,
+        "ply" => Format::Ply,
+        "stl" => Format::Stl,
+        _ => return None,
+    })
+}
+
+fn unknown(path: &Path, head: &[u8]) -> ReadError {
+    let extension = path.extension().map_or_else(|| "none".into(), |e| format!(".{}", e.to_string_lossy()));
+    let what = if head.is_empty() {
+        "the file is empty".to_string()
+    } else if head.starts_with(b"\x89HDF") || head.starts_with(b"CDF") {
+        "it is an HDF5 or netCDF file, perhaps Exodus or CGNS: save it as .vtu or .vti with ParaView"
+            .to_string()
+    } else {
+        let shown: String = head.iter().take(8).map(|b| format!("{b:02x}")).collect();
+        format!("ending {extension}, first bytes {shown}")
+    };
+    ReadError::UnknownFormat { path: path.to_path_buf(), what, known: KNOWN }
+}

@@ -1,0 +1,101 @@
+//! Meshes with materials and pictures, as OBJ and glTF files hold them.
+
+use rt_core::mesh::TriMesh;
+
+/// A scene out of a file; positions are world positions, transforms are applied.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SceneModel {
+    /// The meshes.
+    pub meshes: Vec<SceneMesh>,
+    /// The materials they refer to.
+    pub materials: Vec<SurfaceMaterial>,
+    /// The pictures that materials refer to.
+    pub textures: Vec<Texture>,
+}
+
+impl SceneModel {
+    /// Triangles of all meshes.
+    pub fn num_triangles(&self) -> usize {
+        self.meshes.iter().map(|m| m.mesh.num_triangles()).sum()
+    }
+}
+
+/// One mesh with one material.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SceneMesh {
+    /// Its name in the file.
+    pub name: String,
+    /// The triangles.
+    pub mesh: TriMesh,
+    /// Index into [`SceneModel::materials`].
+    pub material: Option<usize>,
+}
+
+/// How a surface looks, in the terms of glTF's metallic-roughness model. Colours are linear RGB(A).
+#[derive(Debug, Clone, PartialEq)]
+pub struct SurfaceMaterial {
+    /// Its name in the file.
+    pub name: String,
+    /// Base colour and opacity.
+    pub base_color: [f32; 4],
+    /// Index into [`SceneModel::textures`]; multiplies `base_color`.
+    pub base_color_texture: Option<usize>,
+    /// 0 = dielectric, 1 = metal.
+    pub metallic: f32,
+    /// 0 = mirror, 1 = matt.
+    pub roughness: f32,
+    /// Light given off.
+    pub emissive: [f32; 3],
+    /// Refractive index.
+    pub ior: f32,
+    /// Seen from both sides.
+    pub double_sided: bool,
+}
+
+impl Default for SurfaceMaterial {
+    fn default() -> Self {
+        SurfaceMaterial {
+            name: String::new(),
+            base_color: [1.0; 4],
+            base_color_texture: None,
+            metallic: 0.0,
+            roughness: 1.0,
+            emissive: [0.0; 3],
+            ior: 1.5,
+            double_sided: true,
+        }
+    }
+}
+
+/// A picture: 8-bit sRGB with linear alpha, first row at the top.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Texture {
+    /// Its name or file.
+    pub name: String,
+    /// Pixels per row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `width * height` pixels.
+    pub rgba8: Vec<[u8; 4]>,
+    /// True when texture coordinate v = 0 is the lower edge (OBJ), false when it is the upper edge (glTF).
+    pub v_up: bool,
+}
+
+/// Pictures with more bytes than this when unpacked are refused: a few compressed bytes can declare any size.
+const MAX_TEXTURE_BYTES: u64 = 1 << 30;
+
+/// Decodes PNG or JPEG bytes.
+pub(crate) fn decode_texture(name: &str, bytes: &[u8], v_up: bool) -> Result<Texture, String> {
+    let mut reader = image::ImageReader::new(std::io::Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|e| e.to_string())?;
+    let mut limits = image::Limits::default();
+    // A picture of one colour packs about 1:1000; leave room for small ones.
+    limits.max_alloc = Some(MAX_TEXTURE_BYTES.min((bytes.len() as u64).saturating_mul(2048) + (1 << 20)));
+    reader.limits(limits);
+    let picture = reader.decode().map_err(|e| e.to_string())?.to_rgba8();
+    let (width, height) = picture.dimensions();
+    let (pixels, _) = picture.as_raw().as_chunks::<4>();
+    Ok(Texture { name: name.into(), width, height, rgba8: pixels.to_vec(), v_up })
+}

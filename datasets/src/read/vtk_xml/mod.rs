@@ -1,0 +1,89 @@
+//! VTK's XML files: one data set (`.vti .vtp .vtu .vtr .vts`), or a list of other files (`.pvti … .pvd .vtm`).
+//!
+//! All encodings (ascii, inline base64, appended base64, appended raw), both header types, both byte orders, ZLib and LZ4
+//! compression. ParaView writes appended raw data without compression unless told otherwise; VTK's writers base64 with ZLib.
+//! LZMA is refused by name. Source: "VTK File Formats" (Kitware), and what VTK 9.7 and ParaView 5.11 write.
+
+pub(crate) mod blocks;
+mod file;
+mod parallel;
+pub(crate) mod pieces;
+
+use super::{Content, Opened, ReadError, TimeStep};
+use crate::model::Dataset;
+use crate::read::error::{At, Fault, read_bytes};
+use file::{XmlFile, parse_tree, split};
+use std::path::Path;
+
+pub(crate) const FORMAT: &str = "VTK XML";
+
+/// Files may name files that name files; deeper than this is a loop.
+const MAX_NESTING: usize = 8;
+
+/// Reads a VTK XML file of any kind, with the files it names.
+pub fn read(path: &Path) -> Result<Opened, ReadError> {
+    read_nested(path, 0)
+}
+
+/// Reads one file's content; for files that name others, `path` tells where those are.
+pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
+    from_bytes(path, bytes, 0)
+}
+
+fn read_nested(path: &Path, depth: usize) -> Result<Opened, ReadError> {
+    from_bytes(path, &read_bytes(path)?, depth)
+}
+
+fn from_bytes(path: &Path, bytes: &[u8], depth: usize) -> Result<Opened, ReadError> {
+    let fault = |f: Fault| f.in_file(path, FORMAT);
+    if depth > MAX_NESTING {
+        let what = format!("files name each other more than {MAX_NESTING} deep");
+        let cure = "look for a file that names itself".to_string();
+        return Err(fault(Fault::new(At::Field("the chain of files".into()), what, cure)));
+    }
+    let parts = split(bytes).map_err(fault)?;
+    let tree = parse_tree(&parts.head).map_err(fault)?;
+    let file = XmlFile::new(&tree, parts.appended).map_err(fault)?;
+    let mut warnings = Vec::new();
+    let mut steps: Vec<TimeStep> = Vec::new();
+    let kind = file.root.attribute("type").unwrap_or("").to_string();
+    let set = file.root.children().find(|n| n.is_element() && n.tag_name().name() == kind);
+    let Some(set) = set else {
+        return Err(fault(Fault::field("VTKFile", format!("it has no element `{kind}`, its own type"))));
+    };
+    let data = if pieces::KINDS.contains(&kind.as_str()) {
+        let pieces = pieces::pieces(&file, set, &mut warnings).map_err(fault)?;
+        merged(&kind, pieces, &mut warnings).map_err(fault)?
+    } else if let Some(serial) = kind.strip_prefix('P').filter(|k| pieces::KINDS.contains(k)) {
+        parallel::pieces(path, set, serial, depth, &mut warnings)?
+    } else if kind == "Collection" {
+        steps = parallel::time_steps(path, set).map_err(fault)?;
+        parallel::first_time(path, &steps, depth, &mut warnings)?
+    } else if kind == "vtkMultiBlockDataSet"
+        || kind == "vtkPartitionedDataSetCollection"
+        || kind == "vtkPartitionedDataSet"
+    {
+        parallel::multi_block(path, set, depth, 0, &mut warnings)?
+    } else {
+        let known = "PolyData, UnstructuredGrid, ImageData, RectilinearGrid, StructuredGrid, their parallel forms, \
+                     Collection and vtkMultiBlockDataSet are";
+        let at = At::Field("attribute `type` of VTKFile".into());
+        return Err(fault(Fault::unsupported(
+            at,
+            format!("`{kind}`"),
+            format!("{known}; convert it to one of them"),
+        )));
+    };
+    Ok(Opened { format: FORMAT, content: Content::Data(data), warnings, time_steps: steps })
+}
+
+/// Pieces as one data set of kind `kind`, even when there are none.
+fn merged(kind: &str, pieces: Vec<Dataset>, warnings: &mut Vec<String>) -> Result<Dataset, Fault> {
+    if pieces.is_empty() {
+        warnings.push(format!("the {kind} is empty: it has no pieces"));
+        if kind == "UnstructuredGrid" {
+            return Ok(Dataset::UnstructuredGrid(Default::default()));
+        }
+    }
+    Ok(Dataset::merge(pieces, warnings)?)
+}

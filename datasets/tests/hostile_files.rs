@@ -1,0 +1,272 @@
+//! Truncated and damaged files: never a panic, never memory that the bytes cannot justify, always an error with a cure.
+
+mod sample_files;
+
+use datasets::read::{Content, Opened, ReadError, open};
+use proptest::prelude::*;
+use std::path::Path;
+
+/// Reads bytes as a file of this name, and makes everything of it that can be made.
+fn read_and_use(name: &str, bytes: &[u8]) -> Result<Opened, ReadError> {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join(name);
+    std::fs::write(&path, bytes).unwrap();
+    let opened = open(&path);
+    match &opened {
+        Ok(o) => use_all(o),
+        Err(e) => {
+            let text = e.to_string();
+            // A damaged name of another file gives the error of that one.
+            let named = text.contains(name) || matches!(e, ReadError::Io { .. });
+            assert!(named, "the error does not name the file: {text}");
+            assert!(text.contains("; "), "no cure in: {text}");
+        }
+    }
+    opened
+}
+
+fn use_all(opened: &Opened) {
+    // Errors are fine here; panics are not.
+    let Content::Data(data) = &opened.content else {
+        let _ = opened.to_meshes(None);
+        return;
+    };
+    let mut names: Vec<String> = Vec::new();
+    for leaf in data.leaves() {
+        let a = leaf.attributes().unwrap();
+        names.extend(a.point.iter().chain(&a.cell).map(|x| x.name.clone()));
+    }
+    let _ = data.to_trimesh(None);
+    for name in &names {
+        let _ = (
+            data.to_trimesh(Some(name)),
+            data.to_lines(Some(name)),
+            data.to_points(Some(name)),
+            data.to_grid(name),
+        );
+    }
+}
+
+/// The most address space this process ever had, where the system tells. Memory that is asked for but never touched counts.
+fn peak_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmPeak:"))?;
+    Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
+}
+
+/// All test files are below 10 kB; thread stacks and arenas take most of this.
+fn assert_memory_is_bounded() {
+    if let Some(peak) = peak_bytes() {
+        assert!(peak < 3 << 30, "the process asked for {} MiB", peak >> 20);
+    }
+}
+
+/// Ways to damage a file.
+#[derive(Debug, Clone)]
+enum Damage {
+    /// Keep this fraction.
+    Truncate(f64),
+    /// Put these bytes there.
+    Overwrite(f64, Vec<u8>),
+    /// Put another number where one is written.
+    Number(f64, &'static str),
+    /// Leave a part out.
+    Cut(f64, usize),
+    /// Repeat a part.
+    Repeat(f64, usize),
+}
+
+fn damage() -> impl Strategy<Value = Damage> {
+    let numbers = prop::sample::select(vec![
+        "0",
+        "-1",
+        "1",
+        "255",
+        "65536",
+        "2147483647",
+        "4294967295",
+        "4294967296",
+        "9223372036854775807",
+        "18446744073709551615",
+        "1e308",
+        "nan",
+        "3.5",
+        "",
+    ]);
+    let bytes = prop_oneof![
+        prop::collection::vec(any::<u8>(), 1..4),
+        Just(vec![0xff; 4]),
+        Just(vec![0xff; 8]),
+        Just(vec![0; 4]),
+        Just(vec![0xff, 0xff, 0xff, 0x7f]),
+        Just(vec![0, 0, 0, 0x40]),
+        Just(vec![0x7f, 0xff, 0xff, 0xff]),
+    ];
+    prop_oneof![
+        (0.0..1.0).prop_map(Damage::Truncate),
+        (0.0..1.0, bytes).prop_map(|(at, b)| Damage::Overwrite(at, b)),
+        (0.0..1.0, numbers).prop_map(|(at, n)| Damage::Number(at, n)),
+        (0.0..1.0, 1usize..40).prop_map(|(at, n)| Damage::Cut(at, n)),
+        (0.0..1.0, 1usize..40).prop_map(|(at, n)| Damage::Repeat(at, n)),
+    ]
+}
+
+fn apply(bytes: &mut Vec<u8>, d: &Damage) {
+    let len = bytes.len();
+    let place = |at: f64| ((at * len as f64) as usize).min(len.saturating_sub(1));
+    match d {
+        Damage::Truncate(at) => bytes.truncate(place(*at)),
+        Damage::Overwrite(at, new) => {
+            let start = place(*at);
+            bytes.iter_mut().skip(start).zip(new).for_each(|(b, n)| *b = *n);
+        }
+        Damage::Number(at, new) => {
+            let Some(start) = (place(*at)..len).find(|&i| bytes[i].is_ascii_digit()) else { return };
+            let end = (start..len).find(|&i| !bytes[i].is_ascii_digit()).unwrap_or(len);
+            bytes.splice(start..end, new.bytes());
+        }
+        Damage::Cut(at, n) => {
+            let start = place(*at);
+            bytes.drain(start..(start + n).min(len));
+        }
+        Damage::Repeat(at, n) => {
+            let start = place(*at);
+            let part = bytes[start..(start + n).min(len)].to_vec();
+            bytes.splice(start..start, part);
+        }
+    }
+}
+
+#[test]
+fn whole_samples_are_read() {
+    for (name, bytes) in sample_files::all() {
+        let opened = read_and_use(name, &bytes).unwrap_or_else(|e| panic!("{e}"));
+        match &opened.content {
+            Content::Data(d) => assert!(d.counts().0 > 0, "{name}"),
+            Content::Scene(s) => assert!(s.num_triangles() > 0, "{name}"),
+        }
+    }
+}
+
+#[test]
+fn every_truncation_is_survived() {
+    for (name, bytes) in sample_files::all() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join(name);
+        for n in (0..bytes.len()).step_by(1 + bytes.len() / 300) {
+            std::fs::write(&path, &bytes[..n]).unwrap();
+            if let Ok(o) = open(&path) {
+                use_all(&o);
+            }
+        }
+    }
+    assert_memory_is_bounded();
+}
+
+/// Cases per run: enough to find a new fault in days of CI, quick enough for every change. `PROPTEST_CASES` overrides.
+fn cases() -> u32 {
+    std::env::var("PROPTEST_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(1500)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn every_damage_is_survived(which in any::<prop::sample::Index>(), damages in prop::collection::vec(damage(), 1..4)) {
+        thread_local!(static SAMPLES: Vec<sample_files::Sample> = sample_files::all());
+        let (name, mut bytes) = SAMPLES.with(|s| s[which.index(s.len())].clone());
+        damages.iter().for_each(|d| apply(&mut bytes, d));
+        let _ = read_and_use(name, &bytes);
+        assert_memory_is_bounded();
+    }
+}
+
+/// Asserts that the file is refused with a message that has all of `words`.
+fn refused(name: &str, bytes: &[u8], words: &[&str]) {
+    let e = read_and_use(name, bytes).err().unwrap_or_else(|| panic!("{name} was read"));
+    let text = e.to_string();
+    words.iter().for_each(|w| assert!(text.contains(w), "`{w}` is not in: {text}"));
+    assert_memory_is_bounded();
+}
+
+#[test]
+fn declared_sizes_beyond_the_file_are_refused_before_memory_is_taken() {
+    refused(
+        "a.vtk",
+        b"# vtk DataFile Version 3.0\nx\nBINARY\nDATASET POLYDATA\nPOINTS 999999999999 float\n0000",
+        &["at byte 79", "2999999999997 coordinates", "truncated"],
+    );
+    refused(
+        "a.vtk",
+        b"# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 6148914691236517206 double\n0 0 0",
+        &["truncated"],
+    );
+    refused("a.ply", b"ply\nformat binary_little_endian 1.0\nelement vertex 18446744073709551615\nproperty float x\nproperty float y\nproperty float z\nend_header\n", &["18446744073709551615"]);
+    refused("a.nrrd", b"NRRD0004\ntype: float\ndimension: 3\nsizes: 2000000000 2000000000 2000000000\nendian: little\nencoding: raw\n\n0", &["size of the volume"]);
+    refused("a.nrrd", &sample_files::nrrd("gzip", sample_files::gzip(&[0; 4])), &["unpack"]);
+    refused("a_4096x4096x4096_float64.raw", &[0; 64], &["68719476736", "64 bytes"]);
+    let mut stl = vec![0u8; 84];
+    stl[80..].copy_from_slice(&[0xff; 4]);
+    refused("a.stl", &stl, &["4294967295 triangles", "truncated"]);
+    // A megabyte of zeros packs into a kilobyte; a header that asks for a terabyte does not become one.
+    let bomb = sample_files::raw_appended("vtkZLibDataCompressor", sample_files::zlib);
+    let at = bomb.windows(4).position(|w| w == [20, 0, 0, 0]).unwrap();
+    let mut bomb = bomb;
+    bomb[at..at + 4].copy_from_slice(&[0, 0, 0, 0x40]);
+    refused("a.vti", &bomb, &["array `p`", "cannot come from"]);
+}
+
+#[test]
+fn huge_extent_without_arrays_makes_a_box_not_an_avalanche() {
+    let file = b"<VTKFile type=\"ImageData\"><ImageData WholeExtent=\"0 2000000000 0 2000000000 0 2000000000\"><Piece Extent=\"0 2000000000 0 2000000000 0 2000000000\"/></ImageData></VTKFile>";
+    // 8e27 points do not fit in 64 bits; counts saturate and the surface is not built.
+    let opened = read_and_use("a.vti", file).unwrap();
+    let (mesh, _) = opened.dataset().unwrap().to_trimesh(None).unwrap();
+    assert!(mesh.num_triangles() <= 12);
+    let small = String::from_utf8_lossy(file).replace("2000000000", "2000000");
+    let (mesh, _) =
+        read_and_use("a.vti", small.as_bytes()).unwrap().dataset().unwrap().to_trimesh(None).unwrap();
+    assert_eq!(mesh.num_triangles(), 12);
+    assert_memory_is_bounded();
+}
+
+#[test]
+fn files_that_name_themselves_end_with_an_error() {
+    let dir = tempfile::tempdir().unwrap();
+    for (name, text) in [
+        (
+            "loop.pvd",
+            "<VTKFile type=\"Collection\"><Collection><DataSet timestep=\"0\" file=\"loop.pvd\"/></Collection></VTKFile>",
+        ),
+        (
+            "loop.pvtp",
+            "<VTKFile type=\"PPolyData\"><PPolyData><Piece Source=\"loop.pvtp\"/></PPolyData></VTKFile>",
+        ),
+        (
+            "loop.vtm",
+            "<VTKFile type=\"vtkMultiBlockDataSet\"><vtkMultiBlockDataSet><DataSet file=\"loop.vtm\"/></vtkMultiBlockDataSet></VTKFile>",
+        ),
+    ] {
+        let path = dir.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        let e = open(&path).unwrap_err().to_string();
+        assert!(e.contains("names itself"), "{e}");
+    }
+}
+
+#[test]
+fn deep_nesting_does_not_overflow_the_stack() {
+    let deep =
+        format!("<VTKFile type=\"PolyData\">{}{}</VTKFile>", "<a>".repeat(100_000), "</a>".repeat(100_000));
+    let _ = read_and_use("a.vtp", deep.as_bytes());
+    let json = format!("{{\"asset\":{}{}}}", "[".repeat(100_000), "]".repeat(100_000));
+    let _ = read_and_use("a.gltf", json.as_bytes());
+}
+
+#[test]
+fn unknown_and_missing_files_are_named() {
+    refused("a.h5", b"\x89HDF\r\n\x1a\n....", &["HDF5", ".vtu", "PLOT3D"]);
+    refused("empty.dat", b"", &["the file is empty"]);
+    let e = open(Path::new("no/such/file.vti")).unwrap_err().to_string();
+    assert!(e.contains("no/such/file.vti") && e.contains("check the name"), "{e}");
+}

@@ -1,0 +1,397 @@
+//! What a scalar looks like inside a volume: colour and extinction, and their exact integrals over a linear stretch of scalars.
+//!
+//! Extinction σ is piecewise linear in the scalar, colour follows a [`ColorMap`]; so ∫σ ds and ∫σ·colour ds are piecewise polynomials, which are
+//! kept as running sums at the knots. The mean over a stretch s₀..s₁ is then a difference of two look-ups (Engel, Kraus and Ertl 2001, "High-quality
+//! pre-integrated volume rendering", section 4.2, whose approximation also leaves out attenuation within the stretch, but without their table: a peak of any
+//! narrowness counts with its full area).
+
+use crate::colormap::ColorMap;
+
+/// Colour and extinction by scalar.
+#[derive(Debug, Clone)]
+pub struct TransferFunction {
+    colors: ColorMap,
+    extinction: Vec<[f32; 2]>,
+    pieces: Vec<Piece>,
+    /// For evenly spaced scalars from `buckets.lo`: the piece to begin looking at, and how many buckets before this one have
+    /// any extinction.
+    buckets: Buckets,
+}
+
+/// Why a transfer function cannot be used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TransferFunctionError {
+    /// No control point.
+    #[error("transfer function has no extinction points; give at least one [scalar, extinction]")]
+    Empty,
+    /// A bad control point.
+    #[error("transfer function point {index} is {point:?}; {rule}")]
+    Point {
+        /// Which one.
+        index: usize,
+        /// Scalar and extinction (or opacity) given.
+        point: [f32; 2],
+        /// What is allowed.
+        rule: &'static str,
+    },
+    /// A bad unit distance.
+    #[error("opacity unit distance is {0}; it must be finite and positive, in world units")]
+    UnitDistance(f32),
+    /// A bad colour range.
+    #[error("colour map range is {0:?}; it must be finite and, for a logarithmic map, positive")]
+    ColorRange([f32; 2]),
+}
+
+/// A stretch of scalars from `s` on where extinction and extinction times colour are polynomials.
+#[derive(Debug, Clone, Copy)]
+struct Piece {
+    s: f64,
+    /// Extinction at `s`, and its slope.
+    sigma: [f64; 2],
+    /// Colour at `s`, and its slope.
+    color: [[f64; 2]; 3],
+    /// ∫σ, ∫σr, ∫σg, ∫σb up to `s`.
+    sums: [f64; 4],
+    /// Heights of the steps of σ up to and at `s`, added up.
+    steps: f64,
+}
+
+#[derive(Debug, Clone)]
+struct Buckets {
+    lo: f64,
+    per_scalar: f64,
+    first_piece: Vec<u32>,
+    occupied_before: Vec<u32>,
+}
+
+const BUCKETS: usize = 1024;
+/// Parts of one interval of a logarithmic colour map or of an opacity ramp, which are not linear in what is stored.
+const CURVED_PARTS: usize = 16;
+/// Opacity 1 would be infinite extinction; a millionth of the light passes instead.
+const MAX_OPACITY: f32 = 0.999_999;
+
+impl TransferFunction {
+    /// `extinction` holds [scalar, extinction per world unit] in order of scalar, linear between (two points with the same scalar make a
+    /// step) and constant outside. The alpha of `colors` is not used.
+    pub fn new(colors: ColorMap, extinction: Vec<[f32; 2]>) -> Result<Self, TransferFunctionError> {
+        check_points(
+            &extinction,
+            |e| e >= 0.0 && e.is_finite(),
+            "extinction must be finite and not negative",
+        )?;
+        let range_ok = colors.range.iter().all(|r| r.is_finite() && (!colors.log || *r > 0.0));
+        if !range_ok {
+            return Err(TransferFunctionError::ColorRange(colors.range));
+        }
+        let pieces = pieces(&colors, &extinction);
+        let buckets = buckets(&pieces);
+        Ok(TransferFunction { colors, extinction, pieces, buckets })
+    }
+
+    /// `opacity` holds [scalar, opacity of a slab `unit_distance` thick], 0..=1, linear between, as ParaView's and VTK's opacity functions with
+    /// their "scalar opacity unit distance". Opacity 1 lets a millionth pass.
+    pub fn from_opacity(
+        colors: ColorMap,
+        opacity: &[[f32; 2]],
+        unit_distance: f32,
+    ) -> Result<Self, TransferFunctionError> {
+        check_points(opacity, |a| (0.0..=1.0).contains(&a), "opacity must be 0 to 1")?;
+        if !(unit_distance.is_finite() && unit_distance > 0.0) {
+            return Err(TransferFunctionError::UnitDistance(unit_distance));
+        }
+        let sigma = |a: f32| -(-a.min(MAX_OPACITY)).ln_1p() / unit_distance;
+        let mut extinction = vec![[opacity[0][0], sigma(opacity[0][1])]];
+        for w in opacity.windows(2) {
+            let flat = w[0][1] == w[1][1] || w[0][0] == w[1][0];
+            let parts = if flat { 1 } else { CURVED_PARTS };
+            for i in 1..parts {
+                let f = i as f32 / parts as f32;
+                let mix = |k: usize| w[0][k] + (w[1][k] - w[0][k]) * f;
+                extinction.push([mix(0), sigma(mix(1))]);
+            }
+            extinction.push([w[1][0], sigma(w[1][1])]);
+        }
+        TransferFunction::new(colors, extinction)
+    }
+
+    /// The colours.
+    pub fn colors(&self) -> &ColorMap {
+        &self.colors
+    }
+
+    /// Extinction per world unit at `scalar`, straight from the control points. The value after a step counts.
+    pub fn extinction(&self, scalar: f64) -> f64 {
+        extinction_at(&self.extinction, scalar)
+    }
+
+    /// Whether there is any extinction for scalars in `lo..=hi`; may say so when there is none within a thousandth of the range.
+    #[inline]
+    pub(crate) fn is_clear(&self, lo: f64, hi: f64) -> bool {
+        let b = &self.buckets;
+        let (a, z) = (b.index(lo), b.index(hi));
+        b.occupied_before[z + 1] == b.occupied_before[a]
+    }
+
+    /// ∫σ, ∫σr, ∫σg, ∫σb over the scalars up to `s`, from some fixed scalar on.
+    #[inline]
+    pub(crate) fn integral(&self, s: f64) -> [f64; 4] {
+        let p = self.piece(s);
+        let x = s - p.s;
+        let [e0, e1] = p.sigma;
+        let mut r = p.sums;
+        r[0] += x * (e0 + 0.5 * e1 * x);
+        for c in 0..3 {
+            let [c0, c1] = p.color[c];
+            // (e₀ + e₁x)(c₀ + c₁x) integrated.
+            r[c + 1] += x * (e0 * c0 + x * (0.5 * (e0 * c1 + e1 * c0) + x * (e1 * c1) * (1.0 / 3.0)));
+        }
+        r
+    }
+
+    /// Extinction and colour at `s`.
+    #[inline]
+    pub(crate) fn sample(&self, s: f64) -> (f64, [f64; 3]) {
+        let p = self.piece(s);
+        let x = s - p.s;
+        (p.sigma[0] + p.sigma[1] * x, p.color.map(|c| c[0] + c[1] * x))
+    }
+
+    /// Scalars closer than this have no measurable difference of integrals.
+    #[inline]
+    pub(crate) fn resolution(&self) -> f64 {
+        1e-4 / self.buckets.per_scalar
+    }
+
+    /// Whether colour or extinction bend or jump between two scalars.
+    #[inline]
+    pub(crate) fn bends_between(&self, lo: f64, hi: f64) -> bool {
+        self.piece(lo).s != self.piece(hi).s
+    }
+
+    /// Heights of the steps of extinction between two scalars, added up.
+    #[inline]
+    pub(crate) fn steps_between(&self, lo: f64, hi: f64) -> f64 {
+        self.piece(hi).steps - self.piece(lo).steps
+    }
+
+    #[inline]
+    fn piece(&self, s: f64) -> &Piece {
+        let mut i = self.buckets.first_piece[self.buckets.index(s)] as usize;
+        while i + 1 < self.pieces.len() && self.pieces[i + 1].s <= s {
+            i += 1;
+        }
+        &self.pieces[i]
+    }
+}
+
+impl Buckets {
+    #[inline]
+    fn index(&self, s: f64) -> usize {
+        // `as` saturates: below the first bucket is 0. Bucket 0 and the last one stand for everything outside.
+        (((s - self.lo) * self.per_scalar) as usize).min(BUCKETS - 1)
+    }
+}
+
+fn check_points(
+    points: &[[f32; 2]],
+    ok: impl Fn(f32) -> bool,
+    rule: &'static str,
+) -> Result<(), TransferFunctionError> {
+    if points.is_empty() {
+        return Err(TransferFunctionError::Empty);
+    }
+    for (index, &point) in points.iter().enumerate() {
+        if !point[0].is_finite() {
+            return Err(TransferFunctionError::Point { index, point, rule: "its scalar must be finite" });
+        }
+        if index > 0 && point[0] < points[index - 1][0] {
+            return Err(TransferFunctionError::Point { index, point, rule: "scalars must not decrease" });
+        }
+        if !ok(point[1]) {
+            return Err(TransferFunctionError::Point { index, point, rule });
+        }
+    }
+    Ok(())
+}
+
+fn extinction_at(points: &[[f32; 2]], s: f64) -> f64 {
+    let after = points.partition_point(|p| f64::from(p[0]) <= s);
+    if after == 0 {
+        return f64::from(points[0][1]);
+    }
+    let a = points[after - 1].map(f64::from);
+    match points.get(after) {
+        None => a[1],
+        Some(b) => a[1] + (f64::from(b[1]) - a[1]) * (s - a[0]) / (f64::from(b[0]) - a[0]),
+    }
+}
+
+/// Cuts the scalars at every knot of extinction and colour.
+fn pieces(colors: &ColorMap, extinction: &[[f32; 2]]) -> Vec<Piece> {
+    // Where the colour bends.
+    let [lo, hi] = colors.range.map(f64::from);
+    let intervals = (colors.colors.len() - 1) * if colors.log { CURVED_PARTS } else { 1 };
+    let mut knots: Vec<f64> = extinction.iter().map(|p| f64::from(p[0])).collect();
+    for i in 0..=intervals {
+        let f = i as f64 / intervals.max(1) as f64;
+        knots.push(if colors.log { lo * (hi / lo).powf(f) } else { lo + (hi - lo) * f });
+    }
+    knots.sort_by(f64::total_cmp);
+    knots.dedup();
+    let largest = knots[0].abs().max(knots[knots.len() - 1].abs());
+    let span = (knots[knots.len() - 1] - knots[0]).max(1e-5 * largest).max(f64::from(f32::MIN_POSITIVE));
+    // Constant pieces on either side, wide enough for f32 scalars to be far inside.
+    let mut all = vec![knots[0] - span];
+    all.extend(&knots);
+
+    // Limits from inside each piece, so that steps are steps: a colour map of zero width is one, too.
+    let color_at = |s: f32| -> [f64; 3] {
+        let c = colors.lookup(s);
+        [c[0], c[1], c[2]].map(f64::from)
+    };
+    let left_limit = |s: f64| -> f64 {
+        let before = extinction.partition_point(|p| f64::from(p[0]) < s);
+        match (before.checked_sub(1).map(|i| extinction[i].map(f64::from)), extinction.get(before)) {
+            (None, Some(b)) => f64::from(b[1]),
+            (Some(a), None) => a[1],
+            (Some(a), Some(b)) => a[1] + (f64::from(b[1]) - a[1]) * (s - a[0]) / (f64::from(b[0]) - a[0]),
+            (None, None) => 0.0,
+        }
+    };
+    let mut pieces: Vec<Piece> = Vec::with_capacity(all.len());
+    let (mut sums, mut steps, mut sigma_before) = ([0.0; 4], 0.0, None);
+    for (i, &s) in all.iter().enumerate() {
+        let end = all.get(i + 1).copied();
+        let sigma0 = extinction_at(extinction, s);
+        let (sigma0, sigma1) = match end {
+            Some(e) if i == 0 => (left_limit(e), left_limit(e)),
+            Some(e) => (sigma0, left_limit(e)),
+            None => (sigma0, sigma0),
+        };
+        let color1 = end.map(|e| color_at((e as f32).next_down()));
+        let color0 = if i == 0 { color1 } else { None }.unwrap_or_else(|| color_at((s as f32).next_up()));
+        let color1 = color1.unwrap_or(color0);
+        let width = end.map_or(1.0, |e| e - s);
+        let piece = Piece {
+            s,
+            sigma: [sigma0, (sigma1 - sigma0) / width],
+            color: std::array::from_fn(|c| [color0[c], (color1[c] - color0[c]) / width]),
+            sums,
+            steps: {
+                steps += sigma_before.map_or(0.0, |b: f64| (sigma0 - b).abs());
+                steps
+            },
+        };
+        sigma_before = Some(sigma1);
+        if end.is_some() {
+            sums[0] += 0.5 * width * (sigma0 + sigma1);
+            for c in 0..3 {
+                // Simpson's rule is exact for the product of two linear functions.
+                let mid = 0.25 * (sigma0 + sigma1) * (color0[c] + color1[c]);
+                sums[c + 1] += width / 6.0 * (sigma0 * color0[c] + 4.0 * mid + sigma1 * color1[c]);
+            }
+        }
+        pieces.push(piece);
+    }
+    pieces
+}
+
+fn buckets(pieces: &[Piece]) -> Buckets {
+    let (first, last) = (pieces[0].s, pieces[pieces.len() - 1].s);
+    let lo = first;
+    let per_scalar = BUCKETS as f64 / (1.25 * (last - first));
+    let mut b = Buckets { lo, per_scalar, first_piece: Vec::new(), occupied_before: vec![0] };
+    let mut piece = 0;
+    for i in 0..BUCKETS {
+        let (from, to) = (lo + i as f64 / per_scalar, lo + (i + 1) as f64 / per_scalar);
+        // One piece early: rounding in `index` may put a scalar of the bucket before into this one.
+        while piece + 1 < pieces.len() && pieces[piece + 1].s < from - 0.5 / per_scalar {
+            piece += 1;
+        }
+        b.first_piece.push(piece as u32);
+        let occupied = (piece..pieces.len()).take_while(|&k| pieces[k].s <= to + 0.5 / per_scalar).any(|k| {
+            let p = &pieces[k];
+            let end = pieces.get(k + 1).map_or(p.s, |n| n.s);
+            p.sigma[0] > 0.0 || p.sigma[0] + p.sigma[1] * (end - p.s) > 0.0
+        });
+        b.occupied_before.push(b.occupied_before[i] + u32::from(occupied));
+    }
+    b
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn map() -> ColorMap {
+        ColorMap::new(vec![[0.0, 0.0, 1.0, 1.0], [1.0, 0.5, 0.0, 1.0], [1.0, 1.0, 1.0, 1.0]], [-1.0, 3.0])
+    }
+
+    #[test]
+    fn integrals_agree_with_fine_sums_for_ramps_steps_and_peaks() {
+        let step = vec![[-2.0, 0.0], [0.5, 0.0], [0.5, 2.0], [1.0, 2.0], [1.0, 0.3]];
+        let peak = vec![[0.0, 0.0], [1.999, 0.0], [2.0, 100.0], [2.001, 0.0]];
+        for points in [step, peak, vec![[0.0, 1.5]], vec![[-1.0, 0.0], [3.0, 4.0]]] {
+            let tf = TransferFunction::new(map(), points).unwrap();
+            for (a, b) in [(-5.0, 5.0), (0.4, 0.6), (1.99, 2.5), (-9.0, -8.0), (6.0, 40.0), (0.1, 0.2)] {
+                let (n, mut sums) = (200_000, [0.0; 4]);
+                for i in 0..n {
+                    let s = a + (b - a) * (i as f64 + 0.5) / n as f64;
+                    let (sigma, c) = (tf.extinction(s), tf.colors.lookup(s as f32));
+                    sums[0] += sigma;
+                    for k in 0..3 {
+                        sums[k + 1] += sigma * f64::from(c[k]);
+                    }
+                }
+                let (ia, ib) = (tf.integral(a), tf.integral(b));
+                for k in 0..4 {
+                    let (exact, sum) = (ib[k] - ia[k], sums[k] * (b - a) / n as f64);
+                    assert!((exact - sum).abs() < 2e-4 * (b - a).max(1.0), "{a}..{b} [{k}]: {exact} {sum}");
+                }
+            }
+            for i in 0..4000 {
+                let s = -6.0 + i as f64 * 0.003_01;
+                let (sigma, c) = tf.sample(s);
+                assert!((sigma - tf.extinction(s)).abs() < 1e-9 * sigma.max(1.0), "{s}");
+                let exact = tf.colors.lookup(s as f32);
+                assert!((0..3).all(|k| (c[k] - f64::from(exact[k])).abs() < 1e-5), "{s}: {c:?} {exact:?}");
+                if tf.is_clear(s, s + 0.01) {
+                    assert!(
+                        tf.extinction(s) == 0.0
+                            && tf.extinction(s + 0.005) == 0.0
+                            && tf.extinction(s + 0.01) == 0.0
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn clear_ranges_are_seen_and_narrow_peaks_are_not_clear() {
+        let points = vec![[0.0, 0.0], [1.999, 0.0], [2.0, 100.0], [2.001, 0.0], [5.0, 0.0]];
+        let tf = TransferFunction::new(map(), points).unwrap();
+        assert!(tf.is_clear(-100.0, 1.9) && tf.is_clear(2.1, 1e9));
+        assert!(!tf.is_clear(1.0, 3.0) && !tf.is_clear(2.0005, 2.0005));
+    }
+
+    #[test]
+    fn opacity_per_unit_distance_is_kept() {
+        let tf = TransferFunction::from_opacity(map(), &[[0.0, 0.0], [1.0, 0.75], [2.0, 1.0]], 10.0).unwrap();
+        for (s, a) in [(0.0, 0.0), (0.5, 0.375), (1.0, 0.75), (0.3, 0.225)] {
+            let slab = 1.0 - (-10.0 * tf.extinction(s)).exp();
+            assert!((slab - a).abs() < 1e-3, "{s}: {slab}");
+        }
+        assert!(tf.extinction(2.0).is_finite());
+    }
+
+    #[test]
+    fn bad_points_are_named() {
+        let new = |p: &[[f32; 2]]| TransferFunction::new(map(), p.to_vec()).unwrap_err().to_string();
+        assert!(new(&[]).contains("at least one"));
+        assert!(new(&[[0.0, -1.0]]).contains("point 0"));
+        assert!(new(&[[1.0, 0.0], [0.0, 0.0]]).contains("decrease"));
+        assert!(new(&[[f32::NAN, 0.0]]).contains("finite"));
+        assert!(TransferFunction::from_opacity(map(), &[[0.0, 2.0]], 1.0).is_err());
+        assert!(TransferFunction::from_opacity(map(), &[[0.0, 0.2]], 0.0).is_err());
+    }
+}

@@ -1,0 +1,92 @@
+//! Homogeneous slabs, and what a ray has collected from those it has passed.
+
+use super::VolumeQuality;
+
+/// A homogeneous slab: optical thickness, and colour (not multiplied by its opacity).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Layer {
+    pub(super) tau: f64,
+    pub(super) color: [f64; 3],
+}
+
+impl Layer {
+    pub(super) const NOTHING: Layer = Layer { tau: 0.0, color: [0.0; 3] };
+
+    #[inline]
+    pub(super) fn opacity(&self) -> f64 {
+        -(-self.tau).exp_m1()
+    }
+
+    /// Premultiplied colour and opacity.
+    #[inline]
+    pub(super) fn rgba(&self) -> [f64; 4] {
+        let a = self.opacity();
+        [self.color[0] * a, self.color[1] * a, self.color[2] * a, a]
+    }
+
+    /// Premultiplied colour and opacity of this slab in front of another.
+    #[inline]
+    pub(super) fn then(&self, behind: &Layer) -> [f64; 4] {
+        let (f, b) = (self.rgba(), behind.rgba());
+        std::array::from_fn(|c| f[c] + (1.0 - f[3]) * b[c])
+    }
+
+    /// Largest difference of a component.
+    #[inline]
+    pub(super) fn difference(&self, rgba: &[f64; 4]) -> f64 {
+        let own = self.rgba();
+        (0..4).map(|c| (own[c] - rgba[c]).abs()).fold(0.0, f64::max)
+    }
+}
+
+/// A ray on its way.
+pub(super) struct March {
+    pub(super) color: [f64; 3],
+    pub(super) transmittance: f64,
+    pub(super) depth: f64,
+    pub(super) samples: u32,
+    pub(super) quality: VolumeQuality,
+    pub(super) error_per_length: f64,
+    opaque_below: f64,
+}
+
+impl March {
+    pub(super) fn new(quality: VolumeQuality, path: f64) -> Self {
+        let levels = match quality {
+            VolumeQuality::Tolerance { levels } => f64::from(levels.max(1e-6)),
+            VolumeQuality::Step { .. } => 0.1,
+        };
+        // NaN `levels` became 10⁻⁶ by `max`.
+        let budget = 0.5 * levels / 255.0;
+        March {
+            color: [0.0; 3],
+            transmittance: 1.0,
+            depth: f64::INFINITY,
+            samples: 0,
+            quality,
+            error_per_length: budget / path.max(f64::MIN_POSITIVE),
+            opaque_below: budget,
+        }
+    }
+
+    #[inline]
+    pub(super) fn is_opaque(&self) -> bool {
+        self.transmittance < self.opaque_below
+    }
+
+    #[inline]
+    pub(super) fn add(&mut self, ta: f64, tb: f64, layer: &Layer) {
+        if layer.tau <= 0.0 {
+            return;
+        }
+        let [r, g, b, a] = layer.rgba();
+        let before = self.transmittance;
+        for (sum, c) in self.color.iter_mut().zip([r, g, b]) {
+            *sum += before * c;
+        }
+        self.transmittance = before * (1.0 - a);
+        if before > 0.5 && self.transmittance <= 0.5 {
+            self.depth = ta + (tb - ta) * ((2.0 * before).ln() / layer.tau).min(1.0);
+        }
+    }
+}
