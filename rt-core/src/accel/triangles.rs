@@ -121,7 +121,7 @@ impl TriBvh {
             #[inline(always)]
             || {
                 let setup = RaySetup::new(ray);
-                let mut leaves = AnyLeaf::<EXACT> { ray: &setup, found: false };
+                let mut leaves = AnyLeaf::<EXACT>::new(&setup);
                 traverse_body::<S, _, EXACT, false>(simd, &self.bvh, &setup, ray.t_max, &mut leaves);
                 leaves.found
             },
@@ -156,12 +156,18 @@ fn test_leaf<S: Simd, const EXACT: bool>(
     test::<S, f32x4<S>, EXACT>(simd, a, b, c, sx, sy, sz)
 }
 
-struct ClosestLeaf<'r, const EXACT: bool> {
+pub(crate) struct ClosestLeaf<'r, const EXACT: bool> {
     ray: &'r RaySetup,
-    best: ClosestTri,
+    pub(crate) best: ClosestTri,
 }
 
 impl<'r, const EXACT: bool> ClosestLeaf<'r, EXACT> {
+    /// Goes on from a hit found elsewhere in the tree.
+    #[inline(always)]
+    pub(crate) fn continuing(ray: &'r RaySetup, best: ClosestTri) -> Self {
+        ClosestLeaf { ray, best }
+    }
+
     #[inline(always)]
     fn new(ray: &'r RaySetup, t_max: f32) -> Self {
         // Number 0 with t_max: nothing at exactly t_max can win the tie, which makes the range half-open.
@@ -197,9 +203,16 @@ impl<S: Simd, const EXACT: bool> LeafTest<S> for ClosestLeaf<'_, EXACT> {
     }
 }
 
-struct AnyLeaf<'r, const EXACT: bool> {
+pub(crate) struct AnyLeaf<'r, const EXACT: bool> {
     ray: &'r RaySetup,
-    found: bool,
+    pub(crate) found: bool,
+}
+
+impl<'r, const EXACT: bool> AnyLeaf<'r, EXACT> {
+    #[inline(always)]
+    pub(crate) fn new(ray: &'r RaySetup) -> Self {
+        AnyLeaf { ray, found: false }
+    }
 }
 
 impl<S: Simd, const EXACT: bool> LeafTest<S> for AnyLeaf<'_, EXACT> {

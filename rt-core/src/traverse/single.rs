@@ -67,12 +67,26 @@ pub(crate) fn traverse<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, const 
     );
 }
 
+/// [`traverse`] without its own function, for callers that have the instruction set already.
 #[inline(always)]
 pub(crate) fn traverse_body<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, const ORDERED: bool>(
     simd: S,
     bvh: &WideBvh,
     ray: &RaySetup,
+    t_max: f32,
+    leaves: &mut L,
+) {
+    traverse_from::<S, L, CONSERVATIVE, ORDERED>(simd, bvh, ray, t_max, ChildRef::node(0), leaves);
+}
+
+/// The subtree at `start`.
+#[inline(always)]
+pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, const ORDERED: bool>(
+    simd: S,
+    bvh: &WideBvh,
+    ray: &RaySetup,
     mut t_max: f32,
+    start: ChildRef,
     leaves: &mut L,
 ) {
     let units = bvh.units.as_slice();
@@ -86,7 +100,7 @@ pub(crate) fn traverse_body<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, c
     // Distance in the high half, so that integer order is order of distance; t_min >= 0 keeps it non-negative.
     let mut memory = StackMemory::<u64, STACK_SIZE>::new();
     let mut stack = Stack::empty(&mut memory);
-    let mut current = ChildRef::node(0);
+    let mut current = start;
     loop {
         if current.is_leaf() {
             count(Work::Leaves, 1);
