@@ -341,7 +341,7 @@ impl<const EXACT: bool> InstanceClosest<'_, EXACT> {
         // One step beyond the best so far: a tie may go to this instance.
         let limit = if self.best.is_some() { t_max.next_up() } else { *t_max };
         let (local, moved) = p.enter(&Ray { t_max: limit, ..self.ray });
-        if !(local.t_max > local.t_min) {
+        if local.t_max <= local.t_min {
             return;
         }
         let c = self.world.blas[p.geometry].closest::<S, EXACT>(simd, &local);

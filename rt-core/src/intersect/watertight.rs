@@ -88,7 +88,7 @@ where
             u = undecided.select(exact(simd, cx, by, cy, bx), u);
             v = undecided.select(exact(simd, ax, cy, ay, cx), v);
             w = undecided.select(exact(simd, bx, ay, by, ax), w);
-            inside = inside & one_sign(simd, u, v, w);
+            inside &= one_sign(simd, u, v, w);
         }
     }
     let det = u + v + w;
