@@ -11,7 +11,7 @@ use rt_core::light::Light;
 use rt_core::material::{Material, SurfaceModel};
 use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::ray::{HitBlock, Ray, RayBlock};
-use rt_core::render::{RenderOptions, render};
+use rt_core::render::{RenderOptions, Renderer};
 use rt_core::scene::{AmbientOcclusion, Scene};
 use std::time::{Duration, Instant};
 
@@ -97,11 +97,13 @@ fn main() {
         }
         m
     };
-    let row = |name: &str, scene: &Scene, options: RenderOptions| {
+    let mut renderer = Renderer::new();
+    let mut row = |name: &str, scene: &Scene, options: RenderOptions| {
         let mut rays = 0;
         let time = best(rounds, || {
-            let o = render(scene, &camera, &options).expect("the scene is sound");
+            let o = renderer.render(scene, &camera, &options).expect("the scene is sound");
             rays = o.report.rays.total();
+            renderer.recycle(o.frame);
         });
         let ms = time.as_secs_f64() * 1e3;
         println!("{name:32} {ms:9.2}  {rays:10} rays  {:6.2} Mrays/s", rays as f64 / ms / 1e3);

@@ -133,7 +133,7 @@ impl<'a> Placed<'a> {
     }
 
     /// As [`Placed::surface`] where no ray will start: on meshes the normal is taken in f32 where that is safe, and without
-    /// `POINT` the point is left out.
+    /// `POINT` the point is left out, and the face normal of smooth surfaces has any length.
     #[inline]
     pub(crate) fn look<const POINT: bool>(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
         match self.source {
@@ -153,7 +153,10 @@ impl<'a> Placed<'a> {
         let (point, outward) = if POINT {
             self.point_and_normal([a, b, c], hit, ray)
         } else {
-            (DVec3::ZERO, self.quick_normal([a, b, c], hit, ray))
+            (
+                DVec3::ZERO,
+                self.quick_normal([a, b, c], hit, ray, mesh.normals.is_some() && !self.material.flat),
+            )
         };
 
         // Shading normal.
@@ -167,7 +170,7 @@ impl<'a> Placed<'a> {
                     PerElement::Face => normals.values[hit.prim as usize],
                 };
                 let n = self.normal_from_object.map_or(n, |m| m * n);
-                n.try_normalize().unwrap_or(outward)
+                n.try_normalize().unwrap_or_else(|| outward.normalize_or_zero())
             }
             _ => outward,
         };
@@ -216,14 +219,14 @@ impl<'a> Placed<'a> {
         (point, if length > 0.0 { (n / length).as_vec3() } else { -ray.dir.normalize_or_zero() })
     }
 
-    /// Unit face normal in f32 where the triangle's size allows it.
+    /// Face normal in f32 where the triangle's size allows it; of any length when it is only to turn a `smooth` one.
     #[inline]
-    fn quick_normal(&self, corners: [Vec3; 3], hit: &Hit, ray: &Ray) -> Vec3 {
+    fn quick_normal(&self, corners: [Vec3; 3], hit: &Hit, ray: &Ray, smooth: bool) -> Vec3 {
         let [a, b, c] = corners;
         let n = (b - a).cross(c - a);
         let squared = n.length_squared();
         if self.normal_from_object.is_none() && (1e-30..1e30).contains(&squared) {
-            return n * (1.0 / squared.sqrt());
+            return if smooth { n } else { n * (1.0 / squared.sqrt()) };
         }
         self.point_and_normal(corners, hit, ray).1
     }

@@ -454,6 +454,61 @@ fn transparent_blocker_dims_light_by_its_opacity() {
     assert_eq!(o.frame.color_at(0, 0)[0], 1.0);
 }
 
+// ---- Every effect
+
+#[test]
+fn leaving_out_any_one_effect_changes_the_picture_and_zeroes_its_counter() {
+    let mut s = scene(
+        vec![
+            (floor(-1.0, 4.0), Material::pbr([0.8, 0.7, 0.6], 0.0, 0.4)),
+            (sphere(Vec3::new(0.0, 0.9, 0.0), 0.7, 16), Material::dielectric(1.5)),
+            (sphere(Vec3::new(0.0, -0.9, 0.0), 0.7, 16), Material::metal([0.9, 0.6, 0.3], 0.0)),
+            (sphere(Vec3::new(1.2, 0.0, 0.0), 0.5, 16), Material::matte([0.3, 0.5, 0.9]).with_opacity(0.6)),
+        ],
+        vec![Light::point(DVec3::new(3.0, 2.0, 4.0)).with_size(0.4), Light::ambient([0.2; 3])],
+    );
+    s.ambient_occlusion = Some(AmbientOcclusion { distance: 2.0, rays: 4 });
+    s.background = Background::Constant([0.5, 0.6, 0.7, 1.0]);
+    let lens = rt_core::camera::ThinLens { aperture_radius: 0.2, focus_distance: 5.0 };
+    let c = camera(DVec3::new(6.0, 1.0, 2.0), 0.6).with_lens(lens).unwrap();
+    let all = Effects::required_by(&s) | Effects::required_by_camera(&c);
+    assert_eq!(
+        all,
+        Effects::ALL[..8].iter().fold(Effects::NONE, |a, (e, _)| a | *e),
+        "everything but volumes and paths"
+    );
+    let full = draw(&s, &c, options(48));
+    for (effect, name) in &Effects::ALL[..8] {
+        let mut asked = all.without(*effect);
+        if *effect == Effects::SHADOWS {
+            asked = asked.without(Effects::SOFT_SHADOWS);
+        }
+        let o = draw(&s, &c, RenderOptions { effects: Some(asked), ..options(48) });
+        assert!(difference(&full, &o) > 0.01, "{name} changes nothing");
+        assert!(o.report.warnings.iter().any(|w| w.starts_with(name) && w.contains("left out")), "{name}");
+        let r = o.report.rays;
+        let count = match *name {
+            "shadows" => r.shadow,
+            "ambient occlusion" => r.ambient_occlusion,
+            "refraction" => r.refraction,
+            "transparency" => r.transparency,
+            _ => 0,
+        };
+        assert_eq!(count, 0, "{name}");
+    }
+    let o = draw(
+        &s,
+        &c,
+        RenderOptions {
+            effects: Some(
+                all.without(Effects::REFLECTION | Effects::GLOSSY_REFLECTION | Effects::REFRACTION),
+            ),
+            ..options(48)
+        },
+    );
+    assert_eq!(o.report.rays.reflection, 0);
+}
+
 // ---- Requests
 
 #[test]

@@ -402,6 +402,26 @@ fn error_estimate_is_about_the_true_error() {
     assert!(found / estimate < 1.5 && estimate / found < 1.5, "{found} {estimate}");
 }
 
+#[test]
+fn renderer_draws_the_same_in_used_memory() {
+    let s = busy_scene();
+    let c = camera(DVec3::new(6.0, 1.0, 2.0), 0.6);
+    let other = camera(DVec3::new(-5.0, 3.0, 1.0), 0.8);
+    let mut renderer = rt_core::render::Renderer::new();
+    for options in [
+        all_layers(50),
+        RenderOptions { samples: 2, ..all_layers(50) },
+        RenderOptions::new(50, 50),
+        RenderOptions { effects: Some(rt_core::effects::Effects::NONE), ..RenderOptions::new(50, 50) },
+        all_layers(70),
+    ] {
+        let first = renderer.render(&s, &other, &options).unwrap();
+        renderer.recycle(first.frame);
+        let second = renderer.render(&s, &c, &options).unwrap();
+        assert_eq!(second.frame, render(&s, &c, &options).unwrap().frame);
+    }
+}
+
 // ---- Asynchronous
 
 #[test]

@@ -4,7 +4,7 @@
 //! frame before: at each buffer swap the program hands over frame N and gets frame N-1. The price is one frame of lag; the frame
 //! time becomes the larger of the two times instead of their sum.
 
-use super::{Progressive, RenderError, RenderOptions, RenderOutput};
+use super::{RenderError, RenderOptions, RenderOutput, Renderer};
 use crate::camera::Camera;
 use crate::scene::Scene;
 use std::sync::Arc;
@@ -43,8 +43,10 @@ impl AsyncRenderer {
         let worker = std::thread::Builder::new()
             .name("rt-core async".into())
             .spawn(move || {
+                let mut renderer = Renderer::new();
                 for job in incoming {
-                    let run = || draw(&job, &stop_worker);
+                    let mut run =
+                        || renderer.render_unless(&job.scene, &job.camera, &job.options, Some(&stop_worker));
                     let result = match &pool {
                         Some(pool) => pool.install(run),
                         None => run(),
@@ -96,10 +98,4 @@ impl Drop for AsyncRenderer {
             worker.join().ok();
         }
     }
-}
-
-fn draw(job: &Job, stop: &AtomicBool) -> Result<RenderOutput, RenderError> {
-    let mut progressive = Progressive::new(&job.scene, &job.camera, &job.options)?.with_cancel(stop);
-    while progressive.step()? {}
-    Ok(RenderOutput { frame: progressive.frame(), report: progressive.report() })
 }

@@ -1,6 +1,6 @@
 //! Scene and camera in, picture and report out.
 //!
-//! [`render`] draws one frame. [`Progressive`] gives a picture after every sample per pixel. [`AsyncRenderer`] draws frame N while
+//! [`render`] draws one frame, a [`Renderer`] many in the same memory. [`Progressive`] gives a picture after every sample per pixel. [`AsyncRenderer`] draws frame N while
 //! the program prepares frame N+1 (thesis section 4.1.2).
 
 mod assemble;
@@ -9,11 +9,13 @@ mod error;
 mod options;
 mod plan;
 mod progressive;
+mod renderer;
 
 pub use asynchronous::AsyncRenderer;
 pub use error::RenderError;
 pub use options::{Crop, RenderOptions};
 pub use progressive::{Progressive, RenderReport, StopReason};
+pub use renderer::Renderer;
 
 use crate::camera::Camera;
 use crate::frame::Frame;
@@ -31,7 +33,5 @@ pub struct RenderOutput {
 /// Draws `scene` as seen by `camera`, on rayon's current thread pool, until the options' samples, time or error are reached. The same
 /// arguments and seed give the same picture bit for bit on any number of threads (unless time or cancelling cuts it short).
 pub fn render(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Result<RenderOutput, RenderError> {
-    let mut progressive = Progressive::new(scene, camera, options)?;
-    while progressive.step()? {}
-    Ok(RenderOutput { frame: progressive.frame(), report: progressive.report() })
+    Renderer::new().render(scene, camera, options)
 }

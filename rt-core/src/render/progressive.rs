@@ -2,7 +2,7 @@
 
 use super::assemble::{Tile, assemble, tiles};
 use super::plan::{plan, warn_without_effect};
-use super::{RenderError, RenderOptions};
+use super::{RenderError, RenderOptions, RenderOutput};
 use crate::camera::Camera;
 use crate::effects::Effects;
 use crate::frame::{Frame, Layers};
@@ -52,12 +52,23 @@ pub struct RenderReport {
     pub elapsed: Duration,
 }
 
+/// Memory that frames hand on to each other.
+#[derive(Default)]
+pub(super) struct Buffers {
+    tiles: Vec<Tile>,
+    spare: Vec<Workspace>,
+    /// A picture nobody needs any more.
+    pub(super) frame: Frame,
+}
+
 /// A picture in the making.
 pub struct Progressive<'a> {
     stage: Stage<'a>,
     tiles: Vec<Tile>,
     /// Buffers of threads that are not rendering now.
     spare: Mutex<Vec<Workspace>>,
+    /// Memory for the next picture.
+    old_frame: Frame,
     rays: RayStats,
     left_out: Effects,
     warnings: Vec<String>,
@@ -65,7 +76,7 @@ pub struct Progressive<'a> {
     stopped: StopReason,
     started: Instant,
     /// A second cancel flag, for the asynchronous renderer's own use.
-    also_cancel: Option<&'a AtomicBool>,
+    pub(super) also_cancel: Option<&'a AtomicBool>,
 }
 
 impl<'a> Progressive<'a> {
@@ -75,12 +86,23 @@ impl<'a> Progressive<'a> {
         camera: &Camera,
         options: &'a RenderOptions,
     ) -> Result<Progressive<'a>, RenderError> {
+        Progressive::with_buffers(scene, camera, options, Buffers::default())
+    }
+
+    /// As [`Progressive::new`], in memory of an earlier frame.
+    pub(super) fn with_buffers(
+        scene: &'a Scene,
+        camera: &Camera,
+        options: &'a RenderOptions,
+        buffers: Buffers,
+    ) -> Result<Progressive<'a>, RenderError> {
         let started = Instant::now();
         let plan = plan(scene, camera, options)?;
         Ok(Progressive {
             stage: Stage::new(scene, camera, options, plan.effects),
-            tiles: tiles(options, camera),
-            spare: Mutex::new(Vec::new()),
+            tiles: tiles(options, camera, buffers.tiles),
+            spare: Mutex::new(buffers.spare),
+            old_frame: buffers.frame,
             rays: RayStats::default(),
             left_out: plan.left_out,
             warnings: plan.warnings,
@@ -89,11 +111,6 @@ impl<'a> Progressive<'a> {
             started,
             also_cancel: None,
         })
-    }
-
-    pub(super) fn with_cancel(mut self, flag: &'a AtomicBool) -> Progressive<'a> {
-        self.also_cancel = Some(flag);
-        self
     }
 
     /// Adds one sample to every pixel. Returns whether there is more to do; does nothing once there is not.
@@ -172,7 +189,16 @@ impl<'a> Progressive<'a> {
 
     /// The picture so far.
     pub fn frame(&self) -> Frame {
-        assemble(self.stage.options, &self.tiles)
+        assemble(self.stage.options, &self.tiles, Frame::default())
+    }
+
+    /// The finished picture, its account, and the memory for the next.
+    pub(super) fn finish(mut self) -> (RenderOutput, Buffers) {
+        let old = std::mem::take(&mut self.old_frame);
+        let frame = assemble(self.stage.options, &self.tiles, old);
+        let report = self.report();
+        let spare = self.spare.into_inner().unwrap_or_default();
+        (RenderOutput { frame, report }, Buffers { tiles: self.tiles, spare, frame: Frame::default() })
     }
 
     /// The account so far.

@@ -41,7 +41,7 @@ pub(super) fn render_tile(
     } else {
         light_hits::<false>(stage, area, out, work, record, stats);
     }
-    out.add_sample(&work.pixels);
+    out.add_sample(&work.pixels, sample.is_none_or(|s| s == 0));
 }
 
 /// Colours of a tile. `POINT`: some light needs to know where the surface is.
@@ -76,7 +76,9 @@ fn light_hits<const POINT: bool>(
         if material.model == SurfaceModel::Unlit {
             radiance += surface.color;
         } else {
-            let view = -ray.dir.normalize_or_zero();
+            // Matte surfaces look the same from everywhere.
+            let view =
+                if material.model == SurfaceModel::Matte { Vec3::ZERO } else { -ray.dir.normalize_or_zero() };
             for light in &stage.lights {
                 let incident = incident_from(light, surface.point, None);
                 let answer = response(material, &surface, view, incident.dir, light.color, light.highlight);

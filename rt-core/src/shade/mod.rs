@@ -97,7 +97,8 @@ pub(crate) fn render_tile(
     }
     let record = wants_geometry && centered;
     if local::suffices(stage) {
-        local::render_tile(stage, area, out, work, (!centered).then_some(sample), record, &mut stats);
+        let jittered = (!centered).then_some(sample);
+        local::render_tile(stage, area, out, work, jittered, record, &mut stats);
         return stats;
     }
     camera_wave(stage, area, &mut work.current, (!centered).then_some(sample), &mut stats, out.cost_mut());
@@ -122,7 +123,7 @@ pub(crate) fn render_tile(
         std::mem::swap(&mut work.current, next);
         next.clear();
     }
-    out.add_sample(&work.pixels);
+    out.add_sample(&work.pixels, sample == 0);
     stats
 }
 

@@ -67,6 +67,7 @@ pub(crate) struct TileLayers {
     pub(crate) primitive: Vec<u32>,
     pub(crate) cost: Vec<f32>,
     recorded: Vec<bool>,
+    made_for: (Layers, bool),
 }
 
 impl TileLayers {
@@ -85,7 +86,23 @@ impl TileLayers {
             primitive: plane(has(Layers::IDS), u32::MAX),
             cost: plane(has(Layers::COST), 0.0),
             recorded: plane(layers.intersects(Layers::GEOMETRY), false),
+            made_for: (layers, estimate_error),
         }
+    }
+
+    /// As new, in the same memory; false when other layers are wanted. Sums are not cleared: the first sample replaces them.
+    pub(crate) fn reset(&mut self, layers: Layers, background_depth: f32, estimate_error: bool) -> bool {
+        if self.made_for != (layers, estimate_error) {
+            return false;
+        }
+        self.depth.fill(background_depth);
+        self.distance.fill(f32::INFINITY);
+        self.normal.fill([0.0; 3]);
+        self.instance.fill(u32::MAX);
+        self.primitive.fill(u32::MAX);
+        self.cost.fill(0.0);
+        self.recorded.fill(false);
+        true
     }
 
     pub(crate) fn cost_mut(&mut self) -> Option<&mut [f32]> {
@@ -127,7 +144,15 @@ impl TileLayers {
         }
     }
 
-    pub(crate) fn add_sample(&mut self, pixels: &[[f32; 4]]) {
+    /// Adds a sample to the sums; the first one starts them.
+    pub(crate) fn add_sample(&mut self, pixels: &[[f32; 4]], first: bool) {
+        if first {
+            self.color.copy_from_slice(pixels);
+            for (sum, p) in self.luminance_sq.iter_mut().zip(pixels) {
+                *sum = luminance(p).powi(2);
+            }
+            return;
+        }
         for (sum, p) in self.color.iter_mut().zip(pixels) {
             for c in 0..4 {
                 sum[c] += p[c];
