@@ -18,6 +18,7 @@ pub mod ray;
 mod ray_cubic;
 pub mod ray_stats;
 pub mod render;
+pub mod robustness;
 pub mod sampler;
 pub mod scene;
 mod shade;

@@ -1,0 +1,238 @@
+//! How many rays aimed at vertices, edges and points of a closed mesh get through.
+//!
+//! A ray that starts inside a closed surface must hit it. Random rays almost never find the places where a tracer fails, so these are
+//! aimed there: exactly at vertices and edges, beside edges by a few roundings, and from close to the surface, where a triangle is large
+//! against its distance. Tests ask for none at all in [`crate::accel::Robustness::Watertight`]; the program `bench` runs 10⁸ rays
+//! and compares.
+
+use crate::accel::World;
+use crate::mesh::TriMesh;
+use crate::ray::{HitBlock, LANES, NO_HIT, Ray, RayBlock};
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// What a ray is aimed at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Aim {
+    /// A vertex.
+    Vertex,
+    /// A point on an edge, rounded to f32.
+    Edge,
+    /// A point beside an edge, off by up to 10⁻⁶ of its length: there the edge test and the box test may disagree.
+    BesideEdge,
+    /// Any point of a triangle.
+    Anywhere,
+}
+
+impl Aim {
+    /// Every aim.
+    pub const ALL: [Aim; 4] = [Aim::Vertex, Aim::Edge, Aim::BesideEdge, Aim::Anywhere];
+
+    /// The name used in records.
+    pub fn name(self) -> &'static str {
+        match self {
+            Aim::Vertex => "vertices",
+            Aim::Edge => "edges",
+            Aim::BesideEdge => "beside edges",
+            Aim::Anywhere => "anywhere",
+        }
+    }
+}
+
+/// Where rays start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Start {
+    /// In a ball inside the surface, world coordinates.
+    Ball {
+        /// Its centre.
+        center: DVec3,
+        /// Its radius.
+        radius: f64,
+    },
+    /// Between the centre, from which every point of the surface can be seen, and a point of the triangle that the ray is aimed at: mostly
+    /// close to the surface, down to 10⁻⁶ of the way.
+    NearSurface {
+        /// World coordinates.
+        center: DVec3,
+    },
+}
+
+/// Which of the world's queries answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Query {
+    /// [`World::closest`] and [`World::occluded`].
+    Single,
+    /// [`World::closest_coherent`] and [`World::occluded_coherent`].
+    Coherent,
+    /// [`World::closest_incoherent`] and [`World::occluded_incoherent`].
+    Incoherent,
+}
+
+impl Query {
+    /// Every query.
+    pub const ALL: [Query; 3] = [Query::Single, Query::Coherent, Query::Incoherent];
+}
+
+/// What became of the rays.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct LeakCount {
+    /// Rays traced.
+    pub rays: u64,
+    /// Rays without a closest hit.
+    pub leaks: u64,
+    /// Rays that were not occluded.
+    pub occlusion_leaks: u64,
+}
+
+/// A closed mesh, alone in its world, and the rays to test it with.
+#[derive(Clone, Copy)]
+pub struct LeakTest<'a> {
+    /// The world.
+    pub world: &'a World,
+    /// The mesh that its first instance shows.
+    pub mesh: &'a TriMesh,
+    /// Where rays start.
+    pub start: Start,
+    /// What they are aimed at.
+    pub aim: Aim,
+    /// Seed of the rays: the same seed gives the same rays on any number of threads.
+    pub seed: u64,
+}
+
+/// Rays made and traced by one task.
+const BATCH: usize = 4096;
+/// Rays that share an origin and go to neighbouring triangles; every other such group has unrelated rays.
+const TILE: usize = 256;
+
+impl LeakTest<'_> {
+    /// Traces `rays` rays (rounded up to a multiple of 4096) and counts those that get through.
+    pub fn count(&self, query: Query, rays: usize) -> LeakCount {
+        (0..rays.div_ceil(BATCH)).into_par_iter().map(|b| self.count_batch(query, b as u64)).reduce(
+            LeakCount::default,
+            |a, b| LeakCount {
+                rays: a.rays + b.rays,
+                leaks: a.leaks + b.leaks,
+                occlusion_leaks: a.occlusion_leaks + b.occlusion_leaks,
+            },
+        )
+    }
+
+    fn count_batch(&self, query: Query, batch: u64) -> LeakCount {
+        let rays = self.rays(batch);
+        let n = rays.len();
+        let (hits, blocked) = match query {
+            Query::Single => (
+                rays.iter().filter(|r| self.world.closest(r).is_some()).count(),
+                rays.iter().filter(|r| self.world.occluded(r)).count(),
+            ),
+            Query::Coherent | Query::Incoherent => {
+                let blocks = RayBlock::from_rays(&rays);
+                let (mut hits, mut any) = (vec![HitBlock::MISS; blocks.len()], vec![0u16; blocks.len()]);
+                if query == Query::Coherent {
+                    self.world.closest_coherent(&blocks, &mut hits);
+                    self.world.occluded_coherent(&blocks, &mut any);
+                } else {
+                    self.world.closest_incoherent(&blocks, &mut hits);
+                    self.world.occluded_incoherent(&blocks, &mut any);
+                }
+                let found = hits.iter().map(|h| h.prim.iter().filter(|&&p| p != NO_HIT).count()).sum();
+                (found, any.iter().map(|a| a.count_ones() as usize).sum())
+            }
+        };
+        debug_assert_eq!(n % LANES, 0, "batches are whole blocks");
+        LeakCount { rays: n as u64, leaks: (n - hits) as u64, occlusion_leaks: (n - blocked) as u64 }
+    }
+
+    /// The rays of batch `batch`, in render space: 4096, each starting inside.
+    pub fn rays(&self, batch: u64) -> Vec<Ray> {
+        let mut random = Random(self.seed ^ (batch + 1).wrapping_mul(0xd134_2543_de82_ef95));
+        let n = self.mesh.num_triangles();
+        if n == 0 {
+            return vec![Ray::new(Vec3::ZERO, Vec3::ZERO); BATCH];
+        }
+        let place = self.world.instances()[0].world_from_object;
+        let to_render =
+            |p: Vec3| place.transform_point3(self.mesh.origin + p.as_dvec3()) - self.world.origin();
+        let (mut common, mut first) = (Vec3::ZERO, 0);
+        (0..BATCH)
+            .map(|i| {
+                let tile = i / TILE % 2 == 0;
+                if tile && i % TILE == 0 {
+                    first = random.below(n);
+                }
+                let triangle = if tile { (first + i % TILE / 2) % n } else { random.below(n) };
+                let corners = self.mesh.triangle(triangle).map(to_render);
+                let target = self.target(corners, &mut random);
+                let origin = if tile && i % TILE != 0 {
+                    common
+                } else {
+                    self.origin(corners, target, &mut random)
+                };
+                common = origin;
+                Ray::new(origin, target - origin)
+            })
+            .collect()
+    }
+
+    fn target(&self, corners: [DVec3; 3], random: &mut Random) -> Vec3 {
+        let k = random.below(3);
+        let (a, b, c) = (corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]);
+        match self.aim {
+            Aim::Vertex => a,
+            Aim::Edge => a.lerp(b, random.unit()),
+            Aim::BesideEdge => {
+                let off = 1e-6 * (a - b).length() * (10f64).powf(-3.0 * random.unit());
+                a.lerp(b, random.unit()) + random.direction() * off
+            }
+            Aim::Anywhere => a.lerp(b, random.unit()).lerp(c, random.unit()),
+        }
+        .as_vec3()
+    }
+
+    fn origin(&self, corners: [DVec3; 3], target: Vec3, random: &mut Random) -> Vec3 {
+        match self.start {
+            Start::Ball { center, radius } => {
+                let inside = random.direction() * random.unit().cbrt() * radius;
+                (center + inside - self.world.origin()).as_vec3()
+            }
+            Start::NearSurface { center } => {
+                let on = corners[0].lerp(corners[1], random.unit()).lerp(corners[2], random.unit());
+                let on = target.as_dvec3().lerp(on, (10f64).powf(-4.0 * random.unit()));
+                // At least eight f32 steps deep, so that rounding cannot put the start outside.
+                let center = center - self.world.origin();
+                let step = on.abs().max_element() * f32::EPSILON as f64 / (center - on).length();
+                let depth = (10f64).powf(-6.0 * random.unit()).max(8.0 * step).min(1.0);
+                on.lerp(center, depth).as_vec3()
+            }
+        }
+    }
+}
+
+/// A repeatable sequence (SplitMix64, Steele, Lea and Flood 2014).
+struct Random(u64);
+
+impl Random {
+    fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// Uniform in [0, 1).
+    fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        ((self.bits() >> 32) * n as u64 >> 32) as usize
+    }
+
+    /// Uniform on the unit sphere.
+    fn direction(&mut self) -> DVec3 {
+        let z = 2.0 * self.unit() - 1.0;
+        let (sin, cos) = (std::f64::consts::TAU * self.unit()).sin_cos();
+        let r = (1.0 - z * z).max(0.0).sqrt();
+        DVec3::new(r * cos, r * sin, z)
+    }
+}

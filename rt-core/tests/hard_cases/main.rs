@@ -1,0 +1,5 @@
+//! Inputs that break ray tracers, one file per disease.
+
+mod common;
+mod leaks;
+mod ties;
