@@ -70,8 +70,8 @@ pub(crate) struct IdWriter;
 
 impl LeafWriter for IdWriter {
     const UNITS: usize = 1;
-    fn write(&self, prims: impl ExactSizeIterator<Item = u32> + Clone, out: &mut [Unit]) {
-        write_id_leaf(out, prims);
+    fn write(&self, prims: &[u32], out: &mut [Unit]) {
+        write_id_leaf(out, prims.iter().copied());
     }
 }
 
@@ -100,7 +100,7 @@ impl Blas {
             })
             .collect();
         let primitives = refs.len();
-        let bvh = build_wide(refs, &IdWriter, options.quality.bins());
+        let bvh = build_wide(refs, &IdWriter, options.quality.effort());
         let frame = LocalFrame { center: shape.origin(), scale: 1.0 };
         Blas { frame, primitives, skipped: n - primitives, content: Content::Shape { bvh, shape } }
     }

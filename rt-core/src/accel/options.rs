@@ -1,5 +1,6 @@
 //! How to build an acceleration structure, and what came of it.
 
+use super::build::SahEffort;
 use std::time::Duration;
 
 /// What the build spends to make rays faster (thesis section 4.1.2: approximate builds for changing geometry, full builds for
@@ -22,11 +23,11 @@ impl BuildQuality {
     pub const ALL: [BuildQuality; 4] =
         [BuildQuality::Fastest, BuildQuality::Fast, BuildQuality::Balanced, BuildQuality::Best];
 
-    /// Bins per axis of the SAH builder.
-    pub(crate) fn bins(self) -> usize {
+    /// How hard the SAH builder looks for cuts.
+    pub(crate) fn effort(self) -> SahEffort {
         match self {
-            BuildQuality::Fastest | BuildQuality::Fast => 8,
-            BuildQuality::Balanced | BuildQuality::Best => 16,
+            BuildQuality::Fastest | BuildQuality::Fast => SahEffort { bins: 8, longest_axis_only: true },
+            BuildQuality::Balanced | BuildQuality::Best => SahEffort { bins: 16, longest_axis_only: false },
         }
     }
 

@@ -57,23 +57,23 @@ impl TriWriter<'_> {
 impl LeafWriter for TriWriter<'_> {
     const UNITS: usize = TRI_LEAF_UNITS;
 
-    fn write(&self, prims: impl ExactSizeIterator<Item = u32> + Clone, out: &mut [Unit]) {
+    fn write(&self, prims: &[u32], out: &mut [Unit]) {
         let floats: &mut [f32] = bytemuck::cast_slice_mut(out);
-        let mut last = 0;
-        let mut prims = prims;
+        let floats: &mut [f32; 8 * TRI_LEAF_UNITS] = floats.try_into().expect("a leaf's units");
+        // Unused places repeat the last triangle's first vertex: no area, never hit.
+        let last = prims.len() - 1;
         for slot in 0..LEAF_SIZE {
-            // Unused places repeat the last triangle's first vertex: no area, never hit.
-            let next = prims.next();
-            let id = next.unwrap_or(last);
-            let corners = self.triangle(id);
+            let id = prims[slot.min(last)];
+            let mut corners = self.triangle(id);
+            if slot > last {
+                corners = [corners[0]; 3];
+            }
             for (vertex, corner) in corners.iter().enumerate() {
-                let p = if next.is_some() { *corner } else { corners[0] };
                 for axis in 0..3 {
-                    floats[4 * (3 * vertex + axis) + slot] = p[axis];
+                    floats[4 * (3 * vertex + axis) + slot] = corner[axis];
                 }
             }
             floats[36 + slot] = f32::from_bits(id);
-            last = id;
         }
     }
 }
@@ -89,14 +89,18 @@ impl TriBvh {
         debug_assert!(mesh.indices.len() < MAX_PRIMS, "checked by the caller");
         let plain = frame.center == mesh.origin && frame.scale == 1.0;
         let writer = TriWriter { mesh, frame, plain };
-        let refs: Vec<PrimRef> = (0..mesh.indices.len() as u32)
+        // Nearly always every triangle can be built: collect in place and throw out the few others afterwards.
+        let mut refs: Vec<PrimRef> = (0..mesh.indices.len() as u32)
             .into_par_iter()
             .with_min_len(1 << 14)
-            .filter(|&i| mesh.is_renderable(i as usize))
-            .map(|i| PrimRef::new(Aabb::from_points(&writer.triangle(i)), i))
+            .map(|i| {
+                let usable = mesh.is_renderable(i as usize);
+                PrimRef::new(if usable { Aabb::from_points(&writer.triangle(i)) } else { Aabb::EMPTY }, i)
+            })
             .collect();
+        refs.retain(|r| !r.is_empty());
         let skipped = mesh.indices.len() - refs.len();
-        TriBvh { bvh: build_wide(refs, &writer, quality.bins()), skipped }
+        TriBvh { bvh: build_wide(refs, &writer, quality.effort()), skipped }
     }
 
     /// The closest hit of a local-space ray. Set-up and traversal in one body: called once per ray, the call chain around a traversal used to take

@@ -2,7 +2,7 @@
 
 use super::blas::{Blas, IdWriter, leaf_ids};
 use super::build::{MAX_PRIMS, PrimRef, build_wide};
-use super::options::{BuildOptions, BuildReport, Robustness};
+use super::options::{BuildOptions, BuildQuality, BuildReport, Robustness};
 use super::placement::{Placement, distance_to_sphere};
 use super::wide::{ChildRef, Unit, WideBvh};
 use crate::math::{Aabb, exp2i, max_abs};
@@ -138,7 +138,7 @@ impl World {
             .filter(|(_, p)| !p.bounds.is_empty() && p.bounds.min.is_finite() && p.bounds.max.is_finite())
             .map(|(i, p)| PrimRef::new(p.bounds, i as u32))
             .collect();
-        let tlas = build_wide(refs, &IdWriter, 16);
+        let tlas = build_wide(refs, &IdWriter, BuildQuality::Balanced.effort());
         phases.push(("instances", start.elapsed() - phases[0].1));
         let report = BuildReport {
             total: start.elapsed(),

@@ -5,11 +5,18 @@ use super::prim_ref::{Box4, PrimRef, SetBounds};
 use crate::accel::wide::LEAF_SIZE;
 use glam::Vec4;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Most bins per axis.
 const MAX_BINS: usize = 16;
 /// Sets at least this large are binned in parallel, in pieces of this size (fixed, so that the tree does not depend on the threads).
 const PARALLEL_CHUNK: usize = 1 << 16;
+
+/// Leaf tests that `n` primitives cost.
+#[inline(always)]
+pub(crate) fn leaf_tests(n: usize) -> f32 {
+    n.div_ceil(LEAF_SIZE) as f32
+}
 
 /// A way to cut a set in two.
 #[derive(Debug, Clone, Copy)]
@@ -43,23 +50,45 @@ impl BinMap {
         let x = (p.center2() - self.lo) * self.scale + ROUND;
         x.to_array().map(|v| v.to_bits() & (MAX_BINS as u32 - 1))
     }
+
+    /// `bins(p)[axis]`.
+    #[inline(always)]
+    fn bin(&self, p: &PrimRef, axis: usize) -> u32 {
+        self.bins(p)[axis]
+    }
+
+    /// The axis along which the centres reach furthest, as a range.
+    fn longest_axis(&self) -> Range<usize> {
+        let s = self.scale.to_array();
+        // The longest has the smallest scale; scale 0 means no extent at all.
+        let longest = (0..3).filter(|&a| s[a] > 0.0).min_by(|&a, &b| s[a].total_cmp(&s[b])).unwrap_or(0);
+        longest..longest + 1
+    }
 }
 
-struct Bins {
+/// Boxes and numbers of primitives per axis and bin.
+pub(crate) struct Bins {
     boxes: [[Box4; MAX_BINS]; 3],
     counts: [[u32; MAX_BINS]; 3],
 }
 
 impl Bins {
-    fn empty() -> Self {
+    pub(crate) fn empty() -> Self {
         Bins { boxes: [[Box4::EMPTY; MAX_BINS]; 3], counts: [[0; MAX_BINS]; 3] }
     }
 
+    fn clear(&mut self, bins: usize) {
+        for axis in 0..3 {
+            self.boxes[axis][..bins].fill(Box4::EMPTY);
+            self.counts[axis][..bins].fill(0);
+        }
+    }
+
     #[inline]
-    fn add_all(&mut self, refs: &[PrimRef], map: &BinMap) {
+    fn add_all(&mut self, refs: &[PrimRef], map: &BinMap, axes: Range<usize>) {
         for p in refs {
             let b = map.bins(p);
-            for axis in 0..3 {
+            for axis in axes.clone() {
                 let i = b[axis] as usize & (MAX_BINS - 1);
                 self.boxes[axis][i].grow(p);
                 self.counts[axis][i] += 1;
@@ -79,10 +108,10 @@ impl Bins {
 
     /// The cut with the smallest cost area(left)·tests(left) + area(right)·tests(right); `None` when all primitives share one bin in
     /// every axis.
-    fn best_cut(&self, bins: usize) -> Option<Cut> {
-        let tests = |n: u32| n.div_ceil(LEAF_SIZE as u32) as f32;
+    fn best_cut(&self, bins: usize, axes: Range<usize>) -> Option<Cut> {
+        let tests = |n: u32| leaf_tests(n as usize);
         let mut best: Option<(f32, Cut)> = None;
-        for axis in 0..3 {
+        for axis in axes {
             let (boxes, counts) = (&self.boxes[axis], &self.counts[axis]);
             // Cost of everything right of each bin.
             let mut right_cost = [0f32; MAX_BINS];
@@ -117,42 +146,115 @@ pub(crate) struct Split<'a> {
     pub(crate) right_bounds: SetBounds,
 }
 
-/// Cuts `refs` (at least two) at the best place. Primitives that no cut separates (duplicates) are halved by position, so the depth of
-/// the tree stays logarithmic. `max_bins` is at most 16.
-pub(crate) fn split<'a>(refs: &'a mut [PrimRef], bounds: &SetBounds, max_bins: usize) -> Split<'a> {
+/// Effort of a search for cuts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct SahEffort {
+    /// Most bins per axis, 4 to 16; 0 halves sets by position instead of searching.
+    pub(crate) bins: usize,
+    /// Looks at the longest axis alone: a third of the work.
+    pub(crate) longest_axis_only: bool,
+}
+
+impl SahEffort {
+    /// No search: the depth is logarithmic whatever the input.
+    pub(crate) const HALVE: SahEffort = SahEffort { bins: 0, longest_axis_only: false };
+}
+
+/// A cut and how to apply it.
+struct Plane {
+    map: BinMap,
+    cut: Cut,
+    /// Boxes of both sides.
+    boxes: [Box4; 2],
+}
+
+impl Plane {
+    #[inline(always)]
+    fn is_left(&self, p: &PrimRef) -> bool {
+        self.map.bin(p, self.cut.axis) <= self.cut.bin
+    }
+}
+
+/// The best place to cut `refs`; `None` for primitives that no cut separates (duplicates).
+fn find_plane(refs: &[PrimRef], bounds: &SetBounds, effort: SahEffort, bins: &mut Bins) -> Option<Plane> {
     let n = refs.len();
-    let num_bins = max_bins.min(MAX_BINS).min(4 + n / 4);
+    let num_bins = (4 + n / 16).min(effort.bins).min(MAX_BINS);
     let map = BinMap::new(bounds, num_bins);
-    let bins = if n >= 2 * PARALLEL_CHUNK {
-        refs.par_chunks(PARALLEL_CHUNK)
+    let axes = if effort.longest_axis_only { map.longest_axis() } else { 0..3 };
+    if n >= 2 * PARALLEL_CHUNK {
+        *bins = refs
+            .par_chunks(PARALLEL_CHUNK)
             .map(|chunk| {
                 let mut b = Bins::empty();
-                b.add_all(chunk, &map);
+                b.add_all(chunk, &map, axes.clone());
                 b
             })
-            .reduce(Bins::empty, Bins::merge)
+            .reduce(Bins::empty, Bins::merge);
     } else {
-        let mut b = Bins::empty();
-        b.add_all(refs, &map);
+        bins.clear(num_bins);
+        bins.add_all(refs, &map, axes.clone());
+    }
+    let cut = bins.best_cut(num_bins, axes)?;
+    let (left, right) = bins.boxes[cut.axis][..num_bins].split_at(cut.bin as usize + 1);
+    let boxes = [left, right].map(|side| {
+        let mut b = Box4::EMPTY;
+        side.iter().for_each(|bin| b.union(bin));
         b
-    };
-    let Some(cut) = bins.best_cut(num_bins) else { return halve(refs) };
+    });
+    Some(Plane { map, cut, boxes })
+}
 
-    // Partition in place, gathering both sides' bounds on the way.
+/// Cuts `refs` (at least two) at the best place, reordering them. Primitives that no cut separates are halved by position, so the depth
+/// of the tree stays logarithmic. For sets too large to copy: see [`split_into`].
+pub(crate) fn split<'a>(refs: &'a mut [PrimRef], bounds: &SetBounds, effort: SahEffort) -> Split<'a> {
+    let Some(plane) = find_plane(refs, bounds, effort, &mut Bins::empty()) else { return halve(refs) };
     let (mut left_bounds, mut right_bounds) = (SetBounds::EMPTY, SetBounds::EMPTY);
-    let (mut i, mut j) = (0, n);
+    let (mut i, mut j) = (0, refs.len());
     while i < j {
-        if map.bins(&refs[i])[cut.axis] <= cut.bin {
-            left_bounds.grow(&refs[i]);
+        if plane.is_left(&refs[i]) {
+            left_bounds.grow_centers(&refs[i]);
             i += 1;
         } else {
             j -= 1;
             refs.swap(i, j);
-            right_bounds.grow(&refs[j]);
+            right_bounds.grow_centers(&refs[j]);
         }
     }
+    left_bounds.set_box(plane.boxes[0]);
+    right_bounds.set_box(plane.boxes[1]);
     let (left, right) = refs.split_at_mut(i);
     Split { left, left_bounds, right, right_bounds }
+}
+
+/// The same out of place: on success the two sides are the parts of `to`; `None` when no cut separates the primitives.
+///
+/// Every primitive is written to both ends and only one end moves on: no branch depends on the data, which a processor would guess wrong
+/// half the time (a third of the build went into that).
+pub(crate) fn split_into<'a>(
+    from: &[PrimRef],
+    to: &'a mut [PrimRef],
+    bounds: &SetBounds,
+    effort: SahEffort,
+    bins: &mut Bins,
+) -> Option<Split<'a>> {
+    let plane = find_plane(from, bounds, effort, bins)?;
+    let to = &mut to[..from.len()];
+    let mut i = 0;
+    for (done, p) in from.iter().enumerate() {
+        // Places i.. and ..=from the other end are free; together they are as many as primitives are left.
+        let j = from.len() - 1 - (done - i);
+        to[i] = *p;
+        to[j] = *p;
+        i += plane.is_left(p) as usize;
+    }
+    let (left, right) = to.split_at_mut(i);
+    let [left_bounds, right_bounds] = [(&*left, 0), (&*right, 1)].map(|(side, k)| {
+        let mut b = SetBounds::EMPTY;
+        side.iter().for_each(|p| b.grow_centers(p));
+        b.set_box(plane.boxes[k]);
+        b
+    });
+    Some(Split { left, left_bounds, right, right_bounds })
 }
 
 /// Two halves in the present order.

@@ -30,6 +30,12 @@ impl PrimRef {
         self.lo.w.to_bits() & !TAG
     }
 
+    /// Made from an empty box: nothing to build.
+    #[inline(always)]
+    pub(crate) fn is_empty(&self) -> bool {
+        self.lo.x > self.hi.x
+    }
+
     pub(crate) fn bounds(&self) -> Aabb {
         Aabb::new(self.lo.truncate(), self.hi.truncate())
     }
@@ -65,6 +71,19 @@ impl SetBounds {
         self.hi = self.hi.max(p.hi);
         self.center2_lo = self.center2_lo.min(c);
         self.center2_hi = self.center2_hi.max(c);
+    }
+
+    /// Grows the box of the centres alone.
+    #[inline(always)]
+    pub(crate) fn grow_centers(&mut self, p: &PrimRef) {
+        let c = p.center2();
+        self.center2_lo = self.center2_lo.min(c);
+        self.center2_hi = self.center2_hi.max(c);
+    }
+
+    #[inline(always)]
+    pub(crate) fn set_box(&mut self, b: Box4) {
+        (self.lo, self.hi) = (b.lo, b.hi);
     }
 
     pub(crate) fn union(&self, o: &SetBounds) -> SetBounds {

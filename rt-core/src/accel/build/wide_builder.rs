@@ -1,254 +1,216 @@
 //! From primitives to an 8-wide hierarchy, top down and in parallel.
 //!
-//! Large sets are cut in two recursively (each half its own task) until they are small; a wide node then takes the eight sets that come
-//! from always opening the one with the largest surface. Small sets become fragments: pieces of the final arena with references relative
-//! to their start, which are copied together at the end. Sizes of tasks and fragments are fixed, so the tree is the same for any number of
-//! threads.
+//! Large sets are cut in two recursively (each half its own task) down to fragments. Each fragment becomes a binary tree, and a plan which of
+//! its nodes stay as wide ones; then sizes are known, the arena is made, and every fragment writes its own part of it. Sizes of tasks and
+//! fragments are fixed, so the tree is the same for any number of threads.
 
-use super::binned_sah::{Split, halve, split};
+use super::binary_tree::BinaryTree;
+use super::binned_sah::{SahEffort, Split, halve, split};
+use super::collapse::{NO_CHILD, WidePlan, plan};
 use super::prim_ref::{PrimRef, SetBounds};
-use crate::accel::wide::{
-    CHILD_ROW, ChildRef, LEAF_SIZE, MAX_DEPTH, NODE_UNITS, Unit, WIDTH, WideBvh, write_node,
-};
+use super::sah_tree::sah_tree;
+use crate::accel::wide::{ChildRef, LEAF_SIZE, MAX_DEPTH, NODE_UNITS, Unit, WIDTH, WideBvh, write_node};
 use crate::math::Aabb;
 use crate::simd::huge_pages;
 use rayon::prelude::*;
 
 /// Sets up to this size are built by one task into one fragment.
 const FRAGMENT: usize = 1 << 14;
-/// Below this depth of nodes sets are halved instead of cut by cost. Cost-driven cuts of adversarial input (sizes that grow like 2^k) can
-/// peel off one primitive at a time; halving bounds the depth by this plus log2 of the count, and with it the traversal stack.
-const MAX_COST_DEPTH: usize = 28;
+/// Cuts above the fragments that follow the costs; sets further down are halved.
+const MAX_LARGE_CUTS: usize = 40;
 
 /// Puts primitives into leaves.
 pub(crate) trait LeafWriter: Sync {
     /// Units per leaf.
     const UNITS: usize;
     /// Writes up to four primitives into a leaf's units.
-    fn write(&self, prims: impl ExactSizeIterator<Item = u32> + Clone, out: &mut [Unit]);
+    fn write(&self, prims: &[u32], out: &mut [Unit]);
 }
 
-/// A set of primitives on its way to become a subtree.
-enum Set<'a> {
-    /// Already cut in two.
-    Cut(Box<(Set<'a>, Set<'a>)>, SetBounds, usize),
-    /// Not yet.
-    Whole(&'a mut [PrimRef], SetBounds),
+/// The tree above the fragments.
+enum Top {
+    Cut(Box<[Top; 2]>, Aabb),
+    Fragment(Fragment),
 }
 
-impl Set<'_> {
-    fn bounds(&self) -> &SetBounds {
-        match self {
-            Set::Cut(_, b, _) | Set::Whole(_, b) => b,
-        }
-    }
-    fn len(&self) -> usize {
-        match self {
-            Set::Cut(_, _, n) => *n,
-            Set::Whole(refs, _) => refs.len(),
-        }
-    }
+struct Fragment {
+    tree: BinaryTree,
+    plan: WidePlan,
 }
 
-/// A finished piece of the arena, or a node over pieces.
-enum Piece {
-    /// Units with references relative to the first; `nodes` lists where its nodes start.
-    Fragment {
-        units: Vec<Unit>,
-        nodes: Vec<u32>,
-        root: ChildRef,
-        depth: usize,
-    },
-    Node(Vec<(Aabb, Piece)>),
+/// Nodes of the arena above the fragments.
+enum TopNode {
+    Wide(Vec<TopNode>, Aabb),
+    Fragment(Fragment),
 }
 
-impl Piece {
-    /// Nodes from the root of the whole tree to the deepest leaf in here.
-    fn depth(&self) -> usize {
-        match self {
-            Piece::Fragment { depth, .. } => *depth,
-            Piece::Node(children) => children.iter().map(|(_, c)| c.depth()).max().unwrap_or(1),
-        }
-    }
-}
-
-/// Builds a hierarchy over `refs`; `bins` per axis decides between speed and quality (4 to 16; 0 only halves).
-pub(crate) fn build_wide<W: LeafWriter>(mut refs: Vec<PrimRef>, writer: &W, bins: usize) -> WideBvh {
+/// Builds a hierarchy over `refs`; `effort` decides between speed and quality.
+pub(crate) fn build_wide<W: LeafWriter>(mut refs: Vec<PrimRef>, writer: &W, effort: SahEffort) -> WideBvh {
     if refs.is_empty() {
         let mut units = vec![Unit::ZERO; NODE_UNITS];
         write_node(&mut units, &[]);
         return WideBvh { units, bounds: Aabb::EMPTY, depth: 1 };
     }
     let bounds = refs.par_chunks(1 << 16).map(SetBounds::of).reduce(|| SetBounds::EMPTY, |a, b| a.union(&b));
-    let mut piece = build_piece(cut_large(&mut refs, bounds, bins), writer, bins, 0);
-    if piece.depth() > MAX_DEPTH {
+    let mut root = open_top(fragments(&mut refs, &bounds, effort, 0));
+    if root.depth() > MAX_DEPTH {
         // Deeper than the traversal stack: only halving then, which is logarithmic whatever the input.
-        piece = build_piece(cut_large(&mut refs, bounds, 0), writer, 0, 0);
+        root = open_top(fragments(&mut refs, &bounds, SahEffort::HALVE, 0));
     }
-    // The boxes are in the pieces now: 32 bytes a primitive less at the peak, which is the copy below.
+    // The boxes are in the trees now: 32 bytes a primitive less while the arena is written.
     drop(refs);
-    assemble(piece, bounds.aabb())
+    // A tree of one leaf still gets a node, so that traversal always starts at one.
+    let root = match root {
+        TopNode::Fragment(f) if f.plan.nodes.is_empty() => {
+            TopNode::Wide(vec![TopNode::Fragment(f)], bounds.aabb())
+        }
+        node => node,
+    };
+    let depth = root.depth();
+    let mut units = huge_pages::zeroed_units(root.units::<W>());
+    root.write(writer, 0, &mut units);
+    WideBvh { units, bounds: bounds.aabb(), depth }
 }
 
-fn cut<'a>(refs: &'a mut [PrimRef], bounds: &SetBounds, bins: usize) -> Split<'a> {
-    if bins == 0 { halve(refs) } else { split(refs, bounds, bins) }
-}
-
-/// Cuts sets down to a few fragments' size, both sides of each cut in parallel.
-fn cut_large<'a>(refs: &'a mut [PrimRef], bounds: SetBounds, bins: usize) -> Set<'a> {
-    let n = refs.len();
-    if n <= FRAGMENT {
-        return Set::Whole(refs, bounds);
+/// Cuts sets down to fragments, both sides of each cut in parallel, and plans these.
+fn fragments(refs: &mut [PrimRef], bounds: &SetBounds, effort: SahEffort, depth: usize) -> Top {
+    if refs.len() <= FRAGMENT {
+        let tree = sah_tree(refs, bounds, effort);
+        let plan = plan(&tree);
+        return Top::Fragment(Fragment { tree, plan });
     }
-    let s = cut(refs, &bounds, bins);
-    let (l, r) =
-        rayon::join(|| cut_large(s.left, s.left_bounds, bins), || cut_large(s.right, s.right_bounds, bins));
-    Set::Cut(Box::new((l, r)), bounds, n)
-}
-
-/// Opens the set with the largest surface until there are eight, or all fit into leaves.
-fn open_until_wide<'a>(root: Set<'a>, bins: usize, depth: usize, out: &mut Vec<Set<'a>>) {
-    out.clear();
-    out.push(root);
-    while out.len() < WIDTH {
-        let candidate = out
-            .iter()
-            .enumerate()
-            .filter(|(_, s)| s.len() > LEAF_SIZE)
-            .map(|(i, s)| (i, s.bounds().aabb().half_area()))
-            // The first of equals, so that ties do not depend on anything but the input.
-            .fold(
-                None,
-                |best: Option<(usize, f32)>, (i, a)| {
-                    if best.is_none_or(|(_, b)| a > b) { Some((i, a)) } else { best }
-                },
-            );
-        let Some((i, _)) = candidate else { break };
-        let (l, r) = match out.swap_remove(i) {
-            Set::Cut(pair, _, _) => *pair,
-            Set::Whole(refs, bounds) => {
-                let Split { left, left_bounds, right, right_bounds } =
-                    cut(refs, &bounds, if depth < MAX_COST_DEPTH { bins } else { 0 });
-                (Set::Whole(left, left_bounds), Set::Whole(right, right_bounds))
-            }
+    let Split { left, left_bounds, right, right_bounds } =
+        if effort == SahEffort::HALVE || depth >= MAX_LARGE_CUTS {
+            halve(refs)
+        } else {
+            split(refs, bounds, effort)
         };
-        out.push(l);
-        out.push(r);
-    }
+    let (l, r) = rayon::join(
+        || fragments(left, &left_bounds, effort, depth + 1),
+        || fragments(right, &right_bounds, effort, depth + 1),
+    );
+    Top::Cut(Box::new([l, r]), bounds.aabb())
 }
 
-fn build_piece<W: LeafWriter>(set: Set<'_>, writer: &W, bins: usize, depth: usize) -> Piece {
-    if set.len() <= FRAGMENT {
-        let n = set.len();
-        let mut f = FragmentBuilder { writer, bins, units: Vec::new(), nodes: Vec::new(), depth: 0 };
-        f.units.reserve(n * W::UNITS / 3 + n / 2 + NODE_UNITS);
-        let root = f.build(set, depth);
-        return Piece::Fragment { units: f.units, nodes: f.nodes, root, depth: f.depth };
-    }
-    let mut children = Vec::with_capacity(WIDTH);
-    open_until_wide(set, bins, depth, &mut children);
-    let pieces = children
-        .into_par_iter()
-        .map(|c| (c.bounds().aabb(), build_piece(c, writer, bins, depth + 1)))
-        .collect();
-    Piece::Node(pieces)
-}
-
-struct FragmentBuilder<'w, W> {
-    writer: &'w W,
-    bins: usize,
-    units: Vec<Unit>,
-    nodes: Vec<u32>,
-    depth: usize,
-}
-
-impl<W: LeafWriter> FragmentBuilder<'_, W> {
-    fn build(&mut self, set: Set<'_>, depth: usize) -> ChildRef {
-        self.depth = self.depth.max(depth + 1);
-        if set.len() <= LEAF_SIZE {
-            return self.leaf(set);
-        }
-        let at = self.units.len();
-        self.nodes.push(at as u32);
-        self.units.resize(at + NODE_UNITS, Unit::ZERO);
-        let mut sets = Vec::with_capacity(WIDTH);
-        open_until_wide(set, self.bins, depth, &mut sets);
-        let mut children = [(Aabb::EMPTY, ChildRef::NONE); WIDTH];
-        let count = sets.len();
-        // Leaves first: they stand right behind their node.
-        let mut inner = Vec::with_capacity(WIDTH);
-        for (slot, s) in sets.into_iter().enumerate() {
-            children[slot].0 = s.bounds().aabb();
-            if s.len() <= LEAF_SIZE {
-                children[slot].1 = self.leaf(s);
-            } else {
-                inner.push((slot, s));
+/// Wide nodes above the fragments: always opens the set with the largest surface until there are eight. Few enough not to need the
+/// collapse of [`plan`].
+fn open_top(root: Top) -> TopNode {
+    let (pair, bounds) = match root {
+        Top::Fragment(f) => return TopNode::Fragment(f),
+        Top::Cut(pair, bounds) => (pair, bounds),
+    };
+    let mut sets = Vec::from(*pair);
+    while sets.len() < WIDTH {
+        let area = |t: &Top| match t {
+            Top::Cut(_, b) => Some(b.half_area()),
+            Top::Fragment(_) => None,
+        };
+        // The first of equals, so that ties do not depend on anything but the input.
+        let mut largest: Option<(usize, f32)> = None;
+        for (i, a) in sets.iter().enumerate().filter_map(|(i, s)| area(s).map(|a| (i, a))) {
+            if largest.is_none_or(|(_, b)| a > b) {
+                largest = Some((i, a));
             }
         }
-        for (slot, s) in inner {
-            children[slot].1 = self.build(s, depth + 1);
-        }
-        write_node(&mut self.units[at..at + NODE_UNITS], &children[..count]);
-        ChildRef::node(at)
+        let Some((i, _)) = largest else { break };
+        let Top::Cut(pair, _) = sets.swap_remove(i) else { unreachable!("fragments have no area here") };
+        sets.extend(*pair);
     }
-
-    fn leaf(&mut self, set: Set<'_>) -> ChildRef {
-        let Set::Whole(refs, _) = set else { unreachable!("sets of at most four primitives are never cut") };
-        // Ascending numbers: with ties in t the first of a leaf wins, whatever the order of partitioning.
-        refs.sort_unstable_by_key(|p| p.id());
-        let at = self.units.len();
-        self.units.resize(at + W::UNITS, Unit::ZERO);
-        self.writer.write(refs.iter().map(|p| p.id()), &mut self.units[at..]);
-        ChildRef::leaf(at, refs.len())
-    }
+    TopNode::Wide(sets.into_iter().map(open_top).collect(), bounds)
 }
 
-/// Copies the pieces into one arena.
-fn assemble(piece: Piece, bounds: Aabb) -> WideBvh {
-    fn size(p: &Piece) -> usize {
-        match p {
-            Piece::Fragment { units, .. } => units.len(),
-            Piece::Node(children) => NODE_UNITS + children.iter().map(|(_, c)| size(c)).sum::<usize>(),
+impl TopNode {
+    fn bounds(&self) -> Aabb {
+        match self {
+            TopNode::Wide(_, b) => *b,
+            TopNode::Fragment(f) => f.tree.nodes[0].bounds,
         }
     }
-    fn place(p: Piece, base: usize, out: &mut [Unit]) -> (ChildRef, usize) {
-        match p {
-            Piece::Fragment { units, nodes, root, depth } => {
-                out.copy_from_slice(&units);
-                for n in nodes {
-                    for c in out[n as usize + CHILD_ROW].bits_mut() {
-                        *c = ChildRef(*c).shifted(base).0;
-                    }
-                }
-                (root.shifted(base), depth)
+
+    /// Nodes on the longest path from here to a leaf.
+    fn depth(&self) -> usize {
+        match self {
+            TopNode::Wide(children, _) => 1 + children.iter().map(TopNode::depth).max().unwrap_or(0),
+            TopNode::Fragment(f) => f.plan.depth,
+        }
+    }
+
+    /// Units of the arena this takes.
+    fn units<W: LeafWriter>(&self) -> usize {
+        match self {
+            TopNode::Wide(children, _) => {
+                NODE_UNITS + children.iter().map(TopNode::units::<W>).sum::<usize>()
             }
-            Piece::Node(children) => {
+            TopNode::Fragment(f) => f.plan.nodes.len() * NODE_UNITS + f.plan.leaves * W::UNITS,
+        }
+    }
+
+    /// Writes this part of the arena, which starts at unit `base`.
+    fn write<W: LeafWriter>(self, writer: &W, base: usize, out: &mut [Unit]) -> ChildRef {
+        match self {
+            TopNode::Fragment(f) => {
+                let mut w = FragmentWriter { fragment: &f, writer, base, out, next_node: 0, next_unit: 0 };
+                if f.plan.nodes.is_empty() { w.leaf(0) } else { w.node() }
+            }
+            TopNode::Wide(children, _) => {
                 let (node, mut rest) = out.split_at_mut(NODE_UNITS);
                 let mut next = base + NODE_UNITS;
                 let mut jobs = Vec::with_capacity(WIDTH);
-                for (b, c) in children {
-                    let n = size(&c);
+                for c in children {
+                    let n = c.units::<W>();
                     let (mine, others) = rest.split_at_mut(n);
-                    jobs.push((b, c, next, mine));
+                    jobs.push((c, next, mine));
                     next += n;
                     rest = others;
                 }
-                let placed: Vec<(Aabb, (ChildRef, usize))> =
-                    jobs.into_par_iter().map(|(b, c, base, out)| (b, place(c, base, out))).collect();
-                let depth = placed.iter().map(|(_, (_, d))| *d).max().unwrap_or(1);
-                let refs: Vec<_> = placed.into_iter().map(|(b, (r, _))| (b, r)).collect();
-                write_node(node, &refs);
-                (ChildRef::node(base), depth)
+                let placed: Vec<(Aabb, ChildRef)> = jobs
+                    .into_par_iter()
+                    .map(|(c, base, out)| (c.bounds(), c.write(writer, base, out)))
+                    .collect();
+                write_node(node, &placed);
+                ChildRef::node(base)
             }
         }
     }
-    // A tree of one leaf still gets a node, so that traversal always starts at one.
-    let piece = match piece {
-        Piece::Fragment { root, .. } if root.is_leaf() => Piece::Node(vec![(bounds, piece)]),
-        p => p,
-    };
-    let total = size(&piece);
-    let mut units = huge_pages::zeroed_units(total);
-    let (_, depth) = place(piece, 0, &mut units);
-    WideBvh { units, bounds, depth }
+}
+
+/// Writes a fragment's nodes and leaves in the plan's order.
+struct FragmentWriter<'f, W> {
+    fragment: &'f Fragment,
+    writer: &'f W,
+    /// The first unit of `out` in the arena.
+    base: usize,
+    out: &'f mut [Unit],
+    next_node: usize,
+    next_unit: usize,
+}
+
+impl<W: LeafWriter> FragmentWriter<'_, W> {
+    fn node(&mut self) -> ChildRef {
+        let ids = self.fragment.plan.nodes[self.next_node];
+        self.next_node += 1;
+        let at = self.next_unit;
+        self.next_unit += NODE_UNITS;
+        let mut children = [(Aabb::EMPTY, ChildRef::NONE); WIDTH];
+        let mut count = 0;
+        for id in ids.into_iter().take_while(|&id| id != NO_CHILD) {
+            let child = &self.fragment.tree.nodes[id as usize];
+            let reference = if child.is_leaf() { self.leaf(id as usize) } else { self.node() };
+            children[count] = (child.bounds, reference);
+            count += 1;
+        }
+        write_node(&mut self.out[at..at + NODE_UNITS], &children[..count]);
+        ChildRef::node(self.base + at)
+    }
+
+    fn leaf(&mut self, id: usize) -> ChildRef {
+        let tree = &self.fragment.tree;
+        let node = &tree.nodes[id];
+        let prims = &tree.ids[node.first as usize..][..node.count as usize];
+        debug_assert!((1..=LEAF_SIZE).contains(&prims.len()), "a leaf of {}", prims.len());
+        let at = self.next_unit;
+        self.next_unit += W::UNITS;
+        self.writer.write(prims, &mut self.out[at..at + W::UNITS]);
+        ChildRef::leaf(self.base + at, prims.len())
+    }
 }
