@@ -163,11 +163,8 @@ impl LeakTest<'_> {
                 let triangle = if tile { (first + i % TILE / 2) % n } else { random.below(n) };
                 let corners = self.mesh.triangle(triangle).map(to_render);
                 let target = self.target(corners, &mut random);
-                let origin = if tile && i % TILE != 0 {
-                    common
-                } else {
-                    self.origin(corners, target, &mut random)
-                };
+                let origin =
+                    if tile && i % TILE != 0 { common } else { self.origin(corners, target, &mut random) };
                 common = origin;
                 Ray::new(origin, target - origin)
             })

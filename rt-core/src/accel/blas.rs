@@ -12,7 +12,7 @@ use crate::math::{Aabb, exp2i};
 use crate::mesh::TriMesh;
 use crate::ray::Ray;
 use crate::shapes::Shape;
-use crate::traverse::single::{LeafTest, RaySetup, traverse};
+use crate::traverse::single::{LeafTest, RaySetup, beyond, traverse};
 use fearless_simd::Simd;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -149,7 +149,7 @@ struct ShapeLeaf<'a> {
 
 impl<S: Simd> LeafTest<S> for ShapeLeaf<'_> {
     #[inline(always)]
-    fn test(&mut self, _: S, units: &[Unit], leaf: ChildRef, t_max: &mut f32) -> bool {
+    fn test(&mut self, _: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool {
         for &prim in leaf_ids(units, leaf) {
             // Up to and including the best so far: a tie goes to the lower number, as with triangles.
             let ray = Ray { t_max: self.best.t.next_up(), ..self.ray };
@@ -157,7 +157,7 @@ impl<S: Simd> LeafTest<S> for ShapeLeaf<'_> {
             let b = &mut self.best;
             if h.t < b.t || (h.t == b.t && prim < b.prim) {
                 *b = ClosestTri { t: h.t, u: h.u, v: h.v, prim, found: true };
-                *t_max = h.t;
+                *skip_t = beyond(h.t);
             }
         }
         false

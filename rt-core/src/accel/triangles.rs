@@ -10,7 +10,7 @@ use crate::mesh::TriMesh;
 use crate::ray::Ray;
 use crate::stats::{Work, count};
 use crate::traverse::packet::three;
-use crate::traverse::single::{LeafTest, RaySetup, traverse_body};
+use crate::traverse::single::{LeafTest, RaySetup, beyond, traverse_body};
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x4};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -125,7 +125,7 @@ impl TriBvh {
             #[inline(always)]
             || {
                 let setup = RaySetup::new(ray);
-                let mut leaves = AnyLeaf::<EXACT>::new(&setup);
+                let mut leaves = AnyLeaf::<EXACT>::new(&setup, ray.t_max);
                 traverse_body::<S, _, EXACT, false>(simd, &self.bvh, &setup, ray.t_max, &mut leaves);
                 leaves.found
             },
@@ -181,7 +181,7 @@ impl<'r, const EXACT: bool> ClosestLeaf<'r, EXACT> {
 
 impl<S: Simd, const EXACT: bool> LeafTest<S> for ClosestLeaf<'_, EXACT> {
     #[inline(always)]
-    fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, t_max: &mut f32) -> bool {
+    fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool {
         count(Work::Primitives, 1);
         let floats = leaf_floats(units, leaf);
         let Some(c) = test_leaf::<S, EXACT>(simd, floats, self.ray) else { return false };
@@ -200,7 +200,7 @@ impl<S: Simd, const EXACT: bool> LeafTest<S> for ClosestLeaf<'_, EXACT> {
             let b = &mut self.best;
             if t[i] < b.t || (t[i] == b.t && ids[i] < b.prim) {
                 *b = ClosestTri { t: t[i], u: u[i], v: v[i], prim: ids[i], found: true };
-                *t_max = t[i];
+                *skip_t = beyond(t[i]);
             }
         }
         false
@@ -209,24 +209,25 @@ impl<S: Simd, const EXACT: bool> LeafTest<S> for ClosestLeaf<'_, EXACT> {
 
 pub(crate) struct AnyLeaf<'r, const EXACT: bool> {
     ray: &'r RaySetup,
+    t_max: f32,
     pub(crate) found: bool,
 }
 
 impl<'r, const EXACT: bool> AnyLeaf<'r, EXACT> {
     #[inline(always)]
-    pub(crate) fn new(ray: &'r RaySetup) -> Self {
-        AnyLeaf { ray, found: false }
+    pub(crate) fn new(ray: &'r RaySetup, t_max: f32) -> Self {
+        AnyLeaf { ray, t_max, found: false }
     }
 }
 
 impl<S: Simd, const EXACT: bool> LeafTest<S> for AnyLeaf<'_, EXACT> {
     #[inline(always)]
-    fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, t_max: &mut f32) -> bool {
+    fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool {
         count(Work::Primitives, 1);
         let Some(c) = test_leaf::<S, EXACT>(simd, leaf_floats(units, leaf), self.ray) else { return false };
         let hit = c.inside
             & c.t.simd_ge(f32x4::splat(simd, self.ray.t_min))
-            & c.t.simd_lt(f32x4::splat(simd, *t_max));
+            & c.t.simd_lt(f32x4::splat(simd, self.t_max));
         self.found = hit.any_true();
         self.found
     }

@@ -10,7 +10,7 @@ use crate::mesh::{MeshError, TriMesh};
 use crate::ray::{Hit, Ray};
 use crate::shapes::Shape;
 use crate::simd::SimdLevel;
-use crate::traverse::single::{LeafTest, RaySetup, traverse};
+use crate::traverse::single::{LeafTest, RaySetup, beyond, traverse};
 use fearless_simd::{Level, Simd, dispatch};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use std::sync::Arc;
@@ -336,10 +336,10 @@ struct InstanceClosest<'w, const EXACT: bool> {
 }
 
 impl<const EXACT: bool> InstanceClosest<'_, EXACT> {
-    fn try_instance<S: Simd>(&mut self, simd: S, instance: u32, t_max: &mut f32) {
+    fn try_instance<S: Simd>(&mut self, simd: S, instance: u32, skip_t: &mut f32) {
         let p = &self.world.placements[instance as usize];
         // One step beyond the best so far: a tie may go to this instance.
-        let limit = if self.best.is_some() { t_max.next_up() } else { *t_max };
+        let limit = self.best.map_or(self.ray.t_max, |b| b.t.next_up());
         let (local, moved) = p.enter(&Ray { t_max: limit, ..self.ray });
         if local.t_max <= local.t_min {
             return;
@@ -352,15 +352,15 @@ impl<const EXACT: bool> InstanceClosest<'_, EXACT> {
         let better = self.best.is_none_or(|b| t < b.t || (t == b.t && instance < b.instance));
         if better {
             self.best = Some(Hit { t, u: c.u, v: c.v, prim: c.prim, instance });
-            *t_max = t;
+            *skip_t = beyond(t);
         }
     }
 }
 
 impl<S: Simd, const EXACT: bool> LeafTest<S> for InstanceClosest<'_, EXACT> {
-    fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, t_max: &mut f32) -> bool {
+    fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool {
         for &i in leaf_ids(units, leaf) {
-            self.try_instance(simd, i, t_max);
+            self.try_instance(simd, i, skip_t);
         }
         false
     }

@@ -7,7 +7,7 @@
 //! Distributions on the Intel MIC Architecture", 2012.)
 
 use super::packet::three;
-use super::single::{BOX_SLACK, MIN_COMPONENT, RaySetup, traverse_from};
+use super::single::{BOX_SLACK, MIN_COMPONENT, RaySetup, beyond, traverse_from};
 use crate::accel::triangles::{AnyLeaf, ClosestLeaf, ClosestTri};
 use crate::accel::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE};
 use crate::accel::{Unit, WideBvh};
@@ -62,6 +62,7 @@ fn trace_body<S: Simd, const EXACT: bool, const ANY: bool>(
     let rcp: [f32x16<S>; 3] = three!(|a| one / d[a].abs().max(smallest).copysign(d[a]));
     let t_min = f32x16::from_slice(simd, &rays.t_min);
     let slack = f32x16::splat(simd, BOX_SLACK);
+    let skip = f32x16::splat(simd, beyond(1.0));
     // Closest hits so far; the limits of rays that are finished lie before every box.
     let mut t = rays.t_max;
 
@@ -87,7 +88,7 @@ fn trace_body<S: Simd, const EXACT: bool, const ANY: bool>(
                 met &= met - 1;
                 let setup = &setups[lane];
                 if ANY {
-                    let mut leaves = AnyLeaf::<EXACT>::new(setup);
+                    let mut leaves = AnyLeaf::<EXACT>::new(setup, t[lane]);
                     traverse_from::<S, _, EXACT, false>(simd, bvh, setup, t[lane], child, &mut leaves);
                     if leaves.found {
                         hits.prim[lane] = 0;
@@ -116,7 +117,7 @@ fn trace_body<S: Simd, const EXACT: bool, const ANY: bool>(
         let node: &[Unit; NODE_UNITS] =
             units[at..at + NODE_UNITS].try_into().expect("a slice of that length");
         let refs = node[CHILD_ROW].bits();
-        let limit = f32x16::from_slice(simd, &t);
+        let limit = f32x16::from_slice(simd, &t) * skip;
         let base = stack.len();
         for slot in 0..8 {
             if refs[slot] == ChildRef::NONE.0 {

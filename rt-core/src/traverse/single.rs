@@ -12,6 +12,13 @@ use fearless_simd::{Simd, SimdBase, SimdMask, f32x8};
 /// Relative widening of a box's far distance so that rounding never closes it: 1 + 2γ₃ (Ize, "Robust BVH Ray Traversal", JCGT 2013).
 pub(crate) const BOX_SLACK: f32 = 1.0 + 2.0 * crate::math::gamma(3);
 
+/// A little beyond `t`, for skipping boxes: a triangle's `t` and its box's distance round differently, and of two surfaces at the same place both must
+/// be seen for the lower number to win.
+#[inline(always)]
+pub(crate) fn beyond(t: f32) -> f32 {
+    t * (1.0 + 32.0 * f32::EPSILON)
+}
+
 /// Smallest direction component as it enters a reciprocal: keeps 0·∞ out of the slab test while a ray in a box plane still counts as inside.
 pub(crate) const MIN_COMPONENT: f32 = 1e-18;
 
@@ -45,8 +52,9 @@ impl RaySetup {
 
 /// What happens at a leaf.
 pub(crate) trait LeafTest<S: Simd> {
-    /// Tests the primitives of `leaf`; lowers `t_max` to the closest hit so far. Returns true when the search is over.
-    fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, t_max: &mut f32) -> bool;
+    /// Tests the primitives of `leaf`; lowers `skip_t`, the distance from which boxes are skipped, to [`beyond`] the closest hit so far. Returns true when
+    /// the search is over.
+    fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool;
 }
 
 /// Walks the leaves whose boxes the ray meets before `t_max`. `CONSERVATIVE` widens boxes by their rounding error; `ORDERED` goes to the nearest
@@ -85,11 +93,12 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, c
     simd: S,
     bvh: &WideBvh,
     ray: &RaySetup,
-    mut t_max: f32,
+    t_max: f32,
     start: ChildRef,
     leaves: &mut L,
 ) {
     let units = bvh.units.as_slice();
+    let mut skip_t = beyond(t_max);
     let origin: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.origin[a]));
     let rcp: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.rcp[a]));
     let t_min = f32x8::splat(simd, ray.t_min);
@@ -104,7 +113,7 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, c
     loop {
         if current.is_leaf() {
             count(Work::Leaves, 1);
-            if leaves.test(simd, units, current, &mut t_max) {
+            if leaves.test(simd, units, current, &mut skip_t) {
                 return;
             }
         } else {
@@ -121,7 +130,7 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, c
                 2,
                 rcp_far[2],
             ));
-            let hit = near.simd_le(far.min(f32x8::splat(simd, t_max)));
+            let hit = near.simd_le(far.min(f32x8::splat(simd, skip_t)));
             let mut mask = hit.to_bitmask() as u32;
             if mask != 0 {
                 let refs = node[CHILD_ROW].bits();
@@ -169,7 +178,7 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, c
         // ---- Next entry that still lies before the closest hit.
         loop {
             let Some(e) = stack.pop() else { return };
-            if f32::from_bits((e >> 32) as u32) <= t_max {
+            if f32::from_bits((e >> 32) as u32) <= skip_t {
                 current = ChildRef(e as u32);
                 break;
             }

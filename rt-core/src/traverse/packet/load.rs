@@ -3,7 +3,7 @@
 use super::{GROUPS, Packet, Row, load_row, three};
 use crate::intersect::watertight::dominant_axis;
 use crate::ray::{LANES, RayBlock};
-use crate::traverse::single::{MIN_COMPONENT, safe_reciprocal};
+use crate::traverse::single::{MIN_COMPONENT, beyond, safe_reciprocal};
 use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask, f32x16, mask32x16};
 
 /// How far the groups' extents may exceed those of groups that tile the packet before rays' own box tests pay. Shadow rays of the visible points of
@@ -132,7 +132,7 @@ impl Packet {
             near.store_slice(&mut self.origin_near[a]);
             far.store_slice(&mut self.origin_far[a]);
         }
-        reduce_rows::<S, true>(simd, &self.t, 1).store_slice(&mut self.group_t);
+        (reduce_rows::<S, true>(simd, &self.t, 1) * v(beyond(1.0))).store_slice(&mut self.group_t);
         reduce_rows::<S, false>(simd, &self.t_min, 1).store_slice(&mut self.group_t_min);
 
         // ---- Do the groups tile the packet? n groups of four by four pixels extend over 3·√n / (4·√n − 1) of its width, added up and divided by √n.

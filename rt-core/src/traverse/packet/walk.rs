@@ -5,7 +5,7 @@ use crate::accel::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE};
 use crate::accel::{Unit, WideBvh};
 use crate::simd::{Stack, StackMemory, prefetch};
 use crate::stats::{Work, count};
-use crate::traverse::single::BOX_SLACK;
+use crate::traverse::single::{BOX_SLACK, beyond};
 use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x8, f32x16};
 
 /// A child to visit, by the place where its box stands: the node's unit times eight plus the slot.
@@ -193,7 +193,7 @@ impl Packet {
                     while rest != 0 {
                         let g = rest.trailing_zeros() as usize & 15;
                         rest &= rest - 1;
-                        self.group_t[g] = load_row(simd, &self.t[g]).reduce_max();
+                        self.group_t[g] = beyond(load_row(simd, &self.t[g]).reduce_max());
                     }
                     group_t = load_row(simd, &self.group_t);
                     all_t = group_t.reduce_max();
@@ -222,8 +222,8 @@ impl Packet {
             let n: [f32x16<S>; 3] = three!(|a| (p[a] - o[a]) * rcp[a]);
             let f: [f32x16<S>; 3] = three!(|a| (q[a] - o[a]) * rcp[a]);
             let near = n[0].max(n[1]).max(n[2].max(load_row(simd, &self.t_min[g])));
-            let far =
-                (f[0].min(f[1]).min(f[2]) * f32x16::splat(simd, BOX_SLACK)).min(load_row(simd, &self.t[g]));
+            let far = (f[0].min(f[1]).min(f[2]) * f32x16::splat(simd, BOX_SLACK))
+                .min(load_row(simd, &self.t[g]) * f32x16::splat(simd, beyond(1.0)));
             let hit = near.simd_le(far).to_bitmask() as u16 & self.active[g];
             kept |= ((hit != 0) as u16) << g;
         }
