@@ -257,11 +257,15 @@ impl<'a> Placed<'a> {
     pub(crate) fn plane(&self, ray: &Ray, hit: &Hit, origin: DVec3) -> (DVec3, DVec3) {
         match self.source {
             Source::Mesh(mesh) => {
-                let [a, b, c] = mesh
-                    .triangle(hit.prim as usize)
-                    .map(|p| self.render_from_object.transform_point3(p.as_dvec3()));
-                let n = (b - a).cross(c - a);
-                (origin + a + (b - a) * hit.u as f64 + (c - a) * hit.v as f64, n)
+                let corners = mesh.triangle(hit.prim as usize).map(|p| p.as_dvec3());
+                let m = &self.render_from_object;
+                let [a, b, c] = if self.normal_from_object.is_none() {
+                    corners.map(|p| p + m.translation)
+                } else {
+                    corners.map(|p| m.transform_point3(p))
+                };
+                let (e1, e2) = (b - a, c - a);
+                (origin + a + e1 * hit.u as f64 + e2 * hit.v as f64, e1.cross(e2))
             }
             Source::Shape(shape) => {
                 let local_ray = self.object_ray(ray);

@@ -225,9 +225,13 @@ fn trace_geometry_layers(
         for i in 0..work.current.states.len() {
             let Some(hit) = work.hits[i / LANES].get(i % LANES) else { continue };
             let (ray, state) = (work.current.ray(i), work.current.states[i]);
+            if !transparent {
+                out.record(stage, area, state.slot, &ray, &hit, || stage.surface(&ray, &hit).normal);
+                continue;
+            }
             let s = stage.surface(&ray, &hit);
-            if !transparent || s.opacity > 0.0 && s.opacity >= stage.options.depth_min_opacity {
-                out.record(stage, area, state.slot, &ray, &hit, &s);
+            if s.opacity > 0.0 && s.opacity >= stage.options.depth_min_opacity {
+                out.record(stage, area, state.slot, &ray, &hit, || s.normal);
             } else {
                 let ray = Ray { t_min: s.t_behind(&ray, hit.t), ..ray };
                 if ray.is_valid() {
@@ -294,7 +298,7 @@ fn meet_surfaces(
             let shown =
                 !transparent || surface.opacity > 0.0 && surface.opacity >= stage.options.depth_min_opacity;
             if shown && !out.is_recorded(state.slot) {
-                out.record(stage, area, state.slot, &ray, &hit, &surface);
+                out.record(stage, area, state.slot, &ray, &hit, || surface.normal);
             }
         }
         let (lit, radiance) = match placed.material.model {

@@ -152,9 +152,9 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// Window depth and eye distance of the surface met by the ray through NDC `ndc`: the f64 pixel ray is intersected with the
+    /// World point of the surface met by the ray through NDC `ndc`, and that ray's origin. The f64 pixel ray is intersected with the
     /// surface's plane, so neither the f32 ray nor its hit parameter limits the accuracy.
-    pub(crate) fn exact_depth(&self, ndc: [f64; 2], ray: &Ray, hit: &Hit) -> (f32, f32) {
+    pub(crate) fn exact_point(&self, ndc: [f64; 2], ray: &Ray, hit: &Hit) -> (DVec3, DVec3) {
         let (origin, dir) = self.camera.world_ray(ndc);
         let (on_surface, n) = self.placed(hit).plane(ray, hit, self.origin);
         let along = n.dot(dir);
@@ -164,7 +164,6 @@ impl<'a> Stage<'a> {
         // 1e-7 of the distance; a far larger step along the plane is not an improvement but a division by almost 0.
         let step = (on_ray - on_surface).length_squared();
         let limit = 1e-8 * (on_surface - origin).length_squared();
-        let point: DVec3 = if step <= limit { on_ray } else { on_surface };
-        (self.camera.window_depth(point) as f32, (point - origin).length() as f32)
+        (if step <= limit { on_ray } else { on_surface }, origin)
     }
 }

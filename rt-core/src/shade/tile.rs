@@ -4,7 +4,7 @@ use super::stage::Stage;
 use crate::frame::Layers;
 use crate::ray::{Hit, Ray};
 use crate::sampler::Sampler;
-use crate::surface::SurfacePoint;
+use glam::Vec3;
 
 /// Pixels along a tile's side.
 pub(crate) const TILE: u32 = 32;
@@ -114,7 +114,7 @@ impl TileLayers {
         self.recorded[slot as usize]
     }
 
-    /// Fills the geometry layers of a pixel.
+    /// Fills the geometry layers of a pixel. `normal` is looked at only when that layer is wanted.
     pub(crate) fn record(
         &mut self,
         stage: &Stage<'_>,
@@ -122,22 +122,22 @@ impl TileLayers {
         slot: u16,
         ray: &Ray,
         hit: &Hit,
-        s: &SurfacePoint,
+        normal: impl FnOnce() -> Vec3,
     ) {
         let i = slot as usize;
         self.recorded[i] = true;
         if !self.depth.is_empty() || !self.distance.is_empty() {
             let [x, y] = area.pixel(slot).unwrap_or_default();
-            let (depth, distance) = stage.exact_depth(stage.ndc(x, y, [0.5; 2]), ray, hit);
+            let (point, origin) = stage.exact_point(stage.ndc(x, y, [0.5; 2]), ray, hit);
             if let Some(d) = self.depth.get_mut(i) {
-                *d = depth;
+                *d = stage.camera.window_depth(point) as f32;
             }
             if let Some(d) = self.distance.get_mut(i) {
-                *d = distance;
+                *d = (point - origin).length() as f32;
             }
         }
         if let Some(n) = self.normal.get_mut(i) {
-            *n = s.normal.to_array();
+            *n = normal().to_array();
         }
         if let (Some(a), Some(b)) = (self.instance.get_mut(i), self.primitive.get_mut(i)) {
             (*a, *b) = (hit.instance, hit.prim);
