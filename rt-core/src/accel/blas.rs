@@ -64,6 +64,8 @@ pub(crate) struct Blas {
     pub(crate) content: Content,
     pub(crate) primitives: usize,
     pub(crate) skipped: usize,
+    /// For [`super::BuildReport::notes`].
+    pub(crate) notes: Vec<String>,
 }
 
 pub(crate) struct IdWriter;
@@ -84,9 +86,10 @@ pub(crate) fn leaf_ids(units: &[Unit], leaf: ChildRef) -> &[u32] {
 impl Blas {
     pub(crate) fn for_mesh(mesh: &TriMesh, options: &BuildOptions) -> Blas {
         let frame = LocalFrame::choose(mesh.origin, mesh.bounds());
-        let tris = TriBvh::build(mesh, &frame, options.quality);
-        let skipped = tris.skipped;
-        Blas { frame, primitives: mesh.indices.len() - skipped, skipped, content: Content::Triangles(tris) }
+        let mut tris = TriBvh::build(mesh, &frame, options.quality);
+        let (skipped, notes) = (tris.skipped, std::mem::take(&mut tris.notes));
+        let primitives = mesh.indices.len() - skipped;
+        Blas { frame, primitives, skipped, notes, content: Content::Triangles(tris) }
     }
 
     pub(crate) fn for_shape(shape: Arc<dyn Shape>, options: &BuildOptions) -> Blas {
@@ -100,9 +103,10 @@ impl Blas {
             })
             .collect();
         let primitives = refs.len();
-        let bvh = build_wide(refs, &IdWriter, options.quality.effort());
+        let mut notes = Vec::new();
+        let bvh = build_wide(refs, &IdWriter, options.quality.recipe(), &mut notes);
         let frame = LocalFrame { center: shape.origin(), scale: 1.0 };
-        Blas { frame, primitives, skipped: n - primitives, content: Content::Shape { bvh, shape } }
+        Blas { frame, primitives, skipped: n - primitives, notes, content: Content::Shape { bvh, shape } }
     }
 
     pub(crate) fn bvh(&self) -> &WideBvh {

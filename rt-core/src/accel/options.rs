@@ -1,6 +1,6 @@
 //! How to build an acceleration structure, and what came of it.
 
-use super::build::SahEffort;
+use super::build::{Method, Recipe, SahEffort};
 use std::time::Duration;
 
 /// What the build spends to make rays faster (thesis section 4.1.2: approximate builds for changing geometry, full builds for
@@ -23,11 +23,15 @@ impl BuildQuality {
     pub const ALL: [BuildQuality; 4] =
         [BuildQuality::Fastest, BuildQuality::Fast, BuildQuality::Balanced, BuildQuality::Best];
 
-    /// How hard the SAH builder looks for cuts.
-    pub(crate) fn effort(self) -> SahEffort {
+    /// What the builders do for this preset.
+    pub(crate) fn recipe(self) -> Recipe {
+        let quick = SahEffort { bins: 8, longest_axis_only: true };
+        let thorough = SahEffort { bins: 16, longest_axis_only: false };
         match self {
-            BuildQuality::Fastest | BuildQuality::Fast => SahEffort { bins: 8, longest_axis_only: true },
-            BuildQuality::Balanced | BuildQuality::Best => SahEffort { bins: 16, longest_axis_only: false },
+            BuildQuality::Fastest => Recipe { method: Method::Ploc, effort: quick },
+            BuildQuality::Fast => Recipe { method: Method::Sah, effort: quick },
+            BuildQuality::Balanced => Recipe { method: Method::Sah, effort: thorough },
+            BuildQuality::Best => Recipe { method: Method::Reinsertion, effort: thorough },
         }
     }
 
@@ -90,4 +94,6 @@ pub struct BuildReport {
     pub skipped: usize,
     /// Bytes of nodes and leaves.
     pub bytes: usize,
+    /// What was done in another way than asked for, and why; empty as a rule.
+    pub notes: Vec<String>,
 }

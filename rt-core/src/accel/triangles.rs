@@ -82,6 +82,7 @@ impl LeafWriter for TriWriter<'_> {
 pub(crate) struct TriBvh {
     pub(crate) bvh: WideBvh,
     pub(crate) skipped: usize,
+    pub(crate) notes: Vec<String>,
 }
 
 impl TriBvh {
@@ -100,7 +101,8 @@ impl TriBvh {
             .collect();
         refs.retain(|r| !r.is_empty());
         let skipped = mesh.indices.len() - refs.len();
-        TriBvh { bvh: build_wide(refs, &writer, quality.effort()), skipped }
+        let mut notes = Vec::new();
+        TriBvh { bvh: build_wide(refs, &writer, quality.recipe(), &mut notes), skipped, notes }
     }
 
     /// The closest hit of a local-space ray. Set-up and traversal in one body: called once per ray, the call chain around a traversal used to take

@@ -138,7 +138,12 @@ impl World {
             .filter(|(_, p)| !p.bounds.is_empty() && p.bounds.min.is_finite() && p.bounds.max.is_finite())
             .map(|(i, p)| PrimRef::new(p.bounds, i as u32))
             .collect();
-        let tlas = build_wide(refs, &IdWriter, BuildQuality::Balanced.effort());
+        let mut notes: Vec<String> = blas
+            .iter()
+            .enumerate()
+            .flat_map(|(i, b)| b.notes.iter().map(move |n| format!("geometry {i}: {n}")))
+            .collect();
+        let tlas = build_wide(refs, &IdWriter, BuildQuality::Balanced.recipe(), &mut notes);
         phases.push(("instances", start.elapsed() - phases[0].1));
         let report = BuildReport {
             total: start.elapsed(),
@@ -147,6 +152,7 @@ impl World {
             skipped: blas.iter().map(|b| b.skipped).sum(),
             bytes: (tlas.units.len() + blas.iter().map(|b| b.bvh().units.len()).sum::<usize>())
                 * size_of::<Unit>(),
+            notes,
         };
         Ok(World {
             geometries,

@@ -1,6 +1,5 @@
 //! Binary trees over one fragment of the primitives: what every builder makes and the collapse reads.
 
-use super::prim_ref::PrimRef;
 use crate::accel::wide::LEAF_SIZE;
 use crate::math::Aabb;
 
@@ -44,15 +43,16 @@ impl BinaryTree {
         self.nodes.push(NEW);
     }
 
-    /// Makes `node` a leaf of `refs`, which are the fragment's primitives from place `first` on. Ascending numbers: with ties in t the
-    /// first of a leaf wins, whatever the order of partitioning.
+    /// Makes `node` a leaf of up to four primitives, which take the places from `first` on. Ascending numbers: with ties in t the first of a
+    /// leaf wins, whatever the order of partitioning.
     #[inline]
-    pub(crate) fn make_leaf(&mut self, node: usize, first: usize, refs: &[PrimRef]) {
+    pub(crate) fn make_leaf(&mut self, node: usize, first: usize, prims: impl ExactSizeIterator<Item = u32>) {
+        let count = prims.len();
         let n = &mut self.nodes[node];
-        (n.first, n.count) = (first as u32, refs.len() as u32);
-        let ids = &mut self.ids[first..first + refs.len()];
-        for (id, r) in ids.iter_mut().zip(refs) {
-            *id = r.id();
+        (n.first, n.count) = (first as u32, count as u32);
+        let ids = &mut self.ids[first..first + count];
+        for (id, p) in ids.iter_mut().zip(prims) {
+            *id = p;
         }
         sort4(ids);
     }

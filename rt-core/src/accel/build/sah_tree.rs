@@ -42,7 +42,7 @@ impl SahTree {
         self.tree.depth = self.tree.depth.max(depth);
         let n = refs.len();
         if n <= LEAF_SIZE {
-            self.tree.make_leaf(node, first, refs);
+            self.tree.make_leaf(node, first, refs.iter().map(PrimRef::id));
             return;
         }
         let child = self.tree.open(node);

@@ -7,6 +7,7 @@
 use super::binary_tree::BinaryTree;
 use super::binned_sah::{SahEffort, Split, halve, split};
 use super::collapse::{NO_CHILD, WidePlan, plan};
+use super::obvhs_tree::{ploc_tree, reinsert};
 use super::prim_ref::{PrimRef, SetBounds};
 use super::sah_tree::sah_tree;
 use crate::accel::wide::{ChildRef, LEAF_SIZE, MAX_DEPTH, NODE_UNITS, Unit, WIDTH, WideBvh, write_node};
@@ -14,10 +15,44 @@ use crate::math::Aabb;
 use crate::simd::huge_pages;
 use rayon::prelude::*;
 
-/// Sets up to this size are built by one task into one fragment.
-const FRAGMENT: usize = 1 << 14;
 /// Cuts above the fragments that follow the costs; sets further down are halved.
 const MAX_LARGE_CUTS: usize = 40;
+
+/// How to make the binary tree of a fragment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Method {
+    /// Top down by the surface area heuristic.
+    Sah,
+    /// Bottom up along a Morton curve, by obvhs.
+    Ploc,
+    /// [`Method::Sah`], then obvhs' reinsertion.
+    Reinsertion,
+}
+
+/// How to build.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Recipe {
+    pub(crate) method: Method,
+    /// For the cuts above the fragments, and inside them with SAH.
+    pub(crate) effort: SahEffort,
+}
+
+impl Recipe {
+    /// Logarithmic depth whatever the input, and no regard for ray time.
+    const HALVE: Recipe = Recipe { method: Method::Sah, effort: SahEffort::HALVE };
+
+    /// Sets up to this size are built by one task into one fragment.
+    fn fragment(self) -> usize {
+        match self.method {
+            Method::Sah => 1 << 14,
+            Method::Ploc => 1 << 14,
+            Method::Reinsertion => 1 << 16,
+        }
+    }
+}
+
+/// Parts of the nodes that each pass of the reinsertion tries.
+const REINSERTION_PASSES: [f32; 6] = [1.0, 0.5, 0.33, 0.25, 0.2, 0.15];
 
 /// Puts primitives into leaves.
 pub(crate) trait LeafWriter: Sync {
@@ -36,6 +71,30 @@ enum Top {
 struct Fragment {
     tree: BinaryTree,
     plan: WidePlan,
+    /// obvhs could not build or improve this one.
+    fell_back: bool,
+}
+
+impl Fragment {
+    fn new(refs: &mut [PrimRef], bounds: &SetBounds, recipe: Recipe) -> Fragment {
+        let mut fell_back = false;
+        let tree = match recipe.method {
+            Method::Sah => sah_tree(refs, bounds, recipe.effort),
+            Method::Ploc => ploc_tree(refs, bounds).unwrap_or_else(|| {
+                fell_back = true;
+                sah_tree(refs, bounds, recipe.effort)
+            }),
+            Method::Reinsertion => {
+                let tree = sah_tree(refs, bounds, recipe.effort);
+                reinsert(&tree, &REINSERTION_PASSES).unwrap_or_else(|| {
+                    fell_back = true;
+                    tree
+                })
+            }
+        };
+        let plan = plan(&tree);
+        Fragment { tree, plan, fell_back }
+    }
 }
 
 /// Nodes of the arena above the fragments.
@@ -44,18 +103,32 @@ enum TopNode {
     Fragment(Fragment),
 }
 
-/// Builds a hierarchy over `refs`; `effort` decides between speed and quality.
-pub(crate) fn build_wide<W: LeafWriter>(mut refs: Vec<PrimRef>, writer: &W, effort: SahEffort) -> WideBvh {
+/// Builds a hierarchy over `refs`. What could not be done as `recipe` says is added to `notes`.
+pub(crate) fn build_wide<W: LeafWriter>(
+    mut refs: Vec<PrimRef>,
+    writer: &W,
+    recipe: Recipe,
+    notes: &mut Vec<String>,
+) -> WideBvh {
     if refs.is_empty() {
         let mut units = vec![Unit::ZERO; NODE_UNITS];
         write_node(&mut units, &[]);
         return WideBvh { units, bounds: Aabb::EMPTY, depth: 1 };
     }
     let bounds = refs.par_chunks(1 << 16).map(SetBounds::of).reduce(|| SetBounds::EMPTY, |a, b| a.union(&b));
-    let mut root = open_top(fragments(&mut refs, &bounds, effort, 0));
+    let mut root = open_top(fragments(&mut refs, &bounds, recipe, 0));
+    let (fallbacks, all) = root.fallbacks();
+    if fallbacks > 0 {
+        notes.push(format!(
+            "{fallbacks} of {all} parts built by the surface area heuristic alone: obvhs does not take their sizes or makes too deep a tree"
+        ));
+    }
     if root.depth() > MAX_DEPTH {
-        // Deeper than the traversal stack: only halving then, which is logarithmic whatever the input.
-        root = open_top(fragments(&mut refs, &bounds, SahEffort::HALVE, 0));
+        notes.push(format!(
+            "primitives halved by position: cuts by cost gave {} levels, at most {MAX_DEPTH} fit the traversal stack",
+            root.depth()
+        ));
+        root = open_top(fragments(&mut refs, &bounds, Recipe::HALVE, 0));
     }
     // The boxes are in the trees now: 32 bytes a primitive less while the arena is written.
     drop(refs);
@@ -73,12 +146,11 @@ pub(crate) fn build_wide<W: LeafWriter>(mut refs: Vec<PrimRef>, writer: &W, effo
 }
 
 /// Cuts sets down to fragments, both sides of each cut in parallel, and plans these.
-fn fragments(refs: &mut [PrimRef], bounds: &SetBounds, effort: SahEffort, depth: usize) -> Top {
-    if refs.len() <= FRAGMENT {
-        let tree = sah_tree(refs, bounds, effort);
-        let plan = plan(&tree);
-        return Top::Fragment(Fragment { tree, plan });
+fn fragments(refs: &mut [PrimRef], bounds: &SetBounds, recipe: Recipe, depth: usize) -> Top {
+    if refs.len() <= recipe.fragment() {
+        return Top::Fragment(Fragment::new(refs, bounds, recipe));
     }
+    let effort = recipe.effort;
     let Split { left, left_bounds, right, right_bounds } =
         if effort == SahEffort::HALVE || depth >= MAX_LARGE_CUTS {
             halve(refs)
@@ -86,8 +158,8 @@ fn fragments(refs: &mut [PrimRef], bounds: &SetBounds, effort: SahEffort, depth:
             split(refs, bounds, effort)
         };
     let (l, r) = rayon::join(
-        || fragments(left, &left_bounds, effort, depth + 1),
-        || fragments(right, &right_bounds, effort, depth + 1),
+        || fragments(left, &left_bounds, recipe, depth + 1),
+        || fragments(right, &right_bounds, recipe, depth + 1),
     );
     Top::Cut(Box::new([l, r]), bounds.aabb())
 }
@@ -132,6 +204,16 @@ impl TopNode {
         match self {
             TopNode::Wide(children, _) => 1 + children.iter().map(TopNode::depth).max().unwrap_or(0),
             TopNode::Fragment(f) => f.plan.depth,
+        }
+    }
+
+    /// Fragments that obvhs could not build, and all fragments.
+    fn fallbacks(&self) -> (usize, usize) {
+        match self {
+            TopNode::Wide(children, _) => {
+                children.iter().map(TopNode::fallbacks).fold((0, 0), |(f, n), (g, m)| (f + g, n + m))
+            }
+            TopNode::Fragment(f) => (f.fell_back as usize, 1),
         }
     }
 
