@@ -128,7 +128,7 @@ fn row(name: &str, mesh: &TriMesh, costs: &[BuildCost]) -> Row {
 }
 
 /// The largest sizes need up to 400 bytes per triangle while building; a machine without them reports it.
-fn fits_in_memory(size: Size, record: &mut Record) -> bool {
+pub(super) fn fits_in_memory(size: Size, record: &mut Record) -> bool {
     let needed_gib = size.triangles() as f64 * 400.0 / (1u64 << 30) as f64;
     let there_gib = record.machine.memory_gib;
     let fits = there_gib == 0.0 || needed_gib < 0.8 * there_gib;

@@ -2,10 +2,14 @@
 
 mod accuracy_build;
 mod accuracy_robust;
+mod accuracy_sampling;
 mod compare;
+mod effects;
 mod fig4_7;
+mod fig4_9;
 mod lineup;
 mod peers;
+mod pictures;
 
 use crate::machine::Machine;
 use crate::record::Record;
@@ -37,6 +41,24 @@ pub const ALL: &[Experiment] = &[
         run: fig4_7::run,
     },
     Experiment {
+        id: "fig4.9",
+        chapter: 4,
+        title: "Time of a frame against the number of triangles",
+        run: fig4_9::run,
+    },
+    Experiment {
+        id: "effects",
+        chapter: 4,
+        title: "What each effect costs, and that an unused one costs nothing",
+        run: effects::run,
+    },
+    Experiment {
+        id: "accuracy-sampling",
+        chapter: 4,
+        title: "Error against time of ambient occlusion, soft shadows and antialiasing, by sampling",
+        run: accuracy_sampling::run,
+    },
+    Experiment {
         id: "accuracy-build",
         chapter: 4,
         title: "What a better build costs and what rays gain by it",
@@ -53,6 +75,12 @@ pub const ALL: &[Experiment] = &[
         chapter: 4,
         title: "Rays per second, builds and memory against Embree 3, Embree 4 and obvhs",
         run: peers::run,
+    },
+    Experiment {
+        id: "pictures",
+        chapter: 4,
+        title: "The dissertation’s data sets in pictures, with the commands that draw them",
+        run: pictures::run,
     },
 ];
 
