@@ -224,7 +224,7 @@ impl<'r, const EXACT: bool> AnyLeaf<'r, EXACT> {
 
 impl<S: Simd, const EXACT: bool> LeafTest<S> for AnyLeaf<'_, EXACT> {
     #[inline(always)]
-    fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool {
+    fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, _: &mut f32) -> bool {
         count(Work::Primitives, 1);
         let Some(c) = test_leaf::<S, EXACT>(simd, leaf_floats(units, leaf), self.ray) else { return false };
         let hit = c.inside
