@@ -53,7 +53,7 @@ pub const ALL: &[Entry] = &[
                   and ambient occlusion (the dissertation’s figures 3.5 and 3.6).",
         data: &[("wavelet", "1M", Coloring::Scalars)],
         view: None,
-        eye: Some([152.0, -277.0, 138.0]),
+        eye: Some([247.0, -449.0, 224.0]),
         effects: SOFT,
         colors: "cool-warm",
         range: Some([90.0, 220.0]),
