@@ -22,7 +22,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             "{} {}. {command}: {:.1} s to generate, {build:.1} s to build, {render:.1} s to draw.",
             entry.caption, p.contents, p.data_secs
         );
-        record.missing.extend(p.drawn.warnings.iter().map(|w| format!("{}: {w}", entry.name)));
+        record.notes.extend(p.drawn.warnings.iter().map(|w| format!("{}: {w}", entry.name)));
         let png = save::png_bytes(&p.drawn.frame)?;
         record.pictures.push(Picture { name: entry.name.into(), caption, png });
         record.rows.push(

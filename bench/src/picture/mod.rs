@@ -72,7 +72,10 @@ pub fn draw(
     wish.look.adapt(&mut scene, (hi - lo).length() * 0.5);
     let camera = wish.look.lens(placed.camera, placed.focus_distance)?;
 
+    // Glass needs more bounces before what is cut off stops to matter.
+    let glass = wish.look.effects.contains(rt_core::effects::Effects::REFRACTION);
     let options = RenderOptions {
+        max_bounces: if glass { 16 } else { 8 },
         samples: wish.samples,
         layers: Layers::COLOR | wish.layers,
         path_tracing: wish.look.effects.contains(rt_core::effects::Effects::PATH_TRACING),
