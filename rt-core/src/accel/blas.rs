@@ -6,7 +6,7 @@
 
 use super::build::{LeafWriter, PrimRef, build_wide};
 use super::options::BuildOptions;
-use super::triangles::{ClosestTri, TriBvh};
+use super::triangles::{ClosestTri, TriBvh, widened};
 use super::wide::{ChildRef, Unit, WideBvh, write_id_leaf};
 use crate::math::{Aabb, exp2i};
 use crate::mesh::TriMesh;
@@ -99,7 +99,7 @@ impl Blas {
             .with_min_len(1 << 12)
             .filter_map(|i| {
                 let b = shape.bounds(i);
-                (!b.is_empty() && b.min.is_finite() && b.max.is_finite()).then(|| PrimRef::new(b, i))
+                (!b.is_empty() && b.min.is_finite() && b.max.is_finite()).then(|| PrimRef::new(widened(b), i))
             })
             .collect();
         let primitives = refs.len();
@@ -125,7 +125,7 @@ impl Blas {
                 let (setup, t_max) = (RaySetup::new(ray), ray.t_max);
                 let best = ClosestTri { t: t_max, u: 0.0, v: 0.0, prim: 0, found: false };
                 let mut leaves = ShapeLeaf { shape: &**shape, ray: *ray, best };
-                traverse::<S, _, true, true>(simd, bvh, &setup, t_max, &mut leaves);
+                traverse::<S, _, true>(simd, bvh, &setup, t_max, &mut leaves);
                 leaves.best
             }
         }
@@ -138,7 +138,7 @@ impl Blas {
             Content::Triangles(tris) => tris.occluded::<S, EXACT>(simd, ray),
             Content::Shape { bvh, shape } => {
                 let mut leaves = ShapeAny { shape: &**shape, ray: *ray, found: false };
-                traverse::<S, _, true, false>(simd, bvh, &RaySetup::new(ray), ray.t_max, &mut leaves);
+                traverse::<S, _, false>(simd, bvh, &RaySetup::new(ray), ray.t_max, &mut leaves);
                 leaves.found
             }
         }

@@ -4,12 +4,12 @@ use super::blas::{Blas, Content, leaf_ids};
 use super::options::Robustness;
 use super::placement::Placement;
 use super::wide::ChildRef;
-use super::world::World;
-use crate::ray::{HitBlock, LANES, NO_HIT, Ray, RayBlock};
+use super::world::{ORDINARY_LENGTHS, World, with_ordinary_length};
+use crate::ray::{Hit, HitBlock, LANES, NO_HIT, Ray, RayBlock};
 use crate::stats::{Work, count};
 use crate::traverse::hybrid;
 use crate::traverse::packet::{GROUPS, Packet};
-use fearless_simd::{Simd, dispatch};
+use fearless_simd::{Simd, SimdBase, SimdMask, dispatch, f32x16, mask32x16};
 use std::cell::RefCell;
 
 /// Blocks whose occlusion is gathered at a time.
@@ -96,9 +96,12 @@ impl World {
         scratch: &mut Scratch,
     ) {
         for (r, h) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {
-            let r = &r[..h.len()];
+            let n = r.len().min(h.len());
+            let (r, h) = (&r[..n], &mut h[..n]);
             h.fill(HitBlock::MISS);
-            if coherent {
+            if any_unusual_length(simd, r) {
+                self.one_by_one::<S, EXACT, ANY>(simd, r, h);
+            } else if coherent {
                 self.blocks::<S, EXACT, ANY>(simd, r, h, scratch);
             } else {
                 self.incoherent_blocks::<S, EXACT, ANY>(simd, r, h, scratch);
@@ -178,12 +181,14 @@ impl World {
                     continue;
                 }
                 count(Work::Fallbacks, 1);
+                let (ray, unit) = with_ordinary_length(&ray);
                 if ANY {
                     if self.occluded_in::<S, EXACT>(simd, &ray) {
                         h.prim[lane] = 0;
                     }
                 } else {
-                    h.set(lane, self.closest_in::<S, EXACT>(simd, &ray));
+                    let hit = self.closest_in::<S, EXACT>(simd, &ray);
+                    h.set(lane, hit.map(|c| Hit { t: c.t * unit, ..c }));
                 }
             }
         }
@@ -234,6 +239,26 @@ impl World {
             }
         }
     }
+}
+
+/// Whether an active ray's direction is so short or long that single rays rescale it; NaN is not, it is left to the packet.
+#[inline(never)]
+fn any_unusual_length<S: Simd>(simd: S, rays: &[RayBlock]) -> bool {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let row = |r: &[f32; LANES]| f32x16::from_slice(simd, r);
+            let shortest = f32x16::splat(simd, *ORDINARY_LENGTHS.start());
+            let longest = f32x16::splat(simd, *ORDINARY_LENGTHS.end());
+            let mut unusual = mask32x16::splat(simd, false);
+            for r in rays {
+                let m = row(&r.dx).abs().max(row(&r.dy).abs()).max(row(&r.dz).abs());
+                let active = row(&r.t_max).simd_gt(row(&r.t_min));
+                unusual |= (m.simd_lt(shortest) | m.simd_gt(longest)) & active;
+            }
+            unusual.any_true()
+        },
+    )
 }
 
 /// The rays in an instance's local space, limited to what is nearer than `hits`.

@@ -265,7 +265,7 @@ impl World {
             }
             _ => {
                 let setup = RaySetup::new(ray);
-                traverse::<S, _, true, true>(simd, &self.tlas, &setup, ray.t_max, &mut leaves);
+                traverse::<S, _, true>(simd, &self.tlas, &setup, ray.t_max, &mut leaves);
             }
         }
         leaves.best
@@ -283,7 +283,7 @@ impl World {
             1 => leaves.found = self.instance_occluded::<S, EXACT>(simd, 0, ray),
             _ => {
                 let setup = RaySetup::new(ray);
-                traverse::<S, _, true, false>(simd, &self.tlas, &setup, ray.t_max, &mut leaves);
+                traverse::<S, _, false>(simd, &self.tlas, &setup, ray.t_max, &mut leaves);
             }
         }
         leaves.found
@@ -296,11 +296,14 @@ impl World {
     }
 }
 
+/// Largest components of directions that are traced as they are.
+pub(super) const ORDINARY_LENGTHS: std::ops::RangeInclusive<f32> = 1e-4..=1e4;
+
 /// Rays whose direction is neither tiny nor huge pass unchanged; others are scaled by a power of two. The second value turns the scaled
 /// ray's `t` back.
-fn with_ordinary_length(ray: &Ray) -> (Ray, f32) {
+pub(super) fn with_ordinary_length(ray: &Ray) -> (Ray, f32) {
     let m = max_abs(ray.dir);
-    if (1e-4..=1e4).contains(&m) {
+    if ORDINARY_LENGTHS.contains(&m) {
         return (*ray, 1.0);
     }
     let e = (m.log2().round() as i32).clamp(-125, 125);

@@ -93,9 +93,11 @@ where
     }
     let det = u + v + w;
     let inside = inside & det.simd_ne(zero);
-    let t = (u * a[2] + v * b[2] + w * c[2]) * sz / det;
+    // Weights first: products of tiny edge functions and distances would underflow, and t with them.
     let scale = V::splat(simd, 1.0) / det;
-    Some(Candidate { inside, t, u: v * scale, v: w * scale })
+    let (u, v, w) = (u * scale, v * scale, w * scale);
+    let t = (u * a[2] + v * b[2] + w * c[2]) * sz;
+    Some(Candidate { inside, t, u: v, v: w })
 }
 
 /// Lanes in which no two of the three have opposite signs.

@@ -89,7 +89,7 @@ fn trace_body<S: Simd, const EXACT: bool, const ANY: bool>(
                 let setup = &setups[lane];
                 if ANY {
                     let mut leaves = AnyLeaf::<EXACT>::new(setup, t[lane]);
-                    traverse_from::<S, _, EXACT, false>(simd, bvh, setup, t[lane], child, &mut leaves);
+                    traverse_from::<S, _, false>(simd, bvh, setup, t[lane], child, &mut leaves);
                     if leaves.found {
                         hits.prim[lane] = 0;
                         active &= !(1 << lane);
@@ -99,7 +99,7 @@ fn trace_body<S: Simd, const EXACT: bool, const ANY: bool>(
                     let prim = if found { hits.prim[lane] } else { 0 };
                     let best = ClosestTri { t: t[lane], u: hits.u[lane], v: hits.v[lane], prim, found };
                     let mut leaves = ClosestLeaf::<EXACT>::continuing(setup, best);
-                    traverse_from::<S, _, EXACT, true>(simd, bvh, setup, t[lane], child, &mut leaves);
+                    traverse_from::<S, _, true>(simd, bvh, setup, t[lane], child, &mut leaves);
                     let b = leaves.best;
                     if b.found {
                         t[lane] = b.t;

@@ -9,8 +9,13 @@ use crate::simd::{Stack, StackMemory, prefetch};
 use crate::stats::{Work, count};
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x8};
 
-/// Relative widening of a box's far distance so that rounding never closes it: 1 + 2γ₃ (Ize, "Robust BVH Ray Traversal", JCGT 2013).
-pub(crate) const BOX_SLACK: f32 = 1.0 + 2.0 * crate::math::gamma(3);
+/// Relative widening of a box's far distance, 16 u with u = 2⁻²⁴, so that a box is never missed whose triangle the ray meets.
+///
+/// Ize ("Robust BVH Ray Traversal", JCGT 2013) has 6 u for the slab test by itself. The triangle test shears with a slope that carries roundings of
+/// its own, which turns the ray against the slabs by 3 u at either end, and multiplying with this factor rounds once more. What the triangle test
+/// loses in proportion to the triangle instead of the distance is in the boxes: [`crate::accel::triangles::widened`]. So boxes decide nothing: single
+/// rays, packets and every tree give the same answer.
+pub(crate) const BOX_SLACK: f32 = 1.0 + 8.0 * f32::EPSILON;
 
 /// A little beyond `t`, for skipping boxes: a triangle's `t` and its box's distance round differently, and of two surfaces at the same place both must
 /// be seen for the lower number to win.
@@ -19,8 +24,9 @@ pub(crate) fn beyond(t: f32) -> f32 {
     t * (1.0 + 32.0 * f32::EPSILON)
 }
 
-/// Smallest direction component as it enters a reciprocal: keeps 0·∞ out of the slab test while a ray in a box plane still counts as inside.
-pub(crate) const MIN_COMPONENT: f32 = 1e-18;
+/// Smallest direction component as it enters a reciprocal, 2⁻¹²⁴: the reciprocal is finite, which keeps 0·∞ out of the slab test. Not larger: local
+/// space of a mesh of size 10²⁵ has directions of 10⁻²⁵.
+pub(crate) const MIN_COMPONENT: f32 = 4.0 * f32::MIN_POSITIVE;
 
 /// What a ray needs in every step, computed once.
 #[derive(Debug, Clone, Copy)]
@@ -57,12 +63,12 @@ pub(crate) trait LeafTest<S: Simd> {
     fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool;
 }
 
-/// Walks the leaves whose boxes the ray meets before `t_max`. `CONSERVATIVE` widens boxes by their rounding error; `ORDERED` goes to the nearest
+/// Walks the leaves whose boxes the ray meets before `t_max`, widened by rounding errors in every mode: it costs nothing. `ORDERED` goes to the nearest
 /// child first (any-hit queries do not care).
 ///
 /// Never inlined: one body per instruction set, leaf kind and mode. Inlined into its callers it multiplied the compile time by thirty.
 #[inline(never)]
-pub(crate) fn traverse<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, const ORDERED: bool>(
+pub(crate) fn traverse<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
     simd: S,
     bvh: &WideBvh,
     ray: &RaySetup,
@@ -71,25 +77,25 @@ pub(crate) fn traverse<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, const 
 ) {
     simd.vectorize(
         #[inline(always)]
-        || traverse_body::<S, L, CONSERVATIVE, ORDERED>(simd, bvh, ray, t_max, leaves),
+        || traverse_body::<S, L, ORDERED>(simd, bvh, ray, t_max, leaves),
     );
 }
 
 /// [`traverse`] without its own function, for callers that have the instruction set already.
 #[inline(always)]
-pub(crate) fn traverse_body<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, const ORDERED: bool>(
+pub(crate) fn traverse_body<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
     simd: S,
     bvh: &WideBvh,
     ray: &RaySetup,
     t_max: f32,
     leaves: &mut L,
 ) {
-    traverse_from::<S, L, CONSERVATIVE, ORDERED>(simd, bvh, ray, t_max, ChildRef::node(0), leaves);
+    traverse_from::<S, L, ORDERED>(simd, bvh, ray, t_max, ChildRef::node(0), leaves);
 }
 
 /// The subtree at `start`.
 #[inline(always)]
-pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, const ORDERED: bool>(
+pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
     simd: S,
     bvh: &WideBvh,
     ray: &RaySetup,
@@ -103,7 +109,7 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, c
     let rcp: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.rcp[a]));
     let t_min = f32x8::splat(simd, ray.t_min);
     // The slack enters the far planes' reciprocals, which costs nothing in the loop. Far distances below zero never matter: t_min is not below.
-    let slack = f32x8::splat(simd, if CONSERVATIVE { BOX_SLACK } else { 1.0 });
+    let slack = f32x8::splat(simd, BOX_SLACK);
     let rcp_far: [f32x8<S>; 3] = three!(|a| rcp[a] * slack);
     let [nx, ny, nz] = ray.near;
     // Distance in the high half, so that integer order is order of distance; t_min >= 0 keeps it non-negative.

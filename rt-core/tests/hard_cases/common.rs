@@ -72,7 +72,8 @@ pub(crate) fn world(mesh: &TriMesh, options: &BuildOptions) -> World {
 pub(crate) fn hits_all_ways(world: &World, rays: &[Ray], what: &str) -> Vec<Option<Hit>> {
     let single: Vec<Option<Hit>> = rays.iter().map(|r| world.closest(r)).collect();
     let blocks = RayBlock::from_rays(rays);
-    let (mut packets, mut sorted) = (vec![HitBlock::MISS; blocks.len()], vec![HitBlock::MISS; blocks.len()]);
+    let (mut packets, mut sorted) =
+        (vec![HitBlock::MISS; blocks.len()], vec![HitBlock::MISS; blocks.len()]);
     let (mut any, mut any_sorted) = (vec![0u16; blocks.len()], vec![0u16; blocks.len()]);
     world.closest_coherent(&blocks, &mut packets);
     world.closest_incoherent(&blocks, &mut sorted);
@@ -253,4 +254,18 @@ pub(crate) fn camera(eye: Vec3, at: Vec3, half: f32, tiles: u32) -> Vec<Ray> {
         }
     }
     rays
+}
+
+/// Triangles whose height is 10⁻³ to 10⁻⁸ of their length.
+pub(crate) fn needles(n: usize, seed: u64) -> TriMesh {
+    let mut r = Random(seed);
+    let mut mesh = TriMesh::default();
+    for i in 0..n as u32 {
+        let a = r.direction() * r.unit();
+        let along = r.direction();
+        let across = along.cross(r.direction()).normalize() * (10f64).powf(-3.0 - 5.0 * r.unit());
+        mesh.positions.extend([a, a + along, a + along * r.unit() + across].map(|p| p.as_vec3()));
+        mesh.indices.push([3 * i, 3 * i + 1, 3 * i + 2]);
+    }
+    mesh
 }

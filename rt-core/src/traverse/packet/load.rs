@@ -29,6 +29,8 @@ impl Packet {
         // ---- Which lanes hold rays. The first ray stands for the packet and fills empty lanes, so that they widen no interval.
         self.active = [0; GROUPS];
         self.hit = [0; GROUPS];
+        // Number 0 at the ray's own limit: nothing at exactly t_max can win the tie, which makes the range half-open.
+        self.prim = [[0; LANES]; GROUPS];
         self.groups = 0;
         for (g, b) in blocks.iter().enumerate() {
             let on = load_row(simd, &b.t_max).simd_gt(load_row(simd, &b.t_min));

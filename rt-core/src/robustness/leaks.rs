@@ -1,13 +1,13 @@
-//! How many rays aimed at vertices, edges and points of a closed mesh get through.
+//! Rays that slip between the triangles of a closed mesh.
 //!
-//! A ray that starts inside a closed surface must hit it. Random rays almost never find the places where a tracer fails, so these are
-//! aimed there: exactly at vertices and edges, beside edges by a few roundings, and from close to the surface, where a triangle is large
-//! against its distance. Tests ask for none at all in [`crate::accel::Robustness::Watertight`]; the program `bench` runs 10⁸ rays
-//! and compares.
+//! A ray that starts inside a closed surface must hit it. Random rays almost never find the places where a tracer fails, so these are aimed
+//! there: exactly at vertices and edges, beside edges by a few roundings, and from close to the surface, where a triangle is large against
+//! its distance.
 
+use super::Random;
 use crate::accel::World;
 use crate::mesh::TriMesh;
-use crate::ray::{HitBlock, LANES, NO_HIT, Ray, RayBlock};
+use crate::ray::{HitBlock, NO_HIT, Ray, RayBlock};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -139,13 +139,12 @@ impl LeakTest<'_> {
                 (found, any.iter().map(|a| a.count_ones() as usize).sum())
             }
         };
-        debug_assert_eq!(n % LANES, 0, "batches are whole blocks");
         LeakCount { rays: n as u64, leaks: (n - hits) as u64, occlusion_leaks: (n - blocked) as u64 }
     }
 
     /// The rays of batch `batch`, in render space: 4096, each starting inside.
     pub fn rays(&self, batch: u64) -> Vec<Ray> {
-        let mut random = Random(self.seed ^ (batch + 1).wrapping_mul(0xd134_2543_de82_ef95));
+        let mut random = Random::for_batch(self.seed, batch);
         let n = self.mesh.num_triangles();
         if n == 0 {
             return vec![Ray::new(Vec3::ZERO, Vec3::ZERO); BATCH];
@@ -162,31 +161,32 @@ impl LeakTest<'_> {
                 }
                 let triangle = if tile { (first + i % TILE / 2) % n } else { random.below(n) };
                 let corners = self.mesh.triangle(triangle).map(to_render);
-                let target = self.target(corners, &mut random);
-                let origin =
-                    if tile && i % TILE != 0 { common } else { self.origin(corners, target, &mut random) };
+                let (on_surface, target) = self.target(corners, &mut random);
+                let new_origin = i % TILE == 0 || !tile;
+                let origin = if new_origin { self.origin(corners, on_surface, &mut random) } else { common };
                 common = origin;
                 Ray::new(origin, target - origin)
             })
             .collect()
     }
 
-    fn target(&self, corners: [DVec3; 3], random: &mut Random) -> Vec3 {
+    /// A point of the triangle, and the point aimed at: the same or next to it.
+    fn target(&self, corners: [DVec3; 3], random: &mut Random) -> (DVec3, Vec3) {
         let k = random.below(3);
         let (a, b, c) = (corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]);
-        match self.aim {
-            Aim::Vertex => a,
-            Aim::Edge => a.lerp(b, random.unit()),
+        let (on, off) = match self.aim {
+            Aim::Vertex => (a, DVec3::ZERO),
+            Aim::Edge => (a.lerp(b, random.unit()), DVec3::ZERO),
             Aim::BesideEdge => {
                 let off = 1e-6 * (a - b).length() * (10f64).powf(-3.0 * random.unit());
-                a.lerp(b, random.unit()) + random.direction() * off
+                (a.lerp(b, random.unit()), random.direction() * off)
             }
-            Aim::Anywhere => a.lerp(b, random.unit()).lerp(c, random.unit()),
-        }
-        .as_vec3()
+            Aim::Anywhere => (a.lerp(b, random.unit()).lerp(c, random.unit()), DVec3::ZERO),
+        };
+        (on, (on + off).as_vec3())
     }
 
-    fn origin(&self, corners: [DVec3; 3], target: Vec3, random: &mut Random) -> Vec3 {
+    fn origin(&self, corners: [DVec3; 3], near: DVec3, random: &mut Random) -> Vec3 {
         match self.start {
             Start::Ball { center, radius } => {
                 let inside = random.direction() * random.unit().cbrt() * radius;
@@ -194,7 +194,7 @@ impl LeakTest<'_> {
             }
             Start::NearSurface { center } => {
                 let on = corners[0].lerp(corners[1], random.unit()).lerp(corners[2], random.unit());
-                let on = target.as_dvec3().lerp(on, (10f64).powf(-4.0 * random.unit()));
+                let on = near.lerp(on, (10f64).powf(-4.0 * random.unit()));
                 // At least eight f32 steps deep, so that rounding cannot put the start outside.
                 let center = center - self.world.origin();
                 let step = on.abs().max_element() * f32::EPSILON as f64 / (center - on).length();
@@ -205,31 +205,3 @@ impl LeakTest<'_> {
     }
 }
 
-/// A repeatable sequence (SplitMix64, Steele, Lea and Flood 2014).
-struct Random(u64);
-
-impl Random {
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// Uniform in [0, 1).
-    fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        ((self.bits() >> 32) * n as u64 >> 32) as usize
-    }
-
-    /// Uniform on the unit sphere.
-    fn direction(&mut self) -> DVec3 {
-        let z = 2.0 * self.unit() - 1.0;
-        let (sin, cos) = (std::f64::consts::TAU * self.unit()).sin_cos();
-        let r = (1.0 - z * z).max(0.0).sqrt();
-        DVec3::new(r * cos, r * sin, z)
-    }
-}
