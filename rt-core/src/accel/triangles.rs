@@ -47,10 +47,24 @@ struct TriWriter<'m> {
 }
 
 impl TriWriter<'_> {
-    #[inline]
+    #[inline(always)]
     fn triangle(&self, i: u32) -> [Vec3; 3] {
-        let corners = self.mesh.triangle(i as usize);
+        let [a, b, c] = self.mesh.indices[i as usize];
+        let p = &self.mesh.positions;
+        let corners = [p[a as usize], p[b as usize], p[c as usize]];
         if self.plain { corners } else { corners.map(|p| self.frame.local(self.mesh.origin, p)) }
+    }
+}
+
+impl TriWriter<'_> {
+    /// The box of a triangle, [`widened`]; empty when it cannot be built.
+    #[inline(always)]
+    fn bounds(&self, i: u32) -> Aabb {
+        if !self.mesh.is_renderable(i as usize) {
+            return Aabb::EMPTY;
+        }
+        let [a, b, c] = self.triangle(i);
+        widened(Aabb::new(a.min(b).min(c), a.max(b).max(c)))
     }
 }
 
@@ -110,11 +124,7 @@ impl TriBvh {
         let mut refs: Vec<PrimRef> = (0..mesh.indices.len() as u32)
             .into_par_iter()
             .with_min_len(1 << 14)
-            .map(|i| {
-                let usable = mesh.is_renderable(i as usize);
-                let b = if usable { widened(Aabb::from_points(&writer.triangle(i))) } else { Aabb::EMPTY };
-                PrimRef::new(b, i)
-            })
+            .map(|i| PrimRef::new(writer.bounds(i), i))
             .collect();
         refs.retain(|r| !r.is_empty());
         let skipped = mesh.indices.len() - refs.len();

@@ -216,9 +216,15 @@ fn check_instances(
         }
     }
     match found {
-        None => assert!(nearest == f64::INFINITY, "{what}: {ray:?} misses, but hits instance {which} at {nearest}"),
+        None => assert!(
+            nearest == f64::INFINITY,
+            "{what}: {ray:?} misses, but hits instance {which} at {nearest}"
+        ),
         Some(h) => {
-            assert!((h.t as f64) <= nearest + tolerance, "{what}: {ray:?}: {h:?} lies behind instance {which} at {nearest}");
+            assert!(
+                (h.t as f64) <= nearest + tolerance,
+                "{what}: {ray:?}: {h:?} lies behind instance {which} at {nearest}"
+            );
             let inst = &instances[h.instance as usize];
             let [a, b, c] = geometries[inst.geometry].triangle(h.prim as usize).map(|p| p.as_dvec3());
             let p = a + (b - a) * h.u as f64 + (c - a) * h.v as f64;

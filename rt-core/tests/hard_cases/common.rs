@@ -72,8 +72,7 @@ pub(crate) fn world(mesh: &TriMesh, options: &BuildOptions) -> World {
 pub(crate) fn hits_all_ways(world: &World, rays: &[Ray], what: &str) -> Vec<Option<Hit>> {
     let single: Vec<Option<Hit>> = rays.iter().map(|r| world.closest(r)).collect();
     let blocks = RayBlock::from_rays(rays);
-    let (mut packets, mut sorted) =
-        (vec![HitBlock::MISS; blocks.len()], vec![HitBlock::MISS; blocks.len()]);
+    let (mut packets, mut sorted) = (vec![HitBlock::MISS; blocks.len()], vec![HitBlock::MISS; blocks.len()]);
     let (mut any, mut any_sorted) = (vec![0u16; blocks.len()], vec![0u16; blocks.len()]);
     world.closest_coherent(&blocks, &mut packets);
     world.closest_incoherent(&blocks, &mut sorted);

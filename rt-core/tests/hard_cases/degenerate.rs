@@ -175,7 +175,10 @@ fn sizes_over_the_whole_range_of_f32_give_no_false_hits() {
             let Some(h) = h else { continue };
             let [a, b, c] = mesh.triangle(h.prim as usize);
             assert!(h.u >= 0.0 && h.v >= 0.0 && h.u + h.v <= 1.0 + 1e-5, "{options:?}: {r:?}: {h:?}");
-            assert!((r.at(h.t).x / a.x - 1.0).abs() < 1e-3 || a.x < 1e-6, "{options:?}: {r:?}: {h:?} at {a} {b} {c}");
+            assert!(
+                (r.at(h.t).x / a.x - 1.0).abs() < 1e-3 || a.x < 1e-6,
+                "{options:?}: {r:?}: {h:?} at {a} {b} {c}"
+            );
         }
         assert!(w.closest(&rays[190]).is_some(), "{options:?}: a large one is hit");
     }

@@ -77,5 +77,9 @@ fn fast_mode_leaks_only_where_an_edge_function_is_zero() {
     println!("fast: {lost} of {rays} rays leaked\n{}", lines.join("\n"));
     // One in a thousand on curved surfaces; a few per cent of rays at vertices of axis-aligned ones.
     assert!(lost < rays / 50, "{lost} of {rays} rays leaked:\n{}", lines.join("\n"));
-    assert!(lines.iter().all(|l| !l.contains("at anywhere")), "rays that were not aimed leaked:\n{}", lines.join("\n"));
+    assert!(
+        lines.iter().all(|l| !l.contains("at anywhere")),
+        "rays that were not aimed leaked:\n{}",
+        lines.join("\n")
+    );
 }

@@ -28,11 +28,11 @@ fn vec3(of: impl Strategy<Value = f32> + Clone) -> impl Strategy<Value = Vec3> {
     (of.clone(), of.clone(), of).prop_map(|(x, y, z)| Vec3::new(x, y, z))
 }
 
-fn mesh(of: impl Strategy<Value = f32> + Clone, indices: std::ops::Range<u32>) -> impl Strategy<Value = TriMesh> {
-    (
-        prop::collection::vec(vec3(of), 1..40),
-        prop::collection::vec(prop::array::uniform3(indices), 0..60),
-    )
+fn mesh(
+    of: impl Strategy<Value = f32> + Clone,
+    indices: std::ops::Range<u32>,
+) -> impl Strategy<Value = TriMesh> {
+    (prop::collection::vec(vec3(of), 1..40), prop::collection::vec(prop::array::uniform3(indices), 0..60))
         .prop_map(|(positions, indices)| TriMesh::new(positions, indices))
 }
 

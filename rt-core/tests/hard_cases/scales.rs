@@ -55,7 +55,11 @@ fn meshes_of_any_size_are_watertight() {
                 for query in Query::ALL {
                     let start = Start::Ball { center, radius: 0.6 * radius };
                     let c = LeakTest { world: &w, mesh: &mesh, start, aim, seed: 3 }.count(query, 4096);
-                    assert_eq!((c.leaks, c.occlusion_leaks), (0, 0), "radius {radius:e}, offset {offset}: {c:?}");
+                    assert_eq!(
+                        (c.leaks, c.occlusion_leaks),
+                        (0, 0),
+                        "radius {radius:e}, offset {offset}: {c:?}"
+                    );
                 }
             }
         }
@@ -175,12 +179,14 @@ fn spread_out_instances_packets_equal_single_rays() {
         let instances: Vec<Instance> =
             places.iter().map(|&world_from_object| Instance { geometry: 0, world_from_object }).collect();
         for options in some_options() {
-            let w = World::build(vec![Geometry::Mesh(mesh.clone())], instances.clone(), &options).expect("fine");
+            let w =
+                World::build(vec![Geometry::Mesh(mesh.clone())], instances.clone(), &options).expect("fine");
             let mut rays = Vec::new();
             let mut r = Random(4);
             for i in 0..1500 {
                 let at = w.render_from_world(places[i % places.len()].translation);
-                let from = w.render_from_world(places[r.below(places.len())].translation) + Vec3::new(0.5, 1.5, 2.0);
+                let from =
+                    w.render_from_world(places[r.below(places.len())].translation) + Vec3::new(0.5, 1.5, 2.0);
                 let aim = at + (r.direction() * 0.3).as_vec3();
                 rays.push(Ray::new(from, aim - from));
             }

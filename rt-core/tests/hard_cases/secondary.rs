@@ -22,7 +22,10 @@ fn no_false_self_shadow_at_any_size_place_or_camera_distance() {
                 let w = world(&sphere(4, radius, center), &Default::default());
                 let (rays, blocked) = shadows(w, camera_radii, 8192);
                 assert!(rays > 5000, "only {rays} rays");
-                assert_eq!(blocked, 0, "of {rays}: radius {radius:e}, offset {offset}, camera {camera_radii}");
+                assert_eq!(
+                    blocked, 0,
+                    "of {rays}: radius {radius:e}, offset {offset}, camera {camera_radii}"
+                );
             }
         }
     }
@@ -45,7 +48,13 @@ fn no_false_self_shadow_without_recentering() {
 #[test]
 fn no_false_self_shadow_on_transformed_instances() {
     let turn = DMat3::from_quat(DQuat::from_euler(rt_core::glam::EulerRot::XYZ, 0.5, 1.0, -0.3));
-    for scale in [DVec3::ONE, DVec3::new(-1.0, 1.0, 1.0), DVec3::new(1.0, 0.01, 3.0), DVec3::splat(1e-6), DVec3::splat(1e7)] {
+    for scale in [
+        DVec3::ONE,
+        DVec3::new(-1.0, 1.0, 1.0),
+        DVec3::new(1.0, 0.01, 3.0),
+        DVec3::splat(1e-6),
+        DVec3::splat(1e7),
+    ] {
         for translation in [DVec3::ZERO, DVec3::new(40.0, -70.0, 20.0) * scale.length()] {
             let place = DAffine3 { matrix3: turn * DMat3::from_diagonal(scale), translation };
             let geometry = Geometry::Mesh(Arc::new(sphere(4, 1.0, DVec3::ZERO)));

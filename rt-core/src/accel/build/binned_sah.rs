@@ -12,6 +12,10 @@ const MAX_BINS: usize = 16;
 /// Sets at least this large are binned in parallel, in pieces of this size (fixed, so that the tree does not depend on the threads).
 const PARALLEL_CHUNK: usize = 1 << 16;
 
+/// Sets at least this large fill two sets of bins in turn: neighbours often fall into the same bin, and the second would wait for what the
+/// first has just stored.
+const TWO_SETS: usize = 96;
+
 /// Leaf tests that `n` primitives cost.
 #[inline(always)]
 pub(crate) fn leaf_tests(n: usize) -> f32 {
@@ -87,22 +91,31 @@ impl Bins {
     #[inline]
     fn add_all(&mut self, refs: &[PrimRef], map: &BinMap, axes: Range<usize>) {
         for p in refs {
-            let b = map.bins(p);
-            for axis in axes.clone() {
-                let i = b[axis] as usize & (MAX_BINS - 1);
-                self.boxes[axis][i].grow(p);
-                self.counts[axis][i] += 1;
+            self.add(p, map, axes.clone());
+        }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, p: &PrimRef, map: &BinMap, axes: Range<usize>) {
+        let b = map.bins(p);
+        for axis in axes {
+            let i = b[axis] as usize & (MAX_BINS - 1);
+            self.boxes[axis][i].grow(p);
+            self.counts[axis][i] += 1;
+        }
+    }
+
+    fn add_bins(&mut self, o: &Bins, bins: usize) {
+        for axis in 0..3 {
+            for i in 0..bins {
+                self.boxes[axis][i].union(&o.boxes[axis][i]);
+                self.counts[axis][i] += o.counts[axis][i];
             }
         }
     }
 
     fn merge(mut self, o: Bins) -> Bins {
-        for axis in 0..3 {
-            for i in 0..MAX_BINS {
-                self.boxes[axis][i].union(&o.boxes[axis][i]);
-                self.counts[axis][i] += o.counts[axis][i];
-            }
-        }
+        self.add_bins(&o, MAX_BINS);
         self
     }
 
@@ -176,13 +189,18 @@ impl Plane {
 }
 
 /// The best place to cut `refs`; `None` for primitives that no cut separates (duplicates).
-fn find_plane(refs: &[PrimRef], bounds: &SetBounds, effort: SahEffort, bins: &mut Bins) -> Option<Plane> {
+fn find_plane(
+    refs: &[PrimRef],
+    bounds: &SetBounds,
+    effort: SahEffort,
+    bins: &mut [Bins; 2],
+) -> Option<Plane> {
     let n = refs.len();
     let num_bins = (4 + n / 16).min(effort.bins).min(MAX_BINS);
     let map = BinMap::new(bounds, num_bins);
     let axes = if effort.longest_axis_only { map.longest_axis() } else { 0..3 };
     if n >= 2 * PARALLEL_CHUNK {
-        *bins = refs
+        bins[0] = refs
             .par_chunks(PARALLEL_CHUNK)
             .map(|chunk| {
                 let mut b = Bins::empty();
@@ -191,11 +209,23 @@ fn find_plane(refs: &[PrimRef], bounds: &SetBounds, effort: SahEffort, bins: &mu
             })
             .reduce(Bins::empty, Bins::merge);
     } else {
-        bins.clear(num_bins);
-        bins.add_all(refs, &map, axes.clone());
+        let [even, odd] = bins;
+        even.clear(num_bins);
+        if n < TWO_SETS {
+            even.add_all(refs, &map, axes.clone());
+        } else {
+            odd.clear(num_bins);
+            let (pairs, rest) = refs.as_chunks::<2>();
+            for [a, b] in pairs {
+                even.add(a, &map, axes.clone());
+                odd.add(b, &map, axes.clone());
+            }
+            even.add_all(rest, &map, axes.clone());
+            even.add_bins(odd, num_bins);
+        }
     }
-    let cut = bins.best_cut(num_bins, axes)?;
-    let (left, right) = bins.boxes[cut.axis][..num_bins].split_at(cut.bin as usize + 1);
+    let cut = bins[0].best_cut(num_bins, axes)?;
+    let (left, right) = bins[0].boxes[cut.axis][..num_bins].split_at(cut.bin as usize + 1);
     let boxes = [left, right].map(|side| {
         let mut b = Box4::EMPTY;
         side.iter().for_each(|bin| b.union(bin));
@@ -207,7 +237,9 @@ fn find_plane(refs: &[PrimRef], bounds: &SetBounds, effort: SahEffort, bins: &mu
 /// Cuts `refs` (at least two) at the best place, reordering them. Primitives that no cut separates are halved by position, so the depth
 /// of the tree stays logarithmic. For sets too large to copy: see [`split_into`].
 pub(crate) fn split<'a>(refs: &'a mut [PrimRef], bounds: &SetBounds, effort: SahEffort) -> Split<'a> {
-    let Some(plane) = find_plane(refs, bounds, effort, &mut Bins::empty()) else { return halve(refs) };
+    let Some(plane) = find_plane(refs, bounds, effort, &mut [Bins::empty(), Bins::empty()]) else {
+        return halve(refs);
+    };
     let (mut left_bounds, mut right_bounds) = (SetBounds::EMPTY, SetBounds::EMPTY);
     let (mut i, mut j) = (0, refs.len());
     while i < j {
@@ -235,7 +267,7 @@ pub(crate) fn split_into<'a>(
     to: &'a mut [PrimRef],
     bounds: &SetBounds,
     effort: SahEffort,
-    bins: &mut Bins,
+    bins: &mut [Bins; 2],
 ) -> Option<Split<'a>> {
     let plane = find_plane(from, bounds, effort, bins)?;
     let to = &mut to[..from.len()];

@@ -104,20 +104,31 @@ fn depth_of(nodes: &[Bvh2Node]) -> usize {
 /// Renumbers the nodes, makes subtrees of up to four primitives leaves, and computes boxes anew from `leaf_bounds`. The leaves of `bvh`
 /// refer to places in `ids`.
 fn to_binary_tree(bvh: &Bvh2, ids: &[u32], leaf_bounds: impl Fn(&Bvh2Node) -> Aabb) -> Option<BinaryTree> {
-    // ---- Primitives below each node.
-    let mut order = Vec::with_capacity(bvh.nodes.len());
-    let mut stack = vec![(0u32, 1)];
-    while let Some((i, depth)) = stack.pop() {
-        if depth > MAX_BINARY_DEPTH {
-            return None;
-        }
-        order.push(i);
-        let n = &bvh.nodes[i as usize];
-        if !n.is_leaf() {
-            stack.extend([(n.first_index, depth + 1), (n.first_index + 1, depth + 1)]);
+    // ---- Primitives below each node. PLOC numbers parents before children; the optimiser does not keep that.
+    let mut counts = vec![0u32; bvh.nodes.len()];
+    let mut depths = vec![0u8; bvh.nodes.len()];
+    let mut order: Vec<u32> = (0..bvh.nodes.len() as u32).collect();
+    if !bvh.children_are_ordered_after_parents {
+        order.clear();
+        let mut stack = vec![0u32];
+        while let Some(i) = stack.pop() {
+            order.push(i);
+            let n = &bvh.nodes[i as usize];
+            if !n.is_leaf() {
+                stack.extend([n.first_index, n.first_index + 1]);
+            }
         }
     }
-    let mut counts = vec![0u32; bvh.nodes.len()];
+    depths[0] = 1;
+    for &i in &order {
+        let (n, depth) = (&bvh.nodes[i as usize], depths[i as usize]);
+        if depth as usize > MAX_BINARY_DEPTH {
+            return None;
+        }
+        if !n.is_leaf() {
+            depths[n.first_index as usize..][..2].fill(depth + 1);
+        }
+    }
     for &i in order.iter().rev() {
         let n = &bvh.nodes[i as usize];
         let first = n.first_index as usize;

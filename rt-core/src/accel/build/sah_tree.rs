@@ -4,6 +4,7 @@ use super::binary_tree::BinaryTree;
 use super::binned_sah::{Bins, SahEffort, halve, leaf_tests, split_into};
 use super::prim_ref::{Box4, PrimRef, SetBounds};
 use crate::accel::wide::LEAF_SIZE;
+use glam::Vec4;
 
 /// Sets up to this size are cut by trying every place along each axis.
 const SWEEP: usize = 8;
@@ -13,8 +14,11 @@ const MAX_COST_DEPTH: usize = 40;
 
 /// The tree over `refs` (at least one), whose order is lost.
 pub(crate) fn sah_tree(refs: &mut [PrimRef], bounds: &SetBounds, effort: SahEffort) -> BinaryTree {
-    let mut builder =
-        SahTree { tree: BinaryTree::with_room_for(refs.len()), bins: Box::new(Bins::empty()), effort };
+    let mut builder = SahTree {
+        tree: BinaryTree::with_room_for(refs.len()),
+        bins: Box::new([Bins::empty(), Bins::empty()]),
+        effort,
+    };
     let mut copy = refs.to_vec();
     builder.tree.add_root();
     builder.build(0, refs, &mut copy, bounds, 0, 1);
@@ -23,7 +27,7 @@ pub(crate) fn sah_tree(refs: &mut [PrimRef], bounds: &SetBounds, effort: SahEffo
 
 struct SahTree {
     tree: BinaryTree,
-    bins: Box<Bins>,
+    bins: Box<[Bins; 2]>,
     effort: SahEffort,
 }
 
@@ -73,19 +77,10 @@ fn sweep(refs: &mut [PrimRef]) -> (usize, [SetBounds; 2]) {
     let n = refs.len();
     let mut copy = [refs[0]; SWEEP];
     copy[..n].copy_from_slice(refs);
-    let mut best = (f32::INFINITY, n / 2, std::array::from_fn(|i| i as u64));
-    let centers = copy.map(|p| p.center2().to_array());
+    let sorted = orders(&copy, n);
+    let mut best = (f32::INFINITY, n / 2, 0);
     for axis in 0..3 {
-        // Keys that sort by centre, then by place; only the low bits are read afterwards.
-        let mut order: [u64; SWEEP] = std::array::from_fn(|i| (sortable(centers[i][axis]) << 32) | i as u64);
-        for i in 1..n {
-            let mut j = i;
-            while j > 0 && order[j] < order[j - 1] {
-                order.swap(j, j - 1);
-                j -= 1;
-            }
-        }
-        let at = |i: usize| &copy[order[i] as usize & (SWEEP - 1)];
+        let at = |i: usize| &copy[sorted[i][axis] as usize & (SWEEP - 1)];
         let mut right_cost = [0f32; SWEEP];
         let mut acc = Box4::EMPTY;
         for i in (1..n).rev() {
@@ -97,20 +92,71 @@ fn sweep(refs: &mut [PrimRef]) -> (usize, [SetBounds; 2]) {
             acc.grow(at(i - 1));
             let cost = acc.half_area() * leaf_tests(i) + right_cost[i];
             if cost < best.0 {
-                best = (cost, i, order);
+                best = (cost, i, axis);
             }
         }
     }
-    for (p, o) in refs.iter_mut().zip(best.2) {
-        *p = copy[o as usize & (SWEEP - 1)];
+    let (_, at, axis) = best;
+    for (p, o) in refs.iter_mut().zip(sorted) {
+        *p = copy[o[axis] as usize & (SWEEP - 1)];
     }
-    let (left, right) = refs.split_at(best.1);
-    (best.1, [left, right].map(SetBounds::of))
+    let (left, right) = refs.split_at(at);
+    (at, [left, right].map(SetBounds::of))
 }
 
-/// Bits that compare as unsigned integers like the numbers themselves (no NaN).
+/// The places of the first `n` primitives sorted by centre, in the low three bits: `[i][axis]` is the i-th along an axis.
+///
+/// Keys are the centres with their last three bits replaced by the place, so they differ, and a sorting network (19 exchanges, Knuth vol. 3,
+/// section 5.3.4) sorts all axes at once without a branch.
 #[inline(always)]
-fn sortable(x: f32) -> u64 {
-    let b = x.to_bits();
-    (b ^ (((b as i32 >> 31) as u32) | 1 << 31)) as u64
+fn orders(refs: &[PrimRef; SWEEP], n: usize) -> [[u32; 4]; SWEEP] {
+    // Finite even where the sum of two coordinates overflows: NaN would break the network.
+    let limit = Vec4::splat(0.5 * f32::MAX);
+    let mut keys: [Vec4; SWEEP] = std::array::from_fn(|i| {
+        let c = if i < n { refs[i].center2().clamp(-limit, limit) } else { Vec4::MAX };
+        Vec4::from_array(c.to_array().map(|x| f32::from_bits(x.to_bits() & !7 | i as u32)))
+    });
+    #[rustfmt::skip]
+    const NETWORK: [(usize, usize); 19] = [
+        (0, 2), (1, 3), (4, 6), (5, 7), (0, 4), (1, 5), (2, 6), (3, 7), (0, 1), (2, 3),
+        (4, 5), (6, 7), (2, 4), (3, 5), (1, 4), (3, 6), (1, 2), (3, 4), (5, 6),
+    ];
+    for (a, b) in NETWORK {
+        (keys[a], keys[b]) = (keys[a].min(keys[b]), keys[a].max(keys[b]));
+    }
+    keys.map(|k| k.to_array().map(f32::to_bits))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Aabb;
+    use crate::test_shapes::Random;
+    use glam::Vec3;
+
+    #[test]
+    fn orders_sort_every_axis_and_lose_nobody_even_at_the_ends_of_the_range() {
+        let mut r = Random::new(5);
+        for case in 0..2000 {
+            let n = 2 + case % (SWEEP - 1);
+            let huge = if case % 3 == 0 { f32::MAX } else { 1.0 };
+            let refs: [PrimRef; SWEEP] = std::array::from_fn(|i| {
+                let p = r.direction() * r.unit();
+                // Some equal, some at zero.
+                let p = if r.unit() < 0.2 { Vec3::ZERO } else { p * huge };
+                PrimRef::new(Aabb::new(p, p), i as u32)
+            });
+            let sorted = orders(&refs, n);
+            for axis in 0..3 {
+                let places: Vec<usize> = sorted.iter().map(|o| o[axis] as usize & 7).collect();
+                let mut all = places[..n].to_vec();
+                all.sort_unstable();
+                assert_eq!(all, (0..n).collect::<Vec<_>>(), "case {case} axis {axis}");
+                for w in places[..n].windows(2) {
+                    let [a, b] = [w[0], w[1]].map(|i| refs[i].bounds().min[axis]);
+                    assert!(a <= b + 2e-6 * b.abs().max(a.abs()), "case {case}: {a} before {b}");
+                }
+            }
+        }
+    }
 }
