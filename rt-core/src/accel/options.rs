@@ -94,6 +94,8 @@ pub struct BuildReport {
     pub skipped: usize,
     /// Bytes of nodes and leaves.
     pub bytes: usize,
+    /// Most nodes on the way from a geometry's root to a leaf.
+    pub depth: usize,
     /// What was done in another way than asked for, and why; empty as a rule.
     pub notes: Vec<String>,
 }

@@ -6,7 +6,6 @@
 //! wherever it starts, and 16 M triangles take 55 bytes each instead of 66.
 
 use crate::math::Aabb;
-use glam::Vec3;
 
 /// Children of a node.
 pub(crate) const WIDTH: usize = 8;
@@ -82,15 +81,6 @@ impl ChildRef {
     pub(crate) fn count(self) -> usize {
         ((self.0 >> 29) & 3) as usize + 1
     }
-
-    /// The same child in an arena that starts `base` units later.
-    pub(crate) fn shifted(self, base: usize) -> Self {
-        if self == Self::NONE {
-            return self;
-        }
-        debug_assert!(self.unit() + base < Self::MAX_UNITS, "arena too large");
-        ChildRef(self.0 + base as u32)
-    }
 }
 
 /// A hierarchy; the root node is at unit 0.
@@ -128,13 +118,6 @@ pub(crate) fn set_box(node: &mut [Unit], slot: usize, b: Aabb) {
         node[2 * axis].0[slot] = b.min[axis];
         node[2 * axis + 1].0[slot] = b.max[axis];
     }
-}
-
-/// The box of child `slot`.
-pub(crate) fn get_box(node: &[Unit], slot: usize) -> Aabb {
-    let lo = Vec3::from_array(std::array::from_fn(|a| node[2 * a].0[slot]));
-    let hi = Vec3::from_array(std::array::from_fn(|a| node[2 * a + 1].0[slot]));
-    Aabb::new(lo, hi)
 }
 
 /// Writes the ids of a leaf whose primitives are looked up elsewhere (shapes, instances): one unit.

