@@ -208,10 +208,9 @@ fn check_instances(
             let Some(x) = oracle::meet(corners, o, d) else { continue };
             // Surely inside when the ray moves by 10⁻⁵; ill-conditioned meetings are not for this tolerance.
             let inside = x.depth > 1e-5 * x.depth_per_length && x.t_error < tolerance;
-            if inside && x.t >= ray.t_min as f64 + tolerance && x.t < ray.t_max as f64 - tolerance {
-                if x.t < nearest {
-                    (nearest, which) = (x.t, k);
-                }
+            let in_range = x.t >= ray.t_min as f64 + tolerance && x.t < ray.t_max as f64 - tolerance;
+            if inside && in_range && x.t < nearest {
+                (nearest, which) = (x.t, k);
             }
         }
     }
