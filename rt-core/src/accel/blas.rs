@@ -64,6 +64,8 @@ pub(crate) struct Blas {
     pub(crate) content: Content,
     pub(crate) primitives: usize,
     pub(crate) skipped: usize,
+    /// Expected work per ray relative to the tree as built: refits make it grow.
+    pub(crate) cost_growth: f64,
     /// For [`super::BuildReport::notes`].
     pub(crate) notes: Vec<String>,
 }
@@ -89,7 +91,7 @@ impl Blas {
         let mut tris = TriBvh::build(mesh, &frame, options.quality);
         let (skipped, notes) = (tris.skipped, std::mem::take(&mut tris.notes));
         let primitives = mesh.indices.len() - skipped;
-        Blas { frame, primitives, skipped, notes, content: Content::Triangles(tris) }
+        Blas { frame, primitives, skipped, cost_growth: 1.0, notes, content: Content::Triangles(tris) }
     }
 
     pub(crate) fn for_shape(shape: Arc<dyn Shape>, options: &BuildOptions) -> Blas {
@@ -106,7 +108,14 @@ impl Blas {
         let mut notes = Vec::new();
         let bvh = build_wide(refs, &IdWriter, options.quality.recipe(), &mut notes);
         let frame = LocalFrame { center: shape.origin(), scale: 1.0 };
-        Blas { frame, primitives, skipped: n - primitives, notes, content: Content::Shape { bvh, shape } }
+        Blas {
+            frame,
+            primitives,
+            skipped: n - primitives,
+            cost_growth: 1.0,
+            notes,
+            content: Content::Shape { bvh, shape },
+        }
     }
 
     pub(crate) fn bvh(&self) -> &WideBvh {

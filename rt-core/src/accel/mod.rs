@@ -6,12 +6,16 @@ mod brute_force;
 mod build;
 mod options;
 mod placement;
+mod refit;
 mod streams;
 pub(crate) mod triangles;
+mod validate;
 pub(crate) mod wide;
 mod world;
 
 pub use options::{BuildOptions, BuildQuality, BuildReport, Robustness};
+pub use refit::{RefitError, RefitReport};
+pub use validate::{InvalidTree, TreeFacts};
 pub(crate) use wide::{Unit, WideBvh};
 pub use world::{BuildError, Geometry, Instance, World};
 

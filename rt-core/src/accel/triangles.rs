@@ -39,11 +39,18 @@ pub(crate) fn leaf_ids(leaf: &[f32; 8 * TRI_LEAF_UNITS]) -> [u32; 4] {
     std::array::from_fn(|i| leaf[36 + i].to_bits())
 }
 
-struct TriWriter<'m> {
+/// Puts a mesh's triangles into leaves.
+pub(crate) struct TriWriter<'m> {
     mesh: &'m TriMesh,
     frame: &'m LocalFrame,
     /// Positions are stored as they are.
     plain: bool,
+}
+
+impl<'m> TriWriter<'m> {
+    pub(crate) fn new(mesh: &'m TriMesh, frame: &'m LocalFrame) -> Self {
+        TriWriter { mesh, frame, plain: frame.center == mesh.origin && frame.scale == 1.0 }
+    }
 }
 
 impl TriWriter<'_> {
@@ -59,7 +66,7 @@ impl TriWriter<'_> {
 impl TriWriter<'_> {
     /// The box of a triangle, [`widened`]; empty when it cannot be built.
     #[inline(always)]
-    fn bounds(&self, i: u32) -> Aabb {
+    pub(crate) fn bounds(&self, i: u32) -> Aabb {
         if !self.mesh.is_renderable(i as usize) {
             return Aabb::EMPTY;
         }
@@ -74,13 +81,16 @@ impl LeafWriter for TriWriter<'_> {
     fn write(&self, prims: &[u32], out: &mut [Unit]) {
         let floats: &mut [f32] = bytemuck::cast_slice_mut(out);
         let floats: &mut [f32; 8 * TRI_LEAF_UNITS] = floats.try_into().expect("a leaf's units");
-        // Unused places repeat the last triangle's first vertex: no area, never hit.
+        // Unused places, and triangles that a refit made unusable, are points: no area, never hit.
         let last = prims.len() - 1;
         for slot in 0..LEAF_SIZE {
             let id = prims[slot.min(last)];
             let mut corners = self.triangle(id);
             if slot > last {
                 corners = [corners[0]; 3];
+            }
+            if !corners.iter().all(|p| p.is_finite()) {
+                corners = [Vec3::ZERO; 3];
             }
             for (vertex, corner) in corners.iter().enumerate() {
                 for axis in 0..3 {
@@ -118,8 +128,7 @@ pub(crate) struct TriBvh {
 impl TriBvh {
     pub(crate) fn build(mesh: &TriMesh, frame: &LocalFrame, quality: BuildQuality) -> TriBvh {
         debug_assert!(mesh.indices.len() < MAX_PRIMS, "checked by the caller");
-        let plain = frame.center == mesh.origin && frame.scale == 1.0;
-        let writer = TriWriter { mesh, frame, plain };
+        let writer = TriWriter::new(mesh, frame);
         // Nearly always every triangle can be built: collect in place and throw out the few others afterwards.
         let mut refs: Vec<PrimRef> = (0..mesh.indices.len() as u32)
             .into_par_iter()

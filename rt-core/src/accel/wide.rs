@@ -6,6 +6,7 @@
 //! wherever it starts, and 16 M triangles take 55 bytes each instead of 66.
 
 use crate::math::Aabb;
+use glam::Vec3;
 
 /// Children of a node.
 pub(crate) const WIDTH: usize = 8;
@@ -127,4 +128,11 @@ pub(crate) fn write_id_leaf(out: &mut [Unit], ids: impl Iterator<Item = u32>) {
     for (slot, id) in row.iter_mut().zip(ids) {
         *slot = id;
     }
+}
+
+/// The box of child `slot`.
+pub(crate) fn get_box(node: &[Unit], slot: usize) -> Aabb {
+    let lo = Vec3::from_array(std::array::from_fn(|a| node[2 * a].0[slot]));
+    let hi = Vec3::from_array(std::array::from_fn(|a| node[2 * a + 1].0[slot]));
+    Aabb::new(lo, hi)
 }

@@ -69,7 +69,7 @@ pub enum BuildError {
 
 /// Instances of geometries, ready for rays.
 pub struct World {
-    geometries: Vec<Geometry>,
+    pub(super) geometries: Vec<Geometry>,
     instances: Vec<Instance>,
     origin: DVec3,
     bounds: Aabb,
@@ -118,32 +118,12 @@ impl World {
             .collect();
         phases.push(("geometries", start.elapsed()));
 
-        // ---- Render space: world space, moved when everything is far from zero.
-        let origin = choose_origin(&instances, &blas);
-        let placements = instances
-            .iter()
-            .enumerate()
-            .map(|(i, inst)| {
-                let b = &blas[inst.geometry];
-                Placement::new(inst.geometry, &inst.world_from_object, &b.frame, b.bvh().bounds, origin)
-                    .ok_or(BuildError::SingularTransform {
-                        instance: i,
-                        determinant: inst.world_from_object.matrix3.determinant(),
-                    })
-            })
-            .collect::<Result<Vec<_>, _>>()?;
-        let refs = placements
-            .iter()
-            .enumerate()
-            .filter(|(_, p)| !p.bounds.is_empty() && p.bounds.min.is_finite() && p.bounds.max.is_finite())
-            .map(|(i, p)| PrimRef::new(p.bounds, i as u32))
-            .collect();
         let mut notes: Vec<String> = blas
             .iter()
             .enumerate()
             .flat_map(|(i, b)| b.notes.iter().map(move |n| format!("geometry {i}: {n}")))
             .collect();
-        let tlas = build_wide(refs, &IdWriter, BuildQuality::Balanced.recipe(), &mut notes);
+        let Placed { origin, placements, tlas } = place(&instances, &blas, &mut notes)?;
         phases.push(("instances", start.elapsed() - phases[0].1));
         let report = BuildReport {
             total: start.elapsed(),
@@ -173,6 +153,16 @@ impl World {
     pub fn from_mesh(mesh: impl Into<Arc<TriMesh>>, options: &BuildOptions) -> Result<World, BuildError> {
         let instance = Instance { geometry: 0, world_from_object: DAffine3::IDENTITY };
         World::build(vec![Geometry::Mesh(mesh.into())], vec![instance], options)
+    }
+
+    /// Makes the upper level anew after a geometry has changed.
+    pub(super) fn place_again(&mut self) {
+        let placed = place(&self.instances, &self.blas, &mut self.report.notes);
+        let Placed { origin, placements, tlas } = placed.expect("the build accepted these transforms");
+        self.report.primitives = self.blas.iter().map(|b| b.primitives).sum();
+        self.report.skipped = self.blas.iter().map(|b| b.skipped).sum();
+        (self.origin, self.bounds) = (origin, tlas.bounds);
+        (self.placements, self.tlas) = (placements, tlas);
     }
 
     /// World position of render space's origin: `world = origin + render`.
@@ -310,6 +300,39 @@ pub(super) fn with_ordinary_length(ray: &Ray) -> (Ray, f32) {
     let e = (m.log2().round() as i32).clamp(-125, 125);
     let k = exp2i(-e);
     (Ray { dir: ray.dir * k, t_min: ray.t_min / k, t_max: ray.t_max / k, ..*ray }, k)
+}
+
+/// The upper level.
+struct Placed {
+    origin: DVec3,
+    placements: Vec<Placement>,
+    tlas: WideBvh,
+}
+
+/// Chooses render space (world space, moved when everything is far from zero) and places the instances in it.
+fn place(instances: &[Instance], blas: &[Blas], notes: &mut Vec<String>) -> Result<Placed, BuildError> {
+    let origin = choose_origin(instances, blas);
+    let placements = instances
+        .iter()
+        .enumerate()
+        .map(|(i, inst)| {
+            let b = &blas[inst.geometry];
+            Placement::new(inst.geometry, &inst.world_from_object, &b.frame, b.bvh().bounds, origin).ok_or(
+                BuildError::SingularTransform {
+                    instance: i,
+                    determinant: inst.world_from_object.matrix3.determinant(),
+                },
+            )
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    let refs = placements
+        .iter()
+        .enumerate()
+        .filter(|(_, p)| !p.bounds.is_empty() && p.bounds.min.is_finite() && p.bounds.max.is_finite())
+        .map(|(i, p)| PrimRef::new(p.bounds, i as u32))
+        .collect();
+    let tlas = build_wide(refs, &IdWriter, BuildQuality::Balanced.recipe(), notes);
+    Ok(Placed { origin, placements, tlas })
 }
 
 /// Zero, or the middle of the world's bounds when they lie more than four sizes away from it. A single geometry without rotation gets its own

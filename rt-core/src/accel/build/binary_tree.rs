@@ -65,6 +65,13 @@ impl BinaryTree {
         self.nodes[node].first = left as u32;
         left
     }
+
+    /// The surface area heuristic's cost relative to the root's area: expected nodes and leaves a ray through the root's box meets.
+    #[cfg(test)]
+    pub(crate) fn cost(&self) -> f64 {
+        let sum: f64 = self.nodes.iter().map(|n| n.bounds.half_area() as f64).sum();
+        sum / self.nodes[0].bounds.half_area() as f64
+    }
 }
 
 /// Sorts up to four numbers with a network of five exchanges.

@@ -16,3 +16,6 @@ mod wide_builder;
 pub(crate) use binned_sah::SahEffort;
 pub(crate) use prim_ref::{MAX_PRIMS, PrimRef};
 pub(crate) use wide_builder::{LeafWriter, Method, Recipe, build_wide};
+
+#[cfg(test)]
+mod tests;

@@ -42,12 +42,17 @@ pub(crate) fn ploc_tree(refs: &[PrimRef], bounds: &SetBounds) -> Option<BinaryTr
     to_binary_tree(&bvh, &ids, |leaf| refs[leaf.first_index as usize].bounds())
 }
 
-/// The box of `r`, enlarged by up to a sixteenth of its size plus `smallest`, by an amount drawn from its number.
+/// The box of `r`, enlarged on both sides by up to a sixteenth of its size plus `smallest`, by an amount drawn from its number. The centre stays:
+/// were it to move with the amount, equal boxes would be sorted by size, and their costs would grow along the curve.
 fn distinct_box(r: &PrimRef, smallest: f32) -> obvhs::aabb::Aabb {
     let b = r.bounds();
-    let random = (r.id().wrapping_mul(0x9e37_79b9) >> 8) as f32 * 2f32.powi(-24);
-    let max = b.max + (b.extent() * 0.0625 + smallest) * random;
-    obvhs::aabb::Aabb { min: b.min.into(), max: max.into() }
+    // The finaliser of MurmurHash3 (Appleby 2011).
+    let mut h = r.id();
+    h = (h ^ (h >> 16)).wrapping_mul(0x85eb_ca6b);
+    h = (h ^ (h >> 13)).wrapping_mul(0xc2b2_ae35);
+    let random = ((h ^ (h >> 16)) >> 8) as f32 * 2f32.powi(-24);
+    let margin = (b.extent() * 0.0625 + smallest) * random;
+    obvhs::aabb::Aabb { min: (b.min - margin).into(), max: (b.max + margin).into() }
 }
 
 /// `tree` with subtrees moved to where they cost less; `None` when obvhs cannot take it. Each pass tries that part of the nodes which has

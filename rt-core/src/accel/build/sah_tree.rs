@@ -153,10 +153,10 @@ mod tests {
                 all.sort_unstable();
                 assert_eq!(all, (0..n).collect::<Vec<_>>(), "case {case} axis {axis}");
                 for w in places[..n].windows(2) {
-                    // Beyond a quarter of the range centres count as equal.
-                    let limit = 0.25 * f32::MAX;
-                    let [a, b] = [w[0], w[1]].map(|i| refs[i].bounds().min[axis].clamp(-limit, limit));
-                    assert!(a <= b + 2e-6 * b.abs().max(a.abs()), "case {case}: {a} before {b}");
+                    // Twice the centre, as far as it can be told from a larger one.
+                    let center2 = |i: usize| (2.0 * refs[i].bounds().min[axis]).clamp(-1.7e38, 1.7e38);
+                    let [a, b] = [w[0], w[1]].map(center2);
+                    assert!(a <= b + 1e-6 * b.abs().max(a.abs()), "case {case}: {a} before {b}");
                 }
             }
         }
