@@ -50,7 +50,8 @@ pub enum Start {
         radius: f64,
     },
     /// Between the centre, from which every point of the surface can be seen, and a point of the triangle that the ray is aimed at: mostly
-    /// close to the surface, down to 10⁻⁶ of the way.
+    /// close to the surface, down to 10⁻⁶ of the way or eight steps of f32, whichever is more. (Nearer than that `t` may round to below zero,
+    /// and the ray counts as having started behind the surface.)
     NearSurface {
         /// World coordinates.
         center: DVec3,
@@ -85,6 +86,25 @@ pub struct LeakCount {
 }
 
 /// A closed mesh, alone in its world, and the rays to test it with.
+///
+/// ```
+/// use rt_core::accel::{BuildOptions, World};
+/// use rt_core::glam::{DVec3, Vec3};
+/// use rt_core::mesh::TriMesh;
+/// use rt_core::robustness::{Aim, LeakTest, Query, Start};
+///
+/// // A tetrahedron, and the same with one side left out.
+/// let corners = vec![Vec3::ONE, Vec3::new(1.0, -1.0, -1.0), Vec3::new(-1.0, 1.0, -1.0), Vec3::new(-1.0, -1.0, 1.0)];
+/// let closed = TriMesh::new(corners, vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]);
+/// let open = TriMesh { indices: closed.indices[..3].to_vec(), ..closed.clone() };
+/// let leaks = |mesh: &TriMesh| {
+///     let world = World::from_mesh(mesh.clone(), &BuildOptions::default()).unwrap();
+///     let start = Start::Ball { center: DVec3::ZERO, radius: 0.3 };
+///     LeakTest { world: &world, mesh: &closed, start, aim: Aim::Edge, seed: 1 }.count(Query::Coherent, 10_000).leaks
+/// };
+/// assert_eq!(leaks(&closed), 0);
+/// assert!(leaks(&open) > 0);
+/// ```
 #[derive(Clone, Copy)]
 pub struct LeakTest<'a> {
     /// The world.

@@ -178,7 +178,7 @@ fn sizes_over_the_whole_range_of_f32_give_no_false_hits() {
             Ray::new(Vec3::new(-1.0, h, h), Vec3::X)
         })
         .collect();
-    for options in some_options() {
+    for options in some_options().into_iter().filter(|o| o.robustness == Robustness::Watertight) {
         let w = world(&mesh, &options);
         for (r, h) in rays.iter().zip(hits_all_ways(&w, &rays, "the whole range")) {
             let Some(h) = h else { continue };

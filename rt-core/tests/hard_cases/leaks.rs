@@ -72,14 +72,9 @@ fn watertight_edges() {
 }
 
 #[test]
-fn fast_mode_leaks_only_where_an_edge_function_is_zero() {
+fn fast_mode_leaks_are_counted_and_rare() {
     let (rays, lost, lines) = shoot(Robustness::Fast, rays_wanted() / 4);
     println!("fast: {lost} of {rays} rays leaked\n{}", lines.join("\n"));
-    // One in a thousand on curved surfaces; a few per cent of rays at vertices of axis-aligned ones.
-    assert!(lost < rays / 50, "{lost} of {rays} rays leaked:\n{}", lines.join("\n"));
-    assert!(
-        lines.iter().all(|l| !l.contains("at anywhere")),
-        "rays that were not aimed leaked:\n{}",
-        lines.join("\n")
-    );
+    // Zeros count as inside and boxes are as wide as in the other mode: none of 2.5·10⁷ was lost, but nothing rules it out.
+    assert!(lost <= rays / 100_000, "{lost} of {rays} rays leaked:\n{}", lines.join("\n"));
 }
