@@ -39,7 +39,9 @@ fn files(dir: &Path) -> Vec<PathBuf> {
     let poly = Dataset::PolyData(PolyData::from_trimesh(&ball()));
     write_vtk(&vtp, &poly, VtkOptions::default()).unwrap();
     write_vtk(&vti, &field(), VtkOptions::default()).unwrap();
-    write_obj(&obj, &ball()).unwrap();
+    // OBJ holds shape alone.
+    let bare = TriMesh { scalars: None, colors: None, ..ball() };
+    write_obj(&obj, &bare).unwrap();
     write_ply(&ply, &ball()).unwrap();
     vec![vtp, vti, obj, ply]
 }

@@ -216,7 +216,8 @@ mod tests {
     #[test]
     fn every_picture_shows_its_data_and_uses_its_effects() {
         for e in ALL.iter().filter(|e| e.name != "wavelet") {
-            let p = e.paint([48, 32], 1, &mut || Ok(())).unwrap();
+            // Large enough for the star's thin tubes.
+            let p = e.paint([144, 96], 1, &mut || Ok(())).unwrap();
             // Paths inside glass may be cut; the renderer says so.
             let expected = |w: &String| e.name == "glass" && w.contains("max_bounces");
             assert!(p.drawn.warnings.iter().all(expected), "{}: {:?}", e.name, p.drawn.warnings);
