@@ -8,7 +8,7 @@
 //! | [`cache`] | generated meshes kept on disk |
 //! | [`image_io`] | pictures as PNG and multi-layer OpenEXR |
 //! | [`colormaps`], [`view`] | colours and cameras |
-//! | [`model`], [`read`], [`write`] | files of others |
+//! | [`model`], [`read`], [`write`](mod@write) | files of others |
 //! | `cli` (feature) | what all command-line programs here share |
 #![forbid(unsafe_code)]
 
