@@ -20,6 +20,7 @@ pub mod machine;
 pub mod meshes;
 pub mod ours;
 pub mod peers;
+pub mod picture;
 pub mod plot;
 pub mod rays;
 pub mod record;

@@ -2,6 +2,8 @@
 
 use anyhow::Context as _;
 use datasets::generate::nested_wavelet::Size;
+use datasets::generate::wavelet::Wavelet;
+use datasets::isosurface;
 use glam::{DQuat, DVec3, Vec3};
 use rt_core::mesh::TriMesh;
 use std::collections::HashMap;
@@ -13,6 +15,14 @@ pub fn wavelet(size: Size) -> anyhow::Result<Arc<TriMesh>> {
     let surfaces = size
         .generate(Default::default())
         .with_context(|| format!("cannot make the wavelet surfaces of {} triangles", size.name()))?;
+    Ok(Arc::new(surfaces.mesh))
+}
+
+/// The surfaces of the smallest size from a coarser grid of `points` per axis: fewer triangles for quick runs.
+pub fn coarse_wavelet(points: u32) -> anyhow::Result<Arc<TriMesh>> {
+    let grid = Wavelet::with_points(points).grid()?;
+    let surfaces = isosurface::extract(&grid, &Size::M1.isovalues(), Default::default())
+        .with_context(|| format!("cannot make wavelet surfaces from {points} points per axis"))?;
     Ok(Arc::new(surfaces.mesh))
 }
 

@@ -201,12 +201,8 @@ impl Record {
 
 /// All records of a directory, by name. Files that are not records are left alone; a broken record is an error.
 pub fn read_dir(dir: &Path) -> anyhow::Result<Vec<Record>> {
-    let entries = std::fs::read_dir(dir).with_context(|| {
-        format!(
-            "cannot read the directory `{}`; `bench run ID` writes records, `bench list` names them",
-            dir.display()
-        )
-    })?;
+    let entries =
+        std::fs::read_dir(dir).with_context(|| format!("cannot read the directory `{}`", dir.display()))?;
     let mut paths: Vec<PathBuf> =
         entries.flatten().map(|e| e.path()).filter(|p| p.extension().is_some_and(|e| e == "json")).collect();
     paths.sort();
@@ -253,6 +249,7 @@ mod tests {
             y: Axis { label: "time".into(), unit: "s".into(), scale: Scale::Linear },
             categories: vec![],
             series: vec![Series::new("a", vec![(1.0, 2.0), (10.0, 4.0)])],
+            mark: Some(1.0),
         });
         r.pictures.push(Picture { name: "The view".into(), caption: "c".into(), png: vec![1, 2, 3] });
         r
@@ -295,6 +292,6 @@ mod tests {
     #[test]
     fn a_directory_that_is_not_there_is_named() {
         let e = read_dir(Path::new("no/such/dir")).unwrap_err().to_string();
-        assert!(e.contains("no/such/dir") && e.contains("bench list"), "{e}");
+        assert!(e.contains("no/such/dir"), "{e}");
     }
 }

@@ -1,9 +1,23 @@
 //! Generators, readers and writers of data sets.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`catalogue`] | data sets by name, with sizes and views; start here |
+//! | [`generate`] | every data set of the thesis as a deterministic function of its size |
+//! | [`isosurface`] | surfaces of uniform fields, with VTK's triangle counts |
+//! | [`cache`] | generated meshes kept on disk |
+//! | [`image_io`] | pictures as PNG and multi-layer OpenEXR |
+//! | [`colormaps`], [`view`] | colours and cameras |
+//! | [`model`], [`read`], [`write`](mod@write) | files of others |
+//! | `cli` (feature) | what all command-line programs here share |
 #![forbid(unsafe_code)]
 
 mod atomic_file;
+pub mod cache;
+pub mod catalogue;
 #[cfg(feature = "cli")]
 pub mod cli;
+pub mod colormaps;
 pub mod generate;
 pub mod image_io;
 pub mod isosurface;

@@ -35,3 +35,25 @@ pub(crate) fn volume(mesh: &rt_core::mesh::TriMesh) -> f64 {
     let t = (0..mesh.num_triangles()).map(|i| mesh.triangle(i).map(|p| p.as_dvec3()));
     t.map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
 }
+
+/// Number of connected pieces of a mesh.
+pub(crate) fn pieces(indices: &[[u32; 3]]) -> usize {
+    fn root(parent: &mut HashMap<u32, u32>, mut v: u32) -> u32 {
+        while let Some(&p) = parent.get(&v) {
+            v = p;
+        }
+        v
+    }
+    let (mut parent, mut vertices) = (HashMap::new(), std::collections::HashSet::<u32>::new());
+    for t in indices {
+        vertices.extend(t);
+        for e in 0..2 {
+            let (a, b) = (root(&mut parent, t[e]), root(&mut parent, t[e + 1]));
+            if a != b {
+                // Towards the smaller id: ids grow along the surface, so that chains stay short enough for tests.
+                parent.insert(a.max(b), a.min(b));
+            }
+        }
+    }
+    vertices.len() - parent.len()
+}

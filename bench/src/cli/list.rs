@@ -1,20 +1,22 @@
 //! `bench list`.
 
-use super::{Common, print};
 use crate::experiments;
-use serde_json::json;
+use datasets::cli::CommonArgs;
+use serde::Serialize;
 
-pub(super) fn list(common: Common) -> anyhow::Result<()> {
-    if common.json {
-        let list: Vec<_> = experiments::ALL
-            .iter()
-            .map(|e| json!({ "id": e.id, "chapter": e.chapter, "title": e.title }))
-            .collect();
-        return print(&serde_json::to_string_pretty(&list)?);
-    }
-    let width = experiments::ALL.iter().map(|e| e.id.len()).max().unwrap_or(0);
-    for e in experiments::ALL {
-        print(&format!("{:width$}  chapter {}  {}", e.id, e.chapter, e.title))?;
-    }
-    Ok(())
+#[derive(Serialize)]
+struct Entry {
+    id: &'static str,
+    chapter: u8,
+    title: &'static str,
+}
+
+pub(super) fn list(common: CommonArgs) -> anyhow::Result<()> {
+    let entry = |e: &experiments::Experiment| Entry { id: e.id, chapter: e.chapter, title: e.title };
+    let entries: Vec<Entry> = experiments::ALL.iter().map(entry).collect();
+    common.result(&entries, || {
+        let width = entries.iter().map(|e| e.id.len()).max().unwrap_or(0);
+        let line = |e: &Entry| format!("{:width$}  chapter {}  {}", e.id, e.chapter, e.title);
+        entries.iter().map(line).collect::<Vec<_>>().join("\n")
+    })
 }

@@ -2,11 +2,15 @@
 
 mod list;
 mod peers;
+mod render;
 mod report;
 mod run;
 
 use clap::{Args, Parser, Subcommand};
-use std::io::Write as _;
+use datasets::cli::{CommonArgs, CompletionsArgs, run_main};
+use rt_core::accel::{BuildQuality, Robustness};
+use rt_core::effects::Effects;
+use rt_core::environment::Background;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -20,18 +24,7 @@ struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
     #[command(flatten)]
-    common: Common,
-}
-
-/// Options of every command.
-#[derive(Debug, Clone, Copy, Args)]
-struct Common {
-    /// No progress on standard error
-    #[arg(long, short, global = true)]
-    quiet: bool,
-    /// The result as JSON on standard output
-    #[arg(long, global = true)]
-    json: bool,
+    common: CommonArgs,
 }
 
 #[derive(Debug, Subcommand)]
@@ -42,8 +35,14 @@ enum Command {
     Run(RunArgs),
     /// Makes the report of records again
     Report(ReportArgs),
+    /// Draws a file: meshes, isosurfaces of image data, lines as tubes, points as spheres
+    Render(RenderArgs),
+    /// Draws one of the report's pictures of generated data
+    Picture(PictureArgs),
     /// Says which other ray tracers are found and how to get the others; `bench run peers` measures them
     Peers,
+    /// Prints a completion script for a shell
+    Completions(CompletionsArgs),
 }
 
 /// Options of `bench run`.
@@ -73,23 +72,75 @@ struct ReportArgs {
     out: Option<PathBuf>,
 }
 
-/// A mistake on the command line, as opposed to a failure of what it asked for.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-struct UsageError(String);
+/// Options of `bench render`.
+#[derive(Debug, Args)]
+struct RenderArgs {
+    /// VTK (.vtp .vtu .vti .vtr .vts, parallel, .pvd, legacy), PLOT3D, NRRD, MetaImage, OBJ, glTF, PLY, STL
+    file: PathBuf,
+    /// The picture as PNG
+    #[arg(long, short, value_name = "PNG", required_unless_present = "exr")]
+    out: Option<PathBuf>,
+    /// The picture as OpenEXR: colour, depth, distance, normal, ids, rays per pixel
+    #[arg(long, value_name = "EXR")]
+    exr: Option<PathBuf>,
+    /// Pixels per row and rows
+    #[arg(long, default_value = "960x540", value_name = "WxH", value_parser = render::size)]
+    size: [u32; 2],
+    /// Samples per pixel
+    #[arg(long, default_value_t = 4, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    samples: u32,
+    /// Separated by commas: shadows, soft-shadows, ao, reflections, glossy-reflections, refraction, transparency,
+    /// depth-of-field, path-tracing
+    #[arg(long, default_value = "none", value_name = "LIST", value_parser = crate::picture::look::parse_effects)]
+    effects: Effects,
+    /// A camera as TOML or JSON: eye, target, up, vertical_fov_degrees, parallel_height [default: fits the data]
+    #[arg(long, value_name = "FILE")]
+    camera: Option<PathBuf>,
+    /// Array to colour by; `velocity` is a vector's length, `velocity:x` a component [default: what the file marks]
+    #[arg(long, value_name = "ARRAY")]
+    color_by: Option<String>,
+    /// Colour map: viridis, cool-warm, grey
+    #[arg(long, default_value = "viridis", value_name = "MAP", value_parser = render::colors)]
+    colors: String,
+    /// Scalars at the ends of the colour map [default: range of the data]
+    #[arg(long, value_name = "LOW,HIGH", value_parser = render::range, allow_hyphen_values = true)]
+    range: Option<[f32; 2]>,
+    /// Of image data [default: the middle of the range]
+    #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
+    isovalue: Option<f32>,
+    /// gradient, white, black, transparent
+    #[arg(long, default_value = "gradient", value_name = "NAME", value_parser = render::background)]
+    background: Background,
+    /// fast, watertight
+    #[arg(long, default_value = "watertight", value_name = "NAME", value_parser = render::robustness)]
+    robustness: Robustness,
+    /// Of the acceleration structure: fastest, fast, balanced, best
+    #[arg(long, default_value = "balanced", value_name = "NAME", value_parser = render::quality)]
+    quality: BuildQuality,
+}
 
-/// Runs the program. Exit codes: 0 done, 1 failed, 2 wrong usage.
+/// Options of `bench picture`.
+#[derive(Debug, Args)]
+struct PictureArgs {
+    /// wavelet, mixing-layer-outside, mixing-layer-inside, plasma, impact, star, glass
+    name: String,
+    /// The picture as PNG
+    #[arg(long, short, value_name = "PNG", required_unless_present = "exr")]
+    out: Option<PathBuf>,
+    /// The picture as OpenEXR
+    #[arg(long, value_name = "EXR")]
+    exr: Option<PathBuf>,
+    /// Pixels per row and rows
+    #[arg(long, default_value = "960x540", value_name = "WxH", value_parser = render::size)]
+    size: [u32; 2],
+    /// Samples per pixel
+    #[arg(long, default_value_t = 16, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    samples: u32,
+}
+
+/// Runs the program. Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted.
 pub fn main() -> ExitCode {
-    // clap prints its own errors and ends with 2.
-    let cli = Cli::parse();
-    match execute(cli) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(e) if is_broken_pipe(&e) => ExitCode::SUCCESS,
-        Err(e) => {
-            eprintln!("error: {e:#}");
-            ExitCode::from(if e.is::<UsageError>() { 2 } else { 1 })
-        }
-    }
+    run_main(|| execute(Cli::try_parse()?))
 }
 
 fn execute(cli: Cli) -> anyhow::Result<()> {
@@ -98,22 +149,12 @@ fn execute(cli: Cli) -> anyhow::Result<()> {
         None => run::everything_quick(common),
         Some(Command::List) => list::list(common),
         Some(Command::Run(args)) => run::run(common, &args),
-        Some(Command::Report(args)) => report::report(&args),
+        Some(Command::Report(args)) => report::report(common, &args),
+        Some(Command::Render(args)) => render::render(common, &args),
+        Some(Command::Picture(args)) => render::picture(common, &args),
         Some(Command::Peers) => peers::peers(common),
+        Some(Command::Completions(args)) => args.print::<Cli>(),
     }
-}
-
-/// A reader that closes early (`bench list | head`) is no failure.
-fn is_broken_pipe(e: &anyhow::Error) -> bool {
-    e.chain().any(|c| {
-        c.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
-    })
-}
-
-/// A line on standard output.
-fn print(line: &str) -> anyhow::Result<()> {
-    writeln!(std::io::stdout().lock(), "{line}")?;
-    Ok(())
 }
 
 /// Where records and reports go unless told otherwise: the build folder that this program lies in.

@@ -1,31 +1,42 @@
 //! `bench peers`.
 
-use super::{Common, print};
 use crate::peers::embree::{Embree, Version};
-use serde_json::json;
+use datasets::cli::CommonArgs;
+use serde::Serialize;
 
-pub(super) fn peers(common: Common) -> anyhow::Result<()> {
-    let mut rows = vec![];
-    for (name, version) in [("Embree 3", Version::V3), ("Embree 4", Version::V4)] {
-        rows.push(match Embree::load(version) {
-            Ok(e) => json!({ "name": name, "found": true, "version": e.version(), "path": e.path() }),
-            Err(e) => json!({ "name": name, "found": false, "reason": e.to_string() }),
-        });
-    }
-    rows.push(json!({ "name": "obvhs", "found": true, "version": "0.4", "path": "built in" }));
-    if common.json {
-        return print(&serde_json::to_string_pretty(&rows)?);
-    }
-    for r in &rows {
-        let text = |k: &str| r[k].as_str().unwrap_or_default();
-        if r["found"] == true {
-            print(&format!("{:9} {}  {}", text("name"), text("version"), text("path")))?;
-        } else {
-            print(&format!("{:9} missing: {}", text("name"), text("reason")))?;
+#[derive(Serialize)]
+struct Peer {
+    name: &'static str,
+    found: bool,
+    /// Of the library that was loaded.
+    version: Option<String>,
+    path: Option<String>,
+    /// Why it was not found, and the cure.
+    reason: Option<String>,
+}
+
+pub(super) fn peers(common: CommonArgs) -> anyhow::Result<()> {
+    let mut peers: Vec<Peer> = [("Embree 3", Version::V3), ("Embree 4", Version::V4)]
+        .into_iter()
+        .map(|(name, version)| match Embree::load(version) {
+            Ok(e) => {
+                let (version, path) = (Some(e.version().into()), Some(e.path().into()));
+                Peer { name, found: true, version, path, reason: None }
+            }
+            Err(e) => Peer { name, found: false, version: None, path: None, reason: Some(e.to_string()) },
+        })
+        .collect();
+    let (version, path) = (Some("0.4".into()), Some("built in".into()));
+    peers.push(Peer { name: "obvhs", found: true, version, path, reason: None });
+    common.result(&peers, || {
+        let mut text = String::new();
+        for p in &peers {
+            let part = |t: &Option<String>| t.clone().unwrap_or_default();
+            text += &match &p.reason {
+                None => format!("{:9} {}  {}\n", p.name, part(&p.version), part(&p.path)),
+                Some(reason) => format!("{:9} missing: {reason}\n", p.name),
+            };
         }
-    }
-    if !common.json {
-        print("`bench run peers` measures against them.")?;
-    }
-    Ok(())
+        text + "`bench run peers` measures against them."
+    })
 }

@@ -1,76 +1,80 @@
 //! `bench run`, and `bench` alone.
 
 use super::report::write_page;
-use super::{Common, RunArgs, UsageError, default_dir, print};
+use super::{RunArgs, default_dir};
 use crate::experiments::{self, Context, Experiment};
 use crate::record::Record;
-use std::path::PathBuf;
+use datasets::cli::{Cancel, CommonArgs, Interrupted, UsageError};
+use serde_json::json;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-pub(super) fn run(common: Common, args: &RunArgs) -> anyhow::Result<()> {
+pub(super) fn run(common: CommonArgs, args: &RunArgs) -> anyhow::Result<()> {
     let chosen = args.ids.iter().map(|id| find(id)).collect::<Result<Vec<_>, _>>()?;
     let dir = args.out.clone().unwrap_or_else(default_dir);
     let mut dirs = vec![dir.clone()];
     if args.record {
         dirs.push(runs_dir()?);
     }
-    let start = Instant::now();
-    let mut say = |what: &str| {
-        if !common.quiet {
-            eprintln!("{:6.1} s  {what}", start.elapsed().as_secs_f64());
-        }
+    let (start, cancel) = (Instant::now(), Cancel::on_ctrl_c()?);
+    let mut progress = |what: &str| {
+        common.note(0, format_args!("{:6.1} s  {what}", start.elapsed().as_secs_f64()));
+        Ok(cancel.check()?)
     };
-    let mut context = Context::new(args.quick, &mut say);
+    let mut context = Context::new(args.quick, &mut progress);
     for experiment in chosen {
         let record = experiments::run(experiment, &mut context)?;
         for dir in &dirs {
             record.write(dir)?;
         }
-        if common.json {
-            print(&serde_json::to_string(&record)?)?;
-        } else {
-            summary(&record)?;
-        }
+        common.result(&record, || summary(&record))?;
     }
-    let page = write_page(&dir, &dir.join("index.html"))?;
-    if !common.json {
-        print(&format!("report: {}", page.display()))?;
-    }
-    Ok(())
+    finish(common, &dir)
 }
 
 /// Every experiment in its quick form. One that fails is reported, and the others go on.
-pub(super) fn everything_quick(common: Common) -> anyhow::Result<()> {
+pub(super) fn everything_quick(common: CommonArgs) -> anyhow::Result<()> {
     let dir = default_dir();
-    let start = Instant::now();
+    let (start, cancel) = (Instant::now(), Cancel::on_ctrl_c()?);
     let mut failed = vec![];
     let count = experiments::ALL.len();
     for (i, experiment) in experiments::ALL.iter().enumerate() {
-        let mut say = |what: &str| {
-            if !common.quiet {
-                let secs = start.elapsed().as_secs_f64();
-                eprintln!("{secs:6.1} s  [{}/{count}] {}: {what}", i + 1, experiment.id);
-            }
+        let mut progress = |what: &str| {
+            let secs = start.elapsed().as_secs_f64();
+            common.note(0, format_args!("{secs:6.1} s  [{}/{count}] {}: {what}", i + 1, experiment.id));
+            Ok(cancel.check()?)
         };
-        match experiments::run(experiment, &mut Context::new(true, &mut say)) {
+        match experiments::run(experiment, &mut Context::new(true, &mut progress)) {
             Ok(record) => {
                 record.write(&dir)?;
                 if common.json {
-                    print(&serde_json::to_string(&record)?)?;
+                    common.result(&record, String::new)?;
                 }
             }
+            Err(e) if e.is::<Interrupted>() => {
+                // What was finished is worth its report.
+                finish(common, &dir)?;
+                return Err(e);
+            }
             Err(e) => {
-                eprintln!("error: {e:#}");
+                common.warn(format_args!("{e:#}"));
                 failed.push(experiment.id);
             }
         }
     }
-    let page = write_page(&dir, &dir.join("index.html"))?;
-    if !common.json {
-        print(&format!("report: {}", page.display()))?;
-    }
+    finish(common, &dir)?;
     anyhow::ensure!(failed.is_empty(), "these experiments failed: {}", failed.join(", "));
     Ok(())
+}
+
+/// Makes the report and says where it is: on standard output, or beside the progress where that carries JSON.
+fn finish(common: CommonArgs, dir: &Path) -> anyhow::Result<()> {
+    let page = write_page(dir, &dir.join("index.html"))?;
+    if common.json {
+        common.note(0, format_args!("report: {}", page.display()));
+        return Ok(());
+    }
+    common.result(&json!({}), || format!("report: {}", page.display()))
 }
 
 fn find(id: &str) -> Result<&'static Experiment, UsageError> {
@@ -80,17 +84,17 @@ fn find(id: &str) -> Result<&'static Experiment, UsageError> {
     })
 }
 
-/// The ratios, or how many rows there are.
-fn summary(r: &Record) -> anyhow::Result<()> {
-    print(&format!("{}: {} ({} rows, {:.1} s)", r.id, r.title, r.rows.len(), r.elapsed_secs))?;
+/// What is missing and the ratios.
+fn summary(r: &Record) -> String {
+    let mut text = format!("{}: {} ({} rows, {:.1} s)", r.id, r.title, r.rows.len(), r.elapsed_secs);
     for m in &r.missing {
-        print(&format!("  missing: {m}"))?;
+        text += &format!("\n  missing: {m}");
     }
     for x in &r.ratios {
         let low_high = format!("{:.2} to {:.2}", x.low, x.high);
-        print(&format!("  {:6.2}  ({low_high})  {}  against  {}", x.value, x.name, x.rival))?;
+        text += &format!("\n  {:6.2}  ({low_high})  {}  against  {}", x.value, x.name, x.rival);
     }
-    Ok(())
+    text
 }
 
 /// `bench/runs/DATE-MACHINE` of the repository that the working directory is in.

@@ -45,7 +45,7 @@ fn scene(
 ) -> anyhow::Result<()> {
     let mut built: Vec<(BuildQuality, Ours)> = vec![];
     for quality in BuildQuality::ALL {
-        context.say(format!("{name}: building, {}", quality.name()));
+        context.say(format!("{name}: building, {}", quality.name()))?;
         let options = BuildOptions { quality, ..Default::default() };
         let first = Ours::build(mesh, &options)?.cost;
         let mut ours = Ours::build(mesh, &options)?;
@@ -56,7 +56,7 @@ fn scene(
     let kinds = [Kind::Primary, Kind::AmbientOcclusion];
     for (kind, rays) in compare::make_rays(mesh, &view, pixels, &kinds, &built[0].1.view(Mode::Coherent)) {
         let rays = if context.quick { rays.thinned(1 << 18) } else { rays };
-        context.say(format!("{name}: {} rays", kind.name()));
+        context.say(format!("{name}: {} rays", kind.name()))?;
         let mode = if kind.coherent() { Mode::Coherent } else { Mode::Incoherent };
         let contenders: Vec<Contender<'_>> = built
             .iter()

@@ -93,7 +93,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             let ours = Ours::build(&case.mesh, &options)?;
             let base = base.clone().with("tracer", "rt-core").with("robustness", robustness.name());
             let views: [&dyn Tracer; 2] = [&ours.view(Mode::Single), &ours.view(Mode::Coherent)];
-            context.say(format!("{}: rt-core, {}", case.name, robustness.name()));
+            context.say(format!("{}: rt-core, {}", case.name, robustness.name()))?;
             record.rows.extend(shoot(case, &base, views, per_combination));
         }
         for e in &installed.embree {
@@ -101,7 +101,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
                 let options = Options { robust, ..Default::default() };
                 let scene = EmbreeScene::build(e, &case.mesh, &options)?;
                 let name = if robust { "robust" } else { "fast" };
-                context.say(format!("{}: {}, {name}", case.name, e.name()));
+                context.say(format!("{}: {}, {name}", case.name, e.name()))?;
                 let base = base.clone().with("tracer", e.name()).with("robustness", name);
                 record.rows.extend(shoot(
                     case,
@@ -111,7 +111,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
                 ));
             }
         }
-        context.say(format!("{}: obvhs", case.name));
+        context.say(format!("{}: obvhs", case.name))?;
         let peer = Obvhs::build(&case.mesh, Preset::Medium)?;
         let base = base.clone().with("tracer", "obvhs").with("robustness", "only");
         record.rows.extend(shoot(case, &base, [&peer, &peer], rivals));

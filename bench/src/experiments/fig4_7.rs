@@ -2,6 +2,7 @@
 
 use super::Context;
 use super::lineup::Installed;
+use crate::meshes;
 use crate::ours::Ours;
 use crate::peers::BuildCost;
 use crate::peers::embree::{EmbreeScene, Options, Quality};
@@ -40,29 +41,47 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
          node (2012)."
             .into(),
     );
-    let sizes: &[Size] = if context.quick { &[Size::M1] } else { &Size::ALL };
-    let rounds = if context.quick { 2 } else { 3 };
-    for &size in sizes {
-        if !fits_in_memory(size, record) {
-            continue;
+    if context.quick {
+        for points in [51, 101] {
+            let mesh = meshes::coarse_wavelet(points)?;
+            measure(context, record, &installed, &mesh, 3, false)?;
         }
-        let mesh = context.wavelet(size)?;
-        // Slow builders drop out where they would take minutes each.
-        let slow_too = size <= Size::M4;
-        let builders = builders(&mesh, &installed, slow_too && !context.quick);
-        let mut costs: Vec<Vec<BuildCost>> = vec![vec![]; builders.len()];
-        for round in 0..rounds {
-            context.say(format!("{} triangles, round {} of {rounds}", size.name(), round + 1));
-            for i in 0..builders.len() {
-                let i = (i + round) % builders.len();
-                costs[i].push(builders[i].1()?);
+        let mesh = context.wavelet(Size::M1)?;
+        measure(context, record, &installed, &mesh, 2, false)?;
+    } else {
+        for size in Size::ALL {
+            if fits_in_memory(size, record) {
+                let mesh = context.wavelet(size)?;
+                // Slow builders drop out where they would take minutes each.
+                measure(context, record, &installed, &mesh, 3, size <= Size::M4)?;
             }
-        }
-        for ((name, _), costs) in builders.iter().zip(&costs) {
-            record.rows.push(row(name, &mesh, costs));
         }
     }
     record.plots.push(plot(record));
+    Ok(())
+}
+
+/// Builds one mesh with everyone, in turns.
+fn measure(
+    context: &mut Context<'_>,
+    record: &mut Record,
+    installed: &Installed,
+    mesh: &Arc<TriMesh>,
+    rounds: usize,
+    slow_too: bool,
+) -> anyhow::Result<()> {
+    let builders = builders(mesh, installed, slow_too);
+    let mut costs: Vec<Vec<BuildCost>> = vec![vec![]; builders.len()];
+    for round in 0..rounds {
+        context.say(format!("{} triangles, round {} of {rounds}", mesh.num_triangles(), round + 1))?;
+        for i in 0..builders.len() {
+            let i = (i + round) % builders.len();
+            costs[i].push(builders[i].1()?);
+        }
+    }
+    for ((name, _), costs) in builders.iter().zip(&costs) {
+        record.rows.push(row(name, mesh, costs));
+    }
     Ok(())
 }
 
@@ -109,7 +128,7 @@ fn row(name: &str, mesh: &TriMesh, costs: &[BuildCost]) -> Row {
 }
 
 /// The largest sizes need up to 400 bytes per triangle while building; a machine without them reports it.
-fn fits_in_memory(size: Size, record: &mut Record) -> bool {
+pub(super) fn fits_in_memory(size: Size, record: &mut Record) -> bool {
     let needed_gib = size.triangles() as f64 * 400.0 / (1u64 << 30) as f64;
     let there_gib = record.machine.memory_gib;
     let fits = there_gib == 0.0 || needed_gib < 0.8 * there_gib;

@@ -87,16 +87,16 @@ impl Lineup {
         mesh: &Arc<TriMesh>,
         installed: &Installed,
         isa: Isa,
-        say: &mut dyn FnMut(&str),
+        say: &mut dyn FnMut(&str) -> anyhow::Result<()>,
     ) -> anyhow::Result<Lineup> {
         let mut lineup = Lineup { isa, ours: vec![], embree: vec![], obvhs: None };
         for robustness in [Robustness::Watertight, Robustness::Fast] {
-            say("building rt-core");
+            say("building rt-core")?;
             let options = BuildOptions { robustness, simd: isa.ours(), ..Default::default() };
             lineup.ours.push((format!("rt-core {}", robustness.name()), Ours::build(mesh, &options)?));
         }
         for e in &installed.embree {
-            say(&format!("building {}", e.name()));
+            say(&format!("building {}", e.name()))?;
             for robust in [true, false] {
                 let options = Options { robust, max_isa: isa.embree(), ..Options::default() };
                 let kind = if robust { "robust" } else { "fast" };
@@ -104,7 +104,7 @@ impl Lineup {
             }
         }
         if isa == Isa::Best {
-            say("building obvhs");
+            say("building obvhs")?;
             lineup.obvhs = Some(("obvhs CWBVH".into(), Obvhs::build(mesh, Preset::Medium)?));
         }
         Ok(lineup)

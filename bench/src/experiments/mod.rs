@@ -2,15 +2,19 @@
 
 mod accuracy_build;
 mod accuracy_robust;
+mod accuracy_sampling;
 mod compare;
+mod effects;
 mod fig4_7;
+mod fig4_9;
 mod lineup;
 mod peers;
+mod pictures;
 
 use crate::machine::Machine;
 use crate::record::Record;
 use crate::{meshes, runner};
-use anyhow::Context as _;
+use datasets::cli::Interrupted;
 use datasets::generate::nested_wavelet::Size;
 use rt_core::mesh::TriMesh;
 use std::collections::BTreeMap;
@@ -37,6 +41,24 @@ pub const ALL: &[Experiment] = &[
         run: fig4_7::run,
     },
     Experiment {
+        id: "fig4.9",
+        chapter: 4,
+        title: "Time of a frame against the number of triangles",
+        run: fig4_9::run,
+    },
+    Experiment {
+        id: "effects",
+        chapter: 4,
+        title: "What each effect costs, and that an unused one costs nothing",
+        run: effects::run,
+    },
+    Experiment {
+        id: "accuracy-sampling",
+        chapter: 4,
+        title: "Error against time of ambient occlusion, soft shadows and antialiasing, by sampling",
+        run: accuracy_sampling::run,
+    },
+    Experiment {
         id: "accuracy-build",
         chapter: 4,
         title: "What a better build costs and what rays gain by it",
@@ -54,6 +76,12 @@ pub const ALL: &[Experiment] = &[
         title: "Rays per second, builds and memory against Embree 3, Embree 4 and obvhs",
         run: peers::run,
     },
+    Experiment {
+        id: "pictures",
+        chapter: 4,
+        title: "The dissertation’s data sets in pictures, with the commands that draw them",
+        run: pictures::run,
+    },
 ];
 
 /// The experiment of that id.
@@ -65,19 +93,19 @@ pub fn find(id: &str) -> Option<&'static Experiment> {
 pub struct Context<'a> {
     /// Smaller data and fewer rounds: done within a minute on two cores.
     pub quick: bool,
-    /// Told what is being done.
-    pub progress: &'a mut dyn FnMut(&str),
+    /// Told what is done next; an error stops the experiment there.
+    pub progress: &'a mut dyn FnMut(&str) -> anyhow::Result<()>,
     wavelets: BTreeMap<Size, Arc<TriMesh>>,
 }
 
 impl<'a> Context<'a> {
     /// A context.
-    pub fn new(quick: bool, progress: &'a mut dyn FnMut(&str)) -> Context<'a> {
+    pub fn new(quick: bool, progress: &'a mut dyn FnMut(&str) -> anyhow::Result<()>) -> Context<'a> {
         Context { quick, progress, wavelets: BTreeMap::new() }
     }
 
-    fn say(&mut self, what: impl AsRef<str>) {
-        (self.progress)(what.as_ref());
+    fn say(&mut self, what: impl AsRef<str>) -> anyhow::Result<()> {
+        (self.progress)(what.as_ref())
     }
 
     /// The wavelet surfaces of a size. Those up to 4 million triangles are kept for the next experiment.
@@ -85,7 +113,7 @@ impl<'a> Context<'a> {
         if let Some(m) = self.wavelets.get(&size) {
             return Ok(m.clone());
         }
-        self.say(format!("making the wavelet surfaces of {} triangles", size.name()));
+        self.say(format!("making the wavelet surfaces of {} triangles", size.name()))?;
         let mesh = meshes::wavelet(size)?;
         if size <= Size::M4 {
             self.wavelets.insert(size, mesh.clone());
@@ -105,7 +133,10 @@ pub fn run(experiment: &Experiment, context: &mut Context<'_>) -> anyhow::Result
     let machine = Machine::describe();
     let Experiment { id, chapter, title, run } = *experiment;
     let mut record = Record::new(id, title, chapter, context.quick, machine);
-    run(context, &mut record).with_context(|| format!("experiment `{id}` failed"))?;
+    // Ctrl-C is no failure of the experiment.
+    run(context, &mut record).map_err(|e| {
+        if e.is::<Interrupted>() { e } else { e.context(format!("experiment `{id}` failed")) }
+    })?;
     record.elapsed_secs = start.elapsed().as_secs_f64();
     let unexplained = record.unexplained_columns();
     anyhow::ensure!(unexplained.is_empty(), "experiment `{id}` does not explain its columns {unexplained:?}");

@@ -96,7 +96,7 @@ fn scene(
             if rays.len == 0 {
                 continue;
             }
-            context.say(format!("{full_name}, {}: {} rays", view.name, kind.name()));
+            context.say(format!("{full_name}, {}: {} rays", view.name, kind.name()))?;
             let contenders = lineup.contenders(kind, !context.quick);
             let schedule = context.schedule(Schedule::one_thread(), 2.5);
             let timings = compare::time(&schedule, kind, &rays, &contenders)?;
@@ -141,6 +141,7 @@ fn plots(record: &mut Record) {
             Axis::linear("ratio, above 1 rt-core is faster", ""),
             kinds.clone(),
         );
+        plot.mark = Some(1.0);
         for (kind, ratio) in list {
             let rival = family(&ratio.rival);
             let x = kinds.iter().position(|k| *k == kind).unwrap_or(0) as f64;

@@ -99,17 +99,28 @@ pub struct Plot {
     pub categories: Vec<String>,
     /// What is drawn.
     pub series: Vec<Series>,
+    /// A value worth a line across, such as a ratio of 1.
+    #[serde(default)]
+    pub mark: Option<f64>,
 }
 
 impl Plot {
     /// An empty plot of lines.
     pub fn lines(title: &str, x: Axis, y: Axis) -> Plot {
-        Plot { title: title.into(), kind: Kind::Lines, x, y, categories: vec![], series: vec![] }
+        Plot { title: title.into(), kind: Kind::Lines, x, y, categories: vec![], series: vec![], mark: None }
     }
 
     /// An empty plot of bars.
     pub fn bars(title: &str, y: Axis, categories: Vec<String>) -> Plot {
-        Plot { title: title.into(), kind: Kind::Bars, x: Axis::linear("", ""), y, categories, series: vec![] }
+        Plot {
+            title: title.into(),
+            kind: Kind::Bars,
+            x: Axis::linear("", ""),
+            y,
+            categories,
+            series: vec![],
+            mark: None,
+        }
     }
 
     /// The plot as one `<svg>` element, 720 units wide, without references to anything outside.

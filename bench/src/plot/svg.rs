@@ -47,6 +47,7 @@ pub(super) fn draw(plot: &Plot) -> String {
         text(&mut s, LEFT - 6.0, at + 4.0, "end", "", &label(t));
     }
     let middle = (TOP + bottom) / 2.0;
+    let line_across = plot.mark.and_then(|m| y.at(m)).filter(|at| (TOP..=bottom).contains(at));
     let turn = format!("transform=\"rotate(-90 16 {middle:.0})\"");
     text(&mut s, 16.0, middle, "middle", &turn, &plot.y.caption());
     let frame = format_args!(
@@ -74,6 +75,11 @@ pub(super) fn draw(plot: &Plot) -> String {
             }
         }
         Kind::Bars => bars(&mut s, plot, &y, right, bottom),
+    }
+    if let Some(at) = line_across {
+        let line =
+            format!("<path d=\"M{LEFT} {at:.1}H{right}\" stroke=\"currentColor\" stroke-dasharray=\"5 4\"/>");
+        s.push_str(&line);
     }
     let caption_y = bottom + bottom_labels + 14.0;
     text(&mut s, (LEFT + right) / 2.0, caption_y, "middle", "", &plot.x.caption());
@@ -321,6 +327,17 @@ mod tests {
             no_number_is_nan(&svg);
             assert!(count(&svg, "svg") == 1);
         }
+    }
+
+    #[test]
+    fn a_mark_is_drawn_inside_the_frame_only() {
+        let mut p = Plot::bars("ratios", Axis::linear("ratio", ""), vec!["a".into()]);
+        p.series.push(Series::new("s", vec![(0.0, 2.0)]));
+        let without = count(&p.to_svg(), "path");
+        p.mark = Some(1.0);
+        assert_eq!(count(&p.to_svg(), "path"), without + 1);
+        p.mark = Some(50.0);
+        assert_eq!(count(&p.to_svg(), "path"), without);
     }
 
     #[test]

@@ -162,7 +162,7 @@ impl PlaneSource for Impact {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{open_or_flipped_edges, volume, with_threads};
+    use crate::testing::{open_or_flipped_edges, pieces, volume, with_threads};
 
     #[test]
     fn pieces_are_closed() {
@@ -177,8 +177,11 @@ mod tests {
     #[test]
     fn more_fragments_are_more_pieces() {
         let count =
-            |f| Impact::new(96, f, 1).surface(Options::default(), |_| true).unwrap().mesh.num_triangles();
-        assert!(count(400) > count(0) + 10_000, "{} {}", count(400), count(0));
+            |f| pieces(&Impact::new(96, f, 1).surface(Options::default(), |_| true).unwrap().mesh.indices);
+        let [none, many] = [0, 400].map(count);
+        // The plate and the ball touch; fragments smaller than a cell are not seen at this resolution.
+        assert_eq!(none, 1);
+        assert!(many > 60, "{many}");
     }
 
     #[test]

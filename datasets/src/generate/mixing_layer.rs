@@ -6,7 +6,8 @@
 //! The field is the share of the heavy gas, 0 above to 1 below. It falls linearly across a surface whose height is a
 //! sum of long waves (what the shock left behind) plus noise in octaves down to a few cells with Kolmogorov's
 //! amplitudes ∝ wavelength^(1/3). Where the noise's slope in z exceeds one the surface folds over, so its area grows
-//! faster than the square of the resolution, as in the simulation. Along x and y the field is periodic.
+//! faster than the square of the resolution, as in the simulation (measured: 0.18, 1.1, 6.8 and 42.5 million triangles at 128,
+//! 256, 512 and 1024 points). Along x and y the field is periodic.
 
 use super::noise::{Noise, RowScratch};
 use super::random::Random;

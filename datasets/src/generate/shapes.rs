@@ -119,12 +119,13 @@ pub fn torus(tube: f32, around: u32, across: u32) -> TriMesh {
 }
 
 /// An isosurface of the wavelet on `points`³ samples whose border is pulled below every isovalue, so that the surface
-/// is closed: an intricate solid with handles and cavities, in the cube of edge `points` - 1 around zero.
+/// is closed: an intricate solid with handles and cavities, within the cube from -1 to 1.
 pub fn closed_wavelet(points: u32, iso: f64) -> Result<TriMesh, isosurface::IsosurfaceError> {
     let points = points.clamp(3, 1 << 10);
     let w = Wavelet::with_points(points);
     let mut grid = w.grid().unwrap_or_else(|_| unreachable!("3 to 1024 points per axis are a valid extent"));
     let (n, last) = (points as usize, points as usize - 1);
+    (grid.origin, grid.spacing) = (DVec3::NEG_ONE, DVec3::splat(2.0 / last as f64));
     for (i, v) in grid.values.iter_mut().enumerate() {
         if [i % n, i / n % n, i / (n * n)].iter().any(|&c| c == 0 || c == last) {
             *v = f32::min(*v, iso as f32 - 100.0);
@@ -160,7 +161,9 @@ mod tests {
     #[test]
     fn closed_wavelet_is_watertight() {
         let mesh = closed_wavelet(31, 157.09).unwrap();
-        assert!(mesh.num_triangles() > 5000 && volume(&mesh) > 0.0);
+        assert!(mesh.num_triangles() > 5000 && (0.1..8.0).contains(&volume(&mesh)));
+        let b = mesh.bounds();
+        assert!(b.min.min_element() > -1.0 && b.max.max_element() < 1.0, "{b:?}");
         assert_eq!(open_or_flipped_edges(&mesh.indices), 0);
     }
 

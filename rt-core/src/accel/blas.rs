@@ -6,13 +6,13 @@
 
 use super::build::{LeafWriter, PrimRef, build_wide};
 use super::options::BuildOptions;
-use super::triangles::{ClosestTri, TriBvh};
+use super::triangles::{ClosestTri, TriBvh, widened};
 use super::wide::{ChildRef, Unit, WideBvh, write_id_leaf};
 use crate::math::{Aabb, exp2i};
 use crate::mesh::TriMesh;
 use crate::ray::Ray;
 use crate::shapes::Shape;
-use crate::traverse::single::{LeafTest, RaySetup, traverse};
+use crate::traverse::single::{LeafTest, RaySetup, beyond, traverse};
 use fearless_simd::Simd;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -101,7 +101,7 @@ impl Blas {
             .with_min_len(1 << 12)
             .filter_map(|i| {
                 let b = shape.bounds(i);
-                (!b.is_empty() && b.min.is_finite() && b.max.is_finite()).then(|| PrimRef::new(b, i))
+                (!b.is_empty() && b.min.is_finite() && b.max.is_finite()).then(|| PrimRef::new(widened(b), i))
             })
             .collect();
         let primitives = refs.len();
@@ -134,7 +134,7 @@ impl Blas {
                 let (setup, t_max) = (RaySetup::new(ray), ray.t_max);
                 let best = ClosestTri { t: t_max, u: 0.0, v: 0.0, prim: 0, found: false };
                 let mut leaves = ShapeLeaf { shape: &**shape, ray: *ray, best };
-                traverse::<S, _, true, true>(simd, bvh, &setup, t_max, &mut leaves);
+                traverse::<S, _, true>(simd, bvh, &setup, t_max, &mut leaves);
                 leaves.best
             }
         }
@@ -147,7 +147,7 @@ impl Blas {
             Content::Triangles(tris) => tris.occluded::<S, EXACT>(simd, ray),
             Content::Shape { bvh, shape } => {
                 let mut leaves = ShapeAny { shape: &**shape, ray: *ray, found: false };
-                traverse::<S, _, true, false>(simd, bvh, &RaySetup::new(ray), ray.t_max, &mut leaves);
+                traverse::<S, _, false>(simd, bvh, &RaySetup::new(ray), ray.t_max, &mut leaves);
                 leaves.found
             }
         }
@@ -162,7 +162,7 @@ struct ShapeLeaf<'a> {
 
 impl<S: Simd> LeafTest<S> for ShapeLeaf<'_> {
     #[inline(always)]
-    fn test(&mut self, _: S, units: &[Unit], leaf: ChildRef, t_max: &mut f32) -> bool {
+    fn test(&mut self, _: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool {
         for &prim in leaf_ids(units, leaf) {
             // Up to and including the best so far: a tie goes to the lower number, as with triangles.
             let ray = Ray { t_max: self.best.t.next_up(), ..self.ray };
@@ -170,7 +170,7 @@ impl<S: Simd> LeafTest<S> for ShapeLeaf<'_> {
             let b = &mut self.best;
             if h.t < b.t || (h.t == b.t && prim < b.prim) {
                 *b = ClosestTri { t: h.t, u: h.u, v: h.v, prim, found: true };
-                *t_max = h.t;
+                *skip_t = beyond(h.t);
             }
         }
         false

@@ -60,7 +60,9 @@ impl BuildQuality {
 /// What happens to rays through shared edges and vertices.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum Robustness {
-    /// Plain f32: about one ray in a thousand aimed exactly at an edge slips through.
+    /// Edge functions in f32 alone, zeros count as inside. Of 2.5·10⁷ rays aimed at vertices and edges of closed meshes none slipped through, but
+    /// nothing rules it out: a triangle whose edge functions all round to zero is missed. The other way round, a triangle 10⁷ times smaller than its
+    /// distance from the ray may be hit falsely when a large one shares its leaf.
     Fast,
     /// No ray passes between two triangles that share an edge or a vertex (Woop, Benthin and Wald 2013, with conservative boxes
     /// after Ize 2013).
@@ -105,6 +107,8 @@ pub struct BuildReport {
     pub skipped: usize,
     /// Bytes of nodes and leaves.
     pub bytes: usize,
+    /// Most nodes on the way from a geometry's root to a leaf.
+    pub depth: usize,
     /// What was done in another way than asked for, and why; empty as a rule.
     pub notes: Vec<String>,
 }

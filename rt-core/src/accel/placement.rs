@@ -63,10 +63,14 @@ impl Placement {
                 let object = p.as_dvec3() / frame.scale + frame.center;
                 world_from_object.transform_point3(object) - world_origin
             };
+            // Rays are rounded to f32 in local space, from up to 64 radii away in each axis, and so is their direction: off by at most 2⁻¹⁵ radii.
+            let rows = world_from_object.matrix3.transpose();
+            let stretch = DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
+            let margin = stretch / frame.scale * radius * (-15f64).exp2();
             let mut b = Aabb::EMPTY;
             for c in local_bounds.corners() {
                 let p = render_from_local(c);
-                b = b.union(Aabb::new(round_down(p), round_up(p)));
+                b = b.union(Aabb::new(round_down(p - margin), round_up(p + margin)));
             }
             b
         };
@@ -122,16 +126,27 @@ impl Placement {
         let o = self.local_from_render.transform_point3(ray.origin.as_dvec3());
         let d = self.local_from_render.transform_vector3(ray.dir.as_dvec3());
         let moved = if near(o) { 0.0 } else { distance_to_sphere(o, d, self.center, self.radius) };
-        // A moved ray starts before the geometry, so that nothing of it is lost when t_min lies behind.
-        let limits = |t: f32| if moved == 0.0 { t } else { (t as f64 - moved) as f32 };
-        let local = Ray {
-            origin: (o + d * moved).as_vec3(),
-            dir: d.as_vec3(),
-            t_min: limits(ray.t_min).max(0.0),
-            t_max: limits(ray.t_max),
+        let (t_min, t_max) = if moved == 0.0 {
+            (ray.t_min, ray.t_max)
+        } else {
+            // A moved ray starts before the geometry, so that nothing of it is lost when t_min lies behind.
+            (moved_limit(ray.t_min, moved).max(0.0), moved_limit(ray.t_max, moved))
         };
+        let local = Ray { origin: (o + d * moved).as_vec3(), dir: d.as_vec3(), t_min, t_max };
         (local, moved)
     }
+}
+
+/// A limit on a moved ray: x below it are those with `(x as f64 + moved) as f32 < t`, so that the range is half-open in the numbers that callers see.
+fn moved_limit(t: f32, moved: f64) -> f32 {
+    if t == f32::INFINITY {
+        return t;
+    }
+    // Sums below the middle between t and its predecessor round to less than t; 2⁻⁵¹ for the rounding of the sum in f64.
+    let middle = 0.5 * (t as f64 + t.next_down() as f64);
+    let x = middle - moved - middle.abs() * 2.0 * f64::EPSILON;
+    let f = x as f32;
+    if (f as f64) < x { f.next_up() } else { f }
 }
 
 /// The parameter just before the line meets the sphere, or of its closest approach when it does not; at least 0.

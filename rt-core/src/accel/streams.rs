@@ -1,18 +1,19 @@
-//! Many rays in one call: packets for rays that go the same way, sorting for rays that do not.
+//! Many rays in one call: packets for rays that go the same way, shared beginnings for rays that do not.
 
 use super::blas::{Blas, Content, leaf_ids};
 use super::options::Robustness;
 use super::placement::Placement;
 use super::wide::ChildRef;
-use super::world::World;
-use crate::ray::{HitBlock, LANES, NO_HIT, Ray, RayBlock};
+use super::world::{ORDINARY_LENGTHS, World, with_ordinary_length};
+use crate::ray::{Hit, HitBlock, LANES, NO_HIT, Ray, RayBlock};
 use crate::stats::{Work, count};
+use crate::traverse::hybrid;
 use crate::traverse::packet::{GROUPS, Packet};
-use fearless_simd::{Simd, dispatch};
+use fearless_simd::{Simd, SimdBase, SimdMask, dispatch, f32x16, mask32x16};
 use std::cell::RefCell;
 
-/// Blocks that are sorted by direction together.
-const SORT_BLOCKS: usize = 256;
+/// Blocks whose occlusion is gathered at a time.
+const CHUNK: usize = 256;
 
 /// Per-thread buffers: a packet is 24 KiB, too much to clear for every call.
 struct Scratch {
@@ -25,16 +26,6 @@ struct Scratch {
     local_hits: Vec<HitBlock>,
     candidates: Vec<(f32, ChildRef)>,
     order: Vec<(f32, u32)>,
-    sort: SortBuffers,
-}
-
-#[derive(Default)]
-struct SortBuffers {
-    /// Sorted place of each ray, as block · 16 + lane in the caller's arrays.
-    source: Vec<u32>,
-    keys: Vec<u16>,
-    rays: Vec<RayBlock>,
-    hits: Vec<HitBlock>,
 }
 
 thread_local! {
@@ -46,7 +37,6 @@ thread_local! {
         local_hits: Vec::new(),
         candidates: Vec::new(),
         order: Vec::new(),
-        sort: SortBuffers::default(),
     });
 }
 
@@ -56,43 +46,43 @@ impl World {
     ///
     /// The answers are those of [`World::closest`], bit for bit. Rays beyond the shorter of the two slices are not traced.
     pub fn closest_coherent(&self, rays: &[RayBlock], hits: &mut [HitBlock]) {
-        self.with_scratch::<false>(rays, hits, false);
+        self.with_scratch::<false>(rays, hits, true);
     }
 
     /// Occlusion of many similar rays: bit `lane` of `out[block]` is set when that ray is blocked.
     pub fn occluded_coherent(&self, rays: &[RayBlock], out: &mut [u16]) {
-        self.occluded_stream(rays, out, false);
+        self.occluded_stream(rays, out, true);
     }
 
-    /// As [`World::closest_coherent`] for rays in any direction (ambient occlusion, glossy and path tracing): they are reordered by
-    /// direction inside, and the answers come back in the caller's order. Best with a thousand rays or more from nearby points.
+    /// As [`World::closest_coherent`] for rays in any direction (ambient occlusion, glossy and path tracing). Rays of one block should start close to
+    /// one another: they share the way through the tree as long as it is the same.
     pub fn closest_incoherent(&self, rays: &[RayBlock], hits: &mut [HitBlock]) {
-        self.with_scratch::<false>(rays, hits, true);
+        self.with_scratch::<false>(rays, hits, false);
     }
 
     /// As [`World::occluded_coherent`] for rays in any direction.
     pub fn occluded_incoherent(&self, rays: &[RayBlock], out: &mut [u16]) {
-        self.occluded_stream(rays, out, true);
+        self.occluded_stream(rays, out, false);
     }
 
-    fn occluded_stream(&self, rays: &[RayBlock], out: &mut [u16], sort: bool) {
-        let mut hits = [HitBlock::MISS; SORT_BLOCKS];
-        for (rays, out) in rays.chunks(SORT_BLOCKS).zip(out.chunks_mut(SORT_BLOCKS)) {
+    fn occluded_stream(&self, rays: &[RayBlock], out: &mut [u16], coherent: bool) {
+        let mut hits = [HitBlock::MISS; CHUNK];
+        for (rays, out) in rays.chunks(CHUNK).zip(out.chunks_mut(CHUNK)) {
             let hits = &mut hits[..rays.len().min(out.len())];
-            self.with_scratch::<true>(rays, hits, sort);
+            self.with_scratch::<true>(rays, hits, coherent);
             for (o, h) in out.iter_mut().zip(hits) {
                 *o = (0..LANES).fold(0, |m, l| m | ((h.prim[l] != NO_HIT) as u16) << l);
             }
         }
     }
 
-    fn with_scratch<const ANY: bool>(&self, rays: &[RayBlock], hits: &mut [HitBlock], sort: bool) {
+    fn with_scratch<const ANY: bool>(&self, rays: &[RayBlock], hits: &mut [HitBlock], coherent: bool) {
         SCRATCH.with_borrow_mut(|scratch| match self.robustness {
             Robustness::Fast => {
-                dispatch!(self.level, simd => self.stream::<_, false, ANY>(simd, rays, hits, sort, scratch))
+                dispatch!(self.level, simd => self.stream::<_, false, ANY>(simd, rays, hits, coherent, scratch))
             }
             Robustness::Watertight => {
-                dispatch!(self.level, simd => self.stream::<_, true, ANY>(simd, rays, hits, sort, scratch))
+                dispatch!(self.level, simd => self.stream::<_, true, ANY>(simd, rays, hits, coherent, scratch))
             }
         });
     }
@@ -102,31 +92,45 @@ impl World {
         simd: S,
         rays: &[RayBlock],
         hits: &mut [HitBlock],
-        sort: bool,
+        coherent: bool,
         scratch: &mut Scratch,
     ) {
-        if !sort {
-            for (r, h) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {
-                self.blocks::<S, EXACT, ANY>(simd, &r[..h.len()], h, scratch);
+        for (r, h) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {
+            let n = r.len().min(h.len());
+            let (r, h) = (&r[..n], &mut h[..n]);
+            h.fill(HitBlock::MISS);
+            if any_unusual_length(simd, r) {
+                self.one_by_one::<S, EXACT, ANY>(simd, r, h);
+            } else if coherent {
+                self.blocks::<S, EXACT, ANY>(simd, r, h, scratch);
+            } else {
+                self.incoherent_blocks::<S, EXACT, ANY>(simd, r, h, scratch);
             }
-            return;
         }
-        for (r, h) in rays.chunks(SORT_BLOCKS).zip(hits.chunks_mut(SORT_BLOCKS)) {
-            let mut buffers = std::mem::take(&mut scratch.sort);
-            let classes = buffers.sort(&r[..h.len()]);
-            let mut first = 0;
-            for n in classes {
-                // A class starts a new block, so no packet mixes classes.
-                let last = first + n.div_ceil(LANES);
-                for at in (first..last).step_by(GROUPS) {
-                    let end = last.min(at + GROUPS);
-                    let (r, h) = (&buffers.rays[at..end], &mut buffers.hits[at..end]);
-                    self.blocks::<S, EXACT, ANY>(simd, r, h, scratch);
+    }
+
+    /// Blocks of rays in any direction.
+    fn incoherent_blocks<S: Simd, const EXACT: bool, const ANY: bool>(
+        &self,
+        simd: S,
+        rays: &[RayBlock],
+        hits: &mut [HitBlock],
+        scratch: &mut Scratch,
+    ) {
+        match self.placements.as_slice() {
+            [only] => {
+                if let Content::Triangles(tris) = &self.blas[only.geometry].content
+                    && only.accepts_blocks(simd, rays)
+                {
+                    for (r, h) in rays.iter().zip(hits) {
+                        let active = hybrid::active_lanes(r);
+                        hybrid::trace::<S, EXACT, ANY>(simd, &tris.bvh, r, active, h, 0);
+                    }
+                } else {
+                    self.instance_blocks::<S, EXACT, ANY>(simd, 0, rays, hits, scratch, false);
                 }
-                first = last;
             }
-            buffers.scatter(h);
-            scratch.sort = buffers;
+            _ => self.one_by_one::<S, EXACT, ANY>(simd, rays, hits),
         }
     }
 
@@ -138,11 +142,10 @@ impl World {
         hits: &mut [HitBlock],
         scratch: &mut Scratch,
     ) {
-        hits.fill(HitBlock::MISS);
         if let [only] = self.placements.as_slice() {
             let blas = &self.blas[only.geometry];
             if let Content::Triangles(_) = blas.content {
-                self.instance_blocks::<S, EXACT, ANY>(simd, 0, rays, hits, scratch);
+                self.instance_blocks::<S, EXACT, ANY>(simd, 0, rays, hits, scratch, true);
                 return;
             }
         }
@@ -157,7 +160,7 @@ impl World {
             }
             order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             for &(_, instance) in &order {
-                self.instance_blocks::<S, EXACT, ANY>(simd, instance, rays, hits, scratch);
+                self.instance_blocks::<S, EXACT, ANY>(simd, instance, rays, hits, scratch, true);
             }
             scratch.order = order;
             return;
@@ -178,12 +181,14 @@ impl World {
                     continue;
                 }
                 count(Work::Fallbacks, 1);
+                let (ray, unit) = with_ordinary_length(&ray);
                 if ANY {
                     if self.occluded_in::<S, EXACT>(simd, &ray) {
                         h.prim[lane] = 0;
                     }
                 } else {
-                    h.set(lane, self.closest_in::<S, EXACT>(simd, &ray));
+                    let hit = self.closest_in::<S, EXACT>(simd, &ray);
+                    h.set(lane, hit.map(|c| Hit { t: c.t * unit, ..c }));
                 }
             }
         }
@@ -197,11 +202,12 @@ impl World {
         rays: &[RayBlock],
         hits: &mut [HitBlock],
         scratch: &mut Scratch,
+        coherent: bool,
     ) {
         let placement = &self.placements[instance as usize];
         let blas = &self.blas[placement.geometry];
         let alone = self.placements.len() == 1;
-        if alone && placement.accepts_blocks(simd, rays) {
+        if coherent && alone && placement.accepts_blocks(simd, rays) {
             blas_blocks::<S, EXACT, ANY>(simd, blas, rays, hits, instance, &mut scratch.inner);
             return;
         }
@@ -233,6 +239,26 @@ impl World {
             }
         }
     }
+}
+
+/// Whether an active ray's direction is so short or long that single rays rescale it; NaN is not, it is left to the packet.
+#[inline(never)]
+fn any_unusual_length<S: Simd>(simd: S, rays: &[RayBlock]) -> bool {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let row = |r: &[f32; LANES]| f32x16::from_slice(simd, r);
+            let shortest = f32x16::splat(simd, *ORDINARY_LENGTHS.start());
+            let longest = f32x16::splat(simd, *ORDINARY_LENGTHS.end());
+            let mut unusual = mask32x16::splat(simd, false);
+            for r in rays {
+                let m = row(&r.dx).abs().max(row(&r.dy).abs()).max(row(&r.dz).abs());
+                let active = row(&r.t_max).simd_gt(row(&r.t_min));
+                unusual |= (m.simd_lt(shortest) | m.simd_gt(longest)) & active;
+            }
+            unusual.any_true()
+        },
+    )
 }
 
 /// The rays in an instance's local space, limited to what is nearer than `hits`.
@@ -330,98 +356,4 @@ fn singles<S: Simd, const EXACT: bool, const ANY: bool>(
             }
         }
     }
-}
-
-/// Cells per octant and dominant axis: 2 × 2 over the two slopes.
-const CELLS: usize = 4;
-const CLASSES: usize = 24;
-
-impl SortBuffers {
-    /// Sorts the active rays by direction. Returns the number of rays in each class (octant and dominant axis); a class's rays begin a new
-    /// block in `rays`, ordered by cell and then as given.
-    fn sort(&mut self, blocks: &[RayBlock]) -> [usize; CLASSES] {
-        const KEYS: usize = CLASSES * CELLS;
-        let mut counts = [0u32; KEYS + 1];
-        self.keys.clear();
-        for b in blocks {
-            for lane in 0..LANES {
-                let key = if b.t_max[lane] > b.t_min[lane] {
-                    direction_key([b.dx[lane], b.dy[lane], b.dz[lane]])
-                } else {
-                    KEYS
-                };
-                counts[key] += 1;
-                self.keys.push(key as u16);
-            }
-        }
-        // ---- Places: cells in order, classes rounded up to whole blocks.
-        let mut classes = [0usize; CLASSES];
-        let mut place = [0u32; KEYS + 1];
-        let mut next = 0u32;
-        for class in 0..CLASSES {
-            next = next.next_multiple_of(LANES as u32);
-            for cell in 0..CELLS {
-                let k = class * CELLS + cell;
-                place[k] = next;
-                next += counts[k];
-                classes[class] += counts[k] as usize;
-            }
-        }
-        let total = (next as usize).div_ceil(LANES);
-        self.rays.clear();
-        self.rays.resize(total, RayBlock::INACTIVE);
-        self.hits.resize(total.max(self.hits.len()), HitBlock::MISS);
-        self.source.clear();
-        self.source.resize(self.keys.len(), u32::MAX);
-        for (i, &key) in self.keys.iter().enumerate() {
-            if key as usize == KEYS {
-                continue;
-            }
-            let to = place[key as usize] as usize;
-            place[key as usize] += 1;
-            let (from, lane) = (&blocks[i / LANES], i % LANES);
-            let (out, slot) = (&mut self.rays[to / LANES], to % LANES);
-            out.ox[slot] = from.ox[lane];
-            out.oy[slot] = from.oy[lane];
-            out.oz[slot] = from.oz[lane];
-            out.dx[slot] = from.dx[lane];
-            out.dy[slot] = from.dy[lane];
-            out.dz[slot] = from.dz[lane];
-            out.t_min[slot] = from.t_min[lane];
-            out.t_max[slot] = from.t_max[lane];
-            self.source[i] = to as u32;
-        }
-        classes
-    }
-
-    /// Puts the answers where the caller's rays were.
-    fn scatter(&self, out: &mut [HitBlock]) {
-        for (block, sources) in out.iter_mut().zip(self.source.chunks(LANES)) {
-            for (lane, &s) in sources.iter().enumerate() {
-                if s == u32::MAX {
-                    block.set(lane, None);
-                    continue;
-                }
-                let (h, slot) = (&self.hits[s as usize / LANES], s as usize % LANES);
-                block.t[lane] = h.t[slot];
-                block.u[lane] = h.u[slot];
-                block.v[lane] = h.v[slot];
-                block.prim[lane] = h.prim[slot];
-                block.instance[lane] = h.instance[slot];
-            }
-        }
-    }
-}
-
-/// Class (dominant axis and octant) times the number of cells, plus the cell of the slopes. NaN falls into some class; it is sorted out later.
-#[inline(always)]
-fn direction_key(d: [f32; 3]) -> usize {
-    let kz = crate::intersect::watertight::dominant_axis(d);
-    let (kx, ky) = ([1, 2, 0][kz], [2, 0, 1][kz]);
-    let octant = (d[0].is_sign_negative() as usize)
-        | (d[1].is_sign_negative() as usize) << 1
-        | (d[2].is_sign_negative() as usize) << 2;
-    let half = 0.5 * d[kz].abs();
-    let cell = (d[kx].abs() > half) as usize | ((d[ky].abs() > half) as usize) << 1;
-    (kz * 8 + octant) * CELLS + cell
 }

@@ -121,13 +121,6 @@ pub(crate) fn set_box(node: &mut [Unit], slot: usize, b: Aabb) {
     }
 }
 
-/// The box of child `slot`.
-pub(crate) fn get_box(node: &[Unit], slot: usize) -> Aabb {
-    let lo = Vec3::from_array(std::array::from_fn(|a| node[2 * a].0[slot]));
-    let hi = Vec3::from_array(std::array::from_fn(|a| node[2 * a + 1].0[slot]));
-    Aabb::new(lo, hi)
-}
-
 /// Writes the ids of a leaf whose primitives are looked up elsewhere (shapes, instances): one unit.
 pub(crate) fn write_id_leaf(out: &mut [Unit], ids: impl Iterator<Item = u32>) {
     let row = out[0].bits_mut();
@@ -135,4 +128,11 @@ pub(crate) fn write_id_leaf(out: &mut [Unit], ids: impl Iterator<Item = u32>) {
     for (slot, id) in row.iter_mut().zip(ids) {
         *slot = id;
     }
+}
+
+/// The box of child `slot`.
+pub(crate) fn get_box(node: &[Unit], slot: usize) -> Aabb {
+    let lo = Vec3::from_array(std::array::from_fn(|a| node[2 * a].0[slot]));
+    let hi = Vec3::from_array(std::array::from_fn(|a| node[2 * a + 1].0[slot]));
+    Aabb::new(lo, hi)
 }

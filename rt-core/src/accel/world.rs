@@ -10,7 +10,7 @@ use crate::mesh::{MeshError, TriMesh};
 use crate::ray::{Hit, Ray};
 use crate::shapes::Shape;
 use crate::simd::SimdLevel;
-use crate::traverse::single::{LeafTest, RaySetup, traverse};
+use crate::traverse::single::{LeafTest, RaySetup, beyond, traverse};
 use fearless_simd::{Level, Simd, dispatch};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use std::sync::Arc;
@@ -128,6 +128,7 @@ impl World {
         let report = BuildReport {
             total: start.elapsed(),
             phases,
+            depth: blas.iter().map(|b| b.bvh().depth).max().unwrap_or(0),
             primitives: blas.iter().map(|b| b.primitives).sum(),
             skipped: blas.iter().map(|b| b.skipped).sum(),
             bytes: (tlas.units.len() + blas.iter().map(|b| b.bvh().units.len()).sum::<usize>())
@@ -255,7 +256,7 @@ impl World {
             }
             _ => {
                 let setup = RaySetup::new(ray);
-                traverse::<S, _, true, true>(simd, &self.tlas, &setup, ray.t_max, &mut leaves);
+                traverse::<S, _, true>(simd, &self.tlas, &setup, ray.t_max, &mut leaves);
             }
         }
         leaves.best
@@ -273,7 +274,7 @@ impl World {
             1 => leaves.found = self.instance_occluded::<S, EXACT>(simd, 0, ray),
             _ => {
                 let setup = RaySetup::new(ray);
-                traverse::<S, _, true, false>(simd, &self.tlas, &setup, ray.t_max, &mut leaves);
+                traverse::<S, _, false>(simd, &self.tlas, &setup, ray.t_max, &mut leaves);
             }
         }
         leaves.found
@@ -286,11 +287,14 @@ impl World {
     }
 }
 
+/// Largest components of directions that are traced as they are.
+pub(super) const ORDINARY_LENGTHS: std::ops::RangeInclusive<f32> = 1e-4..=1e4;
+
 /// Rays whose direction is neither tiny nor huge pass unchanged; others are scaled by a power of two. The second value turns the scaled
 /// ray's `t` back.
-fn with_ordinary_length(ray: &Ray) -> (Ray, f32) {
+pub(super) fn with_ordinary_length(ray: &Ray) -> (Ray, f32) {
     let m = max_abs(ray.dir);
-    if (1e-4..=1e4).contains(&m) {
+    if ORDINARY_LENGTHS.contains(&m) {
         return (*ray, 1.0);
     }
     let e = (m.log2().round() as i32).clamp(-125, 125);
@@ -365,12 +369,12 @@ struct InstanceClosest<'w, const EXACT: bool> {
 }
 
 impl<const EXACT: bool> InstanceClosest<'_, EXACT> {
-    fn try_instance<S: Simd>(&mut self, simd: S, instance: u32, t_max: &mut f32) {
+    fn try_instance<S: Simd>(&mut self, simd: S, instance: u32, skip_t: &mut f32) {
         let p = &self.world.placements[instance as usize];
         // One step beyond the best so far: a tie may go to this instance.
-        let limit = if self.best.is_some() { t_max.next_up() } else { *t_max };
+        let limit = self.best.map_or(self.ray.t_max, |b| b.t.next_up());
         let (local, moved) = p.enter(&Ray { t_max: limit, ..self.ray });
-        if !(local.t_max > local.t_min) {
+        if local.t_max <= local.t_min {
             return;
         }
         let c = self.world.blas[p.geometry].closest::<S, EXACT>(simd, &local);
@@ -381,15 +385,15 @@ impl<const EXACT: bool> InstanceClosest<'_, EXACT> {
         let better = self.best.is_none_or(|b| t < b.t || (t == b.t && instance < b.instance));
         if better {
             self.best = Some(Hit { t, u: c.u, v: c.v, prim: c.prim, instance });
-            *t_max = t;
+            *skip_t = beyond(t);
         }
     }
 }
 
 impl<S: Simd, const EXACT: bool> LeafTest<S> for InstanceClosest<'_, EXACT> {
-    fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, t_max: &mut f32) -> bool {
+    fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool {
         for &i in leaf_ids(units, leaf) {
-            self.try_instance(simd, i, t_max);
+            self.try_instance(simd, i, skip_t);
         }
         false
     }

@@ -75,27 +75,36 @@ where
     let mut u = cx * by - cy * bx;
     let mut v = ax * cy - ay * cx;
     let mut w = bx * ay - by * ax;
+    // All of one sign, zeros included.
+    let mut inside = one_sign(simd, u, v, w);
+    if !inside.any_true() {
+        return None;
+    }
     if EXACT {
-        let undecided = u.simd_eq(zero) | v.simd_eq(zero) | w.simd_eq(zero);
+        // A zero matters only where the other two agree in sign: then it is the smallest or the largest of the three.
+        let undecided = inside & (u.min(v).min(w).simd_eq(zero) | u.max(v).max(w).simd_eq(zero));
         if undecided.any_true() {
             // Only those lanes: the others keep the bits they would have in any other company.
             u = undecided.select(exact(simd, cx, by, cy, bx), u);
             v = undecided.select(exact(simd, ax, cy, ay, cx), v);
             w = undecided.select(exact(simd, bx, ay, by, ax), w);
+            inside &= one_sign(simd, u, v, w);
         }
-    }
-    // All of one sign, zeros included.
-    let lowest = u.min(v).min(w);
-    let highest = u.max(v).max(w);
-    let inside = lowest.simd_ge(zero) | highest.simd_le(zero);
-    if !inside.any_true() {
-        return None;
     }
     let det = u + v + w;
     let inside = inside & det.simd_ne(zero);
-    let t = (u * a[2] + v * b[2] + w * c[2]) * sz / det;
+    // Weights first: products of tiny edge functions and distances would underflow, and t with them.
     let scale = V::splat(simd, 1.0) / det;
-    Some(Candidate { inside, t, u: v * scale, v: w * scale })
+    let (u, v, w) = (u * scale, v * scale, w * scale);
+    let t = (u * a[2] + v * b[2] + w * c[2]) * sz;
+    Some(Candidate { inside, t, u: v, v: w })
+}
+
+/// Lanes in which no two of the three have opposite signs.
+#[inline(always)]
+fn one_sign<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, u: V, v: V, w: V) -> V::Mask {
+    let zero = V::splat(simd, 0.0);
+    u.min(v).min(w).simd_ge(zero) | u.max(v).max(w).simd_le(zero)
 }
 
 /// p·q − r·s from exact f64 products, rounded to f32: zero only when the difference is. Out of line and in scalar code: it runs for one ray in

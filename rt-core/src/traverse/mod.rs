@@ -1,4 +1,5 @@
 //! Traversal of the 8-wide hierarchy.
 
+pub(crate) mod hybrid;
 pub(crate) mod packet;
 pub(crate) mod single;

@@ -9,11 +9,24 @@ use crate::simd::{Stack, StackMemory, prefetch};
 use crate::stats::{Work, count};
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x8};
 
-/// Relative widening of a box's far distance so that rounding never closes it: 1 + 2γ₃ (Ize, "Robust BVH Ray Traversal", JCGT 2013).
-pub(crate) const BOX_SLACK: f32 = 1.0 + 2.0 * crate::math::gamma(3);
+/// Relative widening of a box's far distance, 16 u with u = 2⁻²⁴, so that a box is never missed whose triangle the ray meets.
+///
+/// Ize ("Robust BVH Ray Traversal", JCGT 2013) has 6 u for the slab test by itself. The triangle test shears with a slope that carries roundings of
+/// its own, which turns the ray against the slabs by 3 u at either end, and multiplying with this factor rounds once more. What the triangle test
+/// loses in proportion to the triangle instead of the distance is in the boxes: [`crate::accel::triangles::widened`]. So boxes decide nothing: single
+/// rays, packets and every tree give the same answer.
+pub(crate) const BOX_SLACK: f32 = 1.0 + 8.0 * f32::EPSILON;
 
-/// Smallest direction component as it enters a reciprocal: keeps 0·∞ out of the slab test while a ray in a box plane still counts as inside.
-pub(crate) const MIN_COMPONENT: f32 = 1e-18;
+/// A little beyond `t`, for skipping boxes: a triangle's `t` and its box's distance round differently, and of two surfaces at the same place both must
+/// be seen for the lower number to win.
+#[inline(always)]
+pub(crate) fn beyond(t: f32) -> f32 {
+    t * (1.0 + 32.0 * f32::EPSILON)
+}
+
+/// Smallest direction component as it enters a reciprocal, 2⁻¹²⁴: the reciprocal is finite, which keeps 0·∞ out of the slab test. Not larger: local
+/// space of a mesh of size 10²⁵ has directions of 10⁻²⁵.
+pub(crate) const MIN_COMPONENT: f32 = 4.0 * f32::MIN_POSITIVE;
 
 /// What a ray needs in every step, computed once.
 #[derive(Debug, Clone, Copy)]
@@ -45,16 +58,17 @@ impl RaySetup {
 
 /// What happens at a leaf.
 pub(crate) trait LeafTest<S: Simd> {
-    /// Tests the primitives of `leaf`; lowers `t_max` to the closest hit so far. Returns true when the search is over.
-    fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, t_max: &mut f32) -> bool;
+    /// Tests the primitives of `leaf`; lowers `skip_t`, the distance from which boxes are skipped, to [`beyond`] the closest hit so far. Returns true when
+    /// the search is over.
+    fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool;
 }
 
-/// Walks the leaves whose boxes the ray meets before `t_max`. `CONSERVATIVE` widens boxes by their rounding error; `ORDERED` goes to the nearest
+/// Walks the leaves whose boxes the ray meets before `t_max`, widened by rounding errors in every mode: it costs nothing. `ORDERED` goes to the nearest
 /// child first (any-hit queries do not care).
 ///
 /// Never inlined: one body per instruction set, leaf kind and mode. Inlined into its callers it multiplied the compile time by thirty.
 #[inline(never)]
-pub(crate) fn traverse<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, const ORDERED: bool>(
+pub(crate) fn traverse<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
     simd: S,
     bvh: &WideBvh,
     ray: &RaySetup,
@@ -63,34 +77,49 @@ pub(crate) fn traverse<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, const 
 ) {
     simd.vectorize(
         #[inline(always)]
-        || traverse_body::<S, L, CONSERVATIVE, ORDERED>(simd, bvh, ray, t_max, leaves),
+        || traverse_body::<S, L, ORDERED>(simd, bvh, ray, t_max, leaves),
     );
 }
 
+/// [`traverse`] without its own function, for callers that have the instruction set already.
 #[inline(always)]
-pub(crate) fn traverse_body<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, const ORDERED: bool>(
+pub(crate) fn traverse_body<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
     simd: S,
     bvh: &WideBvh,
     ray: &RaySetup,
-    mut t_max: f32,
+    t_max: f32,
+    leaves: &mut L,
+) {
+    traverse_from::<S, L, ORDERED>(simd, bvh, ray, t_max, ChildRef::node(0), leaves);
+}
+
+/// The subtree at `start`.
+#[inline(always)]
+pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
+    simd: S,
+    bvh: &WideBvh,
+    ray: &RaySetup,
+    t_max: f32,
+    start: ChildRef,
     leaves: &mut L,
 ) {
     let units = bvh.units.as_slice();
+    let mut skip_t = beyond(t_max);
     let origin: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.origin[a]));
     let rcp: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.rcp[a]));
     let t_min = f32x8::splat(simd, ray.t_min);
     // The slack enters the far planes' reciprocals, which costs nothing in the loop. Far distances below zero never matter: t_min is not below.
-    let slack = f32x8::splat(simd, if CONSERVATIVE { BOX_SLACK } else { 1.0 });
+    let slack = f32x8::splat(simd, BOX_SLACK);
     let rcp_far: [f32x8<S>; 3] = three!(|a| rcp[a] * slack);
     let [nx, ny, nz] = ray.near;
     // Distance in the high half, so that integer order is order of distance; t_min >= 0 keeps it non-negative.
     let mut memory = StackMemory::<u64, STACK_SIZE>::new();
     let mut stack = Stack::empty(&mut memory);
-    let mut current = ChildRef::node(0);
+    let mut current = start;
     loop {
         if current.is_leaf() {
             count(Work::Leaves, 1);
-            if leaves.test(simd, units, current, &mut t_max) {
+            if leaves.test(simd, units, current, &mut skip_t) {
                 return;
             }
         } else {
@@ -107,7 +136,7 @@ pub(crate) fn traverse_body<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, c
                 2,
                 rcp_far[2],
             ));
-            let hit = near.simd_le(far.min(f32x8::splat(simd, t_max)));
+            let hit = near.simd_le(far.min(f32x8::splat(simd, skip_t)));
             let mut mask = hit.to_bitmask() as u32;
             if mask != 0 {
                 let refs = node[CHILD_ROW].bits();
@@ -155,7 +184,7 @@ pub(crate) fn traverse_body<S: Simd, L: LeafTest<S>, const CONSERVATIVE: bool, c
         // ---- Next entry that still lies before the closest hit.
         loop {
             let Some(e) = stack.pop() else { return };
-            if f32::from_bits((e >> 32) as u32) <= t_max {
+            if f32::from_bits((e >> 32) as u32) <= skip_t {
                 current = ChildRef(e as u32);
                 break;
             }

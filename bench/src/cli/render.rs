@@ -1,0 +1,215 @@
+//! `bench render` and `bench picture`.
+
+use super::{PictureArgs, RenderArgs};
+use crate::picture::framing::{Framing, read_camera};
+use crate::picture::look::{BACKGROUNDS, Look};
+use crate::picture::subject::{Choices, Subject};
+use crate::picture::{Drawn, Wish, draw, gallery, save};
+use datasets::cli::{Cancel, CommonArgs, CureExt as _, UsageError};
+use datasets::colormaps;
+use rt_core::accel::{BuildOptions, BuildQuality, Robustness};
+use rt_core::environment::Background;
+use rt_core::frame::Layers;
+use rt_core::ray_stats::RayStats;
+use serde_json::{Value, json};
+use std::path::Path;
+use std::time::Instant;
+
+pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()> {
+    let cancel = Cancel::on_ctrl_c()?;
+    let (png, exr) = outputs(args.out.as_deref(), args.exr.as_deref())?;
+    let framing = args.camera.as_deref().map(read_camera).transpose()?.unwrap_or(Framing::Fitted);
+    let file = args.file.display();
+
+    let start = Instant::now();
+    common.note(0, format_args!("reading {file}"));
+    let opened = datasets::read::open(&args.file)?;
+    let choices = Choices { color_by: args.color_by.clone(), isovalue: args.isovalue };
+    let subject = Subject::from_file(&opened, &choices).cure(format_args!(
+        "look at `{file}` with the options --color-by and --isovalue in mind, or convert it to .vtp or .vti with ParaView"
+    ))?;
+    let (format, read_secs) = (opened.format, start.elapsed().as_secs_f64());
+    drop(opened);
+    cancel.check()?;
+    let (triangles, contents) = (subject.triangles(), subject.contents.clone());
+    let scalar_range = args.range.or(subject.scalar_range);
+    let mut warnings = subject.warnings.clone();
+
+    common.note(0, format_args!("drawing {}", contents.join(", ")));
+    let look = Look {
+        effects: args.effects,
+        colors: args.colors.clone(),
+        range: args.range,
+        background: args.background,
+        ..Look::default()
+    };
+    let wish = Wish {
+        size: args.size,
+        samples: args.samples,
+        look,
+        framing,
+        build: BuildOptions { quality: args.quality, robustness: args.robustness, simd: None },
+        layers: if exr.is_some() { Layers::ALL } else { Layers::COLOR },
+    };
+    let drawn = draw(subject, &wish, &mut || Ok(cancel.check()?))?;
+    warnings.extend(drawn.warnings.iter().cloned());
+    write(png, exr, &drawn, &wish, &mut warnings)?;
+    for w in &warnings {
+        common.warn(format_args!("{file}: {w}"));
+    }
+
+    let object = json!({
+        "file": args.file,
+        "format": format,
+        "contents": contents,
+        "triangles": triangles,
+        "scalar_range": scalar_range,
+        "size": args.size,
+        "samples": drawn.report.samples,
+        "effects": drawn.report.effects.names().collect::<Vec<_>>(),
+        "robustness": args.robustness.name(),
+        "quality": args.quality.name(),
+        "rays": rays(&drawn.report.rays),
+        "seconds": { "read": read_secs, "build": drawn.build_secs, "render": drawn.render_secs },
+        "warnings": warnings,
+        "output": png,
+        "exr": exr,
+    });
+    common.result(&object, || {
+        let written: Vec<String> = [png, exr].iter().flatten().map(|p| p.display().to_string()).collect();
+        format!(
+            "{}: {}; read {read_secs:.2} s, build {:.2} s, render {:.2} s, {} rays",
+            written.join(", "),
+            contents.join(", "),
+            drawn.build_secs,
+            drawn.render_secs,
+            drawn.report.rays.total()
+        )
+    })
+}
+
+pub(super) fn picture(common: CommonArgs, args: &PictureArgs) -> anyhow::Result<()> {
+    let cancel = Cancel::on_ctrl_c()?;
+    let entry = gallery::find(&args.name).map_err(UsageError)?;
+    let (png, exr) = outputs(args.out.as_deref(), args.exr.as_deref())?;
+    common.note(0, format_args!("generating and drawing {}", entry.name));
+    let p = entry.paint(args.size, args.samples, &mut || Ok(cancel.check()?))?;
+    let mut warnings = p.drawn.warnings.clone();
+    write(png, exr, &p.drawn, &p.wish, &mut warnings)?;
+    for w in &warnings {
+        common.warn(format_args!("{}: {w}", entry.name));
+    }
+    let object = json!({
+        "picture": entry.name,
+        "contents": p.contents,
+        "size": args.size,
+        "effects": p.drawn.report.effects.names().collect::<Vec<_>>(),
+        "rays": rays(&p.drawn.report.rays),
+        "seconds": { "data": p.data_secs, "build": p.drawn.build_secs, "render": p.drawn.render_secs },
+        "warnings": warnings,
+        "output": png,
+        "exr": exr,
+    });
+    common.result(&object, || {
+        format!("{}; build {:.2} s, render {:.2} s", p.contents, p.drawn.build_secs, p.drawn.render_secs)
+    })
+}
+
+/// Checks the names before hours of work are spent on a picture that cannot be written.
+fn outputs<'a>(
+    png: Option<&'a Path>,
+    exr: Option<&'a Path>,
+) -> Result<(Option<&'a Path>, Option<&'a Path>), UsageError> {
+    for (path, ending) in [(png, "png"), (exr, "exr")] {
+        let Some(path) = path else { continue };
+        if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)) {
+            return Err(UsageError(format!(
+                "`{}` does not end in .{ending}; -o writes PNG, --exr OpenEXR",
+                path.display()
+            )));
+        }
+    }
+    Ok((png, exr))
+}
+
+fn write(
+    png: Option<&Path>,
+    exr: Option<&Path>,
+    drawn: &Drawn,
+    wish: &Wish,
+    warnings: &mut Vec<String>,
+) -> anyhow::Result<()> {
+    if let Some(path) = png {
+        let report = save::write_png(path, &drawn.frame)?;
+        if report.nan > 0 {
+            warnings.push(format!("{} pixels are not a number and drawn magenta", report.nan));
+        }
+    }
+    if let Some(path) = exr {
+        save::write_exr(path, drawn, wish)?;
+        if save::rounds_ids(&drawn.frame) {
+            warnings.push("primitive ids above 16777216 are rounded in the OpenEXR file".into());
+        }
+    }
+    Ok(())
+}
+
+fn rays(r: &RayStats) -> Value {
+    json!({
+        "primary": r.primary,
+        "shadow": r.shadow,
+        "ambient_occlusion": r.ambient_occlusion,
+        "reflection": r.reflection,
+        "refraction": r.refraction,
+        "transparency": r.transparency,
+        "path": r.path,
+        "volume": r.volume,
+        "total": r.total(),
+    })
+}
+
+// ---- values of options ----------------------------------------------------------------------------------------
+
+/// `960x540`.
+pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
+    let wrong = || format!("`{text}` is not a size; write for example 960x540 (1 to 16384 pixels each)");
+    let (w, h) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
+    let pixels = |t: &str| t.parse().ok().filter(|n| (1..=16384).contains(n));
+    Ok([pixels(w).ok_or_else(wrong)?, pixels(h).ok_or_else(wrong)?])
+}
+
+/// `0.5,2`.
+pub(super) fn range(text: &str) -> Result<[f32; 2], String> {
+    let wrong = || format!("`{text}` is not a range; write for example 0.5,2 (the lower number first)");
+    let (lo, hi) = text.split_once(',').ok_or_else(wrong)?;
+    let number = |t: &str| t.trim().parse().ok().filter(|v: &f32| v.is_finite());
+    let (lo, hi) = (number(lo).ok_or_else(wrong)?, number(hi).ok_or_else(wrong)?);
+    if lo < hi { Ok([lo, hi]) } else { Err(wrong()) }
+}
+
+/// One of the values by its name; the error lists the names.
+fn by_name<T: Copy>(
+    text: &str,
+    what: &str,
+    all: impl Iterator<Item = (&'static str, T)>,
+) -> Result<T, String> {
+    let all: Vec<(&str, T)> = all.collect();
+    let found = all.iter().find(|(name, _)| name.eq_ignore_ascii_case(text));
+    found.map(|f| f.1).ok_or_else(|| {
+        let known: Vec<&str> = all.iter().map(|a| a.0).collect();
+        format!("there is no {what} `{text}`; there are: {}", known.join(", "))
+    })
+}
+
+pub(super) fn quality(text: &str) -> Result<BuildQuality, String> {
+    by_name(text, "quality", BuildQuality::ALL.into_iter().map(|q| (q.name(), q)))
+}
+pub(super) fn robustness(text: &str) -> Result<Robustness, String> {
+    by_name(text, "robustness", Robustness::ALL.into_iter().map(|r| (r.name(), r)))
+}
+pub(super) fn background(text: &str) -> Result<Background, String> {
+    by_name(text, "background", BACKGROUNDS.into_iter())
+}
+pub(super) fn colors(text: &str) -> Result<String, String> {
+    by_name(text, "colour map", colormaps::NAMES.into_iter().map(|n| (n, n))).map(Into::into)
+}

@@ -1,0 +1,166 @@
+//! Error against time of the sampled effects: low-discrepancy points against independent ones.
+
+use super::Context;
+use crate::meshes;
+use crate::picture::framing::Framing;
+use crate::plot::{Axis, Plot, Series};
+use crate::record::{Record, Row};
+use glam::DVec3;
+use rt_core::accel::{BuildOptions, World};
+use rt_core::camera::Camera;
+use rt_core::frame::Frame;
+use rt_core::light::Light;
+use rt_core::material::Material;
+use rt_core::render::{RenderOptions, render};
+use rt_core::sampler::Sampling;
+use rt_core::scene::{AmbientOcclusion, Scene};
+
+/// Seed of the references: other points than any measured picture has.
+const REFERENCE_SEED: u64 = 0x5eed;
+
+/// One sampled quantity: a scene whose number of samples is set by `with`.
+struct Quantity {
+    name: &'static str,
+    scene: Scene,
+    /// The scene and the options with so many samples.
+    with: fn(&Scene, &RenderOptions, u32) -> (Scene, RenderOptions),
+}
+
+pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
+    record.column("quantity", "", "what is sampled");
+    record.column("sampling", "", "how the points are spread");
+    record.column("samples", "", "rays per point on the surface, or samples per pixel");
+    record.column("time", "ms", "wall time of the picture, fastest of the runs");
+    record.column(
+        "rms_error",
+        "grey level",
+        "root mean square over pixels and channels against the reference",
+    );
+    record.column("largest_error", "grey level", "largest difference of a channel of a pixel");
+    record.column("reference_samples", "", "samples of the reference");
+    let (pixels, most, reference) = if context.quick { (96, 64, 1024) } else { (256, 256, 16384) };
+    record.notes.push(format!(
+        "A grey level is 1/255 of white in linear light. References have {reference} low-discrepancy samples with another \
+         seed. Ambient occlusion and soft shadows are sampled at the pixel’s centre alone, so that each curve shows one \
+         source of error; antialiasing is the pixel’s area. Independent points err as the square root of 1/samples."
+    ));
+    let mesh = meshes::coarse_wavelet(if context.quick { 41 } else { 101 })?;
+    let world = World::from_mesh(mesh, &BuildOptions::default())?;
+    let camera = Framing::Fitted.of(&world, [pixels, pixels])?;
+    for quantity in quantities(world, &camera) {
+        let mut plot = Plot::lines(
+            &format!("{}: error against time", quantity.name),
+            Axis::log("time", "ms"),
+            Axis::log("RMS error", "grey level"),
+        );
+        context.say(format!("{}: reference of {reference} samples", quantity.name))?;
+        let options = RenderOptions { seed: REFERENCE_SEED, ..RenderOptions::new(pixels, pixels) };
+        let (exact, _) = picture(&quantity, &camera, &options, reference)?;
+        for sampling in Sampling::ALL {
+            context.say(format!("{}: {}", quantity.name, sampling.name()))?;
+            let mut points = vec![];
+            for n in (0..).map(|k| 1u32 << (2 * k)).take_while(|n| *n <= most) {
+                let options = RenderOptions { sampling, ..RenderOptions::new(pixels, pixels) };
+                let runs = if n <= 16 { 3 } else { 1 };
+                let (mut frame, mut secs) = picture(&quantity, &camera, &options, n)?;
+                for _ in 1..runs {
+                    let again = picture(&quantity, &camera, &options, n)?;
+                    (frame, secs) = (again.0, secs.min(again.1));
+                }
+                let (rms, largest) = difference(&frame, &exact);
+                points.push((secs * 1e3, rms));
+                record.rows.push(
+                    Row::new()
+                        .with("quantity", quantity.name)
+                        .with("sampling", sampling.name())
+                        .with("samples", n)
+                        .with("time", secs * 1e3)
+                        .with("rms_error", rms)
+                        .with("largest_error", largest)
+                        .with("reference_samples", reference),
+                );
+            }
+            plot.series.push(Series::new(sampling.name(), points));
+        }
+        record.plots.push(plot);
+    }
+    Ok(())
+}
+
+fn quantities(world: World, camera: &Camera) -> Vec<Quantity> {
+    let b = world.bounds();
+    let radius = f64::from(b.radius());
+    let eye = camera.eye().unwrap_or(DVec3::ZERO);
+    let mut plain = Scene::new(world);
+    plain.materials = vec![Material::matte([0.8; 3])];
+    let mut ao = plain.clone();
+    ao.lights = vec![Light::ambient([1.0; 3])];
+    ao.ambient_occlusion = Some(AmbientOcclusion { distance: 0.3 * radius, rays: 1 });
+    let mut soft = plain.clone();
+    let place = eye + camera.world_from_view() * DVec3::new(radius, 1.5 * radius, 0.0);
+    soft.lights = vec![Light::point(place).with_size(0.3 * radius)];
+    vec![
+        Quantity {
+            name: "ambient occlusion",
+            scene: ao,
+            with: |s, o, rays| {
+                let mut scene = s.clone();
+                scene.ambient_occlusion = s.ambient_occlusion.map(|a| AmbientOcclusion { rays, ..a });
+                (scene, o.clone())
+            },
+        },
+        Quantity {
+            name: "soft shadow",
+            scene: soft,
+            with: |s, o, light_rays| (s.clone(), RenderOptions { light_rays, ..o.clone() }),
+        },
+        Quantity {
+            name: "antialiasing",
+            scene: plain,
+            with: |s, o, samples| (s.clone(), RenderOptions { samples, ..o.clone() }),
+        },
+    ]
+}
+
+/// The picture and its seconds.
+fn picture(q: &Quantity, camera: &Camera, options: &RenderOptions, n: u32) -> anyhow::Result<(Frame, f64)> {
+    let (scene, options) = (q.with)(&q.scene, options, n);
+    let output = render(&scene, camera, &options)?;
+    Ok((output.frame, output.report.elapsed.as_secs_f64()))
+}
+
+/// Root mean square and largest difference of the colour channels, in grey levels.
+fn difference(a: &Frame, b: &Frame) -> (f64, f64) {
+    let (mut squares, mut largest) = (0.0, 0.0f64);
+    for (x, y) in a.color.iter().zip(&b.color) {
+        for c in 0..3 {
+            let d = f64::from(x[c] - y[c]) * 255.0;
+            squares += d * d;
+            largest = largest.max(d.abs());
+        }
+    }
+    ((squares / (3 * a.color.len().max(1)) as f64).sqrt(), largest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_samples_come_closer_and_low_discrepancy_closest() {
+        let world = World::from_mesh(meshes::coarse_wavelet(21).unwrap(), &BuildOptions::default()).unwrap();
+        let camera = Framing::Fitted.of(&world, [32, 32]).unwrap();
+        for q in quantities(world, &camera) {
+            let draw = |sampling, seed, n| {
+                let options = RenderOptions { sampling, seed, ..RenderOptions::new(32, 32) };
+                picture(&q, &camera, &options, n).unwrap().0
+            };
+            let exact = draw(Sampling::Sobol, REFERENCE_SEED, 1024);
+            let error = |sampling, n| difference(&draw(sampling, 0, n), &exact).0;
+            let [few, many] = [4, 64].map(|n| error(Sampling::Sobol, n));
+            let random = error(Sampling::Random, 64);
+            assert!(many < 0.5 * few, "{}: {few} with 4 samples, {many} with 64", q.name);
+            assert!(many < random, "{}: {many} low-discrepancy, {random} random", q.name);
+        }
+    }
+}

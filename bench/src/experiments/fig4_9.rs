@@ -1,0 +1,107 @@
+//! Figure 4.9: frame time against the number of triangles, same view, primary rays with a headlight.
+
+use super::Context;
+use super::fig4_7::fits_in_memory;
+use crate::picture::framing::Framing;
+use crate::plot::{Axis, Plot, Point, Series};
+use crate::record::{Record, Row};
+use crate::runner::{Schedule, Variant, interleave};
+use datasets::catalogue;
+use datasets::generate::nested_wavelet::Size;
+use rt_core::accel::{BuildOptions, World};
+use rt_core::camera::Camera;
+use rt_core::render::{RenderOptions, render};
+use rt_core::scene::Scene;
+
+pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
+    record.column("triangles", "", "triangles of the wavelet surfaces");
+    record.column("view", "", "view of the data set");
+    record.column("pixels", "", "pixels of the frame, one primary ray each");
+    record.column("covered", "", "pixels that show a surface");
+    record.column("threads", "", "threads that render");
+    record.column("time", "ms", "median over the rounds, wall time of a frame with headlight shading");
+    record.column("time_low", "ms", "fastest round");
+    record.column("time_high", "ms", "slowest round");
+    record.column("cpu", "ms", "median CPU time of all threads");
+    record.column("rate", "Mray/s", "primary rays by median time");
+    record.column("build", "s", "wall time of the acceleration structure");
+    record.column("bytes_per_triangle", "B", "memory of the structure, without the mesh");
+    record.notes.push(
+        "A frame through the renderer: one primary ray a pixel, headlight, matte material, no secondary rays, from the \
+         same camera for all sizes. The time of a ray tracer grows with the logarithm of the number of triangles while \
+         a rasteriser’s grows in proportion: that crossing is the point of the dissertation’s figure."
+            .into(),
+    );
+    let sizes = if context.quick { &[Size::M1, Size::M2, Size::M4][..] } else { &Size::ALL[..] };
+    let pixels = if context.quick { 512 } else { 1024 };
+    for &size in sizes {
+        if fits_in_memory(size, record) {
+            measure(context, record, size, pixels)?;
+        }
+    }
+    record.plots.push(plot(record));
+    Ok(())
+}
+
+fn measure(context: &mut Context<'_>, record: &mut Record, size: Size, pixels: u32) -> anyhow::Result<()> {
+    let mesh = context.wavelet(size)?;
+    context.say(format!("{} triangles: building", mesh.num_triangles()))?;
+    let scene = Scene::new(World::from_mesh(mesh.clone(), &BuildOptions::default())?);
+    let report = scene.world.report();
+    let (build_secs, bytes) = (report.total.as_secs_f64(), report.bytes);
+    let options = RenderOptions::new(pixels, pixels);
+    for view in catalogue::find("wavelet")?.views() {
+        context.say(format!("{} triangles: {}", mesh.num_triangles(), view.name))?;
+        let camera: Camera = Framing::At(view.clone()).of(&scene.world, [pixels, pixels])?;
+        let mut failed = None;
+        let timings = interleave(
+            &context.schedule(Schedule::all_threads(), 4.0),
+            &mut [Variant::new("frame", || match render(&scene, &camera, &options) {
+                Ok(o) => o.frame.color.iter().filter(|c| c[3] > 0.0).count() as u64,
+                Err(e) => {
+                    failed = Some(e);
+                    0
+                }
+            })],
+        )?;
+        if let Some(e) = failed {
+            return Err(e.into());
+        }
+        let timed = &timings.variants[0];
+        let (wall, cpu) =
+            (timed.summary(crate::clock::Clock::Wall), timed.summary(crate::clock::Clock::ProcessCpu));
+        let rays = f64::from(pixels) * f64::from(pixels);
+        record.rows.push(
+            Row::new()
+                .with("triangles", mesh.num_triangles())
+                .with("view", view.name)
+                .with("pixels", rays)
+                .with("covered", timed.check)
+                .with("threads", rayon::current_num_threads())
+                .with("time", wall.median * 1e3)
+                .with("time_low", wall.low * 1e3)
+                .with("time_high", wall.high * 1e3)
+                .with("cpu", cpu.median * 1e3)
+                .with("rate", rays / wall.median / 1e6)
+                .with("build", build_secs)
+                .with("bytes_per_triangle", bytes as f64 / mesh.num_triangles() as f64),
+        );
+    }
+    Ok(())
+}
+
+fn plot(record: &Record) -> Plot {
+    let mut plot = Plot::lines("Time of a frame", Axis::log("triangles", ""), Axis::log("time", "ms"));
+    for row in &record.rows {
+        let (Some(view), Some(x), Some(y)) = (row.text("view"), row.number("triangles"), row.number("time"))
+        else {
+            continue;
+        };
+        let point = Point { x, y, range: row.number("time_low").zip(row.number("time_high")) };
+        match plot.series.iter_mut().find(|s| s.name == view) {
+            Some(s) => s.points.push(point),
+            None => plot.series.push(Series { name: view.into(), points: vec![point] }),
+        }
+    }
+    plot
+}

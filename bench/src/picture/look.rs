@@ -1,0 +1,201 @@
+//! Materials, lights and background: one studio for all pictures, so that pictures differ by their effects alone.
+//!
+//! The key light stands above the viewer's right shoulder, a weak headlight fills the shadows, ambient light is a quarter
+//! of white. All lights move with the camera: nothing that can be seen lies in the dark.
+
+use super::subject::{Paint, Subject};
+use anyhow::Context as _;
+use datasets::colormaps;
+use glam::{DVec3, Vec3};
+use rt_core::accel::BuildOptions;
+use rt_core::camera::{Camera, ThinLens};
+use rt_core::effects::Effects;
+use rt_core::environment::{Background, Environment};
+use rt_core::light::{Light, LightKind};
+use rt_core::material::{Material, SurfaceModel};
+use rt_core::scene::{AmbientOcclusion, Scene, SceneBuilder};
+
+/// What is drawn around and upon the subject.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Look {
+    /// The effects to show. What a file asks for by itself (opacity, glass) is shown in any case.
+    pub effects: Effects,
+    /// Colour map of scalars: one of [`colormaps::NAMES`].
+    pub colors: String,
+    /// Scalars at the ends of the colour map; `None` for the range of the data.
+    pub range: Option<[f32; 2]>,
+    /// What fills uncovered pixels.
+    pub background: Background,
+    /// How far ambient occlusion looks, in radii of the subject.
+    pub occlusion_radii: f64,
+}
+
+impl Default for Look {
+    fn default() -> Look {
+        Look {
+            effects: Effects::NONE,
+            colors: colormaps::NAMES[0].into(),
+            range: None,
+            background: BACKDROP,
+            occlusion_radii: 0.3,
+        }
+    }
+}
+
+/// Pale, darker below.
+const BACKDROP: Background = Background::Gradient { bottom: [0.42, 0.45, 0.50], top: [0.86, 0.89, 0.93] };
+
+/// Names of backgrounds, the default first.
+pub const BACKGROUNDS: [(&str, Background); 4] = [
+    ("gradient", BACKDROP),
+    ("white", Background::Constant([1.0; 4])),
+    ("black", Background::Constant([0.0, 0.0, 0.0, 1.0])),
+    ("transparent", Background::Transparent),
+];
+
+/// Angular radius of the key light when its shadows are soft, radians.
+const KEY_SIZE_RAD: f64 = 0.06;
+/// Aperture of the lens as a share of the distance to the subject.
+const APERTURE: f64 = 0.012;
+
+/// Effects by the names of the command line, the first of each being the one in messages.
+const NAMES: [(Effects, &[&str]); 9] = [
+    (Effects::SHADOWS, &["shadows", "shadow"]),
+    (Effects::SOFT_SHADOWS, &["soft-shadows"]),
+    (Effects::AMBIENT_OCCLUSION, &["ao", "ambient-occlusion"]),
+    (Effects::REFLECTION, &["reflections", "reflection"]),
+    (Effects::GLOSSY_REFLECTION, &["glossy-reflections", "glossy-reflection", "glossy"]),
+    (Effects::REFRACTION, &["refraction"]),
+    (Effects::TRANSPARENCY, &["transparency"]),
+    (Effects::DEPTH_OF_FIELD, &["depth-of-field", "dof"]),
+    (Effects::PATH_TRACING, &["path-tracing"]),
+];
+
+/// A list of effects, separated by commas; `none` and nothing at all are the empty set.
+///
+/// ```
+/// use bench::picture::look::parse_effects;
+/// use rt_core::effects::Effects;
+/// assert_eq!(parse_effects("shadows, ao"), Ok(Effects::SHADOWS | Effects::AMBIENT_OCCLUSION));
+/// assert!(parse_effects("shadow,caustics").unwrap_err().contains("path-tracing"));
+/// ```
+pub fn parse_effects(list: &str) -> Result<Effects, String> {
+    let mut all = Effects::NONE;
+    for wish in list.split(',').map(str::trim).filter(|w| !w.is_empty() && *w != "none") {
+        let simple = wish.to_ascii_lowercase().replace([' ', '_'], "-");
+        let found = NAMES.iter().find(|(_, names)| names.contains(&simple.as_str()));
+        let Some((effect, _)) = found else {
+            let known: Vec<&str> = NAMES.iter().map(|(_, n)| n[0]).collect();
+            return Err(format!("there is no effect `{wish}`; there are: {}, none", known.join(", ")));
+        };
+        all = all | *effect;
+    }
+    Ok(all)
+}
+
+impl Look {
+    fn has(&self, effects: Effects) -> bool {
+        self.effects.intersects(effects)
+    }
+
+    /// The subject in the studio, built.
+    pub fn scene(&self, subject: Subject, build: &BuildOptions) -> anyhow::Result<Scene> {
+        let mut builder = SceneBuilder::new();
+        builder.build_options = *build;
+        let range = self.range.or(subject.scalar_range).unwrap_or([0.0, 1.0]);
+        for part in subject.parts {
+            let material = match part.paint {
+                Paint::Scalars => {
+                    let map = colormaps::by_name(&self.colors, range).with_context(|| {
+                        format!("no colour map `{}`; there are: {}", self.colors, colormaps::NAMES.join(", "))
+                    })?;
+                    self.wished(plain([0.8; 3])).colored_by_scalars(map)
+                }
+                Paint::Color(c) => self.wished(plain(c)),
+                Paint::OfTheFile(m) if self.has(MATERIAL_EFFECTS) => {
+                    Material { color_source: m.color_source.clone(), ..self.wished(plain(m.color)) }
+                }
+                Paint::OfTheFile(m) => m,
+            };
+            let material = builder.material(material);
+            let geometry = builder.geometry(part.geometry);
+            let appearance = rt_core::scene::Appearance::new(material);
+            builder.instance(geometry, glam::DAffine3::IDENTITY, appearance);
+        }
+        builder.background = self.background;
+        let mirrors = Effects::REFLECTION | Effects::GLOSSY_REFLECTION | Effects::REFRACTION;
+        let surrounded = self.has(mirrors | Effects::PATH_TRACING);
+        for light in self.lights().into_iter().filter(|l| !(surrounded && l.kind == LightKind::Ambient)) {
+            builder.light(light);
+        }
+        if surrounded {
+            // Something to see in the mirrors; it takes the place of the ambient light.
+            let up = subject.up.as_vec3().try_normalize().unwrap_or(Vec3::Z);
+            builder.environment =
+                Some(Environment::Gradient { bottom: [0.10, 0.10, 0.11], top: [0.42, 0.45, 0.5], up });
+        }
+        Ok(builder.build()?)
+    }
+
+    fn lights(&self) -> Vec<Light> {
+        let shadows = self.has(Effects::SHADOWS | Effects::SOFT_SHADOWS | Effects::PATH_TRACING);
+        let mut key = Light::directional(DVec3::new(0.5, 0.75, 0.6)).with_color([0.72; 3]).in_camera_frame();
+        if self.has(Effects::SOFT_SHADOWS | Effects::PATH_TRACING) {
+            key = key.with_size(KEY_SIZE_RAD);
+        }
+        let key = if shadows { key } else { key.without_shadows() };
+        vec![key, Light::headlight().with_color([0.16; 3]), Light::ambient([0.27; 3])]
+    }
+
+    /// A material with the wished effects on it.
+    fn wished(&self, mut m: Material) -> Material {
+        if self.has(Effects::REFRACTION) {
+            let absorption = m.color.map(|c| -c.clamp(0.02, 0.999).ln());
+            m.model = SurfaceModel::Dielectric { ior: 1.5, absorption };
+        } else if self.has(Effects::GLOSSY_REFLECTION) {
+            m.model = SurfaceModel::Pbr { metallic: 0.0, roughness: 0.3, specular: 0.3 };
+        } else if self.has(Effects::REFLECTION)
+            && let SurfaceModel::Phong { mirror, .. } = &mut m.model
+        {
+            *mirror = 0.25;
+        }
+        if self.has(Effects::TRANSPARENCY) {
+            m.opacity = 0.45;
+        }
+        m
+    }
+
+    /// Lengths that depend on the subject's radius (half the diagonal of its bounds, world units).
+    pub(super) fn adapt(&self, scene: &mut Scene, radius: f64) {
+        if self.has(Effects::AMBIENT_OCCLUSION) {
+            let distance = (self.occlusion_radii * radius).max(f64::MIN_POSITIVE);
+            scene.ambient_occlusion = Some(AmbientOcclusion { distance, rays: 4 });
+        }
+        for m in &mut scene.materials {
+            if let SurfaceModel::Dielectric { absorption, .. } = &mut m.model
+                && self.has(Effects::REFRACTION)
+            {
+                *absorption = absorption.map(|a| a * (1.0 / radius) as f32);
+            }
+        }
+    }
+
+    /// The camera with a lens when depth of field is wished.
+    pub(super) fn lens(&self, camera: Camera, focus_distance: f64) -> anyhow::Result<Camera> {
+        if !self.has(Effects::DEPTH_OF_FIELD) {
+            return Ok(camera);
+        }
+        Ok(camera.with_lens(ThinLens { aperture_radius: APERTURE * focus_distance, focus_distance })?)
+    }
+}
+
+/// Effects that replace what a file says about its surfaces.
+const MATERIAL_EFFECTS: Effects = Effects::REFLECTION
+    .union(Effects::GLOSSY_REFLECTION)
+    .union(Effects::REFRACTION)
+    .union(Effects::TRANSPARENCY);
+
+/// A little gloss shows the shape.
+fn plain(color: [f32; 3]) -> Material {
+    Material::phong(color, 0.12, 40.0)
+}

@@ -1,0 +1,74 @@
+//! Pictures into files: PNG for eyes, OpenEXR with every layer, its unit and how it was made.
+
+use super::{Drawn, Wish};
+use datasets::image_io::{self, Metadata, Picture, PngDepth, keys};
+use rt_core::frame::{Frame, PlaneValues};
+use std::path::Path;
+
+/// Every layer of a frame as named planes. Where there is nothing, ids are -1.
+pub fn picture(frame: &Frame) -> anyhow::Result<Picture> {
+    let mut p = Picture::new(frame.width, frame.height);
+    for plane in frame.planes() {
+        let (unit, samples) = match plane.values {
+            PlaneValues::F32(v) => (plane.unit, v.into_owned()),
+            PlaneValues::U32(v) => {
+                let id = |&i: &u32| if i == u32::MAX { -1.0 } else { i as f32 };
+                ("index, -1 for none", v.iter().map(id).collect())
+            }
+        };
+        p.add(plane.name, unit, samples)?;
+    }
+    Ok(p)
+}
+
+/// Ids above this are not exact as 32-bit floating point numbers.
+const LARGEST_EXACT_ID: u32 = 1 << 24;
+
+/// True when an id of the frame would be rounded in a file.
+pub fn rounds_ids(frame: &Frame) -> bool {
+    let ids = frame.instance.iter().chain(&frame.primitive);
+    ids.filter(|&&i| i != u32::MAX).any(|&i| i > LARGEST_EXACT_ID)
+}
+
+/// What the file says about its making.
+pub fn metadata(drawn: &Drawn, wish: &Wish) -> Metadata {
+    let mut m = image_io::metadata_of_this_run("bench", env!("CARGO_PKG_VERSION"));
+    // OpenEXR's own attribute of that name is not for free use.
+    if let Some(program) = m.remove(keys::SOFTWARE) {
+        m.insert("program".into(), program);
+    }
+    let names = |n: &mut dyn Iterator<Item = &'static str>| n.collect::<Vec<_>>().join(", ");
+    m.insert(keys::ELAPSED_SECS.into(), drawn.render_secs.into());
+    m.insert(keys::SAMPLES_PER_PIXEL.into(), f64::from(drawn.report.samples).into());
+    m.insert(keys::SEED.into(), "0".into());
+    m.insert("effects".into(), names(&mut drawn.report.effects.names()).into());
+    m.insert("robustness".into(), wish.build.robustness.name().into());
+    m.insert("build_quality".into(), wish.build.quality.name().into());
+    m.insert("rays".into(), (drawn.report.rays.total() as f64).into());
+    m
+}
+
+/// Writes the colour as PNG, 8 bits.
+pub fn write_png(path: &Path, frame: &Frame) -> anyhow::Result<image_io::PngReport> {
+    let mut p = Picture::new(frame.width, frame.height);
+    let opaque = frame.color.iter().all(|c| c[3] == 1.0);
+    for (c, name) in ["R", "G", "B", "A"].into_iter().enumerate().filter(|(c, _)| *c < 3 || !opaque) {
+        p.add(name, "", frame.color.iter().map(|v| v[c]).collect())?;
+    }
+    Ok(image_io::write_png(path, &p, PngDepth::Eight)?)
+}
+
+/// Writes every layer as OpenEXR.
+pub fn write_exr(path: &Path, drawn: &Drawn, wish: &Wish) -> anyhow::Result<()> {
+    let mut p = picture(&drawn.frame)?;
+    p.metadata = metadata(drawn, wish);
+    Ok(image_io::write_exr(path, &p)?)
+}
+
+/// The bytes of the PNG file.
+pub fn png_bytes(frame: &Frame) -> anyhow::Result<Vec<u8>> {
+    let dir = tempfile::tempdir()?;
+    let path = dir.path().join("picture.png");
+    write_png(&path, frame)?;
+    Ok(std::fs::read(&path)?)
+}

@@ -1,0 +1,340 @@
+//! What is drawn: geometry with its own colours, out of a file or out of the catalogue.
+
+use datasets::catalogue::Data;
+use datasets::model::{ColorBy, Dataset};
+use datasets::read::{Content, Opened, SceneModel, SurfaceMaterial};
+use glam::{DVec3, Vec3};
+use rt_core::accel::Geometry;
+use rt_core::grid::Grid;
+use rt_core::material::{Material, Sides};
+use rt_core::mesh::{Attribute, TriMesh};
+use rt_core::shapes::{Isosurface, IsosurfaceNormals, IsosurfaceOptions, Radii, Spheres, Tubes};
+use rt_core::texture::Texture;
+use std::sync::Arc;
+
+/// Where a part's colour comes from.
+#[derive(Debug, Clone)]
+pub enum Paint {
+    /// The geometry's scalars through the colour map.
+    Scalars,
+    /// The geometry's own colours, else this one (linear RGB).
+    Color([f32; 3]),
+    /// A material out of the file.
+    OfTheFile(Material),
+}
+
+/// One geometry.
+#[derive(Clone)]
+pub struct Part {
+    /// Triangles or a shape.
+    pub geometry: Geometry,
+    /// Its colour.
+    pub paint: Paint,
+}
+
+/// Everything that is drawn.
+#[derive(Clone)]
+pub struct Subject {
+    /// The parts.
+    pub parts: Vec<Part>,
+    /// Range of all scalars.
+    pub scalar_range: Option<[f32; 2]>,
+    /// Upward in the world.
+    pub up: DVec3,
+    /// What was left out or chosen, one sentence each.
+    pub warnings: Vec<String>,
+    /// What kinds of geometry, in words.
+    pub contents: Vec<String>,
+}
+
+/// How a file is turned into a subject.
+#[derive(Debug, Clone, Default)]
+pub struct Choices {
+    /// The array to colour by; `None` for the one that the file marks, if it does.
+    pub color_by: Option<String>,
+    /// Isovalue for image data; `None` for the middle of the range.
+    pub isovalue: Option<f32>,
+}
+
+/// Colour of things without one, linear.
+const CLAY: [f32; 3] = [0.62, 0.60, 0.56];
+/// Radius of tubes and points, as a share of the diagonal.
+const TUBE_RADIUS: f64 = 0.002;
+const POINT_RADIUS: f64 = 0.004;
+
+impl Subject {
+    /// Nothing.
+    pub fn empty(up: DVec3) -> Subject {
+        Subject { parts: vec![], scalar_range: None, up, warnings: vec![], contents: vec![] }
+    }
+
+    /// Triangles of all parts.
+    pub fn triangles(&self) -> usize {
+        let count = |p: &Part| match &p.geometry {
+            Geometry::Mesh(m) => m.num_triangles(),
+            Geometry::Shape(_) => 0,
+        };
+        self.parts.iter().map(count).sum()
+    }
+
+    /// Adds triangles; their scalars, if any, are mapped to colours.
+    pub fn add_mesh(&mut self, mesh: TriMesh, otherwise: [f32; 3]) {
+        let paint = match &mesh.scalars {
+            Some(s) => {
+                self.widen(&s.values);
+                Paint::Scalars
+            }
+            None => Paint::Color(otherwise),
+        };
+        self.contents.push(format!("{} triangles", mesh.num_triangles()));
+        self.parts.push(Part { geometry: Geometry::Mesh(Arc::new(mesh)), paint });
+    }
+
+    /// Adds a generated data set. Lines become tubes with their own radii.
+    pub fn add_generated(&mut self, data: Data, otherwise: [f32; 3]) -> anyhow::Result<()> {
+        match data {
+            Data::Mesh(mesh) => self.add_mesh(mesh, otherwise),
+            Data::Lines(lines) => {
+                self.contents.push(format!("{} tube segments", lines.num_segments()));
+                self.widen(&lines.scalars);
+                let geometry = Geometry::Shape(Arc::new(lines.into_tubes()?));
+                self.parts.push(Part { geometry, paint: Paint::Scalars });
+            }
+        }
+        Ok(())
+    }
+
+    /// Everything visible in a file.
+    pub fn from_file(opened: &Opened, choices: &Choices) -> anyhow::Result<Subject> {
+        let mut subject = match &opened.content {
+            Content::Scene(model) => from_scene(model, choices)?,
+            Content::Data(data) => from_data(data, choices)?,
+        };
+        let own = std::mem::take(&mut subject.warnings);
+        subject.warnings = opened.warnings.iter().cloned().chain(own).collect();
+        if opened.time_steps.len() > 1 {
+            let (n, first) = (opened.time_steps.len(), &opened.time_steps[0]);
+            subject.warnings.push(format!(
+                "the file lists {n} steps; this is the first (time {}): give another step’s own file for that",
+                first.time
+            ));
+        }
+        Ok(subject)
+    }
+
+    fn widen(&mut self, scalars: &[f32]) {
+        for &v in scalars.iter().filter(|v| v.is_finite()) {
+            let [lo, hi] = self.scalar_range.unwrap_or([v, v]);
+            self.scalar_range = Some([lo.min(v), hi.max(v)]);
+        }
+    }
+}
+
+// ---- data sets ------------------------------------------------------------------------------------------------
+
+fn from_data(data: &Dataset, choices: &Choices) -> anyhow::Result<Subject> {
+    let mut subject = Subject::empty(DVec3::Z);
+    let marked = || {
+        let a = data.leaves().into_iter().find_map(|d| d.attributes())?;
+        a.point_scalars.clone().or_else(|| a.cell_scalars.clone())
+    };
+    let color = choices.color_by.clone().or_else(marked);
+    if let Some(wish) = &choices.color_by {
+        ColorBy::find(data, wish)?;
+    }
+    if let Some(grid) = lattice(data, &color, &mut subject)? {
+        return isosurface(subject, data, grid, choices);
+    }
+    let (mesh, report) = data.to_trimesh(color.as_deref())?;
+    subject.warnings.extend(report.warnings());
+    if mesh.num_triangles() > 0 {
+        subject.add_mesh(mesh, CLAY);
+    }
+    let (lines, dropped) = data.to_lines(color.as_deref())?;
+    if dropped > 0 {
+        subject
+            .warnings
+            .push(format!("{dropped} lines left out: too few points, or points that do not exist"));
+    }
+    if !lines.is_empty() {
+        add_tubes(&mut subject, &lines)?;
+    }
+    if subject.parts.is_empty() {
+        add_points(&mut subject, data, color.as_deref())?;
+    }
+    Ok(subject)
+}
+
+/// The field of image data; `None` where there is none, or where its outer surface is all there is to see.
+fn lattice(
+    data: &Dataset,
+    color: &Option<String>,
+    subject: &mut Subject,
+) -> anyhow::Result<Option<Arc<Grid>>> {
+    let leaf = match data.leaves()[..] {
+        [leaf @ (Dataset::ImageData(_) | Dataset::RectilinearGrid(_))] => leaf,
+        _ => return Ok(None),
+    };
+    let first = leaf.attributes().and_then(|a| a.point.first().or_else(|| a.cell.first()));
+    let Some(array) = color.clone().or_else(|| first.map(|a| a.name.clone())) else { return Ok(None) };
+    match leaf.to_grid(&array) {
+        Ok(grid) if grid.dims.min_element() >= 2 => Ok(Some(Arc::new(grid))),
+        Ok(_) => Ok(None),
+        Err(e) => {
+            subject.warnings.push(format!("drawn as its outer surface, without an isosurface: {e}"));
+            Ok(None)
+        }
+    }
+}
+
+fn isosurface(
+    mut subject: Subject,
+    data: &Dataset,
+    colors: Arc<Grid>,
+    choices: &Choices,
+) -> anyhow::Result<Subject> {
+    // The surface belongs to the field that the file marks; another array colours it.
+    let marked = data.leaves()[0].attributes().and_then(|a| {
+        a.point_scalars.clone().or_else(|| a.point.iter().find(|p| p.components == 1).map(|p| p.name.clone()))
+    });
+    let field = match (&choices.color_by, marked) {
+        (Some(wish), Some(marked)) if *wish != marked => Arc::new(data.leaves()[0].to_grid(&marked)?),
+        _ => colors.clone(),
+    };
+    let Some((lo, hi)) = field.range() else {
+        anyhow::bail!("the field has no finite value: there is no isosurface to draw");
+    };
+    let iso = choices.isovalue.unwrap_or(0.5 * lo + 0.5 * hi);
+    anyhow::ensure!(
+        lo < iso && iso <= hi,
+        "no isosurface at {iso}: the field ranges from {lo} to {hi}; choose --isovalue in between"
+    );
+    let options = IsosurfaceOptions { normals: IsosurfaceNormals::Smooth, ..Default::default() };
+    let mut surface = Isosurface::new(field.clone(), &[iso], &options)?;
+    let missing = surface.report().cells_non_finite;
+    if missing > 0 {
+        subject
+            .warnings
+            .push(format!("{missing} cells have a value that is not finite: the surface has holes there"));
+    }
+    let paint = if Arc::ptr_eq(&field, &colors) {
+        Paint::Color(CLAY)
+    } else {
+        if let Some((lo, hi)) = colors.range() {
+            subject.widen(&[lo, hi]);
+        }
+        surface = surface.with_color_by(colors);
+        Paint::Scalars
+    };
+    subject
+        .contents
+        .push(format!("isosurface at {iso} of {} points", field.dims.as_u64vec3().element_product()));
+    subject.parts.push(Part { geometry: Geometry::Shape(Arc::new(surface)), paint });
+    Ok(subject)
+}
+
+fn diagonal(points: impl Iterator<Item = DVec3>) -> f64 {
+    let far = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let (lo, hi) = points.filter(|p| p.is_finite()).fold(far, |(lo, hi), p| (lo.min(p), hi.max(p)));
+    let d = (hi - lo).length();
+    if d.is_finite() && d > 0.0 { d } else { 1.0 }
+}
+
+fn add_tubes(subject: &mut Subject, lines: &[datasets::model::Polyline]) -> anyhow::Result<()> {
+    let points: Vec<DVec3> = lines.iter().flat_map(|l| l.points.iter().copied()).collect();
+    let mut offsets = vec![0u32];
+    for l in lines {
+        offsets.push(offsets[offsets.len() - 1] + l.points.len() as u32);
+    }
+    let radius = (TUBE_RADIUS * diagonal(points.iter().copied())) as f32;
+    let mut tubes = Tubes::from_f64_points(&points, &offsets, Radii::Common(radius))?;
+    let mut paint = Paint::Color(CLAY);
+    if lines.iter().all(|l| l.scalars.is_some()) {
+        let scalars: Vec<f32> = lines.iter().filter_map(|l| l.scalars.as_ref()).flatten().copied().collect();
+        subject.widen(&scalars);
+        tubes = tubes.with_scalars(scalars)?;
+        paint = Paint::Scalars;
+    }
+    subject.contents.push(format!("{} lines as tubes", lines.len()));
+    subject.parts.push(Part { geometry: Geometry::Shape(Arc::new(tubes)), paint });
+    Ok(())
+}
+
+fn add_points(subject: &mut Subject, data: &Dataset, color: Option<&str>) -> anyhow::Result<()> {
+    let set = data.to_points(color)?;
+    let radius = (POINT_RADIUS * diagonal(set.points.iter().copied())) as f32;
+    let mut spheres = Spheres::from_f64_centers(&set.points, Radii::Common(radius))?;
+    let mut paint = Paint::Color(CLAY);
+    if let Some(scalars) = set.scalars {
+        subject.widen(&scalars);
+        spheres = spheres.with_scalars(scalars)?;
+        paint = Paint::Scalars;
+    }
+    subject.contents.push(format!("{} points as spheres", set.points.len()));
+    subject.parts.push(Part { geometry: Geometry::Shape(Arc::new(spheres)), paint });
+    Ok(())
+}
+
+// ---- meshes with materials ------------------------------------------------------------------------------------
+
+/// Scenes have y up, as glTF demands and most OBJ files do.
+fn from_scene(model: &SceneModel, choices: &Choices) -> anyhow::Result<Subject> {
+    let mut subject = Subject::empty(DVec3::Y);
+    if let Some(wish) = &choices.color_by {
+        subject
+            .warnings
+            .push(format!("`{wish}` is not used: the file holds meshes with materials and no arrays"));
+    }
+    let textures: Vec<Arc<Texture>> = model.textures.iter().map(texture).collect::<anyhow::Result<_>>()?;
+    let materials: Vec<Material> = model.materials.iter().map(|m| material(m, &textures)).collect();
+    for m in &model.meshes {
+        let paint = match m.material {
+            Some(i) => Paint::OfTheFile(materials[i].clone()),
+            None => Paint::Color(CLAY),
+        };
+        subject.parts.push(Part { geometry: Geometry::Mesh(Arc::new(m.mesh.clone())), paint });
+    }
+    subject.contents.push(format!("{} meshes, {} triangles", model.meshes.len(), model.num_triangles()));
+    Ok(subject)
+}
+
+/// Rows from the bottom up, as rt-core has them.
+fn texture(t: &datasets::read::Texture) -> anyhow::Result<Arc<Texture>> {
+    let row = t.width.max(1) as usize;
+    let rows = t.rgba8.chunks(row);
+    // The reader leaves texture coordinates as the file has them: v = 0 is the upper edge unless `v_up`.
+    let pixels: Vec<u8> = if t.v_up {
+        rows.rev().flatten().flatten().copied().collect()
+    } else {
+        rows.flatten().flatten().copied().collect()
+    };
+    Ok(Arc::new(Texture::from_srgb8(t.width as usize, t.height as usize, &pixels)?))
+}
+
+fn material(m: &SurfaceMaterial, textures: &[Arc<Texture>]) -> Material {
+    let [r, g, b, opacity] = m.base_color;
+    // Reflectance of a smooth interface at normal incidence (Fresnel); rough dielectrics are drawn without mirror rays.
+    let fresnel = ((m.ior - 1.0) / (m.ior + 1.0)).powi(2);
+    let mut out = if m.metallic == 0.0 && m.roughness > 0.5 {
+        Material::matte([r, g, b])
+    } else {
+        let mut out = Material::pbr([r, g, b], m.metallic, m.roughness);
+        if let rt_core::material::SurfaceModel::Pbr { specular, .. } = &mut out.model {
+            *specular = fresnel.clamp(0.0, 1.0);
+        }
+        out
+    };
+    out = out.with_opacity(opacity.clamp(0.0, 1.0)).with_emission(m.emissive);
+    if !m.double_sided {
+        out = out.with_sides(Sides::FrontOnly);
+    }
+    match m.base_color_texture.and_then(|i| textures.get(i)) {
+        Some(t) => out.textured(t.clone()),
+        None => out,
+    }
+}
+
+/// Height as the scalar of a mesh.
+pub fn color_by_height(mesh: &mut TriMesh, up: Vec3) {
+    mesh.scalars = Some(Attribute::per_vertex(mesh.positions.iter().map(|p| p.dot(up)).collect()));
+}

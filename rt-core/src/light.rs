@@ -1,0 +1,250 @@
+//! Lights.
+//!
+//! **Unit.** As in OpenGL and VTK, a light of colour 1 that falls straight onto a matte white surface makes it 1: its irradiance is
+//! π times its colour. The path tracer uses the same unit, so both integrators agree on direct light. An ambient light or an
+//! environment of radiance 1 makes an unoccluded white surface 1.
+
+use glam::{DMat3, DVec3, Vec3};
+
+/// The space a light's position and direction are given in.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum LightFrame {
+    /// World space.
+    #[default]
+    World,
+    /// OpenGL's eye space (x right, y up, z towards the viewer; the eye at the origin): the light moves with the camera.
+    Camera,
+}
+
+/// Shape of a light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LightKind {
+    /// The same from everywhere; dimmed by ambient occlusion.
+    Ambient,
+    /// Parallel light.
+    Directional {
+        /// Direction from the scene to the light, any length.
+        to_light: DVec3,
+        /// Half the angle the light's disk covers, radians; 0 for sharp shadows (the sun: 0.00465).
+        angular_radius_rad: f64,
+    },
+    /// From a point or a sphere, to all sides.
+    Point {
+        /// Centre.
+        position: DVec3,
+        /// Radius of the sphere, world units; 0 for sharp shadows.
+        radius: f64,
+    },
+    /// A cone of light.
+    Spot {
+        /// Tip of the cone.
+        position: DVec3,
+        /// Axis, away from the light.
+        direction: DVec3,
+        /// Half angle of the cone, radians; dark outside.
+        cutoff_rad: f64,
+        /// Light falls off inside the cone as the cosine to the axis to this power (GL_SPOT_EXPONENT).
+        exponent: f64,
+        /// Radius of the disk the light comes from, world units; 0 for sharp shadows.
+        radius: f64,
+    },
+    /// A flat disk that shines to one side, with the cosine to its normal.
+    Disk {
+        /// Centre.
+        position: DVec3,
+        /// Normal of the shining side.
+        direction: DVec3,
+        /// Radius, world units.
+        radius: f64,
+    },
+}
+
+/// A light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Light {
+    /// Shape and place.
+    pub kind: LightKind,
+    /// Space of the place.
+    pub frame: LightFrame,
+    /// Linear RGB; see the module's text for the unit.
+    pub color: [f32; 3],
+    /// Colour of Phong highlights where it differs from `color` (GL_SPECULAR, vtkLight's specular colour).
+    pub highlight_color: Option<[f32; 3]>,
+    /// Divisor c + l·d + q·d² over distance d (GL's attenuation); `[1, 0, 0]` for none, `[0, 0, 1]` for physical lights, whose
+    /// colour is then that at distance 1. Ignored by directional and ambient light.
+    pub attenuation: [f32; 3],
+    /// Whether surfaces block it. A light at the eye never casts a shadow that the eye could see: it gets no shadow rays either way.
+    pub shadows: bool,
+}
+
+impl Light {
+    fn new(kind: LightKind) -> Light {
+        Light {
+            kind,
+            frame: LightFrame::World,
+            color: [1.0; 3],
+            highlight_color: None,
+            attenuation: [1.0, 0.0, 0.0],
+            shadows: true,
+        }
+    }
+
+    /// Isotropic ambient light of radiance `color`.
+    pub fn ambient(color: [f32; 3]) -> Light {
+        Light { color, shadows: false, ..Light::new(LightKind::Ambient) }
+    }
+
+    /// White light from direction `to_light`.
+    pub fn directional(to_light: DVec3) -> Light {
+        Light::new(LightKind::Directional { to_light, angular_radius_rad: 0.0 })
+    }
+
+    /// White light from a point, without attenuation.
+    pub fn point(position: DVec3) -> Light {
+        Light::new(LightKind::Point { position, radius: 0.0 })
+    }
+
+    /// A white cone of light along `direction`.
+    pub fn spot(position: DVec3, direction: DVec3, cutoff_rad: f64) -> Light {
+        Light::new(LightKind::Spot { position, direction, cutoff_rad, exponent: 0.0, radius: 0.0 })
+    }
+
+    /// A white one-sided disk.
+    pub fn disk(position: DVec3, direction: DVec3, radius: f64) -> Light {
+        Light::new(LightKind::Disk { position, direction, radius })
+    }
+
+    /// White light along the viewing direction (VTK's headlight, GL_LIGHT0's default): moves with the camera, casts no shadows.
+    pub fn headlight() -> Light {
+        let kind = LightKind::Directional { to_light: DVec3::Z, angular_radius_rad: 0.0 };
+        Light { frame: LightFrame::Camera, shadows: false, ..Light::new(kind) }
+    }
+
+    /// The same light in another colour.
+    #[must_use]
+    pub fn with_color(self, color: [f32; 3]) -> Light {
+        Light { color, ..self }
+    }
+
+    /// The same light with a size: radius in world units, or for directional light the angular radius in radians.
+    #[must_use]
+    pub fn with_size(mut self, size: f64) -> Light {
+        match &mut self.kind {
+            LightKind::Directional { angular_radius_rad: r, .. }
+            | LightKind::Point { radius: r, .. }
+            | LightKind::Spot { radius: r, .. }
+            | LightKind::Disk { radius: r, .. } => *r = size,
+            LightKind::Ambient => {}
+        }
+        self
+    }
+
+    /// The same light, whose shadows are left out.
+    #[must_use]
+    pub fn without_shadows(self) -> Light {
+        Light { shadows: false, ..self }
+    }
+
+    /// The same light given in eye space.
+    #[must_use]
+    pub fn in_camera_frame(self) -> Light {
+        Light { frame: LightFrame::Camera, ..self }
+    }
+
+    /// Radius or angular radius; 0 for a light without size.
+    pub fn size(&self) -> f64 {
+        match self.kind {
+            LightKind::Ambient => 0.0,
+            LightKind::Directional { angular_radius_rad: r, .. }
+            | LightKind::Point { radius: r, .. }
+            | LightKind::Spot { radius: r, .. }
+            | LightKind::Disk { radius: r, .. } => r,
+        }
+    }
+
+    /// True when it sits at the eye (or comes along the viewing direction) and has no size: what it misses, the eye cannot see.
+    pub fn is_at_eye(&self) -> bool {
+        if self.frame == LightFrame::World || self.size() > 0.0 {
+            return false;
+        }
+        match self.kind {
+            LightKind::Ambient => true,
+            LightKind::Directional { to_light, .. } => {
+                to_light.x == 0.0 && to_light.y == 0.0 && to_light.z > 0.0
+            }
+            LightKind::Point { position, .. }
+            | LightKind::Spot { position, .. }
+            | LightKind::Disk { position, .. } => position == DVec3::ZERO,
+        }
+    }
+
+    /// True when its shadow rays can change a picture.
+    pub fn casts_shadows(&self) -> bool {
+        self.shadows
+            && !matches!(self.kind, LightKind::Ambient)
+            && !self.is_at_eye()
+            && self.color != [0.0; 3]
+    }
+}
+
+/// A light in render space, ready for shading.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PlacedLight {
+    pub(crate) kind: PlacedKind,
+    pub(crate) color: Vec3,
+    pub(crate) highlight: Vec3,
+    pub(crate) attenuation: Option<[f32; 3]>,
+    pub(crate) size: f32,
+    pub(crate) shadows: bool,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum PlacedKind {
+    Directional { to_light: Vec3 },
+    Point { position: Vec3 },
+    Spot { position: Vec3, direction: Vec3, cos_cutoff: f32, exponent: f32 },
+    Disk { position: Vec3, direction: Vec3 },
+}
+
+impl PlacedLight {
+    /// `light` for a camera with axes `world_from_view` and eye `eye` in a render space with origin `origin`. `None` for
+    /// ambient light, which has no place.
+    pub(crate) fn new(
+        light: &Light,
+        world_from_view: DMat3,
+        eye: DVec3,
+        origin: DVec3,
+    ) -> Option<PlacedLight> {
+        let vector = |v: DVec3| {
+            let w = if light.frame == LightFrame::Camera { world_from_view * v } else { v };
+            w.normalize_or_zero().as_vec3()
+        };
+        let point = |p: DVec3| {
+            let w = if light.frame == LightFrame::Camera { eye + world_from_view * p } else { p };
+            (w - origin).as_vec3()
+        };
+        let kind = match light.kind {
+            LightKind::Ambient => return None,
+            LightKind::Directional { to_light, .. } => PlacedKind::Directional { to_light: vector(to_light) },
+            LightKind::Point { position, .. } => PlacedKind::Point { position: point(position) },
+            LightKind::Spot { position, direction, cutoff_rad, exponent, .. } => PlacedKind::Spot {
+                position: point(position),
+                direction: vector(direction),
+                cos_cutoff: cutoff_rad.cos() as f32,
+                exponent: exponent as f32,
+            },
+            LightKind::Disk { position, direction, .. } => {
+                PlacedKind::Disk { position: point(position), direction: vector(direction) }
+            }
+        };
+        let directional = matches!(kind, PlacedKind::Directional { .. });
+        Some(PlacedLight {
+            kind,
+            color: light.color.into(),
+            highlight: light.highlight_color.unwrap_or(light.color).into(),
+            attenuation: (!directional && light.attenuation != [1.0, 0.0, 0.0]).then_some(light.attenuation),
+            size: light.size() as f32,
+            shadows: light.casts_shadows(),
+        })
+    }
+}

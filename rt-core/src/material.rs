@@ -1,0 +1,250 @@
+//! How surfaces look.
+
+use crate::colormap::ColorMap;
+use crate::texture::Texture;
+use std::sync::Arc;
+
+/// Where a surface's colour comes from.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub enum ColorSource {
+    /// The geometry's own colours where it has any (per vertex, per triangle, per primitive), else [`Material::color`].
+    #[default]
+    Attribute,
+    /// [`Material::color`] even on geometry with colours.
+    Constant,
+    /// The geometry's scalars, interpolated first and mapped then (thesis section 3.2.5), so that the map stays sharp inside
+    /// large triangles.
+    Scalars(Arc<ColorMap>),
+    /// A texture by the mesh's texture coordinates, times [`Material::color`].
+    Texture(Arc<Texture>),
+}
+
+/// Highlight of [`SurfaceModel::Phong`].
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Highlight {
+    /// (N·H)^s with the half vector H: fixed-function OpenGL (Blinn 1977).
+    #[default]
+    HalfVector,
+    /// (R·V)^s with the mirrored light direction R: VTK (Phong 1975).
+    Mirrored,
+}
+
+/// How a surface answers light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum SurfaceModel {
+    /// The colour as it is, without lights: pre-lit vertex colours, annotations.
+    Unlit,
+    /// Ideal diffuse.
+    Matte,
+    /// OpenGL's and VTK's model: coefficients times the colour, plus a highlight, plus an optional mirror.
+    Phong {
+        /// Times colour times ambient light.
+        ambient: f32,
+        /// Times colour times light times cosine.
+        diffuse: f32,
+        /// Highlight colour; black for none.
+        specular: [f32; 3],
+        /// Exponent of the highlight.
+        shininess: f32,
+        /// Form of the highlight.
+        highlight: Highlight,
+        /// Share of mirror reflection added, 0..=1; 0 sends no rays.
+        mirror: f32,
+    },
+    /// A metal: the colour is its reflectance at normal incidence (Schlick 1994 towards grazing).
+    Metal {
+        /// 0 for a mirror, 1 for very dull (GGX α = roughness²).
+        roughness: f32,
+    },
+    /// Glass, water: Fresnel reflection and refraction at a smooth interface.
+    Dielectric {
+        /// Refractive index inside over outside.
+        ior: f32,
+        /// Absorption per world unit inside, by channel: transmittance over length s is exp(-absorption s).
+        absorption: [f32; 3],
+    },
+    /// Base colour, metallic, roughness (glTF 2.0's metallic-roughness model).
+    Pbr {
+        /// 0 dielectric to 1 metal.
+        metallic: f32,
+        /// 0 mirror to 1 dull (GGX α = roughness²).
+        roughness: f32,
+        /// Reflectance at normal incidence of the dielectric part; 0.04 for common plastics, 0 for none (sends no rays).
+        specular: f32,
+    },
+}
+
+/// Which sides of a surface are drawn and lit.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Sides {
+    /// Both; the normal is turned to the viewer by the geometry's orientation (GL_LIGHT_MODEL_TWO_SIDE).
+    #[default]
+    Both,
+    /// Both; the shading normal is turned to the viewer by its own direction (VTK).
+    BothByNormal,
+    /// Both are drawn, lit with the outward normal (OpenGL's one-sided lighting: backs are dark).
+    LitOutside,
+    /// Only the outside; rays pass through backs (GL_CULL_FACE, GL_BACK).
+    FrontOnly,
+    /// Only the inside; rays pass through fronts (GL_CULL_FACE, GL_FRONT).
+    BackOnly,
+}
+
+/// A material.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Material {
+    /// Reaction to light.
+    pub model: SurfaceModel,
+    /// Linear RGB.
+    pub color: [f32; 3],
+    /// What replaces or modulates `color`.
+    pub color_source: ColorSource,
+    /// 1 opaque to 0 invisible; times the alpha of the colour source.
+    pub opacity: f32,
+    /// Radiance given off, linear RGB.
+    pub emission: [f32; 3],
+    /// Sides drawn.
+    pub sides: Sides,
+    /// Use the geometric normal even where shading normals exist (GL_FLAT).
+    pub flat: bool,
+}
+
+impl Material {
+    fn new(model: SurfaceModel, color: [f32; 3]) -> Material {
+        Material {
+            model,
+            color,
+            color_source: ColorSource::Attribute,
+            opacity: 1.0,
+            emission: [0.0; 3],
+            sides: Sides::Both,
+            flat: false,
+        }
+    }
+
+    /// Ideal diffuse.
+    pub fn matte(color: [f32; 3]) -> Material {
+        Material::new(SurfaceModel::Matte, color)
+    }
+
+    /// The colour without lighting.
+    pub fn unlit(color: [f32; 3]) -> Material {
+        Material::new(SurfaceModel::Unlit, color)
+    }
+
+    /// OpenGL-like: full ambient and diffuse, a white highlight of strength `specular`.
+    pub fn phong(color: [f32; 3], specular: f32, shininess: f32) -> Material {
+        let model = SurfaceModel::Phong {
+            ambient: 1.0,
+            diffuse: 1.0,
+            specular: [specular; 3],
+            shininess,
+            highlight: Highlight::HalfVector,
+            mirror: 0.0,
+        };
+        Material::new(model, color)
+    }
+
+    /// A metal with reflectance `color`.
+    pub fn metal(color: [f32; 3], roughness: f32) -> Material {
+        Material::new(SurfaceModel::Metal { roughness }, color)
+    }
+
+    /// Clear glass of refractive index `ior`.
+    pub fn dielectric(ior: f32) -> Material {
+        Material::new(SurfaceModel::Dielectric { ior, absorption: [0.0; 3] }, [1.0; 3])
+    }
+
+    /// Metallic-roughness.
+    pub fn pbr(color: [f32; 3], metallic: f32, roughness: f32) -> Material {
+        Material::new(SurfaceModel::Pbr { metallic, roughness, specular: 0.04 }, color)
+    }
+
+    /// The same material with another opacity.
+    #[must_use]
+    pub fn with_opacity(self, opacity: f32) -> Material {
+        Material { opacity, ..self }
+    }
+
+    /// The same material coloured by scalars.
+    #[must_use]
+    pub fn colored_by_scalars(self, map: impl Into<Arc<ColorMap>>) -> Material {
+        Material { color_source: ColorSource::Scalars(map.into()), ..self }
+    }
+
+    /// The same material with a texture.
+    #[must_use]
+    pub fn textured(self, texture: impl Into<Arc<Texture>>) -> Material {
+        Material { color_source: ColorSource::Texture(texture.into()), ..self }
+    }
+
+    /// The same material giving off light.
+    #[must_use]
+    pub fn with_emission(self, emission: [f32; 3]) -> Material {
+        Material { emission, ..self }
+    }
+
+    /// The same material drawn on other sides.
+    #[must_use]
+    pub fn with_sides(self, sides: Sides) -> Material {
+        Material { sides, ..self }
+    }
+
+    /// Whether one side is culled.
+    pub(crate) fn culls(&self) -> bool {
+        matches!(self.sides, Sides::FrontOnly | Sides::BackOnly)
+    }
+
+    /// Reflectance and roughness of the reflection rays it sends: `None` for none.
+    pub(crate) fn reflection_roughness(&self) -> Option<f32> {
+        match self.model {
+            SurfaceModel::Phong { mirror, .. } if mirror > 0.0 => Some(0.0),
+            SurfaceModel::Metal { roughness } => Some(roughness),
+            SurfaceModel::Pbr { metallic, roughness, specular } if metallic > 0.0 || specular > 0.0 => {
+                Some(roughness)
+            }
+            _ => None,
+        }
+    }
+
+    /// Checks the numbers; the error names the field.
+    pub(crate) fn check(&self) -> Result<(), (&'static str, String, &'static str)> {
+        let unit = |field, v: f32| {
+            if (0.0..=1.0).contains(&v) { Ok(()) } else { Err((field, v.to_string(), "between 0 and 1")) }
+        };
+        let light = |field, v: [f32; 3]| {
+            if v.iter().all(|x| x.is_finite() && *x >= 0.0) {
+                Ok(())
+            } else {
+                Err((field, format!("{v:?}"), "finite and not negative in every channel"))
+            }
+        };
+        unit("opacity", self.opacity)?;
+        light("color", self.color)?;
+        light("emission", self.emission)?;
+        match self.model {
+            SurfaceModel::Unlit | SurfaceModel::Matte => Ok(()),
+            SurfaceModel::Phong { ambient, diffuse, specular, shininess, mirror, .. } => {
+                light("ambient", [ambient; 3])?;
+                light("diffuse", [diffuse; 3])?;
+                light("specular", specular)?;
+                light("shininess", [shininess; 3])?;
+                unit("mirror", mirror)
+            }
+            SurfaceModel::Metal { roughness } => unit("roughness", roughness),
+            SurfaceModel::Dielectric { ior, absorption } => {
+                light("absorption", absorption)?;
+                if ior.is_finite() && ior > 0.0 {
+                    Ok(())
+                } else {
+                    Err(("ior", ior.to_string(), "finite and positive"))
+                }
+            }
+            SurfaceModel::Pbr { metallic, roughness, specular } => {
+                unit("metallic", metallic)?;
+                unit("roughness", roughness)?;
+                unit("specular", specular)
+            }
+        }
+    }
+}

@@ -1,0 +1,37 @@
+//! Scene and camera in, picture and report out.
+//!
+//! [`render`] draws one frame, a [`Renderer`] many in the same memory. [`Progressive`] gives a picture after every sample per pixel. [`AsyncRenderer`] draws frame N while
+//! the program prepares frame N+1 (thesis section 4.1.2).
+
+mod assemble;
+mod asynchronous;
+mod error;
+mod options;
+mod plan;
+mod progressive;
+mod renderer;
+
+pub use asynchronous::AsyncRenderer;
+pub use error::RenderError;
+pub use options::{Crop, RenderOptions};
+pub use progressive::{Progressive, RenderReport, StopReason};
+pub use renderer::Renderer;
+
+use crate::camera::Camera;
+use crate::frame::Frame;
+use crate::scene::Scene;
+
+/// A picture with the account of how it came about.
+#[derive(Debug, Clone)]
+pub struct RenderOutput {
+    /// The picture.
+    pub frame: Frame,
+    /// Rays by kind, effects that ran, warnings, time.
+    pub report: RenderReport,
+}
+
+/// Draws `scene` as seen by `camera`, on rayon's current thread pool, until the options' samples, time or error are reached. The same
+/// arguments and seed give the same picture bit for bit on any number of threads (unless time or cancelling cuts it short).
+pub fn render(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Result<RenderOutput, RenderError> {
+    Renderer::new().render(scene, camera, options)
+}

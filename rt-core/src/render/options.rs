@@ -1,0 +1,141 @@
+//! What to compute and when to stop.
+
+use super::RenderError;
+use crate::effects::Effects;
+use crate::frame::Layers;
+use crate::sampler::Sampling;
+use crate::volume::VolumeQuality;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+/// A part of the picture, in pixels from the top left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Crop {
+    /// First column.
+    pub x: u32,
+    /// First row.
+    pub y: u32,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+/// Options of a frame. `RenderOptions { samples: 16, ..RenderOptions::new(640, 480) }`.
+#[derive(Debug, Clone)]
+pub struct RenderOptions {
+    /// Pixels per row of the whole picture.
+    pub width: u32,
+    /// Rows of the whole picture.
+    pub height: u32,
+    /// Draw only this part (its pixels are those of the whole picture, bit for bit). The frame has the part's size.
+    pub crop: Option<Crop>,
+    /// What to compute.
+    pub layers: Layers,
+    /// Effects that may run. `None`: those that scene and camera need. An effect named here that changes no pixel is reported.
+    pub effects: Option<Effects>,
+    /// Light over many bounces in place of ambient light and ambient occlusion.
+    pub path_tracing: bool,
+    /// Samples per pixel, at most. One sample goes through the pixel's centre, several are spread over its square (box filter).
+    pub samples: u32,
+    /// Shadow rays per sample to each light that has a size.
+    pub light_rays: u32,
+    /// How samples are spread.
+    pub sampling: Sampling,
+    /// Another seed gives other noise.
+    pub seed: u64,
+    /// Most reflections, refractions and diffuse bounces in a row; transparent layers do not count.
+    pub max_bounces: u32,
+    /// Rays whose contribution to the pixel cannot exceed this (linear, 1 = white) are not sent. 0 for all.
+    pub min_contribution: f32,
+    /// Depth, distance, normal and ids belong to the first surface of at least this opacity: 0 for any surface that is not
+    /// invisible, 1 for opaque surfaces only, as OpenGL's depth buffer has it.
+    pub depth_min_opacity: f32,
+    /// Accuracy of direct volume rendering.
+    pub volume_quality: VolumeQuality,
+    /// Stop when this much time has passed. The first sample of every pixel is always finished.
+    pub time_limit: Option<Duration>,
+    /// Stop when the standard error of a pixel (root mean square over the picture, luminance) is estimated below this, in 8-bit
+    /// grey levels of linear light (1 = 1/255 of white). Low-discrepancy samples do better than the estimate, which assumes
+    /// independent ones. Looked at from 4 samples on.
+    pub max_error_levels: Option<f32>,
+    /// Set to true to stop as soon as the tiles in work are done.
+    pub cancel: Option<Arc<AtomicBool>>,
+}
+
+impl RenderOptions {
+    /// Colour of a picture of `width` x `height`, one sample per pixel, with the effects that the scene needs.
+    pub fn new(width: u32, height: u32) -> RenderOptions {
+        RenderOptions {
+            width,
+            height,
+            crop: None,
+            layers: Layers::COLOR,
+            effects: None,
+            path_tracing: false,
+            samples: 1,
+            light_rays: 4,
+            sampling: Sampling::Sobol,
+            seed: 0,
+            max_bounces: 8,
+            min_contribution: 1.0 / 1024.0,
+            depth_min_opacity: 0.0,
+            volume_quality: VolumeQuality::default(),
+            time_limit: None,
+            max_error_levels: None,
+            cancel: None,
+        }
+    }
+
+    /// The part to draw: the crop, or everything.
+    pub fn area(&self) -> Crop {
+        self.crop.unwrap_or(Crop { x: 0, y: 0, width: self.width, height: self.height })
+    }
+
+    /// Checks every number.
+    pub fn check(&self) -> Result<(), RenderError> {
+        let error = |field, value: String, rule| Err(RenderError::Option { field, value, rule });
+        const MOST: u32 = 1 << 16;
+        for (field, v) in [("width", self.width), ("height", self.height)] {
+            if v == 0 || v > MOST {
+                return error(field, v.to_string(), "between 1 and 65536 pixels");
+            }
+        }
+        if let Some(c) = self.crop {
+            let inside =
+                |start: u32, n: u32, all: u32| n > 0 && start.checked_add(n).is_some_and(|end| end <= all);
+            if !inside(c.x, c.width, self.width) || !inside(c.y, c.height, self.height) {
+                return error("crop", format!("{c:?}"), "at least one pixel, inside the picture");
+            }
+        }
+        if self.layers.is_empty() {
+            return error("layers", "none".into(), "at least one layer");
+        }
+        for (field, v) in [("samples", self.samples), ("light_rays", self.light_rays)] {
+            if v == 0 {
+                return error(field, "0".into(), "at least 1");
+            }
+        }
+        if self.max_bounces > u16::MAX as u32 {
+            return error("max_bounces", self.max_bounces.to_string(), "at most 65535");
+        }
+        for (field, v) in
+            [("min_contribution", self.min_contribution), ("depth_min_opacity", self.depth_min_opacity)]
+        {
+            if !(0.0..=1.0).contains(&v) {
+                return error(field, v.to_string(), "between 0 and 1");
+            }
+        }
+        if let Some(e) = self.max_error_levels
+            && !(e > 0.0 && e.is_finite())
+        {
+            return error(
+                "max_error_levels",
+                e.to_string(),
+                "positive and finite (8-bit grey levels); leave it out for no limit",
+            );
+        }
+        Ok(())
+    }
+}

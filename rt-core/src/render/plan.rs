@@ -1,0 +1,109 @@
+//! From what is asked for and what the scene needs to what runs, with a word about every difference.
+
+use super::{RenderError, RenderOptions};
+use crate::camera::Camera;
+use crate::effects::Effects;
+use crate::ray_stats::RayStats;
+use crate::scene::Scene;
+
+/// What will run.
+pub(super) struct Plan {
+    pub(super) effects: Effects,
+    /// Needed by the scene but not asked for.
+    pub(super) left_out: Effects,
+    pub(super) warnings: Vec<String>,
+}
+
+pub(super) fn plan(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Result<Plan, RenderError> {
+    options.check()?;
+    scene.check()?;
+    let mut warnings = scene.warnings();
+    let asked = options.effects.map(|e| e.with_if(e.contains(Effects::SOFT_SHADOWS), Effects::SHADOWS));
+    let path = options.path_tracing || asked.is_some_and(|e| e.contains(Effects::PATH_TRACING));
+    let mut needed = Effects::required_by(scene) | Effects::required_by_camera(camera);
+    if path {
+        needed = needed.without(Effects::AMBIENT_OCCLUSION) | Effects::PATH_TRACING;
+    }
+    if path && needed.contains(Effects::VOLUMES) {
+        return Err(RenderError::Unsupported {
+            what: "path tracing",
+            with: "with volumes",
+            cure: "leave the volumes out of the scene, or path tracing out of the options",
+        });
+    }
+    let asked_all = asked.map(|e| e.with_if(path, Effects::PATH_TRACING)).unwrap_or(needed);
+    let effects = asked_all.intersection(needed);
+    for (effect, name) in Effects::ALL {
+        if asked.is_some() && asked_all.contains(effect) && !needed.contains(effect) {
+            warnings.push(format!("{name} changes no pixel: {}", why_not_needed(effect, path)));
+        }
+    }
+    if effects.contains(Effects::VOLUMES) && effects.intersects(Effects::SHADOWS | Effects::AMBIENT_OCCLUSION)
+    {
+        warnings.push(
+            "volumes cast no shadows and no ambient occlusion: light rays pass through them undimmed".into(),
+        );
+    }
+    let left_out = needed.without(effects);
+    for (effect, name) in Effects::ALL {
+        if left_out.contains(effect) {
+            warnings.push(format!("{name} left out: the scene has it, the options do not ask for it"));
+        }
+    }
+    Ok(Plan { effects, left_out, warnings })
+}
+
+fn why_not_needed(effect: Effects, path: bool) -> &'static str {
+    match effect {
+        Effects::SHADOWS => "no light casts shadows that the eye could see",
+        Effects::SOFT_SHADOWS => "no light that casts shadows has a size",
+        Effects::AMBIENT_OCCLUSION if path => "path tracing computes what it stands for",
+        Effects::AMBIENT_OCCLUSION => {
+            "the scene has no ambient occlusion settings, no ambient light or environment, or no surface that answers it"
+        }
+        Effects::REFLECTION => "no material is a mirror or a dielectric",
+        Effects::GLOSSY_REFLECTION => "no material reflects with roughness",
+        Effects::REFRACTION => "no material is a dielectric",
+        Effects::TRANSPARENCY => "every surface is opaque",
+        Effects::DEPTH_OF_FIELD => "the camera has no lens with an aperture",
+        Effects::VOLUMES => "the scene has no volumes",
+        _ => "nothing needs it",
+    }
+}
+
+/// Effects that ran without doing anything, in words, once the frame is done.
+pub(super) fn warn_without_effect(
+    asked: Option<Effects>,
+    ran: Effects,
+    left_out: Effects,
+    rays: &RayStats,
+    out: &mut Vec<String>,
+) {
+    let asked = asked.unwrap_or(Effects::NONE);
+    let path = ran.contains(Effects::PATH_TRACING);
+    for (effect, name) in Effects::ALL {
+        // A path tracer's bounces are not told apart by kind.
+        let told_apart =
+            !path || matches!(effect, Effects::SHADOWS | Effects::SOFT_SHADOWS | Effects::PATH_TRACING);
+        if asked.contains(effect)
+            && ran.contains(effect)
+            && told_apart
+            && rays.times_effective(effect) == Some(0)
+        {
+            out.push(format!("{name} changed no pixel of this picture: nothing in view is affected by it"));
+        }
+    }
+    if rays.opacity_ignored > 0 && !left_out.contains(Effects::TRANSPARENCY) {
+        out.push(format!(
+            "{} hits on surfaces with opacity below 1 were drawn opaque: the scene did not show that it has any; \
+             give a material an opacity below 1",
+            rays.opacity_ignored
+        ));
+    }
+    if rays.cut_at_max_bounces > 0 {
+        out.push(format!(
+            "{} paths were cut at `max_bounces`; what they would have added is missing: raise it if dark spots show",
+            rays.cut_at_max_bounces
+        ));
+    }
+}

@@ -1,0 +1,265 @@
+//! Sample after sample, with a picture after each.
+
+use super::assemble::{Tile, assemble, tiles};
+use super::plan::{plan, warn_without_effect};
+use super::{RenderError, RenderOptions, RenderOutput};
+use crate::camera::Camera;
+use crate::effects::Effects;
+use crate::frame::{Frame, Layers};
+use crate::ray_stats::RayStats;
+use crate::scene::Scene;
+use crate::shade::{Stage, TileArea, TileLayers, Workspace, render_tile};
+use rayon::prelude::*;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Why rendering ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StopReason {
+    /// It has not ended yet.
+    Running,
+    /// All samples are done.
+    Samples,
+    /// The time limit was reached.
+    Time,
+    /// The error estimate fell below the limit.
+    Error,
+    /// The cancel flag was set.
+    Cancelled,
+}
+
+/// The account of a frame.
+#[derive(Debug, Clone)]
+pub struct RenderReport {
+    /// Rays by kind.
+    pub rays: RayStats,
+    /// Effects that ran.
+    pub effects: Effects,
+    /// Effects that scene or camera have, but the options did not ask for.
+    pub left_out: Effects,
+    /// Requests that changed nothing, or were only partly met; empty when all is well.
+    pub warnings: Vec<String>,
+    /// Samples of every pixel; tiles may have one more when time or cancelling cut a pass short.
+    pub samples: u32,
+    /// Why it ended.
+    pub stopped: StopReason,
+    /// Estimated standard error of a pixel (root mean square over the picture, luminance), in 8-bit grey levels of linear light.
+    /// `None` below two samples.
+    pub error_levels: Option<f32>,
+    /// Wall time since the start.
+    pub elapsed: Duration,
+}
+
+/// Memory that frames hand on to each other.
+#[derive(Default)]
+pub(super) struct Buffers {
+    tiles: Vec<Tile>,
+    spare: Vec<Workspace>,
+    /// A picture nobody needs any more.
+    pub(super) frame: Frame,
+}
+
+/// A picture in the making.
+pub struct Progressive<'a> {
+    stage: Stage<'a>,
+    tiles: Vec<Tile>,
+    /// Buffers of threads that are not rendering now.
+    spare: Mutex<Vec<Workspace>>,
+    /// Memory for the next picture.
+    old_frame: Frame,
+    rays: RayStats,
+    left_out: Effects,
+    warnings: Vec<String>,
+    samples: u32,
+    stopped: StopReason,
+    started: Instant,
+    /// A second cancel flag, for the asynchronous renderer's own use.
+    pub(super) also_cancel: Option<&'a AtomicBool>,
+}
+
+impl<'a> Progressive<'a> {
+    /// Checks everything and sets up the frame; traces nothing yet.
+    pub fn new(
+        scene: &'a Scene,
+        camera: &Camera,
+        options: &'a RenderOptions,
+    ) -> Result<Progressive<'a>, RenderError> {
+        Progressive::with_buffers(scene, camera, options, Buffers::default())
+    }
+
+    /// As [`Progressive::new`], in memory of an earlier frame.
+    pub(super) fn with_buffers(
+        scene: &'a Scene,
+        camera: &Camera,
+        options: &'a RenderOptions,
+        buffers: Buffers,
+    ) -> Result<Progressive<'a>, RenderError> {
+        let started = Instant::now();
+        let plan = plan(scene, camera, options)?;
+        Ok(Progressive {
+            stage: Stage::new(scene, camera, options, plan.effects),
+            tiles: tiles(options, camera, buffers.tiles),
+            spare: Mutex::new(buffers.spare),
+            old_frame: buffers.frame,
+            rays: RayStats::default(),
+            left_out: plan.left_out,
+            warnings: plan.warnings,
+            samples: 0,
+            stopped: StopReason::Running,
+            started,
+            also_cancel: None,
+        })
+    }
+
+    /// Adds one sample to every pixel. Returns whether there is more to do; does nothing once there is not.
+    pub fn step(&mut self) -> Result<bool, RenderError> {
+        if self.stopped != StopReason::Running {
+            return Ok(false);
+        }
+        let sample = self.samples;
+        let (stage, spare, started) = (&self.stage, &self.spare, self.started);
+        let also_cancel = self.also_cancel;
+        let options = stage.options;
+        // A pass may be cut short between tiles: at once when cancelled, for lack of time only after the first pass.
+        let cut = || {
+            let is_set = |f: &AtomicBool| f.load(Ordering::Relaxed);
+            if options.cancel.as_deref().is_some_and(is_set) || also_cancel.is_some_and(is_set) {
+                Some(StopReason::Cancelled)
+            } else if sample > 0 && options.time_limit.is_some_and(|l| started.elapsed() >= l) {
+                Some(StopReason::Time)
+            } else {
+                None
+            }
+        };
+        let rays = self
+            .tiles
+            .par_iter_mut()
+            .map(|tile| {
+                if cut().is_some() {
+                    return Ok::<_, RenderError>(RayStats::default());
+                }
+                let mut work = take(spare);
+                let stats = catch_unwind(AssertUnwindSafe(|| {
+                    render_tile(stage, &tile.area, &mut tile.layers, &mut work, sample)
+                }))
+                .map_err(|panic| locate_panic(stage, tile.area, sample, message_of(&*panic)))?;
+                tile.samples += 1;
+                give_back(spare, work);
+                Ok(stats)
+            })
+            .try_reduce(RayStats::default, |mut a, b| {
+                a += b;
+                Ok(a)
+            })?;
+        self.rays += rays;
+        let complete = self.tiles.iter().all(|t| t.samples > sample);
+        self.samples += complete as u32;
+        self.stopped = if let Some(reason) = cut() {
+            reason
+        } else if self.samples >= options.samples || !options.layers.contains(Layers::COLOR) {
+            StopReason::Samples
+        } else if self.time_is_up() {
+            StopReason::Time
+        } else if let (Some(limit), Some(error), true) =
+            (options.max_error_levels, self.error_levels(), self.samples >= 4)
+            && error <= limit
+        {
+            StopReason::Error
+        } else {
+            StopReason::Running
+        };
+        Ok(self.stopped == StopReason::Running)
+    }
+
+    fn time_is_up(&self) -> bool {
+        self.stage.options.time_limit.is_some_and(|l| self.started.elapsed() >= l)
+    }
+
+    /// Estimated standard error, see [`RenderReport::error_levels`].
+    pub fn error_levels(&self) -> Option<f32> {
+        let usable = self.samples >= 2 && self.tiles.iter().all(|t| !t.layers.luminance_sq.is_empty());
+        usable.then(|| {
+            let sum: f64 = self.tiles.iter().map(|t| t.layers.squared_error(&t.area, t.samples)).sum();
+            let area = self.stage.options.area();
+            (255.0 * (sum / (area.width as f64 * area.height as f64)).sqrt()) as f32
+        })
+    }
+
+    /// The picture so far.
+    pub fn frame(&self) -> Frame {
+        assemble(self.stage.options, &self.tiles, Frame::default())
+    }
+
+    /// The finished picture, its account, and the memory for the next.
+    pub(super) fn finish(mut self) -> (RenderOutput, Buffers) {
+        let old = std::mem::take(&mut self.old_frame);
+        let frame = assemble(self.stage.options, &self.tiles, old);
+        let report = self.report();
+        let spare = self.spare.into_inner().unwrap_or_default();
+        (RenderOutput { frame, report }, Buffers { tiles: self.tiles, spare, frame: Frame::default() })
+    }
+
+    /// The account so far.
+    pub fn report(&self) -> RenderReport {
+        let mut warnings = self.warnings.clone();
+        let options = self.stage.options;
+        if self.samples > 0 {
+            warn_without_effect(
+                options.effects,
+                self.stage.effects,
+                self.left_out,
+                &self.rays,
+                &mut warnings,
+            );
+        }
+        RenderReport {
+            rays: self.rays,
+            effects: self.stage.effects,
+            left_out: self.left_out,
+            warnings,
+            samples: self.samples,
+            stopped: self.stopped,
+            error_levels: self.error_levels(),
+            elapsed: self.started.elapsed(),
+        }
+    }
+}
+
+fn take(spare: &Mutex<Vec<Workspace>>) -> Workspace {
+    spare.lock().map(|mut s| s.pop()).ok().flatten().unwrap_or_default()
+}
+
+fn give_back(spare: &Mutex<Vec<Workspace>>, work: Workspace) {
+    if let Ok(mut s) = spare.lock() {
+        s.push(work);
+    }
+}
+
+/// Renders the tile's pixels one by one until one panics again.
+fn locate_panic(stage: &Stage<'_>, tile: TileArea, sample: u32, message: String) -> RenderError {
+    for y in tile.y..tile.y + tile.height {
+        for x in tile.x..tile.x + tile.width {
+            let area = TileArea { x, y, width: 1, height: 1, sample };
+            let again = catch_unwind(AssertUnwindSafe(|| {
+                let mut layers = TileLayers::new(stage.options.layers, 0.0, false);
+                render_tile(stage, &area, &mut layers, &mut Workspace::default(), sample)
+            }));
+            if let Err(panic) = again {
+                return RenderError::Panicked { x, y, sample, message: message_of(&*panic) };
+            }
+        }
+    }
+    let message =
+        format!("{message} (only with the whole tile of {} x {} pixels from here)", tile.width, tile.height);
+    RenderError::Panicked { x: tile.x, y: tile.y, sample, message }
+}
+
+fn message_of(panic: &(dyn std::any::Any + Send)) -> String {
+    panic
+        .downcast_ref::<&str>()
+        .map(|s| s.to_string())
+        .or_else(|| panic.downcast_ref::<String>().cloned())
+        .unwrap_or_else(|| "panic without a message".into())
+}

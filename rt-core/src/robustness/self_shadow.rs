@@ -1,0 +1,72 @@
+//! Secondary rays that meet the surface they start from.
+
+use super::Random;
+use crate::math::orthonormal_basis;
+use crate::ray::Ray;
+use crate::scene::Scene;
+use crate::surface::Placed;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// What became of the rays.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct SelfShadowCount {
+    /// Camera rays that hit, and so secondary rays traced.
+    pub rays: u64,
+    /// Secondary rays that were blocked. On a convex surface every one is false.
+    pub blocked: u64,
+}
+
+/// Cameras around a convex closed surface, the first instance of a scene, and from every visible point a ray outwards (cosine-distributed about
+/// the face normal), started as shading starts them. A ray leaving a convex surface never meets it again.
+#[derive(Clone, Copy)]
+pub struct SelfShadowTest<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Distance of the cameras from the surface's centre, in radii; above 1.
+    pub camera_radii: f32,
+    /// Seed of the rays: the same seed gives the same rays on any number of threads.
+    pub seed: u64,
+}
+
+const BATCH: usize = 4096;
+
+impl SelfShadowTest<'_> {
+    /// Traces `rays` camera rays (rounded up to a multiple of 4096).
+    pub fn count(&self, rays: usize) -> SelfShadowCount {
+        (0..rays.div_ceil(BATCH)).into_par_iter().map(|b| self.count_batch(b as u64)).reduce(
+            SelfShadowCount::default,
+            |a, b| SelfShadowCount { rays: a.rays + b.rays, blocked: a.blocked + b.blocked },
+        )
+    }
+
+    fn count_batch(&self, batch: u64) -> SelfShadowCount {
+        let world = &self.scene.world;
+        let mut count = SelfShadowCount::default();
+        if world.instances().is_empty() || world.bounds().is_empty() {
+            return count;
+        }
+        let mut random = Random::for_batch(self.seed, batch);
+        let placed = Placed::new(self.scene, 0);
+        let (center, radius) = (world.bounds().center().as_dvec3(), world.bounds().radius() as f64);
+        for _ in 0..BATCH {
+            let eye = (center + random.direction() * radius * self.camera_radii as f64).as_vec3();
+            let target = (center + random.direction() * radius * 0.6 * random.unit()).as_vec3();
+            let ray = Ray::new(eye, (target - eye).normalize_or_zero());
+            let Some(hit) = world.closest(&ray).filter(|h| h.instance == 0) else { continue };
+            let s = placed.surface(&ray, &hit);
+            let dir = cosine_direction(s.face_normal, &mut random);
+            count.rays += 1;
+            count.blocked += world.occluded(&Ray::new(s.ray_origin(dir), dir)) as u64;
+        }
+        count
+    }
+}
+
+/// A direction in the half space of `n`, with density proportional to the cosine.
+fn cosine_direction(n: Vec3, random: &mut Random) -> Vec3 {
+    let (t, b) = orthonormal_basis(n);
+    let (r2, phi) = (random.unit(), std::f64::consts::TAU * random.unit());
+    let d = DVec3::new(r2.sqrt() * phi.cos(), r2.sqrt() * phi.sin(), (1.0 - r2).sqrt()).as_vec3();
+    t * d.x + b * d.y + n * d.z
+}

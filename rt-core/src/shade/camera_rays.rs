@@ -1,0 +1,159 @@
+//! Primary rays in render space: the camera's f64 rays, moved next to the scene before they are rounded to f32.
+
+use crate::camera::{Camera, Projection};
+use crate::math::Aabb;
+use crate::ray::Ray;
+use glam::{DVec3, Vec3};
+
+/// How far the eye may be from the scene's centre, in radii of the scene, before rays start at the scene instead of at the eye.
+/// Up to here the eye's f32 rounding is no worse than that of the vertices; rays with one origin are traced faster.
+const EYE_WITHIN_RADII: f64 = 8.0;
+
+/// Makes the rays of one frame.
+pub(crate) struct CameraRays {
+    parallel: bool,
+    /// Eye, or origin at NDC (0,0); render space.
+    origin: DVec3,
+    /// Change of origin per NDC unit (parallel projection).
+    origin_x: DVec3,
+    origin_y: DVec3,
+    /// Direction at NDC (0,0) and its change per NDC unit (perspective).
+    dir: DVec3,
+    dir_x: DVec3,
+    dir_y: DVec3,
+    /// Parameter at which rays start: `world t = start + t`.
+    start: f64,
+    limits: Limits,
+    /// Lens axes scaled by the aperture's radius, and the ray parameter of the plane in focus.
+    lens: Option<(DVec3, DVec3, f64)>,
+}
+
+/// Where the near and the far plane cut the rays.
+enum Limits {
+    /// At the same parameter everywhere: every usual matrix.
+    Same([f64; 2]),
+    /// Somewhere else for each ray (oblique near planes).
+    PerRay(Box<(Camera, DVec3)>),
+}
+
+impl CameraRays {
+    pub(crate) fn new(camera: &Camera, world_origin: DVec3, bounds: Aabb, with_lens: bool) -> CameraRays {
+        let ray = |x, y| camera.world_ray([x, y]);
+        let (o, d) = ray(0.0, 0.0);
+        let (ox, dx) = ray(1.0, 0.0);
+        let (oy, dy) = ray(0.0, 1.0);
+        let parallel = matches!(camera.projection, Projection::Parallel { .. });
+
+        // Start at the scene's bounds when the eye is far from them. Ray parameters are depths, so the nearest corner is in
+        // front of everything for every pixel.
+        let depth_of = |p: DVec3| {
+            let m = camera.clip_from_world;
+            if parallel {
+                let (z, w) = (m.row(2), m.row(3).w);
+                (z.truncate().dot(p) + z.w) / w + 1.0
+            } else {
+                m.row(3).truncate().dot(p) + m.row(3).w
+            }
+        };
+        let corners = bounds.corners().map(|c| depth_of(world_origin + c.as_dvec3()));
+        let nearest = corners.iter().copied().fold(f64::INFINITY, f64::min);
+        let farthest = corners.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let margin = 0.01 * (farthest - nearest);
+        let far_away = (o - world_origin - bounds.center().as_dvec3()).length()
+            > EYE_WITHIN_RADII * 0.5 * (bounds.max.as_dvec3() - bounds.min.as_dvec3()).length();
+        let move_start =
+            !bounds.is_empty() && nearest.is_finite() && (parallel || (far_away && nearest - margin > 0.0));
+        let start = if move_start { nearest - margin } else { 0.0 };
+
+        let limits = {
+            let [a, b, c, e] = [(0.0, 0.0), (1.0, 1.0), (-1.0, 1.0), (1.0, -1.0)].map(|(x, y)| {
+                let (o, d) = ray(x, y);
+                camera.near_far(o, d)
+            });
+            let close = |p: f64, q: f64| p == q || (p - q).abs() <= 1e-7 * p.abs();
+            if [b, c, e].iter().all(|l| close(a[0], l[0]) && close(a[1], l[1])) {
+                Limits::Same(a)
+            } else {
+                Limits::PerRay(Box::new((*camera, world_origin)))
+            }
+        };
+        let lens = camera.lens().filter(|l| with_lens && l.aperture_radius > 0.0).map(|l| {
+            let axes = camera.world_from_view();
+            // Clip w grows by this much per unit of distance along the view.
+            let scale = camera.clip_from_world.row(3).truncate().length();
+            (axes.x_axis * l.aperture_radius, axes.y_axis * l.aperture_radius, l.focus_distance * scale)
+        });
+        CameraRays {
+            parallel,
+            origin: o - world_origin,
+            origin_x: ox - o,
+            origin_y: oy - o,
+            dir: d,
+            dir_x: dx - d,
+            dir_y: dy - d,
+            start,
+            limits,
+            lens,
+        }
+    }
+
+    /// The ray through NDC (`x`, `y`); `lens` is a point of the unit disk. Hits outside the near and far planes are excluded by the
+    /// ray's range.
+    #[inline]
+    pub(crate) fn ray(&self, x: f64, y: f64, lens: [f32; 2]) -> Ray {
+        let mut dir = self.dir + self.dir_x * x + self.dir_y * y;
+        let mut origin = self.origin;
+        if self.parallel {
+            origin += self.origin_x * x + self.origin_y * y;
+        }
+        let [near, far] = match &self.limits {
+            Limits::Same(l) => *l,
+            Limits::PerRay(c) => c.0.near_far(origin + c.1, dir),
+        };
+        if let Some((right, up, focus)) = self.lens {
+            let offset = right * lens[0] as f64 + up * lens[1] as f64;
+            origin += offset;
+            dir -= offset / focus;
+        }
+        if self.start != 0.0 {
+            origin += dir * self.start;
+        }
+        Ray {
+            origin: origin.as_vec3(),
+            dir: dir.as_vec3(),
+            t_min: (near - self.start).max(0.0) as f32,
+            t_max: (far - self.start) as f32,
+        }
+    }
+
+    /// The rays through NDC columns `xs` and rows `ys` when they differ in direction only (perspective, no lens, usual near and
+    /// far planes): sums of one vector per column and one per row. `None` where each ray needs its own arithmetic.
+    pub(crate) fn table(&self, xs: &[f64], ys: &[f64]) -> Option<RayTable> {
+        let Limits::Same([near, far]) = self.limits else { return None };
+        if self.parallel || self.lens.is_some() || self.start != 0.0 {
+            return None;
+        }
+        Some(RayTable {
+            origin: self.origin.as_vec3(),
+            range: [near.max(0.0) as f32, far as f32],
+            columns: xs.iter().map(|x| self.dir_x * *x).collect(),
+            rows: ys.iter().map(|y| self.dir + self.dir_y * *y).collect(),
+        })
+    }
+}
+
+/// Rays of a tile as columns and rows.
+pub(crate) struct RayTable {
+    origin: Vec3,
+    range: [f32; 2],
+    columns: Vec<DVec3>,
+    rows: Vec<DVec3>,
+}
+
+impl RayTable {
+    #[inline]
+    pub(crate) fn ray(&self, x: u32, y: u32) -> Ray {
+        let dir = (self.columns[x as usize] + self.rows[y as usize]).as_vec3();
+        Ray { origin: self.origin, dir, t_min: self.range[0], t_max: self.range[1] }
+    }
+}

@@ -1,0 +1,161 @@
+//! Light straight from the scene's lights, with or without shadow rays.
+
+use super::lobes::response;
+use super::shadow::{Coherence, trace_light_rays};
+use super::stage::Stage;
+use super::wave::{LightRays, RayState};
+use super::{Dimension, Point, TileArea};
+use crate::effects::Effects;
+use crate::light::{PlacedKind, PlacedLight};
+use crate::math::{max_abs, orthonormal_basis};
+use crate::ray::Ray;
+use crate::ray_stats::RayStats;
+use crate::sampler::unit_disk;
+use crate::surface::length;
+use glam::Vec3;
+
+/// Light falling onto a point from one direction.
+pub(super) struct Incident {
+    /// Unit, towards the light.
+    pub(super) dir: Vec3,
+    /// Where the light is; `None` for directional light.
+    from: Option<Vec3>,
+    /// Share of the light's colour that falls here.
+    pub(super) strength: f32,
+}
+
+/// Adds the light of every lamp to `points`.
+pub(crate) fn add_direct_light(
+    stage: &Stage<'_>,
+    area: &TileArea,
+    points: &mut [Point],
+    states: &[RayState],
+    rays: &mut LightRays,
+    stats: &mut RayStats,
+    mut cost: Option<&mut [f32]>,
+) {
+    let shadows = stage.effects.contains(Effects::SHADOWS);
+    let soft = stage.effects.contains(Effects::SOFT_SHADOWS);
+    for (number, light) in stage.lights.iter().enumerate() {
+        rays.clear();
+        let traced = shadows && light.shadows;
+        let spread = soft && light.size > 0.0 && traced;
+        let count = if spread { stage.options.light_rays } else { 1 };
+        for (i, p) in points.iter_mut().enumerate() {
+            if !p.lit {
+                continue;
+            }
+            let state = &states[p.lane as usize];
+            let material = stage.instances[p.instance as usize].material;
+            for k in 0..count {
+                let incident = if spread {
+                    let dimension = state.stream.wrapping_add(Dimension::LIGHTS + number as u32);
+                    let at = unit_disk(area.sampler(stage, state.slot).square_of(dimension, k, count));
+                    incident_from(light, p.surface.point, Some(at))
+                } else {
+                    incident_from(light, p.surface.point, None)
+                };
+                if incident.strength <= 0.0 {
+                    continue;
+                }
+                let answer =
+                    response(material, &p.surface, p.view, incident.dir, light.color, light.highlight);
+                let radiance = answer * (incident.strength / count as f32);
+                if radiance == Vec3::ZERO {
+                    continue;
+                }
+                if traced {
+                    let common = !spread && !stage.light_passes_surfaces();
+                    rays.push(&shadow_ray(p, &incident, common), i as u32, radiance);
+                } else {
+                    p.radiance += radiance;
+                }
+            }
+        }
+        if !traced {
+            continue;
+        }
+        if let Some(cost) = cost.as_deref_mut() {
+            for &(i, _) in &rays.targets {
+                cost[states[points[i as usize].lane as usize].slot as usize] += 1.0;
+            }
+        }
+        let counts =
+            trace_light_rays(stage, rays, Coherence::Alike, |i, light| points[i as usize].radiance += light);
+        stats.shadow += counts.rays;
+        stats.shadow_blocked += counts.blocked;
+    }
+}
+
+/// Direction and strength of `light` at `p`; `at` is a point of the unit disk for lights with a size.
+#[inline]
+pub(super) fn incident_from(light: &PlacedLight, p: Vec3, at: Option<[f32; 2]>) -> Incident {
+    let [x, y] = at.unwrap_or_default();
+    let (center, normal) = match light.kind {
+        PlacedKind::Directional { to_light } => {
+            let dir = if at.is_some() {
+                // Uniform over the disk that the light covers in the sky.
+                let (s, t) = orthonormal_basis(to_light);
+                (to_light + (s * x + t * y) * light.size.tan()).normalize()
+            } else {
+                to_light
+            };
+            return Incident { dir, from: None, strength: 1.0 };
+        }
+        PlacedKind::Point { position } => (position, (p - position).as_dvec3().normalize_or_zero().as_vec3()),
+        PlacedKind::Spot { position, direction, .. } | PlacedKind::Disk { position, direction } => {
+            (position, direction)
+        }
+    };
+    let from = if at.is_some() && normal != Vec3::ZERO {
+        let (s, t) = orthonormal_basis(normal);
+        center + (s * x + t * y) * light.size
+    } else {
+        center
+    };
+    let to_light = from - p;
+    let distance = length(to_light);
+    if distance == 0.0 || !distance.is_finite() {
+        return Incident { dir: Vec3::ZERO, from: Some(from), strength: 0.0 };
+    }
+    let dir = to_light / distance;
+    let mut strength = match light.attenuation {
+        Some([c, l, q]) => 1.0 / (c + distance * (l + distance * q)),
+        None => 1.0,
+    };
+    match light.kind {
+        PlacedKind::Spot { direction, cos_cutoff, exponent, .. } => {
+            let cos = -dir.dot(direction);
+            strength *= if cos < cos_cutoff {
+                0.0
+            } else if exponent == 0.0 {
+                1.0
+            } else {
+                cos.max(0.0).powf(exponent)
+            };
+        }
+        PlacedKind::Disk { direction, .. } => strength *= (-dir.dot(direction)).max(0.0),
+        PlacedKind::Directional { .. } | PlacedKind::Point { .. } => {}
+    }
+    Incident { dir, from: Some(from), strength }
+}
+
+/// The ray between a point and a light. `from_light` asks for the light as its origin: all rays of a light then share it and are
+/// traced as one packet.
+#[inline]
+fn shadow_ray(p: &Point, incident: &Incident, from_light: bool) -> Ray {
+    let origin = p.surface.ray_origin(incident.dir);
+    let Some(light) = incident.from else {
+        return Ray::new(origin, incident.dir);
+    };
+    let to_light = light - origin;
+    if from_light {
+        // The ray's end is off the surface by its error bound; the arithmetic of a ray from this far adds some ulp of the
+        // coordinates, taken off the range. Where that is more than a hundredth (a lamp next to the wall), start at the wall.
+        let slack = 8.0 * f32::EPSILON * (max_abs(light) + max_abs(origin)) / max_abs(to_light);
+        if slack < 0.01 {
+            return Ray::new(light, -to_light).with_t_max(1.0 - slack);
+        }
+    }
+    Ray::new(origin, to_light).with_t_max(1.0)
+}

@@ -1,0 +1,429 @@
+//! The life of a tile of rays: trace a wave, light what it met, send the next waves, until none is left.
+//!
+//! Each effect is a pass over the whole wave, entered once per wave and only if the frame's [`Effects`] has it:
+//! [`direct`] light with its shadow rays, [`ambient_occlusion`], then [`specular`] (mirror, gloss, glass) or [`path`] and
+//! transparency, which send rays into the next waves. Rays behind transparent surfaces stay coherent and form a wave of their own.
+//! Frames without any of these take a loop of their own, [`local`].
+
+mod ambient_occlusion;
+mod camera_rays;
+mod direct;
+mod lobes;
+mod local;
+mod microfacet;
+mod path;
+mod shadow;
+mod specular;
+mod stage;
+mod tile;
+mod volumes;
+mod wave;
+
+pub(crate) use stage::Stage;
+pub(crate) use tile::{TILE, TileArea, TileLayers};
+
+use crate::effects::Effects;
+use crate::frame::Layers;
+use crate::material::SurfaceModel;
+use crate::ray::{HitBlock, LANES, Ray, RayBlock};
+use crate::ray_stats::RayStats;
+use crate::surface::SurfacePoint;
+use glam::Vec3;
+use tile::PIXELS;
+use wave::{LightRays, RayKind, RayState, Wave};
+
+/// Sampler dimensions, counted from a ray's own stream.
+pub(crate) struct Dimension;
+
+impl Dimension {
+    const PIXEL: u32 = 0;
+    const LENS: u32 = 1;
+    const CHOICE: u32 = 2;
+    const SCATTER: u32 = 3;
+    const AMBIENT_OCCLUSION: u32 = 4;
+    /// One per light from here on.
+    const LIGHTS: u32 = 8;
+}
+
+/// A surface met by a ray of the current wave.
+pub(crate) struct Point {
+    pub(crate) surface: SurfacePoint,
+    /// Unit, towards where the ray came from.
+    pub(crate) view: Vec3,
+    /// Collected towards `view`.
+    pub(crate) radiance: Vec3,
+    pub(crate) t: f32,
+    /// Ray of the wave.
+    pub(crate) lane: u32,
+    pub(crate) instance: u32,
+    /// False where lights change nothing.
+    pub(crate) lit: bool,
+}
+
+/// Buffers of one thread, kept from tile to tile.
+#[derive(Default)]
+pub(crate) struct Workspace {
+    current: Wave,
+    behind: Wave,
+    scattered: Wave,
+    hits: Vec<HitBlock>,
+    points: Vec<Point>,
+    light_rays: LightRays,
+    /// One ray in the object spaces of all volumes.
+    along: Vec<Ray>,
+    /// Premultiplied RGBA of this sample.
+    pixels: Vec<[f32; 4]>,
+}
+
+/// Adds sample number `sample` to every pixel of the tile.
+pub(crate) fn render_tile(
+    stage: &Stage<'_>,
+    area: &TileArea,
+    out: &mut TileLayers,
+    work: &mut Workspace,
+    sample: u32,
+) -> RayStats {
+    let mut stats = RayStats::default();
+    let layers = stage.options.layers;
+    let centered = stage.options.samples <= 1 && !stage.effects.contains(Effects::DEPTH_OF_FIELD);
+    let wants_geometry = layers.intersects(Layers::GEOMETRY) && sample == 0;
+
+    // Depth, normals and ids belong to the pixel centre: rays of their own unless the colour's rays go there anyway.
+    if wants_geometry && !(centered && layers.contains(Layers::COLOR)) {
+        trace_geometry_layers(stage, area, out, work, &mut stats);
+    }
+    if !layers.contains(Layers::COLOR) {
+        return stats;
+    }
+    let record = wants_geometry && centered;
+    if local::suffices(stage) {
+        let jittered = (!centered).then_some(sample);
+        local::render_tile(stage, area, out, work, jittered, record, &mut stats);
+        return stats;
+    }
+    camera_wave(stage, area, &mut work.current, (!centered).then_some(sample), &mut stats, out.cost_mut());
+    work.pixels.clear();
+    work.pixels.resize(PIXELS, [0.0; 4]);
+    work.behind.clear();
+    work.scattered.clear();
+
+    let mut coherent = true;
+    let mut area_sample = *area;
+    area_sample.sample = sample;
+    loop {
+        trace(stage, work, coherent);
+        meet_surfaces(stage, &area_sample, out, work, record, &mut stats);
+        light_points(stage, &area_sample, out, work, &mut stats);
+        send_rays(stage, &area_sample, out, work, &mut stats);
+        coherent = !work.behind.is_empty();
+        let next = if coherent { &mut work.behind } else { &mut work.scattered };
+        if next.is_empty() {
+            break;
+        }
+        std::mem::swap(&mut work.current, next);
+        next.clear();
+    }
+    out.add_sample(&work.pixels, sample == 0);
+    stats
+}
+
+/// Rays of every pixel of the tile with their states, see [`camera_blocks`].
+fn camera_wave(
+    stage: &Stage<'_>,
+    area: &TileArea,
+    wave: &mut Wave,
+    sample: Option<u32>,
+    stats: &mut RayStats,
+    cost: Option<&mut [f32]>,
+) {
+    wave.states.clear();
+    wave.states.extend((0..PIXELS as u16).map(|slot| RayState {
+        throughput: Vec3::ONE,
+        absorption: Vec3::ZERO,
+        coverage: 1.0,
+        stream: 0,
+        slot,
+        bounce: 0,
+        kind: RayKind::Camera,
+    }));
+    camera_blocks(stage, area, &mut wave.blocks, sample, stats, cost);
+}
+
+/// Rays of every pixel of the tile, in Morton order; lanes outside the picture are inactive. `sample` of `None` aims at pixel
+/// centres through the middle of the lens.
+fn camera_blocks(
+    stage: &Stage<'_>,
+    area: &TileArea,
+    blocks: &mut Vec<RayBlock>,
+    sample: Option<u32>,
+    stats: &mut RayStats,
+    cost: Option<&mut [f32]>,
+) {
+    blocks.clear();
+    blocks.resize(PIXELS / LANES, RayBlock::INACTIVE);
+    stats.primary += area.width as u64 * area.height as u64;
+    if let Some(cost) = cost {
+        cost.iter_mut().for_each(|c| *c += 1.0);
+    }
+    let table = if sample.is_none() {
+        let columns: Vec<f64> = (0..area.width).map(|x| stage.ndc(area.x + x, area.y, [0.5; 2])[0]).collect();
+        let rows: Vec<f64> = (0..area.height).map(|y| stage.ndc(area.x, area.y + y, [0.5; 2])[1]).collect();
+        stage.camera_rays.table(&columns, &rows)
+    } else {
+        None
+    };
+    if let Some(table) = table {
+        for slot in 0..PIXELS as u16 {
+            if let Some([x, y]) = area.pixel(slot) {
+                blocks[slot as usize / LANES].set(slot as usize % LANES, &table.ray(x - area.x, y - area.y));
+            }
+        }
+        return;
+    }
+    let through_lens = stage.effects.contains(Effects::DEPTH_OF_FIELD) && sample.is_some();
+    for slot in 0..PIXELS as u16 {
+        let Some([x, y]) = area.pixel(slot) else { continue };
+        let (mut at, mut lens) = ([0.5; 2], [0.0; 2]);
+        if let Some(sample) = sample {
+            let sampler = stage.sampler(x, y, sample);
+            if stage.options.samples > 1 {
+                at = sampler.square(Dimension::PIXEL);
+            }
+            if through_lens {
+                lens = crate::sampler::unit_disk(sampler.square(Dimension::LENS));
+            }
+        }
+        let [nx, ny] = stage.ndc(x, y, at);
+        let ray = stage.camera_rays.ray(nx, ny, lens);
+        blocks[slot as usize / LANES].set(slot as usize % LANES, &ray);
+    }
+}
+
+fn trace(stage: &Stage<'_>, work: &mut Workspace, coherent: bool) {
+    work.hits.clear();
+    work.hits.resize(work.current.blocks.len(), HitBlock::MISS);
+    if coherent {
+        stage.scene.world.closest_coherent(&work.current.blocks, &mut work.hits);
+    } else {
+        stage.scene.world.closest_incoherent(&work.current.blocks, &mut work.hits);
+    }
+}
+
+/// Depth, distance, normal and ids of the first surface of at least `depth_min_opacity`.
+fn trace_geometry_layers(
+    stage: &Stage<'_>,
+    area: &TileArea,
+    out: &mut TileLayers,
+    work: &mut Workspace,
+    stats: &mut RayStats,
+) {
+    camera_wave(stage, area, &mut work.current, None, stats, out.cost_mut());
+    let transparent = stage.effects.contains(Effects::TRANSPARENCY);
+    loop {
+        trace(stage, work, true);
+        work.behind.clear();
+        for i in 0..work.current.states.len() {
+            let Some(hit) = work.hits[i / LANES].get(i % LANES) else { continue };
+            let (ray, state) = (work.current.ray(i), work.current.states[i]);
+            if !transparent {
+                out.record(stage, area, state.slot, &ray, &hit, || stage.surface(&ray, &hit).normal);
+                continue;
+            }
+            let s = stage.surface(&ray, &hit);
+            if s.opacity > 0.0 && s.opacity >= stage.options.depth_min_opacity {
+                out.record(stage, area, state.slot, &ray, &hit, || s.normal);
+            } else {
+                let ray = Ray { t_min: s.t_behind(&ray, hit.t), ..ray };
+                if ray.is_valid() {
+                    work.behind.push(&ray, state);
+                    stats.transparency += 1;
+                }
+            }
+        }
+        if work.behind.is_empty() {
+            return;
+        }
+        std::mem::swap(&mut work.current, &mut work.behind);
+    }
+}
+
+/// Hits become points to shade; misses add the background or the surroundings.
+fn meet_surfaces(
+    stage: &Stage<'_>,
+    area: &TileArea,
+    out: &mut TileLayers,
+    work: &mut Workspace,
+    record: bool,
+    stats: &mut RayStats,
+) {
+    let transparent = stage.effects.contains(Effects::TRANSPARENCY);
+    let refraction = stage.effects.intersects(Effects::REFRACTION | Effects::PATH_TRACING);
+    work.points.clear();
+    for i in 0..work.current.states.len() {
+        let (block, lane) = (&work.current.blocks[i / LANES], i % LANES);
+        if block.t_max[lane] < block.t_min[lane] {
+            continue;
+        }
+        let ray = block.get(lane);
+        let hit = work.hits[i / LANES].get(lane);
+        if !stage.volumes.is_empty() {
+            let t_end = hit.map_or(ray.t_max, |h| h.t);
+            volumes::cross(
+                stage,
+                &ray,
+                t_end,
+                &mut work.current.states[i],
+                &mut work.pixels,
+                &mut work.along,
+                stats,
+            );
+        }
+        let Some(hit) = hit else {
+            add_miss(stage, area, &work.current.states[i], ray.dir, &mut work.pixels);
+            continue;
+        };
+        let placed = stage.placed(&hit);
+        let mut surface = placed.surface(&ray, &hit);
+        if !transparent {
+            stats.opacity_ignored += (surface.opacity < 1.0) as u64;
+            surface.opacity = 1.0;
+        }
+        let length = crate::surface::length(ray.dir);
+        let state = &mut work.current.states[i];
+        if state.absorption != Vec3::ZERO {
+            // `t_min` is where the ray entered or was last continued.
+            state.throughput *= (-state.absorption * ((hit.t - ray.t_min) * length)).exp();
+        }
+        if record && state.kind == RayKind::Camera {
+            let shown =
+                !transparent || surface.opacity > 0.0 && surface.opacity >= stage.options.depth_min_opacity;
+            if shown && !out.is_recorded(state.slot) {
+                out.record(stage, area, state.slot, &ray, &hit, || surface.normal);
+            }
+        }
+        let (lit, radiance) = match placed.material.model {
+            SurfaceModel::Unlit => (false, surface.color),
+            SurfaceModel::Dielectric { .. } if refraction => (false, Vec3::ZERO),
+            _ => (surface.opacity > 0.0, Vec3::ZERO),
+        };
+        work.points.push(Point {
+            surface,
+            view: ray.dir * (-1.0 / length),
+            radiance: radiance + Vec3::from(placed.material.emission),
+            t: hit.t,
+            lane: i as u32,
+            instance: hit.instance,
+            lit,
+        });
+    }
+}
+
+fn add_miss(stage: &Stage<'_>, area: &TileArea, state: &RayState, dir: Vec3, pixels: &mut [[f32; 4]]) {
+    let pixel = &mut pixels[state.slot as usize];
+    let radiance = match state.kind {
+        RayKind::Camera => {
+            let [_, y] = area.pixel(state.slot).unwrap_or_default();
+            let [r, g, b, a] = stage.background(y, dir);
+            pixel[3] += state.coverage * a;
+            Vec3::new(r, g, b) * a
+        }
+        RayKind::Reflected | RayKind::Refracted => stage.surroundings(dir),
+        RayKind::Diffuse => {
+            let environment = stage.scene.environment.as_ref();
+            stage.ambient + environment.map_or(Vec3::ZERO, |e| e.radiance(dir.normalize_or_zero()))
+        }
+    };
+    let added = state.throughput * radiance;
+    for c in 0..3 {
+        pixel[c] += added[c];
+    }
+}
+
+fn light_points(
+    stage: &Stage<'_>,
+    area: &TileArea,
+    out: &mut TileLayers,
+    work: &mut Workspace,
+    stats: &mut RayStats,
+) {
+    let Workspace { current, points, light_rays, pixels, .. } = work;
+    if !stage.lights.is_empty() {
+        direct::add_direct_light(stage, area, points, &current.states, light_rays, stats, out.cost_mut());
+    }
+    if stage.mean_radiance.is_some() && !stage.effects.contains(Effects::PATH_TRACING) {
+        ambient_occlusion::add_ambient_light(
+            stage,
+            area,
+            points,
+            &current.states,
+            light_rays,
+            stats,
+            out.cost_mut(),
+        );
+    }
+    // The path tracer chooses between surface and what is behind by chance, with the same mean.
+    let split = !stage.effects.contains(Effects::PATH_TRACING);
+    for p in points.iter() {
+        let state = &current.states[p.lane as usize];
+        let opacity = p.surface.opacity;
+        let pixel = &mut pixels[state.slot as usize];
+        if split {
+            let added = state.throughput * p.radiance * opacity;
+            for c in 0..3 {
+                pixel[c] += added[c];
+            }
+            pixel[3] += state.coverage * opacity;
+        } else if path::scatters(stage, area, state, p) {
+            let added = state.throughput * p.radiance;
+            for c in 0..3 {
+                pixel[c] += added[c];
+            }
+            pixel[3] += state.coverage;
+        }
+    }
+}
+
+/// Rays that go on from the wave's points.
+fn send_rays(
+    stage: &Stage<'_>,
+    area: &TileArea,
+    out: &mut TileLayers,
+    work: &mut Workspace,
+    stats: &mut RayStats,
+) {
+    let e = stage.effects;
+    let (before_behind, before_scattered) = (work.behind.states.len(), work.scattered.states.len());
+    if e.contains(Effects::PATH_TRACING) {
+        path::continue_paths(stage, area, work, stats);
+    } else {
+        if e.intersects(Effects::REFLECTION | Effects::GLOSSY_REFLECTION | Effects::REFRACTION) {
+            specular::send_specular_rays(stage, area, work, stats);
+        }
+        if e.contains(Effects::TRANSPARENCY) {
+            send_behind(stage, work, stats);
+        }
+    }
+    if let Some(cost) = out.cost_mut() {
+        for s in work.behind.states[before_behind..].iter().chain(&work.scattered.states[before_scattered..])
+        {
+            cost[s.slot as usize] += 1.0;
+        }
+    }
+}
+
+/// Continues rays behind transparent surfaces: the same ray with a later start, so that packets stay packets.
+fn send_behind(stage: &Stage<'_>, work: &mut Workspace, stats: &mut RayStats) {
+    for p in work.points.iter().filter(|p| p.surface.opacity < 1.0) {
+        let state = work.current.states[p.lane as usize];
+        let left = 1.0 - p.surface.opacity;
+        let throughput = state.throughput * left;
+        let ray = work.current.ray(p.lane as usize);
+        let ray = Ray { t_min: p.surface.t_behind(&ray, p.t), ..ray };
+        if throughput.max_element() < stage.options.min_contribution || !ray.is_valid() {
+            continue;
+        }
+        let stream = crate::sampler::hash(state.stream.wrapping_add(0x51ed_270b));
+        work.behind.push(&ray, RayState { throughput, coverage: state.coverage * left, stream, ..state });
+        stats.transparency += 1;
+    }
+}

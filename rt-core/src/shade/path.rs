@@ -1,0 +1,136 @@
+//! Path tracing (Kajiya 1986): one continued ray per point, chosen with the probabilities of the material's lobes; lamps by shadow
+//! rays at every point, environment and emission by hitting them. No light is counted twice: lamps have no surface to be hit.
+
+use super::lobes::pbr_transmitted;
+use super::microfacet::schlick;
+use super::specular::{MIRROR_ROUGHNESS, facing, interface, mirrored, sample_lobe, send};
+use super::stage::Stage;
+use super::wave::{RayKind, RayState};
+use super::{Dimension, Point, TileArea, Workspace};
+use crate::material::SurfaceModel;
+use crate::math::orthonormal_basis;
+use crate::ray::Ray;
+use crate::ray_stats::RayStats;
+use crate::sampler::cosine_hemisphere;
+use glam::Vec3;
+
+/// Bounce from which paths are ended by chance (Russian roulette; Arvo and Kirk 1990).
+const ROULETTE_FROM: u16 = 4;
+
+/// Whether the path scatters at `p` rather than passing through it: by chance, with the surface's opacity.
+#[inline]
+pub(super) fn scatters(stage: &Stage<'_>, area: &TileArea, state: &RayState, p: &Point) -> bool {
+    p.surface.opacity >= 1.0 || choice(stage, area, state)[0] < p.surface.opacity
+}
+
+#[inline]
+fn choice(stage: &Stage<'_>, area: &TileArea, state: &RayState) -> [f32; 2] {
+    area.sampler(stage, state.slot).square(state.stream.wrapping_add(Dimension::CHOICE))
+}
+
+pub(super) fn continue_paths(stage: &Stage<'_>, area: &TileArea, work: &mut Workspace, stats: &mut RayStats) {
+    for p in &work.points {
+        let state = work.current.states[p.lane as usize];
+        if !scatters(stage, area, &state, p) {
+            let ray = work.current.ray(p.lane as usize);
+            let ray = Ray { t_min: p.surface.t_behind(&ray, p.t), ..ray };
+            if ray.is_valid() {
+                let stream = crate::sampler::hash(state.stream.wrapping_add(0x51ed_270b));
+                work.behind.push(&ray, RayState { stream, ..state });
+                stats.transparency += 1;
+            }
+            continue;
+        }
+        let Some((dir, weight, mut next)) = scatter(stage, area, p, &state) else { continue };
+        let mut throughput = state.throughput * weight;
+        if state.bounce >= ROULETTE_FROM {
+            let survive = throughput.max_element().min(0.95);
+            let [_, u] = choice(stage, area, &RayState { stream: state.stream ^ 0x2545_f491, ..state });
+            if u >= survive {
+                continue;
+            }
+            throughput /= survive;
+        }
+        next.throughput = throughput;
+        stats.path += send(stage, p, dir, throughput, next, 3, &mut work.scattered, stats);
+    }
+}
+
+/// Direction and weight (BRDF · cosine / density) of the continued path.
+fn scatter(
+    stage: &Stage<'_>,
+    area: &TileArea,
+    p: &Point,
+    state: &RayState,
+) -> Option<(Vec3, Vec3, RayState)> {
+    let sampler = area.sampler(stage, state.slot);
+    let u = sampler.square(state.stream.wrapping_add(Dimension::SCATTER));
+    // The first number of this pair decided about opacity; stretch what is left of it to a fresh one.
+    let [_, lobe] = choice(stage, area, state);
+    let material = stage.instances[p.instance as usize].material;
+    let color = p.surface.color;
+    let n = facing(p);
+    let kind = |kind| RayState { kind, ..*state };
+    let diffuse = |weight: Vec3| {
+        let n =
+            if matches!(material.sides, crate::material::Sides::LitOutside) { p.surface.normal } else { n };
+        let (s, t) = orthonormal_basis(n);
+        let d = cosine_hemisphere(u);
+        let dir = s * d.x + t * d.y + n * d.z;
+        // Directions below the face are inside the body: black.
+        (dir.dot(p.surface.face_normal) > 0.0).then(|| (dir, weight, kind(RayKind::Diffuse)))
+    };
+    let gloss = |f0: Vec3, roughness: f32, probability: f32| {
+        if roughness <= MIRROR_ROUGHNESS {
+            let share = schlick(f0, n.dot(p.view)) / probability;
+            return Some((mirrored(p, n), share, kind(RayKind::Reflected)));
+        }
+        let (dir, share) = sample_lobe(p, n, f0, roughness, u)?;
+        Some((dir, share / probability, kind(RayKind::Reflected)))
+    };
+    match material.model {
+        SurfaceModel::Unlit => None,
+        SurfaceModel::Matte => diffuse(color),
+        SurfaceModel::Phong { diffuse: kd, mirror, .. } => {
+            // The highlight is for lamps only: it is no physical lobe, and has no share of indirect light.
+            let matte = color * kd;
+            let total = mirror + matte.max_element();
+            if total <= 0.0 {
+                return None;
+            }
+            let probability = mirror / total;
+            if lobe < probability {
+                Some((mirrored(p, n), Vec3::splat(mirror / probability), kind(RayKind::Reflected)))
+            } else {
+                diffuse(matte / (1.0 - probability))
+            }
+        }
+        SurfaceModel::Metal { roughness } => gloss(color, roughness, 1.0),
+        SurfaceModel::Pbr { metallic, roughness, specular } => {
+            let f0 = Vec3::splat(specular).lerp(color, metallic);
+            let at_view = schlick(f0, n.dot(p.view)).max_element() * (f0 != Vec3::ZERO) as u32 as f32;
+            let matte = color * (1.0 - metallic);
+            let transmitted = pbr_transmitted(specular, n.dot(p.view));
+            let total = at_view + (matte * transmitted).max_element();
+            if total <= 0.0 {
+                return None;
+            }
+            let probability = at_view / total;
+            if lobe < probability {
+                gloss(f0, roughness, probability)
+            } else {
+                diffuse(matte * transmitted / (1.0 - probability))
+            }
+        }
+        SurfaceModel::Dielectric { ior, absorption } => {
+            let (reflected, through) = interface(p, ior, absorption.into());
+            match through {
+                Some(t) if lobe >= reflected => {
+                    let next = RayState { absorption: t.medium, ..kind(RayKind::Refracted) };
+                    Some((t.dir, color, next))
+                }
+                _ => Some((mirrored(p, n), Vec3::ONE, kind(RayKind::Reflected))),
+            }
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! Mirror, gloss and glass: the rays of Whitted (1980), with microfacet directions for gloss (Cook, Porter and Carpenter 1984).
+
+use super::microfacet::{fresnel_dielectric, masking_ratio, refract, sample_visible_normal, schlick};
+use super::stage::Stage;
+use super::wave::{RayKind, RayState, Wave};
+use super::{Dimension, Point, TileArea, Workspace};
+use crate::effects::Effects;
+use crate::material::SurfaceModel;
+use crate::math::orthonormal_basis;
+use crate::ray::Ray;
+use crate::ray_stats::RayStats;
+use crate::sampler::hash;
+use glam::Vec3;
+
+/// Below this roughness a lobe is narrower than a pixel and treated as a mirror.
+pub(super) const MIRROR_ROUGHNESS: f32 = 1e-3;
+
+/// Stream of a ray that leaves a point in branch `branch`.
+#[inline]
+pub(super) fn child_stream(state: &RayState, branch: u32) -> u32 {
+    hash(state.stream.wrapping_mul(4).wrapping_add(branch).wrapping_add(0x9e37_79b9))
+}
+
+pub(super) fn send_specular_rays(
+    stage: &Stage<'_>,
+    area: &TileArea,
+    work: &mut Workspace,
+    stats: &mut RayStats,
+) {
+    let e = stage.effects;
+    let (mirror, gloss) = (e.contains(Effects::REFLECTION), e.contains(Effects::GLOSSY_REFLECTION));
+    for p in &work.points {
+        let material = stage.instances[p.instance as usize].material;
+        let state = work.current.states[p.lane as usize];
+        let weight = state.throughput * p.surface.opacity;
+        match material.model {
+            SurfaceModel::Phong { mirror: share, .. } if share > 0.0 && mirror => {
+                reflect_at(stage, p, facing(p), weight * share, &state, &mut work.scattered, stats);
+            }
+            SurfaceModel::Metal { roughness } => {
+                let (f0, allowed) =
+                    (p.surface.color, if roughness <= MIRROR_ROUGHNESS { mirror } else { gloss });
+                if allowed {
+                    reflect_lobe(stage, area, p, f0, roughness, weight, &state, &mut work.scattered, stats);
+                }
+            }
+            SurfaceModel::Pbr { metallic, roughness, specular } if metallic > 0.0 || specular > 0.0 => {
+                let f0 = Vec3::splat(specular).lerp(p.surface.color, metallic);
+                if if roughness <= MIRROR_ROUGHNESS { mirror } else { gloss } {
+                    reflect_lobe(stage, area, p, f0, roughness, weight, &state, &mut work.scattered, stats);
+                }
+            }
+            SurfaceModel::Dielectric { ior, absorption } if e.contains(Effects::REFRACTION) => {
+                let (reflected, through) = interface(p, ior, absorption.into());
+                if let Some(t) = through {
+                    let next = RayState { absorption: t.medium, kind: RayKind::Refracted, ..state };
+                    let throughput = weight * p.surface.color * t.share;
+                    stats.refraction +=
+                        send(stage, p, t.dir, throughput, next, 2, &mut work.scattered, stats);
+                }
+                // Total internal reflection belongs to refraction: without it, glass would leak light.
+                if mirror || reflected == 1.0 {
+                    let n = facing(p);
+                    reflect_at(stage, p, n, weight * reflected, &state, &mut work.scattered, stats);
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+/// The shading normal on the side of the viewer.
+#[inline]
+pub(super) fn facing(p: &Point) -> Vec3 {
+    if p.surface.normal.dot(p.view) < 0.0 { -p.surface.normal } else { p.surface.normal }
+}
+
+/// The refracted ray at an interface.
+pub(super) struct Through {
+    pub(super) dir: Vec3,
+    /// Absorption of the medium it enters.
+    pub(super) medium: Vec3,
+    /// Transmitted share.
+    pub(super) share: f32,
+}
+
+/// Reflected share and refracted ray; no ray at total internal reflection.
+#[inline]
+pub(super) fn interface(p: &Point, ior: f32, absorption: Vec3) -> (f32, Option<Through>) {
+    let n = facing(p);
+    let eta = if p.surface.outside { 1.0 / ior } else { ior };
+    let reflected = fresnel_dielectric(n.dot(p.view), eta);
+    let medium = if p.surface.outside { absorption } else { Vec3::ZERO };
+    let through = refract(-p.view, n, eta).filter(|_| reflected < 1.0).map(|dir| Through {
+        dir,
+        medium,
+        share: 1.0 - reflected,
+    });
+    (reflected, through)
+}
+
+/// Mirror direction about `n`, kept above the face.
+#[inline]
+pub(super) fn mirrored(p: &Point, n: Vec3) -> Vec3 {
+    let r = n * (2.0 * n.dot(p.view)) - p.view;
+    let below = r.dot(p.surface.face_normal);
+    if below < 0.0 { r - p.surface.face_normal * (2.0 * below) } else { r }
+}
+
+fn reflect_at(
+    stage: &Stage<'_>,
+    p: &Point,
+    n: Vec3,
+    weight: Vec3,
+    state: &RayState,
+    wave: &mut Wave,
+    stats: &mut RayStats,
+) {
+    let next = RayState { kind: RayKind::Reflected, ..*state };
+    stats.reflection += send(stage, p, mirrored(p, n), weight, next, 1, wave, stats);
+}
+
+fn reflect_lobe(
+    stage: &Stage<'_>,
+    area: &TileArea,
+    p: &Point,
+    f0: Vec3,
+    roughness: f32,
+    weight: Vec3,
+    state: &RayState,
+    wave: &mut Wave,
+    stats: &mut RayStats,
+) {
+    let n = facing(p);
+    if roughness <= MIRROR_ROUGHNESS {
+        return reflect_at(stage, p, n, weight * schlick(f0, n.dot(p.view)), state, wave, stats);
+    }
+    let u = area.sampler(stage, state.slot).square(state.stream.wrapping_add(Dimension::SCATTER));
+    if let Some((dir, share)) = sample_lobe(p, n, f0, roughness, u) {
+        let next = RayState { kind: RayKind::Reflected, ..*state };
+        stats.reflection += send(stage, p, dir, weight * share, next, 1, wave, stats);
+    }
+}
+
+/// A direction of the GGX lobe and its weight.
+#[inline]
+pub(super) fn sample_lobe(p: &Point, n: Vec3, f0: Vec3, roughness: f32, u: [f32; 2]) -> Option<(Vec3, Vec3)> {
+    let alpha = roughness * roughness;
+    let (s, t) = orthonormal_basis(n);
+    let v = Vec3::new(s.dot(p.view), t.dot(p.view), n.dot(p.view));
+    let h = sample_visible_normal(v, alpha, u);
+    let l = h * (2.0 * h.dot(v)) - v;
+    let share = schlick(f0, h.dot(v)) * masking_ratio(v.z, l.z, alpha);
+    let dir = s * l.x + t * l.y + n * l.z;
+    (share != Vec3::ZERO && dir.dot(p.surface.face_normal) > 0.0).then_some((dir, share))
+}
+
+/// Sends a ray unless it is worth too little or has bounced too often. Returns how many were sent.
+pub(super) fn send(
+    stage: &Stage<'_>,
+    p: &Point,
+    dir: Vec3,
+    throughput: Vec3,
+    state: RayState,
+    branch: u32,
+    wave: &mut Wave,
+    stats: &mut RayStats,
+) -> u64 {
+    if throughput.max_element() < stage.options.min_contribution {
+        return 0;
+    }
+    if state.bounce as u32 >= stage.options.max_bounces {
+        stats.cut_at_max_bounces += 1;
+        return 0;
+    }
+    let ray = Ray::new(p.surface.ray_origin(dir), dir);
+    let (stream, bounce) = (child_stream(&state, branch), state.bounce + 1);
+    wave.push(&ray, RayState { throughput, coverage: 0.0, stream, bounce, ..state });
+    1
+}

@@ -1,0 +1,201 @@
+//! A square of pixels: the unit of work, with the layers it fills.
+
+use super::stage::Stage;
+use crate::frame::Layers;
+use crate::ray::{Hit, Ray};
+use crate::sampler::Sampler;
+use glam::Vec3;
+
+/// Pixels along a tile's side.
+pub(crate) const TILE: u32 = 32;
+/// Pixels of a tile.
+pub(crate) const PIXELS: usize = (TILE * TILE) as usize;
+
+/// Where a tile lies: `x..x+width`, `y..y+height` of the whole picture.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TileArea {
+    pub(crate) x: u32,
+    pub(crate) y: u32,
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+    /// Sample that is being rendered.
+    pub(crate) sample: u32,
+}
+
+impl TileArea {
+    /// Pixel of a slot. Slots follow a Morton curve: 16 of them are 4 x 4 pixels, so a block of rays is as square as can be.
+    #[inline]
+    pub(crate) fn pixel(&self, slot: u16) -> Option<[u32; 2]> {
+        let (x, y) = (even_bits(slot), even_bits(slot >> 1));
+        (x < self.width && y < self.height).then(|| [self.x + x, self.y + y])
+    }
+
+    /// Slot of the pixel (`x`, `y`) counted from the tile's corner.
+    #[inline]
+    pub(crate) fn slot(x: u32, y: u32) -> usize {
+        let spread = |v: u32| (0..5).fold(0, |s, b| s | (v >> b & 1) << (2 * b));
+        (spread(x) | spread(y) << 1) as usize
+    }
+
+    /// Sample points of a slot for the current sample.
+    #[inline]
+    pub(crate) fn sampler(&self, stage: &Stage<'_>, slot: u16) -> Sampler {
+        let (x, y) = (even_bits(slot), even_bits(slot >> 1));
+        stage.sampler(self.x + x, self.y + y, self.sample)
+    }
+}
+
+/// Bits 0, 2, 4, 6, 8 packed together.
+#[inline]
+fn even_bits(v: u16) -> u32 {
+    let mut x = v as u32 & 0x155;
+    x = (x | x >> 1) & 0x133;
+    x = (x | x >> 2) & 0x10f;
+    (x | x >> 4) & 0x1f
+}
+
+/// What a tile has computed so far, in slot order. Layers that were not asked for are empty.
+pub(crate) struct TileLayers {
+    /// Sum over the samples.
+    pub(crate) color: Vec<[f32; 4]>,
+    /// Sum of squared luminance over the samples, for the error estimate.
+    pub(crate) luminance_sq: Vec<f32>,
+    pub(crate) depth: Vec<f32>,
+    pub(crate) distance: Vec<f32>,
+    pub(crate) normal: Vec<[f32; 3]>,
+    pub(crate) instance: Vec<u32>,
+    pub(crate) primitive: Vec<u32>,
+    pub(crate) cost: Vec<f32>,
+    recorded: Vec<bool>,
+    made_for: (Layers, bool),
+}
+
+impl TileLayers {
+    pub(crate) fn new(layers: Layers, background_depth: f32, estimate_error: bool) -> TileLayers {
+        fn plane<T: Clone>(wanted: bool, value: T) -> Vec<T> {
+            if wanted { vec![value; PIXELS] } else { Vec::new() }
+        }
+        let has = |l| layers.contains(l);
+        TileLayers {
+            color: plane(has(Layers::COLOR), [0.0; 4]),
+            luminance_sq: plane(has(Layers::COLOR) && estimate_error, 0.0),
+            depth: plane(has(Layers::DEPTH), background_depth),
+            distance: plane(has(Layers::DISTANCE), f32::INFINITY),
+            normal: plane(has(Layers::NORMAL), [0.0; 3]),
+            instance: plane(has(Layers::IDS), u32::MAX),
+            primitive: plane(has(Layers::IDS), u32::MAX),
+            cost: plane(has(Layers::COST), 0.0),
+            recorded: plane(layers.intersects(Layers::GEOMETRY), false),
+            made_for: (layers, estimate_error),
+        }
+    }
+
+    /// As new, in the same memory; false when other layers are wanted. Sums are not cleared: the first sample replaces them.
+    pub(crate) fn reset(&mut self, layers: Layers, background_depth: f32, estimate_error: bool) -> bool {
+        if self.made_for != (layers, estimate_error) {
+            return false;
+        }
+        self.depth.fill(background_depth);
+        self.distance.fill(f32::INFINITY);
+        self.normal.fill([0.0; 3]);
+        self.instance.fill(u32::MAX);
+        self.primitive.fill(u32::MAX);
+        self.cost.fill(0.0);
+        self.recorded.fill(false);
+        true
+    }
+
+    pub(crate) fn cost_mut(&mut self) -> Option<&mut [f32]> {
+        (!self.cost.is_empty()).then_some(&mut self.cost)
+    }
+
+    #[inline]
+    pub(crate) fn is_recorded(&self, slot: u16) -> bool {
+        self.recorded[slot as usize]
+    }
+
+    /// Fills the geometry layers of a pixel. `normal` is looked at only when that layer is wanted.
+    pub(crate) fn record(
+        &mut self,
+        stage: &Stage<'_>,
+        area: &TileArea,
+        slot: u16,
+        ray: &Ray,
+        hit: &Hit,
+        normal: impl FnOnce() -> Vec3,
+    ) {
+        let i = slot as usize;
+        self.recorded[i] = true;
+        if !self.depth.is_empty() || !self.distance.is_empty() {
+            let [x, y] = area.pixel(slot).unwrap_or_default();
+            let (point, origin) = stage.exact_point(stage.ndc(x, y, [0.5; 2]), ray, hit);
+            if let Some(d) = self.depth.get_mut(i) {
+                *d = stage.camera.window_depth(point) as f32;
+            }
+            if let Some(d) = self.distance.get_mut(i) {
+                *d = (point - origin).length() as f32;
+            }
+        }
+        if let Some(n) = self.normal.get_mut(i) {
+            *n = normal().to_array();
+        }
+        if let (Some(a), Some(b)) = (self.instance.get_mut(i), self.primitive.get_mut(i)) {
+            (*a, *b) = (hit.instance, hit.prim);
+        }
+    }
+
+    /// Adds a sample to the sums; the first one starts them.
+    pub(crate) fn add_sample(&mut self, pixels: &[[f32; 4]], first: bool) {
+        if first {
+            self.color.copy_from_slice(pixels);
+            for (sum, p) in self.luminance_sq.iter_mut().zip(pixels) {
+                *sum = luminance(p).powi(2);
+            }
+            return;
+        }
+        for (sum, p) in self.color.iter_mut().zip(pixels) {
+            for c in 0..4 {
+                sum[c] += p[c];
+            }
+        }
+        for (sum, p) in self.luminance_sq.iter_mut().zip(pixels) {
+            let l = luminance(p);
+            *sum += l * l;
+        }
+    }
+
+    /// Sum over the pixels of the squared standard error of the mean luminance after `n` samples.
+    pub(crate) fn squared_error(&self, area: &TileArea, n: u32) -> f64 {
+        let (n, mut sum) = (n as f64, 0.0);
+        for slot in 0..PIXELS as u16 {
+            if area.pixel(slot).is_some() {
+                let mean = luminance(&self.color[slot as usize]) as f64 / n;
+                let variance = (self.luminance_sq[slot as usize] as f64 / n - mean * mean).max(0.0);
+                sum += variance / (n - 1.0);
+            }
+        }
+        sum
+    }
+}
+
+/// Luminance of linear RGB with Rec. 709 primaries.
+#[inline]
+fn luminance(p: &[f32; 4]) -> f32 {
+    0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slots_and_pixels_are_inverse_and_blocks_are_four_by_four() {
+        let area = TileArea { x: 0, y: 0, width: TILE, height: TILE, sample: 0 };
+        for slot in 0..PIXELS as u16 {
+            let [x, y] = area.pixel(slot).unwrap();
+            assert_eq!(TileArea::slot(x, y), slot as usize);
+        }
+        let first: Vec<_> = (0..16).map(|s| area.pixel(s).unwrap()).collect();
+        assert!(first.iter().all(|[x, y]| *x < 4 && *y < 4));
+    }
+}

@@ -1,0 +1,44 @@
+//! Media between a ray's start and the surface it meets.
+
+use super::stage::Stage;
+use super::wave::RayState;
+use crate::ray::Ray;
+use crate::ray_stats::RayStats;
+use crate::volume::{VolumeSample, integrate_overlapping};
+
+/// Adds what `ray` collects in the stage's volumes up to `t_end`, and dims what comes behind. `along` is a buffer.
+pub(super) fn cross(
+    stage: &Stage<'_>,
+    ray: &Ray,
+    t_end: f32,
+    state: &mut RayState,
+    pixels: &mut [[f32; 4]],
+    along: &mut Vec<Ray>,
+    stats: &mut RayStats,
+) {
+    along.clear();
+    let (origin, dir) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
+    // Not normalised: the parameter is the same in every space.
+    along.extend(stage.volumes.iter().map(|(_, object_from_render)| Ray {
+        origin: object_from_render.transform_point3(origin).as_vec3(),
+        dir: object_from_render.transform_vector3(dir).as_vec3(),
+        ..*ray
+    }));
+    let quality = &stage.options.volume_quality;
+    let sample: VolumeSample = if let [(volume, _)] = stage.volumes[..] {
+        volume.integrate(&along[0], ray.t_min, t_end, quality)
+    } else {
+        let pairs: Vec<_> = stage.volumes.iter().zip(along.iter()).map(|((v, _), r)| (*v, *r)).collect();
+        integrate_overlapping(&pairs, ray.t_min, t_end, quality)
+    };
+    stats.volume += (sample.samples > 0) as u64;
+    let [r, g, b, a] = sample.rgba;
+    let pixel = &mut pixels[state.slot as usize];
+    let t = state.throughput;
+    pixel[0] += t.x * r;
+    pixel[1] += t.y * g;
+    pixel[2] += t.z * b;
+    pixel[3] += state.coverage * a;
+    state.throughput *= 1.0 - a;
+    state.coverage *= 1.0 - a;
+}

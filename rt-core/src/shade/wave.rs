@@ -1,0 +1,105 @@
+//! Rays that are traced together, and what each is worth.
+
+use crate::ray::{HitBlock, LANES, Ray, RayBlock};
+use glam::Vec3;
+
+/// What a ray is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum RayKind {
+    /// From the camera, or the same ray behind transparent surfaces.
+    Camera,
+    /// Mirror or glossy reflection.
+    Reflected,
+    /// Through a dielectric's surface.
+    Refracted,
+    /// Diffuse bounce of the path tracer.
+    Diffuse,
+}
+
+/// A ray's part in its pixel.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RayState {
+    /// What radiance met by this ray is multiplied by.
+    pub(crate) throughput: Vec3,
+    /// Absorption per world unit of the medium it travels in.
+    pub(crate) absorption: Vec3,
+    /// Share of the pixel's alpha it decides; 0 for rays that left the line of sight.
+    pub(crate) coverage: f32,
+    /// First sampler dimension of this ray: different for all rays of a pixel.
+    pub(crate) stream: u32,
+    /// Pixel within the tile.
+    pub(crate) slot: u16,
+    /// Surfaces scattered at so far.
+    pub(crate) bounce: u16,
+    pub(crate) kind: RayKind,
+}
+
+/// Rays in blocks, each with its state.
+#[derive(Default)]
+pub(crate) struct Wave {
+    pub(crate) blocks: Vec<RayBlock>,
+    /// One per ray, in lane order; blocks are filled without gaps except in the camera's wave.
+    pub(crate) states: Vec<RayState>,
+}
+
+impl Wave {
+    pub(crate) fn clear(&mut self) {
+        self.blocks.clear();
+        self.states.clear();
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.states.is_empty()
+    }
+
+    /// Appends a ray.
+    #[inline]
+    pub(crate) fn push(&mut self, ray: &Ray, state: RayState) {
+        let lane = self.states.len() % LANES;
+        if lane == 0 {
+            self.blocks.push(RayBlock::INACTIVE);
+        }
+        let last = self.blocks.len() - 1;
+        self.blocks[last].set(lane, ray);
+        self.states.push(state);
+    }
+
+    #[inline]
+    pub(crate) fn ray(&self, i: usize) -> Ray {
+        self.blocks[i / LANES].get(i % LANES)
+    }
+}
+
+/// Rays towards light, each with the point and the radiance it brings there if nothing is in the way.
+#[derive(Default)]
+pub(crate) struct LightRays {
+    pub(crate) blocks: Vec<RayBlock>,
+    pub(crate) targets: Vec<(u32, Vec3)>,
+    /// Bit per lane: blocked.
+    pub(crate) blocked: Vec<u16>,
+    /// For rays that pass through surfaces.
+    pub(crate) hits: Vec<HitBlock>,
+}
+
+impl LightRays {
+    pub(crate) fn clear(&mut self) {
+        self.blocks.clear();
+        self.targets.clear();
+    }
+
+    #[inline]
+    pub(crate) fn push(&mut self, ray: &Ray, point: u32, radiance: Vec3) {
+        let lane = self.targets.len() % LANES;
+        if lane == 0 {
+            self.blocks.push(RayBlock::INACTIVE);
+        }
+        let last = self.blocks.len() - 1;
+        self.blocks[last].set(lane, ray);
+        self.targets.push((point, radiance));
+    }
+
+    #[inline]
+    pub(crate) fn is_blocked(&self, i: usize) -> bool {
+        self.blocked[i / LANES] >> (i % LANES) & 1 != 0
+    }
+}

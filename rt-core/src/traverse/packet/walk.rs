@@ -1,0 +1,232 @@
+//! A packet's way through the hierarchy.
+
+use super::{Packet, PacketLeaf, load_row, three};
+use crate::accel::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE};
+use crate::accel::{Unit, WideBvh};
+use crate::simd::{Stack, StackMemory, prefetch};
+use crate::stats::{Work, count};
+use crate::traverse::single::{BOX_SLACK, beyond};
+use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x8, f32x16};
+
+/// A child to visit, by the place where its box stands: the node's unit times eight plus the slot.
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+struct Entry {
+    /// Distance in the high half.
+    key: u64,
+    /// Groups whose bounds meet the box.
+    groups: u16,
+}
+
+/// Smallest distance to a plane over intervals of origins (`o` is the end that makes it smallest) and reciprocal directions.
+#[inline(always)]
+fn nearest<S: Simd, V: SimdFloat<S, Element = f32>>(plane: V, o: V, rcp_lo: V, rcp_hi: V) -> V {
+    let p = plane - o;
+    (p * rcp_lo).min(p * rcp_hi)
+}
+
+/// Largest distance, likewise.
+#[inline(always)]
+fn farthest<S: Simd, V: SimdFloat<S, Element = f32>>(plane: V, o: V, rcp_lo: V, rcp_hi: V) -> V {
+    let p = plane - o;
+    (p * rcp_lo).max(p * rcp_hi)
+}
+
+/// The six planes of child `slot` in the order near x, y, z, far x, y, z.
+#[inline(always)]
+fn planes(node: &[Unit; NODE_UNITS], near: [usize; 3], slot: usize) -> [f32; 6] {
+    let at = |row: usize| node[row & 7].0[slot & 7];
+    [at(near[0]), at(near[1]), at(near[2]), at(near[0] ^ 1), at(near[1] ^ 1), at(near[2] ^ 1)]
+}
+
+/// Intervals of the sixteen groups, in registers.
+struct GroupBounds<S: Simd> {
+    rcp_lo: [f32x16<S>; 3],
+    rcp_hi: [f32x16<S>; 3],
+    o_near: [f32x16<S>; 3],
+    o_far: [f32x16<S>; 3],
+    t_min: f32x16<S>,
+}
+
+impl<S: Simd> GroupBounds<S> {
+    /// Groups that may meet the box with these planes before `group_t`.
+    #[inline(always)]
+    fn meet(&self, simd: S, planes: &[f32; 6], group_t: f32x16<S>) -> u16 {
+        let n: [f32x16<S>; 3] = three!(|a| nearest(
+            f32x16::splat(simd, planes[a]),
+            self.o_near[a],
+            self.rcp_lo[a],
+            self.rcp_hi[a]
+        ));
+        let f: [f32x16<S>; 3] = three!(|a| farthest(
+            f32x16::splat(simd, planes[a + 3]),
+            self.o_far[a],
+            self.rcp_lo[a],
+            self.rcp_hi[a]
+        ));
+        let near = n[0].max(n[1]).max(n[2].max(self.t_min));
+        let far = (f[0].min(f[1]).min(f[2]) * f32x16::splat(simd, BOX_SLACK)).min(group_t);
+        near.simd_le(far).to_bitmask() as u16
+    }
+}
+
+impl Packet {
+    #[inline(never)]
+    pub(super) fn walk<S: Simd, L: PacketLeaf<S>, const SLAB: bool>(
+        &mut self,
+        simd: S,
+        bvh: &WideBvh,
+        leaves: &mut L,
+    ) {
+        simd.vectorize(
+            #[inline(always)]
+            || self.walk_body::<S, L, SLAB>(simd, bvh, leaves),
+        );
+    }
+
+    /// `SLAB`: groups whose intervals meet a box are tested ray by ray before they go on.
+    #[inline(always)]
+    fn walk_body<S: Simd, L: PacketLeaf<S>, const SLAB: bool>(
+        &mut self,
+        simd: S,
+        bvh: &WideBvh,
+        leaves: &mut L,
+    ) {
+        if self.groups == 0 {
+            return;
+        }
+        let units = bvh.units.as_slice();
+        let v8 = |x: f32| f32x8::splat(simd, x);
+        let near_rows = self.near;
+        let [nx, ny, nz] = near_rows;
+
+        // ---- Bounds of the groups, and of the whole packet for eight boxes at a time.
+        let rcp_lo: [f32x16<S>; 3] = three!(|a| load_row(simd, &self.rcp_lo[a]));
+        let rcp_hi: [f32x16<S>; 3] = three!(|a| load_row(simd, &self.rcp_hi[a]));
+        let o_near: [f32x16<S>; 3] = three!(|a| load_row(simd, &self.origin_near[a]));
+        let o_far: [f32x16<S>; 3] = three!(|a| load_row(simd, &self.origin_far[a]));
+        let all_lo: [f32x8<S>; 3] = three!(|a| v8(rcp_lo[a].reduce_min()));
+        let all_hi: [f32x8<S>; 3] = three!(|a| v8(rcp_hi[a].reduce_max()));
+        let positive = [nx & 1 == 0, ny & 1 == 0, nz & 1 == 0];
+        let all_near: [f32x8<S>; 3] =
+            three!(|a| v8(if positive[a] { o_near[a].reduce_max() } else { o_near[a].reduce_min() }));
+        let all_far: [f32x8<S>; 3] =
+            three!(|a| v8(if positive[a] { o_far[a].reduce_min() } else { o_far[a].reduce_max() }));
+        let group_t_min = load_row(simd, &self.group_t_min);
+        let all_t_min = v8(group_t_min.reduce_min().max(0.0));
+        let mut group_t = load_row(simd, &self.group_t);
+        let mut all_t = group_t.reduce_max();
+        let slack8 = v8(BOX_SLACK);
+        let bounds = GroupBounds { rcp_lo, rcp_hi, o_near, o_far, t_min: group_t_min };
+
+        let mut memory = StackMemory::<Entry, STACK_SIZE>::new();
+        let mut stack = Stack::empty(&mut memory);
+        let mut node_at = 0;
+        let mut groups = self.groups;
+        'nodes: loop {
+            // ---- A node: its eight boxes against the packet, then each that is met against the groups. Testing the groups here, for all children in a
+            // row, lets their long chains of operations overlap; at the pop they would wait for one another.
+            count(Work::Nodes, 1);
+            let node: &[Unit; NODE_UNITS] =
+                units[node_at..node_at + NODE_UNITS].try_into().expect("a slice of that length");
+            let row = |r: usize| f32x8::from_slice(simd, &node[r & 7].0);
+            let n0 = nearest(row(nx), all_near[0], all_lo[0], all_hi[0]);
+            let n1 = nearest(row(ny), all_near[1], all_lo[1], all_hi[1]);
+            let n2 = nearest(row(nz), all_near[2], all_lo[2], all_hi[2]);
+            let f0 = farthest(row(nx ^ 1), all_far[0], all_lo[0], all_hi[0]);
+            let f1 = farthest(row(ny ^ 1), all_far[1], all_lo[1], all_hi[1]);
+            let f2 = farthest(row(nz ^ 1), all_far[2], all_lo[2], all_hi[2]);
+            let near = n0.max(n1).max(n2.max(all_t_min));
+            let far = f0.min(f1).min(f2) * slack8;
+            let mut mask = near.simd_le(far.min(v8(all_t))).to_bitmask() as u32;
+            if mask != 0 {
+                let near: [f32; 8] = near.to_array();
+                let refs = node[CHILD_ROW].bits();
+                let base = stack.len();
+                while mask != 0 {
+                    let i = mask.trailing_zeros() as usize & 7;
+                    mask &= mask - 1;
+                    count(Work::GroupBoxes, 1);
+                    let met = bounds.meet(simd, &planes(node, near_rows, i), group_t) & groups;
+                    if met == 0 {
+                        continue;
+                    }
+                    prefetch::<4>(units, ChildRef(refs[i]).unit());
+                    let place = (node_at * 8 + i) as u64;
+                    stack.push(Entry { key: ((near[i].to_bits() as u64) << 32) | place, groups: met });
+                }
+                stack.sort_descending_from(base);
+            }
+
+            // ---- Entries, nearest first, until an inner node is reached.
+            loop {
+                let Some(Entry { key, groups: mut met }) = stack.pop() else { break 'nodes };
+                let distance = f32::from_bits((key >> 32) as u32);
+                if distance > all_t {
+                    continue;
+                }
+                let (at, slot) = ((key as u32 >> 3) as usize, key as usize & 7);
+                let node: &[Unit; NODE_UNITS] =
+                    units[at..at + NODE_UNITS].try_into().expect("a slice of that length");
+                let child = ChildRef(node[CHILD_ROW].bits()[slot]);
+                if SLAB {
+                    met = self.exact_slabs(simd, &planes(node, near_rows, slot), met);
+                    if met == 0 {
+                        continue;
+                    }
+                }
+                if !child.is_leaf() {
+                    node_at = child.unit();
+                    groups = met;
+                    continue 'nodes;
+                }
+                if !SLAB {
+                    // Hits found since the push may lie before the leaf.
+                    count(Work::GroupBoxes, 1);
+                    met &= bounds.meet(simd, &planes(node, near_rows, slot), group_t);
+                    if met == 0 {
+                        continue;
+                    }
+                }
+                let changed = leaves.leaf(self, simd, units, child, met, distance);
+                if changed != 0 {
+                    let mut rest = changed;
+                    while rest != 0 {
+                        let g = rest.trailing_zeros() as usize & 15;
+                        rest &= rest - 1;
+                        self.group_t[g] = beyond(load_row(simd, &self.t[g]).reduce_max());
+                    }
+                    group_t = load_row(simd, &self.group_t);
+                    all_t = group_t.reduce_max();
+                    if all_t < 0.0 {
+                        break 'nodes;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Of the groups in `reached`, those with a ray that meets the box. The intervals of rays with different origins or diverging directions say
+    /// little far away; this test is each ray's own.
+    #[inline(always)]
+    fn exact_slabs<S: Simd>(&self, simd: S, planes: &[f32; 6], reached: u16) -> u16 {
+        let mut kept = 0;
+        let mut rest = reached;
+        let p: [f32x16<S>; 3] = three!(|a| f32x16::splat(simd, planes[a]));
+        let q: [f32x16<S>; 3] = three!(|a| f32x16::splat(simd, planes[a + 3]));
+        while rest != 0 {
+            let g = rest.trailing_zeros() as usize & 15;
+            rest &= rest - 1;
+            count(Work::GroupBoxes, 1);
+            let o: [f32x16<S>; 3] = three!(|a| load_row(simd, &self.origin[g][a]));
+            let rcp: [f32x16<S>; 3] = three!(|a| load_row(simd, &self.rcp[g][a]));
+            let n: [f32x16<S>; 3] = three!(|a| (p[a] - o[a]) * rcp[a]);
+            let f: [f32x16<S>; 3] = three!(|a| (q[a] - o[a]) * rcp[a]);
+            let near = n[0].max(n[1]).max(n[2].max(load_row(simd, &self.t_min[g])));
+            let far = (f[0].min(f[1]).min(f[2]) * f32x16::splat(simd, BOX_SLACK))
+                .min(load_row(simd, &self.t[g]) * f32x16::splat(simd, beyond(1.0)));
+            let hit = near.simd_le(far).to_bitmask() as u16 & self.active[g];
+            kept |= ((hit != 0) as u16) << g;
+        }
+        kept
+    }
+}

@@ -1,0 +1,74 @@
+//! The range of t is half-open and exact: `t_min <= t < t_max`.
+
+use crate::agreement::placements;
+use crate::common::*;
+use rt_core::accel::{Geometry, Instance, World};
+use rt_core::glam::DVec3;
+use rt_core::ray::Ray;
+use std::sync::Arc;
+
+fn check_limits(w: &World, rays: &[Ray], what: &str) {
+    let free = hits_all_ways(w, rays, what);
+    let with = |f: &dyn Fn(&Ray, f32) -> Ray| -> Vec<Ray> {
+        rays.iter().zip(&free).map(|(r, h)| h.map_or(*r, |h| f(r, h.t))).collect()
+    };
+    // Ending exactly at the hit: not hit. One step later: the same hit. Starting exactly there: the same. One step later: something behind.
+    let up_to = hits_all_ways(w, &with(&|r, t| Ray { t_max: t, ..*r }), what);
+    let beyond = hits_all_ways(w, &with(&|r, t| Ray { t_max: t.next_up(), ..*r }), what);
+    let from = hits_all_ways(w, &with(&|r, t| Ray { t_min: t, ..*r }), what);
+    let behind = hits_all_ways(w, &with(&|r, t| Ray { t_min: t.next_up(), ..*r }), what);
+    let mut hits = 0;
+    for (i, h) in free.iter().enumerate() {
+        let Some(f) = h else { continue };
+        hits += 1;
+        assert_eq!(up_to[i], None, "{what}: {:?} with t_max {} still hits", rays[i], f.t);
+        assert_eq!(bits(beyond[i]), bits(*h), "{what}: {:?} with t_max just beyond {}", rays[i], f.t);
+        assert_eq!(bits(from[i]), bits(*h), "{what}: {:?} with t_min {}", rays[i], f.t);
+        assert!(behind[i].is_none_or(|b| b.t > f.t), "{what}: {:?} with t_min just beyond {}", rays[i], f.t);
+    }
+    assert!(hits > 50, "{what}: only {hits} hits");
+}
+
+#[test]
+fn limits_are_exact_on_one_mesh() {
+    for mesh in [sphere(2, 1.0, DVec3::ZERO), cube(3), soup(300, 6)] {
+        for options in some_options() {
+            let w = world(&mesh, &options);
+            check_limits(&w, &inward_rays(700, 9), &format!("{options:?}"));
+        }
+    }
+}
+
+#[test]
+fn limits_are_exact_far_away_and_on_instances() {
+    let far: Vec<Ray> =
+        inward_rays(700, 10).iter().map(|r| Ray::new(r.origin * 3e5, -r.origin * 3e5)).collect();
+    let one = sphere(2, 1.0, DVec3::ZERO);
+    let instances: Vec<Instance> = placements(30, 2, 1.0)
+        .iter()
+        .map(|&world_from_object| Instance { geometry: 0, world_from_object })
+        .collect();
+    for options in some_options() {
+        check_limits(&world(&one, &options), &far, &format!("far, {options:?}"));
+        let w = World::build(vec![Geometry::Mesh(Arc::new(one.clone()))], instances.clone(), &options)
+            .expect("invertible");
+        check_limits(&w, &inward_rays(700, 9), &format!("instances, {options:?}"));
+        check_limits(&w, &far, &format!("far instances, {options:?}"));
+    }
+}
+
+#[test]
+fn empty_and_reversed_ranges_hit_nothing() {
+    let w = world(&sphere(1, 1.0, DVec3::ZERO), &Default::default());
+    let rays: Vec<Ray> = inward_rays(320, 3)
+        .into_iter()
+        .enumerate()
+        .map(|(i, r)| match i % 4 {
+            0 => Ray { t_min: 0.5, t_max: 0.5, ..r },
+            1 => Ray { t_min: 2.0, t_max: 1.0, ..r },
+            2 => Ray { t_max: 0.0, ..r },
+            _ => Ray { t_min: f32::INFINITY, ..r },
+        })
+        .collect();
+    assert!(hits_all_ways(&w, &rays, "empty ranges").iter().all(Option::is_none));
+}

@@ -1,0 +1,13 @@
+//! Inputs that break ray tracers, one file per disease.
+
+mod agreement;
+mod common;
+mod degenerate;
+mod directions;
+mod leaks;
+mod limits;
+mod oracle;
+mod random;
+mod scales;
+mod secondary;
+mod ties;
