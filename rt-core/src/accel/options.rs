@@ -7,7 +7,7 @@ use std::time::Duration;
 /// exploring). The measured trade-off is bench's experiment `accuracy-build`.
 ///
 /// For nested isosurfaces of 1 M and 4 M triangles, as guidance: CPU time of the build relative to `Balanced`, time of single primary rays
-/// likewise, bytes a triangle. Coherent packets differ by 0 to 5 %.
+/// likewise, bytes a triangle. Coherent packets differ by 0 to 8 %.
 ///
 /// | | build | single rays | bytes |
 /// |---|---|---|---|
@@ -17,8 +17,8 @@ use std::time::Duration;
 /// | `Best` | 1.9–2.2 | 0.96–1.00 | 56 |
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum BuildQuality {
-    /// obvhs' PLOC along a Morton curve with its quickest parameters, without optimisation. Needs least of the primitives' shape; on meshes
-    /// [`BuildQuality::Fast`] is as quick to build and better.
+    /// obvhs' PLOC along a Morton curve with its quickest parameters, without optimisation. On the meshes measured, [`BuildQuality::Fast`] builds
+    /// as quickly and traces faster.
     Fastest,
     /// SAH with 8 bins along the longest axis: for geometry that changes every frame.
     Fast,
