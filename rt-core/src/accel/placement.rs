@@ -1,8 +1,10 @@
 //! Where an instance stands: from render space to a geometry's local space and back.
 
 use super::blas::LocalFrame;
+use super::world::ORDINARY_LENGTHS;
 use crate::math::{Aabb, max_abs};
 use crate::ray::{Ray, RayBlock};
+use crate::traverse::packet::Limits;
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x16};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
@@ -91,6 +93,12 @@ impl Placement {
     #[inline]
     pub(crate) fn accepts(&self, ray: &Ray) -> bool {
         self.identity && max_abs(ray.origin - self.center_f32) <= self.near_f32
+    }
+
+    /// The rays that need no transformation and no rescaling; `None` when all do.
+    pub(crate) fn limits(&self) -> Option<Limits> {
+        let length = (*ORDINARY_LENGTHS.start(), *ORDINARY_LENGTHS.end());
+        self.identity.then(|| Limits { length, center: self.center_f32.to_array(), reach: self.near_f32 })
     }
 
     /// True when these rays need no transformation: local and render space agree and no origin is far away.

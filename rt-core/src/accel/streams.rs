@@ -3,17 +3,15 @@
 use super::blas::{Blas, Content, leaf_ids};
 use super::options::Robustness;
 use super::placement::Placement;
+use super::triangles::TriBvh;
 use super::wide::ChildRef;
 use super::world::{ORDINARY_LENGTHS, World, with_ordinary_length};
 use crate::ray::{Hit, HitBlock, LANES, NO_HIT, Ray, RayBlock};
 use crate::stats::{Work, count};
 use crate::traverse::hybrid;
-use crate::traverse::packet::{GROUPS, Packet};
+use crate::traverse::packet::{GROUPS, Limits, Packet};
 use fearless_simd::{Simd, SimdBase, SimdMask, dispatch, f32x16, mask32x16};
 use std::cell::RefCell;
-
-/// Blocks whose occlusion is gathered at a time.
-const CHUNK: usize = 256;
 
 /// Per-thread buffers: a packet is 24 KiB, too much to clear for every call.
 struct Scratch {
@@ -46,7 +44,7 @@ impl World {
     ///
     /// The answers are those of [`World::closest`], bit for bit. Rays beyond the shorter of the two slices are not traced.
     pub fn closest_coherent(&self, rays: &[RayBlock], hits: &mut [HitBlock]) {
-        self.with_scratch::<false>(rays, hits, true);
+        self.closest_stream(rays, hits, true);
     }
 
     /// Occlusion of many similar rays: bit `lane` of `out[block]` is set when that ray is blocked.
@@ -57,7 +55,7 @@ impl World {
     /// As [`World::closest_coherent`] for rays in any direction (ambient occlusion, glossy and path tracing). Rays of one block should start close to
     /// one another: they share the way through the tree as long as it is the same.
     pub fn closest_incoherent(&self, rays: &[RayBlock], hits: &mut [HitBlock]) {
-        self.with_scratch::<false>(rays, hits, false);
+        self.closest_stream(rays, hits, false);
     }
 
     /// As [`World::occluded_coherent`] for rays in any direction.
@@ -66,28 +64,91 @@ impl World {
     }
 
     fn occluded_stream(&self, rays: &[RayBlock], out: &mut [u16], coherent: bool) {
-        let mut hits = [HitBlock::MISS; CHUNK];
-        for (rays, out) in rays.chunks(CHUNK).zip(out.chunks_mut(CHUNK)) {
-            let hits = &mut hits[..rays.len().min(out.len())];
-            self.with_scratch::<true>(rays, hits, coherent);
-            for (o, h) in out.iter_mut().zip(hits) {
-                *o = (0..LANES).fold(0, |m, l| m | ((h.prim[l] != NO_HIT) as u16) << l);
+        match self.robustness {
+            Robustness::Fast => {
+                dispatch!(self.level, simd => self.occluded_blocks::<_, false>(simd, rays, out, coherent))
+            }
+            Robustness::Watertight => {
+                dispatch!(self.level, simd => self.occluded_blocks::<_, true>(simd, rays, out, coherent))
             }
         }
     }
 
-    fn with_scratch<const ANY: bool>(&self, rays: &[RayBlock], hits: &mut [HitBlock], coherent: bool) {
-        SCRATCH.with_borrow_mut(|scratch| match self.robustness {
-            Robustness::Fast => {
-                dispatch!(self.level, simd => self.stream::<_, false, ANY>(simd, rays, hits, coherent, scratch))
-            }
-            Robustness::Watertight => {
-                dispatch!(self.level, simd => self.stream::<_, true, ANY>(simd, rays, hits, coherent, scratch))
+    fn occluded_blocks<S: Simd, const EXACT: bool>(
+        &self,
+        simd: S,
+        rays: &[RayBlock],
+        out: &mut [u16],
+        coherent: bool,
+    ) {
+        SCRATCH.with_borrow_mut(|scratch| {
+            let alone = if coherent { self.alone() } else { None };
+            let mut hits = [HitBlock::MISS; GROUPS];
+            for (r, out) in rays.chunks(GROUPS).zip(out.chunks_mut(GROUPS)) {
+                let n = r.len().min(out.len());
+                let (r, out) = (&r[..n], &mut out[..n]);
+                if let Some((tris, limits)) = &alone
+                    && scratch.inner.load(simd, r, limits)
+                {
+                    scratch.inner.trace::<S, EXACT, true>(simd, &tris.bvh);
+                    out.copy_from_slice(&scratch.inner.hit[..n]);
+                    continue;
+                }
+                let hits = &mut hits[..n];
+                self.group::<S, EXACT, true>(simd, r, hits, coherent, scratch);
+                for (o, h) in out.iter_mut().zip(hits) {
+                    *o = (0..LANES).fold(0, |m, l| m | ((h.prim[l] != NO_HIT) as u16) << l);
+                }
             }
         });
     }
 
-    fn stream<S: Simd, const EXACT: bool, const ANY: bool>(
+    /// The only geometry, when it is a mesh that stands where the rays are: packets then go straight to it.
+    fn alone(&self) -> Option<(&TriBvh, Limits)> {
+        let [only] = self.placements.as_slice() else { return None };
+        match &self.blas[only.geometry].content {
+            Content::Triangles(tris) => Some((tris, only.limits()?)),
+            _ => None,
+        }
+    }
+
+    fn closest_stream(&self, rays: &[RayBlock], hits: &mut [HitBlock], coherent: bool) {
+        match self.robustness {
+            Robustness::Fast => {
+                dispatch!(self.level, simd => self.closest_blocks::<_, false>(simd, rays, hits, coherent))
+            }
+            Robustness::Watertight => {
+                dispatch!(self.level, simd => self.closest_blocks::<_, true>(simd, rays, hits, coherent))
+            }
+        }
+    }
+
+    fn closest_blocks<S: Simd, const EXACT: bool>(
+        &self,
+        simd: S,
+        rays: &[RayBlock],
+        hits: &mut [HitBlock],
+        coherent: bool,
+    ) {
+        SCRATCH.with_borrow_mut(|scratch| {
+            let alone = if coherent { self.alone() } else { None };
+            for (r, h) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {
+                let n = r.len().min(h.len());
+                let (r, h) = (&r[..n], &mut h[..n]);
+                if let Some((tris, limits)) = &alone
+                    && scratch.inner.load(simd, r, limits)
+                {
+                    scratch.inner.trace::<S, EXACT, false>(simd, &tris.bvh);
+                    scratch.inner.store_all(simd, h, 0);
+                    continue;
+                }
+                self.group::<S, EXACT, false>(simd, r, h, coherent, scratch);
+            }
+        });
+    }
+
+    /// At most sixteen blocks of any kind.
+    fn group<S: Simd, const EXACT: bool, const ANY: bool>(
         &self,
         simd: S,
         rays: &[RayBlock],
@@ -95,17 +156,13 @@ impl World {
         coherent: bool,
         scratch: &mut Scratch,
     ) {
-        for (r, h) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {
-            let n = r.len().min(h.len());
-            let (r, h) = (&r[..n], &mut h[..n]);
-            h.fill(HitBlock::MISS);
-            if any_unusual_length(simd, r) {
-                self.one_by_one::<S, EXACT, ANY>(simd, r, h);
-            } else if coherent {
-                self.blocks::<S, EXACT, ANY>(simd, r, h, scratch);
-            } else {
-                self.incoherent_blocks::<S, EXACT, ANY>(simd, r, h, scratch);
-            }
+        hits.fill(HitBlock::MISS);
+        if any_unusual_length(simd, rays) {
+            self.one_by_one::<S, EXACT, ANY>(simd, rays, hits);
+        } else if coherent {
+            self.blocks::<S, EXACT, ANY>(simd, rays, hits, scratch);
+        } else {
+            self.incoherent_blocks::<S, EXACT, ANY>(simd, rays, hits, scratch);
         }
     }
 
@@ -151,7 +208,7 @@ impl World {
         }
         // ---- Several instances: those whose boxes the packet meets, nearest first.
         scratch.candidates.clear();
-        if self.placements.len() > 1 && scratch.outer.load(simd, rays) {
+        if self.placements.len() > 1 && scratch.outer.load(simd, rays, &Limits::NONE) {
             scratch.outer.collect(simd, &self.tlas, &mut scratch.candidates);
             let mut order = std::mem::take(&mut scratch.order);
             order.clear();
@@ -306,19 +363,19 @@ fn blas_blocks<S: Simd, const EXACT: bool, const ANY: bool>(
     };
     // Sizes 16, then 4, then 1.
     for (r, h) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {
-        if packet.load(simd, r) {
+        if packet.load(simd, r, &Limits::NONE) {
             packet.trace::<S, EXACT, ANY>(simd, &tris.bvh);
             packet.store::<ANY>(h, instance);
             continue;
         }
         for (r, h) in r.chunks(4).zip(h.chunks_mut(4)) {
-            if packet.load(simd, r) {
+            if packet.load(simd, r, &Limits::NONE) {
                 packet.trace::<S, EXACT, ANY>(simd, &tris.bvh);
                 packet.store::<ANY>(h, instance);
                 continue;
             }
             for (r, h) in r.chunks(1).zip(h.chunks_mut(1)) {
-                if packet.load(simd, r) {
+                if packet.load(simd, r, &Limits::NONE) {
                     packet.trace::<S, EXACT, ANY>(simd, &tris.bvh);
                     packet.store::<ANY>(h, instance);
                 } else {

@@ -299,7 +299,13 @@ pub(super) fn with_ordinary_length(ray: &Ray) -> (Ray, f32) {
     }
     let e = (m.log2().round() as i32).clamp(-125, 125);
     let k = exp2i(-e);
-    (Ray { dir: ray.dir * k, t_min: ray.t_min / k, t_max: ray.t_max / k, ..*ray }, k)
+    // The smallest x with x · k >= t: quotients that underflow still keep the range half-open.
+    let limit = |t: f32| {
+        let x = t / k;
+        if x * k < t { x.next_up() } else { x }
+    };
+    // Hits whose t is beyond f32 are none.
+    (Ray { dir: ray.dir * k, t_min: limit(ray.t_min), t_max: limit(ray.t_max.min(f32::MAX)), ..*ray }, k)
 }
 
 /// The upper level.

@@ -161,17 +161,27 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
                     }
                     continue;
                 }
-                let (mut e0, mut e1) = (entry(first), entry(mask.trailing_zeros() as usize));
+                // Up to four are sorted in registers: which of two boxes is nearer is a coin toss, so no branch may ask.
+                let (a, b) = (entry(first), entry(mask.trailing_zeros() as usize));
                 mask &= mask - 1;
-                if e1 < e0 {
-                    (e0, e1) = (e1, e0);
-                }
+                let (e0, e1) = (a.min(b), a.max(b));
                 if mask == 0 {
                     stack.push(e1);
                     current = ChildRef(e0 as u32);
                     continue;
                 }
+                let c = entry(mask.trailing_zeros() as usize);
+                mask &= mask - 1;
+                let (e0, c) = (e0.min(c), e0.max(c));
+                let (e1, e2) = (e1.min(c), e1.max(c));
+                if mask == 0 {
+                    stack.push(e2);
+                    stack.push(e1);
+                    current = ChildRef(e0 as u32);
+                    continue;
+                }
                 let base = stack.len();
+                stack.push(e2);
                 stack.push(e1);
                 stack.push(e0);
                 while mask != 0 {

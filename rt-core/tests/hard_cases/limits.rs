@@ -58,6 +58,32 @@ fn limits_are_exact_far_away_and_on_instances() {
 }
 
 #[test]
+fn limits_are_exact_for_tiny_and_huge_directions() {
+    for options in some_options() {
+        let w = world(&sphere(1, 1.0, DVec3::ZERO), &options);
+        for length in [1e-42f32, 1e-38, 1e-20, 1e-5, 1e5, 1e20, 1e36] {
+            // Distances near 10⁻³⁰ to 3, so that t is in range for most lengths and underflows or overflows for the others.
+            let rays: Vec<Ray> = inward_rays(96, 3)
+                .iter()
+                .map(|r| Ray { dir: r.dir.normalize() * length, t_min: 1e-30, ..*r })
+                .collect();
+            for (r, h) in rays.iter().zip(hits_all_ways(&w, &rays, "lengths")) {
+                let Some(h) = h else {
+                    // Misses only where the distance, 2 to 3, over the length is beyond f32.
+                    assert!(length < 1e-37 || !w.occluded(r), "{options:?}: {r:?}");
+                    continue;
+                };
+                assert!(h.t >= r.t_min && h.t < r.t_max, "{options:?}: {r:?}: {h:?}");
+                let at_end = Ray { t_max: h.t, ..*r };
+                assert_eq!(w.closest(&at_end), None, "{options:?}: {at_end:?}");
+                let from = Ray { t_min: h.t, ..*r };
+                assert_eq!(bits(w.closest(&from)), bits(Some(h)), "{options:?}: {from:?}");
+            }
+        }
+    }
+}
+
+#[test]
 fn empty_and_reversed_ranges_hit_nothing() {
     let w = world(&sphere(1, 1.0, DVec3::ZERO), &Default::default());
     let rays: Vec<Ray> = inward_rays(320, 3)

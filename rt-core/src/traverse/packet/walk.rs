@@ -38,61 +38,63 @@ fn planes(node: &[Unit; NODE_UNITS], near: [usize; 3], slot: usize) -> [f32; 6] 
     [at(near[0]), at(near[1]), at(near[2]), at(near[0] ^ 1), at(near[1] ^ 1), at(near[2] ^ 1)]
 }
 
-/// Intervals of the sixteen groups, in registers.
-struct GroupBounds<S: Simd> {
-    rcp_lo: [f32x16<S>; 3],
-    rcp_hi: [f32x16<S>; 3],
-    o_near: [f32x16<S>; 3],
-    o_far: [f32x16<S>; 3],
-    t_min: f32x16<S>,
-}
-
-impl<S: Simd> GroupBounds<S> {
-    /// Groups that may meet the box with these planes before `group_t`.
+impl Packet {
+    /// Groups that may meet the box with these planes before `group_t`, by their intervals.
     #[inline(always)]
-    fn meet(&self, simd: S, planes: &[f32; 6], group_t: f32x16<S>) -> u16 {
-        let n: [f32x16<S>; 3] = three!(|a| nearest(
-            f32x16::splat(simd, planes[a]),
-            self.o_near[a],
-            self.rcp_lo[a],
-            self.rcp_hi[a]
-        ));
-        let f: [f32x16<S>; 3] = three!(|a| farthest(
-            f32x16::splat(simd, planes[a + 3]),
-            self.o_far[a],
-            self.rcp_lo[a],
-            self.rcp_hi[a]
-        ));
-        let near = n[0].max(n[1]).max(n[2].max(self.t_min));
+    fn meet<S: Simd>(&self, simd: S, planes: &[f32; 6], group_t: f32x16<S>, common: bool) -> u16 {
+        let (n, f): ([f32x16<S>; 3], [f32x16<S>; 3]) = if common {
+            // One origin: the sign of a plane's offset says which end of the interval is nearest.
+            let p: [f32; 3] = three!(|a| planes[a] - self.origin_near[a][0]);
+            let q: [f32; 3] = three!(|a| planes[a + 3] - self.origin_near[a][0]);
+            (
+                three!(|a| load_row(simd, &self.rcp_bounds[a][(p[a] < 0.0) as usize])
+                    * f32x16::splat(simd, p[a])),
+                three!(|a| load_row(simd, &self.rcp_bounds[a][(q[a] >= 0.0) as usize])
+                    * f32x16::splat(simd, q[a])),
+            )
+        } else {
+            let lo: [f32x16<S>; 3] = three!(|a| load_row(simd, &self.rcp_bounds[a][0]));
+            let hi: [f32x16<S>; 3] = three!(|a| load_row(simd, &self.rcp_bounds[a][1]));
+            (
+                three!(|a| {
+                    let o = load_row(simd, &self.origin_near[a]);
+                    nearest(f32x16::splat(simd, planes[a]), o, lo[a], hi[a])
+                }),
+                three!(|a| {
+                    let o = load_row(simd, &self.origin_far[a]);
+                    farthest(f32x16::splat(simd, planes[a + 3]), o, lo[a], hi[a])
+                }),
+            )
+        };
+        let near = n[0].max(n[1]).max(n[2].max(load_row(simd, &self.group_t_min)));
         let far = (f[0].min(f[1]).min(f[2]) * f32x16::splat(simd, BOX_SLACK)).min(group_t);
         near.simd_le(far).to_bitmask() as u16
     }
-}
 
-impl Packet {
+    /// `SLABS`: groups whose intervals meet a box are tested ray by ray before they go on. Returns how many were, and how many of them went on.
     #[inline(never)]
-    pub(super) fn walk<S: Simd, L: PacketLeaf<S>, const SLAB: bool>(
+    pub(super) fn walk<S: Simd, L: PacketLeaf<S>, const SLABS: bool>(
         &mut self,
         simd: S,
         bvh: &WideBvh,
         leaves: &mut L,
-    ) {
+    ) -> (u32, u32) {
         simd.vectorize(
             #[inline(always)]
-            || self.walk_body::<S, L, SLAB>(simd, bvh, leaves),
-        );
+            || self.walk_body::<S, L, SLABS>(simd, bvh, leaves),
+        )
     }
 
-    /// `SLAB`: groups whose intervals meet a box are tested ray by ray before they go on.
     #[inline(always)]
-    fn walk_body<S: Simd, L: PacketLeaf<S>, const SLAB: bool>(
+    fn walk_body<S: Simd, L: PacketLeaf<S>, const SLABS: bool>(
         &mut self,
         simd: S,
         bvh: &WideBvh,
         leaves: &mut L,
-    ) {
+    ) -> (u32, u32) {
+        let (mut tested, mut kept) = (0, 0);
         if self.groups == 0 {
-            return;
+            return (tested, kept);
         }
         let units = bvh.units.as_slice();
         let v8 = |x: f32| f32x8::splat(simd, x);
@@ -100,23 +102,22 @@ impl Packet {
         let [nx, ny, nz] = near_rows;
 
         // ---- Bounds of the groups, and of the whole packet for eight boxes at a time.
-        let rcp_lo: [f32x16<S>; 3] = three!(|a| load_row(simd, &self.rcp_lo[a]));
-        let rcp_hi: [f32x16<S>; 3] = three!(|a| load_row(simd, &self.rcp_hi[a]));
-        let o_near: [f32x16<S>; 3] = three!(|a| load_row(simd, &self.origin_near[a]));
-        let o_far: [f32x16<S>; 3] = three!(|a| load_row(simd, &self.origin_far[a]));
-        let all_lo: [f32x8<S>; 3] = three!(|a| v8(rcp_lo[a].reduce_min()));
-        let all_hi: [f32x8<S>; 3] = three!(|a| v8(rcp_hi[a].reduce_max()));
+        let all_lo: [f32x8<S>; 3] = three!(|a| v8(load_row(simd, &self.rcp_bounds[a][0]).reduce_min()));
+        let all_hi: [f32x8<S>; 3] = three!(|a| v8(load_row(simd, &self.rcp_bounds[a][1]).reduce_max()));
         let positive = [nx & 1 == 0, ny & 1 == 0, nz & 1 == 0];
-        let all_near: [f32x8<S>; 3] =
-            three!(|a| v8(if positive[a] { o_near[a].reduce_max() } else { o_near[a].reduce_min() }));
-        let all_far: [f32x8<S>; 3] =
-            three!(|a| v8(if positive[a] { o_far[a].reduce_min() } else { o_far[a].reduce_max() }));
+        let all_near: [f32x8<S>; 3] = three!(|a| {
+            let o = load_row(simd, &self.origin_near[a]);
+            v8(if positive[a] { o.reduce_max() } else { o.reduce_min() })
+        });
+        let all_far: [f32x8<S>; 3] = three!(|a| {
+            let o = load_row(simd, &self.origin_far[a]);
+            v8(if positive[a] { o.reduce_min() } else { o.reduce_max() })
+        });
         let group_t_min = load_row(simd, &self.group_t_min);
         let all_t_min = v8(group_t_min.reduce_min().max(0.0));
         let mut group_t = load_row(simd, &self.group_t);
         let mut all_t = group_t.reduce_max();
         let slack8 = v8(BOX_SLACK);
-        let bounds = GroupBounds { rcp_lo, rcp_hi, o_near, o_far, t_min: group_t_min };
 
         let mut memory = StackMemory::<Entry, STACK_SIZE>::new();
         let mut stack = Stack::empty(&mut memory);
@@ -146,7 +147,7 @@ impl Packet {
                     let i = mask.trailing_zeros() as usize & 7;
                     mask &= mask - 1;
                     count(Work::GroupBoxes, 1);
-                    let met = bounds.meet(simd, &planes(node, near_rows, i), group_t) & groups;
+                    let met = self.meet(simd, &planes(node, near_rows, i), group_t, L::COMMON) & groups;
                     if met == 0 {
                         continue;
                     }
@@ -168,8 +169,10 @@ impl Packet {
                 let node: &[Unit; NODE_UNITS] =
                     units[at..at + NODE_UNITS].try_into().expect("a slice of that length");
                 let child = ChildRef(node[CHILD_ROW].bits()[slot]);
-                if SLAB {
-                    met = self.exact_slabs(simd, &planes(node, near_rows, slot), met);
+                if SLABS {
+                    tested += met.count_ones();
+                    met = self.exact_slabs(simd, &planes(node, near_rows, slot), met, L::COMMON);
+                    kept += met.count_ones();
                     if met == 0 {
                         continue;
                     }
@@ -179,10 +182,10 @@ impl Packet {
                     groups = met;
                     continue 'nodes;
                 }
-                if !SLAB {
+                if !SLABS {
                     // Hits found since the push may lie before the leaf.
                     count(Work::GroupBoxes, 1);
-                    met &= bounds.meet(simd, &planes(node, near_rows, slot), group_t);
+                    met &= self.meet(simd, &planes(node, near_rows, slot), group_t, L::COMMON);
                     if met == 0 {
                         continue;
                     }
@@ -203,24 +206,30 @@ impl Packet {
                 }
             }
         }
+        (tested, kept)
     }
 
     /// Of the groups in `reached`, those with a ray that meets the box. The intervals of rays with different origins or diverging directions say
     /// little far away; this test is each ray's own.
     #[inline(always)]
-    fn exact_slabs<S: Simd>(&self, simd: S, planes: &[f32; 6], reached: u16) -> u16 {
+    fn exact_slabs<S: Simd>(&self, simd: S, planes: &[f32; 6], reached: u16, common: bool) -> u16 {
         let mut kept = 0;
         let mut rest = reached;
-        let p: [f32x16<S>; 3] = three!(|a| f32x16::splat(simd, planes[a]));
-        let q: [f32x16<S>; 3] = three!(|a| f32x16::splat(simd, planes[a + 3]));
+        // The origin all rays share is subtracted once.
+        let shared = |a: usize| if common { self.origin_near[a][0] } else { 0.0 };
+        let p: [f32x16<S>; 3] = three!(|a| f32x16::splat(simd, planes[a] - shared(a)));
+        let q: [f32x16<S>; 3] = three!(|a| f32x16::splat(simd, planes[a + 3] - shared(a)));
         while rest != 0 {
             let g = rest.trailing_zeros() as usize & 15;
             rest &= rest - 1;
             count(Work::GroupBoxes, 1);
-            let o: [f32x16<S>; 3] = three!(|a| load_row(simd, &self.origin[g][a]));
             let rcp: [f32x16<S>; 3] = three!(|a| load_row(simd, &self.rcp[g][a]));
-            let n: [f32x16<S>; 3] = three!(|a| (p[a] - o[a]) * rcp[a]);
-            let f: [f32x16<S>; 3] = three!(|a| (q[a] - o[a]) * rcp[a]);
+            let (n, f): ([f32x16<S>; 3], [f32x16<S>; 3]) = if common {
+                (three!(|a| p[a] * rcp[a]), three!(|a| q[a] * rcp[a]))
+            } else {
+                let o: [f32x16<S>; 3] = three!(|a| load_row(simd, &self.origin[g][a]));
+                (three!(|a| (p[a] - o[a]) * rcp[a]), three!(|a| (q[a] - o[a]) * rcp[a]))
+            };
             let near = n[0].max(n[1]).max(n[2].max(load_row(simd, &self.t_min[g])));
             let far = (f[0].min(f[1]).min(f[2]) * f32x16::splat(simd, BOX_SLACK))
                 .min(load_row(simd, &self.t[g]) * f32x16::splat(simd, beyond(1.0)));
