@@ -72,6 +72,8 @@ fn files_of_several_formats_become_pictures_that_show_something() {
         let seen = instance.iter().filter(|&&i| i >= 0.0).count();
         assert!((300..2700).contains(&seen), "{f}: {seen} pixels show the ball");
         assert!(layers.metadata.contains_key("effects"));
+        let software = format!("bench {}", env!("CARGO_PKG_VERSION"));
+        assert_eq!(layers.metadata.get("software"), Some(&software.into()));
     }
 }
 
