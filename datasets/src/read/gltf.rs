@@ -298,10 +298,15 @@ impl Reader {
                 m.x_axis.cross(m.y_axis),
             );
             let sign = if world_from_node.determinant() < 0.0 { -1.0 } else { 1.0 };
-            let turned = normals
-                .iter()
-                .map(|v| (sign * (cofactors * DVec3::from(v.map(f64::from)))).normalize_or_zero().as_vec3());
-            mesh.normals = Some(Attribute::per_vertex(turned.collect::<Vec<Vec3>>()));
+            // Normals that nothing turns keep every bit.
+            let turned = |v: &[f32; 3]| {
+                let v = Vec3::from(*v);
+                if m == DMat3::IDENTITY && v.is_finite() {
+                    return v;
+                }
+                (sign * (cofactors * v.as_dvec3())).normalize_or_zero().as_vec3()
+            };
+            mesh.normals = Some(Attribute::per_vertex(normals.iter().map(turned).collect()));
         }
         if let Some(a) = p.get(&Semantic::TexCoords(0)) {
             let t = self.tuples::<2>(&a, &format!("texture coordinates of `{name}`"))?;
