@@ -46,7 +46,8 @@ pub fn write_exr(path: &Path, picture: &Picture) -> Result<(), ImageError> {
                 MetadataValue::Text(_) => "text",
                 MetadataValue::Number(_) => "number",
             };
-            let reason = format!("OpenEXR gives `{key}` a meaning of its own, which is no {kind}; rename the entry");
+            let reason =
+                format!("OpenEXR gives `{key}` a meaning of its own, which is no {kind}; rename the entry");
             return Err(format_error(path, reason));
         }
     }
