@@ -111,8 +111,11 @@ fn metadata_entry((key, value): (&Text, &AttributeValue)) -> Option<(String, Met
 
 // ---- attributes that the format defines ---------------------------------------------------------------------------
 
-/// Standard texts, with their places in the crate's structure.
-const STANDARD_TEXTS: [(&str, fn(&mut LayerAttributes) -> &mut Option<Text>); 8] = [
+/// The name of an attribute and its place in the crate's structure.
+type Standard<T> = (&'static str, fn(&mut LayerAttributes) -> &mut Option<T>);
+
+/// Standard texts.
+const STANDARD_TEXTS: [Standard<Text>; 8] = [
     ("software", |a| &mut a.software_name),
     ("comments", |a| &mut a.comments),
     ("owner", |a| &mut a.owner),
@@ -124,7 +127,7 @@ const STANDARD_TEXTS: [(&str, fn(&mut LayerAttributes) -> &mut Option<Text>); 8]
 ];
 
 /// Standard numbers that may be absent.
-const STANDARD_NUMBERS: [(&str, fn(&mut LayerAttributes) -> &mut Option<f32>); 14] = [
+const STANDARD_NUMBERS: [Standard<f32>; 14] = [
     ("expTime", |a| &mut a.exposure),
     ("aperture", |a| &mut a.aperture),
     ("isoSpeed", |a| &mut a.iso_speed),
