@@ -1,11 +1,20 @@
 //! The program as its users start it: what it prints, what it writes, how it ends.
 
 use serde_json::Value;
+use std::io::{BufRead as _, BufReader};
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 fn bench(args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_bench")).args(args).output().expect("the program starts")
+}
+
+fn bench_in(dir: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_bench"))
+        .current_dir(dir)
+        .args(args)
+        .output()
+        .expect("the program starts")
 }
 
 fn text(bytes: &[u8]) -> String {
@@ -64,7 +73,12 @@ fn peers_are_found_or_explained() {
 fn a_run_prints_one_object_and_writes_record_table_and_report() {
     let dir = tempfile::tempdir().unwrap();
     let folder = dir.path().to_str().unwrap();
-    let out = bench(&["run", "accuracy-robust", "--quick", "--json", "--quiet", "--out", folder]);
+    // A repository, as far as `--record` looks.
+    let repository = tempfile::tempdir().unwrap();
+    std::fs::create_dir_all(repository.path().join("bench/src")).unwrap();
+    std::fs::write(repository.path().join("bench/Cargo.toml"), "").unwrap();
+    let args = ["run", "accuracy-robust", "--quick", "--json", "--quiet", "--record", "--out", folder];
+    let out = bench_in(&repository.path().join("bench/src"), &args);
     assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
     assert!(out.stderr.is_empty(), "quiet means quiet: {}", text(&out.stderr));
     let record: Value = serde_json::from_slice(&out.stdout).expect("one JSON object");
@@ -87,6 +101,79 @@ fn a_run_prints_one_object_and_writes_record_table_and_report() {
     assert!(file("index.html").contains("id=\"accuracy-robust\""));
 
     remake_report(dir.path());
+    check_kept(repository.path(), &record);
+}
+
+/// What `--record` keeps: DATE-MACHINE with the record, and nothing of where this machine has its files.
+fn check_kept(repository: &Path, record: &Value) {
+    let entries = |p: &Path| -> Vec<std::path::PathBuf> {
+        let mut found: Vec<_> = std::fs::read_dir(p).unwrap().map(|e| e.unwrap().path()).collect();
+        found.sort();
+        found
+    };
+    let runs = entries(&repository.join("bench/runs"));
+    assert_eq!(runs.len(), 1, "{runs:?}");
+    let name = runs[0].file_name().unwrap().to_str().unwrap();
+    let day = &record["machine"]["date"].as_str().unwrap()[..10];
+    let cores = format!("{}core-", record["machine"]["cores"]);
+    assert!(name.strip_prefix(&format!("{day}-")).is_some_and(|m| m.starts_with(&cores)), "{name}");
+
+    let files = entries(&runs[0]);
+    let names: Vec<&str> = files.iter().map(|f| f.file_name().unwrap().to_str().unwrap()).collect();
+    assert_eq!(names, ["accuracy-robust.csv", "accuracy-robust.json"]);
+    let mut places = vec![repository.to_path_buf(), std::env::temp_dir(), env!("CARGO_MANIFEST_DIR").into()];
+    places.extend(Path::new(env!("CARGO_BIN_EXE_bench")).parent().map(Path::to_path_buf));
+    places.extend(std::env::var_os("HOME").map(Into::into));
+    for file in &files {
+        let text = std::fs::read_to_string(file).unwrap();
+        for place in places.iter().map(|p| p.to_str().unwrap()).filter(|p| p.len() > 1) {
+            assert!(!text.contains(place), "{} names {place}", file.display());
+        }
+    }
+    let kept: Value = serde_json::from_str(&std::fs::read_to_string(&files[1]).unwrap()).unwrap();
+    assert_eq!(&kept, record);
+}
+
+#[test]
+fn record_outside_a_repository_ends_with_2_and_measures_nothing() {
+    let nowhere = tempfile::tempdir().unwrap();
+    let out = bench_in(nowhere.path(), &["run", "accuracy-robust", "--quick", "--record"]);
+    assert_eq!(out.status.code(), Some(2));
+    assert!(text(&out.stderr).contains("bench/runs"), "{}", text(&out.stderr));
+}
+
+#[test]
+#[cfg(unix)]
+fn ctrl_c_among_pictures_keeps_those_that_are_finished() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path().to_str().unwrap();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_bench"))
+        .args(["run", "pictures", "--quick", "--json", "-v", "--out", folder])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    // Nobody at a terminal: steps are lines.
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
+    lines
+        .by_ref()
+        .find(|l| l.as_ref().unwrap().contains("mixing-layer-outside: data"))
+        .expect("steps are told")
+        .unwrap();
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+    let rest: String = lines.map(|l| l.unwrap() + "\n").collect();
+    let out = child.wait_with_output().unwrap();
+    assert_eq!(out.status.code(), Some(130), "{rest}");
+    assert!(rest.contains("what was finished is kept"), "{rest}");
+
+    let record: Value = serde_json::from_slice(&out.stdout).expect("one JSON object");
+    let rows = record["rows"].as_array().unwrap();
+    assert!(!rows.is_empty() && rows.len() < 7 && rows[0]["picture"] == "wavelet", "{rows:?}");
+    assert!(record["missing"][0].as_str().unwrap().contains("interrupted"), "{record}");
+    for file in ["pictures.json", "pictures.wavelet.png", "index.html"] {
+        assert!(dir.path().join(file).exists(), "{file}");
+    }
 }
 
 /// `bench report` makes the same page from the records alone.

@@ -2,12 +2,14 @@
 
 use datasets::image_io::{read_exr, read_png};
 use datasets::model::{DataArray, Dataset, ImageData, PolyData, Values};
-use datasets::write::{VtkOptions, write_obj, write_ply, write_vtk};
+use datasets::write::{VtkOptions, write_glb, write_obj, write_ply, write_vtk};
 use glam::DVec3;
 use rt_core::mesh::{Attribute, TriMesh};
 use serde_json::Value;
+use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
 
 fn bench(args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_bench")).args(args).output().expect("the program starts")
@@ -36,6 +38,7 @@ fn field() -> Dataset {
 fn files(dir: &Path) -> Vec<PathBuf> {
     let path = |name: &str| dir.join(name);
     let (vtp, vti, obj, ply) = (path("ball.vtp"), path("field.vti"), path("ball.obj"), path("ball.ply"));
+    let glb = path("ball.glb");
     let poly = Dataset::PolyData(PolyData::from_trimesh(&ball()));
     write_vtk(&vtp, &poly, VtkOptions::default()).unwrap();
     write_vtk(&vti, &field(), VtkOptions::default()).unwrap();
@@ -43,7 +46,10 @@ fn files(dir: &Path) -> Vec<PathBuf> {
     let bare = TriMesh { scalars: None, colors: None, ..ball() };
     write_obj(&obj, &bare).unwrap();
     write_ply(&ply, &ball()).unwrap();
-    vec![vtp, vti, obj, ply]
+    let colors = bare.positions.iter().map(|p| [0.5 + 0.5 * p.z, 0.4, 0.3, 1.0].map(|c| c.clamp(0.0, 1.0)));
+    let colored = TriMesh { colors: Some(Attribute::per_vertex(colors.collect())), ..bare.clone() };
+    write_glb(&glb, &colored).unwrap();
+    vec![vtp, vti, obj, ply, glb]
 }
 
 #[test]
@@ -72,6 +78,8 @@ fn files_of_several_formats_become_pictures_that_show_something() {
         let seen = instance.iter().filter(|&&i| i >= 0.0).count();
         assert!((300..2700).contains(&seen), "{f}: {seen} pixels show the ball");
         assert!(layers.metadata.contains_key("effects"));
+        let software = format!("bench {}", env!("CARGO_PKG_VERSION"));
+        assert_eq!(layers.metadata.get("software"), Some(&software.into()));
     }
 }
 
@@ -112,4 +120,101 @@ fn unknown_effects_sizes_and_endings_end_with_2_and_say_what_there_is() {
         assert_eq!(out.status.code(), Some(2), "{args:?}: {message}");
         assert!(message.contains(says), "{args:?}: {message}");
     }
+}
+
+/// Draws the field as a volume and gives the picture's colours and the account.
+fn volume(vti: &Path, args: &[&str]) -> (Vec<[f32; 4]>, Value) {
+    let png = vti.with_extension("png");
+    let always = ["render", vti.to_str().unwrap(), "-o", png.to_str().unwrap(), "--size", "48x48", "--json"];
+    let out = bench(&[&always, args].concat());
+    assert_eq!(out.status.code(), Some(0), "{args:?}: {}", String::from_utf8_lossy(&out.stderr));
+    let pixels = read_png(&png).unwrap().rgba().unwrap();
+    (pixels, serde_json::from_slice(&out.stdout).expect("one JSON object"))
+}
+
+#[test]
+fn image_data_becomes_a_volume_that_opacity_and_isovalue_change() {
+    let dir = tempfile::tempdir().unwrap();
+    let vti = dir.path().join("field.vti");
+    write_vtk(&vti, &field(), VtkOptions::default()).unwrap();
+    let black = ["--background", "black"];
+    let with = |more: &[&str]| volume(&vti, &[&black, more].concat());
+
+    let (ramp, object) = with(&["--effects", "volumes"]);
+    assert!(object["effects"].as_array().unwrap().contains(&"volumes".into()), "{object}");
+    assert!(object["contents"][0].as_str().unwrap().contains("`distance` as a volume"), "{object}");
+    assert_eq!((&object["triangles"], &object["warnings"]), (&0.into(), &serde_json::json!([])));
+    // The distance is largest in the middle, so that is what glows most; the corners of the picture show nothing.
+    let light = |p: [f32; 4]| p[0] + p[1] + p[2];
+    let (middle, side) = (light(ramp[24 * 48 + 24]), light(ramp[24 * 48 + 8]));
+    assert!(middle > 1.2 * side && side > 0.0 && light(ramp[0]) == 0.0, "{middle} {side}");
+
+    let (named, _) = with(&["--volume", "distance"]);
+    assert_eq!(named, ramp, "the marked array, named");
+    let (clear, _) = with(&["--volume", "distance", "--opacity", "0:0,1:0"]);
+    assert!(clear.iter().all(|&p| light(p) == 0.0), "no opacity, no light");
+    let (shell, _) = with(&["--volume", "distance", "--opacity", "0.4:0,0.5:0.9,0.6:0"]);
+    assert_ne!(shell, ramp);
+    let (both, object) = with(&["--effects", "volumes,shadows", "--isovalue", "0.5"]);
+    assert_ne!(both, ramp);
+    assert_eq!(object["contents"].as_array().unwrap().len(), 2, "{object}");
+
+    // A volume alone answers to no light: that is said, not passed over.
+    let (_, object) = with(&["--effects", "volumes,shadows"]);
+    assert!(object["warnings"][0].as_str().unwrap().contains("shadows changes no pixel"), "{object}");
+}
+
+#[test]
+fn volumes_without_a_uniform_grid_are_refused_with_the_cure() {
+    let dir = tempfile::tempdir().unwrap();
+    let files = files(dir.path());
+    let png = dir.path().join("refused.png");
+    let refused = |file: &Path, args: &[&str]| {
+        let always = ["render", file.to_str().unwrap(), "-o", png.to_str().unwrap()];
+        let out = bench(&[&always, args].concat());
+        assert!(!png.exists());
+        (out.status.code(), String::from_utf8_lossy(&out.stderr).into_owned())
+    };
+    for file in files.iter().filter(|f| !f.ends_with("field.vti")) {
+        let (code, message) = refused(file, &["--effects", "volumes"]);
+        assert_eq!(code, Some(1), "{message}");
+        let name = file.file_name().unwrap().to_str().unwrap();
+        assert!(message.contains(name) && message.contains("Resample To Image"), "{message}");
+    }
+    let vti = &files[1];
+    let (code, message) = refused(vti, &["--volume", "pressure"]);
+    assert!(code == Some(1) && message.contains("pressure") && message.contains("distance"), "{message}");
+    let (code, message) = refused(vti, &["--opacity", "0:0,1:1"]);
+    assert!(code == Some(2) && message.contains("--effects volumes"), "{message}");
+    for bad in ["1:0,0:1", "0:2", "0.5"] {
+        let (code, message) = refused(vti, &["--effects", "volumes", "--opacity", bad]);
+        assert!(code == Some(2) && message.contains("SCALAR:OPACITY"), "{bad}: {message}");
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn ctrl_c_within_a_picture_keeps_the_samples_it_has_and_ends_with_130() {
+    let dir = tempfile::tempdir().unwrap();
+    let (vti, png) = (dir.path().join("field.vti"), dir.path().join("field.png"));
+    write_vtk(&vti, &field(), VtkOptions::default()).unwrap();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_bench"))
+        .args(["render", vti.to_str().unwrap(), "-o", png.to_str().unwrap(), "-v"])
+        .args(["--size", "64x48", "--samples", "65536", "--effects", "soft-shadows,ao"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
+    lines.by_ref().find(|l| l.as_ref().unwrap().starts_with("drawing")).expect("notes with -v").unwrap();
+    // One sample takes milliseconds and all of them minutes.
+    std::thread::sleep(Duration::from_secs(3));
+    let pressed = Instant::now();
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+    let rest: String = lines.map(|l| l.unwrap() + "\n").collect();
+    assert_eq!(child.wait().unwrap().code(), Some(130), "{rest}");
+    assert!(pressed.elapsed() < Duration::from_secs(10), "stopped after {:?}", pressed.elapsed());
+    assert!(rest.contains("of 65536 samples") && rest.contains("what was finished is kept"), "{rest}");
+    assert_eq!(read_png(&png).unwrap().width, 64);
 }

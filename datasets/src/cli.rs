@@ -1,7 +1,7 @@
 //! The conventions that all command-line programs here share, written once.
 //!
 //! * Results go to stdout (as text, or as JSON with `--json`); progress, notes and errors go to stderr.
-//! * Progress bars appear only on a terminal, and never with `--quiet`.
+//! * Progress bars appear only on a terminal, and never with `--quiet`; they make way for whatever else is printed.
 //! * Exit codes are those of [`Status`]: 0 done, 1 failed, 2 wrong usage, 130 interrupted.
 //! * Ctrl-C asks the program to stop at the next good place and keep what is finished; a second one ends it at once.
 //! * A closed pipe (`program | head`) is success.
@@ -27,12 +27,14 @@
 //! assert_eq!(status_of(work(["program", "three"])), Status::Usage);
 //! ```
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+pub use indicatif::ProgressBar;
+use indicatif::{ProgressDrawTarget, ProgressStyle, WeakProgressBar};
 use std::fmt::{self, Display};
 use std::io::{self, IsTerminal, Write};
 use std::process::ExitCode;
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, OnceLock};
+use std::time::Duration;
 
 /// How a program ended; the numbers are its exit code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,14 +83,13 @@ impl CommonArgs {
         value: &impl serde::Serialize,
         text: impl FnOnce() -> D,
     ) -> anyhow::Result<()> {
-        let mut out = io::stdout().lock();
-        if self.json {
-            serde_json::to_writer(&mut out, value).map_err(io::Error::from)?;
-            writeln!(out)?;
-        } else {
-            writeln!(out, "{}", text())?;
-        }
-        out.flush()?;
+        let mut line = if self.json { serde_json::to_string(value)? } else { text().to_string() };
+        line.push('\n');
+        beside_the_bar(|| {
+            let mut out = io::stdout().lock();
+            out.write_all(line.as_bytes())?;
+            out.flush()
+        })?;
         Ok(())
     }
 
@@ -104,16 +105,25 @@ impl CommonArgs {
         to_stderr(format_args!("warning: {text}"));
     }
 
-    /// A progress bar on stderr over `total` steps of `what`; invisible with `--quiet` or when stderr is no terminal.
-    /// Dropping it removes it from the screen.
+    /// A progress bar on stderr over `total` steps of `what`; invisible with `--quiet` or when stderr is no terminal
+    /// ([`ProgressBar::is_hidden`]). Dropping it removes it from the screen. One at a time: notes, warnings and results
+    /// are printed above the one made last.
     pub fn progress(&self, total: u64, what: &str) -> ProgressBar {
         let visible = !self.quiet && io::stderr().is_terminal();
         let target = if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        let template = "{msg} {wide_bar} {human_pos}/{human_len} {elapsed} eta {eta}";
+        let template = "{wide_bar} {percent:>3} % {elapsed} eta {eta}  {msg}";
         let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
         let bar = ProgressBar::with_draw_target(Some(total), target).with_style(style);
         bar.set_message(what.to_string());
-        bar.with_finish(indicatif::ProgressFinish::AndClear)
+        let bar = bar.with_finish(indicatif::ProgressFinish::AndClear);
+        if visible {
+            // The clock goes on during long steps.
+            bar.enable_steady_tick(Duration::from_millis(500));
+            if let Ok(mut last) = ON_SCREEN.lock() {
+                *last = Some(bar.downgrade());
+            }
+        }
+        bar
     }
 }
 
@@ -203,16 +213,17 @@ pub struct Interrupted;
 
 /// A flag that Ctrl-C sets. Long work looks at it at good places to stop.
 #[derive(Debug, Clone, Copy)]
-pub struct Cancel(&'static AtomicBool);
+pub struct Cancel(&'static Arc<AtomicBool>);
 
 impl Cancel {
     /// Installs the Ctrl-C handler (once a process; later calls give the same flag). The second Ctrl-C ends the program.
     pub fn on_ctrl_c() -> anyhow::Result<Cancel> {
-        static CANCELLED: AtomicBool = AtomicBool::new(false);
+        static CANCELLED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
         static INSTALLED: OnceLock<Result<(), String>> = OnceLock::new();
+        let flag = CANCELLED.get_or_init(Arc::default);
         // A second Ctrl-C means now: the only place that leaves without returning to the main function.
         let handler = || {
-            if CANCELLED.swap(true, Ordering::SeqCst) {
+            if flag.swap(true, Ordering::SeqCst) {
                 std::process::exit(Status::Interrupted as i32);
             }
             to_stderr(format_args!("stopping at the next good place; Ctrl-C again ends the program at once"));
@@ -221,7 +232,7 @@ impl Cancel {
             .get_or_init(|| ctrlc::set_handler(handler).map_err(|e| e.to_string()))
             .clone()
             .map_err(|e| anyhow::anyhow!("cannot install the Ctrl-C handler: {e}"))?;
-        Ok(Cancel(&CANCELLED))
+        Ok(Cancel(flag))
     }
 
     /// Whether Ctrl-C came.
@@ -230,7 +241,7 @@ impl Cancel {
     }
 
     /// The flag itself, for libraries that take one.
-    pub fn flag(self) -> &'static AtomicBool {
+    pub fn flag(self) -> &'static Arc<AtomicBool> {
         self.0
     }
 
@@ -260,9 +271,21 @@ impl CompletionsArgs {
     }
 }
 
+/// The bar that may be on the screen.
+static ON_SCREEN: Mutex<Option<WeakProgressBar>> = Mutex::new(None);
+
+/// Prints with the progress bar out of the way.
+fn beside_the_bar<T>(print: impl FnOnce() -> T) -> T {
+    let bar = ON_SCREEN.lock().ok().and_then(|last| last.as_ref()?.upgrade());
+    match bar {
+        Some(bar) => bar.suspend(print),
+        None => print(),
+    }
+}
+
 /// Prints a line; a closed stderr is not an error.
 fn to_stderr(line: fmt::Arguments<'_>) {
-    let _ = writeln!(io::stderr().lock(), "{line}");
+    let _ = beside_the_bar(|| writeln!(io::stderr().lock(), "{line}"));
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use datasets::read::{Content, Opened, SceneModel, open};
 use datasets::write::{Encoding, VtkOptions, write_obj, write_ply, write_pvd, write_vtk};
 use glam::{DVec3, Vec3};
 use rt_core::mesh::{Attribute, PerElement, TriMesh};
+use std::io::Write as _;
 
 fn opened(name: &str, bytes: &[u8]) -> Opened {
     let dir = tempfile::tempdir().unwrap();
@@ -114,7 +115,8 @@ fn plot3d_solution_of_another_grid_is_refused() {
 #[test]
 fn blunt_fin_has_its_known_free_stream_and_shock() {
     let Some(path) = std::env::var_os("RTSV_BLUNT_FIN") else {
-        println!("skipped: RTSV_BLUNT_FIN does not name bluntfinxyz.bin");
+        let reason = "skipped: blunt_fin_has_its_known_free_stream_and_shock needs RTSV_BLUNT_FIN to name bluntfinxyz.bin";
+        writeln!(std::io::stderr(), "{reason}").unwrap();
         return;
     };
     let Dataset::StructuredGrid(g) = data(open(path).unwrap()) else { panic!() };

@@ -208,6 +208,11 @@ fn declared_sizes_beyond_the_file_are_refused_before_memory_is_taken() {
     let mut stl = vec![0u8; 84];
     stl[80..].copy_from_slice(&[0xff; 4]);
     refused("a.stl", &stl, &["4294967295 triangles", "truncated"]);
+    let mut glb = sample_files::glb();
+    glb[8..12].copy_from_slice(&[5, 0, 0, 0]);
+    refused("a.glb", &glb, &["at byte 8", "5 bytes"]);
+    let normal = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//6148914691236517207\n";
+    refused("a.obj", normal, &["in line 5", "6148914691236517207"]);
     // A megabyte of zeros packs into a kilobyte; a header that asks for a terabyte does not become one.
     let bomb = sample_files::raw_appended("vtkZLibDataCompressor", sample_files::zlib);
     let at = bomb.windows(4).position(|w| w == [20, 0, 0, 0]).unwrap();

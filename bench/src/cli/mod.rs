@@ -90,7 +90,7 @@ struct RenderArgs {
     #[arg(long, default_value_t = 4, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
     samples: u32,
     /// Separated by commas: shadows, soft-shadows, ao, reflections, glossy-reflections, refraction, transparency,
-    /// depth-of-field, path-tracing
+    /// depth-of-field, volumes (image data as a glowing medium), path-tracing
     #[arg(long, default_value = "none", value_name = "LIST", value_parser = crate::picture::look::parse_effects)]
     effects: Effects,
     /// A camera as TOML or JSON: eye, target, up, vertical_fov_degrees, parallel_height [default: fits the data]
@@ -105,9 +105,16 @@ struct RenderArgs {
     /// Scalars at the ends of the colour map [default: range of the data]
     #[arg(long, value_name = "LOW,HIGH", value_parser = render::range, allow_hyphen_values = true)]
     range: Option<[f32; 2]>,
-    /// Of image data [default: the middle of the range]
+    /// Of image data [default: the middle of the range; with a volume, no isosurface]
     #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
     isovalue: Option<f32>,
+    /// Draws this array as a volume; `--effects volumes` alone takes the array that the file marks
+    #[arg(long, value_name = "ARRAY")]
+    volume: Option<String>,
+    /// Of a volume: SCALAR:OPACITY,..., the opacity of a stretch as long as a tenth of the volume's diagonal, linear in
+    /// between [default: a ramp from 0 to 0.5 over the range of the colours]
+    #[arg(long, value_name = "POINTS", value_parser = render::opacity, allow_hyphen_values = true)]
+    opacity: Option<render::Opacity>,
     /// gradient, white, black, transparent
     #[arg(long, default_value = "gradient", value_name = "NAME", value_parser = render::background)]
     background: Background,

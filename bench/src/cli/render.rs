@@ -3,11 +3,13 @@
 use super::{PictureArgs, RenderArgs};
 use crate::picture::framing::{Framing, read_camera};
 use crate::picture::look::{BACKGROUNDS, Look};
-use crate::picture::subject::{Choices, Subject};
-use crate::picture::{Drawn, Wish, draw, gallery, save};
-use datasets::cli::{Cancel, CommonArgs, CureExt as _, UsageError};
+use crate::picture::subject::{Choices, Subject, VolumeChoice};
+use crate::picture::{Drawn, Watch, Wish, draw, gallery, save};
+use anyhow::Context as _;
+use datasets::cli::{Cancel, CommonArgs, CureExt as _, Interrupted, UsageError};
 use datasets::colormaps;
 use rt_core::accel::{BuildOptions, BuildQuality, Robustness};
+use rt_core::effects::Effects;
 use rt_core::environment::Background;
 use rt_core::frame::Layers;
 use rt_core::ray_stats::RayStats;
@@ -21,13 +23,30 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
     let framing = args.camera.as_deref().map(read_camera).transpose()?.unwrap_or(Framing::Fitted);
     let file = args.file.display();
 
+    let volume = match &args.volume {
+        Some(name) => VolumeChoice::Named(name.clone()),
+        None if args.effects.contains(Effects::VOLUMES) => VolumeChoice::Marked,
+        None => VolumeChoice::No,
+    };
+    if args.opacity.is_some() && volume == VolumeChoice::No {
+        let text = "--opacity belongs to a volume; add --effects volumes or --volume ARRAY";
+        return Err(UsageError(text.into()).into());
+    }
+    let drawn_as_volume = volume != VolumeChoice::No;
+
     let start = Instant::now();
-    common.note(0, format_args!("reading {file}"));
+    common.note(1, format_args!("reading {file}"));
     let opened = datasets::read::open(&args.file)?;
-    let choices = Choices { color_by: args.color_by.clone(), isovalue: args.isovalue };
-    let subject = Subject::from_file(&opened, &choices).cure(format_args!(
-        "look at `{file}` with the options --color-by and --isovalue in mind, or convert it to .vtp or .vti with ParaView"
-    ))?;
+    let choices = Choices { color_by: args.color_by.clone(), isovalue: args.isovalue, volume };
+    let cure = if choices.volume == VolumeChoice::No {
+        "look at the file with the options --color-by and --isovalue in mind, or convert it to .vtp or .vti with ParaView"
+    } else {
+        "draw it without `volumes`, or make image data of it: in ParaView by Resample To Image, saved as .vti; \
+         --volume names one of its arrays"
+    };
+    let subject = Subject::from_file(&opened, &choices)
+        .with_context(|| format!("{file}: cannot be drawn so"))
+        .cure(cure)?;
     let (format, read_secs) = (opened.format, start.elapsed().as_secs_f64());
     drop(opened);
     cancel.check()?;
@@ -35,9 +54,10 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
     let scalar_range = args.range.or(subject.scalar_range);
     let mut warnings = subject.warnings.clone();
 
-    common.note(0, format_args!("drawing {}", contents.join(", ")));
+    common.note(1, format_args!("drawing {}", contents.join(", ")));
     let look = Look {
-        effects: args.effects,
+        effects: args.effects.with_if(drawn_as_volume, Effects::VOLUMES),
+        opacity: args.opacity.clone().map(|o| o.0),
         colors: args.colors.clone(),
         range: args.range,
         background: args.background,
@@ -51,7 +71,11 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
         build: BuildOptions { quality: args.quality, robustness: args.robustness, simd: None },
         layers: if exr.is_some() { Layers::ALL } else { Layers::COLOR },
     };
-    let drawn = draw(subject, &wish, &mut || Ok(cancel.check()?))?;
+    let bar = common.progress(u64::from(args.samples), "drawing");
+    let mut told = |samples: u32| bar.set_position(u64::from(samples));
+    let mut watch = Watch { cancel: Some(cancel.flag().clone()), samples_done: Some(&mut told) };
+    let drawn = draw(subject, &wish, &mut watch)?;
+    drop(bar);
     warnings.extend(drawn.warnings.iter().cloned());
     write(png, exr, &drawn, &wish, &mut warnings)?;
     for w in &warnings {
@@ -85,15 +109,19 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
             drawn.render_secs,
             drawn.report.rays.total()
         )
-    })
+    })?;
+    ended(&drawn)
 }
 
 pub(super) fn picture(common: CommonArgs, args: &PictureArgs) -> anyhow::Result<()> {
     let cancel = Cancel::on_ctrl_c()?;
     let entry = gallery::find(&args.name).map_err(UsageError)?;
     let (png, exr) = outputs(args.out.as_deref(), args.exr.as_deref())?;
-    common.note(0, format_args!("generating and drawing {}", entry.name));
-    let p = entry.paint(args.size, args.samples, &mut || Ok(cancel.check()?))?;
+    let bar = common.progress(u64::from(args.samples), entry.name);
+    let mut told = |samples: u32| bar.set_position(u64::from(samples));
+    let mut watch = Watch { cancel: Some(cancel.flag().clone()), samples_done: Some(&mut told) };
+    let p = entry.paint(args.size, args.samples, &mut watch)?;
+    drop(bar);
     let mut warnings = p.drawn.warnings.clone();
     write(png, exr, &p.drawn, &p.wish, &mut warnings)?;
     for w in &warnings {
@@ -112,7 +140,13 @@ pub(super) fn picture(common: CommonArgs, args: &PictureArgs) -> anyhow::Result<
     });
     common.result(&object, || {
         format!("{}; build {:.2} s, render {:.2} s", p.contents, p.drawn.build_secs, p.drawn.render_secs)
-    })
+    })?;
+    ended(&p.drawn)
+}
+
+/// After Ctrl-C the picture is there with the samples it got, and the program says so.
+fn ended(drawn: &Drawn) -> anyhow::Result<()> {
+    if drawn.is_interrupted() { Err(Interrupted.into()) } else { Ok(()) }
 }
 
 /// Checks the names before hours of work are spent on a picture that cannot be written.
@@ -139,6 +173,10 @@ fn write(
     wish: &Wish,
     warnings: &mut Vec<String>,
 ) -> anyhow::Result<()> {
+    if drawn.is_interrupted() {
+        let (done, all) = (drawn.report.samples, wish.samples);
+        warnings.push(format!("stopped after {done} of {all} samples per pixel"));
+    }
     if let Some(path) = png {
         let report = save::write_png(path, &drawn.frame)?;
         if report.nan > 0 {
@@ -206,6 +244,22 @@ pub(super) fn quality(text: &str) -> Result<BuildQuality, String> {
 }
 pub(super) fn robustness(text: &str) -> Result<Robustness, String> {
     by_name(text, "robustness", Robustness::ALL.into_iter().map(|r| (r.name(), r)))
+}
+/// Scalars and opacities of a volume.
+#[derive(Debug, Clone)]
+pub(super) struct Opacity(Vec<[f32; 2]>);
+
+pub(super) fn opacity(text: &str) -> Result<Opacity, String> {
+    let point = |p: &str| {
+        let (scalar, opacity) = p.split_once(':')?;
+        let numbers = [scalar.trim().parse::<f32>().ok()?, opacity.trim().parse::<f32>().ok()?];
+        (numbers[0].is_finite() && (0.0..=1.0).contains(&numbers[1])).then_some(numbers)
+    };
+    let points: Option<Vec<[f32; 2]>> = text.split(',').map(point).collect();
+    let points = points
+        .filter(|p| p.is_sorted_by(|a, b| a[0] <= b[0]))
+        .ok_or("give SCALAR:OPACITY in order of scalar, opacity 0 to 1, as in 40:0,150:0.1,270:0.9")?;
+    Ok(Opacity(points))
 }
 pub(super) fn background(text: &str) -> Result<Background, String> {
     by_name(text, "background", BACKGROUNDS.into_iter())

@@ -2,10 +2,11 @@
 
 use super::report::write_page;
 use super::{RunArgs, default_dir};
-use crate::experiments::{self, Context, Experiment};
+use crate::experiments::{self, Context, Experiment, Outcome};
 use crate::record::Record;
-use datasets::cli::{Cancel, CommonArgs, Interrupted, UsageError};
+use datasets::cli::{Cancel, CommonArgs, Interrupted, ProgressBar, UsageError};
 use serde_json::json;
+use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -16,44 +17,104 @@ pub(super) fn run(common: CommonArgs, args: &RunArgs) -> anyhow::Result<()> {
     if args.record {
         dirs.push(runs_dir()?);
     }
-    let (start, cancel) = (Instant::now(), Cancel::on_ctrl_c()?);
-    let mut progress = |what: &str| {
-        common.note(0, format_args!("{:6.1} s  {what}", start.elapsed().as_secs_f64()));
-        Ok(cancel.check()?)
-    };
-    let mut context = Context::new(args.quick, &mut progress);
-    for experiment in chosen {
-        let record = experiments::run(experiment, &mut context)?;
-        for dir in &dirs {
+    let cancel = Cancel::on_ctrl_c()?;
+    let steps = Steps::new(common, cancel, chosen.len());
+    let mut progress = |what: &str, share: Option<f64>| steps.next(what, share);
+    let mut context = Context::new(args.quick, Some(cancel.flag().clone()), &mut progress);
+    let mut written = false;
+    for (i, experiment) in chosen.into_iter().enumerate() {
+        steps.begin(i, experiment.id);
+        let Outcome { record, interrupted } = match experiments::run(experiment, &mut context) {
+            Err(e) if e.is::<Interrupted>() && written => {
+                // What was finished is worth its report.
+                finish(common, &dir)?;
+                return Err(e);
+            }
+            outcome => outcome?,
+        };
+        // Half a measurement is no record to keep for years.
+        for dir in &dirs[..if interrupted { 1 } else { dirs.len() }] {
             record.write(dir)?;
         }
+        written = true;
         common.result(&record, || summary(&record))?;
+        if interrupted {
+            finish(common, &dir)?;
+            return Err(Interrupted.into());
+        }
     }
+    drop(steps);
     finish(common, &dir)
+}
+
+/// The progress of experiments: a bar on a terminal; elsewhere a line for each experiment, and with -v for each step.
+struct Steps {
+    common: CommonArgs,
+    cancel: Cancel,
+    bar: ProgressBar,
+    start: Instant,
+    /// Index and id of the experiment that runs.
+    now: Cell<(usize, &'static str)>,
+    count: usize,
+}
+
+/// Steps of the bar for each experiment.
+const FINE: f64 = 1000.0;
+
+impl Steps {
+    fn new(common: CommonArgs, cancel: Cancel, count: usize) -> Steps {
+        let bar = common.progress(count as u64 * FINE as u64, "experiments");
+        Steps { common, cancel, bar, start: Instant::now(), now: Cell::new((0, "")), count }
+    }
+
+    fn begin(&self, i: usize, id: &'static str) {
+        self.now.set((i, id));
+        self.bar.set_position((i as f64 * FINE) as u64);
+        if self.bar.is_hidden() {
+            let secs = self.start.elapsed().as_secs_f64();
+            self.common.note(0, format_args!("{secs:6.1} s  [{}/{}] {id}", i + 1, self.count));
+        }
+    }
+
+    fn next(&self, what: &str, share: Option<f64>) -> anyhow::Result<()> {
+        let (i, id) = self.now.get();
+        self.bar.set_message(format!("{id}: {what}"));
+        if let Some(share) = share {
+            self.bar.set_position(((i as f64 + share.clamp(0.0, 1.0)) * FINE) as u64);
+        }
+        if self.bar.is_hidden() {
+            let secs = self.start.elapsed().as_secs_f64();
+            self.common.note(1, format_args!("{secs:6.1} s  {id}: {what}"));
+        }
+        Ok(self.cancel.check()?)
+    }
 }
 
 /// Every experiment in its quick form. One that fails is reported, and the others go on.
 pub(super) fn everything_quick(common: CommonArgs) -> anyhow::Result<()> {
     let dir = default_dir();
-    let (start, cancel) = (Instant::now(), Cancel::on_ctrl_c()?);
+    let cancel = Cancel::on_ctrl_c()?;
+    let steps = Steps::new(common, cancel, experiments::ALL.len());
     let mut failed = vec![];
-    let count = experiments::ALL.len();
     for (i, experiment) in experiments::ALL.iter().enumerate() {
-        let mut progress = |what: &str| {
-            let secs = start.elapsed().as_secs_f64();
-            common.note(0, format_args!("{secs:6.1} s  [{}/{count}] {}: {what}", i + 1, experiment.id));
-            Ok(cancel.check()?)
-        };
-        match experiments::run(experiment, &mut Context::new(true, &mut progress)) {
-            Ok(record) => {
+        steps.begin(i, experiment.id);
+        let mut progress = |what: &str, share: Option<f64>| steps.next(what, share);
+        let mut context = Context::new(true, Some(cancel.flag().clone()), &mut progress);
+        match experiments::run(experiment, &mut context) {
+            Ok(Outcome { record, interrupted }) => {
                 record.write(&dir)?;
                 if common.json {
                     common.result(&record, String::new)?;
                 }
+                if interrupted {
+                    finish(common, &dir)?;
+                    return Err(Interrupted.into());
+                }
             }
             Err(e) if e.is::<Interrupted>() => {
-                // What was finished is worth its report.
-                finish(common, &dir)?;
+                if i > 0 {
+                    finish(common, &dir)?;
+                }
                 return Err(e);
             }
             Err(e) => {
@@ -62,6 +123,7 @@ pub(super) fn everything_quick(common: CommonArgs) -> anyhow::Result<()> {
             }
         }
     }
+    drop(steps);
     finish(common, &dir)?;
     anyhow::ensure!(failed.is_empty(), "these experiments failed: {}", failed.join(", "));
     Ok(())

@@ -5,13 +5,14 @@ use crate::meshes;
 use crate::picture::framing::Framing;
 use crate::plot::{Axis, Plot, Series};
 use crate::record::{Record, Row};
+use datasets::cli::Interrupted;
 use glam::DVec3;
 use rt_core::accel::{BuildOptions, World};
 use rt_core::camera::Camera;
 use rt_core::frame::Frame;
 use rt_core::light::Light;
 use rt_core::material::Material;
-use rt_core::render::{RenderOptions, render};
+use rt_core::render::{RenderOptions, StopReason, render};
 use rt_core::sampler::Sampling;
 use rt_core::scene::{AmbientOcclusion, Scene};
 
@@ -54,13 +55,14 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             Axis::log("RMS error", "grey level"),
         );
         context.say(format!("{}: reference of {reference} samples", quantity.name))?;
-        let options = RenderOptions { seed: REFERENCE_SEED, ..RenderOptions::new(pixels, pixels) };
+        let plain = RenderOptions { cancel: context.cancel.clone(), ..RenderOptions::new(pixels, pixels) };
+        let options = RenderOptions { seed: REFERENCE_SEED, ..plain.clone() };
         let (exact, _) = picture(&quantity, &camera, &options, reference)?;
         for sampling in Sampling::ALL {
             context.say(format!("{}: {}", quantity.name, sampling.name()))?;
             let mut points = vec![];
             for n in (0..).map(|k| 1u32 << (2 * k)).take_while(|n| *n <= most) {
-                let options = RenderOptions { sampling, ..RenderOptions::new(pixels, pixels) };
+                let options = RenderOptions { sampling, ..plain.clone() };
                 let runs = if n <= 16 { 3 } else { 1 };
                 let (mut frame, mut secs) = picture(&quantity, &camera, &options, n)?;
                 for _ in 1..runs {
@@ -126,6 +128,9 @@ fn quantities(world: World, camera: &Camera) -> Vec<Quantity> {
 fn picture(q: &Quantity, camera: &Camera, options: &RenderOptions, n: u32) -> anyhow::Result<(Frame, f64)> {
     let (scene, options) = (q.with)(&q.scene, options, n);
     let output = render(&scene, camera, &options)?;
+    if output.report.stopped == StopReason::Cancelled {
+        return Err(Interrupted.into());
+    }
     Ok((output.frame, output.report.elapsed.as_secs_f64()))
 }
 

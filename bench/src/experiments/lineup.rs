@@ -73,7 +73,7 @@ impl Installed {
         for version in [Version::V3, Version::V4] {
             match Embree::load(version) {
                 Ok(e) => found.embree.push(e),
-                Err(e) => found.missing.push(e.to_string()),
+                Err(e) => found.missing.push(e.for_a_record()),
             }
         }
         found

@@ -19,6 +19,7 @@ use datasets::generate::nested_wavelet::Size;
 use rt_core::mesh::TriMesh;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// One experiment.
@@ -93,19 +94,30 @@ pub fn find(id: &str) -> Option<&'static Experiment> {
 pub struct Context<'a> {
     /// Smaller data and fewer rounds: done within a minute on two cores.
     pub quick: bool,
-    /// Told what is done next; an error stops the experiment there.
-    pub progress: &'a mut dyn FnMut(&str) -> anyhow::Result<()>,
+    /// Told what is done next and, where it is known, what share of the experiment is done; an error stops the
+    /// experiment there.
+    pub progress: &'a mut Progress<'a>,
+    /// Set to true to stop long pictures between two tiles.
+    pub cancel: Option<Arc<AtomicBool>>,
     wavelets: BTreeMap<Size, Arc<TriMesh>>,
 }
 
+/// What is told about progress: the step, and the share of the experiment that is done, 0..=1.
+pub type Progress<'a> = dyn FnMut(&str, Option<f64>) -> anyhow::Result<()> + 'a;
+
 impl<'a> Context<'a> {
     /// A context.
-    pub fn new(quick: bool, progress: &'a mut dyn FnMut(&str) -> anyhow::Result<()>) -> Context<'a> {
-        Context { quick, progress, wavelets: BTreeMap::new() }
+    pub fn new(quick: bool, cancel: Option<Arc<AtomicBool>>, progress: &'a mut Progress<'a>) -> Context<'a> {
+        Context { quick, progress, cancel, wavelets: BTreeMap::new() }
     }
 
     fn say(&mut self, what: impl AsRef<str>) -> anyhow::Result<()> {
-        (self.progress)(what.as_ref())
+        (self.progress)(what.as_ref(), None)
+    }
+
+    /// As [`Context::say`], with the share of the experiment that is done.
+    fn say_share(&mut self, what: impl AsRef<str>, done: f64) -> anyhow::Result<()> {
+        (self.progress)(what.as_ref(), Some(done))
     }
 
     /// The wavelet surfaces of a size. Those up to 4 million triangles are kept for the next experiment.
@@ -127,20 +139,37 @@ impl<'a> Context<'a> {
     }
 }
 
-/// Runs one experiment and gives its record.
-pub fn run(experiment: &Experiment, context: &mut Context<'_>) -> anyhow::Result<Record> {
+/// What an experiment came to.
+pub struct Outcome {
+    /// The measurements.
+    pub record: Record,
+    /// Ctrl-C ended it before its time: the record holds what was finished and says so.
+    pub interrupted: bool,
+}
+
+/// Runs one experiment. Interrupted before its first row it gives [`Interrupted`].
+pub fn run(experiment: &Experiment, context: &mut Context<'_>) -> anyhow::Result<Outcome> {
     let start = Instant::now();
     let machine = Machine::describe();
     let Experiment { id, chapter, title, run } = *experiment;
     let mut record = Record::new(id, title, chapter, context.quick, machine);
     // Ctrl-C is no failure of the experiment.
-    run(context, &mut record).map_err(|e| {
-        if e.is::<Interrupted>() { e } else { e.context(format!("experiment `{id}` failed")) }
-    })?;
+    let interrupted = match run(context, &mut record) {
+        Ok(()) => false,
+        Err(e) if e.is::<Interrupted>() && record.rows.is_empty() => return Err(e),
+        Err(e) if e.is::<Interrupted>() => {
+            record.missing.push(format!(
+                "everything after the first {} rows: the run was interrupted; `bench run {id}` measures it all",
+                record.rows.len()
+            ));
+            true
+        }
+        Err(e) => return Err(e.context(format!("experiment `{id}` failed"))),
+    };
     record.elapsed_secs = start.elapsed().as_secs_f64();
     let unexplained = record.unexplained_columns();
     anyhow::ensure!(unexplained.is_empty(), "experiment `{id}` does not explain its columns {unexplained:?}");
-    Ok(record)
+    Ok(Outcome { record, interrupted })
 }
 
 #[cfg(test)]

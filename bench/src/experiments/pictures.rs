@@ -1,8 +1,9 @@
 //! Pictures of the dissertation's data sets, each with its command and what it took.
 
 use super::Context;
-use crate::picture::{gallery, save};
+use crate::picture::{Watch, gallery, save};
 use crate::record::{Picture, Record, Row};
+use datasets::cli::Interrupted;
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     record.column("picture", "", "name for `bench picture`");
@@ -13,9 +14,20 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("rays", "Mray", "rays of all kinds");
     record.column("command", "", "draws it again");
     let (size, samples) = if context.quick { ([480, 270], 4) } else { ([1280, 720], 64) };
-    for entry in gallery::ALL {
-        context.say(entry.name)?;
-        let p = entry.paint(size, samples, &mut || Ok(()))?;
+    let all = gallery::ALL.len() as f64;
+    for (n, entry) in gallery::ALL.iter().enumerate() {
+        let share = |samples_done: u32| (n as f64 + f64::from(samples_done) / f64::from(samples)) / all;
+        context.say_share(format!("{}: data", entry.name), share(0))?;
+        let cancel = context.cancel.clone();
+        let mut told = |done: u32| {
+            // The flag stops the picture; nothing is lost when the account of it is not heard.
+            let _ = context.say_share(format!("{}: sample {done} of {samples}", entry.name), share(done));
+        };
+        let mut watch = Watch { cancel, samples_done: Some(&mut told) };
+        let p = entry.paint(size, samples, &mut watch)?;
+        if p.drawn.is_interrupted() {
+            return Err(Interrupted.into());
+        }
         let command = entry.command(size, samples);
         let (build, render) = (p.drawn.build_secs, p.drawn.render_secs);
         let caption = format!(

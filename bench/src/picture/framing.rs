@@ -6,15 +6,18 @@ use datasets::view::View;
 use glam::DVec3;
 use rt_core::accel::World;
 use rt_core::camera::Camera;
+use rt_core::scene::Scene;
 use serde::Deserialize;
 use std::path::Path;
 
 /// Where the camera stands.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum Framing {
-    /// So that the whole subject is in the picture, seen from the front, a little from the side and from above.
+    /// So that the whole subject just fits into the picture, seen from the front, a little from the side and from above.
     #[default]
     Fitted,
+    /// The same, seen from this direction (towards the eye, world, any length).
+    FittedFrom(DVec3),
     /// There.
     At(View),
     /// A parallel projection that shows so many world units from bottom to top.
@@ -34,31 +37,55 @@ const FOV_DEGREES: f64 = 30.0;
 const MARGIN: f64 = 1.04;
 
 /// World corners of everything that is drawn.
-pub(super) fn bounds(world: &World) -> anyhow::Result<(DVec3, DVec3)> {
+pub(super) fn bounds(scene: &Scene) -> anyhow::Result<(DVec3, DVec3)> {
+    let volumes = scene.volumes.iter().map(|v| (v.volume.grid().origin, v.volume.grid().max_corner()));
+    let all = bounds_of_surfaces(&scene.world).into_iter().chain(volumes);
+    corners(all.reduce(|(a, b), (c, d)| (a.min(c), b.max(d))))
+}
+
+fn bounds_of_surfaces(world: &World) -> Option<(DVec3, DVec3)> {
     let b = world.bounds();
-    if b.is_empty() {
-        return Err(anyhow::anyhow!("there is nothing to draw: no triangle, line or point that can be seen"))
-            .cure(
-                "look at the warnings above for what was left out; for image data, choose another --isovalue",
-            );
-    }
-    Ok((world.origin() + b.min.as_dvec3(), world.origin() + b.max.as_dvec3()))
+    let world_from_box = |p: glam::Vec3| world.origin() + p.as_dvec3();
+    (!b.is_empty()).then(|| (world_from_box(b.min), world_from_box(b.max)))
+}
+
+fn corners(found: Option<(DVec3, DVec3)>) -> anyhow::Result<(DVec3, DVec3)> {
+    found
+        .context("there is nothing to draw: no triangle, line or point that can be seen")
+        .cure("look at the warnings above for what was left out; for image data, choose another --isovalue")
 }
 
 impl Framing {
     /// The camera for everything in a world, z up, in a picture of `size` pixels.
     pub fn of(&self, world: &World, size: [u32; 2]) -> anyhow::Result<Camera> {
-        let (lo, hi) = bounds(world)?;
-        Ok(self.camera(lo, hi, DVec3::Z, size)?.camera)
+        let (lo, hi) = corners(bounds_of_surfaces(world))?;
+        let outline = |point: &mut dyn FnMut(DVec3)| corners_of_box(lo, hi).into_iter().for_each(point);
+        let view = self.fitted(&outline, DVec3::Z, size);
+        Ok(self.camera(view.as_ref(), lo, hi, size)?.camera)
     }
 
-    pub(super) fn camera(&self, lo: DVec3, hi: DVec3, up: DVec3, size: [u32; 2]) -> anyhow::Result<Placed> {
+    /// The view that a fitted framing takes of the points that `outline` names; `None` for the other framings.
+    pub(super) fn fitted(&self, outline: &Outline<'_>, up: DVec3, size: [u32; 2]) -> Option<View> {
         let aspect = f64::from(size[0]) / f64::from(size[1].max(1));
-        let fitted;
+        match self {
+            Framing::Fitted => Some(fit(outline, None, up, aspect)),
+            Framing::FittedFrom(backward) => Some(fit(outline, backward.try_normalize(), up, aspect)),
+            Framing::At(_) | Framing::Parallel(..) => None,
+        }
+    }
+
+    /// The camera for a subject between two corners. `fitted` is what [`Framing::fitted`] gave.
+    pub(super) fn camera(
+        &self,
+        fitted: Option<&View>,
+        lo: DVec3,
+        hi: DVec3,
+        size: [u32; 2],
+    ) -> anyhow::Result<Placed> {
+        let aspect = f64::from(size[0]) / f64::from(size[1].max(1));
         let (view, height) = match self {
-            Framing::Fitted => {
-                fitted = fit(lo, hi, up, aspect);
-                (&fitted, None)
+            Framing::Fitted | Framing::FittedFrom(_) => {
+                (fitted.context("a fitted camera needs its subject's outline")?, None)
             }
             Framing::At(view) => (view, None),
             Framing::Parallel(view, height) => (view, Some(*height)),
@@ -80,11 +107,30 @@ impl Framing {
     }
 }
 
-/// The nearest place from which all eight corners are in the picture. Flat subjects are seen face on.
-fn fit(lo: DVec3, hi: DVec3, up: DVec3, aspect: f64) -> View {
+/// Calls its argument with every world point that must be in the picture.
+pub(super) type Outline<'a> = dyn Fn(&mut dyn FnMut(DVec3)) + 'a;
+
+/// The corners of a box.
+pub(super) fn corners_of_box(lo: DVec3, hi: DVec3) -> [DVec3; 8] {
+    std::array::from_fn(|corner| {
+        let pick = |axis: usize| if corner >> axis & 1 == 0 { lo[axis] } else { hi[axis] };
+        DVec3::new(pick(0), pick(1), pick(2))
+    })
+}
+
+/// The nearest place from which all points are in the picture, seen from `backward` or from the front. Flat subjects are
+/// seen face on.
+fn fit(outline: &Outline<'_>, backward: Option<DVec3>, up: DVec3, aspect: f64) -> View {
+    let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    outline(&mut |p| (lo, hi) = (lo.min(p), hi.max(p)));
+    if !(lo.is_finite() && hi.is_finite()) {
+        (lo, hi) = (DVec3::ZERO, DVec3::ZERO);
+    }
     let (middle, extent) = ((lo + hi) * 0.5, hi - lo);
     let thin = extent.min_element() < 1e-4 * extent.max_element();
-    let (backward, up) = if thin {
+    let (backward, up) = if let Some(backward) = backward {
+        (backward, up)
+    } else if thin {
         let normal = match extent.to_array().iter().position(|&e| e == extent.min_element()) {
             Some(0) => DVec3::X,
             Some(1) => DVec3::NEG_Y,
@@ -99,17 +145,52 @@ fn fit(lo: DVec3, hi: DVec3, up: DVec3, aspect: f64) -> View {
     };
     let right = up.cross(backward).normalize_or(DVec3::X);
     let true_up = backward.cross(right);
-    let tan = (0.5 * FOV_DEGREES).to_radians().tan();
-    let distance = (0..8)
-        .map(|corner| {
-            let pick = |axis: usize| if corner >> axis & 1 == 0 { lo[axis] } else { hi[axis] };
-            let c = DVec3::new(pick(0), pick(1), pick(2)) - middle;
-            let (x, y, z) = (c.dot(right).abs(), c.dot(true_up).abs(), c.dot(backward));
-            z + MARGIN * (y / tan).max(x / (tan * aspect))
-        })
-        .fold(0.0, f64::max)
-        .max(1e-12);
-    View { up, ..View::new("fitted", middle + backward * distance, middle) }
+
+    // A point at (x, y, z), z towards the eye, is inside the picture's right border when x - eye.x <= tan (eye.z - z), and
+    // so on for the other three: each pair of borders asks for a least eye.z, and their middle is eye.x or eye.y.
+    let tan = (0.5 * FOV_DEGREES).to_radians().tan() / MARGIN;
+    let (tan_x, tan_y) = (tan * aspect, tan);
+    let mut most = [f64::NEG_INFINITY; 4];
+    let mut nearest = f64::NEG_INFINITY;
+    outline(&mut |p| {
+        let c = p - middle;
+        let (x, y, z) = (c.dot(right), c.dot(true_up), c.dot(backward));
+        let reach = [x + tan_x * z, tan_x * z - x, y + tan_y * z, tan_y * z - y];
+        most = std::array::from_fn(|i| most[i].max(reach[i]));
+        nearest = nearest.max(z);
+    });
+    if !nearest.is_finite() {
+        (most, nearest) = ([0.0; 4], 0.0);
+    }
+    let [right_most, left_most, upper_most, lower_most] = most;
+    let distance = (0.5 * (right_most + left_most) / tan_x).max(0.5 * (upper_most + lower_most) / tan_y);
+    // Points and lines seen end on have no extent to fit.
+    let distance = distance.max(nearest + 1e-3 * extent.length()).max(1e-12);
+    let mut shift = [0.5 * (right_most - left_most), 0.5 * (upper_most - lower_most)];
+
+    // Along the axis with room to spare, equal room on both sides: the outermost points seen from there, as slopes, each
+    // with the reciprocal of its distance, by which its slope changes when the eye moves.
+    let mut ends = [[(f64::INFINITY, 0.0), (f64::NEG_INFINITY, 0.0)]; 2];
+    outline(&mut |p| {
+        let c = p - middle;
+        let per_distance = 1.0 / (distance - c.dot(backward));
+        for (axis, direction) in [right, true_up].into_iter().enumerate() {
+            let slope = (c.dot(direction) - shift[axis]) * per_distance;
+            let [low, high] = &mut ends[axis];
+            if slope < low.0 {
+                *low = (slope, per_distance);
+            }
+            if slope > high.0 {
+                *high = (slope, per_distance);
+            }
+        }
+    });
+    for (axis, [low, high]) in ends.into_iter().enumerate() {
+        let change = (low.0 + high.0) / (low.1 + high.1);
+        shift[axis] += if change.is_finite() { change } else { 0.0 };
+    }
+    let target = middle + right * shift[0] + true_up * shift[1];
+    View { up, ..View::new("fitted", target + backward * distance, target) }
 }
 
 /// An upward direction for a picture seen along `normal`, an axis.
@@ -181,13 +262,26 @@ mod tests {
             (DVec3::ZERO, DVec3::new(1.0, 0.0, 7.0)),
         ] {
             for (up, size) in [(DVec3::Z, [800, 200]), (DVec3::Y, [100, 400]), (DVec3::Z, [64, 64])] {
-                let placed = Framing::Fitted.camera(lo, hi, up, size).unwrap();
-                let corners = (0..8).map(|i| {
-                    let pick = |a: usize| if i >> a & 1 == 0 { lo[a] } else { hi[a] };
-                    ndc(&placed.camera, DVec3::new(pick(0), pick(1), pick(2)))
-                });
-                let most = corners.map(|c| c.x.abs().max(c.y.abs())).fold(0.0, f64::max);
-                assert!((0.8..=1.0).contains(&most), "{lo} {hi} {up} {size:?}: {most}");
+                for framing in [Framing::Fitted, Framing::FittedFrom(DVec3::new(3.0, -4.0, 2.0))] {
+                    let corners = corners_of_box(lo, hi);
+                    let outline = |point: &mut dyn FnMut(DVec3)| corners.into_iter().for_each(point);
+                    let view = framing.fitted(&outline, up, size);
+                    let placed = framing.camera(view.as_ref(), lo, hi, size).unwrap();
+                    let seen = corners.map(|p| ndc(&placed.camera, p));
+                    let [most_x, most_y] =
+                        [0, 1].map(|a| seen.iter().map(|c| c[a].abs()).fold(0.0, f64::max));
+                    let most = most_x.max(most_y);
+                    assert!((0.95..=1.0).contains(&most), "{lo} {hi} {up} {size:?}: {most}");
+                    // Centred along the other axis, too.
+                    for a in [0, 1] {
+                        let ends =
+                            seen.iter().fold([f64::MAX, f64::MIN], |e, c| [e[0].min(c[a]), e[1].max(c[a])]);
+                        assert!(
+                            (ends[0] + ends[1]).abs() < 0.05,
+                            "{lo} {hi} {up} {size:?}: axis {a} {ends:?}"
+                        );
+                    }
+                }
             }
         }
     }

@@ -1,9 +1,9 @@
 //! The pictures of the report and of the README: the dissertation's data sets, each with the command that draws it.
 
 use super::framing::Framing;
-use super::look::Look;
-use super::subject::{Subject, color_by_height};
-use super::{Drawn, Wish, draw};
+use super::look::{BACKGROUNDS, Look};
+use super::subject::{Paint, Subject, color_by_height};
+use super::{Drawn, Watch, Wish, draw};
 use anyhow::Context as _;
 use datasets::catalogue::{self, Data};
 use datasets::isosurface::Options;
@@ -22,6 +22,8 @@ enum Coloring {
     Height,
     /// One colour, linear RGB.
     Plain([f32; 3]),
+    /// None: glass that lets this much light through, linear RGB.
+    Glass([f32; 3]),
 }
 
 /// A picture of generated data.
@@ -33,15 +35,40 @@ pub struct Entry {
     pub caption: &'static str,
     /// Data sets of the catalogue with their sizes and colouring.
     data: &'static [(&'static str, &'static str, Coloring)],
-    /// Name of the first data set's view, or a camera that fits everything.
-    view: Option<&'static str>,
-    /// Eye of a camera that looks at the origin, in place of a view.
-    eye: Option<[f64; 3]>,
+    from: Viewpoint,
     effects: Effects,
     colors: &'static str,
     range: Option<[f32; 2]>,
+    background: &'static str,
     occlusion_radii: f64,
+    /// The data's tubes are drawn so many times as thick: true to the data they would be thinner than a pixel.
+    tubes: f32,
 }
+
+/// Where a picture is taken from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Viewpoint {
+    /// All of it, from this direction.
+    Direction([f64; 3]),
+    /// The view of that name of the first data set.
+    View(&'static str),
+    /// An eye that looks at a target.
+    Eye([f64; 3], [f64; 3]),
+}
+
+/// What pictures have in common.
+const PLAIN: Entry = Entry {
+    name: "",
+    caption: "",
+    data: &[],
+    from: Viewpoint::Direction([-0.5, -0.7, 0.45]),
+    effects: SOFT,
+    colors: "cool-warm",
+    range: None,
+    background: "gradient",
+    occlusion_radii: 0.15,
+    tubes: 1.0,
+};
 
 const SOFT: Effects = Effects::SOFT_SHADOWS.union(Effects::SHADOWS).union(Effects::AMBIENT_OCCLUSION);
 
@@ -52,35 +79,25 @@ pub const ALL: &[Entry] = &[
         caption: "Nested isosurfaces of the wavelet, one million triangles, coloured by isovalue, with soft shadows \
                   and ambient occlusion (the dissertation’s figures 3.5 and 3.6).",
         data: &[("wavelet", "1M", Coloring::Scalars)],
-        view: None,
-        eye: Some([247.0, -449.0, 224.0]),
-        effects: SOFT,
-        colors: "cool-warm",
+        from: Viewpoint::Direction([247.0, -449.0, 224.0]),
         range: Some([90.0, 220.0]),
         occlusion_radii: 0.25,
+        ..PLAIN
     },
     Entry {
         name: "mixing-layer-outside",
         caption: "The turbulent interface of two gases from outside (RMO of table 4.1), coloured by height, with \
                   ambient occlusion and soft shadows.",
         data: &[("mixing-layer", "small", Coloring::Height)],
-        view: Some("RMO"),
-        eye: None,
-        effects: SOFT,
-        colors: "cool-warm",
-        range: None,
-        occlusion_radii: 0.15,
+        from: Viewpoint::Direction([-0.25, -1.0, 0.5]),
+        ..PLAIN
     },
     Entry {
         name: "mixing-layer-inside",
         caption: "The same interface from within (RMI of table 4.1).",
         data: &[("mixing-layer", "small", Coloring::Height)],
-        view: Some("RMI"),
-        eye: None,
-        effects: SOFT,
-        colors: "cool-warm",
-        range: None,
-        occlusion_radii: 0.15,
+        from: Viewpoint::View("RMI"),
+        ..PLAIN
     },
     Entry {
         name: "plasma",
@@ -90,46 +107,46 @@ pub const ALL: &[Entry] = &[
             ("plasma", "small", Coloring::Plain([0.55, 0.56, 0.58])),
             ("plasma-tubes", "small", Coloring::Scalars),
         ],
-        view: Some("whole"),
-        eye: None,
-        effects: SOFT,
+        from: Viewpoint::Direction([-0.2, -1.0, 0.75]),
         colors: "viridis",
-        range: None,
-        occlusion_radii: 0.15,
+        tubes: 1.5,
+        ..PLAIN
     },
     Entry {
         name: "impact",
         caption: "A ball has hit a plate: crater, rim and ejecta (the fracture data of chapter 4), with soft shadows \
                   and ambient occlusion.",
         data: &[("impact", "small", Coloring::Plain([0.60, 0.50, 0.40]))],
-        view: Some("whole"),
-        eye: None,
-        effects: SOFT,
-        colors: "viridis",
-        range: None,
-        occlusion_radii: 0.15,
+        from: Viewpoint::Direction([0.38, -1.0, 0.5]),
+        ..PLAIN
     },
     Entry {
         name: "star",
-        caption: "Magnetic field lines of a star as tubes (the VAPOR star of table 4.1), coloured by field strength.",
-        data: &[("star-field-lines", "small", Coloring::Scalars)],
-        view: Some("whole"),
-        eye: None,
-        effects: SOFT,
-        colors: "cool-warm",
-        range: None,
-        occlusion_radii: 0.2,
+        caption: "Magnetic field lines of a star as tubes (the VAPOR star of table 4.1), coloured by field strength, \
+                  around the star itself.",
+        data: &[
+            ("star-field-lines", "small", Coloring::Scalars),
+            ("icosphere", "medium", Coloring::Plain([0.95, 0.62, 0.28])),
+        ],
+        from: Viewpoint::Eye([8.5, -12.5, 4.5], [0.0, 0.0, 0.0]),
+        colors: "viridis",
+        background: "black",
+        tubes: 3.0,
+        ..PLAIN
     },
     Entry {
         name: "glass",
-        caption: "A closed isosurface of the wavelet as glass: refraction, total internal reflection and absorption.",
-        data: &[("closed-wavelet", "small", Coloring::Plain([0.55, 0.85, 0.80]))],
-        view: None,
-        eye: None,
-        effects: Effects::REFRACTION,
+        caption: "The same star as a ball of glass: the field lines behind it are seen through it, upside down \
+                  (refraction and absorption).",
+        data: &[
+            ("star-field-lines", "small", Coloring::Scalars),
+            ("icosphere", "medium", Coloring::Glass([0.30, 0.75, 0.70])),
+        ],
+        from: Viewpoint::Eye([3.6, -5.4, 1.4], [0.0, 0.0, 0.0]),
+        effects: SOFT.union(Effects::REFRACTION),
         colors: "viridis",
-        range: None,
-        occlusion_radii: 0.2,
+        tubes: 1.5,
+        ..PLAIN
     },
 ];
 
@@ -154,51 +171,51 @@ pub struct Painted {
 }
 
 impl Entry {
-    /// Generates the data and draws them. `go_on` may end the work.
-    pub fn paint(
-        &self,
-        size: [u32; 2],
-        samples: u32,
-        go_on: &mut dyn FnMut() -> anyhow::Result<()>,
-    ) -> anyhow::Result<Painted> {
+    /// Generates the data and draws them, see [`draw`].
+    pub fn paint(&self, size: [u32; 2], samples: u32, watch: &mut Watch<'_>) -> anyhow::Result<Painted> {
         let start = std::time::Instant::now();
         let mut subject = Subject::empty(DVec3::Z);
-        let mut framing = Framing::Fitted;
         for &(name, size, coloring) in self.data {
             let entry = catalogue::find(name)?;
             let options = Options { normals: true, scalars: coloring == Coloring::Scalars };
-            let mut stopped = Ok(());
-            let generated = entry.generate(size, options, &mut |_, _| {
-                stopped = go_on();
-                stopped.is_ok()
-            });
-            stopped?;
+            let generated = entry.generate(size, options, &mut |_, _| watch.check().is_ok());
+            watch.check()?;
             let mut data = generated?;
             if let (Data::Mesh(mesh), Coloring::Height) = (&mut data, coloring) {
                 color_by_height(mesh, Vec3::Z);
             }
+            if let Data::Lines(lines) = &mut data {
+                lines.radii.iter_mut().for_each(|r| *r *= self.tubes);
+            }
             let plain = if let Coloring::Plain(c) = coloring { c } else { [0.8; 3] };
             subject.add_generated(data, plain)?;
-            if let (Some(wish), Framing::Fitted) = (self.view, &framing) {
-                let view = entry.views().into_iter().find(|v| v.name == wish);
-                framing = Framing::At(view.with_context(|| format!("{name} has no view `{wish}`"))?);
+            if let (Coloring::Glass(c), Some(part)) = (coloring, subject.parts.last_mut()) {
+                part.paint = Paint::Glass(c);
             }
         }
-        if let Some(eye) = self.eye {
-            framing = Framing::At(View::new(self.name, eye.into(), DVec3::ZERO));
-        }
+        let framing = match self.from {
+            Viewpoint::Direction(backward) => Framing::FittedFrom(backward.into()),
+            Viewpoint::Eye(eye, target) => Framing::At(View::new(self.name, eye.into(), target.into())),
+            Viewpoint::View(wish) => {
+                let views = catalogue::find(self.data[0].0)?.views();
+                let view = views.into_iter().find(|v| v.name == wish);
+                Framing::At(view.with_context(|| format!("{} has no view `{wish}`", self.data[0].0))?)
+            }
+        };
         let data_secs = start.elapsed().as_secs_f64();
         let contents = subject.contents.join(", ");
         let look = Look {
             effects: self.effects,
             colors: self.colors.into(),
             range: self.range,
+            glass_parts_only: true,
             occlusion_radii: self.occlusion_radii,
+            background: BACKGROUNDS.iter().find(|b| b.0 == self.background).map_or(BACKGROUNDS[0].1, |b| b.1),
             ..Look::default()
         };
         let wish =
             Wish { size, samples, look, framing, build: BuildOptions::default(), layers: Layers::COLOR };
-        let drawn = draw(subject, &wish, go_on)?;
+        let drawn = draw(subject, &wish, watch)?;
         Ok(Painted { drawn, wish, contents, data_secs })
     }
 
@@ -217,7 +234,7 @@ mod tests {
     fn every_picture_shows_its_data_and_uses_its_effects() {
         for e in ALL.iter().filter(|e| e.name != "wavelet") {
             // Large enough for the star's thin tubes.
-            let p = e.paint([144, 96], 1, &mut || Ok(())).unwrap();
+            let p = e.paint([144, 96], 1, &mut Watch::default()).unwrap();
             // Paths inside glass may be cut; the renderer says so.
             let expected = |w: &String| e.name == "glass" && w.contains("max_bounces");
             assert!(p.drawn.warnings.iter().all(expected), "{}: {:?}", e.name, p.drawn.warnings);

@@ -3,17 +3,20 @@
 //! The key light stands above the viewer's right shoulder, a weak headlight fills the shadows, ambient light is a quarter
 //! of white. All lights move with the camera: nothing that can be seen lies in the dark.
 
-use super::subject::{Paint, Subject};
+use super::subject::{Paint, Subject, VolumeField};
 use anyhow::Context as _;
 use datasets::colormaps;
 use glam::{DVec3, Vec3};
 use rt_core::accel::BuildOptions;
 use rt_core::camera::{Camera, ThinLens};
+use rt_core::colormap::ColorMap;
 use rt_core::effects::Effects;
 use rt_core::environment::{Background, Environment};
 use rt_core::light::{Light, LightKind};
 use rt_core::material::{Material, SurfaceModel};
 use rt_core::scene::{AmbientOcclusion, Scene, SceneBuilder};
+use rt_core::transfer_function::TransferFunction;
+use rt_core::volume::{Volume, VolumeOptions};
 
 /// What is drawn around and upon the subject.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,8 +29,13 @@ pub struct Look {
     pub range: Option<[f32; 2]>,
     /// What fills uncovered pixels.
     pub background: Background,
+    /// Refraction belongs to the parts that are [`Paint::Glass`]; otherwise it makes glass of everything.
+    pub glass_parts_only: bool,
     /// How far ambient occlusion looks, in radii of the subject.
     pub occlusion_radii: f64,
+    /// Of a volume: scalars and the opacity of a stretch as long as a tenth of its diagonal, linear in between; `None`
+    /// for a ramp over the range of the colours.
+    pub opacity: Option<Vec<[f32; 2]>>,
 }
 
 impl Default for Look {
@@ -37,7 +45,9 @@ impl Default for Look {
             colors: colormaps::NAMES[0].into(),
             range: None,
             background: BACKDROP,
+            glass_parts_only: false,
             occlusion_radii: 0.3,
+            opacity: None,
         }
     }
 }
@@ -58,8 +68,13 @@ const KEY_SIZE_RAD: f64 = 0.06;
 /// Aperture of the lens as a share of the distance to the subject.
 const APERTURE: f64 = 0.012;
 
+/// Opacity at the upper end of a volume's default ramp, and the stretch that opacities are given for as a share of the
+/// volume's diagonal: neither fog nor a wall for smooth fields.
+const RAMP_OPACITY: f32 = 0.5;
+const OPACITY_STRETCH: f64 = 0.1;
+
 /// Effects by the names of the command line, the first of each being the one in messages.
-const NAMES: [(Effects, &[&str]); 9] = [
+const NAMES: [(Effects, &[&str]); 10] = [
     (Effects::SHADOWS, &["shadows", "shadow"]),
     (Effects::SOFT_SHADOWS, &["soft-shadows"]),
     (Effects::AMBIENT_OCCLUSION, &["ao", "ambient-occlusion"]),
@@ -68,6 +83,7 @@ const NAMES: [(Effects, &[&str]); 9] = [
     (Effects::REFRACTION, &["refraction"]),
     (Effects::TRANSPARENCY, &["transparency"]),
     (Effects::DEPTH_OF_FIELD, &["depth-of-field", "dof"]),
+    (Effects::VOLUMES, &["volumes", "volume"]),
     (Effects::PATH_TRACING, &["path-tracing"]),
 ];
 
@@ -103,14 +119,13 @@ impl Look {
         let mut builder = SceneBuilder::new();
         builder.build_options = *build;
         let range = self.range.or(subject.scalar_range).unwrap_or([0.0, 1.0]);
+        if let Some(field) = &subject.volume {
+            builder.volume(self.volume(field)?);
+        }
         for part in subject.parts {
             let material = match part.paint {
-                Paint::Scalars => {
-                    let map = colormaps::by_name(&self.colors, range).with_context(|| {
-                        format!("no colour map `{}`; there are: {}", self.colors, colormaps::NAMES.join(", "))
-                    })?;
-                    self.wished(plain([0.8; 3])).colored_by_scalars(map)
-                }
+                Paint::Glass(c) => glass(c),
+                Paint::Scalars => self.wished(plain([0.8; 3])).colored_by_scalars(self.color_map(range)?),
                 Paint::Color(c) => self.wished(plain(c)),
                 Paint::OfTheFile(m) if self.has(MATERIAL_EFFECTS) => {
                     Material { color_source: m.color_source.clone(), ..self.wished(plain(m.color)) }
@@ -131,10 +146,29 @@ impl Look {
         if surrounded {
             // Something to see in the mirrors; it takes the place of the ambient light.
             let up = subject.up.as_vec3().try_normalize().unwrap_or(Vec3::Z);
-            builder.environment =
-                Some(Environment::Gradient { bottom: [0.10, 0.10, 0.11], top: [0.42, 0.45, 0.5], up });
+            // What is seen through glass is as bright as what is seen beside it.
+            let (bottom, top) = match self.background {
+                Background::Gradient { bottom, top } if self.has(Effects::REFRACTION) => (bottom, top),
+                _ => ([0.10, 0.10, 0.11], [0.42, 0.45, 0.5]),
+            };
+            builder.environment = Some(Environment::Gradient { bottom, top, up });
         }
         Ok(builder.build()?)
+    }
+
+    fn color_map(&self, range: [f32; 2]) -> anyhow::Result<ColorMap> {
+        colormaps::by_name(&self.colors, range).with_context(|| {
+            format!("no colour map `{}`; there are: {}", self.colors, colormaps::NAMES.join(", "))
+        })
+    }
+
+    fn volume(&self, field: &VolumeField) -> anyhow::Result<Volume> {
+        let [lo, hi] = self.range.unwrap_or(field.range);
+        let ramp = vec![[lo, 0.0], [hi, RAMP_OPACITY]];
+        let stretch = OPACITY_STRETCH * (field.grid.max_corner() - field.grid.origin).length();
+        let opacity = self.opacity.as_ref().unwrap_or(&ramp);
+        let transfer = TransferFunction::from_opacity(self.color_map([lo, hi])?, opacity, stretch as f32)?;
+        Ok(Volume::new(field.grid.clone(), transfer, VolumeOptions::default())?)
     }
 
     fn lights(&self) -> Vec<Light> {
@@ -149,9 +183,8 @@ impl Look {
 
     /// A material with the wished effects on it.
     fn wished(&self, mut m: Material) -> Material {
-        if self.has(Effects::REFRACTION) {
-            let absorption = m.color.map(|c| -c.clamp(0.02, 0.999).ln());
-            m.model = SurfaceModel::Dielectric { ior: 1.5, absorption };
+        if self.has(Effects::REFRACTION) && !self.glass_parts_only {
+            m = glass(m.color);
         } else if self.has(Effects::GLOSSY_REFLECTION) {
             m.model = SurfaceModel::Pbr { metallic: 0.0, roughness: 0.3, specular: 0.3 };
         } else if self.has(Effects::REFLECTION)
@@ -194,6 +227,12 @@ const MATERIAL_EFFECTS: Effects = Effects::REFLECTION
     .union(Effects::GLOSSY_REFLECTION)
     .union(Effects::REFRACTION)
     .union(Effects::TRANSPARENCY);
+
+/// Glass, its absorption over a length of 1.
+fn glass(color: [f32; 3]) -> Material {
+    let absorption = color.map(|c| -c.clamp(0.02, 0.999).ln());
+    Material { model: SurfaceModel::Dielectric { ior: 1.5, absorption }, ..Material::matte(color) }
+}
 
 /// A little gloss shows the shape.
 fn plain(color: [f32; 3]) -> Material {

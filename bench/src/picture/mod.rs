@@ -10,11 +10,15 @@ pub mod look;
 pub mod save;
 pub mod subject;
 
+use datasets::cli::Interrupted;
 use framing::Framing;
 use look::Look;
 use rt_core::accel::BuildOptions;
+use rt_core::effects::Effects;
 use rt_core::frame::{Frame, Layers};
-use rt_core::render::{Progressive, RenderOptions, RenderReport};
+use rt_core::render::{Progressive, RenderOptions, RenderReport, StopReason};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use subject::Subject;
 
@@ -50,13 +54,34 @@ pub struct Drawn {
     pub render_secs: f64,
 }
 
-/// Draws a subject. `go_on` is asked between samples and may end the work with an error.
-pub fn draw(
-    subject: Subject,
-    wish: &Wish,
-    go_on: &mut dyn FnMut() -> anyhow::Result<()>,
-) -> anyhow::Result<Drawn> {
-    let up = subject.up;
+/// How drawing is stopped and watched; the default is neither.
+#[derive(Default)]
+pub struct Watch<'a> {
+    /// Set to true to stop as soon as the tiles in work are done.
+    pub cancel: Option<Arc<AtomicBool>>,
+    /// Told after every sample of all pixels how many are done.
+    pub samples_done: Option<&'a mut dyn FnMut(u32)>,
+}
+
+impl Watch<'_> {
+    /// [`Interrupted`] once the flag is set.
+    fn check(&self) -> Result<(), Interrupted> {
+        let is_set = self.cancel.as_ref().is_some_and(|c| c.load(Ordering::Relaxed));
+        if is_set { Err(Interrupted) } else { Ok(()) }
+    }
+}
+
+impl Drawn {
+    /// Whether the work was stopped before all samples were done.
+    pub fn is_interrupted(&self) -> bool {
+        self.report.stopped == StopReason::Cancelled
+    }
+}
+
+/// Draws a subject. When stopped after the first sample of every pixel, gives the picture so far
+/// ([`Drawn::is_interrupted`]); before, [`Interrupted`].
+pub fn draw(subject: Subject, wish: &Wish, watch: &mut Watch<'_>) -> anyhow::Result<Drawn> {
+    let view = wish.framing.fitted(&|point| subject.outline(point), subject.up, wish.size);
     let start = Instant::now();
     let mut scene = wish.look.scene(subject, &wish.build)?;
     let build_secs = start.elapsed().as_secs_f64();
@@ -67,27 +92,51 @@ pub fn draw(
             .push(format!("{skipped} primitives left out: their coordinates are not finite or out of range"));
     }
 
-    let (lo, hi) = framing::bounds(&scene.world)?;
-    let placed = wish.framing.camera(lo, hi, up, wish.size)?;
+    watch.check()?;
+    let (lo, hi) = framing::bounds(&scene)?;
+    let placed = wish.framing.camera(view.as_ref(), lo, hi, wish.size)?;
     wish.look.adapt(&mut scene, (hi - lo).length() * 0.5);
     let camera = wish.look.lens(placed.camera, placed.focus_distance)?;
 
     // Glass needs more bounces before what is cut off stops to matter.
-    let glass = wish.look.effects.contains(rt_core::effects::Effects::REFRACTION);
+    let wished = wish.look.effects;
+    let glass = wished.contains(Effects::REFRACTION);
+    // What was wished is asked for by name, so that the report says what of it changes no pixel.
+    let needed = Effects::required_by(&scene) | Effects::required_by_camera(&camera);
     let options = RenderOptions {
+        effects: Some(needed | wished),
         max_bounces: if glass { 16 } else { 8 },
         samples: wish.samples,
         layers: Layers::COLOR | wish.layers,
-        path_tracing: wish.look.effects.contains(rt_core::effects::Effects::PATH_TRACING),
+        path_tracing: wished.contains(Effects::PATH_TRACING),
+        cancel: watch.cancel.clone(),
         ..RenderOptions::new(wish.size[0], wish.size[1])
     };
     let start = Instant::now();
     let mut progressive = Progressive::new(&scene, &camera, &options)?;
-    while progressive.step()? {
-        go_on()?;
+    loop {
+        let more = progressive.step()?;
+        if let Some(told) = &mut watch.samples_done {
+            told(progressive.report().samples);
+        }
+        if !more {
+            break;
+        }
     }
-    let (frame, report) = (progressive.frame(), progressive.report());
+    let report = progressive.report();
+    if report.stopped == StopReason::Cancelled && report.samples == 0 {
+        return Err(Interrupted.into());
+    }
+    let frame = progressive.frame();
     let render_secs = start.elapsed().as_secs_f64();
-    warnings.extend(report.warnings.iter().cloned());
+    warnings.extend(report.warnings.iter().filter(|w| !about_another_effect(w, wished)).cloned());
     Ok(Drawn { frame, report, warnings, build_secs, render_secs })
+}
+
+/// Whether a warning says that an effect changed nothing which the scene has by itself and nobody wished for.
+fn about_another_effect(warning: &str, wished: Effects) -> bool {
+    let mut others = Effects::ALL.into_iter().filter(|(e, _)| !wished.contains(*e));
+    others.any(|(_, name)| {
+        warning.strip_prefix(name).is_some_and(|rest| rest.starts_with(" changed no pixel of this picture"))
+    })
 }

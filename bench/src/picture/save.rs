@@ -33,10 +33,6 @@ pub fn rounds_ids(frame: &Frame) -> bool {
 /// What the file says about its making.
 pub fn metadata(drawn: &Drawn, wish: &Wish) -> Metadata {
     let mut m = image_io::metadata_of_this_run("bench", env!("CARGO_PKG_VERSION"));
-    // OpenEXR's own attribute of that name is not for free use.
-    if let Some(program) = m.remove(keys::SOFTWARE) {
-        m.insert("program".into(), program);
-    }
     let names = |n: &mut dyn Iterator<Item = &'static str>| n.collect::<Vec<_>>().join(", ");
     m.insert(keys::ELAPSED_SECS.into(), drawn.render_secs.into());
     m.insert(keys::SAMPLES_PER_PIXEL.into(), f64::from(drawn.report.samples).into());

@@ -1,5 +1,7 @@
 //! What is drawn: geometry with its own colours, out of a file or out of the catalogue.
 
+use super::framing::corners_of_box;
+use anyhow::Context as _;
 use datasets::catalogue::Data;
 use datasets::model::{ColorBy, Dataset};
 use datasets::read::{Content, Opened, SceneModel, SurfaceMaterial};
@@ -8,7 +10,7 @@ use rt_core::accel::Geometry;
 use rt_core::grid::Grid;
 use rt_core::material::{Material, Sides};
 use rt_core::mesh::{Attribute, TriMesh};
-use rt_core::shapes::{Isosurface, IsosurfaceNormals, IsosurfaceOptions, Radii, Spheres, Tubes};
+use rt_core::shapes::{Isosurface, IsosurfaceNormals, IsosurfaceOptions, Radii, Shape, Spheres, Tubes};
 use rt_core::texture::Texture;
 use std::sync::Arc;
 
@@ -19,6 +21,8 @@ pub enum Paint {
     Scalars,
     /// The geometry's own colours, else this one (linear RGB).
     Color([f32; 3]),
+    /// Glass that lets this much of white light through over the subject's radius (linear RGB).
+    Glass([f32; 3]),
     /// A material out of the file.
     OfTheFile(Material),
 }
@@ -30,6 +34,27 @@ pub struct Part {
     pub geometry: Geometry,
     /// Its colour.
     pub paint: Paint,
+    /// World points that a shape lies between; a mesh has its vertices.
+    outline: Vec<DVec3>,
+}
+
+impl Part {
+    fn mesh(mesh: Arc<TriMesh>, paint: Paint) -> Part {
+        Part { geometry: Geometry::Mesh(mesh), paint, outline: vec![] }
+    }
+
+    fn shape(shape: Arc<dyn Shape>, paint: Paint, outline: Vec<DVec3>) -> Part {
+        Part { geometry: Geometry::Shape(shape), paint, outline }
+    }
+}
+
+/// A field drawn as a glowing medium.
+#[derive(Debug, Clone)]
+pub struct VolumeField {
+    /// The scalars.
+    pub grid: Arc<Grid>,
+    /// Its smallest and largest finite value.
+    pub range: [f32; 2],
 }
 
 /// Everything that is drawn.
@@ -37,6 +62,8 @@ pub struct Part {
 pub struct Subject {
     /// The parts.
     pub parts: Vec<Part>,
+    /// What is drawn by direct volume rendering.
+    pub volume: Option<VolumeField>,
     /// Range of all scalars.
     pub scalar_range: Option<[f32; 2]>,
     /// Upward in the world.
@@ -52,8 +79,22 @@ pub struct Subject {
 pub struct Choices {
     /// The array to colour by; `None` for the one that the file marks, if it does.
     pub color_by: Option<String>,
-    /// Isovalue for image data; `None` for the middle of the range.
+    /// Isovalue for image data; `None` for the middle of the range, and for no isosurface inside a volume.
     pub isovalue: Option<f32>,
+    /// Whether image data is drawn as a volume.
+    pub volume: VolumeChoice,
+}
+
+/// Which field is drawn as a volume.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub enum VolumeChoice {
+    /// None.
+    #[default]
+    No,
+    /// The one to colour by, else the one that the file marks, else the first.
+    Marked,
+    /// This array.
+    Named(String),
 }
 
 /// Colour of things without one, linear.
@@ -65,7 +106,7 @@ const POINT_RADIUS: f64 = 0.004;
 impl Subject {
     /// Nothing.
     pub fn empty(up: DVec3) -> Subject {
-        Subject { parts: vec![], scalar_range: None, up, warnings: vec![], contents: vec![] }
+        Subject { parts: vec![], volume: None, scalar_range: None, up, warnings: vec![], contents: vec![] }
     }
 
     /// Triangles of all parts.
@@ -75,6 +116,22 @@ impl Subject {
             Geometry::Shape(_) => 0,
         };
         self.parts.iter().map(count).sum()
+    }
+
+    /// Calls `point` with world points that all of the subject lies between: vertices, points of lines, corners of boxes.
+    pub(super) fn outline(&self, point: &mut dyn FnMut(DVec3)) {
+        for part in &self.parts {
+            match &part.geometry {
+                Geometry::Mesh(m) => {
+                    let used = m.indices.iter().flatten().filter_map(|&k| m.positions.get(k as usize));
+                    used.filter(|p| p.is_finite()).for_each(|p| point(m.origin + p.as_dvec3()));
+                }
+                Geometry::Shape(_) => part.outline.iter().for_each(|p| point(*p)),
+            }
+        }
+        if let Some(v) = &self.volume {
+            corners_of_box(v.grid.origin, v.grid.max_corner()).into_iter().for_each(point);
+        }
     }
 
     /// Adds triangles; their scalars, if any, are mapped to colours.
@@ -87,7 +144,7 @@ impl Subject {
             None => Paint::Color(otherwise),
         };
         self.contents.push(format!("{} triangles", mesh.num_triangles()));
-        self.parts.push(Part { geometry: Geometry::Mesh(Arc::new(mesh)), paint });
+        self.parts.push(Part::mesh(Arc::new(mesh), paint));
     }
 
     /// Adds a generated data set. Lines become tubes with their own radii.
@@ -97,8 +154,8 @@ impl Subject {
             Data::Lines(lines) => {
                 self.contents.push(format!("{} tube segments", lines.num_segments()));
                 self.widen(&lines.scalars);
-                let geometry = Geometry::Shape(Arc::new(lines.into_tubes()?));
-                self.parts.push(Part { geometry, paint: Paint::Scalars });
+                let outline = lines.points.iter().map(|p| p.as_dvec3()).collect();
+                self.parts.push(Part::shape(Arc::new(lines.into_tubes()?), Paint::Scalars, outline));
             }
         }
         Ok(())
@@ -107,6 +164,9 @@ impl Subject {
     /// Everything visible in a file.
     pub fn from_file(opened: &Opened, choices: &Choices) -> anyhow::Result<Subject> {
         let mut subject = match &opened.content {
+            Content::Scene(_) if choices.volume != VolumeChoice::No => {
+                anyhow::bail!("{} files hold meshes; a volume needs a uniform grid", opened.format)
+            }
             Content::Scene(model) => from_scene(model, choices)?,
             Content::Data(data) => from_data(data, choices)?,
         };
@@ -142,6 +202,12 @@ fn from_data(data: &Dataset, choices: &Choices) -> anyhow::Result<Subject> {
     if let Some(wish) = &choices.color_by {
         ColorBy::find(data, wish)?;
     }
+    if choices.volume != VolumeChoice::No {
+        add_volume(&mut subject, data, &color, choices)?;
+        if choices.isovalue.is_none() {
+            return Ok(subject);
+        }
+    }
     if let Some(grid) = lattice(data, &color, &mut subject)? {
         return isosurface(subject, data, grid, choices);
     }
@@ -165,6 +231,48 @@ fn from_data(data: &Dataset, choices: &Choices) -> anyhow::Result<Subject> {
     Ok(subject)
 }
 
+fn add_volume(
+    subject: &mut Subject,
+    data: &Dataset,
+    color: &Option<String>,
+    choices: &Choices,
+) -> anyhow::Result<()> {
+    let array = match &choices.volume {
+        VolumeChoice::Named(name) => Some(name.clone()),
+        _ => color.clone().or_else(|| first_array(data)),
+    };
+    let array = array.context("no array can be drawn as a volume: the file has none")?;
+    let leaf = match data.leaves()[..] {
+        [leaf] => leaf,
+        ref leaves => anyhow::bail!("the file has {} parts; a volume needs one uniform grid", leaves.len()),
+    };
+    ColorBy::find(leaf, &array)?;
+    let grid = leaf.to_grid(&array).with_context(|| format!("`{array}` cannot be drawn as a volume"))?;
+    let Some((lo, hi)) = grid.range() else {
+        anyhow::bail!("`{array}` has no finite value: as a volume it would be empty");
+    };
+    if choices.isovalue.is_none()
+        && let Some(wish) = choices.color_by.as_ref().filter(|wish| **wish != array)
+    {
+        subject.warnings.push(format!(
+            "`{wish}` colours nothing: a volume has the colours of its own scalars, and there is no isosurface without --isovalue"
+        ));
+    }
+    subject
+        .contents
+        .push(format!("`{array}` as a volume of {} points", grid.dims.as_u64vec3().element_product()));
+    subject.widen(&[lo, hi]);
+    subject.volume = Some(VolumeField { grid: Arc::new(grid), range: [lo, hi] });
+    Ok(())
+}
+
+/// The first array of a file, those on points before those on cells.
+fn first_array(data: &Dataset) -> Option<String> {
+    let attributes = data.leaves().first()?.attributes()?;
+    let first = attributes.point.first().or_else(|| attributes.cell.first());
+    first.map(|a| a.name.clone())
+}
+
 /// The field of image data; `None` where there is none, or where its outer surface is all there is to see.
 fn lattice(
     data: &Dataset,
@@ -175,8 +283,7 @@ fn lattice(
         [leaf @ (Dataset::ImageData(_) | Dataset::RectilinearGrid(_))] => leaf,
         _ => return Ok(None),
     };
-    let first = leaf.attributes().and_then(|a| a.point.first().or_else(|| a.cell.first()));
-    let Some(array) = color.clone().or_else(|| first.map(|a| a.name.clone())) else { return Ok(None) };
+    let Some(array) = color.clone().or_else(|| first_array(data)) else { return Ok(None) };
     match leaf.to_grid(&array) {
         Ok(grid) if grid.dims.min_element() >= 2 => Ok(Some(Arc::new(grid))),
         Ok(_) => Ok(None),
@@ -229,7 +336,8 @@ fn isosurface(
     subject
         .contents
         .push(format!("isosurface at {iso} of {} points", field.dims.as_u64vec3().element_product()));
-    subject.parts.push(Part { geometry: Geometry::Shape(Arc::new(surface)), paint });
+    let outline = corners_of_box(field.origin, field.max_corner()).to_vec();
+    subject.parts.push(Part::shape(Arc::new(surface), paint, outline));
     Ok(subject)
 }
 
@@ -256,7 +364,7 @@ fn add_tubes(subject: &mut Subject, lines: &[datasets::model::Polyline]) -> anyh
         paint = Paint::Scalars;
     }
     subject.contents.push(format!("{} lines as tubes", lines.len()));
-    subject.parts.push(Part { geometry: Geometry::Shape(Arc::new(tubes)), paint });
+    subject.parts.push(Part::shape(Arc::new(tubes), paint, points));
     Ok(())
 }
 
@@ -271,7 +379,7 @@ fn add_points(subject: &mut Subject, data: &Dataset, color: Option<&str>) -> any
         paint = Paint::Scalars;
     }
     subject.contents.push(format!("{} points as spheres", set.points.len()));
-    subject.parts.push(Part { geometry: Geometry::Shape(Arc::new(spheres)), paint });
+    subject.parts.push(Part::shape(Arc::new(spheres), paint, set.points));
     Ok(())
 }
 
@@ -292,7 +400,7 @@ fn from_scene(model: &SceneModel, choices: &Choices) -> anyhow::Result<Subject> 
             Some(i) => Paint::OfTheFile(materials[i].clone()),
             None => Paint::Color(CLAY),
         };
-        subject.parts.push(Part { geometry: Geometry::Mesh(Arc::new(m.mesh.clone())), paint });
+        subject.parts.push(Part::mesh(Arc::new(m.mesh.clone()), paint));
     }
     subject.contents.push(format!("{} meshes, {} triangles", model.meshes.len(), model.num_triangles()));
     Ok(subject)

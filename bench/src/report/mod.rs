@@ -93,7 +93,12 @@ fn ratios(ratios: &[Ratio]) -> String {
          <th class=\"n\">spread</th><th class=\"n\">lowest to highest</th><th class=\"n\">rounds</th></tr></thead><tbody>",
     );
     for r in ratios {
-        let class = if r.value >= 1.0 { "faster" } else { "slower" };
+        // Rounds that contradict each other decide nothing.
+        let class = match (r.low > 1.0, r.high < 1.0) {
+            (true, _) => "faster",
+            (_, true) => "slower",
+            _ => "even",
+        };
         s += &format!(
             "<tr><td>{}</td><td>{}</td><td class=\"n {class}\">{:.2}</td><td class=\"n\">{:.2}</td>\
              <td class=\"n\">{:.2} to {:.2}</td><td class=\"n\">{}</td></tr>",
@@ -214,6 +219,26 @@ mod tests {
         }
         closed += rest;
         roxmltree::Document::parse(&closed).unwrap_or_else(|e| panic!("{e}\n{closed}"));
+    }
+
+    #[test]
+    fn ratios_whose_rounds_contradict_each_other_are_neither_faster_nor_slower() {
+        let ratio = |low: f64, value: f64, high: f64| Ratio {
+            name: "ours".into(),
+            rival: "theirs".into(),
+            value,
+            spread: 0.1,
+            low,
+            high,
+            rounds: 7,
+        };
+        for (r, class) in [
+            (ratio(1.1, 1.2, 1.3), "faster"),
+            (ratio(0.9, 1.2, 1.3), "even"),
+            (ratio(0.7, 0.8, 0.9), "slower"),
+        ] {
+            assert!(ratios(&[r]).contains(&format!("class=\"n {class}\"")), "{class}");
+        }
     }
 
     #[test]

@@ -1,11 +1,14 @@
 //! OpenEXR through the `exr` crate: all planes of a picture as 32-bit channels of one part, ZIP-compressed without loss.
 //!
-//! Metadata entries are custom attributes of the same name; the unit of plane `depth.Z` is the text attribute
-//! `unit.depth.Z`. Texts are written as UTF-8.
+//! Metadata entries are attributes of the same name; the unit of plane `depth.Z` is the text attribute `unit.depth.Z`.
+//! Texts are written as UTF-8. Names that the format itself defines as a text (`software`, `comments`, `owner`…) or as a
+//! number (`expTime`, `near`…) become those standard attributes, which other programs show under their own headings.
+//! Standard numbers have 32 bits, all others 64.
 
 use super::{ImageError, Metadata, MetadataValue, Picture, Plane, format_error, io_error};
 use crate::atomic_file::write_atomically;
 use exr::meta::attribute::AttributeValue;
+use exr::meta::header::standard_names;
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, ReadChannels, ReadLayers,
     Text, WritableImage,
@@ -31,11 +34,22 @@ pub fn write_exr(path: &Path, picture: &Picture) -> Result<(), ImageError> {
     let units = picture.planes.iter().filter(|p| !p.unit.is_empty());
     let units = units.map(|p| (format!("{UNIT_PREFIX}{}", p.name), MetadataValue::Text(p.unit.clone())));
     for (key, value) in picture.metadata.clone().into_iter().chain(units) {
-        let value = match value {
-            MetadataValue::Text(t) => AttributeValue::Text(text(&t)),
-            MetadataValue::Number(n) => AttributeValue::F64(n),
-        };
-        attributes.other.insert(name(path, &key)?, value);
+        let attribute = name(path, &key)?;
+        if !standard_names::ALL.contains(&attribute.as_slice()) {
+            let value = match value {
+                MetadataValue::Text(t) => AttributeValue::Text(text(&t)),
+                MetadataValue::Number(n) => AttributeValue::F64(n),
+            };
+            attributes.other.insert(attribute, value);
+        } else if !put_standard(&mut attributes, &key, &value) {
+            let kind = match value {
+                MetadataValue::Text(_) => "text",
+                MetadataValue::Number(_) => "number",
+            };
+            let reason =
+                format!("OpenEXR gives `{key}` a meaning of its own, which is no {kind}; rename the entry");
+            return Err(format_error(path, reason));
+        }
     }
     let mut channels = Vec::new();
     for p in &picture.planes {
@@ -65,6 +79,7 @@ pub fn read_exr(path: &Path) -> Result<Picture, ImageError> {
         |n: usize| u32::try_from(n).map_err(|_| format_error(path, format!("{n} pixels along one side")));
     let mut picture = Picture::new(size(layer.size.0)?, size(layer.size.1)?);
     let mut entries: Metadata = layer.attributes.other.iter().filter_map(metadata_entry).collect();
+    entries.extend(standard_entries(layer.attributes));
     for channel in &layer.channel_data.list {
         let name = string(&channel.name);
         let unit = match entries.remove(&format!("{UNIT_PREFIX}{name}")) {
@@ -93,6 +108,71 @@ fn metadata_entry((key, value): (&Text, &AttributeValue)) -> Option<(String, Met
     };
     Some((string(key), value))
 }
+
+// ---- attributes that the format defines ---------------------------------------------------------------------------
+
+/// The name of an attribute and its place in the crate's structure.
+type Standard<T> = (&'static str, fn(&mut LayerAttributes) -> &mut Option<T>);
+
+/// Standard texts.
+const STANDARD_TEXTS: [Standard<Text>; 8] = [
+    ("software", |a| &mut a.software_name),
+    ("comments", |a| &mut a.comments),
+    ("owner", |a| &mut a.owner),
+    ("capDate", |a| &mut a.capture_date),
+    ("view", |a| &mut a.view_name),
+    ("wrapmodes", |a| &mut a.wrap_mode_name),
+    ("renderingTransform", |a| &mut a.rendering_transform_name),
+    ("lookModTransform", |a| &mut a.look_modification_transform_name),
+];
+
+/// Standard numbers that may be absent.
+const STANDARD_NUMBERS: [Standard<f32>; 14] = [
+    ("expTime", |a| &mut a.exposure),
+    ("aperture", |a| &mut a.aperture),
+    ("isoSpeed", |a| &mut a.iso_speed),
+    ("focus", |a| &mut a.focus),
+    ("near", |a| &mut a.near_clip_plane),
+    ("far", |a| &mut a.far_clip_plane),
+    ("fieldOfViewHorizontal", |a| &mut a.horizontal_field_of_view),
+    ("fieldOfViewVertical", |a| &mut a.vertical_field_of_view),
+    ("utcOffset", |a| &mut a.utc_offset),
+    ("longitude", |a| &mut a.longitude),
+    ("latitude", |a| &mut a.latitude),
+    ("altitude", |a| &mut a.altitude),
+    ("xDensity", |a| &mut a.horizontal_density),
+    ("whiteLuminance", |a| &mut a.white_luminance),
+];
+
+/// Sets a standard attribute; false where that one holds something else.
+fn put_standard(attributes: &mut LayerAttributes, key: &str, value: &MetadataValue) -> bool {
+    match value {
+        MetadataValue::Text(t) => {
+            let Some((_, place)) = STANDARD_TEXTS.iter().find(|(k, _)| *k == key) else { return false };
+            *place(attributes) = Some(text(t));
+        }
+        MetadataValue::Number(n) => {
+            let Some((_, place)) = STANDARD_NUMBERS.iter().find(|(k, _)| *k == key) else { return false };
+            *place(attributes) = Some(*n as f32);
+        }
+    }
+    true
+}
+
+/// The standard attributes that a file has.
+fn standard_entries(mut attributes: LayerAttributes) -> Metadata {
+    let a = &mut attributes;
+    let mut found = Metadata::new();
+    for (key, place) in STANDARD_TEXTS {
+        found.extend(place(a).take().map(|t| (key.to_string(), MetadataValue::Text(string(&t)))));
+    }
+    for (key, place) in STANDARD_NUMBERS {
+        found.extend(place(a).take().map(|n| (key.to_string(), MetadataValue::Number(f64::from(n)))));
+    }
+    found
+}
+
+// ---- texts --------------------------------------------------------------------------------------------------------
 
 fn text(s: &str) -> Text {
     Text::from_slice_unchecked(s.as_bytes())
@@ -142,6 +222,38 @@ mod tests {
             assert_eq!(bits(a), bits(b), "{}", a.name);
         }
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1, "no temporary file is left");
+    }
+
+    #[test]
+    fn names_that_the_format_defines_become_its_own_attributes() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("standard.exr");
+        let mut p = Picture { metadata: super::super::metadata_of_this_run("bench", "1.2"), ..picture() };
+        for (key, _) in STANDARD_TEXTS {
+            p.metadata.insert(key.into(), format!("a {key}").into());
+        }
+        for (n, (key, _)) in STANDARD_NUMBERS.into_iter().enumerate() {
+            p.metadata.insert(key.into(), (n as f64 + 0.5).into());
+        }
+        p.metadata.insert(super::super::keys::SOFTWARE.into(), "bench 1.2".into());
+        write_exr(&path, &p).unwrap();
+        assert_eq!(read_exr(&path).unwrap(), p);
+        let headers = exr::meta::MetaData::read_from_file(&path, true).unwrap().headers;
+        let own = &headers[0].own_attributes;
+        assert_eq!(own.software_name.as_ref().map(string).as_deref(), Some("bench 1.2"));
+        assert!(own.other.keys().all(|k| !standard_names::ALL.contains(&k.as_slice())));
+    }
+
+    #[test]
+    fn a_reserved_name_with_another_kind_of_value_is_refused_by_name() {
+        for (key, value) in
+            [("software", 1.0.into()), ("expTime", "long".into()), ("channels", MetadataValue::from("R"))]
+        {
+            let mut p = picture();
+            p.metadata.insert(key.into(), value);
+            let message = write_exr(Path::new("never-written.exr"), &p).unwrap_err().to_string();
+            assert!(message.contains(key) && message.contains("rename"), "{message}");
+        }
     }
 
     #[test]

@@ -16,6 +16,9 @@ use std::path::Path;
 
 pub(crate) const FORMAT: &str = "glTF";
 
+/// Magic, version and length at the beginning of a `.glb` file.
+const GLB_HEADER_BYTES: u32 = 12;
+
 /// One mesh may appear many times; scenes with more triangles than this in all are refused.
 const MAX_TRIANGLES: usize = 1 << 28;
 
@@ -82,8 +85,16 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
 }
 
 /// The scene after the crate's own checks. Those index the accessors of primitives before they are checked (gltf-json
-/// 1.4.1, mesh.rs), so that is done here first.
+/// 1.4.1, mesh.rs) and subtract the header from the length of a `.glb` file before they look at it (gltf 1.4.1,
+/// binary.rs), so that is done here first.
 fn checked(bytes: &[u8]) -> Result<gltf::Gltf, Fault> {
+    if let Some([magic, _, length]) = bytes.as_chunks::<4>().0.first_chunk::<3>()
+        && magic == b"glTF"
+        && u32::from_le_bytes(*length) < GLB_HEADER_BYTES
+    {
+        let what = format!("the file's length is given as {} bytes", u32::from_le_bytes(*length));
+        return Err(Fault::new(At::Byte(8), what, BROKEN));
+    }
     let fault = |e: gltf::Error| {
         let cure = "check it with the Khronos glTF validator; compressed meshes (Draco, meshopt) must be unpacked first";
         Fault::new(At::Field("the JSON part".into()), e.to_string(), cure)
@@ -298,10 +309,15 @@ impl Reader {
                 m.x_axis.cross(m.y_axis),
             );
             let sign = if world_from_node.determinant() < 0.0 { -1.0 } else { 1.0 };
-            let turned = normals
-                .iter()
-                .map(|v| (sign * (cofactors * DVec3::from(v.map(f64::from)))).normalize_or_zero().as_vec3());
-            mesh.normals = Some(Attribute::per_vertex(turned.collect::<Vec<Vec3>>()));
+            // Normals that nothing turns keep every bit.
+            let turned = |v: &[f32; 3]| {
+                let v = Vec3::from(*v);
+                if m == DMat3::IDENTITY && v.is_finite() {
+                    return v;
+                }
+                (sign * (cofactors * v.as_dvec3())).normalize_or_zero().as_vec3()
+            };
+            mesh.normals = Some(Attribute::per_vertex(normals.iter().map(turned).collect()));
         }
         if let Some(a) = p.get(&Semantic::TexCoords(0)) {
             let t = self.tuples::<2>(&a, &format!("texture coordinates of `{name}`"))?;

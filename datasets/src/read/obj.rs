@@ -35,6 +35,10 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
             }
         }
     };
+    if let Some((line, index)) = oversized_index(bytes) {
+        let what = format!("`{index}` cannot be the number of a vertex");
+        return Err(Fault::new(At::Line(line), what, BROKEN).in_file(path, FORMAT));
+    }
     let mut text = bytes;
     let (models, materials) = tobj::load_obj_buf(&mut text, &options, load_material).map_err(|e| {
         Fault::new(At::Field("the OBJ text".into()), e.to_string(), BROKEN).in_file(path, FORMAT)
@@ -67,6 +71,19 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
         warnings.push(format!("{fanned} faces cross themselves or are too large, and were divided as a fan"));
     }
     Ok(Opened { format: FORMAT, content: Content::Scene(scene), warnings, time_steps: Vec::new() })
+}
+
+/// The first number of a face with more digits than 32 bits have, and its line. `tobj` 4.0.5 (`add_vertex`) multiplies
+/// indices before it compares them with the number of vertices: such ones overflow and may come out as others.
+fn oversized_index(bytes: &[u8]) -> Option<(u64, String)> {
+    let digits_32_bits = 10;
+    let lines = (1..).zip(bytes.split(|&b| b == b'\n'));
+    let mut faces = lines.filter(|(_, l)| l.trim_ascii_start().starts_with(b"f"));
+    faces.find_map(|(line, text)| {
+        let mut numbers = text.split(|b| !b.is_ascii_digit());
+        let long = numbers.find(|n| n.len() > digits_32_bits)?;
+        Some((line, String::from_utf8_lossy(long).into_owned()))
+    })
 }
 
 fn triangles(model: &tobj::Model, fanned: &mut usize, warnings: &mut Vec<String>) -> TriMesh {

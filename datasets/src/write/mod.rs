@@ -1,9 +1,11 @@
-//! Writers: VTK's XML files for ParaView, PLY and OBJ for mesh programs.
+//! Writers: VTK's XML files for ParaView, PLY, OBJ and GLB for mesh programs.
 
+pub mod gltf;
 pub mod obj;
 pub mod ply;
 pub mod vtk_xml;
 
+pub use gltf::write_glb;
 pub use obj::write_obj;
 pub use ply::write_ply;
 pub use vtk_xml::{Encoding, VtkOptions, write_pvd, write_vtk};

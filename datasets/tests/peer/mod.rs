@@ -3,6 +3,7 @@
 //! Order: `RTSV_PYTHON`, `python3`, `$RTSV_PEERS/venv/bin/python`. Without one the test says why it is skipped; with
 //! `RTSV_REQUIRE_PEERS=1` that is a failure.
 
+use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::Command;
 
@@ -27,8 +28,13 @@ pub(crate) fn python_with_vtk(test: &str) -> Option<PathBuf> {
     }
     let reason = format!("{test} needs a Python with VTK (set RTSV_PYTHON): {}", tried.join("; "));
     assert!(std::env::var_os("RTSV_REQUIRE_PEERS").is_none_or(|v| v != "1"), "{reason}");
-    eprintln!("SKIPPED {reason}");
+    say_skipped(&reason);
     None
+}
+
+/// Says on stderr why a test does nothing. `println!` and `eprintln!` would not do: libtest swallows both in tests that pass.
+pub(crate) fn say_skipped(reason: &str) {
+    writeln!(std::io::stderr(), "skipped: {reason}").expect("stderr can be written");
 }
 
 /// Runs `script` with `args` and gives back what it printed. Panics with its error output when it fails.

@@ -79,9 +79,14 @@ impl Embree {
     pub fn open(version: Version, path: &Path) -> Result<Embree, PeerError> {
         let shown = path.display().to_string();
         let unusable = |reason: String| PeerError::Unusable { path: shown.clone(), reason };
+        // The loader's own words (missing file, wrong format) are in the cause.
+        let because = |e: libloading::Error| {
+            let cause = std::error::Error::source(&e).map_or(String::new(), |c| format!(": {c}"));
+            unusable(format!("{e}{cause}"))
+        };
         // SAFETY: loading runs the library's initialisers. The candidates are Embree by name or by the user's choice,
         // whose initialisers only set up its own globals.
-        let library = unsafe { libloading::Library::new(path) }.map_err(|e| unusable(e.to_string()))?;
+        let library = unsafe { libloading::Library::new(path) }.map_err(because)?;
         // SAFETY: `calls` types each symbol as the headers of this major version declare it; that it is this version
         // is checked below, before anything but device functions, which both versions share, is called.
         let calls = unsafe { calls(&library, version) }.map_err(|e| unusable(e.to_string()))?;
@@ -235,6 +240,7 @@ mod tests {
         std::fs::write(&path, "not a library").unwrap();
         let e = Embree::open(Version::V4, &path).err().unwrap().to_string();
         assert!(e.contains("libembree4.so cannot be used"), "{e}");
+        assert!(e.contains("ELF") || e.contains("too short"), "the loader's reason is missing: {e}");
     }
 
     #[test]
