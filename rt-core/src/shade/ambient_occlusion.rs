@@ -28,7 +28,7 @@ pub(crate) fn add_ambient_light(
     let Some(mean) = &stage.mean_radiance else { return };
     let ambient = |p: &Point| {
         let material = stage.instances[p.instance as usize].material;
-        ambient_albedo(material, &p.surface, stage.effects) * mean.for_normal(p.surface.normal)
+        ambient_albedo(material, p.surface.color, stage.effects) * mean.for_normal(p.surface.normal)
     };
     let occlusion =
         stage.scene.ambient_occlusion.filter(|_| stage.effects.contains(Effects::AMBIENT_OCCLUSION));

@@ -12,6 +12,7 @@ use crate::sampler::Sampler;
 use crate::scene::Scene;
 use crate::surface::{Placed, SurfacePoint};
 use crate::volume::Volume;
+use fearless_simd::Level;
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -28,6 +29,8 @@ pub(crate) struct Stage<'a> {
     /// Radiance of the ambient lights alone.
     pub(crate) ambient: Vec3,
     pub(crate) camera_rays: CameraRays,
+    /// Instruction set of ray generation and shading; every one gives the same bits.
+    pub(crate) level: Level,
     /// Volumes with the way into their object space.
     pub(crate) volumes: Vec<(&'a Volume, DAffine3)>,
     /// World position of render space's origin.
@@ -86,6 +89,7 @@ impl<'a> Stage<'a> {
             mean_radiance: MeanRadiance::new(scene.environment.as_ref(), ambient),
             ambient,
             camera_rays: CameraRays::new(camera, origin, bounds, effects.contains(Effects::DEPTH_OF_FIELD)),
+            level: Level::new(),
             volumes,
             origin,
             up: world_from_view.y_axis.as_vec3(),
