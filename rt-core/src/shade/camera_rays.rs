@@ -1,8 +1,10 @@
 //! Primary rays in render space: the camera's f64 rays, moved next to the scene before they are rounded to f32.
 
+use super::tile::{TILE, block_place, lane_pixel};
 use crate::camera::{Camera, Projection};
 use crate::math::Aabb;
-use crate::ray::Ray;
+use crate::ray::{LANES, Ray, RayBlock};
+use fearless_simd::Simd;
 use glam::{DVec3, Vec3};
 
 /// How far the eye may be from the scene's centre, in radii of the scene, before rays start at the scene instead of at the eye.
@@ -126,34 +128,78 @@ impl CameraRays {
         }
     }
 
-    /// The rays through NDC columns `xs` and rows `ys` when they differ in direction only (perspective, no lens, usual near and
-    /// far planes): sums of one vector per column and one per row. `None` where each ray needs its own arithmetic.
-    pub(crate) fn table(&self, xs: &[f64], ys: &[f64]) -> Option<RayTable> {
+    /// The rays of a tile with pixel centres at NDC columns `xs` and rows `ys`, when they differ in direction only (perspective, no lens,
+    /// usual near and far planes): sums of one vector per column and one per row. `None` where each ray needs its own arithmetic.
+    pub(crate) fn table(&self, xs: &[f64; SIDE], ys: &[f64; SIDE]) -> Option<RayTable> {
         let Limits::Same([near, far]) = self.limits else { return None };
         if self.parallel || self.lens.is_some() || self.start != 0.0 {
             return None;
         }
-        Some(RayTable {
+        let mut table = RayTable {
             origin: self.origin.as_vec3(),
             range: [near.max(0.0) as f32, far as f32],
-            columns: xs.iter().map(|x| self.dir_x * *x).collect(),
-            rows: ys.iter().map(|y| self.dir + self.dir_y * *y).collect(),
-        })
+            columns: [[[0.0; LANES]; 3]; SIDE / 4],
+            rows: [[[0.0; LANES]; 3]; SIDE / 4],
+        };
+        for k in 0..SIDE / 4 {
+            for lane in 0..LANES {
+                let [x, y] = lane_pixel(lane);
+                let column = self.dir_x * xs[4 * k + x];
+                let row = self.dir + self.dir_y * ys[4 * k + y];
+                for c in 0..3 {
+                    table.columns[k][c][lane] = column[c];
+                    table.rows[k][c][lane] = row[c];
+                }
+            }
+        }
+        Some(table)
     }
 }
 
-/// Rays of a tile as columns and rows.
+/// Pixels along a tile's side.
+const SIDE: usize = TILE as usize;
+
+/// Rays of a tile as columns and rows: of each, what the lanes of a block of 4 x 4 pixels there have in common.
 pub(crate) struct RayTable {
     origin: Vec3,
     range: [f32; 2],
-    columns: Vec<DVec3>,
-    rows: Vec<DVec3>,
+    columns: [[[f64; LANES]; 3]; SIDE / 4],
+    rows: [[[f64; LANES]; 3]; SIDE / 4],
 }
 
 impl RayTable {
-    #[inline]
-    pub(crate) fn ray(&self, x: u32, y: u32) -> Ray {
-        let dir = (self.columns[x as usize] + self.rows[y as usize]).as_vec3();
-        Ray { origin: self.origin, dir, t_min: self.range[0], t_max: self.range[1] }
+    /// All rays of the tile, block by block.
+    #[inline(never)]
+    pub(crate) fn fill<S: Simd>(&self, simd: S, blocks: &mut [RayBlock]) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                for (b, block) in blocks.iter_mut().enumerate() {
+                    let [x, y] = block_place(b);
+                    let (column, row) = (&self.columns[x], &self.rows[y]);
+                    let [near, far] = self.range;
+                    *block = RayBlock {
+                        ox: [self.origin.x; LANES],
+                        oy: [self.origin.y; LANES],
+                        oz: [self.origin.z; LANES],
+                        dx: sum(&column[0], &row[0]),
+                        dy: sum(&column[1], &row[1]),
+                        dz: sum(&column[2], &row[2]),
+                        t_min: [near; LANES],
+                        t_max: [far; LANES],
+                    };
+                }
+            },
+        );
     }
+}
+
+/// f64 sums rounded to f32: a plain loop, which becomes vector code.
+#[inline(always)]
+fn sum(a: &[f64; LANES], b: &[f64; LANES]) -> [f32; LANES] {
+    let mut out = [0.0; LANES];
+    for lane in 0..LANES {
+        out[lane] = (a[lane] + b[lane]) as f32;
+    }
+    out
 }

@@ -28,6 +28,8 @@ use crate::material::SurfaceModel;
 use crate::ray::{HitBlock, LANES, Ray, RayBlock};
 use crate::ray_stats::RayStats;
 use crate::surface::SurfacePoint;
+use camera_rays::RayTable;
+use fearless_simd::dispatch;
 use glam::Vec3;
 use tile::PIXELS;
 use wave::{LightRays, RayKind, RayState, Wave};
@@ -102,6 +104,9 @@ pub(crate) fn render_tile(
         return stats;
     }
     camera_wave(stage, area, &mut work.current, (!centered).then_some(sample), &mut stats, out.cost_mut());
+    if sample == 0 {
+        work.pixels = std::mem::take(&mut out.color);
+    }
     work.pixels.clear();
     work.pixels.resize(PIXELS, [0.0; 4]);
     work.behind.clear();
@@ -123,7 +128,11 @@ pub(crate) fn render_tile(
         std::mem::swap(&mut work.current, next);
         next.clear();
     }
-    out.add_sample(&work.pixels, sample == 0);
+    if sample == 0 {
+        out.start_samples(std::mem::take(&mut work.pixels));
+    } else {
+        out.add_sample(&work.pixels);
+    }
     stats
 }
 
@@ -159,27 +168,24 @@ fn camera_blocks(
     stats: &mut RayStats,
     cost: Option<&mut [f32]>,
 ) {
-    blocks.clear();
-    blocks.resize(PIXELS / LANES, RayBlock::INACTIVE);
     stats.primary += area.width as u64 * area.height as u64;
     if let Some(cost) = cost {
         cost.iter_mut().for_each(|c| *c += 1.0);
     }
-    let table = if sample.is_none() {
-        let columns: Vec<f64> = (0..area.width).map(|x| stage.ndc(area.x + x, area.y, [0.5; 2])[0]).collect();
-        let rows: Vec<f64> = (0..area.height).map(|y| stage.ndc(area.x, area.y + y, [0.5; 2])[1]).collect();
-        stage.camera_rays.table(&columns, &rows)
-    } else {
-        None
-    };
-    if let Some(table) = table {
-        for slot in 0..PIXELS as u16 {
-            if let Some([x, y]) = area.pixel(slot) {
-                blocks[slot as usize / LANES].set(slot as usize % LANES, &table.ray(x - area.x, y - area.y));
+    if sample.is_none()
+        && let Some(table) = centre_rays(stage, area)
+    {
+        blocks.resize(PIXELS / LANES, RayBlock::INACTIVE);
+        dispatch!(stage.level, simd => table.fill(simd, blocks));
+        if area.width < TILE || area.height < TILE {
+            for slot in (0..PIXELS as u16).filter(|s| area.pixel(*s).is_none()) {
+                blocks[slot as usize / LANES].t_max[slot as usize % LANES] = -1.0;
             }
         }
         return;
     }
+    blocks.clear();
+    blocks.resize(PIXELS / LANES, RayBlock::INACTIVE);
     let through_lens = stage.effects.contains(Effects::DEPTH_OF_FIELD) && sample.is_some();
     for slot in 0..PIXELS as u16 {
         let Some([x, y]) = area.pixel(slot) else { continue };
@@ -199,8 +205,18 @@ fn camera_blocks(
     }
 }
 
+/// Rays through the pixels' centres, where they are sums of columns and rows.
+fn centre_rays(stage: &Stage<'_>, area: &TileArea) -> Option<RayTable> {
+    let mut centres = [[0.0; TILE as usize]; 2];
+    for k in 0..TILE {
+        let [x, y] = stage.ndc(area.x + k, area.y + k, [0.5; 2]);
+        (centres[0][k as usize], centres[1][k as usize]) = (x, y);
+    }
+    stage.camera_rays.table(&centres[0], &centres[1])
+}
+
 fn trace(stage: &Stage<'_>, work: &mut Workspace, coherent: bool) {
-    work.hits.clear();
+    // What is in it does not matter: tracing starts with misses everywhere.
     work.hits.resize(work.current.blocks.len(), HitBlock::MISS);
     if coherent {
         stage.scene.world.closest_coherent(&work.current.blocks, &mut work.hits);

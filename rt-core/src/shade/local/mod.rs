@@ -36,21 +36,27 @@ pub(super) fn render_tile(
     stats: &mut RayStats,
 ) {
     camera_blocks(stage, area, &mut work.current.blocks, sample, stats, out.cost_mut());
-    work.hits.clear();
     work.hits.resize(PIXELS / LANES, HitBlock::MISS);
     stage.scene.world.closest_coherent(&work.current.blocks, &mut work.hits);
-    work.pixels.resize(PIXELS, [0.0; 4]);
+    let first = sample.is_none_or(|s| s == 0);
+    let mut pixels = std::mem::take(if first { &mut out.color } else { &mut work.pixels });
+    pixels.resize(PIXELS, [0.0; 4]);
     prefetch_surfaces(stage, &work.hits);
     let has_place = |l: &crate::light::PlacedLight| !matches!(l.kind, PlacedKind::Directional { .. });
     let points = stage.lights.iter().any(has_place);
     dispatch!(stage.level, simd => {
         if points {
-            light_hits::<_, true>(simd, stage, area, out, work, record, stats);
+            light_hits::<_, true>(simd, stage, area, out, work, &mut pixels, record, stats);
         } else {
-            light_hits::<_, false>(simd, stage, area, out, work, record, stats);
+            light_hits::<_, false>(simd, stage, area, out, work, &mut pixels, record, stats);
         }
     });
-    out.add_sample(&work.pixels, sample.is_none_or(|s| s == 0));
+    if first {
+        out.start_samples(pixels);
+    } else {
+        out.add_sample(&pixels);
+        work.pixels = pixels;
+    }
 }
 
 /// Asks for everything that the tile's hits will read.
@@ -77,12 +83,13 @@ fn light_hits<S: Simd, const POINT: bool>(
     stage: &Stage<'_>,
     area: &TileArea,
     out: &mut TileLayers,
-    work: &mut Workspace,
+    work: &Workspace,
+    pixels: &mut [[f32; 4]],
     record: bool,
     stats: &mut RayStats,
 ) {
     let (mut looks, mut radiance) = (Looks::new(), Rows3::ZERO);
-    for (b, pixels) in work.pixels.chunks_exact_mut(LANES).enumerate() {
+    for (b, pixels) in pixels.chunks_exact_mut(LANES).enumerate() {
         let (rays, hits) = (&work.current.blocks[b], &work.hits[b]);
         let mut rows: [Row; 4] = [[0.0; LANES]; 4];
         let hit = (0..LANES).fold(0u16, |m, l| m | ((hits.prim[l] != NO_HIT) as u16) << l);
