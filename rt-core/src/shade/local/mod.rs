@@ -159,3 +159,6 @@ fn radiance(stage: &Stage<'_>, material: &Material, look: &Look, dir: Vec3) -> V
     }
     radiance
 }
+
+#[cfg(test)]
+mod tests;
