@@ -1,11 +1,10 @@
 //! Primary rays in render space: the camera's f64 rays, moved next to the scene before they are rounded to f32.
 
-use super::tile::{TILE, block_place, lane_pixel};
 use crate::camera::{Camera, Projection};
 use crate::math::Aabb;
 use crate::ray::{LANES, Ray, RayBlock};
 use fearless_simd::Simd;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 /// How far the eye may be from the scene's centre, in radii of the scene, before rays start at the scene instead of at the eye.
 /// Up to here the eye's f32 rounding is no worse than that of the vertices; rays with one origin are traced faster.
@@ -128,78 +127,47 @@ impl CameraRays {
         }
     }
 
-    /// The rays of a tile with pixel centres at NDC columns `xs` and rows `ys`, when they differ in direction only (perspective, no lens,
-    /// usual near and far planes): sums of one vector per column and one per row. `None` where each ray needs its own arithmetic.
-    pub(crate) fn table(&self, xs: &[f64; SIDE], ys: &[f64; SIDE]) -> Option<RayTable> {
-        let Limits::Same([near, far]) = self.limits else { return None };
-        if self.parallel || self.lens.is_some() || self.start != 0.0 {
-            return None;
-        }
-        let mut table = RayTable {
-            origin: self.origin.as_vec3(),
-            range: [near.max(0.0) as f32, far as f32],
-            columns: [[[0.0; LANES]; 3]; SIDE / 4],
-            rows: [[[0.0; LANES]; 3]; SIDE / 4],
-        };
-        for k in 0..SIDE / 4 {
-            for lane in 0..LANES {
-                let [x, y] = lane_pixel(lane);
-                let column = self.dir_x * xs[4 * k + x];
-                let row = self.dir + self.dir_y * ys[4 * k + y];
-                for c in 0..3 {
-                    table.columns[k][c][lane] = column[c];
-                    table.rows[k][c][lane] = row[c];
-                }
-            }
-        }
-        Some(table)
-    }
-}
-
-/// Pixels along a tile's side.
-const SIDE: usize = TILE as usize;
-
-/// Rays of a tile as columns and rows: of each, what the lanes of a block of 4 x 4 pixels there have in common.
-pub(crate) struct RayTable {
-    origin: Vec3,
-    range: [f32; 2],
-    columns: [[[f64; LANES]; 3]; SIDE / 4],
-    rows: [[[f64; LANES]; 3]; SIDE / 4],
-}
-
-impl RayTable {
-    /// All rays of the tile, block by block.
+    /// The rays through sixteen NDC points, see [`CameraRays::ray`]; through the middle of a lens. False, without rays, where each has its
+    /// own near and far plane.
     #[inline(never)]
-    pub(crate) fn fill<S: Simd>(&self, simd: S, blocks: &mut [RayBlock]) {
+    pub(crate) fn fill_block<S: Simd>(
+        &self,
+        simd: S,
+        x: &[f64; LANES],
+        y: &[f64; LANES],
+        out: &mut RayBlock,
+    ) -> bool {
+        let Limits::Same([near, far]) = self.limits else { return false };
         simd.vectorize(
             #[inline(always)]
             || {
-                for (b, block) in blocks.iter_mut().enumerate() {
-                    let [x, y] = block_place(b);
-                    let (column, row) = (&self.columns[x], &self.rows[y]);
-                    let [near, far] = self.range;
-                    *block = RayBlock {
-                        ox: [self.origin.x; LANES],
-                        oy: [self.origin.y; LANES],
-                        oz: [self.origin.z; LANES],
-                        dx: sum(&column[0], &row[0]),
-                        dy: sum(&column[1], &row[1]),
-                        dz: sum(&column[2], &row[2]),
-                        t_min: [near; LANES],
-                        t_max: [far; LANES],
-                    };
+                let move_x = if self.parallel { self.origin_x } else { DVec3::ZERO };
+                let move_y = if self.parallel { self.origin_y } else { DVec3::ZERO };
+                for (c, origin, dir) in [
+                    (0, &mut out.ox, &mut out.dx),
+                    (1, &mut out.oy, &mut out.dy),
+                    (2, &mut out.oz, &mut out.dz),
+                ] {
+                    // Plain loops over plain numbers become vector code.
+                    let (d0, dx, dy) = (self.dir[c], self.dir_x[c], self.dir_y[c]);
+                    let (o0, ox, oy, start) = (self.origin[c], move_x[c], move_y[c], self.start);
+                    if self.parallel || start != 0.0 {
+                        for l in 0..LANES {
+                            let d = d0 + dx * x[l] + dy * y[l];
+                            dir[l] = d as f32;
+                            origin[l] = (o0 + (ox * x[l] + oy * y[l]) + d * start) as f32;
+                        }
+                    } else {
+                        *origin = [o0 as f32; LANES];
+                        for l in 0..LANES {
+                            dir[l] = (d0 + dx * x[l] + dy * y[l]) as f32;
+                        }
+                    }
                 }
+                out.t_min = [(near - self.start).max(0.0) as f32; LANES];
+                out.t_max = [(far - self.start) as f32; LANES];
             },
         );
+        true
     }
-}
-
-/// f64 sums rounded to f32: a plain loop, which becomes vector code.
-#[inline(always)]
-fn sum(a: &[f64; LANES], b: &[f64; LANES]) -> [f32; LANES] {
-    let mut out = [0.0; LANES];
-    for lane in 0..LANES {
-        out[lane] = (a[lane] + b[lane]) as f32;
-    }
-    out
 }

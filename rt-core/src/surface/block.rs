@@ -65,6 +65,11 @@ impl Placed<'_> {
                 if let Some(n) = self.shading_normals(mesh) {
                     prefetch_item(&n.values, k as usize);
                 }
+                match (&self.material.color_source, self.scalars, self.colors) {
+                    (ColorSource::Scalars(_), Some(s), _) => prefetch_item(&s.values, k as usize),
+                    (ColorSource::Attribute, _, Some(c)) => prefetch_item(&c.values, k as usize),
+                    _ => {}
+                }
             }
         }
     }

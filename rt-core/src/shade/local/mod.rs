@@ -9,7 +9,7 @@ use super::direct::incident_from;
 use super::lobes::{ambient_albedo, response};
 use super::stage::Stage;
 use super::tile::{PIXELS, TileArea, TileLayers};
-use super::{Workspace, camera_blocks};
+use super::{Workspace, camera_blocks, prefetch_surfaces};
 use crate::effects::Effects;
 use crate::environment::Background;
 use crate::light::PlacedKind;
@@ -56,24 +56,6 @@ pub(super) fn render_tile(
     } else {
         out.add_sample(&pixels);
         work.pixels = pixels;
-    }
-}
-
-/// Asks for everything that the tile's hits will read.
-fn prefetch_surfaces(stage: &Stage<'_>, hits: &[HitBlock]) {
-    for h in hits {
-        for lane in 0..LANES {
-            if h.prim[lane] != NO_HIT {
-                stage.instances[h.instance[lane] as usize].prefetch_triangle(h.prim[lane]);
-            }
-        }
-    }
-    for h in hits {
-        for lane in 0..LANES {
-            if h.prim[lane] != NO_HIT {
-                stage.instances[h.instance[lane] as usize].prefetch_vertices(h.prim[lane]);
-            }
-        }
     }
 }
 
