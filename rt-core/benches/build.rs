@@ -38,7 +38,7 @@ fn refit(c: &mut Criterion) {
                 mesh.positions.iter_mut().for_each(|p| p.x *= stretch);
                 Arc::new(mesh.clone())
             },
-            |moved| world.refit(0, moved).map(|r| black_box(r)).expect("the same triangles"),
+            |moved| world.refit(0, moved).map(black_box).expect("the same triangles"),
             criterion::BatchSize::PerIteration,
         );
     });

@@ -8,6 +8,7 @@
 mod ambient_occlusion;
 mod camera_rays;
 mod direct;
+mod layers;
 mod lobes;
 mod local;
 mod microfacet;
@@ -116,8 +117,12 @@ pub(crate) fn render_tile(
     let mut coherent = true;
     let mut area_sample = *area;
     area_sample.sample = sample;
+    let mut record_all = record && !stage.effects.contains(Effects::TRANSPARENCY);
     loop {
         trace(stage, work, coherent);
+        if std::mem::take(&mut record_all) {
+            record_camera_hits(stage, &area_sample, out, work);
+        }
         meet_surfaces(stage, &area_sample, out, work, record, &mut stats);
         light_points(stage, &area_sample, out, work, &mut stats);
         send_rays(stage, &area_sample, out, work, &mut stats);
@@ -195,37 +200,37 @@ fn pinhole_blocks<S: Simd>(
     blocks: &mut [RayBlock],
     sample: Option<u32>,
 ) -> bool {
-    let mut centres = [[0.0; TILE as usize]; 2];
-    for k in 0..TILE {
-        let [x, y] = stage.ndc(area.x + k, area.y + k, [0.5; 2]);
-        (centres[0][k as usize], centres[1][k as usize]) = (x, y);
+    // NDC of the pixels' centres: of each column and each row of blocks what its lanes have.
+    let mut centres = [[[0.0; LANES]; TILE as usize / 4]; 2];
+    for k in 0..TILE as usize / 4 {
+        for lane in 0..LANES {
+            let [i, j] = lane_pixel(lane);
+            let [x, y] = stage.ndc(area.x + (4 * k + i) as u32, area.y + (4 * k + j) as u32, [0.5; 2]);
+            (centres[0][k][lane], centres[1][k][lane]) = (x, y);
+        }
     }
     let spread = stage.options.samples > 1;
     let mut sampler = SamplerBlock::new(stage.options.sampling);
     for (b, block) in blocks.iter_mut().enumerate() {
-        let [column, row] = block_place(b).map(|v| 4 * v);
-        let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
-        match sample {
+        let [column, row] = block_place(b);
+        let filled = match sample {
             Some(sample) if spread => {
                 let (mut px, mut py) = ([0; LANES], [0; LANES]);
                 for lane in 0..LANES {
                     let [i, j] = lane_pixel(lane);
-                    (px[lane], py[lane]) = (area.x + (column + i) as u32, area.y + (row + j) as u32);
+                    (px[lane], py[lane]) = (area.x + (4 * column + i) as u32, area.y + (4 * row + j) as u32);
                 }
                 sampler.set_pixels(simd, stage.options.seed, (&px, &py), sample, Dimension::PIXEL);
                 let at = sampler.squares(simd);
+                let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
                 for lane in 0..LANES {
                     [x[lane], y[lane]] = stage.ndc(px[lane], py[lane], [at[0][lane], at[1][lane]]);
                 }
+                stage.camera_rays.fill_block(simd, &x, &y, block)
             }
-            _ => {
-                for lane in 0..LANES {
-                    let [i, j] = lane_pixel(lane);
-                    (x[lane], y[lane]) = (centres[0][column + i], centres[1][row + j]);
-                }
-            }
-        }
-        if !stage.camera_rays.fill_block(simd, &x, &y, block) {
+            _ => stage.camera_rays.fill_block(simd, &centres[0][column], &centres[1][row], block),
+        };
+        if !filled {
             return false;
         }
     }
@@ -292,17 +297,17 @@ fn trace_geometry_layers(
     stats: &mut RayStats,
 ) {
     camera_wave(stage, area, &mut work.current, None, stats, out.cost_mut());
-    let transparent = stage.effects.contains(Effects::TRANSPARENCY);
+    if !stage.effects.contains(Effects::TRANSPARENCY) {
+        trace(stage, work, true);
+        record_camera_hits(stage, area, out, work);
+        return;
+    }
     loop {
         trace(stage, work, true);
         work.behind.clear();
         for i in 0..work.current.states.len() {
             let Some(hit) = work.hits[i / LANES].get(i % LANES) else { continue };
             let (ray, state) = (work.current.ray(i), work.current.states[i]);
-            if !transparent {
-                out.record(stage, area, state.slot, &ray, &hit, || stage.surface(&ray, &hit).normal);
-                continue;
-            }
             let s = stage.surface(&ray, &hit);
             if s.opacity > 0.0 && s.opacity >= stage.options.depth_min_opacity {
                 out.record(stage, area, state.slot, &ray, &hit, || s.normal);
@@ -318,6 +323,18 @@ fn trace_geometry_layers(
             return;
         }
         std::mem::swap(&mut work.current, &mut work.behind);
+    }
+}
+
+/// Geometry layers of the first surfaces of all pixels, opaque or not.
+fn record_camera_hits(stage: &Stage<'_>, area: &TileArea, out: &mut TileLayers, work: &Workspace) {
+    for (b, (rays, hits)) in work.current.blocks.iter().zip(&work.hits).enumerate() {
+        dispatch!(stage.level, simd => layers::record_block(simd, stage, area, b, rays, hits, out));
+        if stage.options.layers.contains(Layers::NORMAL) {
+            let hit = (0..LANES).fold(0u16, |m, l| m | ((hits.prim[l] != NO_HIT) as u16) << l);
+            let normal = |l| hits.get(l).map_or(Vec3::ZERO, |h| stage.surface(&rays.get(l), &h).normal);
+            out.record_normals(b, hit, normal);
+        }
     }
 }
 
@@ -368,9 +385,8 @@ fn meet_surfaces(
             // `t_min` is where the ray entered or was last continued.
             state.throughput *= (-state.absorption * ((hit.t - ray.t_min) * length)).exp();
         }
-        if record && state.kind == RayKind::Camera {
-            let shown =
-                !transparent || surface.opacity > 0.0 && surface.opacity >= stage.options.depth_min_opacity;
+        if record && transparent && state.kind == RayKind::Camera {
+            let shown = surface.opacity > 0.0 && surface.opacity >= stage.options.depth_min_opacity;
             if shown && !out.is_recorded(state.slot) {
                 out.record(stage, area, state.slot, &ray, &hit, || surface.normal);
             }

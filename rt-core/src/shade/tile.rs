@@ -2,7 +2,7 @@
 
 use super::stage::Stage;
 use crate::frame::Layers;
-use crate::ray::{Hit, Ray};
+use crate::ray::{Hit, LANES, Ray};
 use crate::sampler::Sampler;
 use glam::Vec3;
 
@@ -55,19 +55,19 @@ impl TileArea {
 
 /// Pixel of a lane within its block of 4 x 4.
 #[inline]
-pub(crate) fn lane_pixel(lane: usize) -> [usize; 2] {
+pub(crate) const fn lane_pixel(lane: usize) -> [usize; 2] {
     [even_bits(lane as u16) as usize, even_bits(lane as u16 >> 1) as usize]
 }
 
 /// Column and row of a block among the tile's 8 x 8.
 #[inline]
-pub(crate) fn block_place(block: usize) -> [usize; 2] {
+pub(crate) const fn block_place(block: usize) -> [usize; 2] {
     lane_pixel(block)
 }
 
 /// Bits 0, 2, 4, 6, 8 packed together.
 #[inline]
-fn even_bits(v: u16) -> u32 {
+const fn even_bits(v: u16) -> u32 {
     let mut x = v as u32 & 0x155;
     x = (x | x >> 1) & 0x133;
     x = (x | x >> 2) & 0x10f;
@@ -166,6 +166,15 @@ impl TileLayers {
         }
         if let (Some(a), Some(b)) = (self.instance.get_mut(i), self.primitive.get_mut(i)) {
             (*a, *b) = (hit.instance, hit.prim);
+        }
+    }
+
+    /// Fills the normals of the lanes `lanes` of block `b`, if that layer is wanted.
+    pub(crate) fn record_normals(&mut self, b: usize, lanes: u16, normal: impl Fn(usize) -> Vec3) {
+        if let Some(normals) = self.normal.get_mut(b * LANES..(b + 1) * LANES) {
+            for lane in (0..LANES).filter(|l| lanes >> l & 1 != 0) {
+                normals[lane] = normal(lane).to_array();
+            }
         }
     }
 

@@ -4,14 +4,14 @@
 //! into rows first, so that sixteen waits overlap, and then the arithmetic of [`Placed::look`] runs on all lanes, with the same bits. Lanes that need f64 (tiny or
 //! huge triangles, normals that cannot be normalised) are left to `look` itself.
 
-use super::{Look, ORDINARY_NORMAL_SQUARED, Placed, Source};
+use super::{Look, ORDINARY_NORMAL_SQUARED, Placed, Source, plane_of};
 use crate::material::{ColorSource, Sides};
 use crate::mesh::{Attribute, PerElement, TriMesh};
 use crate::ray::{HitBlock, LANES, RayBlock};
 use crate::simd::prefetch_item;
 use crate::simd::vectors::{Row, Rows3, Vec3x16};
 use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask, f32x16, mask32x16};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// Sixteen [`Look`]s, a row per number.
 #[repr(C, align(64))]
@@ -41,6 +41,19 @@ impl Looks {
         self.normal.set(lane, look.normal);
         self.color.set(lane, look.color);
         self.opacity[lane] = look.opacity;
+    }
+}
+
+/// World-space planes through sixteen hits, see [`Placed::plane`].
+#[repr(C, align(64))]
+pub(crate) struct Planes {
+    pub(crate) point: [[f64; LANES]; 3],
+    pub(crate) normal: [[f64; LANES]; 3],
+}
+
+impl Planes {
+    pub(crate) fn new() -> Planes {
+        Planes { point: [[0.0; LANES]; 3], normal: [[0.0; LANES]; 3] }
     }
 }
 
@@ -95,6 +108,71 @@ impl Placed<'_> {
                 out.set(lane, &self.look::<POINT>(&rays.get(lane), &hit));
             }
         }
+    }
+
+    /// [`Placed::plane`] for the hits whose bits are set in `lanes`, all of them on this instance.
+    pub(crate) fn plane_block<S: Simd>(
+        &self,
+        simd: S,
+        lanes: u16,
+        rays: &RayBlock,
+        hits: &HitBlock,
+        origin: DVec3,
+        out: &mut Planes,
+    ) {
+        if let Source::Mesh(mesh) = self.source {
+            self.mesh_planes(simd, mesh, lanes, hits, origin, out);
+            return;
+        }
+        for lane in (0..LANES).filter(|l| lanes >> l & 1 != 0) {
+            if let Some(hit) = hits.get(lane) {
+                let (point, normal) = self.plane(&rays.get(lane), &hit, origin);
+                for c in 0..3 {
+                    (out.point[c][lane], out.normal[c][lane]) = (point[c], normal[c]);
+                }
+            }
+        }
+    }
+
+    #[inline(never)]
+    fn mesh_planes<S: Simd>(
+        &self,
+        simd: S,
+        mesh: &TriMesh,
+        lanes: u16,
+        hits: &HitBlock,
+        origin: DVec3,
+        out: &mut Planes,
+    ) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let first = lanes.trailing_zeros() as usize & 15;
+                let mut corners = [Rows3::ZERO; 3];
+                for lane in 0..LANES {
+                    let from = if lanes >> lane & 1 != 0 { lane } else { first };
+                    let [a, b, c] = mesh.indices[hits.prim[from] as usize];
+                    corners[0].set(lane, mesh.positions[a as usize]);
+                    corners[1].set(lane, mesh.positions[b as usize]);
+                    corners[2].set(lane, mesh.positions[c as usize]);
+                }
+                let (moved, m) = (self.normal_from_object.is_some(), self.render_from_object);
+                let mut all = Planes::new();
+                for l in 0..LANES {
+                    let at = [corners[0].get(l), corners[1].get(l), corners[2].get(l)];
+                    let (p, n) = plane_of(at, [hits.u[l], hits.v[l]], moved, &m, origin);
+                    (all.point[0][l], all.point[1][l], all.point[2][l]) = (p.x, p.y, p.z);
+                    (all.normal[0][l], all.normal[1][l], all.normal[2][l]) = (n.x, n.y, n.z);
+                }
+                for c in 0..3 {
+                    for l in 0..LANES {
+                        let on = lanes >> l & 1 != 0;
+                        out.point[c][l] = if on { all.point[c][l] } else { out.point[c][l] };
+                        out.normal[c][l] = if on { all.normal[c][l] } else { out.normal[c][l] };
+                    }
+                }
+            },
+        );
     }
 
     /// Returns the lanes that it could do.

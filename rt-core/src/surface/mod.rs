@@ -7,7 +7,7 @@
 
 mod block;
 
-pub(crate) use block::Looks;
+pub(crate) use block::{Looks, Planes};
 
 use crate::accel::Geometry;
 use crate::material::{ColorSource, Material, Sides};
@@ -314,15 +314,14 @@ impl<'a> Placed<'a> {
     pub(crate) fn plane(&self, ray: &Ray, hit: &Hit, origin: DVec3) -> (DVec3, DVec3) {
         match self.source {
             Source::Mesh(mesh) => {
-                let corners = mesh.triangle(hit.prim as usize).map(|p| p.as_dvec3());
-                let m = &self.render_from_object;
-                let [a, b, c] = if self.normal_from_object.is_none() {
-                    corners.map(|p| p + m.translation)
-                } else {
-                    corners.map(|p| m.transform_point3(p))
-                };
-                let (e1, e2) = (b - a, c - a);
-                (origin + a + e1 * hit.u as f64 + e2 * hit.v as f64, e1.cross(e2))
+                let moved = self.normal_from_object.is_some();
+                plane_of(
+                    mesh.triangle(hit.prim as usize),
+                    [hit.u, hit.v],
+                    moved,
+                    &self.render_from_object,
+                    origin,
+                )
             }
             Source::Shape(shape) => {
                 let local_ray = self.object_ray(ray);
@@ -405,4 +404,24 @@ fn interpolate4(a: &Attribute<[f32; 4]>, corner: [usize; 3], prim: u32, [w, u, v
         }
         PerElement::Face => a.values[prim as usize],
     }
+}
+
+/// A point of a triangle and its normal, of any length, in world space; `moved` when its instance does more than shift it.
+#[inline(always)]
+fn plane_of(
+    corners: [Vec3; 3],
+    [u, v]: [f32; 2],
+    moved: bool,
+    m: &DAffine3,
+    origin: DVec3,
+) -> (DVec3, DVec3) {
+    let [a, b, c] = corners;
+    let (a, b, c) = (a.as_dvec3(), b.as_dvec3(), c.as_dvec3());
+    let (a, b, c) = if moved {
+        (m.transform_point3(a), m.transform_point3(b), m.transform_point3(c))
+    } else {
+        (a + m.translation, b + m.translation, c + m.translation)
+    };
+    let (e1, e2) = (b - a, c - a);
+    (origin + a + e1 * u as f64 + e2 * v as f64, e1.cross(e2))
 }

@@ -6,6 +6,7 @@
 mod light;
 
 use super::direct::incident_from;
+use super::layers::record_block;
 use super::lobes::{ambient_albedo, response};
 use super::stage::Stage;
 use super::tile::{PIXELS, TileArea, TileLayers};
@@ -101,13 +102,11 @@ fn light_hits<S: Simd, const POINT: bool>(
             }
             light::merge(simd, lanes, &radiance, &mut rows);
             if record {
-                for lane in (0..LANES).filter(|l| lanes >> l & 1 != 0) {
-                    if let Some(hit) = hits.get(lane) {
-                        let slot = (b * LANES + lane) as u16;
-                        out.record(stage, area, slot, &rays.get(lane), &hit, || looks.normal.get(lane));
-                    }
-                }
+                out.record_normals(b, lanes, |lane| looks.normal.get(lane));
             }
+        }
+        if record {
+            record_block(simd, stage, area, b, rays, hits, out);
         }
         light::store_pixels(simd, &rows, pixels);
     }

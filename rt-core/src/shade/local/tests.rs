@@ -106,9 +106,10 @@ fn sixteen_at_a_time_have_the_bits_of_one_at_every_level() {
             // The last ones are cut off by the picture's edge.
             let width = if tile % 3 == 2 { 13 } else { TILE };
             let area = TileArea { x, y, width, height: TILE, sample: 0 };
-            let mut out = TileLayers::new(Layers::COLOR, 1.0, false);
+            let mut out = TileLayers::new(Layers::ALL, 1.0, false);
+            let mut one = TileLayers::new(Layers::ALL, 1.0, false);
             let (mut work, mut stats) = (Workspace::default(), RayStats::default());
-            render_tile(&stage, &area, &mut out, &mut work, None, false, &mut stats);
+            render_tile(&stage, &area, &mut out, &mut work, None, true, &mut stats);
             for slot in 0..PIXELS {
                 let Some([px, py]) = area.pixel(slot as u16) else { continue };
                 let [nx, ny] = stage.ndc(px, py, [0.5; 2]);
@@ -118,6 +119,7 @@ fn sixteen_at_a_time_have_the_bits_of_one_at_every_level() {
                         met[hit.instance as usize] += 1;
                         let placed = stage.placed(&hit);
                         let look = placed.look::<true>(&ray, &hit);
+                        one.record(&stage, &area, slot as u16, &ray, &hit, || look.normal);
                         radiance(&stage, placed.material, &look, ray.dir).extend(1.0).to_array()
                     }
                     None => {
@@ -132,6 +134,9 @@ fn sixteen_at_a_time_have_the_bits_of_one_at_every_level() {
                     out.color[slot]
                 );
             }
+            assert!(out.depth == one.depth && out.distance == one.distance, "depth at {level:?}");
+            assert!(out.instance == one.instance && out.primitive == one.primitive, "ids at {level:?}");
+            assert!(out.normal == one.normal, "normals at {level:?}");
         }
     }
     assert!(
