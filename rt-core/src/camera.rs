@@ -248,7 +248,7 @@ impl Camera {
 
     /// OpenGL's window depth of a world point: 0 (near) to 1 (far) unless the depth range says otherwise. One f64 evaluation of
     /// matrix rows z and w; round it to f32 for a depth buffer.
-    #[inline]
+    #[inline(always)]
     pub fn window_depth(&self, world: DVec3) -> f64 {
         let (z, w) = (self.clip_from_world.row(2), self.clip_from_world.row(3));
         let ndc = (z.truncate().dot(world) + z.w) / (w.truncate().dot(world) + w.w);
@@ -269,6 +269,7 @@ impl Camera {
 
     /// The world ray through NDC (`x`, `y`) as origin and direction, in the parametrization of the module's text: clip w for
     /// perspective, clip z + w over w (0 at the near plane, 2 at the far plane) for parallel projections.
+    #[inline]
     pub fn world_ray(&self, [x, y]: [f64; 2]) -> (DVec3, DVec3) {
         match self.projection {
             Projection::Perspective { eye } => (eye, self.inverse * DVec3::new(x, y, 1.0)),

@@ -1,6 +1,10 @@
 //! One-dimensional lookup from scalar to colour (thesis section 3.2.5): scalars are interpolated first and mapped then, so a
 //! colour map stays sharp inside large triangles.
 
+use crate::ray::LANES;
+use crate::simd::vectors::Row;
+use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask, f32x16};
+
 /// Linear RGBA.
 pub type Rgba = [f32; 4];
 
@@ -39,6 +43,45 @@ impl ColorMap {
         let j = (i + 1).min(self.colors.len() - 1);
         let f = x - i as f32;
         std::array::from_fn(|c| self.colors[i][c] + (self.colors[j][c] - self.colors[i][c]) * f)
+    }
+
+    /// [`ColorMap::lookup`] of sixteen scalars, with the same bits: a row per channel.
+    #[inline(always)]
+    pub(crate) fn lookup_block<S: Simd>(&self, simd: S, scalars: f32x16<S>, out: &mut [Row; 4]) {
+        let v = |x: f32| f32x16::splat(simd, x);
+        if self.log {
+            // Logarithms are not vectorised: each lane by itself.
+            for lane in 0..LANES {
+                let color = self.lookup(scalars[lane]);
+                for c in 0..4 {
+                    out[c][lane] = color[c];
+                }
+            }
+            return;
+        }
+        let [a, b] = self.range;
+        let t = (scalars - v(a)) / v(b - a);
+        let t = t.simd_eq(t).select(t.max(v(0.0)).min(v(1.0)), v(0.5));
+        let last = self.colors.len() - 1;
+        let x = t * v(last as f32);
+        // Not negative, so rounding down is truncation.
+        let i = x.floor();
+        let f = x - i;
+        let (mut low, mut high) = ([[0.0; LANES]; 4], [[0.0; LANES]; 4]);
+        for lane in 0..LANES {
+            let i = (i[lane] as usize).min(last);
+            let (p, q) = (self.colors[i], self.colors[(i + 1).min(last)]);
+            for c in 0..4 {
+                (low[c][lane], high[c][lane]) = (p[c], q[c]);
+            }
+        }
+        let known = scalars.simd_eq(scalars);
+        for c in 0..4 {
+            let (p, q) = (f32x16::from_slice(simd, &low[c]), f32x16::from_slice(simd, &high[c]));
+            let mixed = p + (q - p) * f;
+            let color = if known.all_true() { mixed } else { known.select(mixed, v(self.nan_color[c])) };
+            color.store_slice(&mut out[c]);
+        }
     }
 }
 

@@ -90,7 +90,7 @@ pub enum Background {
 /// within a few per cent of the mean for pictures.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct MeanRadiance {
-    coefficients: [Vec3; 9],
+    pub(crate) coefficients: [Vec3; 9],
 }
 
 impl MeanRadiance {

@@ -5,6 +5,10 @@
 //! in each of the 2^k elementary intervals, so k can grow without starting again. [`Sampling::Random`] has independent points: the
 //! baseline that the accuracy experiments compare with.
 
+use crate::ray::LANES;
+use crate::simd::vectors::Row;
+use fearless_simd::Simd;
+
 /// How sample points are spread.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum Sampling {
@@ -40,8 +44,7 @@ impl Sampler {
     /// Points for sample `index` of the pixel at (`x`, `y`) of the whole picture.
     #[inline]
     pub fn new(kind: Sampling, seed: u64, x: u32, y: u32, index: u32) -> Sampler {
-        let pixel = hash(hash(x ^ seed as u32).wrapping_add(y)) ^ hash((seed >> 32) as u32 ^ 0x5bd1_e995);
-        Sampler { kind, pixel, index }
+        Sampler { kind, pixel: pixel_key(seed, x, y), index }
     }
 
     /// The point of dimension `dimension` (a pair of axes; give each use its own number).
@@ -58,32 +61,131 @@ impl Sampler {
 
     #[inline]
     fn point(&self, index: u32, dimension: u32) -> [f32; 2] {
-        let seed = hash(self.pixel.wrapping_add(dimension.wrapping_mul(0x9e37_79b9)));
         match self.kind {
-            Sampling::Sobol => {
-                let i = owen_scramble(index, seed);
-                [
-                    to_unit(owen_scramble(i.reverse_bits(), hash(seed ^ 0x68bc_21eb))),
-                    to_unit(owen_scramble(sobol_second(i), hash(seed ^ 0x02e5_be93))),
-                ]
-            }
-            Sampling::Random => {
-                let a = hash(seed ^ hash(index));
-                [to_unit(a), to_unit(hash(a ^ 0x3c6e_f372))]
-            }
+            Sampling::Sobol => sobol_point(self.pixel, index, dimension),
+            Sampling::Random => random_point(self.pixel, index, dimension),
         }
     }
 }
 
+/// Points for sixteen uses at once: the functions of [`Sampler`] in loops that become vector code.
+pub(crate) struct SamplerBlock {
+    kind: Sampling,
+    pixel: [u32; LANES],
+    index: [u32; LANES],
+    dimension: [u32; LANES],
+}
+
+impl SamplerBlock {
+    pub(crate) fn new(kind: Sampling) -> SamplerBlock {
+        SamplerBlock { kind, pixel: [0; LANES], index: [0; LANES], dimension: [0; LANES] }
+    }
+
+    /// Lane `lane` is to have [`Sampler::square_of`]`(dimension, k, count)`.
+    #[inline]
+    pub(crate) fn set(&mut self, lane: usize, sampler: &Sampler, dimension: u32, k: u32, count: u32) {
+        self.pixel[lane] = sampler.pixel;
+        self.index[lane] = sampler.index.wrapping_mul(count).wrapping_add(k);
+        self.dimension[lane] = dimension;
+    }
+
+    /// All lanes are to have [`Sampler::square`]`(dimension)` of sample `index`, each of its own pixel.
+    #[inline(never)]
+    pub(crate) fn set_pixels<S: Simd>(
+        &mut self,
+        simd: S,
+        seed: u64,
+        (x, y): (&[u32; LANES], &[u32; LANES]),
+        index: u32,
+        dimension: u32,
+    ) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                (self.index, self.dimension) = ([index; LANES], [dimension; LANES]);
+                for lane in 0..LANES {
+                    self.pixel[lane] = pixel_key(seed, x[lane], y[lane]);
+                }
+            },
+        );
+    }
+
+    /// Points of the unit square.
+    #[inline(never)]
+    pub(crate) fn squares<S: Simd>(&self, simd: S) -> [Row; 2] {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let mut out = [[0.0; LANES]; 2];
+                match self.kind {
+                    Sampling::Sobol => {
+                        for lane in 0..LANES {
+                            let p = sobol_point(self.pixel[lane], self.index[lane], self.dimension[lane]);
+                            (out[0][lane], out[1][lane]) = (p[0], p[1]);
+                        }
+                    }
+                    Sampling::Random => {
+                        for lane in 0..LANES {
+                            let p = random_point(self.pixel[lane], self.index[lane], self.dimension[lane]);
+                            (out[0][lane], out[1][lane]) = (p[0], p[1]);
+                        }
+                    }
+                }
+                out
+            },
+        )
+    }
+
+    /// Directions by [`cosine_hemisphere`].
+    #[inline(never)]
+    pub(crate) fn cosine_hemispheres<S: Simd>(&self, simd: S) -> [Row; 3] {
+        let [a, b] = self.squares(simd);
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let mut out = [[0.0; LANES]; 3];
+                for lane in 0..LANES {
+                    let d = cosine_hemisphere([a[lane], b[lane]]);
+                    (out[0][lane], out[1][lane], out[2][lane]) = (d.x, d.y, d.z);
+                }
+                out
+            },
+        )
+    }
+}
+
+/// What tells pixels (and pictures) apart.
+#[inline(always)]
+fn pixel_key(seed: u64, x: u32, y: u32) -> u32 {
+    hash(hash(x ^ seed as u32).wrapping_add(y)) ^ hash((seed >> 32) as u32 ^ 0x5bd1_e995)
+}
+
+#[inline(always)]
+fn sobol_point(pixel: u32, index: u32, dimension: u32) -> [f32; 2] {
+    let seed = hash(pixel.wrapping_add(dimension.wrapping_mul(0x9e37_79b9)));
+    let i = owen_scramble(index, seed);
+    [
+        to_unit(owen_scramble(i.reverse_bits(), hash(seed ^ 0x68bc_21eb))),
+        to_unit(owen_scramble(sobol_second(i), hash(seed ^ 0x02e5_be93))),
+    ]
+}
+
+#[inline(always)]
+fn random_point(pixel: u32, index: u32, dimension: u32) -> [f32; 2] {
+    let seed = hash(pixel.wrapping_add(dimension.wrapping_mul(0x9e37_79b9)));
+    let a = hash(seed ^ hash(index));
+    [to_unit(a), to_unit(hash(a ^ 0x3c6e_f372))]
+}
+
 /// The top 24 bits as a number in 0..1 (1 excluded: every value is exact in f32).
-#[inline]
+#[inline(always)]
 fn to_unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
 /// Sobol's second dimension as a 32-bit fraction. Its generator matrix is Pascal's triangle mod 2, which by Lucas' theorem is a
 /// Kronecker power: five masked shifts do the work of 32 conditional exclusive-ors.
-#[inline]
+#[inline(always)]
 fn sobol_second(i: u32) -> u32 {
     let mut v = i;
     v ^= (v & 0xaaaa_aaaa) >> 1;
@@ -96,7 +198,7 @@ fn sobol_second(i: u32) -> u32 {
 
 /// Nested uniform scrambling: each bit is flipped by a hash of the bits above it (Laine and Karras 2011, with Burley's constants,
 /// on reversed bits).
-#[inline]
+#[inline(always)]
 fn owen_scramble(v: u32, seed: u32) -> u32 {
     let mut x = v.reverse_bits().wrapping_add(seed);
     x ^= x.wrapping_mul(0x6c50_b47c);
@@ -107,7 +209,7 @@ fn owen_scramble(v: u32, seed: u32) -> u32 {
 }
 
 /// 32 bits to 32 well-mixed bits, one to one (the "lowbias32" constants of Wellons' hash prospector).
-#[inline]
+#[inline(always)]
 pub(crate) fn hash(mut x: u32) -> u32 {
     x ^= x >> 16;
     x = x.wrapping_mul(0x7feb_352d);
@@ -126,15 +228,22 @@ pub fn cosine_hemisphere([a, b]: [f32; 2]) -> glam::Vec3 {
 /// Uniform point in the unit disk: the concentric map of Shirley and Chiu (1997), which keeps neighbours together.
 #[inline]
 pub fn unit_disk([a, b]: [f32; 2]) -> [f32; 2] {
-    use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
     let (x, y) = (2.0 * a - 1.0, 2.0 * b - 1.0);
-    if x == 0.0 && y == 0.0 {
-        return [0.0, 0.0];
-    }
-    let (r, angle) =
-        if x.abs() > y.abs() { (x, FRAC_PI_4 * (y / x)) } else { (y, FRAC_PI_2 - FRAC_PI_4 * (x / y)) };
-    let (sin, cos) = angle.sin_cos();
-    [r * cos, r * sin]
+    // Angles are counted from the nearer axis, x or y. No branches, so that loops over this become vector code.
+    let near_x = x.abs() > y.abs();
+    let (r, across) = if near_x { (x, y) } else { (y, x) };
+    let ratio = across / if r == 0.0 { 1.0 } else { r };
+    let (sin, cos) = sin_cos_to_45_degrees(std::f32::consts::FRAC_PI_4 * ratio);
+    if near_x { [r * cos, r * sin] } else { [r * sin, r * cos] }
+}
+
+/// Sine and cosine of angles within ±π/4 to 1·10⁻⁷, with the same bits on every platform (polynomials of Moshier's Cephes library, sinf.c).
+#[inline(always)]
+fn sin_cos_to_45_degrees(x: f32) -> (f32, f32) {
+    let z = x * x;
+    let sin = x + x * z * (-0.166_666_55 + z * (0.008_332_161 + z * -0.000_195_152_96));
+    let cos = 1.0 - 0.5 * z + z * z * (0.041_666_646 + z * (-0.001_388_731_6 + z * 0.000_024_433_157));
+    (sin, cos)
 }
 
 #[cfg(test)]
@@ -157,6 +266,55 @@ mod tests {
         for i in (0..5000).chain([u32::MAX, 0x8000_0001, 0xdead_beef]) {
             assert_eq!(sobol_second(i), slow(i), "{i:#x}");
         }
+    }
+
+    #[test]
+    fn blocks_have_the_points_of_single_samplers_at_every_level() {
+        use crate::simd::SimdLevel;
+        for level in SimdLevel::available().into_iter().map(Some).chain([None]) {
+            for kind in Sampling::ALL {
+                let one = |lane: u32| Sampler::new(kind, 77 << 20, lane * 37, 5 + lane, lane / 3);
+                let mut block = SamplerBlock::new(kind);
+                for lane in 0..LANES as u32 {
+                    block.set(lane as usize, &one(lane), lane % 4, 2 * lane, 9);
+                }
+                let pixels =
+                    (&std::array::from_fn(|l| 7 * l as u32), &std::array::from_fn(|l| 100 + l as u32));
+                let mut same_sample = SamplerBlock::new(kind);
+                let level = SimdLevel::resolve(level);
+                let (squares, domes, camera) = fearless_simd::dispatch!(level, simd => {
+                    same_sample.set_pixels(simd, 12 << 33, pixels, 3, 1);
+                    (block.squares(simd), block.cosine_hemispheres(simd), same_sample.squares(simd))
+                });
+                for lane in 0..LANES {
+                    let l = lane as u32;
+                    let p = one(l).square_of(l % 4, 2 * l, 9);
+                    let d = cosine_hemisphere(p);
+                    assert_eq!([squares[0][lane], squares[1][lane]], p);
+                    assert_eq!([domes[0][lane], domes[1][lane], domes[2][lane]], d.to_array());
+                    let c = Sampler::new(kind, 12 << 33, pixels.0[lane], pixels.1[lane], 3).square(1);
+                    assert_eq!([camera[0][lane], camera[1][lane]], c);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn disk_points_are_where_sine_and_cosine_say() {
+        use std::f64::consts::FRAC_PI_4;
+        for k in 0..=100_000 {
+            let x = (k as f32 / 50_000.0 - 1.0) * FRAC_PI_4 as f32;
+            let (sin, cos) = sin_cos_to_45_degrees(x);
+            assert!(
+                (sin as f64 - (x as f64).sin()).abs() < 1e-7 && (cos as f64 - (x as f64).cos()).abs() < 1e-7,
+                "{x}"
+            );
+        }
+        assert_eq!(unit_disk([0.5, 0.5]), [0.0, 0.0]);
+        assert_eq!(unit_disk([1.0, 0.5]), [1.0, 0.0]);
+        assert_eq!(unit_disk([0.5, 0.0]), [0.0, -1.0]);
+        let [x, y] = unit_disk([0.0, 0.0]);
+        assert!((x + 0.5f32.sqrt()).abs() < 1e-7 && (x - y).abs() < 1e-7, "{x} {y}");
     }
 
     #[test]

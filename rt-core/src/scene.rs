@@ -168,7 +168,10 @@ impl Scene {
         let geometry_has_alpha = world
             .geometries()
             .iter()
-            .map(|g| matches!(g, Geometry::Mesh(m) if m.colors.as_ref().is_some_and(has_alpha)))
+            .map(|g| match g {
+                Geometry::Mesh(m) => m.colors.as_ref().is_some_and(has_alpha),
+                Geometry::Shape(s) => s.has_transparency(),
+            })
             .collect();
         Scene {
             appearances: vec![Appearance::default(); world.instances().len()],

@@ -8,8 +8,10 @@ use rt_core::light::Light;
 use rt_core::material::{Material, Sides, SurfaceModel};
 use rt_core::mesh::Attribute;
 use rt_core::render::RenderOptions;
-use rt_core::scene::AmbientOcclusion;
+use rt_core::scene::{AmbientOcclusion, SceneBuilder};
+use rt_core::shapes::{Cylinders, Radii, Shape, Spheres, Tubes};
 use scenes_common::*;
+use std::sync::Arc;
 
 fn options(n: u32) -> RenderOptions {
     RenderOptions::new(n, n)
@@ -410,6 +412,40 @@ fn coplanar_layers_are_one_surface_of_the_lowest_id() {
     let s = scene(vec![(floor(0.0, 3.0), m([1.0, 0.0, 0.0])), (floor(0.0, 3.0), m([0.0, 1.0, 0.0]))], vec![]);
     let o = draw(&s, &top_camera(5.0, 4.0), options(16));
     assert!(o.frame.color.iter().all(|p| *p == [0.5, 0.0, 0.0, 0.5]), "{:?}", o.frame.color_at(5, 5));
+}
+
+#[test]
+fn shapes_with_alpha_in_their_colours_are_looked_through() {
+    // Two spheres one behind the other, the front one red and half transparent; and the same through cylinders and tubes.
+    let colors = |alpha: f32| vec![[0.0, 0.0, 1.0, 1.0], [1.0, 0.0, 0.0, alpha]];
+    let centers = vec![Vec3::ZERO, Vec3::new(0.0, 0.0, 2.0)];
+    let ends = || vec![Vec3::new(-1.0, 0.0, 2.0), Vec3::new(1.0, 0.0, 2.0)];
+    for alpha in [1.0, 0.5] {
+        let red = vec![[1.0, 0.0, 0.0, alpha]; 2];
+        let spheres = Spheres::new(centers.clone(), Radii::Common(0.5)).unwrap().with_colors(colors(alpha));
+        let cylinder = Cylinders::new(ends(), Radii::Common(0.5), false).unwrap().with_colors(red.clone());
+        let tube = Tubes::new(ends(), &[0, 2], Radii::Common(0.5)).unwrap().with_colors(red);
+        let shapes: [(Arc<dyn Shape>, bool); 3] = [
+            (Arc::new(spheres.unwrap()), false),
+            (Arc::new(cylinder.unwrap()), true),
+            (Arc::new(tube.unwrap()), true),
+        ];
+        for (k, (shape, needs_back)) in shapes.into_iter().enumerate() {
+            let mut b = SceneBuilder::new();
+            b.shape(shape, Material::unlit([1.0; 3]));
+            if needs_back {
+                b.mesh(floor(0.0, 3.0), Material::unlit([0.0, 0.0, 1.0]));
+            }
+            let s = b.build().unwrap();
+            assert_eq!(Effects::required_by(&s).contains(Effects::TRANSPARENCY), alpha < 1.0, "shape {k}");
+            let o = draw(&s, &top_camera(5.0, 4.0), options(9));
+            // Rays meet the red one on their way in and on their way out.
+            let red = if alpha < 1.0 { 0.75 } else { 1.0 };
+            assert_eq!(o.frame.color_at(4, 4), [red, 0.0, 1.0 - red, 1.0], "shape {k}");
+            assert_eq!(o.report.rays.opacity_ignored, 0);
+            assert!(o.report.warnings.is_empty(), "{:?}", o.report.warnings);
+        }
+    }
 }
 
 #[test]

@@ -1,8 +1,8 @@
-//! From tiles to rows of pixels.
+//! From tiles to rows of pixels: all at once from tiles that collect samples, or tile by tile while each is still in the cache.
 
 use super::RenderOptions;
 use crate::camera::Camera;
-use crate::frame::Frame;
+use crate::frame::{Frame, Layers};
 use crate::shade::{TILE, TileArea, TileLayers};
 use rayon::prelude::*;
 
@@ -105,5 +105,131 @@ impl Grid<'_> {
             }
         });
         out
+    }
+}
+
+/// A picture of blank pixels, in the memory of `old` where it fits (whose pixels then stay what they were).
+pub(super) fn blank_frame(options: &RenderOptions, camera: &Camera, old: Frame) -> Frame {
+    let crop = options.area();
+    let n = crop.width as usize * crop.height as usize;
+    fn plane<T: Clone>(old: Vec<T>, wanted: bool, n: usize, blank: T) -> Vec<T> {
+        match (wanted, old.len() == n) {
+            (false, _) => Vec::new(),
+            (true, true) => old,
+            (true, false) => vec![blank; n],
+        }
+    }
+    let has = |l| options.layers.contains(l);
+    Frame {
+        width: crop.width,
+        height: crop.height,
+        color: plane(old.color, has(Layers::COLOR), n, [0.0; 4]),
+        depth: plane(old.depth, has(Layers::DEPTH), n, camera.background_depth() as f32),
+        distance: plane(old.distance, has(Layers::DISTANCE), n, f32::INFINITY),
+        normal: plane(old.normal, has(Layers::NORMAL), n, [0.0; 3]),
+        instance: plane(old.instance, has(Layers::IDS), n, u32::MAX),
+        primitive: plane(old.primitive, has(Layers::IDS), n, u32::MAX),
+        cost: plane(old.cost, has(Layers::COST), n, 0.0),
+    }
+}
+
+/// The pixels of a picture that belong to one row of tiles, or to one tile: of each layer the rows' pieces.
+pub(super) struct Pieces<'a> {
+    pub(super) area: TileArea,
+    color: Vec<&'a mut [[f32; 4]]>,
+    depth: Vec<&'a mut [f32]>,
+    distance: Vec<&'a mut [f32]>,
+    normal: Vec<&'a mut [[f32; 3]]>,
+    instance: Vec<&'a mut [u32]>,
+    primitive: Vec<&'a mut [u32]>,
+    cost: Vec<&'a mut [f32]>,
+}
+
+/// Rows of tiles, each with its pixels.
+pub(super) fn bands<'a>(options: &RenderOptions, frame: &'a mut Frame) -> Vec<Pieces<'a>> {
+    let crop = options.area();
+    let size = crop.width as usize * TILE as usize;
+    // A layer that was not asked for has no bands.
+    fn next<'a, T>(chunks: &mut std::slice::ChunksMut<'a, T>) -> Vec<&'a mut [T]> {
+        chunks.next().into_iter().collect()
+    }
+    let (mut color, mut depth) = (frame.color.chunks_mut(size), frame.depth.chunks_mut(size));
+    let (mut distance, mut normal) = (frame.distance.chunks_mut(size), frame.normal.chunks_mut(size));
+    let (mut instance, mut primitive) = (frame.instance.chunks_mut(size), frame.primitive.chunks_mut(size));
+    let mut cost = frame.cost.chunks_mut(size);
+    (0..crop.height)
+        .step_by(TILE as usize)
+        .map(|y| Pieces {
+            area: TileArea {
+                x: crop.x,
+                y: crop.y + y,
+                width: crop.width,
+                height: TILE.min(crop.height - y),
+                sample: 0,
+            },
+            color: next(&mut color),
+            depth: next(&mut depth),
+            distance: next(&mut distance),
+            normal: next(&mut normal),
+            instance: next(&mut instance),
+            primitive: next(&mut primitive),
+            cost: next(&mut cost),
+        })
+        .collect()
+}
+
+impl<'a> Pieces<'a> {
+    /// A row of tiles cut into its tiles.
+    pub(super) fn tiles(self) -> Vec<Pieces<'a>> {
+        let Pieces { area, color, depth, distance, normal, instance, primitive, cost } = self;
+        let mut tiles: Vec<Pieces<'a>> = (0..area.width)
+            .step_by(TILE as usize)
+            .map(|x| Pieces {
+                area: TileArea { x: area.x + x, width: TILE.min(area.width - x), ..area },
+                color: Vec::new(),
+                depth: Vec::new(),
+                distance: Vec::new(),
+                normal: Vec::new(),
+                instance: Vec::new(),
+                primitive: Vec::new(),
+                cost: Vec::new(),
+            })
+            .collect();
+        fn deal<'a, T>(band: Vec<&'a mut [T]>, width: u32, mut give: impl FnMut(usize, &'a mut [T])) {
+            for rows in band {
+                for row in rows.chunks_mut(width as usize) {
+                    row.chunks_mut(TILE as usize).enumerate().for_each(|(k, piece)| give(k, piece));
+                }
+            }
+        }
+        let w = area.width;
+        deal(color, w, |k, piece| tiles[k].color.push(piece));
+        deal(depth, w, |k, piece| tiles[k].depth.push(piece));
+        deal(distance, w, |k, piece| tiles[k].distance.push(piece));
+        deal(normal, w, |k, piece| tiles[k].normal.push(piece));
+        deal(instance, w, |k, piece| tiles[k].instance.push(piece));
+        deal(primitive, w, |k, piece| tiles[k].primitive.push(piece));
+        deal(cost, w, |k, piece| tiles[k].cost.push(piece));
+        tiles
+    }
+
+    /// Copies a tile after its only sample.
+    pub(super) fn write(&mut self, tile: &TileLayers) {
+        fn plane<T: Copy>(rows: &mut [&mut [T]], slots: &[T]) {
+            for (y, row) in rows.iter_mut().enumerate() {
+                // Two neighbours in a row are neighbours along the curve, too.
+                for (pair, out) in row.chunks_mut(2).enumerate() {
+                    let slot = TileArea::slot(2 * pair as u32, y as u32);
+                    out.copy_from_slice(&slots[slot..slot + out.len()]);
+                }
+            }
+        }
+        plane(&mut self.color, &tile.color);
+        plane(&mut self.depth, &tile.depth);
+        plane(&mut self.distance, &tile.distance);
+        plane(&mut self.normal, &tile.normal);
+        plane(&mut self.instance, &tile.instance);
+        plane(&mut self.primitive, &tile.primitive);
+        plane(&mut self.cost, &tile.cost);
     }
 }

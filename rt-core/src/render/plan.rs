@@ -96,7 +96,7 @@ pub(super) fn warn_without_effect(
     if rays.opacity_ignored > 0 && !left_out.contains(Effects::TRANSPARENCY) {
         out.push(format!(
             "{} hits on surfaces with opacity below 1 were drawn opaque: the scene did not show that it has any; \
-             give a material an opacity below 1",
+             give a material an opacity below 1, or let the shape's `has_transparency` say so",
             rays.opacity_ignored
         ));
     }

@@ -1,6 +1,6 @@
 //! Sample after sample, with a picture after each.
 
-use super::assemble::{Tile, assemble, tiles};
+use super::assemble::{Pieces, Tile, assemble, bands, blank_frame, tiles};
 use super::plan::{plan, warn_without_effect};
 use super::{RenderError, RenderOptions, RenderOutput};
 use crate::camera::Camera;
@@ -56,18 +56,28 @@ pub struct RenderReport {
 #[derive(Default)]
 pub(super) struct Buffers {
     tiles: Vec<Tile>,
-    spare: Vec<Workspace>,
+    spare: Vec<Desk>,
     /// A picture nobody needs any more.
     pub(super) frame: Frame,
+}
+
+/// What a thread works with.
+#[derive(Default)]
+struct Desk {
+    work: Workspace,
+    /// The tile in work, in pictures of one sample; else tiles have their own.
+    layers: Option<TileLayers>,
 }
 
 /// A picture in the making.
 pub struct Progressive<'a> {
     stage: Stage<'a>,
+    /// Tiles that collect samples. Pictures of one sample have none: each tile goes to its place while it is still in the cache, which saves writing and
+    /// reading 32 bytes per pixel of main memory (measured: 5 of 50 ms at 1024 x 1024).
     tiles: Vec<Tile>,
     /// Buffers of threads that are not rendering now.
-    spare: Mutex<Vec<Workspace>>,
-    /// Memory for the next picture.
+    spare: Mutex<Vec<Desk>>,
+    /// Memory for the picture; in pictures of one sample, after the first step, the picture.
     old_frame: Frame,
     rays: RayStats,
     left_out: Effects,
@@ -100,7 +110,7 @@ impl<'a> Progressive<'a> {
         let plan = plan(scene, camera, options)?;
         Ok(Progressive {
             stage: Stage::new(scene, camera, options, plan.effects),
-            tiles: tiles(options, camera, buffers.tiles),
+            tiles: if one_pass(options) { buffers.tiles } else { tiles(options, camera, buffers.tiles) },
             spare: Mutex::new(buffers.spare),
             old_frame: buffers.frame,
             rays: RayStats::default(),
@@ -133,28 +143,53 @@ impl<'a> Progressive<'a> {
                 None
             }
         };
-        let rays = self
-            .tiles
-            .par_iter_mut()
-            .map(|tile| {
+        let one_pass = one_pass(options);
+        // Rays of the tiles that were drawn, and how many were not.
+        let draw = |area: &TileArea, layers: &mut TileLayers, work: &mut Workspace| {
+            catch_unwind(AssertUnwindSafe(|| render_tile(stage, area, layers, work, sample)))
+                .map_err(|panic| locate_panic(stage, *area, sample, message_of(&*panic)))
+        };
+        let add = |mut a: (RayStats, u32), b: (RayStats, u32)| {
+            a.0 += b.0;
+            Ok((a.0, a.1 + b.1))
+        };
+        let none = || (RayStats::default(), 0);
+        let (rays, missing) = if one_pass {
+            let old = std::mem::take(&mut self.old_frame);
+            self.old_frame = blank_frame(options, &stage.camera, old);
+            let frame = &mut self.old_frame;
+            let pieces = bands(options, frame).into_par_iter().flat_map(|b| b.tiles().into_par_iter());
+            let draw_piece = |mut piece: Pieces<'_>| {
+                let mut desk = take(spare);
+                let mut layers = ready_layers(stage, desk.layers.take());
+                let cut = cut().is_some();
+                let stats = if cut {
+                    layers.clear_color();
+                    RayStats::default()
+                } else {
+                    draw(&piece.area, &mut layers, &mut desk.work)?
+                };
+                piece.write(&layers);
+                desk.layers = Some(layers);
+                give_back(spare, desk);
+                Ok::<_, RenderError>((stats, cut as u32))
+            };
+            pieces.map(draw_piece).try_reduce(none, add)?
+        } else {
+            let draw_tile = |tile: &mut Tile| {
                 if cut().is_some() {
-                    return Ok::<_, RenderError>(RayStats::default());
+                    return Ok::<_, RenderError>((RayStats::default(), 1));
                 }
-                let mut work = take(spare);
-                let stats = catch_unwind(AssertUnwindSafe(|| {
-                    render_tile(stage, &tile.area, &mut tile.layers, &mut work, sample)
-                }))
-                .map_err(|panic| locate_panic(stage, tile.area, sample, message_of(&*panic)))?;
+                let mut desk = take(spare);
+                let stats = draw(&tile.area, &mut tile.layers, &mut desk.work)?;
                 tile.samples += 1;
-                give_back(spare, work);
-                Ok(stats)
-            })
-            .try_reduce(RayStats::default, |mut a, b| {
-                a += b;
-                Ok(a)
-            })?;
+                give_back(spare, desk);
+                Ok((stats, 0))
+            };
+            self.tiles.par_iter_mut().map(draw_tile).try_reduce(none, add)?
+        };
         self.rays += rays;
-        let complete = self.tiles.iter().all(|t| t.samples > sample);
+        let complete = missing == 0;
         self.samples += complete as u32;
         self.stopped = if let Some(reason) = cut() {
             reason
@@ -179,7 +214,9 @@ impl<'a> Progressive<'a> {
 
     /// Estimated standard error, see [`RenderReport::error_levels`].
     pub fn error_levels(&self) -> Option<f32> {
-        let usable = self.samples >= 2 && self.tiles.iter().all(|t| !t.layers.luminance_sq.is_empty());
+        let usable = self.samples >= 2
+            && !one_pass(self.stage.options)
+            && self.tiles.iter().all(|t| !t.layers.luminance_sq.is_empty());
         usable.then(|| {
             let sum: f64 = self.tiles.iter().map(|t| t.layers.squared_error(&t.area, t.samples)).sum();
             let area = self.stage.options.area();
@@ -189,13 +226,24 @@ impl<'a> Progressive<'a> {
 
     /// The picture so far.
     pub fn frame(&self) -> Frame {
-        assemble(self.stage.options, &self.tiles, Frame::default())
+        let options = self.stage.options;
+        if !one_pass(options) {
+            return assemble(options, &self.tiles, Frame::default());
+        }
+        // Before the first step, `old_frame` is some other picture.
+        if self.stopped == StopReason::Running {
+            blank_frame(options, &self.stage.camera, Frame::default())
+        } else {
+            self.old_frame.clone()
+        }
     }
 
     /// The finished picture, its account, and the memory for the next.
     pub(super) fn finish(mut self) -> (RenderOutput, Buffers) {
-        let old = std::mem::take(&mut self.old_frame);
-        let frame = assemble(self.stage.options, &self.tiles, old);
+        let mut frame = std::mem::take(&mut self.old_frame);
+        if !one_pass(self.stage.options) {
+            frame = assemble(self.stage.options, &self.tiles, frame);
+        }
         let report = self.report();
         let spare = self.spare.into_inner().unwrap_or_default();
         (RenderOutput { frame, report }, Buffers { tiles: self.tiles, spare, frame: Frame::default() })
@@ -227,13 +275,26 @@ impl<'a> Progressive<'a> {
     }
 }
 
-fn take(spare: &Mutex<Vec<Workspace>>) -> Workspace {
+/// True when tiles need not remember anything: one sample, or layers without samples.
+fn one_pass(options: &RenderOptions) -> bool {
+    options.samples == 1 || !options.layers.contains(Layers::COLOR)
+}
+
+/// Layers of a tile without anything in them, in the memory of `old` ones where they fit.
+fn ready_layers(stage: &Stage<'_>, old: Option<TileLayers>) -> TileLayers {
+    let background_depth = stage.camera.background_depth() as f32;
+    let layers = stage.options.layers;
+    let used = old.and_then(|mut l| l.reset(layers, background_depth, false).then_some(l));
+    used.unwrap_or_else(|| TileLayers::new(layers, background_depth, false))
+}
+
+fn take(spare: &Mutex<Vec<Desk>>) -> Desk {
     spare.lock().map(|mut s| s.pop()).ok().flatten().unwrap_or_default()
 }
 
-fn give_back(spare: &Mutex<Vec<Workspace>>, work: Workspace) {
+fn give_back(spare: &Mutex<Vec<Desk>>, desk: Desk) {
     if let Ok(mut s) = spare.lock() {
-        s.push(work);
+        s.push(desk);
     }
 }
 

@@ -7,9 +7,11 @@ use super::wave::{LightRays, RayState};
 use super::{Dimension, Point, TileArea};
 use crate::effects::Effects;
 use crate::math::orthonormal_basis;
-use crate::ray::Ray;
+use crate::ray::{LANES, Ray};
 use crate::ray_stats::RayStats;
-use crate::sampler::cosine_hemisphere;
+use crate::sampler::{Sampler, SamplerBlock};
+use crate::simd::vectors::Row;
+use fearless_simd::{Simd, dispatch};
 use glam::Vec3;
 
 /// Rays per batch: enough for the tracer to sort by direction, few enough to stay in the second-level cache.
@@ -22,13 +24,14 @@ pub(crate) fn add_ambient_light(
     points: &mut [Point],
     states: &[RayState],
     rays: &mut LightRays,
+    OcclusionBuffers { open, domes }: &mut OcclusionBuffers,
     stats: &mut RayStats,
     mut cost: Option<&mut [f32]>,
 ) {
     let Some(mean) = &stage.mean_radiance else { return };
     let ambient = |p: &Point| {
         let material = stage.instances[p.instance as usize].material;
-        ambient_albedo(material, &p.surface, stage.effects) * mean.for_normal(p.surface.normal)
+        ambient_albedo(material, p.surface.color, stage.effects) * mean.for_normal(p.surface.normal)
     };
     let occlusion =
         stage.scene.ambient_occlusion.filter(|_| stage.effects.contains(Effects::AMBIENT_OCCLUSION));
@@ -39,39 +42,54 @@ pub(crate) fn add_ambient_light(
         return;
     };
 
-    let per_batch = (BATCH_RAYS / occlusion.rays as usize).max(1);
+    let count = occlusion.rays;
+    let per_batch = (BATCH_RAYS / count as usize).max(1);
     let mut start = 0;
     while start < points.len() {
         let end = (start + per_batch).min(points.len());
-        rays.clear();
+        // ---- Points that ambient light reaches.
+        open.clear();
         for (i, p) in points[start..end].iter().enumerate().filter(|(_, p)| p.lit) {
             let light = ambient(p);
             if light == Vec3::ZERO {
                 continue;
             }
-            let first = rays.targets.len();
             let state = &states[p.lane as usize];
             let sampler = area.sampler(stage, state.slot);
             let dimension = state.stream.wrapping_add(Dimension::AMBIENT_OCCLUSION);
+            open.push(OpenPoint { index: i as u32, light, sampler, dimension });
+        }
+        // ---- Directions over +z, sixteen at a time across points.
+        dispatch!(stage.level, simd => directions(simd, stage, open, count, domes));
+        // ---- Rays.
+        rays.clear();
+        let mut sample = 0;
+        for o in open.iter() {
+            let first = rays.targets.len();
+            let p = &points[start + o.index as usize];
             // The lobe stands on the side that is seen, whatever side the shading normal is lit from.
             let s = &p.surface;
             let normal = if s.normal.dot(s.face_normal) < 0.0 { -s.normal } else { s.normal };
             let (x, y) = orthonormal_basis(normal);
-            for k in 0..occlusion.rays {
-                let d = cosine_hemisphere(sampler.square_of(dimension, k, occlusion.rays));
-                let dir = x * d.x + y * d.y + normal * d.z;
+            // A direction that leaves through the back of the face is never sent, so there is one origin.
+            let origin = s.point + s.face_normal * s.point_error;
+            for _ in 0..count {
+                let [dx, dy, dz] = &domes[sample / LANES];
+                let lane = sample % LANES;
+                sample += 1;
+                let dir = x * dx[lane] + y * dy[lane] + normal * dz[lane];
                 // A smooth normal's hemisphere dips below the face: no sky there to be hidden.
                 if dir.dot(s.face_normal) > 0.0 {
-                    let ray = Ray::new(s.ray_origin(dir), dir).with_t_max(occlusion.distance as f32);
-                    rays.push(&ray, i as u32, light);
+                    let ray = Ray::new(origin, dir).with_t_max(occlusion.distance as f32);
+                    rays.push(&ray, o.index, o.light);
                 }
             }
             let sent = rays.targets.len() - first;
             for target in &mut rays.targets[first..] {
-                target.1 = light / sent as f32;
+                target.1 = o.light / sent as f32;
             }
             if let Some(cost) = cost.as_deref_mut() {
-                cost[state.slot as usize] += sent as f32;
+                cost[states[p.lane as usize].slot as usize] += sent as f32;
             }
         }
         let batch = &mut points[start..end];
@@ -81,5 +99,43 @@ pub(crate) fn add_ambient_light(
         stats.ambient_occlusion += counts.rays;
         stats.ambient_occlusion_blocked += counts.blocked;
         start = end;
+    }
+}
+
+/// Sixteen directions, a row per component.
+type Dome = [Row; 3];
+
+/// Buffers of one thread.
+#[derive(Default)]
+pub(crate) struct OcclusionBuffers {
+    open: Vec<OpenPoint>,
+    domes: Vec<Dome>,
+}
+
+/// A point that sends rays.
+struct OpenPoint {
+    index: u32,
+    light: Vec3,
+    sampler: Sampler,
+    dimension: u32,
+}
+
+/// `count` directions for each point, one after the other.
+fn directions<S: Simd>(simd: S, stage: &Stage<'_>, open: &[OpenPoint], count: u32, out: &mut Vec<Dome>) {
+    out.clear();
+    let mut block = SamplerBlock::new(stage.options.sampling);
+    let mut lane = 0;
+    for o in open {
+        for k in 0..count {
+            block.set(lane, &o.sampler, o.dimension, k, count);
+            lane += 1;
+            if lane == LANES {
+                out.push(block.cosine_hemispheres(simd));
+                lane = 0;
+            }
+        }
+    }
+    if lane > 0 {
+        out.push(block.cosine_hemispheres(simd));
     }
 }

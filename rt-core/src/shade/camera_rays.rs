@@ -2,8 +2,9 @@
 
 use crate::camera::{Camera, Projection};
 use crate::math::Aabb;
-use crate::ray::Ray;
-use glam::{DVec3, Vec3};
+use crate::ray::{LANES, Ray, RayBlock};
+use fearless_simd::Simd;
+use glam::DVec3;
 
 /// How far the eye may be from the scene's centre, in radii of the scene, before rays start at the scene instead of at the eye.
 /// Up to here the eye's f32 rounding is no worse than that of the vertices; rays with one origin are traced faster.
@@ -126,34 +127,47 @@ impl CameraRays {
         }
     }
 
-    /// The rays through NDC columns `xs` and rows `ys` when they differ in direction only (perspective, no lens, usual near and
-    /// far planes): sums of one vector per column and one per row. `None` where each ray needs its own arithmetic.
-    pub(crate) fn table(&self, xs: &[f64], ys: &[f64]) -> Option<RayTable> {
-        let Limits::Same([near, far]) = self.limits else { return None };
-        if self.parallel || self.lens.is_some() || self.start != 0.0 {
-            return None;
-        }
-        Some(RayTable {
-            origin: self.origin.as_vec3(),
-            range: [near.max(0.0) as f32, far as f32],
-            columns: xs.iter().map(|x| self.dir_x * *x).collect(),
-            rows: ys.iter().map(|y| self.dir + self.dir_y * *y).collect(),
-        })
-    }
-}
-
-/// Rays of a tile as columns and rows.
-pub(crate) struct RayTable {
-    origin: Vec3,
-    range: [f32; 2],
-    columns: Vec<DVec3>,
-    rows: Vec<DVec3>,
-}
-
-impl RayTable {
-    #[inline]
-    pub(crate) fn ray(&self, x: u32, y: u32) -> Ray {
-        let dir = (self.columns[x as usize] + self.rows[y as usize]).as_vec3();
-        Ray { origin: self.origin, dir, t_min: self.range[0], t_max: self.range[1] }
+    /// The rays through sixteen NDC points, see [`CameraRays::ray`]; through the middle of a lens. False, without rays, where each has its
+    /// own near and far plane.
+    #[inline(never)]
+    pub(crate) fn fill_block<S: Simd>(
+        &self,
+        simd: S,
+        x: &[f64; LANES],
+        y: &[f64; LANES],
+        out: &mut RayBlock,
+    ) -> bool {
+        let Limits::Same([near, far]) = self.limits else { return false };
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let move_x = if self.parallel { self.origin_x } else { DVec3::ZERO };
+                let move_y = if self.parallel { self.origin_y } else { DVec3::ZERO };
+                for (c, origin, dir) in [
+                    (0, &mut out.ox, &mut out.dx),
+                    (1, &mut out.oy, &mut out.dy),
+                    (2, &mut out.oz, &mut out.dz),
+                ] {
+                    // Plain loops over plain numbers become vector code.
+                    let (d0, dx, dy) = (self.dir[c], self.dir_x[c], self.dir_y[c]);
+                    let (o0, ox, oy, start) = (self.origin[c], move_x[c], move_y[c], self.start);
+                    if self.parallel || start != 0.0 {
+                        for l in 0..LANES {
+                            let d = d0 + dx * x[l] + dy * y[l];
+                            dir[l] = d as f32;
+                            origin[l] = (o0 + (ox * x[l] + oy * y[l]) + d * start) as f32;
+                        }
+                    } else {
+                        *origin = [o0 as f32; LANES];
+                        for l in 0..LANES {
+                            dir[l] = (d0 + dx * x[l] + dy * y[l]) as f32;
+                        }
+                    }
+                }
+                out.t_min = [(near - self.start).max(0.0) as f32; LANES];
+                out.t_max = [(far - self.start) as f32; LANES];
+            },
+        );
+        true
     }
 }

@@ -58,8 +58,9 @@ pub(crate) fn add_direct_light(
                 if incident.strength <= 0.0 {
                     continue;
                 }
+                let (normal, color) = (p.surface.normal, p.surface.color);
                 let answer =
-                    response(material, &p.surface, p.view, incident.dir, light.color, light.highlight);
+                    response(material, normal, color, p.view, incident.dir, light.color, light.highlight);
                 let radiance = answer * (incident.strength / count as f32);
                 if radiance == Vec3::ZERO {
                     continue;

@@ -3,7 +3,6 @@
 use super::microfacet::{ggx, schlick};
 use crate::effects::Effects;
 use crate::material::{Highlight, Material, SurfaceModel};
-use crate::surface::SurfacePoint;
 use glam::Vec3;
 use std::f32::consts::PI;
 
@@ -15,39 +14,42 @@ const MIN_HIGHLIGHT_ALPHA: f32 = 1e-3;
 #[inline]
 pub(crate) fn response(
     m: &Material,
-    s: &SurfacePoint,
+    normal: Vec3,
+    surface_color: Vec3,
     view: Vec3,
     l: Vec3,
     color: Vec3,
     highlight: Vec3,
 ) -> Vec3 {
-    let cos = s.normal.dot(l);
+    let cos = normal.dot(l);
     if cos <= 0.0 {
         return Vec3::ZERO;
     }
     match m.model {
         SurfaceModel::Unlit => Vec3::ZERO,
         // A dielectric gets here only where refraction is switched off.
-        SurfaceModel::Matte | SurfaceModel::Dielectric { .. } => s.color * color * cos,
+        SurfaceModel::Matte | SurfaceModel::Dielectric { .. } => surface_color * color * cos,
         SurfaceModel::Phong { diffuse, specular, shininess, highlight: form, .. } => {
-            let matte = s.color * color * (diffuse * cos);
+            let matte = surface_color * color * (diffuse * cos);
             let specular = Vec3::from(specular);
             if specular == Vec3::ZERO {
                 return matte;
             }
             let base = match form {
-                Highlight::HalfVector => s.normal.dot((l + view).normalize_or_zero()),
-                Highlight::Mirrored => (s.normal * (2.0 * cos) - l).dot(view),
+                Highlight::HalfVector => normal.dot((l + view).normalize_or_zero()),
+                Highlight::Mirrored => (normal * (2.0 * cos) - l).dot(view),
             };
             // 0^0 is 1 in OpenGL: shininess 0 lights the whole side.
             matte + specular * highlight * power(base.max(0.0), shininess)
         }
-        SurfaceModel::Metal { roughness } => microfacets(s.color, roughness, s.normal, view, l) * color * cos,
+        SurfaceModel::Metal { roughness } => {
+            microfacets(surface_color, roughness, normal, view, l) * color * cos
+        }
         SurfaceModel::Pbr { metallic, roughness, specular } => {
-            let f0 = Vec3::splat(specular).lerp(s.color, metallic);
-            let matte = s.color * pbr_transmitted(specular, s.normal.dot(view)) * (1.0 - metallic);
+            let f0 = Vec3::splat(specular).lerp(surface_color, metallic);
+            let matte = surface_color * pbr_transmitted(specular, normal.dot(view)) * (1.0 - metallic);
             let lobe =
-                if f0 == Vec3::ZERO { Vec3::ZERO } else { microfacets(f0, roughness, s.normal, view, l) };
+                if f0 == Vec3::ZERO { Vec3::ZERO } else { microfacets(f0, roughness, normal, view, l) };
             (matte + lobe) * color * cos
         }
     }
@@ -62,7 +64,7 @@ pub(crate) fn pbr_transmitted(specular: f32, cos_view: f32) -> f32 {
 /// x^n for x in 0..=1. Whole exponents, which nearly all materials have, by squaring: a few multiplications, and the same bits on
 /// every platform.
 #[inline]
-fn power(x: f32, n: f32) -> f32 {
+pub(crate) fn power(x: f32, n: f32) -> f32 {
     if n.fract() != 0.0 || n > 1024.0 {
         return x.powf(n);
     }
@@ -86,31 +88,31 @@ fn microfacets(f0: Vec3, roughness: f32, n: Vec3, v: Vec3, l: Vec3) -> Vec3 {
 /// Light sent to the viewer per unit of ambient radiance. Where reflection rays are left out, a reflector takes its share of
 /// ambient light instead of turning black.
 #[inline]
-pub(crate) fn ambient_albedo(m: &Material, s: &SurfacePoint, effects: Effects) -> Vec3 {
+pub(crate) fn ambient_albedo(m: &Material, color: Vec3, effects: Effects) -> Vec3 {
     let reflects = effects.intersects(Effects::REFLECTION.union(Effects::GLOSSY_REFLECTION));
     match m.model {
         SurfaceModel::Unlit => Vec3::ZERO,
-        SurfaceModel::Matte => s.color,
-        SurfaceModel::Phong { ambient, .. } => s.color * ambient,
+        SurfaceModel::Matte => color,
+        SurfaceModel::Phong { ambient, .. } => color * ambient,
         SurfaceModel::Metal { .. } => {
             if reflects {
                 Vec3::ZERO
             } else {
-                s.color
+                color
             }
         }
         SurfaceModel::Pbr { metallic, .. } => {
             if reflects {
-                s.color * (1.0 - metallic)
+                color * (1.0 - metallic)
             } else {
-                s.color
+                color
             }
         }
         SurfaceModel::Dielectric { .. } => {
             if effects.contains(Effects::REFRACTION) {
                 Vec3::ZERO
             } else {
-                s.color
+                color
             }
         }
     }

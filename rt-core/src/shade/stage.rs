@@ -12,6 +12,7 @@ use crate::sampler::Sampler;
 use crate::scene::Scene;
 use crate::surface::{Placed, SurfacePoint};
 use crate::volume::Volume;
+use fearless_simd::Level;
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -28,6 +29,8 @@ pub(crate) struct Stage<'a> {
     /// Radiance of the ambient lights alone.
     pub(crate) ambient: Vec3,
     pub(crate) camera_rays: CameraRays,
+    /// Instruction set of ray generation and shading; every one gives the same bits.
+    pub(crate) level: Level,
     /// Volumes with the way into their object space.
     pub(crate) volumes: Vec<(&'a Volume, DAffine3)>,
     /// World position of render space's origin.
@@ -86,6 +89,7 @@ impl<'a> Stage<'a> {
             mean_radiance: MeanRadiance::new(scene.environment.as_ref(), ambient),
             ambient,
             camera_rays: CameraRays::new(camera, origin, bounds, effects.contains(Effects::DEPTH_OF_FIELD)),
+            level: Level::new(),
             volumes,
             origin,
             up: world_from_view.y_axis.as_vec3(),
@@ -152,18 +156,24 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// World point of the surface met by the ray through NDC `ndc`, and that ray's origin. The f64 pixel ray is intersected with the
-    /// surface's plane, so neither the f32 ray nor its hit parameter limits the accuracy.
+    /// World point of the surface met by the ray through NDC `ndc`, and that ray's origin: see [`point_on_ray`].
     pub(crate) fn exact_point(&self, ndc: [f64; 2], ray: &Ray, hit: &Hit) -> (DVec3, DVec3) {
-        let (origin, dir) = self.camera.world_ray(ndc);
         let (on_surface, n) = self.placed(hit).plane(ray, hit, self.origin);
-        let along = n.dot(dir);
-        let t = n.dot(on_surface - origin) / along;
-        let on_ray = origin + dir * t;
-        // Edge-on planes meet the exact ray anywhere: keep the hit itself then. A pixel's f32 ray and exact ray differ by some
-        // 1e-7 of the distance; a far larger step along the plane is not an improvement but a division by almost 0.
-        let step = (on_ray - on_surface).length_squared();
-        let limit = 1e-8 * (on_surface - origin).length_squared();
-        (if step <= limit { on_ray } else { on_surface }, origin)
+        let ray = self.camera.world_ray(ndc);
+        (point_on_ray(ray, on_surface, n), ray.0)
     }
+}
+
+/// World point where a pixel's f64 ray (origin, direction) meets the plane through `on_surface` with normal `n` (any length), so that neither the f32
+/// ray nor its hit parameter limits the accuracy.
+#[inline(always)]
+pub(crate) fn point_on_ray((origin, dir): (DVec3, DVec3), on_surface: DVec3, n: DVec3) -> DVec3 {
+    let along = n.dot(dir);
+    let t = n.dot(on_surface - origin) / along;
+    let on_ray = origin + dir * t;
+    // Edge-on planes meet the exact ray anywhere: keep the hit itself then. A pixel's f32 ray and exact ray differ by some
+    // 1e-7 of the distance; a far larger step along the plane is not an improvement but a division by almost 0.
+    let step = (on_ray - on_surface).length_squared();
+    let limit = 1e-8 * (on_surface - origin).length_squared();
+    if step <= limit { on_ray } else { on_surface }
 }

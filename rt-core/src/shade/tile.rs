@@ -2,7 +2,7 @@
 
 use super::stage::Stage;
 use crate::frame::Layers;
-use crate::ray::{Hit, Ray};
+use crate::ray::{Hit, LANES, Ray};
 use crate::sampler::Sampler;
 use glam::Vec3;
 
@@ -33,8 +33,16 @@ impl TileArea {
     /// Slot of the pixel (`x`, `y`) counted from the tile's corner.
     #[inline]
     pub(crate) fn slot(x: u32, y: u32) -> usize {
-        let spread = |v: u32| (0..5).fold(0, |s, b| s | (v >> b & 1) << (2 * b));
-        (spread(x) | spread(y) << 1) as usize
+        const SPREAD: [u16; TILE as usize] = {
+            let (mut table, mut v) = ([0; TILE as usize], 0);
+            while v < table.len() {
+                let v16 = v as u16;
+                table[v] = v16 & 1 | (v16 & 2) << 1 | (v16 & 4) << 2 | (v16 & 8) << 3 | (v16 & 16) << 4;
+                v += 1;
+            }
+            table
+        };
+        (SPREAD[x as usize] | SPREAD[y as usize] << 1) as usize
     }
 
     /// Sample points of a slot for the current sample.
@@ -45,9 +53,21 @@ impl TileArea {
     }
 }
 
+/// Pixel of a lane within its block of 4 x 4.
+#[inline]
+pub(crate) const fn lane_pixel(lane: usize) -> [usize; 2] {
+    [even_bits(lane as u16) as usize, even_bits(lane as u16 >> 1) as usize]
+}
+
+/// Column and row of a block among the tile's 8 x 8.
+#[inline]
+pub(crate) const fn block_place(block: usize) -> [usize; 2] {
+    lane_pixel(block)
+}
+
 /// Bits 0, 2, 4, 6, 8 packed together.
 #[inline]
-fn even_bits(v: u16) -> u32 {
+const fn even_bits(v: u16) -> u32 {
     let mut x = v as u32 & 0x155;
     x = (x | x >> 1) & 0x133;
     x = (x | x >> 2) & 0x10f;
@@ -88,6 +108,11 @@ impl TileLayers {
             recorded: plane(layers.intersects(Layers::GEOMETRY), false),
             made_for: (layers, estimate_error),
         }
+    }
+
+    /// No colour, as before any sample.
+    pub(crate) fn clear_color(&mut self) {
+        self.color.fill([0.0; 4]);
     }
 
     /// As new, in the same memory; false when other layers are wanted. Sums are not cleared: the first sample replaces them.
@@ -144,15 +169,25 @@ impl TileLayers {
         }
     }
 
-    /// Adds a sample to the sums; the first one starts them.
-    pub(crate) fn add_sample(&mut self, pixels: &[[f32; 4]], first: bool) {
-        if first {
-            self.color.copy_from_slice(pixels);
-            for (sum, p) in self.luminance_sq.iter_mut().zip(pixels) {
-                *sum = luminance(p).powi(2);
+    /// Fills the normals of the lanes `lanes` of block `b`, if that layer is wanted.
+    pub(crate) fn record_normals(&mut self, b: usize, lanes: u16, normal: impl Fn(usize) -> Vec3) {
+        if let Some(normals) = self.normal.get_mut(b * LANES..(b + 1) * LANES) {
+            for lane in (0..LANES).filter(|l| lanes >> l & 1 != 0) {
+                normals[lane] = normal(lane).to_array();
             }
-            return;
         }
+    }
+
+    /// The first sample is the sum so far.
+    pub(crate) fn start_samples(&mut self, pixels: Vec<[f32; 4]>) {
+        self.color = pixels;
+        for (sum, p) in self.luminance_sq.iter_mut().zip(&self.color) {
+            *sum = luminance(p).powi(2);
+        }
+    }
+
+    /// Adds a further sample to the sums.
+    pub(crate) fn add_sample(&mut self, pixels: &[[f32; 4]]) {
         for (sum, p) in self.color.iter_mut().zip(pixels) {
             for c in 0..4 {
                 sum[c] += p[c];

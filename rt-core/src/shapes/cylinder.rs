@@ -3,7 +3,8 @@
 use super::error::{check_count, check_length};
 use super::frustum::{End, Frustum};
 use super::{
-    Radii, Shape, ShapeError, ShapeHit, ShapeReport, ShapeSurface, in_range, outward_box, rounded_point,
+    Radii, Shape, ShapeError, ShapeHit, ShapeReport, ShapeSurface, any_alpha, in_range, outward_box,
+    rounded_point,
 };
 use crate::math::Aabb;
 use crate::ray::Ray;
@@ -138,6 +139,10 @@ impl Shape for Cylinders {
         let p = ray.origin.as_dvec3() - c.a + ray.dir.as_dvec3() * end.t;
         let u = (p.dot(c.v) / c.v.length_squared()).clamp(0.0, 1.0);
         Some(ShapeHit { t: end.t as f32, u: u as f32, v: f32::from(end.on_plane) })
+    }
+
+    fn has_transparency(&self) -> bool {
+        any_alpha(&self.colors)
     }
 
     fn surface(&self, prim: u32, hit: &ShapeHit, ray: &Ray) -> ShapeSurface {

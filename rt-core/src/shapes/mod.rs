@@ -71,6 +71,18 @@ pub trait Shape: Send + Sync {
 
     /// The surface at a hit this shape reported for `ray`.
     fn surface(&self, prim: u32, hit: &ShapeHit, ray: &Ray) -> ShapeSurface;
+
+    /// Whether [`Shape::surface`] may return a colour with alpha below 1. Asked once, when a scene is made: shapes that say no are not looked
+    /// through, and a hit on one whose colour does have alpha is drawn opaque and counted in
+    /// [`crate::ray_stats::RayStats::opacity_ignored`].
+    fn has_transparency(&self) -> bool {
+        false
+    }
+}
+
+/// Whether any colour lets light through.
+fn any_alpha(colors: &Option<Vec<[f32; 4]>>) -> bool {
+    colors.iter().flatten().any(|c| c[3] < 1.0)
 }
 
 /// One radius for all elements, or one for each.

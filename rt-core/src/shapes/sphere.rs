@@ -7,7 +7,8 @@
 
 use super::error::{check_count, check_length};
 use super::{
-    Radii, Shape, ShapeError, ShapeHit, ShapeReport, ShapeSurface, in_range, outward_box, rounded_point,
+    Radii, Shape, ShapeError, ShapeHit, ShapeReport, ShapeSurface, any_alpha, in_range, outward_box,
+    rounded_point,
 };
 use crate::math::Aabb;
 use crate::ray::Ray;
@@ -99,6 +100,10 @@ impl Shape for Spheres {
         let (near, far) = (near as f32, far as f32);
         let t = if in_range(near, ray) { near } else { far };
         in_range(t, ray).then_some(ShapeHit { t, u: 0.0, v: 0.0 })
+    }
+
+    fn has_transparency(&self) -> bool {
+        any_alpha(&self.colors)
     }
 
     fn surface(&self, prim: u32, hit: &ShapeHit, ray: &Ray) -> ShapeSurface {

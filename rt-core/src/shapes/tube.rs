@@ -9,7 +9,8 @@
 use super::error::{check_count, check_length};
 use super::rounded_cone::{Part, RoundedCone};
 use super::{
-    Radii, Shape, ShapeError, ShapeHit, ShapeReport, ShapeSurface, in_range, outward_box, rounded_point,
+    Radii, Shape, ShapeError, ShapeHit, ShapeReport, ShapeSurface, any_alpha, in_range, outward_box,
+    rounded_point,
 };
 use crate::math::Aabb;
 use crate::ray::Ray;
@@ -220,6 +221,10 @@ impl Shape for Tubes {
 
     fn occluded(&self, prim: u32, ray: &Ray) -> bool {
         self.first(prim as usize, ray).is_some()
+    }
+
+    fn has_transparency(&self) -> bool {
+        any_alpha(&self.colors)
     }
 
     fn surface(&self, prim: u32, hit: &ShapeHit, ray: &Ray) -> ShapeSurface {

@@ -7,9 +7,10 @@
 pub(crate) mod huge_pages;
 mod prefetch;
 mod stack;
+pub(crate) mod vectors;
 
 use fearless_simd::Level;
-pub(crate) use prefetch::prefetch;
+pub(crate) use prefetch::{prefetch, prefetch_item};
 pub(crate) use stack::{Stack, StackMemory};
 
 /// An instruction set the kernels can be limited to, for tests and for measurements against peers at the same level.

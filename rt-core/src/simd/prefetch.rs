@@ -19,3 +19,19 @@ pub(crate) fn prefetch<const LINES: usize>(units: &[Unit], first: usize) {
         let _ = (units, first);
     }
 }
+
+/// Starts loading `items[i]`; out-of-range places are ignored by the processor.
+#[inline(always)]
+pub(crate) fn prefetch_item<T>(items: &[T], i: usize) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        let p = items.as_ptr().wrapping_add(i).cast::<i8>();
+        // SAFETY: as above.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(p) }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    {
+        let _ = (items, i);
+    }
+}

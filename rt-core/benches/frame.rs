@@ -1,0 +1,75 @@
+//! Whole frames on one thread: what a picture costs beyond its rays, and what each effect adds. `cargo bench -p rt-core --bench frame`
+
+mod common;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use rt_core::accel::{BuildOptions, World};
+use rt_core::colormap::ColorMap;
+use rt_core::effects::Effects;
+use rt_core::frame::Layers;
+use rt_core::glam::DVec3;
+use rt_core::light::Light;
+use rt_core::material::Material;
+use rt_core::render::{RenderOptions, Renderer};
+use rt_core::scene::{AmbientOcclusion, Scene};
+
+const SIZE: u32 = 512;
+
+fn frame(c: &mut Criterion) {
+    let world = World::from_mesh(common::shells(), &BuildOptions::default()).expect("a sound mesh");
+    let mut plain = Scene::new(world);
+    plain.materials[0] = Material::phong([0.6, 0.7, 0.8], 0.4, 30.0);
+    let point = Light::point(DVec3::new(4.0, 5.0, 3.0));
+    let color = RenderOptions::new(SIZE, SIZE);
+    let scene = |change: fn(&mut Scene)| {
+        let mut s = plain.clone();
+        change(&mut s);
+        s
+    };
+    let mapped = ColorMap::new(vec![[0.0, 0.0, 1.0, 1.0], [1.0; 4], [1.0, 0.0, 0.0, 1.0]], [0.2, 1.2]);
+    let mut by_scalars = plain.clone();
+    by_scalars.materials[0] = plain.materials[0].clone().colored_by_scalars(mapped);
+    let mut lamp = plain.clone();
+    lamp.lights = vec![point];
+    let none = Some(Effects::NONE);
+    let with_depth = Layers::COLOR | Layers::DEPTH;
+    let occlusion = scene(|s| {
+        s.lights = vec![Light::ambient([1.0; 3])];
+        s.ambient_occlusion = Some(AmbientOcclusion { distance: f64::INFINITY, rays: 8 });
+    });
+    let half = scene(|s| s.materials[0].opacity = 0.5);
+    let cases = [
+        ("ids alone", &plain, RenderOptions { layers: Layers::IDS, ..color.clone() }),
+        ("headlight, flat", &scene(|s| s.materials[0].flat = true), color.clone()),
+        ("headlight", &plain, color.clone()),
+        ("headlight, colour map", &by_scalars, color.clone()),
+        ("headlight, depth", &plain, RenderOptions { layers: with_depth, ..color.clone() }),
+        ("headlight, 4 samples", &plain, RenderOptions { samples: 4, ..color.clone() }),
+        ("point light", &lamp, RenderOptions { effects: none, ..color.clone() }),
+        ("point light, shadows", &lamp, color.clone()),
+        ("ambient occlusion, 8 rays", &occlusion, color.clone()),
+        ("half transparent", &half, color.clone()),
+    ];
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+    let mut group = c.benchmark_group("frame");
+    group.throughput(Throughput::Elements(u64::from(SIZE * SIZE)));
+    for (name, scene, options) in cases {
+        let mut renderer = Renderer::new();
+        group.bench_function(name, |b| {
+            one.install(|| {
+                b.iter(|| {
+                    let output = renderer.render(scene, &common::camera(), &options).expect("a sound scene");
+                    renderer.recycle(output.frame);
+                });
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default().sample_size(20);
+    targets = frame
+}
+criterion_main!(benches);

@@ -1,0 +1,245 @@
+//! Light on sixteen surfaces of one material: the lobes and lights of [`super::radiance`], lane by lane the same bits.
+
+use super::Stage;
+use crate::effects::Effects;
+use crate::environment::MeanRadiance;
+use crate::light::{PlacedKind, PlacedLight};
+use crate::material::{Highlight, Material, SurfaceModel};
+use crate::ray::{LANES, RayBlock};
+use crate::shade::lobes::power;
+use crate::simd::vectors::{Row, Rows3, Vec3x16};
+use crate::surface::Looks;
+use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdNarrow, SimdWiden, f32x16, mask32x16};
+use glam::Vec3;
+
+/// What the vector code knows: ideal diffuse, or that and a highlight.
+#[derive(Clone, Copy)]
+enum Lobe {
+    Matte,
+    Phong { diffuse: f32, specular: Vec3, shininess: f32, highlight: Highlight },
+}
+
+/// Microfacets are left to the scalar code: their many special cases are worth it only where a scene is made of them.
+pub(super) fn knows(model: &SurfaceModel) -> bool {
+    !matches!(model, SurfaceModel::Metal { .. } | SurfaceModel::Pbr { .. })
+}
+
+/// Radiance towards the rays' origins.
+#[inline(never)]
+pub(super) fn radiance_block<S: Simd>(
+    simd: S,
+    stage: &Stage<'_>,
+    material: &Material,
+    looks: &Looks,
+    rays: &RayBlock,
+    out: &mut Rows3,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || body(simd, stage, material, looks, rays, out),
+    );
+}
+
+#[inline(always)]
+fn body<S: Simd>(
+    simd: S,
+    stage: &Stage<'_>,
+    material: &Material,
+    looks: &Looks,
+    rays: &RayBlock,
+    out: &mut Rows3,
+) {
+    let color = Vec3x16::load(simd, &looks.color);
+    let mut sum = Vec3x16::splat(simd, Vec3::from(material.emission));
+    let (lobe, ambient) = match material.model {
+        SurfaceModel::Unlit => {
+            sum.add(color).store(out);
+            return;
+        }
+        SurfaceModel::Phong { ambient, diffuse, specular, shininess, highlight, .. } => {
+            let specular = Vec3::from(specular);
+            (Lobe::Phong { diffuse, specular, shininess, highlight }, ambient)
+        }
+        _ => (Lobe::Matte, 1.0),
+    };
+    let normal = Vec3x16::load(simd, &looks.normal);
+    let dir = Vec3x16::load_rows(simd, [&rays.dx, &rays.dy, &rays.dz]);
+    let zero = Vec3x16::splat(simd, Vec3::ZERO);
+    let (unit, ok) = dir.try_normalize(simd);
+    let view = unit.or_else(ok, zero).neg();
+
+    for light in &stage.lights {
+        let (l, strength) = incident(simd, light, &looks.point);
+        let answer = respond(simd, lobe, color, normal, view, l, light);
+        sum = sum.add(answer.scale(strength));
+    }
+    if let Some(mean) = &stage.mean_radiance {
+        let dielectric = matches!(material.model, SurfaceModel::Dielectric { .. });
+        let dark = dielectric && stage.effects.contains(Effects::REFRACTION);
+        let albedo = match lobe {
+            Lobe::Phong { .. } => color.scale(f32x16::splat(simd, ambient)),
+            Lobe::Matte if dark => zero,
+            Lobe::Matte => color,
+        };
+        sum = sum.add(albedo.mul(mean_radiance(simd, mean, normal)));
+    }
+    sum.store(out);
+}
+
+/// As [`crate::shade::lobes::response`].
+#[inline(always)]
+fn respond<S: Simd>(
+    simd: S,
+    lobe: Lobe,
+    color: Vec3x16<S>,
+    normal: Vec3x16<S>,
+    view: Vec3x16<S>,
+    l: Vec3x16<S>,
+    light: &PlacedLight,
+) -> Vec3x16<S> {
+    let v = |x: f32| f32x16::splat(simd, x);
+    let cos = normal.dot(l);
+    let away = cos.simd_le(v(0.0));
+    let lit = color.mul(Vec3x16::splat(simd, light.color));
+    let answer = match lobe {
+        Lobe::Matte => lit.scale(cos),
+        Lobe::Phong { diffuse, specular, shininess, highlight } => {
+            let matte = lit.scale(v(diffuse) * cos);
+            if specular == Vec3::ZERO {
+                matte
+            } else {
+                let base = match highlight {
+                    Highlight::HalfVector => {
+                        let (h, ok) = l.add(view).try_normalize(simd);
+                        normal.dot(h.or_else(ok, Vec3x16::splat(simd, Vec3::ZERO)))
+                    }
+                    Highlight::Mirrored => normal.scale(v(2.0) * cos).sub(l).dot(view),
+                };
+                let shine = power_block(simd, base.max(v(0.0)), shininess);
+                matte.add(Vec3x16::splat(simd, specular * light.highlight).scale(shine))
+            }
+        }
+    };
+    Vec3x16::splat(simd, Vec3::ZERO).or_else(away, answer)
+}
+
+/// As [`power`].
+#[inline(always)]
+fn power_block<S: Simd>(simd: S, x: f32x16<S>, n: f32) -> f32x16<S> {
+    if n.fract() != 0.0 || n > 1024.0 {
+        let mut row: Row = [0.0; LANES];
+        for lane in 0..LANES {
+            row[lane] = power(x[lane], n);
+        }
+        return f32x16::from_slice(simd, &row);
+    }
+    let (mut k, mut square, mut result) = (n as u32, x, f32x16::splat(simd, 1.0));
+    while k != 0 {
+        if k & 1 != 0 {
+            result *= square;
+        }
+        square *= square;
+        k >>= 1;
+    }
+    result
+}
+
+/// Direction to a light without size and the share of it that arrives, as [`crate::shade::direct::incident_from`].
+#[inline(always)]
+fn incident<S: Simd>(simd: S, light: &PlacedLight, points: &Rows3) -> (Vec3x16<S>, f32x16<S>) {
+    let v = |x: f32| f32x16::splat(simd, x);
+    let (one, zero) = (v(1.0), v(0.0));
+    let from = match light.kind {
+        PlacedKind::Directional { to_light } => return (Vec3x16::splat(simd, to_light), one),
+        PlacedKind::Point { position }
+        | PlacedKind::Spot { position, .. }
+        | PlacedKind::Disk { position, .. } => position,
+    };
+    let to_light = Vec3x16::splat(simd, from).sub(Vec3x16::load(simd, points));
+    let distance = length(to_light);
+    let nowhere = distance.simd_eq(zero) | !distance.simd_lt(v(f32::INFINITY));
+    let dir = Vec3x16::splat(simd, Vec3::ZERO).or_else(nowhere, to_light.div(distance));
+    let mut strength = match light.attenuation {
+        Some([c, l, q]) => one / (v(c) + distance * (v(l) + distance * v(q))),
+        None => one,
+    };
+    match light.kind {
+        PlacedKind::Spot { direction, cos_cutoff, exponent, .. } => {
+            let cos = -dir.dot(Vec3x16::splat(simd, direction));
+            let falloff = if exponent == 0.0 {
+                one
+            } else {
+                let mut row: Row = [0.0; LANES];
+                for lane in 0..LANES {
+                    row[lane] = cos[lane].max(0.0).powf(exponent);
+                }
+                f32x16::from_slice(simd, &row)
+            };
+            strength *= cos.simd_lt(v(cos_cutoff)).select(zero, falloff);
+        }
+        PlacedKind::Disk { direction, .. } => {
+            strength *= (-dir.dot(Vec3x16::splat(simd, direction))).max(zero);
+        }
+        PlacedKind::Directional { .. } | PlacedKind::Point { .. } => {}
+    }
+    (dir, nowhere.select(zero, strength))
+}
+
+/// Lengths of vectors of any size, as [`crate::surface::length`].
+#[inline(always)]
+fn length<S: Simd>(d: Vec3x16<S>) -> f32x16<S> {
+    let ((x, x2), (y, y2), (z, z2)) = (d.x.widen(), d.y.widen(), d.z.widen());
+    let low = (x * x + y * y + z * z).sqrt();
+    let high = (x2 * x2 + y2 * y2 + z2 * z2).sqrt();
+    low.narrow(high)
+}
+
+/// As [`MeanRadiance::for_normal`].
+#[inline(always)]
+fn mean_radiance<S: Simd>(simd: S, mean: &MeanRadiance, n: Vec3x16<S>) -> Vec3x16<S> {
+    let v = |x: f32| f32x16::splat(simd, x);
+    let c = |k: usize| Vec3x16::splat(simd, mean.coefficients[k]);
+    let linear = c(0).add(c(1).scale(n.y)).add(c(2).scale(n.z)).add(c(3).scale(n.x));
+    let quadratic = c(4).scale(n.x * n.y).add(c(5).scale(n.y * n.z));
+    let quadratic = quadratic.add(c(6).scale(v(3.0) * n.z * n.z - v(1.0)));
+    let quadratic = quadratic.add(c(7).scale(n.x * n.z)).add(c(8).scale(n.x * n.x - n.y * n.y));
+    let sum = linear.add(quadratic);
+    Vec3x16 { x: sum.x.max(v(0.0)), y: sum.y.max(v(0.0)), z: sum.z.max(v(0.0)) }
+}
+
+/// Sixteen pixels from their channels' rows.
+#[inline(never)]
+pub(super) fn store_pixels<S: Simd>(simd: S, rows: &[Row; 4], out: &mut [[f32; 4]]) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let [r, g, b, a] = rows;
+            let row = |r: &Row| f32x16::from_slice(simd, r);
+            let (rb_low, rb_high) = row(r).interleave(row(b));
+            let (ga_low, ga_high) = row(g).interleave(row(a));
+            let (first, second) = rb_low.interleave(ga_low);
+            let (third, fourth) = rb_high.interleave(ga_high);
+            for (quarter, out) in [first, second, third, fourth].into_iter().zip(out.chunks_exact_mut(4)) {
+                quarter.store_slice(out.as_flattened_mut());
+            }
+        },
+    );
+}
+
+/// Puts the lanes of `lanes` of `new` into the colour rows, opaque.
+#[inline(never)]
+pub(super) fn merge<S: Simd>(simd: S, lanes: u16, new: &Rows3, rows: &mut [Row; 4]) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            use fearless_simd::SimdMask;
+            let on = mask32x16::from_bitmask(simd, lanes as u64);
+            for c in 0..3 {
+                let (n, o) = (f32x16::from_slice(simd, &new.0[c]), f32x16::from_slice(simd, &rows[c]));
+                on.select(n, o).store_slice(&mut rows[c]);
+            }
+            let a = f32x16::from_slice(simd, &rows[3]);
+            on.select(f32x16::splat(simd, 1.0), a).store_slice(&mut rows[3]);
+        },
+    );
+}

@@ -1,0 +1,392 @@
+//! What local lighting needs of sixteen hits at once.
+//!
+//! Memory is the larger part of it: a hit names a triangle, the triangle three vertices, each of them a position and its attributes. The values of sixteen hits are read
+//! into rows first, so that sixteen waits overlap, and then the arithmetic of [`Placed::look`] runs on all lanes, with the same bits. Lanes that need f64 (tiny or
+//! huge triangles, normals that cannot be normalised) are left to `look` itself.
+
+use super::{Look, ORDINARY_NORMAL_SQUARED, Placed, Source, plane_of};
+use crate::material::{ColorSource, Sides};
+use crate::mesh::{Attribute, PerElement, TriMesh};
+use crate::ray::{HitBlock, LANES, RayBlock};
+use crate::simd::prefetch_item;
+use crate::simd::vectors::{Row, Rows3, Vec3x16};
+use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask, f32x16, mask32x16};
+use glam::{DVec3, Vec3};
+
+/// Sixteen [`Look`]s, a row per number.
+#[repr(C, align(64))]
+pub(crate) struct Looks {
+    pub(crate) point: Rows3,
+    pub(crate) normal: Rows3,
+    pub(crate) color: Rows3,
+    pub(crate) opacity: Row,
+}
+
+impl Looks {
+    pub(crate) fn new() -> Looks {
+        Looks { point: Rows3::ZERO, normal: Rows3::ZERO, color: Rows3::ZERO, opacity: [0.0; LANES] }
+    }
+
+    pub(crate) fn get(&self, lane: usize) -> Look {
+        Look {
+            point: self.point.get(lane),
+            normal: self.normal.get(lane),
+            color: self.color.get(lane),
+            opacity: self.opacity[lane],
+        }
+    }
+
+    fn set(&mut self, lane: usize, look: &Look) {
+        self.point.set(lane, look.point);
+        self.normal.set(lane, look.normal);
+        self.color.set(lane, look.color);
+        self.opacity[lane] = look.opacity;
+    }
+}
+
+/// World-space planes through sixteen hits, see [`Placed::plane`].
+#[repr(C, align(64))]
+pub(crate) struct Planes {
+    pub(crate) point: [[f64; LANES]; 3],
+    pub(crate) normal: [[f64; LANES]; 3],
+}
+
+impl Planes {
+    pub(crate) fn new() -> Planes {
+        Planes { point: [[0.0; LANES]; 3], normal: [[0.0; LANES]; 3] }
+    }
+}
+
+/// Vertex numbers of sixteen triangles, a row per corner.
+type Corners = [[u32; LANES]; 3];
+
+impl Placed<'_> {
+    /// Starts loading the triangle `prim`'s vertex numbers.
+    #[inline]
+    pub(crate) fn prefetch_triangle(&self, prim: u32) {
+        if let Source::Mesh(mesh) = self.source {
+            prefetch_item(&mesh.indices, prim as usize);
+        }
+    }
+
+    /// Starts loading what [`Placed::look_block`] will read of the triangle `prim`'s vertices.
+    #[inline]
+    pub(crate) fn prefetch_vertices(&self, prim: u32) {
+        if let Source::Mesh(mesh) = self.source {
+            for k in mesh.indices[prim as usize] {
+                prefetch_item(&mesh.positions, k as usize);
+                if let Some(n) = self.shading_normals(mesh) {
+                    prefetch_item(&n.values, k as usize);
+                }
+                match (&self.material.color_source, self.scalars, self.colors) {
+                    (ColorSource::Scalars(_), Some(s), _) => prefetch_item(&s.values, k as usize),
+                    (ColorSource::Attribute, _, Some(c)) => prefetch_item(&c.values, k as usize),
+                    _ => {}
+                }
+            }
+        }
+    }
+
+    /// [`Placed::look`] for the hits whose bits are set in `lanes`, all of them on this instance; other lanes of `out` hold anything.
+    pub(crate) fn look_block<S: Simd, const POINT: bool>(
+        &self,
+        simd: S,
+        lanes: u16,
+        rays: &RayBlock,
+        hits: &HitBlock,
+        out: &mut Looks,
+    ) {
+        let done = match self.source {
+            Source::Mesh(mesh) => self.mesh_block::<S, POINT>(simd, mesh, lanes, rays, hits, out),
+            Source::Shape(_) => 0,
+        };
+        let mut left = lanes & !done;
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            if let Some(hit) = hits.get(lane) {
+                out.set(lane, &self.look::<POINT>(&rays.get(lane), &hit));
+            }
+        }
+    }
+
+    /// [`Placed::plane`] for the hits whose bits are set in `lanes`, all of them on this instance.
+    pub(crate) fn plane_block<S: Simd>(
+        &self,
+        simd: S,
+        lanes: u16,
+        rays: &RayBlock,
+        hits: &HitBlock,
+        origin: DVec3,
+        out: &mut Planes,
+    ) {
+        if let Source::Mesh(mesh) = self.source {
+            self.mesh_planes(simd, mesh, lanes, hits, origin, out);
+            return;
+        }
+        for lane in (0..LANES).filter(|l| lanes >> l & 1 != 0) {
+            if let Some(hit) = hits.get(lane) {
+                let (point, normal) = self.plane(&rays.get(lane), &hit, origin);
+                for c in 0..3 {
+                    (out.point[c][lane], out.normal[c][lane]) = (point[c], normal[c]);
+                }
+            }
+        }
+    }
+
+    #[inline(never)]
+    fn mesh_planes<S: Simd>(
+        &self,
+        simd: S,
+        mesh: &TriMesh,
+        lanes: u16,
+        hits: &HitBlock,
+        origin: DVec3,
+        out: &mut Planes,
+    ) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let first = lanes.trailing_zeros() as usize & 15;
+                let mut corners = [Rows3::ZERO; 3];
+                for lane in 0..LANES {
+                    let from = if lanes >> lane & 1 != 0 { lane } else { first };
+                    let [a, b, c] = mesh.indices[hits.prim[from] as usize];
+                    corners[0].set(lane, mesh.positions[a as usize]);
+                    corners[1].set(lane, mesh.positions[b as usize]);
+                    corners[2].set(lane, mesh.positions[c as usize]);
+                }
+                let (moved, m) = (self.normal_from_object.is_some(), self.render_from_object);
+                let mut all = Planes::new();
+                for l in 0..LANES {
+                    let at = [corners[0].get(l), corners[1].get(l), corners[2].get(l)];
+                    let (p, n) = plane_of(at, [hits.u[l], hits.v[l]], moved, &m, origin);
+                    (all.point[0][l], all.point[1][l], all.point[2][l]) = (p.x, p.y, p.z);
+                    (all.normal[0][l], all.normal[1][l], all.normal[2][l]) = (n.x, n.y, n.z);
+                }
+                for c in 0..3 {
+                    for l in 0..LANES {
+                        let on = lanes >> l & 1 != 0;
+                        out.point[c][l] = if on { all.point[c][l] } else { out.point[c][l] };
+                        out.normal[c][l] = if on { all.normal[c][l] } else { out.normal[c][l] };
+                    }
+                }
+            },
+        );
+    }
+
+    /// Returns the lanes that it could do.
+    #[inline(never)]
+    fn mesh_block<S: Simd, const POINT: bool>(
+        &self,
+        simd: S,
+        mesh: &TriMesh,
+        lanes: u16,
+        rays: &RayBlock,
+        hits: &HitBlock,
+        out: &mut Looks,
+    ) -> u16 {
+        simd.vectorize(
+            #[inline(always)]
+            || self.mesh_block_body::<S, POINT>(simd, mesh, lanes, rays, hits, out),
+        )
+    }
+
+    #[inline(always)]
+    fn mesh_block_body<S: Simd, const POINT: bool>(
+        &self,
+        simd: S,
+        mesh: &TriMesh,
+        lanes: u16,
+        rays: &RayBlock,
+        hits: &HitBlock,
+        out: &mut Looks,
+    ) -> u16 {
+        let v = |x: f32| f32x16::splat(simd, x);
+        // Lanes without a hit repeat one that has: nothing below needs to ask again.
+        let first = lanes.trailing_zeros() as usize & 15;
+        let mut prims = hits.prim;
+        for lane in 0..LANES {
+            prims[lane] = if lanes >> lane & 1 != 0 { prims[lane] } else { prims[first] };
+        }
+        let mut corners: Corners = [[0; LANES]; 3];
+        for lane in 0..LANES {
+            let t = mesh.indices[prims[lane] as usize];
+            (corners[0][lane], corners[1][lane], corners[2][lane]) = (t[0], t[1], t[2]);
+        }
+        let a = gather3(simd, &mesh.positions, &corners[0]);
+        let b = gather3(simd, &mesh.positions, &corners[1]);
+        let c = gather3(simd, &mesh.positions, &corners[2]);
+        let (u, w2) = (f32x16::from_slice(simd, &hits.u), f32x16::from_slice(simd, &hits.v));
+        let weights = [v(1.0) - u - w2, u, w2];
+        let dir = Vec3x16::load_rows(simd, [&rays.dx, &rays.dy, &rays.dz]);
+
+        // ---- Face normal.
+        let (e1, e2) = (b.sub(a), c.sub(a));
+        let mut n = e1.cross(e2);
+        if let Some(m) = &self.normal_from_object {
+            n = n.transformed(simd, m);
+        }
+        let squared = n.dot(n);
+        let mut done = squared.simd_ge(v(ORDINARY_NORMAL_SQUARED.start))
+            & squared.simd_lt(v(ORDINARY_NORMAL_SQUARED.end));
+
+        // ---- Shading normal.
+        let (outward, shading) = match self.shading_normals(mesh) {
+            None => {
+                let unit = n.scale(v(1.0) / squared.sqrt());
+                (unit, unit)
+            }
+            Some(normals) => {
+                let mut s = match normals.per {
+                    PerElement::Vertex => {
+                        let p = gather3(simd, &normals.values, &corners[0]).scale(weights[0]);
+                        let p = p.add(gather3(simd, &normals.values, &corners[1]).scale(weights[1]));
+                        p.add(gather3(simd, &normals.values, &corners[2]).scale(weights[2]))
+                    }
+                    PerElement::Face => gather3(simd, &normals.values, &prims),
+                };
+                if let Some(m) = &self.normal_from_object {
+                    s = s.transformed(simd, m);
+                }
+                let (unit, ok) = s.try_normalize(simd);
+                done &= ok;
+                (n, unit)
+            }
+        };
+
+        // ---- Which side is seen, and which is lit.
+        let zero = v(0.0);
+        let outside = outward.dot(dir).simd_le(zero);
+        let back = shading.neg();
+        let (normal, drawn) = match self.material.sides {
+            Sides::Both => (shading.or_else(outside, back), mask32x16::splat(simd, true)),
+            Sides::BothByNormal => {
+                (shading.or_else(shading.dot(dir).simd_le(zero), back), mask32x16::splat(simd, true))
+            }
+            Sides::LitOutside => (shading, mask32x16::splat(simd, true)),
+            Sides::FrontOnly => (shading, outside),
+            Sides::BackOnly => (back, !outside),
+        };
+        normal.store(&mut out.normal);
+
+        // ---- Point.
+        if POINT {
+            let inside = e1.scale(u).add(e2.scale(w2));
+            let shift = Vec3x16::splat(simd, self.render_from_object.translation.as_vec3());
+            let point = if self.normal_from_object.is_none() {
+                a.add(shift).add(inside)
+            } else {
+                let m = &self.render_from_object.matrix3.as_mat3();
+                a.transformed(simd, m).add(shift).add(inside.transformed(simd, m))
+            };
+            point.store(&mut out.point);
+        }
+
+        // ---- Colour.
+        let mut rgba = [[0.0; LANES]; 4];
+        let colored = match &self.material.color_source {
+            ColorSource::Attribute => match self.colors {
+                Some(colors) => {
+                    mix_colors(simd, colors, &corners, &prims, weights, &mut rgba);
+                    true
+                }
+                None => false,
+            },
+            ColorSource::Constant => false,
+            ColorSource::Scalars(map) => match self.scalars {
+                Some(scalars) => {
+                    let value = match scalars.per {
+                        PerElement::Vertex => {
+                            let [x, y, z] = [
+                                gather1(simd, &scalars.values, &corners[0]),
+                                gather1(simd, &scalars.values, &corners[1]),
+                                gather1(simd, &scalars.values, &corners[2]),
+                            ];
+                            x * weights[0] + y * weights[1] + z * weights[2]
+                        }
+                        PerElement::Face => gather1(simd, &scalars.values, &prims),
+                    };
+                    map.lookup_block(simd, value, &mut rgba);
+                    true
+                }
+                None => false,
+            },
+            ColorSource::Texture(_) => {
+                for lane in 0..LANES {
+                    let corner = [corners[0][lane], corners[1][lane], corners[2][lane]].map(|k| k as usize);
+                    let w = [weights[0][lane], weights[1][lane], weights[2][lane]];
+                    let color = self.mesh_color(mesh, corner, prims[lane], w);
+                    for c in 0..4 {
+                        rgba[c][lane] = color[c];
+                    }
+                }
+                true
+            }
+        };
+        let alpha = if colored {
+            out.color.0 = [rgba[0], rgba[1], rgba[2]];
+            f32x16::from_slice(simd, &rgba[3])
+        } else {
+            Vec3x16::splat(simd, Vec3::from(self.material.color)).store(&mut out.color);
+            v(1.0)
+        };
+        drawn.select(v(self.material.opacity) * alpha, zero).store_slice(&mut out.opacity);
+        lanes & done.to_bitmask() as u16
+    }
+}
+
+#[inline(always)]
+fn gather1<S: Simd>(simd: S, values: &[f32], at: &[u32; LANES]) -> f32x16<S> {
+    let mut row = [0.0; LANES];
+    for lane in 0..LANES {
+        row[lane] = values[at[lane] as usize];
+    }
+    f32x16::from_slice(simd, &row)
+}
+
+#[inline(always)]
+fn gather3<S: Simd>(simd: S, values: &[Vec3], at: &[u32; LANES]) -> Vec3x16<S> {
+    let mut rows = Rows3::ZERO;
+    for lane in 0..LANES {
+        rows.set(lane, values[at[lane] as usize]);
+    }
+    Vec3x16::load(simd, &rows)
+}
+
+#[inline(always)]
+fn gather4(values: &[[f32; 4]], at: &[u32; LANES], rows: &mut [Row; 4]) {
+    for lane in 0..LANES {
+        let color = values[at[lane] as usize];
+        for c in 0..4 {
+            rows[c][lane] = color[c];
+        }
+    }
+}
+
+#[inline(always)]
+fn mix_colors<S: Simd>(
+    simd: S,
+    colors: &Attribute<[f32; 4]>,
+    corners: &Corners,
+    prims: &[u32; LANES],
+    [w, u, v]: [f32x16<S>; 3],
+    out: &mut [Row; 4],
+) {
+    if colors.per == PerElement::Face {
+        gather4(&colors.values, prims, out);
+        return;
+    }
+    let mut rows = [[[0.0; LANES]; 4]; 3];
+    for k in 0..3 {
+        gather4(&colors.values, &corners[k], &mut rows[k]);
+    }
+    for c in 0..4 {
+        let [x, y, z] = [
+            f32x16::from_slice(simd, &rows[0][c]),
+            f32x16::from_slice(simd, &rows[1][c]),
+            f32x16::from_slice(simd, &rows[2][c]),
+        ];
+        (x * w + y * u + z * v).store_slice(&mut out[c]);
+    }
+}
