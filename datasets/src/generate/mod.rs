@@ -3,13 +3,19 @@
 //! (The module is called `generate` because `gen` is a keyword.) Nothing here needs a file; random numbers come from
 //! [`random`], so the same parameters give the same data on every machine and any number of threads.
 
+mod cell_average;
+pub mod cone_shock;
+pub mod flow;
+pub mod gas_dynamics;
 pub mod impact;
 pub mod mixing_layer;
 pub mod nested_wavelet;
 mod noise;
+pub mod oblique_shock;
 pub mod plasma;
 pub mod polylines;
 pub mod random;
+mod revolve;
 pub mod shapes;
 pub mod star_field_lines;
 pub mod streamline;
