@@ -4,6 +4,7 @@
 use datasets::catalogue::flows::find;
 use datasets::generate::flow::{Fields, Flow};
 use datasets::image_io::{Picture, PngDepth, write_png};
+use std::io::Write;
 use std::path::Path;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -11,11 +12,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let [name, size, directory] = arguments.as_slice() else {
         return Err("usage: flow_slices NAME SIZE DIRECTORY".into());
     };
+    let mut out = std::io::stdout().lock();
     let start = std::time::Instant::now();
     let flow = find(name)?.generate(size, Fields::All)?;
-    println!("{name} {} in {:.2} s", flow.dims, start.elapsed().as_secs_f64());
+    writeln!(out, "{name} {} in {:.2} s", flow.dims, start.elapsed().as_secs_f64())?;
     for f in &flow.fields {
-        println!("  {} {:?} {}", f.name, f.range(), f.unit);
+        writeln!(out, "  {} {:?} {}", f.name, f.range(), f.unit)?;
         for (axis, label) in ["x", "y", "z"].iter().enumerate() {
             let path = Path::new(directory).join(format!("{name}-{}-{label}.png", f.name));
             write_png(&path, &slice(&flow, f.name, axis)?, PngDepth::Eight)?;

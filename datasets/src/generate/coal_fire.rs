@@ -71,7 +71,7 @@ impl CoalFire {
         flow.fill(&gas_fields(&VOLATILES, fields), scratch, |(d, z), j, k, rows| {
             turbulence.displace_row(d, j, k, |i| {
                 let x = spacing.x * i as f64;
-                (1.5 * width_m(x), 0.3 * (x / (2.0 * PIPE_M)).min(1.0))
+                (1.6 * width_m(x), 0.5 * (x / (2.0 * PIPE_M)).min(1.0))
             });
             z.clear();
             z.extend((0..n).map(|i| {

@@ -73,15 +73,15 @@ impl CombustionJet {
     pub(crate) fn mixing(&self, flow: &Flow) -> Mixing {
         let mut random = Random::new(self.seed);
         let length = flow.spacing_m.x * (flow.dims.x - 1) as f64;
-        // Rollers on both faces, staggered, about 2.3 slots apart; images left and right make them periodic.
-        let count = (length / (2.3 * SLOT_M)).round().max(1.0);
+        // Rollers on both faces, staggered, about 3 slots apart; images left and right make them periodic.
+        let count = (length / (3.0 * SLOT_M)).round().max(1.0);
         let mut rollers = Vec::new();
         for n in 0..count as u32 {
             for side in [-1.0, 1.0] {
                 let stagger = if side > 0.0 { 0.5 } else { 0.0 };
                 let x = (n as f64 + stagger + random.between(-0.15, 0.15)) / count * length - 0.5 * length;
-                let y = side * (0.95 + random.between(-0.15, 0.15)) * SLOT_M;
-                let (size, turn) = (random.between(0.45, 0.7) * SLOT_M, random.between(2.5, 5.0));
+                let y = side * (1.65 + random.between(-0.15, 0.15)) * SLOT_M;
+                let (size, turn) = (random.between(0.7, 1.1) * SLOT_M, random.between(2.5, 5.0));
                 for image in [-1.0, 0.0, 1.0] {
                     let center_m = [x + image * length, y];
                     rollers.push(Vortex { center_m, size_m: size, turn_rad: -side * turn });
@@ -90,7 +90,7 @@ impl CombustionJet {
         }
         let braid = [0, 1, 2].map(|_| random.between(0.0, TAU));
         Mixing {
-            turbulence: Turbulence::new(flow, 2.0 * SLOT_M, self.seed),
+            turbulence: Turbulence::new(flow, 3.0 * SLOT_M, self.seed),
             rollers: Vortices(rollers),
             braid,
             origin_m: flow.origin_m,
@@ -113,7 +113,7 @@ pub(crate) struct Mixing {
 impl Mixing {
     /// The mixture fraction along a row; leaves the displacements behind.
     pub(crate) fn mixture_row(&self, d: &mut Displacement, j: u32, k: u32, z: &mut Vec<f32>) {
-        self.turbulence.displace_row(d, j, k, |_| (2.0 * SLOT_M, 0.3));
+        self.turbulence.displace_row(d, j, k, |_| (2.5 * SLOT_M, 0.45));
         z.clear();
         z.extend((0..self.dims.x as usize).map(|i| {
             let p = self.origin_m + self.spacing_m * DVec3::new(i as f64, j as f64, k as f64);
@@ -130,10 +130,10 @@ impl Mixing {
             * SLOT_M
             * ((TAU * p.z / (2.6 * SLOT_M) + a).sin() + 0.6 * (TAU * p.z / (1.1 * SLOT_M) + b).sin());
         let [x, y] = self.rollers.origin_of([p.x + wander, p.y + 0.3 * wander * (c + p.x / SLOT_M).cos()]);
-        // Half-width 0.95 slots; mixing layers of 0.35 slots; the core is diluted by now.
-        let edge = |y: f64| 0.5 * (1.0 + (y / (0.35 * SLOT_M)).tanh());
-        let dilution = 0.9 - 0.12 * (TAU * x / (4.1 * SLOT_M)).sin();
-        dilution * edge(y + 0.95 * SLOT_M) * edge(0.95 * SLOT_M - y)
+        // The jet has widened to 3.2 slots; its mixing layers are 0.4 slots thick, and its core is diluted.
+        let edge = |y: f64| 0.5 * (1.0 + (y / (0.4 * SLOT_M)).tanh());
+        let dilution = 0.85 - 0.15 * (TAU * x / (4.1 * SLOT_M)).sin();
+        dilution * edge(y + 1.6 * SLOT_M) * edge(1.6 * SLOT_M - y)
     }
 }
 

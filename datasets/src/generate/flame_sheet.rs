@@ -62,7 +62,9 @@ impl FlameSheet<'_> {
         let rise = flame - (cold + (hot - cold) * st);
         let temperature = unburnt(cold, hot) + rise * progress;
         let mut out = vec![0.0, temperature];
-        out.extend(self.species.iter().map(|s| unburnt(s.oxidiser, s.fuel) + st * s.made * progress));
+        out.extend(
+            self.species.iter().map(|s| (unburnt(s.oxidiser, s.fuel) + st * s.made * progress).max(0.0)),
+        );
         let moles: f64 = self.species.iter().zip(&out[2..]).map(|(s, y)| y / s.molar_mass).sum();
         out[0] = self.pressure_pa / (GAS_CONSTANT * temperature * moles);
         out
