@@ -28,6 +28,7 @@ pub mod sample_fields;
 pub mod shapes;
 pub mod star_field_lines;
 pub mod streamline;
+pub mod swept_slice;
 pub mod thermal_plume;
 mod turbulence;
 pub mod wavelet;
