@@ -173,11 +173,16 @@ impl Layers {
         let p = if behind <= 0.0 {
             newton(angle)
         } else {
-            let wake =
-                WAKE_PRESSURE + (1.0 - WAKE_PRESSURE) * smooth((behind - 0.7 * NECK[1]) / (0.6 * NECK[1]));
-            newton(self.half_angle_rad) + (wake - newton(self.half_angle_rad)) * smooth(behind / 0.35)
+            let cone = newton(self.half_angle_rad);
+            cone + (self.wake_pressure(x) - cone) * smooth(behind / 0.35)
         };
         [p, rho0 * (p / p0).powf(1.0 / GAMMA_AIR)]
+    }
+
+    /// Pressure within the wake, over the free stream's.
+    fn wake_pressure(&self, x: f64) -> f64 {
+        let behind = (x - self.base_m.x) / self.base_m.y;
+        WAKE_PRESSURE + (1.0 - WAKE_PRESSURE) * smooth((behind - 0.7 * NECK[1]) / (0.6 * NECK[1]))
     }
 }
 
@@ -228,7 +233,9 @@ impl Layered for Layers {
                 self.stream.temperature_k * (1.0 + 0.5 * (GAMMA_AIR - 1.0) * self.stream.mach.powi(2));
             // The wake cools by mixing as it goes.
             let core = WAKE_TEMPERATURE * reservoir / (1.0 + 0.12 * behind_base / self.base_m.y);
-            let wake = self.inner_state(x, 0.0)[0] * self.stream.temperature_k / core;
+            let wake = self.wake_pressure(x);
+            p = wake + (p - wake) * outside;
+            let wake = wake * self.stream.temperature_k / core;
             rho = wake + (rho - wake) * outside;
         }
         p *= free[2];

@@ -189,7 +189,8 @@ fn lines(grid: &StructuredGrid, nx: usize, ny: usize) -> Result<(Vec<f64>, Vec<V
         let points: Vec<DVec3> = (0..ny).map(|j| grid.points.get(j * nx + line)).collect();
         let x = points[0].x;
         let length = (points[ny - 1] - points[0]).length();
-        if points.iter().any(|p| !((p.x - x).abs() <= 1e-5 * length)) {
+        let straight = |p: &DVec3| (p.x - x).abs() <= 1e-5 * length; // false for NaN, too
+        if !points.iter().all(straight) {
             return Err(SliceError::Line { line, what: "is not at one x" });
         }
         if x_m.last().is_some_and(|&last| x <= last) {
@@ -247,7 +248,9 @@ mod tests {
                     assert!(value.is_nan());
                 } else if r > surface + 0.8 && r < 5.0 && (0.3..3.7).contains(&p.x) {
                     checked += 1;
-                    assert!((value as f64 - (p.x + 10.0 * r)).abs() < 0.1, "{p}: {value}");
+                    // The ramp begins at a corner of the lattice, across which cells are sheared against each other.
+                    let tolerance = if (p.x - 1.0).abs() < 0.6 { 0.3 } else { 0.1 };
+                    assert!((value as f64 - (p.x + 10.0 * r)).abs() < tolerance, "{p}: {value}");
                 }
             }
             assert!(checked > 5000, "{checked}");
