@@ -14,7 +14,7 @@
 //!   growing shear layer (a model in the proportions of measured wakes, e.g. Chapman, NACA 1051).
 //!
 //! Defaults are the conditions of NASA Langley's 20-inch Mach 6 tunnel (p0 862 kPa, T0 500 K: 545 Pa, 61 K, 0.031 kg/m³).
-//! The densities are from 0.03 (wake) to 6 times the free stream's.
+//! The densities are from 0.05 (wake) to 6 times the free stream's.
 
 use super::cell_average::Layered;
 use super::flow::{Fields, Flow, FlowError};

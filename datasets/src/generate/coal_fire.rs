@@ -3,8 +3,8 @@
 //!
 //! The jet leaves a pipe of 50 mm along x into air of 600 K. Mean field: a top hat that turns into the self-similar Gaussian of
 //! a round jet, Z = 5 d/x · exp(-(r/b)²), b = 0.12 x (Pope, "Turbulent Flows", ch. 5); eddies grow with x. The volatiles (CH4,
-//! CO, CO2 in N2) burn at the [`flame_sheet`](super::flame_sheet) at up to 1900 K. Char and ash, which block light in a real one,
-//! are left out. Density 0.19 to 0.6 kg/m³. Smooth at the scale of a cell but for the flame sheet's rounded corner, so it is
+//! CO, CO2 in N2) burn at the `flame_sheet` at up to 1900 K. Char and ash, which block light in a real one,
+//! are left out. Density 0.18 to 0.6 kg/m³. Smooth at the scale of a cell but for the flame sheet's rounded corner, so it is
 //! sampled at points.
 
 use super::combustion_jet::{gas_fields, gas_row};

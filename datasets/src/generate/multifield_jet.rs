@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 /// Diffusivity of mass, m²/s: that of N2 in air at 450 K, so that most of the flame burns and its most strained parts are out.
 const DIFFUSIVITY: f64 = 4e-5;
-/// Scalar dissipation at which the flame goes out, 1/s (Hawkes et al. 2007: about 2000 for this fuel).
+/// Scalar dissipation at which the flame goes out, 1/s (of the order of 2000 for this fuel).
 const QUENCHING: f64 = 2000.0;
 /// Mass fraction of OH in a burning flame.
 const HYDROXYL: f64 = 4e-3;
