@@ -1,4 +1,5 @@
 //! Data sets by name: what there is, in which sizes, from which views, and which figure of the thesis it stands for.
+//! Meshes and lines are here, flows in [`flows`].
 //!
 //! ```
 //! use datasets::catalogue::{Data, find};
@@ -8,7 +9,10 @@
 //! # Ok::<(), datasets::catalogue::CatalogueError>(())
 //! ```
 
+pub mod flows;
+
 use crate::cache::{Cached, MeshCache};
+use crate::generate::flow::FlowError;
 use crate::generate::impact::Impact;
 use crate::generate::mixing_layer::MixingLayer;
 use crate::generate::nested_wavelet::{NestedWaveletError, Size};
@@ -99,6 +103,9 @@ pub enum CatalogueError {
     /// The wavelet cannot be made.
     #[error(transparent)]
     Wavelet(#[from] NestedWaveletError),
+    /// The flow cannot be made.
+    #[error(transparent)]
+    Flow(#[from] FlowError),
 }
 
 /// Told how many steps of how many are done; returning false stops the work.

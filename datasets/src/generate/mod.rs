@@ -3,14 +3,32 @@
 //! (The module is called `generate` because `gen` is a keyword.) Nothing here needs a file; random numbers come from
 //! [`random`], so the same parameters give the same data on every machine and any number of threads.
 
+pub mod blunt_body;
+mod cell_average;
+pub mod coal_fire;
+pub mod combustion_jet;
+pub mod cone_shock;
+pub mod fire;
+mod flame_sheet;
+pub mod flow;
+pub mod gas_dynamics;
+pub mod helium_plume;
 pub mod impact;
 pub mod mixing_layer;
+pub mod multifield_jet;
 pub mod nested_wavelet;
 mod noise;
+pub mod oblique_shock;
 pub mod plasma;
+mod plume;
 pub mod polylines;
 pub mod random;
+mod revolve;
+pub mod sample_fields;
 pub mod shapes;
 pub mod star_field_lines;
 pub mod streamline;
+pub mod swept_slice;
+pub mod thermal_plume;
+mod turbulence;
 pub mod wavelet;
