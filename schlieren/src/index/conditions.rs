@@ -100,9 +100,10 @@ pub struct Answer {
 ///
 /// ```
 /// use schlieren::index::conditions::{Conditions, answer};
-/// let moist = Conditions { humidity: 0.5, ..Default::default() };
+/// // A row of NIST's table: 40 C, 120 kPa, 75 % humidity.
+/// let moist = Conditions { temperature_c: 40.0, pressure_pa: 120e3, humidity: 0.75, ..Default::default() };
 /// let answer = answer(&moist)?;
-/// assert!((answer.n_minus_1 - 2.71375e-4).abs() < 1e-9 && answer.warnings.is_empty());
+/// assert!((answer.n_minus_1 - 2.99418e-4).abs() < 1e-9 && answer.warnings.is_empty());
 /// # Ok::<(), schlieren::index::IndexError>(())
 /// ```
 pub fn answer(conditions: &Conditions) -> Result<Answer, IndexError> {

@@ -33,7 +33,7 @@ pub fn answer(path: &Path) -> Result<Answers, ReadError> {
 /// let answers = answer_table(datasets::read::csv::read_from_bytes("t.csv".as_ref(), text)?)?;
 /// let mut out = Vec::new();
 /// answers.write(&mut out).unwrap();
-/// assert_eq!(out, b"T_C,p_Pa,lambda_um,RH_frac,CO2_ppm,n_minus_1\n20,101325,0.633,0,450,2.71800026278e-4\n");
+/// assert_eq!(out, b"T_C,p_Pa,lambda_um,RH_frac,CO2_ppm,n_minus_1\n20,101325,0.633,0,450,2.71799831635e-4\n");
 /// # Ok::<(), datasets::read::ReadError>(())
 /// ```
 pub fn answer_table(table: CsvTable) -> Result<Answers, ReadError> {
