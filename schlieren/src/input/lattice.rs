@@ -142,7 +142,8 @@ fn target(mesh: &Mesh, own: Option<&Lattice>, options: &Options) -> Result<Latti
         Some([a, b]) => (a.max(low), b.min(high)),
         None => (low, high),
     };
-    if !((high - low).min_element() > 0.0) {
+    let size = high - low;
+    if size.is_nan() || size.min_element() <= 0.0 {
         return Err(InputError::Option {
             what: format!("the bounds leave nothing of the mesh ({whole_low} to {whole_high})"),
             cure: "give the lower and the upper corner in the file's unit of length",
