@@ -16,5 +16,8 @@
 #![forbid(unsafe_code)]
 
 pub mod field;
+pub mod interpolate;
+pub mod march;
 pub mod path;
+pub mod skip;
 pub mod view;
