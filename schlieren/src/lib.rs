@@ -15,6 +15,7 @@
 //! | OPD | optical path minus that of the undisturbed ray, between the same planes | m |
 #![forbid(unsafe_code)]
 
+pub mod analytic;
 pub mod field;
 pub mod interpolate;
 pub mod march;
