@@ -170,7 +170,8 @@ pub mod abel {
     pub fn power_slope(y: f64, radius: f64, m: u32) -> f64 {
         let factor = [2.0, 4.0 / 3.0, 16.0 / 15.0, 32.0 / 35.0][m as usize];
         let inside = (1.0 - (y / radius).powi(2)).max(0.0);
-        factor * radius * (f64::from(m) + 0.5) * inside.powf(f64::from(m) - 0.5) * -2.0 * y / (radius * radius)
+        factor * radius * (f64::from(m) + 0.5) * inside.powf(f64::from(m) - 0.5) * -2.0 * y
+            / (radius * radius)
     }
 }
 

@@ -18,6 +18,7 @@
 pub mod analytic;
 pub mod field;
 pub mod interpolate;
+mod level;
 pub mod march;
 pub mod path;
 pub mod skip;

@@ -29,7 +29,10 @@ fn observed_orders_are_one_two_and_four() {
     assert_order(&Sharma, "Sharma", 4.0);
     assert_order(&RungeKutta4, "Runge-Kutta", 4.0);
     assert_order(&Pefrl, "PEFRL", 4.0);
-    assert_eq!((Euler::ORDER, Verlet::ORDER, Sharma::ORDER, RungeKutta4::ORDER, Pefrl::ORDER), (1, 2, 4, 4, 4));
+    assert_eq!(
+        (Euler::ORDER, Verlet::ORDER, Sharma::ORDER, RungeKutta4::ORDER, Pefrl::ORDER),
+        (1, 2, 4, 4, 4)
+    );
 }
 
 #[test]
@@ -120,11 +123,16 @@ fn kepler_hyperbolas_turn_by_two_arctangents() {
     // |w| = 1 at infinity; from far away the bend outside is k / far.
     let start = Ray::new(DVec3::new(b, 0.0, -far), DVec3::Z);
     let start = Ray { u: DVec3::Z * medium.sample(start.start_m).0, ..start };
-    let run = DormandPrince { tolerance: 1e-13, longest_step_m: far }.run(&medium, &start, 2.0 * far).unwrap();
+    let run =
+        DormandPrince { tolerance: 1e-13, longest_step_m: far }.run(&medium, &start, 2.0 * far).unwrap();
     let w = run.ray.w();
     let turned = f64::atan2(-w.x, w.z);
     // Half of sin(angle) k/far on each side is still to come.
-    assert!((turned - medium.deflection_rad(b)).abs() < 3.0 * 0.05 / far, "{turned} {}", medium.deflection_rad(b));
+    assert!(
+        (turned - medium.deflection_rad(b)).abs() < 3.0 * 0.05 / far,
+        "{turned} {}",
+        medium.deflection_rad(b)
+    );
     // Nothing of Bouguer's invariant is lost on the way.
     let l = run.ray.position_m().cross(w);
     let l0 = start.start_m.cross(start.w());
@@ -170,8 +178,14 @@ fn total_reflection_turns_back_at_the_angle_of_incidence() {
     // n falls from 1 to sqrt(1 - 0.8) over 1 m: a ray at 60 degrees from the normal cannot reach the end.
     let medium = LinearSquare { slope_per_m: -0.4 };
     let start = Ray::new(DVec3::ZERO, DVec3::new(f64::sin(PI / 3.0), f64::cos(PI / 3.0), 0.0));
-    let end = Verlet.run_until(&medium, &start, 1e-3, 100_000, |r| if r.tau_m > 0.1 { -r.position_m().y } else { -1.0 }).unwrap();
-    assert!((end.w() - DVec3::new(f64::sin(PI / 3.0), -f64::cos(PI / 3.0), 0.0)).length() < 1e-12, "{}", end.w());
+    let end = Verlet
+        .run_until(&medium, &start, 1e-3, 100_000, |r| if r.tau_m > 0.1 { -r.position_m().y } else { -1.0 })
+        .unwrap();
+    assert!(
+        (end.w() - DVec3::new(f64::sin(PI / 3.0), -f64::cos(PI / 3.0), 0.0)).length() < 1e-12,
+        "{}",
+        end.w()
+    );
 }
 
 /// Turn around and go the same number of steps: symplectic schemes return to rounding, at any step.

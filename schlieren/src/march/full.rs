@@ -41,7 +41,13 @@ pub struct Full<'a, I: Interpolate, G: Integrator> {
 
 impl<'a, I: Interpolate, G: Integrator> Full<'a, I, G> {
     /// Over an interpolant of `field`.
-    pub fn new(field: &'a Field, interpolate: &'a I, integrator: G, view: View, options: FullOptions) -> Self {
+    pub fn new(
+        field: &'a Field,
+        interpolate: &'a I,
+        integrator: G,
+        view: View,
+        options: FullOptions,
+    ) -> Self {
         Full { field, interpolate, integrator, frame: Frame::new(field, view), options }
     }
 
@@ -76,7 +82,9 @@ impl<'a, I: Interpolate, G: Integrator> Full<'a, I, G> {
             Some(kinds) => {
                 // Step by step, looking at the nearest node.
                 let d = self.field.dims();
-                let stops = |kind: u8| kind == Node::Solid as u8 || (kind != 0 && self.options.blank == BlankCells::Opaque);
+                let stops = |kind: u8| {
+                    kind == Node::Solid as u8 || (kind != 0 && self.options.blank == BlankCells::Opaque)
+                };
                 let look = |r: &Ray| {
                     let p = lattice(r).clamp(DVec3::ZERO, self.frame.last).round().as_usizevec3();
                     kinds[p.x + (p.y + p.z * d[1]) * d[0]] as u8

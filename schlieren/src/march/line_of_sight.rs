@@ -5,15 +5,16 @@
 //! tilt of an extended source's beams shifts nothing.
 
 use super::frame::{BlankCells, Frame, clip};
+use crate::at_level;
 use crate::field::{Field, Node};
 use crate::interpolate::{
-    BSpline, Interpolant, Interpolate, Interpolate16, LANES, Row, Trilinear, bspline_weights, bspline_weights16, cell, prefilter_line,
-    transpose,
+    BSpline, Interpolant, Interpolate, Interpolate16, LANES, Row, Trilinear, bspline_weights,
+    bspline_weights16, cell, prefilter_line, transpose,
 };
 use crate::path::{Exit, Jacobian, LightPaths, Start, Wanted};
 use crate::view::View;
 use fearless_simd::prelude::*;
-use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, i32x16};
+use fearless_simd::{Level, Simd, f32x4, f32x16, i32x16};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -46,7 +47,13 @@ struct Map {
 impl LineOfSight {
     /// Projects a field along a view, in parallel. Along an axis of the field the projection is the exact integral of the cubic B-spline through the
     /// nodes (and takes milliseconds); other directions are integrated with the given interpolant, a step a voxel.
-    pub fn new(field: &Field, view: View, interpolant: Interpolant, wanted: Wanted, blank: BlankCells) -> LineOfSight {
+    pub fn new(
+        field: &Field,
+        view: View,
+        interpolant: Interpolant,
+        wanted: Wanted,
+        blank: BlankCells,
+    ) -> LineOfSight {
         Self::with_level(field, view, interpolant, wanted, blank, Level::new())
     }
 
@@ -63,7 +70,8 @@ impl LineOfSight {
         let axes = [view.right, view.up, view.forward].map(lattice_axis);
         let (map, exit_depth_m) = if let [Some(right), Some(up), Some(forward)] = axes {
             let centre = (view.centre_m - field.origin_m()) / frame.spacing_m;
-            let far = if forward.1 > 0.0 { frame.last[forward.0] - centre[forward.0] } else { centre[forward.0] };
+            let far =
+                if forward.1 > 0.0 { frame.last[forward.0] - centre[forward.0] } else { centre[forward.0] };
             (project_along_axis(field, centre, right, up, forward.0), Some(far * frame.spacing_m[forward.0]))
         } else {
             let map = match interpolant {
@@ -99,7 +107,10 @@ impl LineOfSight {
             return inside.then_some(depth_m);
         }
         let straight = Start { tilt_rad: [0.0; 2], ..*start };
-        let ray = self.frame.undisturbed(&straight, &mut Some(([0.0; 2], [self.frame.view.right, self.frame.view.up, self.frame.view.forward])));
+        let ray = self.frame.undisturbed(
+            &straight,
+            &mut Some(([0.0; 2], [self.frame.view.right, self.frame.view.up, self.frame.view.forward])),
+        );
         (ray.range_m[1] > ray.range_m[0]).then_some(ray.range_m[1])
     }
 
@@ -226,7 +237,13 @@ fn integral_weights(n: usize) -> Vec<f64> {
         .collect()
 }
 
-fn project_along_axis(field: &Field, centre: DVec3, right: (usize, f64), up: (usize, f64), forward: usize) -> Map {
+fn project_along_axis(
+    field: &Field,
+    centre: DVec3,
+    right: (usize, f64),
+    up: (usize, f64),
+    forward: usize,
+) -> Map {
     let dims3 = field.dims();
     let stride = [1, dims3[0], dims3[0] * dims3[1]];
     let weights = integral_weights(dims3[forward]);
@@ -304,7 +321,7 @@ fn project_obliquely<I: Interpolate16>(field: &Field, frame: &Frame, rows: I, le
     let no_kinds: &mut [u8] = &mut [];
     let kind_rows = kinds.as_deref_mut().unwrap_or(no_kinds);
     let line = |v: usize, out: &mut [f64], kinds: &mut [u8]| {
-        dispatch!(level, simd => integrate_row(simd, field, frame, rows, step_m, [lo[0], lo[1] + v as f64 * step_m], out, kinds));
+        at_level!(level, simd => integrate_row(simd, field, frame, rows, step_m, [lo[0], lo[1] + v as f64 * step_m], out, kinds));
     };
     if kind_rows.is_empty() {
         sums.par_chunks_exact_mut(dims[0]).enumerate().for_each(|(v, out)| line(v, out, &mut []));
@@ -315,7 +332,14 @@ fn project_obliquely<I: Interpolate16>(field: &Field, frame: &Frame, rows: I, le
             .for_each(|(v, (out, k))| line(v, out, k));
     }
     let (coefficients, row) = prefilter_map(&sums, dims);
-    Map { coefficients, dims, row, centre: [-lo[0] / step_m, -lo[1] / step_m], per_m: [1.0 / step_m; 2], kinds }
+    Map {
+        coefficients,
+        dims,
+        row,
+        centre: [-lo[0] / step_m, -lo[1] / step_m],
+        per_m: [1.0 / step_m; 2],
+        kinds,
+    }
 }
 
 /// Integrals of eps, in metres, along the rays through a row of map nodes.
@@ -370,13 +394,17 @@ fn integrate_row<S: Simd, I: Interpolate16>(
                         let fraction = f32x16::splat(simd, (k as f32 + 0.5) * per_step);
                         let mut at = [fraction; 3];
                         for c in 0..3 {
-                            at[c] = fraction.mul_add(f32x16::from_slice(simd, &chord[c]), f32x16::from_slice(simd, &entry[c]));
+                            at[c] = fraction.mul_add(
+                                f32x16::from_slice(simd, &chord[c]),
+                                f32x16::from_slice(simd, &entry[c]),
+                            );
                         }
                         some += rows.sample16(simd, &at).eps;
                         if let (Some(nodes), false) = (field.nodes(), kinds.is_empty()) {
                             let p: [Row; 3] = [at[0].into(), at[1].into(), at[2].into()];
                             for l in 0..sums.len() {
-                                let near = [0, 1, 2].map(|c| ((p[c][l] + 0.5).max(0.0) as usize).min(dims[c] - 1));
+                                let near =
+                                    [0, 1, 2].map(|c| ((p[c][l] + 0.5).max(0.0) as usize).min(dims[c] - 1));
                                 let kind = nodes[near[0] + (near[1] + near[2] * dims[1]) * dims[0]] as u8;
                                 if length_m[l] > 0.0 {
                                     let worst = &mut kinds[block * LANES + l];
@@ -403,10 +431,12 @@ fn integrate_row<S: Simd, I: Interpolate16>(
 fn prefilter_map(values: &[f64], [nu, nv]: [usize; 2]) -> (Vec<f32>, usize) {
     let row = nu + 2;
     let mut plane = vec![0.0; row * (nv + 2)];
-    plane[row..row * (nv + 1)].par_chunks_exact_mut(row).zip(values.par_chunks_exact(nu)).for_each(|(to, from)| {
-        to[1..=nu].copy_from_slice(from);
-        prefilter_line(to);
-    });
+    plane[row..row * (nv + 1)].par_chunks_exact_mut(row).zip(values.par_chunks_exact(nu)).for_each(
+        |(to, from)| {
+            to[1..=nu].copy_from_slice(from);
+            prefilter_line(to);
+        },
+    );
     let columns: Vec<Vec<f64>> = (0..row)
         .into_par_iter()
         .map(|i| {
@@ -422,7 +452,7 @@ fn prefilter_map(values: &[f64], [nu, nv]: [usize; 2]) -> (Vec<f32>, usize) {
 impl LightPaths for LineOfSight {
     fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
         assert_eq!(starts.len(), exits.len(), "one exit per start");
-        dispatch!(self.level, simd => self.packets(simd, starts, exits));
+        at_level!(self.level, simd => self.packets(simd, starts, exits));
     }
 
     fn view(&self) -> &View {
