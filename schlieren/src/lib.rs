@@ -15,8 +15,13 @@
 //! | OPD | optical path minus that of the undisturbed ray, between the same planes | m |
 #![forbid(unsafe_code)]
 
+pub mod analytic;
 pub mod field;
+mod level;
 pub mod index;
 pub mod input;
+pub mod interpolate;
+pub mod march;
 pub mod path;
+pub mod skip;
 pub mod view;
