@@ -17,10 +17,10 @@
 
 pub mod analytic;
 pub mod field;
-mod level;
 pub mod index;
 pub mod input;
 pub mod interpolate;
+mod level;
 pub mod march;
 pub mod path;
 pub mod skip;
