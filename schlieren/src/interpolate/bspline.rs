@@ -226,6 +226,8 @@ impl BSplineRows<'_> {
 }
 
 impl Interpolate16 for BSplineRows<'_> {
+    const EXACT: bool = true;
+
     #[inline(always)]
     fn sample16<S: Simd>(&self, simd: S, at: &[f32x16<S>; 3]) -> Samples<S> {
         let mut cells = [i32x16::splat(simd, 0); 3];
