@@ -21,5 +21,6 @@ pub mod interpolate;
 mod level;
 pub mod march;
 pub mod path;
+pub mod plan;
 pub mod skip;
 pub mod view;

@@ -92,17 +92,26 @@ fn blob_and_its_second_derivatives_are_the_closed_form() {
         let u = g.deflection_rad(x, y, 0.5);
         let [xx, xy, yy] = g.jacobian_per_m(x, y, 0.5);
         for c in 0..2 {
-            assert!((f64::from(e.deflection_rad[c]) - u[c]).abs() < 5e-5 * scale);
+            assert!((f64::from(e.deflection_rad[c]) - u[c]).abs() < 1e-4 * scale);
         }
         assert!(
             (f64::from(e.opd_m) - g.path_difference_m(x, y, 0.5)).abs()
-                < 2e-6 * g.path_difference_m(0.0, 0.0, 0.5)
+                < 1e-5 * g.path_difference_m(0.0, 0.0, 0.5)
         );
         let got = j.deflection_per_m.map(|r| r.map(f64::from));
         for (a, b) in [(got[0][0], xx), (got[0][1], xy), (got[1][0], xy), (got[1][1], yy)] {
             assert!((a - b).abs() < 2e-3 * second);
         }
     }
+}
+
+/// Seen obliquely the box is a prism in projection, but light enters and leaves through windows normal to it.
+#[test]
+fn uniform_gas_in_an_oblique_box_is_no_prism() {
+    let field = cube(32, |_| 1e-4);
+    let e = trace(&sight(&field, oblique()), &grid(16, 0.5));
+    assert!(e.iter().all(|e| e.deflection_rad.iter().all(|u| u.abs() < 1e-10)), "{}", largest(&e));
+    assert!(e.iter().all(|e| e.opd_m > 1e-5));
 }
 
 #[test]
