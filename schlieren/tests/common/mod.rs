@@ -57,7 +57,7 @@ pub(crate) fn difference(a: &[Exit], b: &[Exit]) -> (f64, f64) {
             let d = (f64::from(x.deflection_rad[c]) - f64::from(y.deflection_rad[c])) / scale;
             sum += d * d;
             // Not `max`: a NaN must not vanish.
-            if !(d.abs() <= max) {
+            if d.is_nan() || d.abs() > max {
                 max = d.abs();
             }
         }
