@@ -15,6 +15,15 @@
 //! | OPD | optical path minus that of the undisturbed ray, between the same planes | m |
 #![forbid(unsafe_code)]
 
+pub mod cutoff;
 pub mod field;
+pub mod film;
+pub mod filter;
+pub mod optics;
 pub mod path;
+pub mod solids;
+pub mod spectrum;
+pub mod technique;
+#[cfg(test)]
+mod testing;
 pub mod view;
