@@ -8,6 +8,7 @@
 //! | [`cache`] | generated meshes kept on disk |
 //! | [`image_io`] | pictures as PNG and multi-layer OpenEXR |
 //! | [`colormaps`], [`view`] | colours and cameras |
+//! | [`resample`] | data of any mesh on a uniform lattice, with a mask and the error |
 //! | [`model`], [`read`], [`write`](mod@write) | files of others |
 //! | `cli` (feature) | what all command-line programs here share |
 #![forbid(unsafe_code)]
@@ -23,6 +24,7 @@ pub mod image_io;
 pub mod isosurface;
 pub mod model;
 pub mod read;
+pub mod resample;
 #[cfg(test)]
 mod testing;
 pub mod view;

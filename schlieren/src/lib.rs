@@ -19,6 +19,7 @@ pub mod cutoff;
 pub mod field;
 pub mod film;
 pub mod filter;
+pub mod index;
 pub mod optics;
 pub mod path;
 pub mod solids;

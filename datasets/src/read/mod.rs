@@ -4,6 +4,7 @@
 //! justify; what is left out is named in [`Opened::warnings`]; every error names the file, the place and the cure.
 
 pub(crate) mod base64;
+pub mod csv;
 pub mod error;
 pub mod gltf;
 pub mod mhd;

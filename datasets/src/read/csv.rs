@@ -1,0 +1,351 @@
+//! Tables as text: a line of column names, then one row a line. Commas, or semicolons or tabs if the header has them instead.
+//!
+//! Cells may be quoted (`"a, b"`, a quote inside is doubled) but not contain line breaks. Empty lines and lines that begin with
+//! `#` are skipped. Columns are asked for by name, so their order does not matter.
+
+use super::ReadError;
+use super::error::{At, Fault, read_bytes};
+use std::path::{Path, PathBuf};
+
+pub(crate) const FORMAT: &str = "CSV";
+
+/// A table with named columns; cells stay text until a column of numbers is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CsvTable {
+    path: PathBuf,
+    separator: char,
+    header: String,
+    columns: Vec<String>,
+    rows: Vec<Row>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Row {
+    line: u64,
+    text: String,
+    cells: Vec<String>,
+}
+
+/// Reads a table.
+pub fn read(path: &Path) -> Result<CsvTable, ReadError> {
+    read_from_bytes(path, &read_bytes(path)?)
+}
+
+/// Reads a table from its bytes; `path` is for messages.
+pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<CsvTable, ReadError> {
+    parse(path, bytes).map_err(|f| f.in_file(path, FORMAT))
+}
+
+fn parse(path: &Path, bytes: &[u8]) -> Result<CsvTable, Fault> {
+    let text = std::str::from_utf8(bytes).map_err(|e| {
+        let line = bytes[..e.valid_up_to()].iter().filter(|&&b| b == b'\n').count() as u64 + 1;
+        Fault::new(At::Line(line), "bytes that are not text (UTF-8)", "save the table as UTF-8 text")
+    })?;
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let numbered = text.lines().enumerate().map(|(i, l)| (i as u64 + 1, l));
+    let mut lines = numbered.filter(|(_, l)| !l.trim().is_empty() && !l.trim_start().starts_with('#'));
+
+    // The header.
+    let Some((header_line, header)) = lines.next() else {
+        let cure = "the first line must name the columns, such as `x,y,value`";
+        return Err(Fault::new(At::Line(1), "there are no lines with content", cure));
+    };
+    let separator = [',', ';', '\t'].into_iter().find(|&c| header.contains(c)).unwrap_or(',');
+    let columns = cells(header, separator).map_err(|what| unclosed(header_line, what))?;
+    for (i, name) in columns.iter().enumerate() {
+        let at = At::Line(header_line);
+        if name.is_empty() {
+            return Err(Fault::new(at, format!("column {} has no name", i + 1), "name every column"));
+        }
+        if columns[..i].contains(name) {
+            return Err(Fault::new(at, format!("two columns are called `{name}`"), "rename one of them"));
+        }
+    }
+    if columns.iter().all(|c| c.parse::<f64>().is_ok()) {
+        let cure = "put a line with the names of the columns above it";
+        return Err(Fault::new(
+            At::Line(header_line),
+            "numbers where the names of the columns should be",
+            cure,
+        ));
+    }
+
+    // The rows.
+    let mut rows = Vec::new();
+    for (line, text) in lines {
+        let row = cells(text, separator).map_err(|what| unclosed(line, what))?;
+        if row.len() != columns.len() {
+            let what = format!("{} cells, but there are {} columns", row.len(), columns.len());
+            let cure = format!("give every row one cell per column, separated by {separator:?}");
+            return Err(Fault::new(At::Line(line), what, cure));
+        }
+        rows.push(Row { line, text: text.to_string(), cells: row });
+    }
+    Ok(CsvTable { path: path.to_path_buf(), separator, header: header.to_string(), columns, rows })
+}
+
+fn unclosed(line: u64, cell: String) -> Fault {
+    let shown: String = cell.chars().take(40).collect();
+    let what = format!("the quoted cell `{shown}` has no closing quote, or text after it");
+    Fault::new(At::Line(line), what, "close the quote on the same line; double the quotes inside")
+}
+
+/// The cells of a line without surrounding space and quotes; `Err` with the cell whose quotes are wrong.
+fn cells(line: &str, separator: char) -> Result<Vec<String>, String> {
+    let mut out = Vec::new();
+    let mut rest = line;
+    loop {
+        // Space that is not itself the separator (a tab may be).
+        let start = rest.trim_start_matches(|c: char| c.is_whitespace() && c != separator);
+        if let Some(quoted) = start.strip_prefix('"') {
+            let mut cell = String::new();
+            let mut chars = quoted.char_indices().peekable();
+            let after = loop {
+                match chars.next() {
+                    Some((_, '"')) if chars.peek().is_some_and(|c| c.1 == '"') => {
+                        chars.next();
+                        cell.push('"');
+                    }
+                    Some((at, '"')) => break &quoted[at + 1..],
+                    Some((_, c)) => cell.push(c),
+                    None => return Err(cell),
+                }
+            };
+            let after = after.trim_start_matches(|c: char| c.is_whitespace() && c != separator);
+            out.push(cell);
+            match after.strip_prefix(separator) {
+                Some(next) => rest = next,
+                None if after.is_empty() => return Ok(out),
+                None => return Err(out.pop().unwrap_or_default()),
+            }
+        } else {
+            match rest.split_once(separator) {
+                Some((cell, next)) => {
+                    out.push(cell.trim().to_string());
+                    rest = next;
+                }
+                None => {
+                    out.push(rest.trim().to_string());
+                    return Ok(out);
+                }
+            }
+        }
+    }
+}
+
+impl CsvTable {
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+    /// Names of the columns, in order.
+    pub fn columns(&self) -> &[String] {
+        &self.columns
+    }
+    /// What stands between cells.
+    pub fn separator(&self) -> char {
+        self.separator
+    }
+    /// The header as it stands in the file.
+    pub fn header_text(&self) -> &str {
+        &self.header
+    }
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+    /// True when there is only a header.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+    /// Row `row` as it stands in the file; panics when out of range.
+    pub fn row_text(&self, row: usize) -> &str {
+        &self.rows[row].text
+    }
+    /// Line of row `row` in the file, from 1; panics when out of range.
+    pub fn line(&self, row: usize) -> u64 {
+        self.rows[row].line
+    }
+    /// A cell as text; panics when out of range.
+    pub fn cell(&self, row: usize, column: usize) -> &str {
+        &self.rows[row].cells[column]
+    }
+
+    /// Which column has this name; capitals matter only if that tells columns apart.
+    pub fn column_index(&self, name: &str) -> Result<usize, ReadError> {
+        if let Some(i) = self.columns.iter().position(|c| c == name) {
+            return Ok(i);
+        }
+        let mut same = self.columns.iter().enumerate().filter(|(_, c)| c.eq_ignore_ascii_case(name));
+        if let (Some((i, _)), None) = (same.next(), same.next()) {
+            return Ok(i);
+        }
+        let names = self.columns.iter().map(|c| format!("`{c}`")).collect::<Vec<_>>().join(", ");
+        let what = format!("there is no column `{name}`; there are {names}");
+        let cure = format!("rename a column to `{name}`, or add it");
+        Err(Fault::new(At::Field("the header".into()), what, cure).in_file(&self.path, FORMAT))
+    }
+
+    /// The numbers of a column. A cell that is not a finite number is an error with its line, column and content.
+    ///
+    /// ```
+    /// use datasets::read::csv;
+    /// let table = csv::read_from_bytes("t.csv".as_ref(), b"y, x\n1.5, 2\n-3e2, 4\n")?;
+    /// assert_eq!(table.numbers("x")?, [2.0, 4.0]);
+    /// assert_eq!(table.numbers("y")?, [1.5, -300.0]);
+    /// let error = table.numbers("z").unwrap_err().to_string();
+    /// assert!(error.contains("no column `z`; there are `y`, `x`"));
+    /// # Ok::<(), datasets::read::ReadError>(())
+    /// ```
+    pub fn numbers(&self, name: &str) -> Result<Vec<f64>, ReadError> {
+        let column = self.column_index(name)?;
+        self.rows
+            .iter()
+            .map(|row| {
+                let cell = &row.cells[column];
+                cell.parse::<f64>().ok().filter(|x| x.is_finite()).ok_or_else(|| {
+                    let cure = if cell.is_empty() {
+                        "fill it in, or remove the row"
+                    } else if cell.contains(',') {
+                        "write the number with a decimal point"
+                    } else {
+                        "write a number, without its unit"
+                    };
+                    self.fault(row.line, name, cell, "is not a number", cure)
+                })
+            })
+            .collect()
+    }
+
+    /// An error about the value in a cell, for checks that callers make.
+    pub fn cell_error(&self, row: usize, column: &str, what: &str, cure: &str) -> ReadError {
+        let index = self.columns.iter().position(|c| c.eq_ignore_ascii_case(column));
+        let (line, cell) = match (self.rows.get(row), index) {
+            (Some(r), Some(i)) => (r.line, r.cells[i].as_str()),
+            (Some(r), None) => (r.line, ""),
+            (None, _) => (0, ""),
+        };
+        self.fault(line, column, cell, what, cure)
+    }
+
+    fn fault(&self, line: u64, column: &str, cell: &str, what: &str, cure: &str) -> ReadError {
+        let shown: String = cell.chars().take(40).collect();
+        let what = format!("column `{column}`: `{shown}` {what}");
+        Fault::new(At::Line(line), what, cure).in_file(&self.path, FORMAT)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn table(text: &str) -> Result<CsvTable, String> {
+        read_from_bytes(Path::new("t.csv"), text.as_bytes()).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn comments_quotes_separators_and_line_ends() {
+        let t = table(
+            "\u{feff}# made by hand\r\n\"a;1\";B ; c\r\n\r\n\"say \"\"hi\"\"\" ;2; 3 \r\n#x\r\n ;4;\"5\"",
+        )
+        .unwrap();
+        assert_eq!(
+            (t.columns(), t.separator(), t.len()),
+            (&["a;1".into(), "B".into(), "c".into()][..], ';', 2)
+        );
+        assert_eq!((t.cell(0, 0), t.cell(1, 0), t.line(0), t.line(1)), ("say \"hi\"", "", 4, 6));
+        assert_eq!(t.numbers("b").unwrap(), [2.0, 4.0]);
+        assert_eq!(t.numbers("c").unwrap(), [3.0, 5.0]);
+        assert_eq!(table("x\n1\n").unwrap().numbers("x").unwrap(), [1.0]);
+        assert_eq!(table("x\ty\n1\t2\n").unwrap().numbers("y").unwrap(), [2.0]);
+        assert_eq!(table("x\ty\n\t2\n").unwrap().cell(0, 1), "2");
+    }
+
+    #[test]
+    fn errors_name_file_line_column_value_and_cure() {
+        let t = table("a,b\n1,2\n3,warm\n").unwrap();
+        let text = t.numbers("b").unwrap_err().to_string();
+        assert!(
+            text.contains("t.csv")
+                && text.contains("in line 3: column `b`: `warm` is not a number; write a number"),
+            "{text}"
+        );
+        for (bad, word) in [
+            ("", "no lines"),
+            ("# only this\n", "no lines"),
+            ("1,2\n3,4\n", "names of the columns"),
+            ("a,a\n", "two columns"),
+            ("a,\n", "column 2 has no name"),
+            ("a,b\n1\n", "in line 2: 1 cells, but there are 2 columns"),
+            ("a,b\n1,\"2\n", "no closing quote"),
+            ("a,b\n1,\"2\"x\n", "no closing quote"),
+            ("a;b\n1;2,5\n", "decimal point"),
+            ("a,b\n1,\n", "fill it in"),
+            ("a,b\n1,inf\n", "not a number"),
+        ] {
+            let text = match table(bad) {
+                Err(e) => e,
+                Ok(t) => t.numbers("b").unwrap_err().to_string(),
+            };
+            assert!(text.contains(word), "{bad:?}: {text}");
+        }
+        assert!(
+            read_from_bytes(Path::new("t.csv"), b"a\n\xff\n").unwrap_err().to_string().contains("in line 2")
+        );
+        // Capitals do not matter unless they tell columns apart.
+        assert!(table("A,a\n1,2\n").unwrap().numbers("a").is_ok());
+        assert!(table("Ab,aB\n1,2\n").unwrap().numbers("ab").is_err());
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_a_table_or_an_error(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+            if let Ok(t) = read_from_bytes(Path::new("t.csv"), &bytes) {
+                for name in t.columns() {
+                    let _ = t.numbers(name);
+                }
+            }
+        }
+
+        #[test]
+        fn any_text_of_csv_characters_is_a_table_or_an_error(text in "[a-b\",;\t\n\r# 0-9.e-]{0,120}") {
+            if let Ok(t) = table(&text) {
+                prop_assert!((0..t.len()).all(|r| (0..t.columns().len()).all(|c| t.cell(r, c).len() <= text.len())));
+            }
+        }
+
+        #[test]
+        fn what_is_written_is_read_in_any_order_of_columns(
+            rows in proptest::collection::vec(proptest::collection::vec(-1e30f64..1e30, 3), 0..20),
+            order in Just(vec![0usize, 1, 2]).prop_shuffle(),
+            separator in prop_oneof![Just(','), Just(';'), Just('\t')],
+            quoted: bool,
+        ) {
+            let names = ["alpha", "beta", "gamma"];
+            let join = |cells: Vec<String>| {
+                let cells = cells.iter().map(|c| if quoted { format!("\"{c}\"") } else { c.clone() });
+                cells.collect::<Vec<_>>().join(&separator.to_string())
+            };
+            let mut text = join(order.iter().map(|&c| names[c].to_string()).collect()) + "\n";
+            for r in &rows {
+                text += &(join(order.iter().map(|&c| format!("{:e}", r[c])).collect()) + "\n");
+            }
+            let t = table(&text).unwrap();
+            for (c, name) in names.iter().enumerate() {
+                let expected: Vec<f64> = rows.iter().map(|r| r[c]).collect();
+                prop_assert_eq!(t.numbers(name).unwrap(), expected);
+            }
+        }
+
+        #[test]
+        fn quoted_text_survives(cells in proptest::collection::vec("[ -~]{0,12}", 1..5)) {
+            let names: Vec<String> = (0..cells.len()).map(|i| format!("c{i}")).collect();
+            let row: Vec<String> = cells.iter().map(|c| format!("\"{}\"", c.replace('"', "\"\""))).collect();
+            let t = table(&format!("{}\n{}\n", names.join(","), row.join(","))).unwrap();
+            for (i, c) in cells.iter().enumerate() {
+                prop_assert_eq!(t.cell(0, i), c.as_str());
+            }
+        }
+    }
+}

@@ -1,0 +1,475 @@
+//! Any data set as points and solid cells, numbered through all blocks. Lattices keep their implicit cells.
+
+use super::ResampleError;
+use crate::model::{Attributes, CellType, Dataset, Points, UnstructuredGrid, extent_dims};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Bits of `vtkGhostType` (vtkDataSetAttributes.h): a hidden point, and cells that are refined elsewhere or hidden.
+const HIDDEN_POINT: u8 = 2;
+const HIDDEN_CELL: u8 = 32 | 8;
+
+/// What fills space in a data set.
+#[derive(Debug, Clone)]
+pub struct Mesh {
+    points: Vec<DVec3>,
+    parts: Vec<Part>,
+    /// Per cell; empty when none is hidden.
+    hidden: Vec<bool>,
+    cells: usize,
+    left_out: usize,
+    higher_order: usize,
+}
+
+#[derive(Debug, Clone)]
+struct Part {
+    /// Number among [`Dataset::leaves`].
+    leaf: usize,
+    /// The axis along which a plane lattice was given depth.
+    extruded: Option<usize>,
+    points: Range<usize>,
+    cells: Range<usize>,
+    kind: PartKind,
+}
+
+#[derive(Debug, Clone)]
+enum PartKind {
+    /// Points per axis, at least 2.
+    Lattice([usize; 3]),
+    Cells(Box<Explicit>),
+}
+
+/// Cells with their own lists. Numbers of points and faces count within the part.
+#[derive(Debug, Clone)]
+struct Explicit {
+    /// Cell of the grid for each of ours.
+    cell: Vec<u32>,
+    grid: UnstructuredGrid,
+}
+
+/// A cell: corners in VTK's order, and what they span.
+pub(super) struct Corners {
+    pub(super) ids: Vec<u32>,
+    pub(super) shape: Shape,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Shape {
+    Tetra,
+    Hexa,
+    Wedge,
+    Pyramid,
+    /// Faces as indices into the corners.
+    Faces(Vec<Vec<u32>>),
+}
+
+/// What to do with data in a plane, which has no depth for light to go through.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Plane {
+    /// The same flow over this span, half on either side of the plane.
+    Extrude {
+        /// Length, in the unit of the mesh.
+        span: f64,
+    },
+}
+
+impl Mesh {
+    /// All cells of a data set that fill space. Lines, surfaces and vertices are counted in [`Self::left_out`].
+    pub fn new(data: &Dataset) -> Result<Mesh, ResampleError> {
+        Self::build(data, None)
+    }
+
+    /// As [`Self::new`], with depth for data in a plane. Data that has depth of its own is refused.
+    pub fn with_plane(data: &Dataset, plane: Plane) -> Result<Mesh, ResampleError> {
+        Self::build(data, Some(plane))
+    }
+
+    fn build(data: &Dataset, plane: Option<Plane>) -> Result<Mesh, ResampleError> {
+        data.check()?;
+        if let Some(Plane::Extrude { span }) = plane
+            && !(span > 0.0 && span.is_finite())
+        {
+            let cure = "give a positive length in the unit of the mesh";
+            return Err(ResampleError::Option { option: "span", value: span, cure });
+        }
+        let mut mesh =
+            Mesh { points: vec![], parts: vec![], hidden: vec![], cells: 0, left_out: 0, higher_order: 0 };
+        let mut flat = 0;
+        for (number, leaf) in data.leaves().into_iter().enumerate() {
+            let before = mesh.parts.len();
+            flat += usize::from(mesh.add(leaf, plane)?);
+            mesh.parts[before..].iter_mut().for_each(|p| p.leaf = number);
+        }
+        if mesh.cells == 0 {
+            let (found, cure) = if flat > 0 {
+                ("it is a plane".to_string(), "give it a depth: its span, for a two-dimensional flow")
+            } else {
+                (
+                    format!("{} cells of other kinds", mesh.left_out),
+                    "save the volume, not a slice or a surface of it",
+                )
+            };
+            return Err(ResampleError::NoVolume { kind: data.kind(), found, cure });
+        }
+        if plane.is_some() && flat == 0 {
+            return Err(ResampleError::Option {
+                option: "span",
+                value: 0.0,
+                cure: "leave it out: the data has depth of its own",
+            });
+        }
+        Ok(mesh)
+    }
+
+    /// Adds a leaf; true when it is a plane.
+    fn add(&mut self, leaf: &Dataset, plane: Option<Plane>) -> Result<bool, ResampleError> {
+        match leaf {
+            Dataset::ImageData(d) => {
+                let n = d.dims();
+                let at = |i: usize| d.point(i % n[0], i / n[0] % n[1], i / n[0] / n[1]);
+                self.add_lattice(n, &at, &d.attributes, plane)
+            }
+            Dataset::RectilinearGrid(d) => {
+                let (n, c) = (extent_dims(d.extent), &d.coordinates);
+                let at = |i: usize| DVec3::new(c[0][i % n[0]], c[1][i / n[0] % n[1]], c[2][i / n[0] / n[1]]);
+                self.add_lattice(n, &at, &d.attributes, plane)
+            }
+            Dataset::StructuredGrid(d) => {
+                self.add_lattice(extent_dims(d.extent), &|i| d.points.get(i), &d.attributes, plane)
+            }
+            Dataset::UnstructuredGrid(d) => {
+                self.add_cells(d)?;
+                Ok(false)
+            }
+            Dataset::PolyData(d) => {
+                self.left_out += d.verts.len() + d.lines.len() + d.polys.len() + d.strips.len();
+                Ok(false)
+            }
+            Dataset::MultiBlock(_) => Ok(false),
+        }
+    }
+
+    fn add_lattice(
+        &mut self,
+        dims: [usize; 3],
+        at: &(dyn Fn(usize) -> DVec3 + Sync),
+        attributes: &Attributes,
+        plane: Option<Plane>,
+    ) -> Result<bool, ResampleError> {
+        let count: usize = dims.iter().product();
+        let is_flat = count > 0 && dims.iter().filter(|&&d| d == 1).count() == 1;
+        let flat_axis = dims.iter().position(|&d| d == 1);
+        let first = self.points.len();
+        let mut hidden = hidden_cells_of_lattice(dims, attributes);
+        let mut dims = dims;
+        if is_flat {
+            let Some(Plane::Extrude { span }) = plane else {
+                self.left_out += count;
+                return Ok(true);
+            };
+            // A second layer of points along the missing axis; the layers lie half a span to either side.
+            let axis = flat_axis.unwrap_or(2);
+            let flat: Vec<DVec3> = (0..count).map(at).collect();
+            let normal = plane_normal(&flat, dims, axis);
+            dims[axis] = 2;
+            let total = 2 * count;
+            self.points.extend((0..total).map(|i| {
+                let (source, side) = flat_source(i, dims, axis);
+                flat[source] + normal * (span * (side as f64 - 0.5))
+            }));
+        } else {
+            if count == 0 || dims.iter().any(|&d| d < 2) {
+                self.left_out += count;
+                return Ok(false);
+            }
+            let new: Vec<DVec3> = (0..count).into_par_iter().map(at).collect();
+            self.points.extend(new);
+        }
+        let cells: usize = dims.iter().map(|&d| d - 1).product();
+        self.push(first, cells, PartKind::Lattice(dims), &mut hidden)?;
+        if is_flat && let Some(part) = self.parts.last_mut() {
+            part.extruded = flat_axis;
+        }
+        Ok(is_flat)
+    }
+
+    fn add_cells(&mut self, d: &UnstructuredGrid) -> Result<(), ResampleError> {
+        let ghost_cells = d.attributes.cell_array("vtkGhostType");
+        let ghost_points = d.attributes.point_array("vtkGhostType");
+        let n = d.points.len();
+        let (mut cell, mut hidden) = (Vec::new(), Vec::new());
+        for c in 0..d.cells.len() {
+            let ids = d.cells.get(c);
+            let needed = match CellType::of(d.types[c]) {
+                CellType::Solid(faces) => {
+                    1 + faces.iter().flat_map(|f| f.iter()).copied().max().unwrap_or(0) as usize
+                }
+                CellType::Polyhedron if d.faces_of_cell.get(c).is_some_and(|r| !r.is_empty()) => 4,
+                _ => usize::MAX,
+            };
+            let faces_fit = d.faces_of_cell.get(c).is_none_or(|r| {
+                r.clone().all(|f| d.polyhedron_faces.get(f).iter().all(|&k| (k as usize) < n))
+            });
+            if ids.len() < needed || ids.iter().any(|&k| k as usize >= n) || !faces_fit {
+                self.left_out += 1;
+                continue;
+            }
+            self.higher_order += usize::from(needed != usize::MAX && d.types[c] > 16 && d.types[c] != 42);
+            cell.push(c as u32);
+            hidden.push(
+                ghost_cells.is_some_and(|a| a.get(c, 0) as u8 & HIDDEN_CELL != 0)
+                    || ghost_points
+                        .is_some_and(|a| ids.iter().any(|&k| a.get(k as usize, 0) as u8 & HIDDEN_POINT != 0)),
+            );
+        }
+        let first = self.points.len();
+        self.points.extend((0..n).map(|i| d.points.get(i)));
+        let cells = cell.len();
+        let grid =
+            UnstructuredGrid { points: Points::default(), attributes: Attributes::default(), ..d.clone() };
+        self.push(first, cells, PartKind::Cells(Box::new(Explicit { cell, grid })), &mut hidden)
+    }
+
+    fn push(
+        &mut self,
+        first: usize,
+        cells: usize,
+        kind: PartKind,
+        hidden: &mut Vec<bool>,
+    ) -> Result<(), ResampleError> {
+        if self.points.len() >= u32::MAX as usize || self.cells + cells >= u32::MAX as usize {
+            let what =
+                "the mesh has more than 2^32 points or cells; resample its blocks one by one".to_string();
+            return Err(ResampleError::Lattice { dims: [self.points.len(), 1, 1], what });
+        }
+        let range = self.cells..self.cells + cells;
+        self.cells = range.end;
+        if !self.hidden.is_empty() || hidden.iter().any(|h| *h) {
+            self.hidden.resize(range.start, false);
+            self.hidden.append(hidden);
+            self.hidden.resize(range.end, false);
+        }
+        self.parts.push(Part {
+            leaf: 0,
+            extruded: None,
+            points: first..self.points.len(),
+            cells: range,
+            kind,
+        });
+        Ok(())
+    }
+
+    /// Number of points, over all blocks.
+    pub fn num_points(&self) -> usize {
+        self.points.len()
+    }
+    /// Number of cells that fill space.
+    pub fn num_cells(&self) -> usize {
+        self.cells
+    }
+    /// Position of a point; panics when out of range.
+    pub fn point(&self, i: usize) -> DVec3 {
+        self.points[i]
+    }
+    /// Cells that do not fill space or name points that do not exist.
+    pub fn left_out(&self) -> usize {
+        self.left_out
+    }
+    /// Cells of higher order, which count with their straight corners.
+    pub fn higher_order(&self) -> usize {
+        self.higher_order
+    }
+    /// Cells that are hidden.
+    pub fn num_hidden(&self) -> usize {
+        self.hidden.iter().filter(|h| **h).count()
+    }
+    pub(super) fn is_hidden(&self, cell: usize) -> bool {
+        self.hidden.get(cell).copied().unwrap_or(false)
+    }
+
+    /// Smallest box around all finite points.
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let finite = self.points.iter().filter(|p| p.is_finite());
+        finite.fold(nothing, |(low, high), p| (low.min(*p), high.max(*p)))
+    }
+
+    /// The corners of a cell; panics when out of range.
+    pub(super) fn corners(&self, cell: usize) -> Corners {
+        let part = &self.parts[self.parts.partition_point(|p| p.cells.end <= cell)];
+        let local = cell - part.cells.start;
+        let first = part.points.start;
+        match &part.kind {
+            PartKind::Lattice([nx, ny, _]) => {
+                let (cx, cy) = (nx - 1, ny - 1);
+                let (i, j, k) = (local % cx, local / cx % cy, local / cx / cy);
+                let at =
+                    |di: usize, dj: usize, dk: usize| (first + i + di + nx * (j + dj + ny * (k + dk))) as u32;
+                let ids = vec![
+                    at(0, 0, 0),
+                    at(1, 0, 0),
+                    at(1, 1, 0),
+                    at(0, 1, 0),
+                    at(0, 0, 1),
+                    at(1, 0, 1),
+                    at(1, 1, 1),
+                    at(0, 1, 1),
+                ];
+                Corners { ids, shape: Shape::Hexa }
+            }
+            PartKind::Cells(e) => e.corners(local, first as u32),
+        }
+    }
+
+    /// Mean of the corners of a cell.
+    pub(super) fn cell_centre(&self, cell: usize) -> DVec3 {
+        let c = self.corners(cell);
+        c.ids.iter().map(|&i| self.points[i as usize]).sum::<DVec3>() / c.ids.len() as f64
+    }
+
+    /// For each point the mean of the finite values of its cells that are not hidden; NaN where there is none.
+    pub fn cells_to_points(&self, of_cells: &[f64]) -> Vec<f64> {
+        let mut sum = vec![(0.0, 0u32); self.points.len()];
+        for (cell, value) in of_cells.iter().enumerate().take(self.cells) {
+            if value.is_finite() && !self.is_hidden(cell) {
+                for id in self.corners(cell).ids {
+                    let s = &mut sum[id as usize];
+                    *s = (s.0 + value, s.1 + 1);
+                }
+            }
+        }
+        sum.into_iter().map(|(s, n)| if n == 0 { f64::NAN } else { s / f64::from(n) }).collect()
+    }
+
+    /// Values per point in the order of [`Self::point`]. `value` is called with the arrays of each block and the number of
+    /// the point in it.
+    pub fn gather_points(
+        &self,
+        data: &Dataset,
+        mut value: impl FnMut(&Attributes, usize) -> f64,
+    ) -> Vec<f64> {
+        let mut out = Vec::with_capacity(self.points.len());
+        self.each_part(data, |part, attributes| {
+            out.extend((0..part.points.len()).map(|i| {
+                let source = match (&part.kind, part.extruded) {
+                    (PartKind::Lattice(n), Some(axis)) => flat_source(i, *n, axis).0,
+                    _ => i,
+                };
+                value(attributes, source)
+            }));
+        });
+        out
+    }
+
+    /// Values per cell in the order of this mesh; as [`Self::gather_points`].
+    pub fn gather_cells(&self, data: &Dataset, mut value: impl FnMut(&Attributes, usize) -> f64) -> Vec<f64> {
+        let mut out = Vec::with_capacity(self.cells);
+        self.each_part(data, |part, attributes| {
+            out.extend((0..part.cells.len()).map(|i| match &part.kind {
+                PartKind::Lattice(_) => value(attributes, i),
+                PartKind::Cells(e) => value(attributes, e.cell[i] as usize),
+            }));
+        });
+        out
+    }
+
+    /// The parts with the arrays of the leaves they were made from.
+    fn each_part(&self, data: &Dataset, mut f: impl FnMut(&Part, &Attributes)) {
+        let leaves = data.leaves();
+        for part in &self.parts {
+            if let Some(attributes) = leaves.get(part.leaf).and_then(|l| l.attributes()) {
+                f(part, attributes);
+            }
+        }
+    }
+}
+
+impl Explicit {
+    fn corners(&self, local: usize, first: u32) -> Corners {
+        let c = self.cell[local] as usize;
+        let ids = self.grid.cells.get(c);
+        let pick = |order: &[usize]| order.iter().map(|&i| ids[i] + first).collect::<Vec<u32>>();
+        // Higher-order cells store their corners first.
+        match (self.grid.types[c], CellType::of(self.grid.types[c])) {
+            (11, _) => Corners { ids: pick(&[0, 1, 3, 2, 4, 5, 7, 6]), shape: Shape::Hexa },
+            (10 | 24 | 71 | 78, _) => Corners { ids: pick(&[0, 1, 2, 3]), shape: Shape::Tetra },
+            (12 | 25 | 29 | 33 | 72 | 79, _) => {
+                Corners { ids: pick(&[0, 1, 2, 3, 4, 5, 6, 7]), shape: Shape::Hexa }
+            }
+            (13 | 26 | 31 | 32 | 73 | 80, _) => {
+                Corners { ids: pick(&[0, 1, 2, 3, 4, 5]), shape: Shape::Wedge }
+            }
+            (14 | 27 | 37 | 74 | 81, _) => Corners { ids: pick(&[0, 1, 2, 3, 4]), shape: Shape::Pyramid },
+            (_, CellType::Solid(faces)) => {
+                let corners = 1 + faces.iter().flat_map(|f| f.iter()).copied().max().unwrap_or(0) as usize;
+                let faces = faces.iter().map(|f| f.iter().map(|&i| u32::from(i)).collect()).collect();
+                Corners {
+                    ids: ids[..corners].iter().map(|i| i + first).collect(),
+                    shape: Shape::Faces(faces),
+                }
+            }
+            _ => {
+                let mut own: Vec<u32> = Vec::new();
+                let mut faces = Vec::new();
+                for f in self.grid.faces_of_cell.get(c).cloned().unwrap_or(0..0) {
+                    let face = self.grid.polyhedron_faces.get(f).iter().map(|id| {
+                        own.iter().position(|o| o == id).unwrap_or_else(|| {
+                            own.push(*id);
+                            own.len() - 1
+                        }) as u32
+                    });
+                    faces.push(face.collect());
+                }
+                Corners { ids: own.into_iter().map(|i| i + first).collect(), shape: Shape::Faces(faces) }
+            }
+        }
+    }
+}
+
+/// In a lattice that was given a second layer along `axis`: which point of the flat one this was, and on which side.
+fn flat_source(i: usize, dims: [usize; 3], axis: usize) -> (usize, usize) {
+    let mut at = [i % dims[0], i / dims[0] % dims[1], i / dims[0] / dims[1]];
+    let mut n = dims;
+    let side = std::mem::take(&mut at[axis]);
+    n[axis] = 1;
+    (at[0] + n[0] * (at[1] + n[1] * at[2]), side)
+}
+
+/// Unit normal of a plane lattice: that of the sum of its quads.
+fn plane_normal(points: &[DVec3], dims: [usize; 3], axis: usize) -> DVec3 {
+    let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
+    let stride = [1, dims[0], dims[0] * dims[1]];
+    let mut sum = DVec3::ZERO;
+    for j in 0..dims[b].saturating_sub(1) {
+        for i in 0..dims[a].saturating_sub(1) {
+            let p = i * stride[a] + j * stride[b];
+            let (d, e) = (p + stride[a] + stride[b], points[p]);
+            sum += (points[d] - e).cross(points[p + stride[b]] - points[p + stride[a]]);
+        }
+    }
+    sum.normalize_or(DVec3::AXES[axis])
+}
+
+/// Which cells are hidden themselves or by one of their points; empty when none is.
+fn hidden_cells_of_lattice(dims: [usize; 3], a: &Attributes) -> Vec<bool> {
+    let (cells, points) = (a.cell_array("vtkGhostType"), a.point_array("vtkGhostType"));
+    if cells.is_none() && points.is_none() {
+        return Vec::new();
+    }
+    let n = dims.map(|d| if d == 1 { 1 } else { d.saturating_sub(1) });
+    let mut hidden: Vec<bool> = (0..n.iter().product())
+        .map(|c| cells.is_some_and(|a| a.get(c, 0) as u8 & HIDDEN_CELL != 0))
+        .collect();
+    if let Some(a) = points {
+        for (i, h) in hidden.iter_mut().enumerate() {
+            let at = [i % n[0], i / n[0] % n[1], i / n[0] / n[1]];
+            for corner in 0..8usize {
+                let q: [usize; 3] = std::array::from_fn(|c| (at[c] + (corner >> c & 1)).min(dims[c] - 1));
+                let id = q[0] + dims[0] * (q[1] + dims[1] * q[2]);
+                *h |= a.get(id, 0) as u8 & HIDDEN_POINT != 0;
+            }
+        }
+    }
+    hidden
+}

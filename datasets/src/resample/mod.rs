@@ -1,0 +1,269 @@
+//! Data of any mesh on a uniform lattice: curvilinear and rectilinear grids, tetrahedra, hexahedra, wedges, pyramids, prisms,
+//! polyhedra, and collections of them.
+//!
+//! Each cell finds the lattice nodes inside it ([`rasterize`]), so no search tree is needed and time goes with the number of
+//! nodes plus that of cells. Inside a cell values are those of the finite element ([`shape`]): Newton's method inverts the
+//! trilinear map of a hexahedron. Cells whose map cannot be inverted are divided into tetrahedra and counted.
+//!
+//! What a node is, is told by its [`Mark`]; what the resampling cost in accuracy, by the [`Report`]: the lattice is sampled back
+//! at the points of the mesh.
+
+mod mesh;
+mod rasterize;
+mod report;
+mod shape;
+mod smooth;
+
+pub use mesh::{Mesh, Plane};
+pub use report::{Report, SampleBack};
+pub use smooth::smooth;
+
+use crate::model::ModelError;
+use glam::DVec3;
+
+/// Why a data set cannot be resampled.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ResampleError {
+    /// Nothing in it fills space.
+    #[error("the {kind} has no cells that fill space ({found}); {cure}")]
+    NoVolume {
+        /// Kind of data set.
+        kind: &'static str,
+        /// What it has.
+        found: String,
+        /// What to do.
+        cure: &'static str,
+    },
+    /// The lattice asked for is impossible.
+    #[error("a lattice of {0}x{1}x{2} nodes: {what}", dims[0], dims[1], dims[2])]
+    Lattice {
+        /// Its nodes.
+        dims: [usize; 3],
+        /// What is wrong, with the cure.
+        what: String,
+    },
+    /// Another number of values than points or cells.
+    #[error("{found} values for a mesh with {points} points and {cells} cells")]
+    Count {
+        /// Values given.
+        found: usize,
+        /// Points of the mesh.
+        points: usize,
+        /// Cells of the mesh.
+        cells: usize,
+    },
+    /// An option that cannot be.
+    #[error("{option} is {value}; {cure}")]
+    Option {
+        /// Its name.
+        option: &'static str,
+        /// Its value.
+        value: f64,
+        /// What is allowed.
+        cure: &'static str,
+    },
+    /// The data set is not consistent or lacks an array.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+}
+
+/// A uniform lattice: node (i, j, k) is at `origin + spacing * (i, j, k)`, x fastest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lattice {
+    /// Nodes per axis, at least 2.
+    pub dims: [usize; 3],
+    /// First node.
+    pub origin: DVec3,
+    /// Distance between nodes.
+    pub spacing: DVec3,
+}
+
+/// How fine a lattice is to be.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub enum Resolution {
+    /// About eight nodes per cell of the mesh, with 64 to 256 nodes along the longest axis.
+    #[default]
+    Auto,
+    /// This many nodes along the longest axis, and equal spacing along the others as near as whole numbers allow.
+    Longest(usize),
+    /// Nodes at this distance, in the unit of the mesh; what does not divide is left over on both sides.
+    Spacing(f64),
+    /// Nodes per axis.
+    Dims([usize; 3]),
+}
+
+/// More nodes than this are refused: indices have to fit 31 bits.
+const MAX_NODES: usize = (1 << 31) - 1;
+
+impl Lattice {
+    /// A lattice over the box `low`..`high`, for a mesh of so many cells.
+    pub fn fit(low: DVec3, high: DVec3, cells: usize, resolution: Resolution) -> Result<Self, ResampleError> {
+        let size = high - low;
+        let flat = |what: String| ResampleError::Lattice { dims: [0; 3], what };
+        if !(size.is_finite() && low.is_finite() && size.min_element() > 0.0) {
+            return Err(flat(format!(
+                "the box from {low} to {high} has no volume; give bounds that have, or a depth to plane data"
+            )));
+        }
+        let even = |h: f64| -> [usize; 3] {
+            size.to_array().map(|l| ((l / h).round().clamp(1.0, MAX_NODES as f64) as usize) + 1)
+        };
+        let (dims, spacing) = match resolution {
+            Resolution::Auto => {
+                let h = (size.x * size.y * size.z / (8.0 * cells.max(1) as f64)).cbrt();
+                let longest = (size.max_element() / h + 1.0).clamp(64.0, 256.0).round();
+                (even(size.max_element() / (longest - 1.0)), None)
+            }
+            Resolution::Longest(n) => (even(size.max_element() / n.saturating_sub(1).max(1) as f64), None),
+            Resolution::Dims(d) => (d, None),
+            Resolution::Spacing(h) => {
+                if !(h > 0.0 && h.is_finite()) {
+                    let cure = "give the distance between nodes in the unit of the mesh";
+                    return Err(ResampleError::Option { option: "spacing", value: h, cure });
+                }
+                // A hair more than whole, so that 1/0.1 gives ten steps.
+                let dims = size
+                    .to_array()
+                    .map(|l| (l / h * (1.0 + 1e-12)).floor().min(MAX_NODES as f64) as usize + 1);
+                (dims, Some(h))
+            }
+        };
+        let nodes = dims.iter().try_fold(1usize, |n, &d| n.checked_mul(d));
+        if nodes.is_none_or(|n| n > MAX_NODES) || dims.iter().any(|&d| d < 2) {
+            let what = "every axis needs at least 2 nodes, and all together at most 2^31; change the resolution or the bounds";
+            return Err(ResampleError::Lattice { dims, what: what.into() });
+        }
+        let steps = DVec3::from_array(dims.map(|d| (d - 1) as f64));
+        Ok(match spacing {
+            None => Lattice { dims, origin: low, spacing: size / steps },
+            Some(h) => Lattice { dims, origin: low + 0.5 * (size - h * steps), spacing: DVec3::splat(h) },
+        })
+    }
+
+    /// Number of nodes.
+    pub fn len(&self) -> usize {
+        self.dims.iter().product()
+    }
+    /// Never: a lattice has nodes.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+    /// Position of a node.
+    pub fn node(&self, i: usize, j: usize, k: usize) -> DVec3 {
+        self.origin + self.spacing * DVec3::new(i as f64, j as f64, k as f64)
+    }
+}
+
+/// What a node of the lattice is in the mesh.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Mark {
+    /// Inside a cell with values.
+    Inside,
+    /// In no cell.
+    #[default]
+    Outside,
+    /// Inside a cell that is hidden (`vtkGhostType`, iblank 0).
+    Hidden,
+    /// Inside a cell that has no finite value.
+    NotFinite,
+}
+
+/// Values of a mesh.
+#[derive(Debug, Clone, Copy)]
+pub enum Samples<'a> {
+    /// One per point.
+    Points(&'a [f64]),
+    /// One per cell. Points get the mean of their cells, as in `vtkCellDataToPointData`.
+    Cells(&'a [f64]),
+}
+
+/// How to resample.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// A node gets the mean over this many samples per axis of the box around it. 1 takes the value at the node; 2 or more
+    /// average what is finer than the lattice, such as shocks.
+    pub samples_per_axis: usize,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Options { samples_per_axis: 1 }
+    }
+}
+
+/// Values on a lattice.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Resampled {
+    /// Where.
+    pub lattice: Lattice,
+    /// Values at the nodes, x fastest; NaN where the mark is not [`Mark::Inside`].
+    pub values: Vec<f32>,
+    /// What the nodes are.
+    pub marks: Vec<Mark>,
+    /// What it cost.
+    pub report: Report,
+}
+
+/// Most samples per axis and node: 4³ per node is already more than any mesh rewards.
+const MAX_SAMPLES: usize = 8;
+
+/// Puts the values of a mesh on a lattice. The result does not depend on the number of threads.
+///
+/// ```
+/// use datasets::model::{Dataset, ImageData};
+/// use datasets::resample::{Lattice, Mesh, Options, Resolution, Samples, resample};
+/// use glam::DVec3;
+///
+/// // 5³ points with the value x + 2y at unequal distance from the nodes of the new lattice.
+/// let image = ImageData::new([5, 5, 5], DVec3::ZERO, DVec3::splat(0.25));
+/// let mesh = Mesh::new(&Dataset::ImageData(image))?;
+/// let values: Vec<f64> = (0..mesh.num_points()).map(|i| mesh.point(i).x + 2.0 * mesh.point(i).y).collect();
+/// let (low, high) = mesh.bounds();
+/// let lattice = Lattice::fit(low, high, mesh.num_cells(), Resolution::Longest(8))?;
+/// let fine = resample(&mesh, Samples::Points(&values), &lattice, &Options::default())?;
+/// let p = lattice.node(3, 5, 7);
+/// assert!((fine.values[3 + 8 * (5 + 8 * 7)] as f64 - (p.x + 2.0 * p.y)).abs() < 1e-6);
+/// assert!(fine.report.back.max < 1e-6);
+/// # Ok::<(), datasets::resample::ResampleError>(())
+/// ```
+pub fn resample(
+    mesh: &Mesh,
+    samples: Samples<'_>,
+    lattice: &Lattice,
+    options: &Options,
+) -> Result<Resampled, ResampleError> {
+    if !(1..=MAX_SAMPLES).contains(&options.samples_per_axis) {
+        return Err(ResampleError::Option {
+            option: "samples per axis",
+            value: options.samples_per_axis as f64,
+            cure: "from 1 to 8 are allowed",
+        });
+    }
+    let (given, wanted) = match samples {
+        Samples::Points(v) => (v.len(), mesh.num_points()),
+        Samples::Cells(v) => (v.len(), mesh.num_cells()),
+    };
+    if given != wanted {
+        return Err(ResampleError::Count {
+            found: given,
+            points: mesh.num_points(),
+            cells: mesh.num_cells(),
+        });
+    }
+    let averaged;
+    let (points, cells) = match samples {
+        Samples::Points(v) => (v, None),
+        Samples::Cells(v) => {
+            averaged = mesh.cells_to_points(v);
+            (averaged.as_slice(), Some(v))
+        }
+    };
+    let (values, marks, counts) =
+        rasterize::rasterize(mesh, points, cells, lattice, options.samples_per_axis);
+    let back = report::sample_back(mesh, samples, lattice, &values);
+    let report = Report::new(mesh, &marks, counts, back);
+    Ok(Resampled { lattice: *lattice, values, marks, report })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,287 @@
+//! Cells look for the nodes inside them, layer by layer of the lattice.
+//!
+//! A layer of nodes (one k) is one task. It goes through the cells that reach into it in the order of their numbers, so a node on
+//! a face that two cells share gets the same value whatever the number of threads. A node that lies in no cell, but within
+//! [`NEAR`] of one, takes the value of the nearest: curved faces of unlike cells do not match exactly.
+
+use super::mesh::Mesh;
+use super::shape::Cell;
+use super::{Lattice, Mark};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// A point this far outside, in units of the cell, is inside: rounding in the inversion, with 1e3 to spare.
+pub(super) const INSIDE: f64 = 1e-9;
+/// A point this far outside may lie in a gap between faces that do not match.
+const NEAR: f64 = 1e-3;
+
+/// What was met on the way.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Counts {
+    /// Samples that lay in gaps between cells.
+    pub(super) in_gaps: usize,
+    /// Cells whose map folds.
+    pub(super) folded: usize,
+    /// Cells that no sample fell into.
+    pub(super) missed: usize,
+    /// Cells with corners that are not finite.
+    pub(super) nowhere: usize,
+}
+
+/// One sample of a layer: its value, how far outside its cell, and what it is.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    value: f64,
+    outside: f64,
+    mark: Mark,
+}
+
+const NO_SAMPLE: Sample = Sample { value: f64::NAN, outside: f64::INFINITY, mark: Mark::Outside };
+
+/// Marks by how much they say: a cell with values beats a hidden one.
+fn rank(mark: Mark) -> u8 {
+    match mark {
+        Mark::Inside => 3,
+        Mark::NotFinite => 2,
+        Mark::Hidden => 1,
+        Mark::Outside => 0,
+    }
+}
+
+/// The samples of a lattice with `n` per axis and node: index `i` stands at `(i + 0.5)/n − 0.5` nodes from the first node.
+struct Fine<'a> {
+    lattice: &'a Lattice,
+    n: usize,
+}
+
+impl Fine<'_> {
+    fn coordinate(&self, axis: usize, i: usize) -> f64 {
+        let nodes = if self.n == 1 { i as f64 } else { (i as f64 + 0.5) / self.n as f64 - 0.5 };
+        self.lattice.origin[axis] + self.lattice.spacing[axis] * nodes
+    }
+    fn count(&self, axis: usize) -> usize {
+        self.lattice.dims[axis] * self.n
+    }
+    /// Samples between two coordinates, a hair more rather than less.
+    fn between(&self, axis: usize, low: f64, high: f64) -> Option<(usize, usize)> {
+        let n = self.n as f64;
+        let index = |x: f64| ((x - self.lattice.origin[axis]) / self.lattice.spacing[axis] + 0.5) * n - 0.5;
+        let last = (self.count(axis) - 1) as f64;
+        let (a, b) = ((index(low) - 1e-6).ceil().max(0.0), (index(high) + 1e-6).floor().min(last));
+        // NaN compares false.
+        (a <= b).then_some((a as usize, b as usize))
+    }
+    /// Half a node beyond the lattice lies nothing that its nodes should average.
+    fn within(&self, axis: usize, i: usize) -> bool {
+        let nodes = (i as f64 + 0.5) / self.n as f64 - 0.5;
+        self.n == 1 || (0.0..=(self.lattice.dims[axis] - 1) as f64).contains(&nodes)
+    }
+}
+
+/// Values and marks of all nodes.
+pub(super) fn rasterize(
+    mesh: &Mesh,
+    of_points: &[f64],
+    of_cells: Option<&[f64]>,
+    lattice: &Lattice,
+    samples_per_axis: usize,
+) -> (Vec<f32>, Vec<Mark>, Counts) {
+    let fine = Fine { lattice, n: samples_per_axis };
+
+    // Which layers each cell reaches into.
+    let reach: Vec<Option<(u32, u32)>> = (0..mesh.num_cells())
+        .into_par_iter()
+        .map(|cell| {
+            let (low, high) = cell_box(mesh, cell)?;
+            fine.between(0, low.x, high.x)?;
+            fine.between(1, low.y, high.y)?;
+            let (a, b) = fine.between(2, low.z, high.z)?;
+            Some(((a / fine.n) as u32, (b / fine.n) as u32))
+        })
+        .collect();
+    let nowhere = (0..mesh.num_cells()).into_par_iter().filter(|&c| cell_box(mesh, c).is_none()).count();
+
+    // The cells of each layer, in order (counting sort).
+    let layers = lattice.dims[2];
+    let mut starts = vec![0usize; layers + 1];
+    for (a, b) in reach.iter().flatten() {
+        (*a..=*b).for_each(|k| starts[k as usize + 1] += 1);
+    }
+    for k in 0..layers {
+        starts[k + 1] += starts[k];
+    }
+    let mut next = starts.clone();
+    let mut cells = vec![0u32; starts[layers]];
+    for (cell, r) in reach.iter().enumerate() {
+        let Some((a, b)) = *r else { continue };
+        for k in a as usize..=b as usize {
+            cells[next[k]] = cell as u32;
+            next[k] += 1;
+        }
+    }
+    drop(reach);
+
+    let seen: Vec<AtomicBool> = (0..mesh.num_cells()).map(|_| AtomicBool::new(false)).collect();
+    let folded: Vec<AtomicBool> = (0..mesh.num_cells()).map(|_| AtomicBool::new(false)).collect();
+    let in_gaps = AtomicUsize::new(0);
+    let per_layer = lattice.dims[0] * lattice.dims[1];
+    let mut values = vec![f32::NAN; lattice.len()];
+    let mut marks = vec![Mark::Outside; lattice.len()];
+    values.par_chunks_mut(per_layer).zip(marks.par_chunks_mut(per_layer)).enumerate().for_each(
+        |(k, (values, marks))| {
+            let mut samples = vec![NO_SAMPLE; fine.count(0) * fine.count(1) * fine.n];
+            let mut scratch = Scratch::default();
+            for &cell in &cells[starts[k]..starts[k + 1]] {
+                let cell = cell as usize;
+                let data = CellData { mesh, of_points, of_cells, cell };
+                let (hit, fold) = data.visit(&fine, k, &mut samples, &mut scratch);
+                if hit {
+                    seen[cell].store(true, Ordering::Relaxed);
+                }
+                if fold {
+                    folded[cell].store(true, Ordering::Relaxed);
+                }
+            }
+            let gaps = samples.iter().filter(|s| s.outside > INSIDE && s.outside <= NEAR).count();
+            in_gaps.fetch_add(gaps, Ordering::Relaxed);
+            reduce(&fine, k, &samples, values, marks);
+        },
+    );
+    let count = |flags: &[AtomicBool]| flags.iter().filter(|f| f.load(Ordering::Relaxed)).count();
+    let counts = Counts {
+        in_gaps: in_gaps.into_inner(),
+        folded: count(&folded),
+        missed: mesh.num_cells() - count(&seen) - nowhere,
+        nowhere,
+    };
+    (values, marks, counts)
+}
+
+/// Box of a cell with room for [`NEAR`]; `None` when a corner is not finite.
+fn cell_box(mesh: &Mesh, cell: usize) -> Option<(DVec3, DVec3)> {
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for id in mesh.corners(cell).ids {
+        let p = mesh.point(id as usize);
+        if !p.is_finite() {
+            return None;
+        }
+        (low, high) = (low.min(p), high.max(p));
+    }
+    let margin = DVec3::splat((high - low).max_element() * NEAR);
+    Some((low - margin, high + margin))
+}
+
+#[derive(Default)]
+struct Scratch {
+    points: Vec<DVec3>,
+    values: Vec<f64>,
+}
+
+/// A cell with all that is known of it.
+struct CellData<'a> {
+    mesh: &'a Mesh,
+    of_points: &'a [f64],
+    of_cells: Option<&'a [f64]>,
+    cell: usize,
+}
+
+impl CellData<'_> {
+    /// Fills in the samples of layer `k` that lie in the cell; whether any does, and whether the cell folds.
+    fn visit(
+        &self,
+        fine: &Fine<'_>,
+        k: usize,
+        samples: &mut [Sample],
+        scratch: &mut Scratch,
+    ) -> (bool, bool) {
+        let Some((low, high)) = cell_box(self.mesh, self.cell) else { return (false, false) };
+        let ranges = [0, 1, 2].map(|a| fine.between(a, low[a], high[a]));
+        let [Some((x0, x1)), Some((y0, y1)), Some((z0, z1))] = ranges else { return (false, false) };
+        let (z0, z1) = (z0.max(k * fine.n), z1.min(k * fine.n + fine.n - 1));
+
+        let corners = self.mesh.corners(self.cell);
+        scratch.points.clear();
+        scratch.points.extend(corners.ids.iter().map(|&i| self.mesh.point(i as usize)));
+        scratch.values.clear();
+        scratch.values.extend(corners.ids.iter().map(|&i| self.of_points[i as usize]));
+        let shape = Cell::new(&scratch.points, &scratch.values, &corners.shape);
+        let own_mark = if self.mesh.is_hidden(self.cell) {
+            Mark::Hidden
+        } else if self.of_cells.is_some_and(|v| !v[self.cell].is_finite()) {
+            Mark::NotFinite
+        } else {
+            Mark::Inside
+        };
+
+        let mut hit = false;
+        for z in z0..=z1 {
+            for y in y0..=y1 {
+                for x in x0..=x1 {
+                    let slot = &mut samples[x + fine.count(0) * (y + fine.count(1) * (z - k * fine.n))];
+                    if slot.mark == Mark::Inside && slot.outside == 0.0 {
+                        // Already inside another cell. Whether it would also be in this one matters to the count of cells
+                        // without samples only, and there cells that share faces with others are not missed.
+                        hit = true;
+                        continue;
+                    }
+                    let p = DVec3::new(fine.coordinate(0, x), fine.coordinate(1, y), fine.coordinate(2, z));
+                    let Some(place) = shape.place(p).filter(|at| at.outside <= NEAR) else { continue };
+                    hit = true;
+                    let mark = if own_mark == Mark::Inside && !place.value.is_finite() {
+                        Mark::NotFinite
+                    } else {
+                        own_mark
+                    };
+                    let outside = if place.outside <= INSIDE { 0.0 } else { place.outside };
+                    // Inside beats near; then what says more; then nearer; then the cell that came first.
+                    let key = |outside: f64, mark: Mark| (outside == 0.0, rank(mark));
+                    let (new, old) = (key(outside, mark), key(slot.outside, slot.mark));
+                    if new > old || new == old && outside < slot.outside {
+                        *slot = Sample { value: place.value, outside, mark };
+                    }
+                }
+            }
+        }
+        (hit, shape.is_folded())
+    }
+}
+
+/// Nodes of layer `k` from their samples: the mean of those with values when they are at least half, else what most of
+/// the others are.
+fn reduce(fine: &Fine<'_>, k: usize, samples: &[Sample], values: &mut [f32], marks: &mut [Mark]) {
+    let n = fine.n;
+    let width = fine.count(0);
+    for (node, (value, mark)) in values.iter_mut().zip(marks).enumerate() {
+        let (i, j) = (node % fine.lattice.dims[0], node / fine.lattice.dims[0]);
+        let (mut sum, mut count, mut all) = (0.0, 0usize, 0usize);
+        let mut others = [0usize; 3];
+        for z in 0..n {
+            for y in j * n..(j + 1) * n {
+                for x in i * n..(i + 1) * n {
+                    if !(fine.within(0, x) && fine.within(1, y) && fine.within(2, k * n + z)) {
+                        continue;
+                    }
+                    let s = samples[x + width * (y + fine.count(1) * z)];
+                    all += 1;
+                    match s.mark {
+                        Mark::Inside => {
+                            sum += s.value;
+                            count += 1;
+                        }
+                        other => others[rank(other) as usize] += 1,
+                    }
+                }
+            }
+        }
+        if count > 0 && 2 * count >= all {
+            (*value, *mark) = ((sum / count as f64) as f32, Mark::Inside);
+        } else {
+            let most = others.iter().max().copied().unwrap_or(0);
+            *mark = [Mark::NotFinite, Mark::Hidden, Mark::Outside]
+                .into_iter()
+                .find(|m| others[rank(*m) as usize] == most)
+                .unwrap_or(Mark::Outside);
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! Refractive index of gases: always as n − 1, because n itself has no digits left for air.
+//!
+//! | module | what | valid for |
+//! |---|---|---|
+//! | [`ciddor`] | moist air from temperature, pressure, humidity and CO2 | −40…100 °C, 300…1690 nm |
+//! | [`gladstone_dale`] | any gas from its density, with dispersion | gases far from their absorption lines |
+//! | [`mixture`] | gases by mass fraction, and their density from temperature and pressure | ideal gases, flames too |
+//! | [`plasma`] | free electrons | below the critical density |
+//! | [`multifield`] | any fields through transfer functions (thesis, section 5.7) | pictures, not physics |
+//! | [`conditions`], [`csv`] | what the program `schlieren index` answers | |
+//!
+//! Units: wavelengths in micrometres of vacuum where a formula is evaluated (`wavelength_um`; what users type is nm),
+//! temperatures in °C in Ciddor's equation and in K elsewhere, pressures in Pa, densities in kg/m³, humidity and fractions
+//! from 0 to 1, CO2 in µmol/mol (ppm).
+
+pub mod ciddor;
+pub mod conditions;
+pub mod csv;
+pub mod gladstone_dale;
+pub mod mixture;
+pub mod multifield;
+pub mod plasma;
+
+pub use gladstone_dale::Gas;
+pub use mixture::Mixture;
+
+use std::fmt;
+
+/// Why an index cannot be computed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum IndexError {
+    /// A value that no gas has, or at which the formula has no meaning.
+    #[error("{quantity} {value} {unit} {reason}; {cure}")]
+    Impossible {
+        /// What it is, as its option or column is called.
+        quantity: &'static str,
+        /// The value.
+        value: f64,
+        /// Its unit; empty for fractions.
+        unit: &'static str,
+        /// What is wrong with it.
+        reason: &'static str,
+        /// What to do.
+        cure: &'static str,
+    },
+    /// No gas of this name.
+    #[error(
+        "no gas `{name}`; known gases: {known}; or give its Gladstone-Dale constant in cm^3/g as a number, such as NAME=0.42"
+    )]
+    UnknownGas {
+        /// What was asked for.
+        name: String,
+        /// All names.
+        known: String,
+    },
+    /// The mass fractions make no mixture.
+    #[error("the mass fractions of {species} sum to {sum}; {cure}")]
+    Fractions {
+        /// The names.
+        species: String,
+        /// Their sum.
+        sum: f64,
+        /// What to do.
+        cure: &'static str,
+    },
+    /// The density of a gas of unknown molar mass is needed.
+    #[error(
+        "gas `{name}` has no molar mass, so its density does not follow from temperature and pressure; give a density field, or the molar mass as NAME=K@M with M in g/mol, such as `{name}=0.42@77.9`"
+    )]
+    NoMolarMass {
+        /// The gas.
+        name: String,
+    },
+}
+
+/// A value outside the range in which a formula was measured. The result is still computed: warn, and let the user decide.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct OutOfRange {
+    /// The formula, by its author.
+    pub formula: &'static str,
+    /// What is out of range.
+    pub quantity: &'static str,
+    /// The value that lies farthest outside.
+    pub value: f64,
+    /// The range.
+    pub range: [f64; 2],
+    /// Unit of value and range.
+    pub unit: &'static str,
+    /// What to use instead.
+    pub cure: &'static str,
+}
+
+impl fmt::Display for OutOfRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let OutOfRange { formula, quantity, value, range: [low, high], unit, cure } = self;
+        write!(f, "{formula}: {quantity} {value} {unit} is outside {low}..{high} {unit}; {cure}")
+    }
+}
