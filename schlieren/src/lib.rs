@@ -22,6 +22,7 @@ pub mod filter;
 pub mod index;
 pub mod optics;
 pub mod path;
+pub mod scene;
 pub mod solids;
 pub mod spectrum;
 pub mod technique;
