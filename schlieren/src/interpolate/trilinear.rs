@@ -1,0 +1,147 @@
+//! Trilinear eps, and the gradient of that: eight taps.
+
+use super::{Interpolate, Interpolate16, LANES, Sample, Samples, cell};
+use crate::field::Field;
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x16, i32x16, u64x8};
+use std::borrow::Cow;
+
+/// Trilinear interpolation. Its gradient jumps from cell to cell, so shadowgraphs through it are wrong by most of their contrast;
+/// deflections are right within a few percent.
+#[derive(Debug)]
+pub struct Trilinear<'a> {
+    values: Cow<'a, [f32]>,
+    dims: [usize; 3],
+    /// Distance of neighbours along y and z in `values`.
+    stride: [usize; 2],
+}
+
+impl<'a> Trilinear<'a> {
+    /// Over a field, which is copied only when its rows would compete for the same lines of the cache.
+    pub fn new(field: &'a Field) -> Trilinear<'a> {
+        let [nx, ny, nz] = field.dims();
+        let (row, layer) = (padded_row(nx), ny);
+        if row == nx {
+            return Trilinear {
+                values: Cow::Borrowed(field.eps()),
+                dims: [nx, ny, nz],
+                stride: [nx, nx * ny],
+            };
+        }
+        let mut values = vec![0.0; row * layer * nz];
+        for (to, from) in values.chunks_exact_mut(row).zip(field.eps().chunks_exact(nx)) {
+            to[..nx].copy_from_slice(from);
+        }
+        Trilinear { values: Cow::Owned(values), dims: [nx, ny, nz], stride: [row, row * layer] }
+    }
+
+    pub(crate) fn rows(&self) -> TrilinearRows<'_> {
+        let [sy, sz] = self.stride;
+        let len = self.values.len() - sy - sz;
+        TrilinearRows {
+            corners: [
+                &self.values[..len],
+                &self.values[sy..sy + len],
+                &self.values[sz..sz + len],
+                &self.values[sy + sz..sy + sz + len],
+            ],
+            last_cell: self.dims.map(|n| (n - 2) as f32),
+            last: self.dims.map(|n| (n - 1) as f32),
+            stride: [sy as i32, sz as i32],
+        }
+    }
+}
+
+/// Rows of a power of two in length put a column of the lattice into a few lines of the cache.
+pub(super) fn padded_row(nx: usize) -> usize {
+    if nx.is_multiple_of(64) { nx + 16 } else { nx }
+}
+
+impl Interpolate for Trilinear<'_> {
+    fn sample(&self, at: [f64; 3]) -> Sample {
+        let [(i, x), (j, y), (k, z)] = [0, 1, 2].map(|c| cell(at[c], self.dims[c]));
+        let v = |dj: usize, dk: usize| {
+            let o = i + (j + dj) * self.stride[0] + (k + dk) * self.stride[1];
+            let (a, b) = (f64::from(self.values[o]), f64::from(self.values[o + 1]));
+            (a + x * (b - a), b - a)
+        };
+        let [(a, da), (b, db), (c, dc), (d, dd)] = [v(0, 0), v(1, 0), v(0, 1), v(1, 1)];
+        let (low, high) = (a + y * (b - a), c + y * (d - c));
+        let (dx_low, dx_high) = (da + y * (db - da), dc + y * (dd - dc));
+        Sample {
+            eps: low + z * (high - low),
+            gradient: [dx_low + z * (dx_high - dx_low), (b - a) + z * ((d - c) - (b - a)), high - low],
+        }
+    }
+
+    fn dims(&self) -> [usize; 3] {
+        self.dims
+    }
+
+    fn memory_bytes(&self) -> usize {
+        match &self.values {
+            Cow::Borrowed(_) => 0,
+            Cow::Owned(v) => size_of_val(&v[..]),
+        }
+    }
+}
+
+/// The lattice as four slices of one length, shifted by a row and a layer: one bounds check is good for all eight taps.
+#[derive(Clone, Copy)]
+pub(crate) struct TrilinearRows<'a> {
+    corners: [&'a [f32]; 4],
+    last_cell: [f32; 3],
+    last: [f32; 3],
+    stride: [i32; 2],
+}
+
+impl Interpolate16 for TrilinearRows<'_> {
+    #[inline(always)]
+    fn sample16<S: Simd>(&self, simd: S, at: &[f32x16<S>; 3]) -> Samples<S> {
+        // Cells and places in them.
+        let mut cells = [i32x16::splat(simd, 0); 3];
+        let mut place = *at;
+        for c in 0..3 {
+            let clamped = at[c].max(f32x16::splat(simd, 0.0)).min(f32x16::splat(simd, self.last[c]));
+            cells[c] = clamped.min(f32x16::splat(simd, self.last_cell[c])).to_int::<i32x16<S>>();
+            place[c] = clamped - cells[c].to_float::<f32x16<S>>();
+        }
+        let offsets = cells[0] + cells[1] * self.stride[0] + cells[2] * self.stride[1];
+        let offsets: [i32; LANES] = offsets.into();
+
+        // Taps.
+        let [a0, a1] = pairs(simd, self.corners[0], &offsets);
+        let [b0, b1] = pairs(simd, self.corners[1], &offsets);
+        let [c0, c1] = pairs(simd, self.corners[2], &offsets);
+        let [d0, d1] = pairs(simd, self.corners[3], &offsets);
+
+        // Differences first, so that the gradient is not a difference of interpolated values.
+        let [x, y, z] = place;
+        let [da, db, dc, dd] = [a1 - a0, b1 - b0, c1 - c0, d1 - d0];
+        let [a, b, c, d] = [x.mul_add(da, a0), x.mul_add(db, b0), x.mul_add(dc, c0), x.mul_add(dd, d0)];
+        let [dy_low, dy_high] = [b - a, d - c];
+        let [low, high] = [y.mul_add(dy_low, a), y.mul_add(dy_high, c)];
+        let [dx_low, dx_high] = [y.mul_add(db - da, da), y.mul_add(dd - dc, dc)];
+        let dz = high - low;
+        Samples {
+            eps: z.mul_add(dz, low),
+            gradient: [z.mul_add(dx_high - dx_low, dx_low), z.mul_add(dy_high - dy_low, dy_low), dz],
+        }
+    }
+}
+
+/// `row[o]` and `row[o + 1]` for sixteen offsets. Each pair is one load of eight bytes.
+#[inline(always)]
+fn pairs<S: Simd>(simd: S, row: &[f32], offsets: &[i32; LANES]) -> [f32x16<S>; 2] {
+    let mut halves = [[0u64; 8]; 2];
+    for h in 0..2 {
+        for l in 0..8 {
+            let o = offsets[8 * h + l] as u32 as usize;
+            halves[h][l] = bytemuck::cast([row[o], row[o + 1]]);
+        }
+    }
+    let low: f32x16<S> = u64x8::simd_from(simd, halves[0]).bitcast();
+    let high: f32x16<S> = u64x8::simd_from(simd, halves[1]).bitcast();
+    let (even, odd) = low.deinterleave(high);
+    [even, odd]
+}

@@ -1,0 +1,134 @@
+//! Trilinear interpolation of eps and of its central differences at the nodes: what the dissertation keeps in a texture of four floats a voxel.
+
+use super::{Interpolate, Interpolate16, LANES, Sample, Samples, cell, transpose, trilinear::padded_row};
+use crate::field::Field;
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x4, f32x16, i32x16};
+use rayon::prelude::*;
+
+/// Gradient and eps at each node, sixteen bytes.
+#[derive(Debug)]
+pub struct TrilinearGradient {
+    /// d/dx, d/dy, d/dz per lattice step, eps.
+    nodes: Vec<f32>,
+    dims: [usize; 3],
+    /// Distances of neighbours along y and z, in nodes.
+    stride: [usize; 2],
+}
+
+impl TrilinearGradient {
+    /// Takes central differences, and one-sided ones of second order at the faces, in parallel.
+    pub fn new(field: &Field) -> TrilinearGradient {
+        let [nx, ny, nz] = field.dims();
+        let row = padded_row(nx);
+        let eps = field.eps();
+        let mut nodes = vec![0.0f32; 4 * row * ny * nz];
+        nodes.par_chunks_exact_mut(4 * row).enumerate().for_each(|(r, out)| {
+            let (j, k) = (r % ny, r / ny);
+            for (i, node) in out.chunks_exact_mut(4).take(nx).enumerate() {
+                let o = i + (j + k * ny) * nx;
+                node[0] = difference(eps, o, 1, i, nx);
+                node[1] = difference(eps, o, nx, j, ny);
+                node[2] = difference(eps, o, nx * ny, k, nz);
+                node[3] = eps[o];
+            }
+        });
+        TrilinearGradient { nodes, dims: [nx, ny, nz], stride: [row, row * ny] }
+    }
+
+    pub(crate) fn rows(&self) -> TrilinearGradientRows<'_> {
+        let [sy, sz] = self.stride;
+        let len = self.nodes.len() - 4 * (sy + sz);
+        TrilinearGradientRows {
+            corners: [
+                &self.nodes[..len],
+                &self.nodes[4 * sy..4 * sy + len],
+                &self.nodes[4 * sz..4 * sz + len],
+                &self.nodes[4 * (sy + sz)..4 * (sy + sz) + len],
+            ],
+            last_cell: self.dims.map(|n| (n - 2) as f32),
+            last: self.dims.map(|n| (n - 1) as f32),
+            stride: [sy as i32, sz as i32],
+        }
+    }
+}
+
+/// Derivative per lattice step at node `i` of `n` along a line.
+fn difference(eps: &[f32], o: usize, stride: usize, i: usize, n: usize) -> f32 {
+    let v = |o: usize| f64::from(eps[o]);
+    let d = match (i, n) {
+        (_, 2) => v(o - i * stride + stride) - v(o - i * stride),
+        (0, _) => -1.5 * v(o) + 2.0 * v(o + stride) - 0.5 * v(o + 2 * stride),
+        (i, n) if i + 1 == n => 1.5 * v(o) - 2.0 * v(o - stride) + 0.5 * v(o - 2 * stride),
+        _ => 0.5 * (v(o + stride) - v(o - stride)),
+    };
+    d as f32
+}
+
+impl Interpolate for TrilinearGradient {
+    fn sample(&self, at: [f64; 3]) -> Sample {
+        let [(i, x), (j, y), (k, z)] = [0, 1, 2].map(|c| cell(at[c], self.dims[c]));
+        let component = |q: usize| {
+            let v = |d: [usize; 3]| {
+                f64::from(
+                    self.nodes
+                        [4 * (i + d[0] + (j + d[1]) * self.stride[0] + (k + d[2]) * self.stride[1]) + q],
+                )
+            };
+            let along_x = |dj, dk| (1.0 - x) * v([0, dj, dk]) + x * v([1, dj, dk]);
+            let along_y = |dk| (1.0 - y) * along_x(0, dk) + y * along_x(1, dk);
+            (1.0 - z) * along_y(0) + z * along_y(1)
+        };
+        Sample { eps: component(3), gradient: [component(0), component(1), component(2)] }
+    }
+
+    fn dims(&self) -> [usize; 3] {
+        self.dims
+    }
+
+    fn memory_bytes(&self) -> usize {
+        size_of_val(&self.nodes[..])
+    }
+}
+
+/// The nodes as four slices of one length, shifted by a row and a layer.
+#[derive(Clone, Copy)]
+pub(crate) struct TrilinearGradientRows<'a> {
+    corners: [&'a [f32]; 4],
+    last_cell: [f32; 3],
+    last: [f32; 3],
+    stride: [i32; 2],
+}
+
+impl Interpolate16 for TrilinearGradientRows<'_> {
+    #[inline(always)]
+    fn sample16<S: Simd>(&self, simd: S, at: &[f32x16<S>; 3]) -> Samples<S> {
+        let mut cells = [i32x16::splat(simd, 0); 3];
+        let mut place = [[0.0f32; LANES]; 3];
+        for c in 0..3 {
+            let clamped = at[c].max(f32x16::splat(simd, 0.0)).min(f32x16::splat(simd, self.last[c]));
+            cells[c] = clamped.min(f32x16::splat(simd, self.last_cell[c])).to_int::<i32x16<S>>();
+            place[c] = (clamped - cells[c].to_float::<f32x16<S>>()).into();
+        }
+        let offsets = cells[0] + cells[1] * self.stride[0] + cells[2] * self.stride[1];
+        let offsets: [i32; LANES] = offsets.into();
+        let mut out = [0.0f32; 4 * LANES];
+        for l in 0..LANES {
+            let o = 4 * offsets[l] as u32 as usize;
+            let x = f32x4::splat(simd, place[0][l]);
+            let y = f32x4::splat(simd, place[1][l]);
+            let z = f32x4::splat(simd, place[2][l]);
+            let mut edges = [x; 4];
+            for e in 0..4 {
+                let taps = &self.corners[e][o..o + 8];
+                let (a, b) = (f32x4::from_slice(simd, &taps[..4]), f32x4::from_slice(simd, &taps[4..]));
+                edges[e] = x.mul_add(b - a, a);
+            }
+            let [a, b, c, d] = edges;
+            let (low, high) = (y.mul_add(b - a, a), y.mul_add(d - c, c));
+            z.mul_add(high - low, low).store_slice(&mut out[4 * l..4 * l + 4]);
+        }
+        let [gx, gy, gz, eps] = transpose(simd, &out);
+        Samples { eps, gradient: [gx, gy, gz] }
+    }
+}

@@ -1,0 +1,318 @@
+//! Marching deviations in `f32`, sixteen rays at a time: Verlet for gases, Euler to compare with the dissertation.
+
+use super::frame::{BlankCells, Frame};
+use super::packet::{Common, Effects, Nodes, Packet, Skip, With, Work, march};
+use crate::field::Field;
+use crate::interpolate::{
+    BSpline, Interpolant, Interpolate, Interpolate16, LANES, Trilinear, TrilinearGradient,
+};
+use crate::path::{Exit, LightPaths, Start, Wanted};
+use crate::skip::Bricks;
+use crate::view::View;
+use fearless_simd::{Level, Simd, dispatch};
+use glam::DVec3;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// How deviations are stepped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Scheme {
+    /// Position Verlet: second order, symplectic, one sample a step. The default.
+    #[default]
+    Verlet,
+    /// Explicit Euler, first order: equations 5.7 and 5.8 of the dissertation, without its loss of digits.
+    Euler,
+}
+
+/// How to march.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// How deviations are stepped.
+    pub scheme: Scheme,
+    /// Longest step, in lattice steps. 1 is right for nearly all fields: below it, the interpolant decides the error.
+    pub step_voxels: f64,
+    /// What to compute beside deflection and displacement.
+    pub wanted: Wanted,
+    /// What becomes of light in cells without data.
+    pub blank: BlankCells,
+    /// Leave out bricks as long as the bounds of what that leaves out of a ray's deflection add up to less than this. Zero: leave out nothing.
+    pub skip_rad: f64,
+    /// The same for the optical path difference, when that is wanted.
+    pub skip_opd_m: f64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Options {
+            scheme: Scheme::Verlet,
+            step_voxels: 1.0,
+            wanted: Wanted::default(),
+            blank: BlankCells::Opaque,
+            skip_rad: 0.0,
+            skip_opd_m: 0.0,
+        }
+    }
+}
+
+/// What tracing did so far.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counters {
+    /// Rays traced.
+    pub rays: u64,
+    /// Of them, rays that met the field.
+    pub rays_in_field: u64,
+    /// Ray-steps that took a sample (of whole packets: unused lanes count).
+    pub ray_steps: u64,
+    /// Ray-steps that were left out.
+    pub ray_steps_skipped: u64,
+    /// The largest bound on what skipping left out of any ray's deflection, in 1e-15 rad, rounded up.
+    pub left_out_femtorad: u64,
+}
+
+enum Interpolated<'a> {
+    BSpline(BSpline),
+    Trilinear(Trilinear<'a>),
+    TrilinearGradient(TrilinearGradient),
+}
+
+/// Light paths through a field of weak index by deviations from straight rays.
+pub struct Deviational<'a> {
+    field: &'a Field,
+    frame: Frame,
+    options: Options,
+    interpolated: Interpolated<'a>,
+    bricks: Option<Bricks>,
+    level: Level,
+    rays: AtomicU64,
+    rays_in_field: AtomicU64,
+    sampled: AtomicU64,
+    skipped: AtomicU64,
+    left_out_femtorad: AtomicU64,
+}
+
+impl<'a> Deviational<'a> {
+    /// Prepares the interpolant, and bricks if some may be skipped.
+    pub fn new(field: &'a Field, view: View, interpolant: Interpolant, options: Options) -> Deviational<'a> {
+        Self::with_level(field, view, interpolant, options, Level::new())
+    }
+
+    /// [`Deviational::new`] limited to an instruction set, for tests and measurements.
+    pub fn with_level(
+        field: &'a Field,
+        view: View,
+        interpolant: Interpolant,
+        options: Options,
+        level: Level,
+    ) -> Deviational<'a> {
+        let bricks = |s: &BSpline| (options.skip_rad > 0.0).then(|| Bricks::new(field, s));
+        let (interpolated, bricks) = match interpolant {
+            Interpolant::BSpline => {
+                let s = BSpline::new(field);
+                let b = bricks(&s);
+                (Interpolated::BSpline(s), b)
+            }
+            Interpolant::Trilinear => {
+                let b = (options.skip_rad > 0.0).then(|| Bricks::new(field, &BSpline::new(field)));
+                (Interpolated::Trilinear(Trilinear::new(field)), b)
+            }
+            Interpolant::TrilinearGradient => {
+                let b = (options.skip_rad > 0.0).then(|| Bricks::new(field, &BSpline::new(field)));
+                (Interpolated::TrilinearGradient(TrilinearGradient::new(field)), b)
+            }
+        };
+        Deviational {
+            field,
+            frame: Frame::new(field, view),
+            options,
+            interpolated,
+            bricks,
+            level,
+            rays: AtomicU64::new(0),
+            rays_in_field: AtomicU64::new(0),
+            sampled: AtomicU64::new(0),
+            skipped: AtomicU64::new(0),
+            left_out_femtorad: AtomicU64::new(0),
+        }
+    }
+
+    /// What tracing did so far.
+    pub fn counters(&self) -> Counters {
+        let read = |c: &AtomicU64| c.load(Ordering::Relaxed);
+        Counters {
+            rays: read(&self.rays),
+            rays_in_field: read(&self.rays_in_field),
+            ray_steps: read(&self.sampled) * LANES as u64,
+            ray_steps_skipped: read(&self.skipped) * LANES as u64,
+            left_out_femtorad: read(&self.left_out_femtorad),
+        }
+    }
+
+    /// The bricks, when some may be skipped.
+    pub fn bricks(&self) -> Option<&Bricks> {
+        self.bricks.as_ref()
+    }
+
+    /// Bytes held beside the field.
+    pub fn memory_bytes(&self) -> usize {
+        let interpolant = match &self.interpolated {
+            Interpolated::BSpline(s) => s.memory_bytes(),
+            Interpolated::Trilinear(s) => s.memory_bytes(),
+            Interpolated::TrilinearGradient(s) => s.memory_bytes(),
+        };
+        interpolant + self.bricks.as_ref().map_or(0, Bricks::memory_bytes)
+    }
+
+    /// The interpolant as the reference sees it.
+    pub fn interpolate(&self) -> &dyn Interpolate {
+        match &self.interpolated {
+            Interpolated::BSpline(s) => s,
+            Interpolated::Trilinear(s) => s,
+            Interpolated::TrilinearGradient(s) => s,
+        }
+    }
+
+    /// Picks the kernel with only the effects that this march needs.
+    #[inline(always)]
+    fn run<S: Simd, I: Interpolate16>(&self, simd: S, field: I, starts: &[Start], exits: &mut [Exit]) {
+        let (opd, nodes) = (self.options.wanted.opd, self.field.nodes().is_some());
+        match (self.options.scheme, self.bricks.is_some()) {
+            (Scheme::Euler, _) => self.all(simd, field, starts, exits, With::<true, true, false, true>),
+            // Bricks and nodes that are not gas are rare enough for one kernel to do both.
+            (Scheme::Verlet, true) if opd => {
+                self.all(simd, field, starts, exits, With::<true, true, true, false>)
+            }
+            (Scheme::Verlet, true) => self.all(simd, field, starts, exits, With::<false, true, true, false>),
+            (Scheme::Verlet, false) => match (opd, nodes) {
+                (false, false) => self.all(simd, field, starts, exits, With::<false, false, false, false>),
+                (true, false) => self.all(simd, field, starts, exits, With::<true, false, false, false>),
+                (_, true) => self.all(simd, field, starts, exits, With::<true, true, false, false>),
+            },
+        }
+    }
+
+    /// All rays, in groups of packets that are in flight together.
+    #[inline(always)]
+    fn all<S: Simd, I: Interpolate16, E: Effects>(
+        &self,
+        simd: S,
+        field: I,
+        starts: &[Start],
+        exits: &mut [Exit],
+        effects: E,
+    ) {
+        const IN_FLIGHT: usize = 2;
+        let h = (self.frame.spacing_m / self.frame.unit_m).to_array();
+        let common = Common {
+            h2: h.map(|h| (h * h) as f32),
+            rcp_h2: h.map(|h| (1.0 / (h * h)) as f32),
+            nodes: self.field.nodes().map(|kinds| Nodes { kinds, dims: self.field.dims() }),
+            skip: self.bricks.as_ref().map(|bricks| Skip {
+                bricks,
+                unit_m: self.frame.unit_m as f32,
+                tolerance_rad: self.options.skip_rad as f32,
+                tolerance_opd_m: self.options.skip_opd_m as f32,
+            }),
+            survives: match self.options.blank {
+                BlankCells::Opaque => 0,
+                BlankCells::Continued => 1,
+            },
+        };
+        let mut known = None;
+        let mut work = Work::default();
+        let mut in_field = 0;
+        let mut left_out = 0.0f32;
+        for (starts, exits) in starts.chunks(IN_FLIGHT * LANES).zip(exits.chunks_mut(IN_FLIGHT * LANES)) {
+            let mut packets = [const { Packet::EMPTY }; IN_FLIGHT];
+            let mut beams = [([DVec3::ZERO; 3], 0.0f64); IN_FLIGHT * LANES];
+            let mut steps = 0.0f64;
+            for (i, start) in starts.iter().enumerate() {
+                let ray = self.frame.undisturbed(start, &mut known);
+                let length_m = ray.range_m[1] - ray.range_m[0];
+                beams[i] = (ray.beam, ray.range_m[1]);
+                if length_m > 0.0 {
+                    in_field += 1;
+                    steps = steps.max(length_m * ray.direction.length() / self.options.step_voxels);
+                    let entry = ray.at + ray.direction * ray.range_m[0];
+                    let (p, l) = (&mut packets[i / LANES], i % LANES);
+                    for c in 0..3 {
+                        p.entry[c][l] = entry[c] as f32;
+                        p.direction[c][l] = (ray.direction[c] * self.frame.unit_m) as f32;
+                        p.along[c][l] = (ray.beam[2][c] * h[c]) as f32;
+                    }
+                    p.length[l] = (length_m / self.frame.unit_m) as f32;
+                }
+            }
+            if steps > 0.0 {
+                let done = if starts.len() > LANES {
+                    march(simd, field, &common, &mut packets, steps_of(steps), effects)
+                } else {
+                    let [first, ..] = &mut packets;
+                    march(simd, field, &common, std::array::from_mut(first), steps_of(steps), effects)
+                };
+                work.sampled += done.sampled;
+                work.skipped += done.skipped;
+            }
+            for (i, exit) in exits.iter_mut().enumerate() {
+                let (p, l) = (&packets[i / LANES], i % LANES);
+                let ([right, up, _], depth_m) = beams[i];
+                let u = DVec3::from([0, 1, 2].map(|c| f64::from(p.v[c][l]) * h[c]));
+                let xi = DVec3::from([0, 1, 2].map(|c| f64::from(p.xi[c][l]) * h[c])) * self.frame.unit_m;
+                let (transmission, status) = self.options.blank.fate(p.met[l]);
+                left_out = left_out.max(p.left_out[l]);
+                *exit = Exit {
+                    deflection_rad: [u.dot(right) as f32, u.dot(up) as f32],
+                    displacement_m: [xi.dot(right) as f32, xi.dot(up) as f32],
+                    exit_depth_m: depth_m as f32,
+                    opd_m: if self.options.wanted.opd {
+                        (f64::from(p.opd[l]) * self.frame.unit_m * self.field.n0()) as f32
+                    } else {
+                        f32::NAN
+                    },
+                    transmission,
+                    status,
+                };
+            }
+        }
+        self.rays.fetch_add(starts.len() as u64, Ordering::Relaxed);
+        self.rays_in_field.fetch_add(in_field, Ordering::Relaxed);
+        self.sampled.fetch_add(work.sampled, Ordering::Relaxed);
+        self.skipped.fetch_add(work.skipped, Ordering::Relaxed);
+        self.left_out_femtorad.fetch_max((f64::from(left_out) * 1e15).ceil() as u64, Ordering::Relaxed);
+    }
+}
+
+/// Whole steps for a length in steps: a hair above a whole number is rounding, not a step.
+fn steps_of(steps: f64) -> u32 {
+    (steps * (1.0 - 1e-12)).ceil() as u32
+}
+
+impl LightPaths for Deviational<'_> {
+    fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
+        assert_eq!(starts.len(), exits.len(), "one exit per start");
+        match &self.interpolated {
+            Interpolated::BSpline(s) => {
+                let rows = s.rows();
+                dispatch!(self.level, simd => self.run(simd, rows, starts, exits));
+            }
+            Interpolated::Trilinear(s) => {
+                let rows = s.rows();
+                dispatch!(self.level, simd => self.run(simd, rows, starts, exits));
+            }
+            Interpolated::TrilinearGradient(s) => {
+                let rows = s.rows();
+                dispatch!(self.level, simd => self.run(simd, rows, starts, exits));
+            }
+        }
+    }
+
+    fn view(&self) -> &View {
+        &self.frame.view
+    }
+
+    fn wanted(&self) -> Wanted {
+        self.options.wanted
+    }
+
+    fn difference_step_m(&self) -> f64 {
+        0.5 * self.frame.spacing_m.min_element()
+    }
+}

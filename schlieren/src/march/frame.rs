@@ -1,0 +1,110 @@
+//! Where undisturbed rays enter and leave the field.
+
+use crate::field::{Field, Node};
+use crate::path::{Start, Status};
+use crate::view::View;
+use glam::DVec3;
+
+/// What becomes of light in cells without data ([`Node::Blank`]).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum BlankCells {
+    /// It stops: the picture is dark there.
+    #[default]
+    Opaque,
+    /// It goes on through values continued from the gas around them. Exits still say [`Status::Masked`].
+    Continued,
+}
+
+impl BlankCells {
+    /// Transmission and status of a ray by the worst node it met.
+    pub(crate) fn fate(self, met: u8) -> (f32, Status) {
+        match (met, self) {
+            (m, _) if m == Node::Gas as u8 => (1.0, Status::Free),
+            (m, _) if m == Node::Solid as u8 => (0.0, Status::Blocked),
+            (_, BlankCells::Opaque) => (0.0, Status::Masked),
+            (_, BlankCells::Continued) => (1.0, Status::Masked),
+        }
+    }
+}
+
+/// Lattice coordinates of a view's rays.
+#[derive(Debug, Clone)]
+pub(crate) struct Frame {
+    pub(crate) view: View,
+    pub(crate) spacing_m: DVec3,
+    pub(crate) last: DVec3,
+    /// The view's centre in lattice coordinates.
+    centre: DVec3,
+    /// Length unit of the kernels: a power of two near the largest spacing, so that fields of any size use the same numbers.
+    pub(crate) unit_m: f64,
+}
+
+/// One undisturbed ray.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Undisturbed {
+    /// Right, up and direction of its beam.
+    pub(crate) beam: [DVec3; 3],
+    /// Where it crosses the centre plane, in lattice coordinates.
+    pub(crate) at: DVec3,
+    /// Its direction in lattice steps per metre.
+    pub(crate) direction: DVec3,
+    /// Distances in metres from `at` to where it enters and leaves; equal when it misses.
+    pub(crate) range_m: [f64; 2],
+}
+
+impl Frame {
+    pub(crate) fn new(field: &Field, view: View) -> Frame {
+        let spacing_m = DVec3::from(field.spacing_m());
+        let d = field.dims();
+        Frame {
+            view,
+            spacing_m,
+            last: DVec3::new((d[0] - 1) as f64, (d[1] - 1) as f64, (d[2] - 1) as f64),
+            centre: (view.centre_m - field.origin_m()) / spacing_m,
+            unit_m: spacing_m.max_element().log2().round().exp2(),
+        }
+    }
+
+    /// The ray of a start. `known` is a beam computed before, with its tilt: neighbours mostly share it.
+    pub(crate) fn undisturbed(
+        &self,
+        start: &Start,
+        known: &mut Option<([f32; 2], [DVec3; 3])>,
+    ) -> Undisturbed {
+        let beam = match known {
+            Some((tilt, beam)) if *tilt == start.tilt_rad => *beam,
+            _ => {
+                let beam = self.view.beam(start.tilt_rad);
+                *known = Some((start.tilt_rad, beam));
+                beam
+            }
+        };
+        let [x, y] = start.position_m.map(f64::from);
+        let at = self.centre + (self.view.right * x + self.view.up * y) / self.spacing_m;
+        let direction = beam[2] / self.spacing_m;
+        Undisturbed { beam, at, direction, range_m: clip(at, direction, self.last) }
+    }
+
+    /// Lattice steps per metre along a direction.
+    pub(crate) fn lattice_speed_per_m(&self, direction: DVec3) -> f64 {
+        (direction / self.spacing_m).length()
+    }
+}
+
+/// The part of the line `at + s direction` in the box from 0 to `last`, faces included: `[s, s]` when there is none. Directions may have zeros.
+pub(crate) fn clip(at: DVec3, direction: DVec3, last: DVec3) -> [f64; 2] {
+    let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
+    for c in 0..3 {
+        if direction[c] == 0.0 {
+            // Parallel to the faces: inside them or not. Written so that NaN is outside.
+            if !(at[c] >= 0.0 && at[c] <= last[c]) {
+                return [0.0; 2];
+            }
+            continue;
+        }
+        let (a, b) = ((0.0 - at[c]) / direction[c], (last[c] - at[c]) / direction[c]);
+        near = near.max(a.min(b));
+        far = far.min(a.max(b));
+    }
+    if near < far && near.is_finite() && far.is_finite() { [near, far] } else { [0.0; 2] }
+}

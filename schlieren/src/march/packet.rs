@@ -1,0 +1,334 @@
+//! The kernels: sixteen rays a packet in `f32`, several packets in flight.
+//!
+//! State per ray, all zero at the start: the deviation of the position in lattice steps, `xi`, and of its rate, `v`, along the lattice's axes, and the
+//! optical path difference. The undisturbed ray is computed afresh for each step from the step's number. So rounding is relative to the
+//! deviation and not to the position, and a gas of eps = 1e-8 is traced as accurately as one of 1e-3.
+//!
+//! In the lattice's own axes a step needs no rotations: with lattice spacing h (in units of the longest) and gradient g per lattice step,
+//! `dv_i/dtau = (1 + eps) g_i / h_i^2` and `dxi_i/dtau = v_i`.
+
+use crate::field::Node;
+use crate::interpolate::{Interpolate16, LANES, Row, Samples};
+use crate::skip::Bricks;
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x16, i32x16};
+
+/// Rays of one packet with their state. Lengths are in units of [`super::Frame::unit_m`].
+#[derive(Clone)]
+#[repr(C, align(64))]
+pub(super) struct Packet {
+    /// Where the undisturbed rays enter, in lattice coordinates.
+    pub(super) entry: [Row; 3],
+    /// Their direction, in lattice steps per unit of tau.
+    pub(super) direction: [Row; 3],
+    /// The direction times the spacing: projects lattice components of `xi` and `v` on the ray.
+    pub(super) along: [Row; 3],
+    /// Path from entry to undisturbed exit.
+    pub(super) length: Row,
+    pub(super) xi: [Row; 3],
+    pub(super) v: [Row; 3],
+    pub(super) opd: Row,
+    /// Bound on the deflection that skipping left out.
+    pub(super) left_out: Row,
+    /// The worst [`Node`] met.
+    pub(super) met: [u8; LANES],
+}
+
+impl Packet {
+    pub(super) const EMPTY: Packet = Packet {
+        entry: [[0.0; LANES]; 3],
+        direction: [[0.0; LANES]; 3],
+        along: [[0.0; LANES]; 3],
+        length: [0.0; LANES],
+        xi: [[0.0; LANES]; 3],
+        v: [[0.0; LANES]; 3],
+        opd: [0.0; LANES],
+        left_out: [0.0; LANES],
+        met: [0; LANES],
+    };
+}
+
+/// What is the same for all packets.
+#[derive(Clone, Copy)]
+pub(super) struct Common<'a> {
+    /// Spacing squared, and its reciprocal.
+    pub(super) h2: [f32; 3],
+    pub(super) rcp_h2: [f32; 3],
+    /// What the nodes are, where not all are gas.
+    pub(super) nodes: Option<Nodes<'a>>,
+    pub(super) skip: Option<Skip<'a>>,
+    /// The worst kind a ray can survive; a packet whose rays all met something worse is done.
+    pub(super) survives: u8,
+}
+
+/// Kinds of the nodes, for rays to look up the nearest.
+#[derive(Clone, Copy)]
+pub(super) struct Nodes<'a> {
+    pub(super) kinds: &'a [Node],
+    pub(super) dims: [usize; 3],
+}
+
+/// Bricks, and how much may be left out.
+#[derive(Clone, Copy)]
+pub(super) struct Skip<'a> {
+    pub(super) bricks: &'a Bricks,
+    /// Metres of a unit of length.
+    pub(super) unit_m: f32,
+    /// In rad, over the whole ray.
+    pub(super) tolerance_rad: f32,
+    /// In metres, over the whole ray.
+    pub(super) tolerance_opd_m: f32,
+}
+
+/// What a kernel is compiled for.
+pub(super) trait Effects: Copy {
+    /// The optical path difference.
+    const OPD: bool;
+    /// Blank or solid nodes.
+    const NODES: bool;
+    /// Bricks that may be left out.
+    const SKIP: bool;
+    /// The dissertation's explicit Euler (equations 5.7 and 5.8) in place of Verlet.
+    const EULER: bool;
+}
+
+/// The only implementation of [`Effects`].
+#[derive(Clone, Copy)]
+pub(super) struct With<const OPD: bool, const NODES: bool, const SKIP: bool, const EULER: bool>;
+
+impl<const OPD: bool, const NODES: bool, const SKIP: bool, const EULER: bool> Effects
+    for With<OPD, NODES, SKIP, EULER>
+{
+    const OPD: bool = OPD;
+    const NODES: bool = NODES;
+    const SKIP: bool = SKIP;
+    const EULER: bool = EULER;
+}
+
+/// Work done: packet-steps that took a sample, and those that were left out.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Work {
+    pub(super) sampled: u64,
+    pub(super) skipped: u64,
+}
+
+/// Steps that are left out at once, where a brick allows it.
+const STRIDE: u32 = 8;
+
+/// Takes all packets from entry to exit in `steps` steps each, in flight together.
+#[inline(never)]
+pub(super) fn march<S: Simd, I: Interpolate16, E: Effects, const P: usize>(
+    simd: S,
+    field: I,
+    common: &Common<'_>,
+    packets: &mut [Packet; P],
+    steps: u32,
+    _: E,
+) -> Work {
+    simd.vectorize(
+        #[inline(always)]
+        || march_body::<S, I, E, P>(simd, field, common, packets, steps),
+    )
+}
+
+#[inline(always)]
+fn march_body<S: Simd, I: Interpolate16, E: Effects, const P: usize>(
+    simd: S,
+    field: I,
+    common: &Common<'_>,
+    packets: &mut [Packet; P],
+    steps: u32,
+) -> Work {
+    let mut work = Work::default();
+    let per_step = 1.0 / steps as f32;
+    let mut k = 0;
+    while k < steps {
+        // Leaving out whole bricks, when all rays in flight may.
+        if E::SKIP
+            && k % STRIDE == 0
+            && k + STRIDE <= steps
+            && leave_out::<S, E, P>(simd, common, packets, k, per_step)
+        {
+            k += STRIDE;
+            work.skipped += u64::from(STRIDE) * P as u64;
+            continue;
+        }
+        let number = if E::EULER { k as f32 } else { k as f32 + 0.5 };
+        for p in packets.iter_mut() {
+            let dt = f32x16::from_slice(simd, &p.length) * per_step;
+            step::<S, I, E>(simd, field, common, p, number * per_step, dt);
+        }
+        work.sampled += P as u64;
+        k += 1;
+        if E::NODES && packets.iter().all(|p| p.met.iter().all(|m| *m > common.survives)) {
+            return work;
+        }
+    }
+    // Euler's positions are already at the end of the step.
+    for p in packets.iter_mut() {
+        let dt = f32x16::from_slice(simd, &p.length) * per_step;
+        if !E::EULER {
+            drift(simd, p, dt * 0.5);
+        }
+        finish::<S, I, E>(simd, field, common, p);
+    }
+    work.sampled += P as u64;
+    work
+}
+
+/// xi += dt v
+#[inline(always)]
+fn drift<S: Simd>(simd: S, p: &mut Packet, dt: f32x16<S>) {
+    for c in 0..3 {
+        let xi = f32x16::from_slice(simd, &p.xi[c]);
+        let v = f32x16::from_slice(simd, &p.v[c]);
+        dt.mul_add(v, xi).store_slice(&mut p.xi[c]);
+    }
+}
+
+/// One step. The positions arrive at the middle of the last step (Verlet; half a step of drift is missing, and in the first step there is nothing to drift),
+/// and are moved to the middle of this one; `fraction` of the way along the undisturbed ray.
+#[inline(always)]
+fn step<S: Simd, I: Interpolate16, E: Effects>(
+    simd: S,
+    field: I,
+    common: &Common<'_>,
+    p: &mut Packet,
+    fraction: f32,
+    dt: f32x16<S>,
+) {
+    let tau = f32x16::from_slice(simd, &p.length) * fraction;
+    let mut at = [tau; 3];
+    for c in 0..3 {
+        let mut xi = f32x16::from_slice(simd, &p.xi[c]);
+        let v = f32x16::from_slice(simd, &p.v[c]);
+        let moved = dt.mul_add(v, xi);
+        if !E::EULER {
+            xi = moved;
+        }
+        moved.store_slice(&mut p.xi[c]);
+        let straight =
+            tau.mul_add(f32x16::from_slice(simd, &p.direction[c]), f32x16::from_slice(simd, &p.entry[c]));
+        at[c] = straight + xi;
+    }
+    if E::NODES {
+        meet(simd, common, p, &at);
+    }
+    let here = field.sample16(simd, &at);
+    kick::<S, E>(simd, common, p, &here, dt);
+}
+
+/// v += dt (1 + eps) g / h^2, and the optical path with the mean of v before and after.
+#[inline(always)]
+fn kick<S: Simd, E: Effects>(simd: S, common: &Common<'_>, p: &mut Packet, here: &Samples<S>, dt: f32x16<S>) {
+    let eps = here.eps;
+    let push = dt.mul_add(eps, dt);
+    let mut middle = [eps; 3];
+    for c in 0..3 {
+        let v = f32x16::from_slice(simd, &p.v[c]);
+        let push = push * common.rcp_h2[c];
+        if E::OPD {
+            middle[c] = if E::EULER { v } else { (push * 0.5).mul_add(here.gradient[c], v) };
+        }
+        push.mul_add(here.gradient[c], v).store_slice(&mut p.v[c]);
+    }
+    if E::OPD {
+        // (1+eps)^2 - w_z = eps (1 + eps) + u_t^2 / (1 + eps + w_z): all terms small, none a difference.
+        let mut square = middle[0] * 0.0;
+        let mut u_z = square;
+        for c in 0..3 {
+            square = (middle[c] * common.h2[c]).mul_add(middle[c], square);
+            u_z = middle[c].mul_add(f32x16::from_slice(simd, &p.along[c]), u_z);
+        }
+        let transverse = square - u_z * u_z;
+        let more = eps.mul_add(eps, eps) + transverse / (eps + u_z + f32x16::splat(simd, 2.0));
+        dt.mul_add(more, f32x16::from_slice(simd, &p.opd)).store_slice(&mut p.opd);
+    }
+}
+
+/// tau is not depth: a ray that gained `zeta` in depth has passed its exit plane by as much. One step back brings it there.
+#[inline(always)]
+fn finish<S: Simd, I: Interpolate16, E: Effects>(simd: S, field: I, common: &Common<'_>, p: &mut Packet) {
+    let mut zeta = f32x16::splat(simd, 0.0);
+    let mut u_z = zeta;
+    for c in 0..3 {
+        let along = f32x16::from_slice(simd, &p.along[c]);
+        zeta = along.mul_add(f32x16::from_slice(simd, &p.xi[c]), zeta);
+        u_z = along.mul_add(f32x16::from_slice(simd, &p.v[c]), u_z);
+    }
+    let dt = -zeta / (u_z + f32x16::splat(simd, 1.0));
+    drift(simd, p, dt * 0.5);
+    let tau = f32x16::from_slice(simd, &p.length) + dt * 0.5;
+    let mut at = [tau; 3];
+    for c in 0..3 {
+        let straight =
+            tau.mul_add(f32x16::from_slice(simd, &p.direction[c]), f32x16::from_slice(simd, &p.entry[c]));
+        at[c] = straight + f32x16::from_slice(simd, &p.xi[c]);
+    }
+    let here = field.sample16(simd, &at);
+    kick::<S, E>(simd, common, p, &here, dt);
+    drift(simd, p, dt * 0.5);
+}
+
+/// The nearest nodes' kinds.
+#[inline(always)]
+fn meet<S: Simd>(simd: S, common: &Common<'_>, p: &mut Packet, at: &[f32x16<S>; 3]) {
+    let Some(nodes) = common.nodes else { return };
+    let mut near = [i32x16::splat(simd, 0); 3];
+    for c in 0..3 {
+        let last = f32x16::splat(simd, (nodes.dims[c] - 1) as f32);
+        let inside = at[c].max(f32x16::splat(simd, 0.0)).min(last);
+        near[c] = (inside + f32x16::splat(simd, 0.5)).to_int::<i32x16<S>>();
+    }
+    let row = nodes.dims[0] as i32;
+    let o = near[0] + near[1] * row + near[2] * (row * nodes.dims[1] as i32);
+    let o: [i32; LANES] = o.into();
+    for l in 0..LANES {
+        p.met[l] = p.met[l].max(nodes.kinds[o[l] as u32 as usize] as u8);
+    }
+}
+
+/// Moves all packets over [`STRIDE`] steps without a sample, if the bricks there bound what that leaves out.
+#[inline(always)]
+fn leave_out<S: Simd, E: Effects, const P: usize>(
+    simd: S,
+    common: &Common<'_>,
+    packets: &mut [Packet; P],
+    k: u32,
+    per_step: f32,
+) -> bool {
+    let Some(skip) = common.skip else { return false };
+    let share = STRIDE as f32 * per_step;
+    let half = 0.5 * STRIDE as f32;
+    let mut bounds = [([0.0f32; LANES], [0.0f32; LANES]); P];
+    for (p, (angle, mean)) in packets.iter().zip(&mut bounds) {
+        let tau = f32x16::from_slice(simd, &p.length) * ((k as f32 + half) * per_step);
+        let mut at: [Row; 3] = [[0.0; LANES]; 3];
+        for c in 0..3 {
+            let straight =
+                tau.mul_add(f32x16::from_slice(simd, &p.direction[c]), f32x16::from_slice(simd, &p.entry[c]));
+            at[c] = (straight + f32x16::from_slice(simd, &p.xi[c])).into();
+        }
+        for l in 0..LANES {
+            let brick = skip.bricks.around([at[0][l], at[1][l], at[2][l]]);
+            let chord_m = p.length[l] * share * skip.unit_m;
+            angle[l] = p.left_out[l] + brick.max_gradient_per_m * chord_m;
+            mean[l] = brick.mean_eps;
+            let stops = E::NODES && brick.has_nodes;
+            let vague = E::OPD && brick.half_range_eps * chord_m > skip.tolerance_opd_m * share;
+            if angle[l] > skip.tolerance_rad || stops || vague {
+                return false;
+            }
+        }
+    }
+    for (p, (angle, mean)) in packets.iter_mut().zip(&bounds) {
+        p.left_out = *angle;
+        let dt = f32x16::from_slice(simd, &p.length) * share;
+        drift(simd, p, dt);
+        if E::OPD {
+            let here = Samples { eps: f32x16::from_slice(simd, mean), gradient: [dt * 0.0; 3] };
+            kick::<S, E>(simd, common, p, &here, dt);
+        }
+    }
+    true
+}
