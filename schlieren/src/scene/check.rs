@@ -39,11 +39,21 @@ impl Scene {
         self.check_light()?;
         self.check_technique()?;
         self.check_film()?;
-        positive("flow.length_scale", self.flow.length_scale)?;
-        self.flow.density_scale.map_or(Ok(()), |s| positive("flow.density_scale", s))?;
+        self.check_flow()?;
         positive("march.tolerance_rad", self.march.tolerance_rad)?;
         self.march.step_voxels.map_or(Ok(()), |s| positive("march.step_voxels", s))?;
         self.check_effect()
+    }
+
+    fn check_flow(&self) -> Result<(), SceneError> {
+        let flow = &self.flow;
+        positive("flow.length_unit_m", flow.length_unit_m)?;
+        flow.density_unit_kg_m3.map_or(Ok(()), |s| positive("flow.density_unit_kg_m3", s))?;
+        flow.pressure_unit_pa.map_or(Ok(()), |s| positive("flow.pressure_unit_pa", s))?;
+        flow.span.map_or(Ok(()), |s| positive("flow.span", s))?;
+        finite("flow.temperature_zero_k", &[flow.temperature_zero_k.unwrap_or(0.0)])?;
+        within("flow.smoothing_nodes", flow.smoothing_nodes, 0.0, 100.0)?;
+        flow.medium().map(|_| ())
     }
 
     fn check_light(&self) -> Result<(), SceneError> {

@@ -25,17 +25,18 @@
 mod check;
 mod direction;
 mod effects;
+mod flow;
 mod technique;
 
 pub use direction::Direction;
 pub use effects::{Counters, Effects};
+pub use flow::FlowSpec;
 pub use technique::{CutoffSpec, TechniqueSpec};
 
 use crate::filter::Filter;
 use crate::optics::{Optics, SourceShape};
 use crate::spectrum::Line;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Everything a picture is made of.
@@ -68,45 +69,6 @@ pub struct Scene {
     /// Bodies in the test section.
     #[serde(default)]
     pub solids: SolidsSpec,
-}
-
-/// The file and what its arrays are: a density, or temperature and pressure.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FlowSpec {
-    /// VTI, VTR, VTS, VTU, PLOT3D, NRRD, raw…
-    pub file: PathBuf,
-    /// Array with the density.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub density: Option<String>,
-    /// Array with the temperature.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub temperature: Option<String>,
-    /// Array with the pressure, or a number in Pa for all of the field.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub pressure: Option<String>,
-    /// Array with the relative humidity, 0 to 1, or a number for all of the field.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub humidity: Option<String>,
-    /// CO2 in ppm.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub co2_ppm: Option<f64>,
-    /// Arrays with mass fractions, and the gas of each; the rest is air.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub species: BTreeMap<String, String>,
-    /// kg/m³ per unit of the density array (a solver's normalised density times its free stream's).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub density_scale: Option<f64>,
-    /// Metres per unit of the file's coordinates.
-    #[serde(default = "one")]
-    pub length_scale: f64,
-    /// Nodes along the longest axis when the data have to be resampled; chosen from the cells when absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub resample_nodes: Option<u32>,
-}
-
-fn one() -> f64 {
-    1.0
 }
 
 /// The direction of light.
@@ -439,6 +401,12 @@ pub enum SceneError {
         technique: &'static str,
         /// Where it would have an effect.
         hint: &'static str,
+    },
+    /// The arrays of the flow make no medium.
+    #[error("[flow]: {reason}")]
+    Flow {
+        /// What is missing or too much, with the cure.
+        reason: String,
     },
     /// The filter's picture.
     #[error("technique.cutoff")]
