@@ -295,6 +295,22 @@ impl Mesh {
         finite.fold(nothing, |(low, high), p| (low.min(*p), high.max(*p)))
     }
 
+    /// Side of a cube as large as the box of a typical cell: the median over at most 10 000 of them; NaN without cells.
+    pub fn typical_cell(&self) -> f64 {
+        let step = (self.cells / 10_000).max(1);
+        let side = |cell: usize| {
+            let ids = self.corners(cell).ids;
+            let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+            let (low, high) =
+                ids.iter().map(|&i| self.points[i as usize]).fold(nothing, |(l, h), p| (l.min(p), h.max(p)));
+            (high - low).element_product().cbrt()
+        };
+        let mut sides: Vec<f64> =
+            (0..self.cells).step_by(step).map(side).filter(|s| s.is_finite() && *s > 0.0).collect();
+        sides.sort_by(f64::total_cmp);
+        sides.get(sides.len() / 2).copied().unwrap_or(f64::NAN)
+    }
+
     /// The corners of a cell; panics when out of range.
     pub(super) fn corners(&self, cell: usize) -> Corners {
         let part = &self.parts[self.parts.partition_point(|p| p.cells.end <= cell)];

@@ -81,7 +81,7 @@ pub struct Lattice {
 /// How fine a lattice is to be.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub enum Resolution {
-    /// About eight nodes per cell of the mesh, with 64 to 256 nodes along the longest axis.
+    /// Two nodes along the side of half of the cells or more, with 64 to 256 nodes along the longest axis.
     #[default]
     Auto,
     /// This many nodes along the longest axis, and equal spacing along the others as near as whole numbers allow.
@@ -96,8 +96,13 @@ pub enum Resolution {
 const MAX_NODES: usize = (1 << 31) - 1;
 
 impl Lattice {
-    /// A lattice over the box `low`..`high`, for a mesh of so many cells.
-    pub fn fit(low: DVec3, high: DVec3, cells: usize, resolution: Resolution) -> Result<Self, ResampleError> {
+    /// A lattice over the box `low`..`high`; `typical_cell` is [`Mesh::typical_cell`].
+    pub fn fit(
+        low: DVec3,
+        high: DVec3,
+        typical_cell: f64,
+        resolution: Resolution,
+    ) -> Result<Self, ResampleError> {
         let size = high - low;
         let flat = |what: String| ResampleError::Lattice { dims: [0; 3], what };
         if !(size.is_finite() && low.is_finite() && size.min_element() > 0.0) {
@@ -110,8 +115,9 @@ impl Lattice {
         };
         let (dims, spacing) = match resolution {
             Resolution::Auto => {
-                let h = (size.x * size.y * size.z / (8.0 * cells.max(1) as f64)).cbrt();
-                let longest = (size.max_element() / h + 1.0).clamp(64.0, 256.0).round();
+                // Means of stretched meshes are those of their far field: the median is where the cells are.
+                let wish = size.max_element() / (0.5 * typical_cell) + 1.0;
+                let longest = if wish.is_finite() { wish.clamp(64.0, 256.0).round() } else { 64.0 };
                 (even(size.max_element() / (longest - 1.0)), None)
             }
             Resolution::Longest(n) => (even(size.max_element() / n.saturating_sub(1).max(1) as f64), None),
@@ -219,7 +225,7 @@ const MAX_SAMPLES: usize = 8;
 /// let mesh = Mesh::new(&Dataset::ImageData(image))?;
 /// let values: Vec<f64> = (0..mesh.num_points()).map(|i| mesh.point(i).x + 2.0 * mesh.point(i).y).collect();
 /// let (low, high) = mesh.bounds();
-/// let lattice = Lattice::fit(low, high, mesh.num_cells(), Resolution::Longest(8))?;
+/// let lattice = Lattice::fit(low, high, mesh.typical_cell(), Resolution::Longest(8))?;
 /// let fine = resample(&mesh, Samples::Points(&values), &lattice, &Options::default())?;
 /// let p = lattice.node(3, 5, 7);
 /// assert!((fine.values[3 + 8 * (5 + 8 * 7)] as f64 - (p.x + 2.0 * p.y)).abs() < 1e-6);

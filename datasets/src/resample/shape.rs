@@ -134,7 +134,7 @@ impl<'a> Cell<'a> {
             let jacobians = parameters.iter().map(|q| cell.map(*q).1.determinant());
             let (low, high) =
                 jacobians.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), j| (l.min(j), h.max(j)));
-            let (small, large) = if high.abs() >= low.abs() { (low, high) } else { (-high, -low) };
+            let (small, large) = if low + high >= 0.0 { (low, high) } else { (-high, -low) };
             cell.folded = !(small > FOLDED * large);
         }
         cell

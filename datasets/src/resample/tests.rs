@@ -31,7 +31,7 @@ fn at_points(mesh: &Mesh, f: impl Fn(DVec3) -> f64) -> Vec<f64> {
 
 fn lattice_of(mesh: &Mesh, resolution: Resolution) -> Lattice {
     let (low, high) = mesh.bounds();
-    Lattice::fit(low, high, mesh.num_cells(), resolution).unwrap()
+    Lattice::fit(low, high, mesh.typical_cell(), resolution).unwrap()
 }
 
 /// All nodes inside have the value of `f` to `tolerance`.
@@ -313,18 +313,19 @@ fn broken_meshes_give_errors_or_counts() {
         Resolution::Spacing(1e-300),
         Resolution::Dims([usize::MAX; 3]),
     ] {
-        assert!(Lattice::fit(DVec3::ZERO, DVec3::ONE, 1, bad).is_err(), "{bad:?}");
+        assert!(Lattice::fit(DVec3::ZERO, DVec3::ONE, 1.0, bad).is_err(), "{bad:?}");
     }
-    assert!(Lattice::fit(DVec3::ZERO, DVec3::new(1.0, 1.0, 0.0), 1, Resolution::Auto).is_err());
+    assert!(Lattice::fit(DVec3::ZERO, DVec3::new(1.0, 1.0, 0.0), 1.0, Resolution::Auto).is_err());
 }
 
 #[test]
 fn lattices_fit_their_box() {
-    let fit = |r| Lattice::fit(DVec3::ZERO, DVec3::new(1.0, 2.0, 4.0), 1000, r).unwrap();
+    let fit = |r| Lattice::fit(DVec3::ZERO, DVec3::new(1.0, 2.0, 4.0), 0.2, r).unwrap();
     assert_eq!(fit(Resolution::Longest(41)).dims, [11, 21, 41]);
     assert_eq!(fit(Resolution::Spacing(0.1)).dims, [11, 21, 41]);
     let odd = fit(Resolution::Spacing(0.3));
     assert_eq!(odd.dims, [4, 7, 14]);
     assert!((odd.origin - DVec3::new(0.05, 0.1, 0.05)).length() < 1e-12);
-    assert_eq!(fit(Resolution::Auto).dims, [17, 33, 64]);
+    let auto = |typical| Lattice::fit(DVec3::ZERO, DVec3::ONE, typical, Resolution::Auto).unwrap().dims;
+    assert_eq!((auto(0.02), auto(0.5), auto(1e-9), auto(f64::NAN)), ([101; 3], [64; 3], [256; 3], [64; 3]));
 }

@@ -213,8 +213,11 @@ pub fn render(
         let planned = section.paths(scene, 0, Wanted { opd: layers.phase }, against_light)?;
         add_map(scene, section, &planned, &mut r);
     }
-    r.report.levels =
-        r.pixels.iter().flatten().fold([f32::INFINITY, f32::NEG_INFINITY], |[l, h], v| [l.min(*v), h.max(*v)]);
+    r.report.levels = r
+        .pixels
+        .iter()
+        .flatten()
+        .fold([f32::INFINITY, f32::NEG_INFINITY], |[l, h], v| [l.min(*v), h.max(*v)]);
     warn_about_picture(scene, &mut r.report);
     (control.progress)(1.0);
     Ok(r)
@@ -241,7 +244,11 @@ pub fn technique(
         TechniqueSpec::Schlieren { cutoff } => {
             let s = schlieren::Schlieren::new(optics, &cutoff.cutoff()?, sample_source);
             let several = lines.len() > 1;
-            Technique::Schlieren(if several { s.with_band(filter_band(lines[line].wavelength_nm)) } else { s })
+            Technique::Schlieren(if several {
+                s.with_band(filter_band(lines[line].wavelength_nm))
+            } else {
+                s
+            })
         }
         TechniqueSpec::Interferogram { visibility, fringe_spacing_m, fringe_angle_deg } => {
             let fringes = fringe_spacing_m.map(|spacing_m| interferogram::Fringes {
@@ -249,10 +256,17 @@ pub fn technique(
                 angle_deg: fringe_angle_deg.unwrap_or(0.0),
             });
             let wavelength_m = lines[line].wavelength_nm * 1e-9;
-            Technique::Interferogram(interferogram::Interferogram::new(optics, wavelength_m, *visibility, fringes, n0))
+            Technique::Interferogram(interferogram::Interferogram::new(
+                optics,
+                wavelength_m,
+                *visibility,
+                fringes,
+                n0,
+            ))
         }
         TechniqueSpec::Bos { dot_diameter_m, dot_spacing_m, seed } => {
-            let diameter_m = dot_diameter_m.unwrap_or(3.0 * framing.pixel_m).min(dot_spacing_m.unwrap_or(f64::INFINITY));
+            let diameter_m =
+                dot_diameter_m.unwrap_or(3.0 * framing.pixel_m).min(dot_spacing_m.unwrap_or(f64::INFINITY));
             let spacing_m = dot_spacing_m.unwrap_or(2.0 * diameter_m);
             Technique::Bos(bos::Bos::new(optics, bos::Dots { diameter_m, spacing_m, seed: *seed }))
         }
@@ -311,7 +325,11 @@ fn expose_lines(
         let planned = section.paths(scene, line, Wanted { opd: t.needs_opd() }, against_light)?;
         r.report.march.clone_from(&planned.description);
         r.report.deflection_error_rad = planned.error_rad;
-        let margin_px = if t.looks_from_film() { 0 } else { margin_px(&*planned.paths, &optics, &framing, &mut r.report) };
+        let margin_px = if t.looks_from_film() {
+            0
+        } else {
+            margin_px(&*planned.paths, &optics, &framing, &mut r.report)
+        };
         let (sampling, seed) = match scene.sampling {
             SamplingSpec::Photons { jitter: Jitter::Random, seed, .. } => (Sampling::Random, seed),
             SamplingSpec::Photons { seed, .. } => (Sampling::Sobol, seed),
@@ -327,7 +345,8 @@ fn expose_lines(
             tilted_beams,
         };
         let part = |done: f64| (control.progress)((line as f64 + done) / lines.len() as f64);
-        let wished = Layers { counts: layers.counts && line == 0, noise: layers.noise && line == 0, ..layers };
+        let wished =
+            Layers { counts: layers.counts && line == 0, noise: layers.noise && line == 0, ..layers };
         let (scale, before) = (scene.exposure() as f32, r.report.counters.rays);
         if t.is_colored() {
             let film = expose_line::<3>(scene, &setup, framing, wished, control.cancel, &part, r)?;
@@ -450,10 +469,12 @@ fn noise<const C: usize>(films: &[Film<C>], samples: u32, filter: Filter, exposu
 /// and a quarter of that for what the lattice missed.
 fn margin_px(paths: &dyn LightPaths, optics: &Optics, framing: &Framing, report: &mut Report) -> u32 {
     const PROBES: u32 = 64;
-    let probe = |i: u32, n: u32| (f64::from(i) + 0.5) / f64::from(PROBES) * 1.5 * f64::from(n) - 0.25 * f64::from(n);
+    let probe =
+        |i: u32, n: u32| (f64::from(i) + 0.5) / f64::from(PROBES) * 1.5 * f64::from(n) - 0.25 * f64::from(n);
     let starts: Vec<Start> = (0..PROBES * PROBES)
         .map(|k| {
-            let at = framing.plane_from_pixel(probe(k % PROBES, framing.width), probe(k / PROBES, framing.height));
+            let at =
+                framing.plane_from_pixel(probe(k % PROBES, framing.width), probe(k / PROBES, framing.height));
             Start { position_m: at.map(|c| c as f32), tilt_rad: [0.0; 2] }
         })
         .collect();
@@ -519,9 +540,13 @@ fn warn_about_picture(scene: &Scene, report: &mut Report) {
     let visible = 0.004 * high.max(0.1);
     if high - low < visible && !matches!(scene.technique, TechniqueSpec::Bos { .. }) {
         let cure = match scene.technique {
-            TechniqueSpec::Schlieren { .. } => "a smaller source (light.source), a longer focal length (lenses.schlieren_m) or a smaller open part make it more sensitive",
+            TechniqueSpec::Schlieren { .. } => {
+                "a smaller source (light.source), a longer focal length (lenses.schlieren_m) or a smaller open part make it more sensitive"
+            }
             TechniqueSpec::Shadowgraph {} => "a film farther away (film.focus_m) makes it more sensitive",
-            TechniqueSpec::Interferogram { .. } => "the optical path differs by less than a fringe; finite fringes (technique.fringe_spacing_m) show less",
+            TechniqueSpec::Interferogram { .. } => {
+                "the optical path differs by less than a fringe; finite fringes (technique.fringe_spacing_m) show less"
+            }
             _ => "a larger technique.strength shows more",
         };
         report.warnings.push(format!("the picture is even ({low:.4} to {high:.4} of white): {cure}"));

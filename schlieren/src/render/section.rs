@@ -49,7 +49,11 @@ impl TestSection {
     }
 
     /// A test section of fields that are at hand, one per wavelength of the scene.
-    pub fn of_fields(scene: &Scene, fields: Vec<Field>, solids: Option<Solids>) -> Result<TestSection, RenderError> {
+    pub fn of_fields(
+        scene: &Scene,
+        fields: Vec<Field>,
+        solids: Option<Solids>,
+    ) -> Result<TestSection, RenderError> {
         let lines = scene.light.wavelengths_nm.len();
         let (Some(first), true) = (fields.first(), fields.len() == lines) else {
             return Err(RenderError::Fields { wanted: lines, found: fields.len() });
@@ -82,7 +86,13 @@ pub struct Planned<'a> {
 
 impl TestSection {
     /// Light paths through field `line` as the scene's march says.
-    pub fn paths(&self, scene: &Scene, line: usize, wanted: Wanted, against_light: bool) -> Result<Planned<'_>, RenderError> {
+    pub fn paths(
+        &self,
+        scene: &Scene,
+        line: usize,
+        wanted: Wanted,
+        against_light: bool,
+    ) -> Result<Planned<'_>, RenderError> {
         if scene.march.device == Device::Gpu {
             return Err(RenderError::NoGpu);
         }

@@ -215,7 +215,8 @@ mod tests {
     use super::*;
 
     fn flow(text: &str) -> Result<Medium, String> {
-        let spec: FlowSpec = toml::from_str(&format!("file = \"a.vti\"\n{text}")).map_err(|e| e.to_string())?;
+        let spec: FlowSpec =
+            toml::from_str(&format!("file = \"a.vti\"\n{text}")).map_err(|e| e.to_string())?;
         spec.medium().map_err(|e| e.to_string())
     }
 
@@ -236,7 +237,9 @@ mod tests {
 
     #[test]
     fn units_reach_the_medium() {
-        let m = flow("temperature = \"T\"\ntemperature_zero_k = 273.15\npressure = \"1013.25\"\npressure_unit_pa = 100.0");
+        let m = flow(
+            "temperature = \"T\"\ntemperature_zero_k = 273.15\npressure = \"1013.25\"\npressure_unit_pa = 100.0",
+        );
         let Ok(Medium::TemperaturePressure { temperature, pressure, .. }) = m else { panic!("{m:?}") };
         assert_eq!((temperature.offset, pressure.scale), (273.15, 100.0));
         assert_eq!(pressure.source, crate::input::Source::Constant(1013.25));

@@ -1,0 +1,211 @@
+//! Where the values of a data set stand, and how they get to a uniform lattice.
+
+use super::{InputError, Options};
+use datasets::model::{Attributes, ColorBy, Dataset, extent_dims};
+use datasets::resample::{
+    self, Lattice, Mark, Mesh, Plane, Report, Resolution, Samples, resample as resample_mesh,
+};
+use glam::{DMat3, DVec3};
+
+/// The places at which the index is computed.
+pub(super) enum Places {
+    /// The nodes of a uniform lattice that serves as it is.
+    Uniform {
+        lattice: Lattice,
+        /// Axes that run backwards in the file.
+        backwards: [bool; 3],
+    },
+    /// Points or cells of a mesh that has to be resampled.
+    Mesh { mesh: Box<Mesh>, per_point: bool, own: Option<Lattice> },
+}
+
+/// Values on a lattice.
+pub(super) struct OnLattice {
+    pub(super) lattice: Lattice,
+    pub(super) values: Vec<f32>,
+    pub(super) marks: Vec<Mark>,
+    pub(super) report: Option<Report>,
+}
+
+/// Nodes along the axis over which a two-dimensional flow is repeated: enough for any interpolant's border.
+const SPAN_NODES: usize = 8;
+
+impl Places {
+    pub(super) fn find(data: &Dataset, options: &Options) -> Result<Places, InputError> {
+        data.check().map_err(InputError::Model)?;
+        let mut associations = Vec::new();
+        for name in options.medium.arrays() {
+            associations.push(ColorBy::find(data, name)?.per_point);
+        }
+        // Arrays of points and of cells together meet at the points.
+        let per_point = associations.iter().any(|p| *p);
+        let mixed = per_point && associations.iter().any(|p| !p);
+        let own = uniform(data);
+        let ghosts = data
+            .leaves()
+            .iter()
+            .filter_map(|d| d.attributes())
+            .any(|a| a.cell_array("vtkGhostType").is_some() || a.point_array("vtkGhostType").is_some());
+        if let Some((lattice, backwards)) = own
+            && !mixed
+            && !ghosts
+            && options.resolution == Resolution::Auto
+            && options.bounds.is_none()
+            && options.span.is_none()
+            && options.samples_per_axis == 1
+        {
+            let lattice = if per_point { lattice } else { cell_centres(lattice) };
+            return Ok(Places::Uniform { lattice, backwards });
+        }
+        let mesh = match options.span {
+            Some(span) => Mesh::with_plane(data, Plane::Extrude { span })?,
+            None => Mesh::new(data)?,
+        };
+        Ok(Places::Mesh { mesh: Box::new(mesh), per_point, own: own.map(|o| o.0) })
+    }
+
+    /// The values of an array, in the order of the places.
+    pub(super) fn values(&self, data: &Dataset, color: &ColorBy) -> Vec<f64> {
+        let of = |a: &Attributes, i: usize| {
+            // Blocks may lack the array, or have it for the other of points and cells.
+            let array = if color.per_point { a.point_array(&color.name) } else { a.cell_array(&color.name) };
+            array.map_or(f64::NAN, |array| match color.component {
+                Some(c) if c < array.components => array.get(i, c),
+                Some(_) => f64::NAN,
+                None => array.magnitude(i),
+            })
+        };
+        match self {
+            Places::Mesh { mesh, per_point, .. } => match (per_point, color.per_point) {
+                (_, true) => mesh.gather_points(data, of),
+                (false, false) => mesh.gather_cells(data, of),
+                (true, false) => mesh.cells_to_points(&mesh.gather_cells(data, of)),
+            },
+            Places::Uniform { lattice, backwards } => {
+                let leaves = data.leaves();
+                let Some(a) = leaves.first().and_then(|l| l.attributes()) else { return Vec::new() };
+                let d = lattice.dims;
+                let source = |i: usize| {
+                    let mut at = [i % d[0], i / d[0] % d[1], i / d[0] / d[1]];
+                    for axis in 0..3 {
+                        if backwards[axis] {
+                            at[axis] = d[axis] - 1 - at[axis];
+                        }
+                    }
+                    at[0] + d[0] * (at[1] + d[1] * at[2])
+                };
+                (0..lattice.len()).map(|i| of(a, source(i))).collect()
+            }
+        }
+    }
+
+    /// Values at the places as values on a lattice.
+    pub(super) fn to_lattice(&self, values: Vec<f64>, options: &Options) -> Result<OnLattice, InputError> {
+        match self {
+            Places::Uniform { lattice, .. } => {
+                let values: Vec<f32> = values.into_iter().map(|v| v as f32).collect();
+                let mark = |v: &f32| if v.is_finite() { Mark::Inside } else { Mark::NotFinite };
+                let marks = values.iter().map(mark).collect();
+                Ok(OnLattice { lattice: *lattice, values, marks, report: None })
+            }
+            Places::Mesh { mesh, per_point, own } => {
+                let lattice = target(mesh, own.as_ref(), options)?;
+                let samples = if *per_point { Samples::Points(&values) } else { Samples::Cells(&values) };
+                let how = resample::Options { samples_per_axis: options.samples_per_axis };
+                let r = resample_mesh(mesh, samples, &lattice, &how)?;
+                Ok(OnLattice { lattice, values: r.values, marks: r.marks, report: Some(r.report) })
+            }
+        }
+    }
+}
+
+/// The lattice to resample to.
+fn target(mesh: &Mesh, own: Option<&Lattice>, options: &Options) -> Result<Lattice, InputError> {
+    let (low, high) = mesh.bounds();
+    if options.resolution == Resolution::Auto
+        && options.bounds.is_none()
+        && options.span.is_none()
+        && let Some(own) = own
+    {
+        return Ok(*own);
+    }
+    let (low, high) = match options.bounds {
+        Some([a, b]) => (a.max(low), b.min(high)),
+        None => (low, high),
+    };
+    if !((high - low).min_element() > 0.0) {
+        return Err(InputError::Option {
+            what: format!(
+                "the bounds leave nothing of the mesh ({} to {})",
+                mesh.bounds().0,
+                mesh.bounds().1
+            ),
+            cure: "give the lower and the upper corner in the file's unit of length",
+        });
+    }
+    let mut lattice = Lattice::fit(low, high, mesh.typical_cell(), options.resolution)?;
+    // A repeated flow needs no resolution along its span.
+    if let (Some(span), Resolution::Auto | Resolution::Longest(_)) = (options.span, options.resolution) {
+        let size = high - low;
+        let along = (0..3).find(|&a| (size[a] - span).abs() <= 1e-9 * span);
+        if let Some(a) = along {
+            lattice.dims[a] = SPAN_NODES;
+            lattice.spacing[a] = size[a] / (SPAN_NODES - 1) as f64;
+        }
+    }
+    Ok(lattice)
+}
+
+fn cell_centres(points: Lattice) -> Lattice {
+    Lattice {
+        dims: points.dims.map(|d| d.saturating_sub(1)),
+        origin: points.origin + 0.5 * points.spacing,
+        spacing: points.spacing,
+    }
+}
+
+/// The lattice of uniform data in three dimensions whose axes are those of space, and which of them run backwards.
+fn uniform(data: &Dataset) -> Option<(Lattice, [bool; 3])> {
+    let (dims, first, step) = match data {
+        Dataset::ImageData(d) => {
+            let m = d.direction;
+            let axes = DMat3::from_diagonal(DVec3::new(m.x_axis.x, m.y_axis.y, m.z_axis.z));
+            if axes != m {
+                return None;
+            }
+            (d.dims(), d.point(0, 0, 0), axes * d.spacing)
+        }
+        Dataset::RectilinearGrid(d) => {
+            let steps = [0, 1, 2].map(|a| even_step(&d.coordinates[a]));
+            let [Some(x), Some(y), Some(z)] = steps else { return None };
+            let first = DVec3::new(d.coordinates[0][0], d.coordinates[1][0], d.coordinates[2][0]);
+            (extent_dims(d.extent), first, DVec3::new(x, y, z))
+        }
+        Dataset::MultiBlock(blocks) if blocks.len() == 1 => return uniform(&blocks[0].data),
+        _ => return None,
+    };
+    if dims.iter().any(|&d| d < 2)
+        || !(step.abs().min_element() > 0.0 && step.is_finite() && first.is_finite())
+    {
+        return None;
+    }
+    let backwards = step.to_array().map(|s| s < 0.0);
+    let last = first + step * DVec3::from_array(dims.map(|d| (d - 1) as f64));
+    Some((Lattice { dims, origin: first.min(last), spacing: step.abs() }, backwards))
+}
+
+/// The step of coordinates that are where equal steps put them, to four roundings of the largest in f32 (the precision
+/// most files have).
+fn even_step(x: &[f64]) -> Option<f64> {
+    let (&first, &last) = (x.first()?, x.last()?);
+    if x.len() < 2 {
+        return None;
+    }
+    let step = (last - first) / (x.len() - 1) as f64;
+    let allowed = 4.0 * f64::from(f32::EPSILON) * first.abs().max(last.abs());
+    let even = x.iter().enumerate().all(|(i, v)| {
+        let error = (first + step * i as f64 - v).abs();
+        error <= allowed && error < 0.01 * step.abs()
+    });
+    even.then_some(step)
+}

@@ -1,0 +1,225 @@
+//! Which arrays mean what, in which unit.
+
+use super::InputError;
+use super::lattice::Places;
+use crate::index::multifield::{Multifield, Rule, TransferFunction};
+use crate::index::{Gas, IndexError};
+use datasets::model::{ColorBy, Dataset};
+use std::convert::Infallible;
+use std::str::FromStr;
+
+/// An array of the file, or one number everywhere; times a scale plus an offset it is in the unit that is needed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Quantity {
+    /// Where it comes from.
+    pub source: Source,
+    /// Units of SI per unit of the file.
+    pub scale: f64,
+    /// Added after scaling: 273.15 for temperatures in °C, 101325 for gauge pressures.
+    pub offset: f64,
+}
+
+/// Where a quantity comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Source {
+    /// An array, named as in [`ColorBy`] (`velocity:x` takes a component).
+    Array(String),
+    /// The same everywhere.
+    Constant(f64),
+}
+
+impl Quantity {
+    /// The same everywhere, in SI.
+    pub fn constant(value: f64) -> Self {
+        Quantity { source: Source::Constant(value), scale: 1.0, offset: 0.0 }
+    }
+    /// An array in SI.
+    pub fn array(name: impl Into<String>) -> Self {
+        Quantity { source: Source::Array(name.into()), scale: 1.0, offset: 0.0 }
+    }
+    /// Times `scale`.
+    pub fn scaled(mut self, scale: f64) -> Self {
+        self.scale *= scale;
+        self
+    }
+    /// Plus `offset`, after scaling.
+    pub fn shifted(mut self, offset: f64) -> Self {
+        self.offset += offset;
+        self
+    }
+}
+
+impl FromStr for Quantity {
+    type Err = Infallible;
+    /// A number is a constant, anything else the name of an array.
+    fn from_str(text: &str) -> Result<Self, Infallible> {
+        Ok(match text.trim().parse::<f64>() {
+            Ok(x) => Quantity::constant(x),
+            Err(_) => Quantity::array(text),
+        })
+    }
+}
+
+/// What the index depends on.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Medium {
+    /// Gas by its density: Gladstone-Dale.
+    Density {
+        /// kg/m³.
+        density: Quantity,
+        /// Mass fractions and what they are of; the rest is air.
+        species: Vec<(Quantity, Gas)>,
+    },
+    /// Gas by its state: Ciddor for air, Gladstone-Dale with the density of an ideal gas else.
+    TemperaturePressure {
+        /// K.
+        temperature: Quantity,
+        /// Pa.
+        pressure: Quantity,
+        /// Relative humidity, 0 to 1.
+        humidity: Quantity,
+        /// CO2, ppm.
+        co2_ppm: Quantity,
+        /// Mass fractions and what they are of; the rest is air.
+        species: Vec<(Quantity, Gas)>,
+    },
+    /// n − 1 itself.
+    NMinus1(Quantity),
+    /// Free electrons, 1/m³.
+    Electrons(Quantity),
+    /// Any fields through transfer functions (thesis, section 5.7).
+    Multifield {
+        /// Field, curve, weight.
+        parts: Vec<(Quantity, TransferFunction, f64)>,
+        /// How they combine.
+        rule: Rule,
+    },
+}
+
+/// Values of a quantity at all places.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Column {
+    /// One for all.
+    Constant(f64),
+    /// One each.
+    Values(Vec<f64>),
+}
+
+impl Column {
+    pub(super) fn at(&self, i: usize) -> f64 {
+        match self {
+            Column::Constant(x) => *x,
+            Column::Values(v) => v[i],
+        }
+    }
+}
+
+impl Medium {
+    /// Air whose density in kg/m³ is this array.
+    pub fn density(array: impl Into<String>) -> Self {
+        Medium::Density { density: Quantity::array(array), species: Vec::new() }
+    }
+    /// Dry air with 450 ppm CO2 whose temperature (K) and pressure (Pa) are these.
+    pub fn temperature_pressure(temperature: Quantity, pressure: Quantity) -> Self {
+        Medium::TemperaturePressure {
+            temperature,
+            pressure,
+            humidity: Quantity::constant(0.0),
+            co2_ppm: Quantity::constant(450.0),
+            species: Vec::new(),
+        }
+    }
+
+    /// The quantities in the order in which [`super::evaluate`] takes them.
+    fn quantities(&self) -> Vec<&Quantity> {
+        match self {
+            Medium::Density { density, species } => {
+                [density].into_iter().chain(species.iter().map(|s| &s.0)).collect()
+            }
+            Medium::TemperaturePressure { temperature, pressure, humidity, co2_ppm, species } => {
+                let fixed = [temperature, pressure, humidity, co2_ppm];
+                fixed.into_iter().chain(species.iter().map(|s| &s.0)).collect()
+            }
+            Medium::NMinus1(q) | Medium::Electrons(q) => vec![q],
+            Medium::Multifield { parts, .. } => parts.iter().map(|p| &p.0).collect(),
+        }
+    }
+
+    /// Names of the arrays it needs.
+    pub fn arrays(&self) -> Vec<&str> {
+        let names = self.quantities().into_iter().filter_map(|q| match &q.source {
+            Source::Array(name) => Some(name.as_str()),
+            Source::Constant(_) => None,
+        });
+        names.collect()
+    }
+
+    /// For messages.
+    pub(super) fn describe(&self) -> String {
+        let names = self.arrays().iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ");
+        if names.is_empty() { "constants".into() } else { names }
+    }
+
+    pub(super) fn multifield(&self) -> Option<Multifield> {
+        match self {
+            Medium::Multifield { parts, rule } => Some(Multifield {
+                parts: parts.iter().map(|(_, curve, weight)| (curve.clone(), *weight)).collect(),
+                rule: *rule,
+            }),
+            _ => None,
+        }
+    }
+
+    /// Species with the names of their fields.
+    pub(super) fn species(&self) -> Vec<(String, Gas)> {
+        match self {
+            Medium::Density { species, .. } | Medium::TemperaturePressure { species, .. } => species
+                .iter()
+                .map(|(q, gas)| {
+                    let name = match &q.source {
+                        Source::Array(name) => name.clone(),
+                        Source::Constant(_) => gas.to_string(),
+                    };
+                    (name, gas.clone())
+                })
+                .collect(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// The values of all quantities at the places.
+    pub(super) fn columns(&self, data: &Dataset, places: &Places) -> Result<Vec<Column>, InputError> {
+        let quantities = self.quantities();
+        if quantities.iter().all(|q| matches!(q.source, Source::Constant(_))) {
+            return Err(InputError::Option {
+                what: "no array of the file is used, so the index would be the same everywhere".into(),
+                cure: "name the array of density, or those of temperature and pressure",
+            });
+        }
+        quantities
+            .into_iter()
+            .map(|q| {
+                if !(q.scale != 0.0 && q.scale.is_finite() && q.offset.is_finite()) {
+                    return Err(InputError::Index(IndexError::Impossible {
+                        quantity: "unit scale",
+                        value: q.scale,
+                        unit: "",
+                        reason: "is zero or not finite",
+                        cure: "give units of SI per unit of the file",
+                    }));
+                }
+                Ok(match &q.source {
+                    Source::Constant(x) => Column::Constant(x * q.scale + q.offset),
+                    Source::Array(name) => {
+                        let color = ColorBy::find(data, name)?;
+                        let mut values = places.values(data, &color);
+                        if (q.scale, q.offset) != (1.0, 0.0) {
+                            values.iter_mut().for_each(|v| *v = *v * q.scale + q.offset);
+                        }
+                        Column::Values(values)
+                    }
+                })
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,275 @@
+//! From the files of a flow solver to [`Field`]: which arrays mean what, what they make of the index, and the lattice.
+//!
+//! ```text
+//! file ── arrays by name and unit ── n − 1 at the points of the file (f64) ── uniform lattice ── eps = n/n0 − 1 (f32)
+//!         [medium]                   [crate::index]                           [datasets::resample]
+//! ```
+//! The index is computed before resampling, at the points the solver computed, and a common background is subtracted
+//! in f64 before anything is rounded: a plume with differences of 1e-9 in n keeps its digits.
+
+mod evaluate;
+mod lattice;
+mod medium;
+mod reference;
+mod series;
+
+pub use medium::{Medium, Quantity, Source};
+pub use reference::Reference;
+pub use series::{Step, series};
+
+use crate::field::{Field, FieldError, Node};
+use crate::index::IndexError;
+use crate::index::conditions::Model;
+use datasets::model::{Dataset, ModelError};
+use datasets::read::ReadError;
+use datasets::resample::{self, Mark, ResampleError, Resolution};
+use glam::DVec3;
+use std::path::{Path, PathBuf};
+
+/// Why there is no field.
+#[derive(Debug, thiserror::Error)]
+pub enum InputError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// What is in the file does not serve.
+    #[error("{}: {source}", path.display())]
+    InFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: Box<InputError>,
+    },
+    /// An array is missing or broken.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The mesh cannot be put on a lattice.
+    #[error(transparent)]
+    Resample(#[from] ResampleError),
+    /// The index cannot be computed.
+    #[error(transparent)]
+    Index(#[from] IndexError),
+    /// The lattice cannot be a field.
+    #[error(transparent)]
+    Field(#[from] FieldError),
+    /// An option makes no sense.
+    #[error("{what}; {cure}")]
+    Option {
+        /// Which, and its value.
+        what: String,
+        /// What to do.
+        cure: &'static str,
+    },
+}
+
+/// What a node without gas does to light.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Role {
+    /// It is not known what is there: the picture says so.
+    Blank,
+    /// A body, which stops light.
+    Solid,
+    /// Gas like that around it, continued from there: right where a mesh ends in undisturbed flow.
+    Gas,
+}
+
+impl Role {
+    fn node(self) -> Node {
+        match self {
+            Role::Blank => Node::Blank,
+            Role::Solid => Node::Solid,
+            Role::Gas => Node::Gas,
+        }
+    }
+}
+
+/// Everything that decides how a data set becomes a field.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// What the arrays mean.
+    pub medium: Medium,
+    /// Vacuum wavelength, nm.
+    pub wavelength_nm: f64,
+    /// Which formula, for air by temperature and pressure.
+    pub model: Model,
+    /// Metres per unit of length of the file.
+    pub length_unit_m: f64,
+    /// How fine the lattice is to be. Uniform data keeps its own lattice with [`Resolution::Auto`].
+    pub resolution: Resolution,
+    /// Only this part of the data, lower and upper corner in units of the file.
+    pub bounds: Option<[DVec3; 2]>,
+    /// Depth of two-dimensional data, in units of the file.
+    pub span: Option<f64>,
+    /// See [`resample::Options`].
+    pub samples_per_axis: usize,
+    /// Shock smoothing: standard deviation in nodes; 0 for none, 1 to 1.4 where shocks are one cell wide.
+    pub smoothing_nodes: f64,
+    /// What nodes outside every cell are.
+    pub outside: Role,
+    /// What nodes in hidden cells are (iblank 0, `vtkGhostType`).
+    pub hidden: Role,
+    /// The medium around the field, n0.
+    pub reference: Reference,
+}
+
+impl Options {
+    /// Defaults for a medium: 532 nm, metres, the file's own lattice, no smoothing, hidden cells solid, the reference that of
+    /// the border.
+    pub fn new(medium: Medium) -> Self {
+        Options {
+            medium,
+            wavelength_nm: 532.0,
+            model: Model::Auto,
+            length_unit_m: 1.0,
+            resolution: Resolution::Auto,
+            bounds: None,
+            span: None,
+            samples_per_axis: 1,
+            smoothing_nodes: 0.0,
+            outside: Role::Blank,
+            hidden: Role::Solid,
+            reference: Reference::Border,
+        }
+    }
+}
+
+/// How a field came about.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Report {
+    /// The formula: `ciddor`, `gladstone-dale`, `plasma`, `given` or `multifield`.
+    pub formula: &'static str,
+    /// n0 − 1 of the reference.
+    pub reference_n_minus_1: f64,
+    /// Smallest and largest n − 1 at the points of the file.
+    pub n_minus_1_range: [f64; 2],
+    /// Smallest and largest density used, kg/m³, where there is one.
+    pub density_range_kg_m3: Option<[f64; 2]>,
+    /// Of the resampling; `None` for data that is uniform already. Its differences are in n − 1.
+    pub resampling: Option<resample::Report>,
+    /// Change of n − 1 by the smoothing, root mean square.
+    pub smoothing_rms: f64,
+    /// What the user should know, a sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// A field and how it came about.
+#[derive(Debug, Clone)]
+pub struct Loaded {
+    /// The field.
+    pub field: Field,
+    /// How it came about.
+    pub report: Report,
+}
+
+/// Reads a file and makes a field of it. Of a time series this is the first time; see [`series`] for the others.
+pub fn load(path: &Path, options: &Options) -> Result<Loaded, InputError> {
+    let in_file = |e: InputError| InputError::InFile { path: path.to_path_buf(), source: Box::new(e) };
+    let opened = datasets::read::open(path)?;
+    let data = opened.dataset().map_err(|e| in_file(e.into()))?;
+    let mut loaded = from_dataset(data, options).map_err(in_file)?;
+    loaded.report.warnings.splice(0..0, opened.warnings);
+    Ok(loaded)
+}
+
+/// Makes a field of a data set.
+///
+/// ```
+/// use datasets::model::{DataArray, Dataset, ImageData, Values};
+/// use glam::DVec3;
+/// use schlieren::input::{Medium, Options, from_dataset};
+///
+/// // A cube of air with a dense node in the middle.
+/// let mut image = ImageData::new([5, 5, 5], DVec3::ZERO, DVec3::splat(0.01));
+/// let mut rho = vec![1.2; 125];
+/// rho[62] = 1.8;
+/// image.attributes.point.push(DataArray::new("rho", 1, Values::F64(rho)));
+/// let loaded = from_dataset(&Dataset::ImageData(image), &Options::new(Medium::density("rho")))?;
+///
+/// // n − 1 = K ρ with K = 0.227 cm³/g at 532 nm; eps is relative to the border.
+/// assert!((loaded.report.reference_n_minus_1 - 2.724e-4).abs() < 1e-7);
+/// assert_eq!(loaded.field.eps()[0], 0.0);
+/// assert!((loaded.field.eps()[62] - 1.362e-4).abs() < 1e-7);
+/// # Ok::<(), schlieren::input::InputError>(())
+/// ```
+pub fn from_dataset(data: &Dataset, options: &Options) -> Result<Loaded, InputError> {
+    if !(options.length_unit_m > 0.0 && options.length_unit_m.is_finite()) {
+        return Err(InputError::Option {
+            what: format!("length unit {} m", options.length_unit_m),
+            cure: "give metres per unit of the file, such as 0.001 for mm",
+        });
+    }
+    let mut report = Report::default();
+
+    // n − 1 where the file has values, less a common background.
+    let places = lattice::Places::find(data, options)?;
+    let columns = options.medium.columns(data, &places)?;
+    let mut index = evaluate::evaluate(&columns, options, &mut report)?;
+    let background = reference::median(&index);
+    if !background.is_finite() {
+        return Err(InputError::Option {
+            what: format!("no value of {} gives an index", options.medium.describe()),
+            cure: "check that the arrays hold finite numbers in SI units",
+        });
+    }
+    index.iter_mut().for_each(|n| *n -= background);
+
+    // On a uniform lattice.
+    let mut on = places.to_lattice(index, options)?;
+    if let Some(r) = &on.report {
+        report.warnings.extend(r.warnings());
+    }
+    report.resampling = on.report;
+    if options.smoothing_nodes != 0.0 {
+        let before = on.values.clone();
+        resample::smooth(&mut on.values, on.lattice.dims, options.smoothing_nodes)?;
+        report.smoothing_rms = rms_difference(&before, &on.values);
+    }
+
+    // eps = n/n0 − 1 = (d − d0)/n0, where d is n − 1 less the background.
+    let d0 = options.reference.choose(&on, background, &mut report)?;
+    let n0 = 1.0 + background + d0;
+    report.reference_n_minus_1 = background + d0;
+    let eps = on.values.iter().map(|&d| ((f64::from(d) - d0) / n0) as f32).collect();
+    let nodes = nodes_of(&on.marks, options, &mut report);
+    let lattice::OnLattice { lattice, .. } = on;
+    let unit = options.length_unit_m;
+    let spacing_m = (lattice.spacing * unit).to_array();
+    let eps = reference::continued(eps, lattice.dims, &on.marks, options);
+    let field = Field::new(lattice.dims, spacing_m, lattice.origin * unit, eps, n0, nodes)?;
+    Ok(Loaded { field, report })
+}
+
+/// What the nodes are to light.
+fn nodes_of(marks: &[Mark], options: &Options, report: &mut Report) -> Option<Vec<Node>> {
+    if marks.iter().all(|m| *m == Mark::Inside) {
+        return None;
+    }
+    let of = |m: &Mark| match m {
+        Mark::Inside => Node::Gas,
+        Mark::Outside => options.outside.node(),
+        Mark::Hidden => options.hidden.node(),
+        Mark::NotFinite => Node::Blank,
+    };
+    let share = |m: Mark| 100.0 * marks.iter().filter(|x| **x == m).count() as f64 / marks.len() as f64;
+    let outside = share(Mark::Outside);
+    if outside > 0.0 && options.outside == Role::Blank {
+        report.warnings.push(format!(
+            "{outside:.1} % of the lattice lie outside the mesh and are blank; say that they are solid (a body) or gas (undisturbed flow)"
+        ));
+    }
+    let bad = share(Mark::NotFinite);
+    if bad > 0.0 {
+        report.warnings.push(format!("{bad:.2} % of the lattice have no finite index and are blank"));
+    }
+    Some(marks.iter().map(of).collect())
+}
+
+fn rms_difference(a: &[f32], b: &[f32]) -> f64 {
+    let squares = a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).filter(|s| s.is_finite());
+    let (sum, n) = squares.fold((0.0, 0usize), |(s, n), x| (s + x, n + 1));
+    (sum / n.max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,128 @@
+//! The medium that light comes from and goes to: n0.
+
+use super::lattice::OnLattice;
+use super::{InputError, Options, Report, Role};
+use datasets::resample::Mark;
+
+/// How n0 is found.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub enum Reference {
+    /// Median over the gas on the six faces of the lattice: the undisturbed flow, for most data.
+    #[default]
+    Border,
+    /// Median over all gas.
+    Median,
+    /// This n − 1, for instance that of the free stream from [`crate::index::conditions`]. Also how the fields of a time series
+    /// get the same reference: take [`super::Report::reference_n_minus_1`] of the first.
+    Given {
+        /// n0 − 1.
+        n_minus_1: f64,
+    },
+}
+
+/// Median of the finite values; NaN when there is none.
+pub(super) fn median(values: &[f64]) -> f64 {
+    let mut finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    if finite.is_empty() {
+        return f64::NAN;
+    }
+    let middle = finite.len() / 2;
+    *finite.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+impl Reference {
+    /// The reference relative to the background that was subtracted from the values.
+    pub(super) fn choose(
+        &self,
+        on: &OnLattice,
+        background: f64,
+        report: &mut Report,
+    ) -> Result<f64, InputError> {
+        let gas = |keep: &dyn Fn(usize) -> bool| -> Vec<f64> {
+            let inside = (0..on.values.len()).filter(|&i| on.marks[i] == Mark::Inside && keep(i));
+            inside.map(|i| f64::from(on.values[i])).collect()
+        };
+        let all = |_: usize| true;
+        match self {
+            Reference::Given { n_minus_1 } if n_minus_1.is_finite() && *n_minus_1 > -1.0 => {
+                Ok(n_minus_1 - background)
+            }
+            Reference::Given { n_minus_1 } => Err(InputError::Option {
+                what: format!("reference n - 1 is {n_minus_1}"),
+                cure: "give n0 - 1, about 2.7e-4 for air",
+            }),
+            Reference::Median => Ok(or_zero(median(&gas(&all)))),
+            Reference::Border => {
+                let [nx, ny, nz] = on.lattice.dims;
+                let at_border = |i: usize| {
+                    let at = [i % nx, i / nx % ny, i / nx / ny];
+                    at.iter().zip([nx, ny, nz]).any(|(&a, n)| a == 0 || a + 1 == n)
+                };
+                let border = gas(&at_border);
+                if border.is_empty() {
+                    report.warnings.push(
+                        "no gas at the border of the lattice: the reference is the median of all of it"
+                            .into(),
+                    );
+                    return Ok(or_zero(median(&gas(&all))));
+                }
+                Ok(median(&border))
+            }
+        }
+    }
+}
+
+/// Without any gas the field is refused later, with its own error.
+fn or_zero(x: f64) -> f64 {
+    if x.is_finite() { x } else { 0.0 }
+}
+
+/// Values where nodes outside the mesh are to be gas: continued from the nearest gas, layer by layer. Others are left to
+/// [`crate::field::Field::new`].
+pub(super) fn continued(mut eps: Vec<f32>, dims: [usize; 3], marks: &[Mark], options: &Options) -> Vec<f32> {
+    let open = |m: Mark| match m {
+        Mark::Outside => options.outside == Role::Gas,
+        Mark::Hidden => options.hidden == Role::Gas,
+        _ => false,
+    };
+    if !marks.iter().any(|&m| open(m)) {
+        return eps;
+    }
+    let stride = [1, dims[0], dims[0] * dims[1]];
+    let neighbours = |i: usize| {
+        let at = [i % dims[0], i / dims[0] % dims[1], i / stride[2]];
+        (0..3).flat_map(move |c| {
+            let lower = (at[c] > 0).then(|| i - stride[c]);
+            let upper = (at[c] + 1 < dims[c]).then(|| i + stride[c]);
+            [lower, upper].into_iter().flatten()
+        })
+    };
+    let mut known: Vec<bool> = marks.iter().map(|&m| m == Mark::Inside).collect();
+    let mut layer: Vec<usize> =
+        (0..eps.len()).filter(|&i| open(marks[i]) && neighbours(i).any(|j| known[j])).collect();
+    while !layer.is_empty() {
+        let new: Vec<f32> = layer
+            .iter()
+            .map(|&i| {
+                let from = neighbours(i).filter(|&j| known[j]);
+                let (sum, n) = from.fold((0.0, 0.0), |(s, n), j| (s + f64::from(eps[j]), n + 1.0));
+                (sum / n) as f32
+            })
+            .collect();
+        for (&i, v) in layer.iter().zip(new) {
+            (eps[i], known[i]) = (v, true);
+        }
+        let mut next: Vec<usize> =
+            layer.iter().flat_map(|&i| neighbours(i)).filter(|&j| !known[j] && open(marks[j])).collect();
+        next.sort_unstable();
+        next.dedup();
+        layer = next;
+    }
+    // Pockets that no gas reaches are undisturbed.
+    for (i, e) in eps.iter_mut().enumerate() {
+        if open(marks[i]) && !known[i] {
+            *e = 0.0;
+        }
+    }
+    eps
+}

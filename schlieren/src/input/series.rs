@@ -1,0 +1,36 @@
+//! Flows in time: a PVD collection, or a list of files.
+
+use super::InputError;
+use std::path::PathBuf;
+
+/// One time of a series.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Step {
+    /// Its time in the unit of the file; the number in the list where files carry none.
+    pub time: f64,
+    /// The file to give to [`super::load`].
+    pub path: PathBuf,
+}
+
+/// The times of a series: those in a single PVD file, or one per file in the order given.
+///
+/// All of them need the same reference to be compared: load the first, then give its
+/// [`super::Report::reference_n_minus_1`] as [`super::Reference::Given`] to the others.
+pub fn series(paths: &[PathBuf]) -> Result<Vec<Step>, InputError> {
+    if let [only] = paths
+        && only.extension().is_some_and(|e| e.eq_ignore_ascii_case("pvd"))
+    {
+        let opened = datasets::read::open(only)?;
+        if let Some(twice) = opened.time_steps.windows(2).find(|w| w[0].time == w[1].time) {
+            return Err(InputError::InFile {
+                path: only.clone(),
+                source: Box::new(InputError::Option {
+                    what: format!("time {} has several files, the parts of one data set", twice[0].time),
+                    cure: "write each time as one file (.pvtu, .vtm), or open the parts one by one",
+                }),
+            });
+        }
+        return Ok(opened.time_steps.into_iter().map(|s| Step { time: s.time, path: s.path }).collect());
+    }
+    Ok(paths.iter().enumerate().map(|(i, p)| Step { time: i as f64, path: p.clone() }).collect())
+}

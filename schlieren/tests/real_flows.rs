@@ -1,0 +1,82 @@
+//! Flows of others, from file to field. They are not part of this repository: the folder is `RTSV_FLOWS`, or
+//! `shared/data/flow` beside the workspace; without it these tests say that they are skipped.
+
+use datasets::resample::Resolution;
+use glam::DVec3;
+use schlieren::field::Node;
+use schlieren::input::{Loaded, Medium, Options, Quantity, Role, load};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+fn flow(name: &str) -> Option<PathBuf> {
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/flow");
+    let folder = std::env::var_os("RTSV_FLOWS").map_or(beside, PathBuf::from);
+    let path = folder.join(name);
+    if !path.is_file() {
+        let _ = writeln!(std::io::stderr(), "skipped: {} is not there", path.display());
+        return None;
+    }
+    Some(path)
+}
+
+/// NASA Ames (Hung and Buning): Mach 2.95 past a blunt fin on a plate. The leading edge has radius R = 0.5 and its
+/// stagnation line lies at x = 0 in the plane y = 0. Billig (1967) for a cylinder: stand-off d/R = 0.386 exp(4.67/M²) = 0.660.
+#[test]
+fn blunt_fin_has_its_bow_shock_where_theory_puts_it() {
+    let Some(path) = flow("bluntfinxyz.bin") else { return };
+    let medium = Medium::Density { density: Quantity::array("Density").scaled(1.2), species: vec![] };
+    let whole = load(&path, &Options::new(medium.clone())).unwrap();
+    let r = whole.report.resampling.unwrap();
+    assert!(
+        whole.report.warnings.iter().any(|w| w.contains("outside the mesh")),
+        "{:?}",
+        whole.report.warnings
+    );
+    // The stretched mesh is finer than any lattice over all of it at the fin; even so the error is small.
+    assert!(r.back.compared > 20_000 && r.back.rms < 0.03 * r.back.range, "{r:?}");
+    let [low, high] = whole.report.density_range_kg_m3.unwrap();
+    assert!((low - 1.2 * 0.1926).abs() < 0.01 && (high - 1.2 * 4.9775).abs() < 0.01, "{low} {high}");
+
+    // The nose, where the light of the picture goes.
+    let options = Options {
+        bounds: Some([DVec3::new(-1.5, 0.0, 1.0), DVec3::new(0.5, 1.0, 5.5)]),
+        resolution: Resolution::Spacing(0.025),
+        outside: Role::Solid,
+        ..Options::new(medium)
+    };
+    let Loaded { field, report } = load(&path, &options).unwrap();
+    let back = report.resampling.unwrap().back;
+    assert!(back.rms < 0.003 * back.range, "{back:?}");
+    let nodes = field.nodes().unwrap();
+    let [nx, ny, nz] = field.dims();
+    let h = field.spacing_m()[0];
+    for z in [1.4, 3.1, 5.0] {
+        let k = ((z - field.origin_m().z) / field.spacing_m()[2]).round() as usize;
+        assert!(k < nz);
+        let row = nx * ny * k..nx * ny * k + nx;
+        let (eps, kinds) = (&field.eps()[row.clone()], &nodes[row]);
+        let fin = kinds.iter().position(|n| *n == Node::Solid).unwrap();
+        // Centre of the rise: where most of the density is gained, by first moment.
+        let steps: Vec<f64> = eps[..fin].windows(2).map(|w| f64::from(w[1] - w[0]).max(0.0)).collect();
+        let steepest = (0..steps.len()).max_by(|&a, &b| steps[a].total_cmp(&steps[b])).unwrap();
+        let near = steepest.saturating_sub(8)..(steepest + 9).min(steps.len());
+        let (sum, moment) =
+            near.fold((0.0, 0.0), |(s, m), i| (s + steps[i], m + steps[i] * (i as f64 + 0.5)));
+        let stand_off = (fin as f64 - 0.5 - moment / sum) * h / 0.5;
+        let _ = writeln!(std::io::stderr(), "z = {z}: d/R = {stand_off:.3}");
+        assert!((stand_off - 0.66).abs() <= 0.15, "z = {z}: d/R = {stand_off}");
+    }
+}
+
+/// Only the density of this one is physical (0.198 to 0.710 of its reference).
+#[test]
+fn combustor_is_read_and_resampled() {
+    let Some(path) = flow("combxyz.bin") else { return };
+    let Loaded { field, report } = load(&path, &Options::new(Medium::density("Density"))).unwrap();
+    let r = report.resampling.unwrap();
+    assert_eq!((r.cells, r.folded_cells), (56 * 32 * 24, 0));
+    assert!(r.inside > 100_000 && r.back.compared > 20_000 && r.back.rms < 0.02 * r.back.range, "{r:?}");
+    let [low, high] = report.density_range_kg_m3.unwrap();
+    assert!((low - 0.198).abs() < 1e-3 && (high - 0.710).abs() < 1e-3);
+    assert!(field.eps().iter().all(|e| e.is_finite() && e.abs() < 2e-4));
+}
