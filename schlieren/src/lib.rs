@@ -15,6 +15,7 @@
 //! | OPD | optical path minus that of the undisturbed ray, between the same planes | m |
 #![forbid(unsafe_code)]
 
+pub mod cli;
 pub mod cutoff;
 pub mod field;
 pub mod film;
@@ -24,6 +25,7 @@ pub mod input;
 pub mod interpolate;
 pub mod march;
 pub mod optics;
+pub mod output;
 pub mod path;
 pub mod render;
 pub mod scene;
