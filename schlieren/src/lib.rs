@@ -15,6 +15,7 @@
 //! | OPD | optical path minus that of the undisturbed ray, between the same planes | m |
 #![forbid(unsafe_code)]
 
+pub mod analytic;
 pub mod cli;
 pub mod cutoff;
 pub mod field;
@@ -23,6 +24,7 @@ pub mod filter;
 pub mod index;
 pub mod input;
 pub mod interpolate;
+mod level;
 pub mod march;
 pub mod optics;
 pub mod output;

@@ -141,10 +141,10 @@ struct FilmArgs {
     /// Brightness factor; 1 makes undisturbed light white
     #[arg(long, value_name = "FACTOR")]
     exposure: Option<f64>,
-    /// Photons per pixel
+    /// Photons per pixel [default: 16; shadowgraphs are noise-free]
     #[arg(long, value_name = "N")]
     samples: Option<u32>,
-    /// Cells of a lattice of rays instead of photons
+    /// Cells of a lattice of rays instead of photons; the default of shadowgraphs
     #[arg(long, conflicts_with_all = ["samples", "filter", "jitter", "seed", "tilted_beams"])]
     noise_free: bool,
     /// Against noise, for 1 photon per pixel, narrower for more: none, gaussian:SIGMA, mean:RADIUS (pixels), cone:NEAREST
@@ -421,21 +421,26 @@ impl FilmArgs {
         s.film.field_of_view_m = a.field_of_view.or(s.film.field_of_view_m);
         s.film.exposure = a.exposure.or(s.film.exposure);
         if a.noise_free {
-            s.sampling = SamplingSpec::Beams { cells_per_side: 1 };
+            s.sampling = Some(SamplingSpec::Beams { cells_per_side: 1 });
         }
         if a.tilted_beams {
             s.light.beams = BeamsSpec::Tilted;
         }
         let wants_photons =
             a.samples.is_some() || a.filter.is_some() || a.jitter.is_some() || a.seed.is_some();
-        if wants_photons && matches!(s.sampling, SamplingSpec::Beams { .. }) {
-            s.sampling = SamplingSpec::default();
-        }
-        if let SamplingSpec::Photons { samples, jitter, seed, filter } = &mut s.sampling {
-            *samples = a.samples.unwrap_or(*samples);
-            *jitter = a.jitter.unwrap_or(*jitter);
-            *seed = a.seed.unwrap_or(*seed);
-            *filter = a.filter.unwrap_or(*filter);
+        if wants_photons {
+            // Options of photons ask for photons, whatever the technique's custom is.
+            let mut photons = s.sampling();
+            if matches!(photons, SamplingSpec::Beams { .. }) {
+                photons = SamplingSpec::default();
+            }
+            if let SamplingSpec::Photons { samples, jitter, seed, filter } = &mut photons {
+                *samples = a.samples.unwrap_or(*samples);
+                *jitter = a.jitter.unwrap_or(*jitter);
+                *seed = a.seed.unwrap_or(*seed);
+                *filter = a.filter.unwrap_or(*filter);
+            }
+            s.sampling = Some(photons);
         }
         s.march.tolerance_rad = a.tolerance.unwrap_or(s.march.tolerance_rad);
         if a.march.is_some() {

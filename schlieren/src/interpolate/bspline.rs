@@ -199,7 +199,7 @@ pub(crate) struct BSplineRows<'a> {
 
 /// [`weights`] for sixteen rays.
 #[inline(always)]
-pub(super) fn weights16<S: Simd>(simd: S, t: f32x16<S>) -> ([f32x16<S>; 4], [f32x16<S>; 3]) {
+pub(crate) fn weights16<S: Simd>(simd: S, t: f32x16<S>) -> ([f32x16<S>; 4], [f32x16<S>; 3]) {
     let (one, half) = (f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.5));
     let (sixth, two_thirds) = (f32x16::splat(simd, 1.0 / 6.0), f32x16::splat(simd, 2.0 / 3.0));
     let s = one - t;

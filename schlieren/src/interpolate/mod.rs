@@ -15,12 +15,10 @@ mod trilinear;
 mod trilinear_gradient;
 
 pub use bspline::BSpline;
-pub(crate) use bspline::{BSplineRows, weights as bspline_weights};
+pub(crate) use bspline::{weights as bspline_weights, weights16 as bspline_weights16};
 pub(crate) use prefilter::prefilter_line;
 pub use trilinear::Trilinear;
-pub(crate) use trilinear::TrilinearRows;
 pub use trilinear_gradient::TrilinearGradient;
-pub(crate) use trilinear_gradient::TrilinearGradientRows;
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16};

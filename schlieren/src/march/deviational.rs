@@ -2,6 +2,7 @@
 
 use super::frame::{BlankCells, Frame};
 use super::packet::{Common, Effects, Nodes, Packet, Skip, With, Work, march};
+use crate::at_level;
 use crate::field::Field;
 use crate::interpolate::{
     BSpline, Interpolant, Interpolate, Interpolate16, LANES, Trilinear, TrilinearGradient,
@@ -9,7 +10,7 @@ use crate::interpolate::{
 use crate::path::{Exit, LightPaths, Start, Wanted};
 use crate::skip::Bricks;
 use crate::view::View;
-use fearless_simd::{Level, Simd, dispatch};
+use fearless_simd::{Level, Simd};
 use glam::DVec3;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -173,19 +174,17 @@ impl<'a> Deviational<'a> {
     /// Picks the kernel with only the effects that this march needs.
     #[inline(always)]
     fn run<S: Simd, I: Interpolate16>(&self, simd: S, field: I, starts: &[Start], exits: &mut [Exit]) {
-        let (opd, nodes) = (self.options.wanted.opd, self.field.nodes().is_some());
-        match (self.options.scheme, self.bricks.is_some()) {
-            (Scheme::Euler, _) => self.all(simd, field, starts, exits, With::<true, true, false, true>),
-            // Bricks and nodes that are not gas are rare enough for one kernel to do both.
-            (Scheme::Verlet, true) if opd => {
-                self.all(simd, field, starts, exits, With::<true, true, true, false>)
+        let plain = self.field.nodes().is_none() && self.bricks.is_none();
+        match (self.options.scheme, plain) {
+            (Scheme::Verlet, true) if self.options.wanted.opd => {
+                self.all(simd, field, starts, exits, With::<true, false, false, false>);
             }
-            (Scheme::Verlet, true) => self.all(simd, field, starts, exits, With::<false, true, true, false>),
-            (Scheme::Verlet, false) => match (opd, nodes) {
-                (false, false) => self.all(simd, field, starts, exits, With::<false, false, false, false>),
-                (true, false) => self.all(simd, field, starts, exits, With::<true, false, false, false>),
-                (_, true) => self.all(simd, field, starts, exits, With::<true, true, false, false>),
-            },
+            (Scheme::Verlet, true) => {
+                self.all(simd, field, starts, exits, With::<false, false, false, false>)
+            }
+            // Three kernels an interpolant and instruction set, not twelve: each is a second of compiling. The path costs a tenth of a step.
+            (Scheme::Verlet, false) => self.all(simd, field, starts, exits, With::<true, true, true, false>),
+            (Scheme::Euler, _) => self.all(simd, field, starts, exits, With::<true, true, false, true>),
         }
     }
 
@@ -209,7 +208,11 @@ impl<'a> Deviational<'a> {
                 bricks,
                 unit_m: self.frame.unit_m as f32,
                 tolerance_rad: self.options.skip_rad as f32,
-                tolerance_opd_m: self.options.skip_opd_m as f32,
+                tolerance_opd_m: if self.options.wanted.opd {
+                    self.options.skip_opd_m as f32
+                } else {
+                    f32::INFINITY
+                },
             }),
             survives: match self.options.blank {
                 BlankCells::Opaque => 0,
@@ -242,12 +245,7 @@ impl<'a> Deviational<'a> {
                 }
             }
             if steps > 0.0 {
-                let done = if starts.len() > LANES {
-                    march(simd, field, &common, &mut packets, steps_of(steps), effects)
-                } else {
-                    let [first, ..] = &mut packets;
-                    march(simd, field, &common, std::array::from_mut(first), steps_of(steps), effects)
-                };
+                let done = march(simd, field, &common, &mut packets, steps_of(steps), effects);
                 work.sampled += done.sampled;
                 work.skipped += done.skipped;
             }
@@ -291,15 +289,15 @@ impl LightPaths for Deviational<'_> {
         match &self.interpolated {
             Interpolated::BSpline(s) => {
                 let rows = s.rows();
-                dispatch!(self.level, simd => self.run(simd, rows, starts, exits));
+                at_level!(self.level, simd => self.run(simd, rows, starts, exits));
             }
             Interpolated::Trilinear(s) => {
                 let rows = s.rows();
-                dispatch!(self.level, simd => self.run(simd, rows, starts, exits));
+                at_level!(self.level, simd => self.run(simd, rows, starts, exits));
             }
             Interpolated::TrilinearGradient(s) => {
                 let rows = s.rows();
-                dispatch!(self.level, simd => self.run(simd, rows, starts, exits));
+                at_level!(self.level, simd => self.run(simd, rows, starts, exits));
             }
         }
     }

@@ -1,8 +1,33 @@
 //! Through the field: from starts to exits.
+//!
+//! | march | where | cost |
+//! |---|---|---|
+//! | [`LineOfSight`] | deflections so small that rays stay within their voxel | one 2-D sample a photon |
+//! | [`Deviational`] (Verlet) | gases: the default | a sample a step, `f32`, sixteen rays at a time |
+//! | [`Deviational`] (Euler) | the dissertation's equations 5.7 and 5.8, for comparison | the same |
+//! | [`Full`] | strong index: lenses, liquids, turning rays | one to six samples a step, `f64` |
 
+mod adaptive;
 mod deviational;
+mod euler;
 mod frame;
+mod full;
+mod integrator;
+mod line_of_sight;
 mod packet;
+mod pefrl;
+mod rk4;
+mod sharma;
+mod verlet;
 
+pub use adaptive::{DormandPrince, Run};
 pub use deviational::{Counters, Deviational, Options, Scheme};
+pub use euler::Euler;
 pub use frame::BlankCells;
+pub use full::{Full, FullOptions};
+pub use integrator::{Integrator, Interpolated, Medium, Ray};
+pub use line_of_sight::LineOfSight;
+pub use pefrl::Pefrl;
+pub use rk4::RungeKutta4;
+pub use sharma::Sharma;
+pub use verlet::Verlet;

@@ -142,7 +142,8 @@ fn march_body<S: Simd, I: Interpolate16, E: Effects, const P: usize>(
     let mut work = Work::default();
     let per_step = 1.0 / steps as f32;
     let mut k = 0;
-    while k < steps {
+    // One iteration more than steps, to end in the exit plane; in the same loop, so that there is one copy of the sampling code.
+    while k <= steps {
         // Leaving out whole bricks, when all rays in flight may.
         if E::SKIP
             && k % STRIDE == 0
@@ -153,10 +154,19 @@ fn march_body<S: Simd, I: Interpolate16, E: Effects, const P: usize>(
             work.skipped += u64::from(STRIDE) * P as u64;
             continue;
         }
-        let number = if E::EULER { k as f32 } else { k as f32 + 0.5 };
         for p in packets.iter_mut() {
-            let dt = f32x16::from_slice(simd, &p.length) * per_step;
-            step::<S, I, E>(simd, field, common, p, number * per_step, dt);
+            let length = f32x16::from_slice(simd, &p.length);
+            let whole = length * per_step;
+            let s = if k < steps {
+                let number = if E::EULER { k as f32 } else { k as f32 + 0.5 };
+                Step { tau: length * (number * per_step), move_by: whole, dt: whole }
+            } else {
+                last_step::<S, E>(simd, p, length, whole)
+            };
+            step::<S, I, E>(simd, field, common, p, s);
+            if k == steps {
+                drift(simd, p, s.dt * 0.5);
+            }
         }
         work.sampled += P as u64;
         k += 1;
@@ -164,15 +174,6 @@ fn march_body<S: Simd, I: Interpolate16, E: Effects, const P: usize>(
             return work;
         }
     }
-    // Euler's positions are already at the end of the step.
-    for p in packets.iter_mut() {
-        let dt = f32x16::from_slice(simd, &p.length) * per_step;
-        if !E::EULER {
-            drift(simd, p, dt * 0.5);
-        }
-        finish::<S, I, E>(simd, field, common, p);
-    }
-    work.sampled += P as u64;
     work
 }
 
@@ -186,36 +187,60 @@ fn drift<S: Simd>(simd: S, p: &mut Packet, dt: f32x16<S>) {
     }
 }
 
-/// One step. The positions arrive at the middle of the last step (Verlet; half a step of drift is missing, and in the first step there is nothing to drift),
-/// and are moved to the middle of this one; `fraction` of the way along the undisturbed ray.
+/// What a step does.
+#[derive(Clone, Copy)]
+struct Step<S: Simd> {
+    /// Path along the undisturbed ray to where the sample is taken.
+    tau: f32x16<S>,
+    /// How far positions drift from where the last step left them to there.
+    move_by: f32x16<S>,
+    /// For how long the sample pushes.
+    dt: f32x16<S>,
+}
+
+/// One step. Verlet's positions arrive at the middle of the last step and drift to the middle of this one (in the first step there is
+/// nothing to drift yet); Euler's arrive at the start of the step and drift to its end after the sample.
 #[inline(always)]
 fn step<S: Simd, I: Interpolate16, E: Effects>(
     simd: S,
     field: I,
     common: &Common<'_>,
     p: &mut Packet,
-    fraction: f32,
-    dt: f32x16<S>,
+    s: Step<S>,
 ) {
-    let tau = f32x16::from_slice(simd, &p.length) * fraction;
-    let mut at = [tau; 3];
+    let mut at = [s.tau; 3];
     for c in 0..3 {
-        let mut xi = f32x16::from_slice(simd, &p.xi[c]);
+        let xi = f32x16::from_slice(simd, &p.xi[c]);
         let v = f32x16::from_slice(simd, &p.v[c]);
-        let moved = dt.mul_add(v, xi);
-        if !E::EULER {
-            xi = moved;
-        }
+        let moved = s.move_by.mul_add(v, xi);
         moved.store_slice(&mut p.xi[c]);
         let straight =
-            tau.mul_add(f32x16::from_slice(simd, &p.direction[c]), f32x16::from_slice(simd, &p.entry[c]));
-        at[c] = straight + xi;
+            s.tau.mul_add(f32x16::from_slice(simd, &p.direction[c]), f32x16::from_slice(simd, &p.entry[c]));
+        at[c] = straight + if E::EULER { xi } else { moved };
     }
     if E::NODES {
         meet(simd, common, p, &at);
     }
     let here = field.sample16(simd, &at);
-    kick::<S, E>(simd, common, p, &here, dt);
+    kick::<S, E>(simd, common, p, &here, s.dt);
+}
+
+/// tau is not depth: a ray that gained `zeta` in depth has passed its exit plane by as much. One step back brings it there; half of its drift is left to
+/// the caller.
+#[inline(always)]
+fn last_step<S: Simd, E: Effects>(simd: S, p: &Packet, length: f32x16<S>, whole: f32x16<S>) -> Step<S> {
+    // Verlet's positions still miss the second half of the last step.
+    let missing = if E::EULER { whole * 0.0 } else { whole * 0.5 };
+    let mut zeta = f32x16::splat(simd, 0.0);
+    let mut u_z = zeta;
+    for c in 0..3 {
+        let along = f32x16::from_slice(simd, &p.along[c]);
+        zeta = along.mul_add(f32x16::from_slice(simd, &p.xi[c]), zeta);
+        u_z = along.mul_add(f32x16::from_slice(simd, &p.v[c]), u_z);
+    }
+    zeta = missing.mul_add(u_z, zeta);
+    let dt = -zeta / (u_z + f32x16::splat(simd, 1.0));
+    Step { tau: length + dt * 0.5, move_by: missing + dt * 0.5, dt }
 }
 
 /// v += dt (1 + eps) g / h^2, and the optical path with the mean of v before and after.
@@ -244,30 +269,6 @@ fn kick<S: Simd, E: Effects>(simd: S, common: &Common<'_>, p: &mut Packet, here:
         let more = eps.mul_add(eps, eps) + transverse / (eps + u_z + f32x16::splat(simd, 2.0));
         dt.mul_add(more, f32x16::from_slice(simd, &p.opd)).store_slice(&mut p.opd);
     }
-}
-
-/// tau is not depth: a ray that gained `zeta` in depth has passed its exit plane by as much. One step back brings it there.
-#[inline(always)]
-fn finish<S: Simd, I: Interpolate16, E: Effects>(simd: S, field: I, common: &Common<'_>, p: &mut Packet) {
-    let mut zeta = f32x16::splat(simd, 0.0);
-    let mut u_z = zeta;
-    for c in 0..3 {
-        let along = f32x16::from_slice(simd, &p.along[c]);
-        zeta = along.mul_add(f32x16::from_slice(simd, &p.xi[c]), zeta);
-        u_z = along.mul_add(f32x16::from_slice(simd, &p.v[c]), u_z);
-    }
-    let dt = -zeta / (u_z + f32x16::splat(simd, 1.0));
-    drift(simd, p, dt * 0.5);
-    let tau = f32x16::from_slice(simd, &p.length) + dt * 0.5;
-    let mut at = [tau; 3];
-    for c in 0..3 {
-        let straight =
-            tau.mul_add(f32x16::from_slice(simd, &p.direction[c]), f32x16::from_slice(simd, &p.entry[c]));
-        at[c] = straight + f32x16::from_slice(simd, &p.xi[c]);
-    }
-    let here = field.sample16(simd, &at);
-    kick::<S, E>(simd, common, p, &here, dt);
-    drift(simd, p, dt * 0.5);
 }
 
 /// The nearest nodes' kinds.

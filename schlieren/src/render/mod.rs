@@ -21,10 +21,14 @@
 //! ```
 
 mod map;
+mod paths;
 mod section;
+#[cfg(test)]
+mod tests;
 
 pub use map::Map;
-pub use section::{Planned, TestSection};
+pub use paths::{INTERPOLANTS, MARCHES, Planned};
+pub use section::TestSection;
 
 use crate::cutoff::Rgb;
 use crate::film::beams::expose_beams;
@@ -69,6 +73,16 @@ pub enum RenderError {
     /// The GPU march is not part of this program.
     #[error("this build has no march for the GPU; leave out --device gpu (march.device in a scene)")]
     NoGpu,
+    /// A name that nothing has.
+    #[error("{key}: there is no `{name}`; there are: {names}")]
+    Unknown {
+        /// Path of the key in the scene.
+        key: &'static str,
+        /// What was asked for.
+        name: String,
+        /// What there is.
+        names: String,
+    },
     /// The photons for a cone filter do not fit.
     #[error(
         "the cone filter keeps every photon, and {photons} are more than the {limit} it may keep; take fewer samples or another filter"
@@ -301,7 +315,7 @@ fn expose_lines(
     let (framing, optics) = (r.framing, scene.optics());
     let lines = scene.lines();
     let spread_px = beam_spread_px(scene, section, &optics, &framing);
-    let by_photons = matches!(scene.sampling, SamplingSpec::Photons { .. });
+    let by_photons = matches!(scene.sampling(), SamplingSpec::Photons { .. });
     let tilted_beams = by_photons
         && match scene.light.beams {
             BeamsSpec::Auto => spread_px > 0.5,
@@ -323,14 +337,17 @@ fn expose_lines(
         let n0 = section.fields[line].n0();
         let t = technique(scene, line, &framing, n0, tilted_beams)?;
         let planned = section.paths(scene, line, Wanted { opd: t.needs_opd() }, against_light)?;
-        r.report.march.clone_from(&planned.description);
-        r.report.deflection_error_rad = planned.error_rad;
+        if line == 0 {
+            r.report.march.clone_from(&planned.description);
+            r.report.deflection_error_rad = planned.error_rad;
+            r.report.warnings.extend(planned.warnings.iter().cloned());
+        }
         let margin_px = if t.looks_from_film() {
             0
         } else {
             margin_px(&*planned.paths, &optics, &framing, &mut r.report)
         };
-        let (sampling, seed) = match scene.sampling {
+        let (sampling, seed) = match scene.sampling() {
             SamplingSpec::Photons { jitter: Jitter::Random, seed, .. } => (Sampling::Random, seed),
             SamplingSpec::Photons { seed, .. } => (Sampling::Sobol, seed),
             SamplingSpec::Beams { .. } => (Sampling::Sobol, 0),
@@ -385,7 +402,7 @@ fn expose_line<const C: usize>(
         let so_far = done.fetch_add(rays, Ordering::Relaxed) + rays;
         progress(so_far as f64 / total as f64);
     };
-    let film = match scene.sampling {
+    let film = match scene.sampling() {
         SamplingSpec::Beams { cells_per_side } => {
             let total = per_pass * u64::from(cells_per_side).pow(2);
             let film = Film::<C>::new(framing, false);

@@ -3,12 +3,8 @@
 use super::RenderError;
 use crate::field::Field;
 use crate::input;
-use crate::interpolate::Interpolant;
-use crate::march::{Deviational, Options, Scheme};
-use crate::path::{LightPaths, Wanted};
-use crate::scene::{Device, Scene};
+use crate::scene::Scene;
 use crate::solids::Solids;
-use crate::technique::bos::Reversed;
 use crate::view::View;
 
 /// What stands between the lenses.
@@ -71,40 +67,5 @@ impl TestSection {
     /// Depth of the field along the light, in metres.
     pub fn depth_m(&self) -> f64 {
         self.view.forward.abs().dot(self.fields[0].size_m())
-    }
-}
-
-/// Paths of light through one of the fields, and what is known of their accuracy.
-pub struct Planned<'a> {
-    /// The paths.
-    pub paths: Box<dyn LightPaths + 'a>,
-    /// The march, the interpolant and the step that were picked, in words.
-    pub description: String,
-    /// Bound or estimate of the error of a deflection.
-    pub error_rad: Option<f64>,
-}
-
-impl TestSection {
-    /// Light paths through field `line` as the scene's march says.
-    pub fn paths(
-        &self,
-        scene: &Scene,
-        line: usize,
-        wanted: Wanted,
-        against_light: bool,
-    ) -> Result<Planned<'_>, RenderError> {
-        if scene.march.device == Device::Gpu {
-            return Err(RenderError::NoGpu);
-        }
-        let view = if against_light { Reversed::view(&self.view) } else { self.view };
-        let march = Deviational::new(
-            &self.fields[line],
-            view,
-            Interpolant::BSpline,
-            Options { scheme: Scheme::Verlet, wanted, ..Options::default() },
-        );
-        let paths: Box<dyn LightPaths + '_> =
-            if against_light { Box::new(Reversed::new(march)) } else { Box::new(march) };
-        Ok(Planned { paths, description: "verlet, b-spline, 1 voxel".into(), error_rad: None })
     }
 }

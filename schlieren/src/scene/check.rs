@@ -144,7 +144,7 @@ impl Scene {
         film.exposure.map_or(Ok(()), |v| positive("film.exposure", v))?;
         finite("film.center_m", &film.center_m)?;
         finite("film.focus_m", &[self.focus_m()])?;
-        match self.sampling {
+        match self.sampling() {
             SamplingSpec::Photons { samples, filter, .. } => {
                 if !(1..=MAX_SAMPLES).contains(&samples) {
                     return Err(wrong("sampling.samples", samples, format!("give 1 to {MAX_SAMPLES}")));
@@ -178,14 +178,14 @@ impl Scene {
         if self.light.beams != BeamsSpec::Auto && !self.technique.uses_source() {
             return in_vain("light.beams", "; it belongs to schlieren and shadowgraph");
         }
-        if self.light.beams == BeamsSpec::Tilted && matches!(self.sampling, SamplingSpec::Beams { .. }) {
+        if self.light.beams == BeamsSpec::Tilted && matches!(self.sampling(), SamplingSpec::Beams { .. }) {
             return in_vain("light.beams = \"tilted\"", " with sampling by beams; take photons");
         }
         if !self.technique.follows_light() {
             if self.film.focus_m.is_some() {
                 return in_vain("film.focus_m", "; it knows no optics");
             }
-            if self.sampling != SamplingSpec::default() {
+            if self.sampling.is_some() {
                 return in_vain("sampling", "; it takes one ray per pixel");
             }
             if !self.solids.files.is_empty() {

@@ -27,7 +27,7 @@ impl Effects {
             dispersion: follows_light && scene.light.wavelengths_nm.len() > 1,
             solids: follows_light && !scene.solids.files.is_empty(),
             tilted_beams: scene.technique.uses_source() && scene.light.beams == BeamsSpec::Tilted,
-            differentials: follows_light && matches!(scene.sampling, SamplingSpec::Beams { .. }),
+            differentials: follows_light && matches!(scene.sampling(), SamplingSpec::Beams { .. }),
         }
     }
 }

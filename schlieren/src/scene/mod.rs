@@ -60,9 +60,9 @@ pub struct Scene {
     /// Size and focus of the picture.
     #[serde(default)]
     pub film: FilmSpec,
-    /// How the film is exposed.
-    #[serde(default)]
-    pub sampling: SamplingSpec,
+    /// How the film is exposed; each technique has a customary way.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sampling: Option<SamplingSpec>,
     /// How light is taken through the flow.
     #[serde(default)]
     pub march: MarchSpec,
@@ -467,8 +467,20 @@ impl Scene {
         if t.follows_light() {
             s.film.focus_m = Some(self.focus_m());
         }
+        if t.follows_light() {
+            s.sampling = Some(self.sampling());
+        }
         s.film.exposure = Some(self.exposure());
         s
+    }
+
+    /// How the film is exposed: as given, or by the technique. A shadowgraph is nothing but the density of light, which photons tell slowly (16 of them by
+    /// 25 %), so it is made of beams; others are made of photons.
+    pub fn sampling(&self) -> SamplingSpec {
+        let beams = matches!(self.technique, TechniqueSpec::Shadowgraph {});
+        let customary =
+            if beams { SamplingSpec::Beams { cells_per_side: cells() } } else { SamplingSpec::default() };
+        self.sampling.unwrap_or(customary)
     }
 
     /// The plane in focus: as given, or the technique's.

@@ -83,18 +83,19 @@ fn mix(x: u64) -> u64 {
 ///
 /// `paths` look along the reversed view ([`Reversed::view`]), whose right is the picture's left; this exchanges the signs on the way in and out. Light paths
 /// can be reversed, so rays from the camera are the light that reaches it.
-pub struct Reversed<P> {
-    paths: P,
+pub struct Reversed<'a> {
+    paths: Box<dyn LightPaths + 'a>,
+    /// The frame of starts and exits: left-handed, because it is the picture's with the light's direction turned round.
+    view: View,
 }
 
-impl<P: LightPaths> Reversed<P> {
+impl<'a> Reversed<'a> {
     /// `paths` must have been made for [`Reversed::view`] of the picture's view.
-    pub fn new(paths: P) -> Reversed<P> {
-        Reversed { paths }
+    pub fn new(paths: Box<dyn LightPaths + 'a>) -> Reversed<'a> {
+        let inner = *paths.view();
+        Reversed { paths, view: View { right: -inner.right, ..inner } }
     }
-}
 
-impl Reversed<()> {
     /// The view against the light: right and forward negated, up kept, right-handed as before.
     pub fn view(view: &View) -> View {
         View { right: -view.right, forward: -view.forward, ..*view }
@@ -105,7 +106,7 @@ fn mirrored([x, y]: Across) -> Across {
     [-x, y]
 }
 
-impl<P: LightPaths> LightPaths for Reversed<P> {
+impl LightPaths for Reversed<'_> {
     fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
         let mirror = |s: &Start| Start { position_m: mirrored(s.position_m), tilt_rad: mirrored(s.tilt_rad) };
         let starts: Vec<Start> = starts.iter().map(mirror).collect();
@@ -117,7 +118,7 @@ impl<P: LightPaths> LightPaths for Reversed<P> {
     }
 
     fn view(&self) -> &View {
-        self.paths.view()
+        &self.view
     }
 
     fn wanted(&self) -> Wanted {
@@ -174,7 +175,7 @@ mod tests {
         let r = Reversed::view(&v);
         assert_eq!((r.right.cross(r.up), r.forward), (-v.forward, -v.forward));
         // A prism that deflects towards the reversed frame's right deflects to the picture's left.
-        let reversed = Reversed::new(ClosedForm::prism([1e-3, 2e-3]));
+        let reversed = Reversed::new(Box::new(ClosedForm::prism([1e-3, 2e-3])));
         let mut exit = [Exit::UNDISTURBED];
         reversed.trace(&[Start::default()], &mut exit);
         assert_eq!(exit[0].deflection_rad, [-1e-3, 2e-3]);
