@@ -52,8 +52,27 @@ fn the_contract_png_exr_npy_and_json() {
     flow(&dir.path().join("flow.vti"));
     let (file, png, exr, map) = (path("flow.vti"), path("out.png"), path("out.exr"), path("out.npy"));
     let out = schlieren(&[
-        "render", &file, "--density", "rho", "--view", "z", "--technique", "schlieren", "--size", "80x40", "-o", &png, "--exr",
-        &exr, "--npy", &map, "--tolerance", "1e-7rad", "--device", "cpu", "--json",
+        "render",
+        &file,
+        "--density",
+        "rho",
+        "--view",
+        "z",
+        "--technique",
+        "schlieren",
+        "--size",
+        "80x40",
+        "-o",
+        &png,
+        "--exr",
+        &exr,
+        "--npy",
+        &map,
+        "--tolerance",
+        "1e-7rad",
+        "--device",
+        "cpu",
+        "--json",
     ]);
     assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
     let object: Value = serde_json::from_slice(&out.stdout).expect("one JSON object");
@@ -74,13 +93,27 @@ fn the_contract_png_exr_npy_and_json() {
     assert!(deflection(0.03, 0.025)[1] > 2e-5 && deflection(0.03, -0.005)[1] < -2e-5);
 
     let picture = read_exr(Path::new(&exr)).unwrap();
-    for (plane, unit) in [("Y", ""), ("deflection.X", "rad"), ("deflection.Y", "rad"), ("phase.Y", "waves"), ("transmission.Y", "1"), ("samples.Y", "photons"), ("error.Y", "1"), ("error.deflection", "rad")] {
+    for (plane, unit) in [
+        ("Y", ""),
+        ("deflection.X", "rad"),
+        ("deflection.Y", "rad"),
+        ("phase.Y", "waves"),
+        ("transmission.Y", "1"),
+        ("samples.Y", "photons"),
+        ("error.Y", "1"),
+        ("error.deflection", "rad"),
+    ] {
         let p = picture.plane(plane).unwrap_or_else(|| panic!("{plane}"));
         assert_eq!(p.unit, unit, "{plane}");
     }
     let x: Vec<f32> = values.iter().copied().step_by(2).collect();
     assert_eq!(picture.plane("deflection.X").unwrap().samples, x);
-    for (key, value) in [("technique.kind", "schlieren"), ("technique.cutoff.kind", "knife"), ("flow.density", "rho"), ("view.direction", "z")] {
+    for (key, value) in [
+        ("technique.kind", "schlieren"),
+        ("technique.cutoff.kind", "knife"),
+        ("flow.density", "rho"),
+        ("view.direction", "z"),
+    ] {
         assert_eq!(picture.metadata.get(key), Some(&MetadataValue::Text(value.into())), "{key}");
     }
     assert_eq!(picture.metadata.get("lenses.schlieren_m"), Some(&MetadataValue::Number(1.5)));
@@ -104,7 +137,8 @@ fn temperature_pressure_and_species_are_the_same_air() {
     let state = map("b.npy", &["--temperature", "T", "--pressure", "p"]);
     let species = map("c.npy", &["--density", "rho", "--species", "Y=He"]);
     let largest = density.iter().fold(0.0f32, |m, v| m.max(v.abs()));
-    let differ = |a: &[f32], b: &[f32]| a.iter().zip(b).fold(0.0f32, |m, (a, b)| m.max((a - b).abs())) / largest;
+    let differ =
+        |a: &[f32], b: &[f32]| a.iter().zip(b).fold(0.0f32, |m, (a, b)| m.max((a - b).abs())) / largest;
     // The density at 293.15 K and 101325 Pa is 1.204, not the 1.2 that T was made from; and Ciddor's air is not ideal.
     assert!(differ(&density, &state) < 0.01, "{}", differ(&density, &state));
     assert!(differ(&density, &species) < 1e-5, "no helium changes nothing");
@@ -148,7 +182,8 @@ fn a_printed_scene_draws_the_same_picture() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name).to_str().unwrap().to_string();
     flow(&dir.path().join("flow.vti"));
-    let options = ["--density", "rho", "--size", "40x20", "--technique", "interferogram", "--fringe-spacing", "10mm"];
+    let options =
+        ["--density", "rho", "--size", "40x20", "--technique", "interferogram", "--fringe-spacing", "10mm"];
     let (file, a, b, toml) = (path("flow.vti"), path("a.png"), path("b.png"), path("scene.toml"));
     let o = schlieren(&[&["render", &file, "-o", &a, "--print-scene", "--quiet"], &options[..]].concat());
     assert_eq!(o.status.code(), Some(0), "{}", text(&o.stderr));
@@ -172,7 +207,8 @@ fn sweeps_number_their_pictures_and_probes_print_numbers() {
     let (file, png) = (path("flow.vti"), path("turn.png"));
     let base = ["--density", "rho", "--size", "40x20", "--quiet"];
     let o = schlieren(
-        &[&["sweep", &file, "--set", "technique.cutoff.angle_deg=0.0,90.0", "-o", &png, "--json"], &base[..]].concat(),
+        &[&["sweep", &file, "--set", "technique.cutoff.angle_deg=0.0,90.0", "-o", &png, "--json"], &base[..]]
+            .concat(),
     );
     assert_eq!(o.status.code(), Some(0), "{}", text(&o.stderr));
     let lines: Vec<Value> = text(&o.stdout).lines().map(|l| serde_json::from_str(l).unwrap()).collect();
@@ -191,7 +227,17 @@ fn sweeps_number_their_pictures_and_probes_print_numbers() {
 #[test]
 fn the_index_of_a_state_and_of_a_table() {
     let o = schlieren(&[
-        "index", "--wavelength-nm", "633", "--temperature-c", "20", "--pressure-pa", "101325", "--humidity", "0.5", "--co2-ppm", "450",
+        "index",
+        "--wavelength-nm",
+        "633",
+        "--temperature-c",
+        "20",
+        "--pressure-pa",
+        "101325",
+        "--humidity",
+        "0.5",
+        "--co2-ppm",
+        "450",
         "--json",
     ]);
     let n: Value = serde_json::from_slice(&o.stdout).unwrap();

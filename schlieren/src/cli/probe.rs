@@ -34,7 +34,7 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
     let section = TestSection::open(&scene, |what| common.note(0, what))?;
     let framing = framing(&scene, &section);
     let t = technique(&scene, 0, &framing, section.fields[0].n0(), false)?;
-    let planned = section.paths(&scene, 0, Wanted { opd: true }, matches!(t, Technique::Bos(_)))?;
+    let planned = section.paths(&scene, 0, Wanted { opd: true }, matches!(t, Technique::Bos(_)), true)?;
     let [x, y] = args.pixel;
     let position_m = framing.plane_from_pixel(x, y);
     let start = Start { position_m: position_m.map(|c| c as f32), tilt_rad: [0.0; 2] };

@@ -166,8 +166,10 @@ pub struct Report {
     pub tally: Tally,
     /// The march, in words.
     pub march: String,
-    /// Estimated error of a deflection by march and interpolation.
+    /// Measured error of a deflection by march and interpolation, when there is a map.
     pub deflection_error_rad: Option<f64>,
+    /// Estimated error of a deflection by the flow's own lattice.
+    pub resolution_error_rad: Option<f64>,
     /// Largest deflection through a pixel's centre, when there is a map.
     pub largest_deflection_rad: Option<f64>,
     /// By how much bodies' silhouettes can be off because bodies see straight rays, when there are bodies and a map.
@@ -180,6 +182,15 @@ pub struct Report {
     pub pixel_m: f64,
     /// What should be known about the picture, a sentence each.
     pub warnings: Vec<String>,
+}
+
+impl Report {
+    fn add_plan(&mut self, planned: &Planned<'_>) {
+        self.march.clone_from(&planned.description);
+        self.deflection_error_rad = planned.error_rad;
+        self.resolution_error_rad = planned.resolution_error_rad;
+        self.warnings.extend(planned.warnings.iter().cloned());
+    }
 }
 
 /// Draws the scene's picture of a test section. The same for any number of threads.
@@ -210,6 +221,7 @@ pub fn render(
     // Comparisons have no light; the deflection map has.
     let against_light = matches!(scene.technique, TechniqueSpec::Bos { .. });
     let grey = |v: Vec<f32>| v.into_iter().map(|v| [v * exposure as f32; 3]).collect();
+    let mut first = None;
     match scene.technique {
         TechniqueSpec::Volume { strength } => {
             r.pixels = grey(volume::volume(&section.fields[0], &section.view, &framing, strength)?);
@@ -217,14 +229,19 @@ pub fn render(
         TechniqueSpec::Slice { strength, depth_m } => {
             r.pixels = grey(slice::slice(&section.fields[0], &section.view, &framing, depth_m, strength)?);
         }
-        _ => expose_lines(scene, section, layers, control, &mut r)?,
+        _ => first = expose_lines(scene, section, layers, control, &mut r)?,
     }
+    let measured = first.is_some();
     if control.cancel.load(Ordering::Relaxed) {
         return Err(RenderError::Cancelled);
     }
 
     if layers.map {
-        let planned = section.paths(scene, 0, Wanted { opd: layers.phase }, against_light)?;
+        // The picture's own paths serve when they tell what is wanted; the optical path is not computed for photons that do not need it.
+        let planned = match first.filter(|p| p.paths.wanted().opd || !layers.phase) {
+            Some(planned) => planned,
+            None => section.paths(scene, 0, Wanted { opd: layers.phase }, against_light, !measured)?,
+        };
         add_map(scene, section, &planned, &mut r);
     }
     r.report.levels = r
@@ -304,14 +321,14 @@ fn beam_spread_px(scene: &Scene, section: &TestSection, optics: &Optics, framing
     reach_m / optics.schlieren_focal_length_m * lever_m / framing.pixel_m
 }
 
-/// Exposes the film to every line of the spectrum and adds up their colours.
-fn expose_lines(
+/// Exposes the film to every line of the spectrum and adds up their colours. Returns the paths of the first.
+fn expose_lines<'a>(
     scene: &Scene,
-    section: &TestSection,
+    section: &'a TestSection,
     layers: Layers,
     control: &Control<'_>,
     r: &mut Rendered,
-) -> Result<(), RenderError> {
+) -> Result<Option<Planned<'a>>, RenderError> {
     let (framing, optics) = (r.framing, scene.optics());
     let lines = scene.lines();
     let spread_px = beam_spread_px(scene, section, &optics, &framing);
@@ -332,15 +349,14 @@ fn expose_lines(
     let colors = film_colors(&lines);
     r.pixels = vec![[0.0; 3]; framing.pixels()];
     r.colored = lines.len() > 1;
+    let mut first = None;
 
     for line in 0..lines.len() {
         let n0 = section.fields[line].n0();
         let t = technique(scene, line, &framing, n0, tilted_beams)?;
-        let planned = section.paths(scene, line, Wanted { opd: t.needs_opd() }, against_light)?;
+        let planned = section.paths(scene, line, Wanted { opd: t.needs_opd() }, against_light, layers.map && line == 0)?;
         if line == 0 {
-            r.report.march.clone_from(&planned.description);
-            r.report.deflection_error_rad = planned.error_rad;
-            r.report.warnings.extend(planned.warnings.iter().cloned());
+            r.report.add_plan(&planned);
         }
         let margin_px = if t.looks_from_film() {
             0
@@ -381,8 +397,9 @@ fn expose_lines(
         counters.phase_rays += if t.needs_opd() { rays } else { 0 };
         counters.tilted_rays += if tilted_beams { rays } else { 0 };
         counters.dispersion_rays += if line > 0 { rays } else { 0 };
+        first.get_or_insert(planned);
     }
-    Ok(())
+    Ok(first)
 }
 
 /// The film of one line, filtered: energy per pixel.
@@ -523,8 +540,7 @@ fn add_map(scene: &Scene, section: &TestSection, planned: &Planned<'_>, r: &mut 
     let m = map::map(&*planned.paths, &scene.optics(), &r.framing, wavelength_m, n0, blocked);
     let report = &mut r.report;
     if report.march.is_empty() {
-        report.march.clone_from(&planned.description);
-        report.deflection_error_rad = planned.error_rad;
+        report.add_plan(planned);
     }
     report.counters.map_rays += m.transmission.len() as u64;
     report.counters.phase_rays += m.waves.len() as u64;

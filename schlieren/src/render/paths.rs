@@ -1,17 +1,16 @@
-//! Which march takes the light through, and how exact it is.
-//!
-//! What the scene names is taken. What it leaves open is picked by comparison over a coarse lattice of rays: the cheapest march that agrees with a finer
-//! one within half the tolerance. The difference that was seen is reported as the error estimate; it knows the march's error, not that of the
-//! flow's own lattice.
+//! Which march takes the light through, and how exact it is: [`crate::plan`] picks what the scene leaves open by bounds from the tolerance, and measures
+//! what was achieved. Marches that no plan picks, because they are for comparison, are made here.
 
 use super::{RenderError, TestSection};
-use crate::film::Framing;
 use crate::field::Field;
+use crate::film::Framing;
 use crate::interpolate::{BSpline, Interpolant, Interpolate, Trilinear, TrilinearGradient};
+use crate::plan::{Mode, Plan, Request};
 use crate::march::{
-    BlankCells, Deviational, Full, FullOptions, Integrator, LineOfSight, Options, Pefrl, RungeKutta4, Scheme, Sharma,
+    BlankCells, Deviational, Full, FullOptions, Integrator, Options, Pefrl, RungeKutta4, Scheme,
+    Sharma,
 };
-use crate::path::{Exit, LightPaths, Start, Status, Wanted};
+use crate::path::{Exit, LightPaths, Start, Wanted};
 use crate::scene::{Device, Scene};
 use crate::technique::bos::Reversed;
 use crate::view::View;
@@ -21,32 +20,33 @@ pub const MARCHES: [&str; 6] = ["line-of-sight", "verlet", "euler", "pefrl", "sh
 /// Names of interpolants, the default first.
 pub const INTERPOLANTS: [&str; 3] = ["b-spline", "trilinear", "trilinear-gradient"];
 
+/// Rays that are traced twice to measure a plan's error.
+const MEASURED_RAYS: usize = 256;
+
 /// Paths of light through one of the fields, and what is known of their accuracy.
 pub struct Planned<'a> {
     /// The paths.
     pub paths: Box<dyn LightPaths + 'a>,
-    /// The march, the interpolant and the step that were picked, in words.
+    /// The march, the interpolant and the step, in words.
     pub description: String,
-    /// Estimate of the march's error of a deflection; `None` when the march was forced.
+    /// Measured error of a deflection by march, interpolant and step; `None` when it was not to be measured, or the march is one for comparison.
     pub error_rad: Option<f64>,
+    /// Estimate of what the flow's own lattice leaves open.
+    pub resolution_error_rad: Option<f64>,
     /// What should be known, a sentence each.
     pub warnings: Vec<String>,
 }
 
-/// A march with its step in voxels.
-type Choice = (&'static str, f64);
-
-/// What is tried, the cheapest first.
-const LADDER: [Choice; 5] = [("line-of-sight", 1.0), ("verlet", 1.0), ("verlet", 0.5), ("verlet", 0.25), ("pefrl", 0.5)];
-
 impl TestSection {
-    /// Light paths through field `line` as the scene's march says. `against_light`: traced from the camera.
+    /// Light paths through field `line` as the scene's march says. `against_light`: traced from the camera. `measure` traces some rays with everything
+    /// refined, to know the error.
     pub fn paths(
         &self,
         scene: &Scene,
         line: usize,
         wanted: Wanted,
         against_light: bool,
+        measure: bool,
     ) -> Result<Planned<'_>, RenderError> {
         let march = &scene.march;
         if march.device == Device::Gpu {
@@ -60,86 +60,98 @@ impl TestSection {
             },
         };
         let method = known(&march.method, &MARCHES, "march.method")?;
-        let interpolant = match known(&march.interpolant, &INTERPOLANTS, "march.interpolant")? {
-            Some("trilinear") => Interpolant::Trilinear,
-            Some("trilinear-gradient") => Interpolant::TrilinearGradient,
+        let interpolant = known(&march.interpolant, &INTERPOLANTS, "march.interpolant")?.map(|name| match name {
+            "trilinear" => Interpolant::Trilinear,
+            "trilinear-gradient" => Interpolant::TrilinearGradient,
             _ => Interpolant::BSpline,
-        };
+        });
+        let field = &self.fields[line];
         let view = if against_light { Reversed::view(&self.view) } else { self.view };
-        let make = |(name, step): Choice, wanted| make(&self.fields[line], view, interpolant, name, step, wanted);
-        let words = |(name, step): Choice| {
-            let interpolant = INTERPOLANTS[interpolant as usize];
-            match name {
-                "line-of-sight" => format!("line-of-sight, {interpolant}"),
-                _ => format!("{name}, {interpolant}, steps of {step} voxel"),
-            }
+        let with = |mode| Request {
+            tolerance_rad: march.tolerance_rad,
+            mode,
+            interpolant,
+            step_voxels: march.step_voxels,
+            wanted,
+            blank: BlankCells::default(),
         };
 
-        // Forced, or the first rung that agrees with the next but one (the line of sight with the first march).
-        let mut warnings = Vec::new();
-        let mut error_rad = None;
-        let choice = match (method, march.step_voxels) {
-            (Some(name), step) => (name, step.unwrap_or(if name == "pefrl" { 0.5 } else { 1.0 })),
-            (None, Some(step)) => ("verlet", step),
-            (None, None) => {
-                let starts = self.probes();
-                let mut picked = LADDER[LADDER.len() - 1];
-                let mut coarse = traced(&*make(LADDER[0], Wanted::default()), &starts);
-                for pair in LADDER.windows(2) {
-                    let fine = traced(&*make(pair[1], Wanted::default()), &starts);
-                    let difference = largest_difference(&coarse, &fine);
-                    error_rad = Some(difference);
-                    if difference <= 0.5 * march.tolerance_rad {
-                        picked = pair[0];
-                        break;
-                    }
-                    coarse = fine;
-                }
-                picked
+        // For comparison: by name only, never picked.
+        let (paths, description, achieved) = if let Some(name @ ("euler" | "sharma" | "rk4")) = method {
+            let interpolant = interpolant.unwrap_or_default();
+            let step_voxels = march.step_voxels.unwrap_or(1.0);
+            let paths = compared(name, field, view, interpolant, step_voxels, wanted);
+            (paths, described(name, interpolant, step_voxels), None)
+        } else {
+            let mode = method.map(|name| match name {
+                "line-of-sight" => Mode::LineOfSight,
+                "pefrl" => Mode::Full,
+                _ => Mode::Paraxial,
+            });
+            let plan = Plan::new(field, with(mode));
+            // PEFRL is made with the spline only.
+            if plan.mode == Mode::Full && interpolant.is_some_and(|i| i != Interpolant::BSpline) {
+                let step = plan.step_voxels;
+                let options = FullOptions { step_voxels: step, wanted, ..FullOptions::default() };
+                let paths = full(field, view, plan.interpolant, Pefrl, options);
+                (paths, described("pefrl", plan.interpolant, step), None)
+            } else {
+                let name = match plan.mode {
+                    Mode::LineOfSight => "line-of-sight",
+                    Mode::Paraxial => "verlet",
+                    Mode::Full => "pefrl",
+                };
+                let achieved = measure.then(|| plan.measure(field, view, MEASURED_RAYS));
+                (plan.paths(field, view), described(name, plan.interpolant, plan.step_voxels), achieved)
             }
         };
-        if let Some(e) = error_rad.filter(|e| *e > 0.5 * march.tolerance_rad) {
+        let mut warnings = Vec::new();
+        if let Some(a) = achieved.filter(|a| a.max_rad > march.tolerance_rad) {
             warnings.push(format!(
-                "deflections differ by up to {e:.1e} rad between the two finest marches, above half the tolerance of {:.1e} rad; the flow has structures that its lattice does not resolve: smooth shocks (flow.smoothing_nodes) or take a finer lattice",
-                march.tolerance_rad
+                "deflections are off by up to {:.1e} rad, above the tolerance of {:.1e} rad; the flow has structures that its lattice does not resolve: smooth shocks (flow.smoothing_nodes) or take a finer lattice",
+                a.max_rad, march.tolerance_rad
             ));
         }
-        let paths = make(choice, wanted);
         let paths = if against_light { Box::new(Reversed::new(paths)) as Box<dyn LightPaths> } else { paths };
-        Ok(Planned { paths, description: words(choice), error_rad, warnings })
-    }
-
-    /// A coarse lattice of rays over the field.
-    fn probes(&self) -> Vec<Start> {
-        const SIDE: u32 = 24;
-        let [w, h] = self.sides_m();
-        let framing = |pixel_m| Framing { width: SIDE, height: SIDE, pixel_m, center_m: [0.0; 2] };
-        let (across, along) = (framing(w / f64::from(SIDE)).pixel_centers(), framing(h / f64::from(SIDE)).pixel_centers());
-        let both = |(a, b): (&Start, &Start)| Start { position_m: [a.position_m[0], b.position_m[1]], tilt_rad: [0.0; 2] };
-        across.iter().zip(&along).map(both).collect()
+        Ok(Planned {
+            paths,
+            description,
+            error_rad: achieved.map(|a| a.max_rad),
+            resolution_error_rad: achieved.map(|a| a.resolution_rad).filter(|r| r.is_finite()),
+            warnings,
+        })
     }
 }
 
-fn make<'a>(
+fn described(name: &str, interpolant: Interpolant, step_voxels: f64) -> String {
+    let interpolant = match interpolant {
+        Interpolant::BSpline => "b-spline",
+        Interpolant::Trilinear => "trilinear",
+        Interpolant::TrilinearGradient => "trilinear-gradient",
+    };
+    match name {
+        "line-of-sight" => format!("line-of-sight, {interpolant}"),
+        _ => format!("{name}, {interpolant}, steps of {step_voxels} voxel"),
+    }
+}
+
+/// A march that is there to compare with.
+fn compared<'a>(
+    name: &str,
     field: &'a Field,
     view: View,
     interpolant: Interpolant,
-    name: &str,
     step_voxels: f64,
     wanted: Wanted,
 ) -> Box<dyn LightPaths + 'a> {
-    let deviational = |scheme| {
-        let options = Options { scheme, step_voxels, wanted, ..Options::default() };
-        Box::new(Deviational::new(field, view, interpolant, options)) as Box<dyn LightPaths + 'a>
-    };
     let options = FullOptions { step_voxels, wanted, ..FullOptions::default() };
     match name {
-        "line-of-sight" => Box::new(LineOfSight::new(field, view, interpolant, wanted, BlankCells::default())),
-        "euler" => deviational(Scheme::Euler),
-        "pefrl" => full(field, view, interpolant, Pefrl, options),
         "sharma" => full(field, view, interpolant, Sharma, options),
         "rk4" => full(field, view, interpolant, RungeKutta4, options),
-        _ => deviational(Scheme::Verlet),
+        _ => {
+            let options = Options { scheme: Scheme::Euler, step_voxels, wanted, ..Options::default() };
+            Box::new(Deviational::new(field, view, interpolant, options))
+        }
     }
 }
 
@@ -151,8 +163,12 @@ fn full<'a, G: Integrator + Copy + 'a>(
     options: FullOptions,
 ) -> Box<dyn LightPaths + 'a> {
     match interpolant {
-        Interpolant::BSpline => Box::new(Owned { field, interpolate: BSpline::new(field), integrator, view, options }),
-        Interpolant::Trilinear => Box::new(Owned { field, interpolate: Trilinear::new(field), integrator, view, options }),
+        Interpolant::BSpline => {
+            Box::new(Owned { field, interpolate: BSpline::new(field), integrator, view, options })
+        }
+        Interpolant::Trilinear => {
+            Box::new(Owned { field, interpolate: Trilinear::new(field), integrator, view, options })
+        }
         Interpolant::TrilinearGradient => {
             Box::new(Owned { field, interpolate: TrilinearGradient::new(field), integrator, view, options })
         }
@@ -170,7 +186,8 @@ struct Owned<'a, I, G> {
 
 impl<I: Interpolate, G: Integrator + Copy> LightPaths for Owned<'_, I, G> {
     fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
-        Full::new(self.field, &self.interpolate, self.integrator, self.view, self.options).trace(starts, exits);
+        Full::new(self.field, &self.interpolate, self.integrator, self.view, self.options)
+            .trace(starts, exits);
     }
 
     fn view(&self) -> &View {
@@ -184,20 +201,4 @@ impl<I: Interpolate, G: Integrator + Copy> LightPaths for Owned<'_, I, G> {
     fn difference_step_m(&self) -> f64 {
         Full::new(self.field, &self.interpolate, self.integrator, self.view, self.options).difference_step_m()
     }
-}
-
-fn traced(paths: &dyn LightPaths, starts: &[Start]) -> Vec<Exit> {
-    let mut exits = vec![Exit::UNDISTURBED; starts.len()];
-    paths.trace_parallel(starts, &mut exits);
-    exits
-}
-
-/// Largest difference of deflections between rays that come through in both.
-fn largest_difference(a: &[Exit], b: &[Exit]) -> f64 {
-    let free = |e: &Exit| e.transmission > 0.0 && e.status != Status::Turned;
-    let difference = |(a, b): (&Exit, &Exit)| {
-        let d = [0, 1].map(|i| f64::from(a.deflection_rad[i]) - f64::from(b.deflection_rad[i]));
-        d[0].hypot(d[1])
-    };
-    a.iter().zip(b).filter(|(a, b)| free(a) && free(b)).map(difference).fold(0.0, f64::max)
 }

@@ -30,8 +30,16 @@ const SMALL: &str = "[film]\nsize = [48, 40]\n";
 
 #[test]
 fn pictures_are_the_same_for_any_number_of_threads() {
-    for technique in ["kind = \"schlieren\"", "kind = \"shadowgraph\"", "kind = \"schlieren\"\ncutoff = { kind = \"color\", radius_m = 1e-4 }"] {
-        for sampling in ["method = \"photons\"\nsamples = 4", "method = \"beams\"", "method = \"photons\"\nsamples = 4\nfilter = { kind = \"cone\", nearest = 6 }"] {
+    for technique in [
+        "kind = \"schlieren\"",
+        "kind = \"shadowgraph\"",
+        "kind = \"schlieren\"\ncutoff = { kind = \"color\", radius_m = 1e-4 }",
+    ] {
+        for sampling in [
+            "method = \"photons\"\nsamples = 4",
+            "method = \"beams\"",
+            "method = \"photons\"\nsamples = 4\nfilter = { kind = \"cone\", nearest = 6 }",
+        ] {
             let text = format!("{SMALL}[technique]\n{technique}\n[sampling]\n{sampling}");
             let with = |threads| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -80,7 +88,10 @@ fn what_a_scene_does_not_call_for_is_not_counted() {
     let plain = c(photons, Layers::NONE);
     let k = plain.counters;
     assert!(k.rays >= 2 * 48 * 40);
-    assert_eq!((k.map_rays, k.phase_rays, k.dispersion_rays, k.solid_queries, k.tilted_rays, k.differential_rays), (0, 0, 0, 0, 0, 0));
+    assert_eq!(
+        (k.map_rays, k.phase_rays, k.dispersion_rays, k.solid_queries, k.tilted_rays, k.differential_rays),
+        (0, 0, 0, 0, 0, 0)
+    );
     assert_eq!(plain.effects, Effects::default());
 
     let phase = c(&format!("[technique]\nkind = \"interferogram\"\n{photons}"), Layers::NONE);
@@ -102,9 +113,12 @@ fn a_plate_casts_its_shadow_and_only_there() {
     let positions = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
     let mesh = TriMesh::new(positions, vec![[0, 1, 2], [0, 2, 3]]);
     let plate = || Solids::from_world(World::from_mesh(mesh.clone(), &BuildOptions::default()).unwrap());
-    for sampling in ["method = \"photons\"\nsamples = 4\nfilter = { kind = \"none\" }", "method = \"beams\""] {
+    for sampling in ["method = \"photons\"\nsamples = 4\nfilter = { kind = \"none\" }", "method = \"beams\""]
+    {
         // The scene names a file so that its effects know of bodies; what is used is the plate above.
-        let s = scene(&format!("{SMALL}[technique]\nkind = \"shadowgraph\"\n[solids]\nfiles = [\"plate.stl\"]\n[sampling]\n{sampling}"));
+        let s = scene(&format!(
+            "{SMALL}[technique]\nkind = \"shadowgraph\"\n[solids]\nfiles = [\"plate.stl\"]\n[sampling]\n{sampling}"
+        ));
         let section = TestSection::of_fields(&s, vec![blob()], Some(plate())).unwrap();
         let r = render(&s, &section, Layers { map: true, ..Layers::NONE }, &Control::default()).unwrap();
         // Rays bend outwards by up to 0.5 m · 3e-5 = 15 µm, far below a pixel of 2.4 mm.
