@@ -29,6 +29,7 @@ pub mod march;
 pub mod optics;
 pub mod output;
 pub mod path;
+pub mod plan;
 pub mod render;
 pub mod scene;
 pub mod skip;

@@ -70,6 +70,9 @@ pub trait Interpolate: Sync {
 
 /// The kernels: sixteen points in `f32`. Implementors borrow an interpolant's arrays, so that bounds are checked once a point.
 pub(crate) trait Interpolate16: Copy + Sync {
+    /// Accurate enough for sums over hundreds of samples to be compensated.
+    const EXACT: bool;
+
     /// At points in lattice coordinates, which may lie outside (but are no NaNs).
     fn sample16<S: Simd>(&self, simd: S, at: &[f32x16<S>; 3]) -> Samples<S>;
 }

@@ -96,6 +96,8 @@ pub(crate) struct TrilinearRows<'a> {
 }
 
 impl Interpolate16 for TrilinearRows<'_> {
+    const EXACT: bool = false;
+
     #[inline(always)]
     fn sample16<S: Simd>(&self, simd: S, at: &[f32x16<S>; 3]) -> Samples<S> {
         // Cells and places in them.

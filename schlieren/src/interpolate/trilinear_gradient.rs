@@ -101,6 +101,8 @@ pub(crate) struct TrilinearGradientRows<'a> {
 }
 
 impl Interpolate16 for TrilinearGradientRows<'_> {
+    const EXACT: bool = false;
+
     #[inline(always)]
     fn sample16<S: Simd>(&self, simd: S, at: &[f32x16<S>; 3]) -> Samples<S> {
         let mut cells = [i32x16::splat(simd, 0); 3];

@@ -37,7 +37,7 @@ pub struct Options {
     pub blank: BlankCells,
     /// Leave out bricks as long as the bounds of what that leaves out of a ray's deflection add up to less than this. Zero: leave out nothing.
     pub skip_rad: f64,
-    /// The same for the optical path difference, when that is wanted.
+    /// The largest error of the optical path difference that leaving out one stretch of eight steps may cost, when that is wanted.
     pub skip_opd_m: f64,
 }
 
@@ -225,43 +225,63 @@ impl<'a> Deviational<'a> {
         let mut left_out = 0.0f32;
         for (starts, exits) in starts.chunks(IN_FLIGHT * LANES).zip(exits.chunks_mut(IN_FLIGHT * LANES)) {
             let mut packets = [const { Packet::EMPTY }; IN_FLIGHT];
-            let mut beams = [([DVec3::ZERO; 3], 0.0f64); IN_FLIGHT * LANES];
+            let mut rays = [Ready::default(); IN_FLIGHT * LANES];
             let mut steps = 0.0f64;
-            for (i, start) in starts.iter().enumerate() {
+            for (ready, start) in rays.iter_mut().zip(starts) {
                 let ray = self.frame.undisturbed(start, &mut known);
                 let length_m = ray.range_m[1] - ray.range_m[0];
-                beams[i] = (ray.beam, ray.range_m[1]);
-                if length_m > 0.0 {
-                    in_field += 1;
-                    steps = steps.max(length_m * ray.direction.length() / self.options.step_voxels);
-                    let entry = ray.at + ray.direction * ray.range_m[0];
-                    let (p, l) = (&mut packets[i / LANES], i % LANES);
-                    for c in 0..3 {
-                        p.entry[c][l] = entry[c] as f32;
-                        p.direction[c][l] = (ray.direction[c] * self.frame.unit_m) as f32;
-                        p.along[c][l] = (ray.beam[2][c] * h[c]) as f32;
-                    }
-                    p.length[l] = (length_m / self.frame.unit_m) as f32;
-                }
+                *ready = Ready {
+                    beam: ray.beam,
+                    exit_depth_m: ray.range_m[1],
+                    length_m,
+                    middle: ray.at + ray.direction * (0.5 * (ray.range_m[0] + ray.range_m[1])),
+                    chord: ray.direction * length_m,
+                    scale: 1.0,
+                };
+                steps = steps.max(ready.chord.length() / self.options.step_voxels);
             }
-            if steps > 0.0 {
-                let done = march(simd, field, &common, &mut packets, steps_of(steps), effects);
+            let steps = steps_of(steps);
+            for (i, ready) in rays.iter_mut().enumerate().filter(|(_, r)| r.length_m > 0.0) {
+                in_field += 1;
+                let (p, l) = (&mut packets[i / LANES], i % LANES);
+                for c in 0..3 {
+                    p.middle[c][l] = ready.middle[c] as f32;
+                    ready.middle[c] -= f64::from(p.middle[c][l]);
+                    p.xi[c][l] = ready.middle[c] as f32;
+                    p.stride[c][l] = (ready.chord[c] / f64::from(steps)) as f32;
+                    p.along[c][l] = (ready.beam[2][c] * h[c]) as f32;
+                }
+                let dt = ready.length_m / f64::from(steps) / self.frame.unit_m;
+                p.dt[l] = dt as f32;
+                ready.scale = dt / f64::from(p.dt[l]);
+            }
+            if steps > 0 {
+                let done = march(simd, field, &common, &mut packets, steps, effects);
                 work.sampled += done.sampled;
                 work.skipped += done.skipped;
             }
             for (i, exit) in exits.iter_mut().enumerate() {
                 let (p, l) = (&packets[i / LANES], i % LANES);
-                let ([right, up, _], depth_m) = beams[i];
-                let u = DVec3::from([0, 1, 2].map(|c| f64::from(p.v[c][l]) * h[c]));
-                let xi = DVec3::from([0, 1, 2].map(|c| f64::from(p.xi[c][l]) * h[c])) * self.frame.unit_m;
+                let [right, up, _] = rays[i].beam;
+                let scale = rays[i].scale;
+                let u = DVec3::from([0, 1, 2].map(|c| f64::from(p.v[c][l]) * h[c])) * scale;
+                let left_over = rays[i].middle;
+                let xi = DVec3::from(
+                    [0, 1, 2].map(|c| (f64::from(p.xi[c][l]) - f64::from(left_over[c] as f32)) * h[c]),
+                );
+                let xi = if rays[i].length_m > 0.0 {
+                    xi * (scale * scale * self.frame.unit_m)
+                } else {
+                    DVec3::ZERO
+                };
                 let (transmission, status) = self.options.blank.fate(p.met[l]);
                 left_out = left_out.max(p.left_out[l]);
                 *exit = Exit {
                     deflection_rad: [u.dot(right) as f32, u.dot(up) as f32],
                     displacement_m: [xi.dot(right) as f32, xi.dot(up) as f32],
-                    exit_depth_m: depth_m as f32,
+                    exit_depth_m: rays[i].exit_depth_m as f32,
                     opd_m: if self.options.wanted.opd {
-                        (f64::from(p.opd[l]) * self.frame.unit_m * self.field.n0()) as f32
+                        (f64::from(p.opd[l]) * scale * self.frame.unit_m * self.field.n0()) as f32
                     } else {
                         f32::NAN
                     },
@@ -276,6 +296,20 @@ impl<'a> Deviational<'a> {
         self.skipped.fetch_add(work.skipped, Ordering::Relaxed);
         self.left_out_femtorad.fetch_max((f64::from(left_out) * 1e15).ceil() as u64, Ordering::Relaxed);
     }
+}
+
+/// A ray on its way into a packet.
+#[derive(Clone, Copy, Default)]
+struct Ready {
+    beam: [DVec3; 3],
+    exit_depth_m: f64,
+    length_m: f64,
+    /// The middle of its way in lattice coordinates; then what rounding that to f32 left out.
+    middle: DVec3,
+    /// From entry to exit in lattice coordinates.
+    chord: DVec3,
+    /// What rounding the step to f32 did to it: every step of a ray is wrong by the same factor, and that is put right at the end.
+    scale: f64,
 }
 
 /// Whole steps for a length in steps: a hair above a whole number is rounding, not a step.

@@ -61,7 +61,7 @@ impl<'a, I: Interpolate, G: Integrator> Full<'a, I, G> {
         let [right, up, direction] = ray.beam;
         let lattice = |r: &Ray| (r.position_m() - self.field.origin_m()) / self.frame.spacing_m;
         let at_m = self.field.origin_m() + ray.at * self.frame.spacing_m;
-        let begin = Ray::new(at_m + direction * near_m, direction);
+        let begin = Ray::inside(&medium, at_m + direction * near_m, direction);
         let length_m = far_m - near_m;
         let speed = self.frame.lattice_speed_per_m(direction);
         let steps = (length_m * speed / self.options.step_voxels).ceil().max(1.0);

@@ -40,6 +40,9 @@ struct Map {
     /// Map coordinate of the view's centre, and map steps per metre (negative where the lattice runs the other way).
     centre: [f64; 2],
     per_m: [f64; 2],
+    /// Coefficients of the deflection along right and up, where it is not the slope of the first. Obliquely the way through the field's
+    /// box changes from ray to ray, and that slope would be the deflection of a prism of the box's shape.
+    slopes: Option<[Vec<f32>; 2]>,
     /// The worst [`Node`] on the way, by nearest map node.
     kinds: Option<Vec<u8>>,
 }
@@ -79,7 +82,7 @@ impl LineOfSight {
                     let s = BSpline::new(field);
                     project_obliquely(field, &frame, s.rows(), level)
                 }
-                // The gradient comes from the projection, so that of the interpolant is not needed.
+                // Line of sight is linear in eps, so there is nothing that gradients at the nodes could add.
                 Interpolant::Trilinear | Interpolant::TrilinearGradient => {
                     let s = Trilinear::new(field);
                     debug_assert_eq!(s.dims(), field.dims());
@@ -93,7 +96,8 @@ impl LineOfSight {
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        size_of_val(&self.map.coefficients[..]) + self.map.kinds.as_ref().map_or(0, Vec::len)
+        size_of_val(&self.map.coefficients[..]) * if self.map.slopes.is_some() { 3 } else { 1 }
+            + self.map.kinds.as_ref().map_or(0, Vec::len)
     }
 
     /// Where a photon leaves the field; `None` when it misses it.
@@ -139,13 +143,9 @@ impl LineOfSight {
             #[inline(always)]
             || {
                 let m = &self.map;
-                let len = m.coefficients.len() - 3 * m.row;
-                let rows = [
-                    &m.coefficients[..len],
-                    &m.coefficients[m.row..m.row + len],
-                    &m.coefficients[2 * m.row..2 * m.row + len],
-                    &m.coefficients[3 * m.row..3 * m.row + len],
-                ];
+                let rows = four_rows(&m.coefficients, m.row);
+                let slope_rows =
+                    m.slopes.as_ref().map(|s| [four_rows(&s[0], m.row), four_rows(&s[1], m.row)]);
                 for (starts, exits) in starts.chunks(LANES).zip(exits.chunks_mut(LANES)) {
                     let mut at = [[0.0f32; LANES]; 2];
                     for (l, s) in starts.iter().enumerate() {
@@ -153,15 +153,29 @@ impl LineOfSight {
                             at[c][l] = (m.centre[c] + f64::from(s.position_m[c]) * m.per_m[c]) as f32;
                         }
                     }
-                    let [path, along_s, along_t] = spline2(simd, rows, m.dims, m.row, &at);
+                    let [path, mut along_s, mut along_t] = spline2(simd, rows, m.dims, m.row, &at);
+                    for l in 0..LANES {
+                        along_s[l] *= m.per_m[0] as f32;
+                        along_t[l] *= m.per_m[1] as f32;
+                    }
+                    if let Some([s, t]) = slope_rows {
+                        [along_s, ..] = spline2(simd, s, m.dims, m.row, &at);
+                        [along_t, ..] = spline2(simd, t, m.dims, m.row, &at);
+                    }
                     for (l, (s, e)) in starts.iter().zip(exits).enumerate() {
-                        let slope = [along_s[l] * m.per_m[0] as f32, along_t[l] * m.per_m[1] as f32];
+                        let slope = [along_s[l], along_t[l]];
                         *e = self.exit(s, [at[0][l], at[1][l]], path[l], slope);
                     }
                 }
             },
         );
     }
+}
+
+/// A map as four slices of one length, shifted by rows.
+fn four_rows(coefficients: &[f32], row: usize) -> [&[f32]; 4] {
+    let len = coefficients.len() - 3 * row;
+    [0, 1, 2, 3].map(|j| &coefficients[j * row..j * row + len])
 }
 
 /// Value and derivatives of a two-dimensional spline at sixteen points.
@@ -293,6 +307,7 @@ fn project_along_axis(
         row,
         centre: [centre[right.0], centre[up.0]],
         per_m: [right.1 / field.spacing_m()[right.0], up.1 / field.spacing_m()[up.0]],
+        slopes: None,
         kinds,
     }
 }
@@ -316,11 +331,11 @@ fn project_obliquely<I: Interpolate16>(field: &Field, frame: &Frame, rows: I, le
         }
     }
     let dims = [0, 1].map(|a| ((hi[a] - lo[a]) / step_m).ceil() as usize + 1);
-    let mut sums = vec![0.0f64; dims[0] * dims[1]];
+    let mut sums = vec![[0.0f64; 3]; dims[0] * dims[1]];
     let mut kinds = field.nodes().map(|_| vec![0u8; dims[0] * dims[1]]);
     let no_kinds: &mut [u8] = &mut [];
     let kind_rows = kinds.as_deref_mut().unwrap_or(no_kinds);
-    let line = |v: usize, out: &mut [f64], kinds: &mut [u8]| {
+    let line = |v: usize, out: &mut [[f64; 3]], kinds: &mut [u8]| {
         at_level!(level, simd => integrate_row(simd, field, frame, rows, step_m, [lo[0], lo[1] + v as f64 * step_m], out, kinds));
     };
     if kind_rows.is_empty() {
@@ -331,18 +346,21 @@ fn project_obliquely<I: Interpolate16>(field: &Field, frame: &Frame, rows: I, le
             .enumerate()
             .for_each(|(v, (out, k))| line(v, out, k));
     }
-    let (coefficients, row) = prefilter_map(&sums, dims);
+    let component = |q: usize| -> Vec<f64> { sums.iter().map(|s| s[q]).collect() };
+    let (coefficients, row) = prefilter_map(&component(0), dims);
+    let slopes = [1, 2].map(|q| prefilter_map(&component(q), dims).0);
     Map {
         coefficients,
         dims,
         row,
         centre: [-lo[0] / step_m, -lo[1] / step_m],
         per_m: [1.0 / step_m; 2],
+        slopes: Some(slopes),
         kinds,
     }
 }
 
-/// Integrals of eps, in metres, along the rays through a row of map nodes.
+/// Integrals of eps (in metres) and of its gradient along right and up, along the rays through a row of map nodes.
 #[inline(never)]
 fn integrate_row<S: Simd, I: Interpolate16>(
     simd: S,
@@ -351,7 +369,7 @@ fn integrate_row<S: Simd, I: Interpolate16>(
     rows: I,
     step_m: f64,
     first_m: [f64; 2],
-    out: &mut [f64],
+    out: &mut [[f64; 3]],
     kinds: &mut [u8],
 ) {
     simd.vectorize(
@@ -361,6 +379,7 @@ fn integrate_row<S: Simd, I: Interpolate16>(
             let direction = frame.view.forward / frame.spacing_m;
             let speed = direction.length();
             let dims = field.dims();
+            let (right, up) = (frame.view.right / frame.spacing_m, frame.view.up / frame.spacing_m);
             for (block, sums) in out.chunks_mut(LANES).enumerate() {
                 let mut entry = [[0.0f32; LANES]; 3];
                 let mut chord = [[0.0f32; LANES]; 3];
@@ -384,11 +403,11 @@ fn integrate_row<S: Simd, I: Interpolate16>(
                 }
                 let steps = (longest_m * speed).ceil().max(1.0) as u32;
                 let per_step = 1.0 / steps as f32;
-                let mut total = [0.0f64; LANES];
+                let mut total = [[0.0f64; LANES]; 4];
                 let mut k = 0;
                 while k < steps {
                     // A few steps in f32, blocks of them in f64: the sum's rounding does not grow with the path.
-                    let mut some = f32x16::splat(simd, 0.0);
+                    let mut some = [f32x16::splat(simd, 0.0); 4];
                     let end = (k + 16).min(steps);
                     while k < end {
                         let fraction = f32x16::splat(simd, (k as f32 + 0.5) * per_step);
@@ -399,7 +418,11 @@ fn integrate_row<S: Simd, I: Interpolate16>(
                                 f32x16::from_slice(simd, &entry[c]),
                             );
                         }
-                        some += rows.sample16(simd, &at).eps;
+                        let here = rows.sample16(simd, &at);
+                        some[0] += here.eps;
+                        for c in 0..3 {
+                            some[c + 1] += here.gradient[c];
+                        }
                         if let (Some(nodes), false) = (field.nodes(), kinds.is_empty()) {
                             let p: [Row; 3] = [at[0].into(), at[1].into(), at[2].into()];
                             for l in 0..sums.len() {
@@ -414,13 +437,17 @@ fn integrate_row<S: Simd, I: Interpolate16>(
                         }
                         k += 1;
                     }
-                    let some: Row = some.into();
-                    for l in 0..LANES {
-                        total[l] += f64::from(some[l]);
+                    for (total, some) in total.iter_mut().zip(some) {
+                        let some: Row = some.into();
+                        for l in 0..LANES {
+                            total[l] += f64::from(some[l]);
+                        }
                     }
                 }
                 for (l, s) in sums.iter_mut().enumerate() {
-                    *s = total[l] * length_m[l] / f64::from(steps);
+                    let step_m = length_m[l] / f64::from(steps);
+                    let gradient = DVec3::new(total[1][l], total[2][l], total[3][l]) * step_m;
+                    *s = [total[0][l] * step_m, gradient.dot(right), gradient.dot(up)];
                 }
             }
         },
@@ -479,28 +506,54 @@ impl LightPaths for LineOfSight {
                 continue;
             }
             let [(i, x), (k, y)] = [0, 1].map(|c| cell(at[c], m.dims[c]));
-            let ((wx, dx), (wy, dy)) = (bspline_weights(x), bspline_weights(y));
-            // Second derivatives: linear weights of second differences.
-            let (hx, hy) = ([1.0 - x, x], [1.0 - y, y]);
-            let [mut xx, mut xy, mut yy] = [0.0f64; 3];
-            let c = |a: usize, b: usize| f64::from(m.coefficients[i + a + (k + b) * m.row]);
-            for b in 0..4 {
-                for a in 0..2 {
-                    xx += wy[b] * hx[a] * (c(a, b) - 2.0 * c(a + 1, b) + c(a + 2, b));
-                    yy += wx[b] * hy[a] * (c(b, a) - 2.0 * c(b, a + 1) + c(b, a + 2));
-                }
-            }
-            for b in 0..3 {
-                for a in 0..3 {
-                    xy += dx[a] * dy[b] * ((c(a + 1, b + 1) - c(a, b + 1)) - (c(a + 1, b) - c(a, b)));
-                }
-            }
-            let [p, q] = m.per_m;
-            let hessian = [[xx * p * p, xy * p * q], [xy * p * q, yy * q * q]];
+            let hessian = match &m.slopes {
+                None => second_derivatives(&m.coefficients, m.row, [i, k], [x, y], m.per_m),
+                Some(slopes) => [0, 1].map(|r| derivatives(&slopes[r], m.row, [i, k], [x, y], m.per_m)),
+            };
             j.deflection_per_m = hessian.map(|r| r.map(|v| v as f32));
             j.displacement_per_m = hessian.map(|r| r.map(|v| (v * f64::from(e.exit_depth_m)) as f32));
         }
     }
+}
+
+/// First derivatives of a map's spline, per metre.
+fn derivatives(c: &[f32], row: usize, [i, k]: [usize; 2], [x, y]: [f64; 2], per_m: [f64; 2]) -> [f64; 2] {
+    let ((wx, dx), (wy, dy)) = (bspline_weights(x), bspline_weights(y));
+    let c = |a: usize, b: usize| f64::from(c[i + a + (k + b) * row]);
+    let (mut along_x, mut along_y) = (0.0, 0.0);
+    for b in 0..4 {
+        for a in 0..3 {
+            along_x += wy[b] * dx[a] * (c(a + 1, b) - c(a, b));
+            along_y += wx[b] * dy[a] * (c(b, a + 1) - c(b, a));
+        }
+    }
+    [along_x * per_m[0], along_y * per_m[1]]
+}
+
+/// Second derivatives: linear weights of second differences.
+fn second_derivatives(
+    c: &[f32],
+    row: usize,
+    [i, k]: [usize; 2],
+    [x, y]: [f64; 2],
+    [p, q]: [f64; 2],
+) -> [[f64; 2]; 2] {
+    let ((wx, dx), (wy, dy)) = (bspline_weights(x), bspline_weights(y));
+    let (hx, hy) = ([1.0 - x, x], [1.0 - y, y]);
+    let c = |a: usize, b: usize| f64::from(c[i + a + (k + b) * row]);
+    let [mut xx, mut xy, mut yy] = [0.0f64; 3];
+    for b in 0..4 {
+        for a in 0..2 {
+            xx += wy[b] * hx[a] * (c(a, b) - 2.0 * c(a + 1, b) + c(a + 2, b));
+            yy += wx[b] * hy[a] * (c(b, a) - 2.0 * c(b, a + 1) + c(b, a + 2));
+        }
+    }
+    for b in 0..3 {
+        for a in 0..3 {
+            xy += dx[a] * dy[b] * ((c(a + 1, b + 1) - c(a, b + 1)) - (c(a + 1, b) - c(a, b)));
+        }
+    }
+    [[xx * p * p, xy * p * q], [xy * p * q, yy * q * q]]
 }
 
 /// Nodes are compared by how bad they are for light.

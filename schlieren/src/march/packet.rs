@@ -17,17 +17,25 @@ use fearless_simd::{Simd, f32x16, i32x16};
 #[derive(Clone)]
 #[repr(C, align(64))]
 pub(super) struct Packet {
-    /// Where the undisturbed rays enter, in lattice coordinates.
-    pub(super) entry: [Row; 3],
-    /// Their direction, in lattice steps per unit of tau.
-    pub(super) direction: [Row; 3],
+    /// The middle of the undisturbed ray's way through the field, in lattice coordinates. Positions are counted from there because that halves
+    /// the largest product, and with it the rounding.
+    pub(super) middle: [Row; 3],
+    /// A step along the undisturbed ray, in lattice coordinates.
+    pub(super) stride: [Row; 3],
     /// The direction times the spacing: projects lattice components of `xi` and `v` on the ray.
     pub(super) along: [Row; 3],
-    /// Path from entry to undisturbed exit.
-    pub(super) length: Row,
+    /// A step of tau. Before the march: of path. The ray enters with a rate of 1 + eps there, and deviations are from a ray that keeps it.
+    pub(super) dt: Row,
+    /// eps where the ray enters.
+    pub(super) eps_at_entry: Row,
+    /// Starts as what rounding `middle` to f32 left out, which [`super::Deviational`] takes off again at the end.
     pub(super) xi: [Row; 3],
     pub(super) v: [Row; 3],
+    /// What rounding left out of `v` so far (Kahan 1965), for interpolants that are worth it.
+    pub(super) v_rest: [Row; 3],
     pub(super) opd: Row,
+    /// The same for `opd`.
+    pub(super) opd_rest: Row,
     /// Bound on the deflection that skipping left out.
     pub(super) left_out: Row,
     /// The worst [`Node`] met.
@@ -36,13 +44,16 @@ pub(super) struct Packet {
 
 impl Packet {
     pub(super) const EMPTY: Packet = Packet {
-        entry: [[0.0; LANES]; 3],
-        direction: [[0.0; LANES]; 3],
+        middle: [[0.0; LANES]; 3],
+        stride: [[0.0; LANES]; 3],
         along: [[0.0; LANES]; 3],
-        length: [0.0; LANES],
+        dt: [0.0; LANES],
+        eps_at_entry: [0.0; LANES],
         xi: [[0.0; LANES]; 3],
         v: [[0.0; LANES]; 3],
+        v_rest: [[0.0; LANES]; 3],
         opd: [0.0; LANES],
+        opd_rest: [0.0; LANES],
         left_out: [0.0; LANES],
         met: [0; LANES],
     };
@@ -76,7 +87,7 @@ pub(super) struct Skip<'a> {
     pub(super) unit_m: f32,
     /// In rad, over the whole ray.
     pub(super) tolerance_rad: f32,
-    /// In metres, over the whole ray.
+    /// In metres, for each stretch that is left out.
     pub(super) tolerance_opd_m: f32,
 }
 
@@ -140,36 +151,46 @@ fn march_body<S: Simd, I: Interpolate16, E: Effects, const P: usize>(
     steps: u32,
 ) -> Work {
     let mut work = Work::default();
-    let per_step = 1.0 / steps as f32;
+    // Step numbers are counted from the middle of the way: exact in f32.
+    let middle = 0.5 * steps as f32;
     let mut k = 0;
-    // One iteration more than steps, to end in the exit plane; in the same loop, so that there is one copy of the sampling code.
+    let mut entering = true;
+    // Two iterations more than steps, to look at the entry and to end in the exit plane; in the same loop, so that there is one copy of the
+    // sampling code.
     while k <= steps {
         // Leaving out whole bricks, when all rays in flight may.
         if E::SKIP
+            && !entering
             && k % STRIDE == 0
             && k + STRIDE <= steps
-            && leave_out::<S, E, P>(simd, common, packets, k, per_step)
+            && leave_out::<S, I, E, P>(simd, common, packets, k as f32 - middle)
         {
             k += STRIDE;
             work.skipped += u64::from(STRIDE) * P as u64;
             continue;
         }
         for p in packets.iter_mut() {
-            let length = f32x16::from_slice(simd, &p.length);
-            let whole = length * per_step;
-            let s = if k < steps {
+            let dt = f32x16::from_slice(simd, &p.dt);
+            let s = if entering {
+                let zero = dt * 0.0;
+                Step { number: zero - f32x16::splat(simd, middle), move_by: zero, dt: zero }
+            } else if k < steps {
                 let number = if E::EULER { k as f32 } else { k as f32 + 0.5 };
-                Step { tau: length * (number * per_step), move_by: whole, dt: whole }
+                Step { number: f32x16::splat(simd, number - middle), move_by: dt, dt }
             } else {
-                last_step::<S, E>(simd, p, length, whole)
+                last_step::<S, E>(simd, p, middle)
             };
-            step::<S, I, E>(simd, field, common, p, s);
-            if k == steps {
+            let eps = step::<S, I, E>(simd, field, common, p, s);
+            if entering {
+                eps.store_slice(&mut p.eps_at_entry);
+                (dt / (eps + f32x16::splat(simd, 1.0))).store_slice(&mut p.dt);
+            } else if k == steps {
                 drift(simd, p, s.dt * 0.5);
             }
         }
         work.sampled += P as u64;
-        k += 1;
+        k += u32::from(!entering);
+        entering = false;
         if E::NODES && packets.iter().all(|p| p.met.iter().all(|m| *m > common.survives)) {
             return work;
         }
@@ -190,8 +211,8 @@ fn drift<S: Simd>(simd: S, p: &mut Packet, dt: f32x16<S>) {
 /// What a step does.
 #[derive(Clone, Copy)]
 struct Step<S: Simd> {
-    /// Path along the undisturbed ray to where the sample is taken.
-    tau: f32x16<S>,
+    /// Steps along the undisturbed ray from its middle to where the sample is taken.
+    number: f32x16<S>,
     /// How far positions drift from where the last step left them to there.
     move_by: f32x16<S>,
     /// For how long the sample pushes.
@@ -207,28 +228,30 @@ fn step<S: Simd, I: Interpolate16, E: Effects>(
     common: &Common<'_>,
     p: &mut Packet,
     s: Step<S>,
-) {
-    let mut at = [s.tau; 3];
+) -> f32x16<S> {
+    let mut at = [s.number; 3];
     for c in 0..3 {
         let xi = f32x16::from_slice(simd, &p.xi[c]);
         let v = f32x16::from_slice(simd, &p.v[c]);
         let moved = s.move_by.mul_add(v, xi);
         moved.store_slice(&mut p.xi[c]);
         let straight =
-            s.tau.mul_add(f32x16::from_slice(simd, &p.direction[c]), f32x16::from_slice(simd, &p.entry[c]));
+            s.number.mul_add(f32x16::from_slice(simd, &p.stride[c]), f32x16::from_slice(simd, &p.middle[c]));
         at[c] = straight + if E::EULER { xi } else { moved };
     }
     if E::NODES {
         meet(simd, common, p, &at);
     }
     let here = field.sample16(simd, &at);
-    kick::<S, E>(simd, common, p, &here, s.dt);
+    kick::<S, I, E>(simd, common, p, &here, s.dt);
+    here.eps
 }
 
 /// tau is not depth: a ray that gained `zeta` in depth has passed its exit plane by as much. One step back brings it there; half of its drift is left to
 /// the caller.
 #[inline(always)]
-fn last_step<S: Simd, E: Effects>(simd: S, p: &Packet, length: f32x16<S>, whole: f32x16<S>) -> Step<S> {
+fn last_step<S: Simd, E: Effects>(simd: S, p: &Packet, middle: f32) -> Step<S> {
+    let whole = f32x16::from_slice(simd, &p.dt);
     // Verlet's positions still miss the second half of the last step.
     let missing = if E::EULER { whole * 0.0 } else { whole * 0.5 };
     let mut zeta = f32x16::splat(simd, 0.0);
@@ -239,13 +262,26 @@ fn last_step<S: Simd, E: Effects>(simd: S, p: &Packet, length: f32x16<S>, whole:
         u_z = along.mul_add(f32x16::from_slice(simd, &p.v[c]), u_z);
     }
     zeta = missing.mul_add(u_z, zeta);
-    let dt = -zeta / (u_z + f32x16::splat(simd, 1.0));
-    Step { tau: length + dt * 0.5, move_by: missing + dt * 0.5, dt }
+    let rate = u_z + f32x16::from_slice(simd, &p.eps_at_entry) + f32x16::splat(simd, 1.0);
+    let dt = -zeta / rate;
+    // Rays that miss the field have steps of length zero.
+    let steps = (whole.simd_gt(0.0)).select(dt / whole, dt * 0.0);
+    Step {
+        number: steps.mul_add(f32x16::splat(simd, 0.5), f32x16::splat(simd, middle)),
+        move_by: missing + dt * 0.5,
+        dt,
+    }
 }
 
 /// v += dt (1 + eps) g / h^2, and the optical path with the mean of v before and after.
 #[inline(always)]
-fn kick<S: Simd, E: Effects>(simd: S, common: &Common<'_>, p: &mut Packet, here: &Samples<S>, dt: f32x16<S>) {
+fn kick<S: Simd, I: Interpolate16, E: Effects>(
+    simd: S,
+    common: &Common<'_>,
+    p: &mut Packet,
+    here: &Samples<S>,
+    dt: f32x16<S>,
+) {
     let eps = here.eps;
     let push = dt.mul_add(eps, dt);
     let mut middle = [eps; 3];
@@ -255,7 +291,14 @@ fn kick<S: Simd, E: Effects>(simd: S, common: &Common<'_>, p: &mut Packet, here:
         if E::OPD {
             middle[c] = if E::EULER { v } else { (push * 0.5).mul_add(here.gradient[c], v) };
         }
-        push.mul_add(here.gradient[c], v).store_slice(&mut p.v[c]);
+        if I::EXACT {
+            let term = push.mul_sub(here.gradient[c], f32x16::from_slice(simd, &p.v_rest[c]));
+            let new = v + term;
+            ((new - v) - term).store_slice(&mut p.v_rest[c]);
+            new.store_slice(&mut p.v[c]);
+        } else {
+            push.mul_add(here.gradient[c], v).store_slice(&mut p.v[c]);
+        }
     }
     if E::OPD {
         // (1+eps)^2 - w_z = eps (1 + eps) + u_t^2 / (1 + eps + w_z): all terms small, none a difference.
@@ -266,8 +309,14 @@ fn kick<S: Simd, E: Effects>(simd: S, common: &Common<'_>, p: &mut Packet, here:
             u_z = middle[c].mul_add(f32x16::from_slice(simd, &p.along[c]), u_z);
         }
         let transverse = square - u_z * u_z;
-        let more = eps.mul_add(eps, eps) + transverse / (eps + u_z + f32x16::splat(simd, 2.0));
-        dt.mul_add(more, f32x16::from_slice(simd, &p.opd)).store_slice(&mut p.opd);
+        let twice = eps + u_z + f32x16::from_slice(simd, &p.eps_at_entry) + f32x16::splat(simd, 2.0);
+        let more = eps.mul_add(eps, eps) + transverse / twice;
+        // A phase of thousands of radians wants more digits than a plain sum of hundreds of terms keeps.
+        let sum = f32x16::from_slice(simd, &p.opd);
+        let term = dt.mul_sub(more, f32x16::from_slice(simd, &p.opd_rest));
+        let new = sum + term;
+        ((new - sum) - term).store_slice(&mut p.opd_rest);
+        new.store_slice(&mut p.opd);
     }
 }
 
@@ -291,32 +340,29 @@ fn meet<S: Simd>(simd: S, common: &Common<'_>, p: &mut Packet, at: &[f32x16<S>; 
 
 /// Moves all packets over [`STRIDE`] steps without a sample, if the bricks there bound what that leaves out.
 #[inline(always)]
-fn leave_out<S: Simd, E: Effects, const P: usize>(
+fn leave_out<S: Simd, I: Interpolate16, E: Effects, const P: usize>(
     simd: S,
     common: &Common<'_>,
     packets: &mut [Packet; P],
-    k: u32,
-    per_step: f32,
+    first: f32,
 ) -> bool {
     let Some(skip) = common.skip else { return false };
-    let share = STRIDE as f32 * per_step;
-    let half = 0.5 * STRIDE as f32;
+    let number = f32x16::splat(simd, first + 0.5 * STRIDE as f32);
     let mut bounds = [([0.0f32; LANES], [0.0f32; LANES]); P];
     for (p, (angle, mean)) in packets.iter().zip(&mut bounds) {
-        let tau = f32x16::from_slice(simd, &p.length) * ((k as f32 + half) * per_step);
         let mut at: [Row; 3] = [[0.0; LANES]; 3];
         for c in 0..3 {
-            let straight =
-                tau.mul_add(f32x16::from_slice(simd, &p.direction[c]), f32x16::from_slice(simd, &p.entry[c]));
+            let straight = number
+                .mul_add(f32x16::from_slice(simd, &p.stride[c]), f32x16::from_slice(simd, &p.middle[c]));
             at[c] = (straight + f32x16::from_slice(simd, &p.xi[c])).into();
         }
         for l in 0..LANES {
             let brick = skip.bricks.around([at[0][l], at[1][l], at[2][l]]);
-            let chord_m = p.length[l] * share * skip.unit_m;
+            let chord_m = p.dt[l] * (STRIDE as f32 * skip.unit_m);
             angle[l] = p.left_out[l] + brick.max_gradient_per_m * chord_m;
             mean[l] = brick.mean_eps;
             let stops = E::NODES && brick.has_nodes;
-            let vague = E::OPD && brick.half_range_eps * chord_m > skip.tolerance_opd_m * share;
+            let vague = E::OPD && brick.half_range_eps * chord_m > skip.tolerance_opd_m;
             if angle[l] > skip.tolerance_rad || stops || vague {
                 return false;
             }
@@ -324,11 +370,11 @@ fn leave_out<S: Simd, E: Effects, const P: usize>(
     }
     for (p, (angle, mean)) in packets.iter_mut().zip(&bounds) {
         p.left_out = *angle;
-        let dt = f32x16::from_slice(simd, &p.length) * share;
+        let dt = f32x16::from_slice(simd, &p.dt) * STRIDE as f32;
         drift(simd, p, dt);
         if E::OPD {
             let here = Samples { eps: f32x16::from_slice(simd, mean), gradient: [dt * 0.0; 3] };
-            kick::<S, E>(simd, common, p, &here, dt);
+            kick::<S, I, E>(simd, common, p, &here, dt);
         }
     }
     true
