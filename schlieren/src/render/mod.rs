@@ -354,7 +354,13 @@ fn expose_lines<'a>(
     for line in 0..lines.len() {
         let n0 = section.fields[line].n0();
         let t = technique(scene, line, &framing, n0, tilted_beams)?;
-        let planned = section.paths(scene, line, Wanted { opd: t.needs_opd() }, against_light, layers.map && line == 0)?;
+        let planned = section.paths(
+            scene,
+            line,
+            Wanted { opd: t.needs_opd() },
+            against_light,
+            layers.map && line == 0,
+        )?;
         if line == 0 {
             r.report.add_plan(&planned);
         }

@@ -3,14 +3,12 @@
 
 use super::{RenderError, TestSection};
 use crate::field::Field;
-use crate::film::Framing;
 use crate::interpolate::{BSpline, Interpolant, Interpolate, Trilinear, TrilinearGradient};
-use crate::plan::{Mode, Plan, Request};
 use crate::march::{
-    BlankCells, Deviational, Full, FullOptions, Integrator, Options, Pefrl, RungeKutta4, Scheme,
-    Sharma,
+    BlankCells, Deviational, Full, FullOptions, Integrator, Options, Pefrl, RungeKutta4, Scheme, Sharma,
 };
 use crate::path::{Exit, LightPaths, Start, Wanted};
+use crate::plan::{Mode, Plan, Request};
 use crate::scene::{Device, Scene};
 use crate::technique::bos::Reversed;
 use crate::view::View;
@@ -60,11 +58,12 @@ impl TestSection {
             },
         };
         let method = known(&march.method, &MARCHES, "march.method")?;
-        let interpolant = known(&march.interpolant, &INTERPOLANTS, "march.interpolant")?.map(|name| match name {
-            "trilinear" => Interpolant::Trilinear,
-            "trilinear-gradient" => Interpolant::TrilinearGradient,
-            _ => Interpolant::BSpline,
-        });
+        let interpolant =
+            known(&march.interpolant, &INTERPOLANTS, "march.interpolant")?.map(|name| match name {
+                "trilinear" => Interpolant::Trilinear,
+                "trilinear-gradient" => Interpolant::TrilinearGradient,
+                _ => Interpolant::BSpline,
+            });
         let field = &self.fields[line];
         let view = if against_light { Reversed::view(&self.view) } else { self.view };
         let with = |mode| Request {
