@@ -1,9 +1,9 @@
 //! Models in the test section: triangle meshes that block light, as in every photograph from a wind tunnel.
 //!
 //! Whether a photon is blocked is asked once, along its undisturbed straight ray, before it is traced: blocked photons cost no march, and the meshes
-//! need not know how light bends. The true ray leaves the straight one by at most the displacement, so a silhouette is wrong by no more than that:
-//! [`crate::render::Report`] holds the largest displacement seen, in pixels ([`crate::render::Report::silhouette_error_px`]), and it is said when it
-//! is above half a pixel. In gases it is far below. Testing every step of a march against the meshes would cost a BVH query per
+//! need not know how light bends. Where light is bent one way on its way through, as by most flows, the true ray is farthest from the straight one where it
+//! leaves, so a silhouette is off by no more than the displacement there: [`crate::render::Report::silhouette_error_px`] is the largest one seen, in pixels, and
+//! there is a warning when it is above half a pixel. In gases it is far below. Testing every step of a march against the meshes would cost a BVH query per
 //! step and gain nothing visible; where bodies stand in strongly bending media, mark their cells in the field, which stops the bent ray itself.
 
 use crate::path::Start;

@@ -162,6 +162,7 @@ fn wrong_usage_exits_with_2_and_names_the_option() {
         (&["--density", "rho", "--technique", "bos", "--cutoff-angle", "3", "-o", &png], "--cutoff-angle"),
         (&["--density", "rho", "--technique", "slice", "--samples", "3", "-o", &png], "sampling"),
         (&["--density", "rho", "--cutoff", "circle", "--cutoff-open", "0.5", "-o", &png], "--cutoff-open"),
+        (&["--density", "rho", "--focal-length", "3m", "-o", &png], "schlieren_m"),
         (&["--density", "rho", "--noise-free", "--samples", "3", "-o", &png], "--samples"),
         (&["--density", "rho", "--view", "30,95", "-o", &png], "AZIMUTH"),
         (&["--density", "rho", "--tolerance", "1 foot", "-o", &png], "1e-7rad"),
@@ -193,7 +194,7 @@ fn a_printed_scene_draws_the_same_picture() {
     assert_eq!(o.status.code(), Some(0), "{}", text(&o.stderr));
     assert_eq!(std::fs::read(&a).unwrap(), std::fs::read(&b).unwrap());
 
-    std::fs::write(&toml, text(&o.stdout) + "[flow]\nfile = \"flow.vti\"\ndensty = \"rho\"\n").unwrap();
+    std::fs::write(&toml, "[flow]\nfile = \"flow.vti\"\ndensty = \"rho\"\n").unwrap();
     let o = schlieren(&["render", "--scene", &toml, "-o", &b]);
     assert_eq!(o.status.code(), Some(1));
     assert!(text(&o.stderr).contains("densty"), "{}", text(&o.stderr));

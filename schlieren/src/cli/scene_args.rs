@@ -100,6 +100,9 @@ struct OpticsArgs {
     /// knife: part of the source's image that stays open, 0 to 1
     #[arg(long, value_name = "PART")]
     cutoff_open: Option<f64>,
+    /// knife: the same as a height in the cut-off plane
+    #[arg(long, value_name = "LENGTH", value_parser = units::length, conflicts_with = "cutoff_open")]
+    cutoff_height: Option<f64>,
     /// circle, complemented-circle, color: radius in the cut-off plane; picture: half its width
     #[arg(long, value_name = "LENGTH", value_parser = units::length)]
     cutoff_radius: Option<f64>,
@@ -324,6 +327,7 @@ impl OpticsArgs {
             ("--cutoff", self.cutoff.is_some()),
             ("--cutoff-angle", self.cutoff_angle.is_some()),
             ("--cutoff-open", self.cutoff_open.is_some()),
+            ("--cutoff-height", self.cutoff_height.is_some()),
             ("--cutoff-radius", self.cutoff_radius.is_some()),
         ];
         let TechniqueSpec::Schlieren { cutoff } = &mut s.technique else {
@@ -364,6 +368,12 @@ impl OpticsArgs {
             match cutoff {
                 CutoffSpec::Knife { open, .. } => *open = part,
                 _ => return Err(in_vain("--cutoff-open", "cut-off", kind, "knife").into()),
+            }
+        }
+        if let Some(height) = self.cutoff_height {
+            match cutoff {
+                CutoffSpec::Knife { open_m, .. } => *open_m = Some(height),
+                _ => return Err(in_vain("--cutoff-height", "cut-off", kind, "knife").into()),
             }
         }
         if let Some(radius) = self.cutoff_radius {

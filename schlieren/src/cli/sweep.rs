@@ -139,7 +139,7 @@ mod tests {
         assert_eq!(
             turned.technique,
             crate::scene::TechniqueSpec::Schlieren {
-                cutoff: crate::scene::CutoffSpec::Knife { angle_deg: 45.0, open: 0.5 }
+                cutoff: crate::scene::CutoffSpec::Knife { angle_deg: 45.0, open: 0.5, open_m: None }
             }
         );
         let s = setting("view.direction=x,y").unwrap();

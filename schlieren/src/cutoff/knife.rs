@@ -21,6 +21,8 @@ pub struct Knife {
 pub enum KnifePosition {
     /// a/h: the part of the undisturbed source image's height that stays open. 0.5 is the customary half cut-off.
     OpenFraction(f64),
+    /// a itself, in metres. (As a fraction, the schlieren lens' focal length cancels: image and shift grow alike. With a given height it counts.)
+    OpenM(f64),
     /// Metres from the axis; light beyond it passes.
     EdgeM(f64),
 }
@@ -36,6 +38,7 @@ impl Knife {
     pub fn edge_m(&self, image: &SourceImage) -> f64 {
         match self.position {
             KnifePosition::OpenFraction(open) => image.half_extent_m(self.direction()) * (1.0 - 2.0 * open),
+            KnifePosition::OpenM(height) => image.half_extent_m(self.direction()) - height,
             KnifePosition::EdgeM(edge) => edge,
         }
     }
@@ -153,6 +156,27 @@ mod tests {
         let at = |x, y| knife.edge(&image).averaged([x, y]);
         assert_eq!(at(0.0, 1e-4), at(5e-4, 1e-4));
         assert!(at(0.0, 1e-4) > 0.5 && at(0.0, -1e-4) < 0.5);
+    }
+
+    #[test]
+    fn sensitivity_is_f2_over_a_and_f2_cancels_from_fractions() {
+        use crate::optics::{Optics, SourceShape};
+        let slope = |f2: f64, position| {
+            let source = SourceShape::Slit { width_m: 1e-3, length_m: 5e-3, angle_deg: 0.0 };
+            let optics = Optics { source, schlieren_focal_length_m: f2, ..Optics::CUSTOMARY };
+            let image = optics.source_image();
+            let knife = Knife { angle_deg: 0.0, position };
+            let at = |e: f64| f64::from(knife.edge(&image).averaged([(f2 * e) as f32, 0.0]));
+            let contrast = (at(1e-5) - at(0.0)) / at(0.0) / 1e-5;
+            let expected = optics.sensitivity_per_rad(knife.open_height_m(&image));
+            assert!((contrast / expected - 1.0).abs() < 1e-3, "{contrast} {expected}");
+            contrast
+        };
+        // a = 0.5 mm: 3000 and 6000 per radian. A half: 3000 whatever f2.
+        let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-3;
+        assert!(near(slope(1.5, KnifePosition::OpenM(0.5e-3)), 3000.0));
+        assert!(near(slope(3.0, KnifePosition::OpenM(0.5e-3)), 6000.0));
+        assert!(near(slope(3.0, KnifePosition::OpenFraction(0.5)), 3000.0));
     }
 
     #[test]

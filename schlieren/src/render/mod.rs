@@ -580,7 +580,7 @@ fn warn_about_picture(scene: &Scene, report: &mut Report) {
     if high - low < visible && !matches!(scene.technique, TechniqueSpec::Bos { .. }) {
         let cure = match scene.technique {
             TechniqueSpec::Schlieren { .. } => {
-                "a smaller source (light.source), a longer focal length (lenses.schlieren_m) or a smaller open part make it more sensitive"
+                "a smaller source (light.source), a longer collimator (lenses.collimator_m) or a smaller opening of the cut-off make it more sensitive"
             }
             TechniqueSpec::Shadowgraph {} => "a film farther away (film.focus_m) makes it more sensitive",
             TechniqueSpec::Interferogram { .. } => {

@@ -139,7 +139,7 @@ fn a_plate_casts_its_shadow_and_only_there() {
 
 #[test]
 fn even_pictures_are_warned_about_and_cancelling_cancels() {
-    let r = drawn("[film]\nsize = [16, 16]\n[lenses]\nschlieren_m = 1e-3", Layers::NONE);
+    let r = drawn("[film]\nsize = [16, 16]\n[lenses]\ncollimator_m = 1e-3", Layers::NONE);
     assert!(r.report.warnings.iter().any(|w| w.contains("more sensitive")), "{:?}", r.report.warnings);
     let s = scene(SMALL);
     let section = TestSection::of_fields(&s, vec![blob()], None).unwrap();

@@ -86,8 +86,16 @@ impl Scene {
         match &self.technique {
             TechniqueSpec::Shadowgraph {} => Ok(()),
             TechniqueSpec::Schlieren { cutoff } => match cutoff {
-                CutoffSpec::Knife { angle_deg, open } => {
+                CutoffSpec::Knife { angle_deg, open, open_m } => {
                     finite("technique.cutoff.angle_deg", &[*angle_deg])?;
+                    open_m.map_or(Ok(()), |h| positive("technique.cutoff.open_m", h))?;
+                    if open_m.is_some() && *open != 0.5 {
+                        return Err(wrong(
+                            "technique.cutoff.open",
+                            open,
+                            "leave it out where open_m is given",
+                        ));
+                    }
                     within("technique.cutoff.open", *open, 0.0, 1.0)
                 }
                 CutoffSpec::Circle { radius_m, center_m }
@@ -168,6 +176,33 @@ impl Scene {
         }
     }
 
+    /// Focal lengths that cancel or meet nothing. The customary ones are never refused: they stand in every effective scene.
+    fn check_lenses(&self) -> Result<(), SceneError> {
+        let technique = self.technique.name();
+        let customary = super::LensSpec::default();
+        let fraction = matches!(
+            self.technique,
+            TechniqueSpec::Schlieren { cutoff: CutoffSpec::Knife { open_m: None, .. } }
+        );
+        if self.lenses.schlieren_m != customary.schlieren_m {
+            let in_vain = |hint| Err(SceneError::NoEffect { key: "lenses.schlieren_m", technique, hint });
+            if fraction {
+                return in_vain(
+                    ", because with a knife that leaves a fraction of the source open the image and its shift grow alike; give the open height technique.cutoff.open_m, or take lenses.collimator_m",
+                );
+            }
+            if !matches!(self.technique, TechniqueSpec::Schlieren { .. }) {
+                return in_vain("; it belongs to schlieren");
+            }
+        }
+        let point = self.optics().source == crate::optics::SourceShape::Point;
+        if self.lenses.collimator_m != customary.collimator_m && (point || !self.technique.uses_source()) {
+            let hint = "; it sets how large the source looks, and there is a point or none";
+            return Err(SceneError::NoEffect { key: "lenses.collimator_m", technique, hint });
+        }
+        Ok(())
+    }
+
     /// A key whose value cannot change a pixel is refused.
     fn check_effect(&self) -> Result<(), SceneError> {
         let technique = self.technique.name();
@@ -181,6 +216,7 @@ impl Scene {
         if self.light.beams == BeamsSpec::Tilted && matches!(self.sampling(), SamplingSpec::Beams { .. }) {
             return in_vain("light.beams = \"tilted\"", " with sampling by beams; take photons");
         }
+        self.check_lenses()?;
         if !self.technique.follows_light() {
             if self.film.focus_m.is_some() {
                 return in_vain("film.focus_m", "; it knows no optics");
@@ -272,6 +308,8 @@ mod tests {
             ("[technique]\nkind = \"volume\"\n[solids]\nfiles = [\"a.stl\"]", "solids"),
             ("[technique]\nkind = \"interferogram\"\nfringe_angle_deg = 3.0", "fringe_angle_deg"),
             ("[technique]\nkind = \"shadowgraph\"\n[film]\nfocus_m = 0.0", "film.focus_m"),
+            ("[lenses]\nschlieren_m = 3.0", "lenses.schlieren_m"),
+            ("[technique]\nkind = \"shadowgraph\"\n[lenses]\ncollimator_m = 3.0", "lenses.collimator_m"),
         ] {
             let message = refused(text);
             assert!(message.contains(key), "{text}: {message}");

@@ -133,6 +133,9 @@ pub enum CutoffSpec {
         /// Part of the source's image that it leaves open.
         #[serde(default = "half")]
         open: f64,
+        /// The same as a height in the cut-off plane, in place of `open`.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        open_m: Option<f64>,
     },
     /// An iris.
     Circle {
@@ -171,7 +174,7 @@ pub enum CutoffSpec {
 
 impl Default for CutoffSpec {
     fn default() -> Self {
-        CutoffSpec::Knife { angle_deg: 0.0, open: half() }
+        CutoffSpec::Knife { angle_deg: 0.0, open: half(), open_m: None }
     }
 }
 
@@ -179,8 +182,9 @@ impl CutoffSpec {
     /// The cut-off; reads the picture of a filter.
     pub fn cutoff(&self) -> Result<Cutoff, SceneError> {
         Ok(match self {
-            CutoffSpec::Knife { angle_deg, open } => {
-                Cutoff::Knife(Knife { angle_deg: *angle_deg, position: KnifePosition::OpenFraction(*open) })
+            CutoffSpec::Knife { angle_deg, open, open_m } => {
+                let position = open_m.map_or(KnifePosition::OpenFraction(*open), KnifePosition::OpenM);
+                Cutoff::Knife(Knife { angle_deg: *angle_deg, position })
             }
             CutoffSpec::Circle { radius_m, center_m } => Cutoff::Aperture(Aperture {
                 radius_m: *radius_m,
