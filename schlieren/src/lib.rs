@@ -43,13 +43,26 @@
 #![forbid(unsafe_code)]
 
 pub mod analytic;
+pub mod cli;
+pub mod cutoff;
 pub mod field;
+pub mod film;
+pub mod filter;
 pub mod index;
 pub mod input;
 pub mod interpolate;
 mod level;
 pub mod march;
+pub mod optics;
+pub mod output;
 pub mod path;
 pub mod plan;
+pub mod render;
+pub mod scene;
 pub mod skip;
+pub mod solids;
+pub mod spectrum;
+pub mod technique;
+#[cfg(test)]
+mod testing;
 pub mod view;

@@ -1,0 +1,52 @@
+//! The command line: what was typed becomes a call of the library.
+
+mod index;
+mod probe;
+mod render;
+mod scene_args;
+mod sweep;
+mod units;
+
+use clap::{Parser, Subcommand};
+use datasets::cli::{CommonArgs, CompletionsArgs, run_main};
+use std::process::ExitCode;
+
+/// Schlieren, shadowgraph, interferogram and background-oriented schlieren from flow data.
+#[derive(Debug, Parser)]
+#[command(name = "schlieren", version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    #[command(flatten)]
+    common: CommonArgs,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Draws a flow
+    Render(Box<render::RenderArgs>),
+    /// Draws a time series, or one flow for several values of an option
+    Sweep(Box<sweep::SweepArgs>),
+    /// Prints the path and the numbers of one pixel
+    Probe(Box<probe::ProbeArgs>),
+    /// Computes the index of refraction of a gas
+    Index(index::IndexArgs),
+    /// Prints a completion script for a shell
+    Completions(CompletionsArgs),
+}
+
+/// Runs the program. Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted.
+pub fn main() -> ExitCode {
+    run_main(|| execute(Cli::try_parse()?))
+}
+
+fn execute(cli: Cli) -> anyhow::Result<()> {
+    let common = cli.common;
+    match cli.command {
+        Command::Render(args) => render::render(common, &args),
+        Command::Sweep(args) => sweep::sweep(common, &args),
+        Command::Probe(args) => probe::probe(common, &args),
+        Command::Index(args) => index::index(common, &args),
+        Command::Completions(args) => args.print::<Cli>(),
+    }
+}

@@ -1,0 +1,185 @@
+//! `schlieren render`.
+
+use super::scene_args::SceneArgs;
+use crate::output;
+use crate::render::{Control, Layers, RenderError, Rendered, TestSection};
+use crate::scene::{Scene, TechniqueSpec};
+use clap::Args;
+use datasets::cli::{Cancel, CommonArgs, Interrupted, UsageError};
+use serde_json::{Value, json};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Options of `schlieren render`.
+#[derive(Debug, Args)]
+pub(super) struct RenderArgs {
+    /// The flow: VTK (.vti .vtr .vts .vtu, parallel, .pvd, legacy), PLOT3D, NRRD, MetaImage, raw
+    file: Option<PathBuf>,
+    /// The picture as PNG
+    #[arg(long, short, value_name = "PNG")]
+    out: Option<PathBuf>,
+    /// The picture as OpenEXR: colour, deflection, displacement, phase, transmission, samples, error, and every parameter
+    #[arg(long, value_name = "EXR")]
+    exr: Option<PathBuf>,
+    /// The deflection map as NumPy array (height, width, 2) in rad
+    #[arg(long, value_name = "NPY")]
+    npy: Option<PathBuf>,
+    /// Print the scene in effect as TOML, and draw only if an output is named
+    #[arg(long)]
+    print_scene: bool,
+    #[command(flatten)]
+    scene: SceneArgs,
+}
+
+pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()> {
+    let cancel = Cancel::on_ctrl_c()?;
+    let outputs = Outputs::new(args.out.as_deref(), args.exr.as_deref(), args.npy.as_deref())?;
+    let scene = args.scene.scene(args.file.as_deref())?;
+    if args.print_scene {
+        std::io::stdout().lock().write_all(scene.effective().to_toml()?.as_bytes())?;
+    }
+    if outputs.is_empty() {
+        if args.print_scene {
+            return Ok(());
+        }
+        return Err(UsageError("no output: give -o PNG, --exr EXR or --npy NPY".into()).into());
+    }
+    let drawn = draw(common, cancel, &scene, &outputs)?;
+    if args.print_scene && !common.json {
+        return Ok(());
+    }
+    common.result(&drawn.json, || &drawn.text)
+}
+
+/// Files to write.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Outputs<'a> {
+    png: Option<&'a Path>,
+    exr: Option<&'a Path>,
+    npy: Option<&'a Path>,
+}
+
+impl<'a> Outputs<'a> {
+    /// Checks the names before time is spent on a picture that cannot be written.
+    pub(super) fn new(
+        png: Option<&'a Path>,
+        exr: Option<&'a Path>,
+        npy: Option<&'a Path>,
+    ) -> Result<Self, UsageError> {
+        for (path, ending, flag) in [(png, "png", "-o"), (exr, "exr", "--exr"), (npy, "npy", "--npy")] {
+            let Some(path) = path else { continue };
+            if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)) {
+                return Err(UsageError(format!("{flag} `{}` does not end in .{ending}", path.display())));
+            }
+        }
+        Ok(Outputs { png, exr, npy })
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.png.is_none() && self.exr.is_none() && self.npy.is_none()
+    }
+
+    fn names(&self) -> String {
+        let names: Vec<String> =
+            [self.png, self.exr, self.npy].iter().flatten().map(|p| p.display().to_string()).collect();
+        names.join(", ")
+    }
+}
+
+/// A picture that was written, in words and as JSON.
+pub(super) struct Drawn {
+    pub(super) json: Value,
+    pub(super) text: String,
+}
+
+/// Reads, draws and writes.
+pub(super) fn draw(
+    common: CommonArgs,
+    cancel: Cancel,
+    scene: &Scene,
+    outputs: &Outputs<'_>,
+) -> anyhow::Result<Drawn> {
+    let start = Instant::now();
+    let section = TestSection::open(scene, |what| common.note(0, what))?;
+    let read_secs = start.elapsed().as_secs_f64();
+    cancel.check()?;
+
+    let layers = Layers {
+        map: outputs.exr.is_some() || outputs.npy.is_some() || common.json,
+        phase: outputs.exr.is_some(),
+        counts: outputs.exr.is_some(),
+        noise: outputs.exr.is_some(),
+    };
+    let bar = common.progress(1000, scene.technique.name());
+    let rendered = {
+        let progress = |part: f64| bar.set_position((1000.0 * part) as u64);
+        let control = Control { cancel: cancel.flag(), progress: &progress };
+        match crate::render::render(scene, &section, layers, &control) {
+            Err(RenderError::Cancelled) => return Err(Interrupted.into()),
+            other => other?,
+        }
+    };
+    drop(bar);
+    let render_secs = start.elapsed().as_secs_f64() - read_secs;
+    write(outputs, scene, &rendered, start.elapsed().as_secs_f64())?;
+    for w in &rendered.report.warnings {
+        common.warn(w);
+    }
+    let field = &section.fields[0];
+    let r = &rendered.report;
+    let json = json!({
+        "file": scene.flow.file,
+        "technique": scene.technique.name(),
+        "size": scene.film.size,
+        "pixel_m": r.pixel_m,
+        "grid": field.dims(),
+        "n0_minus_1": section.input.as_ref().map(|i| i.reference_n_minus_1),
+        "index_formula": section.input.as_ref().map(|i| i.formula),
+        "march": r.march,
+        "tolerance_rad": scene.march.tolerance_rad,
+        "deflection_error_rad": r.deflection_error_rad,
+        "resolution_error_rad": r.resolution_error_rad,
+        "largest_deflection_rad": r.largest_deflection_rad,
+        "levels": r.levels,
+        "effects": r.effects,
+        "counters": r.counters,
+        "photons": r.tally,
+        "margin_px": r.margin_px,
+        "silhouette_error_px": r.silhouette_error_px,
+        "seconds": { "read": read_secs, "render": render_secs },
+        "warnings": r.warnings,
+        "output": outputs.png,
+        "exr": outputs.exr,
+        "npy": outputs.npy,
+    });
+    let deflection =
+        r.largest_deflection_rad.map_or(String::new(), |d| format!(", deflections up to {d:.3e} rad"));
+    let text = format!(
+        "{}: {}{deflection}; {} rays; read {read_secs:.2} s, render {render_secs:.2} s",
+        outputs.names(),
+        described(scene),
+        r.counters.rays + r.counters.map_rays,
+    );
+    Ok(Drawn { json, text })
+}
+
+fn described(scene: &Scene) -> String {
+    match &scene.technique {
+        TechniqueSpec::Schlieren { cutoff } => format!("schlieren, {}", cutoff.name()),
+        other => other.name().to_string(),
+    }
+}
+
+fn write(outputs: &Outputs<'_>, scene: &Scene, rendered: &Rendered, elapsed_secs: f64) -> anyhow::Result<()> {
+    if let Some(path) = outputs.png {
+        output::write_png(path, rendered)?;
+    }
+    if let Some(path) = outputs.exr {
+        output::write_exr(path, rendered, scene, elapsed_secs)?;
+    }
+    if let Some(path) = outputs.npy {
+        output::write_npy(path, rendered)?;
+    }
+    Ok(())
+}

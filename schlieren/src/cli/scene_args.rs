@@ -1,0 +1,473 @@
+//! Options that describe the scene, and how they change the one from a file. An option that changes nothing is refused by name.
+
+use super::units;
+use crate::scene::{
+    BeamsSpec, CutoffSpec, Device, Direction, FilterSpec, FlowSpec, Jitter, SamplingSpec, Scene, SourceSpec,
+    TechniqueSpec,
+};
+use clap::{Args, ValueEnum};
+use datasets::cli::UsageError;
+use std::path::PathBuf;
+
+/// The scene's options, shared by `render`, `sweep` and `probe`.
+#[derive(Debug, Clone, Args)]
+pub(super) struct SceneArgs {
+    /// A scene as TOML; options change it
+    #[arg(long, value_name = "TOML")]
+    pub(super) scene: Option<PathBuf>,
+    #[command(flatten)]
+    flow: FlowArgs,
+    #[command(flatten)]
+    optics: OpticsArgs,
+    #[command(flatten)]
+    film: FilmArgs,
+}
+
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Flow (a number can stand for an array)")]
+struct FlowArgs {
+    /// Array with the density in kg/m³
+    #[arg(long, value_name = "NAME")]
+    density: Option<String>,
+    /// kg/m³ per unit of the density array, for densities relative to a free stream
+    #[arg(long, value_name = "NUMBER")]
+    density_unit: Option<f64>,
+    /// Array with the temperature in K
+    #[arg(long, value_name = "NAME")]
+    temperature: Option<String>,
+    /// Array with the pressure in Pa
+    #[arg(long, value_name = "NAME")]
+    pressure: Option<String>,
+    /// Array with the relative humidity, 0 to 1
+    #[arg(long, value_name = "NAME")]
+    humidity: Option<String>,
+    /// CO2 in ppm
+    #[arg(long, value_name = "NUMBER")]
+    co2_ppm: Option<String>,
+    /// Array with n - 1
+    #[arg(long, value_name = "NAME")]
+    n_minus_1: Option<String>,
+    /// Array with free electrons per m³
+    #[arg(long, value_name = "NAME")]
+    electrons: Option<String>,
+    /// Array with the mass fraction of a gas; may be repeated
+    #[arg(long, value_name = "NAME=GAS", value_parser = units::species)]
+    species: Vec<(String, String)>,
+    /// Metres per unit of the file's coordinates
+    #[arg(long, value_name = "METRES", value_parser = units::length)]
+    length_unit: Option<f64>,
+    /// Depth of two-dimensional data, in units of the file
+    #[arg(long, value_name = "NUMBER")]
+    span: Option<f64>,
+    /// Nodes along the longest axis when data are resampled
+    #[arg(long, value_name = "N")]
+    resample: Option<usize>,
+    /// Standard deviation in nodes of the smoothing of shocks
+    #[arg(long, value_name = "NODES")]
+    smoothing: Option<f64>,
+    /// Body that blocks light (OBJ, STL, PLY, glTF, VTP); may be repeated
+    #[arg(long, value_name = "FILE")]
+    solid: Vec<PathBuf>,
+}
+
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Light and optics (lengths in m, or with mm, um, nm)")]
+struct OpticsArgs {
+    /// x, y, z, or azimuth and elevation of the light in degrees
+    #[arg(long, value_name = "x|y|z|AZ,EL", allow_hyphen_values = true)]
+    view: Option<Direction>,
+    /// shadowgraph, schlieren, interferogram, bos; to compare with: volume, slice
+    #[arg(long, value_name = "NAME", value_parser = technique)]
+    technique: Option<TechniqueSpec>,
+    /// Vacuum wavelength in nm; several, separated by commas, are traced each by itself
+    #[arg(long, value_name = "NM", value_delimiter = ',')]
+    wavelength: Vec<f64>,
+    /// point, slit:WIDTH,LENGTH or circle:DIAMETER
+    #[arg(long, value_name = "SHAPE", value_parser = units::source)]
+    source: Option<SourceSpec>,
+    /// Of the schlieren lens, f2
+    #[arg(long, value_name = "LENGTH", value_parser = units::length)]
+    focal_length: Option<f64>,
+    /// Of the collimator, f1
+    #[arg(long, value_name = "LENGTH", value_parser = units::length)]
+    collimator: Option<f64>,
+    /// schlieren: knife, circle, complemented-circle, color, or a picture (PNG)
+    #[arg(long, value_name = "KIND|PNG")]
+    cutoff: Option<String>,
+    /// knife: direction that brightens; color: direction of red; degrees from the picture's right
+    #[arg(long, value_name = "DEGREES", allow_hyphen_values = true)]
+    cutoff_angle: Option<f64>,
+    /// knife: part of the source's image that stays open, 0 to 1
+    #[arg(long, value_name = "PART")]
+    cutoff_open: Option<f64>,
+    /// knife: the same as a height in the cut-off plane
+    #[arg(long, value_name = "LENGTH", value_parser = units::length, conflicts_with = "cutoff_open")]
+    cutoff_height: Option<f64>,
+    /// circle, complemented-circle, color: radius in the cut-off plane; picture: half its width
+    #[arg(long, value_name = "LENGTH", value_parser = units::length)]
+    cutoff_radius: Option<f64>,
+    /// shadowgraph: distance of the film; bos: distance of the background; else the plane in focus. From the middle of the field
+    #[arg(long, value_name = "LENGTH", value_parser = units::length, allow_hyphen_values = true)]
+    film_distance: Option<f64>,
+    /// interferogram: distance of the fringes without flow [default: infinite]
+    #[arg(long, value_name = "LENGTH", value_parser = units::length)]
+    fringe_spacing: Option<f64>,
+    /// interferogram: direction across the fringes
+    #[arg(long, value_name = "DEGREES", allow_hyphen_values = true)]
+    fringe_angle: Option<f64>,
+    /// interferogram: contrast of the fringes, 0 to 1
+    #[arg(long, value_name = "V")]
+    visibility: Option<f64>,
+    /// bos: diameter of the background's dots
+    #[arg(long, value_name = "LENGTH", value_parser = units::length)]
+    dot_diameter: Option<f64>,
+    /// bos: mean distance of the background's dots
+    #[arg(long, value_name = "LENGTH", value_parser = units::length)]
+    dot_spacing: Option<f64>,
+    /// volume, slice: in the exponent
+    #[arg(long, value_name = "NUMBER")]
+    strength: Option<f64>,
+    /// slice: from the middle along the light
+    #[arg(long, value_name = "LENGTH", value_parser = units::length, allow_hyphen_values = true)]
+    slice_depth: Option<f64>,
+}
+
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Film and accuracy")]
+struct FilmArgs {
+    /// Pixels per row and rows
+    #[arg(long, value_name = "WxH", value_parser = units::size)]
+    size: Option<[u32; 2]>,
+    /// Width of what the picture shows [default: all of the field]
+    #[arg(long, value_name = "LENGTH", value_parser = units::length)]
+    field_of_view: Option<f64>,
+    /// Brightness factor; 1 makes undisturbed light white
+    #[arg(long, value_name = "FACTOR")]
+    exposure: Option<f64>,
+    /// Photons per pixel [default: 16; shadowgraphs are noise-free]
+    #[arg(long, value_name = "N")]
+    samples: Option<u32>,
+    /// Cells of a lattice of rays instead of photons; the default of shadowgraphs
+    #[arg(long, conflicts_with_all = ["samples", "filter", "jitter", "seed", "tilted_beams"])]
+    noise_free: bool,
+    /// Against noise, for 1 photon per pixel, narrower for more: none, gaussian:SIGMA, mean:RADIUS (pixels), cone:NEAREST
+    #[arg(long, value_name = "FILTER", value_parser = filter)]
+    filter: Option<FilterSpec>,
+    /// sobol or random
+    #[arg(long, value_name = "NAME", value_parser = jitter)]
+    jitter: Option<Jitter>,
+    /// Of the jitter
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Trace every photon in the beam of its own point of the source
+    #[arg(long)]
+    tilted_beams: bool,
+    /// Largest error of a deflection: 1e-7rad, 0.1urad
+    #[arg(long, value_name = "ANGLE", value_parser = units::angle_rad)]
+    tolerance: Option<f64>,
+    /// Force a march: line-of-sight, verlet, ...
+    #[arg(long, value_name = "NAME")]
+    march: Option<String>,
+    /// Force an interpolant: b-spline, trilinear, trilinear-gradient
+    #[arg(long, value_name = "NAME")]
+    interpolant: Option<String>,
+    /// Force a step, in voxels
+    #[arg(long, value_name = "VOXELS")]
+    step: Option<f64>,
+    /// Where to compute
+    #[arg(long, value_enum, value_name = "DEVICE")]
+    device: Option<Device>,
+}
+
+fn technique(text: &str) -> Result<TechniqueSpec, String> {
+    TechniqueSpec::by_name(text).ok_or_else(|| {
+        format!("there is no technique `{text}`; there are: {}", TechniqueSpec::NAMES.join(", "))
+    })
+}
+
+fn jitter(text: &str) -> Result<Jitter, String> {
+    match text {
+        "sobol" => Ok(Jitter::Sobol),
+        "random" => Ok(Jitter::Random),
+        _ => Err(format!("there is no jitter `{text}`; there are: sobol, random")),
+    }
+}
+
+fn filter(text: &str) -> Result<FilterSpec, String> {
+    let wrong = || format!("`{text}` is not a filter; write none, gaussian:0.8, mean:1 or cone:8");
+    let (kind, number) = text.split_once(':').unwrap_or((text, ""));
+    let number = || number.parse::<f64>().ok().filter(|v| v.is_finite() && *v >= 0.0).ok_or_else(wrong);
+    match kind {
+        "none" => Ok(FilterSpec::None {}),
+        "gaussian" => Ok(FilterSpec::Gaussian { sigma_px: number()? }),
+        "mean" => Ok(FilterSpec::Mean { radius_px: number()? }),
+        "cone" => Ok(FilterSpec::Cone { nearest: number()? as u32 }),
+        _ => Err(wrong()),
+    }
+}
+
+fn in_vain(flag: &str, what: &str, name: &str, belongs: &str) -> UsageError {
+    UsageError(format!("{flag} changes nothing with {what} `{name}`; leave it out, or take {belongs}"))
+}
+
+impl SceneArgs {
+    /// The scene in effect, checked.
+    pub(super) fn scene(&self, file: Option<&std::path::Path>) -> anyhow::Result<Scene> {
+        let mut s = match &self.scene {
+            Some(path) => Scene::open(path)?,
+            None => Scene::default(),
+        };
+        if let Some(file) = file {
+            s.flow.file = file.to_path_buf();
+        }
+        if s.flow.file.as_os_str().is_empty() {
+            return Err(UsageError("no flow: give a file, or a scene that names one".into()).into());
+        }
+        self.flow.apply(&mut s.flow);
+        s.solids.files.extend(self.flow.solid.iter().cloned());
+        self.optics.apply(&mut s)?;
+        self.film.apply(&mut s)?;
+        // What a scene refuses is wrong usage here: the values come from the command line.
+        if let Err(e) = s.check() {
+            return Err(match self.scene {
+                None => UsageError(e.to_string()).into(),
+                Some(_) => e.into(),
+            });
+        }
+        Ok(s)
+    }
+}
+
+impl FlowArgs {
+    fn apply(&self, f: &mut FlowSpec) {
+        let a = self;
+        // Another alternative on the command line replaces that of the file.
+        if a.density.is_some() || a.temperature.is_some() || a.n_minus_1.is_some() || a.electrons.is_some() {
+            let FlowSpec {
+                file,
+                model,
+                length_unit_m,
+                span,
+                resample_nodes,
+                smoothing_nodes,
+                outside,
+                hidden,
+                reference_n_minus_1,
+                ..
+            } = f.clone();
+            *f = FlowSpec {
+                file,
+                model,
+                length_unit_m,
+                span,
+                resample_nodes,
+                smoothing_nodes,
+                outside,
+                hidden,
+                reference_n_minus_1,
+                ..FlowSpec::default()
+            };
+        }
+        let set = |to: &mut Option<String>, from: &Option<String>| {
+            if from.is_some() {
+                to.clone_from(from);
+            }
+        };
+        set(&mut f.density, &a.density);
+        set(&mut f.temperature, &a.temperature);
+        set(&mut f.pressure, &a.pressure);
+        set(&mut f.humidity, &a.humidity);
+        set(&mut f.co2_ppm, &a.co2_ppm);
+        set(&mut f.n_minus_1, &a.n_minus_1);
+        set(&mut f.electrons, &a.electrons);
+        f.species.extend(a.species.iter().cloned());
+        f.density_unit_kg_m3 = a.density_unit.or(f.density_unit_kg_m3);
+        f.length_unit_m = a.length_unit.unwrap_or(f.length_unit_m);
+        f.span = a.span.or(f.span);
+        f.resample_nodes = a.resample.or(f.resample_nodes);
+        f.smoothing_nodes = a.smoothing.unwrap_or(f.smoothing_nodes);
+    }
+}
+
+impl OpticsArgs {
+    fn apply(&self, s: &mut Scene) -> anyhow::Result<()> {
+        let a = self;
+        s.view.direction = a.view.unwrap_or(s.view.direction);
+        if let Some(t) = &a.technique
+            && t.name() != s.technique.name()
+        {
+            s.technique = t.clone();
+        }
+        if !a.wavelength.is_empty() {
+            s.light.wavelengths_nm.clone_from(&a.wavelength);
+            s.light.weights.clear();
+        }
+        s.light.source = a.source.or(s.light.source);
+        s.film.focus_m = a.film_distance.or(s.film.focus_m);
+        self.apply_lenses(s)?;
+        self.apply_cutoff(s)?;
+        self.apply_rest(s)
+    }
+
+    fn apply_lenses(&self, s: &mut Scene) -> anyhow::Result<()> {
+        let uses = s.technique.uses_source();
+        for (flag, value) in [("--focal-length", self.focal_length), ("--collimator", self.collimator)] {
+            if value.is_some() && !uses {
+                return Err(in_vain(flag, "technique", s.technique.name(), "schlieren or shadowgraph").into());
+            }
+        }
+        s.lenses.schlieren_m = self.focal_length.unwrap_or(s.lenses.schlieren_m);
+        s.lenses.collimator_m = self.collimator.unwrap_or(s.lenses.collimator_m);
+        Ok(())
+    }
+
+    fn apply_cutoff(&self, s: &mut Scene) -> anyhow::Result<()> {
+        let name = s.technique.name();
+        let flags = [
+            ("--cutoff", self.cutoff.is_some()),
+            ("--cutoff-angle", self.cutoff_angle.is_some()),
+            ("--cutoff-open", self.cutoff_open.is_some()),
+            ("--cutoff-height", self.cutoff_height.is_some()),
+            ("--cutoff-radius", self.cutoff_radius.is_some()),
+        ];
+        let TechniqueSpec::Schlieren { cutoff } = &mut s.technique else {
+            return match flags.iter().find(|f| f.1) {
+                Some((flag, _)) => Err(in_vain(flag, "technique", name, "schlieren").into()),
+                None => Ok(()),
+            };
+        };
+        // Light deflected by 0.3 mrad reaches the rim at the customary focal length.
+        let customary = 0.5e-3;
+        match self.cutoff.as_deref() {
+            None => {}
+            Some("knife") => *cutoff = CutoffSpec::default(),
+            Some("circle") => *cutoff = CutoffSpec::Circle { radius_m: customary, center_m: [0.0; 2] },
+            Some("complemented-circle") => {
+                *cutoff = CutoffSpec::ComplementedCircle { radius_m: customary, center_m: [0.0; 2] };
+            }
+            Some("color") => *cutoff = CutoffSpec::Color { radius_m: customary, red_deg: 0.0 },
+            Some(file) if file.to_ascii_lowercase().ends_with(".png") => {
+                *cutoff = CutoffSpec::Image { file: file.into(), width_m: 2.0 * customary };
+            }
+            Some(other) => {
+                return Err(UsageError(format!(
+                    "there is no cut-off `{other}`; there are: knife, circle, complemented-circle, color, or a picture that ends in .png"
+                ))
+                .into());
+            }
+        }
+        let kind = cutoff.name();
+        if let Some(angle) = self.cutoff_angle {
+            match cutoff {
+                CutoffSpec::Knife { angle_deg, .. } => *angle_deg = angle,
+                CutoffSpec::Color { red_deg, .. } => *red_deg = angle,
+                _ => return Err(in_vain("--cutoff-angle", "cut-off", kind, "knife or color").into()),
+            }
+        }
+        if let Some(part) = self.cutoff_open {
+            match cutoff {
+                CutoffSpec::Knife { open, .. } => *open = part,
+                _ => return Err(in_vain("--cutoff-open", "cut-off", kind, "knife").into()),
+            }
+        }
+        if let Some(height) = self.cutoff_height {
+            match cutoff {
+                CutoffSpec::Knife { open_m, .. } => *open_m = Some(height),
+                _ => return Err(in_vain("--cutoff-height", "cut-off", kind, "knife").into()),
+            }
+        }
+        if let Some(radius) = self.cutoff_radius {
+            match cutoff {
+                CutoffSpec::Circle { radius_m, .. }
+                | CutoffSpec::ComplementedCircle { radius_m, .. }
+                | CutoffSpec::Color { radius_m, .. } => *radius_m = radius,
+                CutoffSpec::Image { width_m, .. } => *width_m = 2.0 * radius,
+                _ => return Err(in_vain("--cutoff-radius", "cut-off", kind, "another cut-off").into()),
+            }
+        }
+        Ok(())
+    }
+
+    fn apply_rest(&self, s: &mut Scene) -> anyhow::Result<()> {
+        let name = s.technique.name();
+        for (flag, present, belongs) in [
+            ("--fringe-spacing", self.fringe_spacing.is_some(), &["interferogram"][..]),
+            ("--fringe-angle", self.fringe_angle.is_some(), &["interferogram"]),
+            ("--visibility", self.visibility.is_some(), &["interferogram"]),
+            ("--dot-diameter", self.dot_diameter.is_some(), &["bos"]),
+            ("--dot-spacing", self.dot_spacing.is_some(), &["bos"]),
+            ("--strength", self.strength.is_some(), &["volume", "slice"]),
+            ("--slice-depth", self.slice_depth.is_some(), &["slice"]),
+        ] {
+            if present && !belongs.contains(&name) {
+                return Err(in_vain(flag, "technique", name, &belongs.join(" or ")).into());
+            }
+        }
+        match &mut s.technique {
+            TechniqueSpec::Interferogram { visibility, fringe_spacing_m, fringe_angle_deg } => {
+                *visibility = self.visibility.unwrap_or(*visibility);
+                *fringe_spacing_m = self.fringe_spacing.or(*fringe_spacing_m);
+                *fringe_angle_deg = self.fringe_angle.or(*fringe_angle_deg);
+            }
+            TechniqueSpec::Bos { dot_diameter_m, dot_spacing_m, .. } => {
+                *dot_diameter_m = self.dot_diameter.or(*dot_diameter_m);
+                *dot_spacing_m = self.dot_spacing.or(*dot_spacing_m);
+            }
+            TechniqueSpec::Volume { strength } => *strength = self.strength.unwrap_or(*strength),
+            TechniqueSpec::Slice { strength, depth_m } => {
+                *strength = self.strength.unwrap_or(*strength);
+                *depth_m = self.slice_depth.unwrap_or(*depth_m);
+            }
+            TechniqueSpec::Shadowgraph {} | TechniqueSpec::Schlieren { .. } => {}
+        }
+        Ok(())
+    }
+}
+
+impl FilmArgs {
+    fn apply(&self, s: &mut Scene) -> anyhow::Result<()> {
+        let a = self;
+        s.film.size = a.size.unwrap_or(s.film.size);
+        s.film.field_of_view_m = a.field_of_view.or(s.film.field_of_view_m);
+        s.film.exposure = a.exposure.or(s.film.exposure);
+        if a.noise_free {
+            s.sampling = Some(SamplingSpec::Beams { cells_per_side: 1 });
+        }
+        if a.tilted_beams {
+            s.light.beams = BeamsSpec::Tilted;
+        }
+        let wants_photons =
+            a.samples.is_some() || a.filter.is_some() || a.jitter.is_some() || a.seed.is_some();
+        if wants_photons {
+            // Options of photons ask for photons, whatever the technique's custom is.
+            let mut photons = s.sampling();
+            if matches!(photons, SamplingSpec::Beams { .. }) {
+                photons = SamplingSpec::default();
+            }
+            if let SamplingSpec::Photons { samples, jitter, seed, filter } = &mut photons {
+                *samples = a.samples.unwrap_or(*samples);
+                *jitter = a.jitter.unwrap_or(*jitter);
+                *seed = a.seed.unwrap_or(*seed);
+                *filter = a.filter.unwrap_or(*filter);
+            }
+            s.sampling = Some(photons);
+        }
+        s.march.tolerance_rad = a.tolerance.unwrap_or(s.march.tolerance_rad);
+        if a.march.is_some() {
+            s.march.method.clone_from(&a.march);
+        }
+        if a.interpolant.is_some() {
+            s.march.interpolant.clone_from(&a.interpolant);
+        }
+        s.march.step_voxels = a.step.or(s.march.step_voxels);
+        s.march.device = a.device.unwrap_or(s.march.device);
+        if s.march.device == Device::Gpu {
+            return Err(UsageError(format!(
+                "--device gpu: this build has no march for the GPU; there is: {}",
+                Device::Cpu.to_possible_value().map_or(String::new(), |v| v.get_name().to_string())
+            ))
+            .into());
+        }
+        Ok(())
+    }
+}

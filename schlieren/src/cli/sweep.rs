@@ -1,0 +1,155 @@
+//! `schlieren sweep`: a time series, or one flow for several values of a key of its scene.
+
+use super::render::{Outputs, draw};
+use super::scene_args::SceneArgs;
+use crate::scene::Scene;
+use clap::Args;
+use datasets::cli::{Cancel, CommonArgs, UsageError};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Options of `schlieren sweep`.
+#[derive(Debug, Args)]
+pub(super) struct SweepArgs {
+    /// Files of a time series, or one collection (.pvd), or one file with --set
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    /// A key of the scene with its values: technique.cutoff.angle_deg=0,45,90
+    #[arg(long, value_name = "KEY=V1,V2,...", value_parser = setting)]
+    set: Option<Setting>,
+    /// Pictures, numbered: out-0000.png for out.png
+    #[arg(long, short, value_name = "PNG")]
+    out: Option<PathBuf>,
+    /// The same as OpenEXR
+    #[arg(long, value_name = "EXR")]
+    exr: Option<PathBuf>,
+    /// Deflection maps, numbered
+    #[arg(long, value_name = "NPY")]
+    npy: Option<PathBuf>,
+    #[command(flatten)]
+    scene: SceneArgs,
+}
+
+/// A key and its values.
+#[derive(Debug, Clone)]
+struct Setting {
+    key: Vec<String>,
+    values: Vec<toml::Value>,
+}
+
+/// `film.focus_m=0.1,0.2`. Values are TOML; what is none is a text.
+fn setting(text: &str) -> Result<Setting, String> {
+    let wrong = || format!("`{text}` is not KEY=V1,V2,...; write for example film.focus_m=0.1,0.2,0.4");
+    let (key, values) = text.split_once('=').ok_or_else(wrong)?;
+    let value = |v: &str| {
+        let parsed = format!("v = {v}").parse::<toml::Table>().ok().and_then(|mut t| t.remove("v"));
+        parsed.unwrap_or_else(|| toml::Value::String(v.into()))
+    };
+    if key.is_empty() || values.is_empty() {
+        return Err(wrong());
+    }
+    Ok(Setting {
+        key: key.split('.').map(str::to_string).collect(),
+        values: values.split(',').map(|v| value(v.trim())).collect(),
+    })
+}
+
+/// The scene with a key set to a value.
+fn with(scene: &Scene, key: &[String], value: &toml::Value) -> anyhow::Result<Scene> {
+    let mut tree = toml::Value::Table(scene.to_toml()?.parse()?);
+    let mut at = &mut tree;
+    for part in key {
+        let table = at
+            .as_table_mut()
+            .ok_or_else(|| UsageError(format!("--set {}: `{part}` is inside a value", key.join("."))))?;
+        at = table.entry(part.clone()).or_insert_with(|| toml::Value::Table(toml::Table::new()));
+    }
+    *at = value.clone();
+    let text = toml::to_string(&tree)?;
+    Scene::from_toml(&text).map_err(|e| {
+        let why = std::error::Error::source(&e).map_or(String::new(), |s| format!(": {s}"));
+        UsageError(format!("--set {}={value}: {e}{why}", key.join("."))).into()
+    })
+}
+
+pub(super) fn sweep(common: CommonArgs, args: &SweepArgs) -> anyhow::Result<()> {
+    let cancel = Cancel::on_ctrl_c()?;
+    if Outputs::new(args.out.as_deref(), args.exr.as_deref(), args.npy.as_deref())?.is_empty() {
+        return Err(UsageError("no output: give -o PNG, --exr EXR or --npy NPY".into()).into());
+    }
+
+    // What is drawn: scenes with the value that tells them apart.
+    let mut runs: Vec<(serde_json::Value, Scene)> = Vec::new();
+    match &args.set {
+        Some(set) => {
+            let [file] = &args.files[..] else {
+                return Err(UsageError("--set sweeps over one file; leave out the others".into()).into());
+            };
+            let scene = args.scene.scene(Some(file))?;
+            for value in &set.values {
+                runs.push((json!({ set.key.join("."): value }), with(&scene, &set.key, value)?));
+            }
+        }
+        None => {
+            for step in crate::input::series(&args.files)? {
+                runs.push((json!({ "time": step.time }), args.scene.scene(Some(&step.path))?));
+            }
+        }
+    }
+
+    let mut reference: Option<f64> = None;
+    for (i, (label, mut scene)) in runs.into_iter().enumerate() {
+        cancel.check()?;
+        // All times are relative to the first one's surroundings, or pictures could not be compared.
+        if args.set.is_none() && scene.flow.reference_n_minus_1.is_none() {
+            scene.flow.reference_n_minus_1 = reference;
+        }
+        let numbered = |p: &Option<PathBuf>| p.as_ref().map(|p| number(p, i));
+        let (png, exr, npy) = (numbered(&args.out), numbered(&args.exr), numbered(&args.npy));
+        let outputs = Outputs::new(png.as_deref(), exr.as_deref(), npy.as_deref())?;
+        let drawn = draw(common, cancel, &scene, &outputs)?;
+        reference = reference.or(drawn.json["n0_minus_1"].as_f64());
+        let mut object = drawn.json;
+        if let Some(map) = object.as_object_mut() {
+            map.insert("index".into(), i.into());
+            map.insert("swept".into(), label.clone());
+        }
+        common.result(&object, || format!("{label} {}", drawn.text))?;
+    }
+    Ok(())
+}
+
+/// `out.png` as `out-0003.png`.
+fn number(path: &std::path::Path, i: usize) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let extension = path.extension().unwrap_or_default().to_string_lossy().into_owned();
+    path.with_file_name(format!("{stem}-{i:04}.{extension}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_are_set_with_the_type_they_have() {
+        let scene = Scene::from_toml("[flow]\nfile = \"a.vti\"\ndensity = \"rho\"").unwrap();
+        let s = setting("technique.cutoff.angle_deg=0.0,45.0").unwrap();
+        assert_eq!(s.values.len(), 2);
+        let turned = with(&scene, &s.key, &s.values[1]).unwrap();
+        assert_eq!(
+            turned.technique,
+            crate::scene::TechniqueSpec::Schlieren {
+                cutoff: crate::scene::CutoffSpec::Knife { angle_deg: 45.0, open: 0.5, open_m: None }
+            }
+        );
+        let s = setting("view.direction=x,y").unwrap();
+        assert_eq!(with(&scene, &s.key, &s.values[0]).unwrap().view.direction.to_string(), "x");
+        let s = setting("film.focsu_m=1.0").unwrap();
+        assert!(with(&scene, &s.key, &s.values[0]).unwrap_err().to_string().contains("focsu_m"));
+    }
+
+    #[test]
+    fn pictures_are_numbered() {
+        assert_eq!(number("a/out.png".as_ref(), 12), PathBuf::from("a/out-0012.png"));
+    }
+}

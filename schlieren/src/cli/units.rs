@@ -1,0 +1,108 @@
+//! Values of options with their units.
+
+use crate::scene::SourceSpec;
+
+/// Units of lengths.
+const LENGTHS: [(&str, f64); 6] =
+    [("nm", 1e-9), ("um", 1e-6), ("µm", 1e-6), ("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)];
+/// Units of angles of light.
+const ANGLES: [(&str, f64); 6] = [
+    ("urad", 1e-6),
+    ("µrad", 1e-6),
+    ("mrad", 1e-3),
+    ("nrad", 1e-9),
+    ("arcsec", std::f64::consts::PI / 648_000.0),
+    ("rad", 1.0),
+];
+
+/// A number with one of the units, or bare in `units`' last.
+fn with_unit(text: &str, units: &[(&str, f64)], example: &str) -> Result<f64, String> {
+    let wrong = || format!("`{text}` is no such quantity; write for example {example}");
+    let text_trimmed = text.trim();
+    // The longest unit that fits: "mm" ends with "m", too.
+    let unit = units.iter().filter(|u| text_trimmed.ends_with(u.0)).max_by_key(|u| u.0.len());
+    let (number, scale) =
+        unit.map_or((text_trimmed, 1.0), |u| (&text_trimmed[..text_trimmed.len() - u.0.len()], u.1));
+    let value: f64 = number.trim().parse().map_err(|_| wrong())?;
+    if value.is_finite() { Ok(value * scale) } else { Err(wrong()) }
+}
+
+/// `0.5`, `500mm`, `0.5m`: metres.
+pub(super) fn length(text: &str) -> Result<f64, String> {
+    with_unit(text, &LENGTHS, "0.5m, 20mm or 500um")
+}
+
+/// `1e-7rad`, `0.1urad`, `1e-7`: radians.
+pub(super) fn angle_rad(text: &str) -> Result<f64, String> {
+    with_unit(text, &ANGLES, "1e-7rad, 0.1urad or 0.02arcsec")
+}
+
+/// `1024x768`.
+pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
+    let wrong = || format!("`{text}` is not a size; write for example 960x540 (1 to 16384 pixels each)");
+    let (w, h) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
+    let pixels = |t: &str| t.parse().ok().filter(|n| (1..=16384).contains(n));
+    Ok([pixels(w).ok_or_else(wrong)?, pixels(h).ok_or_else(wrong)?])
+}
+
+/// `point`, `slit:1mm,5mm`, `circle:0.5mm`.
+pub(super) fn source(text: &str) -> Result<SourceSpec, String> {
+    let wrong = || {
+        format!("`{text}` is not a source; write point, slit:WIDTH,LENGTH (slit:1mm,5mm) or circle:DIAMETER")
+    };
+    if text == "point" {
+        return Ok(SourceSpec::Point {});
+    }
+    let (kind, sizes) = text.split_once(':').ok_or_else(wrong)?;
+    match kind {
+        "slit" => {
+            let (w, l) = sizes.split_once(',').ok_or_else(wrong)?;
+            Ok(SourceSpec::Slit { width_m: length(w)?, length_m: length(l)?, angle_deg: None })
+        }
+        "circle" => Ok(SourceSpec::Circle { diameter_m: length(sizes)? }),
+        _ => Err(wrong()),
+    }
+}
+
+/// `NAME=GAS`.
+pub(super) fn species(text: &str) -> Result<(String, String), String> {
+    let parts = text.split_once('=').filter(|(name, gas)| !name.is_empty() && !gas.is_empty());
+    let (name, gas) = parts
+        .ok_or_else(|| format!("`{text}` is not NAME=GAS; write for example Y_CH4=CH4 or Y_fuel=0.42"))?;
+    Ok((name.to_string(), gas.to_string()))
+}
+
+/// Two numbers, `320,200`.
+pub(super) fn pair(text: &str) -> Result<[f64; 2], String> {
+    let wrong = || format!("`{text}` is not two numbers; write for example 320,200");
+    let (a, b) = text.split_once(',').ok_or_else(wrong)?;
+    let number = |t: &str| t.trim().parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(wrong);
+    Ok([number(a)?, number(b)?])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_are_read_and_bare_numbers_are_si() {
+        for (text, value) in
+            [("500mm", 0.5), ("0.5", 0.5), ("0.5m", 0.5), ("633nm", 633e-9), ("2cm", 0.02), ("3µm", 3e-6)]
+        {
+            assert!((length(text).unwrap() / value - 1.0).abs() < 1e-12, "{text}");
+        }
+        assert_eq!(angle_rad("1e-7rad"), Ok(1e-7));
+        assert!((angle_rad("1mrad").unwrap() - 1e-3).abs() < 1e-18);
+        assert!((angle_rad("1arcsec").unwrap() - 4.848e-6).abs() < 1e-9);
+        for wrong in ["", "mm", "1 foot", "nan", "inf m"] {
+            assert!(length(wrong).unwrap_err().contains("20mm"), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn sources_are_read() {
+        assert_eq!(source("circle:0.5mm"), Ok(SourceSpec::Circle { diameter_m: 0.5e-3 }));
+        assert!(matches!(source("slit:1mm,5mm"), Ok(SourceSpec::Slit { angle_deg: None, .. })));
+        assert!(source("lamp").unwrap_err().contains("slit:1mm,5mm"));
+    }
+}

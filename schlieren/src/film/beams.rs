@@ -1,0 +1,274 @@
+//! Exposure without noise: the beam is cut into square cells by a lattice of rays, and each cell's energy goes to where its corners land.
+//!
+//! Where the corners of a cell enclose half the area they started with, the film is twice as bright: the picture is `I = Σ 1/|det J|` over all sheets
+//! of light, J being the derivative of the landing place, with J taken as differences over a cell and the result averaged over pixels. Energy is
+//! conserved exactly, folded cells (caustics) add up, and nothing has to be inverted. A shadowgraph takes one ray per pixel instead of hundreds.
+//!
+//! Cells are split into two triangles, which are distributed to pixels by exact areas. A triangle with a corner that does not arrive is dropped: the
+//! shadow of a body is up to one cell too large.
+
+use super::photons::Exposure;
+use super::{Film, Tally, quantize};
+use crate::optics::Across;
+use crate::path::{Exit, Start, Status};
+use crate::technique::Photon;
+use rayon::prelude::*;
+use rt_core::sampler::Sampler;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Points of the source that stand for it where no closed form is known.
+const SOURCE_POINTS: u32 = 64;
+
+/// Where the corner of a cell landed.
+#[derive(Clone, Copy)]
+struct Corner {
+    /// In pixels; NaN when it did not arrive.
+    at_px: [f64; 2],
+    energy: [f32; 3],
+}
+
+const LOST: Corner = Corner { at_px: [f64::NAN; 2], energy: [0.0; 3] };
+
+/// Exposes `film` with `per_side` × `per_side` cells per pixel. `progress` gets numbers of rays. Returns `None` when `cancel` was set. The developed
+/// film is `film.developed(1.0)`. [`Tally`] counts triangles.
+pub fn expose_beams<const C: usize>(
+    exposure: &Exposure<'_>,
+    film: &Film<C>,
+    per_side: u32,
+    cancel: &AtomicBool,
+    progress: &(dyn Fn(u64) + Sync),
+) -> Option<Tally> {
+    let framing = *film.framing();
+    let (k, margin) = (f64::from(per_side), exposure.margin_px);
+    let columns = ((framing.width + 2 * margin) * per_side + 1) as usize;
+    let rows = ((framing.height + 2 * margin) * per_side + 1) as usize;
+    let place = |i: usize| i as f64 / k - f64::from(margin);
+    let source_points = source_points(exposure);
+
+    // Two rows of corners at a time are enough, but rows are traced in parallel: bands of cells, each with its own corners.
+    const BAND: usize = 16;
+    let bands: Vec<usize> = (0..rows - 1).step_by(BAND).collect();
+    let tallies: Vec<Tally> = bands
+        .par_iter()
+        .map(|&first| {
+            let mut tally = Tally::default();
+            if cancel.load(Ordering::Relaxed) {
+                return tally;
+            }
+            let last = (first + BAND).min(rows - 1);
+            let mut above = corners(exposure, film, &source_points, columns, place(first), &place);
+            for row in first..last {
+                let below = corners(exposure, film, &source_points, columns, place(row + 1), &place);
+                for c in 0..columns - 1 {
+                    let [a, b, d, e] = [above[c], above[c + 1], below[c], below[c + 1]];
+                    // The diagonal alternates, so that no direction of the picture is preferred.
+                    let halves =
+                        if (row + c) % 2 == 0 { [[a, b, d], [b, e, d]] } else { [[a, b, e], [a, e, d]] };
+                    for t in halves {
+                        tally.sent += 1;
+                        if t.iter().all(|p| p.at_px[0].is_finite()) {
+                            tally.landed += 1;
+                            tally.on_film += u64::from(deposit(film, t, 0.5 / (k * k)));
+                        }
+                    }
+                }
+                above = below;
+            }
+            progress(((last - first) * columns) as u64);
+            tally
+        })
+        .collect();
+    if cancel.load(Ordering::Relaxed) {
+        return None;
+    }
+    let mut all = Tally::default();
+    tallies.iter().for_each(|t| all.add(t));
+    Some(all)
+}
+
+/// Points that stand for the source; none when a closed form does.
+fn source_points(exposure: &Exposure<'_>) -> Vec<Across> {
+    if !exposure.technique.needs_source_points() {
+        return Vec::new();
+    }
+    let image = exposure.technique.optics().source_image();
+    let point = |i| image.point_m(Sampler::new(exposure.sampling, exposure.seed, 0, 0, i).square(0));
+    (0..SOURCE_POINTS).map(point).collect()
+}
+
+/// A row of corners at height `y` in pixels.
+fn corners<const C: usize>(
+    exposure: &Exposure<'_>,
+    film: &Film<C>,
+    source_points: &[Across],
+    columns: usize,
+    y: f64,
+    place: &impl Fn(usize) -> f64,
+) -> Vec<Corner> {
+    let (framing, technique) = (film.framing(), exposure.technique);
+    let start = |i: usize| Start {
+        position_m: framing.plane_from_pixel(place(i), y).map(|c| c as f32),
+        tilt_rad: [0.0; 2],
+    };
+    let starts: Vec<Start> = (0..columns).map(start).collect();
+    let mut exits = vec![Exit::UNDISTURBED; columns];
+    exposure.paths.trace(&starts, &mut exits);
+    let corner = |(i, (start, exit)): (usize, (&Start, &Exit))| {
+        let stopped = exit.status == Status::Turned || exit.transmission <= 0.0;
+        if stopped || exposure.solids.is_some_and(|s| s.block(exposure.paths.view(), start)) {
+            return LOST;
+        }
+        let shift_m = technique.optics().film_shift_m(start, exit);
+        let of = |image_point_m| technique.energy(&Photon { start, exit, image_point_m, shift_m });
+        let mut energy = [0.0f32; 3];
+        match source_points {
+            [] => energy = of([0.0; 2]),
+            points => points.iter().for_each(|&p| {
+                let e = of(p);
+                (0..3).for_each(|c| energy[c] += e[c] / points.len() as f32);
+            }),
+        }
+        let shift = if technique.looks_from_film() { [0.0; 2] } else { shift_m.map(f64::from) };
+        // The lattice is exact and the shift small: areas keep the shift's relative accuracy.
+        let at_px = [place(i) + shift[0] / framing.pixel_m, y - shift[1] / framing.pixel_m];
+        Corner { at_px, energy: energy.map(|e| e * exit.transmission) }
+    };
+    starts.iter().zip(&exits).enumerate().map(corner).collect()
+}
+
+/// Distributes a triangle that started with `area_px` and the mean of its corners' energy per pixel. True when any of it falls on the film.
+fn deposit<const C: usize>(film: &Film<C>, t: [Corner; 3], area_px: f64) -> bool {
+    let framing = film.framing();
+    let energy: [f64; C] =
+        std::array::from_fn(|c| t.iter().map(|p| f64::from(p.energy[c])).sum::<f64>() / 3.0 * area_px);
+    let points = t.map(|p| p.at_px);
+    let bounds = |axis: usize, size: u32| {
+        let low = points.iter().map(|p| p[axis]).fold(f64::INFINITY, f64::min).floor();
+        let high = points.iter().map(|p| p[axis]).fold(f64::NEG_INFINITY, f64::max).floor();
+        (low.max(0.0) as i64, high.min(f64::from(size) - 1.0) as i64)
+    };
+    let ((x0, x1), (y0, y1)) = (bounds(0, framing.width), bounds(1, framing.height));
+    let area = polygon_area(&points);
+    let give = |x: i64, y: i64, share: f64| {
+        let shared = energy.map(|e| quantize((e * share) as f32));
+        film.add(y as usize * framing.width as usize + x as usize, shared, 0);
+    };
+    // A triangle in a focus has no area left: all of it goes to one pixel.
+    if area < 1e-9 {
+        let center = [0, 1].map(|i| ((points[0][i] + points[1][i] + points[2][i]) / 3.0).floor());
+        let inside = (0.0..f64::from(framing.width)).contains(&center[0])
+            && (0.0..f64::from(framing.height)).contains(&center[1]);
+        if inside {
+            give(center[0] as i64, center[1] as i64, 1.0);
+        }
+        return inside;
+    }
+    let mut any = false;
+    for y in y0..=y1 {
+        let row = clip(clip(Polygon::new(&points), 1, y as f64, 1.0), 1, y as f64 + 1.0, -1.0);
+        for x in x0..=x1 {
+            let cell = clip(clip(row, 0, x as f64, 1.0), 0, x as f64 + 1.0, -1.0);
+            let share = polygon_area(cell.points()) / area;
+            if share > 0.0 {
+                give(x, y, share);
+                any = true;
+            }
+        }
+    }
+    any
+}
+
+/// A convex polygon: a triangle cut by four lines has at most seven corners.
+#[derive(Clone, Copy)]
+struct Polygon {
+    corners: [[f64; 2]; 8],
+    len: usize,
+}
+
+impl Polygon {
+    fn new(points: &[[f64; 2]; 3]) -> Polygon {
+        let mut corners = [[0.0; 2]; 8];
+        corners[..3].copy_from_slice(points);
+        Polygon { corners, len: 3 }
+    }
+
+    fn points(&self) -> &[[f64; 2]] {
+        &self.corners[..self.len]
+    }
+
+    fn push(&mut self, p: [f64; 2]) {
+        // Rounding cannot make a ninth corner of a convex polygon, but a NaN could.
+        if self.len < self.corners.len() {
+            self.corners[self.len] = p;
+            self.len += 1;
+        }
+    }
+}
+
+/// The part of a polygon on one side of a line across `axis`: above `limit` for `side` = 1, below for -1 (Sutherland and Hodgman 1974).
+fn clip(polygon: Polygon, axis: usize, limit: f64, side: f64) -> Polygon {
+    let mut out = Polygon { corners: [[0.0; 2]; 8], len: 0 };
+    let points = polygon.points();
+    for (i, p) in points.iter().enumerate() {
+        let q = points[(i + 1) % points.len()];
+        let (dp, dq) = (side * (p[axis] - limit), side * (q[axis] - limit));
+        if dp >= 0.0 {
+            out.push(*p);
+        }
+        if (dp >= 0.0) != (dq >= 0.0) {
+            let t = dp / (dp - dq);
+            let mut cut = [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])];
+            cut[axis] = limit;
+            out.push(cut);
+        }
+    }
+    out
+}
+
+/// Area of a polygon, whichever way round. Coordinates are taken relative to the first corner, so that far from zero nothing is lost.
+fn polygon_area(points: &[[f64; 2]]) -> f64 {
+    let Some((o, rest)) = points.split_first() else { return 0.0 };
+    let twice = |w: &[[f64; 2]]| (w[0][0] - o[0]) * (w[1][1] - o[1]) - (w[1][0] - o[0]) * (w[0][1] - o[1]);
+    0.5 * rest.windows(2).map(twice).sum::<f64>().abs()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::Framing;
+
+    fn corner(x: f64, y: f64) -> Corner {
+        Corner { at_px: [x, y], energy: [1.0; 3] }
+    }
+
+    #[test]
+    fn a_triangle_over_many_pixels_gives_each_its_area() {
+        let film = Film::<1>::new(Framing::fitted(4, 4, [1.0, 1.0]), false);
+        // Half of the square 0..3 x 0..3, clockwise and then back: both ways round count alike.
+        assert!(deposit(&film, [corner(0.0, 0.0), corner(3.0, 0.0), corner(0.0, 3.0)], 4.5));
+        assert!(deposit(&film, [corner(3.0, 3.0), corner(3.0, 0.0), corner(0.0, 3.0)], 4.5));
+        let f = film.developed(1.0);
+        for y in 0..4 {
+            for x in 0..4 {
+                let expected = if x < 3 && y < 3 { 1.0 } else { 0.0 };
+                assert!((f[y * 4 + x][0] - expected).abs() < 1e-6, "{x} {y}: {}", f[y * 4 + x][0]);
+            }
+        }
+    }
+
+    #[test]
+    fn a_point_focus_keeps_all_its_energy() {
+        let film = Film::<1>::new(Framing::fitted(4, 4, [1.0, 1.0]), false);
+        assert!(deposit(&film, [corner(2.5, 1.5); 3], 0.5));
+        assert_eq!(film.developed(1.0)[4 + 2], [0.5]);
+        assert!(!deposit(&film, [corner(-2.5, 1.5); 3], 0.5), "beside the film");
+    }
+
+    #[test]
+    fn triangles_half_outside_leave_only_their_inside() {
+        let film = Film::<1>::new(Framing::fitted(2, 2, [1.0, 1.0]), false);
+        deposit(&film, [corner(-2.0, 0.0), corner(2.0, 0.0), corner(0.0, 2.0)], 4.0);
+        let sum: f32 = film.developed(1.0).iter().map(|e| e[0]).sum();
+        assert!((sum - 2.0).abs() < 1e-6, "{sum}");
+    }
+}

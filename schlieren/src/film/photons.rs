@@ -1,0 +1,181 @@
+//! Exposure by photons: every pixel's share of the beam is sent as jittered rays that land where the flow takes them.
+//!
+//! Starts form a low-discrepancy sequence in each pixel, a function of pixel, pass and seed alone; passes can be added at any time. Pixels beside the
+//! picture send photons too, as far as light strays (`margin_px`), so the picture's edge is as bright as it should be.
+
+use super::{Film, PhotonTile, TILE, Tally};
+use crate::optics::Across;
+use crate::path::{Exit, LightPaths, Start, Status};
+use crate::solids::Solids;
+use crate::technique::{Photon, Technique};
+use rayon::prelude::*;
+use rt_core::sampler::{Sampler, Sampling};
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Dimensions of the sampler.
+const JITTER: u32 = 0;
+const SOURCE: u32 = 1;
+
+/// What light is sent, and how it is read.
+#[derive(Clone, Copy)]
+pub struct Exposure<'a> {
+    /// Takes photons through the flow.
+    pub paths: &'a dyn LightPaths,
+    /// Turns exits into energy.
+    pub technique: &'a Technique,
+    /// Bodies in the test section.
+    pub solids: Option<&'a Solids>,
+    /// Jitter: low-discrepancy, or random for comparison.
+    pub sampling: Sampling,
+    /// Of the jitter.
+    pub seed: u64,
+    /// Pixels around the picture that send light as well.
+    pub margin_px: u32,
+    /// Whether every photon travels in the beam of its own source point (an extended source blurs what is out of focus), or all in the axial one.
+    pub tilted_beams: bool,
+}
+
+/// A photon on the film, kept for filters that look for neighbours.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Landed<const C: usize> {
+    /// In pixels from the picture's upper left corner; may lie beside the picture.
+    pub at_px: [f32; 2],
+    /// 1 for an undisturbed photon without a cut-off.
+    pub energy: [f32; C],
+}
+
+/// What [`expose`] did.
+#[derive(Debug, Default)]
+pub struct Exposed<const C: usize> {
+    /// Photons by fate.
+    pub tally: Tally,
+    /// All landed photons, when they were to be kept, in an order that does not depend on threads.
+    pub landed: Vec<Landed<C>>,
+}
+
+/// Sends passes `passes`, one photon per pixel and pass; pass i goes to film `i % films.len()` (two films tell the noise: their difference). Every tile
+/// reports its photons to `progress`. Returns `None` when `cancel` was set; the films are then half exposed and worthless.
+pub fn expose<const C: usize>(
+    exposure: &Exposure<'_>,
+    films: &[Film<C>],
+    passes: Range<u32>,
+    keep: bool,
+    cancel: &AtomicBool,
+    progress: &(dyn Fn(u64) + Sync),
+) -> Option<Exposed<C>> {
+    let framing = *films.first()?.framing();
+    let margin = i64::from(exposure.margin_px);
+    let along = |n: u32| (-margin..i64::from(n) + margin).step_by(TILE as usize);
+    let corners: Vec<[i64; 2]> =
+        along(framing.height).flat_map(|y| along(framing.width).map(move |x| [x, y])).collect();
+    let limit = [i64::from(framing.width) + margin, i64::from(framing.height) + margin];
+    let tiles: Vec<Exposed<C>> = corners
+        .par_iter()
+        .map(|&corner| {
+            let mut done = Exposed::default();
+            if !cancel.load(Ordering::Relaxed) {
+                let end = [0, 1].map(|i| (corner[i] + i64::from(TILE)).min(limit[i]));
+                expose_tile(exposure, films, [corner, end], passes.clone(), keep, &mut done);
+                progress(done.tally.sent);
+            }
+            done
+        })
+        .collect();
+    if cancel.load(Ordering::Relaxed) {
+        return None;
+    }
+    let mut all = Exposed::default();
+    for mut tile in tiles {
+        all.tally.add(&tile.tally);
+        all.landed.append(&mut tile.landed);
+    }
+    Some(all)
+}
+
+fn expose_tile<const C: usize>(
+    exposure: &Exposure<'_>,
+    films: &[Film<C>],
+    [corner, end]: [[i64; 2]; 2],
+    passes: Range<u32>,
+    keep: bool,
+    done: &mut Exposed<C>,
+) {
+    let framing = *films[0].framing();
+    let (technique, optics) = (exposure.technique, exposure.technique.optics());
+    let mut tiles: Vec<PhotonTile<'_, C>> = films.iter().map(|f| PhotonTile::new(f, corner)).collect();
+    let capacity = (TILE * TILE) as usize;
+    let (mut starts, mut places) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
+    let mut image_points: Vec<Across> = Vec::with_capacity(capacity);
+    let mut exits = vec![Exit::UNDISTURBED; capacity];
+    let needs_source = exposure.tilted_beams || technique.needs_source_points();
+    let to_pixels = (1.0 / framing.pixel_m) as f32;
+
+    for pass in passes {
+        // Starts: a jittered place in every pixel.
+        starts.clear();
+        places.clear();
+        image_points.clear();
+        for y in corner[1]..end[1] {
+            for x in corner[0]..end[0] {
+                // The margin's pixels have negative numbers; as u32 they are other numbers, no worse.
+                let sampler = Sampler::new(exposure.sampling, exposure.seed, x as u32, y as u32, pass);
+                let jitter = sampler.square(JITTER);
+                let place = [x as f32 + jitter[0], y as f32 + jitter[1]];
+                let at = framing
+                    .plane_from_pixel(x as f64 + f64::from(jitter[0]), y as f64 + f64::from(jitter[1]));
+                let mut start = Start { position_m: at.map(|c| c as f32), tilt_rad: [0.0; 2] };
+                let mut point = [0.0; 2];
+                if needs_source {
+                    point = optics.source_image().point_m(sampler.square(SOURCE));
+                    if exposure.tilted_beams {
+                        start.tilt_rad = optics.tilt_rad(point);
+                    }
+                }
+                done.tally.sent += 1;
+                if exposure.solids.is_some_and(|s| s.block(exposure.paths.view(), &start)) {
+                    done.tally.blocked_by_solids += 1;
+                    continue;
+                }
+                starts.push(start);
+                places.push(place);
+                image_points.push(point);
+            }
+        }
+
+        // Through the flow.
+        let exits = &mut exits[..starts.len()];
+        exposure.paths.trace(&starts, exits);
+
+        // Onto the film.
+        let tile = &mut tiles[pass as usize % films.len()];
+        for i in 0..starts.len() {
+            let (start, exit) = (&starts[i], &exits[i]);
+            if exit.status == Status::Turned {
+                done.tally.turned += 1;
+                continue;
+            }
+            if exit.transmission <= 0.0 {
+                done.tally.blocked_in_field += 1;
+                continue;
+            }
+            let shift_m = optics.film_shift_m(start, exit);
+            let energy = technique.energy(&Photon { start, exit, image_point_m: image_points[i], shift_m });
+            let moved = if technique.looks_from_film() { [0.0; 2] } else { shift_m };
+            // A NaN or infinity in either becomes NaN here; comparisons with it are false.
+            let check = (moved[0] + moved[1] + energy[0] + energy[1] + energy[2]) * 0.0;
+            if check != 0.0 {
+                done.tally.not_a_number += 1;
+                continue;
+            }
+            let at_px = [places[i][0] + moved[0] * to_pixels, places[i][1] - moved[1] * to_pixels];
+            let energy: [f32; C] = std::array::from_fn(|c| energy[c] * exit.transmission);
+            done.tally.landed += 1;
+            done.tally.on_film += u64::from(tile.deposit(at_px, energy));
+            if keep {
+                done.landed.push(Landed { at_px, energy });
+            }
+        }
+    }
+    tiles.into_iter().for_each(PhotonTile::flush);
+}

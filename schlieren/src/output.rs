@@ -1,0 +1,216 @@
+//! Pictures into files: PNG for eyes, OpenEXR with every layer and every parameter, NumPy for the deflection map.
+
+use crate::render::Rendered;
+use crate::scene::{Scene, SceneError};
+use datasets::image_io::{self, ImageError, Metadata, Picture, PngDepth, PngReport, keys};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Why a picture cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum OutputError {
+    /// The image format says no.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// The scene cannot be written into the metadata.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The file system says no.
+    #[error("{path}: cannot write")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// No map was made.
+    #[error("the deflection map was not rendered; ask for Layers::map")]
+    NoMap,
+}
+
+/// Writes the picture, 8 bits a channel, sRGB.
+pub fn write_png(path: &Path, rendered: &Rendered) -> Result<PngReport, OutputError> {
+    let mut p = Picture::new(rendered.framing.width, rendered.framing.height);
+    add_pixels(&mut p, rendered)?;
+    Ok(image_io::write_png(path, &p, PngDepth::Eight)?)
+}
+
+/// Writes every layer that was rendered:
+///
+/// | plane | unit | |
+/// |---|---|---|
+/// | `R` `G` `B`, or `Y` | | the picture, linear |
+/// | `deflection.X` `.Y` | rad | along the picture's right and up |
+/// | `displacement.X` `.Y` | m | in the plane of focus, in the test section |
+/// | `phase.Y` | waves | in the plane of focus |
+/// | `transmission.Y` | | 1 free, 0 blocked |
+/// | `samples.Y` | photons | that landed on the pixel |
+/// | `error.Y` | | of the picture, by too few photons |
+/// | `error.deflection` | rad | of the deflection, by march and interpolation |
+///
+/// and as metadata every value of the effective scene under its TOML path, the scene as a whole, and what was done.
+pub fn write_exr(
+    path: &Path,
+    rendered: &Rendered,
+    scene: &Scene,
+    elapsed_secs: f64,
+) -> Result<(), OutputError> {
+    let mut p = picture(rendered)?;
+    p.metadata = metadata(rendered, scene, elapsed_secs)?;
+    Ok(image_io::write_exr(path, &p)?)
+}
+
+/// All layers as planes.
+pub fn picture(rendered: &Rendered) -> Result<Picture, OutputError> {
+    let mut p = Picture::new(rendered.framing.width, rendered.framing.height);
+    add_pixels(&mut p, rendered)?;
+    if let Some(m) = &rendered.map {
+        for (axis, name) in ["X", "Y"].into_iter().enumerate() {
+            let of = |v: &[[f32; 2]]| v.iter().map(|d| d[axis]).collect();
+            p.add(&format!("deflection.{name}"), "rad", of(&m.deflection_rad))?;
+            p.add(&format!("displacement.{name}"), "m", of(&m.displacement_m))?;
+        }
+        if !m.waves.is_empty() {
+            p.add("phase.Y", "waves", m.waves.clone())?;
+        }
+        p.add("transmission.Y", "1", m.transmission.clone())?;
+    }
+    if let Some(counts) = &rendered.counts {
+        p.add("samples.Y", "photons", counts.iter().map(|n| *n as f32).collect())?;
+    }
+    if let Some(noise) = &rendered.noise {
+        p.add("error.Y", "1", noise.clone())?;
+    }
+    if let Some(error) = rendered.report.deflection_error_rad {
+        p.add("error.deflection", "rad", vec![error as f32; rendered.framing.pixels()])?;
+    }
+    Ok(p)
+}
+
+fn add_pixels(p: &mut Picture, rendered: &Rendered) -> Result<(), OutputError> {
+    let channel = |c: usize| rendered.pixels.iter().map(|v| v[c]).collect();
+    if rendered.colored {
+        for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
+            p.add(name, "", channel(c))?;
+        }
+    } else {
+        p.add("Y", "", channel(0))?;
+    }
+    Ok(())
+}
+
+/// Every parameter and what was done.
+pub fn metadata(rendered: &Rendered, scene: &Scene, elapsed_secs: f64) -> Result<Metadata, OutputError> {
+    let mut m = image_io::metadata_of_this_run("schlieren", env!("CARGO_PKG_VERSION"));
+    // OpenEXR's own attribute of that name is not for free use.
+    if let Some(program) = m.remove(keys::SOFTWARE) {
+        m.insert("program".into(), program);
+    }
+    m.insert(keys::ELAPSED_SECS.into(), elapsed_secs.into());
+    let text = scene.effective().to_toml()?;
+    if let Ok(table) = text.parse::<toml::Table>() {
+        flatten("", &toml::Value::Table(table), &mut m);
+    }
+    m.insert("scene".into(), text.into());
+    let r = &rendered.report;
+    m.insert("pixel_m".into(), r.pixel_m.into());
+    m.insert("march_in_effect".into(), r.march.clone().into());
+    m.insert("rays".into(), (r.counters.rays as f64).into());
+    if let Some(e) = r.deflection_error_rad {
+        m.insert("deflection_error_rad".into(), e.into());
+    }
+    if !r.warnings.is_empty() {
+        m.insert("warnings".into(), r.warnings.join("\n").into());
+    }
+    Ok(m)
+}
+
+/// Values of a TOML tree under their paths: `film.focus_m`. Lists are texts.
+fn flatten(path: &str, value: &toml::Value, out: &mut Metadata) {
+    match value {
+        toml::Value::Table(table) => {
+            for (key, v) in table {
+                let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+                flatten(&path, v, out);
+            }
+        }
+        toml::Value::Float(v) => {
+            out.insert(path.into(), (*v).into());
+        }
+        toml::Value::Integer(v) => {
+            out.insert(path.into(), (*v as f64).into());
+        }
+        toml::Value::String(v) => {
+            out.insert(path.into(), v.clone().into());
+        }
+        other => {
+            out.insert(path.into(), other.to_string().into());
+        }
+    }
+}
+
+/// Writes the deflection map as a NumPy array of shape (height, width, 2), little-endian f32, in rad along the picture's right and up; row 0 is the top.
+pub fn write_npy(path: &Path, rendered: &Rendered) -> Result<(), OutputError> {
+    let map = rendered.map.as_ref().ok_or(OutputError::NoMap)?;
+    let shape = format!("({}, {}, 2)", rendered.framing.height, rendered.framing.width);
+    let bytes = npy(&shape, map.deflection_rad.as_flattened());
+    write_whole(path, &bytes).map_err(|source| OutputError::Io { path: path.into(), source })
+}
+
+/// NumPy's format, version 1.0: magic, length, a Python dictionary padded so that the data begin at a multiple of 64, the data.
+fn npy(shape: &str, values: &[f32]) -> Vec<u8> {
+    const PREAMBLE: usize = 10;
+    let mut header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}");
+    let end = (PREAMBLE + header.len() + 1).next_multiple_of(64);
+    header.extend(std::iter::repeat_n(' ', end - PREAMBLE - header.len() - 1));
+    header.push('\n');
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes());
+    bytes.extend(header.as_bytes());
+    bytes.extend(values.iter().flat_map(|v| v.to_le_bytes()));
+    bytes
+}
+
+/// A file that appears whole or not at all.
+pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut name = path.file_name().unwrap_or_default().to_os_string();
+    name.push(format!(".{}.partial", std::process::id()));
+    let temporary = path.with_file_name(name);
+    let result = std::fs::File::create(&temporary)
+        .and_then(|mut f| f.write_all(bytes))
+        .and_then(|()| std::fs::rename(&temporary, path));
+    if result.is_err() {
+        // The first error is the one to report.
+        let _ = std::fs::remove_file(&temporary);
+    }
+    result
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn npy_is_numpys_format() {
+        let bytes = npy("(1, 2, 2)", &[1.0, -2.0, 0.5, 1e-7]);
+        assert_eq!(&bytes[..8], b"\x93NUMPY\x01\x00");
+        let length = usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+        assert_eq!((10 + length) % 64, 0);
+        let header = std::str::from_utf8(&bytes[10..10 + length]).unwrap();
+        assert!(header.starts_with("{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2, 2), }"));
+        assert!(header.ends_with('\n'));
+        assert_eq!(bytes.len(), 10 + length + 16);
+        assert_eq!(bytes[10 + length + 4..][..4], (-2.0f32).to_le_bytes());
+    }
+
+    #[test]
+    fn every_parameter_has_its_path() {
+        let table: toml::Table =
+            "[film]\nsize = [3, 4]\nfocus_m = 0.5\n[technique]\nkind = \"bos\"".parse().unwrap();
+        let mut m = Metadata::new();
+        flatten("", &toml::Value::Table(table), &mut m);
+        assert_eq!(m["film.focus_m"], 0.5.into());
+        assert_eq!(m["technique.kind"], "bos".into());
+        assert!(m.contains_key("film.size"));
+    }
+}

@@ -1,0 +1,60 @@
+//! The deflection map: one ray through the centre of every pixel. What measurements and other programs compare with.
+
+use crate::film::Framing;
+use crate::optics::Optics;
+use crate::path::{Exit, LightPaths, Status};
+
+/// What rays through the pixels' centres met, row by row from the top.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Map {
+    /// Deflection along right and up; 0 where no light came through.
+    pub deflection_rad: Vec<[f32; 2]>,
+    /// Displacement in the plane of focus: what BOS measures when that is the background.
+    pub displacement_m: Vec<[f32; 2]>,
+    /// Optical path difference in the plane of focus, in waves; empty when it was not asked for.
+    pub waves: Vec<f32>,
+    /// 1 free, 0 blocked.
+    pub transmission: Vec<f32>,
+    /// Largest deflection's size.
+    pub largest_deflection_rad: f64,
+    /// Largest displacement where rays leave the field.
+    pub largest_displacement_m: f64,
+    /// Pixels whose ray did not come through.
+    pub dark: usize,
+}
+
+/// Traces the map. `blocked` says which starts meet a body.
+pub(super) fn map(
+    paths: &dyn LightPaths,
+    optics: &Optics,
+    framing: &Framing,
+    wavelength_m: f64,
+    n0: f64,
+    blocked: impl Fn(&crate::path::Start) -> bool,
+) -> Map {
+    let starts = framing.pixel_centers();
+    let mut exits = vec![Exit::UNDISTURBED; starts.len()];
+    paths.trace_parallel(&starts, &mut exits);
+    let mut map = Map::default();
+    for (start, exit) in starts.iter().zip(&exits) {
+        let [dx, dy] = exit.deflection_rad;
+        let dark = exit.status == Status::Turned
+            || exit.transmission <= 0.0
+            || !(dx.is_finite() && dy.is_finite())
+            || blocked(start);
+        map.dark += usize::from(dark);
+        map.transmission.push(if dark { 0.0 } else { exit.transmission });
+        map.deflection_rad.push(if dark { [0.0; 2] } else { exit.deflection_rad });
+        map.displacement_m.push(if dark { [0.0; 2] } else { optics.film_shift_m(start, exit) });
+        if paths.wanted().opd {
+            let path_m = f64::from(optics.film_path_difference_m(exit, n0 as f32));
+            map.waves.push(if dark { 0.0 } else { (path_m / wavelength_m) as f32 });
+        }
+        if !dark {
+            let size = |v: [f32; 2]| f64::from(v[0]).hypot(f64::from(v[1]));
+            map.largest_deflection_rad = map.largest_deflection_rad.max(size(exit.deflection_rad));
+            map.largest_displacement_m = map.largest_displacement_m.max(size(exit.displacement_m));
+        }
+    }
+    map
+}

@@ -1,0 +1,203 @@
+//! Which march takes the light through, and how exact it is: [`crate::plan`] picks what the scene leaves open by bounds from the tolerance, and measures
+//! what was achieved. Marches that no plan picks, because they are for comparison, are made here.
+
+use super::{RenderError, TestSection};
+use crate::field::Field;
+use crate::interpolate::{BSpline, Interpolant, Interpolate, Trilinear, TrilinearGradient};
+use crate::march::{
+    BlankCells, Deviational, Full, FullOptions, Integrator, Options, Pefrl, RungeKutta4, Scheme, Sharma,
+};
+use crate::path::{Exit, LightPaths, Start, Wanted};
+use crate::plan::{Mode, Plan, Request};
+use crate::scene::{Device, Scene};
+use crate::technique::bos::Reversed;
+use crate::view::View;
+
+/// Names of marches, the cheapest first.
+pub const MARCHES: [&str; 6] = ["line-of-sight", "verlet", "euler", "pefrl", "sharma", "rk4"];
+/// Names of interpolants, the default first.
+pub const INTERPOLANTS: [&str; 3] = ["b-spline", "trilinear", "trilinear-gradient"];
+
+/// Rays that are traced twice to measure a plan's error.
+const MEASURED_RAYS: usize = 256;
+
+/// Paths of light through one of the fields, and what is known of their accuracy.
+pub struct Planned<'a> {
+    /// The paths.
+    pub paths: Box<dyn LightPaths + 'a>,
+    /// The march, the interpolant and the step, in words.
+    pub description: String,
+    /// Measured error of a deflection by march, interpolant and step; `None` when it was not to be measured, or the march is one for comparison.
+    pub error_rad: Option<f64>,
+    /// Estimate of what the flow's own lattice leaves open.
+    pub resolution_error_rad: Option<f64>,
+    /// What should be known, a sentence each.
+    pub warnings: Vec<String>,
+}
+
+impl TestSection {
+    /// Light paths through field `line` as the scene's march says. `against_light`: traced from the camera. `measure` traces some rays with everything
+    /// refined, to know the error.
+    pub fn paths(
+        &self,
+        scene: &Scene,
+        line: usize,
+        wanted: Wanted,
+        against_light: bool,
+        measure: bool,
+    ) -> Result<Planned<'_>, RenderError> {
+        let march = &scene.march;
+        if march.device == Device::Gpu {
+            return Err(RenderError::NoGpu);
+        }
+        let known = |name: &Option<String>, names: &[&'static str], key| match name {
+            None => Ok(None),
+            Some(n) => match names.iter().find(|k| **k == n.as_str()) {
+                Some(k) => Ok(Some(*k)),
+                None => Err(RenderError::Unknown { key, name: n.clone(), names: names.join(", ") }),
+            },
+        };
+        let method = known(&march.method, &MARCHES, "march.method")?;
+        let interpolant =
+            known(&march.interpolant, &INTERPOLANTS, "march.interpolant")?.map(|name| match name {
+                "trilinear" => Interpolant::Trilinear,
+                "trilinear-gradient" => Interpolant::TrilinearGradient,
+                _ => Interpolant::BSpline,
+            });
+        let field = &self.fields[line];
+        let view = if against_light { Reversed::view(&self.view) } else { self.view };
+        let with = |mode| Request {
+            tolerance_rad: march.tolerance_rad,
+            mode,
+            interpolant,
+            step_voxels: march.step_voxels,
+            wanted,
+            blank: BlankCells::default(),
+        };
+
+        // For comparison: by name only, never picked.
+        let (paths, description, achieved) = if let Some(name @ ("euler" | "sharma" | "rk4")) = method {
+            let interpolant = interpolant.unwrap_or_default();
+            let step_voxels = march.step_voxels.unwrap_or(1.0);
+            let paths = compared(name, field, view, interpolant, step_voxels, wanted);
+            (paths, described(name, interpolant, step_voxels), None)
+        } else {
+            let mode = method.map(|name| match name {
+                "line-of-sight" => Mode::LineOfSight,
+                "pefrl" => Mode::Full,
+                _ => Mode::Paraxial,
+            });
+            let plan = Plan::new(field, with(mode));
+            // PEFRL is made with the spline only.
+            if plan.mode == Mode::Full && interpolant.is_some_and(|i| i != Interpolant::BSpline) {
+                let step = plan.step_voxels;
+                let options = FullOptions { step_voxels: step, wanted, ..FullOptions::default() };
+                let paths = full(field, view, plan.interpolant, Pefrl, options);
+                (paths, described("pefrl", plan.interpolant, step), None)
+            } else {
+                let name = match plan.mode {
+                    Mode::LineOfSight => "line-of-sight",
+                    Mode::Paraxial => "verlet",
+                    Mode::Full => "pefrl",
+                };
+                let achieved = measure.then(|| plan.measure(field, view, MEASURED_RAYS));
+                (plan.paths(field, view), described(name, plan.interpolant, plan.step_voxels), achieved)
+            }
+        };
+        let mut warnings = Vec::new();
+        if let Some(a) = achieved.filter(|a| a.max_rad > march.tolerance_rad) {
+            warnings.push(format!(
+                "deflections are off by up to {:.1e} rad, above the tolerance of {:.1e} rad; the flow has structures that its lattice does not resolve: smooth shocks (flow.smoothing_nodes) or take a finer lattice",
+                a.max_rad, march.tolerance_rad
+            ));
+        }
+        let paths = if against_light { Box::new(Reversed::new(paths)) as Box<dyn LightPaths> } else { paths };
+        Ok(Planned {
+            paths,
+            description,
+            error_rad: achieved.map(|a| a.max_rad),
+            resolution_error_rad: achieved.map(|a| a.resolution_rad).filter(|r| r.is_finite()),
+            warnings,
+        })
+    }
+}
+
+fn described(name: &str, interpolant: Interpolant, step_voxels: f64) -> String {
+    let interpolant = match interpolant {
+        Interpolant::BSpline => "b-spline",
+        Interpolant::Trilinear => "trilinear",
+        Interpolant::TrilinearGradient => "trilinear-gradient",
+    };
+    match name {
+        "line-of-sight" => format!("line-of-sight, {interpolant}"),
+        _ => format!("{name}, {interpolant}, steps of {step_voxels} voxel"),
+    }
+}
+
+/// A march that is there to compare with.
+fn compared<'a>(
+    name: &str,
+    field: &'a Field,
+    view: View,
+    interpolant: Interpolant,
+    step_voxels: f64,
+    wanted: Wanted,
+) -> Box<dyn LightPaths + 'a> {
+    let options = FullOptions { step_voxels, wanted, ..FullOptions::default() };
+    match name {
+        "sharma" => full(field, view, interpolant, Sharma, options),
+        "rk4" => full(field, view, interpolant, RungeKutta4, options),
+        _ => {
+            let options = Options { scheme: Scheme::Euler, step_voxels, wanted, ..Options::default() };
+            Box::new(Deviational::new(field, view, interpolant, options))
+        }
+    }
+}
+
+fn full<'a, G: Integrator + Copy + 'a>(
+    field: &'a Field,
+    view: View,
+    interpolant: Interpolant,
+    integrator: G,
+    options: FullOptions,
+) -> Box<dyn LightPaths + 'a> {
+    match interpolant {
+        Interpolant::BSpline => {
+            Box::new(Owned { field, interpolate: BSpline::new(field), integrator, view, options })
+        }
+        Interpolant::Trilinear => {
+            Box::new(Owned { field, interpolate: Trilinear::new(field), integrator, view, options })
+        }
+        Interpolant::TrilinearGradient => {
+            Box::new(Owned { field, interpolate: TrilinearGradient::new(field), integrator, view, options })
+        }
+    }
+}
+
+/// [`Full`] together with the interpolant that it borrows.
+struct Owned<'a, I, G> {
+    field: &'a Field,
+    interpolate: I,
+    integrator: G,
+    view: View,
+    options: FullOptions,
+}
+
+impl<I: Interpolate, G: Integrator + Copy> LightPaths for Owned<'_, I, G> {
+    fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
+        Full::new(self.field, &self.interpolate, self.integrator, self.view, self.options)
+            .trace(starts, exits);
+    }
+
+    fn view(&self) -> &View {
+        &self.view
+    }
+
+    fn wanted(&self) -> Wanted {
+        self.options.wanted
+    }
+
+    fn difference_step_m(&self) -> f64 {
+        Full::new(self.field, &self.interpolate, self.integrator, self.view, self.options).difference_step_m()
+    }
+}

@@ -1,0 +1,71 @@
+//! The test section: fields for each wavelength, the view, the bodies, and the paths of light through them.
+
+use super::RenderError;
+use crate::field::Field;
+use crate::input;
+use crate::scene::Scene;
+use crate::solids::Solids;
+use crate::view::View;
+
+/// What stands between the lenses.
+pub struct TestSection {
+    /// The gas for the light of each wavelength of the scene, in its order.
+    pub fields: Vec<Field>,
+    /// The view around the fields' middle.
+    pub view: View,
+    /// Bodies.
+    pub solids: Option<Solids>,
+    /// How the field came about; `None` when it was not read from a file.
+    pub input: Option<input::Report>,
+    /// What was repaired or left out, a sentence each.
+    pub warnings: Vec<String>,
+}
+
+impl TestSection {
+    /// Reads what the scene names. `read` is told what is read, before it is.
+    pub fn open(scene: &Scene, mut read: impl FnMut(&str)) -> Result<TestSection, RenderError> {
+        let mut fields = Vec::new();
+        let mut report: Option<input::Report> = None;
+        for line in scene.lines() {
+            read(&format!("reading {} for {} nm", scene.flow.file.display(), line.wavelength_nm));
+            let loaded = input::load(&scene.flow.file, &scene.flow.options(line.wavelength_nm)?)?;
+            fields.push(loaded.field);
+            report.get_or_insert(loaded.report);
+        }
+        let mut warnings = report.as_ref().map_or(Vec::new(), |r| r.warnings.clone());
+        let mut solids = None;
+        if !scene.solids.files.is_empty() {
+            read("reading bodies");
+            let (bodies, more) = Solids::open(&scene.solids.files)?;
+            warnings.extend(more);
+            solids = Some(bodies);
+        }
+        let section = TestSection::of_fields(scene, fields, solids)?;
+        Ok(TestSection { input: report, warnings, ..section })
+    }
+
+    /// A test section of fields that are at hand, one per wavelength of the scene.
+    pub fn of_fields(
+        scene: &Scene,
+        fields: Vec<Field>,
+        solids: Option<Solids>,
+    ) -> Result<TestSection, RenderError> {
+        let lines = scene.light.wavelengths_nm.len();
+        let (Some(first), true) = (fields.first(), fields.len() == lines) else {
+            return Err(RenderError::Fields { wanted: lines, found: fields.len() });
+        };
+        let view = scene.view.direction.view(first.centre_m())?;
+        Ok(TestSection { fields, view, solids, input: None, warnings: Vec::new() })
+    }
+
+    /// Sides of the field as the view sees them, in metres.
+    pub fn sides_m(&self) -> [f64; 2] {
+        let size = self.fields[0].size_m();
+        [self.view.right, self.view.up].map(|axis| axis.abs().dot(size))
+    }
+
+    /// Depth of the field along the light, in metres.
+    pub fn depth_m(&self) -> f64 {
+        self.view.forward.abs().dot(self.fields[0].size_m())
+    }
+}

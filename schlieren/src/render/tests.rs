@@ -1,0 +1,175 @@
+use super::*;
+use crate::field::Field;
+use crate::solids::Solids;
+use glam::{DVec3, Vec3};
+use rt_core::accel::{BuildOptions, World};
+use rt_core::mesh::TriMesh;
+
+const SIGMA: f64 = 12e-3;
+const AMPLITUDE: f64 = -2e-5;
+
+fn blob() -> Field {
+    Field::from_fn([33; 3], [3e-3; 3], DVec3::splat(-48e-3), 1.00027, |p| {
+        AMPLITUDE * (-p.length_squared() / (2.0 * SIGMA * SIGMA)).exp()
+    })
+    .unwrap()
+}
+
+fn scene(rest: &str) -> Scene {
+    Scene::from_toml(&format!("[flow]\nfile = \"-\"\ndensity = \"-\"\n{rest}")).unwrap()
+}
+
+fn drawn(rest: &str, layers: Layers) -> Rendered {
+    let s = scene(rest);
+    let fields = s.lines().iter().map(|_| blob()).collect();
+    let section = TestSection::of_fields(&s, fields, None).unwrap();
+    render(&s, &section, layers, &Control::default()).unwrap()
+}
+
+const SMALL: &str = "[film]\nsize = [48, 40]\n";
+
+#[test]
+fn pictures_are_the_same_for_any_number_of_threads() {
+    for technique in [
+        "kind = \"schlieren\"",
+        "kind = \"shadowgraph\"",
+        "kind = \"schlieren\"\ncutoff = { kind = \"color\", radius_m = 1e-4 }",
+    ] {
+        for sampling in [
+            "method = \"photons\"\nsamples = 4",
+            "method = \"beams\"",
+            "method = \"photons\"\nsamples = 4\nfilter = { kind = \"cone\", nearest = 6 }",
+        ] {
+            let text = format!("{SMALL}[technique]\n{technique}\n[sampling]\n{sampling}");
+            let with = |threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                pool.install(|| drawn(&text, Layers::NONE).pixels)
+            };
+            let bits = |p: Vec<Rgb>| p.into_iter().flatten().map(f32::to_bits).collect::<Vec<_>>();
+            assert_eq!(bits(with(1)), bits(with(5)), "{text}");
+        }
+    }
+}
+
+#[test]
+fn the_map_is_the_closed_form_with_row_0_at_the_top() {
+    let r = drawn(SMALL, Layers { map: true, phase: true, ..Layers::NONE });
+    let m = r.map.unwrap();
+    let half_m = 48e-3;
+    let n0 = 1.00027;
+    let (mut worst, mut worst_phase) = (0.0f64, 0.0f64);
+    for (i, s) in r.framing.pixel_centers().iter().enumerate() {
+        let [x, y] = s.position_m.map(f64::from);
+        if x.abs() > half_m || y.abs() > half_m {
+            continue;
+        }
+        let inside = crate::analytic::erf(half_m / (SIGMA * 2f64.sqrt()));
+        let path = AMPLITUDE
+            * SIGMA
+            * std::f64::consts::TAU.sqrt()
+            * (-(x * x + y * y) / (2.0 * SIGMA * SIGMA)).exp()
+            * inside;
+        for (got, at) in m.deflection_rad[i].iter().zip([x, y]) {
+            worst = worst.max((f64::from(*got) + at / (SIGMA * SIGMA) * path).abs());
+        }
+        worst_phase = worst_phase.max((f64::from(m.waves[i]) - n0 * path / 633e-9).abs());
+    }
+    // σ is four voxels: the B-spline's error is 7e-5 rms (notes' table at h/σ 0.2…0.4), several times that at most; deflections reach 3e-5.
+    assert!(m.largest_deflection_rad > 2e-5 && worst < 3e-3 * m.largest_deflection_rad, "{worst:e}");
+    assert!(worst_phase < 2e-3, "{worst_phase:e} waves of {}", AMPLITUDE * SIGMA * 2.5 / 633e-9);
+    // Warm air bends light away from its middle: up in the upper row.
+    assert!(m.deflection_rad[10 * 48 + 24][1] > 0.0 && m.deflection_rad[30 * 48 + 24][1] < 0.0);
+}
+
+#[test]
+fn what_a_scene_does_not_call_for_is_not_counted() {
+    let c = |text: &str, layers| drawn(&format!("{SMALL}{text}"), layers).report;
+    let photons = "[sampling]\nmethod = \"photons\"\nsamples = 2\n";
+    let plain = c(photons, Layers::NONE);
+    let k = plain.counters;
+    assert!(k.rays >= 2 * 48 * 40);
+    assert_eq!(
+        (k.map_rays, k.phase_rays, k.dispersion_rays, k.solid_queries, k.tilted_rays, k.differential_rays),
+        (0, 0, 0, 0, 0, 0)
+    );
+    assert_eq!(plain.effects, Effects::default());
+
+    let phase = c(&format!("[technique]\nkind = \"interferogram\"\n{photons}"), Layers::NONE);
+    assert!(phase.effects.phase && phase.counters.phase_rays == phase.counters.rays);
+    let colors = c(&format!("[light]\nwavelengths_nm = [633, 532]\n{photons}"), Layers::NONE);
+    assert!(colors.effects.dispersion && colors.counters.dispersion_rays * 2 == colors.counters.rays);
+    let tilted = c(&format!("[light]\nbeams = \"tilted\"\n{photons}"), Layers::NONE);
+    assert!(tilted.effects.tilted_beams && tilted.counters.tilted_rays == tilted.counters.rays);
+    let beams = c("[technique]\nkind = \"shadowgraph\"\n", Layers::NONE);
+    assert!(beams.effects.differentials && beams.counters.differential_rays == beams.counters.rays);
+    let slice = c("[technique]\nkind = \"slice\"\n", Layers::NONE);
+    assert_eq!(slice.counters, Counters::default());
+}
+
+#[test]
+fn a_plate_casts_its_shadow_and_only_there() {
+    // A square of 20 mm in the middle of the section, across the light.
+    let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0) * 10e-3;
+    let positions = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+    let mesh = TriMesh::new(positions, vec![[0, 1, 2], [0, 2, 3]]);
+    let plate = || Solids::from_world(World::from_mesh(mesh.clone(), &BuildOptions::default()).unwrap());
+    for sampling in ["method = \"photons\"\nsamples = 4\nfilter = { kind = \"none\" }", "method = \"beams\""]
+    {
+        // The scene names a file so that its effects know of bodies; what is used is the plate above.
+        let s = scene(&format!(
+            "{SMALL}[technique]\nkind = \"shadowgraph\"\n[solids]\nfiles = [\"plate.stl\"]\n[sampling]\n{sampling}"
+        ));
+        let section = TestSection::of_fields(&s, vec![blob()], Some(plate())).unwrap();
+        let r = render(&s, &section, Layers { map: true, ..Layers::NONE }, &Control::default()).unwrap();
+        // Rays bend outwards by up to 0.5 m · 3e-5 = 15 µm, far below a pixel of 2.4 mm.
+        let at = |x_mm: f64, y_mm: f64| {
+            let [x, y] = [x_mm, -y_mm].map(|c| c * 1e-3 / r.framing.pixel_m);
+            r.pixels[(y + 20.0) as usize * 48 + (x + 24.0) as usize][0]
+        };
+        assert_eq!(at(0.0, 0.0), 0.0, "{sampling}");
+        assert_eq!(at(7.0, -7.0), 0.0);
+        assert!(at(14.0, 0.0) > 0.4 && at(0.0, 14.0) > 0.4 && at(-14.0, 14.0) > 0.4);
+        assert!(r.report.counters.solid_queries > 0 && r.report.effects.solids);
+        assert!(r.report.silhouette_error_px.unwrap() < 0.01);
+        let map = r.map.unwrap();
+        assert_eq!(map.transmission[20 * 48 + 24], 0.0);
+        assert!(map.dark > 50 && map.dark < 80, "(20 mm / 2.4 mm)² pixels: {}", map.dark);
+    }
+}
+
+#[test]
+fn even_pictures_are_warned_about_and_cancelling_cancels() {
+    let r = drawn("[film]\nsize = [16, 16]\n[lenses]\ncollimator_m = 1e-3", Layers::NONE);
+    assert!(r.report.warnings.iter().any(|w| w.contains("more sensitive")), "{:?}", r.report.warnings);
+    let s = scene(SMALL);
+    let section = TestSection::of_fields(&s, vec![blob()], None).unwrap();
+    let cancel = AtomicBool::new(true);
+    let control = Control { cancel: &cancel, progress: &|_| {} };
+    assert!(matches!(render(&s, &section, Layers::NONE, &control), Err(RenderError::Cancelled)));
+}
+
+#[test]
+fn the_tolerance_picks_the_march() {
+    let march = |rest: &str| drawn(&format!("{SMALL}[march]\n{rest}"), Layers::NONE).report;
+    let rough = march("tolerance_rad = 1e-6");
+    assert!(rough.march.starts_with("line-of-sight"), "{}", rough.march);
+    let fine = march("tolerance_rad = 2e-10");
+    assert!(!fine.march.starts_with("line-of-sight"), "{} {:?}", fine.march, fine.deflection_error_rad);
+    for name in MARCHES {
+        assert!(march(&format!("method = \"{name}\"")).march.starts_with(name));
+    }
+    let s = scene("[march]\nmethod = \"guess\"");
+    let section = TestSection::of_fields(&s, vec![blob()], None).unwrap();
+    let error = render(&s, &section, Layers::NONE, &Control::default()).unwrap_err().to_string();
+    assert!(error.contains("guess") && error.contains("rk4"), "{error}");
+}
+
+#[test]
+fn dots_are_displaced_as_the_map_says() {
+    let r = drawn(&format!("{SMALL}[technique]\nkind = \"bos\"\n"), Layers { map: true, ..Layers::NONE });
+    let m = r.map.unwrap();
+    // Camera rays bend away from the warm middle; the background stands 0.5 m behind: at (x, 0) by about 0.5 m times the deflection.
+    let i = 20 * 48 + 30;
+    let ratio = f64::from(m.displacement_m[i][0]) / f64::from(m.deflection_rad[i][0]);
+    assert!((ratio - 0.5).abs() < 0.01 && m.deflection_rad[i][0] > 0.0, "{ratio}");
+}

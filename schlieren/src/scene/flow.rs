@@ -1,0 +1,247 @@
+//! The gas as it is written in scenes: a file, and which array means what.
+
+use super::SceneError;
+use crate::index::Gas;
+use crate::index::conditions::Model;
+use crate::input::{Medium, Options, Quantity, Reference, Role};
+use datasets::resample::Resolution;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// The file and what its arrays are: a density, or temperature and pressure, or an index, or electrons. Where an array is named, a number can stand that holds for all
+/// of the field.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FlowSpec {
+    /// VTI, VTR, VTS, VTU, PLOT3D, NRRD, raw…
+    pub file: PathBuf,
+    /// Density.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub density: Option<String>,
+    /// kg/m³ per unit of the density: of a solver's free stream where densities are relative to it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub density_unit_kg_m3: Option<f64>,
+    /// Temperature in K (see `temperature_zero_k`).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<String>,
+    /// Added to the temperature: 273.15 when it is in °C.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature_zero_k: Option<f64>,
+    /// Pressure.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pressure: Option<String>,
+    /// Pa per unit of the pressure.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pressure_unit_pa: Option<f64>,
+    /// Relative humidity, 0 to 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub humidity: Option<String>,
+    /// CO2 in ppm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub co2_ppm: Option<String>,
+    /// n - 1 itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub n_minus_1: Option<String>,
+    /// Free electrons per m³.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub electrons: Option<String>,
+    /// Arrays with mass fractions, and the gas of each; the rest is air.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub species: BTreeMap<String, String>,
+    /// Formula for air by temperature and pressure.
+    #[serde(default)]
+    pub model: Model,
+    /// Metres per unit of the file's coordinates.
+    #[serde(default = "one")]
+    pub length_unit_m: f64,
+    /// Depth of two-dimensional data, in units of the file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub span: Option<f64>,
+    /// Nodes along the longest axis when the data have to be resampled; chosen from the cells when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub resample_nodes: Option<usize>,
+    /// Standard deviation in nodes of the smoothing of shocks; 0 for none.
+    #[serde(default)]
+    pub smoothing_nodes: f64,
+    /// What lies outside the mesh.
+    #[serde(default = "blank")]
+    pub outside: Role,
+    /// What lies in cells that the solver hid.
+    #[serde(default = "solid")]
+    pub hidden: Role,
+    /// n0 - 1 of the medium around the field; that of the field's border when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference_n_minus_1: Option<f64>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn blank() -> Role {
+    Role::Blank
+}
+
+fn solid() -> Role {
+    Role::Solid
+}
+
+impl Default for FlowSpec {
+    fn default() -> Self {
+        FlowSpec {
+            file: PathBuf::new(),
+            density: None,
+            density_unit_kg_m3: None,
+            temperature: None,
+            temperature_zero_k: None,
+            pressure: None,
+            pressure_unit_pa: None,
+            humidity: None,
+            co2_ppm: None,
+            n_minus_1: None,
+            electrons: None,
+            species: BTreeMap::new(),
+            model: Model::Auto,
+            length_unit_m: one(),
+            span: None,
+            resample_nodes: None,
+            smoothing_nodes: 0.0,
+            outside: blank(),
+            hidden: solid(),
+            reference_n_minus_1: None,
+        }
+    }
+}
+
+/// An array's name or a number.
+fn quantity(text: &str) -> Quantity {
+    let Ok(q) = text.parse::<Quantity>();
+    q
+}
+
+impl FlowSpec {
+    /// What the index depends on; refuses arrays that do not go together.
+    pub fn medium(&self) -> Result<Medium, SceneError> {
+        let wrong = |reason: String| SceneError::Flow { reason };
+        let species = || -> Result<Vec<(Quantity, Gas)>, SceneError> {
+            let gas = |(array, gas): (&String, &String)| match gas.parse::<Gas>() {
+                Ok(gas) => Ok((quantity(array), gas)),
+                Err(e) => Err(wrong(format!("species `{array}`: {e}"))),
+            };
+            self.species.iter().map(gas).collect()
+        };
+        let given = [
+            ("density", self.density.is_some()),
+            ("temperature", self.temperature.is_some()),
+            ("n_minus_1", self.n_minus_1.is_some()),
+            ("electrons", self.electrons.is_some()),
+        ];
+        let named: Vec<&str> = given.iter().filter(|g| g.1).map(|g| g.0).collect();
+        let [only] = named[..] else {
+            return Err(wrong(match named.len() {
+                0 => "nothing says what the index depends on; name the array of the density, or those of temperature and pressure".into(),
+                _ => format!("{} are alternatives; keep one", named.join(" and ")),
+            }));
+        };
+
+        // What belongs to another alternative changes nothing, so it is refused.
+        let by_state = only == "temperature";
+        let by_gas = by_state || only == "density";
+        for (key, present, belongs) in [
+            ("density_unit_kg_m3", self.density_unit_kg_m3.is_some(), only == "density"),
+            ("pressure", self.pressure.is_some(), by_state),
+            ("pressure_unit_pa", self.pressure_unit_pa.is_some(), by_state),
+            ("temperature_zero_k", self.temperature_zero_k.is_some(), by_state),
+            ("humidity", self.humidity.is_some(), by_state),
+            ("co2_ppm", self.co2_ppm.is_some(), by_state),
+            ("species", !self.species.is_empty(), by_gas),
+            ("model", self.model != Model::Auto, by_state),
+        ] {
+            if present && !belongs {
+                return Err(wrong(format!("`{key}` changes nothing with `{only}`; leave one of them out")));
+            }
+        }
+
+        let text = |t: &Option<String>| t.as_deref().map(quantity);
+        Ok(match only {
+            "density" => Medium::Density {
+                density: text(&self.density)
+                    .unwrap_or(Quantity::constant(f64::NAN))
+                    .scaled(self.density_unit_kg_m3.unwrap_or(1.0)),
+                species: species()?,
+            },
+            "temperature" => {
+                let Some(pressure) = text(&self.pressure) else {
+                    return Err(wrong(
+                        "a temperature needs a pressure; name its array, or give Pa for all of the field, such as pressure = \"101325\"".into(),
+                    ));
+                };
+                Medium::TemperaturePressure {
+                    temperature: text(&self.temperature)
+                        .unwrap_or(Quantity::constant(f64::NAN))
+                        .shifted(self.temperature_zero_k.unwrap_or(0.0)),
+                    pressure: pressure.scaled(self.pressure_unit_pa.unwrap_or(1.0)),
+                    humidity: text(&self.humidity).unwrap_or(Quantity::constant(0.0)),
+                    co2_ppm: text(&self.co2_ppm).unwrap_or(Quantity::constant(450.0)),
+                    species: species()?,
+                }
+            }
+            "n_minus_1" => Medium::NMinus1(text(&self.n_minus_1).unwrap_or(Quantity::constant(f64::NAN))),
+            _ => Medium::Electrons(text(&self.electrons).unwrap_or(Quantity::constant(f64::NAN))),
+        })
+    }
+
+    /// How the file becomes a field for light of this wavelength.
+    pub fn options(&self, wavelength_nm: f64) -> Result<Options, SceneError> {
+        let border = Reference::Border;
+        Ok(Options {
+            wavelength_nm,
+            model: self.model,
+            length_unit_m: self.length_unit_m,
+            resolution: self.resample_nodes.map_or(Resolution::Auto, Resolution::Longest),
+            depth: self.span.map(crate::input::Depth::Span),
+            smoothing_nodes: self.smoothing_nodes,
+            outside: self.outside,
+            hidden: self.hidden,
+            reference: self.reference_n_minus_1.map_or(border, |n_minus_1| Reference::Given { n_minus_1 }),
+            ..Options::new(self.medium()?)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn flow(text: &str) -> Result<Medium, String> {
+        let spec: FlowSpec =
+            toml::from_str(&format!("file = \"a.vti\"\n{text}")).map_err(|e| e.to_string())?;
+        spec.medium().map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn alternatives_and_lacks_are_named() {
+        for (text, word) in [
+            ("", "nothing says"),
+            ("density = \"rho\"\ntemperature = \"T\"", "density and temperature are alternatives"),
+            ("temperature = \"T\"", "needs a pressure"),
+            ("density = \"rho\"\nhumidity = \"0.5\"", "`humidity` changes nothing"),
+            ("n_minus_1 = \"n\"\nspecies = { Y = \"He\" }", "`species` changes nothing"),
+            ("density = \"rho\"\nspecies = { Y = \"unobtainium\" }", "unobtainium"),
+        ] {
+            let message = flow(text).unwrap_err();
+            assert!(message.contains(word), "{text}: {message}");
+        }
+    }
+
+    #[test]
+    fn units_reach_the_medium() {
+        let m = flow(
+            "temperature = \"T\"\ntemperature_zero_k = 273.15\npressure = \"1013.25\"\npressure_unit_pa = 100.0",
+        );
+        let Ok(Medium::TemperaturePressure { temperature, pressure, .. }) = m else { panic!("{m:?}") };
+        assert_eq!((temperature.offset, pressure.scale), (273.15, 100.0));
+        assert_eq!(pressure.source, crate::input::Source::Constant(1013.25));
+    }
+}

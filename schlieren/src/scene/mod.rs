@@ -1,0 +1,539 @@
+//! A picture's recipe as a TOML file: flow, view, light, bench, technique, film, march.
+//!
+//! Unknown keys are refused, keys that belong to another technique are unknown, and [`Scene::to_toml`] writes every value in effect, so a picture can be made
+//! again from what is written with it. Lengths are metres, angles degrees where people set them and radians where light is bent.
+//!
+//! ```
+//! use schlieren::scene::Scene;
+//! let scene = Scene::from_toml(
+//!     r#"
+//!     [flow]
+//!     file = "jet.vti"
+//!     density = "rho"
+//!     [technique]
+//!     kind = "schlieren"
+//!     cutoff = { kind = "knife", angle_deg = 90.0, open = 0.3 }
+//!     "#,
+//! )?;
+//! assert_eq!(scene.film.size, [512, 512]);
+//! assert_eq!(Scene::from_toml(&scene.to_toml()?)?, scene);
+//! let error = Scene::from_toml("[flow]\nfile = \"jet.vti\"\nviscosity = \"mu\"").unwrap_err();
+//! assert!(error.to_string().contains("viscosity"));
+//! # Ok::<(), schlieren::scene::SceneError>(())
+//! ```
+
+mod check;
+mod direction;
+mod effects;
+mod flow;
+mod technique;
+
+pub use direction::Direction;
+pub use effects::{Counters, Effects};
+pub use flow::FlowSpec;
+pub use technique::{CutoffSpec, TechniqueSpec};
+
+use crate::filter::Filter;
+use crate::optics::{Optics, SourceShape};
+use crate::spectrum::Line;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Everything a picture is made of.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// The gas.
+    pub flow: FlowSpec,
+    /// From where.
+    #[serde(default)]
+    pub view: ViewSpec,
+    /// Colour and extent of the light.
+    #[serde(default)]
+    pub light: LightSpec,
+    /// Lenses.
+    #[serde(default)]
+    pub lenses: LensSpec,
+    /// What is made of the light.
+    #[serde(default)]
+    pub technique: TechniqueSpec,
+    /// Size and focus of the picture.
+    #[serde(default)]
+    pub film: FilmSpec,
+    /// How the film is exposed; each technique has a customary way.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sampling: Option<SamplingSpec>,
+    /// How light is taken through the flow.
+    #[serde(default)]
+    pub march: MarchSpec,
+    /// Bodies in the test section.
+    #[serde(default)]
+    pub solids: SolidsSpec,
+}
+
+/// The direction of light.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ViewSpec {
+    /// `"x"`, `"y"`, `"z"`, or `"AZIMUTH,ELEVATION"` of the light in degrees.
+    #[serde(default)]
+    pub direction: Direction,
+}
+
+/// The light.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LightSpec {
+    /// Vacuum wavelengths. The index is that of the first for one; several are traced each by itself and added up in their colours.
+    #[serde(default = "helium_neon")]
+    pub wavelengths_nm: Vec<f64>,
+    /// Parts of the light per wavelength; even when absent.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub weights: Vec<f64>,
+    /// Shape of the source; each technique has a customary one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<SourceSpec>,
+    /// Whether beams of different points of the source are traced each by itself.
+    #[serde(default)]
+    pub beams: BeamsSpec,
+}
+
+fn helium_neon() -> Vec<f64> {
+    vec![633.0]
+}
+
+impl Default for LightSpec {
+    fn default() -> Self {
+        LightSpec { wavelengths_nm: helium_neon(), weights: Vec::new(), source: None, beams: BeamsSpec::Auto }
+    }
+}
+
+/// The source's shape.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum SourceSpec {
+    /// No extent.
+    Point {},
+    /// A rectangle.
+    Slit {
+        /// Along `angle_deg`.
+        width_m: f64,
+        /// Across it.
+        length_m: f64,
+        /// Direction of the width; that of the knife when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        angle_deg: Option<f64>,
+    },
+    /// A disc.
+    Circle {
+        /// Of the disc.
+        diameter_m: f64,
+    },
+}
+
+/// How the extent of the source is treated on the way through the flow. (In the cut-off plane it always counts.)
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BeamsSpec {
+    /// Tilted when the source's tilts move anything by more than half a pixel, within the flow or in the plane of focus.
+    #[default]
+    Auto,
+    /// All light travels along the axis.
+    Axial,
+    /// Each photon has the tilt of its own point of the source.
+    Tilted,
+}
+
+/// The lenses (or mirrors).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LensSpec {
+    /// f1, from the source to the collimator.
+    #[serde(default = "focal_length")]
+    pub collimator_m: f64,
+    /// f2, from the schlieren lens to the cut-off.
+    #[serde(default = "focal_length")]
+    pub schlieren_m: f64,
+}
+
+fn focal_length() -> f64 {
+    Optics::CUSTOMARY.schlieren_focal_length_m
+}
+
+impl Default for LensSpec {
+    fn default() -> Self {
+        LensSpec { collimator_m: focal_length(), schlieren_m: focal_length() }
+    }
+}
+
+/// The film.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FilmSpec {
+    /// Pixels per row, and rows.
+    #[serde(default = "film_size")]
+    pub size: [u32; 2],
+    /// Width of what the picture shows, in the test section; all of the field when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub field_of_view_m: Option<f64>,
+    /// Where the picture's middle is, from the middle of the field along right and up.
+    #[serde(default)]
+    pub center_m: [f64; 2],
+    /// The plane in focus, from the middle of the field along the light: the film's distance of a shadowgraph, the background's distance of
+    /// a BOS set-up (towards the light). Each technique has a customary one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub focus_m: Option<f64>,
+    /// Factor from energy to the picture's brightness (1 is white); each technique has a customary one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exposure: Option<f64>,
+}
+
+fn film_size() -> [u32; 2] {
+    [512, 512]
+}
+
+impl Default for FilmSpec {
+    fn default() -> Self {
+        FilmSpec {
+            size: film_size(),
+            field_of_view_m: None,
+            center_m: [0.0; 2],
+            focus_m: None,
+            exposure: None,
+        }
+    }
+}
+
+/// How the film is exposed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "method", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum SamplingSpec {
+    /// By jittered photons ([`crate::film::photons`]).
+    Photons {
+        /// Per pixel.
+        #[serde(default = "samples")]
+        samples: u32,
+        /// How they are spread.
+        #[serde(default)]
+        jitter: Jitter,
+        /// Of the jitter.
+        #[serde(default)]
+        seed: u64,
+        /// Against noise.
+        #[serde(default)]
+        filter: FilterSpec,
+    },
+    /// By cells of a lattice of rays, without noise ([`crate::film::beams`]).
+    Beams {
+        /// Cells along a pixel's side.
+        #[serde(default = "cells")]
+        cells_per_side: u32,
+    },
+}
+
+fn samples() -> u32 {
+    16
+}
+
+fn cells() -> u32 {
+    1
+}
+
+impl Default for SamplingSpec {
+    fn default() -> Self {
+        SamplingSpec::Photons {
+            samples: samples(),
+            jitter: Jitter::Sobol,
+            seed: 0,
+            filter: FilterSpec::default(),
+        }
+    }
+}
+
+/// How photons are spread over a pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Jitter {
+    /// A scrambled Sobol sequence.
+    #[default]
+    Sobol,
+    /// Independent, as in the thesis; to compare with.
+    Random,
+}
+
+/// [`Filter`], for one photon per pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum FilterSpec {
+    /// No filter.
+    None {},
+    /// A Gaussian.
+    Gaussian {
+        /// Standard deviation.
+        sigma_px: f64,
+    },
+    /// A mean over a square.
+    Mean {
+        /// Reach to every side.
+        radius_px: f64,
+    },
+    /// A cone over the nearest photons.
+    Cone {
+        /// How many.
+        nearest: u32,
+    },
+}
+
+impl Default for FilterSpec {
+    fn default() -> Self {
+        // Half a pixel at the customary 16 photons.
+        FilterSpec::Gaussian { sigma_px: 0.8 }
+    }
+}
+
+impl FilterSpec {
+    /// The filter.
+    pub fn filter(self) -> Filter {
+        match self {
+            FilterSpec::None {} => Filter::None,
+            FilterSpec::Gaussian { sigma_px } => Filter::Gaussian { sigma_px },
+            FilterSpec::Mean { radius_px } => Filter::Mean { radius_px },
+            FilterSpec::Cone { nearest } => Filter::Cone { nearest },
+        }
+    }
+}
+
+/// How light is taken through the flow.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MarchSpec {
+    /// Largest error of a deflection; it picks what is not named below.
+    #[serde(default = "tolerance")]
+    pub tolerance_rad: f64,
+    /// Name of the march; picked by the tolerance when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub method: Option<String>,
+    /// Name of the interpolant; picked by the tolerance when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interpolant: Option<String>,
+    /// Step in voxels; picked by the tolerance when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub step_voxels: Option<f64>,
+    /// Where it is computed.
+    #[serde(default)]
+    pub device: Device,
+}
+
+fn tolerance() -> f64 {
+    1e-7
+}
+
+impl Default for MarchSpec {
+    fn default() -> Self {
+        MarchSpec {
+            tolerance_rad: tolerance(),
+            method: None,
+            interpolant: None,
+            step_voxels: None,
+            device: Device::Cpu,
+        }
+    }
+}
+
+/// Where paths are computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Device {
+    /// All cores.
+    #[default]
+    Cpu,
+    /// By compute shaders.
+    Gpu,
+}
+
+/// Bodies.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SolidsSpec {
+    /// OBJ, STL, PLY, glTF, VTP…, in metres in the flow's coordinates.
+    #[serde(default)]
+    pub files: Vec<PathBuf>,
+}
+
+/// Why a scene is none.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneError {
+    /// The file cannot be read.
+    #[error("{path}: cannot read the scene")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// It is no TOML, or a key is unknown or has the wrong type. The message shows the line.
+    #[error("{name}: not a scene")]
+    Toml {
+        /// The file, or "scene".
+        name: String,
+        /// Where and why.
+        source: toml::de::Error,
+    },
+    /// A scene that cannot be written.
+    #[error("the scene cannot be written as TOML")]
+    Write(#[from] toml::ser::Error),
+    /// A value that no scene can have.
+    #[error("{key} is {value}; {cure}")]
+    Value {
+        /// Path of the key in the TOML file.
+        key: &'static str,
+        /// What it is.
+        value: String,
+        /// What it can be.
+        cure: String,
+    },
+    /// A value that changes no pixel.
+    #[error("{key} changes nothing with technique `{technique}`; leave it out{hint}")]
+    NoEffect {
+        /// Path of the key.
+        key: &'static str,
+        /// The technique.
+        technique: &'static str,
+        /// Where it would have an effect.
+        hint: &'static str,
+    },
+    /// The arrays of the flow make no medium.
+    #[error("[flow]: {reason}")]
+    Flow {
+        /// What is missing or too much, with the cure.
+        reason: String,
+    },
+    /// The filter's picture.
+    #[error("technique.cutoff")]
+    Filter(#[from] crate::cutoff::FilterError),
+}
+
+impl Scene {
+    /// A scene from TOML, checked.
+    pub fn from_toml(text: &str) -> Result<Scene, SceneError> {
+        Scene::parse(text, "scene")
+    }
+
+    /// A scene from a file, checked. Files it names are taken relative to it.
+    pub fn open(path: &Path) -> Result<Scene, SceneError> {
+        let text =
+            std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.into(), source })?;
+        let mut scene = Scene::parse(&text, &path.display().to_string())?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let mut files = vec![&mut scene.flow.file];
+        files.extend(scene.solids.files.iter_mut());
+        if let TechniqueSpec::Schlieren { cutoff: CutoffSpec::Image { file, .. } } = &mut scene.technique {
+            files.push(file);
+        }
+        for file in files {
+            // Joining keeps absolute paths.
+            *file = folder.join(&*file);
+        }
+        Ok(scene)
+    }
+
+    fn parse(text: &str, name: &str) -> Result<Scene, SceneError> {
+        let scene: Scene =
+            toml::from_str(text).map_err(|source| SceneError::Toml { name: name.into(), source })?;
+        scene.check()?;
+        Ok(scene)
+    }
+
+    /// The scene as TOML, with the values in effect where some were left to the technique.
+    pub fn to_toml(&self) -> Result<String, SceneError> {
+        Ok(toml::to_string(self)?)
+    }
+
+    /// The same with every choice that was left to the technique made explicit (`--print-scene`).
+    #[must_use]
+    pub fn effective(&self) -> Scene {
+        let mut s = self.clone();
+        let t = &self.technique;
+        if t.uses_source() {
+            let optics = self.optics();
+            s.light.source = Some(match optics.source {
+                SourceShape::Point => SourceSpec::Point {},
+                SourceShape::Slit { width_m, length_m, angle_deg } => {
+                    SourceSpec::Slit { width_m, length_m, angle_deg: Some(angle_deg) }
+                }
+                SourceShape::Circle { diameter_m } => SourceSpec::Circle { diameter_m },
+            });
+        }
+        if t.follows_light() {
+            s.film.focus_m = Some(self.focus_m());
+        }
+        if t.follows_light() {
+            s.sampling = Some(self.sampling());
+        }
+        s.film.exposure = Some(self.exposure());
+        s
+    }
+
+    /// How the film is exposed: as given, or by the technique. A shadowgraph is nothing but the density of light, which photons tell slowly (16 of them by
+    /// 25 %), so it is made of beams; others are made of photons.
+    pub fn sampling(&self) -> SamplingSpec {
+        let beams = matches!(self.technique, TechniqueSpec::Shadowgraph {});
+        let customary =
+            if beams { SamplingSpec::Beams { cells_per_side: cells() } } else { SamplingSpec::default() };
+        self.sampling.unwrap_or(customary)
+    }
+
+    /// The plane in focus: as given, or the technique's.
+    pub fn focus_m(&self) -> f64 {
+        self.film.focus_m.unwrap_or(match self.technique {
+            TechniqueSpec::Shadowgraph {} | TechniqueSpec::Bos { .. } => 0.5,
+            _ => 0.0,
+        })
+    }
+
+    /// From energy to brightness: as given, or the technique's. A shadowgraph's undisturbed light is set to the middle, so that there is room above it.
+    pub fn exposure(&self) -> f64 {
+        self.film.exposure.unwrap_or(if matches!(self.technique, TechniqueSpec::Shadowgraph {}) {
+            0.5
+        } else {
+            1.0
+        })
+    }
+
+    /// The bench.
+    pub fn optics(&self) -> Optics {
+        let along_knife = match &self.technique {
+            TechniqueSpec::Schlieren { cutoff: CutoffSpec::Knife { angle_deg, .. } } => *angle_deg,
+            _ => 0.0,
+        };
+        let customary = match &self.technique {
+            TechniqueSpec::Schlieren { cutoff: CutoffSpec::Knife { .. } } => {
+                SourceSpec::Slit { width_m: 1e-3, length_m: 5e-3, angle_deg: None }
+            }
+            TechniqueSpec::Schlieren { .. } => SourceSpec::Circle { diameter_m: 0.5e-3 },
+            _ => SourceSpec::Point {},
+        };
+        let source = match self.light.source.unwrap_or(customary) {
+            SourceSpec::Point {} => SourceShape::Point,
+            SourceSpec::Slit { width_m, length_m, angle_deg } => {
+                SourceShape::Slit { width_m, length_m, angle_deg: angle_deg.unwrap_or(along_knife) }
+            }
+            SourceSpec::Circle { diameter_m } => SourceShape::Circle { diameter_m },
+        };
+        Optics {
+            source,
+            collimator_focal_length_m: self.lenses.collimator_m,
+            schlieren_focal_length_m: self.lenses.schlieren_m,
+            focus_m: self.focus_m(),
+        }
+    }
+
+    /// The lines of the spectrum; weights add up to 1.
+    pub fn lines(&self) -> Vec<Line> {
+        let light = &self.light;
+        let weight = |i: usize| light.weights.get(i).copied().unwrap_or(1.0);
+        let total: f64 = (0..light.wavelengths_nm.len()).map(weight).sum();
+        let line = |(i, &wavelength_nm): (usize, &f64)| Line { wavelength_nm, weight: weight(i) / total };
+        light.wavelengths_nm.iter().enumerate().map(line).collect()
+    }
+}

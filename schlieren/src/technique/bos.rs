@@ -1,0 +1,183 @@
+//! Background-oriented schlieren: a camera sees a pattern through the flow, and the pattern is displaced.
+//!
+//! Rays are sent from the camera (far away: a parallel beam) through the flow to the background, which stands at `Optics::focus_m` behind the flow
+//! as the camera sees it; the camera is focused on it. A ray that leaves with the deflection ε at the depth z hits it displaced by
+//! `ξ + ε (focus - z)`: the displacement that correlating the picture with the undisturbed one yields. The paths must be traced against the light
+//! ([`Reversed`]).
+//!
+//! The pattern is random dots: one dot per cell of a square lattice, jittered by a hash of the cell, the same at any resolution.
+
+use super::Photon;
+use crate::optics::{Across, Optics};
+use crate::path::{Exit, LightPaths, Start, Wanted};
+use crate::view::View;
+
+/// A dotted background seen through the flow.
+#[derive(Debug, Clone, Copy)]
+pub struct Bos {
+    pub(super) optics: Optics,
+    dots: Dots,
+}
+
+/// A background of random dots.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dots {
+    /// Diameter of a dot, in object space.
+    pub diameter_m: f64,
+    /// Mean distance between dots: the side of the lattice's cells.
+    pub spacing_m: f64,
+    /// Which pattern.
+    pub seed: u32,
+}
+
+impl Bos {
+    /// The background stands at `optics.focus_m` behind the middle of the flow, seen from the camera.
+    pub fn new(optics: Optics, dots: Dots) -> Bos {
+        Bos { optics, dots }
+    }
+
+    #[inline]
+    pub(super) fn energy(&self, photon: &Photon<'_>) -> f32 {
+        let at = [0, 1].map(|i| f64::from(photon.start.position_m[i]) + f64::from(photon.shift_m[i]));
+        self.dots.brightness(at)
+    }
+}
+
+impl Dots {
+    /// 0 on a dot, 1 beside it.
+    pub fn brightness(&self, at_m: [f64; 2]) -> f32 {
+        let cell = at_m.map(|c| (c / self.spacing_m).floor());
+        let radius2 = 0.25 * self.diameter_m * self.diameter_m;
+        // A dot may reach into neighbouring cells, no further: its diameter is at most a cell.
+        for dj in -1..=1 {
+            for di in -1..=1 {
+                let (i, j) = (cell[0] + f64::from(di), cell[1] + f64::from(dj));
+                let [u, v] = self.place(i as i64, j as i64);
+                let (dx, dy) = (at_m[0] - (i + u) * self.spacing_m, at_m[1] - (j + v) * self.spacing_m);
+                if dx * dx + dy * dy < radius2 {
+                    return 0.0;
+                }
+            }
+        }
+        1.0
+    }
+
+    /// Where in its cell the dot lies, each 0..1.
+    fn place(&self, i: i64, j: i64) -> [f64; 2] {
+        let word = (i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+            ^ (j as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f).rotate_left(32)
+            ^ u64::from(self.seed);
+        let bits = mix(mix(word));
+        [bits as u32, (bits >> 32) as u32].map(|b| f64::from(b) / 4_294_967_296.0)
+    }
+}
+
+/// 64 bits to 64 well-mixed bits (the finaliser of Steele, Lea and Flood's SplitMix, 2014).
+fn mix(x: u64) -> u64 {
+    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}
+
+/// Paths traced against the light, in the frame of the picture.
+///
+/// `paths` look along the reversed view ([`Reversed::view`]), whose right is the picture's left; this exchanges the signs on the way in and out. Light paths
+/// can be reversed, so rays from the camera are the light that reaches it.
+pub struct Reversed<'a> {
+    paths: Box<dyn LightPaths + 'a>,
+    /// The frame of starts and exits: left-handed, because it is the picture's with the light's direction turned round.
+    view: View,
+}
+
+impl<'a> Reversed<'a> {
+    /// `paths` must have been made for [`Reversed::view`] of the picture's view.
+    pub fn new(paths: Box<dyn LightPaths + 'a>) -> Reversed<'a> {
+        let inner = *paths.view();
+        Reversed { paths, view: View { right: -inner.right, ..inner } }
+    }
+
+    /// The view against the light: right and forward negated, up kept, right-handed as before.
+    pub fn view(view: &View) -> View {
+        View { right: -view.right, forward: -view.forward, ..*view }
+    }
+}
+
+fn mirrored([x, y]: Across) -> Across {
+    [-x, y]
+}
+
+impl LightPaths for Reversed<'_> {
+    fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
+        let mirror = |s: &Start| Start { position_m: mirrored(s.position_m), tilt_rad: mirrored(s.tilt_rad) };
+        let starts: Vec<Start> = starts.iter().map(mirror).collect();
+        self.paths.trace(&starts, exits);
+        for e in exits {
+            e.deflection_rad = mirrored(e.deflection_rad);
+            e.displacement_m = mirrored(e.displacement_m);
+        }
+    }
+
+    fn view(&self) -> &View {
+        &self.view
+    }
+
+    fn wanted(&self) -> Wanted {
+        self.paths.wanted()
+    }
+
+    fn difference_step_m(&self) -> f64 {
+        self.paths.difference_step_m()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::Framing;
+    use crate::technique::Technique;
+    use crate::testing::{ClosedForm, expose_grey};
+
+    const DOTS: Dots = Dots { diameter_m: 2e-3, spacing_m: 4e-3, seed: 1 };
+    const FRAMING: Framing = Framing { width: 64, height: 48, pixel_m: 0.5e-3, center_m: [0.0; 2] };
+
+    fn picture(paths: &ClosedForm, distance_m: f64) -> Vec<f32> {
+        let optics = Optics { focus_m: distance_m, ..Optics::CUSTOMARY };
+        expose_grey(&Technique::Bos(Bos::new(optics, DOTS)), paths, FRAMING, 16)
+    }
+
+    #[test]
+    fn a_prism_displaces_the_pattern_by_angle_times_distance() {
+        let still = picture(&ClosedForm::prism([0.0; 2]), 2.0);
+        // 1 mm right and 0.5 mm up at 2 m: what pixel (x, y) sees, pixel (x+2, y-1) saw without flow.
+        let moved = picture(&ClosedForm::prism([5e-4, 2.5e-4]), 2.0);
+        let same = |dx: usize, dy: usize| {
+            (4..44)
+                .flat_map(|y| (4..60).map(move |x| (x, y)))
+                .fold(0.0f32, |sum, (x, y)| sum + (moved[y * 64 + x] - still[(y - dy) * 64 + x + dx]).abs())
+                / (40.0 * 56.0)
+        };
+        assert!(same(2, 1) < 0.03 && same(0, 0) > 0.2, "{} {}", same(2, 1), same(0, 0));
+    }
+
+    #[test]
+    fn dots_cover_the_area_they_should() {
+        // Dots whose places overlap cover a little less than their sum, π/16 of the area.
+        let n = 400;
+        let dark = (0..n * n)
+            .filter(|k| DOTS.brightness([f64::from(k % n), f64::from(k / n)].map(|v| v * 2.1e-4)) == 0.0);
+        let part = dark.count() as f64 / f64::from(n * n);
+        assert!((0.17..0.197).contains(&part), "{part}");
+    }
+
+    #[test]
+    fn against_the_light_left_is_right() {
+        let v = View::along(crate::view::Axis::Z, glam::DVec3::ZERO);
+        let r = Reversed::view(&v);
+        assert_eq!((r.right.cross(r.up), r.forward), (-v.forward, -v.forward));
+        // A prism that deflects towards the reversed frame's right deflects to the picture's left.
+        let reversed = Reversed::new(Box::new(ClosedForm::prism([1e-3, 2e-3])));
+        let mut exit = [Exit::UNDISTURBED];
+        reversed.trace(&[Start::default()], &mut exit);
+        assert_eq!(exit[0].deflection_rad, [-1e-3, 2e-3]);
+    }
+}

@@ -1,0 +1,112 @@
+//! Schlieren: light is let through, held back or coloured by where its deflection brings it in the cut-off plane.
+
+use super::Photon;
+use crate::cutoff::{Cutoff, CutoffPlane, Rgb};
+use crate::optics::Optics;
+
+/// A schlieren set-up.
+#[derive(Debug, Clone)]
+pub struct Schlieren {
+    pub(super) optics: Optics,
+    plane: CutoffPlane,
+    colored: bool,
+    sampled: bool,
+    /// How much of each of the filter's channels this light's wavelength is; `None` for white light whose dispersion does not matter.
+    band: Option<Rgb>,
+}
+
+impl Schlieren {
+    /// `cutoff` in the bench. With `sample_source` every photon takes its own point of the source although a closed form for all of them is known;
+    /// needed with tilted beams, where each source point lights another way through the flow.
+    pub fn new(optics: Optics, cutoff: &Cutoff, sample_source: bool) -> Schlieren {
+        let plane = CutoffPlane::new(cutoff, optics.source_image());
+        let sampled = sample_source || !plane.has_closed_form();
+        Schlieren { optics, plane, colored: cutoff.is_colored(), sampled, band: None }
+    }
+
+    /// For light of one wavelength among several: a coloured filter then passes `band · rgb`, and the picture of this wavelength is grey.
+    pub fn with_band(self, band: Rgb) -> Schlieren {
+        Schlieren { band: Some(band), ..self }
+    }
+
+    pub(super) fn samples_the_source(&self) -> bool {
+        self.sampled
+    }
+
+    pub(super) fn is_colored(&self) -> bool {
+        self.colored && self.band.is_none()
+    }
+
+    #[inline]
+    pub(super) fn energy(&self, photon: &Photon<'_>) -> Rgb {
+        let at_m = self.optics.cutoff_point_m(photon.image_point_m, photon.exit);
+        let closed_form = if self.sampled { None } else { self.plane.averaged(at_m) };
+        let rgb = closed_form.unwrap_or_else(|| self.plane.transmission(at_m));
+        match self.band {
+            Some(band) => [band[0] * rgb[0] + band[1] * rgb[1] + band[2] * rgb[2]; 3],
+            None => rgb,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cutoff::{ColorWheel, Knife, KnifePosition};
+    use crate::testing::{ClosedForm, expose_grey, expose_rgb};
+    use crate::{film::Framing, technique::Technique};
+
+    const FRAMING: Framing = Framing { width: 24, height: 16, pixel_m: 1e-3, center_m: [0.0; 2] };
+    const HALF_OPEN: KnifePosition = KnifePosition::OpenFraction(0.5);
+
+    #[test]
+    fn a_prism_of_known_deflection_has_the_known_grey_level() {
+        // f2 = 1.5 m, half of a 1 mm slit open: I = 1/2 + 1.5 ε / 1 mm.
+        let prism = ClosedForm::prism([1e-4, 5e-5]);
+        // Along the 5 mm of the slit's length the same shift shows a fifth as much.
+        for (angle_deg, expected) in [(0.0, 0.65), (90.0, 0.515), (180.0, 0.35), (-90.0, 0.485)] {
+            let cutoff = Cutoff::Knife(Knife { angle_deg, position: HALF_OPEN });
+            for sampled in [false, true] {
+                let s = Schlieren::new(Optics::CUSTOMARY, &cutoff, sampled);
+                let film = expose_grey(&Technique::Schlieren(s), &prism, FRAMING, 64);
+                let middle = film[8 * 24 + 12];
+                let expected: f32 = expected;
+                // Closed form: rounding. Sampled: 64 points of a (0,2)-sequence on a straight edge.
+                let tolerance = if sampled { 2.0 / 64.0 } else { 2e-6 };
+                assert!((middle - expected).abs() < tolerance, "{angle_deg} {sampled}: {middle} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_gaussian_blob_is_its_gradient_in_grey_levels() {
+        let blob = ClosedForm::gaussian(1e-7, 4e-3, 0.0);
+        let cutoff = Cutoff::Knife(Knife { angle_deg: 0.0, position: HALF_OPEN });
+        let s = Schlieren::new(Optics::CUSTOMARY, &cutoff, false);
+        let film = expose_grey(&Technique::Schlieren(s), &blob, FRAMING, 64);
+        let (mut worst, mut contrast) = (0.0f32, 0.0f32);
+        for (i, start) in FRAMING.pixel_centers().iter().enumerate() {
+            let expected = 0.5 + 1.5 / 1e-3 * blob.exit(start).deflection_rad[0];
+            worst = worst.max((film[i] - expected).abs());
+            contrast = contrast.max((expected - 0.5).abs());
+        }
+        // The pixel's mean against its centre, h²/24 of the second derivative (h = σ/4), is 0.3 % of the contrast.
+        assert!(contrast > 0.02 && worst < 0.01 * contrast, "{worst} of {contrast}");
+    }
+
+    #[test]
+    fn the_color_filter_paints_directions() {
+        let cutoff = Cutoff::Color(ColorWheel { radius_m: 1e-3, red_deg: 0.0 });
+        let optics = Optics { source: crate::optics::SourceShape::Point, ..Optics::CUSTOMARY };
+        for (deflection, strongest) in [([3e-4, 0.0], 0), ([-1.5e-4, 2.6e-4], 1), ([-1.5e-4, -2.6e-4], 2)] {
+            let technique = Technique::Schlieren(Schlieren::new(optics, &cutoff, false));
+            assert!(technique.is_colored() && !technique.needs_source_points());
+            let film = expose_rgb(&technique, &ClosedForm::prism(deflection), FRAMING, 4);
+            let c = film[8 * 24 + 12];
+            assert!(
+                (c[strongest] - 1.0).abs() < 0.01 && c[(strongest + 1) % 3] < 0.6,
+                "{deflection:?}: {c:?}"
+            );
+        }
+    }
+}
