@@ -1,6 +1,7 @@
 //! Options that describe the scene, and how they change the one from a file. An option that changes nothing is refused by name.
 
 use super::units;
+use crate::input::Role;
 use crate::scene::{
     BeamsSpec, CutoffSpec, Device, Direction, FilterSpec, FlowSpec, Jitter, SamplingSpec, Scene, SourceSpec,
     TechniqueSpec,
@@ -65,6 +66,12 @@ struct FlowArgs {
     /// Standard deviation in nodes of the smoothing of shocks
     #[arg(long, value_name = "NODES")]
     smoothing: Option<f64>,
+    /// What lies outside the mesh: blank, solid (a body) or gas (undisturbed flow)
+    #[arg(long, value_name = "ROLE", value_parser = units::role)]
+    outside: Option<Role>,
+    /// What lies in cells that the solver hid: blank, solid or gas
+    #[arg(long, value_name = "ROLE", value_parser = units::role)]
+    hidden: Option<Role>,
     /// Body that blocks light (OBJ, STL, PLY, glTF, VTP); may be repeated
     #[arg(long, value_name = "FILE")]
     solid: Vec<PathBuf>,
@@ -286,6 +293,8 @@ impl FlowArgs {
         f.span = a.span.or(f.span);
         f.resample_nodes = a.resample.or(f.resample_nodes);
         f.smoothing_nodes = a.smoothing.unwrap_or(f.smoothing_nodes);
+        f.outside = a.outside.unwrap_or(f.outside);
+        f.hidden = a.hidden.unwrap_or(f.hidden);
     }
 }
 

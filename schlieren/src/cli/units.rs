@@ -1,5 +1,6 @@
 //! Values of options with their units.
 
+use crate::input::Role;
 use crate::scene::SourceSpec;
 
 /// Units of lengths.
@@ -70,6 +71,16 @@ pub(super) fn species(text: &str) -> Result<(String, String), String> {
     let (name, gas) = parts
         .ok_or_else(|| format!("`{text}` is not NAME=GAS; write for example Y_CH4=CH4 or Y_fuel=0.42"))?;
     Ok((name.to_string(), gas.to_string()))
+}
+
+/// What a node without gas is to light.
+pub(super) fn role(text: &str) -> Result<Role, String> {
+    match text {
+        "blank" => Ok(Role::Blank),
+        "solid" => Ok(Role::Solid),
+        "gas" => Ok(Role::Gas),
+        _ => Err(format!("`{text}` is nothing that can be there; there are: blank, solid, gas")),
+    }
 }
 
 /// Two numbers, `320,200`.

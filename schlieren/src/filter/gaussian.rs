@@ -3,7 +3,7 @@
 /// Weights of a Gaussian at distances 0, 1, 2… pixels, as far as they matter (1e-6 of the middle). A pixel's weight is the Gaussian's integral over it,
 /// taken with Simpson's rule, so that narrow ones keep their width.
 pub fn weights(sigma_px: f64) -> Vec<f64> {
-    if !(sigma_px > 0.0) {
+    if sigma_px.is_nan() || sigma_px <= 0.0 {
         return vec![1.0];
     }
     let density = |x: f64| (-0.5 * (x / sigma_px).powi(2)).exp();

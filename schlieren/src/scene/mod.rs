@@ -18,7 +18,7 @@
 //! assert_eq!(scene.film.size, [512, 512]);
 //! assert_eq!(Scene::from_toml(&scene.to_toml()?)?, scene);
 //! let error = Scene::from_toml("[flow]\nfile = \"jet.vti\"\nviscosity = \"mu\"").unwrap_err();
-//! assert!(error.to_string().contains("viscosity"));
+//! assert!(std::error::Error::source(&error).unwrap().to_string().contains("viscosity"));
 //! # Ok::<(), schlieren::scene::SceneError>(())
 //! ```
 
