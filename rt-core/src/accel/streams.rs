@@ -10,8 +10,13 @@ use crate::ray::{Hit, HitBlock, LANES, NO_HIT, Ray, RayBlock};
 use crate::stats::{Work, count};
 use crate::traverse::hybrid;
 use crate::traverse::packet::{GROUPS, Limits, Packet};
+use crate::traverse::single::beyond;
 use fearless_simd::{Simd, SimdBase, SimdMask, dispatch, f32x16, mask32x16};
 use std::cell::RefCell;
+
+/// With more instances than this in a packet's way its rays go one by one: most of them meet only a few each. Measured on glyphs, 512² primary rays,
+/// packets against one by one: 41 and 47 ms with 216 instances, 88 and 60 with 1,000, 4104 and 112 with 125,000.
+const MOST_CANDIDATES: usize = 16;
 
 /// Per-thread buffers: a packet is 24 KiB, too much to clear for every call.
 struct Scratch {
@@ -215,12 +220,20 @@ impl World {
             for &(distance, leaf) in &scratch.candidates {
                 order.extend(leaf_ids(&self.tlas.units, leaf).iter().map(|&i| (distance, i)));
             }
-            order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            for &(_, instance) in &order {
-                self.instance_blocks::<S, EXACT, ANY>(simd, instance, rays, hits, scratch, true);
+            let few = order.len() <= MOST_CANDIDATES;
+            if few {
+                order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+                for &(distance, instance) in &order {
+                    if all_answered::<ANY>(rays, hits, distance) {
+                        break;
+                    }
+                    self.instance_blocks::<S, EXACT, ANY>(simd, instance, rays, hits, scratch, true);
+                }
             }
             scratch.order = order;
-            return;
+            if few {
+                return;
+            }
         }
         self.one_by_one::<S, EXACT, ANY>(simd, rays, hits);
     }
@@ -296,6 +309,17 @@ impl World {
             }
         }
     }
+}
+
+/// Whether nothing at `distance` or beyond can change an answer.
+fn all_answered<const ANY: bool>(rays: &[RayBlock], hits: &[HitBlock], distance: f32) -> bool {
+    rays.iter().zip(hits).all(|(r, h)| {
+        (0..LANES).all(|lane| {
+            let found = h.prim[lane] != NO_HIT;
+            let idle = r.t_max[lane] <= r.t_min[lane];
+            idle || found && (ANY || beyond(h.t[lane]) < distance)
+        })
+    })
 }
 
 /// Whether an active ray's direction is so short or long that single rays rescale it; NaN is not, it is left to the packet.
