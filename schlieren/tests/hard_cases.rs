@@ -285,7 +285,6 @@ fn full_and_deviational_agree_where_both_hold() {
     }
 }
 
-/// The trait's own differences give what the march's neighbours say.
 #[test]
 fn parallel_tracing_takes_any_number_of_rays() {
     let field = cube(16, lopsided);

@@ -209,16 +209,14 @@ pub(crate) fn weights16<S: Simd>(simd: S, t: f32x16<S>) -> ([f32x16<S>; 4], [f32
     (w, [s2 * half, t.mul_add(s, half), t2 * half])
 }
 
-impl BSplineRows<'_> {
-    /// The 4x4 taps of a layer, two rows a vector.
-    #[inline(always)]
-    fn layer<S: Simd>(&self, simd: S, at: usize) -> [f32x8<S>; 2] {
-        let r0 = f32x4::from_slice(simd, &self.rows[0][at..at + 4]);
-        let r1 = f32x4::from_slice(simd, &self.rows[1][at..at + 4]);
-        let r2 = f32x4::from_slice(simd, &self.rows[2][at..at + 4]);
-        let r3 = f32x4::from_slice(simd, &self.rows[3][at..at + 4]);
-        [r0.combine(r1), r2.combine(r3)]
-    }
+/// The 4x4 taps of a layer, two rows a vector.
+#[inline(always)]
+fn layer<S: Simd>(simd: S, rows: &[&[f32]; 4], at: usize) -> [f32x8<S>; 2] {
+    let r0 = f32x4::from_slice(simd, &rows[0][at..at + 4]);
+    let r1 = f32x4::from_slice(simd, &rows[1][at..at + 4]);
+    let r2 = f32x4::from_slice(simd, &rows[2][at..at + 4]);
+    let r3 = f32x4::from_slice(simd, &rows[3][at..at + 4]);
+    [r0.combine(r1), r2.combine(r3)]
 }
 
 impl Interpolate16 for BSplineRows<'_> {
@@ -248,12 +246,15 @@ impl Interpolate16 for BSplineRows<'_> {
         let mut value = [0.0f32; 4 * LANES];
         let mut along_y = [0.0f32; 4 * LANES];
         let mut along_z = [0.0f32; 4 * LANES];
+        // Cut to one length here, where the compiler can see it: then one check is enough for a layer's four rows.
+        let len = self.rows[0].len();
+        let rows = [self.rows[0], &self.rows[1][..len], &self.rows[2][..len], &self.rows[3][..len]];
         for l in 0..LANES {
             let o = offsets[l] as u32 as usize;
-            let c0 = self.layer(simd, o);
-            let c1 = self.layer(simd, o + self.stride[1]);
-            let c2 = self.layer(simd, o + 2 * self.stride[1]);
-            let c3 = self.layer(simd, o + 3 * self.stride[1]);
+            let c0 = layer(simd, &rows, o);
+            let c1 = layer(simd, &rows, o + self.stride[1]);
+            let c2 = layer(simd, &rows, o + 2 * self.stride[1]);
+            let c3 = layer(simd, &rows, o + 3 * self.stride[1]);
             let (w0, w1) = (f32x8::splat(simd, wz[0][l]), f32x8::splat(simd, wz[1][l]));
             let (w2, w3) = (f32x8::splat(simd, wz[2][l]), f32x8::splat(simd, wz[3][l]));
             let [d0, d1, d2] =

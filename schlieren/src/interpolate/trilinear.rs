@@ -112,10 +112,7 @@ impl Interpolate16 for TrilinearRows<'_> {
         let offsets: [i32; LANES] = offsets.into();
 
         // Taps.
-        let [a0, a1] = pairs(simd, self.corners[0], &offsets);
-        let [b0, b1] = pairs(simd, self.corners[1], &offsets);
-        let [c0, c1] = pairs(simd, self.corners[2], &offsets);
-        let [d0, d1] = pairs(simd, self.corners[3], &offsets);
+        let [[a0, a1], [b0, b1], [c0, c1], [d0, d1]] = taps(simd, &self.corners, &offsets);
 
         // Differences first, so that the gradient is not a difference of interpolated values.
         let [x, y, z] = place;
@@ -132,18 +129,26 @@ impl Interpolate16 for TrilinearRows<'_> {
     }
 }
 
-/// `row[o]` and `row[o + 1]` for sixteen offsets. Each pair is one load of eight bytes.
+/// The two neighbours along x at each of a cell's four edges, for sixteen cells. Each pair is one load of eight bytes.
 #[inline(always)]
-fn pairs<S: Simd>(simd: S, row: &[f32], offsets: &[i32; LANES]) -> [f32x16<S>; 2] {
-    let mut halves = [[0u64; 8]; 2];
-    for h in 0..2 {
-        for l in 0..8 {
-            let o = offsets[8 * h + l] as u32 as usize;
-            halves[h][l] = bytemuck::cast([row[o], row[o + 1]]);
+fn taps<S: Simd>(simd: S, corners: &[&[f32]; 4], offsets: &[i32; LANES]) -> [[f32x16<S>; 2]; 4] {
+    // Cut to one length here, where the compiler can see it: then one check is enough for all four.
+    let len = corners[0].len();
+    let corners = [corners[0], &corners[1][..len], &corners[2][..len], &corners[3][..len]];
+    let mut halves = [[[0u64; 8]; 2]; 4];
+    for l in 0..LANES {
+        let o = offsets[l] as u32 as usize;
+        for e in 0..4 {
+            let pair = &corners[e][o..o + 2];
+            halves[e][l / 8][l % 8] = bytemuck::cast([pair[0], pair[1]]);
         }
     }
-    let low: f32x16<S> = u64x8::simd_from(simd, halves[0]).bitcast();
-    let high: f32x16<S> = u64x8::simd_from(simd, halves[1]).bitcast();
-    let (even, odd) = low.deinterleave(high);
-    [even, odd]
+    let mut out = [[f32x16::splat(simd, 0.0); 2]; 4];
+    for e in 0..4 {
+        let low: f32x16<S> = u64x8::simd_from(simd, halves[e][0]).bitcast();
+        let high: f32x16<S> = u64x8::simd_from(simd, halves[e][1]).bitcast();
+        let (even, odd) = low.deinterleave(high);
+        out[e] = [even, odd];
+    }
+    out
 }

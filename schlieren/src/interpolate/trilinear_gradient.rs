@@ -114,6 +114,10 @@ impl Interpolate16 for TrilinearGradientRows<'_> {
         }
         let offsets = cells[0] + cells[1] * self.stride[0] + cells[2] * self.stride[1];
         let offsets: [i32; LANES] = offsets.into();
+        // Cut to one length here, where the compiler can see it: then one check is enough for all four.
+        let len = self.corners[0].len();
+        let corners =
+            [self.corners[0], &self.corners[1][..len], &self.corners[2][..len], &self.corners[3][..len]];
         let mut out = [0.0f32; 4 * LANES];
         for l in 0..LANES {
             let o = 4 * offsets[l] as u32 as usize;
@@ -122,7 +126,7 @@ impl Interpolate16 for TrilinearGradientRows<'_> {
             let z = f32x4::splat(simd, place[2][l]);
             let mut edges = [x; 4];
             for e in 0..4 {
-                let taps = &self.corners[e][o..o + 8];
+                let taps = &corners[e][o..o + 8];
                 let (a, b) = (f32x4::from_slice(simd, &taps[..4]), f32x4::from_slice(simd, &taps[4..]));
                 edges[e] = x.mul_add(b - a, a);
             }

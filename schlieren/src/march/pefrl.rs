@@ -8,7 +8,7 @@ pub struct Pefrl;
 
 const XI: f64 = 0.178_617_895_844_809_1;
 const LAMBDA: f64 = -0.212_341_831_062_605_4;
-const CHI: f64 = -0.066_264_582_669_818_49;
+const CHI: f64 = -0.066_264_582_669_818_5;
 
 impl Integrator for Pefrl {
     const ORDER: u32 = 4;
