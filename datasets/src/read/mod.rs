@@ -5,6 +5,7 @@
 
 pub(crate) mod base64;
 pub mod csv;
+pub mod csv_lattice;
 pub mod error;
 pub mod gltf;
 pub mod mhd;

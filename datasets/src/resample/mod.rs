@@ -11,11 +11,13 @@
 mod mesh;
 mod rasterize;
 mod report;
+mod revolve;
 mod shape;
 mod smooth;
 
 pub use mesh::{Mesh, Plane};
 pub use report::{Report, SampleBack};
+pub use revolve::{revolve, revolved_bounds};
 pub use smooth::smooth;
 
 use crate::model::ModelError;

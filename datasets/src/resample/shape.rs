@@ -135,7 +135,7 @@ impl<'a> Cell<'a> {
             let (low, high) =
                 jacobians.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), j| (l.min(j), h.max(j)));
             let (small, large) = if low + high >= 0.0 { (low, high) } else { (-high, -low) };
-            cell.folded = !(small > FOLDED * large);
+            cell.folded = small.is_nan() || small <= FOLDED * large;
         }
         cell
     }
@@ -256,8 +256,8 @@ fn mean(points: impl ExactSizeIterator<Item = DVec3>) -> DVec3 {
 fn barycentric(a: DVec3, b: DVec3, c: DVec3, d: DVec3, p: DVec3, size: f64) -> Option<[f64; 4]> {
     let edges = DMat3::from_cols(b - a, c - a, d - a);
     let det = edges.determinant();
-    // Twelve digits of the volume of the cell's box: below, rounding decides.
-    if !(det.abs() > 1e-14 * size * size * size) {
+    // Fourteen digits of the volume of the cell's box: below, rounding decides.
+    if det.is_nan() || det.abs() <= 1e-14 * size * size * size {
         return None;
     }
     let w = edges.inverse() * (p - a);

@@ -223,7 +223,7 @@ fn vapour_mole_fraction(air: &MoistAir) -> Result<f64, IndexError> {
     }
     let enhancement = 1.00062 + 3.14e-8 * p + 5.6e-7 * t * t;
     let fraction = enhancement * relative_humidity * saturation_pressure_pa(t) / p;
-    if !(fraction <= 1.0) {
+    if !(0.0..=1.0).contains(&fraction) {
         return impossible(
             "relative humidity",
             relative_humidity,

@@ -266,7 +266,7 @@ pub const KNOWN: &[KnownGas] = &[
 impl KnownGas {
     /// Gladstone-Dale constant in m³/kg (1000 times smaller than in cm³/g). NaN below 185 nm and where a formula has a pole.
     pub fn k_m3_per_kg(&self, wavelength_um: f64) -> f64 {
-        if !(wavelength_um >= 0.185) {
+        if wavelength_um.is_nan() || wavelength_um < 0.185 {
             return f64::NAN;
         }
         let s = wavelength_um.powi(-2);

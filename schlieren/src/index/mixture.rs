@@ -128,7 +128,7 @@ impl Blend {
 /// Mass fractions of gases given by mole (volume) fractions, which must sum to 1 to [`SUM_TOLERANCE`].
 pub fn mass_from_mole_fractions(gases: &[(f64, Gas)]) -> Result<Vec<f64>, IndexError> {
     let sum: f64 = gases.iter().map(|g| g.0).sum();
-    if !((sum - 1.0).abs() <= SUM_TOLERANCE) {
+    if !(1.0 - SUM_TOLERANCE..=1.0 + SUM_TOLERANCE).contains(&sum) {
         let species = gases.iter().map(|g| g.1.to_string()).collect::<Vec<_>>().join(", ");
         return Err(IndexError::Fractions { species, sum, cure: "mole fractions must sum to 1" });
     }

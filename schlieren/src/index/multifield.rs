@@ -29,7 +29,7 @@ impl TransferFunction {
         if let Some((v, n)) = knots.iter().find(|(v, n)| !(v.is_finite() && n.is_finite())) {
             return Err(impossible(if v.is_finite() { *n } else { *v }, "is not finite"));
         }
-        if let Some(w) = knots.windows(2).find(|w| !(w[0].0 < w[1].0)) {
+        if let Some(w) = knots.windows(2).find(|w| w[0].0 >= w[1].0) {
             return Err(impossible(w[1].0, "does not lie above the one before"));
         }
         Ok(TransferFunction { knots })

@@ -1,9 +1,10 @@
 //! Where the values of a data set stand, and how they get to a uniform lattice.
 
-use super::{InputError, Options};
+use super::{Depth, InputError, Options};
 use datasets::model::{Attributes, ColorBy, Dataset, extent_dims};
 use datasets::resample::{
-    self, Lattice, Mark, Mesh, Plane, Report, Resolution, Samples, resample as resample_mesh,
+    self, Lattice, Mark, Mesh, Plane, Report, Resolution, Samples, resample as resample_mesh, revolve,
+    revolved_bounds,
 };
 use glam::{DMat3, DVec3};
 
@@ -51,14 +52,15 @@ impl Places {
             && !ghosts
             && options.resolution == Resolution::Auto
             && options.bounds.is_none()
-            && options.span.is_none()
+            && options.depth.is_none()
             && options.samples_per_axis == 1
         {
             let lattice = if per_point { lattice } else { cell_centres(lattice) };
             return Ok(Places::Uniform { lattice, backwards });
         }
-        let mesh = match options.span {
-            Some(span) => Mesh::with_plane(data, Plane::Extrude { span })?,
+        let mesh = match options.depth {
+            Some(Depth::Span(span)) => Mesh::with_plane(data, Plane::Extrude { span })?,
+            Some(Depth::Revolve) => Mesh::with_plane(data, Plane::Extrude { span: sheet(data) })?,
             None => Mesh::new(data)?,
         };
         Ok(Places::Mesh { mesh: Box::new(mesh), per_point, own: own.map(|o| o.0) })
@@ -112,7 +114,10 @@ impl Places {
                 let lattice = target(mesh, own.as_ref(), options)?;
                 let samples = if *per_point { Samples::Points(&values) } else { Samples::Cells(&values) };
                 let how = resample::Options { samples_per_axis: options.samples_per_axis };
-                let r = resample_mesh(mesh, samples, &lattice, &how)?;
+                let r = match options.depth {
+                    Some(Depth::Revolve) => revolve(mesh, samples, &lattice, &how)?,
+                    _ => resample_mesh(mesh, samples, &lattice, &how)?,
+                };
                 Ok(OnLattice { lattice, values: r.values, marks: r.marks, report: Some(r.report) })
             }
         }
@@ -121,31 +126,39 @@ impl Places {
 
 /// The lattice to resample to.
 fn target(mesh: &Mesh, own: Option<&Lattice>, options: &Options) -> Result<Lattice, InputError> {
-    let (low, high) = mesh.bounds();
+    let (low, high) = match options.depth {
+        Some(Depth::Revolve) => revolved_bounds(mesh)?,
+        _ => mesh.bounds(),
+    };
     if options.resolution == Resolution::Auto
         && options.bounds.is_none()
-        && options.span.is_none()
+        && options.depth.is_none()
         && let Some(own) = own
     {
         return Ok(*own);
     }
+    let (whole_low, whole_high) = (low, high);
     let (low, high) = match options.bounds {
         Some([a, b]) => (a.max(low), b.min(high)),
         None => (low, high),
     };
-    if !((high - low).min_element() > 0.0) {
+    let size = high - low;
+    if size.is_nan() || size.min_element() <= 0.0 {
         return Err(InputError::Option {
-            what: format!(
-                "the bounds leave nothing of the mesh ({} to {})",
-                mesh.bounds().0,
-                mesh.bounds().1
-            ),
+            what: format!("the bounds leave nothing of the mesh ({whole_low} to {whole_high})"),
             cure: "give the lower and the upper corner in the file's unit of length",
         });
     }
-    let mut lattice = Lattice::fit(low, high, mesh.typical_cell(), options.resolution)?;
+    // A sheet's thickness says nothing of its cells; the plane's own steps are taken instead.
+    let typical = match options.depth {
+        Some(_) => (high - low).truncate().element_product().sqrt() / (mesh.num_cells() as f64).sqrt(),
+        None => mesh.typical_cell(),
+    };
+    let mut lattice = Lattice::fit(low, high, typical, options.resolution)?;
     // A repeated flow needs no resolution along its span.
-    if let (Some(span), Resolution::Auto | Resolution::Longest(_)) = (options.span, options.resolution) {
+    if let (Some(Depth::Span(span)), Resolution::Auto | Resolution::Longest(_)) =
+        (options.depth, options.resolution)
+    {
         let size = high - low;
         let along = (0..3).find(|&a| (size[a] - span).abs() <= 1e-9 * span);
         if let Some(a) = along {
@@ -154,6 +167,27 @@ fn target(mesh: &Mesh, own: Option<&Lattice>, options: &Options) -> Result<Latti
         }
     }
     Ok(lattice)
+}
+
+/// Thickness that a plane gets before it is revolved: far below any lattice's spacing, far above rounding.
+fn sheet(data: &Dataset) -> f64 {
+    let range = |p: &mut dyn Iterator<Item = f64>| {
+        let (low, high) = p.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        high - low
+    };
+    let longest = data.leaves().into_iter().map(|leaf| match leaf {
+        Dataset::ImageData(d) => {
+            let [nx, ny, nz] = d.dims().map(|n| n.saturating_sub(1));
+            (d.point(nx, ny, nz) - d.point(0, 0, 0)).abs().max_element()
+        }
+        Dataset::RectilinearGrid(d) => {
+            d.coordinates.iter().map(|c| range(&mut c.iter().copied())).fold(0.0, f64::max)
+        }
+        Dataset::StructuredGrid(d) => range(&mut (0..d.points.len()).map(|i| d.points.get(i).x)),
+        _ => 1.0,
+    });
+    let longest = longest.filter(|x| x.is_finite()).fold(0.0, f64::max);
+    if longest > 0.0 { 1e-6 * longest } else { 1.0 }
 }
 
 fn cell_centres(points: Lattice) -> Lattice {

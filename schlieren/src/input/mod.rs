@@ -84,6 +84,15 @@ impl Role {
     }
 }
 
+/// What two-dimensional data becomes in space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Depth {
+    /// The same flow over this span, in units of the file, half on either side of the plane.
+    Span(f64),
+    /// The flow turned about the x axis; y is the radius.
+    Revolve,
+}
+
 /// Everything that decides how a data set becomes a field.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
@@ -99,8 +108,8 @@ pub struct Options {
     pub resolution: Resolution,
     /// Only this part of the data, lower and upper corner in units of the file.
     pub bounds: Option<[DVec3; 2]>,
-    /// Depth of two-dimensional data, in units of the file.
-    pub span: Option<f64>,
+    /// What two-dimensional data becomes in space; must be given for it, and only for it.
+    pub depth: Option<Depth>,
     /// See [`resample::Options`].
     pub samples_per_axis: usize,
     /// Shock smoothing: standard deviation in nodes; 0 for none, 1 to 1.4 where shocks are one cell wide.
@@ -124,7 +133,7 @@ impl Options {
             length_unit_m: 1.0,
             resolution: Resolution::Auto,
             bounds: None,
-            span: None,
+            depth: None,
             samples_per_axis: 1,
             smoothing_nodes: 0.0,
             outside: Role::Blank,
@@ -165,6 +174,11 @@ pub struct Loaded {
 /// Reads a file and makes a field of it. Of a time series this is the first time; see [`series`] for the others.
 pub fn load(path: &Path, options: &Options) -> Result<Loaded, InputError> {
     let in_file = |e: InputError| InputError::InFile { path: path.to_path_buf(), source: Box::new(e) };
+    // A table of points on a lattice: cell centres of a solver, or ParaView's export.
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
+        let data = datasets::read::csv_lattice::dataset(&datasets::read::csv::read(path)?)?;
+        return from_dataset(&data, options).map_err(in_file);
+    }
     let opened = datasets::read::open(path)?;
     let data = opened.dataset().map_err(|e| in_file(e.into()))?;
     let mut loaded = from_dataset(data, options).map_err(in_file)?;

@@ -248,7 +248,7 @@ fn bounds_units_spans_and_smoothing() {
     let options = Options::new(Medium::density("rho"));
     let text = from_dataset(&flat, &options).unwrap_err().to_string();
     assert!(text.contains("it is a plane"), "{text}");
-    let options = Options { span: Some(0.5), resolution: Resolution::Longest(17), ..options };
+    let options = Options { depth: Some(Depth::Span(0.5)), resolution: Resolution::Longest(17), ..options };
     let sharp = from_dataset(&flat, &options).unwrap();
     assert_eq!(sharp.field.dims()[2], 8);
     assert!((sharp.field.size_m().z - 0.5).abs() < 1e-9);
