@@ -60,6 +60,9 @@ struct FlowArgs {
     /// Depth of two-dimensional data, in units of the file
     #[arg(long, value_name = "NUMBER")]
     span: Option<f64>,
+    /// Two-dimensional data are half of an axisymmetric flow
+    #[arg(long, conflicts_with = "span")]
+    revolve: bool,
     /// Nodes along the longest axis when data are resampled
     #[arg(long, value_name = "N")]
     resample: Option<usize>,
@@ -255,6 +258,7 @@ impl FlowArgs {
                 model,
                 length_unit_m,
                 span,
+                revolve,
                 resample_nodes,
                 smoothing_nodes,
                 outside,
@@ -267,6 +271,7 @@ impl FlowArgs {
                 model,
                 length_unit_m,
                 span,
+                revolve,
                 resample_nodes,
                 smoothing_nodes,
                 outside,
@@ -290,7 +295,8 @@ impl FlowArgs {
         f.species.extend(a.species.iter().cloned());
         f.density_unit_kg_m3 = a.density_unit.or(f.density_unit_kg_m3);
         f.length_unit_m = a.length_unit.unwrap_or(f.length_unit_m);
-        f.span = a.span.or(f.span);
+        f.span = a.span.or(f.span.filter(|_| !a.revolve));
+        f.revolve = a.revolve || (f.revolve && a.span.is_none());
         f.resample_nodes = a.resample.or(f.resample_nodes);
         f.smoothing_nodes = a.smoothing.unwrap_or(f.smoothing_nodes);
         f.outside = a.outside.unwrap_or(f.outside);

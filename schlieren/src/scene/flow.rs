@@ -3,7 +3,7 @@
 use super::SceneError;
 use crate::index::Gas;
 use crate::index::conditions::Model;
-use crate::input::{Medium, Options, Quantity, Reference, Role};
+use crate::input::{Depth, Medium, Options, Quantity, Reference, Role};
 use datasets::resample::Resolution;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -58,6 +58,9 @@ pub struct FlowSpec {
     /// Depth of two-dimensional data, in units of the file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub span: Option<f64>,
+    /// Two-dimensional data are half of an axisymmetric flow, revolved about its axis.
+    #[serde(default)]
+    pub revolve: bool,
     /// Nodes along the longest axis when the data have to be resampled; chosen from the cells when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub resample_nodes: Option<usize>,
@@ -105,6 +108,7 @@ impl Default for FlowSpec {
             model: Model::Auto,
             length_unit_m: one(),
             span: None,
+            revolve: false,
             resample_nodes: None,
             smoothing_nodes: 0.0,
             outside: blank(),
@@ -131,6 +135,9 @@ impl FlowSpec {
             };
             self.species.iter().map(gas).collect()
         };
+        if self.revolve && self.span.is_some() {
+            return Err(wrong("`span` and `revolve` are alternatives; keep one".into()));
+        }
         let given = [
             ("density", self.density.is_some()),
             ("temperature", self.temperature.is_some()),
@@ -200,7 +207,7 @@ impl FlowSpec {
             model: self.model,
             length_unit_m: self.length_unit_m,
             resolution: self.resample_nodes.map_or(Resolution::Auto, Resolution::Longest),
-            depth: self.span.map(crate::input::Depth::Span),
+            depth: if self.revolve { Some(Depth::Revolve) } else { self.span.map(Depth::Span) },
             smoothing_nodes: self.smoothing_nodes,
             outside: self.outside,
             hidden: self.hidden,
