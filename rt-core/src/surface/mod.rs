@@ -177,7 +177,7 @@ impl<'a> Placed<'a> {
         let n = self.normal_from_object.map_or(n, |m| m * n);
         let squared = n.length_squared();
         let outward = if !ORDINARY_NORMAL_SQUARED.contains(&squared) {
-            self.point_and_normal([a, b, c], hit, ray).1
+            self.exact_normal([a, b, c], hit, ray)
         } else if smooth.is_some() {
             // Any length will do to turn the shading normal.
             n
@@ -190,6 +190,13 @@ impl<'a> Placed<'a> {
         let [r, g, b, alpha] = self.mesh_color(mesh, corner, hit.prim, weights);
         let opacity = if drawn { self.material.opacity * alpha } else { 0.0 };
         Look { point, normal, color: Vec3::new(r, g, b), opacity }
+    }
+
+    /// Out of the way of the usual case.
+    #[cold]
+    #[inline(never)]
+    fn exact_normal(&self, corners: [Vec3; 3], hit: &Hit, ray: &Ray) -> Vec3 {
+        self.point_and_normal(corners, hit, ray).1
     }
 
     /// Normals to interpolate, if the material wants them.
@@ -246,7 +253,7 @@ impl<'a> Placed<'a> {
         n.try_normalize().unwrap_or_else(|| outward.normalize_or_zero())
     }
 
-    #[inline]
+    #[inline(always)]
     fn mesh_color(&self, mesh: &TriMesh, corner: [usize; 3], prim: u32, [w, u, v]: [f32; 3]) -> [f32; 4] {
         match &self.material.color_source {
             ColorSource::Attribute => self.colors.map(|c| interpolate4(c, corner, prim, [w, u, v])),
@@ -273,7 +280,7 @@ impl<'a> Placed<'a> {
     }
 
     /// Point and unit face normal in f64: no underflow for tiny triangles, no cancellation for distant ones.
-    #[inline]
+    #[inline(always)]
     fn point_and_normal(&self, corners: [Vec3; 3], hit: &Hit, ray: &Ray) -> (DVec3, Vec3) {
         let [a, b, c] = corners.map(|p| p.as_dvec3());
         let (e1, e2) = (b - a, c - a);
