@@ -12,8 +12,8 @@ use schlieren::analytic::Luneburg;
 use schlieren::field::Field;
 use schlieren::interpolate::{BSpline, Interpolant, Interpolate, Trilinear, TrilinearGradient};
 use schlieren::march::{
-    BlankCells, Deviational, DormandPrince, Euler, Full, FullOptions, Integrator, LineOfSight, Options, Pefrl, Ray,
-    RungeKutta4, Scheme, Sharma, Verlet,
+    BlankCells, Deviational, DormandPrince, Euler, Full, FullOptions, Integrator, LineOfSight, Options,
+    Pefrl, Ray, RungeKutta4, Scheme, Sharma, Verlet,
 };
 use schlieren::path::{LightPaths, Start, Wanted};
 use schlieren::plan::{Mode, Plan, Request};
@@ -34,7 +34,11 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("step", "voxel", "longest step");
     record.column("samples", "", "samples of the medium along a ray");
     record.column("time", "ns", "CPU time of one thread for a ray, fastest of three runs");
-    record.column("rms_error", "", "root mean square over rays, as part of the largest true deflection (Luneburg: of the radius)");
+    record.column(
+        "rms_error",
+        "",
+        "root mean square over rays, as part of the largest true deflection (Luneburg: of the radius)",
+    );
     record.column("largest_error", "", "largest error, the same way");
     record.column("order", "", "observed order: from this and the row before, at half as many samples");
     record.column("amplitude", "", "largest eps of the blob");
@@ -51,7 +55,9 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
 /// Fastest of three runs on this thread, ns a ray, and the error against the truth.
 fn measure(paths: &dyn LightPaths, starts: &[Start], truth: &[[f64; 2]]) -> (f64, f64, f64) {
     let exits = traced(paths, starts);
-    let secs = (0..3).map(|_| clock::measure(|| traced(paths, starts)).1.thread_cpu_secs).fold(f64::INFINITY, f64::min);
+    let secs = (0..3)
+        .map(|_| clock::measure(|| traced(paths, starts)).1.thread_cpu_secs)
+        .fold(f64::INFINITY, f64::min);
     let (rms, largest) = error_of(&exits, truth);
     (secs * 1e9 / starts.len() as f64, rms, largest)
 }
@@ -69,7 +75,8 @@ fn lattice(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
     let fast = tiles(64, 0.5);
     // The f64 marches take a ray at a time and ten times as long.
     let few = tiles(if context.quick { 16 } else { 32 }, 0.5);
-    let (truth, few_truth) = (blob_deflections(&gaussian, &view, &fast)?, blob_deflections(&gaussian, &view, &few)?);
+    let (truth, few_truth) =
+        (blob_deflections(&gaussian, &view, &fast)?, blob_deflections(&gaussian, &view, &few)?);
     record.notes.push(format!(
         "Lattice: a blob of eps 1e-5 and sigma 0.08 m in a cube of 1 m, {n}³ nodes (sigma is {:.1} voxels), seen 0.6 rad off its axes. The truth is \
          an adaptive march in f64 through the blob itself. f32 marches carry deviations, sixteen rays at a time; f64 marches take one ray at a \
@@ -78,7 +85,12 @@ fn lattice(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
         0.08 * (n - 1) as f64
     ));
     let mut by_march: Vec<Series> = vec![];
-    let mut add = |record: &mut Record, march: &str, interpolant: &str, precision: &str, step: Option<f64>, m: (f64, f64, f64)| {
+    let mut add = |record: &mut Record,
+                   march: &str,
+                   interpolant: &str,
+                   precision: &str,
+                   step: Option<f64>,
+                   m: (f64, f64, f64)| {
         record.rows.push(
             Row::new()
                 .with("part", "lattice")
@@ -149,7 +161,11 @@ struct FullMarches<'a> {
 
 impl FullMarches<'_> {
     fn one<I: Interpolate, G: Integrator>(&self, interpolate: &I, integrator: G) -> (f64, f64, f64) {
-        measure(&Full::new(self.field, interpolate, integrator, self.view, self.options), self.starts, self.truth)
+        measure(
+            &Full::new(self.field, interpolate, integrator, self.view, self.options),
+            self.starts,
+            self.truth,
+        )
     }
 
     fn all<I: Interpolate>(&self, i: &I) -> Vec<(&'static str, (f64, f64, f64))> {

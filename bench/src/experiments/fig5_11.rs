@@ -19,12 +19,18 @@ use std::sync::atomic::AtomicBool;
 const TECHNIQUES: [(&str, &str); 8] = [
     ("shadowgraph", "[technique]\nkind = \"shadowgraph\""),
     ("schlieren, knife", "[technique]\nkind = \"schlieren\""),
-    ("schlieren, circle", "[technique]\nkind = \"schlieren\"\ncutoff = { kind = \"circle\", radius_m = 2e-4 }"),
+    (
+        "schlieren, circle",
+        "[technique]\nkind = \"schlieren\"\ncutoff = { kind = \"circle\", radius_m = 2e-4 }",
+    ),
     (
         "schlieren, complemented circle",
         "[technique]\nkind = \"schlieren\"\ncutoff = { kind = \"complemented-circle\", radius_m = 2e-4 }",
     ),
-    ("schlieren, colour", "[technique]\nkind = \"schlieren\"\ncutoff = { kind = \"color\", radius_m = 5e-4 }"),
+    (
+        "schlieren, colour",
+        "[technique]\nkind = \"schlieren\"\ncutoff = { kind = \"color\", radius_m = 5e-4 }",
+    ),
     ("interferogram, infinite fringe", "[technique]\nkind = \"interferogram\""),
     ("interferogram, finite fringe", "[technique]\nkind = \"interferogram\"\nfringe_spacing_m = 2e-3"),
     ("BOS", "[technique]\nkind = \"bos\""),
@@ -50,7 +56,11 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("rate", "Mphoton/s", "photons by median wall time on all threads, start to film");
     record.column("rate_per_core", "Mphoton/s", "photons by CPU time of all threads");
     record.column("frames", "1/s", "frames of 512² pixels with 10 photons each, by that rate");
-    record.column("of_gtx280", "", "rate by the 34.1 Mphoton/s (13 frames) that the dissertation reports for its GTX 280");
+    record.column(
+        "of_gtx280",
+        "",
+        "rate by the 34.1 Mphoton/s (13 frames) that the dissertation reports for its GTX 280",
+    );
     record.column("picture", "s", "wall time of a whole picture from the field at hand: plan, projection or spline, 16 photons a pixel or beams");
     let threads = rayon::current_num_threads();
     record.notes.push(format!(
@@ -146,10 +156,7 @@ fn exposed(b: &Bench, section: &TestSection, paths: &dyn LightPaths, passes: u32
 
 /// Whole pictures by the tool's own choice, and the comparisons that have no photons.
 fn pictures(context: &mut Context<'_>, record: &mut Record, section: &TestSection) -> anyhow::Result<()> {
-    let others = [
-        ("slice", "[technique]\nkind = \"slice\""),
-        ("volume", "[technique]\nkind = \"volume\""),
-    ];
+    let others = [("slice", "[technique]\nkind = \"slice\""), ("volume", "[technique]\nkind = \"volume\"")];
     // In the quick form two stand for all.
     let list: Vec<(&str, &str)> = match context.quick {
         true => vec![TECHNIQUES[1], others[0]],
@@ -162,9 +169,13 @@ fn pictures(context: &mut Context<'_>, record: &mut Record, section: &TestSectio
         let rendered = paint(context, &scene, section)?;
         let secs = start.elapsed().as_secs_f64();
         record.rows.push(
-            Row::new().with("technique", name).with("march", rendered.report.march.as_str()).with("picture", secs),
+            Row::new()
+                .with("technique", name)
+                .with("march", rendered.report.march.as_str())
+                .with("picture", secs),
         );
-        let caption = format!("{name}: combustion jet, 512² pixels, {secs:.2} s; march: {}", rendered.report.march);
+        let caption =
+            format!("{name}: combustion jet, 512² pixels, {secs:.2} s; march: {}", rendered.report.march);
         record.pictures.push(picture(name, caption, &rendered)?);
     }
     Ok(())

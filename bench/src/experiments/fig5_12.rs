@@ -16,7 +16,11 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("flow", "", "what light goes through");
     record.column("amplitude", "", "largest |eps| = |n/n0 - 1|");
     record.column("deflection", "rad", "largest deflection, traced");
-    record.column("deflection_rms", "", "rms difference of deflections, line of sight against traced, as part of the largest");
+    record.column(
+        "deflection_rms",
+        "",
+        "rms difference of deflections, line of sight against traced, as part of the largest",
+    );
     record.column("deflection_max", "", "largest difference, the same way");
     record.column("path_rms", "", "rms difference of optical paths, as part of the largest");
     record.column("path_waves", "waves", "largest difference of optical paths, at 633 nm");
@@ -94,8 +98,13 @@ fn difference(field: &Field, pixels: u32) -> Difference {
     let mut traced = straight.clone();
     LineOfSight::new(field, view, Interpolant::BSpline, wanted, BlankCells::Opaque)
         .trace_parallel(&starts, &mut straight);
-    Deviational::new(field, view, Interpolant::BSpline, Options { step_voxels: 0.5, wanted, ..Options::default() })
-        .trace_parallel(&starts, &mut traced);
+    Deviational::new(
+        field,
+        view,
+        Interpolant::BSpline,
+        Options { step_voxels: 0.5, wanted, ..Options::default() },
+    )
+    .trace_parallel(&starts, &mut traced);
     let both = || straight.iter().zip(&traced).filter(|(a, b)| a.transmission > 0.0 && b.transmission > 0.0);
     let size_of = |v: [f32; 2]| f64::from(v[0]).hypot(f64::from(v[1]));
     let largest = |f: &dyn Fn(&Exit) -> f64| both().map(|(_, b)| f(b)).fold(0.0, f64::max);
@@ -144,7 +153,11 @@ fn pictures(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()
         let rendered = paint(context, &scene(&toml)?, &section)?;
         let secs = start.elapsed().as_secs_f64();
         record.rows.push(Row::new().with("picture", name).with("time", secs));
-        record.pictures.push(picture(name, format!("{name}: combustion jet, {pixels}² pixels, {secs:.1} s"), &rendered)?);
+        record.pictures.push(picture(
+            name,
+            format!("{name}: combustion jet, {pixels}² pixels, {secs:.1} s"),
+            &rendered,
+        )?);
         painted.push(rendered);
     }
     // Both have the same photons, so what is left is the bending.
@@ -157,7 +170,9 @@ fn pictures(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()
             *a = [0.5 + GAIN * off; 3];
         }
         rms = (rms / traced.pixels.len() as f64).sqrt();
-        let caption = format!("line of sight minus traced, {GAIN} times, on mid-grey; root mean square {rms:.1e} of white");
+        let caption = format!(
+            "line of sight minus traced, {GAIN} times, on mid-grey; root mean square {rms:.1e} of white"
+        );
         let Picture { png, .. } = picture("difference", String::new(), straight)?;
         record.pictures.push(Picture { name: "difference".into(), caption, png });
     }

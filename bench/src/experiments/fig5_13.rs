@@ -10,7 +10,11 @@ use schlieren::scene::Jitter;
 
 /// Techniques on the combustion jet: name, TOML, what is seen.
 const GALLERY: [(&str, &str, &str); 12] = [
-    ("shadowgraph", "kind = \"shadowgraph\"", "second derivatives of the path: bright where light converges, 0.5 m behind the flow"),
+    (
+        "shadowgraph",
+        "kind = \"shadowgraph\"",
+        "second derivatives of the path: bright where light converges, 0.5 m behind the flow",
+    ),
     ("knife, upright", "kind = \"schlieren\"", "deflection to the right is brighter"),
     (
         "knife, level",
@@ -39,7 +43,11 @@ const GALLERY: [(&str, &str, &str); 12] = [
         "fringes shifted by the optical path",
     ),
     ("BOS", "kind = \"bos\"", "a background of dots, displaced"),
-    ("volume rendering", "kind = \"volume\"\nstrength = 40.0", "for comparison: |grad n| as smoke, no optics"),
+    (
+        "volume rendering",
+        "kind = \"volume\"\nstrength = 40.0",
+        "for comparison: |grad n| as smoke, no optics",
+    ),
     ("slice", "kind = \"slice\"", "for comparison: |grad n| in the middle plane"),
     (
         "colours of white light",
@@ -96,13 +104,20 @@ fn gallery(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
         );
         record.notes.extend(rendered.report.warnings.iter().map(|w| format!("{name}: {w}")));
         let settings = toml.replace('\n', "; ");
-        record.pictures.push(picture(name, format!("{name}: {meaning}. {secs:.2} s. [technique] {settings}"), &rendered)?);
+        record.pictures.push(picture(
+            name,
+            format!("{name}: {meaning}. {secs:.2} s. [technique] {settings}"),
+            &rendered,
+        )?);
     }
     Ok(())
 }
 
 /// The field for each line: eps in proportion to air's n - 1.
-fn dispersed(field: &schlieren::field::Field, lines: &[schlieren::spectrum::Line]) -> anyhow::Result<Vec<schlieren::field::Field>> {
+fn dispersed(
+    field: &schlieren::field::Field,
+    lines: &[schlieren::spectrum::Line],
+) -> anyhow::Result<Vec<schlieren::field::Field>> {
     use schlieren::field::Field;
     use schlieren::index::Gas;
     let air: Gas = "air".parse()?;
@@ -111,7 +126,14 @@ fn dispersed(field: &schlieren::field::Field, lines: &[schlieren::spectrum::Line
         let ratio = air.k_m3_per_kg(line.wavelength_nm * 1e-3)? / at_633;
         let eps = field.eps().iter().map(|e| (f64::from(*e) * ratio) as f32).collect();
         let n0 = 1.0 + (field.n0() - 1.0) * ratio;
-        Ok(Field::new(field.dims(), field.spacing_m(), field.origin_m(), eps, n0, field.nodes().map(<[_]>::to_vec))?)
+        Ok(Field::new(
+            field.dims(),
+            field.spacing_m(),
+            field.origin_m(),
+            eps,
+            n0,
+            field.nodes().map(<[_]>::to_vec),
+        )?)
     };
     lines.iter().map(one).collect()
 }

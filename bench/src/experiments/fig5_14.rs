@@ -43,7 +43,8 @@ impl Noisy {
         let (size, pixels, reference_samples) =
             if context.quick { ("small", 96, 2048) } else { ("medium", 192, 16384) };
         context.say("combustion jet")?;
-        let text = format!("[film]\nsize = [{pixels}, {pixels}]\n[march]\nmethod = \"line-of-sight\"\n{technique}");
+        let text =
+            format!("[film]\nsize = [{pixels}, {pixels}]\n[march]\nmethod = \"line-of-sight\"\n{technique}");
         let scene = scene(&text)?;
         let section = TestSection::of_fields(&scene, vec![flow("combustion-jet", size)?], None)?;
         Ok(Noisy { scene, section, reference_samples })
@@ -129,7 +130,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         if name == "schlieren, knife" {
             // The dissertation's three, at the tenfold counts where its first number meets ours.
             let first = THESIS_SAMPLES;
-            let points: Vec<(f64, f64)> = THESIS_PERCENT.iter().zip([1.0, 10.0, 100.0]).map(|(p, n)| (first * n, *p)).collect();
+            let points: Vec<(f64, f64)> =
+                THESIS_PERCENT.iter().zip([1.0, 10.0, 100.0]).map(|(p, n)| (first * n, *p)).collect();
             for (n, percent) in &points {
                 record.rows.push(
                     Row::new()
@@ -162,7 +164,8 @@ fn order(points: &[(f64, f64)]) -> Option<f64> {
     let logs: Vec<(f64, f64)> = points.iter().filter(|p| p.1 > 0.0).map(|p| (p.0.ln(), p.1.ln())).collect();
     let n = logs.len() as f64;
     let (mx, my) = (logs.iter().map(|p| p.0).sum::<f64>() / n, logs.iter().map(|p| p.1).sum::<f64>() / n);
-    let (sxy, sxx) = logs.iter().fold((0.0, 0.0), |(a, b), p| (a + (p.0 - mx) * (p.1 - my), b + (p.0 - mx).powi(2)));
+    let (sxy, sxx) =
+        logs.iter().fold((0.0, 0.0), |(a, b), p| (a + (p.0 - mx) * (p.1 - my), b + (p.0 - mx).powi(2)));
     (logs.len() >= 2).then(|| -sxy / sxx)
 }
 

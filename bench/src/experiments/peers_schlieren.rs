@@ -36,7 +36,11 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("step", "voxel", "step");
     record.column("rms_error", "", "root mean square over rays, as part of the largest true deflection");
     record.column("largest_error", "", "largest error, the same way");
-    record.column("time", "ns", "median CPU time of one thread for a ray; empty where only the error was taken");
+    record.column(
+        "time",
+        "ns",
+        "median CPU time of one thread for a ray; empty where only the error was taken",
+    );
     record.column("ours", "", "our setting with at most that error that was fastest in a trial");
     record.column("our_error", "", "its rms error");
     record.column("our_time", "ns", "its time for a ray");
@@ -99,13 +103,17 @@ fn compare(
             let best = traced_ours.iter().filter(|o| o.error <= rms).min_by(|a, b| a.secs.total_cmp(&b.secs));
             let what = format!("{n}³, {view_name}, step {step}: {rival}");
             let Some(best) = best else {
-                record.missing.push(format!("{what}: its error of {rms:.1e} is below that of every traced setting of ours"));
+                record.missing.push(format!(
+                    "{what}: its error of {rms:.1e} is below that of every traced setting of ours"
+                ));
                 continue;
             };
             let mut variants = vec![tracing("rival", paths, starts), tracing("traced", &*best.paths, starts)];
             if los_error <= rms {
                 variants.push(tracing("line of sight", &projected, starts));
-                variants.push(Variant::new("line of sight, projected anew", || fingerprint(&traced(&los(), starts))));
+                variants.push(Variant::new("line of sight, projected anew", || {
+                    fingerprint(&traced(&los(), starts))
+                }));
             }
             let timings = interleave(&context.schedule(Schedule::one_thread(), 0.5), &mut variants)?;
             let ns = |name: &str| timings.summary(name).map(|s| s.median * 1e9 / starts.len() as f64);
@@ -122,7 +130,11 @@ fn compare(
             );
             for variant in ["traced", "line of sight", "line of sight, projected anew"] {
                 if let Some(r) = timings.ratio(variant, "rival") {
-                    record.ratios.push(Ratio { name: format!("{what}: ours, {variant}"), rival: rival.into(), ..r });
+                    record.ratios.push(Ratio {
+                        name: format!("{what}: ours, {variant}"),
+                        rival: rival.into(),
+                        ..r
+                    });
                 }
             }
         }
@@ -133,13 +145,20 @@ fn compare(
 /// Traced settings of ours.
 fn ours(field: &Field, view: View) -> Vec<Ours<'_>> {
     let mut list = vec![];
-    for (name, interpolant) in
-        [("Verlet, b-spline", Interpolant::BSpline), ("Verlet, trilinear gradients", Interpolant::TrilinearGradient), ("Verlet, trilinear", Interpolant::Trilinear)]
-    {
+    for (name, interpolant) in [
+        ("Verlet, b-spline", Interpolant::BSpline),
+        ("Verlet, trilinear gradients", Interpolant::TrilinearGradient),
+        ("Verlet, trilinear", Interpolant::Trilinear),
+    ] {
         for step_voxels in [8.0, 4.0, 2.0, 1.0, 0.5] {
             let options = Options { step_voxels, ..Options::default() };
             let paths = Box::new(Deviational::new(field, view, interpolant, options));
-            list.push(Ours { name: format!("{name}, step {step_voxels}"), paths, error: f64::INFINITY, secs: f64::INFINITY });
+            list.push(Ours {
+                name: format!("{name}, step {step_voxels}"),
+                paths,
+                error: f64::INFINITY,
+                secs: f64::INFINITY,
+            });
         }
     }
     list
@@ -155,7 +174,11 @@ fn trial(paths: &dyn LightPaths, starts: &[Start], truth: &[[f64; 2]]) -> (f64, 
 fn tracing<'a>(name: &str, paths: &'a dyn LightPaths, starts: &'a [Start]) -> Variant<'a> {
     let exits = std::rc::Rc::new(RefCell::new(vec![Exit::UNDISTURBED; starts.len()]));
     let seen = exits.clone();
-    Variant::checked(name, move || paths.trace(starts, &mut exits.borrow_mut()), move || fingerprint(&seen.borrow()))
+    Variant::checked(
+        name,
+        move || paths.trace(starts, &mut exits.borrow_mut()),
+        move || fingerprint(&seen.borrow()),
+    )
 }
 
 /// Bars of the ratios, and error against time on the finest lattice.
@@ -190,7 +213,9 @@ fn plot(record: &mut Record) {
         );
         for r in &record.rows {
             let here = r.number("nodes") == Some(finest) && r.text("view") == Some(view);
-            let (Some(march), Some(x), Some(y), true) = (r.text("march"), r.number("time"), r.number("rms_error"), here) else {
+            let (Some(march), Some(x), Some(y), true) =
+                (r.text("march"), r.number("time"), r.number("rms_error"), here)
+            else {
                 continue;
             };
             let name = march.split(", step").next().unwrap_or(march).to_string();

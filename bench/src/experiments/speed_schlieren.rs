@@ -1,7 +1,9 @@
 //! How fast light goes through a field: ray-steps and photons per second at 256³ and 256 steps, and a frame of the combustion jet.
 
 use super::Context;
-use super::test_section::{GTX_280_PHOTONS_PER_SEC, check_cancelled, fingerprint, flow, oblique, scene, tiles};
+use super::test_section::{
+    GTX_280_PHOTONS_PER_SEC, check_cancelled, fingerprint, flow, oblique, scene, tiles,
+};
 use crate::clock::Clock;
 use crate::plot::{Axis, Plot, Point, Series};
 use crate::record::{Record, Row};
@@ -25,7 +27,11 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("rate", "1/s", "count by median wall time");
     record.column("rate_low", "1/s", "slowest round");
     record.column("rate_high", "1/s", "fastest round");
-    record.column("rate_per_core", "1/s", "count by median CPU time of all threads: what a core that runs nothing else does");
+    record.column(
+        "rate_per_core",
+        "1/s",
+        "count by median CPU time of all threads: what a core that runs nothing else does",
+    );
     record.column("bar", "1/s", "what it should reach on two idle cores");
     record.column("of_bar", "", "rate by bar");
     record.column("of_bar_idle", "", "rate of two cores by CPU time, by bar");
@@ -124,7 +130,8 @@ fn jet(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     let (field, view) = (&section.fields[0], section.view);
     let framing = framing(&scene, &section);
     let technique = technique(&scene, 0, &framing, field.n0(), false)?;
-    let los = |f: &Field| LineOfSight::new(f, view, Interpolant::BSpline, Wanted::default(), BlankCells::Opaque);
+    let los =
+        |f: &Field| LineOfSight::new(f, view, Interpolant::BSpline, Wanted::default(), BlankCells::Opaque);
     let held = los(field);
     let never = AtomicBool::new(false);
     let frame = |paths: &LineOfSight| {
@@ -165,7 +172,9 @@ fn jet(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
 }
 
 fn plots(record: &mut Record) {
-    for (unit, title) in [("ray-steps", "Ray-steps per second, 256³, 256 steps"), ("photons", "Photons per second")] {
+    for (unit, title) in
+        [("ray-steps", "Ray-steps per second, 256³, 256 steps"), ("photons", "Photons per second")]
+    {
         let of_unit = || record.rows.iter().filter(|r| r.text("unit") == Some(unit));
         let names: Vec<String> = of_unit().filter_map(|r| r.text("what").map(String::from)).collect();
         let mut plot = Plot::bars(title, Axis::log("rate", "1/s"), names);

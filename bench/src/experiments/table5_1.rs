@@ -46,7 +46,11 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("bricks_build", "ms", "time of building those");
     record.column("film", "MB", "energy and counts of 512² pixels");
     record.column("ours", "MB", "sum of the four");
-    record.column("resident", "MB", "growth of the process's resident memory by field and march, as the kernel counts it");
+    record.column(
+        "resident",
+        "MB",
+        "growth of the process's resident memory by field and march, as the kernel counts it",
+    );
     record.column("build", "s", "wall time of preparing the march, field at hand");
     record.column("per_voxel", "B", "our bytes without the film by voxels");
     record.notes.push(
@@ -78,9 +82,13 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         let h = 1.0 / (longest - 1) as f64;
         for (march, &(label, interpolant, skip_rad)) in marches.iter().enumerate() {
             check_cancelled(context)?;
-            context.say_share(format!("{name}, {label}"), (n as f64 + march as f64 / marches.len() as f64) / 5.0)?;
+            context.say_share(
+                format!("{name}, {label}"),
+                (n as f64 + march as f64 / marches.len() as f64) / 5.0,
+            )?;
             let before = resident_bytes();
-            let field = Field::from_fn(dims, [h; 3], DVec3::ZERO, 1.000_27, |p| 1e-5 * p.x * (p.y + 0.5 * p.z))?;
+            let field =
+                Field::from_fn(dims, [h; 3], DVec3::ZERO, 1.000_27, |p| 1e-5 * p.x * (p.y + 0.5 * p.z))?;
             let view = View::along(ViewAxis::Z, field.centre_m());
             let start = std::time::Instant::now();
             let row = Row::new().with("data", name).with("march", label);
@@ -91,14 +99,21 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             let (march_bytes, bricks, row, build_secs, after) = match interpolant {
                 None => {
                     let wanted = Wanted::default();
-                    let los = LineOfSight::new(&field, view, Interpolant::BSpline, wanted, BlankCells::Opaque);
+                    let los =
+                        LineOfSight::new(&field, view, Interpolant::BSpline, wanted, BlankCells::Opaque);
                     (los.memory_bytes(), 0, row, start.elapsed().as_secs_f64(), resident_bytes())
                 }
                 Some(interpolant) => {
-                    let d = Deviational::new(&field, view, interpolant, Options { skip_rad, ..Options::default() });
+                    let d = Deviational::new(
+                        &field,
+                        view,
+                        interpolant,
+                        Options { skip_rad, ..Options::default() },
+                    );
                     let build = start.elapsed().as_secs_f64();
                     let bricks = d.bricks().map_or(0, schlieren::skip::Bricks::memory_bytes);
-                    let row = row.with("bricks_build", d.bricks().map(|b| b.build_time().as_secs_f64() * 1e3));
+                    let row =
+                        row.with("bricks_build", d.bricks().map(|b| b.build_time().as_secs_f64() * 1e3));
                     (d.memory_bytes() - bricks, bricks, row, build, resident_bytes())
                 }
             };

@@ -67,9 +67,7 @@ pub(super) fn picture(name: &str, caption: String, rendered: &Rendered) -> anyho
 
 /// Rays through the middle of a picture of `side_m`, in tiles of 4 by 4 as a renderer sends them: `width` by `width` of them.
 pub(super) fn tiles(width: usize, side_m: f64) -> Vec<Start> {
-    let at = |block: usize, i: usize| {
-        ((((block * 4 + i) as f64 + 0.5) / width as f64 - 0.5) * side_m) as f32
-    };
+    let at = |block: usize, i: usize| ((((block * 4 + i) as f64 + 0.5) / width as f64 - 0.5) * side_m) as f32;
     (0..width * width / 16)
         .flat_map(|tile| {
             let (bx, by) = (tile % (width / 4), tile / (width / 4));
@@ -95,7 +93,11 @@ pub(super) fn blob(amplitude: f64, n: usize) -> anyhow::Result<(Gaussian, Field)
 
 /// Deflections by the blob itself, without a lattice: an adaptive march in f64, to 1e-13 of the index's amplitude. Rays have to pass within 0.3 m of the middle: farther
 /// out, the cube cuts off what this does not.
-pub(super) fn blob_deflections(blob: &Gaussian, view: &View, starts: &[Start]) -> anyhow::Result<Vec<[f64; 2]>> {
+pub(super) fn blob_deflections(
+    blob: &Gaussian,
+    view: &View,
+    starts: &[Start],
+) -> anyhow::Result<Vec<[f64; 2]>> {
     use rayon::prelude::*;
     let half_m = 0.7;
     let march = DormandPrince { tolerance: 1e-13 * blob.amplitude, longest_step_m: 0.02 };
