@@ -77,7 +77,7 @@ fn marches(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
     let views = [("along an axis", View::along(ViewAxis::Z, DVec3::ZERO)), ("at 0.6 rad", oblique()?)];
     let wanted = Wanted { opd: false };
     for (view_name, view) in views {
-        let rays = tiles(if context.quick { 128 } else { 256 }, 0.9);
+        let rays = tiles(if context.quick { 192 } else { 256 }, 0.9);
         let photons = tiles(if context.quick { 1024 } else { 2048 }, 0.9);
         let mut marches = vec![];
         for (name, interpolant, bar) in [
