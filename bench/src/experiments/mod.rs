@@ -3,13 +3,22 @@
 mod accuracy_build;
 mod accuracy_robust;
 mod accuracy_sampling;
+mod accuracy_schlieren;
 mod compare;
 mod effects;
 mod fig4_7;
 mod fig4_9;
+mod fig5_11;
+mod fig5_12;
+mod fig5_13;
+mod fig5_14;
 mod lineup;
 mod peers;
+mod peers_schlieren;
 mod pictures;
+mod speed_schlieren;
+mod table5_1;
+mod test_section;
 
 use crate::machine::Machine;
 use crate::record::Record;
@@ -82,6 +91,54 @@ pub const ALL: &[Experiment] = &[
         chapter: 4,
         title: "The dissertation’s data sets in pictures, with the commands that draw them",
         run: pictures::run,
+    },
+    Experiment {
+        id: "fig5.11",
+        chapter: 5,
+        title: "Photons per second by technique, on the combustion jet",
+        run: fig5_11::run,
+    },
+    Experiment {
+        id: "fig5.12",
+        chapter: 5,
+        title: "Volume rendering, line of sight and traced light, and how far the latter two are apart",
+        run: fig5_12::run,
+    },
+    Experiment {
+        id: "fig5.13",
+        chapter: 5,
+        title: "What the techniques show of one flow, and what filters make of noise",
+        run: fig5_13::run,
+    },
+    Experiment {
+        id: "fig5.14",
+        chapter: 5,
+        title: "Noise against photons, independent or low-discrepancy, filtered or not",
+        run: fig5_14::run,
+    },
+    Experiment {
+        id: "table5.1",
+        chapter: 5,
+        title: "Memory by data set, by the dissertation’s layout and ours",
+        run: table5_1::run,
+    },
+    Experiment {
+        id: "accuracy-schlieren",
+        chapter: 5,
+        title: "Error against time of light’s way through a gas, and the tolerance asked against the error got",
+        run: accuracy_schlieren::run,
+    },
+    Experiment {
+        id: "peers-schlieren",
+        chapter: 5,
+        title: "Time at equal error against the dissertation’s method",
+        run: peers_schlieren::run,
+    },
+    Experiment {
+        id: "speed-schlieren",
+        chapter: 5,
+        title: "Ray-steps and photons per second, and frames of the combustion jet",
+        run: speed_schlieren::run,
     },
 ];
 

@@ -1,11 +1,13 @@
 //! Other ray tracers behind one interface, to measure ours against.
 //!
 //! [`embree`] is loaded at run time when it is installed; [`obvhs`] is a crate and always here; [`brute_force`]
-//! tests every triangle in f64 and is what the others are checked against.
+//! tests every triangle in f64 and is what the others are checked against. [`thesis_schlieren`] is the dissertation's way
+//! through a gas.
 
 pub mod brute_force;
 pub mod embree;
 pub mod obvhs;
+pub mod thesis_schlieren;
 
 use crate::rays::{HitBlock, LANES, NO_HIT, RayBlock, RaySet};
 use rayon::prelude::*;

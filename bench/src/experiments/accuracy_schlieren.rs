@@ -1,0 +1,347 @@
+//! Error against time of light's way through a gas: integrator by interpolant by step by precision, on closed forms; and the tolerance asked for
+//! against the error got.
+
+use super::Context;
+use super::test_section::{blob, blob_deflections, check_cancelled, error_of, oblique, tiles, traced};
+use crate::clock;
+use crate::peers::thesis_schlieren::ThesisMarch;
+use crate::plot::{Axis, Plot, Series};
+use crate::record::{Record, Row};
+use glam::DVec3;
+use schlieren::analytic::Luneburg;
+use schlieren::field::Field;
+use schlieren::interpolate::{BSpline, Interpolant, Interpolate, Trilinear, TrilinearGradient};
+use schlieren::march::{
+    BlankCells, Deviational, DormandPrince, Euler, Full, FullOptions, Integrator, LineOfSight, Options,
+    Pefrl, Ray, RungeKutta4, Scheme, Sharma, Verlet,
+};
+use schlieren::path::{LightPaths, Start, Wanted};
+use schlieren::plan::{Mode, Plan, Request};
+use schlieren::view::View;
+use std::f64::consts::FRAC_PI_2;
+
+const INTERPOLANTS: [(&str, Interpolant); 3] = [
+    ("b-spline", Interpolant::BSpline),
+    ("trilinear gradients", Interpolant::TrilinearGradient),
+    ("trilinear", Interpolant::Trilinear),
+];
+
+pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
+    record.column("part", "", "what is measured: `lattice`, `integrators` or `tolerance`");
+    record.column("march", "", "integrator, and for the dissertation's own the form of its state");
+    record.column("interpolant", "", "between the nodes");
+    record.column("precision", "", "of the march's numbers");
+    record.column("step", "voxel", "longest step");
+    record.column("samples", "", "samples of the medium along a ray");
+    record.column("time", "ns", "CPU time of one thread for a ray, fastest of three runs");
+    record.column(
+        "rms_error",
+        "",
+        "root mean square over rays, as part of the largest true deflection (Luneburg: of the radius)",
+    );
+    record.column("largest_error", "", "largest error, the same way");
+    record.column("order", "", "observed order: from this and the row before, at half as many samples");
+    record.column("amplitude", "", "largest eps of the blob");
+    record.column("asked", "rad", "tolerance asked for");
+    record.column("bound", "rad", "a-priori bound of all errors of the plan");
+    record.column("estimated", "rad", "error that the plan measured itself (march and arithmetic)");
+    record.column("got", "rad", "largest true error");
+    record.column("kept", "", "whether what was got is within what was asked");
+    for amplitude in [1e-5, 0.03] {
+        lattice(context, record, amplitude)?;
+    }
+    integrators(context, record)?;
+    tolerances(context, record)
+}
+
+/// Rays to time and rays to compare with the truth.
+struct Rays {
+    timed: Vec<Start>,
+    compared: Vec<Start>,
+    truth: Vec<[f64; 2]>,
+}
+
+impl Rays {
+    /// Fastest of three runs on this thread in ns a ray, rms and largest error.
+    fn measure(&self, paths: &dyn LightPaths) -> (f64, f64, f64) {
+        let run = |_| clock::measure(|| traced(paths, &self.timed)).1.thread_cpu_secs;
+        let secs = (0..3).map(run).fold(f64::INFINITY, f64::min);
+        let (rms, largest) = error_of(&traced(paths, &self.compared), &self.truth);
+        (secs * 1e9 / self.timed.len() as f64, rms, largest)
+    }
+}
+
+fn steps(quick: bool) -> &'static [f64] {
+    if quick { &[16.0, 8.0, 4.0, 2.0, 1.0, 0.5] } else { &[16.0, 8.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.125] }
+}
+
+/// A blob on a lattice, seen obliquely: every march, interpolant and step.
+fn lattice(context: &mut Context<'_>, record: &mut Record, amplitude: f64) -> anyhow::Result<()> {
+    let n = if context.quick { 96 } else { 128 };
+    context.say(format!("closed form on a lattice, amplitude {amplitude:e}"))?;
+    let (gaussian, field) = blob(amplitude, n)?;
+    let view = oblique()?;
+    // All are compared by the same rays. The f64 marches take a ray at a time and ten times as long, so fewer are timed.
+    let compared = tiles(if context.quick { 16 } else { 32 }, 0.5);
+    let truth = blob_deflections(&gaussian, &view, &compared)?;
+    let few = Rays { timed: compared.clone(), compared, truth };
+    let fast = Rays { timed: tiles(64, 0.5), compared: few.compared.clone(), truth: few.truth.clone() };
+    if amplitude < 1e-3 {
+        record.notes.push(format!(
+            "Lattice: blobs of eps 1e-5 (a gas) and 0.03 (a liquid) and sigma 0.08 m in a cube of 1 m, {n}³ nodes (sigma is {:.1} voxels), seen 0.6 \
+             rad off its axes. The truth is an adaptive march in f64 through the blob itself. f32 marches carry deviations, sixteen rays at a time; \
+             f64 marches take one ray at a time. In the gas the interpolant decides the error and integrator and step hardly matter; in the liquid the \
+             integrator does. The dissertation's march carries position and direction in f32, which is what limits it in the gas: more \
+             steps make it worse.",
+            0.08 * (n - 1) as f64
+        ));
+    }
+    let mut curves: Vec<Series> = vec![];
+    let mut add = |march: &str, interpolant: &str, precision: &str, step: Option<f64>, m: (f64, f64, f64)| {
+        record.rows.push(
+            Row::new()
+                .with("part", "lattice")
+                .with("march", march)
+                .with("interpolant", interpolant)
+                .with("precision", precision)
+                .with("step", step)
+                .with("time", m.0)
+                .with("rms_error", m.1)
+                .with("largest_error", m.2)
+                .with("amplitude", amplitude),
+        );
+        let name = format!("{march}, {interpolant}, {precision}");
+        match curves.iter_mut().find(|s| s.name == name) {
+            Some(s) => s.points.extend(Series::new("", vec![(m.0, m.1)]).points),
+            None => curves.push(Series::new(name, vec![(m.0, m.1)])),
+        }
+    };
+    let los = LineOfSight::new(&field, view, Interpolant::BSpline, Wanted::default(), BlankCells::Opaque);
+    add("line of sight", "b-spline", "f32", None, fast.measure(&los));
+    for (name, interpolant) in INTERPOLANTS {
+        for &step_voxels in steps(context.quick) {
+            check_cancelled(context)?;
+            context.say(format!("amplitude {amplitude:e}: {name}, steps of {step_voxels} voxel"))?;
+            for (march, scheme) in [("Verlet", Scheme::Verlet), ("Euler", Scheme::Euler)] {
+                let options = Options { scheme, step_voxels, ..Options::default() };
+                let paths = Deviational::new(&field, view, interpolant, options);
+                add(march, name, "f32", Some(step_voxels), fast.measure(&paths));
+            }
+            let options = FullOptions { step_voxels, ..FullOptions::default() };
+            let full = FullMarches { field: &field, view, options, rays: &few };
+            let results = match interpolant {
+                Interpolant::BSpline => full.all(&BSpline::new(&field)),
+                Interpolant::Trilinear => full.all(&Trilinear::new(&field)),
+                Interpolant::TrilinearGradient => full.all(&TrilinearGradient::new(&field)),
+            };
+            for (march, m) in results {
+                add(march, name, "f64", Some(step_voxels), m);
+            }
+        }
+    }
+    for &step in steps(context.quick) {
+        let march = ThesisMarch::new(&field, view, step);
+        add("dissertation", "trilinear gradients", "f32", Some(step), few.measure(&march));
+    }
+    // All curves are in the rows; the plot has those that answer a question.
+    const SHOWN: [&str; 10] = [
+        "line of sight, b-spline, f32",
+        "Verlet, b-spline, f32",
+        "Euler, b-spline, f32",
+        "Verlet, b-spline, f64",
+        "Sharma, b-spline, f64",
+        "PEFRL, b-spline, f64",
+        "Verlet, trilinear gradients, f32",
+        "Euler, trilinear gradients, f32",
+        "Verlet, trilinear, f32",
+        "dissertation, trilinear gradients, f32",
+    ];
+    let mut plot = Plot::lines(
+        &format!("Error against time on a lattice, eps {amplitude}"),
+        Axis::log("CPU time of a ray", "ns"),
+        Axis::log("rms error / largest deflection", ""),
+    );
+    plot.series.extend(SHOWN.iter().filter_map(|s| curves.iter().find(|c| c.name == *s).cloned()));
+    record.plots.push(plot);
+    Ok(())
+}
+
+/// The marches in f64 over one interpolant.
+struct FullMarches<'a> {
+    field: &'a Field,
+    view: View,
+    options: FullOptions,
+    rays: &'a Rays,
+}
+
+impl FullMarches<'_> {
+    fn one<I: Interpolate, G: Integrator>(&self, interpolate: &I, integrator: G) -> (f64, f64, f64) {
+        self.rays.measure(&Full::new(self.field, interpolate, integrator, self.view, self.options))
+    }
+
+    fn all<I: Interpolate>(&self, i: &I) -> Vec<(&'static str, (f64, f64, f64))> {
+        vec![
+            ("Euler", self.one(i, Euler)),
+            ("Verlet", self.one(i, Verlet)),
+            ("Sharma", self.one(i, Sharma)),
+            ("RK4", self.one(i, RungeKutta4)),
+            ("PEFRL", self.one(i, Pefrl)),
+        ]
+    }
+}
+
+/// A Luneburg lens: the integrators without any lattice, in f64, with their orders.
+fn integrators(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
+    context.say("integrators on the Luneburg lens")?;
+    record.notes.push(
+        "Integrators: 101 rays through a quarter turn of a Luneburg lens, f64, no lattice; the error is that of the place they reach. \
+         Orders are 1 for Euler, 2 for Verlet, 4 for Sharma, RK4 and PEFRL; the adaptive Dormand-Prince is the reference of everything else."
+            .into(),
+    );
+    let mut plot = Plot::lines(
+        "Integrators on the Luneburg lens",
+        Axis::log("samples along a ray", ""),
+        Axis::log("rms error / radius", ""),
+    );
+    plot.series.push(order_curve("Euler", Euler, record));
+    plot.series.push(order_curve("Verlet", Verlet, record));
+    plot.series.push(order_curve("Sharma", Sharma, record));
+    plot.series.push(order_curve("RK4", RungeKutta4, record));
+    plot.series.push(order_curve("PEFRL", Pefrl, record));
+    // The adaptive one has a tolerance in place of steps.
+    let mut points = vec![];
+    for exponent in [4, 6, 8, 10, 12] {
+        let march = DormandPrince { tolerance: 10f64.powi(-exponent), longest_step_m: 1.0 };
+        let mut samples = 0;
+        let m = lens(|b| {
+            let run = march.run(&Luneburg, &entering(b), FRAC_PI_2);
+            samples = run.map_or(0, |r| r.samples);
+            run.map_or(DVec3::NAN, |r| r.ray.position_m())
+        });
+        points.push((f64::from(samples), m.1));
+        record.rows.push(integrator_row("Dormand-Prince", f64::from(samples), m));
+    }
+    plot.series.push(Series::new("Dormand-Prince", points));
+    record.plots.push(plot);
+    Ok(())
+}
+
+fn order_curve<G: Integrator>(name: &str, integrator: G, record: &mut Record) -> Series {
+    let mut points: Vec<(f64, f64)> = vec![];
+    for steps in [8, 16, 32, 64, 128, 256, 512] {
+        let m = lens(|b| integrator.run(&Luneburg, &entering(b), FRAC_PI_2, steps).position_m());
+        let samples = f64::from(steps * G::SAMPLES);
+        let before = points.last().map(|p| p.1);
+        points.push((samples, m.1));
+        let order = before.filter(|_| m.1 > 1e-13).map(|b| (b / m.1).log2());
+        record.rows.push(integrator_row(name, samples, m).with("order", order));
+    }
+    Series::new(name, points)
+}
+
+fn integrator_row(name: &str, samples: f64, (ns, rms, largest): (f64, f64, f64)) -> Row {
+    Row::new()
+        .with("part", "integrators")
+        .with("march", name)
+        .with("interpolant", "none")
+        .with("precision", "f64")
+        .with("samples", samples)
+        .with("time", ns)
+        .with("rms_error", rms)
+        .with("largest_error", largest)
+}
+
+/// The ray that enters the lens along z at height `b`.
+fn entering(b: f64) -> Ray {
+    let (at, w) = Luneburg::ray(b, 0.0);
+    Ray::new(at, w)
+}
+
+/// Time of a ray, rms and largest error of the place after a quarter turn.
+fn lens(mut end: impl FnMut(f64) -> DVec3) -> (f64, f64, f64) {
+    let heights: Vec<f64> = (-50..=50).map(|i| f64::from(i) * 0.018).collect();
+    let mut ends = vec![];
+    let secs = (0..3)
+        .map(|_| {
+            let (places, time) = clock::measure(|| heights.iter().map(|b| end(*b)).collect::<Vec<DVec3>>());
+            ends = places;
+            time.thread_cpu_secs
+        })
+        .fold(f64::INFINITY, f64::min);
+    let off = heights.iter().zip(&ends).map(|(b, e)| (*e - Luneburg::ray(*b, FRAC_PI_2).0).length());
+    let (squares, largest) = off.fold((0.0, 0.0f64), |(s, l), o| (s + o * o, l.max(o)));
+    let n = heights.len() as f64;
+    (secs * 1e9 / n, (squares / n).sqrt(), largest)
+}
+
+/// Plans for tolerances from coarse to fine: what was asked, what was bounded, what came.
+fn tolerances(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
+    let n = if context.quick { 64 } else { 128 };
+    record.notes.push(format!(
+        "Tolerance: plans for blobs of three amplitudes on {n}³ nodes. Where a plan's own bound is above what was asked, no march can do \
+         better on that lattice, and the plan says so; the error that it got is still orders below the bound, which adds up worst cases."
+    ));
+    let mut plot = Plot::lines(
+        "Tolerance asked against error got",
+        Axis::log("tolerance asked", "rad"),
+        Axis::log("largest error got", "rad"),
+    );
+    let mut time = Plot::lines(
+        "What a tolerance costs",
+        Axis::log("tolerance asked", "rad"),
+        Axis::log("CPU time of a ray", "ns"),
+    );
+    let starts = tiles(if context.quick { 32 } else { 64 }, 0.5);
+    let view = oblique()?;
+    let mut asked_line = vec![];
+    for amplitude in [1e-6, 1e-5, 1e-4] {
+        check_cancelled(context)?;
+        context.say(format!("plans for an amplitude of {amplitude:e}"))?;
+        let (gaussian, field) = blob(amplitude, n)?;
+        let truth = blob_deflections(&gaussian, &view, &starts)?;
+        let rays = Rays { timed: starts.clone(), compared: starts.clone(), truth: truth.clone() };
+        let scale = truth.iter().map(|t| t[0].hypot(t[1])).fold(0.0, f64::max);
+        let (mut got_points, mut time_points) = (vec![], vec![]);
+        for exponent in 3..=10 {
+            let asked = 10f64.powi(-exponent);
+            let plan = Plan::new(&field, Request { tolerance_rad: asked, ..Request::default() });
+            let paths = plan.paths(&field, view);
+            let (ns, rms, largest) = rays.measure(&*paths);
+            let b = plan.bounds;
+            let got = largest * scale;
+            got_points.push((asked, got));
+            time_points.push((asked, ns));
+            asked_line.push((asked, asked));
+            let march = match plan.mode {
+                Mode::LineOfSight => "line of sight",
+                Mode::Paraxial => "Verlet",
+                Mode::Full => "PEFRL",
+            };
+            let name = INTERPOLANTS.iter().find(|i| i.1 == plan.interpolant).map_or("", |i| i.0);
+            record.rows.push(
+                Row::new()
+                    .with("part", "tolerance")
+                    .with("march", march)
+                    .with("interpolant", name)
+                    .with("precision", if plan.mode == Mode::Full { "f64" } else { "f32" })
+                    .with("step", plan.step_voxels)
+                    .with("time", ns)
+                    .with("rms_error", rms)
+                    .with("largest_error", largest)
+                    .with("amplitude", amplitude)
+                    .with("asked", asked)
+                    .with("bound", b.bending_rad + b.interpolation_rad + b.step_rad)
+                    .with("estimated", plan.measure(&field, view, 256).max_rad)
+                    .with("got", got)
+                    .with("kept", if got <= asked { "yes" } else { "no" }),
+            );
+        }
+        plot.series.push(Series::new(format!("amplitude {amplitude:e}"), got_points));
+        time.series.push(Series::new(format!("amplitude {amplitude:e}"), time_points));
+    }
+    asked_line.truncate(8);
+    plot.series.push(Series::new("what was asked", asked_line));
+    record.plots.push(plot);
+    record.plots.push(time);
+    Ok(())
+}
