@@ -67,7 +67,8 @@ impl Kernel {
         for slab in 0..self.slabs - 1 {
             text += &format!("        case {slab}u: {{ return sample_{slab}(o, p.place); }}\n");
         }
-        text += &format!("        default: {{ return sample_{}(o, p.place); }}\n    }}\n}}\n", self.slabs - 1);
+        text +=
+            &format!("        default: {{ return sample_{}(o, p.place); }}\n    }}\n}}\n", self.slabs - 1);
         text
     }
 }

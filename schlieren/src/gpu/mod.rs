@@ -26,7 +26,9 @@ pub use paths::{GpuCounters, GpuOptions, GpuPaths};
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum GpuError {
     /// There is none.
-    #[error("no GPU: {0}; install its Vulkan driver (on Debian mesa-vulkan-drivers, which also has one that runs on the CPU), or compute on the CPU (--device cpu)")]
+    #[error(
+        "no GPU: {0}; install its Vulkan driver (on Debian mesa-vulkan-drivers, which also has one that runs on the CPU), or compute on the CPU (--device cpu)"
+    )]
     NoAdapter(String),
     /// It cannot be opened.
     #[error("the GPU `{adapter}` cannot be opened: {reason}")]
@@ -45,7 +47,9 @@ pub enum GpuError {
         cure: &'static str,
     },
     /// The field does not fit.
-    #[error("{what} of {dims:?} nodes takes {need} and `{adapter}` has room for {room}; compute on the CPU (--device cpu), or resample the flow coarser")]
+    #[error(
+        "{what} of {dims:?} nodes takes {need} and `{adapter}` has room for {room}; compute on the CPU (--device cpu), or resample the flow coarser"
+    )]
     TooLarge {
         /// Part of the field.
         what: &'static str,

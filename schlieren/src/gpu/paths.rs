@@ -390,9 +390,9 @@ impl<'a> GpuPaths<'a> {
         self.rays_on_cpu.fetch_add(starts.len() as u64, Ordering::Relaxed);
         let GpuOptions { step_voxels, wanted, blank } = self.options;
         let options = Options { step_voxels, wanted, blank, ..Options::default() };
-        let cpu = self.fallback.get_or_init(|| {
-            Deviational::new(self.field, self.frame.view, self.interpolant, options)
-        });
+        let cpu = self
+            .fallback
+            .get_or_init(|| Deviational::new(self.field, self.frame.view, self.interpolant, options));
         if parallel {
             cpu.trace_parallel(starts, exits);
         } else {

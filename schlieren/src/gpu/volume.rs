@@ -79,7 +79,8 @@ fn cut(cells: usize, halo: usize, layer_bytes: u64, binding_bytes: u64, most: u3
 
 /// Two bits a node, sixteen a word.
 fn packed(nodes: &[crate::field::Node]) -> Vec<u32> {
-    let word = |w: &[crate::field::Node]| w.iter().enumerate().fold(0, |a, (i, n)| a | (*n as u32) << (2 * i));
+    let word =
+        |w: &[crate::field::Node]| w.iter().enumerate().fold(0, |a, (i, n)| a | (*n as u32) << (2 * i));
     nodes.chunks(16).map(word).collect()
 }
 

@@ -55,11 +55,7 @@ pub(crate) struct Left {
 
 impl Prepared {
     /// The undisturbed ray of a start. `known` is as for [`Frame::undisturbed`].
-    pub(crate) fn new(
-        frame: &Frame,
-        start: &Start,
-        known: &mut Option<([f32; 2], [DVec3; 3])>,
-    ) -> Prepared {
+    pub(crate) fn new(frame: &Frame, start: &Start, known: &mut Option<([f32; 2], [DVec3; 3])>) -> Prepared {
         let ray = frame.undisturbed(start, known);
         let length_m = ray.range_m[1] - ray.range_m[0];
         Prepared {
