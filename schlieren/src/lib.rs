@@ -48,6 +48,8 @@ pub mod cutoff;
 pub mod field;
 pub mod film;
 pub mod filter;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 pub mod index;
 pub mod input;
 pub mod interpolate;

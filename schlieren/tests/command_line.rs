@@ -156,7 +156,7 @@ fn wrong_usage_exits_with_2_and_names_the_option() {
         (&["--density", "rho", "-o", "x.jpg"], ".png"),
         (&["-o", &png], "density"),
         (&["--density", "rho", "--temperature", "T", "--pressure", "p", "-o", &png], "alternatives"),
-        (&["--density", "rho", "--device", "gpu", "-o", &png], "gpu"),
+        (&["--density", "rho", "--device", "abacus", "-o", &png], "auto"),
         (&["--density", "rho", "--technique", "magic", "-o", &png], "shadowgraph"),
         (&["--density", "rho", "--fringe-spacing", "1mm", "-o", &png], "--fringe-spacing"),
         (&["--density", "rho", "--technique", "bos", "--cutoff-angle", "3", "-o", &png], "--cutoff-angle"),
@@ -258,4 +258,31 @@ fn completions_know_the_commands() {
     let o = schlieren(&["completions", "bash"]);
     assert_eq!(o.status.code(), Some(0));
     assert!(text(&o.stdout).contains("sweep"));
+}
+
+/// Without a Vulkan device, as on most machines that have no display: --device gpu is an error that names the cure, auto draws on the CPU and says why.
+#[test]
+fn a_gpu_that_is_not_there() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name).to_str().unwrap().to_string();
+    flow(&dir.path().join("flow.vti"));
+    let run = |device: &str, png: &str| {
+        Command::new(env!("CARGO_BIN_EXE_schlieren"))
+            .args(["render", &path("flow.vti"), "--density", "rho", "--size", "16x8", "--march", "verlet"])
+            .args(["--device", device, "-o", png])
+            .env("VK_DRIVER_FILES", "/nonexistent.json")
+            .env("VK_ICD_FILENAMES", "/nonexistent.json")
+            .output()
+            .expect("the program starts")
+    };
+    let o = run("gpu", &path("gpu.png"));
+    let stderr = text(&o.stderr);
+    assert_eq!(o.status.code(), Some(2), "{stderr}");
+    assert!(stderr.contains("--device gpu") && stderr.contains("--device cpu"), "{stderr}");
+    assert!(!Path::new(&path("gpu.png")).exists());
+    let o = run("auto", &path("auto.png"));
+    let stderr = text(&o.stderr);
+    assert_eq!(o.status.code(), Some(0), "{stderr}");
+    assert!(stderr.contains("on the CPU"), "{stderr}");
+    assert!(Path::new(&path("auto.png")).exists());
 }

@@ -6,7 +6,7 @@ use crate::scene::{
     BeamsSpec, CutoffSpec, Device, Direction, FilterSpec, FlowSpec, Jitter, SamplingSpec, Scene, SourceSpec,
     TechniqueSpec,
 };
-use clap::{Args, ValueEnum};
+use clap::Args;
 use datasets::cli::UsageError;
 use std::path::PathBuf;
 
@@ -184,7 +184,7 @@ struct FilmArgs {
     /// Force a step, in voxels
     #[arg(long, value_name = "VOXELS")]
     step: Option<f64>,
-    /// Where to compute
+    /// Where to trace: gpu needs a Vulkan device; auto takes one if it can, and says why if it cannot
     #[arg(long, value_enum, value_name = "DEVICE")]
     device: Option<Device>,
 }
@@ -476,13 +476,7 @@ impl FilmArgs {
         }
         s.march.step_voxels = a.step.or(s.march.step_voxels);
         s.march.device = a.device.unwrap_or(s.march.device);
-        if s.march.device == Device::Gpu {
-            return Err(UsageError(format!(
-                "--device gpu: this build has no march for the GPU; there is: {}",
-                Device::Cpu.to_possible_value().map_or(String::new(), |v| v.get_name().to_string())
-            ))
-            .into());
-        }
+        crate::render::check_gpu(&s.march).map_err(|e| UsageError(format!("--device gpu: {e}")))?;
         Ok(())
     }
 }

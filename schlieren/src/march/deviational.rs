@@ -2,6 +2,7 @@
 
 use super::frame::{BlankCells, Frame};
 use super::packet::{Common, Effects, Nodes, Packet, Skip, With, Work, march};
+use super::prepared::{GROUP, Left, Prepared, steps_of};
 use crate::at_level;
 use crate::field::Field;
 use crate::interpolate::{
@@ -11,7 +12,6 @@ use crate::path::{Exit, LightPaths, Start, Wanted};
 use crate::skip::Bricks;
 use crate::view::View;
 use fearless_simd::{Level, Simd};
-use glam::DVec3;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// How deviations are stepped.
@@ -198,7 +198,7 @@ impl<'a> Deviational<'a> {
         exits: &mut [Exit],
         effects: E,
     ) {
-        const IN_FLIGHT: usize = 2;
+        const IN_FLIGHT: usize = GROUP / LANES;
         let h = (self.frame.spacing_m / self.frame.unit_m).to_array();
         let common = Common {
             h2: h.map(|h| (h * h) as f32),
@@ -225,35 +225,24 @@ impl<'a> Deviational<'a> {
         let mut left_out = 0.0f32;
         for (starts, exits) in starts.chunks(IN_FLIGHT * LANES).zip(exits.chunks_mut(IN_FLIGHT * LANES)) {
             let mut packets = [const { Packet::EMPTY }; IN_FLIGHT];
-            let mut rays = [Ready::default(); IN_FLIGHT * LANES];
+            let mut rays = [Prepared::default(); IN_FLIGHT * LANES];
             let mut steps = 0.0f64;
-            for (ready, start) in rays.iter_mut().zip(starts) {
-                let ray = self.frame.undisturbed(start, &mut known);
-                let length_m = ray.range_m[1] - ray.range_m[0];
-                *ready = Ready {
-                    beam: ray.beam,
-                    exit_depth_m: ray.range_m[1],
-                    length_m,
-                    middle: ray.at + ray.direction * (0.5 * (ray.range_m[0] + ray.range_m[1])),
-                    chord: ray.direction * length_m,
-                    scale: 1.0,
-                };
-                steps = steps.max(ready.chord.length() / self.options.step_voxels);
+            for (ray, start) in rays.iter_mut().zip(starts) {
+                *ray = Prepared::new(&self.frame, start, &mut known);
+                steps = steps.max(ray.steps(self.options.step_voxels));
             }
             let steps = steps_of(steps);
-            for (i, ready) in rays.iter_mut().enumerate().filter(|(_, r)| r.length_m > 0.0) {
+            for (i, ray) in rays.iter_mut().enumerate().filter(|(_, r)| r.meets_field()) {
                 in_field += 1;
                 let (p, l) = (&mut packets[i / LANES], i % LANES);
+                let entry = ray.entry(&self.frame, steps);
                 for c in 0..3 {
-                    p.middle[c][l] = ready.middle[c] as f32;
-                    ready.middle[c] -= f64::from(p.middle[c][l]);
-                    p.xi[c][l] = ready.middle[c] as f32;
-                    p.stride[c][l] = (ready.chord[c] / f64::from(steps)) as f32;
-                    p.along[c][l] = (ready.beam[2][c] * h[c]) as f32;
+                    p.middle[c][l] = entry.middle[c];
+                    p.xi[c][l] = entry.xi[c];
+                    p.stride[c][l] = entry.stride[c];
+                    p.along[c][l] = entry.along[c];
                 }
-                let dt = ready.length_m / f64::from(steps) / self.frame.unit_m;
-                p.dt[l] = dt as f32;
-                ready.scale = dt / f64::from(p.dt[l]);
+                p.dt[l] = entry.dt;
             }
             if steps > 0 {
                 let done = march(simd, field, &common, &mut packets, steps, effects);
@@ -262,32 +251,14 @@ impl<'a> Deviational<'a> {
             }
             for (i, exit) in exits.iter_mut().enumerate() {
                 let (p, l) = (&packets[i / LANES], i % LANES);
-                let [right, up, _] = rays[i].beam;
-                let scale = rays[i].scale;
-                let u = DVec3::from([0, 1, 2].map(|c| f64::from(p.v[c][l]) * h[c])) * scale;
-                let left_over = rays[i].middle;
-                let xi = DVec3::from(
-                    [0, 1, 2].map(|c| (f64::from(p.xi[c][l]) - f64::from(left_over[c] as f32)) * h[c]),
-                );
-                let xi = if rays[i].length_m > 0.0 {
-                    xi * (scale * scale * self.frame.unit_m)
-                } else {
-                    DVec3::ZERO
-                };
-                let (transmission, status) = self.options.blank.fate(p.met[l]);
                 left_out = left_out.max(p.left_out[l]);
-                *exit = Exit {
-                    deflection_rad: [u.dot(right) as f32, u.dot(up) as f32],
-                    displacement_m: [xi.dot(right) as f32, xi.dot(up) as f32],
-                    exit_depth_m: rays[i].exit_depth_m as f32,
-                    opd_m: if self.options.wanted.opd {
-                        (f64::from(p.opd[l]) * scale * self.frame.unit_m * self.field.n0()) as f32
-                    } else {
-                        f32::NAN
-                    },
-                    transmission,
-                    status,
+                let left = Left {
+                    v: [0, 1, 2].map(|c| p.v[c][l]),
+                    xi: [0, 1, 2].map(|c| p.xi[c][l]),
+                    opd: self.options.wanted.opd.then_some(p.opd[l]),
+                    met: p.met[l],
                 };
+                *exit = rays[i].exit(&self.frame, self.field.n0(), self.options.blank, &left);
             }
         }
         self.rays.fetch_add(starts.len() as u64, Ordering::Relaxed);
@@ -296,25 +267,6 @@ impl<'a> Deviational<'a> {
         self.skipped.fetch_add(work.skipped, Ordering::Relaxed);
         self.left_out_femtorad.fetch_max((f64::from(left_out) * 1e15).ceil() as u64, Ordering::Relaxed);
     }
-}
-
-/// A ray on its way into a packet.
-#[derive(Clone, Copy, Default)]
-struct Ready {
-    beam: [DVec3; 3],
-    exit_depth_m: f64,
-    length_m: f64,
-    /// The middle of its way in lattice coordinates; then what rounding that to f32 left out.
-    middle: DVec3,
-    /// From entry to exit in lattice coordinates.
-    chord: DVec3,
-    /// What rounding the step to f32 did to it: every step of a ray is wrong by the same factor, and that is put right at the end.
-    scale: f64,
-}
-
-/// Whole steps for a length in steps: a hair above a whole number is rounding, not a step.
-fn steps_of(steps: f64) -> u32 {
-    (steps * (1.0 - 1e-12)).ceil() as u32
 }
 
 impl LightPaths for Deviational<'_> {

@@ -21,12 +21,14 @@
 //! ```
 
 mod map;
+mod on_gpu;
 mod paths;
 mod section;
 #[cfg(test)]
 mod tests;
 
 pub use map::Map;
+pub use on_gpu::check_gpu;
 pub use paths::{INTERPOLANTS, MARCHES, Planned};
 pub use section::TestSection;
 
@@ -71,8 +73,12 @@ pub enum RenderError {
         found: usize,
     },
     /// The GPU march is not part of this program.
-    #[error("this build has no march for the GPU; leave out --device gpu (march.device in a scene)")]
+    #[error("this program is built without the feature gpu; take --device cpu (march.device in a scene)")]
     NoGpu,
+    /// The GPU was asked for and cannot do it.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Gpu(#[from] crate::gpu::GpuError),
     /// A name that nothing has.
     #[error("{key}: there is no `{name}`; there are: {names}")]
     Unknown {

@@ -1,6 +1,7 @@
 //! Which march takes the light through, and how exact it is: [`crate::plan`] picks what the scene leaves open by bounds from the tolerance, and measures
 //! what was achieved. Marches that no plan picks, because they are for comparison, are made here.
 
+use super::on_gpu::on_gpu;
 use super::{RenderError, TestSection};
 use crate::field::Field;
 use crate::interpolate::{BSpline, Interpolant, Interpolate, Trilinear, TrilinearGradient};
@@ -8,8 +9,8 @@ use crate::march::{
     BlankCells, Deviational, Full, FullOptions, Integrator, Options, Pefrl, RungeKutta4, Scheme, Sharma,
 };
 use crate::path::{Exit, LightPaths, Start, Wanted};
-use crate::plan::{Mode, Plan, Request};
-use crate::scene::{Device, Scene};
+use crate::plan::{Achieved, Mode, Plan, Request};
+use crate::scene::Scene;
 use crate::technique::bos::Reversed;
 use crate::view::View;
 
@@ -47,9 +48,6 @@ impl TestSection {
         measure: bool,
     ) -> Result<Planned<'_>, RenderError> {
         let march = &scene.march;
-        if march.device == Device::Gpu {
-            return Err(RenderError::NoGpu);
-        }
         let known = |name: &Option<String>, names: &[&'static str], key| match name {
             None => Ok(None),
             Some(n) => match names.iter().find(|k| **k == n.as_str()) {
@@ -75,6 +73,18 @@ impl TestSection {
             blank: BlankCells::default(),
         };
 
+        // On the GPU, if wanted and possible.
+        let mode = method.map(|name| match name {
+            "line-of-sight" => Mode::LineOfSight,
+            "verlet" => Mode::Paraxial,
+            _ => Mode::Full,
+        });
+        let planned = on_gpu(march, field, view, with(mode), measure.then_some(MEASURED_RAYS))?;
+        let why_not = match planned {
+            Ok(planned) => return Ok(planned.seen(against_light)),
+            Err(why_not) => why_not,
+        };
+
         // For comparison: by name only, never picked.
         let (paths, description, achieved) = if let Some(name @ ("euler" | "sharma" | "rk4")) = method {
             let interpolant = interpolant.unwrap_or_default();
@@ -82,11 +92,6 @@ impl TestSection {
             let paths = compared(name, field, view, interpolant, step_voxels, wanted);
             (paths, described(name, interpolant, step_voxels), None)
         } else {
-            let mode = method.map(|name| match name {
-                "line-of-sight" => Mode::LineOfSight,
-                "pefrl" => Mode::Full,
-                _ => Mode::Paraxial,
-            });
             let plan = Plan::new(field, with(mode));
             // PEFRL is made with the spline only.
             if plan.mode == Mode::Full && interpolant.is_some_and(|i| i != Interpolant::BSpline) {
@@ -104,25 +109,44 @@ impl TestSection {
                 (plan.paths(field, view), described(name, plan.interpolant, plan.step_voxels), achieved)
             }
         };
+        let mut planned = Planned::new(paths, description, achieved, march.tolerance_rad);
+        planned.warnings.extend(why_not);
+        Ok(planned.seen(against_light))
+    }
+}
+
+impl<'a> Planned<'a> {
+    pub(super) fn new(
+        paths: Box<dyn LightPaths + 'a>,
+        description: String,
+        achieved: Option<Achieved>,
+        tolerance_rad: f64,
+    ) -> Planned<'a> {
         let mut warnings = Vec::new();
-        if let Some(a) = achieved.filter(|a| a.max_rad > march.tolerance_rad) {
+        if let Some(a) = achieved.filter(|a| a.max_rad > tolerance_rad) {
             warnings.push(format!(
-                "deflections are off by up to {:.1e} rad, above the tolerance of {:.1e} rad; the flow has structures that its lattice does not resolve: smooth shocks (flow.smoothing_nodes) or take a finer lattice",
-                a.max_rad, march.tolerance_rad
+                "deflections are off by up to {:.1e} rad, above the tolerance of {tolerance_rad:.1e} rad; the flow has structures that its lattice does not resolve: smooth shocks (flow.smoothing_nodes) or take a finer lattice",
+                a.max_rad
             ));
         }
-        let paths = if against_light { Box::new(Reversed::new(paths)) as Box<dyn LightPaths> } else { paths };
-        Ok(Planned {
+        Planned {
             paths,
             description,
             error_rad: achieved.map(|a| a.max_rad),
             resolution_error_rad: achieved.map(|a| a.resolution_rad).filter(|r| r.is_finite()),
             warnings,
-        })
+        }
+    }
+
+    /// The same, seen from the film when `against_light`.
+    fn seen(self, against_light: bool) -> Planned<'a> {
+        let paths = self.paths;
+        let paths = if against_light { Box::new(Reversed::new(paths)) as Box<dyn LightPaths> } else { paths };
+        Planned { paths, ..self }
     }
 }
 
-fn described(name: &str, interpolant: Interpolant, step_voxels: f64) -> String {
+pub(super) fn described(name: &str, interpolant: Interpolant, step_voxels: f64) -> String {
     let interpolant = match interpolant {
         Interpolant::BSpline => "b-spline",
         Interpolant::Trilinear => "trilinear",

@@ -347,8 +347,10 @@ pub enum Device {
     /// All cores.
     #[default]
     Cpu,
-    /// By compute shaders.
+    /// By compute shaders; an error where that cannot be.
     Gpu,
+    /// On a GPU if there is one and it has a kernel for the march, else on the CPU, saying why.
+    Auto,
 }
 
 /// Bodies.

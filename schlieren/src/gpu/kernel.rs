@@ -1,0 +1,131 @@
+//! The shader for what a scene calls for, put together from the pieces beside this file. What is not wanted is not in it.
+
+use crate::interpolate::Interpolant;
+use std::fmt::Write as _;
+
+/// First binding of the field's slabs. Before it: parameters, rays, what is left of rays, kinds of nodes.
+pub(super) const FIRST_SLAB: u32 = 4;
+
+/// What a kernel is compiled for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) struct Kernel {
+    /// [`Interpolant::BSpline`] or [`Interpolant::Trilinear`].
+    pub(super) interpolant: Interpolant,
+    /// The optical path difference.
+    pub(super) opd: bool,
+    /// Blank or solid nodes.
+    pub(super) nodes: bool,
+    /// Bindings over which the field is spread.
+    pub(super) slabs: u32,
+}
+
+impl Kernel {
+    /// Layers of nodes beyond its cells that a slab holds.
+    pub(super) fn halo(interpolant: Interpolant) -> usize {
+        match interpolant {
+            Interpolant::BSpline => 3,
+            _ => 1,
+        }
+    }
+
+    /// The shader.
+    pub(super) fn wgsl(&self) -> String {
+        // B-splines are worth compensated sums, as on the CPU.
+        let spline = self.interpolant == Interpolant::BSpline;
+        let mut text = format!("const OPD = {};\nconst COMPENSATED = {spline};\n", self.opd);
+        text += include_str!("march.wgsl");
+        text += if self.nodes {
+            include_str!("nodes.wgsl")
+        } else {
+            "fn meet(at: vec3f) -> u32 {\n    return 0u;\n}\n"
+        };
+        if spline {
+            text += "fn weighted(w: vec4f, v: vec4f) -> f32 {\n    return fma(w.w, v.w, fma(w.z, v.z, fma(w.y, v.y, w.x * v.x)));\n}\n";
+        }
+        let piece = if spline { include_str!("bspline.wgsl") } else { include_str!("trilinear.wgsl") };
+        for slab in 0..self.slabs {
+            let binding = FIRST_SLAB + slab;
+            let declared =
+                writeln!(text, "@group(0) @binding({binding}) var<storage, read> values_{slab}: array<f32>;");
+            declared.expect("writing to a String cannot fail");
+            text += &piece.replace("SLAB", &slab.to_string());
+        }
+        text += &self.sample();
+        text
+    }
+
+    /// eps (w) and its gradient per lattice step (xyz), from the slab that holds the point.
+    fn sample(&self) -> String {
+        let mut text = "fn sample(at: vec3f) -> vec4f {\n    let p = place_of(at);\n".to_string();
+        let offset = |z: &str| format!("p.cell.x + p.cell.y * params.row + ({z}) * params.layer");
+        if self.slabs == 1 {
+            text += &format!("    return sample_0({}, p.place);\n}}\n", offset("p.cell.z"));
+            return text;
+        }
+        text += "    let slab = p.cell.z / params.slab;\n";
+        text += &format!("    let o = {};\n    switch slab {{\n", offset("p.cell.z - slab * params.slab"));
+        for slab in 0..self.slabs - 1 {
+            text += &format!("        case {slab}u: {{ return sample_{slab}(o, p.place); }}\n");
+        }
+        text +=
+            &format!("        default: {{ return sample_{}(o, p.place); }}\n    }}\n}}\n", self.slabs - 1);
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wgpu::naga;
+
+    fn all() -> impl Iterator<Item = Kernel> {
+        let of = |k: u32| Kernel {
+            interpolant: if k & 1 == 0 { Interpolant::BSpline } else { Interpolant::Trilinear },
+            opd: k & 2 != 0,
+            nodes: k & 4 != 0,
+            slabs: [1, 2, 7][(k >> 3) as usize],
+        };
+        (0..24).map(of)
+    }
+
+    fn parsed(wgsl: &str) -> naga::Module {
+        naga::front::wgsl::parse_str(wgsl).unwrap_or_else(|e| panic!("{}", e.emit_to_string(wgsl)))
+    }
+
+    /// Needs no device. Without capabilities: nothing that only some devices have, f64 least of all (naga accepts its exp(), drivers return garbage).
+    #[test]
+    fn every_shader_is_valid_wgsl_for_every_device() {
+        use naga::valid::{Capabilities, ValidationFlags, Validator};
+        for kernel in all() {
+            let wgsl = kernel.wgsl();
+            let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
+            if let Err(e) = validator.validate(&parsed(&wgsl)) {
+                panic!("{kernel:?}: {}", e.emit_to_string(&wgsl));
+            }
+        }
+    }
+
+    /// The parameters that Rust writes are those that the shader reads.
+    #[test]
+    fn structures_have_the_sizes_that_are_written() {
+        for kernel in all() {
+            let module = parsed(&kernel.wgsl());
+            for (name, bytes) in [("Params", 96), ("Ray", 64), ("Left", 32)] {
+                let found = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name));
+                let naga::TypeInner::Struct { span, .. } = found.expect(name).1.inner else {
+                    panic!("{name} is no structure")
+                };
+                assert_eq!(span, bytes, "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_not_wanted_is_not_bound() {
+        for kernel in all() {
+            let module = parsed(&kernel.wgsl());
+            let bound = module.global_variables.iter().filter(|(_, v)| v.binding.is_some()).count() as u32;
+            assert_eq!(bound, 3 + u32::from(kernel.nodes) + kernel.slabs, "{kernel:?}");
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! Light paths on a GPU: the deviational Verlet march of [`crate::march::Deviational`] as a Vulkan compute shader.
+//!
+//! The same numbers as on the CPU, within a few roundings: rays are prepared and read out in `f64` by the same code, take the same steps, and the kernel
+//! does the same operations in `f32` in the same order. The field lies in storage buffers and is interpolated with explicit weights, because texture
+//! units round theirs to 8 bits. A field larger than one binding of the device is cut into slabs, one a binding.
+//!
+//! | file | holds |
+//! |---|---|
+//! | device.rs | finding an adapter, opening it, what it can hold |
+//! | kernel.rs, *.wgsl | the shader, put together from what a scene calls for |
+//! | volume.rs | the field on the device |
+//! | paths.rs | [`GpuPaths`]: starts in, exits out, in batches |
+//!
+//! What has no kernel here is refused by name ([`GpuError::Unsupported`]): line of sight and full marches, and gradients that are interpolated
+//! themselves.
+
+mod device;
+mod kernel;
+mod paths;
+mod volume;
+
+pub use device::Gpu;
+pub use paths::{GpuCounters, GpuOptions, GpuPaths};
+
+/// Why the GPU does not do it.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum GpuError {
+    /// There is none.
+    #[error(
+        "no GPU: {0}; install its Vulkan driver (on Debian mesa-vulkan-drivers, which also has one that runs on the CPU), or compute on the CPU (--device cpu)"
+    )]
+    NoAdapter(String),
+    /// It cannot be opened.
+    #[error("the GPU `{adapter}` cannot be opened: {reason}")]
+    Open {
+        /// Its name.
+        adapter: String,
+        /// What its driver says.
+        reason: String,
+    },
+    /// There is no kernel for it.
+    #[error("the GPU has no kernel for {what}; it has verlet with b-spline or trilinear. {cure}")]
+    Unsupported {
+        /// What was asked for.
+        what: String,
+        /// What to do instead.
+        cure: &'static str,
+    },
+    /// The field does not fit.
+    #[error(
+        "{what} of {dims:?} nodes takes {need} and `{adapter}` has room for {room}; compute on the CPU (--device cpu), or resample the flow coarser"
+    )]
+    TooLarge {
+        /// Part of the field.
+        what: &'static str,
+        /// Of the field.
+        dims: [usize; 3],
+        /// What it would take.
+        need: String,
+        /// What there is.
+        room: String,
+        /// The device.
+        adapter: String,
+    },
+    /// Its driver refused or failed.
+    #[error("`{adapter}` failed: {reason}; compute on the CPU (--device cpu)")]
+    Failed {
+        /// The device.
+        adapter: String,
+        /// What its driver says.
+        reason: String,
+    },
+}

@@ -1,0 +1,424 @@
+//! Starts in, exits out, in batches.
+
+use super::kernel::{FIRST_SLAB, Kernel};
+use super::volume::Volume;
+use super::{Gpu, GpuError};
+use crate::field::Field;
+use crate::interpolate::Interpolant;
+use crate::march::{BlankCells, Deviational, Frame, GROUP, Left, Options, Prepared, steps_of};
+use crate::path::{Exit, LightPaths, Start, Wanted};
+use crate::view::View;
+use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, mpsc};
+use wgpu::{BufferDescriptor, BufferUsages};
+
+/// Rays of one dispatch: enough to fill any device, few enough that two batches take little memory and no driver thinks that the device hangs.
+const BATCH: usize = 1 << 18;
+/// As in march.wgsl.
+const WORKGROUP: usize = 64;
+
+/// How to march; the fields of [`Options`] that the GPU has a kernel for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GpuOptions {
+    /// Longest step, in lattice steps.
+    pub step_voxels: f64,
+    /// What to compute beside deflection and displacement.
+    pub wanted: Wanted,
+    /// What becomes of light in cells without data.
+    pub blank: BlankCells,
+}
+
+impl Default for GpuOptions {
+    fn default() -> Self {
+        GpuOptions { step_voxels: 1.0, wanted: Wanted::default(), blank: BlankCells::Opaque }
+    }
+}
+
+/// What tracing did so far.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct GpuCounters {
+    /// Rays traced.
+    pub rays: u64,
+    /// Steps they were to take on the device.
+    pub ray_steps: u64,
+    /// Kernels started.
+    pub dispatches: u64,
+    /// Rays that the CPU had to trace because the device failed.
+    pub rays_on_cpu: u64,
+}
+
+/// Light paths through a field of weak index, traced on a GPU. [`LightPaths::trace_parallel`] on many starts is the fast way; every call costs a round
+/// trip to the device.
+///
+/// Of a ray that is stopped, `status` tells what stopped it, and deflection and displacement are those where it was stopped.
+pub struct GpuPaths<'a> {
+    gpu: Arc<Gpu>,
+    field: &'a Field,
+    frame: Frame,
+    interpolant: Interpolant,
+    options: GpuOptions,
+    pipeline: wgpu::ComputePipeline,
+    volume: Volume,
+    /// Buffers that no batch uses at the moment.
+    idle: Mutex<Vec<Scratch>>,
+    /// Takes over when the device fails.
+    fallback: OnceLock<Deviational<'a>>,
+    rays: AtomicU64,
+    ray_steps: AtomicU64,
+    dispatches: AtomicU64,
+    rays_on_cpu: AtomicU64,
+}
+
+/// [`Ray`] of march.wgsl.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Ray {
+    middle: [f32; 3],
+    dt: f32,
+    stride: [f32; 3],
+    steps: u32,
+    along: [f32; 3],
+    unused_0: u32,
+    xi: [f32; 3],
+    unused_1: u32,
+}
+
+/// `Left` of march.wgsl.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct RawLeft {
+    v: [f32; 3],
+    opd: f32,
+    xi: [f32; 3],
+    met: u32,
+}
+
+/// `Params` of march.wgsl.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Params {
+    h2: [f32; 3],
+    rays: u32,
+    rcp_h2: [f32; 3],
+    survives: u32,
+    last: [f32; 3],
+    row: u32,
+    last_cell: [f32; 3],
+    layer: u32,
+    dims: [u32; 3],
+    slab: u32,
+    zero: u32,
+    unused: [u32; 3],
+}
+
+/// Buffers for one batch.
+struct Scratch {
+    capacity: usize,
+    params: wgpu::Buffer,
+    rays: wgpu::Buffer,
+    lefts: wgpu::Buffer,
+    readback: wgpu::Buffer,
+    bindings: wgpu::BindGroup,
+}
+
+/// A batch on its way.
+struct Pending {
+    scratch: Scratch,
+    prepared: Vec<Prepared>,
+    index: wgpu::SubmissionIndex,
+    mapped: mpsc::Receiver<Result<(), wgpu::BufferAsyncError>>,
+}
+
+impl<'a> GpuPaths<'a> {
+    /// Compiles the kernel and copies the field (or its spline) to the device.
+    ///
+    /// # Errors
+    /// If there is no kernel for the interpolant, or the field does not fit.
+    pub fn new(
+        gpu: Arc<Gpu>,
+        field: &'a Field,
+        view: View,
+        interpolant: Interpolant,
+        options: GpuOptions,
+    ) -> Result<GpuPaths<'a>, GpuError> {
+        if interpolant == Interpolant::TrilinearGradient {
+            return Err(GpuError::Unsupported {
+                what: "the interpolant trilinear-gradient".into(),
+                cure: "Take one of them, or compute on the CPU (--device cpu).",
+            });
+        }
+        let volume = Volume::new(&gpu, field, interpolant)?;
+        let pipeline = gpu.pipeline(&Kernel {
+            interpolant,
+            opd: options.wanted.opd,
+            nodes: volume.kinds.is_some(),
+            slabs: volume.slabs.len() as u32,
+        })?;
+        Ok(GpuPaths {
+            gpu,
+            field,
+            frame: Frame::new(field, view),
+            interpolant,
+            options,
+            pipeline,
+            volume,
+            idle: Mutex::default(),
+            fallback: OnceLock::new(),
+            rays: AtomicU64::new(0),
+            ray_steps: AtomicU64::new(0),
+            dispatches: AtomicU64::new(0),
+            rays_on_cpu: AtomicU64::new(0),
+        })
+    }
+
+    /// What tracing did so far.
+    pub fn counters(&self) -> GpuCounters {
+        let read = |c: &AtomicU64| c.load(Ordering::Relaxed);
+        GpuCounters {
+            rays: read(&self.rays),
+            ray_steps: read(&self.ray_steps),
+            dispatches: read(&self.dispatches),
+            rays_on_cpu: read(&self.rays_on_cpu),
+        }
+    }
+
+    /// Memory that the field takes on the device, without batches.
+    pub fn device_bytes(&self) -> u64 {
+        self.volume.bytes
+    }
+
+    /// Bindings over which the field is spread.
+    pub fn slabs(&self) -> usize {
+        self.volume.slabs.len()
+    }
+
+    fn params(&self, rays: usize) -> Params {
+        let h = (self.frame.spacing_m / self.frame.unit_m).to_array();
+        let dims = self.field.dims();
+        Params {
+            h2: h.map(|h| (h * h) as f32),
+            rays: rays as u32,
+            rcp_h2: h.map(|h| (1.0 / (h * h)) as f32),
+            survives: match self.options.blank {
+                BlankCells::Opaque => 0,
+                BlankCells::Continued => 1,
+            },
+            last: dims.map(|n| (n - 1) as f32),
+            row: self.volume.stride[0] as u32,
+            last_cell: dims.map(|n| (n - 2) as f32),
+            layer: self.volume.stride[1] as u32,
+            dims: dims.map(|n| n as u32),
+            slab: self.volume.layers as u32,
+            zero: 0,
+            unused: [0; 3],
+        }
+    }
+
+    /// Takes buffers for this many rays, or makes them.
+    fn scratch(&self, rays: usize) -> Result<Scratch, GpuError> {
+        let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(i) = idle.iter().position(|s| s.capacity >= rays) {
+            return Ok(idle.swap_remove(i));
+        }
+        drop(idle);
+        let capacity = rays.next_power_of_two().clamp(1024, BATCH);
+        self.gpu.checked(|| {
+            let buffer = |size: usize, usage| {
+                self.gpu.device.create_buffer(&BufferDescriptor {
+                    label: None,
+                    size: size as u64,
+                    usage,
+                    mapped_at_creation: false,
+                })
+            };
+            let params = buffer(size_of::<Params>(), BufferUsages::UNIFORM | BufferUsages::COPY_DST);
+            let rays = buffer(capacity * size_of::<Ray>(), BufferUsages::STORAGE | BufferUsages::COPY_DST);
+            let left_bytes = capacity * size_of::<RawLeft>();
+            let lefts = buffer(left_bytes, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
+            let readback = buffer(left_bytes, BufferUsages::MAP_READ | BufferUsages::COPY_DST);
+            let mut bound = vec![(0, &params), (1, &rays), (2, &lefts)];
+            bound.extend(self.volume.kinds.as_ref().map(|k| (3, k)));
+            bound.extend((FIRST_SLAB..).zip(&self.volume.slabs));
+            let entries: Vec<_> = bound
+                .iter()
+                .map(|(binding, b)| wgpu::BindGroupEntry {
+                    binding: *binding,
+                    resource: b.as_entire_binding(),
+                })
+                .collect();
+            let bindings = self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: None,
+                layout: &self.pipeline.get_bind_group_layout(0),
+                entries: &entries,
+            });
+            Scratch { capacity, params, rays, lefts, readback, bindings }
+        })
+    }
+
+    /// Rays of a whole number of groups: all take the steps of their group's longest.
+    fn prepare(&self, starts: &[Start], prepared: &mut [Prepared], rays: &mut [Ray]) {
+        let mut known = None;
+        let groups = starts.chunks(GROUP).zip(prepared.chunks_mut(GROUP)).zip(rays.chunks_mut(GROUP));
+        for ((starts, prepared), rays) in groups {
+            let mut steps = 0.0f64;
+            for (p, start) in prepared.iter_mut().zip(starts) {
+                *p = Prepared::new(&self.frame, start, &mut known);
+                steps = steps.max(p.steps(self.options.step_voxels));
+            }
+            let steps = steps_of(steps);
+            for (p, ray) in prepared.iter_mut().zip(rays).filter(|(p, _)| p.meets_field()) {
+                let e = p.entry(&self.frame, steps);
+                *ray = Ray {
+                    middle: e.middle,
+                    dt: e.dt,
+                    stride: e.stride,
+                    steps,
+                    along: e.along,
+                    unused_0: 0,
+                    xi: e.xi,
+                    unused_1: 0,
+                };
+            }
+        }
+    }
+
+    /// Sends at most [`BATCH`] rays on their way.
+    fn submit(&self, starts: &[Start], parallel: bool) -> Result<Pending, GpuError> {
+        let mut prepared = vec![Prepared::default(); starts.len()];
+        let mut rays = vec![Ray::zeroed(); starts.len()];
+        if parallel {
+            const CHUNK: usize = 32 * GROUP;
+            starts
+                .par_chunks(CHUNK)
+                .zip(prepared.par_chunks_mut(CHUNK))
+                .zip(rays.par_chunks_mut(CHUNK))
+                .for_each(|((s, p), r)| self.prepare(s, p, r));
+        } else {
+            self.prepare(starts, &mut prepared, &mut rays);
+        }
+        let scratch = self.scratch(starts.len())?;
+        let queue = &self.gpu.queue;
+        queue.write_buffer(&scratch.params, 0, bytemuck::bytes_of(&self.params(starts.len())));
+        queue.write_buffer(&scratch.rays, 0, bytemuck::cast_slice(&rays));
+        let mut commands = self.gpu.device.create_command_encoder(&Default::default());
+        {
+            let mut pass = commands.begin_compute_pass(&Default::default());
+            pass.set_pipeline(&self.pipeline);
+            pass.set_bind_group(0, &scratch.bindings, &[]);
+            pass.dispatch_workgroups(starts.len().div_ceil(WORKGROUP) as u32, 1, 1);
+        }
+        let bytes = (starts.len() * size_of::<RawLeft>()) as u64;
+        commands.copy_buffer_to_buffer(&scratch.lefts, 0, &scratch.readback, 0, bytes);
+        let index = queue.submit([commands.finish()]);
+        let (tell, mapped) = mpsc::channel();
+        scratch.readback.map_async(wgpu::MapMode::Read, ..bytes, move |r| {
+            // Nobody listens any more when the batch was given up.
+            let _ = tell.send(r);
+        });
+        let steps: u64 = rays.iter().map(|r| u64::from(r.steps)).sum();
+        self.ray_steps.fetch_add(steps, Ordering::Relaxed);
+        self.dispatches.fetch_add(1, Ordering::Relaxed);
+        Ok(Pending { scratch, prepared, index, mapped })
+    }
+
+    /// Waits for a batch and reads it out.
+    fn finish(&self, pending: Pending, exits: &mut [Exit], parallel: bool) -> Result<(), GpuError> {
+        let wait = wgpu::PollType::Wait { submission_index: Some(pending.index), timeout: None };
+        let failed = |e: &dyn std::fmt::Display| self.gpu.failed(e.to_string());
+        self.gpu.device.poll(wait).map_err(|e| failed(&e))?;
+        // Another thread's poll may have taken this batch's completion and be about to tell; so this waits as well.
+        pending.mapped.recv().map_err(|e| failed(&e))?.map_err(|e| failed(&e))?;
+        if let Some(e) = self.gpu.failure() {
+            return Err(self.gpu.failed(e));
+        }
+        let bytes = (exits.len() * size_of::<RawLeft>()) as u64;
+        {
+            let range = pending.scratch.readback.get_mapped_range(..bytes).map_err(|e| failed(&e))?;
+            let lefts: &[RawLeft] = bytemuck::cast_slice(&range);
+            let read = |((exit, p), raw): ((&mut Exit, &Prepared), &RawLeft)| {
+                let opd = self.options.wanted.opd.then_some(raw.opd);
+                let left = Left { v: raw.v, xi: raw.xi, opd, met: raw.met as u8 };
+                *exit = p.exit(&self.frame, self.field.n0(), self.options.blank, &left);
+            };
+            if parallel {
+                const LEAST: usize = 1024;
+                let all = exits.par_iter_mut().zip(&pending.prepared).zip(lefts);
+                all.with_min_len(LEAST).for_each(read);
+            } else {
+                exits.iter_mut().zip(&pending.prepared).zip(lefts).for_each(read);
+            }
+        }
+        pending.scratch.readback.unmap();
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(pending.scratch);
+        Ok(())
+    }
+
+    /// All rays, one batch being prepared while the device works on the one before.
+    fn batches(&self, starts: &[Start], exits: &mut [Exit], parallel: bool) {
+        assert_eq!(starts.len(), exits.len(), "one exit per start");
+        self.rays.fetch_add(starts.len() as u64, Ordering::Relaxed);
+        let mut before: Option<(Pending, &[Start], &mut [Exit])> = None;
+        for (starts, exits) in starts.chunks(BATCH).zip(exits.chunks_mut(BATCH)) {
+            let next = match self.gpu.failure() {
+                Some(e) => Err(self.gpu.failed(e)),
+                None => self.submit(starts, parallel),
+            };
+            if let Some((pending, starts, exits)) = before.take() {
+                self.finish_or_fall_back(pending, starts, exits, parallel);
+            }
+            match next {
+                Ok(pending) => before = Some((pending, starts, exits)),
+                Err(_) => self.trace_on_cpu(starts, exits, parallel),
+            }
+        }
+        if let Some((pending, starts, exits)) = before {
+            self.finish_or_fall_back(pending, starts, exits, parallel);
+        }
+    }
+
+    fn finish_or_fall_back(&self, pending: Pending, starts: &[Start], exits: &mut [Exit], parallel: bool) {
+        if self.finish(pending, exits, parallel).is_err() {
+            self.trace_on_cpu(starts, exits, parallel);
+        }
+    }
+
+    /// The same march on the CPU, when the device is lost: pictures take longer then, and are as right. [`GpuCounters::rays_on_cpu`] and [`Gpu::failure`] tell.
+    fn trace_on_cpu(&self, starts: &[Start], exits: &mut [Exit], parallel: bool) {
+        self.rays_on_cpu.fetch_add(starts.len() as u64, Ordering::Relaxed);
+        let GpuOptions { step_voxels, wanted, blank } = self.options;
+        let options = Options { step_voxels, wanted, blank, ..Options::default() };
+        let cpu = self
+            .fallback
+            .get_or_init(|| Deviational::new(self.field, self.frame.view, self.interpolant, options));
+        if parallel {
+            cpu.trace_parallel(starts, exits);
+        } else {
+            cpu.trace(starts, exits);
+        }
+    }
+}
+
+impl LightPaths for GpuPaths<'_> {
+    fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
+        self.batches(starts, exits, false);
+    }
+
+    fn view(&self) -> &View {
+        &self.frame.view
+    }
+
+    fn wanted(&self) -> Wanted {
+        self.options.wanted
+    }
+
+    fn difference_step_m(&self) -> f64 {
+        0.5 * DVec3::min_element(self.frame.spacing_m)
+    }
+
+    fn trace_parallel(&self, starts: &[Start], exits: &mut [Exit]) {
+        self.batches(starts, exits, true);
+    }
+}

@@ -1,0 +1,128 @@
+//! The field on the device: its nodes, or its spline's coefficients, in slabs of layers no larger than a binding.
+
+use super::kernel::Kernel;
+use super::{Gpu, GpuError};
+use crate::field::Field;
+use crate::interpolate::{BSpline, Interpolant};
+use wgpu::{BufferDescriptor, BufferUsages};
+
+/// Bytes handed to the driver at once; more would all be copied into staging memory before the first of them leaves it.
+const UPLOAD_BYTES: usize = 64 << 20;
+
+/// A field on the device.
+pub(super) struct Volume {
+    /// Slabs along z. Neighbours share the layers that cells at their border need.
+    pub(super) slabs: Vec<wgpu::Buffer>,
+    /// What nodes are, two bits each, when not all are gas.
+    pub(super) kinds: Option<wgpu::Buffer>,
+    /// Distances of neighbours along y and z.
+    pub(super) stride: [usize; 2],
+    /// Layers of cells in a slab.
+    pub(super) layers: usize,
+    /// Memory on the device.
+    pub(super) bytes: u64,
+}
+
+impl Volume {
+    pub(super) fn new(gpu: &Gpu, field: &Field, interpolant: Interpolant) -> Result<Volume, GpuError> {
+        let spline;
+        let [nx, ny, nz] = field.dims();
+        let (values, stride) = if interpolant == Interpolant::BSpline {
+            spline = BSpline::new(field);
+            spline.coefficients()
+        } else {
+            (field.eps(), [nx, nx * ny])
+        };
+        let halo = Kernel::halo(interpolant);
+        let too_large = |what, need, room| GpuError::TooLarge {
+            what,
+            dims: field.dims(),
+            need,
+            room,
+            adapter: gpu.name(),
+        };
+        let Some((count, layers)) = cut(nz - 1, halo, 4 * stride[1] as u64, gpu.binding_bytes(), gpu.slabs())
+        else {
+            let need = bytes_of(size_of_val(values) as u64);
+            let room = format!("{} bindings of {}", gpu.slabs(), bytes_of(gpu.binding_bytes()));
+            return Err(too_large("a field", need, room));
+        };
+        let words = field.nodes().map(packed);
+        if let Some(w) = words.as_ref().filter(|w| size_of_val(&w[..]) as u64 > gpu.binding_bytes()) {
+            let (need, room) = (bytes_of(size_of_val(&w[..]) as u64), bytes_of(gpu.binding_bytes()));
+            return Err(too_large("the mask", need, room));
+        }
+
+        let slabs = (0..count)
+            .map(|s| {
+                let first = s * layers;
+                let last = (first + layers).min(nz - 1) + halo;
+                upload(gpu, bytemuck::cast_slice(&values[first * stride[1]..last * stride[1]]))
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let kinds = words.map(|w| upload(gpu, bytemuck::cast_slice(&w))).transpose()?;
+        let bytes = slabs.iter().chain(&kinds).map(wgpu::Buffer::size).sum();
+        Ok(Volume { slabs, kinds, stride, layers, bytes })
+    }
+}
+
+/// Number of slabs, and layers of cells in each (the last may have fewer), so that no slab is larger than a binding. `None` when that takes more than
+/// `most` slabs.
+fn cut(cells: usize, halo: usize, layer_bytes: u64, binding_bytes: u64, most: u32) -> Option<(usize, usize)> {
+    let layers = usize::try_from(binding_bytes / layer_bytes).ok()?.checked_sub(halo)?.min(cells);
+    if layers == 0 {
+        return None;
+    }
+    let count = cells.div_ceil(layers);
+    (count <= most as usize).then_some((count, layers))
+}
+
+/// Two bits a node, sixteen a word.
+fn packed(nodes: &[crate::field::Node]) -> Vec<u32> {
+    let word =
+        |w: &[crate::field::Node]| w.iter().enumerate().fold(0, |a, (i, n)| a | (*n as u32) << (2 * i));
+    nodes.chunks(16).map(word).collect()
+}
+
+fn upload(gpu: &Gpu, bytes: &[u8]) -> Result<wgpu::Buffer, GpuError> {
+    gpu.checked(|| {
+        let buffer = gpu.device.create_buffer(&BufferDescriptor {
+            label: Some("field"),
+            size: bytes.len() as u64,
+            usage: BufferUsages::STORAGE | BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        for (i, part) in bytes.chunks(UPLOAD_BYTES).enumerate() {
+            gpu.queue.write_buffer(&buffer, (i * UPLOAD_BYTES) as u64, part);
+            gpu.queue.submit([]);
+        }
+        buffer
+    })
+}
+
+fn bytes_of(bytes: u64) -> String {
+    format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::Node;
+
+    #[test]
+    fn slabs_hold_all_cells_and_no_more_than_a_binding() {
+        assert_eq!(cut(255, 1, 1000, 256_000, 8), Some((1, 255)), "fits as a whole");
+        assert_eq!(cut(255, 1, 1000, 255_999, 8), Some((2, 254)), "one cell too many");
+        assert_eq!(cut(255, 3, 1000, 43_999, 8), Some((7, 40)));
+        assert_eq!(cut(255, 3, 1000, 20_000, 8), None, "too many slabs");
+        assert_eq!(cut(255, 3, 1000, 3_999, 1000), None, "not even one layer of cells");
+        assert_eq!(cut(255, 3, 1000, 0, 1000), None);
+    }
+
+    #[test]
+    fn nodes_are_packed_from_the_lowest_bits() {
+        let mut nodes = [Node::Gas; 18];
+        (nodes[1], nodes[15], nodes[17]) = (Node::Blank, Node::Solid, Node::Solid);
+        assert_eq!(packed(&nodes), [0x8000_0004, 0x8]);
+    }
+}

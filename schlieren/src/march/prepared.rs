@@ -1,0 +1,126 @@
+//! A ray's way into a kernel and out of it, in `f64`: the same for the kernels of the CPU and of the GPU.
+
+use super::frame::{BlankCells, Frame};
+use crate::path::{Exit, Start};
+use glam::DVec3;
+
+/// Neighbouring rays that take the same number of steps: the most that the longest of them needs. The GPU keeps to the CPU's groups, so that both
+/// do the same steps.
+pub(crate) const GROUP: usize = 32;
+
+/// A ray on its way into a kernel.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Prepared {
+    beam: [DVec3; 3],
+    exit_depth_m: f64,
+    length_m: f64,
+    /// The middle of its way in lattice coordinates.
+    middle: DVec3,
+    /// What rounding that to f32 left out.
+    rest: DVec3,
+    /// From entry to exit in lattice coordinates.
+    chord: DVec3,
+    /// What rounding the step to f32 did to it: every step of a ray is wrong by the same factor, and that is put right at the end.
+    scale: f64,
+}
+
+/// What a kernel gets of a ray. Lengths are in units of [`Frame::unit_m`].
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Entry {
+    /// The middle of the undisturbed ray's way through the field, in lattice coordinates. Positions are counted from there because that halves
+    /// the largest product, and with it the rounding.
+    pub(crate) middle: [f32; 3],
+    /// What rounding `middle` to f32 left out: the deviation's start, taken off again at the end.
+    pub(crate) xi: [f32; 3],
+    /// A step along the undisturbed ray, in lattice coordinates.
+    pub(crate) stride: [f32; 3],
+    /// The direction times the spacing: projects lattice components of deviations on the ray.
+    pub(crate) along: [f32; 3],
+    /// A step of path.
+    pub(crate) dt: f32,
+}
+
+/// What a kernel gives back.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Left {
+    /// Rate of the deviation along the lattice's axes.
+    pub(crate) v: [f32; 3],
+    /// The deviation, in lattice steps.
+    pub(crate) xi: [f32; 3],
+    /// Optical path difference; `None` when it was not computed.
+    pub(crate) opd: Option<f32>,
+    /// The worst [`crate::field::Node`] met.
+    pub(crate) met: u8,
+}
+
+impl Prepared {
+    /// The undisturbed ray of a start. `known` is as for [`Frame::undisturbed`].
+    pub(crate) fn new(frame: &Frame, start: &Start, known: &mut Option<([f32; 2], [DVec3; 3])>) -> Prepared {
+        let ray = frame.undisturbed(start, known);
+        let length_m = ray.range_m[1] - ray.range_m[0];
+        Prepared {
+            beam: ray.beam,
+            exit_depth_m: ray.range_m[1],
+            length_m,
+            middle: ray.at + ray.direction * (0.5 * (ray.range_m[0] + ray.range_m[1])),
+            rest: DVec3::ZERO,
+            chord: ray.direction * length_m,
+            scale: 1.0,
+        }
+    }
+
+    /// Whether the ray meets the field.
+    pub(crate) fn meets_field(&self) -> bool {
+        self.length_m > 0.0
+    }
+
+    /// Steps that a ray needs, as a fraction. The greatest of a group is for [`steps_of`].
+    pub(crate) fn steps(&self, step_voxels: f64) -> f64 {
+        self.chord.length() / step_voxels
+    }
+
+    /// What the kernel gets of a ray that meets the field and takes this many steps.
+    pub(crate) fn entry(&mut self, frame: &Frame, steps: u32) -> Entry {
+        let h = frame.spacing_m / frame.unit_m;
+        let mut e = Entry::default();
+        for c in 0..3 {
+            e.middle[c] = self.middle[c] as f32;
+            self.rest[c] = self.middle[c] - f64::from(e.middle[c]);
+            e.xi[c] = self.rest[c] as f32;
+            e.stride[c] = (self.chord[c] / f64::from(steps)) as f32;
+            e.along[c] = (self.beam[2][c] * h[c]) as f32;
+        }
+        let dt = self.length_m / f64::from(steps) / frame.unit_m;
+        e.dt = dt as f32;
+        self.scale = dt / f64::from(e.dt);
+        e
+    }
+
+    /// What the kernel left, as an exit.
+    pub(crate) fn exit(&self, frame: &Frame, n0: f64, blank: BlankCells, left: &Left) -> Exit {
+        let [right, up, _] = self.beam;
+        let h = frame.spacing_m / frame.unit_m;
+        let u = DVec3::from([0, 1, 2].map(|c| f64::from(left.v[c]) * h[c])) * self.scale;
+        let xi = if self.meets_field() {
+            let xi = [0, 1, 2].map(|c| (f64::from(left.xi[c]) - f64::from(self.rest[c] as f32)) * h[c]);
+            DVec3::from(xi) * (self.scale * self.scale * frame.unit_m)
+        } else {
+            DVec3::ZERO
+        };
+        let (transmission, status) = blank.fate(left.met);
+        let opd_m = |opd: f32| (f64::from(opd) * self.scale * frame.unit_m * n0) as f32;
+        Exit {
+            deflection_rad: [u.dot(right) as f32, u.dot(up) as f32],
+            displacement_m: [xi.dot(right) as f32, xi.dot(up) as f32],
+            exit_depth_m: self.exit_depth_m as f32,
+            opd_m: left.opd.map_or(f32::NAN, opd_m),
+            transmission,
+            status,
+        }
+    }
+}
+
+/// Whole steps for a length in steps: a hair above a whole number is rounding, not a step.
+pub(crate) fn steps_of(steps: f64) -> u32 {
+    (steps * (1.0 - 1e-12)).ceil() as u32
+}

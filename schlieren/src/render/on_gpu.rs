@@ -1,0 +1,118 @@
+//! What the GPU takes over, and why not when it does not.
+
+use super::RenderError;
+use super::paths::Planned;
+use crate::field::Field;
+use crate::plan::Request;
+use crate::scene::{Device, MarchSpec};
+use crate::view::View;
+
+/// Why a scene's march cannot be computed on a GPU here whatever the flow is, for who asked for one. Opens it.
+///
+/// # Errors
+/// With the reason and the cure.
+pub fn check_gpu(march: &MarchSpec) -> Result<(), RenderError> {
+    if march.device != Device::Gpu {
+        return Ok(());
+    }
+    #[cfg(feature = "gpu")]
+    return refused(march.method.as_deref(), march.interpolant.as_deref())
+        .map_or_else(|| crate::gpu::Gpu::shared().map(|_| ()), Err)
+        .map_err(RenderError::Gpu);
+    #[cfg(not(feature = "gpu"))]
+    Err(RenderError::NoGpu)
+}
+
+#[cfg(feature = "gpu")]
+const CURE: &str = "Leave out --march or --interpolant, or compute on the CPU (--device cpu).";
+
+/// A march or an interpolant, forced by name, that has no kernel.
+#[cfg(feature = "gpu")]
+fn refused(method: Option<&str>, interpolant: Option<&str>) -> Option<crate::gpu::GpuError> {
+    let what = match (method, interpolant) {
+        (Some(m), _) if m != "verlet" => format!("the march {m}"),
+        (_, Some("trilinear-gradient")) => "the interpolant trilinear-gradient".into(),
+        _ => return None,
+    };
+    Some(crate::gpu::GpuError::Unsupported { what, cure: CURE })
+}
+
+/// Paths on the GPU if the scene wants that and it can be, else in words why not; no words when the CPU was asked for, or is quicker by plan.
+#[cfg(feature = "gpu")]
+pub(super) fn on_gpu<'a>(
+    march: &MarchSpec,
+    field: &'a Field,
+    view: View,
+    request: Request,
+    measured_rays: Option<usize>,
+) -> Result<Result<Planned<'a>, Option<String>>, RenderError> {
+    use crate::gpu::{Gpu, GpuError, GpuOptions, GpuPaths};
+    use crate::plan::{Mode, Plan};
+    use std::sync::Arc;
+
+    if march.device == Device::Cpu {
+        return Ok(Err(None));
+    }
+    let mut plan = Plan::new(field, request);
+    if plan.mode == Mode::LineOfSight && request.mode.is_none() {
+        if march.device == Device::Auto {
+            return Ok(Err(None));
+        }
+        // Asked for the GPU: what line of sight leaves out, Verlet has.
+        plan = Plan::from_roughness(field, Request { mode: Some(Mode::Paraxial), ..request }, plan.roughness);
+    }
+    let made = (|| {
+        if let Some(e) = refused(march.method.as_deref(), march.interpolant.as_deref()) {
+            return Err(e);
+        }
+        if plan.mode != Mode::Paraxial {
+            return Err(GpuError::Unsupported {
+                what: "the full march (pefrl), which an index as strong as this flow's needs".into(),
+                cure: "Compute on the CPU (--device cpu), or force --march verlet.",
+            });
+        }
+        let gpu = Gpu::shared()?;
+        if march.device == Device::Auto && gpu.is_software() {
+            return Err(GpuError::NoAdapter(format!(
+                "the only Vulkan device, {}, runs on the CPU",
+                gpu.name()
+            )));
+        }
+        let options =
+            GpuOptions { step_voxels: plan.step_voxels, wanted: request.wanted, blank: request.blank };
+        Ok((GpuPaths::new(Arc::clone(&gpu), field, view, plan.interpolant, options)?, gpu))
+    })();
+    match made {
+        Ok((paths, gpu)) => {
+            // The CPU's march stands in: the same within roundings.
+            let achieved = measured_rays.map(|rays| plan.measure(field, view, rays));
+            let described = super::paths::described("verlet", plan.interpolant, plan.step_voxels);
+            Ok(Ok(Planned::new(
+                Box::new(paths),
+                format!("{described}, on {}", gpu.name()),
+                achieved,
+                march.tolerance_rad,
+            )))
+        }
+        Err(e) if march.device == Device::Gpu => Err(RenderError::Gpu(e)),
+        Err(e) => Ok(Err(Some(format!("computed on the CPU: {e}")))),
+    }
+}
+
+/// This program has no march for the GPU.
+#[cfg(not(feature = "gpu"))]
+pub(super) fn on_gpu<'a>(
+    march: &MarchSpec,
+    _: &'a Field,
+    _: View,
+    _: Request,
+    _: Option<usize>,
+) -> Result<Result<Planned<'a>, Option<String>>, RenderError> {
+    match march.device {
+        Device::Cpu => Ok(Err(None)),
+        Device::Auto => {
+            Ok(Err(Some("computed on the CPU: this program is built without the feature gpu".into())))
+        }
+        Device::Gpu => Err(RenderError::NoGpu),
+    }
+}

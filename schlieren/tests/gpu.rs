@@ -1,0 +1,336 @@
+//! The GPU against the CPU: the same march, so the same numbers within roundings.
+//!
+//! Any Vulkan device serves, Mesa's lavapipe too. Without one these tests say so and pass, unless RTSV_REQUIRE_PEERS=1.
+#![cfg(feature = "gpu")]
+
+mod common;
+
+use common::{blob, cube, difference, grid, largest, lopsided, oblique, trace};
+use glam::DVec3;
+use schlieren::field::{Field, Node};
+use schlieren::gpu::{Gpu, GpuError, GpuOptions, GpuPaths};
+use schlieren::interpolate::Interpolant;
+use schlieren::march::{BlankCells, Deviational, Options};
+use schlieren::path::{Exit, LightPaths, Start, Status, Wanted};
+use schlieren::render::{Control, Layers, RenderError, Rendered, TestSection, render};
+use schlieren::scene::Scene;
+use schlieren::view::{Axis, View};
+use std::io::Write as _;
+use std::sync::Arc;
+
+/// Largest difference of deflections, of the largest deflection. Both sum up a hundred terms in f32, compensated, from positions that are one rounding (1e-7 of
+/// 30 voxels) apart, because devices need not fuse multiplication and addition.
+const TOLERANCE: f64 = 1e-6;
+
+/// The device, or why the test is skipped.
+fn gpu() -> Option<Arc<Gpu>> {
+    match Gpu::shared() {
+        Ok(gpu) => Some(gpu),
+        Err(e) => {
+            assert!(std::env::var_os("RTSV_REQUIRE_PEERS").is_none_or(|v| v != "1"), "{e}");
+            writeln!(std::io::stderr(), "skipped: {e}").unwrap();
+            None
+        }
+    }
+}
+
+fn cpu<'a>(field: &'a Field, view: View, interpolant: Interpolant, options: GpuOptions) -> Deviational<'a> {
+    let GpuOptions { step_voxels, wanted, blank } = options;
+    let options = Options { step_voxels, wanted, blank, ..Options::default() };
+    Deviational::new(field, view, interpolant, options)
+}
+
+/// Exits of both.
+fn both(
+    gpu: Arc<Gpu>,
+    field: &Field,
+    view: View,
+    interpolant: Interpolant,
+    options: GpuOptions,
+    starts: &[Start],
+) -> [Vec<Exit>; 2] {
+    let on_gpu = GpuPaths::new(gpu, field, view, interpolant, options).unwrap();
+    let exits = trace(&on_gpu, starts);
+    assert_eq!(on_gpu.counters().rays_on_cpu, 0, "the device failed");
+    assert_eq!(on_gpu.counters().rays, starts.len() as u64);
+    [exits, trace(&cpu(field, view, interpolant, options), starts)]
+}
+
+/// Largest difference of `value`, of its largest value.
+fn relative(a: &[Exit], b: &[Exit], value: impl Fn(&Exit) -> f32) -> f64 {
+    let largest = b.iter().map(|e| f64::from(value(e)).abs()).fold(0.0, f64::max);
+    let differences = a.iter().zip(b).map(|(a, b)| (f64::from(value(a)) - f64::from(value(b))).abs());
+    differences.fold(0.0, |m, d| if d.is_nan() || d > m { d } else { m }) / largest
+}
+
+#[test]
+fn deflection_displacement_and_opd_agree_with_the_cpu() {
+    let Some(gpu) = gpu() else { return };
+    let field = cube(33, lopsided);
+    let wanted = Wanted { opd: true };
+    for view in [View::along(Axis::X, DVec3::ZERO), View::along(Axis::Z, DVec3::ZERO), oblique()] {
+        let options = GpuOptions { wanted, ..GpuOptions::default() };
+        let starts = grid(15, 0.9);
+        let [a, b] = both(gpu.clone(), &field, view, Interpolant::BSpline, options, &starts);
+        let (_, max) = difference(&a, &b);
+        assert!(max < TOLERANCE, "deflection: {max:e}");
+        let xi = relative(&a, &b, |e| e.displacement_m[0]);
+        assert!(xi < TOLERANCE, "displacement: {xi:e}");
+        let opd = relative(&a, &b, |e| e.opd_m);
+        assert!(opd < TOLERANCE, "OPD: {opd:e}");
+        for (a, b) in a.iter().zip(&b) {
+            assert_eq!(
+                (a.status, a.transmission, a.exit_depth_m),
+                (b.status, b.transmission, b.exit_depth_m)
+            );
+        }
+    }
+}
+
+/// Its gradient jumps from cell to cell: a sample within a rounding of a cell's face may take the other cell's. That is one step's push, changed by the
+/// jump; all other rays agree.
+#[test]
+fn trilinear_agrees_but_for_samples_on_a_face() {
+    let Some(gpu) = gpu() else { return };
+    let field = cube(33, lopsided);
+    for view in [View::along(Axis::Y, DVec3::ZERO), oblique()] {
+        let wanted = Wanted { opd: true };
+        let options = GpuOptions { wanted, ..GpuOptions::default() };
+        let [a, b] = both(gpu.clone(), &field, view, Interpolant::Trilinear, options, &grid(15, 0.9));
+        let scale = largest(&b);
+        let off = |(a, b): &(&Exit, &Exit)| {
+            (0..2).any(|c| f64::from((a.deflection_rad[c] - b.deflection_rad[c]).abs()) > TOLERANCE * scale)
+        };
+        let others = a.iter().zip(&b).filter(off).count();
+        assert!(others <= 2, "{others} of {} rays differ", a.len());
+        let (_, max) = difference(&a, &b);
+        assert!(max < 5e-3, "{max:e}");
+        let opd = relative(&a, &b, |e| e.opd_m);
+        assert!(opd < TOLERANCE, "OPD: {opd:e}");
+    }
+}
+
+/// Not a multiple of a work group, of a group of rays or of anything; a lattice of 3 x 2 x 29 nodes; rays beside the field; a single ray; none.
+#[test]
+fn odd_sizes() {
+    let Some(gpu) = gpu() else { return };
+    let spacing = [0.3, 0.41, 0.037];
+    let field = Field::from_fn([3, 2, 29], spacing, DVec3::new(-0.3, -0.2, -0.5), 1.0003, lopsided).unwrap();
+    let view = View::new(DVec3::new(0.2, -0.3, 1.0), DVec3::Y, field.centre_m()).unwrap();
+    for interpolant in [Interpolant::BSpline, Interpolant::Trilinear] {
+        for count in [0, 1, 31, 65, 997] {
+            let starts = &grid(32, 1.3)[..count];
+            let options =
+                GpuOptions { step_voxels: 0.37, wanted: Wanted { opd: true }, ..GpuOptions::default() };
+            let [a, b] = both(gpu.clone(), &field, view, interpolant, options, starts);
+            assert_eq!(a.len(), count);
+            if count < 65 {
+                continue;
+            }
+            let (_, max) = difference(&a, &b);
+            assert!(max < TOLERANCE, "{interpolant:?}, {count} rays: {max:e}");
+            let beside = a.iter().filter(|e| **e == Exit { opd_m: 0.0, ..Exit::UNDISTURBED }).count();
+            assert!(count < 997 || beside > 100, "{beside} rays pass beside the field");
+        }
+    }
+}
+
+/// The paraxial form keeps its digits for gases of any strength: as tests/deviational.rs has it for the CPU.
+#[test]
+fn weak_gases_keep_their_digits_at_oblique_views() {
+    let Some(gpu) = gpu() else { return };
+    let starts = grid(9, 0.7);
+    for amplitude in [1e-8, 1e-4] {
+        let field = blob(33, amplitude, 0.12);
+        let [a, b] =
+            both(gpu.clone(), &field, oblique(), Interpolant::BSpline, GpuOptions::default(), &starts);
+        let (_, max) = difference(&a, &b);
+        assert!(max < TOLERANCE, "{amplitude:e}: {max:e}");
+        assert!(a.iter().all(|e| e.opd_m.is_nan()), "not asked for");
+    }
+}
+
+#[test]
+fn tilted_beams_agree() {
+    let Some(gpu) = gpu() else { return };
+    let field = blob(24, 1e-4, 0.15);
+    let mut starts = grid(9, 0.7);
+    for (i, s) in starts.iter_mut().enumerate() {
+        s.tilt_rad = [1e-3 * (i % 5) as f32, -2e-3 * (i % 3) as f32];
+    }
+    let [a, b] = both(gpu, &field, oblique(), Interpolant::BSpline, GpuOptions::default(), &starts);
+    let (_, max) = difference(&a, &b);
+    assert!(max < TOLERANCE, "{max:e}");
+}
+
+/// A solid ball within a shell of blank cells.
+fn with_body(n: usize) -> Field {
+    let plain = cube(n, lopsided);
+    let node = |i: usize| {
+        let at = [i % n, i / n % n, i / (n * n)].map(|k| k as f64 / (n - 1) as f64 - 0.5);
+        match DVec3::from(at).distance(DVec3::new(0.1, -0.05, 0.0)) {
+            r if r < 0.12 => Node::Solid,
+            r if r < 0.2 => Node::Blank,
+            _ => Node::Gas,
+        }
+    };
+    let nodes = (0..n * n * n).map(node).collect();
+    Field::new(plain.dims(), plain.spacing_m(), plain.origin_m(), plain.eps().to_vec(), 1.0, Some(nodes))
+        .unwrap()
+}
+
+#[test]
+fn masks_stop_the_rays_that_they_stop_on_the_cpu() {
+    let Some(gpu) = gpu() else { return };
+    let field = with_body(29);
+    let starts = grid(23, 0.9);
+    for blank in [BlankCells::Opaque, BlankCells::Continued] {
+        let options = GpuOptions { blank, ..GpuOptions::default() };
+        let [a, b] = both(gpu.clone(), &field, oblique(), Interpolant::BSpline, options, &starts);
+        let scale = largest(&b);
+        for (a, b) in a.iter().zip(&b) {
+            assert_eq!(a.transmission, b.transmission);
+            match blank {
+                // What lies behind opaque cells is found by rays whose neighbours are still on their way; by the GPU's never.
+                BlankCells::Opaque => assert_eq!(a.status == Status::Free, b.status == Status::Free),
+                BlankCells::Continued => assert_eq!(a.status, b.status),
+            }
+            if a.transmission > 0.0 {
+                for c in 0..2 {
+                    let d = f64::from((a.deflection_rad[c] - b.deflection_rad[c]).abs());
+                    assert!(d < TOLERANCE * scale, "{d:e} rad");
+                }
+            }
+        }
+        let dark = a.iter().filter(|e| e.transmission == 0.0).count();
+        assert!((10..400).contains(&dark), "{dark} of {} rays are stopped", a.len());
+    }
+}
+
+/// Cut into slabs the field is the same field: bit for bit, because the arithmetic is.
+#[test]
+fn a_field_larger_than_a_binding_is_the_same_field() {
+    let Some(whole) = gpu() else { return };
+    let field = cube(21, lopsided);
+    for interpolant in [Interpolant::BSpline, Interpolant::Trilinear] {
+        let starts = grid(11, 0.9);
+        let options = GpuOptions { wanted: Wanted { opd: true }, ..GpuOptions::default() };
+        let view = oblique();
+        let one = GpuPaths::new(whole.clone(), &field, view, interpolant, options).unwrap();
+        assert_eq!(one.slabs(), 1);
+        let expected = trace(&one, &starts);
+        // 20 layers of cells: room for 8, then 4 of them with what their neighbours share.
+        for (layers, slabs) in [(8, 3), (4, 5)] {
+            let (row, halo) = if interpolant == Interpolant::BSpline { (23, 3) } else { (21, 1) };
+            let small = Gpu::open().unwrap().with_binding_limit(4 * row * row * (layers + halo) + 15);
+            let many = GpuPaths::new(Arc::new(small), &field, view, interpolant, options).unwrap();
+            assert_eq!(many.slabs(), slabs, "{interpolant:?}, {layers} layers");
+            assert_eq!(trace(&many, &starts), expected, "{interpolant:?}, {slabs} slabs");
+        }
+    }
+}
+
+#[test]
+fn a_field_that_fits_no_way_is_refused_with_numbers() {
+    let Some(_) = gpu() else { return };
+    let tiny = Arc::new(Gpu::open().unwrap().with_binding_limit(1024));
+    let field = cube(21, lopsided);
+    let e =
+        GpuPaths::new(tiny, &field, oblique(), Interpolant::BSpline, GpuOptions::default()).err().unwrap();
+    assert!(matches!(e, GpuError::TooLarge { dims: [21, 21, 21], .. }), "{e:?}");
+    assert!(e.to_string().contains("--device cpu"), "{e}");
+}
+
+#[test]
+fn an_interpolant_without_a_kernel_is_refused_by_name() {
+    let Some(gpu) = gpu() else { return };
+    let field = cube(5, lopsided);
+    let interpolant = Interpolant::TrilinearGradient;
+    let e = GpuPaths::new(gpu, &field, oblique(), interpolant, GpuOptions::default()).err().unwrap();
+    assert!(e.to_string().contains("trilinear-gradient"), "{e}");
+}
+
+/// Threads that share the paths get what one gets: buffers of batches are not mixed up.
+#[test]
+fn batches_of_several_threads_do_not_mix() {
+    let Some(gpu) = gpu() else { return };
+    let field = cube(17, lopsided);
+    let paths = GpuPaths::new(gpu, &field, oblique(), Interpolant::BSpline, GpuOptions::default()).unwrap();
+    let starts = grid(32, 0.9);
+    let expected = trace(&paths, &starts);
+    let mut parallel = vec![Exit::UNDISTURBED; starts.len()];
+    paths.trace_parallel(&starts, &mut parallel);
+    assert_eq!(format!("{parallel:?}"), format!("{expected:?}"));
+    std::thread::scope(|s| {
+        for t in 0..4 {
+            let (paths, starts, expected) = (&paths, &starts, &expected);
+            s.spawn(move || {
+                for part in 0..4 {
+                    let range = 64 * (4 * t + part)..64 * (4 * t + part + 1);
+                    let exits = trace(paths, &starts[range.clone()]);
+                    assert_eq!(format!("{exits:?}"), format!("{:?}", &expected[range]));
+                }
+            });
+        }
+    });
+}
+
+/// A scene of `field` drawn on a device.
+fn drawn(field: &Field, device: &str, rest: &str) -> Result<Rendered, RenderError> {
+    let toml = format!(
+        "[flow]\nfile = \"\"\ndensity = \"-\"\n[film]\nsize = [40, 30]\n[march]\ndevice = \"{device}\"\n{rest}"
+    );
+    let scene = Scene::from_toml(&toml).unwrap();
+    let section = TestSection::of_fields(&scene, vec![field.clone()], None).unwrap();
+    render(&scene, &section, Layers { map: true, ..Layers::NONE }, &Control::default())
+}
+
+/// Schlieren by photons, a noise-free shadowgraph, an interferogram (which reads the phase), and BOS, which is traced from the film.
+#[test]
+fn films_agree_with_the_cpu() {
+    let Some(gpu) = gpu() else { return };
+    let field = cube(33, lopsided);
+    for rest in [
+        "method = \"verlet\"\n[sampling]\nmethod = \"photons\"\nsamples = 2",
+        "method = \"verlet\"\n[technique]\nkind = \"shadowgraph\"",
+        "method = \"verlet\"\n[technique]\nkind = \"interferogram\"",
+        "method = \"verlet\"\n[technique]\nkind = \"bos\"",
+    ] {
+        let [a, b] = ["gpu", "cpu"].map(|d| drawn(&field, d, rest).unwrap());
+        let sum: f64 = a.pixels.iter().zip(&b.pixels).map(|(a, b)| f64::from(a[0] - b[0]).powi(2)).sum();
+        let rms = (sum / a.pixels.len() as f64).sqrt();
+        assert!(rms < 1e-3, "{rest}: {rms:e}");
+        let contrast = b.report.levels[1] - b.report.levels[0];
+        assert!(contrast > 0.05, "{rest}: an empty picture, {contrast}");
+        assert!(a.report.march.contains(&gpu.name()), "{}", a.report.march);
+        assert!(!b.report.march.contains(" on "), "{}", b.report.march);
+        let [a, b] = [a, b].map(|r| r.map.unwrap().deflection_rad);
+        let scale = b.iter().flatten().fold(0.0f32, |m, d| m.max(d.abs()));
+        let off = a.iter().flatten().zip(b.iter().flatten()).fold(0.0f32, |m, (a, b)| m.max((a - b).abs()));
+        assert!(f64::from(off / scale) < TOLERANCE, "{rest}: {:e}", off / scale);
+    }
+}
+
+#[test]
+fn marches_without_a_kernel_are_refused_by_name_or_left_to_the_cpu() {
+    let Some(_) = gpu() else { return };
+    let field = cube(9, lopsided);
+    for (rest, word) in
+        [("method = \"pefrl\"", "pefrl"), ("interpolant = \"trilinear-gradient\"", "gradient")]
+    {
+        let e = drawn(&field, "gpu", rest).unwrap_err();
+        assert!(matches!(e, RenderError::Gpu(GpuError::Unsupported { .. })), "{e:?}");
+        assert!(e.to_string().contains(word), "{e}");
+        let r = drawn(&field, "auto", rest).unwrap();
+        assert!(
+            r.report.warnings.iter().any(|w| w.contains("on the CPU") && w.contains(word)),
+            "{:?}",
+            r.report
+        );
+    }
+    // What the plan would do by line of sight, because the tolerance is wide, is traced when the GPU is asked for.
+    let r = drawn(&field, "gpu", "tolerance_rad = 1e-3").unwrap();
+    assert!(r.report.march.starts_with("verlet"), "{}", r.report.march);
+    let r = drawn(&field, "auto", "tolerance_rad = 1e-3").unwrap();
+    assert!(r.report.march.starts_with("line-of-sight"), "{}", r.report.march);
+}
