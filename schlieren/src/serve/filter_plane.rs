@@ -10,21 +10,21 @@ use rt_core::colormap::linear_to_srgb;
 use rt_core::sampler::{Sampler, Sampling};
 
 /// Raster of what is shown, along each side.
-pub const PIXELS: usize = 160;
+pub(super) const PIXELS: usize = 160;
 /// Points of the source's image that light of one pixel is spread over.
 const SOURCE_POINTS: u32 = 8;
 
 /// The cut-off plane around the axis, row by row from the top.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FilterPlane {
+pub(super) struct FilterPlane {
     /// Half the side of the square that is shown.
-    pub half_m: f64,
+    pub(super) half_m: f64,
     /// Transmission, 8 bits, sRGB.
-    pub rgb: Vec<u8>,
+    pub(super) rgb: Vec<u8>,
     /// Share of the light that crosses each pixel; all of it adds up to at most 1.
-    pub light: Vec<f32>,
+    pub(super) light: Vec<f32>,
     /// Share of the light that crosses the plane beyond.
-    pub outside: f32,
+    pub(super) outside: f32,
 }
 
 /// Half the side of the plane that is worth showing: the light and the cut-off, rounded up to a number with one digit so that it does not flicker. The size

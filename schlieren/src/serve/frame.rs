@@ -45,8 +45,8 @@ pub struct FrameInfo {
     pub largest_deflection_rad: Option<f64>,
     /// The march, in words.
     pub march: String,
-    /// Whether a thinned field was drawn.
-    pub thinned: bool,
+    /// Whether it was drawn with a coarse tolerance, and maybe through every so many nodes of the field.
+    pub draft: bool,
     /// Darkest and brightest channel.
     pub levels: [f32; 2],
     /// What should be known.

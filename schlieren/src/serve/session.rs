@@ -46,7 +46,7 @@ pub(super) struct Save {
 
 /// Which file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SaveKind {
+pub(super) enum SaveKind {
     /// For eyes.
     Png,
     /// All layers.

@@ -29,6 +29,8 @@ const MOVING_SECS: f64 = 0.06;
 const MOVING_SIDES: [u32; 2] = [320, 64];
 /// Photons per pixel of it.
 const MOVING_SAMPLES: u32 = 4;
+/// Tolerance of the first two pictures: straight rays through all but the strongest flows, which shows as much as an eye sees.
+const DRAFT_TOLERANCE_RAD: f64 = 1e-2;
 /// How long nothing has to change before the error is measured: that cannot be stopped.
 const STILL: Duration = Duration::from_millis(500);
 
@@ -86,6 +88,8 @@ struct Section {
 #[derive(Debug, Clone, PartialEq)]
 struct Level {
     scene: Scene,
+    /// Drawn with a coarse tolerance.
+    draft: bool,
     thin: bool,
     stoppable: bool,
     samples: Option<u32>,
@@ -172,14 +176,14 @@ impl Worker {
             if i == 0 && last > 0 {
                 self.adapt(elapsed_secs, scene);
             }
-            let traced = self.traced(&level, &geometry, i > 0 || last == 0)?;
+            let traced = self.traced(&level, &geometry)?;
             let info = FrameInfo {
                 generation,
                 finished: false,
                 samples: level.samples,
                 samples_wanted: wanted_samples(scene),
                 elapsed_secs,
-                thinned: level.thin && self.section.as_ref().is_some_and(|s| s.thin.is_some()),
+                draft: level.draft,
                 ..FrameInfo::default()
             };
             let complete = i == last && self.errors_known(&geometry).is_some();
@@ -259,8 +263,8 @@ impl Worker {
         self.with_section(level.thin, |s| render::render(&level.scene, s, layers, &control))?
     }
 
-    /// Deflections of the whole picture's size where they are known or wanted (`whole`), else of this level's.
-    fn traced(&mut self, level: &Level, geometry: &Geometry, whole: bool) -> Result<Arc<Traced>, RenderError> {
+    /// Deflections of the scene itself where they are known, else of this level.
+    fn traced(&mut self, level: &Level, geometry: &Geometry) -> Result<Arc<Traced>, RenderError> {
         if let Some((g, t)) = &self.traced
             && g == geometry
         {
@@ -278,7 +282,7 @@ impl Worker {
                 render::map::map(&*planned.paths, &scene.optics(), &framing, wavelength_m, n0, blocked);
             Ok::<_, RenderError>(Arc::new(Traced { map, framing }))
         })??;
-        if whole && !level.thin && Geometry::of(scene).film == geometry.film {
+        if !level.draft {
             self.traced = Some((geometry.clone(), traced.clone()));
         }
         Ok(traced)
@@ -410,13 +414,14 @@ fn levels(scene: &Scene, moving_side: u32) -> Vec<Level> {
         if let (Some(n), SamplingSpec::Photons { jitter, seed, filter, .. }) = (samples, scene.sampling()) {
             s.sampling = Some(SamplingSpec::Photons { samples: n, jitter, seed, filter });
         }
-        Level { scene: s, thin: false, stoppable: true, samples }
+        Level { scene: s, draft: false, thin: false, stoppable: true, samples }
     };
-    let mut moving = whole(wanted.map(|n| n.min(MOVING_SAMPLES)));
-    moving.thin = true;
-    moving.stoppable = false;
+    let mut draft = whole(wanted.map(|n| n.min(MOVING_SAMPLES)));
+    draft.scene.march.tolerance_rad = scene.march.tolerance_rad.max(DRAFT_TOLERANCE_RAD);
+    draft.draft = true;
+    let mut moving = Level { thin: true, stoppable: false, ..draft.clone() };
     shrink(&mut moving.scene, moving_side);
-    let mut levels = vec![moving];
+    let mut levels = vec![moving, draft];
     let mut samples = MOVING_SAMPLES;
     while wanted.is_some_and(|w| samples < w) {
         levels.push(whole(Some(samples)));
@@ -456,7 +461,8 @@ mod tests {
         let s = scene("[film]\nsize = [512, 256]\n[sampling]\nmethod = \"photons\"\nsamples = 100");
         let levels = levels(&s, 128);
         let samples: Vec<_> = levels.iter().map(|l| l.samples.unwrap()).collect();
-        assert_eq!(samples, [4, 4, 16, 64, 100]);
+        assert_eq!(samples, [4, 4, 4, 16, 64, 100]);
+        assert!(levels[0].draft && levels[1].draft && !levels[2].draft);
         assert_eq!(levels[0].scene.film.size, [128, 64]);
         assert!(levels[0].thin && !levels[0].stoppable);
         assert_eq!(levels.last().unwrap().scene, s);

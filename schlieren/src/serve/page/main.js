@@ -34,14 +34,14 @@ const canPaint = () => kind() === "schlieren";
 
 function onFrame(frame) {
   info = frame.info;
-  $("progress").firstElementChild.style.width = info.finished ? "100%" : info.samples_wanted && !info.thinned ? `${Math.round(10 + 80 * Math.log2(1 + info.samples) / Math.log2(1 + info.samples_wanted))}%` : "8%";
+  $("progress").firstElementChild.style.width = info.finished ? "100%" : info.samples_wanted && !info.draft ? `${Math.round(10 + 80 * Math.log2(1 + info.samples) / Math.log2(1 + info.samples_wanted))}%` : "8%";
   if (info.error) { say(info.error); $("done").textContent = "no picture"; return; }
   picture.show(frame, state?.effective.film.size);
   filter.show(frame);
   if (state) state.half = filter.half();
   if (!$("radius").dataset.touched && info.filter_half_m) $("radius").value = Number((info.filter_half_m * 1e3 / 12).toPrecision(2));
   const rate = info.rays / info.elapsed_secs;
-  $("done").textContent = info.finished ? "finished" : "refining…";
+  $("done").textContent = info.finished ? "finished" : info.draft ? "draft…" : "refining…";
   const t = state?.effective;
   numbers([
     ["noise", info.noise_rms === null ? "none" : `${percent(info.noise_rms)} of white`],
