@@ -61,6 +61,8 @@ pub mod path;
 pub mod plan;
 pub mod render;
 pub mod scene;
+#[cfg(feature = "serve")]
+pub mod serve;
 pub mod skip;
 pub mod solids;
 pub mod spectrum;

@@ -16,6 +16,7 @@ const PACKAGES: &[(&str, &str)] = &[
     ("libembree-dev", "Embree 3.13.5, the CPU ray tracing kernels that rt-core is measured against"),
     ("mesa-vulkan-drivers", "lavapipe, a Vulkan device on the CPU that schlieren's GPU kernels are tested on"),
     ("python3-venv", "a place for the wheels below"),
+    ("chromium", "the browser that schlieren's interactive page is tested in"),
 ];
 
 /// Wheels, with the versions that our numbers were measured with, and what each is for.
@@ -43,6 +44,8 @@ pub(crate) struct Peers {
     embree3: Option<PathBuf>,
     /// Shared library of Embree 4.
     embree4: Option<PathBuf>,
+    /// Chromium's program.
+    chromium: Option<PathBuf>,
     /// The virtual environment's Python, with all [`WHEELS`] in their versions.
     python: Option<PathBuf>,
     /// What went wrong or was not allowed while installing.
@@ -50,18 +53,30 @@ pub(crate) struct Peers {
 }
 
 impl Peers {
+    /// Every peer by name.
+    fn named(&self) -> [(&'static str, &Option<PathBuf>); 4] {
+        [
+            ("Embree 3", &self.embree3),
+            ("Embree 4", &self.embree4),
+            ("Chromium", &self.chromium),
+            ("Python with VTK", &self.python),
+        ]
+    }
+
     /// Names of the peers that were not found.
     pub(crate) fn missing(&self) -> Vec<&'static str> {
-        let all =
-            [("Embree 3", &self.embree3), ("Embree 4", &self.embree4), ("Python with VTK", &self.python)];
-        all.into_iter().filter(|(_, path)| path.is_none()).map(|(name, _)| name).collect()
+        self.named().into_iter().filter(|(_, path)| path.is_none()).map(|(name, _)| name).collect()
     }
 
     /// The variables through which tests find the peers.
     pub(crate) fn environment(&self, require: bool) -> Vec<(&'static str, PathBuf)> {
         let mut variables = vec![("RTSV_PEERS", self.folder.clone())];
-        let found =
-            [("RTSV_EMBREE3", &self.embree3), ("RTSV_EMBREE4", &self.embree4), ("RTSV_PYTHON", &self.python)];
+        let found = [
+            ("RTSV_EMBREE3", &self.embree3),
+            ("RTSV_EMBREE4", &self.embree4),
+            ("RTSV_CHROMIUM", &self.chromium),
+            ("RTSV_PYTHON", &self.python),
+        ];
         variables.extend(found.into_iter().filter_map(|(name, path)| Some((name, path.clone()?))));
         if require {
             variables.push(("RTSV_REQUIRE_PEERS", PathBuf::from("1")));
@@ -72,9 +87,7 @@ impl Peers {
     /// One line per peer, and the notes.
     pub(crate) fn describe(&self) -> String {
         let mut text = String::new();
-        for (name, path) in
-            [("Embree 3", &self.embree3), ("Embree 4", &self.embree4), ("Python with VTK", &self.python)]
-        {
+        for (name, path) in self.named() {
             let place = path.as_ref().map_or("not found".to_owned(), |p| p.display().to_string());
             writeln!(text, "peer {name:<16} {place}").expect("writing to a String cannot fail");
         }
@@ -101,6 +114,7 @@ pub(crate) fn set_up(root: &Path, install: Install) -> Peers {
     Peers {
         embree3: system_library_folders().iter().find_map(|d| library_in(d, "libembree3.so")),
         embree4: wheel_library(&venv, "embreex.libs", "libembree4"),
+        chromium: Some(PathBuf::from("/usr/bin/chromium")).filter(|p| p.is_file()),
         python: wheels_are_there(&python).then_some(python),
         folder,
         notes,
@@ -239,7 +253,7 @@ mod tests {
             notes: vec!["why".to_owned()],
             ..Peers::default()
         };
-        assert_eq!(peers.missing(), ["Embree 4", "Python with VTK"]);
+        assert_eq!(peers.missing(), ["Embree 4", "Chromium", "Python with VTK"]);
         let names = |require| peers.environment(require).into_iter().map(|(n, _)| n).collect::<Vec<_>>();
         assert_eq!(names(false), ["RTSV_PEERS", "RTSV_EMBREE3"]);
         assert_eq!(names(true), ["RTSV_PEERS", "RTSV_EMBREE3", "RTSV_REQUIRE_PEERS"]);

@@ -4,6 +4,8 @@ mod index;
 mod probe;
 mod render;
 mod scene_args;
+#[cfg(feature = "serve")]
+mod serve;
 mod sweep;
 mod units;
 
@@ -29,6 +31,9 @@ enum Command {
     Sweep(Box<sweep::SweepArgs>),
     /// Prints the path and the numbers of one pixel
     Probe(Box<probe::ProbeArgs>),
+    /// Opens an interactive page in the browser
+    #[cfg(feature = "serve")]
+    Serve(Box<serve::ServeArgs>),
     /// Computes the index of refraction of a gas
     Index(index::IndexArgs),
     /// Prints a completion script for a shell
@@ -46,6 +51,8 @@ fn execute(cli: Cli) -> anyhow::Result<()> {
         Command::Render(args) => render::render(common, &args),
         Command::Sweep(args) => sweep::sweep(common, &args),
         Command::Probe(args) => probe::probe(common, &args),
+        #[cfg(feature = "serve")]
+        Command::Serve(args) => serve::serve(common, &args),
         Command::Index(args) => index::index(common, &args),
         Command::Completions(args) => args.print::<Cli>(),
     }

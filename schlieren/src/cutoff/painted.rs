@@ -66,9 +66,17 @@ fn paint(filter: &mut FilterImage, stroke: &Stroke) {
     let [a, b] = [stroke.from_m, stroke.to_m];
     let along = [b[0] - a[0], b[1] - a[1]];
     let length2 = along[0] * along[0] + along[1] * along[1];
-    for j in 0..height {
+
+    // Only where the brush and its soft rim can be: paintings have thousands of small strokes.
+    let reach = stroke.radius_m + pixel_m;
+    let rows = [a[1].max(b[1]) + reach, a[1].min(b[1]) - reach].map(|y| (0.5 - y / size[1]) * f64::from(height));
+    let columns = [a[0].min(b[0]) - reach, a[0].max(b[0]) + reach].map(|x| (0.5 + x / size[0]) * f64::from(width));
+    // Casts saturate: what lies beside the filter ends at its border.
+    let [top, left] = [rows[0], columns[0]].map(|v| v.floor() as u32);
+    let [bottom, right] = [rows[1], columns[1]].map(|v| v.ceil() as u32);
+    for j in top..bottom.min(height) {
         let y = (0.5 - (f64::from(j) + 0.5) / f64::from(height)) * size[1];
-        for i in 0..width {
+        for i in left..right.min(width) {
             let x = ((f64::from(i) + 0.5) / f64::from(width) - 0.5) * size[0];
             // Distance to the segment; a dab has no direction.
             let t = ((x - a[0]) * along[0] + (y - a[1]) * along[1]) / length2;

@@ -64,7 +64,8 @@ impl TransferFunction {
 }
 
 /// How the contributions of the fields are put together.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Rule {
     /// Refractivities add, as those of gases do.
     #[default]

@@ -24,7 +24,7 @@ pub struct Map {
 }
 
 /// Traces the map. `blocked` says which starts meet a body.
-pub(super) fn map(
+pub(crate) fn map(
     paths: &dyn LightPaths,
     optics: &Optics,
     framing: &Framing,

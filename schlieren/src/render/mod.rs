@@ -20,7 +20,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod map;
+pub(crate) mod map;
 mod on_gpu;
 mod paths;
 mod section;

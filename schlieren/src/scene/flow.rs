@@ -4,6 +4,7 @@ use super::SceneError;
 use crate::index::Gas;
 use crate::index::conditions::Model;
 use crate::input::{Depth, Medium, Options, Quantity, Reference, Role};
+use crate::index::multifield::{Rule, TransferFunction};
 use datasets::resample::Resolution;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -46,6 +47,9 @@ pub struct FlowSpec {
     /// Free electrons per m³.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub electrons: Option<String>,
+    /// Any arrays, each through a curve to n - 1 (thesis, section 5.7): illustration, not physics.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub multifield: Option<MultifieldSpec>,
     /// Arrays with mass fractions, and the gas of each; the rest is air.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub species: BTreeMap<String, String>,
@@ -78,6 +82,28 @@ pub struct FlowSpec {
     pub reference_n_minus_1: Option<f64>,
 }
 
+/// Arrays with their curves.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MultifieldSpec {
+    /// How their contributions combine.
+    #[serde(default)]
+    pub rule: Rule,
+    /// Curves by the names of arrays.
+    pub fields: BTreeMap<String, CurveSpec>,
+}
+
+/// One array's curve.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CurveSpec {
+    /// Pairs of a value and its n - 1, values increasing; straight between them, constant beyond.
+    pub knots: Vec<[f64; 2]>,
+    /// Factor; 0 leaves the array out.
+    #[serde(default = "one")]
+    pub weight: f64,
+}
+
 fn one() -> f64 {
     1.0
 }
@@ -104,6 +130,7 @@ impl Default for FlowSpec {
             co2_ppm: None,
             n_minus_1: None,
             electrons: None,
+            multifield: None,
             species: BTreeMap::new(),
             model: Model::Auto,
             length_unit_m: one(),
@@ -143,6 +170,7 @@ impl FlowSpec {
             ("temperature", self.temperature.is_some()),
             ("n_minus_1", self.n_minus_1.is_some()),
             ("electrons", self.electrons.is_some()),
+            ("multifield", self.multifield.is_some()),
         ];
         let named: Vec<&str> = given.iter().filter(|g| g.1).map(|g| g.0).collect();
         let [only] = named[..] else {
@@ -194,9 +222,32 @@ impl FlowSpec {
                     species: species()?,
                 }
             }
+            "multifield" => self.multifield_medium()?,
             "n_minus_1" => Medium::NMinus1(text(&self.n_minus_1).unwrap_or(Quantity::constant(f64::NAN))),
             _ => Medium::Electrons(text(&self.electrons).unwrap_or(Quantity::constant(f64::NAN))),
         })
+    }
+
+    fn multifield_medium(&self) -> Result<Medium, SceneError> {
+        let spec = self.multifield.clone().unwrap_or_default();
+        let mut parts = Vec::new();
+        for (array, curve) in &spec.fields {
+            let wrong = |reason: String| SceneError::Flow { reason: format!("multifield `{array}`: {reason}") };
+            if !curve.weight.is_finite() {
+                return Err(wrong(format!("weight {} is not a finite number", curve.weight)));
+            }
+            // An array without weight need not even be read.
+            if curve.weight != 0.0 {
+                let knots = curve.knots.iter().map(|k| (k[0], k[1])).collect();
+                let function = TransferFunction::new(knots).map_err(|e| wrong(e.to_string()))?;
+                parts.push((Quantity::array(array), function, curve.weight));
+            }
+        }
+        if parts.is_empty() {
+            let reason = "multifield: no array has a weight other than 0; give at least one curve".into();
+            return Err(SceneError::Flow { reason });
+        }
+        Ok(Medium::Multifield { parts, rule: spec.rule })
     }
 
     /// How the file becomes a field for light of this wavelength.
@@ -236,10 +287,21 @@ mod tests {
             ("density = \"rho\"\nhumidity = \"0.5\"", "`humidity` changes nothing"),
             ("n_minus_1 = \"n\"\nspecies = { Y = \"He\" }", "`species` changes nothing"),
             ("density = \"rho\"\nspecies = { Y = \"unobtainium\" }", "unobtainium"),
+            ("multifield = { fields = {} }", "no array has a weight"),
+            ("multifield = { fields = { T = { knots = [[2, 0], [1, 0]] } } }", "multifield `T`"),
+            ("density = \"rho\"\nmultifield = { fields = { T = { knots = [[0, 0]] } } }", "alternatives"),
         ] {
             let message = flow(text).unwrap_err();
             assert!(message.contains(word), "{text}: {message}");
         }
+    }
+
+    #[test]
+    fn curves_reach_the_medium_and_weightless_ones_do_not() {
+        let m = flow("multifield = { rule = \"largest\", fields = { T = { knots = [[300, 0], [2000, -2e-4]] }, Z = { knots = [[0, 0]], weight = 0.0 } } }");
+        let Ok(Medium::Multifield { parts, rule }) = m else { panic!("{m:?}") };
+        assert_eq!((parts.len(), rule), (1, Rule::Largest));
+        assert!((parts[0].1.at(1150.0) + 1e-4).abs() < 1e-18);
     }
 
     #[test]

@@ -30,7 +30,7 @@ mod technique;
 
 pub use direction::Direction;
 pub use effects::{Counters, Effects};
-pub use flow::FlowSpec;
+pub use flow::{CurveSpec, FlowSpec, MultifieldSpec};
 pub use technique::{CutoffSpec, TechniqueSpec};
 
 use crate::filter::Filter;

@@ -1,0 +1,54 @@
+//! `schlieren serve`.
+
+use super::scene_args::SceneArgs;
+use crate::serve;
+use clap::Args;
+use datasets::cli::{Cancel, CommonArgs, Interrupted, UsageError};
+use serde_json::json;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+
+/// Options of `schlieren serve`.
+#[derive(Debug, Args)]
+pub(super) struct ServeArgs {
+    /// The flow
+    file: Option<PathBuf>,
+    /// Where to listen; port 0 takes a free one. Other addresses than 127.0.0.1 let other machines in that know the page's whole address
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:0")]
+    listen: SocketAddr,
+    #[command(flatten)]
+    scene: SceneArgs,
+}
+
+pub(super) fn serve(common: CommonArgs, args: &ServeArgs) -> anyhow::Result<()> {
+    let cancel = Cancel::on_ctrl_c()?;
+    let mut scene = args.scene.scene(args.file.as_deref())?;
+    // Saved scenes go to another folder.
+    let whole = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    scene.flow.file = whole(&scene.flow.file);
+    scene.solids.files.iter_mut().for_each(|f| *f = whole(f));
+    if let crate::scene::TechniqueSpec::Schlieren { cutoff: crate::scene::CutoffSpec::Image { file, .. } } =
+        &mut scene.technique
+    {
+        *file = whole(file);
+    }
+    if !args.listen.ip().is_loopback() {
+        common.warn(format_args!(
+            "listening on {}: everyone who can reach this machine and sees the address can use the page, and it is not encrypted",
+            args.listen
+        ));
+    }
+    common.note(0, format_args!("reading {}", scene.flow.file.display()));
+    let mut printed = Ok(());
+    let outcome = serve::serve(scene, args.listen, cancel.flag(), |url| {
+        printed = common.result(&json!({ "url": url }), || format!("open {url}"));
+        common.note(0, "Ctrl-C ends");
+    });
+    match outcome {
+        Err(serve::ServeError::Refused(why)) => return Err(UsageError(why.to_string()).into()),
+        other => other?,
+    }
+    printed?;
+    cancel.check()?;
+    Err(Interrupted.into())
+}

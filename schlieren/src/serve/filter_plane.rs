@@ -1,0 +1,248 @@
+//! The filter as the page shows it: what it lets through, where the light is on it, and how light is followed from a pixel to the filter.
+
+use crate::cutoff::painted::{Painting, Stroke};
+use crate::cutoff::{Cutoff, CutoffPlane, Rgb};
+use crate::film::Framing;
+use crate::optics::{Across, SourceImage};
+use crate::render::Map;
+use crate::scene::{CutoffSpec, Scene, SceneError, TechniqueSpec};
+use rt_core::colormap::linear_to_srgb;
+use rt_core::sampler::{Sampler, Sampling};
+
+/// Raster of what is shown, along each side.
+pub(super) const PIXELS: usize = 160;
+/// Points of the source's image that light of one pixel is spread over.
+const SOURCE_POINTS: u32 = 8;
+
+/// The cut-off plane around the axis, row by row from the top.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct FilterPlane {
+    /// Half the side of the square that is shown.
+    pub(super) half_m: f64,
+    /// Transmission, 8 bits, sRGB.
+    pub(super) rgb: Vec<u8>,
+    /// Share of the light that crosses each pixel; all of it adds up to at most 1.
+    pub(super) light: Vec<f32>,
+    /// Share of the light that crosses the plane beyond.
+    pub(super) outside: f32,
+}
+
+/// Half the side of the plane that is worth showing: the light and the cut-off, rounded up to a number with one digit so that it does not flicker. The size
+/// of a painting stays.
+pub(super) fn half_side_m(scene: &Scene, map: Option<&Map>) -> f64 {
+    let optics = scene.optics();
+    let image = optics.source_image();
+    let source_m = image.half_extent_m([1.0, 0.0]).max(image.half_extent_m([0.0, 1.0]));
+    // A few rays through a shock go far; the rest would be a dot beside them.
+    let mut sizes: Vec<f32> =
+        map.map_or(Vec::new(), |m| m.deflection_rad.iter().map(|d| d[0].hypot(d[1])).collect());
+    let mut deflection_rad = 0.0;
+    if !sizes.is_empty() {
+        let at = sizes.len() * 995 / 1000;
+        deflection_rad = f64::from(*sizes.select_nth_unstable_by(at, f32::total_cmp).1);
+    }
+    let light_m = source_m + optics.schlieren_focal_length_m * deflection_rad;
+    let cutoff_m = match &scene.technique {
+        TechniqueSpec::Schlieren { cutoff } => match cutoff {
+            CutoffSpec::Painted(p) => return 0.5 * p.size_m[0].max(p.size_m[1]),
+            CutoffSpec::Circle { radius_m, center_m } | CutoffSpec::ComplementedCircle { radius_m, center_m } => {
+                radius_m + center_m[0].hypot(center_m[1])
+            }
+            CutoffSpec::Color { radius_m, .. } => *radius_m,
+            CutoffSpec::Image { width_m, .. } => 0.5 * width_m,
+            CutoffSpec::Knife { .. } => 0.0,
+        },
+        _ => 0.0,
+    };
+    let wanted = 1.15 * light_m.max(cutoff_m).max(1e-6);
+    let digit = 10f64.powf(wanted.log10().floor());
+    (wanted / digit).ceil() * digit
+}
+
+/// The cut-off in the light of the scene's source; open for techniques without one.
+fn plane(scene: &Scene) -> Result<CutoffPlane, SceneError> {
+    let cutoff = match &scene.technique {
+        TechniqueSpec::Schlieren { cutoff } => cutoff.cutoff()?,
+        _ => Cutoff::Open,
+    };
+    Ok(CutoffPlane::new(&cutoff, scene.optics().source_image()))
+}
+
+impl FilterPlane {
+    /// What is in the plane. Without a map, where the light is is not known and left dark.
+    pub(super) fn new(scene: &Scene, map: Option<&Map>) -> Result<FilterPlane, SceneError> {
+        let half_m = half_side_m(scene, map);
+        let plane = plane(scene)?;
+        let center = |i: usize| 2.0 * half_m * ((i as f64 + 0.5) / PIXELS as f64 - 0.5);
+        let mut rgb = Vec::with_capacity(3 * PIXELS * PIXELS);
+        for j in 0..PIXELS {
+            for i in 0..PIXELS {
+                let t = plane.transmission([center(i) as f32, -center(j) as f32]);
+                rgb.extend(t.map(|v| (255.0 * linear_to_srgb(v.clamp(0.0, 1.0))).round() as u8));
+            }
+        }
+        let (light, outside) = map.map_or((vec![0.0; PIXELS * PIXELS], 0.0), |m| histogram(scene, m, half_m));
+        Ok(FilterPlane { half_m, rgb, light, outside })
+    }
+}
+
+/// Where light crosses the plane: each pixel's ray, spread over the image of the source.
+fn histogram(scene: &Scene, map: &Map, half_m: f64) -> (Vec<f32>, f32) {
+    let optics = scene.optics();
+    let (f2, image) = (optics.schlieren_focal_length_m as f32, optics.source_image());
+    let points = if image == SourceImage::Point { 1 } else { SOURCE_POINTS };
+    let (mut sums, mut outside, mut all) = (vec![0.0f64; PIXELS * PIXELS], 0.0f64, 0.0f64);
+    let to_pixels = (0.5 * PIXELS as f64 / half_m) as f32;
+    let middle = 0.5 * PIXELS as f32;
+    for (k, (d, t)) in map.deflection_rad.iter().zip(&map.transmission).enumerate().filter(|(_, p)| *p.1 > 0.0) {
+        for s in 0..points {
+            let point = image.point_m(Sampler::new(Sampling::Sobol, 0, k as u32, 0, s).square(0));
+            let x = middle + (point[0] + f2 * d[0]) * to_pixels;
+            let y = middle - (point[1] + f2 * d[1]) * to_pixels;
+            let side = PIXELS as f32;
+            let energy = f64::from(*t);
+            all += energy;
+            if x >= 0.0 && y >= 0.0 && x < side && y < side {
+                sums[y as usize * PIXELS + x as usize] += energy;
+            } else {
+                outside += energy;
+            }
+        }
+    }
+    let all = all.max(f64::MIN_POSITIVE);
+    (sums.into_iter().map(|s| (s / all) as f32).collect(), (outside / all) as f32)
+}
+
+/// Where the light of a place of the picture crosses the filter: deflection and point, for the middle of the source. `at` is 0..=1 from the picture's upper left
+/// corner. `None` where no light comes from.
+///
+/// The map is by where rays start, the picture by where they land; out of focus that is not the same. A few steps of a fixed-point iteration find the start.
+pub(super) fn traced(map: &Map, framing: &Framing, f2_m: f64, at: [f64; 2]) -> Option<(Across, Across)> {
+    let [w, h] = [framing.width, framing.height];
+    let landed = [at[0] * f64::from(w), at[1] * f64::from(h)];
+    let pixel = |p: [f64; 2]| {
+        let [x, y] = [p[0].clamp(0.0, f64::from(w - 1)) as usize, p[1].clamp(0.0, f64::from(h - 1)) as usize];
+        y * w as usize + x
+    };
+    let mut start = landed;
+    for _ in 0..4 {
+        let moved = map.displacement_m.get(pixel(start))?;
+        start = [
+            landed[0] - f64::from(moved[0]) / framing.pixel_m,
+            landed[1] + f64::from(moved[1]) / framing.pixel_m,
+        ];
+    }
+    let k = pixel(start);
+    if !start.iter().all(|v| v.is_finite()) || *map.transmission.get(k)? <= 0.0 {
+        return None;
+    }
+    let d = *map.deflection_rad.get(k)?;
+    Some((d, d.map(|c| (f2_m * f64::from(c)) as f32)))
+}
+
+/// A cut-off as a painting, to be painted on. Knives and circles become dabs of the same shape; a wheel of colours or a picture cannot, so they give way to `ground`
+/// and the second value is false.
+pub(super) fn as_painting(
+    scene: &Scene,
+    cutoff: &CutoffSpec,
+    half_m: f64,
+    ground: Rgb,
+) -> Result<(Painting, bool), SceneError> {
+    let painting = |ground_rgb, strokes| Painting { size_m: [2.0 * half_m; 2], pixels: 512, ground_rgb, strokes };
+    let dab = |at: [f64; 2], radius_m, rgb| Stroke { from_m: at, to_m: at, radius_m, rgb };
+    let (black, white) = ([0.0; 3], [1.0; 3]);
+    Ok(match cutoff {
+        CutoffSpec::Painted(p) => (p.clone(), true),
+        CutoffSpec::Circle { radius_m, center_m } => {
+            (painting(black, vec![dab(*center_m, *radius_m, white)]), true)
+        }
+        CutoffSpec::ComplementedCircle { radius_m, center_m } => {
+            (painting(white, vec![dab(*center_m, *radius_m, black)]), true)
+        }
+        CutoffSpec::Knife { angle_deg, .. } => {
+            // The edge, found where the transmission changes along its normal.
+            let plane = plane(scene)?;
+            let (sin, cos) = angle_deg.to_radians().sin_cos();
+            let open = |t: f64| plane.transmission([(t * cos) as f32, (t * sin) as f32])[0] >= 0.5;
+            let (mut closed_m, mut open_m) = (-1.0, 1.0);
+            for _ in 0..60 {
+                let middle = 0.5 * (closed_m + open_m);
+                *if open(middle) { &mut open_m } else { &mut closed_m } = middle;
+            }
+            // A dab so large that its rim is straight: over the filter it sags by less than a thousandth of its half side.
+            let radius_m = 1000.0 * half_m;
+            let at = [cos, sin].map(|c| c * (open_m + radius_m));
+            (painting(black, vec![dab(at, radius_m, white)]), true)
+        }
+        CutoffSpec::Color { .. } | CutoffSpec::Image { .. } => (painting(ground, Vec::new()), false),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene(technique: &str) -> Scene {
+        Scene::from_toml(&format!("[flow]\nfile = \"a\"\ndensity = \"r\"\n{technique}")).unwrap()
+    }
+
+    fn prism(deflection: Across) -> Map {
+        Map {
+            deflection_rad: vec![deflection; 16],
+            displacement_m: vec![[0.0; 2]; 16],
+            transmission: vec![1.0; 16],
+            ..Map::default()
+        }
+    }
+
+    #[test]
+    fn light_is_where_the_deflection_brings_it() {
+        let s = scene("[light]\nsource = { kind = \"point\" }");
+        let plane = FilterPlane::new(&s, Some(&prism([2e-4, -1e-4]))).unwrap();
+        // f2 = 1.5 m: 0.3 mm to the right, 0.15 mm down.
+        let brightest = (0..PIXELS * PIXELS).max_by(|a, b| plane.light[*a].total_cmp(&plane.light[*b])).unwrap();
+        let at = |i: usize| 2.0 * plane.half_m * ((i as f64 + 0.5) / PIXELS as f64 - 0.5);
+        let pixel_m = 2.0 * plane.half_m / PIXELS as f64;
+        assert!((at(brightest % PIXELS) - 3e-4).abs() < pixel_m);
+        assert!((at(brightest / PIXELS) - 1.5e-4).abs() < pixel_m);
+        assert!((plane.light.iter().sum::<f32>() + plane.outside - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn knives_and_circles_become_paintings_of_the_same_shape() {
+        for cutoff in [
+            "{ kind = \"knife\", angle_deg = 30.0, open = 0.3 }",
+            "{ kind = \"circle\", radius_m = 4e-4, center_m = [1e-4, 2e-4] }",
+            "{ kind = \"complemented-circle\", radius_m = 5e-4 }",
+        ] {
+            let s = scene(&format!("[technique]\nkind = \"schlieren\"\ncutoff = {cutoff}"));
+            let TechniqueSpec::Schlieren { cutoff } = &s.technique else { panic!() };
+            let half_m = half_side_m(&s, None);
+            let (painting, same) = as_painting(&s, cutoff, half_m, [0.0; 3]).unwrap();
+            assert!(same);
+            // With the same source: only then the knife's edge is where it was.
+            let mut painted = s.clone();
+            painted.light.source = s.effective().light.source;
+            painted.technique = TechniqueSpec::Schlieren { cutoff: CutoffSpec::Painted(painting) };
+            let [a, b] = [&s, &painted].map(|s| FilterPlane::new(s, None).unwrap());
+            assert_eq!(a.half_m, b.half_m);
+            let differ = a.rgb.iter().zip(&b.rgb).filter(|(a, b)| a.abs_diff(**b) > 128).count();
+            // Only along the edge, and there by less than a pixel.
+            assert!(differ < 3 * 2 * PIXELS, "{cutoff:?}: {differ}");
+            assert!(a.rgb.iter().any(|v| *v == 255) && a.rgb.iter().any(|v| *v == 0));
+        }
+    }
+
+    #[test]
+    fn a_place_of_the_picture_is_followed_back_to_where_its_light_started() {
+        let framing = Framing { width: 4, height: 4, pixel_m: 1e-3, center_m: [0.0; 2] };
+        let mut map = prism([1e-4, 0.0]);
+        assert_eq!(traced(&map, &framing, 2.0, [0.5, 0.5]), Some(([1e-4, 0.0], [2e-4, 0.0])));
+        // All light lands a pixel to the right of where it started: what is seen in column 2 has started in column 1.
+        map.displacement_m = vec![[1e-3, 0.0]; 16];
+        map.deflection_rad[2 * 4 + 1] = [0.0, 3e-4];
+        assert_eq!(traced(&map, &framing, 2.0, [0.6, 0.6]).unwrap().1, [0.0, 6e-4]);
+        map.transmission = vec![0.0; 16];
+        assert_eq!(traced(&map, &framing, 2.0, [0.5, 0.5]), None);
+    }
+}

@@ -1,0 +1,124 @@
+//! The flow in memory: read once, made into fields again whenever wavelengths or transfer functions change.
+
+use crate::field::{Field, Node};
+use crate::input::{InputError, from_dataset};
+use crate::render::{RenderError, TestSection};
+use crate::scene::{FlowSpec, Scene};
+use crate::solids::Solids;
+use datasets::model::Dataset;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// An array of the file that can have a transfer function.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ArrayInfo {
+    /// Its name.
+    pub name: String,
+    /// Smallest and largest finite value; of vectors, of their magnitude.
+    pub range: [f64; 2],
+}
+
+/// A file's data.
+pub(super) struct Flow {
+    data: Dataset,
+    warnings: Vec<String>,
+}
+
+impl Flow {
+    /// Reads the file. Of a time series this is the first time.
+    pub(super) fn open(spec: &FlowSpec) -> Result<Flow, InputError> {
+        let path = &spec.file;
+        let in_file = |e: InputError| InputError::InFile { path: path.clone(), source: Box::new(e) };
+        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
+            let data = datasets::read::csv_lattice::dataset(&datasets::read::csv::read(path)?)?;
+            return Ok(Flow { data, warnings: Vec::new() });
+        }
+        let opened = datasets::read::open(path)?;
+        let data = opened.dataset().map_err(|e| in_file(e.into()))?.clone();
+        Ok(Flow { data, warnings: opened.warnings })
+    }
+
+    /// Arrays of points and cells whose values differ, by name.
+    pub(super) fn arrays(&self) -> Vec<ArrayInfo> {
+        let mut found: BTreeMap<String, [f64; 2]> = BTreeMap::new();
+        let leaves = self.data.leaves();
+        for a in leaves.iter().filter_map(|l| l.attributes()) {
+            for array in a.point.iter().chain(&a.cell).filter(|a| !a.name.starts_with("vtk")) {
+                // As an array of the medium is read: components of a vector by its magnitude.
+                let range = if array.components == 1 {
+                    array.range().map(|r| [r.0, r.1])
+                } else {
+                    let sizes = (0..array.tuples()).map(|i| array.magnitude(i)).filter(|m| m.is_finite());
+                    let nothing = [f64::INFINITY, f64::NEG_INFINITY];
+                    Some(sizes.fold(nothing, |[l, h], m| [l.min(m), h.max(m)]))
+                };
+                if let Some([low, high]) = range.filter(|r| r[0] < r[1]) {
+                    let r = found.entry(array.name.clone()).or_insert([low, high]);
+                    *r = [r[0].min(low), r[1].max(high)];
+                }
+            }
+        }
+        found.into_iter().map(|(name, range)| ArrayInfo { name, range }).collect()
+    }
+
+    /// The test section for a scene. `solids` are taken over from the one before: a page cannot change them.
+    pub(super) fn section(&self, scene: &Scene, solids: Option<Solids>) -> Result<TestSection, RenderError> {
+        let mut fields = Vec::new();
+        let mut report = None;
+        for line in scene.lines() {
+            let options = scene.flow.options(line.wavelength_nm)?;
+            let loaded = from_dataset(&self.data, &options).map_err(|e| InputError::InFile {
+                path: scene.flow.file.clone(),
+                source: Box::new(e),
+            })?;
+            fields.push(loaded.field);
+            report.get_or_insert(loaded.report);
+        }
+        let mut section = TestSection::of_fields(scene, fields, solids)?;
+        section.warnings = self.warnings.clone();
+        section.warnings.extend(report.iter().flat_map(|r| r.warnings.iter().cloned()));
+        section.input = report;
+        Ok(section)
+    }
+}
+
+/// Nodes of a field that is drawn while something moves.
+const COARSE_NODES: usize = 1 << 18;
+
+/// Every so many nodes of a field, few enough to be drawn while something moves; `None` when the field is as small as that already.
+pub(super) fn coarse(field: &Field) -> Option<Field> {
+    let d = field.dims();
+    let kept = |every: usize| d.map(|n| (n - 1) / every + 1);
+    let every = (1..).find(|e| kept(*e).iter().product::<usize>() <= COARSE_NODES)?;
+    let dims = kept(every);
+    // Interpolants need a few nodes to each side.
+    if every == 1 || dims.iter().any(|n| *n < 4) {
+        return None;
+    }
+    let count = dims.iter().product();
+    let from = |i: usize| {
+        let [x, y, z] = [i % dims[0], i / dims[0] % dims[1], i / (dims[0] * dims[1])].map(|c| c * every);
+        x + d[0] * (y + d[1] * z)
+    };
+    let eps = (0..count).map(|i| field.eps()[from(i)]).collect();
+    let nodes = field.nodes().map(|n: &[Node]| (0..count).map(|i| n[from(i)]).collect());
+    // Stretched so that the last node is where the whole field's last node is: the picture must not jump when it gets sharp.
+    let spacing_m = [0, 1, 2].map(|c| field.spacing_m()[c] * (d[c] - 1) as f64 / (dims[c] - 1) as f64);
+    Field::new(dims, spacing_m, field.origin_m(), eps, field.n0(), nodes).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    #[test]
+    fn the_coarse_field_fills_the_same_box() {
+        let f = Field::from_fn([130, 129, 70], [1e-3; 3], DVec3::splat(0.5), 1.0003, |p| 1e-5 * p.x).unwrap();
+        let c = coarse(&f).unwrap();
+        assert!(c.dims().iter().product::<usize>() <= COARSE_NODES);
+        assert!((c.size_m() - f.size_m()).length() < 1e-12 && c.origin_m() == f.origin_m());
+        let small = Field::from_fn([20; 3], [1e-3; 3], DVec3::ZERO, 1.0, |_| 0.0).unwrap();
+        assert!(coarse(&small).is_none());
+    }
+}

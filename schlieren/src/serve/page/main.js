@@ -1,0 +1,134 @@
+// The page: what happens where becomes a change of the scene; states and frames from the program become what is seen.
+
+import * as server from "./server.js";
+import * as picture from "./picture.js";
+import * as filter from "./filter.js";
+import * as settings from "./settings.js";
+import * as curves from "./curves.js";
+import { quantity, percent, linear } from "./units.js";
+
+const $ = id => document.getElementById(id);
+let state = null, info = null, angles = null, tool = "orbit", lostSince = null;
+
+// ---- From the program -------------------------------------------------------------------------------------------
+
+const AXES = { x: [0, 0], y: [-90, 0], z: [-90, 90] };
+
+function onState(next) {
+  state = { ...next, half: filter.half() || 1e-3 };
+  $("file").textContent = next.file || "";
+  const direction = next.effective.view.direction;
+  angles = AXES[direction] || direction.split(",").map(Number);
+  settings.show(state);
+  curves.show(state);
+  const paints = canPaint();
+  filter.lock(!paints);
+  $("brush").hidden = !paints;
+  $("filter").closest("fieldset").hidden = !["schlieren", "shadowgraph", "interferogram", "bos"].includes(kind());
+  document.querySelector("input[value=paint]").disabled = !paints;
+  if (!paints && tool === "paint") setTool("orbit");
+}
+
+const kind = () => state?.effective.technique.kind;
+const canPaint = () => kind() === "schlieren";
+
+function onFrame(frame) {
+  info = frame.info;
+  $("progress").firstElementChild.style.width = info.finished ? "100%" : info.samples_wanted && !info.draft ? `${Math.round(10 + 80 * Math.log2(1 + info.samples) / Math.log2(1 + info.samples_wanted))}%` : "8%";
+  if (info.error) { say(info.error); $("done").textContent = "no picture"; return; }
+  picture.show(frame, state?.effective.film.size);
+  filter.show(frame);
+  if (state) state.half = filter.half();
+  if (!$("radius").dataset.touched && info.filter_half_m) $("radius").value = Number((info.filter_half_m * 1e3 / 12).toPrecision(2));
+  const rate = info.rays / info.elapsed_secs;
+  $("done").textContent = info.finished ? "finished" : info.draft ? "draft…" : "refining…";
+  const t = state?.effective;
+  numbers([
+    ["noise", info.noise_rms === null ? "none" : `${percent(info.noise_rms)} of white`],
+    ["samples per second", info.rays ? quantity(rate, "") : "–"],
+    ["photons per pixel", info.samples === null ? "none" : info.samples_wanted > info.samples ? `${info.samples} of ${info.samples_wanted}` : `${info.samples}`],
+    ["largest deflection", quantity(info.largest_deflection_rad, "rad")],
+    ["error of deflections", info.deflection_error_rad === null ? "when finished" : `± ${quantity(info.deflection_error_rad, "rad", 2)}`],
+    ["error of the flow's lattice", info.resolution_error_rad === null ? "–" : `± ${quantity(info.resolution_error_rad, "rad", 2)}`],
+    ["pixel", quantity(info.pixel_m, "m")],
+    ["brightness", `${percent(info.levels[0], 3)} to ${percent(info.levels[1], 3)}`],
+    ["light along", angles ? `azimuth ${Math.round(angles[0] * 10) / 10}°, elevation ${Math.round(angles[1] * 10) / 10}°` : "–"],
+    ["march", info.march || "–"],
+  ]);
+  $("warnings").replaceChildren(...(info.finished ? info.warnings : []).map(w => Object.assign(document.createElement("li"), { textContent: w })));
+  // For scripts that wait.
+  document.body.dataset.serial = info.serial;
+  document.body.dataset.generation = info.generation;
+  document.body.dataset.finished = info.finished;
+}
+
+function numbers(pairs) {
+  $("numbers").replaceChildren(...pairs.map(([name, value]) => {
+    const div = document.createElement("div");
+    div.append(Object.assign(document.createElement("dt"), { textContent: name }), Object.assign(document.createElement("dd"), { textContent: value }));
+    return div;
+  }));
+}
+
+function say(text, note = false) {
+  const box = $("message");
+  box.hidden = !text;
+  box.textContent = text || "";
+  box.classList.toggle("note", note);
+}
+
+function onLost(lost) {
+  if (lost) { lostSince ??= Date.now(); if (Date.now() - lostSince > 1000) say("The program does not answer: it was ended, or the connection is lost. This page goes on when it is back."); }
+  else { lostSince = null; say(null); }
+}
+
+// ---- To the program ---------------------------------------------------------------------------------------------
+
+server.listen(onState, say);
+settings.listen(server.change);
+curves.listen(server.change);
+
+function orbit(azimuth, elevation) {
+  const turned = ((azimuth + 180) % 360 + 360) % 360 - 180;
+  angles = [Math.round(turned * 100) / 100, Math.round(Math.min(90, Math.max(-90, elevation)) * 100) / 100];
+  server.change({ view: { direction: `${angles[0]},${angles[1]}` } });
+}
+
+const radius = () => Math.max(1e-9, Number($("radius").value) / 1e3 || 0);
+const paint = on => points => server.paint({ on, points, radius_m: radius(), rgb: linear($("color").value) });
+
+picture.interact({
+  angles: () => angles || [0, 0], orbit, paints: () => tool === "paint" && canPaint(), paint: paint("picture"), trace: server.trace, mark: filter.point,
+});
+filter.interact({ paints: canPaint, radius, paint: paint("filter") });
+
+function setTool(next) {
+  tool = next;
+  document.querySelector(`input[name=tool][value=${next}]`).checked = true;
+  picture.setPainting(next === "paint");
+}
+for (const input of document.querySelectorAll("input[name=tool]")) input.addEventListener("change", () => setTool(input.value));
+for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => server.change({ view: { direction: button.dataset.view } }));
+$("radius").addEventListener("input", () => { $("radius").dataset.touched = "1"; });
+
+// A cleared filter keeps its size and the source that it was painted for.
+const ground = rgb => server.change({
+  light: { source: state.effective.light.source },
+  technique: { kind: "schlieren", cutoff: { kind: "painted", size_m: [2 * filter.half(), 2 * filter.half()], ground_rgb: rgb } },
+});
+$("clear-white").addEventListener("click", () => ground([1, 1, 1]));
+$("clear-black").addEventListener("click", () => ground([0, 0, 0]));
+$("undo").addEventListener("click", () => {
+  const cutoff = state.scene.technique.cutoff;
+  if (cutoff?.kind !== "painted" || !cutoff.strokes.length) return say("nothing is painted that could be undone", true);
+  return server.change({ technique: { kind: "schlieren", cutoff: { ...cutoff, strokes: cutoff.strokes.slice(0, -1) } } });
+});
+for (const color of ["#ffffff", "#808080", "#000000", "#ff2020", "#ffd020", "#20c040", "#20a0ff", "#a040ff"]) {
+  const button = Object.assign(document.createElement("button"), { title: color });
+  button.style.background = color;
+  button.addEventListener("click", () => { $("color").value = color; });
+  $("swatches").append(button);
+}
+
+await server.refresh().catch(e => say(e.message));
+server.frames(onFrame, onLost);

@@ -1,0 +1,80 @@
+// Talking to the program: one change on its way at a time, later ones merged meanwhile; frames as they come.
+
+let onState = () => {}, onError = () => {};
+let waiting = null, busy = false;
+
+export function listen(state, error) { onState = state; onError = error; }
+
+// Objects that choose a kind, and all transfer functions together, are replaced whole, as the program does it.
+function merge(into, patch) {
+  for (const [key, value] of Object.entries(patch)) {
+    const nested = value && typeof value === "object" && !Array.isArray(value);
+    if (nested && key !== "multifield" && !("kind" in value) && !("method" in value) && into[key] && typeof into[key] === "object") merge(into[key], value);
+    else into[key] = value;
+  }
+  return into;
+}
+
+async function call(path, body) {
+  const response = await fetch(path, body === undefined ? {} : { method: "POST", body: JSON.stringify(body) });
+  const answer = await response.json().catch(() => ({ error: `the program answered ${response.status}` }));
+  if (!response.ok) throw new Error(answer.error || `the program answered ${response.status}`);
+  return answer;
+}
+
+export async function change(patch) {
+  waiting = waiting ? merge(waiting, patch) : structuredClone(patch);
+  if (busy) return;
+  busy = true;
+  while (waiting) {
+    const next = waiting;
+    waiting = null;
+    try { onState(await call("scene", next)); onError(null); }
+    catch (e) { onError(e.message); try { onState(await call("state")); } catch { /* said below by the frames */ } }
+  }
+  busy = false;
+}
+
+export const refresh = async () => onState(await call("state"));
+export const trace = at => call("trace", { at });
+
+// Strokes go one after the other, so that later ones cover earlier ones.
+let strokes = Promise.resolve();
+export function paint(request) {
+  strokes = strokes.then(() => call("paint", request)).then(async answer => {
+    if (answer.note) onError(answer.note, true);
+    await refresh();
+    return answer;
+  }).catch(e => onError(e.message));
+  return strokes;
+}
+
+function decode(buffer) {
+  const view = new DataView(buffer), length = view.getUint32(0, true);
+  const info = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  let at = 4 + length;
+  const take = n => { const bytes = new Uint8Array(buffer, at, n); at += n; return bytes; };
+  const rgb = take(3 * info.width * info.height), n = info.filter_pixels * info.filter_pixels;
+  const filter = take(3 * n);
+  return { info, rgb, filter, light: n ? new Float32Array(buffer.slice(at, at + 4 * n)) : new Float32Array(0) };
+}
+
+export async function frames(show, lost) {
+  for (let after = 0, failures = 0; ;) {
+    try {
+      const response = await fetch(`frame?after=${after}`);
+      if (failures) { failures = 0; lost(false); await refresh(); }
+      if (response.status === 204) continue;
+      if (!response.ok) throw new Error(`frame: ${response.status}`);
+      const frame = decode(await response.arrayBuffer());
+      after = frame.info.serial;
+      show(frame);
+      // Between two frames the browser must have time to draw.
+      await new Promise(r => setTimeout(r, 0));
+    } catch (e) {
+      failures += 1;
+      lost(true, e);
+      await new Promise(r => setTimeout(r, Math.min(5000, 250 * failures)));
+    }
+  }
+}

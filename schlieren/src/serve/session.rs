@@ -1,0 +1,516 @@
+//! What the page's requests and the drawing thread share: the scene, the newest frame, and what is wanted next.
+//!
+//! Requests only change values under a lock that nobody holds for long; everything that takes time is done by [`super::worker`].
+
+use super::filter_plane::{as_painting, half_side_m, traced};
+use super::flow::ArrayInfo;
+use super::frame::{Frame, Traced};
+use crate::cutoff::Rgb;
+use crate::cutoff::painted::Stroke;
+use crate::optics::Across;
+use crate::scene::{BeamsSpec, CutoffSpec, FilmSpec, FlowSpec, LensSpec, LightSpec, SamplingSpec, Scene, TechniqueSpec};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+
+/// Longest side of a picture on the page; larger ones are for `schlieren render`.
+pub const MAX_SIDE: u32 = 2048;
+/// Most photons per pixel on the page.
+pub const MAX_SAMPLES: u32 = 4096;
+/// Most strokes of a painting.
+pub const MAX_STROKES: usize = 5000;
+/// Most points of one request to paint.
+pub const MAX_POINTS: usize = 4096;
+/// Sections of the scene that a page may change; of the flow only its transfer functions.
+const PAGE_SECTIONS: [&str; 8] = ["view", "light", "lenses", "technique", "film", "sampling", "march", "flow"];
+
+/// Why a request was refused; the text goes to the page.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct Refused(pub String);
+
+fn refused(text: impl Into<String>) -> Refused {
+    Refused(text.into())
+}
+
+/// A file to make.
+pub(super) struct Save {
+    pub(super) scene: Scene,
+    pub(super) kind: SaveKind,
+    /// Set when nobody waits for it any more.
+    pub(super) cancel: Arc<AtomicBool>,
+    pub(super) reply: tokio::sync::oneshot::Sender<Result<Vec<u8>, String>>,
+}
+
+/// Which file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum SaveKind {
+    /// For eyes.
+    Png,
+    /// All layers.
+    Exr,
+}
+
+/// Values that belong to a technique, kept for when it is chosen again.
+#[derive(Clone)]
+struct Kept {
+    technique: TechniqueSpec,
+    light: LightSpec,
+    lenses: LensSpec,
+    film: FilmSpec,
+    sampling: Option<SamplingSpec>,
+}
+
+pub(super) struct Shared {
+    pub(super) scene: Scene,
+    /// Counts changes of the scene.
+    pub(super) generation: u64,
+    pub(super) saves: VecDeque<Save>,
+    pub(super) frame: Option<Arc<Frame>>,
+    pub(super) stop: bool,
+    kept: BTreeMap<&'static str, Kept>,
+}
+
+/// See the [module](self).
+pub struct Session {
+    shared: Mutex<Shared>,
+    pub(super) wake: Condvar,
+    /// Set to stop what is being drawn.
+    pub(super) cancel: AtomicBool,
+    pub(super) frames: tokio::sync::watch::Sender<u64>,
+    /// Arrays for transfer functions.
+    arrays: Vec<ArrayInfo>,
+    /// As it was when the program started: a page may change neither files nor what the arrays mean, only curves.
+    flow: FlowSpec,
+    image: Option<CutoffSpec>,
+}
+
+/// A request to paint.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Paint {
+    /// Where the points are.
+    pub on: Canvas,
+    /// Along the stroke: on the filter metres from the axis, on the picture 0..=1 from its upper left corner.
+    pub points: Vec<[f64; 2]>,
+    /// Of the brush, on the filter.
+    pub radius_m: f64,
+    /// Linear transmission.
+    pub rgb: Rgb,
+}
+
+/// What is painted on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Canvas {
+    /// The filter itself.
+    Filter,
+    /// The picture; each point is followed back to the filter.
+    Picture,
+}
+
+/// What painting did.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Painted {
+    /// The scene's number now.
+    pub generation: u64,
+    /// Strokes that were added.
+    pub added: usize,
+    /// Points without light, which have no place on the filter.
+    pub dark: usize,
+    /// What the user should know.
+    pub note: Option<String>,
+}
+
+impl Session {
+    /// A session that starts with this scene.
+    pub(super) fn new(scene: Scene, arrays: Vec<ArrayInfo>) -> Result<Session, Refused> {
+        check_limits(&scene)?;
+        let image = match &scene.technique {
+            TechniqueSpec::Schlieren { cutoff: cutoff @ CutoffSpec::Image { .. } } => Some(cutoff.clone()),
+            _ => None,
+        };
+        let shared = Shared {
+            scene: scene.clone(),
+            generation: 1,
+            saves: VecDeque::new(),
+            frame: None,
+            stop: false,
+            kept: BTreeMap::new(),
+        };
+        Ok(Session {
+            shared: Mutex::new(shared),
+            wake: Condvar::new(),
+            cancel: AtomicBool::new(false),
+            frames: tokio::sync::watch::channel(0).0,
+            arrays,
+            flow: scene.flow,
+            image,
+        })
+    }
+
+    pub(super) fn lock(&self) -> MutexGuard<'_, Shared> {
+        // Values are replaced whole, so they are sound even after a panic elsewhere.
+        self.shared.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What the page needs to know about the scene.
+    pub fn state(&self) -> Value {
+        let shared = self.lock();
+        let scene = &shared.scene;
+        serde_json::json!({
+            "generation": shared.generation,
+            "scene": scene,
+            "effective": scene.effective(),
+            "file": scene.flow.file.file_name().map(|n| n.to_string_lossy().into_owned()),
+            "arrays": self.arrays,
+            "techniques": TechniqueSpec::NAMES,
+            "image_filter": self.image,
+            "limits": { "side": MAX_SIDE, "samples": MAX_SAMPLES, "strokes": MAX_STROKES },
+        })
+    }
+
+    /// The scene in effect as TOML.
+    pub fn toml(&self) -> Result<String, Refused> {
+        let scene = self.lock().scene.effective();
+        scene.to_toml().map_err(|e| refused(chain(&e)))
+    }
+
+    /// The newest frame.
+    pub fn frame(&self) -> Option<Arc<Frame>> {
+        self.lock().frame.clone()
+    }
+
+    /// Changes the scene by a JSON merge patch (RFC 7396); objects with a `kind` or `method` are replaced whole, `null` is the technique's custom. A technique of
+    /// another kind brings its own bench back. Returns the new generation.
+    pub fn edit(&self, patch: &Value) -> Result<u64, Refused> {
+        let mut shared = self.lock();
+        let before = shared.scene.clone();
+        let mut kept = None;
+        let mut base = before.clone();
+
+        // Another technique: the bench as it was with it, or its custom.
+        let wanted = patch.pointer("/technique/kind").and_then(Value::as_str);
+        if let Some(name) = wanted.filter(|n| *n != before.technique.name()) {
+            let Some(custom) = TechniqueSpec::by_name(name) else {
+                return Err(refused(format!(
+                    "there is no technique `{name}`; there are: {}",
+                    TechniqueSpec::NAMES.join(", ")
+                )));
+            };
+            kept = Some(Kept::of(&before));
+            let again = shared.kept.get(custom.name()).cloned();
+            Kept::bring_back(again, custom, &mut base);
+        }
+        let mut patch = patch.clone();
+        if kept.is_some() && patch.pointer("/technique").and_then(Value::as_object).is_some_and(|t| t.len() == 1) {
+            patch["technique"] = serde_json::to_value(&base.technique).map_err(|e| refused(e.to_string()))?;
+        }
+        self.check_patch(&patch)?;
+
+        // The flow: only its transfer functions.
+        if let Some(curves) = patch.pointer("/flow/multifield").cloned() {
+            base.flow = match curves {
+                Value::Null => self.flow.clone(),
+                curves => self.with_curves(curves)?,
+            };
+        }
+        if let Some(sections) = patch.as_object_mut() {
+            sections.remove("flow");
+        }
+        let mut value = serde_json::to_value(&base).map_err(|e| refused(e.to_string()))?;
+        merge(&mut value, patch);
+        let scene: Scene = serde_json::from_value(value).map_err(|e| refused(format!("not a scene: {e}")))?;
+        self.check_scene(&scene)?;
+        if let Some(k) = kept {
+            shared.kept.insert(k.technique.name(), k);
+        }
+        if scene != before {
+            shared.scene = scene;
+            self.changed(&mut shared);
+        }
+        Ok(shared.generation)
+    }
+
+    fn check_patch(&self, patch: &Value) -> Result<(), Refused> {
+        let Some(sections) = patch.as_object() else {
+            return Err(refused("a change is an object such as {\"view\": {\"direction\": \"30,15\"}}"));
+        };
+        if let Some(other) = sections.keys().find(|k| !PAGE_SECTIONS.contains(&k.as_str())) {
+            return Err(refused(format!("`{other}` cannot be changed from the page; these can: {}", PAGE_SECTIONS.join(", "))));
+        }
+        match sections.get("flow").and_then(Value::as_object) {
+            Some(flow) if flow.keys().any(|k| k != "multifield") => {
+                Err(refused("of the flow only `multifield` can be changed from the page; start the program with other options"))
+            }
+            None if sections.contains_key("flow") => Err(refused("`flow` is no object")),
+            _ => Ok(()),
+        }
+    }
+
+    fn with_curves(&self, curves: Value) -> Result<FlowSpec, Refused> {
+        if self.arrays.len() < 2 {
+            return Err(refused("the flow has fewer than two arrays; transfer functions are for several"));
+        }
+        let multifield =
+            serde_json::from_value(curves).map_err(|e| refused(format!("not transfer functions: {e}")))?;
+        let f = self.flow.clone();
+        let flow = FlowSpec {
+            file: f.file,
+            length_unit_m: f.length_unit_m,
+            span: f.span,
+            resample_nodes: f.resample_nodes,
+            smoothing_nodes: f.smoothing_nodes,
+            outside: f.outside,
+            hidden: f.hidden,
+            multifield: Some(multifield),
+            ..FlowSpec::default()
+        };
+        for name in flow.multifield.iter().flat_map(|m| m.fields.keys()) {
+            if !self.arrays.iter().any(|a| a.name == *name) {
+                let names: Vec<&str> = self.arrays.iter().map(|a| a.name.as_str()).collect();
+                return Err(refused(format!("there is no array `{name}`; there are: {}", names.join(", "))));
+            }
+        }
+        Ok(flow)
+    }
+
+    fn check_scene(&self, scene: &Scene) -> Result<(), Refused> {
+        check_limits(scene)?;
+        // Pages must not make the program read any file.
+        if let TechniqueSpec::Schlieren { cutoff: cutoff @ CutoffSpec::Image { file, .. } } = &scene.technique {
+            let known = self.image.as_ref().is_some_and(|i| matches!(i, CutoffSpec::Image { file: f, .. } if f == file));
+            if !known {
+                return Err(refused(format!(
+                    "the page cannot open `{}` as a filter; start the program with --cutoff PNG for a {}",
+                    file.display(),
+                    cutoff.name()
+                )));
+            }
+        }
+        scene.check().map_err(|e| refused(chain(&e)))
+    }
+
+    /// Paints on the filter. The first stroke turns the cut-off into a painting.
+    pub fn paint(&self, paint: &Paint) -> Result<Painted, Refused> {
+        let finite = paint.points.iter().flatten().all(|c| c.is_finite() && c.abs() < 1e3);
+        if !finite || !(paint.radius_m > 0.0 && paint.radius_m < 1e3) {
+            return Err(refused("a stroke needs finite points and a brush larger than 0 m"));
+        }
+        if !paint.rgb.iter().all(|c| (0.0..=1.0).contains(c)) {
+            return Err(refused("a filter's transmissions are 0 to 1"));
+        }
+        if paint.points.len() > MAX_POINTS {
+            return Err(refused(format!("{} points are more than {MAX_POINTS}; paint in pieces", paint.points.len())));
+        }
+        let mut shared = self.lock();
+        let TechniqueSpec::Schlieren { cutoff } = shared.scene.technique.clone() else {
+            return Err(refused("only schlieren has a filter; take technique schlieren to paint"));
+        };
+
+        // Where on the filter.
+        let traced_view = shared.frame.as_ref().and_then(|f| f.traced.clone());
+        let (places, dark) = match paint.on {
+            Canvas::Filter => (paint.points.clone(), 0),
+            Canvas::Picture => {
+                let Some(view) = &traced_view else {
+                    return Err(refused("the picture is not drawn yet; paint when it stands still"));
+                };
+                let f2 = shared.scene.optics().schlieren_focal_length_m;
+                let on_filter = |p: &[f64; 2]| traced(&view.map, &view.framing, f2, *p).map(|t| t.1.map(f64::from));
+                let places: Vec<[f64; 2]> = paint.points.iter().filter_map(on_filter).collect();
+                let dark = paint.points.len() - places.len();
+                (places, dark)
+            }
+        };
+
+        // Onto a painting.
+        let half_m = half_side_m(&shared.scene, traced_view.as_ref().map(|t| &t.map));
+        let (mut painting, same) =
+            as_painting(&shared.scene, &cutoff, half_m, [0.0; 3]).map_err(|e| refused(chain(&e)))?;
+        let strokes = strokes(&places, paint);
+        let added = strokes.len();
+        painting.strokes.extend(strokes);
+        if painting.strokes.len() > MAX_STROKES {
+            return Err(refused(format!("the painting would have more than {MAX_STROKES} strokes; start a new one")));
+        }
+        let mut scene = shared.scene.clone();
+        // The source stays as it was: a knife's customary slit would otherwise become a painting's customary disc.
+        scene.light.source = scene.effective().light.source;
+        scene.technique = TechniqueSpec::Schlieren { cutoff: CutoffSpec::Painted(painting) };
+        self.check_scene(&scene)?;
+        if added > 0 {
+            shared.scene = scene;
+            self.changed(&mut shared);
+        }
+        let note = (!same && added > 0)
+            .then(|| format!("a {} filter cannot be painted over; the painting starts on black", cutoff.name()));
+        Ok(Painted { generation: shared.generation, added, dark, note })
+    }
+
+    /// Where the light of a place of the picture goes: deflection, and point on the filter; `None` without light.
+    pub fn trace(&self, at: [f64; 2]) -> Result<Option<(Across, Across)>, Refused> {
+        if !at.iter().all(|c| (0.0..=1.0).contains(c)) {
+            return Err(refused("places of the picture are 0 to 1 from its upper left corner"));
+        }
+        let shared = self.lock();
+        let view: Option<Arc<Traced>> = shared.frame.as_ref().and_then(|f| f.traced.clone());
+        let view = view.ok_or_else(|| refused("the picture is not drawn yet"))?;
+        let f2 = shared.scene.optics().schlieren_focal_length_m;
+        Ok(traced(&view.map, &view.framing, f2, at))
+    }
+
+    /// Asks for a file; the receiver gets it or why there is none.
+    pub(super) fn save(
+        &self,
+        kind: SaveKind,
+        cancel: Arc<AtomicBool>,
+    ) -> Result<tokio::sync::oneshot::Receiver<Result<Vec<u8>, String>>, Refused> {
+        const QUEUE: usize = 4;
+        let mut shared = self.lock();
+        if shared.saves.len() >= QUEUE {
+            return Err(refused(format!("{QUEUE} files are being made already; try again when they are done")));
+        }
+        let (reply, receiver) = tokio::sync::oneshot::channel();
+        let scene = shared.scene.clone();
+        shared.saves.push_back(Save { scene, kind, cancel, reply });
+        drop(shared);
+        self.cancel.store(true, Ordering::Relaxed);
+        self.wake.notify_all();
+        Ok(receiver)
+    }
+
+    /// Ends the drawing thread.
+    pub(super) fn stop(&self) {
+        let mut shared = self.lock();
+        shared.stop = true;
+        // Dropping the senders tells those who wait.
+        for save in shared.saves.drain(..) {
+            save.cancel.store(true, Ordering::Relaxed);
+        }
+        drop(shared);
+        self.cancel.store(true, Ordering::Relaxed);
+        self.wake.notify_all();
+    }
+
+    /// Shows a frame to everyone who waits for one.
+    pub(super) fn publish(&self, frame: Frame) {
+        let serial = frame.info.serial;
+        self.lock().frame = Some(Arc::new(frame));
+        self.frames.send_replace(serial);
+    }
+
+    fn changed(&self, shared: &mut Shared) {
+        shared.generation += 1;
+        self.cancel.store(true, Ordering::Relaxed);
+        self.wake.notify_all();
+    }
+}
+
+/// Strokes through places on the filter. Neighbouring places farther apart than the brush is wide are not joined on the picture's behalf: across a shock they have nothing between
+/// them. Places that a dab already covers add nothing.
+fn strokes(places: &[[f64; 2]], paint: &Paint) -> Vec<Stroke> {
+    let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+    let mut strokes: Vec<Stroke> = Vec::new();
+    let mut last: Option<[f64; 2]> = None;
+    for &to_m in places {
+        let joined = |l: &[f64; 2]| paint.on == Canvas::Filter || distance(*l, to_m) <= 2.0 * paint.radius_m;
+        if last.is_some_and(|l| distance(l, to_m) < 0.05 * paint.radius_m) {
+            continue;
+        }
+        let from_m = last.filter(joined).unwrap_or(to_m);
+        strokes.push(Stroke { from_m, to_m, radius_m: paint.radius_m, rgb: paint.rgb });
+        last = Some(to_m);
+    }
+    strokes
+}
+
+impl Kept {
+    fn of(scene: &Scene) -> Kept {
+        Kept {
+            technique: scene.technique.clone(),
+            light: scene.light.clone(),
+            lenses: scene.lenses,
+            film: scene.film,
+            sampling: scene.sampling,
+        }
+    }
+
+    /// What belongs to a technique as it was, or its custom. Framing and colours belong to all.
+    fn bring_back(kept: Option<Kept>, custom: TechniqueSpec, scene: &mut Scene) {
+        let light = LightSpec { wavelengths_nm: scene.light.wavelengths_nm.clone(), weights: scene.light.weights.clone(), ..LightSpec::default() };
+        let kept = kept.unwrap_or(Kept {
+            technique: custom,
+            light,
+            lenses: LensSpec::default(),
+            film: FilmSpec::default(),
+            sampling: None,
+        });
+        scene.light.source = kept.light.source;
+        scene.light.beams = if kept.technique.uses_source() { kept.light.beams } else { BeamsSpec::Auto };
+        scene.lenses = kept.lenses;
+        scene.film.focus_m = kept.film.focus_m;
+        scene.film.exposure = kept.film.exposure;
+        scene.sampling = kept.sampling;
+        if !kept.technique.follows_light() {
+            // They take one wavelength.
+            scene.light.wavelengths_nm.truncate(1);
+            scene.light.weights.clear();
+        }
+        scene.technique = kept.technique;
+    }
+}
+
+fn check_limits(scene: &Scene) -> Result<(), Refused> {
+    let [w, h] = scene.film.size;
+    if w > MAX_SIDE || h > MAX_SIDE {
+        return Err(refused(format!(
+            "film.size is {w}x{h}; the page draws at most {MAX_SIDE} pixels along a side: save the scene and draw it with `schlieren render --scene`"
+        )));
+    }
+    match scene.sampling() {
+        SamplingSpec::Photons { samples, .. } if samples > MAX_SAMPLES => Err(refused(format!(
+            "sampling.samples is {samples}; the page takes at most {MAX_SAMPLES}: save the scene and draw it with `schlieren render --scene`"
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// RFC 7396, but for objects that choose one of several kinds: merged, keys of the old kind would remain.
+fn merge(target: &mut Value, patch: Value) {
+    let Value::Object(patch) = patch else {
+        *target = patch;
+        return;
+    };
+    let chooses = patch.contains_key("kind") || patch.contains_key("method");
+    if chooses || !target.is_object() {
+        *target = Value::Object(serde_json::Map::new());
+    }
+    let Value::Object(target) = target else { return };
+    for (key, value) in patch {
+        if value.is_null() {
+            target.remove(&key);
+        } else {
+            merge(target.entry(key).or_insert(Value::Null), value);
+        }
+    }
+}
+
+/// An error with its causes.
+pub(super) fn chain(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(c) = cause {
+        let more = c.to_string();
+        if !text.contains(&more) {
+            text += &format!(": {more}");
+        }
+        cause = c.source();
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,484 @@
+//! The thread that draws: coarse at once, finer while nothing changes, then the error of the march.
+//!
+//! ```text
+//!            change                 change during 2…                 nothing changes
+//!  requests ───┐                         ┐
+//!  thread      └─ 1 coarse, never stopped └─ (stopped) 1 coarse ─ 2 … ─ samples × 4 … ─ finished ─ error measured
+//! ```
+//! The first picture after a change is never stopped by the next change: whoever drags without pause sees every picture that this machine can draw. All others are
+//! stopped at once. Each is drawn from scratch, so the finished one is bit for bit what `schlieren render` makes of the same scene; since photons grow by fours, that costs a third more than
+//! adding them up would.
+
+use super::filter_plane::FilterPlane;
+use super::flow::{Flow, coarse};
+use super::frame::{Frame, FrameInfo, Traced};
+use super::session::{Save, SaveKind, Session, chain};
+use crate::output;
+use crate::path::Wanted;
+use crate::render::{self, Control, Layers, Map, RenderError, Rendered, TestSection, framing};
+use crate::scene::{FlowSpec, MarchSpec, SamplingSpec, Scene, TechniqueSpec, ViewSpec};
+use crate::solids::Solids;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// What the first picture after a change may take.
+const MOVING_SECS: f64 = 0.06;
+/// Longest side of that picture, at most and at least.
+const MOVING_SIDES: [u32; 2] = [320, 64];
+/// Photons per pixel of it.
+const MOVING_SAMPLES: u32 = 4;
+/// Tolerance of the first two pictures: straight rays through all but the strongest flows, which shows as much as an eye sees.
+const DRAFT_TOLERANCE_RAD: f64 = 1e-2;
+/// How long nothing has to change before the error is measured: that cannot be stopped.
+const STILL: Duration = Duration::from_millis(500);
+
+/// What deflections depend on.
+#[derive(Clone, PartialEq)]
+struct Geometry {
+    flow: FlowSpec,
+    view: ViewSpec,
+    wavelengths_nm: Vec<f64>,
+    film: [f64; 6],
+    march: MarchSpec,
+}
+
+impl Geometry {
+    fn of(scene: &Scene) -> Geometry {
+        let (f, n) = (&scene.film, f64::NEG_INFINITY);
+        let [w, h] = f.size.map(f64::from);
+        Geometry {
+            flow: scene.flow.clone(),
+            view: scene.view.clone(),
+            wavelengths_nm: scene.light.wavelengths_nm.clone(),
+            film: [w, h, f.field_of_view_m.unwrap_or(n), f.center_m[0], f.center_m[1], scene.focus_m()],
+            march: scene.march.clone(),
+        }
+    }
+}
+
+/// Measured once for each geometry.
+#[derive(Clone, Copy, Default)]
+struct Errors {
+    march_rad: Option<f64>,
+    resolution_rad: Option<f64>,
+}
+
+pub(super) struct Worker {
+    session: Arc<Session>,
+    flow: Flow,
+    /// The section for a flow and wavelengths, and a thinned one.
+    section: Option<Section>,
+    solids: Option<Solids>,
+    traced: Option<(Geometry, Arc<Traced>)>,
+    errors: Option<(Geometry, Errors)>,
+    serial: u64,
+    moving_side: u32,
+}
+
+struct Section {
+    flow: FlowSpec,
+    wavelengths_nm: Vec<f64>,
+    full: TestSection,
+    thin: Option<TestSection>,
+}
+
+/// One of the pictures on the way to the finished one.
+#[derive(Debug, Clone, PartialEq)]
+struct Level {
+    scene: Scene,
+    /// Drawn with a coarse tolerance.
+    draft: bool,
+    thin: bool,
+    stoppable: bool,
+    samples: Option<u32>,
+}
+
+impl Worker {
+    pub(super) fn new(session: Arc<Session>, flow: Flow, solids: Option<Solids>) -> Worker {
+        Worker {
+            session,
+            flow,
+            section: None,
+            solids,
+            traced: None,
+            errors: None,
+            serial: 0,
+            moving_side: MOVING_SIDES[0],
+        }
+    }
+
+    /// Draws until the session stops.
+    pub(super) fn run(mut self) {
+        let mut finished = 0;
+        loop {
+            // What is wanted.
+            let session = self.session.clone();
+            let mut shared = session.lock();
+            while !shared.stop && shared.saves.is_empty() && shared.generation == finished {
+                shared = session.wake.wait(shared).unwrap_or_else(std::sync::PoisonError::into_inner);
+            }
+            if shared.stop {
+                return;
+            }
+            session.cancel.store(false, Ordering::Relaxed);
+            let save = shared.saves.pop_front();
+            let (scene, generation) = (shared.scene.clone(), shared.generation);
+            drop(shared);
+
+            match save {
+                Some(save) => self.save(save),
+                None => {
+                    if self.draw(&scene, generation) {
+                        finished = generation;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Draws all pictures of a scene; false when stopped before the last.
+    fn draw(&mut self, scene: &Scene, generation: u64) -> bool {
+        let session = self.session.clone();
+        // A panic must not leave a page that waits for ever.
+        let outcome = catch_unwind(AssertUnwindSafe(|| self.draw_levels(scene, generation)));
+        let error = match outcome {
+            Ok(Ok(done)) => return done,
+            Ok(Err(RenderError::Cancelled)) => return false,
+            Ok(Err(e)) => chain(&e),
+            Err(panic) => {
+                self.section = None;
+                let text = panic.downcast_ref::<String>().cloned();
+                let text = text.or_else(|| panic.downcast_ref::<&str>().map(ToString::to_string));
+                format!("drawing this scene panicked ({}); please report it with the saved scene", text.unwrap_or_default())
+            }
+        };
+        self.serial += 1;
+        let info =
+            FrameInfo { serial: self.serial, generation, finished: true, error: Some(error), ..FrameInfo::default() };
+        session.publish(Frame::new(info, None, None, None));
+        true
+    }
+
+    fn draw_levels(&mut self, scene: &Scene, generation: u64) -> Result<bool, RenderError> {
+        self.prepare(scene)?;
+        let dots = self.with_section(false, |s| dots(scene, s))?;
+        let levels = levels(scene, self.moving_side).into_iter().map(|l| l.with_dots(&dots));
+        let levels: Vec<Level> = levels.collect();
+        let last = levels.len() - 1;
+        let geometry = Geometry::of(scene);
+        let mut drawn = None;
+        for (i, level) in levels.into_iter().enumerate() {
+            let start = Instant::now();
+            let rendered = self.render(&level)?;
+            let elapsed_secs = start.elapsed().as_secs_f64();
+            if i == 0 && last > 0 {
+                self.adapt(elapsed_secs, scene);
+            }
+            let traced = self.traced(&level, &geometry)?;
+            let info = FrameInfo {
+                generation,
+                finished: false,
+                samples: level.samples,
+                samples_wanted: wanted_samples(scene),
+                elapsed_secs,
+                draft: level.draft,
+                ..FrameInfo::default()
+            };
+            let complete = i == last && self.errors_known(&geometry).is_some();
+            self.publish(scene, FrameInfo { finished: complete, ..info.clone() }, &rendered, &traced)?;
+            drawn = Some((info, rendered, traced));
+            if i < last && self.session.cancel.load(Ordering::Relaxed) {
+                return Ok(false);
+            }
+        }
+
+        // The error of the march, when it stands still.
+        if self.errors_known(&geometry).is_some() {
+            return Ok(true);
+        }
+        let end = Instant::now() + STILL;
+        while Instant::now() < end {
+            if self.session.cancel.load(Ordering::Relaxed) {
+                return Ok(false);
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        self.measure(scene, &geometry)?;
+        if let Some((info, rendered, traced)) = drawn {
+            self.publish(scene, FrameInfo { finished: true, ..info }, &rendered, &traced)?;
+        }
+        Ok(true)
+    }
+
+    /// The test section for a scene.
+    fn prepare(&mut self, scene: &Scene) -> Result<(), RenderError> {
+        let fits = |s: &Section| s.flow == scene.flow && s.wavelengths_nm == scene.light.wavelengths_nm;
+        if !self.section.as_ref().is_some_and(fits) {
+            if let Some(old) = self.section.take() {
+                self.solids = old.full.solids;
+            }
+            // Bodies are kept where a failure cannot lose them.
+            let mut full = self.flow.section(scene, None)?;
+            let thin_fields: Option<Vec<_>> = full.fields.iter().map(coarse).collect();
+            let thin = match thin_fields {
+                Some(fields) => Some(TestSection::of_fields(scene, fields, None)?),
+                None => None,
+            };
+            full.solids = self.solids.take();
+            let (flow, wavelengths_nm) = (scene.flow.clone(), scene.light.wavelengths_nm.clone());
+            self.section = Some(Section { flow, wavelengths_nm, full, thin });
+        }
+        if let Some(s) = &mut self.section {
+            let view = scene.view.direction.view(s.full.fields[0].centre_m())?;
+            s.full.view = view;
+            if let Some(thin) = &mut s.thin {
+                thin.view = view;
+            }
+        }
+        Ok(())
+    }
+
+    /// Bodies belong to the whole section; the thinned one borrows them for the time of `with`.
+    fn with_section<T>(&mut self, thin: bool, with: impl FnOnce(&TestSection) -> T) -> Result<T, RenderError> {
+        let Some(s) = &mut self.section else { return Err(RenderError::Cancelled) };
+        match s.thin.as_mut().filter(|_| thin) {
+            Some(thin) => {
+                thin.solids = s.full.solids.take();
+                let result = catch_unwind(AssertUnwindSafe(|| with(thin)));
+                s.full.solids = thin.solids.take();
+                result.map_err(|panic| std::panic::resume_unwind(panic))
+            }
+            None => Ok(with(&s.full)),
+        }
+    }
+
+    fn render(&mut self, level: &Level) -> Result<Rendered, RenderError> {
+        static NEVER: AtomicBool = AtomicBool::new(false);
+        let session = self.session.clone();
+        let control =
+            Control { cancel: if level.stoppable { &session.cancel } else { &NEVER }, progress: &|_| {} };
+        let layers = Layers { noise: true, ..Layers::NONE };
+        self.with_section(level.thin, |s| render::render(&level.scene, s, layers, &control))?
+    }
+
+    /// Deflections of the scene itself where they are known, else of this level.
+    fn traced(&mut self, level: &Level, geometry: &Geometry) -> Result<Arc<Traced>, RenderError> {
+        if let Some((g, t)) = &self.traced
+            && g == geometry
+        {
+            return Ok(t.clone());
+        }
+        let scene = &level.scene;
+        let traced = self.with_section(level.thin, |section| {
+            let planned = section.paths(scene, 0, Wanted { opd: false }, false, false)?;
+            let framing = framing(scene, section);
+            let blocked =
+                |s: &crate::path::Start| section.solids.as_ref().is_some_and(|b| b.block(&section.view, s));
+            let wavelength_m = scene.light.wavelengths_nm[0] * 1e-9;
+            let n0 = section.fields[0].n0();
+            let map: Map =
+                render::map::map(&*planned.paths, &scene.optics(), &framing, wavelength_m, n0, blocked);
+            Ok::<_, RenderError>(Arc::new(Traced { map, framing }))
+        })??;
+        if !level.draft {
+            self.traced = Some((geometry.clone(), traced.clone()));
+        }
+        Ok(traced)
+    }
+
+    fn errors_known(&self, geometry: &Geometry) -> Option<Errors> {
+        self.errors.as_ref().filter(|e| e.0 == *geometry).map(|e| e.1)
+    }
+
+    fn measure(&mut self, scene: &Scene, geometry: &Geometry) -> Result<(), RenderError> {
+        let errors = self.with_section(false, |section| {
+            let planned = section.paths(scene, 0, Wanted { opd: false }, false, true)?;
+            Ok::<_, RenderError>(Errors {
+                march_rad: planned.error_rad,
+                resolution_rad: planned.resolution_error_rad,
+            })
+        })??;
+        self.errors = Some((geometry.clone(), errors));
+        Ok(())
+    }
+
+    fn publish(
+        &mut self,
+        scene: &Scene,
+        info: FrameInfo,
+        rendered: &Rendered,
+        traced: &Arc<Traced>,
+    ) -> Result<(), RenderError> {
+        let filter = FilterPlane::new(scene, Some(&traced.map))?;
+        self.serial += 1;
+        let r = &rendered.report;
+        let errors = self.errors_known(&Geometry::of(scene));
+        let noise = rendered.noise.as_ref().filter(|n| !n.is_empty());
+        let squares = |n: &Vec<f32>| n.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>() / n.len() as f64;
+        let info = FrameInfo {
+            serial: self.serial,
+            rays: r.counters.rays,
+            noise_rms: noise.map(|n| squares(n).sqrt()),
+            noise_max: noise.map(|n| f64::from(n.iter().fold(0.0f32, |m, v| m.max(*v)))),
+            deflection_error_rad: errors.and_then(|e| e.march_rad),
+            resolution_error_rad: errors.and_then(|e| e.resolution_rad),
+            largest_deflection_rad: Some(traced.map.largest_deflection_rad),
+            march: r.march.clone(),
+            levels: r.levels,
+            warnings: r.warnings.clone(),
+            focal_length_m: scene.optics().schlieren_focal_length_m,
+            ..info
+        };
+        self.session.publish(Frame::new(info, Some(rendered), Some(&filter), Some(traced.clone())));
+        Ok(())
+    }
+
+    /// Sides of moving pictures follow this machine's speed.
+    fn adapt(&mut self, elapsed_secs: f64, scene: &Scene) {
+        let factor = (MOVING_SECS / elapsed_secs.max(1e-4)).sqrt().clamp(0.5, 1.3);
+        let largest = scene.film.size[0].max(scene.film.size[1]).min(MOVING_SIDES[0]);
+        let side = f64::from(self.moving_side) * factor;
+        self.moving_side = (side as u32).min(largest).max(MOVING_SIDES[1]);
+    }
+
+    fn save(&mut self, save: Save) {
+        let outcome = catch_unwind(AssertUnwindSafe(|| self.file(&save)));
+        let result = outcome.unwrap_or_else(|_| Err("drawing this scene panicked; please report it with the saved scene".into()));
+        // Nobody may wait any more.
+        let _ = save.reply.send(result);
+    }
+
+    fn file(&mut self, save: &Save) -> Result<Vec<u8>, String> {
+        let text = |e: &dyn std::error::Error| chain(e);
+        self.prepare(&save.scene).map_err(|e| text(&e))?;
+        let start = Instant::now();
+        let layers = match save.kind {
+            SaveKind::Png => Layers::NONE,
+            SaveKind::Exr => Layers::ALL,
+        };
+        // Changes of the scene do not stop a file that was asked for; its request's end and the program's do.
+        let control = Control { cancel: &save.cancel, progress: &|_| {} };
+        let rendered = self
+            .with_section(false, |s| render::render(&save.scene, s, layers, &control))
+            .and_then(|r| r)
+            .map_err(|e| text(&e))?;
+        let folder = tempfile::tempdir().map_err(|e| text(&e))?;
+        let path = folder.path().join("picture");
+        match save.kind {
+            SaveKind::Png => output::write_png(&path, &rendered).map(|_| ()),
+            SaveKind::Exr => {
+                output::write_exr(&path, &rendered, &save.scene, start.elapsed().as_secs_f64())
+            }
+        }
+        .map_err(|e| text(&e))?;
+        std::fs::read(&path).map_err(|e| text(&e))
+    }
+}
+
+/// The background's dots in metres, where the scene leaves them to the pixels: coarse pictures have other pixels, and the same dots.
+fn dots(scene: &Scene, section: &TestSection) -> Option<TechniqueSpec> {
+    let TechniqueSpec::Bos { dot_diameter_m: None, dot_spacing_m, seed } = scene.technique else { return None };
+    // As [`render::technique`] chooses them.
+    let diameter_m = (3.0 * framing(scene, section).pixel_m).min(dot_spacing_m.unwrap_or(f64::INFINITY));
+    Some(TechniqueSpec::Bos {
+        dot_diameter_m: Some(diameter_m),
+        dot_spacing_m: Some(dot_spacing_m.unwrap_or(2.0 * diameter_m)),
+        seed,
+    })
+}
+
+impl Level {
+    fn with_dots(mut self, dots: &Option<TechniqueSpec>) -> Level {
+        // The finished picture stays the scene's own.
+        if let Some(dots) = dots.as_ref().filter(|_| self.thin) {
+            self.scene.technique = dots.clone();
+        }
+        self
+    }
+}
+
+fn wanted_samples(scene: &Scene) -> Option<u32> {
+    match scene.sampling() {
+        SamplingSpec::Photons { samples, .. } if scene.technique.follows_light() => Some(samples),
+        _ => None,
+    }
+}
+
+/// The pictures on the way to the scene's own, which is the last.
+fn levels(scene: &Scene, moving_side: u32) -> Vec<Level> {
+    let wanted = wanted_samples(scene);
+    let whole = |samples: Option<u32>| {
+        let mut s = scene.clone();
+        if let (Some(n), SamplingSpec::Photons { jitter, seed, filter, .. }) = (samples, scene.sampling()) {
+            s.sampling = Some(SamplingSpec::Photons { samples: n, jitter, seed, filter });
+        }
+        Level { scene: s, draft: false, thin: false, stoppable: true, samples }
+    };
+    let mut draft = whole(wanted.map(|n| n.min(MOVING_SAMPLES)));
+    draft.scene.march.tolerance_rad = scene.march.tolerance_rad.max(DRAFT_TOLERANCE_RAD);
+    draft.draft = true;
+    let mut moving = Level { thin: true, stoppable: false, ..draft.clone() };
+    shrink(&mut moving.scene, moving_side);
+    let mut levels = vec![moving, draft];
+    let mut samples = MOVING_SAMPLES;
+    while wanted.is_some_and(|w| samples < w) {
+        levels.push(whole(Some(samples)));
+        samples *= 4;
+    }
+    // The scene itself, untouched.
+    levels.push(Level { scene: scene.clone(), ..whole(wanted) });
+    levels
+}
+
+/// The same picture with fewer pixels.
+fn shrink(scene: &mut Scene, side: u32) {
+    let [w, h] = scene.film.size;
+    let longest = w.max(h);
+    if longest <= side {
+        return;
+    }
+    let factor = f64::from(side) / f64::from(longest);
+    scene.film.size = [w, h].map(|n| (f64::from(n) * factor).round().max(1.0) as u32);
+    if let SamplingSpec::Beams { cells_per_side } = scene.sampling()
+        && cells_per_side > 1
+    {
+        scene.sampling = Some(SamplingSpec::Beams { cells_per_side: 1 });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene(rest: &str) -> Scene {
+        Scene::from_toml(&format!("[flow]\nfile = \"a\"\ndensity = \"r\"\n{rest}")).unwrap()
+    }
+
+    #[test]
+    fn pictures_get_finer_and_the_last_is_the_scene_itself() {
+        let s = scene("[film]\nsize = [512, 256]\n[sampling]\nmethod = \"photons\"\nsamples = 100");
+        let levels = levels(&s, 128);
+        let samples: Vec<_> = levels.iter().map(|l| l.samples.unwrap()).collect();
+        assert_eq!(samples, [4, 4, 4, 16, 64, 100]);
+        assert!(levels[0].draft && levels[1].draft && !levels[2].draft);
+        assert_eq!(levels[0].scene.film.size, [128, 64]);
+        assert!(levels[0].thin && !levels[0].stoppable);
+        assert_eq!(levels.last().unwrap().scene, s);
+        for l in &levels {
+            l.scene.check().unwrap();
+        }
+    }
+
+    #[test]
+    fn every_technique_has_pictures_that_are_scenes() {
+        for name in TechniqueSpec::NAMES {
+            let s = scene(&format!("[technique]\nkind = \"{name}\""));
+            let levels = levels(&s, 100);
+            assert!(levels.len() >= 2, "{name}");
+            levels.iter().for_each(|l| l.scene.check().unwrap());
+            assert_eq!(levels.last().unwrap().scene, s);
+        }
+    }
+}

@@ -1,0 +1,267 @@
+//! `schlieren serve` as the page and as strangers talk to it.
+#![cfg(feature = "serve")]
+
+mod serving;
+
+use datasets::image_io::{read_exr, read_png};
+use serde_json::json;
+use serving::{Served, changed};
+use std::io::{Read, Write};
+use std::time::{Duration, Instant};
+
+const SMALL: [&str; 4] = ["--size", "96x48", "--samples", "16"];
+
+#[test]
+fn the_page_and_its_parts_need_nothing_from_elsewhere() {
+    let s = Served::start(&SMALL);
+    let page = s.get("");
+    assert_eq!(page.status, 200);
+    assert!(page.head.contains("content-security-policy: default-src 'none'"), "{}", page.head);
+    let mut parts = vec![page.text()];
+    for part in ["page.css", "main.js", "server.js", "units.js", "picture.js", "filter.js", "settings.js", "curves.js"] {
+        let answer = s.get(part);
+        assert_eq!(answer.status, 200, "{part}");
+        parts.push(answer.text());
+    }
+    for text in parts {
+        assert!(!text.contains("http://") && !text.contains("https://") && !text.contains("//cdn"), "{text:.80}");
+    }
+}
+
+#[test]
+fn without_the_token_nothing_is_told() {
+    let s = Served::start(&SMALL);
+    let wrong = format!("/{}/", "0".repeat(32));
+    for path in ["/", "/state", "/frame", "//", &wrong, &format!("{wrong}state"), &s.base.to_uppercase()[..9]] {
+        let request = format!("GET {path} HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n");
+        let answer = s.raw(request.as_bytes()).unwrap();
+        assert_eq!(answer.status, 403, "{path}");
+        assert!(!answer.text().contains(s.base.trim_matches('/')), "{path}");
+    }
+    let request = format!("POST {wrong}scene HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Length: 2\r\n\r\n{{}}");
+    assert_eq!(s.raw(request.as_bytes()).unwrap().status, 403);
+    assert!(s.is_healthy());
+}
+
+#[test]
+fn the_finished_picture_is_that_of_render() {
+    let s = Served::start(&SMALL);
+    let shown = s.finished();
+    assert_eq!((shown.info["width"].as_u64(), shown.info["height"].as_u64()), (Some(96), Some(48)));
+    assert_eq!(shown.info["samples"], 16);
+    assert!(shown.info["deflection_error_rad"].as_f64().unwrap() < 1e-6, "{}", shown.info);
+    assert!(shown.info["noise_rms"].as_f64().unwrap() > 0.0 && shown.info["rays"].as_u64().unwrap() > 96 * 48 * 16);
+
+    // The saved picture has the same pixels, and the saved scene makes the same picture again.
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name);
+    let save = |kind: &str| {
+        let answer = s.get(&format!("save/{kind}"));
+        assert_eq!(answer.status, 200, "{kind}: {}", answer.text());
+        std::fs::write(path(&format!("saved.{kind}")), &answer.body).unwrap();
+    };
+    ["png", "exr", "toml"].map(save);
+    let png = read_png(&path("saved.png")).unwrap();
+    assert_eq!((png.width, png.height), (96, 48));
+    let exr = read_exr(&path("saved.exr")).unwrap();
+    for plane in ["Y", "deflection.X", "phase.Y", "samples.Y", "error.Y"] {
+        assert!(exr.plane(plane).is_some(), "{plane}");
+    }
+    let status = std::process::Command::new(env!("CARGO_BIN_EXE_schlieren"))
+        .args(["render", "--quiet", "--scene"])
+        .arg(path("saved.toml"))
+        .arg("-o")
+        .arg(path("again.png"))
+        .status()
+        .unwrap();
+    assert!(status.success());
+    let again = read_png(&path("again.png")).unwrap();
+    assert_eq!(again.rgba().unwrap(), png.rgba().unwrap());
+    let bytes: Vec<u8> = again.rgba().unwrap().iter().flat_map(|p| [p[0], p[1], p[2]]).map(srgb).collect();
+    assert_eq!(bytes, shown.rgb);
+}
+
+fn srgb(v: f32) -> u8 {
+    (255.0 * rt_core::colormap::linear_to_srgb(v)).round() as u8
+}
+
+#[test]
+fn every_technique_and_cutoff_draws() {
+    let s = Served::start(&SMALL);
+    let mut last = s.finished().rgb;
+    for technique in ["shadowgraph", "interferogram", "bos", "volume", "slice", "schlieren"] {
+        s.change(&json!({"technique": {"kind": technique}}));
+        let shown = s.finished();
+        assert_eq!(shown.info["error"], serde_json::Value::Null, "{technique}");
+        assert!(changed(&last, &shown.rgb) > 0.02, "{technique} looks like the one before");
+        last = shown.rgb;
+    }
+    for cutoff in [
+        json!({"kind": "knife", "angle_deg": 90.0}),
+        json!({"kind": "circle", "radius_m": 2e-4}),
+        json!({"kind": "complemented-circle", "radius_m": 2e-4}),
+        json!({"kind": "color", "radius_m": 2e-4}),
+        json!({"kind": "painted", "size_m": [2e-3, 2e-3], "ground_rgb": [0.0, 1.0, 0.0]}),
+    ] {
+        s.change(&json!({"technique": {"kind": "schlieren", "cutoff": cutoff}}));
+        let shown = s.finished();
+        assert!(changed(&last, &shown.rgb) > 0.02, "{cutoff}");
+        last = shown.rgb;
+    }
+}
+
+#[test]
+fn painting_changes_the_picture_where_its_light_is() {
+    let s = Served::start(&SMALL);
+    // A clear filter and a small source: the picture is white until something is painted.
+    s.change(&json!({
+        "light": {"source": {"kind": "circle", "diameter_m": 5e-5}},
+        "technique": {"kind": "schlieren", "cutoff": {"kind": "painted", "size_m": [2e-3, 2e-3], "ground_rgb": [1, 1, 1]}},
+    }));
+    let white = s.finished();
+    assert!(white.rgb.iter().all(|v| *v > 250));
+    assert!((white.light.iter().sum::<f32>() - 1.0).abs() < 0.05, "the light is on the filter");
+
+    // Left of the blob's middle: its own place on the filter, away from the axis.
+    let at = [0.60, 0.40];
+    let traced = s.ask("POST", "trace", &json!({ "at": at }).to_string()).json();
+    let place = [0, 1].map(|i| traced["filter_m"][i].as_f64().unwrap());
+    assert!(place[0].hypot(place[1]) > 5e-5, "{traced}");
+    let red = |on: &str, points: serde_json::Value| {
+        let body = json!({"on": on, "points": points, "radius_m": 6e-5, "rgb": [1.0, 0.0, 0.0]});
+        let answer = s.ask("POST", "paint", &body.to_string());
+        assert_eq!(answer.status, 200, "{}", answer.text());
+        s.finished()
+    };
+    let by_picture = red("picture", json!([at]));
+    let pixel = |rgb: &[u8], at: [f64; 2]| {
+        let i = 3 * ((at[1] * 48.0) as usize * 96 + (at[0] * 96.0) as usize);
+        [rgb[i], rgb[i + 1], rgb[i + 2]]
+    };
+    let p = pixel(&by_picture.rgb, at);
+    assert!(p[0] > 240 && p[1] < 80, "{p:?}");
+    assert!(pixel(&by_picture.rgb, [0.05, 0.9]).iter().all(|v| *v > 250), "undisturbed light is not painted on");
+    assert!(changed(&white.filter, &by_picture.filter) > 0.0);
+
+    // The same by its place on the filter changes nothing any more; the axis turns the background red.
+    let by_filter = red("filter", json!([place]));
+    assert!(changed(&by_picture.rgb, &by_filter.rgb) < 0.01);
+    let axis = red("filter", json!([[0.0, 0.0]]));
+    let p = pixel(&axis.rgb, [0.05, 0.9]);
+    assert!(p[0] > 240 && p[1] < 80, "{p:?}");
+}
+
+#[test]
+fn curves_make_another_index_and_bodies_stay_shut() {
+    let s = Served::start(&SMALL);
+    let state = s.get("state").json();
+    let names: Vec<&str> = state["arrays"].as_array().unwrap().iter().map(|a| a["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["T", "rho"]);
+    let density = s.finished().rgb;
+    let knots = json!([[290.0, 0.0], [400.0, 3e-4]]);
+    s.change(&json!({"flow": {"multifield": {"fields": {"T": {"knots": knots}}}}}));
+    let curves = s.finished();
+    assert!(changed(&density, &curves.rgb) > 0.02);
+    s.change(&json!({"flow": {"multifield": null}}));
+    assert_eq!(s.finished().rgb, density);
+}
+
+#[test]
+fn bad_requests_get_a_reason_and_harm_nothing() {
+    let s = Served::start(&SMALL);
+    for (method, path, body, status) in [
+        ("POST", "scene", "{", 400),
+        ("POST", "scene", "{\"film\": {\"size\": [4000000000, 4000000000]}}", 422),
+        ("POST", "scene", "{\"film\": {\"size\": [1e999, 1]}}", 400),
+        ("POST", "scene", "{\"flow\": {\"file\": \"/etc/passwd\"}}", 422),
+        ("POST", "scene", "{\"view\": {\"direction\": \"up\"}}", 422),
+        ("POST", "paint", "{\"on\": \"wall\"}", 400),
+        ("POST", "trace", "{\"at\": [7, 7]}", 422),
+        ("GET", "frame?after=minus", "", 400),
+        ("GET", "save/exe", "", 404),
+        ("GET", "nothing", "", 404),
+        ("GET", "../../etc/passwd", "", 404),
+        ("DELETE", "scene", "", 405),
+    ] {
+        let answer = s.ask(method, path, body);
+        assert_eq!(answer.status, status, "{method} {path} {body}: {}", answer.text());
+        if status == 422 {
+            assert!(answer.json()["error"].as_str().unwrap().len() > 10);
+        }
+    }
+    let deep = "[".repeat(100_000);
+    assert_eq!(s.ask("POST", "scene", &deep).status, 400);
+    let huge = " ".repeat(3 << 20);
+    assert_eq!(s.ask("POST", "scene", &huge).status, 413);
+    // Not HTTP at all; a header without end; a length that is a lie.
+    for bytes in [
+        b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03".to_vec(),
+        b"GET / HTTP/1.1\r\nX: ".iter().copied().chain(std::iter::repeat_n(b'a', 1 << 20)).collect(),
+        format!("POST {}scene HTTP/1.1\r\nHost: x\r\nContent-Length: 99999999999999999999\r\n\r\n", s.base).into_bytes(),
+    ] {
+        if let Some(answer) = s.raw(&bytes) {
+            assert!((400..500).contains(&answer.status), "{}", answer.head);
+        }
+    }
+    assert_eq!(s.finished().info["error"], serde_json::Value::Null);
+}
+
+#[test]
+fn dropped_and_idle_connections_are_left_behind() {
+    let s = Served::start(&SMALL);
+    let _idle: Vec<_> = (0..50).map(|_| s.connect()).collect();
+    for _ in 0..20 {
+        let mut half = s.connect();
+        half.write_all(format!("POST {}scene HTTP/1.1\r\nHost: x\r\nContent-Length: 1000\r\n\r\n{{\"film\"", s.base).as_bytes()).unwrap();
+        let mut wait = s.connect();
+        wait.write_all(format!("GET {}frame?after=999999 HTTP/1.1\r\nHost: x\r\n\r\n", s.base).as_bytes()).unwrap();
+        let mut reads_a_little = s.connect();
+        reads_a_little.write_all(format!("GET {}frame HTTP/1.1\r\nHost: x\r\n\r\n", s.base).as_bytes()).unwrap();
+        let _ = reads_a_little.read(&mut [0; 10]);
+    }
+    // A file that takes long and that nobody waits for.
+    s.change(&json!({"film": {"size": [2048, 2048]}, "sampling": {"method": "photons", "samples": 4096}}));
+    let mut gone = s.connect();
+    gone.write_all(format!("GET {}save/exr HTTP/1.1\r\nHost: x\r\n\r\n", s.base).as_bytes()).unwrap();
+    std::thread::sleep(Duration::from_millis(300));
+    drop(gone);
+
+    // Requests are answered at once while the drawing thread is at work…
+    let start = Instant::now();
+    assert!(s.is_healthy());
+    assert!(start.elapsed() < Duration::from_secs(2), "{:?}", start.elapsed());
+    // …and it takes up the next scene.
+    s.change(&json!({"film": {"size": [96, 48]}, "sampling": null}));
+    assert_eq!(s.finished().info["width"], 96);
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_ends_it_soon_even_while_it_draws_and_someone_waits() {
+    let mut s = Served::start(&SMALL);
+    s.change(&json!({"film": {"size": [2048, 2048]}, "sampling": {"method": "photons", "samples": 4096}}));
+    let mut wait = s.connect();
+    wait.write_all(format!("GET {}frame?after=999999 HTTP/1.1\r\nHost: x\r\n\r\n", s.base).as_bytes()).unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    let start = Instant::now();
+    let kill = std::process::Command::new("kill").args(["-INT", &s.child.id().to_string()]).status().unwrap();
+    assert!(kill.success());
+    let status = s.child.wait().unwrap();
+    assert_eq!(status.code(), Some(130));
+    assert!(start.elapsed() < Duration::from_secs(10), "{:?}", start.elapsed());
+}
+
+#[test]
+fn a_taken_port_and_a_wrong_flow_are_errors_of_the_command_line() {
+    let s = Served::start(&SMALL);
+    let run = |args: &[&str]| {
+        let out = std::process::Command::new(env!("CARGO_BIN_EXE_schlieren")).args(args).output().unwrap();
+        (out.status.code(), String::from_utf8_lossy(&out.stderr).into_owned())
+    };
+    let (code, text) = run(&["serve", "nothing.vti", "--density", "rho", "--listen", &s.address]);
+    assert!(code == Some(1) && text.contains("cannot listen"), "{text}");
+    let (code, text) = run(&["serve", "nothing.vti", "--density", "rho"]);
+    assert!(code == Some(1) && text.contains("nothing.vti"), "{text}");
+    let (code, text) = run(&["serve", "--density", "rho"]);
+    assert!(code == Some(2) && text.contains("no flow"), "{text}");
+}

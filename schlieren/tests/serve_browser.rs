@@ -1,0 +1,137 @@
+//! The page in a real browser, by hand: look, orbit, paint, switch. What the window shows must change where it should.
+//!
+//! Needs Chromium (`cargo xtask test` installs Debian's). Without it the test says so and passes, unless RTSV_REQUIRE_PEERS is set.
+#![cfg(feature = "serve")]
+
+mod serving;
+#[path = "serving/browser.rs"]
+mod browser;
+
+use browser::{Browser, chromium};
+use datasets::image_io::{Picture, read_png};
+use serving::Served;
+
+/// The window's picture, and where on it the page's parts are.
+struct Window {
+    picture: Picture,
+    rgba: Vec<[f32; 4]>,
+}
+
+/// Left, top, width, height in pixels of the window.
+type Rect = [f64; 4];
+
+fn rect(b: &mut Browser, id: &str) -> Rect {
+    let r = b.evaluate(&format!(
+        "(() => {{ const r = document.getElementById('{id}').getBoundingClientRect(); return [r.left, r.top, r.width, r.height]; }})()"
+    ));
+    [0, 1, 2, 3].map(|i| r[i].as_f64().unwrap())
+}
+
+fn look(b: &mut Browser, name: &str) -> Window {
+    let dir = tempfile::tempdir().unwrap();
+    // Kept where the person who runs the test wants to look at it.
+    let keep = std::env::var_os("RTSV_SCREENSHOTS").map(std::path::PathBuf::from);
+    let path = keep.unwrap_or_else(|| dir.path().to_path_buf()).join(format!("serve-{name}.png"));
+    std::fs::write(&path, b.screenshot()).unwrap();
+    let picture = read_png(&path).unwrap();
+    Window { rgba: picture.rgba().unwrap(), picture }
+}
+
+/// Part of the pixels in a part of a rectangle (`[left, top, right, bottom]` as fractions) that differ visibly.
+fn differs(a: &Window, b: &Window, r: Rect, part: [f64; 4]) -> f64 {
+    let x = [0, 2].map(|i| (r[0] + part[i] * r[2]) as usize);
+    let y = [1, 3].map(|i| (r[1] + part[i] * r[3]) as usize);
+    let width = a.picture.width as usize;
+    let (mut changed, mut all) = (0, 0);
+    for j in y[0]..y[1] {
+        for i in x[0]..x[1] {
+            let [p, q] = [a, b].map(|w| w.rgba[j * width + i]);
+            all += 1;
+            changed += usize::from((0..3).any(|c| (p[c] - q[c]).abs() > 0.02));
+        }
+    }
+    f64::from(changed as u32) / f64::from(all.max(1))
+}
+
+/// Waits until the page shows the finished picture of the scene that the program has now.
+fn settled(b: &mut Browser) {
+    b.wait_for(
+        "fetch('state').then(r => r.json()).then(s => document.body.dataset.finished === 'true' && Number(document.body.dataset.generation) === s.generation)",
+    );
+}
+
+fn inside(r: Rect, x: f64, y: f64) -> [f64; 2] {
+    [r[0] + x * r[2], r[1] + y * r[3]]
+}
+
+#[test]
+fn looking_orbiting_painting_and_switching() {
+    let program = match chromium() {
+        Ok(program) => program,
+        Err(why) => {
+            assert!(std::env::var_os("RTSV_REQUIRE_PEERS").is_none(), "Chromium is required: {why}");
+            eprintln!("skipped: {why}");
+            return;
+        }
+    };
+    let s = Served::start(&["--size", "384x192", "--samples", "16", "--source", "slit:0.2mm,1mm"]);
+    let mut b = Browser::open(&program, &s.url());
+    b.wait_for("document.readyState === 'complete' && document.body.dataset.finished === 'true'");
+    let first = look(&mut b, "first");
+    let (picture, filter) = (rect(&mut b, "picture"), rect(&mut b, "filter"));
+    assert!(picture[2] > 300.0 && (picture[2] / picture[3] - 2.0).abs() < 0.05, "{picture:?}");
+    let text = b.evaluate("document.body.innerText").to_string();
+    for word in ["orbit", "knife", "samples per second", "error of deflections", "noise", "rad", "mm", "transfer functions"] {
+        assert!(text.contains(word), "the page lacks `{word}`: {text}");
+    }
+
+    // Orbit: the blob wanders, the empty corner does not change.
+    b.drag(&[inside(picture, 0.4, 0.5), inside(picture, 0.45, 0.5), inside(picture, 0.55, 0.55), inside(picture, 0.6, 0.6)]);
+    settled(&mut b);
+    let orbited = look(&mut b, "orbited");
+    let direction = s.get("state").json()["scene"]["view"]["direction"].to_string();
+    assert!(direction.contains(','), "{direction}");
+    assert!(differs(&first, &orbited, picture, [0.2, 0.2, 0.8, 0.8]) > 0.03);
+    b.evaluate("document.querySelector('[data-view=z]').click()");
+    settled(&mut b);
+    let back = look(&mut b, "back");
+    assert!(differs(&first, &back, picture, [0.0, 0.0, 1.0, 0.8]) < 1e-3, "the same view is the same picture");
+
+    // Paint on the filter: a red dab in the middle colours undisturbed light, on the picture and on the filter.
+    b.evaluate("document.getElementById('clear-white').click()");
+    settled(&mut b);
+    let clear = look(&mut b, "clear");
+    b.drag(&[inside(filter, 0.5, 0.4), inside(filter, 0.5, 0.45), inside(filter, 0.5, 0.5), inside(filter, 0.5, 0.6)]);
+    b.wait_for("fetch('state').then(r => r.json()).then(s => s.scene.technique.cutoff.strokes.length > 0)");
+    settled(&mut b);
+    let painted = look(&mut b, "painted-filter");
+    let corner = [0.02, 0.05, 0.2, 0.4];
+    assert!(differs(&clear, &painted, picture, corner) > 0.9, "undisturbed light is painted on");
+    assert!(differs(&clear, &painted, filter, [0.45, 0.45, 0.55, 0.55]) > 0.3);
+    assert!(differs(&clear, &painted, filter, [0.05, 0.05, 0.3, 0.3]) < 0.01, "the rest of the filter is as it was");
+
+    // Paint on the picture: what is under the brush changes; undisturbed light goes elsewhere on the filter.
+    b.evaluate("document.getElementById('clear-white').click()");
+    settled(&mut b);
+    b.evaluate("document.querySelector('input[value=paint]').click(); const r = document.getElementById('radius'); r.value = 0.05; r.dispatchEvent(new Event('input'))");
+    b.drag(&[inside(picture, 0.59, 0.38), inside(picture, 0.6, 0.4), inside(picture, 0.61, 0.42)]);
+    b.wait_for("fetch('state').then(r => r.json()).then(s => s.scene.technique.cutoff.strokes.length > 0)");
+    settled(&mut b);
+    let on_picture = look(&mut b, "painted-picture");
+    assert!(differs(&clear, &on_picture, picture, [0.59, 0.38, 0.61, 0.42]) > 0.8, "under the brush");
+
+    // Switch: another picture, other settings.
+    b.evaluate("const t = document.querySelector('select[name=technique]'); t.value = 'interferogram'; t.dispatchEvent(new Event('change'))");
+    b.wait_for("document.body.innerText.includes('fringe spacing')");
+    settled(&mut b);
+    let switched = look(&mut b, "interferogram");
+    assert!(differs(&on_picture, &switched, picture, [0.3, 0.1, 0.9, 0.9]) > 0.2);
+    assert!(b.evaluate("document.querySelector('input[value=paint]').disabled") == true, "no filter to paint on");
+
+    // Nonsense is answered on the page, and the page goes on.
+    b.evaluate("const w = document.querySelector('input[name=wavelengths]'); w.value = '0.5'; w.dispatchEvent(new Event('change'))");
+    b.wait_for("document.getElementById('message').innerText.includes('wavelengths_nm')");
+    settled(&mut b);
+    let refused: Vec<&String> = b.complaints.iter().filter(|c| !c.contains("422")).collect();
+    assert!(refused.is_empty(), "{refused:?}");
+}
