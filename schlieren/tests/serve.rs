@@ -18,13 +18,25 @@ fn the_page_and_its_parts_need_nothing_from_elsewhere() {
     assert_eq!(page.status, 200);
     assert!(page.head.contains("content-security-policy: default-src 'none'"), "{}", page.head);
     let mut parts = vec![page.text()];
-    for part in ["page.css", "main.js", "server.js", "units.js", "picture.js", "filter.js", "settings.js", "curves.js"] {
+    for part in [
+        "page.css",
+        "main.js",
+        "server.js",
+        "units.js",
+        "picture.js",
+        "filter.js",
+        "settings.js",
+        "curves.js",
+    ] {
         let answer = s.get(part);
         assert_eq!(answer.status, 200, "{part}");
         parts.push(answer.text());
     }
     for text in parts {
-        assert!(!text.contains("http://") && !text.contains("https://") && !text.contains("//cdn"), "{text:.80}");
+        assert!(
+            !text.contains("http://") && !text.contains("https://") && !text.contains("//cdn"),
+            "{text:.80}"
+        );
     }
 }
 
@@ -32,13 +44,16 @@ fn the_page_and_its_parts_need_nothing_from_elsewhere() {
 fn without_the_token_nothing_is_told() {
     let s = Served::start(&SMALL);
     let wrong = format!("/{}/", "0".repeat(32));
-    for path in ["/", "/state", "/frame", "//", &wrong, &format!("{wrong}state"), &s.base.to_uppercase()[..9]] {
+    for path in ["/", "/state", "/frame", "//", &wrong, &format!("{wrong}state"), &s.base.to_uppercase()[..9]]
+    {
         let request = format!("GET {path} HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n");
         let answer = s.raw(request.as_bytes()).unwrap();
         assert_eq!(answer.status, 403, "{path}");
         assert!(!answer.text().contains(s.base.trim_matches('/')), "{path}");
     }
-    let request = format!("POST {wrong}scene HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Length: 2\r\n\r\n{{}}");
+    let request = format!(
+        "POST {wrong}scene HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Length: 2\r\n\r\n{{}}"
+    );
     assert_eq!(s.raw(request.as_bytes()).unwrap().status, 403);
     assert!(s.is_healthy());
 }
@@ -50,7 +65,10 @@ fn the_finished_picture_is_that_of_render() {
     assert_eq!((shown.info["width"].as_u64(), shown.info["height"].as_u64()), (Some(96), Some(48)));
     assert_eq!(shown.info["samples"], 16);
     assert!(shown.info["deflection_error_rad"].as_f64().unwrap() < 1e-6, "{}", shown.info);
-    assert!(shown.info["noise_rms"].as_f64().unwrap() > 0.0 && shown.info["rays"].as_u64().unwrap() > 96 * 48 * 16);
+    assert!(
+        shown.info["noise_rms"].as_f64().unwrap() > 0.0
+            && shown.info["rays"].as_u64().unwrap() > 96 * 48 * 16
+    );
 
     // The saved picture has the same pixels, and the saved scene makes the same picture again.
     let dir = tempfile::tempdir().unwrap();
@@ -140,7 +158,10 @@ fn painting_changes_the_picture_where_its_light_is() {
     };
     let p = pixel(&by_picture.rgb, at);
     assert!(p[0] > 240 && p[1] < 80, "{p:?}");
-    assert!(pixel(&by_picture.rgb, [0.05, 0.9]).iter().all(|v| *v > 250), "undisturbed light is not painted on");
+    assert!(
+        pixel(&by_picture.rgb, [0.05, 0.9]).iter().all(|v| *v > 250),
+        "undisturbed light is not painted on"
+    );
     assert!(changed(&white.filter, &by_picture.filter) > 0.0);
 
     // The same by its place on the filter changes nothing any more; the axis turns the background red.
@@ -155,7 +176,8 @@ fn painting_changes_the_picture_where_its_light_is() {
 fn curves_make_another_index_and_bodies_stay_shut() {
     let s = Served::start(&SMALL);
     let state = s.get("state").json();
-    let names: Vec<&str> = state["arrays"].as_array().unwrap().iter().map(|a| a["name"].as_str().unwrap()).collect();
+    let names: Vec<&str> =
+        state["arrays"].as_array().unwrap().iter().map(|a| a["name"].as_str().unwrap()).collect();
     assert_eq!(names, ["T", "rho"]);
     let density = s.finished().rgb;
     let knots = json!([[290.0, 0.0], [400.0, 3e-4]]);
@@ -197,7 +219,8 @@ fn bad_requests_get_a_reason_and_harm_nothing() {
     for bytes in [
         b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03".to_vec(),
         b"GET / HTTP/1.1\r\nX: ".iter().copied().chain(std::iter::repeat_n(b'a', 1 << 20)).collect(),
-        format!("POST {}scene HTTP/1.1\r\nHost: x\r\nContent-Length: 99999999999999999999\r\n\r\n", s.base).into_bytes(),
+        format!("POST {}scene HTTP/1.1\r\nHost: x\r\nContent-Length: 99999999999999999999\r\n\r\n", s.base)
+            .into_bytes(),
     ] {
         if let Some(answer) = s.raw(&bytes) {
             assert!((400..500).contains(&answer.status), "{}", answer.head);
@@ -212,11 +235,18 @@ fn dropped_and_idle_connections_are_left_behind() {
     let _idle: Vec<_> = (0..50).map(|_| s.connect()).collect();
     for _ in 0..20 {
         let mut half = s.connect();
-        half.write_all(format!("POST {}scene HTTP/1.1\r\nHost: x\r\nContent-Length: 1000\r\n\r\n{{\"film\"", s.base).as_bytes()).unwrap();
+        half.write_all(
+            format!("POST {}scene HTTP/1.1\r\nHost: x\r\nContent-Length: 1000\r\n\r\n{{\"film\"", s.base)
+                .as_bytes(),
+        )
+        .unwrap();
         let mut wait = s.connect();
-        wait.write_all(format!("GET {}frame?after=999999 HTTP/1.1\r\nHost: x\r\n\r\n", s.base).as_bytes()).unwrap();
+        wait.write_all(format!("GET {}frame?after=999999 HTTP/1.1\r\nHost: x\r\n\r\n", s.base).as_bytes())
+            .unwrap();
         let mut reads_a_little = s.connect();
-        reads_a_little.write_all(format!("GET {}frame HTTP/1.1\r\nHost: x\r\n\r\n", s.base).as_bytes()).unwrap();
+        reads_a_little
+            .write_all(format!("GET {}frame HTTP/1.1\r\nHost: x\r\n\r\n", s.base).as_bytes())
+            .unwrap();
         let _ = reads_a_little.read(&mut [0; 10]);
     }
     // A file that takes long and that nobody waits for.
@@ -241,7 +271,8 @@ fn ctrl_c_ends_it_soon_even_while_it_draws_and_someone_waits() {
     let mut s = Served::start(&SMALL);
     s.change(&json!({"film": {"size": [2048, 2048]}, "sampling": {"method": "photons", "samples": 4096}}));
     let mut wait = s.connect();
-    wait.write_all(format!("GET {}frame?after=999999 HTTP/1.1\r\nHost: x\r\n\r\n", s.base).as_bytes()).unwrap();
+    wait.write_all(format!("GET {}frame?after=999999 HTTP/1.1\r\nHost: x\r\n\r\n", s.base).as_bytes())
+        .unwrap();
     std::thread::sleep(Duration::from_millis(500));
     let start = Instant::now();
     let kill = std::process::Command::new("kill").args(["-INT", &s.child.id().to_string()]).status().unwrap();

@@ -69,8 +69,10 @@ fn paint(filter: &mut FilterImage, stroke: &Stroke) {
 
     // Only where the brush and its soft rim can be: paintings have thousands of small strokes.
     let reach = stroke.radius_m + pixel_m;
-    let rows = [a[1].max(b[1]) + reach, a[1].min(b[1]) - reach].map(|y| (0.5 - y / size[1]) * f64::from(height));
-    let columns = [a[0].min(b[0]) - reach, a[0].max(b[0]) + reach].map(|x| (0.5 + x / size[0]) * f64::from(width));
+    let rows =
+        [a[1].max(b[1]) + reach, a[1].min(b[1]) - reach].map(|y| (0.5 - y / size[1]) * f64::from(height));
+    let columns =
+        [a[0].min(b[0]) - reach, a[0].max(b[0]) + reach].map(|x| (0.5 + x / size[0]) * f64::from(width));
     // Casts saturate: what lies beside the filter ends at its border.
     let [top, left] = [rows[0], columns[0]].map(|v| v.floor() as u32);
     let [bottom, right] = [rows[1], columns[1]].map(|v| v.ceil() as u32);

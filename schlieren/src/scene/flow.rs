@@ -232,7 +232,8 @@ impl FlowSpec {
         let spec = self.multifield.clone().unwrap_or_default();
         let mut parts = Vec::new();
         for (array, curve) in &spec.fields {
-            let wrong = |reason: String| SceneError::Flow { reason: format!("multifield `{array}`: {reason}") };
+            let wrong =
+                |reason: String| SceneError::Flow { reason: format!("multifield `{array}`: {reason}") };
             if !curve.weight.is_finite() {
                 return Err(wrong(format!("weight {} is not a finite number", curve.weight)));
             }
@@ -298,7 +299,9 @@ mod tests {
 
     #[test]
     fn curves_reach_the_medium_and_weightless_ones_do_not() {
-        let m = flow("multifield = { rule = \"largest\", fields = { T = { knots = [[300, 0], [2000, -2e-4]] }, Z = { knots = [[0, 0]], weight = 0.0 } } }");
+        let m = flow(
+            "multifield = { rule = \"largest\", fields = { T = { knots = [[300, 0], [2000, -2e-4]] }, Z = { knots = [[0, 0]], weight = 0.0 } } }",
+        );
         let Ok(Medium::Multifield { parts, rule }) = m else { panic!("{m:?}") };
         assert_eq!((parts.len(), rule), (1, Rule::Largest));
         assert!((parts[0].1.at(1150.0) + 1e-4).abs() < 1e-18);

@@ -45,7 +45,8 @@ pub(super) fn half_side_m(scene: &Scene, map: Option<&Map>) -> f64 {
     let cutoff_m = match &scene.technique {
         TechniqueSpec::Schlieren { cutoff } => match cutoff {
             CutoffSpec::Painted(p) => return 0.5 * p.size_m[0].max(p.size_m[1]),
-            CutoffSpec::Circle { radius_m, center_m } | CutoffSpec::ComplementedCircle { radius_m, center_m } => {
+            CutoffSpec::Circle { radius_m, center_m }
+            | CutoffSpec::ComplementedCircle { radius_m, center_m } => {
                 radius_m + center_m[0].hypot(center_m[1])
             }
             CutoffSpec::Color { radius_m, .. } => *radius_m,
@@ -94,7 +95,9 @@ fn histogram(scene: &Scene, map: &Map, half_m: f64) -> (Vec<f32>, f32) {
     let (mut sums, mut outside, mut all) = (vec![0.0f64; PIXELS * PIXELS], 0.0f64, 0.0f64);
     let to_pixels = (0.5 * PIXELS as f64 / half_m) as f32;
     let middle = 0.5 * PIXELS as f32;
-    for (k, (d, t)) in map.deflection_rad.iter().zip(&map.transmission).enumerate().filter(|(_, p)| *p.1 > 0.0) {
+    for (k, (d, t)) in
+        map.deflection_rad.iter().zip(&map.transmission).enumerate().filter(|(_, p)| *p.1 > 0.0)
+    {
         for s in 0..points {
             let point = image.point_m(Sampler::new(Sampling::Sobol, 0, k as u32, 0, s).square(0));
             let x = middle + (point[0] + f2 * d[0]) * to_pixels;
@@ -148,7 +151,8 @@ pub(super) fn as_painting(
     half_m: f64,
     ground: Rgb,
 ) -> Result<(Painting, bool), SceneError> {
-    let painting = |ground_rgb, strokes| Painting { size_m: [2.0 * half_m; 2], pixels: 512, ground_rgb, strokes };
+    let painting =
+        |ground_rgb, strokes| Painting { size_m: [2.0 * half_m; 2], pixels: 512, ground_rgb, strokes };
     let dab = |at: [f64; 2], radius_m, rgb| Stroke { from_m: at, to_m: at, radius_m, rgb };
     let (black, white) = ([0.0; 3], [1.0; 3]);
     Ok(match cutoff {
@@ -200,7 +204,8 @@ mod tests {
         let s = scene("[light]\nsource = { kind = \"point\" }");
         let plane = FilterPlane::new(&s, Some(&prism([2e-4, -1e-4]))).unwrap();
         // f2 = 1.5 m: 0.3 mm to the right, 0.15 mm down.
-        let brightest = (0..PIXELS * PIXELS).max_by(|a, b| plane.light[*a].total_cmp(&plane.light[*b])).unwrap();
+        let brightest =
+            (0..PIXELS * PIXELS).max_by(|a, b| plane.light[*a].total_cmp(&plane.light[*b])).unwrap();
         let at = |i: usize| 2.0 * plane.half_m * ((i as f64 + 0.5) / PIXELS as f64 - 0.5);
         let pixel_m = 2.0 * plane.half_m / PIXELS as f64;
         assert!((at(brightest % PIXELS) - 3e-4).abs() < pixel_m);

@@ -67,10 +67,8 @@ impl Flow {
         let mut report = None;
         for line in scene.lines() {
             let options = scene.flow.options(line.wavelength_nm)?;
-            let loaded = from_dataset(&self.data, &options).map_err(|e| InputError::InFile {
-                path: scene.flow.file.clone(),
-                source: Box::new(e),
-            })?;
+            let loaded = from_dataset(&self.data, &options)
+                .map_err(|e| InputError::InFile { path: scene.flow.file.clone(), source: Box::new(e) })?;
             fields.push(loaded.field);
             report.get_or_insert(loaded.report);
         }

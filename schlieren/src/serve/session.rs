@@ -8,7 +8,9 @@ use super::frame::{Frame, Traced};
 use crate::cutoff::Rgb;
 use crate::cutoff::painted::Stroke;
 use crate::optics::Across;
-use crate::scene::{BeamsSpec, CutoffSpec, FilmSpec, FlowSpec, LensSpec, LightSpec, SamplingSpec, Scene, TechniqueSpec};
+use crate::scene::{
+    BeamsSpec, CutoffSpec, FilmSpec, FlowSpec, LensSpec, LightSpec, SamplingSpec, Scene, TechniqueSpec,
+};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::{BTreeMap, VecDeque};
@@ -24,7 +26,8 @@ pub const MAX_STROKES: usize = 5000;
 /// Most points of one request to paint.
 pub const MAX_POINTS: usize = 4096;
 /// Sections of the scene that a page may change; of the flow only its transfer functions.
-const PAGE_SECTIONS: [&str; 8] = ["view", "light", "lenses", "technique", "film", "sampling", "march", "flow"];
+const PAGE_SECTIONS: [&str; 8] =
+    ["view", "light", "lenses", "technique", "film", "sampling", "march", "flow"];
 
 /// Why a request was refused; the text goes to the page.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -205,7 +208,9 @@ impl Session {
             Kept::bring_back(again, custom, &mut base);
         }
         let mut patch = patch.clone();
-        if kept.is_some() && patch.pointer("/technique").and_then(Value::as_object).is_some_and(|t| t.len() == 1) {
+        if kept.is_some()
+            && patch.pointer("/technique").and_then(Value::as_object).is_some_and(|t| t.len() == 1)
+        {
             patch["technique"] = serde_json::to_value(&base.technique).map_err(|e| refused(e.to_string()))?;
         }
         self.check_patch(&patch)?;
@@ -239,12 +244,15 @@ impl Session {
             return Err(refused("a change is an object such as {\"view\": {\"direction\": \"30,15\"}}"));
         };
         if let Some(other) = sections.keys().find(|k| !PAGE_SECTIONS.contains(&k.as_str())) {
-            return Err(refused(format!("`{other}` cannot be changed from the page; these can: {}", PAGE_SECTIONS.join(", "))));
+            return Err(refused(format!(
+                "`{other}` cannot be changed from the page; these can: {}",
+                PAGE_SECTIONS.join(", ")
+            )));
         }
         match sections.get("flow").and_then(Value::as_object) {
-            Some(flow) if flow.keys().any(|k| k != "multifield") => {
-                Err(refused("of the flow only `multifield` can be changed from the page; start the program with other options"))
-            }
+            Some(flow) if flow.keys().any(|k| k != "multifield") => Err(refused(
+                "of the flow only `multifield` can be changed from the page; start the program with other options",
+            )),
             None if sections.contains_key("flow") => Err(refused("`flow` is no object")),
             _ => Ok(()),
         }
@@ -280,8 +288,12 @@ impl Session {
     fn check_scene(&self, scene: &Scene) -> Result<(), Refused> {
         check_limits(scene)?;
         // Pages must not make the program read any file.
-        if let TechniqueSpec::Schlieren { cutoff: cutoff @ CutoffSpec::Image { file, .. } } = &scene.technique {
-            let known = self.image.as_ref().is_some_and(|i| matches!(i, CutoffSpec::Image { file: f, .. } if f == file));
+        if let TechniqueSpec::Schlieren { cutoff: cutoff @ CutoffSpec::Image { file, .. } } = &scene.technique
+        {
+            let known = self
+                .image
+                .as_ref()
+                .is_some_and(|i| matches!(i, CutoffSpec::Image { file: f, .. } if f == file));
             if !known {
                 return Err(refused(format!(
                     "the page cannot open `{}` as a filter; start the program with --cutoff PNG for a {}",
@@ -303,7 +315,10 @@ impl Session {
             return Err(refused("a filter's transmissions are 0 to 1"));
         }
         if paint.points.len() > MAX_POINTS {
-            return Err(refused(format!("{} points are more than {MAX_POINTS}; paint in pieces", paint.points.len())));
+            return Err(refused(format!(
+                "{} points are more than {MAX_POINTS}; paint in pieces",
+                paint.points.len()
+            )));
         }
         let mut shared = self.lock();
         let TechniqueSpec::Schlieren { cutoff } = shared.scene.technique.clone() else {
@@ -319,7 +334,8 @@ impl Session {
                     return Err(refused("the picture is not drawn yet; paint when it stands still"));
                 };
                 let f2 = shared.scene.optics().schlieren_focal_length_m;
-                let on_filter = |p: &[f64; 2]| traced(&view.map, &view.framing, f2, *p).map(|t| t.1.map(f64::from));
+                let on_filter =
+                    |p: &[f64; 2]| traced(&view.map, &view.framing, f2, *p).map(|t| t.1.map(f64::from));
                 let places: Vec<[f64; 2]> = paint.points.iter().filter_map(on_filter).collect();
                 let dark = paint.points.len() - places.len();
                 (places, dark)
@@ -334,7 +350,9 @@ impl Session {
         let added = strokes.len();
         painting.strokes.extend(strokes);
         if painting.strokes.len() > MAX_STROKES {
-            return Err(refused(format!("the painting would have more than {MAX_STROKES} strokes; start a new one")));
+            return Err(refused(format!(
+                "the painting would have more than {MAX_STROKES} strokes; start a new one"
+            )));
         }
         let mut scene = shared.scene.clone();
         // The source stays as it was: a knife's customary slit would otherwise become a painting's customary disc.
@@ -345,8 +363,9 @@ impl Session {
             shared.scene = scene;
             self.changed(&mut shared);
         }
-        let note = (!same && added > 0)
-            .then(|| format!("a {} filter cannot be painted over; the painting starts on black", cutoff.name()));
+        let note = (!same && added > 0).then(|| {
+            format!("a {} filter cannot be painted over; the painting starts on black", cutoff.name())
+        });
         Ok(Painted { generation: shared.generation, added, dark, note })
     }
 
@@ -371,7 +390,9 @@ impl Session {
         const QUEUE: usize = 4;
         let mut shared = self.lock();
         if shared.saves.len() >= QUEUE {
-            return Err(refused(format!("{QUEUE} files are being made already; try again when they are done")));
+            return Err(refused(format!(
+                "{QUEUE} files are being made already; try again when they are done"
+            )));
         }
         let (reply, receiver) = tokio::sync::oneshot::channel();
         let scene = shared.scene.clone();
@@ -440,7 +461,11 @@ impl Kept {
 
     /// What belongs to a technique as it was, or its custom. Framing and colours belong to all.
     fn bring_back(kept: Option<Kept>, custom: TechniqueSpec, scene: &mut Scene) {
-        let light = LightSpec { wavelengths_nm: scene.light.wavelengths_nm.clone(), weights: scene.light.weights.clone(), ..LightSpec::default() };
+        let light = LightSpec {
+            wavelengths_nm: scene.light.wavelengths_nm.clone(),
+            weights: scene.light.weights.clone(),
+            ..LightSpec::default()
+        };
         let kept = kept.unwrap_or(Kept {
             technique: custom,
             light,

@@ -151,12 +151,20 @@ impl Worker {
                 self.section = None;
                 let text = panic.downcast_ref::<String>().cloned();
                 let text = text.or_else(|| panic.downcast_ref::<&str>().map(ToString::to_string));
-                format!("drawing this scene panicked ({}); please report it with the saved scene", text.unwrap_or_default())
+                format!(
+                    "drawing this scene panicked ({}); please report it with the saved scene",
+                    text.unwrap_or_default()
+                )
             }
         };
         self.serial += 1;
-        let info =
-            FrameInfo { serial: self.serial, generation, finished: true, error: Some(error), ..FrameInfo::default() };
+        let info = FrameInfo {
+            serial: self.serial,
+            generation,
+            finished: true,
+            error: Some(error),
+            ..FrameInfo::default()
+        };
         session.publish(Frame::new(info, None, None, None));
         true
     }
@@ -241,7 +249,11 @@ impl Worker {
     }
 
     /// Bodies belong to the whole section; the thinned one borrows them for the time of `with`.
-    fn with_section<T>(&mut self, thin: bool, with: impl FnOnce(&TestSection) -> T) -> Result<T, RenderError> {
+    fn with_section<T>(
+        &mut self,
+        thin: bool,
+        with: impl FnOnce(&TestSection) -> T,
+    ) -> Result<T, RenderError> {
         let Some(s) = &mut self.section else { return Err(RenderError::Cancelled) };
         match s.thin.as_mut().filter(|_| thin) {
             Some(thin) => {
@@ -345,7 +357,9 @@ impl Worker {
 
     fn save(&mut self, save: Save) {
         let outcome = catch_unwind(AssertUnwindSafe(|| self.file(&save)));
-        let result = outcome.unwrap_or_else(|_| Err("drawing this scene panicked; please report it with the saved scene".into()));
+        let result = outcome.unwrap_or_else(|_| {
+            Err("drawing this scene panicked; please report it with the saved scene".into())
+        });
         // Nobody may wait any more.
         let _ = save.reply.send(result);
     }
@@ -368,9 +382,7 @@ impl Worker {
         let path = folder.path().join("picture");
         match save.kind {
             SaveKind::Png => output::write_png(&path, &rendered).map(|_| ()),
-            SaveKind::Exr => {
-                output::write_exr(&path, &rendered, &save.scene, start.elapsed().as_secs_f64())
-            }
+            SaveKind::Exr => output::write_exr(&path, &rendered, &save.scene, start.elapsed().as_secs_f64()),
         }
         .map_err(|e| text(&e))?;
         std::fs::read(&path).map_err(|e| text(&e))
@@ -379,7 +391,9 @@ impl Worker {
 
 /// The background's dots in metres, where the scene leaves them to the pixels: coarse pictures have other pixels, and the same dots.
 fn dots(scene: &Scene, section: &TestSection) -> Option<TechniqueSpec> {
-    let TechniqueSpec::Bos { dot_diameter_m: None, dot_spacing_m, seed } = scene.technique else { return None };
+    let TechniqueSpec::Bos { dot_diameter_m: None, dot_spacing_m, seed } = scene.technique else {
+        return None;
+    };
     // As [`render::technique`] chooses them.
     let diameter_m = (3.0 * framing(scene, section).pixel_m).min(dot_spacing_m.unwrap_or(f64::INFINITY));
     Some(TechniqueSpec::Bos {

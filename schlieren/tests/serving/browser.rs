@@ -15,7 +15,12 @@ pub(crate) fn chromium() -> Result<PathBuf, String> {
     let folders = std::env::var_os("PATH").unwrap_or_default();
     let names = ["chromium", "chromium-browser", "google-chrome"];
     let found = std::env::split_paths(&folders).flat_map(|f| names.map(|n| f.join(n))).find(|p| p.is_file());
-    found.ok_or_else(|| format!("none of {} is in PATH and RTSV_CHROMIUM is not set; on Debian: apt-get install chromium", names.join(", ")))
+    found.ok_or_else(|| {
+        format!(
+            "none of {} is in PATH and RTSV_CHROMIUM is not set; on Debian: apt-get install chromium",
+            names.join(", ")
+        )
+    })
 }
 
 pub(crate) struct Browser {
@@ -32,7 +37,13 @@ impl Browser {
     pub(crate) fn open(program: &PathBuf, url: &str) -> Browser {
         let profile = tempfile::tempdir().unwrap();
         let mut child = Command::new(program)
-            .args(["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run"])
+            .args([
+                "--headless=new",
+                "--no-sandbox",
+                "--disable-gpu",
+                "--disable-dev-shm-usage",
+                "--no-first-run",
+            ])
             .args(["--remote-debugging-port=0", "--window-size=1280,1100", "--force-device-scale-factor=1"])
             .arg(format!("--user-data-dir={}", profile.path().display()))
             .arg("about:blank")
@@ -99,7 +110,12 @@ impl Browser {
         let end = Instant::now() + Duration::from_secs(120);
         while self.evaluate(expression) != true {
             let state = "document.body?.innerText.slice(0, 600)";
-            assert!(Instant::now() < end, "never true: {expression}\n{}\n{:?}", self.evaluate(state), self.complaints);
+            assert!(
+                Instant::now() < end,
+                "never true: {expression}\n{}\n{:?}",
+                self.evaluate(state),
+                self.complaints
+            );
             std::thread::sleep(Duration::from_millis(50));
         }
     }
@@ -184,7 +200,8 @@ fn http(host: &str, request: &str) -> TcpStream {
 /// Address of the first page's socket.
 fn page_of(host: &str) -> String {
     for _ in 0..100 {
-        let stream = http(host, &format!("GET /json/list HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n"));
+        let stream =
+            http(host, &format!("GET /json/list HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n"));
         let mut reader = BufReader::new(stream);
         let mut length = 0;
         for line in reader.by_ref().lines().map_while(Result::ok).take_while(|l| !l.is_empty()) {

@@ -163,7 +163,8 @@ impl Shown {
         let (n, m) = (3 * size("width") * size("height"), size("filter_pixels").pow(2));
         let rest = &bytes[4 + length..];
         assert_eq!(rest.len(), n + 3 * m + 4 * m, "{info}");
-        let light = rest[n + 3 * m..].chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect();
+        let light =
+            rest[n + 3 * m..].chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect();
         Shown { rgb: rest[..n].to_vec(), filter: rest[n..n + 3 * m].to_vec(), light, info }
     }
 }

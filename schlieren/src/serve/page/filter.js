@@ -28,7 +28,7 @@ function draw() {
     // What is let through is shown dimmed, so that light (yellow) stands out on white as well as on black.
     for (let c = 0; c < 3; c++) {
       const ground = filter[3 * i + c] * (showLight.checked ? 0.62 : 1) + (showLight.checked ? 14 : 0);
-      image.data[4 * i + c] = ground * (1 - 0.9 * glow) + [255, 190, 40][c] * 0.9 * glow;
+      image.data[4 * i + c] = ground * (1 - 0.65 * glow) + [255, 190, 40][c] * 0.65 * glow;
     }
     image.data[4 * i + 3] = 255;
   }

@@ -51,7 +51,7 @@ function cutoffRows(state) {
       rows.push(number("width", "mm", 1e3, s => of(s).width_m, (v, s) => set({ width_m: v })(s)));
       break;
     case "painted":
-      rows.push({ kind: "hint", get: s => `${of(s).strokes.length} strokes. Paint below on the filter, or choose “paint” above and paint on the picture: each pixel is traced to its place on the filter.` });
+      rows.push({ kind: "hint", get: s => `${of(s).strokes.length} strokes. Paint on the filter plane, or choose “paint” above and paint on the picture: each pixel is traced to its place on the filter. The smaller the light source, the finer the picture tells directions apart.` });
   }
   return rows;
 }

@@ -14,7 +14,10 @@ fn scene(s: &Session) -> Scene {
 #[test]
 fn a_change_merges_and_null_is_the_custom() {
     let s = session("");
-    assert_eq!(s.edit(&json!({"film": {"exposure": 2.0, "size": [64, 32]}, "view": {"direction": "30,15"}})), Ok(2));
+    assert_eq!(
+        s.edit(&json!({"film": {"exposure": 2.0, "size": [64, 32]}, "view": {"direction": "30,15"}})),
+        Ok(2)
+    );
     assert_eq!((scene(&s).film.exposure, scene(&s).film.size), (Some(2.0), [64, 32]));
     assert_eq!(s.edit(&json!({"film": {"exposure": null}})), Ok(3));
     assert_eq!((scene(&s).film.exposure, scene(&s).film.size), (None, [64, 32]));
@@ -52,7 +55,10 @@ fn refusals_say_why_and_change_nothing() {
         (json!({"solids": {"files": ["/etc/passwd"]}}), "cannot be changed from the page"),
         (json!({"flow": {"file": "/etc/passwd"}}), "only `multifield`"),
         (json!({"flow": 3}), "no object"),
-        (json!({"technique": {"kind": "schlieren", "cutoff": {"kind": "image", "file": "/etc/passwd", "width_m": 1.0}}}), "cannot open"),
+        (
+            json!({"technique": {"kind": "schlieren", "cutoff": {"kind": "image", "file": "/etc/passwd", "width_m": 1.0}}}),
+            "cannot open",
+        ),
         (json!({"film": {"size": [100_000, 100_000]}}), "at most 2048"),
         (json!({"film": {"size": [1e300, 1]}}), "not a scene"),
         (json!({"film": {"size": [0, 1]}}), "film.size"),
