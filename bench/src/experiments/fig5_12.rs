@@ -171,7 +171,7 @@ fn pictures(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()
         let off: Vec<f32> = straight.pixels.iter().zip(&traced.pixels).map(|(a, b)| a[0] - b[0]).collect();
         let rms = (off.iter().map(|o| f64::from(o * o)).sum::<f64>() / off.len() as f64).sqrt();
         // A power of ten that makes the root mean square a visible grey.
-        let gain = 10f64.powf((0.1 / rms.max(1e-12)).log10().floor());
+        let gain = 10f64.powf((0.5 / rms.max(1e-12)).log10().floor());
         straight.pixels = off.iter().map(|o| [0.5 + (gain * f64::from(*o)) as f32; 3]).collect();
         let caption = format!(
             "line of sight minus traced, {gain} times, on mid-grey; root mean square {rms:.1e} of white, from the \
