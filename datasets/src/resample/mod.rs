@@ -1,8 +1,8 @@
 //! Data of any mesh on a uniform lattice: curvilinear and rectilinear grids, tetrahedra, hexahedra, wedges, pyramids, prisms,
 //! polyhedra, and collections of them.
 //!
-//! Each cell finds the lattice nodes inside it ([`rasterize`]), so no search tree is needed and time goes with the number of
-//! nodes plus that of cells. Inside a cell values are those of the finite element ([`shape`]): Newton's method inverts the
+//! Each cell finds the lattice nodes inside it (`rasterize`), so no search tree is needed and time goes with the number of
+//! nodes plus that of cells. Inside a cell values are those of the finite element (`shape`): Newton's method inverts the
 //! trilinear map of a hexahedron. Cells whose map cannot be inverted are divided into tetrahedra and counted.
 //!
 //! What a node is, is told by its [`Mark`]; what the resampling cost in accuracy, by the [`Report`]: the lattice is sampled back

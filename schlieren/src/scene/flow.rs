@@ -3,8 +3,8 @@
 use super::SceneError;
 use crate::index::Gas;
 use crate::index::conditions::Model;
-use crate::input::{Depth, Medium, Options, Quantity, Reference, Role};
 use crate::index::multifield::{Rule, TransferFunction};
+use crate::input::{Depth, Medium, Options, Quantity, Reference, Role};
 use datasets::resample::Resolution;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
