@@ -5,7 +5,7 @@
 //! | [`Knife`] | one side of an edge at any angle | 5.3.4, equation 5.12 |
 //! | [`Aperture`] | the inside of a circle (bright field), or the outside: the complemented circle (dark field) | 5.3.4 |
 //! | [`ColorWheel`] | all of it, coloured by direction and size | equation 5.16 |
-//! | [`FilterImage`] | what a picture in the plane lets through: a file, or one [painted](painted) by hand | 5.6 |
+//! | [`FilterImage`] | what a picture in the plane lets through: a file, or one [painted] by hand | 5.6 |
 //!
 //! Coordinates are metres in the plane, along the picture's right and up. Transmission is linear and at most 1 in each channel.
 

@@ -30,7 +30,7 @@ use std::time::Duration;
 pub enum ServeError {
     /// The flow or the bodies cannot be read, or make no test section.
     #[error(transparent)]
-    Render(#[from] RenderError),
+    Render(Box<RenderError>),
     /// The page does not draw such scenes.
     #[error(transparent)]
     Refused(#[from] Refused),
@@ -45,6 +45,12 @@ pub enum ServeError {
     /// The system gives no randomness, thread or event loop.
     #[error("the server cannot start: {0}")]
     Start(String),
+}
+
+impl From<RenderError> for ServeError {
+    fn from(e: RenderError) -> Self {
+        ServeError::Render(Box::new(e))
+    }
 }
 
 /// How often the end of the program is looked for.

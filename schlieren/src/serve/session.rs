@@ -76,7 +76,7 @@ pub(super) struct Shared {
     kept: BTreeMap<&'static str, Kept>,
 }
 
-/// See the [module](self).
+/// The state that requests and the drawing thread share.
 pub struct Session {
     shared: Mutex<Shared>,
     pub(super) wake: Condvar,
@@ -308,7 +308,8 @@ impl Session {
     /// Paints on the filter. The first stroke turns the cut-off into a painting.
     pub fn paint(&self, paint: &Paint) -> Result<Painted, Refused> {
         let finite = paint.points.iter().flatten().all(|c| c.is_finite() && c.abs() < 1e3);
-        if !finite || !(paint.radius_m > 0.0 && paint.radius_m < 1e3) {
+        let brush = paint.radius_m > 0.0 && paint.radius_m < 1e3;
+        if !(finite && brush) {
             return Err(refused("a stroke needs finite points and a brush larger than 0 m"));
         }
         if !paint.rgb.iter().all(|c| (0.0..=1.0).contains(c)) {

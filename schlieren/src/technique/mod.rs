@@ -6,7 +6,7 @@
 //! | [`schlieren`] | what the cut-off lets through | 5.3.4 |
 //! | [`interferogram`] | what interference with a reference beam leaves | 5.3.5 |
 //! | [`bos`] | the light of the background it came from | – |
-//! | [`volume`], [`slice`] | nothing: pictures without optics, to compare with | 5.6 |
+//! | [`volume`], [`mod@slice`] | nothing: pictures without optics, to compare with | 5.6 |
 
 pub mod bos;
 pub mod interferogram;
