@@ -322,7 +322,7 @@ fn marches_without_a_kernel_are_refused_by_name_or_left_to_the_cpu() {
         [("method = \"pefrl\"", "pefrl"), ("interpolant = \"trilinear-gradient\"", "gradient")]
     {
         let e = drawn(&field, "gpu", rest).unwrap_err();
-        assert!(matches!(e, RenderError::Gpu(GpuError::Unsupported { .. })), "{e:?}");
+        assert!(matches!(*e, RenderError::Gpu(GpuError::Unsupported { .. })), "{e:?}");
         assert!(e.to_string().contains(word), "{e}");
         let r = drawn(&field, "auto", rest).unwrap();
         assert!(
