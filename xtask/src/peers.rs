@@ -14,7 +14,10 @@ use crate::runner::first_line_of;
 /// Debian 12 packages, and what each is for.
 const PACKAGES: &[(&str, &str)] = &[
     ("libembree-dev", "Embree 3.13.5, the CPU ray tracing kernels that rt-core is measured against"),
-    ("mesa-vulkan-drivers", "lavapipe, a Vulkan device on the CPU that schlieren's GPU kernels are tested on"),
+    (
+        "mesa-vulkan-drivers",
+        "lavapipe, a Vulkan device on the CPU that schlieren's GPU kernels are tested on",
+    ),
     ("python3-venv", "a place for the wheels below"),
 ];
 
