@@ -93,7 +93,7 @@ fn compare(
     }
     record.rows.push(base().with("march", "ours: line of sight").with("rms_error", los_error));
 
-    for step in [2.0, 1.0, 0.5, 0.25] {
+    for step in [16.0, 8.0, 4.0, 2.0, 1.0, 0.5] {
         check_cancelled(context)?;
         let scalar = ThesisMarch::new(field, view, step);
         let options = Options { scheme: Scheme::Euler, step_voxels: step, ..Options::default() };
@@ -152,7 +152,7 @@ fn ours(field: &Field, view: View) -> Vec<Ours<'_>> {
         ("Verlet, trilinear gradients", Interpolant::TrilinearGradient),
         ("Verlet, trilinear", Interpolant::Trilinear),
     ] {
-        for step_voxels in [8.0, 4.0, 2.0, 1.0, 0.5] {
+        for step_voxels in [16.0, 8.0, 4.0, 2.0, 1.0, 0.5] {
             let options = Options { step_voxels, ..Options::default() };
             let paths = Box::new(Deviational::new(field, view, interpolant, options));
             list.push(Ours {
