@@ -65,3 +65,13 @@ fn errors_are_within_bounds_and_bounds_within_tolerance_where_possible() {
         }
     }
 }
+
+/// Steps shorter than what the lattice can tell are wasted.
+#[test]
+fn coarse_lattices_do_not_ask_for_short_steps() {
+    let field = blob(16, 1e-3, 0.08);
+    let plan = Plan::new(&field, ask(1e-9));
+    assert_eq!(plan.mode, Mode::Paraxial);
+    assert!(plan.bounds.interpolation_rad > 1e-9 && plan.step_voxels >= 0.5, "{plan:?}");
+    assert!(Plan::new(&field, ask(0.0)).step_voxels < plan.step_voxels);
+}
