@@ -212,9 +212,10 @@ impl Plan {
             // Fourth order: the constant of PEFRL is about 1/5000 (Omelyan 2002, table 2), times a fifth derivative that a spline does not have.
             Mode::Full => length_m * (voxels * h_m).powi(3) / 200.0 * r.fourth,
         };
-        // Where the lattice itself is off by more than the tolerance, shorter steps only cost time: its bound takes the tolerance's place. (A turbulent jet
-        // took steps of an eighth of a voxel, eight times the time, for the same error.) Zero asks for all there is.
-        let share = if tolerance > 0.0 { 0.25 * tolerance.max(of_interpolant(interpolant)) } else { 0.0 };
+        // A quarter of the tolerance while the interpolant's bound leaves it; where the lattice itself is off by more, a third of that bound, which is the same
+        // number where the two cases meet. Shorter steps would only cost time. Zero asks for all there is.
+        let share =
+            if tolerance > 0.0 { (tolerance / 4.0).max(of_interpolant(interpolant) / 3.0) } else { 0.0 };
         let step_voxels = request.step_voxels.unwrap_or_else(|| {
             let mut step = 1.0;
             while step > SHORTEST_STEP && of_step(step) > share {
