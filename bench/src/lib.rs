@@ -17,6 +17,7 @@ pub mod cli;
 pub mod clock;
 pub mod experiments;
 pub mod machine;
+pub mod memory;
 pub mod meshes;
 pub mod ours;
 pub mod peers;

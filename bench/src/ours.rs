@@ -1,7 +1,7 @@
 //! rt-core behind the interface of the peers.
 
 use crate::peers::{BuildCost, Tracer};
-use crate::{clock, rays};
+use crate::{clock, memory, rays};
 use glam::Vec3;
 use rays::{HitBlock, LANES, RayBlock};
 use rt_core::accel::{BuildError, BuildOptions, World};
@@ -35,7 +35,7 @@ pub struct Ours {
     /// The world.
     pub world: World,
     options: BuildOptions,
-    /// What building cost; the peak is not counted inside rt-core.
+    /// What building cost; the peak is what the resident set grew by, without the mesh.
     pub cost: BuildCost,
     /// Render space minus the mesh's coordinates; zero unless the mesh lies far from zero.
     shift: Vec3,
@@ -44,13 +44,14 @@ pub struct Ours {
 impl Ours {
     /// Builds on rayon's current pool.
     pub fn build(mesh: &Arc<TriMesh>, options: &BuildOptions) -> Result<Ours, BuildError> {
-        let (world, time) = clock::measure(|| World::from_mesh(mesh.clone(), options));
+        let ((world, time), peak_bytes) =
+            memory::peak(|| clock::measure(|| World::from_mesh(mesh.clone(), options)));
         let world = world?;
         let cost = BuildCost {
             wall_secs: time.wall_secs,
             cpu_secs: time.process_cpu_secs,
             bytes: world.report().bytes as u64,
-            peak_bytes: None,
+            peak_bytes,
         };
         let shift = (mesh.origin - world.origin()).as_vec3();
         Ok(Ours { world, options: *options, cost, shift })

@@ -32,12 +32,12 @@ impl Schedule {
     /// For work on one thread: 7 rounds by thread CPU time, pinned.
     pub fn one_thread() -> Schedule {
         let clock = Clock::ThreadCpu;
-        Schedule { warmup_rounds: 1, rounds: 7, budget_secs: 120.0, min_rounds: 3, clock, pin: true }
+        Schedule { warmup_rounds: 1, rounds: 7, budget_secs: 25.0, min_rounds: 3, clock, pin: true }
     }
 
     /// For work on several threads: 7 rounds by the wall clock.
     pub fn all_threads() -> Schedule {
-        Schedule { clock: Clock::Wall, pin: false, ..Schedule::one_thread() }
+        Schedule { clock: Clock::Wall, pin: false, budget_secs: 60.0, ..Schedule::one_thread() }
     }
 
     /// Few rounds within `budget_secs`, for `--quick`.

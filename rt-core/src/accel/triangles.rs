@@ -198,6 +198,7 @@ fn test_leaf<S: Simd, const EXACT: bool>(
     test::<S, f32x4<S>, EXACT>(simd, a, b, c, sx, sy, sz)
 }
 
+#[derive(Clone, Copy)]
 pub(crate) struct ClosestLeaf<'r, const EXACT: bool> {
     ray: &'r RaySetup,
     pub(crate) best: ClosestTri,
@@ -245,6 +246,7 @@ impl<S: Simd, const EXACT: bool> LeafTest<S> for ClosestLeaf<'_, EXACT> {
     }
 }
 
+#[derive(Clone, Copy)]
 pub(crate) struct AnyLeaf<'r, const EXACT: bool> {
     ray: &'r RaySetup,
     t_max: f32,

@@ -44,6 +44,11 @@ impl<'m, T: Copy, const N: usize> Stack<'m, T, N> {
     }
 
     #[inline(always)]
+    pub(crate) fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    #[inline(always)]
     pub(crate) fn len(&self) -> usize {
         self.len
     }

@@ -2,4 +2,5 @@
 
 pub(crate) mod hybrid;
 pub(crate) mod packet;
+pub(crate) mod pair;
 pub(crate) mod single;
