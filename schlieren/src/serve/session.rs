@@ -529,10 +529,7 @@ pub(super) fn chain(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();
     while let Some(c) = cause {
-        let more = c.to_string();
-        if !text.contains(&more) {
-            text += &format!(": {more}");
-        }
+        text += &format!(": {c}");
         cause = c.source();
     }
     text
