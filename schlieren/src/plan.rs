@@ -47,6 +47,10 @@ pub struct Request {
     pub wanted: Wanted,
     /// What becomes of light in cells without data.
     pub blank: BlankCells,
+    /// [`Options::skip_rad`], for [`Mode::Paraxial`].
+    pub skip_rad: f64,
+    /// [`Options::skip_opd_m`].
+    pub skip_opd_m: f64,
 }
 
 /// Largest values in a field, per metre.
@@ -243,7 +247,8 @@ impl Plan {
                     step_voxels: self.step_voxels,
                     wanted,
                     blank,
-                    ..Options::default()
+                    skip_rad: self.request.skip_rad,
+                    skip_opd_m: self.request.skip_opd_m,
                 };
                 Box::new(Deviational::new(field, view, self.interpolant, options))
             }
@@ -255,7 +260,8 @@ impl Plan {
         }
     }
 
-    /// Traces about `rays` rays of a view as planned and once more with everything refined (quarter steps, splines, bending), and compares.
+    /// Traces about `rays` rays of a view as planned and once more with everything refined (quarter steps, splines, bending, nothing
+    /// left out), and compares.
     pub fn measure(&self, field: &Field, view: View, rays: usize) -> Achieved {
         let starts = sample_starts(field, &view, rays.max(1));
         let mut planned = vec![Exit::UNDISTURBED; starts.len()];
@@ -265,6 +271,7 @@ impl Plan {
             mode: if self.mode == Mode::Full { Mode::Full } else { Mode::Paraxial },
             interpolant: Interpolant::BSpline,
             step_voxels: 0.25 * self.step_voxels,
+            request: Request { skip_rad: 0.0, ..self.request },
             ..*self
         };
         fine.paths(field, view).trace_parallel(&starts, &mut refined);

@@ -35,6 +35,9 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
     let framing = framing(&scene, &section);
     let t = technique(&scene, 0, &framing, section.fields[0].n0(), false)?;
     let planned = section.paths(&scene, 0, Wanted { opd: true }, matches!(t, Technique::Bos(_)), true)?;
+    for w in section.warnings.iter().chain(&planned.warnings) {
+        common.warn(w);
+    }
     let [x, y] = args.pixel;
     let position_m = framing.plane_from_pixel(x, y);
     let start = Start { position_m: position_m.map(|c| c as f32), tilt_rad: [0.0; 2] };
@@ -42,6 +45,7 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
     planned.paths.trace(&[start], &mut exit);
     let [exit] = exit;
 
+    let left_out = planned.paths.left_out();
     let optics = t.optics();
     let shift_m = optics.film_shift_m(&start, &exit);
     let photon = Photon { start: &start, exit: &exit, image_point_m: [0.0; 2], shift_m };
@@ -77,9 +81,18 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
         "energy": energy,
         "march": planned.description,
         "deflection_error_rad": planned.error_rad,
+        "left_out": left_out,
+        "warnings": section.warnings.iter().chain(&planned.warnings).collect::<Vec<_>>(),
     });
     common.result(&object, || {
         let [dx, dy] = exit.deflection_rad;
+        let skipped = left_out.map_or(String::new(), |l| {
+            format!(
+                "\nleft out         {:.0} % of the steps, at most {:.1e} rad",
+                100.0 * l.steps_part,
+                l.bound_rad
+            )
+        });
         let error = planned.error_rad.map_or(String::new(), |e| format!(" ± {e:.1e}"));
         format!(
             "pixel {x}, {y}: {status}\n\
@@ -90,7 +103,7 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
              film             shifted by ({:.4}, {:.4}) pixels\n\
              cut-off plane    ({:.4e}, {:.4e}) m from the axis\n\
              energy           {:.6} {:.6} {:.6}\n\
-             march            {}",
+             march            {}{skipped}",
             world.x,
             world.y,
             world.z,

@@ -8,7 +8,7 @@ use crate::field::Field;
 use crate::interpolate::{
     BSpline, Interpolant, Interpolate, Interpolate16, LANES, Trilinear, TrilinearGradient,
 };
-use crate::path::{Exit, LightPaths, Start, Wanted};
+use crate::path::{Exit, LeftOut, LightPaths, Start, Wanted};
 use crate::skip::Bricks;
 use crate::view::View;
 use fearless_simd::{Level, Simd};
@@ -298,5 +298,16 @@ impl LightPaths for Deviational<'_> {
 
     fn difference_step_m(&self) -> f64 {
         0.5 * self.frame.spacing_m.min_element()
+    }
+
+    fn left_out(&self) -> Option<LeftOut> {
+        let bricks = self.bricks.as_ref()?;
+        let c = self.counters();
+        Some(LeftOut {
+            steps_part: c.ray_steps_skipped as f64 / (c.ray_steps + c.ray_steps_skipped).max(1) as f64,
+            bound_rad: c.left_out_femtorad as f64 * 1e-15,
+            bricks_bytes: bricks.memory_bytes(),
+            bricks_secs: bricks.build_time().as_secs_f64(),
+        })
     }
 }

@@ -103,6 +103,9 @@ pub(super) fn expose_lines<'a>(
                 (0..3).for_each(|c| p[c] += f[0] * color[c] * scale);
             }
         }
+        if line == 0 {
+            r.report.left_out = planned.paths.left_out();
+        }
         let counters = &mut r.report.counters;
         let rays = counters.rays - before;
         counters.phase_rays += if t.needs_opd() { rays } else { 0 };

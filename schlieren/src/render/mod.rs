@@ -35,7 +35,7 @@ pub use section::TestSection;
 
 use crate::cutoff::Rgb;
 use crate::film::{Framing, Tally};
-use crate::path::{Start, Wanted};
+use crate::path::{LeftOut, Start, Wanted};
 use crate::scene::{Counters, Effects, Scene, SceneError, TechniqueSpec};
 use crate::spectrum::filter_band;
 use crate::technique::volume::ComparisonError;
@@ -176,6 +176,8 @@ pub struct Report {
     pub largest_deflection_rad: Option<f64>,
     /// By how much bodies' silhouettes can be off because bodies see straight rays, when there are bodies and a map.
     pub silhouette_error_px: Option<f64>,
+    /// What leaving out even gas came to (`march.skip_rad`), in the light of the first wavelength or, without light, the map.
+    pub left_out: Option<LeftOut>,
     /// Darkest and brightest channel of the picture.
     pub levels: [f32; 2],
     /// Pixels around the picture that sent light as well.
@@ -238,6 +240,12 @@ pub fn render(
         return Err(RenderError::Cancelled);
     }
 
+    if scene.march.skip_rad > 0.0 && !measured && !layers.map {
+        let name = scene.technique.name();
+        r.report
+            .warnings
+            .push(format!("march.skip_rad changes nothing with technique {name}, which follows no light"));
+    }
     if layers.map {
         // The picture's own paths serve when they tell what is wanted; the optical path is not computed for photons that do not need it.
         let planned = match first.filter(|p| p.paths.wanted().opd || !layers.phase) {
@@ -318,6 +326,7 @@ fn add_map(scene: &Scene, section: &TestSection, planned: &Planned<'_>, r: &mut 
     if report.march.is_empty() {
         report.add_plan(planned);
     }
+    report.left_out = report.left_out.or(planned.paths.left_out());
     report.counters.map_rays += m.transmission.len() as u64;
     report.counters.phase_rays += m.waves.len() as u64;
     report.counters.solid_queries += if section.solids.is_some() { m.transmission.len() as u64 } else { 0 };

@@ -16,7 +16,7 @@ pub fn check_gpu(march: &MarchSpec) -> Result<(), RenderError> {
         return Ok(());
     }
     #[cfg(feature = "gpu")]
-    return refused(march.method.as_deref(), march.interpolant.as_deref())
+    return refused(march)
         .map_or_else(|| crate::gpu::Gpu::shared().map(|_| ()), Err)
         .map_err(RenderError::Gpu);
     #[cfg(not(feature = "gpu"))]
@@ -24,14 +24,15 @@ pub fn check_gpu(march: &MarchSpec) -> Result<(), RenderError> {
 }
 
 #[cfg(feature = "gpu")]
-const CURE: &str = "Leave out --march or --interpolant, or compute on the CPU (--device cpu).";
+const CURE: &str = "Leave out --march, --interpolant or --skip, or compute on the CPU (--device cpu).";
 
-/// A march or an interpolant, forced by name, that has no kernel.
+/// What a scene asks for by name that has no kernel.
 #[cfg(feature = "gpu")]
-fn refused(method: Option<&str>, interpolant: Option<&str>) -> Option<crate::gpu::GpuError> {
-    let what = match (method, interpolant) {
+fn refused(march: &MarchSpec) -> Option<crate::gpu::GpuError> {
+    let what = match (march.method.as_deref(), march.interpolant.as_deref()) {
         (Some(m), _) if m != "verlet" => format!("the march {m}"),
         (_, Some("trilinear-gradient")) => "the interpolant trilinear-gradient".into(),
+        _ if march.skip_rad > 0.0 => "leaving out even gas (march.skip_rad)".into(),
         _ => return None,
     };
     Some(crate::gpu::GpuError::Unsupported { what, cure: CURE })
@@ -62,7 +63,7 @@ pub(super) fn on_gpu<'a>(
         plan = Plan::from_roughness(field, Request { mode: Some(Mode::Paraxial), ..request }, plan.roughness);
     }
     let made = (|| {
-        if let Some(e) = refused(march.method.as_deref(), march.interpolant.as_deref()) {
+        if let Some(e) = refused(march) {
             return Err(e);
         }
         if plan.mode != Mode::Paraxial {

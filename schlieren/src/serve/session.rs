@@ -264,18 +264,7 @@ impl Session {
         }
         let multifield =
             serde_json::from_value(curves).map_err(|e| refused(format!("not transfer functions: {e}")))?;
-        let f = self.flow.clone();
-        let flow = FlowSpec {
-            file: f.file,
-            length_unit_m: f.length_unit_m,
-            span: f.span,
-            resample_nodes: f.resample_nodes,
-            smoothing_nodes: f.smoothing_nodes,
-            outside: f.outside,
-            hidden: f.hidden,
-            multifield: Some(multifield),
-            ..FlowSpec::default()
-        };
+        let flow = FlowSpec { multifield: Some(multifield), ..self.flow.without_medium() };
         for name in flow.multifield.iter().flat_map(|m| m.fields.keys()) {
             if !self.arrays.iter().any(|a| a.name == *name) {
                 let names: Vec<&str> = self.arrays.iter().map(|a| a.name.as_str()).collect();
