@@ -111,6 +111,11 @@ pub trait LightPaths: Sync {
     /// The distance over which [`LightPaths::trace_with_jacobians`] may take differences: half a voxel or so.
     fn difference_step_m(&self) -> f64;
 
+    /// What failed on the way and was made up for, with its cause, for who looks at the result.
+    fn trouble(&self) -> Option<String> {
+        None
+    }
+
     /// What leaving out even gas came to so far; `None` where nothing is to be left out.
     fn left_out(&self) -> Option<LeftOut> {
         None

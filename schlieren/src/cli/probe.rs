@@ -35,9 +35,6 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
     let framing = framing(&scene, &section);
     let t = technique(&scene, 0, &framing, section.fields[0].n0(), false)?;
     let planned = section.paths(&scene, 0, Wanted { opd: true }, matches!(t, Technique::Bos(_)), true)?;
-    for w in section.warnings.iter().chain(&planned.warnings) {
-        common.warn(w);
-    }
     let [x, y] = args.pixel;
     let position_m = framing.plane_from_pixel(x, y);
     let start = Start { position_m: position_m.map(|c| c as f32), tilt_rad: [0.0; 2] };
@@ -46,6 +43,11 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
     let [exit] = exit;
 
     let left_out = planned.paths.left_out();
+    let trouble = planned.paths.trouble();
+    let warnings: Vec<&String> = section.warnings.iter().chain(&planned.warnings).chain(&trouble).collect();
+    for w in &warnings {
+        common.warn(w);
+    }
     let optics = t.optics();
     let shift_m = optics.film_shift_m(&start, &exit);
     let photon = Photon { start: &start, exit: &exit, image_point_m: [0.0; 2], shift_m };
@@ -82,7 +84,7 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
         "march": planned.description,
         "deflection_error_rad": planned.error_rad,
         "left_out": left_out,
-        "warnings": section.warnings.iter().chain(&planned.warnings).collect::<Vec<_>>(),
+        "warnings": warnings,
     });
     common.result(&object, || {
         let [dx, dy] = exit.deflection_rad;

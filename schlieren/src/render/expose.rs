@@ -103,6 +103,7 @@ pub(super) fn expose_lines<'a>(
                 (0..3).for_each(|c| p[c] += f[0] * color[c] * scale);
             }
         }
+        r.report.add_traced(&*planned.paths);
         if line == 0 {
             r.report.left_out = planned.paths.left_out();
         }

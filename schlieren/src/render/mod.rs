@@ -35,7 +35,7 @@ pub use section::TestSection;
 
 use crate::cutoff::Rgb;
 use crate::film::{Framing, Tally};
-use crate::path::{LeftOut, Start, Wanted};
+use crate::path::{LeftOut, LightPaths, Start, Wanted};
 use crate::scene::{Counters, Effects, Scene, SceneError, TechniqueSpec};
 use crate::spectrum::filter_band;
 use crate::technique::volume::ComparisonError;
@@ -189,6 +189,12 @@ pub struct Report {
 }
 
 impl Report {
+    /// What tracing ran into.
+    fn add_traced(&mut self, paths: &dyn LightPaths) {
+        let new = paths.trouble().filter(|t| !self.warnings.contains(t));
+        self.warnings.extend(new);
+    }
+
     fn add_plan(&mut self, planned: &Planned<'_>) {
         self.march.clone_from(&planned.description);
         self.deflection_error_rad = planned.error_rad;
@@ -327,6 +333,7 @@ fn add_map(scene: &Scene, section: &TestSection, planned: &Planned<'_>, r: &mut 
         report.add_plan(planned);
     }
     report.left_out = report.left_out.or(planned.paths.left_out());
+    report.add_traced(&*planned.paths);
     report.counters.map_rays += m.transmission.len() as u64;
     report.counters.phase_rays += m.waves.len() as u64;
     report.counters.solid_queries += if section.solids.is_some() { m.transmission.len() as u64 } else { 0 };

@@ -38,6 +38,17 @@ fn refused(march: &MarchSpec) -> Option<crate::gpu::GpuError> {
     Some(crate::gpu::GpuError::Unsupported { what, cure: CURE })
 }
 
+/// Why the CPU stands in for a GPU that cannot do it. Who asked for one gets an error for what can be known before anything is drawn; a device that is lost or
+/// out of memory spoils no picture.
+#[cfg(feature = "gpu")]
+fn stands_in(asked: Device, error: crate::gpu::GpuError) -> Result<String, RenderError> {
+    match error {
+        crate::gpu::GpuError::Failed { .. } => Ok(crate::gpu::made_up_for(&error)),
+        e if asked == Device::Gpu => Err(RenderError::Gpu(e)),
+        e => Ok(crate::gpu::made_up_for(&e)),
+    }
+}
+
 /// Paths on the GPU if the scene wants that and it can be, else in words why not; no words when the CPU was asked for, or is quicker by plan.
 #[cfg(feature = "gpu")]
 pub(super) fn on_gpu<'a>(
@@ -95,8 +106,7 @@ pub(super) fn on_gpu<'a>(
                 march.tolerance_rad,
             )))
         }
-        Err(e) if march.device == Device::Gpu => Err(RenderError::Gpu(e)),
-        Err(e) => Ok(Err(Some(format!("computed on the CPU: {e}")))),
+        Err(e) => stands_in(march.device, e).map(|why| Err(Some(why))),
     }
 }
 
@@ -115,5 +125,25 @@ pub(super) fn on_gpu<'a>(
             Ok(Err(Some("computed on the CPU: this program is built without the feature gpu".into())))
         }
         Device::Gpu => Err(RenderError::NoGpu),
+    }
+}
+
+#[cfg(all(test, feature = "gpu"))]
+mod tests {
+    use super::*;
+    use crate::gpu::GpuError;
+
+    #[test]
+    fn a_device_that_fails_spoils_no_picture_and_one_that_cannot_is_refused() {
+        let lost = GpuError::Failed { adapter: "Lamp 9".into(), reason: "the device is lost".into() };
+        for asked in [Device::Gpu, Device::Auto] {
+            let told = stands_in(asked, lost.clone()).unwrap();
+            for word in ["Lamp 9", "the device is lost", "on the CPU"] {
+                assert!(told.contains(word), "{word}: {told}");
+            }
+        }
+        let none = GpuError::NoAdapter("Vulkan finds no device".into());
+        assert!(matches!(stands_in(Device::Gpu, none.clone()), Err(RenderError::Gpu(_))));
+        assert!(stands_in(Device::Auto, none).unwrap().contains("computed on the CPU: no GPU"));
     }
 }

@@ -129,6 +129,10 @@ impl LightPaths for Reversed<'_> {
         self.paths.difference_step_m()
     }
 
+    fn trouble(&self) -> Option<String> {
+        self.paths.trouble()
+    }
+
     fn left_out(&self) -> Option<LeftOut> {
         self.paths.left_out()
     }
