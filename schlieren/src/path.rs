@@ -93,6 +93,41 @@ pub struct LeftOut {
     pub bricks_secs: f64,
 }
 
+/// Paths that several pictures share.
+impl<T: LightPaths + Send + ?Sized> LightPaths for std::sync::Arc<T> {
+    fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
+        (**self).trace(starts, exits);
+    }
+
+    fn view(&self) -> &View {
+        (**self).view()
+    }
+
+    fn wanted(&self) -> Wanted {
+        (**self).wanted()
+    }
+
+    fn difference_step_m(&self) -> f64 {
+        (**self).difference_step_m()
+    }
+
+    fn trouble(&self) -> Option<String> {
+        (**self).trouble()
+    }
+
+    fn left_out(&self) -> Option<LeftOut> {
+        (**self).left_out()
+    }
+
+    fn trace_with_jacobians(&self, starts: &[Start], exits: &mut [Exit], jacobians: &mut [Jacobian]) {
+        (**self).trace_with_jacobians(starts, exits, jacobians);
+    }
+
+    fn trace_parallel(&self, starts: &[Start], exits: &mut [Exit]) {
+        (**self).trace_parallel(starts, exits);
+    }
+}
+
 /// Something that takes light through the test section.
 pub trait LightPaths: Sync {
     /// Traces each start to the exit of the same number, on the calling thread. Neighbouring starts should be neighbours in the picture: rays are taken in

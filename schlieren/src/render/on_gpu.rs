@@ -3,6 +3,7 @@
 use super::RenderError;
 use super::paths::Planned;
 use crate::field::Field;
+use crate::march::Kept;
 use crate::plan::Request;
 use crate::scene::{Device, MarchSpec};
 use crate::view::View;
@@ -57,6 +58,7 @@ pub(super) fn on_gpu<'a>(
     view: View,
     request: Request,
     measured_rays: Option<usize>,
+    kept: &Kept,
 ) -> Result<Result<Planned<'a>, Option<String>>, RenderError> {
     use crate::gpu::{Gpu, GpuError, GpuOptions, GpuPaths};
     use crate::plan::{Mode, Plan};
@@ -65,7 +67,7 @@ pub(super) fn on_gpu<'a>(
     if march.device == Device::Cpu {
         return Ok(Err(None));
     }
-    let mut plan = Plan::new(field, request);
+    let mut plan = Plan::from_roughness(field, request, kept.roughness(field));
     if plan.mode == Mode::LineOfSight && request.mode.is_none() {
         if march.device == Device::Auto {
             return Ok(Err(None));
@@ -97,7 +99,7 @@ pub(super) fn on_gpu<'a>(
     match made {
         Ok((paths, gpu)) => {
             // The CPU's march stands in: the same within roundings.
-            let achieved = measured_rays.map(|rays| plan.measure(field, view, rays));
+            let achieved = measured_rays.map(|rays| plan.measure_with(field, view, rays, kept));
             let described = super::paths::described("verlet", plan.interpolant, plan.step_voxels);
             Ok(Ok(Planned::new(
                 Box::new(paths),
@@ -118,6 +120,7 @@ pub(super) fn on_gpu<'a>(
     _: View,
     _: Request,
     _: Option<usize>,
+    _: &Kept,
 ) -> Result<Result<Planned<'a>, Option<String>>, RenderError> {
     match march.device {
         Device::Cpu => Ok(Err(None)),

@@ -6,7 +6,7 @@ use super::{RenderError, TestSection};
 use crate::field::Field;
 use crate::interpolate::{BSpline, Interpolant, Interpolate, Trilinear, TrilinearGradient};
 use crate::march::{
-    BlankCells, Deviational, Full, FullOptions, Integrator, Options, Pefrl, RungeKutta4, Scheme, Sharma,
+    BlankCells, Deviational, Full, FullOptions, Integrator, Kept, Options, Pefrl, RungeKutta4, Scheme, Sharma,
 };
 use crate::path::{Exit, LightPaths, Start, Wanted};
 use crate::plan::{Achieved, Mode, Plan, Request};
@@ -66,6 +66,8 @@ impl TestSection {
                 _ => Interpolant::BSpline,
             });
         let field = &self.fields[line];
+        let for_once = Kept::default();
+        let kept = self.kept.get(line).unwrap_or(&for_once);
         let view = if against_light { Reversed::view(&self.view) } else { self.view };
         let with = |mode| Request {
             tolerance_rad: march.tolerance_rad,
@@ -84,7 +86,7 @@ impl TestSection {
             "verlet" => Mode::Paraxial,
             _ => Mode::Full,
         });
-        let planned = on_gpu(march, field, view, with(mode), measure.then_some(MEASURED_RAYS))?;
+        let planned = on_gpu(march, field, view, with(mode), measure.then_some(MEASURED_RAYS), kept)?;
         let why_not = match planned {
             Ok(planned) => return Ok(planned.seen(against_light)),
             Err(why_not) => why_not,
@@ -98,7 +100,7 @@ impl TestSection {
             let paths = compared(name, field, view, interpolant, step_voxels, wanted);
             (paths, described(name, interpolant, step_voxels), None)
         } else {
-            let plan = Plan::new(field, with(mode));
+            let plan = Plan::from_roughness(field, with(mode), kept.roughness(field));
             // PEFRL is made with the spline only.
             if plan.mode == Mode::Full && interpolant.is_some_and(|i| i != Interpolant::BSpline) {
                 let step = plan.step_voxels;
@@ -112,7 +114,7 @@ impl TestSection {
                     Mode::Paraxial => "verlet",
                     Mode::Full => "pefrl",
                 };
-                let achieved = measure.then(|| plan.measure(field, view, MEASURED_RAYS));
+                let achieved = measure.then(|| plan.measure_with(field, view, MEASURED_RAYS, kept));
                 let mut description = described(name, plan.interpolant, plan.step_voxels);
                 if march.skip_rad > 0.0 {
                     match plan.mode {
@@ -122,7 +124,7 @@ impl TestSection {
                         Mode::LineOfSight | Mode::Full => in_vain = Some(left_nothing_out(name)),
                     }
                 }
-                (plan.paths(field, view), description, achieved)
+                (plan.paths_with(field, view, kept), description, achieved)
             }
         };
         let mut planned = Planned::new(paths, description, achieved, march.tolerance_rad);
