@@ -80,6 +80,54 @@ pub struct Wanted {
     pub opd: bool,
 }
 
+/// What leaving out even gas came to; see [`crate::skip`].
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct LeftOut {
+    /// Part of the steps that took no sample, 0 to 1.
+    pub steps_part: f64,
+    /// Bound on what that changed any ray's deflection by.
+    pub bound_rad: f64,
+    /// Bytes that the bricks take.
+    pub bricks_bytes: usize,
+    /// Time it took to build them.
+    pub bricks_secs: f64,
+}
+
+/// Paths that several pictures share.
+impl<T: LightPaths + Send + ?Sized> LightPaths for std::sync::Arc<T> {
+    fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
+        (**self).trace(starts, exits);
+    }
+
+    fn view(&self) -> &View {
+        (**self).view()
+    }
+
+    fn wanted(&self) -> Wanted {
+        (**self).wanted()
+    }
+
+    fn difference_step_m(&self) -> f64 {
+        (**self).difference_step_m()
+    }
+
+    fn trouble(&self) -> Option<String> {
+        (**self).trouble()
+    }
+
+    fn left_out(&self) -> Option<LeftOut> {
+        (**self).left_out()
+    }
+
+    fn trace_with_jacobians(&self, starts: &[Start], exits: &mut [Exit], jacobians: &mut [Jacobian]) {
+        (**self).trace_with_jacobians(starts, exits, jacobians);
+    }
+
+    fn trace_parallel(&self, starts: &[Start], exits: &mut [Exit]) {
+        (**self).trace_parallel(starts, exits);
+    }
+}
+
 /// Something that takes light through the test section.
 pub trait LightPaths: Sync {
     /// Traces each start to the exit of the same number, on the calling thread. Neighbouring starts should be neighbours in the picture: rays are taken in
@@ -97,6 +145,16 @@ pub trait LightPaths: Sync {
 
     /// The distance over which [`LightPaths::trace_with_jacobians`] may take differences: half a voxel or so.
     fn difference_step_m(&self) -> f64;
+
+    /// What failed on the way and was made up for, with its cause, for who looks at the result.
+    fn trouble(&self) -> Option<String> {
+        None
+    }
+
+    /// What leaving out even gas came to so far; `None` where nothing is to be left out.
+    fn left_out(&self) -> Option<LeftOut> {
+        None
+    }
 
     /// [`LightPaths::trace`], and how each exit changes with its start. This implementation takes central differences of four more rays each;
     /// implementations with smooth fields do better.

@@ -14,11 +14,12 @@
 
 use crate::field::Field;
 use crate::interpolate::{BSpline, Interpolant};
-use crate::march::{BlankCells, Deviational, Full, FullOptions, LineOfSight, Options, Pefrl, Scheme};
+use crate::march::{BlankCells, Deviational, Full, FullOptions, Kept, Options, Pefrl, Projection, Scheme};
 use crate::path::{Exit, LightPaths, Start, Status, Wanted};
 use crate::view::View;
 use glam::DVec3;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// How light is taken through the field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -47,6 +48,10 @@ pub struct Request {
     pub wanted: Wanted,
     /// What becomes of light in cells without data.
     pub blank: BlankCells,
+    /// [`Options::skip_rad`], for [`Mode::Paraxial`].
+    pub skip_rad: f64,
+    /// [`Options::skip_opd_m`].
+    pub skip_opd_m: f64,
 }
 
 /// Largest values in a field, per metre.
@@ -234,40 +239,56 @@ impl Plan {
 
     /// The march as planned.
     pub fn paths<'a>(&self, field: &'a Field, view: View) -> Box<dyn LightPaths + 'a> {
+        self.paths_with(field, view, &Kept::default())
+    }
+
+    /// [`Plan::paths`] with what was prepared for this field before.
+    pub fn paths_with<'a>(&self, field: &'a Field, view: View, kept: &Kept) -> Box<dyn LightPaths + 'a> {
         let (wanted, blank) = (self.request.wanted, self.request.blank);
         match self.mode {
-            Mode::LineOfSight => Box::new(LineOfSight::new(field, view, self.interpolant, wanted, blank)),
+            Mode::LineOfSight => {
+                let projection = Projection { view, interpolant: self.interpolant, wanted, blank };
+                Box::new(kept.line_of_sight(field, projection))
+            }
             Mode::Paraxial => {
                 let options = Options {
                     scheme: Scheme::Verlet,
                     step_voxels: self.step_voxels,
                     wanted,
                     blank,
-                    ..Options::default()
+                    skip_rad: self.request.skip_rad,
+                    skip_opd_m: self.request.skip_opd_m,
                 };
-                Box::new(Deviational::new(field, view, self.interpolant, options))
+                Box::new(Deviational::with_kept(field, view, self.interpolant, options, kept))
             }
             Mode::Full => {
                 let options =
                     FullOptions { step_voxels: self.step_voxels, wanted, blank, ..FullOptions::default() };
-                Box::new(FullSpline { field, spline: BSpline::new(field), view, options })
+                Box::new(FullSpline { field, spline: kept.spline(field), view, options })
             }
         }
     }
 
-    /// Traces about `rays` rays of a view as planned and once more with everything refined (quarter steps, splines, bending), and compares.
+    /// Traces about `rays` rays of a view as planned and once more with everything refined (quarter steps, splines, bending, nothing
+    /// left out), and compares.
     pub fn measure(&self, field: &Field, view: View, rays: usize) -> Achieved {
+        self.measure_with(field, view, rays, &Kept::default())
+    }
+
+    /// [`Plan::measure`] with what was prepared for this field before.
+    pub fn measure_with(&self, field: &Field, view: View, rays: usize, kept: &Kept) -> Achieved {
         let starts = sample_starts(field, &view, rays.max(1));
         let mut planned = vec![Exit::UNDISTURBED; starts.len()];
-        self.paths(field, view).trace_parallel(&starts, &mut planned);
+        self.paths_with(field, view, kept).trace_parallel(&starts, &mut planned);
         let mut refined = planned.clone();
         let fine = Plan {
             mode: if self.mode == Mode::Full { Mode::Full } else { Mode::Paraxial },
             interpolant: Interpolant::BSpline,
             step_voxels: 0.25 * self.step_voxels,
+            request: Request { skip_rad: 0.0, ..self.request },
             ..*self
         };
-        fine.paths(field, view).trace_parallel(&starts, &mut refined);
+        fine.paths_with(field, view, kept).trace_parallel(&starts, &mut refined);
         let (max_rad, rms_rad, rays) = compare(&planned, &refined);
         let resolution_rad = coarsened(field).map_or(f64::INFINITY, |coarse| {
             let mut other = planned.clone();
@@ -327,14 +348,14 @@ fn coarsened(field: &Field) -> Option<Field> {
 /// [`Full`] that owns its spline.
 struct FullSpline<'a> {
     field: &'a Field,
-    spline: BSpline,
+    spline: Arc<BSpline>,
     view: View,
     options: FullOptions,
 }
 
 impl LightPaths for FullSpline<'_> {
     fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
-        Full::new(self.field, &self.spline, Pefrl, self.view, self.options).trace(starts, exits);
+        Full::new(self.field, &*self.spline, Pefrl, self.view, self.options).trace(starts, exits);
     }
 
     fn view(&self) -> &View {

@@ -18,9 +18,14 @@ fn text(bytes: &[u8]) -> String {
 
 /// Air of 1.2 kg/m³ with a light blob right of and above the middle, in a box of 0.2 x 0.1 x 0.1 m.
 fn flow(path: &Path) {
-    let (nx, n) = (41u32, 21u32);
-    let mut image = ImageData::new([nx, n, n], DVec3::new(-0.1, -0.05, -0.05), DVec3::splat(5e-3));
-    let at = |i: u32, n: u32| (f64::from(i) - 0.5 * f64::from(n - 1)) * 5e-3;
+    flow_of(path, [41, 21]);
+}
+
+/// The same with so many nodes.
+fn flow_of(path: &Path, [nx, n]: [u32; 2]) {
+    let spacing_m = 0.1 / f64::from(n - 1);
+    let mut image = ImageData::new([nx, n, n], DVec3::new(-0.1, -0.05, -0.05), DVec3::splat(spacing_m));
+    let at = |i: u32, n: u32| (f64::from(i) - 0.5 * f64::from(n - 1)) * spacing_m;
     let blob = |i: u32| {
         let (x, y, z) = (at(i % nx, nx), at(i / nx % n, n), at(i / nx / n, n));
         1.2 - 0.3 * (-((x - 0.03).powi(2) + (y - 0.01).powi(2) + z * z) / (2.0 * 0.015f64.powi(2))).exp()
@@ -166,6 +171,15 @@ fn wrong_usage_exits_with_2_and_names_the_option() {
         (&["--density", "rho", "--noise-free", "--samples", "3", "-o", &png], "--samples"),
         (&["--density", "rho", "--view", "30,95", "-o", &png], "AZIMUTH"),
         (&["--density", "rho", "--tolerance", "1 foot", "-o", &png], "1e-7rad"),
+        (&["--density", "rho", "--skip", "1e-9rad", "--march", "euler", "-o", &png], "only verlet"),
+        (&["--density", "rho", "--skip=-1", "-o", &png], "skip_rad"),
+        (&["--density", "rho", "--skip", "1e-9rad", "--device", "gpu", "-o", &png], "skip"),
+        (&["--density", "rho", "--curve", "T=300:0,900:-1e-4", "-o", &png], "alternatives"),
+        (&["--density", "rho", "--curve-weight", "T=2", "-o", &png], "--curve-weight"),
+        (&["--density", "rho", "--curve-rule", "sum", "-o", &png], "--curve-rule"),
+        (&["--curve", "T=300", "-o", &png], "T=300:0,2000:-2e-4"),
+        (&["--curve", "T=300:0", "--curve", "T=400:0", "-o", &png], "twice"),
+        (&["--curve", "T=300:0,900:-1e-4", "--curve-weight", "Y=2", "-o", &png], "Y"),
     ] {
         let o = schlieren(&[&["render", file][..], args].concat());
         let stderr = text(&o.stderr);
@@ -223,6 +237,142 @@ fn sweeps_number_their_pictures_and_probes_print_numbers() {
     let p: Value = serde_json::from_slice(&o.stdout).unwrap();
     assert_eq!(p["status"], "free");
     assert!(p["deflection_rad"][0].as_f64().unwrap() > 1e-5, "{p}");
+}
+
+/// The same options on the command line and in a scene, in every command that draws or traces.
+#[test]
+fn gas_is_left_out_within_a_bound_that_is_reported() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name).to_str().unwrap().to_string();
+    // Fine enough that some bricks of 8 voxels are far from the blob.
+    flow_of(&dir.path().join("flow.vti"), [129, 65]);
+    let (file, png, scene) = (path("flow.vti"), path("a.png"), path("scene.toml"));
+    std::fs::write(
+        &scene,
+        "[flow]\nfile = \"flow.vti\"\ndensity = \"rho\"\n[film]\nsize = [40, 20]\n[march]\nmethod = \"verlet\"\nskip_rad = 1e-5\n",
+    )
+    .unwrap();
+    let base = ["--density", "rho", "--size", "40x20", "--march", "verlet", "--json", "--quiet"];
+    let json = |args: &[&str]| -> Vec<Value> {
+        let o = schlieren(args);
+        assert_eq!(o.status.code(), Some(0), "{args:?}: {}", text(&o.stderr));
+        text(&o.stdout).lines().map(|l| serde_json::from_str(l).unwrap()).collect()
+    };
+    let plain = json(&[&["render", &file, "-o", &png], &base[..]].concat());
+    assert!(plain[0]["left_out"].is_null());
+    let by_option = json(&[&["render", &file, "-o", &png, "--skip", "1e-5rad"], &base[..]].concat());
+    let by_scene = json(&["render", "--scene", &scene, "-o", &png, "--json", "--quiet"]);
+    let probed = json(&["probe", "--scene", &scene, "--pixel", "2,18", "--json", "--quiet"]);
+    let swept = json(&[
+        "sweep",
+        &file,
+        "--scene",
+        &scene,
+        "--set",
+        "march.skip_rad=0.0,1e-5",
+        "-o",
+        &png,
+        "--json",
+        "--quiet",
+    ]);
+    assert!(swept[0]["left_out"].is_null());
+    for object in [&by_option[0], &by_scene[0], &probed[0], &swept[1]] {
+        let left = &object["left_out"];
+        assert!(left["steps_part"].as_f64().is_some_and(|p| p > 0.0 && p <= 1.0), "{object}");
+        assert!(left["bound_rad"].as_f64().is_some_and(|b| (0.0..=1e-5 * 1.001).contains(&b)), "{object}");
+        assert!(object["march"].as_str().is_some_and(|m| m.contains("leaving out")), "{object}");
+    }
+    // Where the probe looks, the gas is even to the last digit; over the picture it is not.
+    assert!(by_option[0]["left_out"]["bound_rad"].as_f64().unwrap() > 0.0);
+    // What the bound says is what happens to the deflections.
+    let change = by_option[0]["largest_deflection_rad"].as_f64().unwrap()
+        - plain[0]["largest_deflection_rad"].as_f64().unwrap();
+    assert!(change.abs() <= 1e-5, "{change}");
+
+    // Straight rays take no steps that could be left out.
+    let o = schlieren(&[
+        "render",
+        &file,
+        "--density",
+        "rho",
+        "--size",
+        "40x20",
+        "--tolerance",
+        "1e-2rad",
+        "--skip",
+        "1e-7rad",
+        "-o",
+        &png,
+    ]);
+    assert!(text(&o.stderr).contains("march.skip_rad changes nothing"), "{}", text(&o.stderr));
+    let o = schlieren(&[
+        "render",
+        &file,
+        "--density",
+        "rho",
+        "--size",
+        "40x20",
+        "--technique",
+        "slice",
+        "--skip",
+        "1e-7rad",
+        "-o",
+        &png,
+    ]);
+    assert!(text(&o.stderr).contains("march.skip_rad changes nothing"), "{}", text(&o.stderr));
+}
+
+#[test]
+fn transfer_functions_from_options_and_from_a_scene_are_the_same() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name).to_str().unwrap().to_string();
+    flow(&dir.path().join("flow.vti"));
+    let (file, png, scene) = (path("flow.vti"), path("a.png"), path("scene.toml"));
+    std::fs::write(
+        &scene,
+        "[flow]\nfile = \"flow.vti\"\n[flow.multifield]\nrule = \"largest\"\n[flow.multifield.fields]\nT = { knots = [[293.15, 0.0], [400.0, -1e-4]], weight = 2.0 }\nrho = { knots = [[0.9, 2e-5], [1.2, 0.0]] }\n[film]\nsize = [40, 20]\n",
+    )
+    .unwrap();
+    let curves = [
+        "--curve",
+        "T=293.15:0,400:-1e-4",
+        "--curve",
+        "rho=0.9:2e-5,1.2:0",
+        "--curve-weight",
+        "T=2",
+        "--curve-rule",
+        "largest",
+        "--size",
+        "40x20",
+    ];
+    let run = |args: &[&str]| {
+        let o = schlieren(&[args, &["--quiet"]].concat());
+        assert_eq!(o.status.code(), Some(0), "{args:?}: {}", text(&o.stderr));
+        text(&o.stdout)
+    };
+    let map = |name: &str, args: &[&str]| {
+        let out = path(name);
+        run(&[&["render", "--npy", &out], args].concat());
+        npy(Path::new(&out)).1
+    };
+    let by_scene = map("scene.npy", &["--scene", &scene]);
+    assert!(by_scene.iter().any(|v| v.abs() > 1e-6), "the curves bend light");
+    assert_eq!(map("options.npy", &[&[file.as_str()], &curves[..]].concat()), by_scene);
+    // A curve on the command line replaces that of the scene and keeps the others.
+    let without = map("without.npy", &["--scene", &scene, "--curve-weight", "T=0"]);
+    assert_ne!(without, by_scene);
+    assert_eq!(map("again.npy", &["--scene", &scene, "--curve", "rho=0.9:2e-5,1.2:0"]), by_scene);
+
+    let probe = |args: &[&str]| run(&[&["probe", "--pixel", "29,8", "--json"], args].concat());
+    assert_eq!(probe(&[&[file.as_str()], &curves[..]].concat()), probe(&["--scene", &scene]));
+    let swept = run(&[
+        &["sweep", &file, "--set", "flow.multifield.rule=sum,largest", "-o", &png, "--json"],
+        &curves[..],
+    ]
+    .concat());
+    assert_eq!(swept.lines().count(), 2);
+    let bytes = ["a-0000.png", "a-0001.png"].map(|n| std::fs::read(path(n)).unwrap());
+    assert_ne!(bytes[0], bytes[1], "the rule was changed");
 }
 
 #[test]

@@ -191,6 +191,64 @@ fn curves_make_another_index_and_bodies_stay_shut() {
 }
 
 #[test]
+fn steps_of_a_series_are_read_when_chosen_and_relative_to_the_first() {
+    let s = Served::start_series(&SMALL);
+    let state = s.get("state").json();
+    assert_eq!((&state["times"], &state["step"]), (&json!([0.0, 0.5, 1.0, 1.5]), &json!(0)));
+    let first = s.finished();
+    assert_eq!(first.info["error"], serde_json::Value::Null);
+
+    // The last: another picture, and the saved scene makes the same, relative to the first step's surroundings.
+    assert_eq!(s.change(&json!({"step": 3}))["step"], 3);
+    let last = s.finished();
+    assert_eq!(last.info["error"], serde_json::Value::Null);
+    assert!(changed(&first.rgb, &last.rgb) > 0.02);
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name);
+    let toml = s.get("save/toml").text();
+    let reference = toml.lines().find_map(|l| l.strip_prefix("reference_n_minus_1 = ")).expect(&toml);
+    // 1.2 kg/m3 of air in red light; that step's own surroundings would be 2.48e-4.
+    assert!((reference.parse::<f64>().unwrap() - 2.71e-4).abs() < 2e-6, "{reference}");
+    assert!(toml.contains("flow-3.vti"), "{toml}");
+    std::fs::write(path("saved.toml"), toml).unwrap();
+    let status = std::process::Command::new(env!("CARGO_BIN_EXE_schlieren"))
+        .args(["render", "--quiet", "--scene"])
+        .arg(path("saved.toml"))
+        .arg("-o")
+        .arg(path("again.png"))
+        .status()
+        .unwrap();
+    assert!(status.success());
+    let again = read_png(&path("again.png")).unwrap();
+    let bytes: Vec<u8> = again.rgba().unwrap().iter().flat_map(|p| [p[0], p[1], p[2]]).map(srgb).collect();
+    assert_eq!(bytes, last.rgb);
+
+    // Transfer functions stay with the step, and other changes with both.
+    let knots = json!([[290.0, 0.0], [400.0, 3e-4]]);
+    let state = s.change(&json!({"flow": {"multifield": {"fields": {"T": {"knots": knots}}}}}));
+    assert_eq!(state["step"], 3);
+    assert_eq!(s.finished().info["error"], serde_json::Value::Null);
+    assert_eq!(s.change(&json!({"flow": {"multifield": null}}))["step"], 3);
+    assert_eq!(s.finished().rgb, last.rgb);
+
+    // A file that is missing is an error of its step only.
+    s.change(&json!({"step": 2}));
+    assert!(s.finished().info["error"].as_str().is_some_and(|e| e.contains("flow-2.vti")));
+    s.change(&json!({"step": 0}));
+    assert_eq!(s.finished().rgb, first.rgb);
+
+    for wrong in [json!(4), json!(-1), json!(1.5), json!("1"), json!(null), json!({"a": 1})] {
+        let answer = s.ask("POST", "scene", &json!({ "step": wrong }).to_string());
+        assert_eq!(answer.status, 422, "{wrong}: {}", answer.text());
+        assert!(answer.json()["error"].as_str().unwrap().contains("0 to 3"), "{}", answer.text());
+    }
+    let single = Served::start(&SMALL);
+    assert_eq!(single.get("state").json()["times"], json!([]));
+    let answer = single.ask("POST", "scene", "{\"step\": 0}");
+    assert!(answer.status == 422 && answer.text().contains(".pvd"), "{}", answer.text());
+}
+
+#[test]
 fn bad_requests_get_a_reason_and_harm_nothing() {
     let s = Served::start(&SMALL);
     for (method, path, body, status) in [

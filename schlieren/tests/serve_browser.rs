@@ -76,7 +76,7 @@ fn looking_orbiting_painting_and_switching() {
             return;
         }
     };
-    let s = Served::start(&["--size", "384x192", "--samples", "16", "--source", "circle:0.05mm"]);
+    let s = Served::start_series(&["--size", "384x192", "--samples", "16", "--source", "circle:0.05mm"]);
     let mut b = Browser::open(&program, &s.url());
     b.wait_for("document.readyState === 'complete' && document.body.dataset.finished === 'true'");
     let first = look(&mut b, "first");
@@ -157,6 +157,13 @@ fn looking_orbiting_painting_and_switching() {
         b.evaluate("document.querySelector('input[value=paint]').disabled") == true,
         "no filter to paint on"
     );
+
+    // Another time: the blob is elsewhere.
+    b.evaluate("const step = document.getElementById('step'); step.value = 3; step.dispatchEvent(new Event('input'))");
+    b.wait_for("document.getElementById('when').innerText.includes('4 of 4')");
+    settled(&mut b);
+    let later = look(&mut b, "later");
+    assert!(differs(&switched, &later, picture, [0.1, 0.1, 0.9, 0.9]) > 0.1);
 
     // Nonsense is answered on the page, and the page goes on.
     b.evaluate("const w = document.querySelector('input[name=wavelengths]'); w.value = '0.5'; w.dispatchEvent(new Event('change'))");

@@ -6,14 +6,15 @@
 //! * the shock's shape and stand-off: Billig's correlation ([`bow_shock`](super::gas_dynamics::bow_shock)), with the attached
 //!   cone's shock (Taylor and Maccoll) far away;
 //! * the jump across it: Rankine and Hugoniot with the local shock angle;
-//! * the stagnation point: Rayleigh's pitot formula; the surface: modified Newtonian pressure (Lees 1955),
+//! * the stagnation point: Rayleigh's pitot formula; the surface: modified Newtonian pressure (after L. Lees, 1955),
 //!   p = p∞ + (p02 - p∞) sin²φ, and the entropy of the stagnation streamline;
 //! * in between: linear in the radius from shock to surface (a model; smooth, so that only the shock and the wake have
 //!   sharp gradients);
 //! * behind the base: a wake of hot thin gas at a third of the free stream's pressure that necks and recompresses, with a
-//!   growing shear layer (a model in the proportions of measured wakes, e.g. Chapman, NACA 1051).
+//!   growing shear layer (a model; the pressure is of the order of base pressures in D. R. Chapman, NACA Report 1051, 1951).
 //!
-//! Defaults are the conditions of NASA Langley's 20-inch Mach 6 tunnel (p0 862 kPa, T0 500 K: 545 Pa, 61 K, 0.031 kg/m³).
+//! Defaults are conditions of the order of those in NASA Langley's 20-inch Mach 6 tunnel (p0 862 kPa, T0 500 K, which give 545 Pa,
+//! 61 K, 0.031 kg/m³).
 //! The densities are from 0.05 (wake) to 6 times the free stream's.
 
 use super::cell_average::Layered;

@@ -2,7 +2,8 @@
 //! of table 5.1 of the thesis.
 //!
 //! The jet leaves a pipe of 50 mm along x into air of 600 K. Mean field: a top hat that turns into the self-similar Gaussian of
-//! a round jet, Z = 5 d/x · exp(-(r/b)²), b = 0.12 x (Pope, "Turbulent Flows", ch. 5); eddies grow with x. The volatiles (CH4,
+//! a round jet, Z = 5 d/x · exp(-(r/b)²), b = 0.12 x (the form after S. B. Pope, "Turbulent Flows", 2000, ch. 5; the constants
+//! are of the order of measured ones); eddies grow with x. The volatiles (CH4,
 //! CO, CO2 in N2) burn at the `flame_sheet` at up to 1900 K. Char and ash, which block light in a real one,
 //! are left out. Density 0.18 to 0.6 kg/m³. Smooth at the scale of a cell but for the flame sheet's rounded corner, so it is
 //! sampled at points.

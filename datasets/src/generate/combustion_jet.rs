@@ -2,8 +2,8 @@
 //! simulation of 480 x 720 x 100 points in table 5.1 of the thesis (a temporally evolving jet: x along it, periodic; y
 //! across; z the span).
 //!
-//! Streams, pressure and slot are those of E. R. Hawkes et al., "Scalar mixing in direct numerical simulations of temporally
-//! evolving plane jet flames", Proc. Combust. Inst. 31, 2007: fuel 50 % CO, 10 % H2, 40 % N2 and oxidiser 25 % O2, 75 % N2 by
+//! Streams, pressure and slot are after E. R. Hawkes et al., "Scalar mixing in direct numerical simulations of temporally
+//! evolving plane jet flames with skeletal CO/H2 kinetics", Proc. Combust. Inst. 31, 2007: fuel 50 % CO, 10 % H2, 40 % N2 and oxidiser 25 % O2, 75 % N2 by
 //! volume, both at 500 K and 1 atm, slot 1.37 mm. The mean mixture fraction is a smoothed top hat; rollers and
 //! `turbulence` fold it; the gas follows from the `flame_sheet`. Ranges: 500 to
 //! about 2030 K, density 0.19 to 0.71 kg/m³. Smooth at the scale of a cell (the finest wave has six), so it is sampled at points.

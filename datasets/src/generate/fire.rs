@@ -1,8 +1,8 @@
 //! A heptane pool fire: a pool of 0.3 m burns in air. Stands for the 293³ heptane fire of table 5.1 of the thesis.
 //!
 //! `plume` mixes, the `flame_sheet` burns: C7H16 + 11 O2 = 7 CO2 + 8 H2O, stoichiometric
-//! mixture fraction 0.062. The flame's temperature is 1500 K, well below the adiabatic 2270 K, as soot radiates (pool fires of
-//! this size: 1100 to 1500 K). Ranges: 300 to 1500 K, density 0.23 to 3.3 kg/m³ (heptane's heavy vapour at its boiling point,
+//! mixture fraction 0.062. The flame's temperature is set to 1500 K, well below the adiabatic one of about 2270 K, as soot
+//! radiates: the order of magnitude of pool fires of this size. Ranges: 300 to 1500 K, density 0.23 to 3.3 kg/m³ (heptane's heavy vapour at its boiling point,
 //! just above the pool). Smooth at the scale of a cell but for the flame sheet's rounded corner, so it is sampled at points.
 
 use super::combustion_jet::{gas_fields, gas_row};

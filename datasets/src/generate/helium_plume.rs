@@ -1,9 +1,9 @@
 //! A helium plume that puffs: a disc of helium of 1 m rises into air at rest, rolls up into rings and breaks up. Stands for
 //! the 227 x 302 x 302 simulation of table 5.1 of the thesis.
 //!
-//! Source and proportions are those of the experiment of O'Hern et al., J. Fluid Mech. 544, 2005 (source 1 m, puffing about
-//! 1.4 times a second, neck at about half a diameter). Isothermal at 298 K and 1 atm, so density and helium are one field
-//! seen twice: 0.164 (helium) to 1.185 kg/m³ (air). The index of refraction is not a function of the density alone, which is
+//! The source is after the experiment of T. J. O'Hern et al., "Experimental study of a turbulent buoyant helium plume", J. Fluid
+//! Mech. 544, 2005 (source 1 m, puffing about 1.4 times a second); the neck at half a diameter and the rings are ours. Isothermal
+//! at 298 K and 1 atm, so density and helium are one field seen twice: 0.164 (helium) to 1.185 kg/m³ (air). The index of refraction is not a function of the density alone, which is
 //! why the mass fractions come along. Smooth at the scale of a cell, so it is sampled at points.
 
 use super::flow::{Field, Fields, Flow, FlowError, names};

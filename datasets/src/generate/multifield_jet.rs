@@ -3,7 +3,8 @@
 //! front of them.
 //!
 //! Mixture fraction and density are those of [`combustion_jet`](super::combustion_jet). The others follow from them as in
-//! laminar flamelets (Peters 1984): χ = 2 D |∇Z|²; the flame is a band of Z about the stoichiometric value, whose heat release
+//! laminar flamelets (N. Peters, "Laminar diffusion flamelet models in non-premixed turbulent combustion", Prog. Energy
+//! Combust. Sci. 10, 1984): χ = 2 D |∇Z|²; the flame is a band of Z about the stoichiometric value, whose heat release
 //! grows with χ and which goes out (no OH) where χ exceeds its quenching value. The vorticity is the curl of the jet's mean
 //! velocity plus eddies that follow the displacements. Derivatives are central differences, one-sided at the border.
 
@@ -15,7 +16,7 @@ use rayon::prelude::*;
 
 /// Diffusivity of mass, m²/s: that of N2 in air at 450 K, so that most of the flame burns and its most strained parts are out.
 const DIFFUSIVITY: f64 = 4e-5;
-/// Scalar dissipation at which the flame goes out, 1/s (of the order of 2000 for this fuel).
+/// Scalar dissipation at which the flame goes out, 1/s: 2000, the order of magnitude for this fuel.
 const QUENCHING: f64 = 2000.0;
 /// Mass fraction of OH in a burning flame.
 const HYDROXYL: f64 = 4e-3;

@@ -16,7 +16,7 @@ pub(crate) struct Shape {
     pub(crate) neck: f64,
     /// Height of the neck.
     pub(crate) neck_height: f64,
-    /// Growth of the radius with height above the neck: 6/5 α of Morton, Taylor and Turner 1956 with α = 0.1 is 0.12.
+    /// Growth of the radius with height above the neck: 6/5 α after Morton, Taylor and Turner 1956 with α = 0.1 is 0.12.
     pub(crate) growth: f64,
     /// Height at which the axis is diluted to half.
     pub(crate) half_height: f64,

@@ -142,7 +142,7 @@ mod tests {
             assert!(((m2 - m1) / (2.0 * h) / lift - 1.0).abs() < 1e-8, "momentum at {z}");
         }
         // Engineering formulas for Q in W and z in m: 0.128 Q^(1/3) z^(-1/3) m/s and 0.329 Q^(2/3) z^(-5/3) K on the axis
-        // (Mundt 1996); they assume an entrainment of 0.093.
+        // (after E. Mundt, thesis, KTH Stockholm, 1996), which agree with the closed form for an entrainment of about 0.093.
         let excess = plume.lightness(1.0) * plume.temperature_k;
         assert!((plume.velocity_m_per_s(1.0) / (0.128 * 100f64.cbrt()) - 1.0).abs() < 0.1);
         assert!((excess / (0.329 * 100f64.powf(2.0 / 3.0)) - 1.0).abs() < 0.15, "{excess}");

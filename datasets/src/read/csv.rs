@@ -2,6 +2,8 @@
 //!
 //! Cells may be quoted (`"a, b"`, a quote inside is doubled) but not contain line breaks. Empty lines and lines that begin with
 //! `#` are skipped. Columns are asked for by name, so their order does not matter.
+//!
+//! The lexer is our own because the crate csv does not refuse broken quotes: ARCHITECTURE.md, "Decisions".
 
 use super::ReadError;
 use super::error::{At, Fault, read_bytes};
@@ -280,6 +282,7 @@ mod tests {
             ("a,b\n1\n", "in line 2: 1 cells, but there are 2 columns"),
             ("a,b\n1,\"2\n", "no closing quote"),
             ("a,b\n1,\"2\"x\n", "no closing quote"),
+            ("a,b\n1,\"2\"5\n", "no closing quote"),
             ("a;b\n1;2,5\n", "decimal point"),
             ("a,b\n1,\n", "fill it in"),
             ("a,b\n1,inf\n", "not a number"),

@@ -28,7 +28,7 @@ impl fmt::Display for At {
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The operating system refuses.
-    #[error("{}: {source}; {cure}", path.display())]
+    #[error("{}: cannot be read; {cure}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
@@ -242,5 +242,28 @@ impl<'a> Cursor<'a> {
             }
             Ok(v) => Ok(v),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::error::Error;
+    use std::path::Path;
+
+    #[test]
+    fn the_systems_reason_is_in_the_chain_once() {
+        let error = super::read_bytes(Path::new("no/such/file")).unwrap_err();
+        let cause = error.source().expect("the system's error");
+        let chain = format!("{error}: {cause}");
+        assert!(
+            chain.starts_with("no/such/file: cannot be read; check the name and the directory: "),
+            "{chain}"
+        );
+        assert_eq!(chain.matches(&cause.to_string()).count(), 1, "{chain}");
+        assert!(cause.source().is_none(), "{cause}");
+
+        let error = crate::write::write_file(Path::new("no/such/file"), |_| Ok(())).unwrap_err();
+        let cause = error.source().expect("the system's error");
+        assert!(!error.to_string().contains(&cause.to_string()), "{error}: {cause}");
     }
 }

@@ -205,7 +205,10 @@ impl Reader {
         let name = image.name().unwrap_or("").to_string();
         match image.source() {
             gltf::image::Source::Uri { uri, .. } => {
-                let bytes = resource(path, uri).map_err(|e| e.to_string())?;
+                let bytes = resource(path, uri).map_err(|e| match std::error::Error::source(&e) {
+                    Some(reason) => format!("{e}: {reason}"),
+                    None => e.to_string(),
+                })?;
                 decode_texture(&name, &bytes, false)
             }
             gltf::image::Source::View { view, .. } => {

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
     /// The operating system refuses.
-    #[error("{}: {source}; check that the directory exists, may be written and has room", path.display())]
+    #[error("{}: cannot be written; check that the directory exists, may be written and has room", path.display())]
     Io {
         /// The file.
         path: PathBuf,

@@ -1,5 +1,6 @@
 //! The command line: what was typed becomes a call of the library.
 
+mod flow_args;
 mod index;
 mod probe;
 mod render;

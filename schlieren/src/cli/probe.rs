@@ -42,6 +42,12 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
     planned.paths.trace(&[start], &mut exit);
     let [exit] = exit;
 
+    let left_out = planned.paths.left_out();
+    let trouble = planned.paths.trouble();
+    let warnings: Vec<&String> = section.warnings.iter().chain(&planned.warnings).chain(&trouble).collect();
+    for w in &warnings {
+        common.warn(w);
+    }
     let optics = t.optics();
     let shift_m = optics.film_shift_m(&start, &exit);
     let photon = Photon { start: &start, exit: &exit, image_point_m: [0.0; 2], shift_m };
@@ -77,9 +83,18 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
         "energy": energy,
         "march": planned.description,
         "deflection_error_rad": planned.error_rad,
+        "left_out": left_out,
+        "warnings": warnings,
     });
     common.result(&object, || {
         let [dx, dy] = exit.deflection_rad;
+        let skipped = left_out.map_or(String::new(), |l| {
+            format!(
+                "\nleft out         {:.0} % of the steps, at most {:.1e} rad",
+                100.0 * l.steps_part,
+                l.bound_rad
+            )
+        });
         let error = planned.error_rad.map_or(String::new(), |e| format!(" ± {e:.1e}"));
         format!(
             "pixel {x}, {y}: {status}\n\
@@ -90,7 +105,7 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
              film             shifted by ({:.4}, {:.4}) pixels\n\
              cut-off plane    ({:.4e}, {:.4e}) m from the axis\n\
              energy           {:.6} {:.6} {:.6}\n\
-             march            {}",
+             march            {}{skipped}",
             world.x,
             world.y,
             world.z,

@@ -140,6 +140,7 @@ pub(super) fn draw(
         "tolerance_rad": scene.march.tolerance_rad,
         "deflection_error_rad": r.deflection_error_rad,
         "resolution_error_rad": r.resolution_error_rad,
+        "left_out": r.left_out,
         "largest_deflection_rad": r.largest_deflection_rad,
         "levels": r.levels,
         "effects": r.effects,

@@ -1,9 +1,9 @@
 //! Options that describe the scene, and how they change the one from a file. An option that changes nothing is refused by name.
 
+use super::flow_args::FlowArgs;
 use super::units;
-use crate::input::Role;
 use crate::scene::{
-    BeamsSpec, CutoffSpec, Device, Direction, FilterSpec, FlowSpec, Jitter, SamplingSpec, Scene, SourceSpec,
+    BeamsSpec, CutoffSpec, Device, Direction, FilterSpec, Jitter, SamplingSpec, Scene, SourceSpec,
     TechniqueSpec,
 };
 use clap::Args;
@@ -22,62 +22,6 @@ pub(super) struct SceneArgs {
     optics: OpticsArgs,
     #[command(flatten)]
     film: FilmArgs,
-}
-
-#[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "Flow (a number can stand for an array)")]
-struct FlowArgs {
-    /// Array with the density in kg/m³
-    #[arg(long, value_name = "NAME")]
-    density: Option<String>,
-    /// kg/m³ per unit of the density array, for densities relative to a free stream
-    #[arg(long, value_name = "NUMBER")]
-    density_unit: Option<f64>,
-    /// Array with the temperature in K
-    #[arg(long, value_name = "NAME")]
-    temperature: Option<String>,
-    /// Array with the pressure in Pa
-    #[arg(long, value_name = "NAME")]
-    pressure: Option<String>,
-    /// Array with the relative humidity, 0 to 1
-    #[arg(long, value_name = "NAME")]
-    humidity: Option<String>,
-    /// CO2 in ppm
-    #[arg(long, value_name = "NUMBER")]
-    co2_ppm: Option<String>,
-    /// Array with n - 1
-    #[arg(long, value_name = "NAME")]
-    n_minus_1: Option<String>,
-    /// Array with free electrons per m³
-    #[arg(long, value_name = "NAME")]
-    electrons: Option<String>,
-    /// Array with the mass fraction of a gas; may be repeated
-    #[arg(long, value_name = "NAME=GAS", value_parser = units::species)]
-    species: Vec<(String, String)>,
-    /// Metres per unit of the file's coordinates
-    #[arg(long, value_name = "METRES", value_parser = units::length)]
-    length_unit: Option<f64>,
-    /// Depth of two-dimensional data, in units of the file
-    #[arg(long, value_name = "NUMBER")]
-    span: Option<f64>,
-    /// Two-dimensional data are half of an axisymmetric flow
-    #[arg(long, conflicts_with = "span")]
-    revolve: bool,
-    /// Nodes along the longest axis when data are resampled
-    #[arg(long, value_name = "N")]
-    resample: Option<usize>,
-    /// Standard deviation in nodes of the smoothing of shocks
-    #[arg(long, value_name = "NODES")]
-    smoothing: Option<f64>,
-    /// What lies outside the mesh: blank, solid (a body) or gas (undisturbed flow)
-    #[arg(long, value_name = "ROLE", value_parser = units::role)]
-    outside: Option<Role>,
-    /// What lies in cells that the solver hid: blank, solid or gas
-    #[arg(long, value_name = "ROLE", value_parser = units::role)]
-    hidden: Option<Role>,
-    /// Body that blocks light (OBJ, STL, PLY, glTF, VTP); may be repeated
-    #[arg(long, value_name = "FILE")]
-    solid: Vec<PathBuf>,
 }
 
 #[derive(Debug, Clone, Args)]
@@ -184,6 +128,9 @@ struct FilmArgs {
     /// Force a step, in voxels
     #[arg(long, value_name = "VOXELS")]
     step: Option<f64>,
+    /// Leave out gas so even that no ray's deflection changes by more than this in all: 1e-9rad. For verlet on the CPU
+    #[arg(long, value_name = "ANGLE", value_parser = units::angle_rad)]
+    skip: Option<f64>,
     /// Where to trace: gpu needs a Vulkan device; auto takes one if it can, and says why if it cannot
     #[arg(long, value_enum, value_name = "DEVICE")]
     device: Option<Device>,
@@ -233,8 +180,7 @@ impl SceneArgs {
         if s.flow.file.as_os_str().is_empty() {
             return Err(UsageError("no flow: give a file, or a scene that names one".into()).into());
         }
-        self.flow.apply(&mut s.flow);
-        s.solids.files.extend(self.flow.solid.iter().cloned());
+        self.flow.apply(&mut s)?;
         self.optics.apply(&mut s)?;
         self.film.apply(&mut s)?;
         // What a scene refuses is wrong usage here: the values come from the command line.
@@ -245,62 +191,6 @@ impl SceneArgs {
             });
         }
         Ok(s)
-    }
-}
-
-impl FlowArgs {
-    fn apply(&self, f: &mut FlowSpec) {
-        let a = self;
-        // Another alternative on the command line replaces that of the file.
-        if a.density.is_some() || a.temperature.is_some() || a.n_minus_1.is_some() || a.electrons.is_some() {
-            let FlowSpec {
-                file,
-                model,
-                length_unit_m,
-                span,
-                revolve,
-                resample_nodes,
-                smoothing_nodes,
-                outside,
-                hidden,
-                reference_n_minus_1,
-                ..
-            } = f.clone();
-            *f = FlowSpec {
-                file,
-                model,
-                length_unit_m,
-                span,
-                revolve,
-                resample_nodes,
-                smoothing_nodes,
-                outside,
-                hidden,
-                reference_n_minus_1,
-                ..FlowSpec::default()
-            };
-        }
-        let set = |to: &mut Option<String>, from: &Option<String>| {
-            if from.is_some() {
-                to.clone_from(from);
-            }
-        };
-        set(&mut f.density, &a.density);
-        set(&mut f.temperature, &a.temperature);
-        set(&mut f.pressure, &a.pressure);
-        set(&mut f.humidity, &a.humidity);
-        set(&mut f.co2_ppm, &a.co2_ppm);
-        set(&mut f.n_minus_1, &a.n_minus_1);
-        set(&mut f.electrons, &a.electrons);
-        f.species.extend(a.species.iter().cloned());
-        f.density_unit_kg_m3 = a.density_unit.or(f.density_unit_kg_m3);
-        f.length_unit_m = a.length_unit.unwrap_or(f.length_unit_m);
-        f.span = a.span.or(f.span.filter(|_| !a.revolve));
-        f.revolve = a.revolve || (f.revolve && a.span.is_none());
-        f.resample_nodes = a.resample.or(f.resample_nodes);
-        f.smoothing_nodes = a.smoothing.unwrap_or(f.smoothing_nodes);
-        f.outside = a.outside.unwrap_or(f.outside);
-        f.hidden = a.hidden.unwrap_or(f.hidden);
     }
 }
 
@@ -475,6 +365,7 @@ impl FilmArgs {
             s.march.interpolant.clone_from(&a.interpolant);
         }
         s.march.step_voxels = a.step.or(s.march.step_voxels);
+        s.march.skip_rad = a.skip.unwrap_or(s.march.skip_rad);
         s.march.device = a.device.unwrap_or(s.march.device);
         crate::render::check_gpu(&s.march).map_err(|e| UsageError(format!("--device gpu: {e}")))?;
         Ok(())

@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 /// Options of `schlieren serve`.
 #[derive(Debug, Args)]
 pub(super) struct ServeArgs {
-    /// The flow
-    file: Option<PathBuf>,
+    /// The flow; of a time series (several files, or one .pvd) the page shows any step
+    files: Vec<PathBuf>,
     /// Where to listen; port 0 takes a free one. Other addresses than 127.0.0.1 let other machines in that know the page's whole address
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:0")]
     listen: SocketAddr,
@@ -22,7 +22,7 @@ pub(super) struct ServeArgs {
 
 pub(super) fn serve(common: CommonArgs, args: &ServeArgs) -> anyhow::Result<()> {
     let cancel = Cancel::on_ctrl_c()?;
-    let mut scene = args.scene.scene(args.file.as_deref())?;
+    let mut scene = args.scene.scene(args.files.first().map(PathBuf::as_path))?;
     // Saved scenes go to another folder.
     let whole = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     scene.flow.file = whole(&scene.flow.file);
@@ -32,6 +32,20 @@ pub(super) fn serve(common: CommonArgs, args: &ServeArgs) -> anyhow::Result<()> 
     {
         *file = whole(file);
     }
+    let mut steps = match &args.files[..] {
+        [] | [_] => match crate::input::series(std::slice::from_ref(&scene.flow.file)) {
+            Ok(steps) => steps,
+            // Times in parts are no steps that can be chosen; the first is read whole.
+            Err(e @ crate::input::InputError::InFile { .. }) => {
+                common
+                    .warn(format_args!("only the first time is shown: {}", datasets::cli::report(&e.into())));
+                Vec::new()
+            }
+            Err(e) => return Err(e.into()),
+        },
+        files => crate::input::series(files)?,
+    };
+    steps.iter_mut().for_each(|s| s.path = whole(&s.path));
     if !args.listen.ip().is_loopback() {
         common.warn(format_args!(
             "listening on {}: everyone who can reach this machine and sees the address can use the page, and it is not encrypted",
@@ -40,7 +54,7 @@ pub(super) fn serve(common: CommonArgs, args: &ServeArgs) -> anyhow::Result<()> 
     }
     common.note(0, format_args!("reading {}", scene.flow.file.display()));
     let mut printed = Ok(());
-    let outcome = serve::serve(scene, args.listen, cancel.flag(), |url| {
+    let outcome = serve::serve(scene, steps, args.listen, cancel.flag(), |url| {
         printed = common.result(&json!({ "url": url }), || format!("open {url}"));
         common.note(0, "Ctrl-C ends");
     });

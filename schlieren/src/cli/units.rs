@@ -1,5 +1,6 @@
 //! Values of options with their units.
 
+use crate::index::multifield::Rule;
 use crate::input::Role;
 use crate::scene::SourceSpec;
 
@@ -73,6 +74,37 @@ pub(super) fn species(text: &str) -> Result<(String, String), String> {
     Ok((name.to_string(), gas.to_string()))
 }
 
+/// `NAME=VALUE:N,VALUE:N`: a transfer function's points.
+pub(super) fn curve(text: &str) -> Result<(String, Vec<[f64; 2]>), String> {
+    let wrong = || {
+        format!(
+            "`{text}` is not NAME=VALUE:N,VALUE:N,... with n - 1 at values of the array; write for example T=300:0,2000:-2e-4"
+        )
+    };
+    let number = |t: &str| t.trim().parse::<f64>().ok().filter(|v| v.is_finite());
+    let knot = |t: &str| t.split_once(':').and_then(|(v, n)| Some([number(v)?, number(n)?]));
+    let (name, knots) = text.rsplit_once('=').filter(|p| !p.0.is_empty()).ok_or_else(wrong)?;
+    let knots = knots.split(',').map(knot).collect::<Option<Vec<_>>>().ok_or_else(wrong)?;
+    Ok((name.to_string(), knots))
+}
+
+/// `NAME=NUMBER`.
+pub(super) fn weight(text: &str) -> Result<(String, f64), String> {
+    let parts = text.rsplit_once('=').filter(|p| !p.0.is_empty());
+    let number = |t: &str| t.trim().parse::<f64>().ok().filter(|v| v.is_finite());
+    let parsed = parts.and_then(|(name, w)| Some((name.to_string(), number(w)?)));
+    parsed.ok_or_else(|| format!("`{text}` is not NAME=NUMBER; write for example T=0.5"))
+}
+
+/// How transfer functions combine.
+pub(super) fn rule(text: &str) -> Result<Rule, String> {
+    match text {
+        "sum" => Ok(Rule::Sum),
+        "largest" => Ok(Rule::Largest),
+        _ => Err(format!("there is no rule `{text}`; there are: sum, largest")),
+    }
+}
+
 /// What a node without gas is to light.
 pub(super) fn role(text: &str) -> Result<Role, String> {
     match text {
@@ -108,6 +140,16 @@ mod tests {
         for wrong in ["", "mm", "1 foot", "nan", "inf m"] {
             assert!(length(wrong).unwrap_err().contains("20mm"), "{wrong}");
         }
+    }
+
+    #[test]
+    fn curves_are_read() {
+        assert_eq!(curve("T=300:0, 2000:-2e-4"), Ok(("T".into(), vec![[300.0, 0.0], [2000.0, -2e-4]])));
+        for wrong in ["T", "=1:2", "T=1", "T=1:x", "T=1:2,"] {
+            assert!(curve(wrong).unwrap_err().contains("T=300:0,2000:-2e-4"), "{wrong}");
+        }
+        assert_eq!(weight("T=-0.5"), Ok(("T".into(), -0.5)));
+        assert!(weight("T").is_err() && rule("mean").unwrap_err().contains("largest"));
     }
 
     #[test]

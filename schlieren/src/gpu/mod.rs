@@ -10,11 +10,13 @@
 //! | kernel.rs, *.wgsl | the shader, put together from what a scene calls for |
 //! | volume.rs | the field on the device |
 //! | paths.rs | [`GpuPaths`]: starts in, exits out, in batches |
+//! | fall_back.rs | what happens to batches that the device does not finish |
 //!
 //! What has no kernel here is refused by name ([`GpuError::Unsupported`]): line of sight and full marches, and gradients that are interpolated
 //! themselves.
 
 mod device;
+mod fall_back;
 mod kernel;
 mod paths;
 mod volume;
@@ -70,4 +72,14 @@ pub enum GpuError {
         /// What its driver says.
         reason: String,
     },
+}
+
+/// A failure, told with the picture that was drawn all the same.
+pub(crate) fn made_up_for(failure: &GpuError) -> String {
+    match failure {
+        GpuError::Failed { adapter, reason } => {
+            format!("the GPU `{adapter}` failed ({reason}); what it left was computed on the CPU")
+        }
+        other => format!("computed on the CPU: {other}"),
+    }
 }

@@ -1,5 +1,6 @@
 //! Starts in, exits out, in batches.
 
+use super::fall_back::{Batches, FallBack};
 use super::kernel::{FIRST_SLAB, Kernel};
 use super::volume::Volume;
 use super::{Gpu, GpuError};
@@ -12,7 +13,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError, mpsc};
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use wgpu::{BufferDescriptor, BufferUsages};
 
 /// Rays of one dispatch: enough to fill any device, few enough that two batches take little memory and no driver thinks that the device hangs.
@@ -53,23 +54,23 @@ pub struct GpuCounters {
 /// Light paths through a field of weak index, traced on a GPU. [`LightPaths::trace_parallel`] on many starts is the fast way; every call costs a round
 /// trip to the device.
 ///
+/// When the device fails on the way, the rest is traced on the CPU: [`GpuCounters::rays_on_cpu`] counts it and [`LightPaths::trouble`] names the cause.
+///
 /// Of a ray that is stopped, `status` tells what stopped it, and deflection and displacement are those where it was stopped.
 pub struct GpuPaths<'a> {
     gpu: Arc<Gpu>,
     field: &'a Field,
     frame: Frame,
-    interpolant: Interpolant,
     options: GpuOptions,
     pipeline: wgpu::ComputePipeline,
     volume: Volume,
     /// Buffers that no batch uses at the moment.
     idle: Mutex<Vec<Scratch>>,
     /// Takes over when the device fails.
-    fallback: OnceLock<Deviational<'a>>,
+    fall_back: FallBack<'a>,
     rays: AtomicU64,
     ray_steps: AtomicU64,
     dispatches: AtomicU64,
-    rays_on_cpu: AtomicU64,
 }
 
 /// [`Ray`] of march.wgsl.
@@ -125,7 +126,7 @@ struct Scratch {
 }
 
 /// A batch on its way.
-struct Pending {
+pub(super) struct Pending {
     scratch: Scratch,
     prepared: Vec<Prepared>,
     index: wgpu::SubmissionIndex,
@@ -157,20 +158,20 @@ impl<'a> GpuPaths<'a> {
             nodes: volume.kinds.is_some(),
             slabs: volume.slabs.len() as u32,
         })?;
+        let GpuOptions { step_voxels, wanted, blank } = options;
+        let on_cpu = Options { step_voxels, wanted, blank, ..Options::default() };
         Ok(GpuPaths {
             gpu,
             field,
             frame: Frame::new(field, view),
-            interpolant,
             options,
             pipeline,
             volume,
             idle: Mutex::default(),
-            fallback: OnceLock::new(),
+            fall_back: FallBack::new(move || Box::new(Deviational::new(field, view, interpolant, on_cpu))),
             rays: AtomicU64::new(0),
             ray_steps: AtomicU64::new(0),
             dispatches: AtomicU64::new(0),
-            rays_on_cpu: AtomicU64::new(0),
         })
     }
 
@@ -181,7 +182,7 @@ impl<'a> GpuPaths<'a> {
             rays: read(&self.rays),
             ray_steps: read(&self.ray_steps),
             dispatches: read(&self.dispatches),
-            rays_on_cpu: read(&self.rays_on_cpu),
+            rays_on_cpu: self.fall_back.rays(),
         }
     }
 
@@ -284,9 +285,15 @@ impl<'a> GpuPaths<'a> {
             }
         }
     }
+}
 
-    /// Sends at most [`BATCH`] rays on their way.
+impl Batches for GpuPaths<'_> {
+    type Pending = Pending;
+
     fn submit(&self, starts: &[Start], parallel: bool) -> Result<Pending, GpuError> {
+        if let Some(e) = self.gpu.failure() {
+            return Err(self.gpu.failed(e));
+        }
         let mut prepared = vec![Prepared::default(); starts.len()];
         let mut rays = vec![Ray::zeroed(); starts.len()];
         if parallel {
@@ -324,7 +331,6 @@ impl<'a> GpuPaths<'a> {
         Ok(Pending { scratch, prepared, index, mapped })
     }
 
-    /// Waits for a batch and reads it out.
     fn finish(&self, pending: Pending, exits: &mut [Exit], parallel: bool) -> Result<(), GpuError> {
         let wait = wgpu::PollType::Wait { submission_index: Some(pending.index), timeout: None };
         let failed = |e: &dyn std::fmt::Display| self.gpu.failed(e.to_string());
@@ -355,55 +361,12 @@ impl<'a> GpuPaths<'a> {
         self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(pending.scratch);
         Ok(())
     }
-
-    /// All rays, one batch being prepared while the device works on the one before.
-    fn batches(&self, starts: &[Start], exits: &mut [Exit], parallel: bool) {
-        assert_eq!(starts.len(), exits.len(), "one exit per start");
-        self.rays.fetch_add(starts.len() as u64, Ordering::Relaxed);
-        let mut before: Option<(Pending, &[Start], &mut [Exit])> = None;
-        for (starts, exits) in starts.chunks(BATCH).zip(exits.chunks_mut(BATCH)) {
-            let next = match self.gpu.failure() {
-                Some(e) => Err(self.gpu.failed(e)),
-                None => self.submit(starts, parallel),
-            };
-            if let Some((pending, starts, exits)) = before.take() {
-                self.finish_or_fall_back(pending, starts, exits, parallel);
-            }
-            match next {
-                Ok(pending) => before = Some((pending, starts, exits)),
-                Err(_) => self.trace_on_cpu(starts, exits, parallel),
-            }
-        }
-        if let Some((pending, starts, exits)) = before {
-            self.finish_or_fall_back(pending, starts, exits, parallel);
-        }
-    }
-
-    fn finish_or_fall_back(&self, pending: Pending, starts: &[Start], exits: &mut [Exit], parallel: bool) {
-        if self.finish(pending, exits, parallel).is_err() {
-            self.trace_on_cpu(starts, exits, parallel);
-        }
-    }
-
-    /// The same march on the CPU, when the device is lost: pictures take longer then, and are as right. [`GpuCounters::rays_on_cpu`] and [`Gpu::failure`] tell.
-    fn trace_on_cpu(&self, starts: &[Start], exits: &mut [Exit], parallel: bool) {
-        self.rays_on_cpu.fetch_add(starts.len() as u64, Ordering::Relaxed);
-        let GpuOptions { step_voxels, wanted, blank } = self.options;
-        let options = Options { step_voxels, wanted, blank, ..Options::default() };
-        let cpu = self
-            .fallback
-            .get_or_init(|| Deviational::new(self.field, self.frame.view, self.interpolant, options));
-        if parallel {
-            cpu.trace_parallel(starts, exits);
-        } else {
-            cpu.trace(starts, exits);
-        }
-    }
 }
 
 impl LightPaths for GpuPaths<'_> {
     fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
-        self.batches(starts, exits, false);
+        self.rays.fetch_add(starts.len() as u64, Ordering::Relaxed);
+        self.fall_back.trace(self, BATCH, starts, exits, false);
     }
 
     fn view(&self) -> &View {
@@ -418,7 +381,12 @@ impl LightPaths for GpuPaths<'_> {
         0.5 * DVec3::min_element(self.frame.spacing_m)
     }
 
+    fn trouble(&self) -> Option<String> {
+        self.fall_back.trouble()
+    }
+
     fn trace_parallel(&self, starts: &[Start], exits: &mut [Exit]) {
-        self.batches(starts, exits, true);
+        self.rays.fetch_add(starts.len() as u64, Ordering::Relaxed);
+        self.fall_back.trace(self, BATCH, starts, exits, true);
     }
 }

@@ -33,7 +33,7 @@ pub enum InputError {
     #[error(transparent)]
     Read(#[from] ReadError),
     /// What is in the file does not serve.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: no field can be made of it", path.display())]
     InFile {
         /// The file.
         path: PathBuf,

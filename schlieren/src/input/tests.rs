@@ -340,3 +340,32 @@ fn blocks_without_the_array_are_blank() {
     assert_eq!(field.count(Node::Blank), 4 * 25);
     assert!(report.warnings.iter().any(|w| w.contains("no finite index")), "{:?}", report.warnings);
 }
+
+/// An error and its causes, outermost first.
+fn chain(error: &dyn std::error::Error) -> Vec<String> {
+    std::iter::successors(Some(error), |e| e.source()).map(ToString::to_string).collect()
+}
+
+#[test]
+fn no_error_repeats_its_cause() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("flow.csv");
+    std::fs::write(&file, "x,rho\n0,1\n1,1\n").unwrap();
+    let missing = folder.path().join("missing.vti");
+    for (path, option, causes) in [
+        // No file: the system's reason is the cause.
+        (&missing, "rho", 2),
+        // A file without the array.
+        (&file, "density", 2),
+    ] {
+        let error = load(path, &Options::new(Medium::density(option))).unwrap_err();
+        let texts = chain(&error);
+        assert_eq!(texts.len(), causes, "{texts:?}");
+        assert!(texts[0].starts_with(&path.display().to_string()), "{texts:?}");
+        for pair in texts.windows(2) {
+            assert!(!pair[0].contains(&pair[1]), "{texts:?}");
+        }
+        // Around it nothing is added.
+        assert_eq!(chain(&crate::render::RenderError::from(error)), texts);
+    }
+}

@@ -1,9 +1,12 @@
 //! Prefiltered cubic B-spline: C2, 64 taps.
 
-use super::{Interpolate, Interpolate16, LANES, Row, Sample, Samples, cell, prefilter_line, transpose};
+use super::{
+    Interpolate, Interpolate16, LANES, Row, Sample, Samples, cell, cells16, prefilter_line, transpose,
+    trilinear::padded_row,
+};
 use crate::field::Field;
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x4, f32x8, f32x16, i32x16};
+use fearless_simd::{Simd, f32x4, f32x8, f32x16};
 use rayon::prelude::*;
 
 /// The natural cubic spline through the nodes. Sigworth's rule of thumb holds: where the field is resolved at all, its error is hundreds of times smaller than
@@ -20,10 +23,7 @@ impl BSpline {
     /// Filters a field's values into coefficients, in parallel.
     pub fn new(field: &Field) -> BSpline {
         let [nx, ny, nz] = field.dims();
-        let row = match nx + 2 {
-            r if r.is_multiple_of(64) => r + 16,
-            r => r,
-        };
+        let row = padded_row(nx + 2);
         let layer = row * (ny + 2);
 
         // Along x and y, a layer at a time in f64.
@@ -224,13 +224,7 @@ impl Interpolate16 for BSplineRows<'_> {
 
     #[inline(always)]
     fn sample16<S: Simd>(&self, simd: S, at: &[f32x16<S>; 3]) -> Samples<S> {
-        let mut cells = [i32x16::splat(simd, 0); 3];
-        let mut place = *at;
-        for c in 0..3 {
-            let clamped = at[c].max(f32x16::splat(simd, 0.0)).min(f32x16::splat(simd, self.last[c]));
-            cells[c] = clamped.min(f32x16::splat(simd, self.last_cell[c])).to_int::<i32x16<S>>();
-            place[c] = clamped - cells[c].to_float::<f32x16<S>>();
-        }
+        let (cells, place) = cells16(simd, at, self.last, self.last_cell);
         let offsets = cells[0] + cells[1] * (self.stride[0] as i32) + cells[2] * (self.stride[1] as i32);
         let offsets: [i32; LANES] = offsets.into();
         let (wx, dx) = weights16(simd, place[0]);

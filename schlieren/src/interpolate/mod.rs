@@ -21,7 +21,7 @@ pub use trilinear::Trilinear;
 pub use trilinear_gradient::TrilinearGradient;
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x16};
+use fearless_simd::{Simd, f32x16, i32x16};
 
 /// Which interpolant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -82,6 +82,24 @@ pub(crate) fn cell(at: f64, nodes: usize) -> (usize, f64) {
     let at = at.clamp(0.0, (nodes - 1) as f64);
     let i = (at as usize).min(nodes - 2);
     (i, at - i as f64)
+}
+
+/// [`cell`] along x, y and z for sixteen rays. `last` and `last_cell` are n - 1 and n - 2 along each.
+#[inline(always)]
+pub(crate) fn cells16<S: Simd>(
+    simd: S,
+    at: &[f32x16<S>; 3],
+    last: [f32; 3],
+    last_cell: [f32; 3],
+) -> ([i32x16<S>; 3], [f32x16<S>; 3]) {
+    let mut cells = [i32x16::splat(simd, 0); 3];
+    let mut place = *at;
+    for c in 0..3 {
+        let clamped = at[c].max(f32x16::splat(simd, 0.0)).min(f32x16::splat(simd, last[c]));
+        cells[c] = clamped.min(f32x16::splat(simd, last_cell[c])).to_int::<i32x16<S>>();
+        place[c] = clamped - cells[c].to_float::<f32x16<S>>();
+    }
+    (cells, place)
 }
 
 /// Four numbers for each of sixteen rays, ray by ray, as four vectors over the rays.

@@ -1,9 +1,9 @@
 //! Trilinear eps, and the gradient of that: eight taps.
 
-use super::{Interpolate, Interpolate16, LANES, Sample, Samples, cell};
+use super::{Interpolate, Interpolate16, LANES, Sample, Samples, cell, cells16};
 use crate::field::Field;
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x16, i32x16, u64x8};
+use fearless_simd::{Simd, f32x16, u64x8};
 use std::borrow::Cow;
 
 /// Trilinear interpolation. Its gradient jumps from cell to cell, so shadowgraphs through it are wrong by most of their contrast;
@@ -101,13 +101,7 @@ impl Interpolate16 for TrilinearRows<'_> {
     #[inline(always)]
     fn sample16<S: Simd>(&self, simd: S, at: &[f32x16<S>; 3]) -> Samples<S> {
         // Cells and places in them.
-        let mut cells = [i32x16::splat(simd, 0); 3];
-        let mut place = *at;
-        for c in 0..3 {
-            let clamped = at[c].max(f32x16::splat(simd, 0.0)).min(f32x16::splat(simd, self.last[c]));
-            cells[c] = clamped.min(f32x16::splat(simd, self.last_cell[c])).to_int::<i32x16<S>>();
-            place[c] = clamped - cells[c].to_float::<f32x16<S>>();
-        }
+        let (cells, place) = cells16(simd, at, self.last, self.last_cell);
         let offsets = cells[0] + cells[1] * self.stride[0] + cells[2] * self.stride[1];
         let offsets: [i32; LANES] = offsets.into();
 

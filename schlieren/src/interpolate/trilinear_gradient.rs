@@ -1,9 +1,11 @@
 //! Trilinear interpolation of eps and of its central differences at the nodes: what the dissertation keeps in a texture of four floats a voxel.
 
-use super::{Interpolate, Interpolate16, LANES, Sample, Samples, cell, transpose, trilinear::padded_row};
+use super::{
+    Interpolate, Interpolate16, LANES, Row, Sample, Samples, cell, cells16, transpose, trilinear::padded_row,
+};
 use crate::field::Field;
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x4, f32x16, i32x16};
+use fearless_simd::{Simd, f32x4, f32x16};
 use rayon::prelude::*;
 
 /// Gradient and eps at each node, sixteen bytes.
@@ -105,13 +107,8 @@ impl Interpolate16 for TrilinearGradientRows<'_> {
 
     #[inline(always)]
     fn sample16<S: Simd>(&self, simd: S, at: &[f32x16<S>; 3]) -> Samples<S> {
-        let mut cells = [i32x16::splat(simd, 0); 3];
-        let mut place = [[0.0f32; LANES]; 3];
-        for c in 0..3 {
-            let clamped = at[c].max(f32x16::splat(simd, 0.0)).min(f32x16::splat(simd, self.last[c]));
-            cells[c] = clamped.min(f32x16::splat(simd, self.last_cell[c])).to_int::<i32x16<S>>();
-            place[c] = (clamped - cells[c].to_float::<f32x16<S>>()).into();
-        }
+        let (cells, place) = cells16(simd, at, self.last, self.last_cell);
+        let place: [Row; 3] = place.map(Into::into);
         let offsets = cells[0] + cells[1] * self.stride[0] + cells[2] * self.stride[1];
         let offsets: [i32; LANES] = offsets.into();
         // Cut to one length here, where the compiler can see it: then one check is enough for all four.

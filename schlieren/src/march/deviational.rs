@@ -1,6 +1,7 @@
 //! Marching deviations in `f32`, sixteen rays at a time: Verlet for gases, Euler to compare with the dissertation.
 
 use super::frame::{BlankCells, Frame};
+use super::kept::Kept;
 use super::packet::{Common, Effects, Nodes, Packet, Skip, With, Work, march};
 use super::prepared::{GROUP, Left, Prepared, steps_of};
 use crate::at_level;
@@ -8,10 +9,11 @@ use crate::field::Field;
 use crate::interpolate::{
     BSpline, Interpolant, Interpolate, Interpolate16, LANES, Trilinear, TrilinearGradient,
 };
-use crate::path::{Exit, LightPaths, Start, Wanted};
+use crate::path::{Exit, LeftOut, LightPaths, Start, Wanted};
 use crate::skip::Bricks;
 use crate::view::View;
 use fearless_simd::{Level, Simd};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// How deviations are stepped.
@@ -70,7 +72,7 @@ pub struct Counters {
 }
 
 enum Interpolated<'a> {
-    BSpline(BSpline),
+    BSpline(Arc<BSpline>),
     Trilinear(Trilinear<'a>),
     TrilinearGradient(TrilinearGradient),
 }
@@ -104,22 +106,39 @@ impl<'a> Deviational<'a> {
         options: Options,
         level: Level,
     ) -> Deviational<'a> {
-        let bricks = |s: &BSpline| (options.skip_rad > 0.0).then(|| Bricks::new(field, s));
-        let (interpolated, bricks) = match interpolant {
+        Self::made(field, view, interpolant, options, level, &|| Arc::new(BSpline::new(field)))
+    }
+
+    /// [`Deviational::new`] with a spline through this field that is at hand.
+    pub fn with_kept(
+        field: &'a Field,
+        view: View,
+        interpolant: Interpolant,
+        options: Options,
+        kept: &Kept,
+    ) -> Deviational<'a> {
+        Self::made(field, view, interpolant, options, Level::new(), &|| kept.spline(field))
+    }
+
+    fn made(
+        field: &'a Field,
+        view: View,
+        interpolant: Interpolant,
+        options: Options,
+        level: Level,
+        spline: &dyn Fn() -> Arc<BSpline>,
+    ) -> Deviational<'a> {
+        let (interpolated, of_bricks) = match interpolant {
             Interpolant::BSpline => {
-                let s = BSpline::new(field);
-                let b = bricks(&s);
-                (Interpolated::BSpline(s), b)
+                let s = spline();
+                (Interpolated::BSpline(s.clone()), Some(s))
             }
-            Interpolant::Trilinear => {
-                let b = (options.skip_rad > 0.0).then(|| Bricks::new(field, &BSpline::new(field)));
-                (Interpolated::Trilinear(Trilinear::new(field)), b)
-            }
+            Interpolant::Trilinear => (Interpolated::Trilinear(Trilinear::new(field)), None),
             Interpolant::TrilinearGradient => {
-                let b = (options.skip_rad > 0.0).then(|| Bricks::new(field, &BSpline::new(field)));
-                (Interpolated::TrilinearGradient(TrilinearGradient::new(field)), b)
+                (Interpolated::TrilinearGradient(TrilinearGradient::new(field)), None)
             }
         };
+        let bricks = (options.skip_rad > 0.0).then(|| Bricks::new(field, &of_bricks.unwrap_or_else(spline)));
         Deviational {
             field,
             frame: Frame::new(field, view),
@@ -165,7 +184,7 @@ impl<'a> Deviational<'a> {
     /// The interpolant as the reference sees it.
     pub fn interpolate(&self) -> &dyn Interpolate {
         match &self.interpolated {
-            Interpolated::BSpline(s) => s,
+            Interpolated::BSpline(s) => &**s,
             Interpolated::Trilinear(s) => s,
             Interpolated::TrilinearGradient(s) => s,
         }
@@ -298,5 +317,16 @@ impl LightPaths for Deviational<'_> {
 
     fn difference_step_m(&self) -> f64 {
         0.5 * self.frame.spacing_m.min_element()
+    }
+
+    fn left_out(&self) -> Option<LeftOut> {
+        let bricks = self.bricks.as_ref()?;
+        let c = self.counters();
+        Some(LeftOut {
+            steps_part: c.ray_steps_skipped as f64 / (c.ray_steps + c.ray_steps_skipped).max(1) as f64,
+            bound_rad: c.left_out_femtorad as f64 * 1e-15,
+            bricks_bytes: bricks.memory_bytes(),
+            bricks_secs: bricks.build_time().as_secs_f64(),
+        })
     }
 }

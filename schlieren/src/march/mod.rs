@@ -13,6 +13,7 @@ mod euler;
 mod frame;
 mod full;
 mod integrator;
+mod kept;
 mod line_of_sight;
 mod packet;
 mod pefrl;
@@ -29,6 +30,7 @@ pub use frame::BlankCells;
 pub(crate) use frame::Frame;
 pub use full::{Full, FullOptions};
 pub use integrator::{Integrator, Interpolated, Medium, Ray};
+pub use kept::{Kept, Projection};
 pub use line_of_sight::LineOfSight;
 pub use pefrl::Pefrl;
 #[cfg(feature = "gpu")]

@@ -20,6 +20,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod expose;
 pub(crate) mod map;
 mod on_gpu;
 mod paths;
@@ -33,18 +34,13 @@ pub use paths::{INTERPOLANTS, MARCHES, Planned};
 pub use section::TestSection;
 
 use crate::cutoff::Rgb;
-use crate::film::beams::expose_beams;
-use crate::film::photons::{Exposure, Landed, expose};
-use crate::film::{Film, Framing, Tally};
-use crate::filter::Filter;
-use crate::optics::{Optics, SourceImage};
-use crate::path::{Exit, LightPaths, Start, Wanted};
-use crate::scene::{BeamsSpec, Counters, Effects, Jitter, SamplingSpec, Scene, SceneError, TechniqueSpec};
-use crate::spectrum::{film_colors, filter_band};
+use crate::film::{Framing, Tally};
+use crate::path::{LeftOut, LightPaths, Start, Wanted};
+use crate::scene::{Counters, Effects, Scene, SceneError, TechniqueSpec};
+use crate::spectrum::filter_band;
 use crate::technique::volume::ComparisonError;
 use crate::technique::{Technique, bos, interferogram, schlieren, slice, volume};
-use rt_core::sampler::Sampling;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Why there is no picture.
 #[derive(Debug, thiserror::Error)]
@@ -180,6 +176,8 @@ pub struct Report {
     pub largest_deflection_rad: Option<f64>,
     /// By how much bodies' silhouettes can be off because bodies see straight rays, when there are bodies and a map.
     pub silhouette_error_px: Option<f64>,
+    /// What leaving out even gas came to (`march.skip_rad`), in the light of the first wavelength or, without light, the map.
+    pub left_out: Option<LeftOut>,
     /// Darkest and brightest channel of the picture.
     pub levels: [f32; 2],
     /// Pixels around the picture that sent light as well.
@@ -191,6 +189,12 @@ pub struct Report {
 }
 
 impl Report {
+    /// What tracing ran into.
+    fn add_traced(&mut self, paths: &dyn LightPaths) {
+        let new = paths.trouble().filter(|t| !self.warnings.contains(t));
+        self.warnings.extend(new);
+    }
+
     fn add_plan(&mut self, planned: &Planned<'_>) {
         self.march.clone_from(&planned.description);
         self.deflection_error_rad = planned.error_rad;
@@ -235,13 +239,19 @@ pub fn render(
         TechniqueSpec::Slice { strength, depth_m } => {
             r.pixels = grey(slice::slice(&section.fields[0], &section.view, &framing, depth_m, strength)?);
         }
-        _ => first = expose_lines(scene, section, layers, control, &mut r)?,
+        _ => first = expose::expose_lines(scene, section, layers, control, &mut r)?,
     }
     let measured = first.is_some();
     if control.cancel.load(Ordering::Relaxed) {
         return Err(RenderError::Cancelled);
     }
 
+    if scene.march.skip_rad > 0.0 && !measured && !layers.map {
+        let name = scene.technique.name();
+        r.report
+            .warnings
+            .push(format!("march.skip_rad changes nothing with technique {name}, which follows no light"));
+    }
     if layers.map {
         // The picture's own paths serve when they tell what is wanted; the optical path is not computed for photons that do not need it.
         let planned = match first.filter(|p| p.paths.wanted().opd || !layers.phase) {
@@ -313,238 +323,6 @@ pub fn technique(
     })
 }
 
-/// How far the beams of an extended source part from the axial one, in pixels: within the flow, or on the way to the plane in focus.
-fn beam_spread_px(scene: &Scene, section: &TestSection, optics: &Optics, framing: &Framing) -> f64 {
-    if !scene.technique.uses_source() {
-        return 0.0;
-    }
-    let reach_m = match optics.source_image() {
-        SourceImage::Point => 0.0,
-        SourceImage::Rectangle { half_m, .. } => half_m[0].hypot(half_m[1]),
-        SourceImage::Disc { radius_m } => radius_m,
-    };
-    let lever_m = optics.focus_m.abs().max(0.5 * section.depth_m());
-    reach_m / optics.schlieren_focal_length_m * lever_m / framing.pixel_m
-}
-
-/// Exposes the film to every line of the spectrum and adds up their colours. Returns the paths of the first.
-fn expose_lines<'a>(
-    scene: &Scene,
-    section: &'a TestSection,
-    layers: Layers,
-    control: &Control<'_>,
-    r: &mut Rendered,
-) -> Result<Option<Planned<'a>>, RenderError> {
-    let (framing, optics) = (r.framing, scene.optics());
-    let lines = scene.lines();
-    let spread_px = beam_spread_px(scene, section, &optics, &framing);
-    let by_photons = matches!(scene.sampling(), SamplingSpec::Photons { .. });
-    let tilted_beams = by_photons
-        && match scene.light.beams {
-            BeamsSpec::Auto => spread_px > 0.5,
-            BeamsSpec::Axial => false,
-            BeamsSpec::Tilted => scene.technique.uses_source(),
-        };
-    if spread_px > 0.5 && !tilted_beams {
-        r.report.warnings.push(format!(
-            "the source's extent would blur the picture by {spread_px:.1} pixels, which is left out; take photons with light.beams = \"auto\""
-        ));
-    }
-    r.report.effects.tilted_beams = tilted_beams;
-    let against_light = matches!(scene.technique, TechniqueSpec::Bos { .. });
-    let colors = film_colors(&lines);
-    r.pixels = vec![[0.0; 3]; framing.pixels()];
-    r.colored = lines.len() > 1;
-    let mut first = None;
-
-    for line in 0..lines.len() {
-        let n0 = section.fields[line].n0();
-        let t = technique(scene, line, &framing, n0, tilted_beams)?;
-        let planned = section.paths(
-            scene,
-            line,
-            Wanted { opd: t.needs_opd() },
-            against_light,
-            layers.map && line == 0,
-        )?;
-        if line == 0 {
-            r.report.add_plan(&planned);
-        }
-        let margin_px = if t.looks_from_film() {
-            0
-        } else {
-            margin_px(&*planned.paths, &optics, &framing, &mut r.report)
-        };
-        let (sampling, seed) = match scene.sampling() {
-            SamplingSpec::Photons { jitter: Jitter::Random, seed, .. } => (Sampling::Random, seed),
-            SamplingSpec::Photons { seed, .. } => (Sampling::Sobol, seed),
-            SamplingSpec::Beams { .. } => (Sampling::Sobol, 0),
-        };
-        let setup = Exposure {
-            paths: &*planned.paths,
-            technique: &t,
-            solids: section.solids.as_ref(),
-            sampling,
-            seed,
-            margin_px,
-            tilted_beams,
-        };
-        let part = |done: f64| (control.progress)((line as f64 + done) / lines.len() as f64);
-        let wished =
-            Layers { counts: layers.counts && line == 0, noise: layers.noise && line == 0, ..layers };
-        let (scale, before) = (scene.exposure() as f32, r.report.counters.rays);
-        if t.is_colored() {
-            let film = expose_line::<3>(scene, &setup, framing, wished, control.cancel, &part, r)?;
-            r.colored = true;
-            r.pixels = film.into_iter().map(|p| p.map(|v| v * scale)).collect();
-        } else {
-            let film = expose_line::<1>(scene, &setup, framing, wished, control.cancel, &part, r)?;
-            let color = if lines.len() > 1 { colors[line] } else { [1.0; 3] };
-            for (p, f) in r.pixels.iter_mut().zip(film) {
-                (0..3).for_each(|c| p[c] += f[0] * color[c] * scale);
-            }
-        }
-        let counters = &mut r.report.counters;
-        let rays = counters.rays - before;
-        counters.phase_rays += if t.needs_opd() { rays } else { 0 };
-        counters.tilted_rays += if tilted_beams { rays } else { 0 };
-        counters.dispersion_rays += if line > 0 { rays } else { 0 };
-        first.get_or_insert(planned);
-    }
-    Ok(first)
-}
-
-/// The film of one line, filtered: energy per pixel.
-fn expose_line<const C: usize>(
-    scene: &Scene,
-    setup: &Exposure<'_>,
-    framing: Framing,
-    layers: Layers,
-    cancel: &AtomicBool,
-    progress: &(dyn Fn(f64) + Sync),
-    r: &mut Rendered,
-) -> Result<Vec<[f32; C]>, RenderError> {
-    let done = AtomicU64::new(0);
-    let side = |n: u32| u64::from(n) + 2 * u64::from(setup.margin_px);
-    let per_pass = side(framing.width) * side(framing.height);
-    let finished = |total: u64, rays: u64| {
-        let so_far = done.fetch_add(rays, Ordering::Relaxed) + rays;
-        progress(so_far as f64 / total as f64);
-    };
-    let film = match scene.sampling() {
-        SamplingSpec::Beams { cells_per_side } => {
-            let total = per_pass * u64::from(cells_per_side).pow(2);
-            let film = Film::<C>::new(framing, false);
-            let tally = expose_beams(setup, &film, cells_per_side, cancel, &|n| finished(total, n))
-                .ok_or(RenderError::Cancelled)?;
-            r.report.tally.add(&tally);
-            let rays = done.load(Ordering::Relaxed);
-            r.report.counters.differential_rays += rays;
-            r.report.counters.rays += rays;
-            r.report.counters.solid_queries += if setup.solids.is_some() { rays } else { 0 };
-            film.developed(1.0)
-        }
-        SamplingSpec::Photons { samples, filter, .. } => {
-            let filter = filter.filter().shrunk(samples);
-            let total = per_pass * u64::from(samples);
-            let keep = matches!(filter, Filter::Cone { .. });
-            if keep && total > crate::filter::cone::MAX_PHOTONS {
-                let limit = crate::filter::cone::MAX_PHOTONS;
-                return Err(RenderError::TooManyPhotons { photons: total, limit });
-            }
-            let two = layers.noise && samples > 1;
-            let films: Vec<Film<C>> =
-                (0..if two { 2 } else { 1 }).map(|_| Film::new(framing, layers.counts)).collect();
-            let exposed = expose(setup, &films, 0..samples, keep, cancel, &|n| finished(total, n))
-                .ok_or(RenderError::Cancelled)?;
-            r.report.tally.add(&exposed.tally);
-            r.report.counters.rays += exposed.tally.sent - exposed.tally.blocked_by_solids;
-            r.report.counters.solid_queries += if setup.solids.is_some() { exposed.tally.sent } else { 0 };
-            if two {
-                r.noise = Some(noise(&films, samples, filter, scene.exposure()));
-            }
-            if let [first, second] = &films[..] {
-                first.add_film(second);
-            }
-            if layers.counts {
-                r.counts = films[0].counts();
-            }
-            filtered(&films[0].developed(f64::from(samples)), &exposed.landed, &framing, filter, samples)
-        }
-    };
-    Ok(film)
-}
-
-/// Takes the noise out of a film.
-fn filtered<const C: usize>(
-    film: &[[f32; C]],
-    landed: &[Landed<C>],
-    framing: &Framing,
-    filter: Filter,
-    samples: u32,
-) -> Vec<[f32; C]> {
-    let width = framing.width as usize;
-    match filter {
-        Filter::None => film.to_vec(),
-        Filter::Gaussian { sigma_px } => crate::filter::gaussian::gaussian(film, width, sigma_px),
-        Filter::Mean { radius_px } => crate::filter::mean::mean(film, width, radius_px),
-        Filter::Cone { nearest } => crate::filter::cone::cone(landed, framing, nearest, f64::from(samples)),
-    }
-}
-
-/// Half the difference between two halves of the photons, filtered like the picture (a cone's noise is told by its film's).
-fn noise<const C: usize>(films: &[Film<C>], samples: u32, filter: Filter, exposure: f64) -> Vec<f32> {
-    let halves = [samples.div_ceil(2), samples / 2];
-    let developed: Vec<Vec<[f32; C]>> =
-        films.iter().zip(halves).map(|(f, n)| f.developed(f64::from(n))).collect();
-    let difference: Vec<[f32; C]> = developed[0]
-        .iter()
-        .zip(&developed[1])
-        .map(|(a, b)| std::array::from_fn(|c| 0.5 * exposure as f32 * (a[c] - b[c])))
-        .collect();
-    let width = films[0].framing().width as usize;
-    let difference = match filter {
-        Filter::Gaussian { sigma_px } => crate::filter::gaussian::gaussian(&difference, width, sigma_px),
-        Filter::Mean { radius_px } => crate::filter::mean::mean(&difference, width, radius_px),
-        Filter::None | Filter::Cone { .. } => difference,
-    };
-    difference.iter().map(|d| d.iter().fold(0.0f32, |m, v| m.max(v.abs()))).collect()
-}
-
-/// Pixels around the picture from which light can stray into it: the farthest stray of a coarse lattice of rays over the picture and half its size more,
-/// and a quarter of that for what the lattice missed.
-fn margin_px(paths: &dyn LightPaths, optics: &Optics, framing: &Framing, report: &mut Report) -> u32 {
-    const PROBES: u32 = 64;
-    let probe =
-        |i: u32, n: u32| (f64::from(i) + 0.5) / f64::from(PROBES) * 1.5 * f64::from(n) - 0.25 * f64::from(n);
-    let starts: Vec<Start> = (0..PROBES * PROBES)
-        .map(|k| {
-            let at =
-                framing.plane_from_pixel(probe(k % PROBES, framing.width), probe(k / PROBES, framing.height));
-            Start { position_m: at.map(|c| c as f32), tilt_rad: [0.0; 2] }
-        })
-        .collect();
-    let mut exits = vec![Exit::UNDISTURBED; starts.len()];
-    paths.trace_parallel(&starts, &mut exits);
-    let lands = |e: &&(&Start, &Exit)| e.1.transmission > 0.0 && e.1.status != crate::path::Status::Turned;
-    let stray = |(s, e): (&Start, &Exit)| {
-        let [x, y] = optics.film_shift_m(s, e);
-        f64::from(x.abs().max(y.abs())) / framing.pixel_m
-    };
-    let pairs: Vec<(&Start, &Exit)> = starts.iter().zip(&exits).collect();
-    let farthest = pairs.iter().filter(lands).map(|p| stray(*p)).fold(0.0f64, f64::max);
-    let wanted = (1.25 * farthest + 1.0).ceil();
-    let limit = f64::from(framing.width.max(framing.height));
-    if wanted > limit {
-        report.warnings.push(format!(
-            "light strays by {farthest:.0} pixels, more than the picture's size; what comes from farther away is left out. Bring the film nearer, or look at more"
-        ));
-    }
-    let margin = wanted.min(limit) as u32;
-    report.margin_px = report.margin_px.max(margin);
-    margin
-}
-
 fn add_map(scene: &Scene, section: &TestSection, planned: &Planned<'_>, r: &mut Rendered) {
     let blocked = |s: &Start| section.solids.as_ref().is_some_and(|b| b.block(&section.view, s));
     let wavelength_m = scene.light.wavelengths_nm[0] * 1e-9;
@@ -554,6 +332,8 @@ fn add_map(scene: &Scene, section: &TestSection, planned: &Planned<'_>, r: &mut 
     if report.march.is_empty() {
         report.add_plan(planned);
     }
+    report.left_out = report.left_out.or(planned.paths.left_out());
+    report.add_traced(&*planned.paths);
     report.counters.map_rays += m.transmission.len() as u64;
     report.counters.phase_rays += m.waves.len() as u64;
     report.counters.solid_queries += if section.solids.is_some() { m.transmission.len() as u64 } else { 0 };

@@ -3,6 +3,7 @@
 use super::RenderError;
 use super::paths::Planned;
 use crate::field::Field;
+use crate::march::Kept;
 use crate::plan::Request;
 use crate::scene::{Device, MarchSpec};
 use crate::view::View;
@@ -16,7 +17,7 @@ pub fn check_gpu(march: &MarchSpec) -> Result<(), RenderError> {
         return Ok(());
     }
     #[cfg(feature = "gpu")]
-    return refused(march.method.as_deref(), march.interpolant.as_deref())
+    return refused(march)
         .map_or_else(|| crate::gpu::Gpu::shared().map(|_| ()), Err)
         .map_err(RenderError::Gpu);
     #[cfg(not(feature = "gpu"))]
@@ -24,17 +25,29 @@ pub fn check_gpu(march: &MarchSpec) -> Result<(), RenderError> {
 }
 
 #[cfg(feature = "gpu")]
-const CURE: &str = "Leave out --march or --interpolant, or compute on the CPU (--device cpu).";
+const CURE: &str = "Leave out --march, --interpolant or --skip, or compute on the CPU (--device cpu).";
 
-/// A march or an interpolant, forced by name, that has no kernel.
+/// What a scene asks for by name that has no kernel.
 #[cfg(feature = "gpu")]
-fn refused(method: Option<&str>, interpolant: Option<&str>) -> Option<crate::gpu::GpuError> {
-    let what = match (method, interpolant) {
+fn refused(march: &MarchSpec) -> Option<crate::gpu::GpuError> {
+    let what = match (march.method.as_deref(), march.interpolant.as_deref()) {
         (Some(m), _) if m != "verlet" => format!("the march {m}"),
         (_, Some("trilinear-gradient")) => "the interpolant trilinear-gradient".into(),
+        _ if march.skip_rad > 0.0 => "leaving out even gas (march.skip_rad)".into(),
         _ => return None,
     };
     Some(crate::gpu::GpuError::Unsupported { what, cure: CURE })
+}
+
+/// Why the CPU stands in for a GPU that cannot do it. Who asked for one gets an error for what can be known before anything is drawn; a device that is lost or
+/// out of memory spoils no picture.
+#[cfg(feature = "gpu")]
+fn stands_in(asked: Device, error: crate::gpu::GpuError) -> Result<String, RenderError> {
+    match error {
+        crate::gpu::GpuError::Failed { .. } => Ok(crate::gpu::made_up_for(&error)),
+        e if asked == Device::Gpu => Err(RenderError::Gpu(e)),
+        e => Ok(crate::gpu::made_up_for(&e)),
+    }
 }
 
 /// Paths on the GPU if the scene wants that and it can be, else in words why not; no words when the CPU was asked for, or is quicker by plan.
@@ -45,6 +58,7 @@ pub(super) fn on_gpu<'a>(
     view: View,
     request: Request,
     measured_rays: Option<usize>,
+    kept: &Kept,
 ) -> Result<Result<Planned<'a>, Option<String>>, RenderError> {
     use crate::gpu::{Gpu, GpuError, GpuOptions, GpuPaths};
     use crate::plan::{Mode, Plan};
@@ -53,7 +67,7 @@ pub(super) fn on_gpu<'a>(
     if march.device == Device::Cpu {
         return Ok(Err(None));
     }
-    let mut plan = Plan::new(field, request);
+    let mut plan = Plan::from_roughness(field, request, kept.roughness(field));
     if plan.mode == Mode::LineOfSight && request.mode.is_none() {
         if march.device == Device::Auto {
             return Ok(Err(None));
@@ -62,7 +76,7 @@ pub(super) fn on_gpu<'a>(
         plan = Plan::from_roughness(field, Request { mode: Some(Mode::Paraxial), ..request }, plan.roughness);
     }
     let made = (|| {
-        if let Some(e) = refused(march.method.as_deref(), march.interpolant.as_deref()) {
+        if let Some(e) = refused(march) {
             return Err(e);
         }
         if plan.mode != Mode::Paraxial {
@@ -85,7 +99,7 @@ pub(super) fn on_gpu<'a>(
     match made {
         Ok((paths, gpu)) => {
             // The CPU's march stands in: the same within roundings.
-            let achieved = measured_rays.map(|rays| plan.measure(field, view, rays));
+            let achieved = measured_rays.map(|rays| plan.measure_with(field, view, rays, kept));
             let described = super::paths::described("verlet", plan.interpolant, plan.step_voxels);
             Ok(Ok(Planned::new(
                 Box::new(paths),
@@ -94,8 +108,7 @@ pub(super) fn on_gpu<'a>(
                 march.tolerance_rad,
             )))
         }
-        Err(e) if march.device == Device::Gpu => Err(RenderError::Gpu(e)),
-        Err(e) => Ok(Err(Some(format!("computed on the CPU: {e}")))),
+        Err(e) => stands_in(march.device, e).map(|why| Err(Some(why))),
     }
 }
 
@@ -107,6 +120,7 @@ pub(super) fn on_gpu<'a>(
     _: View,
     _: Request,
     _: Option<usize>,
+    _: &Kept,
 ) -> Result<Result<Planned<'a>, Option<String>>, RenderError> {
     match march.device {
         Device::Cpu => Ok(Err(None)),
@@ -114,5 +128,25 @@ pub(super) fn on_gpu<'a>(
             Ok(Err(Some("computed on the CPU: this program is built without the feature gpu".into())))
         }
         Device::Gpu => Err(RenderError::NoGpu),
+    }
+}
+
+#[cfg(all(test, feature = "gpu"))]
+mod tests {
+    use super::*;
+    use crate::gpu::GpuError;
+
+    #[test]
+    fn a_device_that_fails_spoils_no_picture_and_one_that_cannot_is_refused() {
+        let lost = GpuError::Failed { adapter: "Lamp 9".into(), reason: "the device is lost".into() };
+        for asked in [Device::Gpu, Device::Auto] {
+            let told = stands_in(asked, lost.clone()).unwrap();
+            for word in ["Lamp 9", "the device is lost", "on the CPU"] {
+                assert!(told.contains(word), "{word}: {told}");
+            }
+        }
+        let none = GpuError::NoAdapter("Vulkan finds no device".into());
+        assert!(matches!(stands_in(Device::Gpu, none.clone()), Err(RenderError::Gpu(_))));
+        assert!(stands_in(Device::Auto, none).unwrap().contains("computed on the CPU: no GPU"));
     }
 }

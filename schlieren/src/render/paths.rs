@@ -6,7 +6,7 @@ use super::{RenderError, TestSection};
 use crate::field::Field;
 use crate::interpolate::{BSpline, Interpolant, Interpolate, Trilinear, TrilinearGradient};
 use crate::march::{
-    BlankCells, Deviational, Full, FullOptions, Integrator, Options, Pefrl, RungeKutta4, Scheme, Sharma,
+    BlankCells, Deviational, Full, FullOptions, Integrator, Kept, Options, Pefrl, RungeKutta4, Scheme, Sharma,
 };
 use crate::path::{Exit, LightPaths, Start, Wanted};
 use crate::plan::{Achieved, Mode, Plan, Request};
@@ -21,6 +21,9 @@ pub const INTERPOLANTS: [&str; 3] = ["b-spline", "trilinear", "trilinear-gradien
 
 /// Rays that are traced twice to measure a plan's error.
 const MEASURED_RAYS: usize = 256;
+
+/// The error of the phase that leaving out eight steps may cost, in waves: a hundred of such stretches are a thousandth of a wave.
+const SKIPPED_WAVES: f64 = 1e-5;
 
 /// Paths of light through one of the fields, and what is known of their accuracy.
 pub struct Planned<'a> {
@@ -63,6 +66,8 @@ impl TestSection {
                 _ => Interpolant::BSpline,
             });
         let field = &self.fields[line];
+        let for_once = Kept::default();
+        let kept = self.kept.get(line).unwrap_or(&for_once);
         let view = if against_light { Reversed::view(&self.view) } else { self.view };
         let with = |mode| Request {
             tolerance_rad: march.tolerance_rad,
@@ -71,6 +76,8 @@ impl TestSection {
             step_voxels: march.step_voxels,
             wanted,
             blank: BlankCells::default(),
+            skip_rad: march.skip_rad,
+            skip_opd_m: SKIPPED_WAVES * scene.light.wavelengths_nm[line] * 1e-9,
         };
 
         // On the GPU, if wanted and possible.
@@ -79,12 +86,13 @@ impl TestSection {
             "verlet" => Mode::Paraxial,
             _ => Mode::Full,
         });
-        let planned = on_gpu(march, field, view, with(mode), measure.then_some(MEASURED_RAYS))?;
+        let planned = on_gpu(march, field, view, with(mode), measure.then_some(MEASURED_RAYS), kept)?;
         let why_not = match planned {
             Ok(planned) => return Ok(planned.seen(against_light)),
             Err(why_not) => why_not,
         };
 
+        let mut in_vain = None;
         // For comparison: by name only, never picked.
         let (paths, description, achieved) = if let Some(name @ ("euler" | "sharma" | "rk4")) = method {
             let interpolant = interpolant.unwrap_or_default();
@@ -92,12 +100,13 @@ impl TestSection {
             let paths = compared(name, field, view, interpolant, step_voxels, wanted);
             (paths, described(name, interpolant, step_voxels), None)
         } else {
-            let plan = Plan::new(field, with(mode));
+            let plan = Plan::from_roughness(field, with(mode), kept.roughness(field));
             // PEFRL is made with the spline only.
             if plan.mode == Mode::Full && interpolant.is_some_and(|i| i != Interpolant::BSpline) {
                 let step = plan.step_voxels;
                 let options = FullOptions { step_voxels: step, wanted, ..FullOptions::default() };
                 let paths = full(field, view, plan.interpolant, Pefrl, options);
+                in_vain = (march.skip_rad > 0.0).then(|| left_nothing_out("pefrl"));
                 (paths, described("pefrl", plan.interpolant, step), None)
             } else {
                 let name = match plan.mode {
@@ -105,12 +114,22 @@ impl TestSection {
                     Mode::Paraxial => "verlet",
                     Mode::Full => "pefrl",
                 };
-                let achieved = measure.then(|| plan.measure(field, view, MEASURED_RAYS));
-                (plan.paths(field, view), described(name, plan.interpolant, plan.step_voxels), achieved)
+                let achieved = measure.then(|| plan.measure_with(field, view, MEASURED_RAYS, kept));
+                let mut description = described(name, plan.interpolant, plan.step_voxels);
+                if march.skip_rad > 0.0 {
+                    match plan.mode {
+                        Mode::Paraxial => {
+                            description += &format!(", leaving out at most {:e} rad", march.skip_rad)
+                        }
+                        Mode::LineOfSight | Mode::Full => in_vain = Some(left_nothing_out(name)),
+                    }
+                }
+                (plan.paths_with(field, view, kept), description, achieved)
             }
         };
         let mut planned = Planned::new(paths, description, achieved, march.tolerance_rad);
         planned.warnings.extend(why_not);
+        planned.warnings.extend(in_vain);
         Ok(planned.seen(against_light))
     }
 }
@@ -144,6 +163,17 @@ impl<'a> Planned<'a> {
         let paths = if against_light { Box::new(Reversed::new(paths)) as Box<dyn LightPaths> } else { paths };
         Planned { paths, ..self }
     }
+}
+
+/// Why skipping was asked for in vain.
+fn left_nothing_out(march: &str) -> String {
+    let why = match march {
+        "line-of-sight" => {
+            "the tolerance lets the plan take straight rays, which need no steps through the flow; force --march verlet to compare"
+        }
+        _ => "the index is so strong that the plan takes the full march, which samples every step",
+    };
+    format!("march.skip_rad changes nothing: {why}")
 }
 
 pub(super) fn described(name: &str, interpolant: Interpolant, step_voxels: f64) -> String {

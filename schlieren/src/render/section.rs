@@ -3,6 +3,7 @@
 use super::RenderError;
 use crate::field::Field;
 use crate::input;
+use crate::march::Kept;
 use crate::scene::Scene;
 use crate::solids::Solids;
 use crate::view::View;
@@ -19,6 +20,8 @@ pub struct TestSection {
     pub input: Option<input::Report>,
     /// What was repaired or left out, a sentence each.
     pub warnings: Vec<String>,
+    /// What marches prepared of each field, when that is to be kept.
+    pub(super) kept: Vec<Kept>,
 }
 
 impl TestSection {
@@ -55,7 +58,15 @@ impl TestSection {
             return Err(RenderError::Fields { wanted: lines, found: fields.len() });
         };
         let view = scene.view.direction.view(first.centre_m())?;
-        Ok(TestSection { fields, view, solids, input: None, warnings: Vec::new() })
+        Ok(TestSection { fields, view, solids, input: None, warnings: Vec::new(), kept: Vec::new() })
+    }
+
+    /// Keeps what marches prepare of the fields (splines, projections) for further pictures: takes as much memory as the fields again, and the time of the second
+    /// picture is that of its light alone. Fields must not be replaced after this.
+    #[must_use]
+    pub fn keeping(mut self) -> TestSection {
+        self.kept = self.fields.iter().map(|_| Kept::default()).collect();
+        self
     }
 
     /// Sides of the field as the view sees them, in metres.

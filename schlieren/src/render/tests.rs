@@ -173,3 +173,48 @@ fn dots_are_displaced_as_the_map_says() {
     let ratio = f64::from(m.displacement_m[i][0]) / f64::from(m.deflection_rad[i][0]);
     assert!((ratio - 0.5).abs() < 0.01 && m.deflection_rad[i][0] > 0.0, "{ratio}");
 }
+
+/// Paths whose device failed on the way: right, and with something to tell.
+struct Failed<'a>(Box<dyn LightPaths + 'a>);
+
+impl LightPaths for Failed<'_> {
+    fn trace(&self, starts: &[Start], exits: &mut [crate::path::Exit]) {
+        self.0.trace(starts, exits);
+    }
+    fn view(&self) -> &crate::view::View {
+        self.0.view()
+    }
+    fn wanted(&self) -> Wanted {
+        self.0.wanted()
+    }
+    fn difference_step_m(&self) -> f64 {
+        self.0.difference_step_m()
+    }
+    fn trouble(&self) -> Option<String> {
+        Some("the GPU `Lamp 9` failed (out of memory); what it left was computed on the CPU".into())
+    }
+}
+
+#[test]
+fn a_device_that_failed_on_the_way_is_a_warning_of_the_picture_told_once() {
+    for technique in ["schlieren", "bos"] {
+        let s = scene(&format!("{SMALL}[technique]\nkind = \"{technique}\""));
+        let section = TestSection::of_fields(&s, vec![blob()], None).unwrap();
+        let against_light = technique == "bos";
+        let planned = section.paths(&s, 0, Wanted::default(), against_light, false).unwrap();
+        let planned = Planned { paths: Box::new(Failed(planned.paths)), ..planned };
+        let mut r = drawn(&format!("{SMALL}[technique]\nkind = \"{technique}\""), Layers::NONE);
+        for _ in 0..2 {
+            add_map(&s, &section, &planned, &mut r);
+        }
+        let told = r.report.warnings.iter().filter(|w| w.contains("Lamp 9") && w.contains("out of memory"));
+        assert_eq!(told.count(), 1, "{technique}: {:?}", r.report.warnings);
+        assert!(r.map.is_some());
+    }
+    // Paths that look against the light pass it on.
+    let s = scene(&format!("{SMALL}[technique]\nkind = \"bos\""));
+    let section = TestSection::of_fields(&s, vec![blob()], None).unwrap();
+    let planned = section.paths(&s, 0, Wanted::default(), false, false).unwrap();
+    let reversed = crate::technique::bos::Reversed::new(Box::new(Failed(planned.paths)));
+    assert!(reversed.trouble().is_some_and(|t| t.contains("Lamp 9")));
+}

@@ -42,7 +42,24 @@ impl Scene {
         self.check_flow()?;
         positive("march.tolerance_rad", self.march.tolerance_rad)?;
         self.march.step_voxels.map_or(Ok(()), |s| positive("march.step_voxels", s))?;
+        self.check_skip()?;
         self.check_effect()
+    }
+
+    /// Only one march can leave out gas.
+    fn check_skip(&self) -> Result<(), SceneError> {
+        let skip = self.march.skip_rad;
+        if !(skip >= 0.0 && skip.is_finite()) {
+            return Err(wrong("march.skip_rad", skip, "give 0 or a small angle, such as 1e-9"));
+        }
+        match self.march.method.as_deref().filter(|m| skip > 0.0 && *m != "verlet") {
+            Some(m) => Err(wrong(
+                "march.skip_rad",
+                skip,
+                format!("it changes nothing with march.method = \"{m}\": only verlet can leave out even gas"),
+            )),
+            None => Ok(()),
+        }
     }
 
     fn check_flow(&self) -> Result<(), SceneError> {
@@ -293,6 +310,8 @@ mod tests {
             ("[light]\nwavelengths_nm = [500, 600]\nweights = [1.0]", ["weights", "2 wavelengths"]),
             ("[view]\ndirection = \"up\"", ["up", "AZIMUTH"]),
             ("[march]\ntolerance_rad = nan", ["tolerance_rad", "above 0"]),
+            ("[march]\nskip_rad = -1e-9", ["skip_rad", "give 0"]),
+            ("[march]\nskip_rad = 1e-9\nmethod = \"euler\"", ["skip_rad", "only verlet"]),
         ] {
             let message = refused(text);
             assert!(words.iter().all(|w| message.contains(w)), "{text}: {message}");

@@ -152,6 +152,22 @@ fn quantity(text: &str) -> Quantity {
 }
 
 impl FlowSpec {
+    /// The same file and lattice, without what its arrays mean.
+    #[must_use]
+    pub fn without_medium(&self) -> FlowSpec {
+        FlowSpec {
+            file: self.file.clone(),
+            length_unit_m: self.length_unit_m,
+            span: self.span,
+            revolve: self.revolve,
+            resample_nodes: self.resample_nodes,
+            smoothing_nodes: self.smoothing_nodes,
+            outside: self.outside,
+            hidden: self.hidden,
+            ..FlowSpec::default()
+        }
+    }
+
     /// What the index depends on; refuses arrays that do not go together.
     pub fn medium(&self) -> Result<Medium, SceneError> {
         let wrong = |reason: String| SceneError::Flow { reason };

@@ -319,6 +319,10 @@ pub struct MarchSpec {
     /// Step in voxels; picked by the tolerance when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub step_voxels: Option<f64>,
+    /// Gas is left out as long as that changes no ray's deflection by more than this in all; 0 leaves out nothing. Where the phase is computed, its error is kept
+    /// below 1e-5 waves for each eight steps that are left out.
+    #[serde(default)]
+    pub skip_rad: f64,
     /// Where it is computed.
     #[serde(default)]
     pub device: Device,
@@ -335,6 +339,7 @@ impl Default for MarchSpec {
             method: None,
             interpolant: None,
             step_voxels: None,
+            skip_rad: 0.0,
             device: Device::Cpu,
         }
     }

@@ -3,11 +3,12 @@
 use crate::field::{Field, Node};
 use crate::input::{InputError, from_dataset};
 use crate::render::{RenderError, TestSection};
-use crate::scene::{FlowSpec, Scene};
+use crate::scene::Scene;
 use crate::solids::Solids;
 use datasets::model::Dataset;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 /// An array of the file that can have a transfer function.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -20,22 +21,24 @@ pub struct ArrayInfo {
 
 /// A file's data.
 pub(super) struct Flow {
+    /// Where it is from.
+    pub(super) file: PathBuf,
     data: Dataset,
     warnings: Vec<String>,
 }
 
 impl Flow {
-    /// Reads the file. Of a time series this is the first time.
-    pub(super) fn open(spec: &FlowSpec) -> Result<Flow, InputError> {
-        let path = &spec.file;
-        let in_file = |e: InputError| InputError::InFile { path: path.clone(), source: Box::new(e) };
+    /// Reads a file. Of a collection this is the first time.
+    pub(super) fn open(path: &Path) -> Result<Flow, InputError> {
+        let file = path.to_path_buf();
+        let in_file = |e: InputError| InputError::InFile { path: file.clone(), source: Box::new(e) };
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
             let data = datasets::read::csv_lattice::dataset(&datasets::read::csv::read(path)?)?;
-            return Ok(Flow { data, warnings: Vec::new() });
+            return Ok(Flow { file, data, warnings: Vec::new() });
         }
         let opened = datasets::read::open(path)?;
         let data = opened.dataset().map_err(|e| in_file(e.into()))?.clone();
-        Ok(Flow { data, warnings: opened.warnings })
+        Ok(Flow { data, warnings: opened.warnings, file })
     }
 
     /// Arrays of points and cells whose values differ, by name.
@@ -61,6 +64,14 @@ impl Flow {
         found.into_iter().map(|(name, range)| ArrayInfo { name, range }).collect()
     }
 
+    /// n0 - 1 around this flow, in the light of the scene's first wavelength: what all times of a series are relative to.
+    pub(super) fn reference_n_minus_1(&self, scene: &Scene) -> Result<f64, RenderError> {
+        let options = scene.flow.options(scene.light.wavelengths_nm[0])?;
+        let loaded = from_dataset(&self.data, &options)
+            .map_err(|e| InputError::InFile { path: self.file.clone(), source: Box::new(e) })?;
+        Ok(loaded.report.reference_n_minus_1)
+    }
+
     /// The test section for a scene. `solids` are taken over from the one before: a page cannot change them.
     pub(super) fn section(&self, scene: &Scene, solids: Option<Solids>) -> Result<TestSection, RenderError> {
         let mut fields = Vec::new();
@@ -68,7 +79,7 @@ impl Flow {
         for line in scene.lines() {
             let options = scene.flow.options(line.wavelength_nm)?;
             let loaded = from_dataset(&self.data, &options)
-                .map_err(|e| InputError::InFile { path: scene.flow.file.clone(), source: Box::new(e) })?;
+                .map_err(|e| InputError::InFile { path: self.file.clone(), source: Box::new(e) })?;
             fields.push(loaded.field);
             report.get_or_insert(loaded.report);
         }

@@ -17,6 +17,7 @@ pub use flow::ArrayInfo;
 pub use frame::{Frame, FrameInfo};
 pub use session::{Canvas, MAX_POINTS, MAX_SAMPLES, MAX_SIDE, MAX_STROKES, Paint, Painted, Refused, Session};
 
+use crate::input::Step;
 use crate::render::RenderError;
 use crate::scene::Scene;
 use crate::solids::Solids;
@@ -58,9 +59,10 @@ const TICK: Duration = Duration::from_millis(50);
 /// How long connections may take to finish at the end.
 const FAREWELL: Duration = Duration::from_secs(1);
 
-/// Serves the scene until `cancel` is set. `ready` gets the address of the page once it can be opened, and notes on the way.
+/// Serves the scene until `cancel` is set. With several `steps` the page has a choice of time, and the first is shown first; with fewer the scene's own file is. `ready` gets the address of the page once it can be opened, and notes on the way.
 pub fn serve(
-    scene: Scene,
+    mut scene: Scene,
+    steps: Vec<Step>,
     address: SocketAddr,
     cancel: &AtomicBool,
     ready: impl FnOnce(&str),
@@ -74,12 +76,16 @@ pub fn serve(
     let listener = runtime.block_on(tokio::net::TcpListener::bind(address)).map_err(listen)?;
     let url = format!("http://{}/{token}/", listener.local_addr().map_err(listen)?);
 
-    let flow = flow::Flow::open(&scene.flow).map_err(RenderError::from)?;
+    let steps = if steps.len() > 1 { steps } else { Vec::new() };
+    if let Some(first) = steps.first() {
+        scene.flow.file.clone_from(&first.path);
+    }
+    let flow = flow::Flow::open(&scene.flow.file).map_err(RenderError::from)?;
     let mut solids = None;
     if !scene.solids.files.is_empty() {
         solids = Some(Solids::open(&scene.solids.files).map_err(RenderError::from)?.0);
     }
-    let session = Arc::new(Session::new(scene, flow.arrays())?);
+    let session = Arc::new(Session::new(scene, flow.arrays(), steps)?);
     let worker = worker::Worker::new(session.clone(), flow, solids);
     let thread = std::thread::Builder::new()
         .name("draws".into())

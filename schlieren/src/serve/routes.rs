@@ -5,7 +5,7 @@
 //! | `GET /` and `GET /NAME` | the page and its parts |
 //! | `GET /state` | scene, arrays, limits (JSON) |
 //! | `GET /frame?after=N` | the newest frame when its number is not N; waits for one, 204 when none comes for a while |
-//! | `POST /scene` | a change as JSON merge patch |
+//! | `POST /scene` | a change as JSON merge patch; `step` chooses the time of a series |
 //! | `POST /paint` | [`Paint`] |
 //! | `POST /trace` | where a place of the picture lies on the filter |
 //! | `GET /save/png`, `/save/exr`, `/save/toml` | files |

@@ -7,6 +7,7 @@ use super::flow::ArrayInfo;
 use super::frame::{Frame, Traced};
 use crate::cutoff::Rgb;
 use crate::cutoff::painted::Stroke;
+use crate::input::Step;
 use crate::optics::Across;
 use crate::scene::{
     BeamsSpec, CutoffSpec, FilmSpec, FlowSpec, LensSpec, LightSpec, SamplingSpec, Scene, TechniqueSpec,
@@ -25,7 +26,7 @@ pub const MAX_SAMPLES: u32 = 4096;
 pub const MAX_STROKES: usize = 5000;
 /// Most points of one request to paint.
 pub const MAX_POINTS: usize = 4096;
-/// Sections of the scene that a page may change; of the flow only its transfer functions.
+/// Sections of the scene that a page may change; of the flow only its transfer functions (and its time, by `step`).
 const PAGE_SECTIONS: [&str; 8] =
     ["view", "light", "lenses", "technique", "film", "sampling", "march", "flow"];
 
@@ -74,6 +75,8 @@ pub(super) struct Shared {
     pub(super) frame: Option<Arc<Frame>>,
     pub(super) stop: bool,
     kept: BTreeMap<&'static str, Kept>,
+    /// n0 - 1 that all steps are drawn with, and the scene's flow for which that was found.
+    pub(super) reference: Option<(FlowSpec, f64)>,
 }
 
 /// The state that requests and the drawing thread share.
@@ -83,7 +86,9 @@ pub struct Session {
     /// Set to stop what is being drawn.
     pub(super) cancel: AtomicBool,
     pub(super) frames: tokio::sync::watch::Sender<u64>,
-    /// Arrays for transfer functions.
+    /// Times of a series, at least two; none of one flow.
+    pub(super) steps: Vec<Step>,
+    /// Arrays for transfer functions, of the first step.
     arrays: Vec<ArrayInfo>,
     /// As it was when the program started: a page may change neither files nor what the arrays mean, only curves.
     flow: FlowSpec,
@@ -129,7 +134,7 @@ pub struct Painted {
 
 impl Session {
     /// A session that starts with this scene.
-    pub(super) fn new(scene: Scene, arrays: Vec<ArrayInfo>) -> Result<Session, Refused> {
+    pub(super) fn new(scene: Scene, arrays: Vec<ArrayInfo>, steps: Vec<Step>) -> Result<Session, Refused> {
         check_limits(&scene)?;
         let image = match &scene.technique {
             TechniqueSpec::Schlieren { cutoff: cutoff @ CutoffSpec::Image { .. } } => Some(cutoff.clone()),
@@ -142,12 +147,14 @@ impl Session {
             frame: None,
             stop: false,
             kept: BTreeMap::new(),
+            reference: None,
         };
         Ok(Session {
             shared: Mutex::new(shared),
             wake: Condvar::new(),
             cancel: AtomicBool::new(false),
             frames: tokio::sync::watch::channel(0).0,
+            steps,
             arrays,
             flow: scene.flow,
             image,
@@ -168,6 +175,8 @@ impl Session {
             "scene": scene,
             "effective": scene.effective(),
             "file": scene.flow.file.file_name().map(|n| n.to_string_lossy().into_owned()),
+            "times": self.steps.iter().map(|s| s.time).collect::<Vec<_>>(),
+            "step": self.steps.iter().position(|s| s.path == scene.flow.file),
             "arrays": self.arrays,
             "techniques": TechniqueSpec::NAMES,
             "image_filter": self.image,
@@ -177,7 +186,22 @@ impl Session {
 
     /// The scene in effect as TOML.
     pub fn toml(&self) -> Result<String, Refused> {
-        let scene = self.lock().scene.effective();
+        let shared = self.lock();
+        let mut scene = shared.scene.effective();
+        if self.is_later(&scene) {
+            // Without the series around it, the file would be relative to its own surroundings and make another picture.
+            match &shared.reference {
+                Some((flow, n_minus_1)) if *flow == shared.scene.flow => {
+                    scene.flow.reference_n_minus_1 = Some(*n_minus_1);
+                }
+                _ => {
+                    return Err(refused(
+                        "this step is not read yet; save the scene when its picture is there",
+                    ));
+                }
+            }
+        }
+        drop(shared);
         scene.to_toml().map_err(|e| refused(chain(&e)))
     }
 
@@ -208,6 +232,7 @@ impl Session {
             Kept::bring_back(again, custom, &mut base);
         }
         let mut patch = patch.clone();
+        let step = patch.as_object_mut().and_then(|p| p.remove("step"));
         if kept.is_some()
             && patch.pointer("/technique").and_then(Value::as_object).is_some_and(|t| t.len() == 1)
         {
@@ -222,6 +247,11 @@ impl Session {
                 curves => self.with_curves(curves)?,
             };
         }
+        // The time: one of those there are. Transfer functions start from the first file, so the one shown is named again.
+        base.flow.file = match step {
+            Some(step) => self.step(&step)?.path.clone(),
+            None => before.flow.file.clone(),
+        };
         if let Some(sections) = patch.as_object_mut() {
             sections.remove("flow");
         }
@@ -237,6 +267,20 @@ impl Session {
             self.changed(&mut shared);
         }
         Ok(shared.generation)
+    }
+
+    fn step(&self, number: &Value) -> Result<&Step, Refused> {
+        let step = number.as_u64().and_then(|n| self.steps.get(usize::try_from(n).ok()?));
+        step.ok_or_else(|| match self.steps.len() {
+            0 => refused("`step`: the flow has one time; start the program with a time series (.pvd, or several files)"),
+            n => refused(format!("`step` is {number}; give 0 to {}", n - 1)),
+        })
+    }
+
+    /// Whether a scene shows a step that the first one's surroundings belong to.
+    pub(super) fn is_later(&self, scene: &Scene) -> bool {
+        scene.flow.reference_n_minus_1.is_none()
+            && self.steps.first().is_some_and(|s| s.path != scene.flow.file)
     }
 
     fn check_patch(&self, patch: &Value) -> Result<(), Refused> {
@@ -264,18 +308,7 @@ impl Session {
         }
         let multifield =
             serde_json::from_value(curves).map_err(|e| refused(format!("not transfer functions: {e}")))?;
-        let f = self.flow.clone();
-        let flow = FlowSpec {
-            file: f.file,
-            length_unit_m: f.length_unit_m,
-            span: f.span,
-            resample_nodes: f.resample_nodes,
-            smoothing_nodes: f.smoothing_nodes,
-            outside: f.outside,
-            hidden: f.hidden,
-            multifield: Some(multifield),
-            ..FlowSpec::default()
-        };
+        let flow = FlowSpec { multifield: Some(multifield), ..self.flow.without_medium() };
         for name in flow.multifield.iter().flat_map(|m| m.fields.keys()) {
             if !self.arrays.iter().any(|a| a.name == *name) {
                 let names: Vec<&str> = self.arrays.iter().map(|a| a.name.as_str()).collect();
@@ -529,10 +562,7 @@ pub(super) fn chain(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();
     while let Some(c) = cause {
-        let more = c.to_string();
-        if !text.contains(&more) {
-            text += &format!(": {more}");
-        }
+        text += &format!(": {c}");
         cause = c.source();
     }
     text

@@ -67,7 +67,10 @@ struct Errors {
 
 pub(super) struct Worker {
     session: Arc<Session>,
+    /// The file that was read last.
     flow: Flow,
+    /// n0 - 1 of a series' first step, for the flow (as of that step) and wavelength it was made with.
+    reference: Option<(FlowSpec, f64, f64)>,
     /// The section for a flow and wavelengths, and a thinned one.
     section: Option<Section>,
     solids: Option<Solids>,
@@ -100,6 +103,7 @@ impl Worker {
         Worker {
             session,
             flow,
+            reference: None,
             section: None,
             solids,
             traced: None,
@@ -227,11 +231,16 @@ impl Worker {
             if let Some(old) = self.section.take() {
                 self.solids = old.full.solids;
             }
+            if self.flow.file != scene.flow.file {
+                self.flow = Flow::open(&scene.flow.file)?;
+            }
+            let mut of_series = scene.clone();
+            of_series.flow.reference_n_minus_1 = self.reference_n_minus_1(scene)?;
             // Bodies are kept where a failure cannot lose them.
-            let mut full = self.flow.section(scene, None)?;
+            let mut full = self.flow.section(&of_series, None)?.keeping();
             let thin_fields: Option<Vec<_>> = full.fields.iter().map(coarse).collect();
             let thin = match thin_fields {
-                Some(fields) => Some(TestSection::of_fields(scene, fields, None)?),
+                Some(fields) => Some(TestSection::of_fields(scene, fields, None)?.keeping()),
                 None => None,
             };
             full.solids = self.solids.take();
@@ -246,6 +255,24 @@ impl Worker {
             }
         }
         Ok(())
+    }
+
+    /// What a scene's times are relative to: the surroundings of the first, or pictures could not be compared.
+    fn reference_n_minus_1(&mut self, scene: &Scene) -> Result<Option<f64>, RenderError> {
+        if !self.session.is_later(scene) {
+            return Ok(scene.flow.reference_n_minus_1);
+        }
+        let mut first = scene.clone();
+        first.flow.file.clone_from(&self.session.steps[0].path);
+        let wavelength_nm = scene.light.wavelengths_nm[0];
+        let known = self.reference.as_ref().filter(|r| r.0 == first.flow && r.1 == wavelength_nm);
+        let n_minus_1 = match known {
+            Some((_, _, n_minus_1)) => *n_minus_1,
+            None => Flow::open(&first.flow.file)?.reference_n_minus_1(&first)?,
+        };
+        self.reference = Some((first.flow, wavelength_nm, n_minus_1));
+        self.session.lock().reference = Some((scene.flow.clone(), n_minus_1));
+        Ok(Some(n_minus_1))
     }
 
     /// Bodies belong to the whole section; the thinned one borrows them for the time of `with`.

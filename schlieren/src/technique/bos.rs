@@ -9,7 +9,7 @@
 
 use super::Photon;
 use crate::optics::{Across, Optics};
-use crate::path::{Exit, LightPaths, Start, Wanted};
+use crate::path::{Exit, LeftOut, LightPaths, Start, Wanted};
 use crate::view::View;
 
 /// A dotted background seen through the flow.
@@ -127,6 +127,14 @@ impl LightPaths for Reversed<'_> {
 
     fn difference_step_m(&self) -> f64 {
         self.paths.difference_step_m()
+    }
+
+    fn trouble(&self) -> Option<String> {
+        self.paths.trouble()
+    }
+
+    fn left_out(&self) -> Option<LeftOut> {
+        self.paths.left_out()
     }
 }
 

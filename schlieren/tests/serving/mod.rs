@@ -13,12 +13,18 @@ use std::time::{Duration, Instant};
 
 /// Air with a light blob right of and above the middle, in a box of 0.2 x 0.1 x 0.1 m, and a temperature beside it.
 pub(crate) fn flow(path: &Path) {
+    flow_at(path, 0.03, 1.2);
+}
+
+/// The same with the blob elsewhere, in other surroundings.
+fn flow_at(path: &Path, blob_x_m: f64, around_kg_m3: f64) {
     let (nx, n) = (41u32, 21u32);
     let mut image = ImageData::new([nx, n, n], DVec3::new(-0.1, -0.05, -0.05), DVec3::splat(5e-3));
     let at = |i: u32, n: u32| (f64::from(i) - 0.5 * f64::from(n - 1)) * 5e-3;
     let blob = |i: u32| {
         let (x, y, z) = (at(i % nx, nx), at(i / nx % n, n), at(i / nx / n, n));
-        1.2 - 0.3 * (-((x - 0.03).powi(2) + (y - 0.01).powi(2) + z * z) / (2.0 * 0.015f64.powi(2))).exp()
+        around_kg_m3
+            - 0.3 * (-((x - blob_x_m).powi(2) + (y - 0.01).powi(2) + z * z) / (2.0 * 0.015f64.powi(2))).exp()
     };
     let values: Vec<f32> = (0..nx * n * n).map(|i| blob(i) as f32).collect();
     let temperature = values.iter().map(|r| 1.2 / r * 293.15).collect();
@@ -60,6 +66,29 @@ impl Served {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("flow.vti");
         flow(&path);
+        Served::of(&path, dir, options)
+    }
+
+    /// A series of four times: the blob wanders to the left. The file of the third is missing.
+    pub(crate) fn start_series(options: &[&str]) -> Served {
+        let dir = tempfile::tempdir().unwrap();
+        let path = |name: &str| dir.path().join(name);
+        let mut entries = String::new();
+        for (i, (x_m, around)) in [(0.03, 1.2), (0.0, 1.2), (0.0, 1.2), (-0.03, 1.1)].into_iter().enumerate()
+        {
+            let name = format!("flow-{i}.vti");
+            entries += &format!("<DataSet timestep=\"{}\" file=\"{name}\"/>", 0.5 * i as f64);
+            flow_at(&path(&name), x_m, around);
+        }
+        std::fs::remove_file(path("flow-2.vti")).unwrap();
+        let text = format!(
+            "<VTKFile type=\"Collection\" version=\"0.1\"><Collection>{entries}</Collection></VTKFile>"
+        );
+        std::fs::write(path("flow.pvd"), text).unwrap();
+        Served::of(&path("flow.pvd"), dir, options)
+    }
+
+    fn of(path: &Path, dir: tempfile::TempDir, options: &[&str]) -> Served {
         let mut child = Command::new(env!("CARGO_BIN_EXE_schlieren"))
             .args(["serve", path.to_str().unwrap(), "--density", "rho", "--json"])
             .args(options)

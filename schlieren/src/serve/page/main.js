@@ -19,6 +19,7 @@ function onState(next) {
   $("file").textContent = next.file || "";
   const direction = next.effective.view.direction;
   angles = AXES[direction] || direction.split(",").map(Number);
+  showTime(next);
   settings.show(state);
   curves.show(state);
   const paints = canPaint();
@@ -27,6 +28,14 @@ function onState(next) {
   $("filter").closest("fieldset").hidden = !["schlieren", "shadowgraph", "interferogram", "bos"].includes(kind());
   document.querySelector("input[value=paint]").disabled = !paints;
   if (!paints && tool === "paint") setTool("orbit");
+}
+
+function showTime({ times, step }) {
+  $("time").hidden = times.length < 2;
+  if (times.length < 2) return;
+  $("step").max = times.length - 1;
+  if (document.activeElement !== $("step")) $("step").value = step;
+  $("when").textContent = `${step + 1} of ${times.length}, t = ${Number(times[step].toPrecision(6))}`;
 }
 
 const kind = () => state?.effective.technique.kind;
@@ -109,6 +118,7 @@ function setTool(next) {
 }
 for (const input of document.querySelectorAll("input[name=tool]")) input.addEventListener("change", () => setTool(input.value));
 for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => server.change({ view: { direction: button.dataset.view } }));
+$("step").addEventListener("input", () => server.change({ step: Number($("step").value) }));
 $("radius").addEventListener("input", () => { $("radius").dataset.touched = "1"; });
 
 // A cleared filter keeps its size and the source that it was painted for.

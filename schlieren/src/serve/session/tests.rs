@@ -4,7 +4,7 @@ use serde_json::json;
 fn session(rest: &str) -> Session {
     let scene = Scene::from_toml(&format!("[flow]\nfile = \"a\"\ndensity = \"r\"\n{rest}")).unwrap();
     let array = |name: &str| ArrayInfo { name: name.into(), range: [0.0, 1.0] };
-    Session::new(scene, vec![array("r"), array("T")]).unwrap()
+    Session::new(scene, vec![array("r"), array("T")], Vec::new()).unwrap()
 }
 
 fn scene(s: &Session) -> Scene {

@@ -1,0 +1,153 @@
+//! Options that say what the flow's arrays mean, and how they change the scene.
+
+use super::units;
+use crate::index::conditions::Model;
+use crate::index::multifield::Rule;
+use crate::input::Role;
+use crate::scene::{CurveSpec, FlowSpec, Scene};
+use clap::Args;
+use datasets::cli::UsageError;
+use std::path::PathBuf;
+
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Flow (a number can stand for an array)")]
+pub(super) struct FlowArgs {
+    /// Array with the density in kg/m³
+    #[arg(long, value_name = "NAME")]
+    density: Option<String>,
+    /// kg/m³ per unit of the density array, for densities relative to a free stream
+    #[arg(long, value_name = "NUMBER")]
+    density_unit: Option<f64>,
+    /// Array with the temperature in K
+    #[arg(long, value_name = "NAME")]
+    temperature: Option<String>,
+    /// Array with the pressure in Pa
+    #[arg(long, value_name = "NAME")]
+    pressure: Option<String>,
+    /// Array with the relative humidity, 0 to 1
+    #[arg(long, value_name = "NAME")]
+    humidity: Option<String>,
+    /// CO2 in ppm
+    #[arg(long, value_name = "NUMBER")]
+    co2_ppm: Option<String>,
+    /// Array with n - 1
+    #[arg(long, value_name = "NAME")]
+    n_minus_1: Option<String>,
+    /// Array with free electrons per m³
+    #[arg(long, value_name = "NAME")]
+    electrons: Option<String>,
+    /// Array with the mass fraction of a gas; may be repeated
+    #[arg(long, value_name = "NAME=GAS", value_parser = units::species)]
+    species: Vec<(String, String)>,
+    /// Transfer function of an array to n - 1, straight between its points; may be repeated, one per array. Illustration, not physics
+    #[arg(long, value_name = "NAME=VALUE:N,...", value_parser = units::curve, allow_hyphen_values = true)]
+    curve: Vec<(String, Vec<[f64; 2]>)>,
+    /// Factor of an array's transfer function; 0 leaves it out
+    #[arg(long, value_name = "NAME=NUMBER", value_parser = units::weight, allow_hyphen_values = true)]
+    curve_weight: Vec<(String, f64)>,
+    /// How transfer functions combine: sum, or largest
+    #[arg(long, value_name = "RULE", value_parser = units::rule)]
+    curve_rule: Option<Rule>,
+    /// Metres per unit of the file's coordinates
+    #[arg(long, value_name = "METRES", value_parser = units::length)]
+    length_unit: Option<f64>,
+    /// Depth of two-dimensional data, in units of the file
+    #[arg(long, value_name = "NUMBER")]
+    span: Option<f64>,
+    /// Two-dimensional data are half of an axisymmetric flow
+    #[arg(long, conflicts_with = "span")]
+    revolve: bool,
+    /// Nodes along the longest axis when data are resampled
+    #[arg(long, value_name = "N")]
+    resample: Option<usize>,
+    /// Standard deviation in nodes of the smoothing of shocks
+    #[arg(long, value_name = "NODES")]
+    smoothing: Option<f64>,
+    /// What lies outside the mesh: blank, solid (a body) or gas (undisturbed flow)
+    #[arg(long, value_name = "ROLE", value_parser = units::role)]
+    outside: Option<Role>,
+    /// What lies in cells that the solver hid: blank, solid or gas
+    #[arg(long, value_name = "ROLE", value_parser = units::role)]
+    hidden: Option<Role>,
+    /// Body that blocks light (OBJ, STL, PLY, glTF, VTP); may be repeated
+    #[arg(long, value_name = "FILE")]
+    solid: Vec<PathBuf>,
+}
+
+impl FlowArgs {
+    /// Changes the scene's flow and bodies. What arrays mean is checked with the scene.
+    pub(super) fn apply(&self, s: &mut Scene) -> Result<(), UsageError> {
+        let a = self;
+        s.solids.files.extend(a.solid.iter().cloned());
+        let f = &mut s.flow;
+        // Another alternative on the command line replaces that of the file; transfer functions are added to those it has.
+        let by_curves = !a.curve.is_empty() && f.multifield.is_none();
+        let by_state = a.density.is_some() || a.temperature.is_some();
+        if by_curves || by_state || a.n_minus_1.is_some() || a.electrons.is_some() {
+            *f = FlowSpec {
+                model: if by_state { f.model } else { Model::Auto },
+                reference_n_minus_1: f.reference_n_minus_1,
+                ..f.without_medium()
+            };
+        }
+        let set = |to: &mut Option<String>, from: &Option<String>| {
+            if from.is_some() {
+                to.clone_from(from);
+            }
+        };
+        set(&mut f.density, &a.density);
+        set(&mut f.temperature, &a.temperature);
+        set(&mut f.pressure, &a.pressure);
+        set(&mut f.humidity, &a.humidity);
+        set(&mut f.co2_ppm, &a.co2_ppm);
+        set(&mut f.n_minus_1, &a.n_minus_1);
+        set(&mut f.electrons, &a.electrons);
+        f.species.extend(a.species.iter().cloned());
+        f.density_unit_kg_m3 = a.density_unit.or(f.density_unit_kg_m3);
+        f.length_unit_m = a.length_unit.unwrap_or(f.length_unit_m);
+        f.span = a.span.or(f.span.filter(|_| !a.revolve));
+        f.revolve = a.revolve || (f.revolve && a.span.is_none());
+        f.resample_nodes = a.resample.or(f.resample_nodes);
+        f.smoothing_nodes = a.smoothing.unwrap_or(f.smoothing_nodes);
+        f.outside = a.outside.unwrap_or(f.outside);
+        f.hidden = a.hidden.unwrap_or(f.hidden);
+        self.apply_curves(f)
+    }
+
+    fn apply_curves(&self, f: &mut FlowSpec) -> Result<(), UsageError> {
+        if !self.curve.is_empty() {
+            f.multifield.get_or_insert_default();
+        }
+        let Some(multifield) = &mut f.multifield else {
+            let flag = if self.curve_rule.is_some() { "--curve-rule" } else { "--curve-weight" };
+            return match self.curve_rule.is_some() || !self.curve_weight.is_empty() {
+                true => Err(UsageError(format!(
+                    "{flag} changes nothing without transfer functions; give --curve"
+                ))),
+                false => Ok(()),
+            };
+        };
+        for (i, (name, knots)) in self.curve.iter().enumerate() {
+            if self.curve[..i].iter().any(|c| c.0 == *name) {
+                return Err(UsageError(format!(
+                    "--curve {name} is given twice; an array has one transfer function"
+                )));
+            }
+            // A curve of the scene's file keeps its weight.
+            let weight = multifield.fields.get(name).map_or(1.0, |c| c.weight);
+            multifield.fields.insert(name.clone(), CurveSpec { knots: knots.clone(), weight });
+        }
+        for (name, weight) in &self.curve_weight {
+            let Some(curve) = multifield.fields.get_mut(name) else {
+                let names: Vec<&str> = multifield.fields.keys().map(String::as_str).collect();
+                return Err(UsageError(format!(
+                    "--curve-weight {name}: this array has no transfer function; there are those of: {}",
+                    names.join(", ")
+                )));
+            };
+            curve.weight = *weight;
+        }
+        multifield.rule = self.curve_rule.unwrap_or(multifield.rule);
+        Ok(())
+    }
+}
