@@ -1,6 +1,7 @@
 //! The command line: what was typed becomes a call of the library.
 
 mod index;
+mod media_args;
 mod probe;
 mod render;
 mod scene_args;

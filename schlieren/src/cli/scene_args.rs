@@ -1,5 +1,6 @@
 //! Options that describe the scene, and how they change the one from a file. An option that changes nothing is refused by name.
 
+use super::media_args::MediaArgs;
 use super::units;
 use crate::input::Role;
 use crate::scene::{
@@ -20,6 +21,8 @@ pub(super) struct SceneArgs {
     flow: FlowArgs,
     #[command(flatten)]
     optics: OpticsArgs,
+    #[command(flatten)]
+    media: MediaArgs,
     #[command(flatten)]
     film: FilmArgs,
 }
@@ -236,6 +239,7 @@ impl SceneArgs {
         self.flow.apply(&mut s.flow);
         s.solids.files.extend(self.flow.solid.iter().cloned());
         self.optics.apply(&mut s)?;
+        self.media.apply(&mut s.media);
         self.film.apply(&mut s)?;
         // What a scene refuses is wrong usage here: the values come from the command line.
         if let Err(e) = s.check() {

@@ -130,7 +130,9 @@ impl Media {
                 ));
             }
             if negative > 0 {
-                out.push(format!("media.{name}: {negative} of {nodes} values are below 0; they are taken as 0"));
+                out.push(format!(
+                    "media.{name}: {negative} of {nodes} values are below 0; they are taken as 0"
+                ));
             }
         }
         out

@@ -63,14 +63,7 @@ impl Volume {
     fn of(dims: [usize; 3], spacing_m: DVec3, origin_m: DVec3, values: Vec<f32>, repairs: Repairs) -> Volume {
         let range =
             values.iter().fold([f32::INFINITY, f32::NEG_INFINITY], |[l, h], v| [l.min(*v), h.max(*v)]);
-        Volume {
-            values: Trilinear::of(Cow::Owned(values), dims),
-            dims,
-            spacing_m,
-            origin_m,
-            range,
-            repairs,
-        }
+        Volume { values: Trilinear::of(Cow::Owned(values), dims), dims, spacing_m, origin_m, range, repairs }
     }
 
     /// The same value everywhere in a field.

@@ -21,6 +21,7 @@
 //! ```
 
 pub(crate) mod map;
+mod media;
 mod on_gpu;
 mod paths;
 mod section;
@@ -28,6 +29,7 @@ mod section;
 mod tests;
 
 pub use map::Map;
+pub use media::MediaMap;
 pub use on_gpu::check_gpu;
 pub use paths::{INTERPOLANTS, MARCHES, Planned};
 pub use section::TestSection;
@@ -79,6 +81,11 @@ pub enum RenderError {
     #[cfg(feature = "gpu")]
     #[error(transparent)]
     Gpu(#[from] crate::gpu::GpuError),
+    /// The scene names a property of the medium, and the test section has none.
+    #[error(
+        "the scene has media.{0} and the test section does not; read it from a file, or give it with `TestSection::with_media`"
+    )]
+    NoMedia(&'static str),
     /// A name that nothing has.
     #[error("{key}: there is no `{name}`; there are: {names}")]
     Unknown {
@@ -152,6 +159,8 @@ pub struct Rendered {
     pub colored: bool,
     /// With [`Layers::map`].
     pub map: Option<Map>,
+    /// With [`Layers::map`], when the scene has media.
+    pub media: Option<MediaMap>,
     /// With [`Layers::counts`], when photons were sent.
     pub counts: Option<Vec<u32>>,
     /// With [`Layers::noise`]: estimated error of each pixel's brightness by too few photons: half the difference between two halves of them, of the first
@@ -214,6 +223,7 @@ pub fn render(
         pixels: Vec::new(),
         colored: false,
         map: None,
+        media: None,
         counts: None,
         noise: None,
         report: Report {
@@ -242,6 +252,9 @@ pub fn render(
         return Err(RenderError::Cancelled);
     }
 
+    if let Some(planned) = &first {
+        media::add_emission(scene, section, planned, layers, &mut r)?;
+    }
     if layers.map {
         // The picture's own paths serve when they tell what is wanted; the optical path is not computed for photons that do not need it.
         let planned = match first.filter(|p| p.paths.wanted().opd || !layers.phase) {
@@ -249,7 +262,9 @@ pub fn render(
             None => section.paths(scene, 0, Wanted { opd: layers.phase }, against_light, !measured)?,
         };
         add_map(scene, section, &planned, &mut r);
+        media::add_map(scene, section, &planned, &mut r)?;
     }
+    media::warn(scene, layers, &mut r.report.warnings);
     r.report.levels = r
         .pixels
         .iter()
@@ -409,6 +424,7 @@ fn expose_lines<'a>(
         counters.phase_rays += if t.needs_opd() { rays } else { 0 };
         counters.tilted_rays += if tilted_beams { rays } else { 0 };
         counters.dispersion_rays += if line > 0 { rays } else { 0 };
+        counters.media_rays += planned.take_media_rays();
         first.get_or_insert(planned);
     }
     Ok(first)

@@ -92,6 +92,7 @@ pub(super) fn on_gpu<'a>(
                 format!("{described}, on {}", gpu.name()),
                 achieved,
                 march.tolerance_rad,
+                (Mode::Paraxial.into(), plan.step_voxels),
             )))
         }
         Err(e) if march.device == Device::Gpu => Err(RenderError::Gpu(e)),
