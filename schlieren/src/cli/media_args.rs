@@ -8,10 +8,10 @@ use clap::Args;
 #[command(next_help_heading = "Light in the medium (a number can stand for an array)")]
 pub(super) struct MediaArgs {
     /// Array with the absorption in 1/m
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", allow_hyphen_values = true)]
     absorption: Option<String>,
     /// Array with the emission in 1/m: per metre of path, relative to undisturbed light without a cut-off
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", allow_hyphen_values = true)]
     emission: Option<String>,
     /// Array with the rotation of the plane of polarisation in rad/m, counter-clockwise in the picture
     #[arg(long, value_name = "NAME", allow_hyphen_values = true)]

@@ -9,7 +9,7 @@
 //! | [`Property::Rotation`] | ρ(x), rad/m | φ = ∫ ρ ds; an analyser at the angle θ to the polariser passes cos²(θ - φ) | Faraday, Malus |
 //!
 //! Nothing of it bends light, so it is collected in a walk of its own beside the march ([`Walk`]), and a scene without such properties runs none of this code.
-//! The walk bends as the march does ([`Bend`]): straight for line of sight, in `f32` by the trilinear gradient of eps for gases (a displacement within 2 %, and
+//! The walk bends as the march does ([`Bend`]): straight for line of sight, in `f32` by the trilinear gradient of eps for gases (a displacement within some per cent, and
 //! the displacement itself is below a voxel there), in `f64` by the spline for strong index.
 //!
 //! Properties are sampled trilinearly: they are not differentiated, and trilinear never rings below zero. A smooth property of width σ on a lattice of spacing h

@@ -22,6 +22,8 @@
 
 pub(crate) mod map;
 mod media;
+#[cfg(test)]
+mod media_tests;
 mod on_gpu;
 mod paths;
 mod section;
