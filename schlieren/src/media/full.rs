@@ -51,7 +51,8 @@ pub(super) fn collect(
     let mut sums = Sums::default();
     for _ in 0..FullOptions::default().patience.saturating_mul(steps as u32).max(1) {
         let mut after = Pefrl.step(&medium, &before, dtau_m);
-        let last = !(outside(&after) < 0.0);
+        let out = outside(&after);
+        let last = out >= 0.0 || out.is_nan();
         if last {
             after = Pefrl.run_until(&medium, &before, dtau_m, 1, outside).unwrap_or(after);
         }

@@ -63,12 +63,19 @@ impl Packet {
     }
 }
 
+/// A property, and its lattice coordinates: those of the field times `scale` plus `offset`.
+struct OnOwnLattice<'a> {
+    rows: TrilinearRows<'a>,
+    scale: [f32; 3],
+    offset: [f32; 3],
+}
+
 /// What is sampled on the way, the same for all packets.
 pub(super) struct Sampled<'a> {
     /// eps; `None` for straight rays.
     eps: Option<TrilinearRows<'a>>,
-    /// Absorption, emission, rotation, each with its lattice coordinates: those of the field times the first plus the second.
-    properties: [Option<(TrilinearRows<'a>, [f32; 3], [f32; 3])>; 3],
+    /// Absorption, emission, rotation.
+    properties: [Option<OnOwnLattice<'a>>; 3],
     /// Kinds of the field's nodes, its dimensions, and which kinds end a walk.
     nodes: Option<(&'a [Node], [usize; 3], [bool; 3])>,
     h2: [f32; 3],
@@ -84,7 +91,7 @@ impl<'a> Sampled<'a> {
             v.map(|v| {
                 let scale = (spacing_m / v.spacing_m).as_vec3().to_array();
                 let offset = ((field.origin_m() - v.origin_m) / v.spacing_m).as_vec3().to_array();
-                (v.values.rows(), scale, offset)
+                OnOwnLattice { rows: v.values.rows(), scale, offset }
             })
         });
         let stops = [Node::Gas, Node::Blank, Node::Solid].map(|n| walk.stops(n as u8));
@@ -192,7 +199,7 @@ fn gather<S: Simd>(
     }
     let mut values: [Row; 3] = [[0.0; LANES]; 3];
     for (row, property) in values.iter_mut().zip(&sampled.properties) {
-        if let Some((rows, scale, offset)) = property {
+        if let Some(OnOwnLattice { rows, scale, offset }) = property {
             let mut there = *at;
             for c in 0..3 {
                 there[c] = at[c].mul_add(f32x16::splat(simd, scale[c]), f32x16::splat(simd, offset[c]));
