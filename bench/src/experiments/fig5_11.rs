@@ -79,7 +79,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     check_cancelled(context)?;
     let first = scene(TECHNIQUES[0].1)?;
     let mut section = TestSection::of_fields(&first, vec![field], None)?;
-    section = section.with_media(smoke(&section.fields[0])?);
+    let smoke = smoke(&section.fields[0])?;
+    section = section.with_media(smoke);
     section.warnings.clear();
     let mut benches = vec![];
     for (name, toml) in TECHNIQUES {
