@@ -44,13 +44,15 @@ const PIXELS: u32 = 512;
 const LOS: &str = "line of sight";
 const TRACED: &str = "traced";
 
+/// Paths traced against the light, with the optical path, and through smoke.
+type Needs = (bool, bool, bool);
+
 /// A technique ready to be exposed.
 struct Bench {
     name: &'static str,
     scene: Scene,
     technique: Technique,
-    /// Traced against the light, with the optical path, and through smoke.
-    needs: (bool, bool, bool),
+    needs: Needs,
 }
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
@@ -93,7 +95,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
 
     for (march, method, passes) in [(LOS, "line-of-sight", 10), (TRACED, "verlet", 1)] {
         // Light paths that several techniques share are made once.
-        let mut shared: Vec<((bool, bool, bool), Box<dyn LightPaths + '_>)> = vec![];
+        let mut shared: Vec<(Needs, Box<dyn LightPaths + '_>)> = vec![];
         for b in &benches {
             if shared.iter().any(|s| s.0 == b.needs) {
                 continue;
