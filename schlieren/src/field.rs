@@ -100,28 +100,12 @@ impl Field {
         n0: f64,
         mut nodes: Option<Vec<Node>>,
     ) -> Result<Field, FieldError> {
-        for (axis, c) in ['x', 'y', 'z'].into_iter().zip(0..3) {
-            if dims[c] < 2 {
-                return Err(FieldError::TooFew { axis, nodes: dims[c] });
-            }
-            if !(spacing_m[c] > 0.0 && spacing_m[c].is_finite()) {
-                return Err(FieldError::Spacing { axis, spacing_m: spacing_m[c] });
-            }
-        }
-        // Interpolants add a border of up to three nodes and address with i32.
-        let wanted = dims.iter().try_fold(1usize, |n, d| n.checked_mul(*d));
-        let padded = dims.iter().try_fold(1usize, |n, d| n.checked_mul(d.checked_add(4)?));
-        let (Some(wanted), Some(..0x8000_0000)) = (wanted, padded) else {
-            return Err(FieldError::TooMany(dims[0], dims[1], dims[2]));
-        };
+        let wanted = check_lattice(dims, spacing_m, origin_m)?;
         if eps.len() != wanted {
             return Err(FieldError::Length { what: "eps", got: eps.len(), dims, wanted });
         }
         if let Some(n) = nodes.as_ref().filter(|n| n.len() != wanted) {
             return Err(FieldError::Length { what: "the mask", got: n.len(), dims, wanted });
-        }
-        if !origin_m.is_finite() {
-            return Err(FieldError::Origin(origin_m.x, origin_m.y, origin_m.z));
         }
         if !(n0 > 0.0 && n0.is_finite()) {
             return Err(FieldError::Reference(n0));
@@ -244,8 +228,34 @@ impl Field {
     }
 }
 
+/// The number of nodes of a lattice that light can be taken through.
+pub(crate) fn check_lattice(
+    dims: [usize; 3],
+    spacing_m: [f64; 3],
+    origin_m: DVec3,
+) -> Result<usize, FieldError> {
+    for (axis, c) in ['x', 'y', 'z'].into_iter().zip(0..3) {
+        if dims[c] < 2 {
+            return Err(FieldError::TooFew { axis, nodes: dims[c] });
+        }
+        if !(spacing_m[c] > 0.0 && spacing_m[c].is_finite()) {
+            return Err(FieldError::Spacing { axis, spacing_m: spacing_m[c] });
+        }
+    }
+    if !origin_m.is_finite() {
+        return Err(FieldError::Origin(origin_m.x, origin_m.y, origin_m.z));
+    }
+    // Interpolants add a border of up to three nodes and address with i32.
+    let nodes = dims.iter().try_fold(1usize, |n, d| n.checked_mul(*d));
+    let padded = dims.iter().try_fold(1usize, |n, d| n.checked_mul(d.checked_add(4)?));
+    match (nodes, padded) {
+        (Some(nodes), Some(..0x8000_0000)) => Ok(nodes),
+        _ => Err(FieldError::TooMany(dims[0], dims[1], dims[2])),
+    }
+}
+
 /// Gives nodes that are not gas the mean of their known neighbours, from the gas inwards layer by layer.
-fn fill(dims: [usize; 3], eps: &mut [f32], nodes: &[Node]) {
+pub(crate) fn fill(dims: [usize; 3], eps: &mut [f32], nodes: &[Node]) {
     let [nx, ny, nz] = dims;
     let stride = [1, nx, nx * ny];
     let mut known: Vec<bool> = nodes.iter().map(|k| *k == Node::Gas).collect();

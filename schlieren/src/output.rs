@@ -47,6 +47,9 @@ pub fn write_png(path: &Path, rendered: &Rendered) -> Result<PngReport, OutputEr
 /// | `samples.Y` | photons | that landed on the pixel |
 /// | `error.Y` | | of the picture, by too few photons |
 /// | `error.deflection` | rad | of the deflection, by march and interpolation |
+/// | `optical_depth.Y` | | of the light's way, when the scene has `media.absorption` |
+/// | `emission.Y` | | of the camera's way, 1 is undisturbed light without a cut-off, when it has `media.emission` |
+/// | `rotation.Y` | rad | of the plane of polarisation, when it has `media.rotation` |
 ///
 /// and as metadata every value of the effective scene under its TOML path, the scene as a whole, and what was done.
 pub fn write_exr(
@@ -74,6 +77,17 @@ pub fn picture(rendered: &Rendered) -> Result<Picture, OutputError> {
             p.add("phase.Y", "waves", m.waves.clone())?;
         }
         p.add("transmission.Y", "1", m.transmission.clone())?;
+    }
+    if let Some(m) = &rendered.media {
+        for (name, unit, layer) in [
+            ("optical_depth.Y", "1", &m.optical_depth),
+            ("emission.Y", "1", &m.emission),
+            ("rotation.Y", "rad", &m.rotation_rad),
+        ] {
+            if !layer.is_empty() {
+                p.add(name, unit, layer.clone())?;
+            }
+        }
     }
     if let Some(counts) = &rendered.counts {
         p.add("samples.Y", "photons", counts.iter().map(|n| *n as f32).collect())?;

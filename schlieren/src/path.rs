@@ -30,7 +30,7 @@ pub struct Exit {
     pub exit_depth_m: f32,
     /// Optical path minus that of the undisturbed ray in the reference medium, between the same planes. NaN when it was not asked for.
     pub opd_m: f32,
-    /// 1 free; 0 blocked; between when absorption is on.
+    /// 1 free; 0 blocked; between when absorption or an analyser dims the light ([`crate::media`]).
     pub transmission: f32,
     /// What happened to the ray.
     pub status: Status,

@@ -11,6 +11,7 @@ use crate::view::View;
 use datasets::model::ModelError;
 use datasets::read::ReadError;
 use rt_core::accel::{BuildError, BuildOptions, Geometry, Instance, World};
+use rt_core::ray::Ray;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -86,6 +87,17 @@ impl Solids {
 
     /// Whether a body lies anywhere on the photon's straight ray.
     pub fn block(&self, view: &View, start: &Start) -> bool {
+        self.world.occluded(&self.ray(view, start).0)
+    }
+
+    /// How far along the photon's straight ray the first body is, from the plane through the view's centre; `None` when there is none.
+    pub fn depth_m(&self, view: &View, start: &Start) -> Option<f64> {
+        let (ray, before_m) = self.ray(view, start);
+        self.world.closest(&ray).map(|hit| before_m + f64::from(hit.t))
+    }
+
+    /// A photon's straight ray, and where on it that begins.
+    fn ray(&self, view: &View, start: &Start) -> (Ray, f64) {
         let [right, up, direction] = [view.right, view.up, view.beam(start.tilt_rad)[2]];
         let at = view.centre_m + right * f64::from(start.position_m[0]) + up * f64::from(start.position_m[1]);
         let bounds = self.world.bounds();
@@ -93,7 +105,7 @@ impl Solids {
         let middle = self.world.origin() + ((bounds.max + bounds.min) * 0.5).as_dvec3();
         // From before all bodies: one radius in front of their bounding sphere, wherever that is.
         let back = (middle - at).dot(direction) - radius;
-        let (ray, _) = self.world.ray_from_world(at + direction * back, direction);
-        self.world.occluded(&ray)
+        let (ray, moved) = self.world.ray_from_world(at + direction * back, direction);
+        (ray, back + moved)
     }
 }

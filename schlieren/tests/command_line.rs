@@ -36,6 +36,10 @@ fn flow_of(path: &Path, [nx, n]: [u32; 2]) {
     image.attributes.point.push(DataArray::new("T", 1, Values::F32(temperature)));
     image.attributes.point.push(DataArray::new("p", 1, constant(101_325.0)));
     image.attributes.point.push(DataArray::new("Y", 1, constant(0.0)));
+    // Smoke of 6 per metre, with a hole in the data and a value that cannot be.
+    let mut soot = vec![6.0; values.len()];
+    (soot[0], soot[1]) = (f32::NAN, -1.0);
+    image.attributes.point.push(DataArray::new("soot", 1, Values::F32(soot)));
     image.attributes.point.push(DataArray::new("rho", 1, Values::F32(values)));
     write_vtk(path, &Dataset::ImageData(image), VtkOptions::default()).expect("the flow is written");
 }
@@ -373,6 +377,79 @@ fn transfer_functions_from_options_and_from_a_scene_are_the_same() {
     assert_eq!(swept.lines().count(), 2);
     let bytes = ["a-0000.png", "a-0001.png"].map(|n| std::fs::read(path(n)).unwrap());
     assert_ne!(bytes[0], bytes[1], "the rule was changed");
+}
+
+#[test]
+fn smoke_glow_and_rotation_reach_pictures_layers_probes_and_sweeps() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name).to_str().unwrap().to_string();
+    flow(&dir.path().join("flow.vti"));
+    let file = path("flow.vti");
+    let media = ["--absorption", "soot", "--emission", "0.5", "--rotation", "-3", "--analyser", "-20"];
+    let run = |command: &str, args: &[&str], media: &[&str]| {
+        let mut all = vec![command, &file, "--density", "rho", "--size", "40x20", "--json"];
+        all.extend(media);
+        all.extend(args);
+        let out = schlieren(&all);
+        assert_eq!(out.status.code(), Some(0), "{all:?}: {}", text(&out.stderr));
+        text(&out.stdout)
+    };
+    let exr = path("out.exr");
+    let object: Value = serde_json::from_str(&run("render", &["--exr", &exr], &media)).unwrap();
+    let warnings = object["warnings"].to_string();
+    assert!(warnings.contains("media.absorption: 1 of 18081 values are not finite"), "{warnings}");
+    assert!(warnings.contains("1 of 18081 values are below 0"), "{warnings}");
+    assert!(object["counters"]["media_rays"].as_u64() > object["counters"]["rays"].as_u64());
+    let picture = read_exr(Path::new(&exr)).unwrap();
+    let (tau, deep) = (6.0 * 0.1f32, 0.1f32);
+    let glow = 0.5 / 6.0 * (1.0 - (-tau).exp());
+    for (plane, unit, value) in
+        [("optical_depth.Y", "1", tau), ("emission.Y", "1", glow), ("rotation.Y", "rad", -3.0 * deep)]
+    {
+        let p = picture.plane(plane).unwrap_or_else(|| panic!("{plane}"));
+        assert_eq!(p.unit, unit, "{plane}");
+        let seen = p.samples[10 * 40 + 20];
+        assert!((seen - value).abs() < 1e-5 * value.abs(), "{plane}: {seen} {value}");
+    }
+    let meta = |key: &str| picture.metadata.get(key).cloned();
+    assert_eq!(meta("media.absorption"), Some(MetadataValue::Text("soot".into())));
+    assert_eq!(meta("media.analyser_deg"), Some(MetadataValue::Number(-20.0)));
+    assert_eq!(meta("media.stop_m"), Some(MetadataValue::Number(0.025)));
+
+    // Without them there are no such layers, and no ray is spent.
+    let plain: Value = serde_json::from_str(&run("render", &["--exr", &exr], &[])).unwrap();
+    assert_eq!(plain["counters"]["media_rays"], 0);
+    let picture = read_exr(Path::new(&exr)).unwrap();
+    assert!(picture.plane("optical_depth.Y").is_none() && meta("media.absorption").is_some());
+    assert!(!picture.metadata.keys().any(|k| k.starts_with("media.")));
+
+    let probe: Value = serde_json::from_str(&run("probe", &["--pixel", "20,10"], &media)).unwrap();
+    for (key, value) in [("optical_depth", tau), ("emission", glow), ("rotation_rad", -3.0 * deep)] {
+        assert!((probe[key].as_f64().unwrap() as f32 - value).abs() < 1e-5 * value.abs(), "{probe}");
+    }
+    let malus = (-20f32.to_radians() + 0.3).cos().powi(2) * (-tau).exp();
+    assert!((probe["transmission"].as_f64().unwrap() as f32 - malus).abs() < 1e-5, "{probe}");
+
+    let png = path("out.png");
+    let swept = run("sweep", &["--set", "media.analyser_deg=0.0,45.0", "-o", &png], &media[..6]);
+    assert_eq!(swept.lines().count(), 2);
+    assert!(dir.path().join("out-0001.png").exists());
+
+    for (command, args, words) in [
+        ("render", &["--absorption", "fog"][..], "fog"),
+        ("render", &["--absorption", "-4"], "media.absorption"),
+        ("render", &["--analyser", "45"], "media.rotation"),
+        ("serve", &["--absorption", "soot"], "[media]"),
+    ] {
+        let mut all = vec![command, &file, "--density", "rho"];
+        all.extend(args);
+        if command == "render" {
+            all.extend(["-o", &png]);
+        }
+        let out = schlieren(&all);
+        let message = text(&out.stderr);
+        assert!(out.status.code() != Some(0) && message.contains(words), "{all:?}: {message}");
+    }
 }
 
 #[test]

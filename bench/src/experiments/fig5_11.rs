@@ -7,8 +7,10 @@ use crate::plot::{Axis, Plot, Point, Series};
 use crate::record::{Record, Row};
 use crate::runner::{Schedule, Variant, interleave};
 use rt_core::sampler::Sampling;
+use schlieren::field::Field;
 use schlieren::film::Film;
 use schlieren::film::photons::{Exposure, expose};
+use schlieren::media::{Media, Property, Volume};
 use schlieren::path::{LightPaths, Wanted};
 use schlieren::render::{TestSection, framing, technique};
 use schlieren::scene::Scene;
@@ -16,9 +18,11 @@ use schlieren::technique::Technique;
 use std::sync::atomic::AtomicBool;
 
 /// Techniques of the figure, as scenes.
-const TECHNIQUES: [(&str, &str); 8] = [
+const TECHNIQUES: [(&str, &str); 9] = [
     ("shadowgraph", "[technique]\nkind = \"shadowgraph\""),
     ("schlieren, knife", "[technique]\nkind = \"schlieren\""),
+    // The pair that shows what absorption costs, and that without it in the scene nothing is paid.
+    ("schlieren, knife, smoke", "[technique]\nkind = \"schlieren\"\n[media]\nabsorption = \"smoke\""),
     (
         "schlieren, circle",
         "[technique]\nkind = \"schlieren\"\ncutoff = { kind = \"circle\", radius_m = 2e-4 }",
@@ -40,13 +44,15 @@ const PIXELS: u32 = 512;
 const LOS: &str = "line of sight";
 const TRACED: &str = "traced";
 
+/// Paths traced against the light, with the optical path, and through smoke.
+type Needs = (bool, bool, bool);
+
 /// A technique ready to be exposed.
 struct Bench {
     name: &'static str,
     scene: Scene,
     technique: Technique,
-    /// Traced against the light, and with the optical path.
-    needs: (bool, bool),
+    needs: Needs,
 }
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
@@ -66,7 +72,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.notes.push(format!(
         "Everything a photon needs: low-discrepancy start, way through the gas, technique, film. Wall time on {threads} threads; the rate per core \
          is by CPU time and is what an idle core does. The projection of line of sight and the spline of the march are made once for a view and \
-         are not in the rates; `picture` is a whole `schlieren render` without reading the file."
+         are not in the rates; `picture` is a whole `schlieren render` without reading the file. Smoke (absorption, on the flow's \
+         own lattice) stands in the test section of every row; only the row that calls for it walks through it."
     ));
     let (size, dims) = ("thesis", "480x720x100");
     context.say(format!("combustion jet {dims}"))?;
@@ -74,19 +81,21 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     check_cancelled(context)?;
     let first = scene(TECHNIQUES[0].1)?;
     let mut section = TestSection::of_fields(&first, vec![field], None)?;
+    let smoke = smoke(&section.fields[0])?;
+    section = section.with_media(smoke);
     section.warnings.clear();
     let mut benches = vec![];
     for (name, toml) in TECHNIQUES {
         let scene = scene(toml)?;
         let framing = framing(&scene, &section);
         let technique = technique(&scene, 0, &framing, section.fields[0].n0(), false)?;
-        let needs = (technique.looks_from_film(), technique.needs_opd());
+        let needs = (technique.looks_from_film(), technique.needs_opd(), !scene.media.is_empty());
         benches.push(Bench { name, scene, technique, needs });
     }
 
     for (march, method, passes) in [(LOS, "line-of-sight", 10), (TRACED, "verlet", 1)] {
         // Light paths that several techniques share are made once.
-        let mut shared: Vec<((bool, bool), Box<dyn LightPaths + '_>)> = vec![];
+        let mut shared: Vec<(Needs, Box<dyn LightPaths + '_>)> = vec![];
         for b in &benches {
             if shared.iter().any(|s| s.0 == b.needs) {
                 continue;
@@ -128,6 +137,14 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     pictures(context, record, &section)?;
     plot(record);
     Ok(())
+}
+
+/// Smoke as dense as the gas is disturbed, on the flow's own lattice: at most 2 per metre.
+fn smoke(field: &Field) -> anyhow::Result<Media> {
+    let largest = field.eps().iter().fold(f32::MIN_POSITIVE, |m, e| m.max(e.abs()));
+    let values = field.eps().iter().map(|e| 2.0 * e.abs() / largest).collect();
+    let volume = Volume::new(field.dims(), field.spacing_m(), field.origin_m(), values, None)?;
+    Ok(Media::default().with(Property::Absorption, volume))
 }
 
 /// One exposure; returns the light on the film.

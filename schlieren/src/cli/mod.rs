@@ -2,6 +2,7 @@
 
 mod flow_args;
 mod index;
+mod media_args;
 mod probe;
 mod render;
 mod scene_args;

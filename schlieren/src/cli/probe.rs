@@ -60,13 +60,13 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
         Status::Turned => "turned back or aside",
     };
     let light = if blocked { 0.0 } else { exit.transmission };
-    let energy = t.energy(&photon).map(|e| e * light);
+    let energy = if light > 0.0 { t.landed(&photon) } else { [0.0; 3] };
     let view = &section.view;
     let world = view.centre_m + view.right * position_m[0] + view.up * position_m[1];
     let waves = f64::from(optics.film_path_difference_m(&exit, section.fields[0].n0() as f32))
         / (scene.light.wavelengths_nm[0] * 1e-9);
     let cutoff_m = optics.cutoff_point_m([0.0; 2], &exit);
-    let object = json!({
+    let mut object = json!({
         "pixel": args.pixel,
         "status": status,
         "start_m": world.to_array(),
@@ -86,6 +86,22 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
         "left_out": left_out,
         "warnings": warnings,
     });
+    let mut of_medium = String::new();
+    if let Some(c) = section.collected(&scene, &planned, &[start])? {
+        let c = c[0];
+        let emission = section.emitted(&scene, &planned, &[start])?.map_or(0.0, |e| e[0]);
+        let given = &scene.media;
+        for (name, words, unit, value, present) in [
+            ("optical_depth", "optical depth    ", "", c.optical_depth, given.absorption.is_some()),
+            ("emission", "emission         ", " of undisturbed light", emission, given.emission.is_some()),
+            ("rotation_rad", "rotation         ", " rad", c.rotation_rad, given.rotation.is_some()),
+        ] {
+            if present {
+                object[name] = value.into();
+                of_medium += &format!("{words}{value:.6}{unit}\n");
+            }
+        }
+    }
     common.result(&object, || {
         let [dx, dy] = exit.deflection_rad;
         let skipped = left_out.map_or(String::new(), |l| {
@@ -104,7 +120,7 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
              optical path     {:+.6e} m, {waves:+.4} waves of {} nm\n\
              film             shifted by ({:.4}, {:.4}) pixels\n\
              cut-off plane    ({:.4e}, {:.4e}) m from the axis\n\
-             energy           {:.6} {:.6} {:.6}\n\
+             {of_medium}energy           {:.6} {:.6} {:.6}\n\
              march            {}{skipped}",
             world.x,
             world.y,

@@ -19,7 +19,7 @@ pub(super) struct RenderArgs {
     /// The picture as PNG
     #[arg(long, short, value_name = "PNG")]
     out: Option<PathBuf>,
-    /// The picture as OpenEXR: colour, deflection, displacement, phase, transmission, samples, error, and every parameter
+    /// The picture as OpenEXR: colour, deflection, displacement, phase, transmission, samples, error, what the medium does, and every parameter
     #[arg(long, value_name = "EXR")]
     exr: Option<PathBuf>,
     /// The deflection map as NumPy array (height, width, 2) in rad

@@ -1,6 +1,7 @@
 //! Options that describe the scene, and how they change the one from a file. An option that changes nothing is refused by name.
 
 use super::flow_args::FlowArgs;
+use super::media_args::MediaArgs;
 use super::units;
 use crate::scene::{
     BeamsSpec, CutoffSpec, Device, Direction, FilterSpec, Jitter, SamplingSpec, Scene, SourceSpec,
@@ -20,6 +21,8 @@ pub(super) struct SceneArgs {
     flow: FlowArgs,
     #[command(flatten)]
     optics: OpticsArgs,
+    #[command(flatten)]
+    media: MediaArgs,
     #[command(flatten)]
     film: FilmArgs,
 }
@@ -182,6 +185,7 @@ impl SceneArgs {
         }
         self.flow.apply(&mut s)?;
         self.optics.apply(&mut s)?;
+        self.media.apply(&mut s.media);
         self.film.apply(&mut s)?;
         // What a scene refuses is wrong usage here: the values come from the command line.
         if let Err(e) = s.check() {

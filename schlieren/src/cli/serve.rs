@@ -23,6 +23,12 @@ pub(super) struct ServeArgs {
 pub(super) fn serve(common: CommonArgs, args: &ServeArgs) -> anyhow::Result<()> {
     let cancel = Cancel::on_ctrl_c()?;
     let mut scene = args.scene.scene(args.files.first().map(PathBuf::as_path))?;
+    if !scene.media.is_empty() {
+        return Err(UsageError(
+            "the page does not show absorption, emission or rotation; leave out [media] and its options, or take `schlieren render`".into(),
+        )
+        .into());
+    }
     // Saved scenes go to another folder.
     let whole = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     scene.flow.file = whole(&scene.flow.file);

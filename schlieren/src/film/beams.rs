@@ -119,7 +119,7 @@ fn corners<const C: usize>(
             return LOST;
         }
         let shift_m = technique.optics().film_shift_m(start, exit);
-        let of = |image_point_m| technique.energy(&Photon { start, exit, image_point_m, shift_m });
+        let of = |image_point_m| technique.landed(&Photon { start, exit, image_point_m, shift_m });
         let mut energy = [0.0f32; 3];
         match source_points {
             [] => energy = of([0.0; 2]),
@@ -131,7 +131,7 @@ fn corners<const C: usize>(
         let shift = if technique.looks_from_film() { [0.0; 2] } else { shift_m.map(f64::from) };
         // The lattice is exact and the shift small: areas keep the shift's relative accuracy.
         let at_px = [place(i) + shift[0] / framing.pixel_m, y - shift[1] / framing.pixel_m];
-        Corner { at_px, energy: energy.map(|e| e * exit.transmission) }
+        Corner { at_px, energy }
     };
     starts.iter().zip(&exits).enumerate().map(corner).collect()
 }

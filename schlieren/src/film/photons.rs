@@ -160,7 +160,7 @@ fn expose_tile<const C: usize>(
                 continue;
             }
             let shift_m = optics.film_shift_m(start, exit);
-            let energy = technique.energy(&Photon { start, exit, image_point_m: image_points[i], shift_m });
+            let energy = technique.landed(&Photon { start, exit, image_point_m: image_points[i], shift_m });
             let moved = if technique.looks_from_film() { [0.0; 2] } else { shift_m };
             // A NaN or infinity in either becomes NaN here; comparisons with it are false.
             let check = (moved[0] + moved[1] + energy[0] + energy[1] + energy[2]) * 0.0;
@@ -169,7 +169,7 @@ fn expose_tile<const C: usize>(
                 continue;
             }
             let at_px = [places[i][0] + moved[0] * to_pixels, places[i][1] - moved[1] * to_pixels];
-            let energy: [f32; C] = std::array::from_fn(|c| energy[c] * exit.transmission);
+            let energy: [f32; C] = std::array::from_fn(|c| energy[c]);
             done.tally.landed += 1;
             done.tally.on_film += u64::from(tile.deposit(at_px, energy));
             if keep {

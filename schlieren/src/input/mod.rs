@@ -9,10 +9,12 @@
 
 mod evaluate;
 mod lattice;
+mod media;
 mod medium;
 mod reference;
 mod series;
 
+pub use media::{load_media, media_from_dataset};
 pub use medium::{Medium, Quantity, Source};
 pub use reference::Reference;
 pub use series::{Step, series};
@@ -173,17 +175,25 @@ pub struct Loaded {
 
 /// Reads a file and makes a field of it. Of a time series this is the first time; see [`series`] for the others.
 pub fn load(path: &Path, options: &Options) -> Result<Loaded, InputError> {
+    let (mut loaded, warnings) = with_data(path, |data| from_dataset(data, options))?;
+    loaded.report.warnings.splice(0..0, warnings);
+    Ok(loaded)
+}
+
+/// Reads a file and makes something of its data; also what the reader warns of. Errors name the file.
+fn with_data<T>(
+    path: &Path,
+    make: impl FnOnce(&Dataset) -> Result<T, InputError>,
+) -> Result<(T, Vec<String>), InputError> {
     let in_file = |e: InputError| InputError::InFile { path: path.to_path_buf(), source: Box::new(e) };
     // A table of points on a lattice: cell centres of a solver, or ParaView's export.
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
         let data = datasets::read::csv_lattice::dataset(&datasets::read::csv::read(path)?)?;
-        return from_dataset(&data, options).map_err(in_file);
+        return Ok((make(&data).map_err(in_file)?, Vec::new()));
     }
     let opened = datasets::read::open(path)?;
     let data = opened.dataset().map_err(|e| in_file(e.into()))?;
-    let mut loaded = from_dataset(data, options).map_err(in_file)?;
-    loaded.report.warnings.splice(0..0, opened.warnings);
-    Ok(loaded)
+    Ok((make(data).map_err(in_file)?, opened.warnings))
 }
 
 /// Makes a field of a data set.

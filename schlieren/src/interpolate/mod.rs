@@ -18,6 +18,7 @@ pub use bspline::BSpline;
 pub(crate) use bspline::{weights as bspline_weights, weights16 as bspline_weights16};
 pub(crate) use prefilter::prefilter_line;
 pub use trilinear::Trilinear;
+pub(crate) use trilinear::TrilinearRows;
 pub use trilinear_gradient::TrilinearGradient;
 
 use fearless_simd::prelude::*;

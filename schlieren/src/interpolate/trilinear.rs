@@ -19,20 +19,27 @@ pub struct Trilinear<'a> {
 impl<'a> Trilinear<'a> {
     /// Over a field, which is copied only when its rows would compete for the same lines of the cache.
     pub fn new(field: &'a Field) -> Trilinear<'a> {
-        let [nx, ny, nz] = field.dims();
+        Trilinear::of(Cow::Borrowed(field.eps()), field.dims())
+    }
+
+    /// Over any values at the nodes of a lattice, x fastest, at least two nodes along each axis.
+    pub(crate) fn of(values: Cow<'a, [f32]>, [nx, ny, nz]: [usize; 3]) -> Trilinear<'a> {
         let (row, layer) = (padded_row(nx), ny);
         if row == nx {
-            return Trilinear {
-                values: Cow::Borrowed(field.eps()),
-                dims: [nx, ny, nz],
-                stride: [nx, nx * ny],
-            };
+            return Trilinear { values, dims: [nx, ny, nz], stride: [nx, nx * ny] };
         }
-        let mut values = vec![0.0; row * layer * nz];
-        for (to, from) in values.chunks_exact_mut(row).zip(field.eps().chunks_exact(nx)) {
+        let mut padded = vec![0.0; row * layer * nz];
+        for (to, from) in padded.chunks_exact_mut(row).zip(values.chunks_exact(nx)) {
             to[..nx].copy_from_slice(from);
         }
-        Trilinear { values: Cow::Owned(values), dims: [nx, ny, nz], stride: [row, row * layer] }
+        Trilinear { values: Cow::Owned(padded), dims: [nx, ny, nz], stride: [row, row * layer] }
+    }
+
+    /// The values at the nodes, x fastest, without padding.
+    pub(crate) fn nodes(&self) -> Vec<f32> {
+        let [nx, ny, nz] = self.dims;
+        let rows = self.values.chunks_exact(self.stride[0]).take(ny * nz);
+        rows.flat_map(|row| &row[..nx]).copied().collect()
     }
 
     pub(crate) fn rows(&self) -> TrilinearRows<'_> {

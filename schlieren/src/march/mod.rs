@@ -26,7 +26,6 @@ pub use adaptive::{DormandPrince, Run};
 pub use deviational::{Counters, Deviational, Options, Scheme};
 pub use euler::Euler;
 pub use frame::BlankCells;
-#[cfg(feature = "gpu")]
 pub(crate) use frame::Frame;
 pub use full::{Full, FullOptions};
 pub use integrator::{Integrator, Interpolated, Medium, Ray};
@@ -34,7 +33,8 @@ pub use kept::{Kept, Projection};
 pub use line_of_sight::LineOfSight;
 pub use pefrl::Pefrl;
 #[cfg(feature = "gpu")]
-pub(crate) use prepared::{GROUP, Left, Prepared, steps_of};
+pub(crate) use prepared::{GROUP, Left};
+pub(crate) use prepared::{Prepared, steps_of};
 pub use rk4::RungeKutta4;
 pub use sharma::Sharma;
 pub use verlet::Verlet;

@@ -69,6 +69,11 @@ impl Prepared {
         }
     }
 
+    /// Distances along the ray, from where it crosses the centre plane, to where it enters and leaves the field.
+    pub(crate) fn range_m(&self) -> [f64; 2] {
+        [self.exit_depth_m - self.length_m, self.exit_depth_m]
+    }
+
     /// Whether the ray meets the field.
     pub(crate) fn meets_field(&self) -> bool {
         self.length_m > 0.0

@@ -112,6 +112,7 @@ pub(super) fn expose_lines<'a>(
         counters.phase_rays += if t.needs_opd() { rays } else { 0 };
         counters.tilted_rays += if tilted_beams { rays } else { 0 };
         counters.dispersion_rays += if line > 0 { rays } else { 0 };
+        counters.media_rays += planned.take_media_rays();
         first.get_or_insert(planned);
     }
     Ok(first)

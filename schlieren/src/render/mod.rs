@@ -22,6 +22,9 @@
 
 mod expose;
 pub(crate) mod map;
+mod media;
+#[cfg(test)]
+mod media_tests;
 mod on_gpu;
 mod paths;
 mod section;
@@ -29,6 +32,7 @@ mod section;
 mod tests;
 
 pub use map::Map;
+pub use media::MediaMap;
 pub use on_gpu::check_gpu;
 pub use paths::{INTERPOLANTS, MARCHES, Planned};
 pub use section::TestSection;
@@ -75,6 +79,11 @@ pub enum RenderError {
     #[cfg(feature = "gpu")]
     #[error(transparent)]
     Gpu(#[from] crate::gpu::GpuError),
+    /// The scene names a property of the medium, and the test section has none.
+    #[error(
+        "the scene has media.{0} and the test section does not; read it from a file, or give it with `TestSection::with_media`"
+    )]
+    NoMedia(&'static str),
     /// A name that nothing has.
     #[error("{key}: there is no `{name}`; there are: {names}")]
     Unknown {
@@ -148,6 +157,8 @@ pub struct Rendered {
     pub colored: bool,
     /// With [`Layers::map`].
     pub map: Option<Map>,
+    /// With [`Layers::map`], when the scene has media.
+    pub media: Option<MediaMap>,
     /// With [`Layers::counts`], when photons were sent.
     pub counts: Option<Vec<u32>>,
     /// With [`Layers::noise`]: estimated error of each pixel's brightness by too few photons: half the difference between two halves of them, of the first
@@ -218,6 +229,7 @@ pub fn render(
         pixels: Vec::new(),
         colored: false,
         map: None,
+        media: None,
         counts: None,
         noise: None,
         report: Report {
@@ -246,6 +258,9 @@ pub fn render(
         return Err(RenderError::Cancelled);
     }
 
+    if let Some(planned) = &first {
+        media::add_emission(scene, section, planned, layers, &mut r)?;
+    }
     if scene.march.skip_rad > 0.0 && !measured && !layers.map {
         let name = scene.technique.name();
         r.report
@@ -259,7 +274,9 @@ pub fn render(
             None => section.paths(scene, 0, Wanted { opd: layers.phase }, against_light, !measured)?,
         };
         add_map(scene, section, &planned, &mut r);
+        media::add_map(scene, section, &planned, &mut r)?;
     }
+    media::warn(scene, layers, &mut r.report.warnings);
     r.report.levels = r
         .pixels
         .iter()

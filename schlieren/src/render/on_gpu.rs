@@ -106,6 +106,7 @@ pub(super) fn on_gpu<'a>(
                 format!("{described}, on {}", gpu.name()),
                 achieved,
                 march.tolerance_rad,
+                (Mode::Paraxial.into(), plan.step_voxels),
             )))
         }
         Err(e) => stands_in(march.device, e).map(|why| Err(Some(why))),

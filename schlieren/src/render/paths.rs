@@ -8,11 +8,14 @@ use crate::interpolate::{BSpline, Interpolant, Interpolate, Trilinear, Trilinear
 use crate::march::{
     BlankCells, Deviational, Full, FullOptions, Integrator, Kept, Options, Pefrl, RungeKutta4, Scheme, Sharma,
 };
+use crate::media::Bend;
 use crate::path::{Exit, LightPaths, Start, Wanted};
 use crate::plan::{Achieved, Mode, Plan, Request};
 use crate::scene::Scene;
 use crate::technique::bos::Reversed;
 use crate::view::View;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Names of marches, the cheapest first.
 pub const MARCHES: [&str; 6] = ["line-of-sight", "verlet", "euler", "pefrl", "sharma", "rk4"];
@@ -37,6 +40,11 @@ pub struct Planned<'a> {
     pub resolution_error_rad: Option<f64>,
     /// What should be known, a sentence each.
     pub warnings: Vec<String>,
+    /// How the paths bend, and their step: for what goes the same way beside them.
+    pub(super) bend: Bend,
+    pub(super) step_voxels: f64,
+    /// Rays that were walked for what the medium does to their light.
+    pub(super) media_rays: Arc<AtomicU64>,
 }
 
 impl TestSection {
@@ -88,26 +96,34 @@ impl TestSection {
         });
         let planned = on_gpu(march, field, view, with(mode), measure.then_some(MEASURED_RAYS), kept)?;
         let why_not = match planned {
-            Ok(planned) => return Ok(planned.seen(against_light)),
+            Ok(mut planned) => {
+                if !scene.media.dims_light().is_empty() {
+                    planned.warnings.push("absorption and rotation are collected on the CPU".into());
+                }
+                return Ok(self.dimmed(scene, line, view, planned)?.seen(against_light));
+            }
             Err(why_not) => why_not,
         };
 
         let mut in_vain = None;
         // For comparison: by name only, never picked.
-        let (paths, description, achieved) = if let Some(name @ ("euler" | "sharma" | "rk4")) = method {
+        let (paths, description, achieved, walked) = if let Some(name @ ("euler" | "sharma" | "rk4")) = method
+        {
             let interpolant = interpolant.unwrap_or_default();
             let step_voxels = march.step_voxels.unwrap_or(1.0);
             let paths = compared(name, field, view, interpolant, step_voxels, wanted);
-            (paths, described(name, interpolant, step_voxels), None)
+            let bend = if name == "euler" { Bend::Paraxial } else { Bend::Full };
+            (paths, described(name, interpolant, step_voxels), None, (bend, step_voxels))
         } else {
             let plan = Plan::from_roughness(field, with(mode), kept.roughness(field));
+            let walked = (Bend::from(plan.mode), plan.step_voxels);
             // PEFRL is made with the spline only.
             if plan.mode == Mode::Full && interpolant.is_some_and(|i| i != Interpolant::BSpline) {
                 let step = plan.step_voxels;
                 let options = FullOptions { step_voxels: step, wanted, ..FullOptions::default() };
                 let paths = full(field, view, plan.interpolant, Pefrl, options);
                 in_vain = (march.skip_rad > 0.0).then(|| left_nothing_out("pefrl"));
-                (paths, described("pefrl", plan.interpolant, step), None)
+                (paths, described("pefrl", plan.interpolant, step), None, walked)
             } else {
                 let name = match plan.mode {
                     Mode::LineOfSight => "line-of-sight",
@@ -124,13 +140,13 @@ impl TestSection {
                         Mode::LineOfSight | Mode::Full => in_vain = Some(left_nothing_out(name)),
                     }
                 }
-                (plan.paths_with(field, view, kept), description, achieved)
+                (plan.paths_with(field, view, kept), description, achieved, walked)
             }
         };
-        let mut planned = Planned::new(paths, description, achieved, march.tolerance_rad);
+        let mut planned = Planned::new(paths, description, achieved, march.tolerance_rad, walked);
         planned.warnings.extend(why_not);
         planned.warnings.extend(in_vain);
-        Ok(planned.seen(against_light))
+        Ok(self.dimmed(scene, line, view, planned)?.seen(against_light))
     }
 }
 
@@ -140,6 +156,7 @@ impl<'a> Planned<'a> {
         description: String,
         achieved: Option<Achieved>,
         tolerance_rad: f64,
+        (bend, step_voxels): (Bend, f64),
     ) -> Planned<'a> {
         let mut warnings = Vec::new();
         if let Some(a) = achieved.filter(|a| a.max_rad > tolerance_rad) {
@@ -154,7 +171,15 @@ impl<'a> Planned<'a> {
             error_rad: achieved.map(|a| a.max_rad),
             resolution_error_rad: achieved.map(|a| a.resolution_rad).filter(|r| r.is_finite()),
             warnings,
+            bend,
+            step_voxels,
+            media_rays: Arc::default(),
         }
+    }
+
+    /// Rays that were walked through media since this was last asked.
+    pub(super) fn take_media_rays(&self) -> u64 {
+        self.media_rays.swap(0, Ordering::Relaxed)
     }
 
     /// The same, seen from the film when `against_light`.

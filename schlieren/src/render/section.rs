@@ -4,6 +4,7 @@ use super::RenderError;
 use crate::field::Field;
 use crate::input;
 use crate::march::Kept;
+use crate::media::Media;
 use crate::scene::Scene;
 use crate::solids::Solids;
 use crate::view::View;
@@ -16,6 +17,8 @@ pub struct TestSection {
     pub view: View,
     /// Bodies.
     pub solids: Option<Solids>,
+    /// What the gas does to light beside bending it.
+    pub media: Option<Media>,
     /// How the field came about; `None` when it was not read from a file.
     pub input: Option<input::Report>,
     /// What was repaired or left out, a sentence each.
@@ -43,8 +46,16 @@ impl TestSection {
             warnings.extend(more);
             solids = Some(bodies);
         }
-        let section = TestSection::of_fields(scene, fields, solids)?;
-        Ok(TestSection { input: report, warnings, ..section })
+        let mut section = TestSection::of_fields(scene, fields, solids)?;
+        (section.input, section.warnings) = (report, warnings);
+        if !scene.media.is_empty() {
+            read("reading absorption, emission or rotation");
+            let options = scene.flow.options(scene.light.wavelengths_nm[0])?;
+            let (file, field) = (&scene.flow.file, &section.fields[0]);
+            let media = input::load_media(file, &options, &scene.media.quantities(), field)?;
+            section = section.with_media(media);
+        }
+        Ok(section)
     }
 
     /// A test section of fields that are at hand, one per wavelength of the scene.
@@ -58,7 +69,8 @@ impl TestSection {
             return Err(RenderError::Fields { wanted: lines, found: fields.len() });
         };
         let view = scene.view.direction.view(first.centre_m())?;
-        Ok(TestSection { fields, view, solids, input: None, warnings: Vec::new(), kept: Vec::new() })
+        let (input, warnings, kept) = (None, Vec::new(), Vec::new());
+        Ok(TestSection { fields, view, solids, media: None, input, warnings, kept })
     }
 
     /// Keeps what marches prepare of the fields (splines, projections) for further pictures: takes as much memory as the fields again, and the time of the second

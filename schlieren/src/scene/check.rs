@@ -12,14 +12,14 @@ fn wrong(key: &'static str, value: impl Display, cure: impl Into<String>) -> Sce
     SceneError::Value { key, value: value.to_string(), cure: cure.into() }
 }
 
-fn positive(key: &'static str, value: f64) -> Result<(), SceneError> {
+pub(super) fn positive(key: &'static str, value: f64) -> Result<(), SceneError> {
     if value > 0.0 && value.is_finite() {
         return Ok(());
     }
     Err(wrong(key, value, "give a number above 0"))
 }
 
-fn finite(key: &'static str, values: &[f64]) -> Result<(), SceneError> {
+pub(super) fn finite(key: &'static str, values: &[f64]) -> Result<(), SceneError> {
     match values.iter().find(|v| !v.is_finite()) {
         None => Ok(()),
         Some(v) => Err(wrong(key, v, "give a finite number")),
@@ -43,7 +43,8 @@ impl Scene {
         positive("march.tolerance_rad", self.march.tolerance_rad)?;
         self.march.step_voxels.map_or(Ok(()), |s| positive("march.step_voxels", s))?;
         self.check_skip()?;
-        self.check_effect()
+        self.check_effect()?;
+        self.check_media()
     }
 
     /// Only one march can leave out gas.

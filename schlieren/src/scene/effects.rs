@@ -16,6 +16,12 @@ pub struct Effects {
     pub tilted_beams: bool,
     /// Differences between neighbouring rays.
     pub differentials: bool,
+    /// Light lost in the medium.
+    pub absorption: bool,
+    /// Light added by the medium.
+    pub emission: bool,
+    /// A plane of polarisation that the medium turns.
+    pub polarisation: bool,
 }
 
 impl Effects {
@@ -28,6 +34,9 @@ impl Effects {
             solids: follows_light && !scene.solids.files.is_empty(),
             tilted_beams: scene.technique.uses_source() && scene.light.beams == BeamsSpec::Tilted,
             differentials: follows_light && matches!(scene.sampling(), SamplingSpec::Beams { .. }),
+            absorption: scene.media.absorption.is_some(),
+            emission: scene.media.emission.is_some(),
+            polarisation: scene.media.rotation.is_some(),
         }
     }
 }
@@ -49,4 +58,6 @@ pub struct Counters {
     pub tilted_rays: u64,
     /// Rays that are corners of cells.
     pub differential_rays: u64,
+    /// Rays along which absorption, emission or rotation were collected.
+    pub media_rays: u64,
 }

@@ -26,11 +26,13 @@ mod check;
 mod direction;
 mod effects;
 mod flow;
+mod media;
 mod technique;
 
 pub use direction::Direction;
 pub use effects::{Counters, Effects};
 pub use flow::{CurveSpec, FlowSpec, MultifieldSpec};
+pub use media::MediaSpec;
 pub use technique::{CutoffSpec, TechniqueSpec};
 
 use crate::filter::Filter;
@@ -69,6 +71,9 @@ pub struct Scene {
     /// Bodies in the test section.
     #[serde(default)]
     pub solids: SolidsSpec,
+    /// What the medium does to light beside bending it.
+    #[serde(default, skip_serializing_if = "MediaSpec::is_empty")]
+    pub media: MediaSpec,
 }
 
 /// The direction of light.
@@ -476,6 +481,9 @@ impl Scene {
         }
         if t.follows_light() {
             s.sampling = Some(self.sampling());
+        }
+        if self.media.emission.is_some() && matches!(t, TechniqueSpec::Schlieren { .. }) {
+            s.media.stop_m = Some(self.media.stop_m());
         }
         s.film.exposure = Some(self.exposure());
         s

@@ -100,6 +100,12 @@ impl<'a> Reversed<'a> {
     pub fn view(view: &View) -> View {
         View { right: -view.right, forward: -view.forward, ..*view }
     }
+
+    /// Starts of the picture in the frame of [`Reversed::view`].
+    pub fn starts(starts: &[Start]) -> Vec<Start> {
+        let mirror = |s: &Start| Start { position_m: mirrored(s.position_m), tilt_rad: mirrored(s.tilt_rad) };
+        starts.iter().map(mirror).collect()
+    }
 }
 
 fn mirrored([x, y]: Across) -> Across {
@@ -108,9 +114,7 @@ fn mirrored([x, y]: Across) -> Across {
 
 impl LightPaths for Reversed<'_> {
     fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
-        let mirror = |s: &Start| Start { position_m: mirrored(s.position_m), tilt_rad: mirrored(s.tilt_rad) };
-        let starts: Vec<Start> = starts.iter().map(mirror).collect();
-        self.paths.trace(&starts, exits);
+        self.paths.trace(&Reversed::starts(starts), exits);
         for e in exits {
             e.deflection_rad = mirrored(e.deflection_rad);
             e.displacement_m = mirrored(e.displacement_m);

@@ -61,10 +61,21 @@ impl Interferogram {
 
     #[inline]
     pub(super) fn energy(&self, photon: &Photon<'_>) -> f32 {
+        0.5 + 0.5 * self.visibility * self.cos_phase(photon)
+    }
+
+    /// With a part `left` of the object beam: `I = (1 + T + 2 √T V cos φ)/4`.
+    #[inline]
+    pub(super) fn dimmed(&self, photon: &Photon<'_>, left: f32) -> f32 {
+        0.25 * (1.0 + left) + 0.5 * left.sqrt() * self.visibility * self.cos_phase(photon)
+    }
+
+    #[inline]
+    fn cos_phase(&self, photon: &Photon<'_>) -> f32 {
         // Whole waves are taken off in f64; what is left is exact enough in f32.
         let waves = self.waves(photon);
         let rest = (waves - waves.round()) as f32;
-        0.5 + 0.5 * self.visibility * (std::f32::consts::TAU * rest).cos()
+        (std::f32::consts::TAU * rest).cos()
     }
 }
 

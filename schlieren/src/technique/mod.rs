@@ -89,4 +89,25 @@ impl Technique {
             Technique::Bos(b) => [b.energy(photon); 3],
         }
     }
+
+    /// The energy a photon leaves of what [`Exit::transmission`] says has come through. Absorption dims the object beam, so an interferogram loses contrast before it gets
+    /// dark.
+    #[inline]
+    pub fn landed(&self, photon: &Photon<'_>) -> Rgb {
+        let left = photon.exit.transmission;
+        match self {
+            Technique::Interferogram(i) if left < 1.0 => [i.dimmed(photon, left); 3],
+            _ => self.energy(photon).map(|e| e * left),
+        }
+    }
+
+    /// The part that reaches the film of light that fills a stop in the cut-off plane evenly: what the flow itself emits. An interferometer's two beam splitters
+    /// leave a quarter of the object beam.
+    pub fn passes_evenly(&self, stop_m: f64) -> Rgb {
+        match self {
+            Technique::Schlieren(s) => s.passes_evenly(stop_m),
+            Technique::Interferogram(_) => [0.25; 3],
+            Technique::Shadowgraph(_) | Technique::Bos(_) => [1.0; 3],
+        }
+    }
 }

@@ -41,11 +41,34 @@ impl Schlieren {
     pub(super) fn energy(&self, photon: &Photon<'_>) -> Rgb {
         let at_m = self.optics.cutoff_point_m(photon.image_point_m, photon.exit);
         let closed_form = if self.sampled { None } else { self.plane.averaged(at_m) };
-        let rgb = closed_form.unwrap_or_else(|| self.plane.transmission(at_m));
+        self.seen(closed_form.unwrap_or_else(|| self.plane.transmission(at_m)))
+    }
+
+    /// What this light's wavelength sees of the filter's colours.
+    #[inline]
+    fn seen(&self, rgb: Rgb) -> Rgb {
         match self.band {
             Some(band) => [band[0] * rgb[0] + band[1] * rgb[1] + band[2] * rgb[2]; 3],
             None => rgb,
         }
+    }
+
+    /// The cut-off's mean over a round stop in its plane, from the middles of a million squares.
+    pub(super) fn passes_evenly(&self, stop_m: f64) -> Rgb {
+        const SIDE: u32 = 1024;
+        let place = |i: u32| ((f64::from(i) + 0.5) / f64::from(SIDE) - 0.5) * stop_m;
+        let (mut sum, mut squares) = ([0.0f64; 3], 0u32);
+        for j in 0..SIDE {
+            for i in 0..SIDE {
+                let at_m = [place(i), place(j)];
+                if at_m[0].hypot(at_m[1]) <= 0.5 * stop_m {
+                    let rgb = self.seen(self.plane.transmission(at_m.map(|c| c as f32)));
+                    (0..3).for_each(|c| sum[c] += f64::from(rgb[c]));
+                    squares += 1;
+                }
+            }
+        }
+        sum.map(|s| (s / f64::from(squares)) as f32)
     }
 }
 

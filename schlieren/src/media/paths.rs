@@ -1,0 +1,85 @@
+//! Light paths of any march, and what the medium leaves of their light.
+
+use super::{Collected, Walk};
+use crate::path::{Exit, Jacobian, LeftOut, LightPaths, Start, Wanted};
+use crate::view::View;
+use rayon::prelude::*;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Paths whose [`Exit::transmission`] has what absorption and an analyser leave. Whatever else is in the exits is left as the march computed it, bit by bit.
+pub struct ThroughMedia<'a> {
+    paths: Box<dyn LightPaths + 'a>,
+    walk: Walk<'a>,
+    analyser_rad: Option<f64>,
+    rays: Arc<AtomicU64>,
+}
+
+impl<'a> ThroughMedia<'a> {
+    /// `paths` and `walk` must be of the same field and view. The angle of the analyser is to the polariser, counter-clockwise in the picture; `rays` counts the rays that were
+    /// walked.
+    pub fn new(
+        paths: Box<dyn LightPaths + 'a>,
+        walk: Walk<'a>,
+        analyser_rad: Option<f64>,
+        rays: Arc<AtomicU64>,
+    ) -> ThroughMedia<'a> {
+        ThroughMedia { paths, walk, analyser_rad, rays }
+    }
+
+    /// Rays that were walked so far.
+    pub fn rays(&self) -> u64 {
+        self.rays.load(Ordering::Relaxed)
+    }
+
+    fn dim(&self, starts: &[Start], exits: &mut [Exit]) {
+        let mut collected = vec![Collected::default(); starts.len()];
+        self.walk.collect(starts, None, &mut collected);
+        for (exit, c) in exits.iter_mut().zip(&collected) {
+            // 0 stays for what is blocked: light that is absorbed, however much, still tells where it went.
+            if exit.transmission > 0.0 {
+                let left = f64::from(exit.transmission) * c.transmission(self.analyser_rad);
+                exit.transmission = (left as f32).max(f32::MIN_POSITIVE);
+            }
+        }
+        self.rays.fetch_add(starts.len() as u64, Ordering::Relaxed);
+    }
+}
+
+impl LightPaths for ThroughMedia<'_> {
+    fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
+        self.paths.trace(starts, exits);
+        self.dim(starts, exits);
+    }
+
+    fn view(&self) -> &View {
+        self.paths.view()
+    }
+
+    fn wanted(&self) -> Wanted {
+        self.paths.wanted()
+    }
+
+    fn difference_step_m(&self) -> f64 {
+        self.paths.difference_step_m()
+    }
+
+    fn trouble(&self) -> Option<String> {
+        self.paths.trouble()
+    }
+
+    fn left_out(&self) -> Option<LeftOut> {
+        self.paths.left_out()
+    }
+
+    fn trace_with_jacobians(&self, starts: &[Start], exits: &mut [Exit], jacobians: &mut [Jacobian]) {
+        self.paths.trace_with_jacobians(starts, exits, jacobians);
+        self.dim(starts, exits);
+    }
+
+    fn trace_parallel(&self, starts: &[Start], exits: &mut [Exit]) {
+        const CHUNK: usize = 1024;
+        self.paths.trace_parallel(starts, exits);
+        starts.par_chunks(CHUNK).zip(exits.par_chunks_mut(CHUNK)).for_each(|(s, e)| self.dim(s, e));
+    }
+}

@@ -1,0 +1,190 @@
+//! The medium in pictures: paths that lose light, the light that the medium adds, and layers of both.
+//!
+//! Light from the source is dimmed photon by photon ([`crate::media::ThroughMedia`]). Light that the medium emits is no photon's: each pixel's camera ray, parallel to the axis, is
+//! walked back through the flow, and what was collected on it is added to the exposed film, after all filters, for it has no noise. On its way to the film it
+//! meets the same bench: it fills the stop in the cut-off plane evenly, so a cut-off passes its mean over the stop wherever the light came from
+//! ([`Technique::passes_evenly`]), and half of it gets through an analyser.
+
+use super::paths::Planned;
+use super::{Layers, RenderError, Rendered, TestSection, technique};
+use crate::march::BlankCells;
+use crate::media::{Collected, Media, Property, ThroughMedia, Walk};
+use crate::path::Start;
+use crate::scene::{Scene, TechniqueSpec};
+use crate::spectrum::film_colors;
+use crate::technique::Technique;
+use crate::technique::bos::Reversed;
+use crate::view::View;
+use std::sync::Arc;
+
+/// What was collected through the pixels' centres, row by row from the top; empty for properties that are not in the scene.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct MediaMap {
+    /// Optical depth.
+    pub optical_depth: Vec<f32>,
+    /// Emission as the film sees it, before cut-off and exposure: 1 is undisturbed light without a cut-off.
+    pub emission: Vec<f32>,
+    /// Rotation of the plane of polarisation in rad.
+    pub rotation_rad: Vec<f32>,
+}
+
+impl TestSection {
+    /// The same with properties of the medium.
+    #[must_use]
+    pub fn with_media(mut self, media: Media) -> TestSection {
+        self.warnings.extend(media.warnings());
+        self.media = Some(media);
+        self
+    }
+
+    /// The media that the scene calls for; `None` when it calls for none.
+    fn media_of(&self, scene: &Scene) -> Result<Option<&Media>, RenderError> {
+        let has = |p: Property| self.media.as_ref().is_some_and(|m| m.get(p).is_some());
+        match scene.media.quantities().iter().find(|(p, _)| !has(*p)) {
+            Some((property, _)) => Err(RenderError::NoMedia(property.name())),
+            None => Ok(self.media.as_ref().filter(|_| !scene.media.is_empty())),
+        }
+    }
+
+    /// Planned paths with what the medium leaves of their light.
+    pub(super) fn dimmed<'a>(
+        &'a self,
+        scene: &Scene,
+        line: usize,
+        view: View,
+        mut planned: Planned<'a>,
+    ) -> Result<Planned<'a>, RenderError> {
+        let wanted = scene.media.dims_light();
+        let Some(media) = self.media_of(scene)?.filter(|_| !wanted.is_empty()) else { return Ok(planned) };
+        let walk = self.walk(media, line, view, &planned, &wanted);
+        let (analyser, rays) = (scene.media.analyser_rad(), Arc::clone(&planned.media_rays));
+        planned.paths = Box::new(ThroughMedia::new(planned.paths, walk, analyser, rays));
+        Ok(planned)
+    }
+
+    fn walk<'a>(
+        &'a self,
+        media: &'a Media,
+        line: usize,
+        view: View,
+        planned: &Planned<'_>,
+        wanted: &[Property],
+    ) -> Walk<'a> {
+        let field = &self.fields[line];
+        Walk::new(field, view, media, wanted, planned.bend, planned.step_voxels, BlankCells::default())
+    }
+
+    /// What the picture's light collects from these starts: by the light's own way, or the camera's with techniques that look from the film. Emission is left out: see
+    /// [`TestSection::emitted`]. `None` when the scene has no media.
+    pub fn collected(
+        &self,
+        scene: &Scene,
+        planned: &Planned<'_>,
+        starts: &[Start],
+    ) -> Result<Option<Vec<Collected>>, RenderError> {
+        let Some(media) = self.media_of(scene)? else { return Ok(None) };
+        let wanted = [Property::Absorption, Property::Rotation];
+        let against_light = matches!(scene.technique, TechniqueSpec::Bos { .. });
+        let mut out = vec![Collected::default(); starts.len()];
+        if against_light {
+            let walk = self.walk(media, 0, Reversed::view(&self.view), planned, &wanted);
+            walk.collect_parallel(&Reversed::starts(starts), None, &mut out);
+        } else {
+            self.walk(media, 0, self.view, planned, &wanted).collect_parallel(starts, None, &mut out);
+        }
+        Ok(Some(out))
+    }
+
+    /// What the medium emits towards the film along camera rays that end at these starts, bodies in front of it hiding it. `None` when the scene has no emission.
+    pub fn emitted(
+        &self,
+        scene: &Scene,
+        planned: &Planned<'_>,
+        starts: &[Start],
+    ) -> Result<Option<Vec<f32>>, RenderError> {
+        let emission = scene.media.emission.is_some();
+        let Some(media) = self.media_of(scene)?.filter(|_| emission) else { return Ok(None) };
+        let view = Reversed::view(&self.view);
+        let wanted = [Property::Absorption, Property::Emission];
+        let walk = self.walk(media, 0, view, planned, &wanted);
+        let starts = Reversed::starts(starts);
+        let ends: Option<Vec<f64>> = self
+            .solids
+            .as_ref()
+            .map(|solids| starts.iter().map(|s| solids.depth_m(&view, s).unwrap_or(f64::INFINITY)).collect());
+        let mut out = vec![Collected::default(); starts.len()];
+        walk.collect_parallel(&starts, ends.as_deref(), &mut out);
+        Ok(Some(out.into_iter().map(|c| c.emission).collect()))
+    }
+}
+
+/// Adds what the medium emits to the exposed film.
+pub(super) fn add_emission(
+    scene: &Scene,
+    section: &TestSection,
+    planned: &Planned<'_>,
+    layers: Layers,
+    r: &mut Rendered,
+) -> Result<(), RenderError> {
+    if scene.media.emission.is_none() {
+        return Ok(());
+    }
+    let Some(emitted) = section.emitted(scene, planned, &r.framing.pixel_centers())? else { return Ok(()) };
+    r.report.counters.media_rays += emitted.len() as u64;
+
+    // The medium glows in the light's own spectrum.
+    let lines = scene.lines();
+    let colors = film_colors(&lines);
+    let mut gain = [0.0f32; 3];
+    for line in 0..lines.len() {
+        let t: Technique = technique(scene, line, &r.framing, section.fields[line].n0(), false)?;
+        let passes = t.passes_evenly(scene.media.stop_m());
+        let color = if lines.len() > 1 { colors[line] } else { [1.0; 3] };
+        (0..3).for_each(|c| gain[c] += passes[c] * color[c]);
+    }
+    let polariser = if scene.media.analyser_deg.is_some() { 0.5 } else { 1.0 };
+    let exposure = scene.exposure() as f32 * polariser;
+    for (pixel, emission) in r.pixels.iter_mut().zip(&emitted) {
+        (0..3).for_each(|c| pixel[c] += emission * gain[c] * exposure);
+    }
+    if layers.map {
+        r.media.get_or_insert_default().emission = emitted;
+    }
+    Ok(())
+}
+
+/// The layers of absorption and rotation; pixels without light get zeros.
+pub(super) fn add_map(
+    scene: &Scene,
+    section: &TestSection,
+    planned: &Planned<'_>,
+    r: &mut Rendered,
+) -> Result<(), RenderError> {
+    let counters = &mut r.report.counters;
+    counters.media_rays += planned.take_media_rays();
+    let spec = &scene.media;
+    if spec.absorption.is_none() && spec.rotation.is_none() {
+        return Ok(());
+    }
+    let Some(all) = section.collected(scene, planned, &r.framing.pixel_centers())? else { return Ok(()) };
+    counters.media_rays += all.len() as u64;
+    let lit = |i: usize| r.map.as_ref().is_none_or(|m| m.transmission[i] > 0.0);
+    let layer = |wanted: bool, of: fn(&Collected) -> f32| -> Vec<f32> {
+        let all = if wanted { &all[..] } else { &[] };
+        all.iter().enumerate().map(|(i, c)| if lit(i) { of(c) } else { 0.0 }).collect()
+    };
+    let optical_depth = layer(spec.absorption.is_some(), |c| c.optical_depth);
+    let rotation_rad = layer(spec.rotation.is_some(), |c| c.rotation_rad);
+    let map = r.media.get_or_insert_default();
+    (map.optical_depth, map.rotation_rad) = (optical_depth, rotation_rad);
+    Ok(())
+}
+
+/// A rotation that no analyser makes visible is an answer only where layers are asked for.
+pub(super) fn warn(scene: &Scene, layers: Layers, warnings: &mut Vec<String>) {
+    if scene.media.rotation.is_some() && scene.media.analyser_deg.is_none() && !layers.map {
+        warnings.push(
+            "media.rotation does not show in the picture without an analyser (media.analyser_deg); its angles are in the EXR's layer rotation.Y".into(),
+        );
+    }
+}
