@@ -35,7 +35,7 @@ pub struct Ours {
     /// The world.
     pub world: World,
     options: BuildOptions,
-    /// What building cost; the peak is what the resident set grew by, without the mesh.
+    /// What building cost; the peak is what the heap grew by, without the mesh.
     pub cost: BuildCost,
     /// Render space minus the mesh's coordinates; zero unless the mesh lies far from zero.
     shift: Vec3,
@@ -51,7 +51,7 @@ impl Ours {
             wall_secs: time.wall_secs,
             cpu_secs: time.process_cpu_secs,
             bytes: world.report().bytes as u64,
-            peak_bytes,
+            peak_bytes: Some(peak_bytes),
         };
         let shift = (mesh.origin - world.origin()).as_vec3();
         Ok(Ours { world, options: *options, cost, shift })

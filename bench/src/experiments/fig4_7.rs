@@ -31,7 +31,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column(
         "peak_bytes_per_triangle",
         "B",
-        "the most held while building: what Embree reports, what the process grew by for rt-core",
+        "the most held while building: what Embree reports, what the heap grew by for rt-core",
     );
     let installed = Installed::find();
     record.missing.extend(installed.missing.iter().cloned());
