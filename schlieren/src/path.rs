@@ -83,7 +83,7 @@ pub struct Wanted {
 /// Something that takes light through the test section.
 pub trait LightPaths: Sync {
     /// Traces each start to the exit of the same number, on the calling thread. Neighbouring starts should be neighbours in the picture: rays are taken in
-    /// packets.
+    /// packets, and those that look at the same nodes are faster. No exit depends on it.
     ///
     /// # Panics
     /// If the slices differ in length.

@@ -32,7 +32,7 @@ pub use integrator::{Integrator, Interpolated, Medium, Ray};
 pub use line_of_sight::LineOfSight;
 pub use pefrl::Pefrl;
 #[cfg(feature = "gpu")]
-pub(crate) use prepared::{GROUP, Left, Prepared, steps_of};
+pub(crate) use prepared::{Left, Prepared};
 pub use rk4::RungeKutta4;
 pub use sharma::Sharma;
 pub use verlet::Verlet;
