@@ -55,6 +55,7 @@ pub mod input;
 pub mod interpolate;
 mod level;
 pub mod march;
+pub mod measure;
 pub mod media;
 pub mod optics;
 pub mod output;

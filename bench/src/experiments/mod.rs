@@ -16,6 +16,7 @@ mod lineup;
 mod peers;
 mod peers_schlieren;
 mod pictures;
+mod shock_angles;
 mod speed_schlieren;
 mod table5_1;
 mod test_section;
@@ -127,6 +128,12 @@ pub const ALL: &[Experiment] = &[
         chapter: 5,
         title: "Error against time of light’s way through a gas, and the tolerance asked against the error got",
         run: accuracy_schlieren::run,
+    },
+    Experiment {
+        id: "shock-angles",
+        chapter: 5,
+        title: "Angles of wedge and cone shocks measured in pictures, against theta-beta-M and Taylor and Maccoll",
+        run: shock_angles::run,
     },
     Experiment {
         id: "peers-schlieren",

@@ -41,9 +41,19 @@ pub(super) fn scene(rest: &str) -> anyhow::Result<Scene> {
 
 /// Renders; a cancelled picture is an interrupted experiment.
 pub(super) fn paint(context: &Context<'_>, scene: &Scene, section: &TestSection) -> anyhow::Result<Rendered> {
+    paint_with(context, scene, section, Layers::NONE)
+}
+
+/// [`paint`], with what is wanted beside the picture.
+pub(super) fn paint_with(
+    context: &Context<'_>,
+    scene: &Scene,
+    section: &TestSection,
+    layers: Layers,
+) -> anyhow::Result<Rendered> {
     let never = AtomicBool::new(false);
     let control = Control { cancel: context.cancel.as_deref().unwrap_or(&never), progress: &|_| {} };
-    match render(scene, section, Layers::NONE, &control) {
+    match render(scene, section, layers, &control) {
         Err(RenderError::Cancelled) => Err(Interrupted.into()),
         other => Ok(other?),
     }

@@ -6,7 +6,7 @@ use super::volume::Volume;
 use super::{Gpu, GpuError};
 use crate::field::Field;
 use crate::interpolate::Interpolant;
-use crate::march::{BlankCells, Deviational, Frame, GROUP, Left, Options, Prepared, steps_of};
+use crate::march::{BlankCells, Deviational, Frame, Left, Options, Prepared};
 use crate::path::{Exit, LightPaths, Start, Wanted};
 use crate::view::View;
 use bytemuck::{Pod, Zeroable};
@@ -259,18 +259,13 @@ impl<'a> GpuPaths<'a> {
         })
     }
 
-    /// Rays of a whole number of groups: all take the steps of their group's longest.
+    /// Rays as the kernel gets them; those that miss the field stay zero.
     fn prepare(&self, starts: &[Start], prepared: &mut [Prepared], rays: &mut [Ray]) {
         let mut known = None;
-        let groups = starts.chunks(GROUP).zip(prepared.chunks_mut(GROUP)).zip(rays.chunks_mut(GROUP));
-        for ((starts, prepared), rays) in groups {
-            let mut steps = 0.0f64;
-            for (p, start) in prepared.iter_mut().zip(starts) {
-                *p = Prepared::new(&self.frame, start, &mut known);
-                steps = steps.max(p.steps(self.options.step_voxels));
-            }
-            let steps = steps_of(steps);
-            for (p, ray) in prepared.iter_mut().zip(rays).filter(|(p, _)| p.meets_field()) {
+        for ((start, p), ray) in starts.iter().zip(prepared).zip(rays) {
+            *p = Prepared::new(&self.frame, start, &mut known);
+            let steps = p.steps(self.options.step_voxels);
+            if steps > 0 {
                 let e = p.entry(&self.frame, steps);
                 *ray = Ray {
                     middle: e.middle,
@@ -297,7 +292,7 @@ impl Batches for GpuPaths<'_> {
         let mut prepared = vec![Prepared::default(); starts.len()];
         let mut rays = vec![Ray::zeroed(); starts.len()];
         if parallel {
-            const CHUNK: usize = 32 * GROUP;
+            const CHUNK: usize = 1024;
             starts
                 .par_chunks(CHUNK)
                 .zip(prepared.par_chunks_mut(CHUNK))

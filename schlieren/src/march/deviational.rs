@@ -2,8 +2,8 @@
 
 use super::frame::{BlankCells, Frame};
 use super::kept::Kept;
-use super::packet::{Common, Effects, Nodes, Packet, Skip, With, Work, march};
-use super::prepared::{GROUP, Left, Prepared, steps_of};
+use super::packet::{Common, Effects, Nodes, Packet, Skip, Steps, With, Work, march};
+use super::prepared::{Left, Prepared};
 use crate::at_level;
 use crate::field::Field;
 use crate::interpolate::{
@@ -37,7 +37,9 @@ pub struct Options {
     pub wanted: Wanted,
     /// What becomes of light in cells without data.
     pub blank: BlankCells,
-    /// Leave out bricks as long as the bounds of what that leaves out of a ray's deflection add up to less than this. Zero: leave out nothing.
+    /// Leave out bricks as long as the bounds of what that leaves out of a ray's deflection add up to less than this. Zero: leave out nothing, and no
+    /// ray's exit depends on any other ray. With it, rays that are in flight together leave out the same, so that they agree with the same rays traced
+    /// in another order within twice this bound.
     pub skip_rad: f64,
     /// The largest error of the optical path difference that leaving out one stretch of eight steps may cost, when that is wanted.
     pub skip_opd_m: f64,
@@ -217,7 +219,7 @@ impl<'a> Deviational<'a> {
         exits: &mut [Exit],
         effects: E,
     ) {
-        const IN_FLIGHT: usize = GROUP / LANES;
+        const IN_FLIGHT: usize = 2;
         let h = (self.frame.spacing_m / self.frame.unit_m).to_array();
         let common = Common {
             h2: h.map(|h| (h * h) as f32),
@@ -245,16 +247,18 @@ impl<'a> Deviational<'a> {
         for (starts, exits) in starts.chunks(IN_FLIGHT * LANES).zip(exits.chunks_mut(IN_FLIGHT * LANES)) {
             let mut packets = [const { Packet::EMPTY }; IN_FLIGHT];
             let mut rays = [Prepared::default(); IN_FLIGHT * LANES];
-            let mut steps = 0.0f64;
             for (ray, start) in rays.iter_mut().zip(starts) {
                 *ray = Prepared::new(&self.frame, start, &mut known);
-                steps = steps.max(ray.steps(self.options.step_voxels));
             }
-            let steps = steps_of(steps);
+            let mut steps = Steps { shortest: u32::MAX, longest: 0 };
             for (i, ray) in rays.iter_mut().enumerate().filter(|(_, r)| r.meets_field()) {
                 in_field += 1;
                 let (p, l) = (&mut packets[i / LANES], i % LANES);
-                let entry = ray.entry(&self.frame, steps);
+                let of_ray = ray.steps(self.options.step_voxels);
+                steps.shortest = steps.shortest.min(of_ray);
+                steps.longest = steps.longest.max(of_ray);
+                p.steps[l] = of_ray as f32;
+                let entry = ray.entry(&self.frame, of_ray);
                 for c in 0..3 {
                     p.middle[c][l] = entry.middle[c];
                     p.xi[c][l] = entry.xi[c];
@@ -263,7 +267,7 @@ impl<'a> Deviational<'a> {
                 }
                 p.dt[l] = entry.dt;
             }
-            if steps > 0 {
+            if steps.longest > 0 {
                 let done = march(simd, field, &common, &mut packets, steps, effects);
                 work.sampled += done.sampled;
                 work.skipped += done.skipped;

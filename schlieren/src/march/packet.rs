@@ -6,6 +6,11 @@
 //!
 //! In the lattice's own axes a step needs no rotations: with lattice spacing h (in units of the longest) and gradient g per lattice step,
 //! `dv_i/dtau = (1 + eps) g_i / h_i^2` and `dxi_i/dtau = v_i`.
+//!
+//! A ray's exit does not depend on the rays beside it: each takes its own number of steps, and one that has arrived or was stopped *rests*: its step
+//! of tau is zero from then on, so that what the packet still does changes nothing of it. (In an earlier form all took the steps of the longest, and stopped rays
+//! went on until the last of them was stopped: whether a ray that met a blank cell first and a body later was masked or blocked was up to its neighbours.)
+//! The one exception is leaving out bricks, which rays in flight decide together.
 
 use crate::field::Node;
 use crate::interpolate::{Interpolate16, LANES, Row, Samples};
@@ -25,7 +30,10 @@ pub(super) struct Packet {
     /// The direction times the spacing: projects lattice components of `xi` and `v` on the ray.
     pub(super) along: [Row; 3],
     /// A step of tau. Before the march: of path. The ray enters with a rate of 1 + eps there, and deviations are from a ray that keeps it.
+    /// Zero for rays that miss the field, and for those at rest.
     pub(super) dt: Row,
+    /// Steps from entry to exit. Zero for rays that miss the field.
+    pub(super) steps: Row,
     /// eps where the ray enters.
     pub(super) eps_at_entry: Row,
     /// Starts as what rounding `middle` to f32 left out, which [`super::Deviational`] takes off again at the end.
@@ -48,6 +56,7 @@ impl Packet {
         stride: [[0.0; LANES]; 3],
         along: [[0.0; LANES]; 3],
         dt: [0.0; LANES],
+        steps: [0.0; LANES],
         eps_at_entry: [0.0; LANES],
         xi: [[0.0; LANES]; 3],
         v: [[0.0; LANES]; 3],
@@ -68,7 +77,7 @@ pub(super) struct Common<'a> {
     /// What the nodes are, where not all are gas.
     pub(super) nodes: Option<Nodes<'a>>,
     pub(super) skip: Option<Skip<'a>>,
-    /// The worst kind a ray can survive; a packet whose rays all met something worse is done.
+    /// The worst kind a ray can survive; one that met something worse rests where it did.
     pub(super) survives: u8,
 }
 
@@ -126,14 +135,14 @@ pub(super) struct Work {
 /// Steps that are left out at once, where a brick allows it.
 const STRIDE: u32 = 8;
 
-/// Takes all packets from entry to exit in `steps` steps each, in flight together.
+/// Takes all packets from entry to exit, in flight together.
 #[inline(never)]
 pub(super) fn march<S: Simd, I: Interpolate16, E: Effects, const P: usize>(
     simd: S,
     field: I,
     common: &Common<'_>,
     packets: &mut [Packet; P],
-    steps: u32,
+    steps: Steps,
     _: E,
 ) -> Work {
     simd.vectorize(
@@ -148,22 +157,20 @@ fn march_body<S: Simd, I: Interpolate16, E: Effects, const P: usize>(
     field: I,
     common: &Common<'_>,
     packets: &mut [Packet; P],
-    steps: u32,
+    steps: Steps,
 ) -> Work {
     let mut work = Work::default();
-    // Step numbers are counted from the middle of the way: exact in f32.
-    let middle = 0.5 * steps as f32;
     let mut k = 0;
     let mut entering = true;
     // Two iterations more than steps, to look at the entry and to end in the exit plane; in the same loop, so that there is one copy of the
     // sampling code.
-    while k <= steps {
+    while k <= steps.longest {
         // Leaving out whole bricks, when all rays in flight may.
         if E::SKIP
             && !entering
             && k % STRIDE == 0
-            && k + STRIDE <= steps
-            && leave_out::<S, I, E, P>(simd, common, packets, k as f32 - middle)
+            && k + STRIDE <= steps.shortest
+            && leave_out::<S, I, E, P>(simd, common, packets, k as f32)
         {
             k += STRIDE;
             work.skipped += u64::from(STRIDE) * P as u64;
@@ -171,31 +178,80 @@ fn march_body<S: Simd, I: Interpolate16, E: Effects, const P: usize>(
         }
         for p in packets.iter_mut() {
             let dt = f32x16::from_slice(simd, &p.dt);
-            let s = if entering {
+            let of_ray = f32x16::from_slice(simd, &p.steps);
+            // Step numbers are counted from the middle of the way: exact in f32.
+            let middle = of_ray * 0.5;
+            let number = f32x16::splat(simd, if E::EULER { k as f32 } else { k as f32 + 0.5 }) - middle;
+            let mut s = Step { number, move_by: dt, dt };
+            let mut arriving = None;
+            if entering {
                 let zero = dt * 0.0;
-                Step { number: zero - f32x16::splat(simd, middle), move_by: zero, dt: zero }
-            } else if k < steps {
-                let number = if E::EULER { k as f32 } else { k as f32 + 0.5 };
-                Step { number: f32x16::splat(simd, number - middle), move_by: dt, dt }
-            } else {
-                last_step::<S, E>(simd, p, middle)
-            };
+                s = Step { number: zero - middle, move_by: zero, dt: zero };
+            } else if k >= steps.shortest {
+                // Some rays arrive; for the others this is a step like any other.
+                let now = of_ray.simd_eq(k as f32) & dt.simd_gt(0.0);
+                let last = last_step::<S, E>(simd, p, middle);
+                s.number = now.select(last.number, s.number);
+                s.move_by = now.select(last.move_by, s.move_by);
+                s.dt = now.select(last.dt, s.dt);
+                arriving = Some(now);
+            }
             let eps = step::<S, I, E>(simd, field, common, p, s);
             if entering {
                 eps.store_slice(&mut p.eps_at_entry);
                 (dt / (eps + f32x16::splat(simd, 1.0))).store_slice(&mut p.dt);
-            } else if k == steps {
-                drift(simd, p, s.dt * 0.5);
+                if E::NODES {
+                    // The line above gave those that enter through a body a step again.
+                    rest_where_stopped(common, p);
+                }
+            } else if let Some(now) = arriving {
+                // Not of rays that were stopped in this last step.
+                let going = f32x16::from_slice(simd, &p.dt).simd_gt(0.0);
+                let half = going.select(s.dt * 0.5, dt * 0.0);
+                drift(simd, p, now.select(half, dt * 0.0));
+                for l in 0..LANES {
+                    if p.steps[l] == k as f32 {
+                        rest(p, l);
+                    }
+                }
             }
         }
         work.sampled += P as u64;
         k += u32::from(!entering);
         entering = false;
-        if E::NODES && packets.iter().all(|p| p.met.iter().all(|m| *m > common.survives)) {
+        if E::NODES && packets.iter().all(|p| p.dt == [0.0; LANES]) {
             return work;
         }
     }
     work
+}
+
+/// Steps from entry to exit of those rays in flight that meet the field.
+#[derive(Clone, Copy)]
+pub(super) struct Steps {
+    /// The fewest of any ray.
+    pub(super) shortest: u32,
+    /// The most of any ray.
+    pub(super) longest: u32,
+}
+
+/// A ray has arrived or was stopped. What compensation still holds is below the last digit, and must not get into it with the steps of others.
+#[inline(always)]
+fn rest(p: &mut Packet, l: usize) {
+    p.dt[l] = 0.0;
+    p.opd_rest[l] = 0.0;
+    for c in 0..3 {
+        p.v_rest[c][l] = 0.0;
+    }
+}
+
+#[inline(always)]
+fn rest_where_stopped(common: &Common<'_>, p: &mut Packet) {
+    for l in 0..LANES {
+        if p.met[l] > common.survives {
+            rest(p, l);
+        }
+    }
 }
 
 /// xi += dt v
@@ -227,7 +283,7 @@ fn step<S: Simd, I: Interpolate16, E: Effects>(
     field: I,
     common: &Common<'_>,
     p: &mut Packet,
-    s: Step<S>,
+    mut s: Step<S>,
 ) -> f32x16<S> {
     let mut at = [s.number; 3];
     for c in 0..3 {
@@ -241,6 +297,8 @@ fn step<S: Simd, I: Interpolate16, E: Effects>(
     }
     if E::NODES {
         meet(simd, common, p, &at);
+        let going = f32x16::from_slice(simd, &p.dt).simd_gt(0.0);
+        s.dt = going.select(s.dt, s.dt * 0.0);
     }
     let here = field.sample16(simd, &at);
     kick::<S, I, E>(simd, common, p, &here, s.dt);
@@ -250,7 +308,7 @@ fn step<S: Simd, I: Interpolate16, E: Effects>(
 /// tau is not depth: a ray that gained `zeta` in depth has passed its exit plane by as much. One step back brings it there; half of its drift is left to
 /// the caller.
 #[inline(always)]
-fn last_step<S: Simd, E: Effects>(simd: S, p: &Packet, middle: f32) -> Step<S> {
+fn last_step<S: Simd, E: Effects>(simd: S, p: &Packet, middle: f32x16<S>) -> Step<S> {
     let whole = f32x16::from_slice(simd, &p.dt);
     // Verlet's positions still miss the second half of the last step.
     let missing = if E::EULER { whole * 0.0 } else { whole * 0.5 };
@@ -266,11 +324,7 @@ fn last_step<S: Simd, E: Effects>(simd: S, p: &Packet, middle: f32) -> Step<S> {
     let dt = -zeta / rate;
     // Rays that miss the field have steps of length zero.
     let steps = (whole.simd_gt(0.0)).select(dt / whole, dt * 0.0);
-    Step {
-        number: steps.mul_add(f32x16::splat(simd, 0.5), f32x16::splat(simd, middle)),
-        move_by: missing + dt * 0.5,
-        dt,
-    }
+    Step { number: steps.mul_add(f32x16::splat(simd, 0.5), middle), move_by: missing + dt * 0.5, dt }
 }
 
 /// v += dt (1 + eps) g / h^2, and the optical path with the mean of v before and after.
@@ -320,7 +374,7 @@ fn kick<S: Simd, I: Interpolate16, E: Effects>(
     }
 }
 
-/// The nearest nodes' kinds.
+/// The nearest nodes' kinds, for the rays that are on their way; those that may not go on rest.
 #[inline(always)]
 fn meet<S: Simd>(simd: S, common: &Common<'_>, p: &mut Packet, at: &[f32x16<S>; 3]) {
     let Some(nodes) = common.nodes else { return };
@@ -334,8 +388,11 @@ fn meet<S: Simd>(simd: S, common: &Common<'_>, p: &mut Packet, at: &[f32x16<S>; 
     let o = near[0] + near[1] * row + near[2] * (row * nodes.dims[1] as i32);
     let o: [i32; LANES] = o.into();
     for l in 0..LANES {
-        p.met[l] = p.met[l].max(nodes.kinds[o[l] as u32 as usize] as u8);
+        if p.dt[l] > 0.0 {
+            p.met[l] = p.met[l].max(nodes.kinds[o[l] as u32 as usize] as u8);
+        }
     }
+    rest_where_stopped(common, p);
 }
 
 /// Moves all packets over [`STRIDE`] steps without a sample, if the bricks there bound what that leaves out.
@@ -352,6 +409,7 @@ fn leave_out<S: Simd, I: Interpolate16, E: Effects, const P: usize>(
     for (p, (angle, mean)) in packets.iter().zip(&mut bounds) {
         let mut at: [Row; 3] = [[0.0; LANES]; 3];
         for c in 0..3 {
+            let number = number - f32x16::from_slice(simd, &p.steps) * 0.5;
             let straight = number
                 .mul_add(f32x16::from_slice(simd, &p.stride[c]), f32x16::from_slice(simd, &p.middle[c]));
             at[c] = (straight + f32x16::from_slice(simd, &p.xi[c])).into();
@@ -361,7 +419,8 @@ fn leave_out<S: Simd, I: Interpolate16, E: Effects, const P: usize>(
             let chord_m = p.dt[l] * (STRIDE as f32 * skip.unit_m);
             angle[l] = p.left_out[l] + brick.max_gradient_per_m * chord_m;
             mean[l] = brick.mean_eps;
-            let stops = E::NODES && brick.has_nodes;
+            // A ray at rest is not in that brick any more.
+            let stops = E::NODES && brick.has_nodes && p.dt[l] > 0.0;
             let vague = E::OPD && brick.half_range_eps * chord_m > skip.tolerance_opd_m;
             if angle[l] > skip.tolerance_rad || stops || vague {
                 return false;

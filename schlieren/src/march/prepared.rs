@@ -4,10 +4,6 @@ use super::frame::{BlankCells, Frame};
 use crate::path::{Exit, Start};
 use glam::DVec3;
 
-/// Neighbouring rays that take the same number of steps: the most that the longest of them needs. The GPU keeps to the CPU's groups, so that both
-/// do the same steps.
-pub(crate) const GROUP: usize = 32;
-
 /// A ray on its way into a kernel.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Prepared {
@@ -79,9 +75,9 @@ impl Prepared {
         self.length_m > 0.0
     }
 
-    /// Steps that a ray needs, as a fraction. The greatest of a group is for [`steps_of`].
-    pub(crate) fn steps(&self, step_voxels: f64) -> f64 {
-        self.chord.length() / step_voxels
+    /// Steps that a ray needs; none when it misses the field. Of every ray by itself: its exit must not depend on its neighbours.
+    pub(crate) fn steps(&self, step_voxels: f64) -> u32 {
+        if self.meets_field() { steps_of(self.chord.length() / step_voxels).max(1) } else { 0 }
     }
 
     /// What the kernel gets of a ray that meets the field and takes this many steps.
@@ -126,6 +122,6 @@ impl Prepared {
 }
 
 /// Whole steps for a length in steps: a hair above a whole number is rounding, not a step.
-pub(crate) fn steps_of(steps: f64) -> u32 {
+fn steps_of(steps: f64) -> u32 {
     (steps * (1.0 - 1e-12)).ceil() as u32
 }

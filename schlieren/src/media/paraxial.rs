@@ -13,14 +13,16 @@ use fearless_simd::{Simd, f32x16, i32x16};
 
 /// Rays with their state. Lengths are in units of [`Frame::unit_m`] unless the name says metres.
 pub(super) struct Packet {
-    steps: u32,
+    /// Steps from entry to exit. Each ray has its own: what it collects must not depend on the rays beside it.
+    steps: Row,
+    longest: u32,
     middle: [Row; 3],
     stride: [Row; 3],
     along: [Row; 3],
     /// A step of depth.
     dz: Row,
     dz_m: [f64; LANES],
-    /// After how many steps a ray is at its end; infinite when it has none.
+    /// After how many steps a ray is at its end, where it leaves the field at the latest.
     end: [f64; LANES],
     xi: [Row; 3],
     /// Slope, in lattice steps per unit of depth.
@@ -30,9 +32,10 @@ pub(super) struct Packet {
 }
 
 impl Packet {
-    pub(super) fn new(steps: u32) -> Packet {
+    pub(super) fn new() -> Packet {
         Packet {
-            steps,
+            steps: [0.0; LANES],
+            longest: 0,
             middle: [[0.0; LANES]; 3],
             stride: [[0.0; LANES]; 3],
             along: [[0.0; LANES]; 3],
@@ -47,9 +50,11 @@ impl Packet {
     }
 
     /// A ray that meets the field.
-    pub(super) fn set(&mut self, l: usize, ray: &mut Prepared, frame: &Frame, end_m: f64) {
+    pub(super) fn set(&mut self, l: usize, ray: &mut Prepared, frame: &Frame, steps: u32, end_m: f64) {
         let [near_m, far_m] = ray.range_m();
-        let entry = ray.entry(frame, self.steps);
+        let entry = ray.entry(frame, steps);
+        self.steps[l] = steps as f32;
+        self.longest = self.longest.max(steps);
         for c in 0..3 {
             self.middle[c][l] = entry.middle[c];
             self.stride[c][l] = entry.stride[c];
@@ -57,8 +62,8 @@ impl Packet {
             self.xi[c][l] = entry.xi[c];
         }
         self.dz[l] = entry.dt;
-        self.dz_m[l] = (far_m - near_m) / f64::from(self.steps);
-        self.end[l] = (end_m - near_m) / self.dz_m[l];
+        self.dz_m[l] = (far_m - near_m) / f64::from(steps);
+        self.end[l] = ((end_m - near_m) / self.dz_m[l]).min(f64::from(steps));
         self.stopped[l] = self.end[l] <= 0.0;
     }
 }
@@ -111,9 +116,9 @@ pub(super) fn walk16<S: Simd>(simd: S, sampled: &Sampled<'_>, p: &mut Packet) {
     simd.vectorize(
         #[inline(always)]
         || {
-            let middle = 0.5 * p.steps as f32;
-            for k in 0..p.steps {
-                let number = f32x16::splat(simd, k as f32 + 0.5 - middle);
+            let middle = f32x16::from_slice(simd, &p.steps) * 0.5;
+            for k in 0..p.longest {
+                let number = f32x16::splat(simd, k as f32 + 0.5) - middle;
                 let mut at = [number; 3];
                 for c in 0..3 {
                     let straight = number.mul_add(

@@ -5,7 +5,7 @@ use super::{Collected, Media, Property, Volume, full};
 use crate::at_level;
 use crate::field::{Field, Node};
 use crate::interpolate::{BSpline, LANES, Trilinear};
-use crate::march::{BlankCells, Frame, Prepared, steps_of};
+use crate::march::{BlankCells, Frame, Prepared};
 use crate::path::Start;
 use crate::plan::Mode;
 use crate::view::View;
@@ -102,18 +102,17 @@ impl<'a> Walk<'a> {
         let sampled = Sampled::new(self, rows);
         let mut known = None;
         for (chunk, (starts, out)) in starts.chunks(LANES).zip(out.chunks_mut(LANES)).enumerate() {
-            let mut rays = [Prepared::default(); LANES];
-            let mut steps = 0.0f64;
-            for (ray, start) in rays.iter_mut().zip(starts) {
-                *ray = Prepared::new(&self.frame, start, &mut known);
-                steps = steps.max(ray.steps(self.step_voxels));
+            let mut packet = Packet::new();
+            let mut any = false;
+            for (l, start) in starts.iter().enumerate() {
+                let mut ray = Prepared::new(&self.frame, start, &mut known);
+                if ray.meets_field() {
+                    let steps = ray.steps(self.step_voxels);
+                    packet.set(l, &mut ray, &self.frame, steps, end_m(chunk * LANES + l));
+                    any = true;
+                }
             }
-            let steps = steps_of(steps);
-            let mut packet = Packet::new(steps);
-            for (l, ray) in rays.iter_mut().enumerate().filter(|(_, r)| r.meets_field()) {
-                packet.set(l, ray, &self.frame, end_m(chunk * LANES + l));
-            }
-            if steps > 0 {
+            if any {
                 at_level!(self.level, simd => walk16(simd, &sampled, &mut packet));
             }
             for (l, to) in out.iter_mut().enumerate() {

@@ -1,0 +1,266 @@
+//! Cell by cell: steps that end on the faces of the lattice's cells, Gauss's rule between them. The reference for interpolated fields.
+//!
+//! Between two faces an interpolant is one polynomial; across a face something of it jumps (trilinear: the gradient; trilinear gradients: their slope; the
+//! cubic spline: its third derivative). An integrator that steps over a face has no order there, and an adaptive one does not
+//! notice: its estimate compares two formulas that saw the same few points (`adaptive_estimates_are_fooled_by_kinks`). Here no formula ever sees both sides.
+//!
+//! Along a straight line a trilinear function is a cubic polynomial and its gradient a quadratic one, so Gauss's rule with two points integrates both without error; the
+//! cubic spline in three variables is of degree 9, which takes five points. Bent rays take the collocation method on three
+//! Gauss points (Kuntzmann and Butcher; Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I*, table II.7.4): order 6, symmetric, symplectic, and on a
+//! ray that is not bent it is the three-point rule.
+
+use super::integrator::{Integrator, Medium, Rate, Ray};
+use crate::field::Field;
+use glam::DVec3;
+
+/// Splits steps at the faces of a field's cells.
+///
+/// As an [`Integrator`] it takes steps of any (positive) length; each is split where it crosses faces. A ray in a face belongs to the upper cell, as for the
+/// interpolants. A ray that is drawn into a face from both sides (a ridge of a trilinear eps) zigzags along it in thousands of steps a cell.
+///
+/// ```
+/// use glam::DVec3;
+/// use schlieren::field::Field;
+/// use schlieren::interpolate::Trilinear;
+/// use schlieren::march::{CellExact, Interpolated, Points};
+///
+/// // eps = 1e-5 x y z is trilinear: the interpolant is the function itself.
+/// let field = Field::from_fn([5; 3], [1.0; 3], DVec3::ZERO, 1.0, |p| 1e-5 * p.x * p.y * p.z)?;
+/// let trilinear = Trilinear::new(&field);
+/// let medium = Interpolated::new(&field, &trilinear);
+/// let diagonal = DVec3::ONE.normalize();
+/// let s = CellExact::new(&field).line_of_sight(&medium, DVec3::ZERO, diagonal, 48f64.sqrt(), Points::Two);
+/// // From corner to corner, x = y = z = s/√3.
+/// assert!((s.path_m - 1e-5 * 64.0 * 48f64.sqrt() / 4.0).abs() < 1e-9);
+/// assert!((s.slope.x - 1e-5 * 16.0 * 48f64.sqrt() / 3.0).abs() < 1e-9);
+/// # Ok::<(), schlieren::field::FieldError>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct CellExact {
+    origin_m: DVec3,
+    spacing_m: DVec3,
+    last: DVec3,
+}
+
+/// Gauss points in each cell along a straight line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Points {
+    /// Exact for cubic polynomials: trilinear eps and gradients.
+    Two,
+    /// Exact up to degree 5.
+    #[default]
+    Three,
+    /// Exact up to degree 9: the cubic spline in three variables.
+    Five,
+}
+
+impl Points {
+    /// Places in 0..1 and weights, whose sum is 1.
+    fn rule(self) -> &'static [(f64, f64)] {
+        const TWO: [(f64, f64); 2] = [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
+        const THREE: [(f64, f64); 3] = [(C[0], B[0]), (C[1], B[1]), (C[2], B[2])];
+        const FIVE: [(f64, f64); 5] = [
+            (0.046_910_077_030_668_0, 0.118_463_442_528_094_54),
+            (0.230_765_344_947_158_45, 0.239_314_335_249_683_23),
+            (0.5, 0.284_444_444_444_444_44),
+            (0.769_234_655_052_841_5, 0.239_314_335_249_683_23),
+            (0.953_089_922_969_332, 0.118_463_442_528_094_54),
+        ];
+        match self {
+            Points::Two => &TWO,
+            Points::Three => &THREE,
+            Points::Five => &FIVE,
+        }
+    }
+}
+
+/// Integrals along a straight line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sight {
+    /// Integral of the gradient of eps: across the line it is the deflection to first order, in rad.
+    pub slope: DVec3,
+    /// Integral of eps: the optical path difference to first order, divided by n0.
+    pub path_m: f64,
+    /// Pieces of the line, each in one cell.
+    pub pieces: u32,
+}
+
+/// Points and weights of Gauss's rule on 0..1: 1/2 ∓ √15/10.
+const C: [f64; 3] = [0.112_701_665_379_258_31, 0.5, 0.887_298_334_620_741_7];
+const B: [f64; 3] = [5.0 / 18.0, 4.0 / 9.0, 5.0 / 18.0];
+const ROOT_15: f64 = 3.872_983_346_207_417;
+const A: [[f64; 3]; 3] = [
+    [5.0 / 36.0, 2.0 / 9.0 - ROOT_15 / 15.0, 5.0 / 36.0 - ROOT_15 / 30.0],
+    [5.0 / 36.0 + ROOT_15 / 24.0, 2.0 / 9.0, 5.0 / 36.0 - ROOT_15 / 24.0],
+    [5.0 / 36.0 + ROOT_15 / 30.0, 2.0 / 9.0 + ROOT_15 / 15.0, 5.0 / 36.0],
+];
+
+/// A ray this close to a face, in cells, is on it. Rounding of coordinates in the thousands is a thousandth of it.
+const ON_FACE: f64 = 1e-10;
+/// How far a step may end beyond a face, in cells.
+const BEYOND: f64 = 1e-11;
+
+impl CellExact {
+    /// The cells of a field.
+    pub fn new(field: &Field) -> CellExact {
+        let d = field.dims();
+        CellExact {
+            origin_m: field.origin_m(),
+            spacing_m: DVec3::from(field.spacing_m()),
+            last: DVec3::new((d[0] - 1) as f64, (d[1] - 1) as f64, (d[2] - 1) as f64),
+        }
+    }
+
+    fn lattice(&self, at_m: DVec3) -> DVec3 {
+        (at_m - self.origin_m) / self.spacing_m
+    }
+
+    /// Integrals along a line from `start_m` in `direction` (of length one) over `length_m`, with Gauss's rule between every two faces.
+    pub fn line_of_sight(
+        &self,
+        medium: &impl Medium,
+        start_m: DVec3,
+        direction: DVec3,
+        length_m: f64,
+        points: Points,
+    ) -> Sight {
+        // Distances to all faces, each from its own number: nothing is accumulated.
+        let (from, rate) = (self.lattice(start_m), direction / self.spacing_m);
+        let mut ends = vec![0.0, length_m];
+        for c in 0..3 {
+            if rate[c] != 0.0 {
+                let (a, b) = (from[c], from[c] + rate[c] * length_m);
+                let first = a.min(b).ceil().clamp(0.0, self.last[c]);
+                let after = a.max(b).floor().clamp(0.0, self.last[c]);
+                let faces = first as u64..=after as u64;
+                ends.extend(faces.map(|i| (i as f64 - from[c]) / rate[c]));
+            }
+        }
+        ends.retain(|s| (0.0..=length_m).contains(s));
+        ends.sort_unstable_by(f64::total_cmp);
+        let mut out = Sight { slope: DVec3::ZERO, path_m: 0.0, pieces: 0 };
+        for pair in ends.windows(2) {
+            let piece_m = pair[1] - pair[0];
+            if piece_m <= 0.0 {
+                continue;
+            }
+            out.pieces += 1;
+            for (place, weight) in points.rule() {
+                let (eps, gradient) = medium.sample(start_m + direction * (pair[0] + place * piece_m));
+                out.path_m += eps * (weight * piece_m);
+                out.slope += gradient * (weight * piece_m);
+            }
+        }
+        out
+    }
+
+    /// The cell that a ray is in, or enters when it is on a face, as its lowest and highest coordinates. Infinite outside the lattice, where values are continued.
+    fn cell(&self, at: DVec3, rate: DVec3) -> [DVec3; 2] {
+        let (mut low, mut high) = (DVec3::NEG_INFINITY, DVec3::INFINITY);
+        for c in 0..3 {
+            let below =
+                if rate[c] < 0.0 { (at[c] - ON_FACE).ceil() - 1.0 } else { (at[c] + ON_FACE).floor() };
+            if below >= 0.0 {
+                low[c] = below.min(self.last[c]);
+            }
+            if below < self.last[c] {
+                high[c] = (below + 1.0).max(0.0);
+            }
+        }
+        [low, high]
+    }
+}
+
+/// A medium as one cell has it: beyond its faces the values on them. Without this the stages of a step that is still too long would see the next cell, and where the
+/// two pull apart the equations would have no solution at all.
+struct Within<'a, M> {
+    medium: &'a M,
+    low_m: DVec3,
+    high_m: DVec3,
+}
+
+impl<M: Medium> Medium for Within<'_, M> {
+    fn sample(&self, at_m: DVec3) -> (f64, DVec3) {
+        // Not `clamp`, which panics where a bound is no number.
+        self.medium.sample(at_m.max(self.low_m).min(self.high_m))
+    }
+}
+
+/// How far a point is outside a cell, and along which axis. Negative inside.
+fn outside([low, high]: [DVec3; 2], at: DVec3) -> (f64, usize) {
+    let by = (low - at).max(at - high);
+    let axis = if by.x >= by.y && by.x >= by.z { 0 } else { 1 + usize::from(by.z > by.y) };
+    (by[axis], axis)
+}
+
+/// One step of the collocation method, its three equations solved by iteration: the gas is so thin, or the cell so small, that each round gains digits.
+fn collocation(medium: &impl Medium, ray: &Ray, step_m: f64) -> Ray {
+    const ROUNDS: u32 = 16;
+    let stage = |i: usize, k: &[Rate; 3]| {
+        let mut at = ray.after(step_m, &Rate::sum(&[(A[i][0], &k[0]), (A[i][1], &k[1]), (A[i][2], &k[2])]));
+        at.tau_m = ray.tau_m + C[i] * step_m;
+        at.rate(medium)
+    };
+    let mut k = [Rate { xi: ray.u, u: DVec3::ZERO, excess: 0.0 }; 3];
+    for _ in 0..ROUNDS {
+        let next = [0, 1, 2].map(|i| stage(i, &k));
+        let change = |i: usize| (next[i].xi - k[i].xi).length() + (next[i].u - k[i].u).length() * step_m;
+        let size = |i: usize| next[i].xi.length() + next[i].u.length() * step_m;
+        let done = (0..3).all(|i| change(i) <= 1e-16 * size(i));
+        k = next;
+        if done {
+            break;
+        }
+    }
+    ray.after(step_m, &Rate::sum(&[(B[0], &k[0]), (B[1], &k[1]), (B[2], &k[2])]))
+}
+
+impl Integrator for CellExact {
+    /// In a medium that is smooth within each cell.
+    const ORDER: u32 = 6;
+    /// For each round of solving the collocation's equations, in each cell.
+    const SAMPLES: u32 = 3;
+
+    fn step(&self, medium: &impl Medium, ray: &Ray, dtau_m: f64) -> Ray {
+        let end_m = ray.tau_m + dtau_m;
+        let least_m = 1e-9 * self.spacing_m.min_element();
+        let mut r = *ray;
+        // The number of pieces is bounded by the least step; this bound is for media that are no numbers.
+        for _ in 0..1_000_000 {
+            let left_m = end_m - r.tau_m;
+            if left_m.is_nan() || left_m <= 0.0 {
+                break;
+            }
+            let (at, rate) = (self.lattice(r.position_m()), r.w() / self.spacing_m);
+            let cell = self.cell(at, rate);
+            let inside = Within {
+                medium,
+                low_m: self.origin_m + (cell[0] + BEYOND) * self.spacing_m,
+                high_m: self.origin_m + (cell[1] - BEYOND) * self.spacing_m,
+            };
+            // Where a straight ray leaves the cell. A bent one may fall a little short of it, and the next step makes up for that.
+            let to_face = |c: usize| {
+                let face = if rate[c] > 0.0 { cell[1][c] } else { cell[0][c] };
+                if rate[c] == 0.0 { f64::INFINITY } else { (face - at[c]) / rate[c] }
+            };
+            let mut step_m = to_face(0).min(to_face(1)).min(to_face(2)).clamp(least_m, left_m.max(least_m));
+            let mut next = collocation(&inside, &r, step_m);
+            // Or go beyond it: shorter, by the rate at which it leaves.
+            for _ in 0..60 {
+                let (by, axis) = outside(cell, self.lattice(next.position_m()));
+                if by.is_nan() || by <= BEYOND || step_m <= least_m {
+                    break;
+                }
+                let leaving = (next.w() / self.spacing_m)[axis].abs();
+                let shorter = step_m - by / leaving;
+                step_m = if shorter > 0.1 * step_m { shorter } else { 0.5 * step_m }.max(least_m);
+                next = collocation(&inside, &r, step_m);
+            }
+            r = next;
+            if step_m >= left_m {
+                r.tau_m = end_m;
+            }
+        }
+        r
+    }
+}
