@@ -202,6 +202,29 @@ fn walks_end_at_bodies_and_where_they_are_told() {
 
 /// SELFOC, n² = n0² (1 - g² r²): x = x0 cos(g τ), z = w_z τ, ds = (n/n0) dτ, so the path is longer than the rod by a closed integral.
 #[test]
+fn what_a_ray_collects_does_not_depend_on_the_rays_beside_it() {
+    // Long ways, short ones across a corner, and rays that miss, in one packet and alone.
+    let field =
+        Field::from_fn([33, 25, 17], [0.0125; 3], DVec3::ZERO, 1.0003, |x| 1e-4 * (9.0 * x.x * x.y).sin())
+            .unwrap();
+    let smoke: Vec<f32> = (0..33 * 25 * 17).map(|i| 1.0 + (i % 7) as f32).collect();
+    let volume = Volume::new([33, 25, 17], [0.0125; 3], DVec3::ZERO, smoke, None).unwrap();
+    let media = Media::default().with(Property::Absorption, volume);
+    let view = View::from_angles_deg(34.0, 17.0, field.centre_m()).unwrap();
+    let starts: Vec<Start> =
+        (0..48).map(|i| start(-0.3 + 0.0125 * f64::from(i), 0.004 * f64::from(i % 5))).collect();
+    for bend in EVERY_BEND {
+        let w = walk(&field, view, &media, bend);
+        let together = along(&w, &starts);
+        assert!(together.iter().filter(|c| c.optical_depth > 0.1).count() > 16);
+        assert!(together.iter().any(|c| c.optical_depth == 0.0));
+        for (s, c) in starts.iter().zip(&together) {
+            assert_eq!(along(&w, &[*s]), [*c], "{bend:?} {s:?}");
+        }
+    }
+}
+
+#[test]
 fn in_strong_index_the_way_is_the_bent_one() {
     let (g, x0, length): (f64, f64, f64) = (3.0, 0.12, 1.0);
     let n = [65, 65, 129];
