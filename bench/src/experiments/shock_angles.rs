@@ -118,7 +118,8 @@ fn shock(rendered: &Rendered) -> Option<Line> {
     let photograph = Photograph::of(rendered)?;
     let width = f64::from(photograph.framing.width);
     let [left, right] = [0.35, 0.98].map(|p| photograph.framing.plane_from_pixel(p * width, 0.0)[0]);
-    let points = photograph.fronts_m(From::Top, Mark::Edge, 0.05, 4);
+    // On a coarse lattice a shock is many pixels wide, and the change from one to the next small.
+    let points = photograph.fronts_m(From::Top, Mark::Edge, 0.01, 4);
     fitted_line(&points.into_iter().filter(|p| (left..right).contains(&p[0])).collect::<Vec<_>>())
 }
 
