@@ -385,7 +385,7 @@ fn blas_blocks<S: Simd, const EXACT: bool, const ANY: bool>(
         singles::<S, EXACT, ANY>(simd, blas, rays, hits, instance);
         return;
     };
-    // Sizes 16, then 4, then 1.
+    // Packets of 16 blocks, then of 4; blocks whose rays part share the beginning of their way.
     for (r, h) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {
         if packet.load(simd, r, &Limits::NONE) {
             packet.trace::<S, EXACT, ANY>(simd, &tris.bvh);
@@ -398,13 +398,8 @@ fn blas_blocks<S: Simd, const EXACT: bool, const ANY: bool>(
                 packet.store::<ANY>(h, instance);
                 continue;
             }
-            for (r, h) in r.chunks(1).zip(h.chunks_mut(1)) {
-                if packet.load(simd, r, &Limits::NONE) {
-                    packet.trace::<S, EXACT, ANY>(simd, &tris.bvh);
-                    packet.store::<ANY>(h, instance);
-                } else {
-                    singles::<S, EXACT, ANY>(simd, blas, r, h, instance);
-                }
+            for (r, h) in r.iter().zip(h) {
+                hybrid::trace::<S, EXACT, ANY>(simd, &tris.bvh, r, hybrid::active_lanes(r), h, instance);
             }
         }
     }

@@ -2,8 +2,9 @@
 
 use super::{Packet, PacketLeaf, load_row, three};
 use crate::accel::wide::ChildRef;
-use crate::accel::{Unit, triangles};
+use crate::accel::{Unit, WideBvh, triangles};
 use crate::intersect::watertight::test;
+use crate::ray::LANES;
 use crate::stats::{Work, count};
 use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x4, f32x16, mask32x16, u32x16};
 
@@ -26,6 +27,19 @@ impl<S: Simd, const EXACT: bool, const ANY: bool, const COMMON: bool> PacketLeaf
         _: f32,
     ) -> u16 {
         packet.triangles::<S, EXACT, ANY, COMMON>(simd, units, leaf, reached)
+    }
+
+    #[inline(always)]
+    fn few(
+        &mut self,
+        packet: &mut Packet,
+        simd: S,
+        bvh: &WideBvh,
+        node: ChildRef,
+        met: u16,
+        lanes: &[u16; LANES],
+    ) -> u16 {
+        packet.few::<S, EXACT, ANY>(simd, bvh, node, met, lanes)
     }
 }
 

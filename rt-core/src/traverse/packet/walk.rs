@@ -1,8 +1,10 @@
 //! A packet's way through the hierarchy.
 
-use super::{Packet, PacketLeaf, load_row, three};
+use super::few::FEW;
+use super::{Packet, PacketLeaf, Slabs, load_row, three};
 use crate::accel::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE};
 use crate::accel::{Unit, WideBvh};
+use crate::ray::LANES;
 use crate::simd::{Stack, StackMemory, prefetch};
 use crate::stats::{Work, count};
 use crate::traverse::single::{BOX_SLACK, beyond};
@@ -71,14 +73,14 @@ impl Packet {
         near.simd_le(far).to_bitmask() as u16
     }
 
-    /// `SLABS`: groups whose intervals meet a box are tested ray by ray before they go on. Returns how many were, and how many of them went on.
+    /// `SLABS`: groups whose intervals meet a box are tested ray by ray before they go on. Returns how many were and what came of it.
     #[inline(never)]
     pub(super) fn walk<S: Simd, L: PacketLeaf<S>, const SLABS: bool>(
         &mut self,
         simd: S,
         bvh: &WideBvh,
         leaves: &mut L,
-    ) -> (u32, u32) {
+    ) -> Slabs {
         simd.vectorize(
             #[inline(always)]
             || self.walk_body::<S, L, SLABS>(simd, bvh, leaves),
@@ -91,10 +93,10 @@ impl Packet {
         simd: S,
         bvh: &WideBvh,
         leaves: &mut L,
-    ) -> (u32, u32) {
-        let (mut tested, mut kept) = (0, 0);
+    ) -> Slabs {
+        let mut slabs = Slabs::default();
         if self.groups == 0 {
-            return (tested, kept);
+            return slabs;
         }
         let units = bvh.units.as_slice();
         let v8 = |x: f32| f32x8::splat(simd, x);
@@ -169,15 +171,19 @@ impl Packet {
                 let node: &[Unit; NODE_UNITS] =
                     units[at..at + NODE_UNITS].try_into().expect("a slice of that length");
                 let child = ChildRef(node[CHILD_ROW].bits()[slot]);
+                let mut lanes = [0; LANES];
+                let mut rays = u32::MAX;
                 if SLABS {
-                    tested += met.count_ones();
-                    met = self.exact_slabs(simd, &planes(node, near_rows, slot), met, L::COMMON);
-                    kept += met.count_ones();
+                    slabs.tested += met.count_ones();
+                    (met, rays) =
+                        self.exact_slabs(simd, &planes(node, near_rows, slot), met, L::COMMON, &mut lanes);
+                    slabs.kept += met.count_ones();
+                    slabs.rays += rays;
                     if met == 0 {
                         continue;
                     }
                 }
-                if !child.is_leaf() {
+                if !child.is_leaf() && rays > FEW as u32 {
                     node_at = child.unit();
                     groups = met;
                     continue 'nodes;
@@ -190,7 +196,11 @@ impl Packet {
                         continue;
                     }
                 }
-                let changed = leaves.leaf(self, simd, units, child, met, distance);
+                let changed = if SLABS && !child.is_leaf() {
+                    leaves.few(self, simd, bvh, child, met, &lanes)
+                } else {
+                    leaves.leaf(self, simd, units, child, met, distance)
+                };
                 if changed != 0 {
                     let mut rest = changed;
                     while rest != 0 {
@@ -206,14 +216,21 @@ impl Packet {
                 }
             }
         }
-        (tested, kept)
+        slabs
     }
 
-    /// Of the groups in `reached`, those with a ray that meets the box. The intervals of rays with different origins or diverging directions say
+    /// Of the groups in `reached`, those with a ray that meets the box, and how many rays do; `lanes` gets which. The intervals of rays with different origins or diverging directions say
     /// little far away; this test is each ray's own.
     #[inline(always)]
-    fn exact_slabs<S: Simd>(&self, simd: S, planes: &[f32; 6], reached: u16, common: bool) -> u16 {
-        let mut kept = 0;
+    fn exact_slabs<S: Simd>(
+        &self,
+        simd: S,
+        planes: &[f32; 6],
+        reached: u16,
+        common: bool,
+        lanes: &mut [u16; LANES],
+    ) -> (u16, u32) {
+        let (mut kept, mut rays) = (0, 0);
         let mut rest = reached;
         // The origin all rays share is subtracted once.
         let shared = |a: usize| if common { self.origin_near[a][0] } else { 0.0 };
@@ -235,7 +252,9 @@ impl Packet {
                 .min(load_row(simd, &self.t[g]) * f32x16::splat(simd, beyond(1.0)));
             let hit = near.simd_le(far).to_bitmask() as u16 & self.active[g];
             kept |= ((hit != 0) as u16) << g;
+            rays += hit.count_ones();
+            lanes[g] = hit;
         }
-        kept
+        (kept, rays)
     }
 }
