@@ -393,6 +393,11 @@ fn warn_about_picture(scene: &Scene, report: &mut Report) {
         };
         report.warnings.push(format!("the picture is even ({low:.4} to {high:.4} of white): {cure}"));
     }
+    if report.tally.blocked_in_field > 0 && report.largest_deflection_rad == Some(0.0) {
+        report.warnings.push(
+            "no light passes the flow: every ray that enters it meets cells that are blank or solid; say what lies outside the mesh (flow.outside) and in hidden cells (flow.hidden), or look from another side".into(),
+        );
+    }
     if report.tally.not_a_number > 0 {
         report.warnings.push(format!(
             "{} photons came back with numbers that are none and were left out; please report this",

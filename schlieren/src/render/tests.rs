@@ -1,5 +1,5 @@
 use super::*;
-use crate::field::Field;
+use crate::field::{Field, Node};
 use crate::solids::Solids;
 use glam::{DVec3, Vec3};
 use rt_core::accel::{BuildOptions, World};
@@ -49,6 +49,25 @@ fn pictures_are_the_same_for_any_number_of_threads() {
             assert_eq!(bits(with(1)), bits(with(5)), "{text}");
         }
     }
+}
+
+#[test]
+fn a_flow_that_no_light_passes_is_named() {
+    let walled = |from: usize| {
+        let kind = |i: usize| if i / 1089 == 16 && i % 33 >= from { Node::Blank } else { Node::Gas };
+        let nodes: Vec<Node> = (0..33 * 33 * 33).map(kind).collect();
+        let b = blob();
+        Field::new(b.dims(), b.spacing_m(), b.origin_m(), b.eps().to_vec(), b.n0(), Some(nodes)).unwrap()
+    };
+    let s = scene(&format!("{SMALL}[view]\ndirection = \"z\"\n"));
+    let warned = |from| {
+        let section = TestSection::of_fields(&s, vec![walled(from)], None).unwrap();
+        let r = render(&s, &section, Layers { map: true, ..Layers::NONE }, &Control::default()).unwrap();
+        assert!(r.report.tally.blocked_in_field > 0);
+        r.report.warnings.iter().any(|w| w.contains("no light passes the flow"))
+    };
+    assert!(warned(0));
+    assert!(!warned(8), "a quarter is open");
 }
 
 #[test]
