@@ -197,7 +197,7 @@ pub fn decode<P: Composite>(
     }
     let (mask, pixels) = bytes[HEADER_BYTES..].split_at(mask_bytes as usize);
     let ones: u64 = mask.iter().map(|byte| u64::from(byte.count_ones())).sum();
-    let past_the_end = (span..8 * mask_bytes).any(|bit| mask[(bit / 8) as usize] >> (bit % 8) & 1 == 1);
+    let past_the_end = (span..8 * mask_bytes).any(|bit| (mask[(bit / 8) as usize] >> (bit % 8)) & 1 == 1);
     if mask_bytes > 0 && (ones != active || past_the_end) {
         return Err(WireError::Mask);
     }

@@ -12,7 +12,7 @@ const STRATEGIES: [Strategy; 6] = [
     Strategy::RadixK { k: 4 },
     Strategy::RadixK { k: 8 },
 ];
-const SIZES: [(u32, u32); 6] = [(1, 1), (2, 1), (7, 3), (1, 13), (31, 5), (64, 33)];
+const SIZES: [(u32, u32); 7] = [(0, 3), (1, 1), (2, 1), (7, 3), (1, 13), (31, 5), (64, 33)];
 
 /// xorshift64*; a seed gives the same frames everywhere.
 struct Random(u64);
