@@ -5,13 +5,14 @@
 //! thesis are about this step; IceT (Moreland, Kendall, Peterka, Huang, SC11) is the library it used.
 //!
 //! ```
-//! use composite::{Frame, Options, threads};
+//! use composite::{Communicator, Frame, Options, threads};
 //!
 //! // Three ranks, an image of 2x1 pixels: rank r drew red r at depth 0.9 - 0.1 r, but only the last rank the second pixel.
 //! let results = threads::run(3, |mut comm| {
-//!     let r = composite::Communicator::rank(&comm) as u8;
+//!     let r = comm.rank() as u8;
 //!     let depth = [[0.9, 0.8, 0.7][usize::from(r)], if r == 2 { 0.5 } else { 1.0 }];
-//!     let frame = Frame::with_depth(2, 1, &[[r, 0, 0, 255]; 2], &depth)?;
+//!     let color = [[r, 0, 0, 255]; 2];
+//!     let frame = Frame::with_depth(2, 1, &color, &depth)?;
 //!     composite::composite(&mut comm, &frame, &Options::default())
 //! });
 //! let on_rank_0 = results[0].as_ref().unwrap().as_ref().unwrap();

@@ -6,9 +6,12 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+/// Messages from one rank to another: tag and content, oldest first.
+type Mailbox = VecDeque<(u32, Vec<u8>)>;
+
 struct State {
-    /// `mail[receiver][sender]`: tag and message, oldest first.
-    mail: Vec<Vec<VecDeque<(u32, Vec<u8>)>>>,
+    /// `mail[receiver][sender]`.
+    mail: Vec<Vec<Mailbox>>,
     lost: Vec<bool>,
     aborted: Option<(usize, String)>,
     at_barrier: Vec<bool>,
@@ -44,7 +47,7 @@ pub struct ThreadComm {
 /// A group of `size` ranks; hand each element to its own thread.
 pub fn group(size: usize) -> Vec<ThreadComm> {
     let state = State {
-        mail: (0..size).map(|_| (0..size).map(|_| VecDeque::new()).collect()).collect(),
+        mail: (0..size).map(|_| vec![Mailbox::new(); size]).collect(),
         lost: vec![false; size],
         aborted: None,
         at_barrier: vec![false; size],
