@@ -229,3 +229,21 @@ fn ranks_that_drew_nothing_send_no_pixel_and_background_is_exact() {
         }
     }
 }
+
+/// Direct send counts in chunks of three pixels here, and the image ends with a chunk of two.
+#[test]
+fn a_single_pixel_in_the_last_incomplete_chunk_is_not_lost() {
+    let (w, h) = (61, 35);
+    let empty = vec![[0.0_f32; 4]; 61 * 35];
+    let mut single = empty.clone();
+    single[61 * 35 - 1] = [0.25, 0.0, 0.0, 0.5];
+    for drawn_by in 0..3 {
+        let frames: Vec<_> = (0..3)
+            .map(|rank| Frame::premultiplied(w, h, if rank == drawn_by { &single } else { &empty }).unwrap())
+            .collect();
+        for strategy in STRATEGIES {
+            let image = over_threads(&frames, &Options { strategy, ..Options::default() });
+            assert_eq!(image.colors(), single, "{strategy:?}, drawn by rank {drawn_by}");
+        }
+    }
+}
