@@ -1,5 +1,50 @@
-//! Sort-last compositing and data-parallel rendering, over threads or MPI.
+//! Sort-last compositing: every rank has rendered its part of the data, together they make one image.
 //!
-//! **Status: not built yet.** This member holds its place in the workspace and has no code; ARCHITECTURE.md says
-//! what it will do and in which order the members come.
+//! Slices of colour and depth, or of ordered premultiplied colour, go in; one image, or a piece of it on every rank, comes
+//! out, over any [`Communicator`]. All strategies give the same bits as [`composite_serial`]. Sections 3.2.1 and 3.3 of the
+//! thesis are about this step; IceT (Moreland, Kendall, Peterka, Huang, SC11) is the library it used.
+//!
+//! ```
+//! use composite::{Communicator, Frame, Options, threads};
+//!
+//! // Three ranks, an image of 2x1 pixels: rank r drew red r at depth 0.9 - 0.1 r, but only the last rank the second pixel.
+//! let results = threads::run(3, |mut comm| {
+//!     let r = comm.rank() as u8;
+//!     let depth = [[0.9, 0.8, 0.7][usize::from(r)], if r == 2 { 0.5 } else { 1.0 }];
+//!     let color = [[r, 0, 0, 255]; 2];
+//!     let frame = Frame::with_depth(2, 1, &color, &depth)?;
+//!     composite::composite(&mut comm, &frame, &Options::default())
+//! });
+//! let on_rank_0 = results[0].as_ref().unwrap().as_ref().unwrap();
+//! let image = on_rank_0.image.as_ref().unwrap();
+//! assert_eq!(image.colors(), [[2, 0, 0, 255]; 2]);
+//! assert_eq!(image.depths(), [0.7, 0.5]);
+//! ```
+//!
+//! Built so far: the library over threads. Not built: MPI, shared-memory merging, streaming, choosing a strategy
+//! automatically, 2-D bounding rectangles, SIMD, rendering.
 #![forbid(unsafe_code)]
+
+pub mod comm;
+pub mod rank_order;
+pub mod wire;
+
+mod collect;
+mod compositor;
+mod error;
+mod frame;
+mod pixel;
+mod reference;
+mod report;
+mod session;
+mod strategies;
+
+pub use comm::{CommError, Communicator, threads};
+pub use compositor::{Composited, Destination, Options, composite};
+pub use error::CompositeError;
+pub use frame::{Frame, Image, Piece};
+pub use pixel::{Color, Composite, DepthPixel, PixelFormat, PremultipliedPixel, combine};
+pub use reference::composite_serial;
+pub use report::Report;
+pub use strategies::Strategy;
+pub use wire::WireError;

@@ -1,0 +1,314 @@
+//! Ranks as threads of one process: every rank has a mailbox for each other rank, messages are moved and not copied.
+//!
+//! The whole group shares one lock. It is held for the move of one pointer, never while pixels are worked on.
+use super::{CommError, Communicator};
+use std::collections::VecDeque;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Messages from one rank to another: tag and content, oldest first.
+type Mailbox = VecDeque<(u32, Vec<u8>)>;
+
+struct State {
+    /// `mail[receiver][sender]`.
+    mail: Vec<Vec<Mailbox>>,
+    lost: Vec<bool>,
+    aborted: Option<(usize, String)>,
+    at_barrier: Vec<bool>,
+    barriers_done: u64,
+}
+
+struct Group {
+    state: Mutex<State>,
+    /// One per rank, so that a message wakes its receiver alone.
+    wake: Vec<Condvar>,
+}
+
+impl Group {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        // Nothing panics while the lock is held, so a poisoned state is still a whole one.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn wake_all(&self) {
+        for condvar in &self.wake {
+            condvar.notify_all();
+        }
+    }
+}
+
+/// One rank of a group of threads. Dropping it leaves the group: whoever still waits for this rank gets
+/// [`CommError::PeerLost`], but messages already sent still arrive.
+pub struct ThreadComm {
+    rank: usize,
+    group: Arc<Group>,
+}
+
+/// A group of `size` ranks; hand each element to its own thread.
+pub fn group(size: usize) -> Vec<ThreadComm> {
+    let state = State {
+        mail: (0..size).map(|_| vec![Mailbox::new(); size]).collect(),
+        lost: vec![false; size],
+        aborted: None,
+        at_barrier: vec![false; size],
+        barriers_done: 0,
+    };
+    let wake = (0..size).map(|_| Condvar::new()).collect();
+    let group = Arc::new(Group { state: Mutex::new(state), wake });
+    (0..size).map(|rank| ThreadComm { rank, group: Arc::clone(&group) }).collect()
+}
+
+/// Runs `work` on `size` ranks, each on a thread of its own, and returns their results in rank order.
+///
+/// A panic of one rank is that rank's [`CommError::Panicked`]; the others see it as [`CommError::PeerLost`].
+pub fn run<T: Send>(size: usize, work: impl Fn(ThreadComm) -> T + Sync) -> Vec<Result<T, CommError>> {
+    let work = &work;
+    std::thread::scope(|scope| {
+        let threads: Vec<_> = group(size)
+            .into_iter()
+            .map(|comm| {
+                let rank = comm.rank;
+                let name = format!("rank {rank}");
+                (rank, std::thread::Builder::new().name(name).spawn_scoped(scope, move || work(comm)))
+            })
+            .collect();
+        threads
+            .into_iter()
+            .map(|(rank, thread)| match thread {
+                Ok(thread) => {
+                    thread.join().map_err(|panic| CommError::Panicked { rank, message: words(&*panic) })
+                }
+                Err(error) => Err(CommError::NoThread { rank, reason: error.to_string() }),
+            })
+            .collect()
+    })
+}
+
+fn words(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(ToString::to_string);
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no message".to_string())
+}
+
+impl ThreadComm {
+    fn check_rank(&self, peer: usize) -> Result<(), CommError> {
+        let size = self.group.wake.len();
+        if peer < size { Ok(()) } else { Err(CommError::NoSuchRank { peer, size }) }
+    }
+
+    /// Waits until `ready` gives something, the group is aborted, or `timeout` has passed (then `None`).
+    fn wait<T>(
+        &self,
+        timeout: Duration,
+        mut ready: impl FnMut(&mut State) -> Option<Result<T, CommError>>,
+    ) -> Result<Option<T>, CommError> {
+        let begin = Instant::now();
+        let mut state = self.group.lock();
+        loop {
+            if let Some((by, reason)) = &state.aborted {
+                return Err(CommError::Aborted { by: *by, reason: reason.clone() });
+            }
+            if let Some(result) = ready(&mut state) {
+                return result.map(Some);
+            }
+            let Some(left) = timeout.checked_sub(begin.elapsed()).filter(|left| !left.is_zero()) else {
+                return Ok(None);
+            };
+            let woken = self.group.wake[self.rank].wait_timeout(state, left);
+            state = woken.unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+}
+
+impl Communicator for ThreadComm {
+    fn rank(&self) -> usize {
+        self.rank
+    }
+
+    fn size(&self) -> usize {
+        self.group.wake.len()
+    }
+
+    fn send(&mut self, destination: usize, tag: u32, message: Vec<u8>) -> Result<(), CommError> {
+        self.check_rank(destination)?;
+        let mut state = self.group.lock();
+        if let Some((by, reason)) = &state.aborted {
+            return Err(CommError::Aborted { by: *by, reason: reason.clone() });
+        }
+        if state.lost[destination] {
+            return Err(CommError::PeerLost { rank: self.rank, peer: destination });
+        }
+        state.mail[destination][self.rank].push_back((tag, message));
+        self.group.wake[destination].notify_all();
+        Ok(())
+    }
+
+    fn recv(&mut self, source: usize, tag: u32, timeout: Duration) -> Result<Vec<u8>, CommError> {
+        self.check_rank(source)?;
+        let rank = self.rank;
+        let message = self.wait(timeout, |state| {
+            let mail = &mut state.mail[rank][source];
+            if let Some(position) = mail.iter().position(|(its_tag, _)| *its_tag == tag) {
+                return mail.remove(position).map(|(_, message)| Ok(message));
+            }
+            state.lost[source].then_some(Err(CommError::PeerLost { rank, peer: source }))
+        })?;
+        message.ok_or(CommError::Timeout { rank, peer: source, tag, waited_ms: timeout.as_millis() as u64 })
+    }
+
+    fn barrier(&mut self, timeout: Duration) -> Result<(), CommError> {
+        let rank = self.rank;
+        let before = {
+            let mut state = self.group.lock();
+            state.at_barrier[rank] = true;
+            let before = state.barriers_done;
+            if state.at_barrier.iter().all(|&here| here) {
+                state.at_barrier.fill(false);
+                state.barriers_done += 1;
+                self.group.wake_all();
+            }
+            before
+        };
+        let passed = self.wait(timeout, |state| {
+            if state.barriers_done > before {
+                return Some(Ok(()));
+            }
+            let peer = (0..state.lost.len()).find(|&peer| state.lost[peer] && !state.at_barrier[peer])?;
+            Some(Err(CommError::PeerLost { rank, peer }))
+        })?;
+        if passed.is_some() {
+            return Ok(());
+        }
+        let mut state = self.group.lock();
+        if state.barriers_done > before {
+            // The last rank came between the end of the wait and the lock.
+            return Ok(());
+        }
+        let missing = state.at_barrier.iter().position(|&here| !here).unwrap_or(rank);
+        // This rank no longer waits: without this, a latecomer would pass a barrier that has failed here.
+        state.at_barrier[rank] = false;
+        Err(CommError::BarrierTimeout { rank, missing, waited_ms: timeout.as_millis() as u64 })
+    }
+
+    fn abort(&mut self, reason: &str) {
+        let mut state = self.group.lock();
+        if state.aborted.is_none() {
+            state.aborted = Some((self.rank, reason.to_string()));
+        }
+        self.group.wake_all();
+    }
+}
+
+impl Drop for ThreadComm {
+    fn drop(&mut self) {
+        self.group.lock().lost[self.rank] = true;
+        self.group.wake_all();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LONG: Duration = Duration::from_secs(20);
+    const SHORT: Duration = Duration::from_millis(30);
+
+    fn results<T: Send>(size: usize, work: impl Fn(ThreadComm) -> T + Sync) -> Vec<T> {
+        run(size, work).into_iter().map(|result| result.unwrap()).collect()
+    }
+
+    #[test]
+    fn messages_keep_their_order_within_a_tag_and_tags_do_not_mix() {
+        let received = results(2, |mut comm| {
+            if comm.rank() == 0 {
+                for (tag, byte) in [(7, 1), (8, 2), (7, 3)] {
+                    comm.send(1, tag, vec![byte]).unwrap();
+                }
+                return Vec::new();
+            }
+            [8, 7, 7].map(|tag| comm.recv(0, tag, LONG).unwrap()[0]).to_vec()
+        });
+        assert_eq!(received[1], [2, 1, 3]);
+    }
+
+    #[test]
+    fn a_rank_may_send_to_itself_and_to_no_rank_outside() {
+        let mut comm = group(1).remove(0);
+        comm.send(0, 1, vec![5]).unwrap();
+        assert_eq!(comm.recv(0, 1, LONG).unwrap(), [5]);
+        assert_eq!(comm.send(1, 1, vec![]), Err(CommError::NoSuchRank { peer: 1, size: 1 }));
+        assert_eq!(comm.recv(9, 1, LONG), Err(CommError::NoSuchRank { peer: 9, size: 1 }));
+    }
+
+    #[test]
+    fn silence_is_a_timeout_that_names_both_ranks() {
+        let mut comms = group(2);
+        let error = comms[1].recv(0, 4, SHORT).unwrap_err();
+        assert_eq!(error, CommError::Timeout { rank: 1, peer: 0, tag: 4, waited_ms: 30 });
+    }
+
+    #[test]
+    fn a_panicking_rank_is_lost_to_those_who_wait_for_it() {
+        let outcome = run(3, |mut comm| {
+            assert!(comm.rank() != 1, "on purpose");
+            comm.recv(1, 0, LONG)
+        });
+        assert_eq!(outcome[0], Ok(Err(CommError::PeerLost { rank: 0, peer: 1 })));
+        assert_eq!(outcome[1], Err(CommError::Panicked { rank: 1, message: "on purpose".into() }));
+        assert_eq!(outcome[2], Ok(Err(CommError::PeerLost { rank: 2, peer: 1 })));
+    }
+
+    #[test]
+    fn what_a_rank_sent_before_it_left_still_arrives() {
+        let mut comms = group(2);
+        let mut first = comms.remove(0);
+        first.send(1, 0, vec![1]).unwrap();
+        drop(first);
+        assert_eq!(comms[0].recv(0, 0, LONG), Ok(vec![1]));
+        assert_eq!(comms[0].recv(0, 0, LONG), Err(CommError::PeerLost { rank: 1, peer: 0 }));
+        assert_eq!(comms[0].send(0, 0, vec![]), Err(CommError::PeerLost { rank: 1, peer: 0 }));
+    }
+
+    #[test]
+    fn an_abort_reaches_waiting_ranks_at_once_and_the_first_reason_stays() {
+        let begin = Instant::now();
+        let outcome = results(4, |mut comm| {
+            if comm.rank() == 2 {
+                std::thread::sleep(SHORT);
+                comm.abort("out of memory");
+                comm.abort("something later");
+                return comm.barrier(LONG).unwrap_err();
+            }
+            comm.recv(2, 0, LONG).unwrap_err()
+        });
+        for error in outcome {
+            assert_eq!(error, CommError::Aborted { by: 2, reason: "out of memory".into() });
+        }
+        assert!(begin.elapsed() < LONG);
+    }
+
+    #[test]
+    fn nobody_passes_a_barrier_before_all_have_come() {
+        use std::sync::atomic::{AtomicUsize, Ordering};
+        let arrived = AtomicUsize::new(0);
+        let seen = results(5, |mut comm| {
+            (1..=20)
+                .map(|round| {
+                    arrived.fetch_add(1, Ordering::SeqCst);
+                    comm.barrier(LONG).unwrap();
+                    arrived.load(Ordering::SeqCst) >= 5 * round
+                })
+                .collect::<Vec<_>>()
+        });
+        assert!(seen.iter().flatten().all(|&complete| complete));
+    }
+
+    #[test]
+    fn a_barrier_without_one_rank_names_it() {
+        let mut comms = group(3);
+        let error = comms[0].barrier(SHORT).unwrap_err();
+        assert_eq!(error, CommError::BarrierTimeout { rank: 0, missing: 1, waited_ms: 30 });
+        let gone = comms.remove(2);
+        drop(gone);
+        assert_eq!(comms[1].barrier(LONG), Err(CommError::PeerLost { rank: 1, peer: 2 }));
+    }
+}

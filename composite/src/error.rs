@@ -1,0 +1,66 @@
+//! What can go wrong, by name.
+use crate::comm::CommError;
+use crate::wire::WireError;
+
+/// Why a composited image could not be made. After an error no rank gets an image: the communicator is aborted.
+#[derive(Debug, thiserror::Error, Clone, PartialEq, Eq)]
+pub enum CompositeError {
+    /// A slice of a frame has the wrong length.
+    #[error(
+        "the {slice} slice holds {found} values but a {width_px}x{height_px} image needs {expected}: pass one value per pixel"
+    )]
+    FrameSize {
+        /// `colour` or `depth`.
+        slice: &'static str,
+        /// Width of the frame.
+        width_px: u32,
+        /// Height of the frame.
+        height_px: u32,
+        /// Values needed.
+        expected: u64,
+        /// Values given.
+        found: u64,
+    },
+    /// The serial reference got nothing.
+    #[error("no frame to composite: pass the frame of at least one rank")]
+    NoFrames,
+    /// The serial reference got frames of several sizes.
+    #[error(
+        "rank {rank} has a {}x{} image, the others {}x{}: render the same size on every rank",
+        found_px.0, found_px.1, expected_px.0, expected_px.1
+    )]
+    SizesDiffer {
+        /// First rank that differs from rank 0.
+        rank: usize,
+        /// Its width and height.
+        found_px: (u32, u32),
+        /// Width and height of rank 0.
+        expected_px: (u32, u32),
+    },
+    /// The options cannot work for this communicator.
+    #[error("{0}")]
+    Options(String),
+    /// A message arrived that cannot be used.
+    #[error("rank {rank} got an unusable message from rank {from}: {reason}")]
+    Message {
+        /// The receiver.
+        rank: usize,
+        /// The sender.
+        from: usize,
+        /// What is wrong with it.
+        reason: WireError,
+    },
+    /// Two ranks hold the same part of the finished image, or nobody holds a part.
+    #[error(
+        "the pieces of the image do not fit together at pixel {pixel} (piece of rank {rank}): all ranks must use the same options"
+    )]
+    Pieces {
+        /// Where.
+        pixel: u64,
+        /// Whose piece.
+        rank: usize,
+    },
+    /// The transport failed.
+    #[error(transparent)]
+    Comm(#[from] CommError),
+}
