@@ -6,10 +6,10 @@
 //! 1.1 times. Collecting rays and subtrees of several steps first, so that fewer walk alone, lost 5 %: a ray that is answered early is of no more use then.)
 
 use super::packet::three;
-use super::single::{BOX_SLACK, LeafTest, RaySetup, beyond};
-use crate::accel::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE};
+use super::single::{BOX_SLACK, LeafTest, RaySetup, beyond, follow};
+use crate::accel::wide::{ChildRef, NODE_UNITS, STACK_SIZE};
 use crate::accel::{Unit, WideBvh};
-use crate::simd::{Stack, StackMemory, prefetch};
+use crate::simd::{Stack, StackMemory};
 use crate::stats::{Work, count};
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x8};
 
@@ -106,62 +106,12 @@ impl<'m, S: Simd, L: LeafTest<S>> Walk<'m, S, L> {
         units: &[Unit],
         node: &[Unit; NODE_UNITS],
         near: f32x8<S>,
-        mut mask: u32,
+        mask: u32,
     ) -> bool {
         count(Work::Nodes, 1);
-        let mut pop = true;
-        if mask != 0 {
-            pop = false;
-            let refs = node[CHILD_ROW].bits();
-            let first = mask.trailing_zeros() as usize;
-            mask &= mask - 1;
-            if mask == 0 {
-                self.current = ChildRef(refs[first & 7]);
-                prefetch::<4>(units, self.current.unit());
-            } else {
-                let near: [f32; 8] = near.to_array();
-                let entry = |i: usize| {
-                    let child = refs[i & 7];
-                    prefetch::<4>(units, ChildRef(child).unit());
-                    ((near[i & 7].to_bits() as u64) << 32) | child as u64
-                };
-                if !ORDERED {
-                    self.current = ChildRef(entry(first) as u32);
-                    while mask != 0 {
-                        self.stack.push(entry(mask.trailing_zeros() as usize));
-                        mask &= mask - 1;
-                    }
-                } else {
-                    let (a, b) = (entry(first), entry(mask.trailing_zeros() as usize));
-                    mask &= mask - 1;
-                    let (e0, e1) = (a.min(b), a.max(b));
-                    if mask == 0 {
-                        self.stack.push(e1);
-                        self.current = ChildRef(e0 as u32);
-                    } else {
-                        let c = entry(mask.trailing_zeros() as usize);
-                        mask &= mask - 1;
-                        let (e0, c) = (e0.min(c), e0.max(c));
-                        let (e1, e2) = (e1.min(c), e1.max(c));
-                        let base = self.stack.len();
-                        self.stack.push(e2);
-                        self.stack.push(e1);
-                        if mask == 0 {
-                            self.current = ChildRef(e0 as u32);
-                        } else {
-                            self.stack.push(e0);
-                            while mask != 0 {
-                                self.stack.push(entry(mask.trailing_zeros() as usize));
-                                mask &= mask - 1;
-                            }
-                            self.stack.sort_descending_from(base);
-                            pop = true;
-                        }
-                    }
-                }
-            }
-        }
-        self.settle(simd, units, pop)
+        let child = follow::<S, ORDERED>(units, node, near, mask, &mut self.stack);
+        self.current = child.unwrap_or(self.current);
+        self.settle(simd, units, child.is_none())
     }
 
     /// Tests leaves and takes from the stack until an inner node is reached; `pop`: the current reference is used up.

@@ -137,58 +137,10 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
                 rcp_far[2],
             ));
             let hit = near.simd_le(far.min(f32x8::splat(simd, skip_t)));
-            let mut mask = hit.to_bitmask() as u32;
-            if mask != 0 {
-                let refs = node[CHILD_ROW].bits();
-                let first = mask.trailing_zeros() as usize;
-                mask &= mask - 1;
-                if mask == 0 {
-                    current = ChildRef(refs[first & 7]);
-                    prefetch::<4>(units, current.unit());
-                    continue;
-                }
-                let near: [f32; 8] = near.to_array();
-                let entry = |i: usize| {
-                    let child = refs[i & 7];
-                    prefetch::<4>(units, ChildRef(child).unit());
-                    ((near[i & 7].to_bits() as u64) << 32) | child as u64
-                };
-                if !ORDERED {
-                    current = ChildRef(entry(first) as u32);
-                    while mask != 0 {
-                        stack.push(entry(mask.trailing_zeros() as usize));
-                        mask &= mask - 1;
-                    }
-                    continue;
-                }
-                // Up to four are sorted in registers: which of two boxes is nearer is a coin toss, so no branch may ask.
-                let (a, b) = (entry(first), entry(mask.trailing_zeros() as usize));
-                mask &= mask - 1;
-                let (e0, e1) = (a.min(b), a.max(b));
-                if mask == 0 {
-                    stack.push(e1);
-                    current = ChildRef(e0 as u32);
-                    continue;
-                }
-                let c = entry(mask.trailing_zeros() as usize);
-                mask &= mask - 1;
-                let (e0, c) = (e0.min(c), e0.max(c));
-                let (e1, e2) = (e1.min(c), e1.max(c));
-                if mask == 0 {
-                    stack.push(e2);
-                    stack.push(e1);
-                    current = ChildRef(e0 as u32);
-                    continue;
-                }
-                let base = stack.len();
-                stack.push(e2);
-                stack.push(e1);
-                stack.push(e0);
-                while mask != 0 {
-                    stack.push(entry(mask.trailing_zeros() as usize));
-                    mask &= mask - 1;
-                }
-                stack.sort_descending_from(base);
+            if let Some(child) = follow::<S, ORDERED>(units, node, near, hit.to_bitmask() as u32, &mut stack)
+            {
+                current = child;
+                continue;
             }
         }
         // ---- Next entry that still lies before the closest hit.
@@ -200,4 +152,66 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
             }
         }
     }
+}
+
+/// Where to go from a node of which the boxes in `mask` are met, at the distances `near`: the nearest child when `ORDERED`, any otherwise; the others wait on the
+/// stack. `None`: what comes next is on the stack.
+#[inline(always)]
+pub(super) fn follow<S: Simd, const ORDERED: bool>(
+    units: &[Unit],
+    node: &[Unit; NODE_UNITS],
+    near: f32x8<S>,
+    mut mask: u32,
+    stack: &mut Stack<'_, u64, STACK_SIZE>,
+) -> Option<ChildRef> {
+    if mask == 0 {
+        return None;
+    }
+    let refs = node[CHILD_ROW].bits();
+    let first = mask.trailing_zeros() as usize;
+    mask &= mask - 1;
+    if mask == 0 {
+        let child = ChildRef(refs[first & 7]);
+        prefetch::<4>(units, child.unit());
+        return Some(child);
+    }
+    let near: [f32; 8] = near.to_array();
+    let entry = |i: usize| {
+        let child = refs[i & 7];
+        prefetch::<4>(units, ChildRef(child).unit());
+        ((near[i & 7].to_bits() as u64) << 32) | child as u64
+    };
+    if !ORDERED {
+        let child = ChildRef(entry(first) as u32);
+        while mask != 0 {
+            stack.push(entry(mask.trailing_zeros() as usize));
+            mask &= mask - 1;
+        }
+        return Some(child);
+    }
+    // Up to three are sorted in registers: which of two boxes is nearer is a coin toss, so no branch may ask.
+    let (a, b) = (entry(first), entry(mask.trailing_zeros() as usize));
+    mask &= mask - 1;
+    let (e0, e1) = (a.min(b), a.max(b));
+    if mask == 0 {
+        stack.push(e1);
+        return Some(ChildRef(e0 as u32));
+    }
+    let c = entry(mask.trailing_zeros() as usize);
+    mask &= mask - 1;
+    let (e0, c) = (e0.min(c), e0.max(c));
+    let (e1, e2) = (e1.min(c), e1.max(c));
+    let base = stack.len();
+    stack.push(e2);
+    stack.push(e1);
+    if mask == 0 {
+        return Some(ChildRef(e0 as u32));
+    }
+    stack.push(e0);
+    while mask != 0 {
+        stack.push(entry(mask.trailing_zeros() as usize));
+        mask &= mask - 1;
+    }
+    stack.sort_descending_from(base);
+    None
 }

@@ -115,7 +115,8 @@ impl SlabUse {
     /// Beyond this share of kept groups the tests cost more than they save. Measured shares on one million triangles: 0.83 and 0.94 for pixels (orbit, close by),
     /// where the tests cost a tenth of the time; 0.66 and 0.93 for rays from a light, where they save a third and cost a quarter.
     const KEPT: f32 = 0.75;
-    /// With fewer rays than this in a group that is tested, the packet falls apart, and the tests find the few rays that had better go on alone.
+    /// With fewer rays than this in a group that is tested, the packet falls apart, and the tests find the few rays that had better go on alone. One value tried: rays from a light
+    /// among pipes took 94 instead of 133 ms, among isosurfaces nothing changed.
     const RAYS: f32 = 5.0;
 
     fn next(&mut self) -> bool {
