@@ -5,10 +5,14 @@ use crate::tree::{File, files, words};
 /// The only places where `unsafe` may be written, and why it cannot be avoided there. ARCHITECTURE.md explains each.
 const UNSAFE_ROOMS: &[(&str, &str)] = &[
     ("rt-core/src/simd", "vector loads and huge pages below the safe SIMD layer"),
-    ("gluray/src/symbols.rs", "exported OpenGL symbols, called by programs we do not know"),
-    ("gluray/src/real.rs", "calls into the real OpenGL library"),
-    ("vtk-bridge/src/capi.rs", "the C ABI for VTK and ParaView"),
-    ("composite/src/comm/mpi.rs", "calls into an MPI library found at run time"),
+    ("gluray/src/symbols", "exported OpenGL symbols, called by programs we do not know"),
+    ("gluray/src/real", "calls into the real OpenGL library"),
+    ("gluray/src/client_memory", "vertex arrays that live in the program's own memory"),
+    ("vtk-bridge/src/capi", "the C ABI for VTK and ParaView"),
+    ("vtk-bridge/src/loader", "finds the VTK that is in the process and loads what fits it"),
+    ("vtk-bridge/src/anari/abi", "the C++ vtables through which ANARI programs call a device"),
+    ("composite/src/comm/mpi", "calls into an MPI library found at run time"),
+    ("composite/src/rival", "calls into IceT, found at run time; a measurement against a rival is a call into it"),
     ("bench/src/peers", "calls into C libraries that we measure against"),
 ];
 
