@@ -95,7 +95,13 @@ impl<P: Composite> Layer<P> {
 }
 
 #[inline(always)]
-fn join_rows<P: Composite, S: Simd>(simd: S, layer: &mut Layer<P>, view: &View<'_, P>, both: Rect, side: Side) {
+fn join_rows<P: Composite, S: Simd>(
+    simd: S,
+    layer: &mut Layer<P>,
+    view: &View<'_, P>,
+    both: Rect,
+    side: Side,
+) {
     for y in both.y0..both.y1 {
         let (colors, depths) = view.row(y, both.x0, both.x1);
         let (held_colors, held_depths) = layer.row_mut(y, both.x0, both.x1);

@@ -6,7 +6,12 @@ use fearless_simd::Simd;
 
 /// Appends the values of `SIZE` bytes in `row` whose bits are set in the words at `mask_at` of `out` itself.
 #[inline(always)]
-pub(crate) fn append_active<const SIZE: usize, S: Simd>(simd: S, out: &mut Vec<u8>, mask_at: usize, row: &[u8]) {
+pub(crate) fn append_active<const SIZE: usize, S: Simd>(
+    simd: S,
+    out: &mut Vec<u8>,
+    mask_at: usize,
+    row: &[u8],
+) {
     // Room for the whole row and one vector more, so that nothing below has to grow the buffer.
     out.reserve(row.len() + 64);
     for (index, block) in row.chunks(64 * SIZE).enumerate() {
@@ -47,7 +52,12 @@ fn append_by_runs<const SIZE: usize>(out: &mut Vec<u8>, word: u64, block: &[u8])
 
 /// Whether there is an instruction for it.
 #[inline(always)]
-fn append_by_vectors<const SIZE: usize, S: Simd>(simd: S, out: &mut Vec<u8>, word: u64, block: &[u8]) -> bool {
+fn append_by_vectors<const SIZE: usize, S: Simd>(
+    simd: S,
+    out: &mut Vec<u8>,
+    word: u64,
+    block: &[u8],
+) -> bool {
     #[cfg(target_arch = "x86_64")]
     if SIZE == 4
         && let Some(avx512) = simd.level().as_avx512()

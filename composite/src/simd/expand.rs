@@ -1,10 +1,10 @@
 //! From the active pixels of a message back to rows: joined to what is held, or put in place.
 use crate::color::Color;
 use crate::pixel::{Composite, combine};
+use crate::simd::for_runs;
 use crate::simd::runs::nearest_run;
 #[cfg(target_arch = "x86_64")]
 use crate::simd::runs::{padded_16, take_nearer};
-use crate::simd::for_runs;
 use fearless_simd::Simd;
 
 /// Active pixels of one row of a message.
@@ -92,7 +92,8 @@ pub(crate) fn join_row<P: Composite, S: Simd>(
             continue;
         }
         let first = 64 * index;
-        if word != u64::MAX && join_by_vectors::<P, S>(simd, row, taken, word, first, held_colors, held_depths, side)
+        if word != u64::MAX
+            && join_by_vectors::<P, S>(simd, row, taken, word, first, held_colors, held_depths, side)
         {
             taken += word.count_ones() as usize;
             continue;
@@ -150,7 +151,8 @@ pub(crate) fn place_row<P: Composite>(row: SparseRow<'_>, colors: &mut [P::Color
         for_runs(word, |start, length| {
             let at = first + start;
             let from = taken * P::Color::BYTES..(taken + length) * P::Color::BYTES;
-            bytemuck::cast_slice_mut::<_, u8>(&mut colors[at..at + length]).copy_from_slice(&row.colors[from]);
+            bytemuck::cast_slice_mut::<_, u8>(&mut colors[at..at + length])
+                .copy_from_slice(&row.colors[from]);
             if with_depths {
                 bytemuck::cast_slice_mut::<_, u8>(&mut depths[at..at + length])
                     .copy_from_slice(&row.depths[4 * taken..4 * (taken + length)]);

@@ -1,7 +1,7 @@
 //! Which pixels of a row are active: 64 of them a word, lowest bit first.
 use crate::color::Color;
 use crate::pixel::Composite;
-use fearless_simd::{Simd, SimdBase, SimdFloat, SimdInt, SimdMask, f32x16, u32x16};
+use fearless_simd::{Simd, SimdBase, SimdMask, f32x16, u32x16};
 
 /// What a row, or several, held.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

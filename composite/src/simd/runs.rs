@@ -3,8 +3,7 @@ use crate::color::Color;
 use crate::simd::load_64;
 use bytemuck::{cast_slice, cast_slice_mut, pod_read_unaligned};
 use fearless_simd::{
-    Bytes, Select, Simd, SimdBase, SimdFloat, SimdInt, SimdMask, SimdNarrow, SimdWiden, f32x16, u8x64, u16x32,
-    u32x16,
+    Bytes, Select, Simd, SimdBase, SimdInt, SimdMask, SimdNarrow, SimdWiden, f32x16, u8x64, u16x32, u32x16,
 };
 
 /// Sixteen colours of four bytes.
@@ -106,8 +105,8 @@ pub(crate) fn over_rgba8<S: Simd>(simd: S, others: &[u8], held: &mut [[u8; 4]], 
         let see_through = !front.swizzle_dyn_within_blocks(alpha_of);
         let (back_low, back_high) = back.widen();
         let (through_low, through_high) = see_through.widen();
-        let behind =
-            divided_by_255(simd, back_low * through_low).narrow(divided_by_255(simd, back_high * through_high));
+        let behind = divided_by_255(simd, back_low * through_low)
+            .narrow(divided_by_255(simd, back_high * through_high));
         front.saturating_add(behind).store_slice(&mut held_bytes[range]);
     }
     over_one_by_one(&others[64 * blocks..], &mut held[16 * blocks..], others_in_front);
