@@ -13,10 +13,19 @@ const SOURCES: &[(&str, &str)] = &[
     ("RtvBridge/CMakeLists.txt", include_str!("../../cpp/plugin/RtvBridge/CMakeLists.txt")),
     ("RtvBridge/paraview.plugin", include_str!("../../cpp/plugin/RtvBridge/paraview.plugin")),
     ("RtvBridge/rtv_bridge.xml", include_str!("../../cpp/plugin/RtvBridge/rtv_bridge.xml")),
-    ("RtvBridge/RtvModule/CMakeLists.txt", include_str!("../../cpp/plugin/RtvBridge/RtvModule/CMakeLists.txt")),
+    (
+        "RtvBridge/RtvModule/CMakeLists.txt",
+        include_str!("../../cpp/plugin/RtvBridge/RtvModule/CMakeLists.txt"),
+    ),
     ("RtvBridge/RtvModule/vtk.module", include_str!("../../cpp/plugin/RtvBridge/RtvModule/vtk.module")),
-    ("RtvBridge/RtvModule/vtkRtvSettings.h", include_str!("../../cpp/plugin/RtvBridge/RtvModule/vtkRtvSettings.h")),
-    ("RtvBridge/RtvModule/vtkRtvSettings.cxx", include_str!("../../cpp/plugin/RtvBridge/RtvModule/vtkRtvSettings.cxx")),
+    (
+        "RtvBridge/RtvModule/vtkRtvSettings.h",
+        include_str!("../../cpp/plugin/RtvBridge/RtvModule/vtkRtvSettings.h"),
+    ),
+    (
+        "RtvBridge/RtvModule/vtkRtvSettings.cxx",
+        include_str!("../../cpp/plugin/RtvBridge/RtvModule/vtkRtvSettings.cxx"),
+    ),
 ];
 
 /// Builds the plugin for `flavour` and puts it into its folder. Returns the file.
