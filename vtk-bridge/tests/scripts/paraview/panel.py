@@ -28,7 +28,7 @@ def pixels():
 
 plain = pixels()
 for name, value in [("Shadows", 1), ("AmbientSamples", 8), ("Mirror", 0.5), ("Material", "Metal"), ("Material", "Glass"), ("Material", "Transparent"), ("PathTracing", 1)]:
-    before = getattr(settings, name)
+    before = "Scene" if name == "Material" else 0
     setattr(settings, name, value)
     changed = sum(abs(a - b) > 3 for a, b in zip(plain, pixels())) / len(plain)
     assert changed > 0.002, (name, value, changed)
