@@ -100,13 +100,15 @@ pub struct Compositor<P: Composite> {
     options: Options,
     scratch: Scratch<P>,
     spare: Option<Image<P>>,
+    /// Where the frames of one node are merged.
+    pub(crate) node_image: Option<Image<P>>,
 }
 
 impl<P: Composite> Compositor<P> {
     /// A compositor that has no buffers yet.
     pub fn new(options: Options) -> Self {
         let scratch = Scratch::new(Kernels::new(options.simd));
-        Self { options, scratch, spare: None }
+        Self { options, scratch, spare: None, node_image: None }
     }
 
     /// How it composites.

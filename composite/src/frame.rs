@@ -101,6 +101,17 @@ impl<'a, P: PixelFormat> Frame<'a, P> {
         self.color.is_empty()
     }
 
+    /// An image composited before, as a frame.
+    pub(crate) fn of_image(image: &'a Image<P>) -> Self {
+        Self {
+            width_px: image.width_px,
+            height_px: image.height_px,
+            color: &image.colors,
+            depth: &image.depths,
+            bounds: None,
+        }
+    }
+
     /// Whether the renderer has said where it drew.
     pub(crate) fn is_bounded(&self) -> bool {
         self.bounds.is_some()

@@ -38,6 +38,7 @@ mod rect;
 mod reference;
 mod report;
 mod session;
+mod shared;
 mod simd;
 mod strategies;
 mod tiles;
@@ -53,6 +54,7 @@ pub use pixel::{Composite, DepthPixel, PixelFormat, PremultipliedPixel, combine}
 pub use rect::Rect;
 pub use reference::composite_serial;
 pub use report::Report;
+pub use shared::composite_shared;
 pub use simd::SimdLevel;
 pub use strategies::Strategy;
 pub use wire::WireError;

@@ -208,6 +208,10 @@ impl<'a> Session<'a> {
 }
 
 impl Message {
+    pub(crate) fn rect(&self) -> Rect {
+        self.rect
+    }
+
     /// The message as its pixels; it has been checked when it came.
     pub(crate) fn part<P: Composite>(&self) -> Part<'_> {
         Part::reopen::<P>(&self.bytes, self.rect, self.depths)
