@@ -39,6 +39,7 @@ mod pixel;
 mod rect;
 mod reference;
 mod report;
+mod seats;
 mod session;
 mod shared;
 mod simd;
@@ -59,6 +60,7 @@ pub use pixel::{Composite, DepthPixel, PixelFormat, PremultipliedPixel, combine}
 pub use rect::Rect;
 pub use reference::composite_serial;
 pub use report::Report;
+pub use seats::{Seat, seats};
 pub use shared::composite_shared;
 pub use simd::SimdLevel;
 pub use strategies::Strategy;

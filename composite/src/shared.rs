@@ -20,7 +20,7 @@ use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
 /// Rows that a thread takes at a time.
-const BAND_ROWS: usize = 16;
+pub(crate) const BAND_ROWS: usize = 16;
 
 /// Composites frames of one memory, in rank order, with `threads` threads. The bits are those of
 /// [`composite_serial`](crate::composite_serial).
@@ -95,19 +95,13 @@ fn merge<P: Composite>(
     let bands = colors.chunks_mut(band_pixels).zip(depth_bands).enumerate();
     let bands = Mutex::new(bands);
     let work = || {
-        let mut rows = Rows::<P>::new(width, views.len());
+        let mut rows = Rows::<P>::new(width);
         loop {
             let next = bands.lock().unwrap_or_else(PoisonError::into_inner).next();
             let Some((index, (colors, depths))) = next else { break };
             let first = (index * BAND_ROWS) as u32;
             let depths = depths.unwrap_or(&mut []);
-            at_level!(
-                kernels,
-                simd => rows.merge_band(&views, first, colors, depths,
-                    #[inline(always)]
-                    |c, d, held_c, held_d, side| join_run::<P, _>(simd, c, d, held_c, held_d, side)),
-                rows.merge_band(&views, first, colors, depths, join_run_scalar::<P>)
-            );
+            merge_band(kernels, &mut rows, &views, first, colors, depths);
         }
     };
     let most = pixels.div_ceil(band_pixels).max(1);
@@ -121,8 +115,26 @@ fn merge<P: Composite>(
     Ok(Image { width_px, height_px, colors, depths })
 }
 
+/// Rows `first_row…` of all views into `colors` and, if it is not empty, `depths`.
+pub(crate) fn merge_band<P: Composite>(
+    kernels: Kernels,
+    rows: &mut Rows<P>,
+    views: &[View<'_, P>],
+    first_row: u32,
+    colors: &mut [P::Color],
+    depths: &mut [f32],
+) {
+    at_level!(
+        kernels,
+        simd => rows.merge_band(views, first_row, colors, depths,
+            #[inline(always)]
+            |c, d, held_c, held_d, side| join_run::<P, _>(simd, c, d, held_c, held_d, side)),
+        rows.merge_band(views, first_row, colors, depths, join_run_scalar::<P>)
+    );
+}
+
 /// Rows in which one thread works.
-struct Rows<P: Composite> {
+pub(crate) struct Rows<P: Composite> {
     depth: Vec<f32>,
     /// For blended formats: the groups of the balanced tree that wait for their other half, by the logarithm of their size.
     waiting: Vec<Group<P>>,
@@ -136,7 +148,7 @@ struct Group<P: Composite> {
 }
 
 impl<P: Composite> Rows<P> {
-    fn new(width: usize, _ranks: usize) -> Self {
+    pub(crate) fn new(width: usize) -> Self {
         Self {
             depth: vec![1.0; if P::HAS_DEPTH { width } else { 0 }],
             waiting: Vec::new(),

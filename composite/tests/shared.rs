@@ -1,9 +1,10 @@
 //! Frames of one memory, merged without messages, and nodes of several ranks: the bits of the serial reference.
 use composite::{
-    Communicator, Composite, Compositor, DepthPixel, Frame, Options, PremultipliedPixel, Rect,
-    composite_serial, composite_shared, threads,
+    Communicator, Composite, CompositeError, Compositor, DepthPixel, Destination, Frame, Image, Options, PremultipliedPixel, Rect,
+    composite_serial, composite_shared, seats, threads,
 };
 use std::num::NonZeroUsize;
+use std::sync::{Arc, Mutex};
 
 const SIZE: (u32, u32) = (70, 37);
 
@@ -131,4 +132,58 @@ fn nan_depths_of_all_ranks_of_a_node_are_counted() {
     let mut compositor = Compositor::new(Options::default());
     let done = compositor.composite_node(&mut comm, &frames, NonZeroUsize::MIN).unwrap();
     assert_eq!(done.report.nan_depths, nan);
+}
+
+#[test]
+fn ranks_at_a_table_give_the_bits_of_the_serial_reference_frame_after_frame() {
+    for ranks in [1, 2, 5, 8] {
+        let drawn: Vec<Drawn> = (0..ranks).map(draw).collect();
+        let frames: Vec<_> = drawn.iter().map(z).collect();
+        let images: Vec<Arc<Image<DepthPixel<[u8; 4]>>>> = drawn
+            .iter()
+            .map(|d| Arc::new(Image::from_planes(SIZE.0, SIZE.1, d.bytes.clone(), d.depth.clone()).unwrap()))
+            .collect();
+        let expected = composite_serial(&frames).unwrap();
+        let places: Vec<_> = seats(ranks).into_iter().map(|seat| Mutex::new(Some(seat))).collect();
+        let results = threads::run(ranks, |mut comm| {
+            let rank = comm.rank();
+            let mut seat = places[rank].lock().unwrap().take().unwrap();
+            for repeat in 0..4 {
+                // With depths and without, to the first rank and to the last.
+                let root = if repeat < 2 { 0 } else { ranks - 1 };
+                let options =
+                    Options { depth: repeat % 2 == 0, destination: Destination::Rank(root), ..Options::default() };
+                let bounds = frames[rank].bounds();
+                let done = seat.composite(&mut comm, &images[rank], bounds, &options).unwrap();
+                assert_eq!(done.report.nan_depths, frames[rank].nan_depths());
+                assert_eq!(done.image.is_some(), rank == root);
+                if let Some(image) = done.image {
+                    assert!(image.colors() == expected.colors());
+                    assert!(image.depths() == if options.depth { expected.depths() } else { &[] });
+                    seat.recycle(image);
+                }
+            }
+        });
+        assert!(results.iter().all(Result::is_ok));
+    }
+}
+
+#[test]
+fn a_table_names_what_it_cannot_do_and_who_did_not_come() {
+    let image = Arc::new(Image::<PremultipliedPixel<[u8; 4]>>::from_planes(1, 1, vec![[1; 4]], vec![]).unwrap());
+    let places: Vec<_> = seats(2).into_iter().map(|seat| Mutex::new(Some(seat))).collect();
+    let results = threads::run(2, |mut comm| {
+        let mut seat = places[comm.rank()].lock().unwrap().take().unwrap();
+        if comm.rank() == 1 {
+            return Ok(());
+        }
+        let options = Options { timeout: std::time::Duration::from_secs(20), ..Options::default() };
+        seat.composite(&mut comm, &image, Rect::of_size(1, 1), &options).map(|_| ())
+    });
+    assert!(results[0].as_ref().unwrap().as_ref().unwrap_err().to_string().contains("rank 1"));
+    let mut comm = threads::group(1).remove(0);
+    let mut seat = seats(1).remove(0);
+    let options = Options { destination: Destination::Distributed, ..Options::default() };
+    let error = seat.composite(&mut comm, &image, Rect::of_size(1, 1), &options).unwrap_err();
+    assert!(matches!(error, CompositeError::Options(_)));
 }
