@@ -5,11 +5,12 @@
 //!
 //! `cargo bench -p composite --bench paths -- [SIZE] [RANKS…] [WORDS…]`
 use composite::{
-    Communicator, CompositeError, Compositor, DepthPixel, Frame, Options, PremultipliedPixel, Rect, Report,
-    SimdLevel, Strategy, composite_shared, threads,
+    Communicator, CompositeError, Compositor, DepthPixel, Frame, Image, Options, PremultipliedPixel, Rect,
+    Report, SimdLevel, Strategy, composite_shared, seats, threads,
 };
 use std::num::NonZeroUsize;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
 fn hash(mut x: u64) -> u64 {
     x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -122,7 +123,8 @@ fn main() {
                     Options { slice_px: Some(slice_px), ..base.clone() },
                 ));
             }
-            variants.push((SHARED.into(), false, base.clone()));
+            variants.push((format!("z {SHARED}"), false, base.clone()));
+            variants.push(("z table".into(), false, base.clone()));
             variants.push(("f32 blend".into(), true, base.clone()));
             variants.push((format!("f32 blend {SHARED}"), true, base.clone()));
             variants.push((
@@ -136,7 +138,15 @@ fn main() {
             }
             let pictures: Vec<Picture> = (0..ranks).map(|rank| picture(scene, rank, ranks, size)).collect();
             let times = Mutex::new(vec![Vec::<(f64, f64, Report)>::new(); variants.len()]);
+            let places: Vec<_> = seats(ranks).into_iter().map(|seat| Mutex::new(Some(seat))).collect();
+            let images: Vec<Arc<Image<DepthPixel<[u8; 4]>>>> = pictures
+                .iter()
+                .map(|p| {
+                    Arc::new(Image::from_planes(size, size, p.colors.clone(), p.depths.clone()).unwrap())
+                })
+                .collect();
             let results = threads::run(ranks, |mut comm| {
+                let mut own_seat = None;
                 let rank = comm.rank();
                 let picture = &pictures[rank];
                 let (z, f) = (z_frame(size, picture)?, f32_frame(size, picture)?);
@@ -167,6 +177,12 @@ fn main() {
                                 }
                             }
                             Report::default()
+                        } else if name == "z table" {
+                            let seat =
+                                own_seat.get_or_insert_with(|| places[rank].lock().unwrap().take().unwrap());
+                            let done = seat.composite(&mut comm, &images[rank], picture.bounds, options)?;
+                            done.image.map(|image| seat.recycle(image));
+                            done.report
                         } else if *blend {
                             let done = of_f[index].composite(&mut comm, &f)?;
                             done.image.map(|image| of_f[index].recycle(image));
@@ -206,4 +222,53 @@ fn main() {
             }
         }
     }
+    if words.is_empty() || words.iter().any(|word| word == "stream") {
+        counts.iter().for_each(|&ranks| streamed(ranks, size));
+    }
+}
+
+/// A frame whose rendering is waiting (as for another device or other cores), in 16 tiles: rendered and then composited, and streamed.
+fn streamed(ranks: usize, size: u32) {
+    const RENDER: Duration = Duration::from_millis(48);
+    let pictures: Vec<Picture> = (0..ranks).map(|rank| picture("dense", rank, ranks, size)).collect();
+    let times = Mutex::new([Vec::new(), Vec::new(), Vec::new()]);
+    let results = threads::run(ranks, |mut comm| {
+        let rank = comm.rank();
+        let frame = z_frame(size, &pictures[rank])?;
+        let mut compositor = Compositor::new(Options { depth: false, ..Options::default() });
+        for repeat in 0..10 {
+            for kind in 0..3 {
+                comm.barrier(Duration::from_secs(60))?;
+                let begin = Instant::now();
+                let image = if kind < 2 {
+                    if kind == 0 {
+                        std::thread::sleep(RENDER);
+                    }
+                    compositor.composite(&mut comm, &frame)?.image
+                } else {
+                    let mut stream = compositor.stream(&mut comm, (size, size), Rect::of_size(size, size))?;
+                    for tile in 0..16 {
+                        // What compositing has cost does not delay rendering, which goes on elsewhere.
+                        std::thread::sleep((RENDER * (tile + 1) / 16).saturating_sub(begin.elapsed()));
+                        let row = |i: u32| size * i / 16;
+                        stream
+                            .tile_done(&frame, Rect { x0: 0, y0: row(tile), x1: size, y1: row(tile + 1) })?;
+                    }
+                    stream.finish(&frame)?.image
+                };
+                comm.barrier(Duration::from_secs(60))?;
+                if rank == 0 && repeat > 1 {
+                    times.lock().unwrap()[kind].push(1e3 * begin.elapsed().as_secs_f64());
+                }
+                image.map(|image| compositor.recycle(image));
+            }
+        }
+        Ok::<_, CompositeError>(())
+    });
+    results.into_iter().for_each(|result| result.unwrap().unwrap());
+    let [after, alone, streamed] = times.into_inner().unwrap().map(median);
+    println!(
+        "stream dense p={ranks:<3} rendering {:.0} ms, compositing {alone:.1} ms; one after the other {after:.1} ms, streamed {streamed:.1} ms",
+        RENDER.as_secs_f64() * 1e3
+    );
 }

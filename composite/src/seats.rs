@@ -83,7 +83,9 @@ impl<P: Composite> Seat<P> {
         let begin = comm.now();
         let ranks = self.table().laid.len();
         let root = match options.destination {
-            Destination::Rank(root) if root < ranks && comm.size() == ranks && options.order.is_none() => root,
+            Destination::Rank(root) if root < ranks && comm.size() == ranks && options.order.is_none() => {
+                root
+            }
             _ => {
                 return Err(CompositeError::Options(format!(
                     "a table of {ranks} ranks composites in rank order to one of them, over a communicator of as many ranks: \
@@ -98,8 +100,10 @@ impl<P: Composite> Seat<P> {
         comm.barrier(options.timeout)?;
         let published = comm.now();
         let laid: Vec<Laid<P>> = self.table().laid.iter().flatten().cloned().collect();
-        let frames: Vec<Frame<'_, P>> =
-            laid.iter().map(|(image, bounds)| Frame::of_image(image).bounded(*bounds)).collect::<Result<_, _>>()?;
+        let frames: Vec<Frame<'_, P>> = laid
+            .iter()
+            .map(|(image, bounds)| Frame::of_image(image).bounded(*bounds))
+            .collect::<Result<_, _>>()?;
         let (width_px, height_px) = check_sizes(&frames)?;
 
         // Bands, as long as there are any.
@@ -135,7 +139,8 @@ impl<P: Composite> Seat<P> {
         if self.rank == root {
             let depth_pixels = if depth { width * height } else { 0 };
             let spare = self.spare.take();
-            let fitting = spare.filter(|i| i.colors.len() == width * height && i.depths.len() == depth_pixels);
+            let fitting =
+                spare.filter(|i| i.colors.len() == width * height && i.depths.len() == depth_pixels);
             let (mut all_colors, mut all_depths) = match fitting {
                 Some(image) => (image.colors, image.depths),
                 None => (vec![P::EMPTY.color(); width * height], vec![1.0; depth_pixels]),

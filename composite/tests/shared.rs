@@ -1,7 +1,7 @@
 //! Frames of one memory, merged without messages, and nodes of several ranks: the bits of the serial reference.
 use composite::{
-    Communicator, Composite, CompositeError, Compositor, DepthPixel, Destination, Frame, Image, Options, PremultipliedPixel, Rect,
-    composite_serial, composite_shared, seats, threads,
+    Communicator, Composite, CompositeError, Compositor, DepthPixel, Destination, Frame, Image, Options,
+    PremultipliedPixel, Rect, composite_serial, composite_shared, seats, threads,
 };
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex};
@@ -151,8 +151,11 @@ fn ranks_at_a_table_give_the_bits_of_the_serial_reference_frame_after_frame() {
             for repeat in 0..4 {
                 // With depths and without, to the first rank and to the last.
                 let root = if repeat < 2 { 0 } else { ranks - 1 };
-                let options =
-                    Options { depth: repeat % 2 == 0, destination: Destination::Rank(root), ..Options::default() };
+                let options = Options {
+                    depth: repeat % 2 == 0,
+                    destination: Destination::Rank(root),
+                    ..Options::default()
+                };
                 let bounds = frames[rank].bounds();
                 let done = seat.composite(&mut comm, &images[rank], bounds, &options).unwrap();
                 assert_eq!(done.report.nan_depths, frames[rank].nan_depths());
@@ -170,7 +173,8 @@ fn ranks_at_a_table_give_the_bits_of_the_serial_reference_frame_after_frame() {
 
 #[test]
 fn a_table_names_what_it_cannot_do_and_who_did_not_come() {
-    let image = Arc::new(Image::<PremultipliedPixel<[u8; 4]>>::from_planes(1, 1, vec![[1; 4]], vec![]).unwrap());
+    let image =
+        Arc::new(Image::<PremultipliedPixel<[u8; 4]>>::from_planes(1, 1, vec![[1; 4]], vec![]).unwrap());
     let places: Vec<_> = seats(2).into_iter().map(|seat| Mutex::new(Some(seat))).collect();
     let results = threads::run(2, |mut comm| {
         let mut seat = places[comm.rank()].lock().unwrap().take().unwrap();

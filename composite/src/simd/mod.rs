@@ -87,21 +87,29 @@ macro_rules! at_level {
     ($kernels:expr, $simd:ident => $vectors:expr, $scalar:expr) => {
         match $kernels.0 {
             #[cfg(target_arch = "x86_64")]
-            Some(fearless_simd::Level::Avx512($simd)) => {
-                fearless_simd::Simd::vectorize($simd, #[inline(always)] || $vectors)
-            }
+            Some(fearless_simd::Level::Avx512($simd)) => fearless_simd::Simd::vectorize(
+                $simd,
+                #[inline(always)]
+                || $vectors,
+            ),
             #[cfg(target_arch = "x86_64")]
-            Some(fearless_simd::Level::Avx2($simd)) => {
-                fearless_simd::Simd::vectorize($simd, #[inline(always)] || $vectors)
-            }
+            Some(fearless_simd::Level::Avx2($simd)) => fearless_simd::Simd::vectorize(
+                $simd,
+                #[inline(always)]
+                || $vectors,
+            ),
             #[cfg(target_arch = "x86_64")]
-            Some(fearless_simd::Level::Sse4_2($simd)) => {
-                fearless_simd::Simd::vectorize($simd, #[inline(always)] || $vectors)
-            }
+            Some(fearless_simd::Level::Sse4_2($simd)) => fearless_simd::Simd::vectorize(
+                $simd,
+                #[inline(always)]
+                || $vectors,
+            ),
             #[cfg(target_arch = "aarch64")]
-            Some(fearless_simd::Level::Neon($simd)) => {
-                fearless_simd::Simd::vectorize($simd, #[inline(always)] || $vectors)
-            }
+            Some(fearless_simd::Level::Neon($simd)) => fearless_simd::Simd::vectorize(
+                $simd,
+                #[inline(always)]
+                || $vectors,
+            ),
             _ => $scalar,
         }
     };
