@@ -23,7 +23,7 @@
 //!
 //! Built so far: the library over threads. Not built: MPI, shared-memory merging, streaming, choosing a strategy
 //! automatically, 2-D bounding rectangles, SIMD, rendering.
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 pub mod comm;
 pub mod rank_order;
