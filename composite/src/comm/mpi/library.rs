@@ -160,6 +160,30 @@ impl Mpi {
         if text.is_empty() { format!("error {code}") } else { text }
     }
 
+    /// `MPI_IN_PLACE`.
+    #[cfg(feature = "rival")]
+    pub(crate) fn in_place(&self) -> *const c_void {
+        self.constants.in_place as *const c_void
+    }
+
+    /// Waits for one of `requests` and says which; `None` if all are null.
+    #[cfg(feature = "rival")]
+    pub(crate) fn wait_any_of(&self, requests: &[Handle]) -> Option<usize> {
+        let mut index: c_int = -1;
+        let count = requests.len() as c_int;
+        let (mut wide, mut narrow) = (Vec::new(), Vec::<u32>::new());
+        let array: *mut c_void = if self.constants.request_bytes == 4 {
+            narrow.extend(requests.iter().map(|&request| request as u32));
+            narrow.as_mut_ptr().cast()
+        } else {
+            wide.extend_from_slice(requests);
+            wide.as_mut_ptr().cast()
+        };
+        // SAFETY: `count` requests or nulls in an array of the ABI's width. Undefined is negative in every ABI.
+        unsafe { (self.functions.wait_any)(count, array, &raw mut index, self.status_ignore()) };
+        usize::try_from(index).ok().filter(|&index| index < requests.len())
+    }
+
     /// The status argument where nobody looks at it.
     pub(crate) fn status_ignore(&self) -> *mut Status {
         self.constants.status_ignore as *mut Status
