@@ -36,7 +36,8 @@ pub fn find() -> Result<PathBuf, RivalError> {
         files.sort();
         for name in NAMES {
             let is_it = |path: &&PathBuf| {
-                let file = path.file_name().map(|file| file.to_string_lossy().into_owned()).unwrap_or_default();
+                let file =
+                    path.file_name().map(|file| file.to_string_lossy().into_owned()).unwrap_or_default();
                 file.starts_with(name) && file.contains(".so")
             };
             if let Some(path) = files.iter().find(is_it) {
@@ -107,8 +108,7 @@ pub(super) struct Library {
 impl Library {
     /// Loads IceT; `private` from a copy of the file, so that its global variables are this rank's own.
     pub(super) fn open(path: &Path, private: bool) -> Result<Self, RivalError> {
-        let unusable =
-            |reason: String| RivalError::Unusable { path: path.to_path_buf(), reason };
+        let unusable = |reason: String| RivalError::Unusable { path: path.to_path_buf(), reason };
         let dynamic = if private {
             static COPIES: AtomicU64 = AtomicU64::new(0);
             let number = COPIES.fetch_add(1, Ordering::Relaxed);
@@ -116,7 +116,8 @@ impl Library {
             let salt = &raw const number as usize;
             let name = format!("composite-icet-{}-{salt:x}-{number}.so", std::process::id());
             let copy = std::env::temp_dir().join(name);
-            std::fs::copy(path, &copy).map_err(|e| unusable(format!("no copy at {}: {e}", copy.display())))?;
+            std::fs::copy(path, &copy)
+                .map_err(|e| unusable(format!("no copy at {}: {e}", copy.display())))?;
             // SAFETY: IceT's core has no initialisers.
             let dynamic = unsafe { Dynamic::open(Some(&copy), RTLD_NOW | RTLD_LOCAL) };
             // It stays mapped without its name.
@@ -141,7 +142,8 @@ impl Library {
         let layer = ManuallyDrop::new(layer.map_err(|error| unusable(error.to_string()))?);
         // SAFETY: takes an MPI_Comm, a pointer in Open MPI, and gives IceT's communicator (IceTMPI.h).
         unsafe {
-            let create = layer.get::<unsafe extern "C" fn(usize) -> *mut c_void>(b"icetCreateMPICommunicator");
+            let create =
+                layer.get::<unsafe extern "C" fn(usize) -> *mut c_void>(b"icetCreateMPICommunicator");
             let create = create.map_err(|error| unusable(error.to_string()))?;
             Ok(create(world))
         }

@@ -21,7 +21,7 @@ use over_comm::OverComm;
 use over_mpi::OverMpi;
 use std::ffi::{c_int, c_void};
 use std::path::{Path, PathBuf};
-use table::{Table, Transport};
+use table::Table;
 
 /// Why IceT could not be used.
 #[derive(Debug, thiserror::Error, Clone, PartialEq, Eq)]
@@ -104,8 +104,6 @@ pub enum IcetMode {
     Depth,
     /// Premultiplied RGBA f32, in order.
     BlendF32,
-    /// Premultiplied RGBA8, in order. IceT truncates.
-    Blend8,
 }
 
 /// A frame as IceT takes it.
@@ -115,8 +113,6 @@ pub enum IcetFrame<'a> {
     Depth(&'a [[u8; 4]], &'a [f32]),
     /// For [`IcetMode::BlendF32`].
     BlendF32(&'a [[f32; 4]]),
-    /// For [`IcetMode::Blend8`].
-    Blend8(&'a [[u8; 4]]),
 }
 
 /// The collected image, in IceT's memory until its next frame.
@@ -128,14 +124,14 @@ pub enum IcetImage<'a> {
     RgbaF32(&'a [[f32; 4]]),
 }
 
-/// How IceT's messages travel.
+/// How IceT's messages travel. Boxes have a fixed address, which IceT keeps.
 enum Carrier {
     /// Its own layer for Open MPI.
     Own,
-    /// MPI functions, called directly. The box has a fixed address, which IceT keeps.
-    Mpi(#[allow(dead_code, reason = "kept alive for IceT")] Box<OverMpi>, Box<Table>),
+    /// MPI functions, called directly.
+    Mpi { _over: Box<OverMpi>, _table: Box<Table> },
     /// A communicator that is lent for each call.
-    Comm(Box<OverComm>, Box<Table>),
+    Comm { over: Box<OverComm>, _table: Box<Table> },
 }
 
 /// One rank's IceT.
@@ -171,7 +167,14 @@ impl Icet {
         let mut table = Box::new(table::of::<OverMpi>((&raw mut *over).cast()));
         // SAFETY: the table and what it points to live as long as this object, and IceT is not called after that.
         unsafe { (library.functions.create_context)((&raw mut *table).cast()) };
-        Self::set_up(library, Carrier::Mpi(over, table), mode, width_px, height_px, comm.rank())
+        Self::set_up(
+            library,
+            Carrier::Mpi { _over: over, _table: table },
+            mode,
+            width_px,
+            height_px,
+            comm.rank(),
+        )
     }
 
     /// IceT over any communicator between threads, set up for images of this size that go to rank 0. The communicator is to be
@@ -190,11 +193,11 @@ impl Icet {
         let rank = comm.rank();
         let mut over = Box::new(OverComm::new(rank, comm.size()));
         let mut table = Box::new(table::of::<OverComm>((&raw mut *over).cast()));
-        let _lent = over.lend(comm);
+        let lent = over.lend(comm);
         // SAFETY: as in `over_mpi`; the communicator is lent for this call.
         unsafe { (library.functions.create_context)((&raw mut *table).cast()) };
-        drop(_lent);
-        Self::set_up(library, Carrier::Comm(over, table), mode, width_px, height_px, rank)
+        drop(lent);
+        Self::set_up(library, Carrier::Comm { over, _table: table }, mode, width_px, height_px, rank)
     }
 
     fn set_up(
@@ -209,7 +212,6 @@ impl Icet {
         let (composite_mode, color, depth) = match mode {
             IcetMode::Depth => (0x0301, 0xC001, 0xD001),
             IcetMode::BlendF32 => (0x0302, 0xC002, 0xD000),
-            IcetMode::Blend8 => (0x0302, 0xC001, 0xD000),
         };
         let f = &library.functions;
         // SAFETY: a context is current (one per process or per copy of the library); all arguments are numbers.
@@ -274,16 +276,13 @@ impl Icet {
                 self.fits(colors.len())?;
                 (colors.as_ptr().cast(), std::ptr::null())
             }
-            IcetFrame::Blend8(colors) => {
-                self.fits(colors.len())?;
-                (colors.as_ptr().cast(), std::ptr::null())
-            }
         };
-        let viewport = [bounds.x0, bounds.y0, bounds.width() as u32, bounds.height() as u32].map(|n| n as c_int);
+        let viewport =
+            [bounds.x0, bounds.y0, bounds.width() as u32, bounds.height() as u32].map(|n| n as c_int);
         let background = [0.0_f32; 4];
         let lent = match &mut self.carrier {
-            Carrier::Comm(over, _) => Some(over.lend(comm)),
-            Carrier::Own | Carrier::Mpi(..) => None,
+            Carrier::Comm { over, .. } => Some(over.lend(comm)),
+            Carrier::Own | Carrier::Mpi { .. } => None,
         };
         // SAFETY: buffers of the size of the tile in the formats of `set_up`, four numbers, no matrices (allowed: there is no bounding
         // box to project), four channels.
@@ -310,7 +309,7 @@ impl Icet {
                     let first = (self.library.functions.image_colors_f32)(image);
                     IcetImage::RgbaF32(std::slice::from_raw_parts(first, self.pixels))
                 }
-                IcetMode::Depth | IcetMode::Blend8 => {
+                IcetMode::Depth => {
                     let first = (self.library.functions.image_colors_u8)(image);
                     IcetImage::Rgba8(std::slice::from_raw_parts(first, self.pixels))
                 }
@@ -319,7 +318,11 @@ impl Icet {
     }
 
     fn fits(&self, found: usize) -> Result<(), RivalError> {
-        if found == self.pixels { Ok(()) } else { Err(RivalError::FrameSize { expected: self.pixels, found }) }
+        if found == self.pixels {
+            Ok(())
+        } else {
+            Err(RivalError::FrameSize { expected: self.pixels, found })
+        }
     }
 
     /// Whether its messages go over its own MPI layer.

@@ -133,7 +133,9 @@ impl Transport for OverMpi {
     fn allgather(&mut self, send: *const u8, count: usize, recv: *mut u8) {
         let (m, n) = (&self.mpi, count as c_int);
         // SAFETY: see above.
-        unsafe { (m.functions.allgather)(self.or_in_place(send), n, m.byte, recv.cast(), n, m.byte, m.world) };
+        unsafe {
+            (m.functions.allgather)(self.or_in_place(send), n, m.byte, recv.cast(), n, m.byte, m.world)
+        };
     }
 
     fn alltoall(&mut self, send: *const u8, count: usize, recv: *mut u8) {
