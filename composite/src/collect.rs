@@ -36,11 +36,14 @@ impl<P: Composite> Collector<P> {
         if root != Some(session.place) {
             return Ok(collector);
         }
-        for &(place, rect) in pieces {
-            if place != session.place {
-                session.post::<P>(place, Tag::Collect, &rect)?;
-                collector.outstanding.push((place, rect));
-            }
+        for &(place, rect) in pieces.iter().filter(|piece| piece.0 != session.place) {
+            collector.outstanding.push((place, rect));
+        }
+        for &(place, _) in &collector.outstanding {
+            // Pieces of one place come in any order, so each receive has room for the largest.
+            let of_place = collector.outstanding.iter().filter(|piece| piece.0 == place);
+            let largest = of_place.map(|piece| piece.1).max_by_key(wire::longest::<P>);
+            session.post::<P>(place, Tag::Collect, &largest.unwrap_or(Rect::EMPTY))?;
         }
         let begin = session.now();
         collector.image = Some(blank(size_px, depths, pieces, spare));

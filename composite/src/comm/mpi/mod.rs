@@ -126,7 +126,7 @@ impl MpiComm {
         let (rank, size) = (rank as usize, size as usize);
 
         // More ranks than processors: a rank that spins takes the processor from the one it waits for.
-        let processors = std::thread::available_parallelism().map_or(1, usize::from);
+        let processors = launcher::processors_here();
         let here = launcher::ranks_here(|name| std::env::var(name).ok()).unwrap_or(size);
         let spins = if here > processors { 1 } else { 2000 };
         Ok(Self {
