@@ -63,8 +63,7 @@ pub(super) fn ranks_here(variable: impl Fn(&str) -> Option<String>) -> Option<us
 /// Processors of this machine. What the standard library says is less where the launcher has bound each rank to its own.
 pub(super) fn processors_here() -> usize {
     let online = std::fs::read_to_string("/sys/devices/system/cpu/online").unwrap_or_default();
-    count_ranges(online.trim())
-        .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+    count_ranges(online.trim()).unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
 }
 
 /// How many numbers are in a list like `0-3,8`.
