@@ -18,6 +18,10 @@ const PACKAGES: &[(&str, &str)] = &[
         "mesa-vulkan-drivers",
         "lavapipe, a Vulkan device on the CPU that schlieren's GPU kernels are tested on",
     ),
+    ("openmpi-bin", "Open MPI 4, over which composite runs; nothing is built with it"),
+    ("mpich", "MPICH 4, the other MPI that the same program must run over"),
+    ("libsimgrid-dev", "SimGrid's SMPI, which runs composite on 128 simulated nodes"),
+    ("paraview", "IceT, the compositing library that composite is measured against, and its MPI layer"),
     ("python3-venv", "a place for the wheels below"),
     ("chromium", "the browser that schlieren's interactive page is tested in"),
 ];
@@ -49,6 +53,14 @@ pub(crate) struct Peers {
     embree4: Option<PathBuf>,
     /// Chromium's program.
     chromium: Option<PathBuf>,
+    /// Open MPI's launcher.
+    openmpi: Option<PathBuf>,
+    /// MPICH's launcher.
+    mpich: Option<PathBuf>,
+    /// SimGrid's launcher.
+    smpirun: Option<PathBuf>,
+    /// Shared library of IceT's core.
+    icet: Option<PathBuf>,
     /// The virtual environment's Python, with all [`WHEELS`] in their versions.
     python: Option<PathBuf>,
     /// What went wrong or was not allowed while installing.
@@ -57,11 +69,15 @@ pub(crate) struct Peers {
 
 impl Peers {
     /// Every peer by name.
-    fn named(&self) -> [(&'static str, &Option<PathBuf>); 4] {
+    fn named(&self) -> [(&'static str, &Option<PathBuf>); 8] {
         [
             ("Embree 3", &self.embree3),
             ("Embree 4", &self.embree4),
             ("Chromium", &self.chromium),
+            ("Open MPI", &self.openmpi),
+            ("MPICH", &self.mpich),
+            ("SimGrid", &self.smpirun),
+            ("IceT", &self.icet),
             ("Python with VTK", &self.python),
         ]
     }
@@ -78,6 +94,10 @@ impl Peers {
             ("RTSV_EMBREE3", &self.embree3),
             ("RTSV_EMBREE4", &self.embree4),
             ("RTSV_CHROMIUM", &self.chromium),
+            ("RTSV_OPENMPI", &self.openmpi),
+            ("RTSV_MPICH", &self.mpich),
+            ("RTSV_SMPIRUN", &self.smpirun),
+            ("RTSV_ICET", &self.icet),
             ("RTSV_PYTHON", &self.python),
         ];
         variables.extend(found.into_iter().filter_map(|(name, path)| Some((name, path.clone()?))));
@@ -117,7 +137,11 @@ pub(crate) fn set_up(root: &Path, install: Install) -> Peers {
     Peers {
         embree3: system_library_folders().iter().find_map(|d| library_in(d, "libembree3.so")),
         embree4: wheel_library(&venv, "embreex.libs", "libembree4"),
-        chromium: Some(PathBuf::from("/usr/bin/chromium")).filter(|p| p.is_file()),
+        chromium: program("chromium"),
+        openmpi: program("mpirun.openmpi"),
+        mpich: program("mpirun.mpich"),
+        smpirun: program("smpirun"),
+        icet: system_library_folders().iter().find_map(|d| library_in(d, "libvtkIceTCore-pv")),
         python: wheels_are_there(&python).then_some(python),
         folder,
         notes,
@@ -222,6 +246,11 @@ fn wheels_are_there(python: &Path) -> bool {
     python.is_file() && first_line_of(python, &["-c", &script]).is_some()
 }
 
+/// A program of a Debian package.
+fn program(name: &str) -> Option<PathBuf> {
+    Some(Path::new("/usr/bin").join(name)).filter(|path| path.is_file())
+}
+
 // ---- Shared libraries -----------------------------------------------------------------------------------------
 
 fn system_library_folders() -> Vec<PathBuf> {
@@ -256,7 +285,7 @@ mod tests {
             notes: vec!["why".to_owned()],
             ..Peers::default()
         };
-        assert_eq!(peers.missing(), ["Embree 4", "Chromium", "Python with VTK"]);
+        assert_eq!(peers.missing(), ["Embree 4", "Chromium", "Open MPI", "MPICH", "SimGrid", "IceT", "Python with VTK"]);
         let names = |require| peers.environment(require).into_iter().map(|(n, _)| n).collect::<Vec<_>>();
         assert_eq!(names(false), ["RTSV_PEERS", "RTSV_EMBREE3"]);
         assert_eq!(names(true), ["RTSV_PEERS", "RTSV_EMBREE3", "RTSV_REQUIRE_PEERS"]);
