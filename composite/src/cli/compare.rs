@@ -16,7 +16,7 @@ use std::fmt;
 use std::path::Path;
 
 /// Frames before the clock counts: buffers are made and connections opened.
-const WARM_UP: u64 = 2;
+const WARM_UP: u64 = 3;
 /// Largest difference of a channel that counts as equal where floating-point colours are blended: IceT groups the ranks differently
 /// for every strategy, so its own strategies differ by about as much.
 const BLEND_TOLERANCE: f32 = 1e-5;
