@@ -43,8 +43,9 @@ pub(super) fn start(common: CommonArgs, ranks: usize, arguments: &[OsString]) ->
         "--cfg=smpi/cpu-threshold:1e-7",
         // The default collectives are pathological from 96 ranks on (13 times slower).
         "--cfg=smpi/coll-selector:mpich",
-        // Looking whether a message has left costs no simulated time.
+        // Looking whether a message has left, and what time it is, costs no simulated time.
         "--cfg=smpi/test:0",
+        "--cfg=smpi/wtime:0",
         "--log=root.thresh:error",
         "--log=no_loc",
     ]);

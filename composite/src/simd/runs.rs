@@ -31,9 +31,16 @@ pub(crate) fn nearest_run<C: Color, S: Simd>(
         let theirs = colors.as_chunks::<64>().0.iter().zip(depths.as_chunks::<64>().0);
         for ((held_color, held_depth), (color, depth)) in ours.zip(theirs) {
             let depth: f32x16<S> = u8x64::from_slice(simd, depth).bitcast();
-            let color = #[inline(always)]
-            || colors_16(simd, color);
-            take_nearer(simd, color, depth, held_color, held_depth, wins_ties, u64::MAX);
+            take_nearer(
+                simd,
+                #[inline(always)]
+                || colors_16(simd, color),
+                depth,
+                held_color,
+                held_depth,
+                wins_ties,
+                u64::MAX,
+            );
             done += 16;
         }
     }

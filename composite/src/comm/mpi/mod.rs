@@ -9,6 +9,7 @@
 #![allow(unsafe_code, reason = "calls into an MPI library found at run time")]
 
 mod abi;
+mod clock;
 mod error;
 pub mod launcher;
 mod library;
@@ -21,6 +22,7 @@ pub use library::inspect;
 pub(crate) use library::{Handle, Mpi};
 
 use super::{Arrival, CommError, Communicator, Receive};
+use clock::Clock;
 use notice::{Notice, Notices};
 use std::ffi::c_int;
 use std::rc::Rc;
@@ -48,6 +50,7 @@ pub struct MpiComm {
     mpi: Rc<Mpi>,
     rank: usize,
     size: usize,
+    clock: Clock,
     transfers: Transfers,
     notices: Notices,
     left: Vec<bool>,
@@ -134,6 +137,7 @@ impl MpiComm {
         Ok(Self {
             rank,
             size,
+            clock: Clock::new(mpi.abi),
             transfers: Transfers::new(rank, messages, chunk_bytes),
             notices: Notices::new(notices),
             left: vec![false; size],
@@ -228,8 +232,7 @@ impl Communicator for MpiComm {
     }
 
     fn now(&self) -> f64 {
-        // SAFETY: no arguments.
-        unsafe { (self.mpi.functions.wtime)() }
+        self.clock.now(&self.mpi)
     }
 
     fn send(&mut self, destination: usize, tag: u32, message: Vec<u8>) -> Result<(), CommError> {
@@ -242,6 +245,7 @@ impl Communicator for MpiComm {
         if self.transfers.outgoing() >= REAP_AT {
             self.transfers.reap(&self.mpi);
         }
+        self.clock.set(&self.mpi);
         Ok(())
     }
 
@@ -271,7 +275,9 @@ impl Communicator for MpiComm {
             return Ok(arrival);
         }
         loop {
-            if self.transfers.progress(&self.mpi, block)? {
+            let came = self.transfers.progress(&self.mpi, block)?;
+            self.clock.set(&self.mpi);
+            if came {
                 match self.complete(posted) {
                     Some(arrival) => return Ok(arrival),
                     None => continue,
