@@ -230,14 +230,21 @@ fn join_by_vectors<P: Composite, S: Simd>(
                 continue;
             }
             let depth = padded_16(avx512, row.behind_depths, 4 * taken);
-            let color = #[inline(always)]
-            || -> u32x16<_> {
-                let packed = padded_16(avx512, row.behind_colors, 4 * taken);
-                expand_16(avx512, packed.into(), lanes).simd_into(avx512)
-            };
             let depth: u32x16<_> = expand_16(avx512, depth.into(), lanes).simd_into(avx512);
             let ties = side == Side::Higher;
-            take_nearer(avx512, color, depth.bitcast(), held_color, held_depth, ties, u64::from(lanes));
+            take_nearer(
+                avx512,
+                #[inline(always)]
+                || -> u32x16<_> {
+                    let packed = padded_16(avx512, row.behind_colors, 4 * taken);
+                    expand_16(avx512, packed.into(), lanes).simd_into(avx512)
+                },
+                depth.bitcast(),
+                held_color,
+                held_depth,
+                ties,
+                u64::from(lanes),
+            );
             taken += lanes.count_ones() as usize;
         }
         return true;

@@ -31,9 +31,16 @@ pub(crate) fn nearest_run<C: Color, S: Simd>(
         let theirs = colors.as_chunks::<64>().0.iter().zip(depths.as_chunks::<64>().0);
         for ((held_color, held_depth), (color, depth)) in ours.zip(theirs) {
             let depth: f32x16<S> = u8x64::from_slice(simd, depth).bitcast();
-            let color = #[inline(always)]
-            || colors_16(simd, color);
-            take_nearer(simd, color, depth, held_color, held_depth, wins_ties, u64::MAX);
+            take_nearer(
+                simd,
+                #[inline(always)]
+                || colors_16(simd, color),
+                depth,
+                held_color,
+                held_depth,
+                wins_ties,
+                u64::MAX,
+            );
             done += 16;
         }
     }
@@ -67,7 +74,7 @@ pub(crate) fn take_nearer<S: Simd>(
         depth.simd_lt(held)
     };
     if lanes != u64::MAX {
-        wins = wins & fearless_simd::mask32x16::from_bitmask(simd, lanes);
+        wins &= fearless_simd::mask32x16::from_bitmask(simd, lanes);
     }
     // Most blocks of a picture are taken whole or not at all.
     if wins.any_true() {
