@@ -47,7 +47,10 @@ fn picture(scene: &str, rank: usize, ranks: usize, size: u32) -> Picture {
             let inside = match scene {
                 "dense" => true,
                 "discs" => u * u + v * v < 1.0,
-                _ => u * u + v * v < 1.0 && hash(((y * n + x) / 3) as u64 * 131 + rank as u64) % 6 == 0,
+                _ => {
+                    u * u + v * v < 1.0
+                        && hash(((y * n + x) / 3) as u64 * 131 + rank as u64).is_multiple_of(6)
+                }
             };
             if inside {
                 let at = y * n + x;
@@ -181,15 +184,21 @@ fn main() {
                             let seat =
                                 own_seat.get_or_insert_with(|| places[rank].lock().unwrap().take().unwrap());
                             let done = seat.composite(&mut comm, &images[rank], picture.bounds, options)?;
-                            done.image.map(|image| seat.recycle(image));
+                            if let Some(image) = done.image {
+                                seat.recycle(image);
+                            }
                             done.report
                         } else if *blend {
                             let done = of_f[index].composite(&mut comm, &f)?;
-                            done.image.map(|image| of_f[index].recycle(image));
+                            if let Some(image) = done.image {
+                                of_f[index].recycle(image);
+                            }
                             done.report
                         } else {
                             let done = of_z[index].composite(&mut comm, &z)?;
-                            done.image.map(|image| of_z[index].recycle(image));
+                            if let Some(image) = done.image {
+                                of_z[index].recycle(image);
+                            }
                             done.report
                         };
                         let elapsed = comm.now() - begin;
@@ -260,7 +269,9 @@ fn streamed(ranks: usize, size: u32) {
                 if rank == 0 && repeat > 1 {
                     times.lock().unwrap()[kind].push(1e3 * begin.elapsed().as_secs_f64());
                 }
-                image.map(|image| compositor.recycle(image));
+                if let Some(image) = image {
+                    compositor.recycle(image);
+                }
             }
         }
         Ok::<_, CompositeError>(())

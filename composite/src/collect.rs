@@ -11,6 +11,9 @@ use crate::rect::Rect;
 use crate::session::{Session, Tag};
 use crate::wire;
 
+/// The image at the root; elsewhere nothing, or this rank's piece where there is no root.
+pub(crate) type Outcome<P> = (Option<Image<P>>, Option<Piece<P>>);
+
 pub(crate) struct Collector<P: Composite> {
     root: Option<usize>,
     depths: bool,
@@ -112,10 +115,7 @@ impl<P: Composite> Collector<P> {
     }
 
     /// Waits for what has not come; the image at the root, this rank's piece where there is no root.
-    pub(crate) fn finish(
-        mut self,
-        session: &mut Session<'_>,
-    ) -> Result<(Option<Image<P>>, Option<Piece<P>>), CompositeError> {
+    pub(crate) fn finish(mut self, session: &mut Session<'_>) -> Result<Outcome<P>, CompositeError> {
         while session.is_waiting() {
             if let Some((place, _, bytes)) = session.next(true)? {
                 self.take(session, place, bytes)?;

@@ -111,7 +111,6 @@ fn merge<P: Composite>(
         }
         work();
     });
-    drop(bands);
     Ok(Image { width_px, height_px, colors, depths })
 }
 

@@ -20,7 +20,7 @@ fn noise(a: usize, b: usize, c: usize, d: usize) -> u64 {
 fn planes<C: composite::Color>(rank: usize, w: usize, h: usize) -> (Vec<C>, Vec<f32>) {
     let pixel = |index: usize| {
         let v = noise(rank + 1, w, h, index);
-        let on = rank % 4 != 2 && v % 3 > 0;
+        let on = rank % 4 != 2 && !v.is_multiple_of(3);
         let alpha = (v >> 4) as f32 / 4096.0;
         let channels = [alpha * 0.5, alpha * 0.25, alpha, alpha.max(0.01)];
         let color = if on { C::from_f32(channels) } else { C::TRANSPARENT };
@@ -239,8 +239,11 @@ fn ranks_that_reach_behind_those_after_them_are_refused_where_they_meet() {
     }
 }
 
+/// One rank's fragments, where those of each pixel end, and its surfaces.
+type Dealt = (Vec<Fragment>, Vec<usize>, Vec<[f32; 4]>, Vec<f32>);
+
 /// Fragments of a scene, dealt out to ranks at random: layers of all ranks lie between each other.
-fn deal(ranks: usize, w: usize, h: usize) -> Vec<(Vec<Fragment>, Vec<usize>, Vec<[f32; 4]>, Vec<f32>)> {
+fn deal(ranks: usize, w: usize, h: usize) -> Vec<Dealt> {
     let mut dealt: Vec<_> = (0..ranks)
         .map(|_| (Vec::new(), Vec::new(), vec![[0.0; 4]; w * h], vec![f32::INFINITY; w * h]))
         .collect();
@@ -256,7 +259,7 @@ fn deal(ranks: usize, w: usize, h: usize) -> Vec<(Vec<Fragment>, Vec<usize>, Vec
         for (rank, (fragments, ends, colors, depths)) in dealt.iter_mut().enumerate() {
             ends.push(fragments.len());
             // The same surface for every number of ranks, held by one of them.
-            if noise(8, 9, 1, pixel) % 3 == 0 && noise(8, 9, 2, pixel) as usize % ranks == rank {
+            if noise(8, 9, 1, pixel).is_multiple_of(3) && noise(8, 9, 2, pixel) as usize % ranks == rank {
                 colors[pixel] = [0.2, 0.4, 0.6, 1.0];
                 depths[pixel] = noise(8, 9, 3, pixel) as f32 / 65536.0;
             }

@@ -43,7 +43,7 @@ fn draw_tile(rank: usize, tile: Rect, (colors, depths): &mut Planes) {
     for y in tile.y0..tile.y1 {
         for x in tile.x0..tile.x1 {
             let v = value(rank, x, y);
-            if inside(&bounds_of(rank), x, y) && v % 5 > 0 {
+            if inside(&bounds_of(rank), x, y) && !v.is_multiple_of(5) {
                 let index = (y * W + x) as usize;
                 colors[index] = [rank as u8 + 1, v as u8, 7, 255];
                 depths[index] = (v % 16) as f32 / 16.0;

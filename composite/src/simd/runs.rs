@@ -74,7 +74,7 @@ pub(crate) fn take_nearer<S: Simd>(
         depth.simd_lt(held)
     };
     if lanes != u64::MAX {
-        wins = wins & fearless_simd::mask32x16::from_bitmask(simd, lanes);
+        wins &= fearless_simd::mask32x16::from_bitmask(simd, lanes);
     }
     // Most blocks of a picture are taken whole or not at all.
     if wins.any_true() {
