@@ -84,13 +84,8 @@ fn mpich_carries_every_strategy_to_the_bits_of_the_reference() {
 fn messages_cut_into_chunks_arrive_whole_and_in_order() {
     for (variable, ranks) in [("RTSV_OPENMPI", 3), ("RTSV_MPICH", 2)] {
         let Some(mpirun) = peer(variable) else { continue };
-        for bytes in ["1000", "7"] {
-            // Seven bytes are many chunks: without the longest messages it would take long.
-            if bytes == "7" && variable == "RTSV_MPICH" {
-                continue;
-            }
-            check(ranks, &["--mpi", "--chunk-bytes", bytes], &[("COMPOSITE_MPIRUN", &mpirun)], "");
-        }
+        // Some of the lengths in `check` are multiples of this, some differ from one by a byte.
+        check(ranks, &["--mpi", "--chunk-bytes", "1000"], &[("COMPOSITE_MPIRUN", &mpirun)], "");
     }
 }
 
