@@ -252,6 +252,7 @@ impl Communicator for MpiComm {
     fn post_recv(&mut self, source: usize, tag: u32, capacity: usize) -> Result<Receive, CommError> {
         self.check_peer(source)?;
         let id = self.transfers.post(&self.mpi, source, tag, capacity)?;
+        self.clock.set(&self.mpi);
         Ok(Receive { id, source, tag, capacity })
     }
 
