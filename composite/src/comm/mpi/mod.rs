@@ -40,6 +40,12 @@ const LAST_MESSAGES: Duration = Duration::from_millis(200);
 const PARTING: Duration = Duration::from_secs(2);
 /// Messages on their way from which on a sender looks which of them have left.
 const REAP_AT: usize = 16;
+/// Polls before the processor is offered to others, where every rank has its own.
+const SPINS: u32 = 2000;
+/// Offers of the processor before a rank sleeps, where ranks share processors.
+const YIELDS: u32 = 100;
+/// How long it sleeps then.
+const NAP: Duration = Duration::from_micros(20);
 /// How often a waiting rank looks for notices.
 const NOTICE_INTERVAL: Duration = Duration::from_millis(1);
 
@@ -55,8 +61,8 @@ pub struct MpiComm {
     notices: Notices,
     left: Vec<bool>,
     aborted: Option<(usize, String)>,
-    /// Polls before the processor is offered to others.
-    spins: u32,
+    /// Whether there are more ranks here than processors.
+    oversubscribed: bool,
     finalize: bool,
 }
 
@@ -133,7 +139,6 @@ impl MpiComm {
         // More ranks than processors: a rank that spins takes the processor from the one it waits for.
         let processors = launcher::processors_here();
         let here = launcher::ranks_here(|name| std::env::var(name).ok()).unwrap_or(size);
-        let spins = if here > processors { 1 } else { 2000 };
         Ok(Self {
             rank,
             size,
@@ -142,7 +147,7 @@ impl MpiComm {
             notices: Notices::new(notices),
             left: vec![false; size],
             aborted: None,
-            spins,
+            oversubscribed: here > processors,
             finalize: initialized == 0,
             mpi: Rc::new(mpi),
         })
@@ -293,7 +298,10 @@ impl Communicator for MpiComm {
                 return Err(silent);
             }
             polls += 1;
-            if polls > self.spins {
+            if self.oversubscribed && polls > YIELDS {
+                // Whoever only yields uses up its share of the processor and is served last when its message has come.
+                std::thread::sleep(NAP);
+            } else if self.oversubscribed || polls > SPINS {
                 std::thread::yield_now();
             }
             if now.duration_since(heard) >= NOTICE_INTERVAL {
