@@ -318,8 +318,8 @@ fn differing(ours: &Ours, theirs: IcetImage<'_>) -> u64 {
         }
         (Ours::Blend(ours), IcetImage::RgbaF32(theirs)) => {
             let differ = |(a, b): &(&[f32; 4], &[f32; 4])| {
-                // Negated, so that NaN differs.
-                a.iter().zip(*b).any(|(a, b)| !((a - b).abs() <= BLEND_TOLERANCE))
+                // Not "any is farther", so that NaN differs.
+                !a.iter().zip(*b).all(|(a, b)| (a - b).abs() <= BLEND_TOLERANCE)
             };
             ours.colors().iter().zip(theirs).filter(differ).count()
         }

@@ -7,8 +7,11 @@ const PLOT_WIDTH: f64 = 760.0;
 const ROW: f64 = 22.0;
 const TOP: f64 = 64.0;
 
+/// Name, colour, and seconds of a rank.
+type Phase = (&'static str, &'static str, fn(&Line) -> f64);
+
 /// The phases in the order in which they begin; the colours are Okabe and Ito's, which the colour-blind can tell apart.
-const PHASES: [(&str, &str, fn(&Line) -> f64); 5] = [
+const PHASES: [Phase; 5] = [
     ("render", "#009e73", |line| line.render_secs),
     ("compress", "#56b4e9", |line| line.compress_secs),
     ("send", "#e69f00", |line| line.send_secs),

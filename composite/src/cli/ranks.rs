@@ -36,14 +36,14 @@ pub(super) struct RankArgs {
 /// One rank, whatever it is.
 pub(super) enum RankComm {
     Thread(threads::ThreadComm),
-    Mpi(MpiComm),
+    Mpi(Box<MpiComm>),
 }
 
 impl RankComm {
     pub(super) fn comm(&mut self) -> &mut dyn Communicator {
         match self {
             Self::Thread(comm) => comm,
-            Self::Mpi(comm) => comm,
+            Self::Mpi(comm) => &mut **comm,
         }
     }
 
@@ -140,7 +140,7 @@ impl RankArgs {
         work: impl Fn(&mut RankComm) -> anyhow::Result<T>,
         finish: impl FnOnce(T) -> anyhow::Result<Status>,
     ) -> anyhow::Result<Status> {
-        let mut comm = RankComm::Mpi(MpiComm::with_chunks(self.chunk_bytes)?);
+        let mut comm = RankComm::Mpi(Box::new(MpiComm::with_chunks(self.chunk_bytes)?));
         let size = comm.comm().size();
         let result = match self.ranks {
             Some(wanted) if wanted != size => Err(anyhow::Error::new(UsageError(format!(
