@@ -8,7 +8,7 @@ use crate::report::Report;
 use crate::session::Session;
 use crate::strategies::Strategy;
 use crate::wire::mix;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Where the finished image goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -88,7 +88,7 @@ fn composite_or_fail<P: Composite>(
     frame: &Frame<'_, P>,
     options: &Options,
 ) -> Result<Composited<P>, CompositeError> {
-    let begin = Instant::now();
+    let begin = comm.now();
 
     // Options that can be refused before any message.
     let size = comm.size();
@@ -111,7 +111,7 @@ fn composite_or_fail<P: Composite>(
 
     // Where the pieces go. What collecting costs is its own column and not part of the others.
     let before = session.report;
-    let collecting = Instant::now();
+    let collecting = session.now();
     let (image, piece) = match root {
         None => (None, Some(piece)),
         Some(root) => {
@@ -120,7 +120,7 @@ fn composite_or_fail<P: Composite>(
             (pixels.map(|pixels| Image { width_px, height_px, pixels }), None)
         }
     };
-    let collect_secs = collecting.elapsed().as_secs_f64();
+    let collect_secs = session.now() - collecting;
     let report = Report {
         compress_secs: before.compress_secs,
         blend_secs: before.blend_secs,
@@ -132,7 +132,7 @@ fn composite_or_fail<P: Composite>(
         // Longer than a wait for a message: the rank that misses one shall be the first to say so, because it knows which.
         comm.barrier(options.timeout.saturating_mul(2))?;
     }
-    let report = Report { total_secs: begin.elapsed().as_secs_f64(), ..report };
+    let report = Report { total_secs: comm.now() - begin, ..report };
     Ok(Composited { image, piece, report })
 }
 

@@ -5,7 +5,7 @@ use crate::pixel::{Composite, combine};
 use crate::report::Report;
 use crate::wire::{self, WireError};
 use std::ops::Range;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Which messages belong together; the order within a tag is kept by every communicator.
 #[derive(Clone, Copy)]
@@ -46,6 +46,11 @@ impl<'a> Session<'a> {
         Self { comm, order, place, fingerprint, image_pixels, timeout, report: Report::default() }
     }
 
+    /// The communicator's time, in seconds.
+    pub(crate) fn now(&self) -> f64 {
+        self.comm.now()
+    }
+
     pub(crate) fn places(&self) -> usize {
         self.order.len()
     }
@@ -62,16 +67,16 @@ impl<'a> Session<'a> {
     fn send_bytes(&mut self, place: usize, tag: Tag, message: Vec<u8>) -> Result<(), CompositeError> {
         self.report.messages_sent += 1;
         self.report.bytes_sent += message.len() as u64;
-        let begin = Instant::now();
+        let begin = self.comm.now();
         self.comm.send(self.order[place], tag as u32, message)?;
-        self.report.exchange_secs += begin.elapsed().as_secs_f64();
+        self.report.exchange_secs += self.comm.now() - begin;
         Ok(())
     }
 
-    fn recv_bytes(&mut self, place: usize, tag: Tag) -> Result<Vec<u8>, CompositeError> {
-        let begin = Instant::now();
-        let message = self.comm.recv(self.order[place], tag as u32, self.timeout)?;
-        self.report.exchange_secs += begin.elapsed().as_secs_f64();
+    fn recv_bytes(&mut self, place: usize, tag: Tag, capacity: usize) -> Result<Vec<u8>, CompositeError> {
+        let begin = self.comm.now();
+        let message = self.comm.recv(self.order[place], tag as u32, capacity, self.timeout)?;
+        self.report.exchange_secs += self.comm.now() - begin;
         self.report.bytes_received += message.len() as u64;
         Ok(message)
     }
@@ -84,9 +89,9 @@ impl<'a> Session<'a> {
         range: Range<usize>,
         pixel: impl Fn(usize) -> P,
     ) -> Result<(), CompositeError> {
-        let begin = Instant::now();
+        let begin = self.comm.now();
         let message = wire::encode(self.fingerprint, range, pixel);
-        self.report.compress_secs += begin.elapsed().as_secs_f64();
+        self.report.compress_secs += self.comm.now() - begin;
         self.send_bytes(place, tag, message)
     }
 
@@ -98,13 +103,15 @@ impl<'a> Session<'a> {
         expected: Option<Range<usize>>,
         use_part: impl FnOnce(&wire::Part<'_>) -> T,
     ) -> Result<T, CompositeError> {
-        let message = self.recv_bytes(place, tag)?;
-        let begin = Instant::now();
+        // A little more than the longest honest message: one that is too long shall reach the decoder, which says what is wrong.
+        let pixels = expected.as_ref().map_or(self.image_pixels, ExactSizeIterator::len);
+        let message = self.recv_bytes(place, tag, wire::longest::<P>(pixels) + 64)?;
+        let begin = self.comm.now();
         let result = match wire::decode::<P>(&message, self.fingerprint, self.image_pixels, expected) {
             Ok(part) => Ok(use_part(&part)),
             Err(reason) => Err(self.unusable(place, reason)),
         };
-        self.report.blend_secs += begin.elapsed().as_secs_f64();
+        self.report.blend_secs += self.comm.now() - begin;
         result
     }
 
@@ -147,7 +154,7 @@ impl<'a> Session<'a> {
                 all.push(numbers.to_vec());
                 continue;
             }
-            let bytes = self.recv_bytes(place, Tag::Load)?;
+            let bytes = self.recv_bytes(place, Tag::Load, message.len().max(64 * 1024))?;
             all.push(
                 read_numbers(&bytes, message.len(), self.fingerprint).map_err(|r| self.unusable(place, r))?,
             );

@@ -19,6 +19,11 @@ const MAGIC: u64 = u64::from_le_bytes(*b"COMPOS01");
 /// Bytes in front of the mask.
 pub const HEADER_BYTES: usize = 64;
 
+/// Length in bytes of the longest message about a part of `pixels` pixels.
+pub fn longest<P: Composite>(pixels: usize) -> usize {
+    HEADER_BYTES + 8 * pixels.div_ceil(64) + pixels.saturating_mul(P::BYTES)
+}
+
 /// What is wrong with a message.
 #[derive(Debug, thiserror::Error, Clone, PartialEq, Eq)]
 pub enum WireError {

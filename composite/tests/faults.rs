@@ -1,4 +1,5 @@
 //! Faults end in a named error on every rank, for every strategy, and never in a hang.
+use composite::comm::{Arrival, Receive};
 use composite::{
     CommError, Communicator, CompositeError, Destination, Frame, Options, Strategy, WireError, threads,
 };
@@ -54,8 +55,16 @@ impl Communicator for Faulty {
         self.inner.send(destination, tag, message)
     }
 
-    fn recv(&mut self, source: usize, tag: u32, timeout: Duration) -> Result<Vec<u8>, CommError> {
-        self.inner.recv(source, tag, timeout)
+    fn now(&self) -> f64 {
+        self.inner.now()
+    }
+
+    fn post_recv(&mut self, source: usize, tag: u32, capacity: usize) -> Result<Receive, CommError> {
+        self.inner.post_recv(source, tag, capacity)
+    }
+
+    fn wait_any(&mut self, posted: &mut Vec<Receive>, timeout: Duration) -> Result<Arrival, CommError> {
+        self.inner.wait_any(posted, timeout)
     }
 
     fn barrier(&mut self, timeout: Duration) -> Result<(), CommError> {
