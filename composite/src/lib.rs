@@ -27,6 +27,8 @@
 
 pub mod comm;
 pub mod rank_order;
+#[cfg(feature = "render")]
+pub mod render;
 pub mod wire;
 
 mod collect;
