@@ -67,7 +67,7 @@ impl World {
         if geometries.len() != whole.geometries.len() {
             return Err(BuildError::NotAPart { expected: whole.geometries.len(), found: geometries.len() });
         }
-        World::build_like(geometries, instances, options, Some(whole))
+        World::build_like(geometries, instances, options, Some(whole), None)
     }
 }
 

@@ -14,6 +14,7 @@ use crate::simd::SimdLevel;
 use crate::traverse::single::{LeafTest, RaySetup, beyond, traverse};
 use fearless_simd::{Level, Simd, dispatch};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -24,6 +25,16 @@ pub enum Geometry {
     Mesh(Arc<TriMesh>),
     /// Spheres, tubes, isosurfaces, user geometry.
     Shape(Arc<dyn Shape>),
+}
+
+impl Geometry {
+    /// Where the shared data lie: the same for two clones of one geometry, and never for two geometries that are both alive.
+    fn address(&self) -> usize {
+        match self {
+            Geometry::Mesh(m) => Arc::as_ptr(m) as usize,
+            Geometry::Shape(s) => Arc::as_ptr(s) as *const () as usize,
+        }
+    }
 }
 
 /// A geometry placed in the world.
@@ -85,7 +96,9 @@ pub struct World {
     origin: DVec3,
     bounds: Aabb,
     report: BuildReport,
-    pub(super) blas: Vec<Blas>,
+    /// Shared with worlds made from this one ([`World::build_sharing`]).
+    pub(super) blas: Vec<Arc<Blas>>,
+    pub(super) options: BuildOptions,
     pub(super) placements: Vec<Placement>,
     pub(super) tlas: WideBvh,
     pub(super) robustness: Robustness,
@@ -99,15 +112,29 @@ impl World {
         instances: Vec<Instance>,
         options: &BuildOptions,
     ) -> Result<World, BuildError> {
-        World::build_like(geometries, instances, options, None)
+        World::build_sharing(geometries, instances, options, None)
     }
 
-    /// Builds a world, or a part of one.
+    /// As [`World::build`], but a geometry that `previous` has as well (the same [`Arc`], whatever its index) keeps its acceleration
+    /// structure: when one of five hundred meshes changes, or only transforms do, the others cost nothing. The options must be those of
+    /// `previous`, or everything is built anew. The hits are those of a world built from nothing (after a [`World::refit`] of `previous`: those
+    /// of the refitted one).
+    pub fn build_sharing(
+        geometries: Vec<Geometry>,
+        instances: Vec<Instance>,
+        options: &BuildOptions,
+        previous: Option<&World>,
+    ) -> Result<World, BuildError> {
+        World::build_like(geometries, instances, options, None, previous)
+    }
+
+    /// Builds a world, or a part of one, with the structures of `previous` where it has the same geometries.
     pub(super) fn build_like(
         geometries: Vec<Geometry>,
         instances: Vec<Instance>,
         options: &BuildOptions,
         whole: Option<&Whole>,
+        previous: Option<&World>,
     ) -> Result<World, BuildError> {
         let start = Instant::now();
         let mut phases = Vec::new();
@@ -117,10 +144,14 @@ impl World {
                 return Err(BuildError::NoSuchGeometry { instance: i, geometry: inst.geometry, count });
             }
         }
+        let known = previous.filter(|w| w.options == *options).map(World::trees_by_address);
         let blas = geometries
             .iter()
             .enumerate()
-            .map(|(i, g)| blas_of(i, g, options, whole))
+            .map(|(i, g)| match known.as_ref().and_then(|k| k.get(&g.address())) {
+                Some(tree) => Ok(Arc::clone(tree)),
+                None => blas_of(i, g, options, whole).map(Arc::new),
+            })
             .collect::<Result<Vec<_>, _>>()?;
         phases.push(("geometries", start.elapsed()));
 
@@ -150,6 +181,7 @@ impl World {
             blas,
             placements,
             tlas,
+            options: *options,
             robustness: options.robustness,
             level: SimdLevel::resolve(options.simd),
         })
@@ -159,6 +191,10 @@ impl World {
     pub fn from_mesh(mesh: impl Into<Arc<TriMesh>>, options: &BuildOptions) -> Result<World, BuildError> {
         let instance = Instance { geometry: 0, world_from_object: DAffine3::IDENTITY };
         World::build(vec![Geometry::Mesh(mesh.into())], vec![instance], options)
+    }
+
+    fn trees_by_address(&self) -> HashMap<usize, &Arc<Blas>> {
+        self.geometries.iter().map(Geometry::address).zip(&self.blas).collect()
     }
 
     /// Makes the upper level anew after a geometry has changed.
@@ -324,7 +360,7 @@ struct Placed {
 /// Chooses render space (world space, moved when everything is far from zero) and places the instances in it.
 fn place(
     instances: &[Instance],
-    blas: &[Blas],
+    blas: &[Arc<Blas>],
     whole: Option<&Whole>,
     notes: &mut Vec<String>,
 ) -> Result<Placed, BuildError> {
@@ -355,7 +391,7 @@ fn place(
 
 /// Zero, or the middle of the world's bounds when they lie more than four sizes away from it. A single geometry without rotation gets its own
 /// centre, so that its local space and render space coincide.
-fn choose_origin(instances: &[Instance], blas: &[Blas]) -> DVec3 {
+fn choose_origin(instances: &[Instance], blas: &[Arc<Blas>]) -> DVec3 {
     if let [only] = instances
         && only.world_from_object.matrix3 == DMat3::IDENTITY
         && only.world_from_object.is_finite()
