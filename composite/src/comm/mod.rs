@@ -1,5 +1,6 @@
 //! How ranks talk. Compositing needs no more than this trait, so any transport can be plugged in.
 pub mod collective;
+pub mod sim;
 pub mod threads;
 
 mod error;
