@@ -114,6 +114,11 @@ impl<P: Composite> Compositor<P> {
         &self.options
     }
 
+    /// Another order from front to back ([`Options::order`]) for the frames to come.
+    pub fn set_order(&mut self, order: Option<Vec<usize>>) {
+        self.options.order = order;
+    }
+
     /// Takes back an image that is no longer needed, so that the next one is written over it.
     pub fn recycle(&mut self, image: Image<P>) {
         self.spare = Some(image);

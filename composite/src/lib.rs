@@ -21,12 +21,17 @@
 //! assert_eq!(image.depths(), [0.7, 0.5]);
 //! ```
 //!
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
+#[cfg(feature = "cli")]
+pub mod cli;
 pub mod comm;
 pub mod rank_order;
 #[cfg(feature = "render")]
 pub mod render;
+#[cfg(feature = "rival")]
+pub mod rival;
+pub mod scenes;
 
 mod collect;
 mod color;
