@@ -209,6 +209,7 @@ impl Communicator for SimComm {
             let arrival_secs =
                 s.network.transfer(&mut s.interfaces, (rank, destination), now_secs, message.len());
             s.ranks[destination].mail[rank].push_back(Mail { tag, arrival_secs, message });
+            s.look_again(destination);
             Ok(())
         };
         self.until_computing(schedule);
@@ -239,7 +240,7 @@ impl Communicator for SimComm {
         let mut schedule = group.lock();
         self.book(&mut schedule);
         let deadline_secs = schedule.ranks[rank].clock_secs + timeout.as_secs_f64();
-        schedule.ranks[rank].state = State::Waiting { wanted: wanted.clone(), deadline_secs };
+        schedule.wait(rank, wanted.clone(), deadline_secs);
         let mut schedule = self.until_granted(&group, schedule)?;
 
         // ---- What arrived first, of the lowest rank among equals.
@@ -293,6 +294,9 @@ impl Drop for SimComm {
         let group = Arc::clone(&self.group);
         let mut schedule = group.lock();
         schedule.ranks[self.rank].state = State::Gone;
+        for rank in 0..schedule.ranks.len() {
+            schedule.look_again(rank);
+        }
         group.dispatch(&mut schedule);
     }
 }

@@ -29,8 +29,8 @@ pub(super) enum State {
     Ready,
     /// In a call that takes effect at its clock.
     Acting,
-    /// In a call that takes effect when one of these is there, or at the deadline.
-    Waiting { wanted: Vec<Wanted>, deadline_secs: f64 },
+    /// In a call that takes effect when one of these is there, or at the deadline: at `earliest_secs`, as far as is known.
+    Waiting { wanted: Vec<Wanted>, deadline_secs: f64, earliest_secs: f64 },
     /// Its call may take effect.
     Granted,
     /// It has left.
@@ -80,19 +80,33 @@ impl Schedule {
         matches!(self.ranks[wanted.source].state, State::Gone) && self.find(rank, wanted).is_none()
     }
 
+    /// Makes a rank wait.
+    pub(super) fn wait(&mut self, rank: usize, wanted: Vec<Wanted>, deadline_secs: f64) {
+        self.ranks[rank].state = State::Waiting { wanted, deadline_secs, earliest_secs: deadline_secs };
+        self.look_again(rank);
+    }
+
+    /// To be called when something has changed for a rank that may wait: a message was sent to it, or another rank has gone.
+    pub(super) fn look_again(&mut self, rank: usize) {
+        let r = &self.ranks[rank];
+        let State::Waiting { wanted, deadline_secs, .. } = &r.state else { return };
+        let time = if wanted.iter().any(|w| self.is_lost(rank, w)) {
+            r.clock_secs
+        } else {
+            let arrivals = wanted.iter().filter_map(|w| self.find(rank, w));
+            arrivals.map(|(_, arrival)| arrival).fold(*deadline_secs, f64::min).max(r.clock_secs)
+        };
+        if let State::Waiting { earliest_secs, .. } = &mut self.ranks[rank].state {
+            *earliest_secs = time;
+        }
+    }
+
     /// The earliest time at which a rank can do something that others notice.
     fn earliest_secs(&self, rank: usize) -> f64 {
-        let r = &self.ranks[rank];
-        match &r.state {
+        match &self.ranks[rank].state {
             State::Gone => f64::INFINITY,
-            State::Waiting { wanted, deadline_secs } => {
-                if wanted.iter().any(|w| self.is_lost(rank, w)) {
-                    return r.clock_secs;
-                }
-                let arrivals = wanted.iter().filter_map(|w| self.find(rank, w));
-                arrivals.map(|(_, arrival)| arrival).fold(*deadline_secs, f64::min).max(r.clock_secs)
-            }
-            _ => r.clock_secs,
+            State::Waiting { earliest_secs, .. } => *earliest_secs,
+            _ => self.ranks[rank].clock_secs,
         }
     }
 
