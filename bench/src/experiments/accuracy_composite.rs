@@ -33,7 +33,9 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     ));
     record.notes.push(CAVEAT.into());
     for alpha in ALPHAS {
-        for (name, strategy) in [("direct send", Strategy::DirectSend), ("radix-k", Strategy::RadixK { k: 8 })] {
+        for (name, strategy) in
+            [("direct send", Strategy::DirectSend), ("radix-k", Strategy::RadixK { k: 8 })]
+        {
             context.say(format!("alpha {alpha}, {name}"))?;
             let case = Case { alpha, size, frames, strategy, name };
             measure::<[u8; 4]>(record, "u8", &case)?;
@@ -48,9 +50,10 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         Axis::log("error", "1/255"),
     );
     for alpha in ALPHAS {
-        let of = record.rows.iter().filter(|r| {
-            r.number("alpha") == Some(alpha) && r.text("strategy") == Some("direct send")
-        });
+        let of = record
+            .rows
+            .iter()
+            .filter(|r| r.number("alpha") == Some(alpha) && r.text("strategy") == Some("direct send"));
         let mut points: Vec<Point> = of
             .filter_map(|r| Some(Point { x: r.number("time")?, y: r.number("error")?, range: None }))
             .collect();
@@ -121,8 +124,7 @@ where
         }
         Ok((secs, sent, image.map(|i| i.colors().to_vec())))
     })?;
-    let slowest: Vec<f64> =
-        (0..frames).map(|f| results.iter().map(|r| r.0[f]).fold(0.0, f64::max)).collect();
+    let slowest: Vec<f64> = (0..frames).map(|f| results.iter().map(|r| r.0[f]).fold(0.0, f64::max)).collect();
     let sent: u64 = results.iter().map(|r| r.1).sum();
     let Some(image) = results.into_iter().next().and_then(|r| r.2) else {
         anyhow::bail!("rank 0 has no image");

@@ -2,6 +2,7 @@
 
 use super::Context;
 use super::many_ranks::{CAVEAT, powers, simulated};
+use super::smpi;
 use crate::plot::{Axis, Plot, Series};
 use crate::record::{Record, Row};
 use crate::runner::Ratio;
@@ -37,6 +38,12 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("fps", "1/s", "frames per second at that time");
     record.column("time_low", "ms", "fastest frame");
     record.column("time_high", "ms", "slowest frame");
+    record.column(
+        "smpi",
+        "ms",
+        "the same under SimGrid's SMPI, of IceT its best strategy; empty where that is not installed",
+    );
+    record.column("model_over_smpi", "", "time by our model over that by SMPI, of direct send");
     record.column("differ", "", "pixels that differ from direct send's image");
     let (size, frames, most) = if context.quick { (512, 2, 64) } else { (1024, 5, 128) };
     record.notes.push(format!(
@@ -46,12 +53,25 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     ));
     record.notes.push(CAVEAT.into());
     let icet = rival::find();
-    if icet.is_none() {
-        record.missing.push(rival::missing().to_string());
+    if let Err(why) = &icet {
+        record.missing.push(why.to_string());
     }
+    let icet = icet.ok();
+    let mut smpi_is_there = true;
     for ranks in powers(2, most) {
         context.say(format!("{ranks} ranks"))?;
         measure(record, ranks, size, frames, icet.as_deref())?;
+        // SimGrid takes minutes for many ranks.
+        if smpi_is_there && ranks <= if context.quick { 8 } else { 64 } {
+            context.say(format!("{ranks} ranks under SMPI"))?;
+            match smpi::compare_ms(ranks, size, frames) {
+                Ok(times) => beside_smpi(record, ranks, times),
+                Err(why) => {
+                    record.missing.push(format!("times under SMPI: {why}"));
+                    smpi_is_there = false;
+                }
+            }
+        }
     }
     let mut plot = Plot::lines("Compositing", Axis::log("ranks", ""), Axis::log("frames per second", "1/s"));
     for (name, _) in ALL {
@@ -109,6 +129,22 @@ fn measure(
     Ok(())
 }
 
+/// Puts SMPI's times of direct send and of the best of IceT beside ours.
+fn beside_smpi(record: &mut Record, ranks: usize, [ours_ms, icet_ms]: [f64; 2]) {
+    let of_ranks = record.rows.iter_mut().filter(|r| r.number("ranks") == Some(ranks as f64));
+    for row in of_ranks {
+        let name = row.text("compositor").unwrap_or_default().to_string();
+        let time = row.number("time");
+        *row = match name.as_str() {
+            "direct send" => {
+                std::mem::take(row).with("smpi", ours_ms).with("model_over_smpi", time.map(|t| t / ours_ms))
+            }
+            "IceT radix-kr" => std::mem::take(row).with("smpi", icet_ms),
+            _ => continue,
+        };
+    }
+}
+
 /// One rank's times by compositor and frame, and on rank 0 the pixels that differ from the first compositor's.
 struct OneRank {
     secs: Vec<Vec<f64>>,
@@ -138,8 +174,7 @@ fn one_rank(
             Who::Icet(_) => None,
         })
         .collect();
-    let mut theirs =
-        icet.map(|path| Icet::over_comm(path, comm, IcetMode::Depth, size, size)).transpose()?;
+    let mut theirs = icet.map(|path| Icet::over_comm(path, comm, IcetMode::Depth, size, size)).transpose()?;
     let mut out = OneRank { secs: vec![Vec::new(); all.len()], differ: vec![0; all.len()] };
     for n in 0..=frames {
         Scene::Discs.draw(n as u64, rank, ranks, &mut drawn);

@@ -42,7 +42,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let mut plot = Plot::lines("Sharing", Axis::log("ranks", ""), Axis::log("time of a frame", "ms"));
     for name in ["replicated", "parts"] {
         let of = record.rows.iter().filter(|r| r.text("sharing") == Some(name));
-        plot.series.push(Series::new(name, of.filter_map(|r| r.number("ranks").zip(r.number("frame"))).collect()));
+        plot.series
+            .push(Series::new(name, of.filter_map(|r| r.number("ranks").zip(r.number("frame"))).collect()));
     }
     record.plots.push(plot);
     Ok(())

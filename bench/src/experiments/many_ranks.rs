@@ -44,12 +44,10 @@ impl FrameCost {
     fn of(reports: &[&RankReport]) -> FrameCost {
         let begin = reports.iter().map(|r| r.begin_at_secs).fold(f64::INFINITY, f64::min);
         let end = reports.iter().map(|r| r.begin_at_secs + r.total_secs()).fold(0.0, f64::max);
-        let render = |r: &RankReport| {
-            r.secs(Activity::Render) + r.secs(Activity::Shade) + r.secs(Activity::Answer)
-        };
-        let mean = |f: &dyn Fn(&RankReport) -> f64| {
-            reports.iter().map(|r| f(r)).sum::<f64>() / reports.len() as f64
-        };
+        let render =
+            |r: &RankReport| r.secs(Activity::Render) + r.secs(Activity::Shade) + r.secs(Activity::Answer);
+        let mean =
+            |f: &dyn Fn(&RankReport) -> f64| reports.iter().map(|r| f(r)).sum::<f64>() / reports.len() as f64;
         FrameCost {
             frame_secs: end - begin,
             render_mean_secs: mean(&render),
@@ -123,7 +121,8 @@ pub(super) fn frames(
         let output: anyhow::Result<Vec<RankReport>> = output?;
         reports.push(output?);
     }
-    let costs = (0..frames).map(|f| FrameCost::of(&reports.iter().map(|r| &r[f]).collect::<Vec<_>>())).collect();
+    let costs =
+        (0..frames).map(|f| FrameCost::of(&reports.iter().map(|r| &r[f]).collect::<Vec<_>>())).collect();
     Ok(Frames { costs, last: reports.into_iter().filter_map(|mut r| r.pop()).collect() })
 }
 
@@ -152,10 +151,18 @@ pub(super) fn powers(first: usize, last: usize) -> impl Iterator<Item = usize> {
 /// Columns of [`with_cost`].
 pub(super) fn cost_columns(record: &mut Record) {
     record.column("ranks", "", "ranks, one thread each");
-    record.column("frame", "ms", "median over the frames: from the first rank's begin to the picture on rank 0");
+    record.column(
+        "frame",
+        "ms",
+        "median over the frames: from the first rank's begin to the picture on rank 0",
+    );
     record.column("frame_low", "ms", "fastest frame");
     record.column("frame_high", "ms", "slowest frame");
-    record.column("render_mean", "ms", "tracing and shading of the median frame, mean over the ranks (CPU time)");
+    record.column(
+        "render_mean",
+        "ms",
+        "tracing and shading of the median frame, mean over the ranks (CPU time)",
+    );
     record.column("render_max", "ms", "the same of the slowest rank");
     record.column("rest_mean", "ms", "compositing, collecting, messages and waiting, mean over the ranks");
     record.column("sent", "MB", "bytes sent by all ranks");

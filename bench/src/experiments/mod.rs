@@ -23,6 +23,7 @@ mod peers;
 mod peers_schlieren;
 mod pictures;
 mod shock_angles;
+mod smpi;
 mod speed_schlieren;
 mod strong_scaling;
 mod table5_1;

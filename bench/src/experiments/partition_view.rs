@@ -10,7 +10,11 @@ use composite::render::{FrameOptions, Partition, Split};
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     cost_columns(record);
     record.column("view", "", "data set and view");
-    record.column("partition", "", "triangles: the same number for each rank; view: the same expected work in this picture");
+    record.column(
+        "partition",
+        "",
+        "triangles: the same number for each rank; view: the same expected work in this picture",
+    );
     record.column("imbalance", "", "slowest rank’s render time over the mean");
     record.column("most_triangles", "", "triangles of the rank that has most");
     record.notes.push(
@@ -54,13 +58,15 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             }
         }
     }
-    let mut plot = Plot::lines("Partitions", Axis::log("ranks", ""), Axis::log("slowest rank’s render", "ms"));
+    let mut plot =
+        Plot::lines("Partitions", Axis::log("ranks", ""), Axis::log("slowest rank’s render", "ms"));
     for (data, view, _) in cases {
         for name in ["triangles", "view"] {
             let view = format!("{data} {view}");
-            let of = record.rows.iter().filter(|r| {
-                r.text("view") == Some(view.as_str()) && r.text("partition") == Some(name)
-            });
+            let of = record
+                .rows
+                .iter()
+                .filter(|r| r.text("view") == Some(view.as_str()) && r.text("partition") == Some(name));
             let points = of.filter_map(|r| r.number("ranks").zip(r.number("render_max"))).collect();
             plot.series.push(Series::new(format!("{view}, by {name}"), points));
         }

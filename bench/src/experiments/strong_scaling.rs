@@ -78,7 +78,8 @@ fn run(
         ("lamp and occlusion", "render_max", "slowest rank’s render, lamp and occlusion"),
     ] {
         let of = record.rows.iter().filter(|r| r.text("light") == Some(light));
-        plot.series.push(Series::new(name, of.filter_map(|r| r.number("ranks").zip(r.number(column))).collect()));
+        plot.series
+            .push(Series::new(name, of.filter_map(|r| r.number("ranks").zip(r.number(column))).collect()));
     }
     record.plots.push(plot);
     Ok(())

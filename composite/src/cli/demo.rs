@@ -1,7 +1,7 @@
 //! `composite demo`: a data set rendered in parts ([`demo_data`]), or frames made without a renderer composited; with a plot of what
 //! each rank did when.
-use super::{demo_data, gantt};
 use super::ranks::{RankArgs, RankComm};
+use super::{demo_data, gantt};
 use crate::compositor::{Compositor, Options};
 use crate::frame::Frame;
 use crate::pixel::DepthPixel;

@@ -3,7 +3,7 @@ use super::{DataParallel, FrameError, FrameOptions, FrameOutput, Partition, Spli
 use crate::comm::Communicator;
 use datasets::catalogue::{self, CatalogueError, Data};
 use datasets::isosurface::Options as SurfaceOptions;
-use rt_core::accel::{BuildOptions, World};
+use rt_core::accel::BuildOptions;
 use rt_core::camera::{Camera, CameraError};
 use rt_core::environment::Background;
 use rt_core::glam::DVec3;
@@ -109,7 +109,8 @@ impl Demo {
         };
         let partition = Partition::new(&scene, ranks, &split);
         let scene = if self.color_by_rank { colored(&scene, &partition) } else { scene };
-        let options = RenderOptions { samples: self.samples, ..RenderOptions::new(self.size_px[0], self.size_px[1]) };
+        let options =
+            RenderOptions { samples: self.samples, ..RenderOptions::new(self.size_px[0], self.size_px[1]) };
         Ok(Prepared { scene, camera, options, partition })
     }
 
@@ -132,11 +133,13 @@ impl Demo {
         let views = catalogue::find(&self.data)?.views();
         let view = match &self.view {
             None => &views[0],
-            Some(name) => views.iter().find(|v| v.name.eq_ignore_ascii_case(name)).ok_or_else(|| DemoError::View {
-                data: self.data.clone(),
-                view: name.clone(),
-                known: views.iter().map(|v| v.name.as_str()).collect::<Vec<_>>().join(", "),
-            })?,
+            Some(name) => {
+                views.iter().find(|v| v.name.eq_ignore_ascii_case(name)).ok_or_else(|| DemoError::View {
+                    data: self.data.clone(),
+                    view: name.clone(),
+                    known: views.iter().map(|v| v.name.as_str()).collect::<Vec<_>>().join(", "),
+                })?
+            }
         };
         let bounds = mesh.bounds();
         let middle = mesh.origin + bounds.center().as_dvec3();
@@ -172,7 +175,11 @@ impl Prepared {
     ///
     /// # Errors
     /// Any fault on any rank ends the frame for all.
-    pub fn run(&self, comm: &mut dyn Communicator, options: &FrameOptions) -> Result<FrameOutput, FrameError> {
+    pub fn run(
+        &self,
+        comm: &mut dyn Communicator,
+        options: &FrameOptions,
+    ) -> Result<FrameOutput, FrameError> {
         let part = self.partition.part(&self.scene, comm.rank(), &BuildOptions::default())?;
         let mut renderer = DataParallel::new(comm, part, options.clone())?;
         renderer.frame(comm, &self.camera, &self.options)
@@ -182,7 +189,9 @@ impl Prepared {
 /// The same scene with a colour for each rank's triangles.
 fn colored(scene: &Scene, partition: &Partition) -> Scene {
     let mut scene = scene.clone();
-    for (geometry, appearance) in scene.world.instances().iter().map(|i| i.geometry).zip(&mut scene.appearances) {
+    for (geometry, appearance) in
+        scene.world.instances().iter().map(|i| i.geometry).zip(&mut scene.appearances)
+    {
         let count: usize = (0..partition.parts()).map(|r| partition.primitives(r)[geometry].len()).sum();
         let mut colors = vec![[0.0; 4]; count];
         for rank in 0..partition.parts() {
@@ -220,7 +229,8 @@ mod tests {
     fn the_demo_is_the_picture_of_one_node() {
         for demo in [small(), Demo { cut_by_view: true, global_light: false, ..small() }] {
             let prepared = demo.prepare(5, &mut |_, _| true).unwrap();
-            let outputs = threads::run(5, |mut comm| prepared.run(&mut comm, &FrameOptions::default()).unwrap());
+            let outputs =
+                threads::run(5, |mut comm| prepared.run(&mut comm, &FrameOptions::default()).unwrap());
             let picture = outputs[0].as_ref().unwrap().frame.as_ref().unwrap();
             let expected = render(&prepared.scene, &prepared.camera, &prepared.options).unwrap().frame;
             assert!(picture.color == expected.color);

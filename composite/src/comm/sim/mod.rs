@@ -244,9 +244,10 @@ impl Communicator for SimComm {
         let mut schedule = self.until_granted(&group, schedule)?;
 
         // ---- What arrived first, of the lowest rank among equals.
-        let found = wanted.iter().enumerate().filter_map(|(i, w)| {
-            schedule.find(rank, w).map(|(at, arrival)| (i, at, arrival, w.source))
-        });
+        let found = wanted
+            .iter()
+            .enumerate()
+            .filter_map(|(i, w)| schedule.find(rank, w).map(|(at, arrival)| (i, at, arrival, w.source)));
         let found = found.min_by(|a, b| a.2.total_cmp(&b.2).then(a.3.cmp(&b.3)));
         let now_secs = schedule.ranks[rank].clock_secs;
         let result = match found.filter(|f| f.2 <= deadline_secs.max(now_secs)) {

@@ -28,8 +28,12 @@ impl Network {
     };
 
     /// 4X HDR InfiniBand: 24 GB/s.
-    pub const HDR: Network =
-        Network { name: "HDR InfiniBand, 24 GB/s", latency_secs: 0.6e-6, byte_secs: 1.0 / 24e9, ..Network::QDR };
+    pub const HDR: Network = Network {
+        name: "HDR InfiniBand, 24 GB/s",
+        latency_secs: 0.6e-6,
+        byte_secs: 1.0 / 24e9,
+        ..Network::QDR
+    };
 
     /// Gigabit Ethernet.
     pub const GIGABIT: Network = Network {
