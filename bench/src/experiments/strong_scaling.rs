@@ -2,10 +2,13 @@
 
 use super::Context;
 use super::many_ranks::{Sharing, cost_columns, frames, powers, with_cost};
+use crate::picture::save;
 use crate::plot::{Axis, Plot, Series};
-use crate::record::{Record, Row};
+use crate::record::{Picture, Record, Row};
+use anyhow::Context as _;
 use composite::render::demo::Demo;
 use composite::render::{FrameOptions, Partition, Split};
+use composite::threads;
 
 /// Figure 3.7: the mixing layer from outside.
 pub(super) fn rmo(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
@@ -70,6 +73,8 @@ fn run(
             );
         }
     }
+    context.say(format!("{data} {size}: picture"))?;
+    record.pictures.push(picture(&demo)?);
     let mut plot = Plot::lines("Strong scaling", Axis::log("ranks", ""), Axis::log("time of a frame", "ms"));
     for (light, column, name) in [
         ("headlight", "frame", "frame, headlight"),
@@ -83,4 +88,21 @@ fn run(
     }
     record.plots.push(plot);
     Ok(())
+}
+
+/// The scene in eight parts, each in a colour of its own.
+fn picture(demo: &Demo) -> anyhow::Result<Picture> {
+    const RANKS: usize = 8;
+    let demo = Demo { color_by_rank: true, global_light: true, ..demo.clone() };
+    let prepared = demo.prepare(RANKS, &mut |_, _| true)?;
+    let mut outputs = threads::run(RANKS, |mut comm| prepared.run(&mut comm, &FrameOptions::default()));
+    let frame = outputs.swap_remove(0)??.frame.context("rank 0 has the picture")?;
+    Ok(Picture {
+        name: format!("{}-{}-parts", demo.data, demo.view.unwrap_or_default()),
+        caption: format!(
+            "{} in {RANKS} parts, a colour for each rank, rendered by {RANKS} ranks: shadows and ambient occlusion cross the borders of parts.",
+            demo.data
+        ),
+        png: save::png_bytes(&frame)?,
+    })
 }
