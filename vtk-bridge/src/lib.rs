@@ -1,5 +1,4 @@
 //! Ray tracing inside unmodified VTK and ParaView.
-//!
-//! **Status: not built yet.** This member holds its place in the workspace and has no code; ARCHITECTURE.md says
-//! what it will do and in which order the members come.
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
+
+pub mod anari;
