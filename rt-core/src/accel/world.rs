@@ -27,11 +27,13 @@ pub enum Geometry {
 }
 
 impl Geometry {
-    /// Where the shared data lie: the same for two clones of one geometry, and never for two geometries that are both alive.
+    /// Where the shared data lie: the same for two clones of one geometry and for two looks of one shape, and never for two others that are
+    /// both alive.
     fn address(&self) -> usize {
+        let of_shape = |s: &Arc<dyn Shape>| Arc::as_ptr(s) as *const () as usize;
         match self {
             Geometry::Mesh(m) => Arc::as_ptr(m) as usize,
-            Geometry::Shape(s) => Arc::as_ptr(s) as *const () as usize,
+            Geometry::Shape(s) => s.tree_of().as_ref().map_or_else(|| of_shape(s), of_shape),
         }
     }
 }
@@ -139,7 +141,8 @@ impl World {
         let blas: Vec<Arc<Blas>> = geometries
             .iter()
             .map(|g| match (known.as_ref().and_then(|k| k.get(&g.address())), g) {
-                (Some(tree), _) => Arc::clone(tree),
+                (Some(tree), Geometry::Mesh(_)) => Arc::clone(tree),
+                (Some(tree), Geometry::Shape(s)) => Blas::with_shape(tree, s),
                 (None, Geometry::Mesh(m)) => Arc::new(Blas::for_mesh(m, options)),
                 (None, Geometry::Shape(s)) => Arc::new(Blas::for_shape(s.clone(), options)),
             })

@@ -6,7 +6,7 @@ use rt_core::glam::{DAffine3, DVec3, Vec3};
 use rt_core::math::Aabb;
 use rt_core::mesh::{PerElement, TriMesh};
 use rt_core::ray::Ray;
-use rt_core::shapes::{Shape, ShapeHit, ShapeSurface, outward_bounds};
+use rt_core::shapes::{Shape, ShapeHit, ShapeSurface};
 use std::sync::Arc;
 
 /// An input of a material.
@@ -179,8 +179,13 @@ impl Shape for TriangleShape {
         if corners.iter().any(|p| !p.is_finite()) {
             return Aabb::EMPTY;
         }
+        // One step outwards: a ray may meet a triangle that is flat in an axis with a rounding error.
         let b = Aabb::from_points(&corners);
-        outward_bounds(b.min.as_dvec3(), b.max.as_dvec3())
+        let (down, up) = (|v: f32| v.next_down(), |v: f32| v.next_up());
+        Aabb::new(
+            Vec3::new(down(b.min.x), down(b.min.y), down(b.min.z)),
+            Vec3::new(up(b.max.x), up(b.max.y), up(b.max.z)),
+        )
     }
 
     fn closest(&self, prim: u32, ray: &Ray) -> Option<ShapeHit> {
