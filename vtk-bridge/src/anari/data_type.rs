@@ -187,7 +187,7 @@ impl DataType {
             Some((Component::Signed(s), _)) => scalars(s, |b| signed(b) as f64),
             Some((_, n)) => self.attribute(bytes)[..n].iter().map(|v| f64::from(*v)).collect(),
             None if matches!(self.0, 2208..=2211) => scalars(8, float64),
-            None if matches!(self.0, 2004..=2007 | 103) => scalars(4, |b| signed(b) as f64),
+            None if matches!(self.0, 2004..=2007 | 100 | 103) => scalars(4, |b| signed(b) as f64),
             None if matches!(self.0, 2104..=2107) => scalars(8, |b| unsigned(b) as f64),
             None => scalars(4, |b| f64::from(f32::from_ne_bytes([b[0], b[1], b[2], b[3]]))),
         }

@@ -462,7 +462,7 @@ impl Device {
             .collect();
         let accumulate = frame.bool("accumulation", false).then(|| {
             let mut key: Vec<u64> = size.iter().map(|s| u64::from(*s)).collect();
-            [&world, &camera, &renderer].into_iter().for_each(|o| super::scene::world::fingerprint(o, |_| true, &mut key));
+            [&world, &camera, &renderer].into_iter().for_each(|o| super::scene::world::fingerprint(o, &|_| true, &mut key));
             key
         });
         let sums = lock(&self.sums).entry(handle).or_default().clone();

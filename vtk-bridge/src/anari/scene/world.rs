@@ -58,7 +58,7 @@ pub(crate) struct Ids {
 }
 
 /// Values that decide what is made of an object; `keep` chooses its own parameters.
-pub(crate) fn fingerprint(object: &Object, keep: impl Fn(&str) -> bool, out: &mut Vec<u64>) {
+pub(crate) fn fingerprint(object: &Object, keep: &dyn Fn(&str) -> bool, out: &mut Vec<u64>) {
     out.push(object.handle.0);
     if object.kind.is_array() {
         out.push(object.version());
@@ -67,7 +67,7 @@ pub(crate) fn fingerprint(object: &Object, keep: impl Fn(&str) -> bool, out: &mu
     for (name, value) in object.parameters().iter().filter(|(name, _)| keep(name)) {
         out.extend(name.bytes().map(u64::from));
         match value {
-            Value::Object(o) => fingerprint(o, |_| true, out),
+            Value::Object(o) => fingerprint(o, &|_| true, out),
             other => other.fingerprint(out),
         }
     }
@@ -174,7 +174,7 @@ impl Making<'_> {
         }
         for volume in group.objects("volume") {
             let mut key = Vec::new();
-            fingerprint(&volume, |_| true, &mut key);
+            fingerprint(&volume, &|_| true, &mut key);
             let notes = &mut *self.notes;
             let made = kept(&self.old.volumes, &mut self.cache.volumes, key, || volume_of(&volume, notes));
             let Some(medium) = made.as_ref() else { continue };
@@ -208,19 +208,19 @@ impl Making<'_> {
             return;
         }
         let mut key = Vec::new();
-        fingerprint(&geometry, |name| !is_look(name), &mut key);
+        fingerprint(&geometry, &|name| !is_look(name), &mut key);
         let notes = &mut *self.notes;
         let prepared =
             kept(&self.old.prepared, &mut self.cache.prepared, key.clone(), || prepare(&geometry, notes));
         self.grow(prepared.bounds, &spot.world_from_object);
         let notes = &mut *self.notes;
 
-        fingerprint(&geometry, is_look, &mut key);
-        fingerprint(&material, |_| true, &mut key);
+        fingerprint(&geometry, &is_look, &mut key);
+        fingerprint(&material, &|_| true, &mut key);
         if let Some(instance) = spot.instance {
             let replaced = instance.parameters().keys().any(|k| SLOTS.contains(&k.as_str()));
             if replaced {
-                fingerprint(instance, |name| SLOTS.contains(&name), &mut key);
+                fingerprint(instance, &|name| SLOTS.contains(&name), &mut key);
             }
         }
         if names_the_world(&material) {

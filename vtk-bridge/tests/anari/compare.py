@@ -1,0 +1,62 @@
+"""Draws every scene with our device and with barney: `compare.py FOLDER [SCENE...]`. Prints a JSON object by scene; pictures go into FOLDER.
+
+What is compared: one directional light, no ambient light, light over all bounces. Where barney is not what ANARI says, its scene is changed to mean the
+same (see `irradiance`), or the scene is left to the tests against known pictures (`NOT_IN_BARNEY`).
+"""
+import json
+import subprocess
+import sys
+
+import scenes
+from anari_c import *
+
+SAMPLES = 64
+IRRADIANCE = 2.0
+# barney 1.2.6 gives half of a directional light's irradiance: a white matte surface that faces irradiance pi becomes 0.5 there, and 1 by ANARI's
+# definition (reflected radiance = albedo / pi * irradiance).
+BARNEY_FACTOR = 2.0
+# Kinds of objects that barney lacks, does otherwise, or ends the process at.
+NOT_IN_BARNEY = {}
+
+
+def picture(name, scene):
+    d = Device(name)
+    ours = name == "rtv"
+    light = scenes.directional(d, IRRADIANCE * (1.0 if ours else BARNEY_FACTOR))
+    f = scenes.view(d, scene(d), lights=[light], ambient=0.0, renderer="pathtracer" if ours else "default", pixelSamples=SAMPLES)
+    return draw(d, f), d
+
+
+def save(path, p):
+    try:
+        from PIL import Image
+    except ImportError:
+        return
+    Image.fromarray(np.ascontiguousarray(p[::-1, :, :3])).save(path)
+
+
+def barney(folder, name):
+    """In a process of its own, which barney may end."""
+    path = f"{folder}/{name}_barney.npy"
+    run = subprocess.run([sys.executable, __file__, "--barney", path, name], capture_output=True)
+    return np.load(path) if run.returncode == 0 else None
+
+
+if __name__ == "__main__":
+    by_name = {s.__name__: s for s in scenes.SCENES}
+    if sys.argv[1] == "--barney":
+        np.save(sys.argv[2], picture("barney", by_name[sys.argv[3]])[0])
+        sys.exit()
+    folder, chosen = sys.argv[1], sys.argv[2:] or list(by_name)
+    out = {}
+    for name in chosen:
+        ours, d = picture("rtv", by_name[name])
+        save(f"{folder}/{name}_rtv.png", ours)
+        found = dict(messages=[t for s, t in d.messages if s in ("fatal", "error", "warning")], covered=int((np.abs(ours.astype(int) - ours[0, 0]).sum(-1) > 8).sum()))
+        theirs = None if name in NOT_IN_BARNEY else barney(folder, name)
+        if theirs is not None:
+            save(f"{folder}/{name}_barney.png", theirs)
+            found["psnr"] = round(float(psnr(ours[..., :3], theirs[..., :3])), 2)
+        out[name] = found
+        print(name, found, file=sys.stderr, flush=True)
+    print(json.dumps(out))
