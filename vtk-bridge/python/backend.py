@@ -1,6 +1,6 @@
 """Builds the wheel (PEP 517) with Python's standard library: the package, and the shared library of vtk-bridge.
 
-The library is $RTV_LIBRARY, or what `cargo build --release -p vtk-bridge` makes in the workspace that this folder is part of.
+The library is $RTVTK_LIBRARY, or what `cargo build --release -p vtk-bridge` makes in the workspace that this folder is part of.
 """
 import base64
 import hashlib
@@ -27,11 +27,11 @@ License: MIT OR Apache-2.0
 
 def library():
     """The shared library to ship."""
-    given = os.environ.get("RTV_LIBRARY")
+    given = os.environ.get("RTVTK_LIBRARY")
     if given:
         path = pathlib.Path(given)
         if not path.is_file():
-            raise SystemExit(f"RTV_LIBRARY is {given}, which is no file; leave it out to build the library with cargo")
+            raise SystemExit(f"RTVTK_LIBRARY is {given}, which is no file; leave it out to build the library with cargo")
         return path
     subprocess.run(["cargo", "build", "--release", "-p", "vtk-bridge", "--lib"], cwd=HERE, check=True)
     target = os.environ.get("CARGO_TARGET_DIR") or HERE.parent.parent / "target"

@@ -76,6 +76,8 @@ class Extractor:
             raise Untraceable("points (set RTV_POINT_RADIUS to trace them as spheres)")
         if p.GetRepresentation() == SURFACE and p.GetEdgeVisibility():
             raise Untraceable("edges on the surface")
+        if actor.GetBackfaceProperty() is not None:
+            raise Untraceable("backs with a property of their own")
         if p.GetNumberOfTextures() > 0:
             raise Untraceable("textures of the property (albedo, material, normal)")
         shader = actor.GetShaderProperty()
@@ -143,8 +145,6 @@ def _surface(bridge, actor, mapper, data, state, block, name, point_radius, line
     s.property.opacity = state["opacity"]
     if state["color"]:
         s.property.ambient_color[:] = s.property.diffuse_color[:] = state["color"]
-    if actor.GetBackfaceProperty():
-        s.back, s.has_back = _property(actor.GetBackfaceProperty()), 1
     matrix = matrix_of(actor)
     s.world_from_data[:] = matrix.ravel().tolist()
     s.point_radius, s.line_radius, s.edges_only = point_radius, line_radius, representation == WIREFRAME

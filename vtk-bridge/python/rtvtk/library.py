@@ -41,7 +41,7 @@ class Surface(C.Structure):
         ("verts", Cells), ("lines", Cells), ("polys", Cells), ("strips", Cells), ("point_normals", Array), ("cell_normals", Array),
         ("texcoords", Array), ("clip_planes", Array), ("color_source", C.c_uint32), ("edges_only", C.c_uint32), ("colors", Array), ("map", Array),
         ("nan_color", C.c_uint8 * 4), ("texture_interpolate", C.c_uint8), ("texture_repeat", C.c_uint8), ("reserved", C.c_uint8 * 2),
-        ("texture", Array), ("texture_width", C.c_uint32), ("has_back", C.c_uint32), ("property", Property), ("back", Property),
+        ("texture", Array), ("texture_width", C.c_uint32), ("reserved_2", C.c_uint32), ("property", Property),
         ("world_from_data", C.c_double * 16), ("glyph_matrices", Array), ("glyph_colors", Array), ("point_radius", C.c_double),
         ("line_radius", C.c_double),
     ]
@@ -70,7 +70,7 @@ class Picture(C.Structure):
 
 def _places():
     here = os.path.dirname(os.path.abspath(__file__))
-    yield "RTV_LIBRARY", os.environ.get("RTV_LIBRARY")
+    yield "RTVTK_LIBRARY", os.environ.get("RTVTK_LIBRARY")
     yield "the package", os.path.join(here, "libvtk_bridge.so")
     home = os.environ.get("RTV_HOME")
     yield "RTV_HOME", home and os.path.join(home, "libvtk_bridge.so")
@@ -87,7 +87,7 @@ def _load():
                 return C.CDLL(path), path
             except OSError as error:
                 raise RtvError(f"{path} cannot be loaded: {error}") from error
-    raise RtvError(f"the library libvtk_bridge.so was not found; tried {', '.join(tried)}; set RTV_LIBRARY to the file")
+    raise RtvError(f"the library libvtk_bridge.so was not found; tried {', '.join(tried)}; set RTVTK_LIBRARY to the file")
 
 
 def _functions(library, path):

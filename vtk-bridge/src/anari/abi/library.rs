@@ -2,6 +2,7 @@
 
 use super::callback::{Callback, Own, StatusCallback};
 use super::device::DeviceObject;
+use super::frontend::has_initialized_devices;
 use super::introspection::Introspection;
 use super::text::text;
 use crate::anari::status::{Code, Listener, Message, Severity};
@@ -50,6 +51,35 @@ static TABLE: Table = Table {
     unload_module,
 };
 
+/// The table before `newInitializedDevice` was put in.
+#[repr(C)]
+struct OldTable {
+    offset_to_top: isize,
+    type_information: *const c_void,
+    destroy: unsafe extern "C" fn(This),
+    delete: unsafe extern "C" fn(This),
+    new_device: unsafe extern "C" fn(This, *const c_char) -> *mut c_void,
+    device_extensions: unsafe extern "C" fn(This, *const c_char) -> *const *const c_char,
+    device_subtypes: unsafe extern "C" fn(This) -> *const *const c_char,
+    load_module: unsafe extern "C" fn(This, *const c_char),
+    unload_module: unsafe extern "C" fn(This, *const c_char),
+}
+
+// SAFETY: functions and a null, never changed.
+unsafe impl Sync for OldTable {}
+
+static OLD_TABLE: OldTable = OldTable {
+    offset_to_top: 0,
+    type_information: std::ptr::null(),
+    destroy,
+    delete,
+    new_device,
+    device_extensions,
+    device_subtypes,
+    load_module,
+    unload_module,
+};
+
 /// The library object over ANARI's loader's arguments: the loaded module, and a status callback for devices without their own.
 ///
 /// # Safety
@@ -57,7 +87,11 @@ static TABLE: Table = Table {
 pub unsafe fn new_library(module: *mut c_void, callback: *const c_void, user: *const c_void) -> *mut c_void {
     // SAFETY: a null pointer is `None`; any other is a function of this type, as the caller promised.
     let callback = unsafe { std::mem::transmute::<*const c_void, Option<StatusCallback>>(callback) };
-    let table = (&raw const TABLE.destroy).cast();
+    let table = if has_initialized_devices() {
+        (&raw const TABLE.destroy).cast()
+    } else {
+        (&raw const OLD_TABLE.destroy).cast()
+    };
     Box::into_raw(Box::new(LibraryObject { table, module, callback, user })).cast()
 }
 

@@ -11,6 +11,7 @@
 
 mod callback;
 mod device;
+mod frontend;
 mod introspection;
 mod library;
 pub(crate) mod memory;

@@ -183,6 +183,11 @@ fn draw(order: &Order, job: &Job) -> Result<(Picture, Vec<String>), String> {
     let layers = wanted.into_iter().filter(|(on, _)| *on).map(|(_, l)| l).reduce(|a, b| a | b);
     let mut sums = lock(&order.sums);
     let mut options = RenderOptions { cancel: Some(job.cancel.clone()), ..view.options.clone() };
+    let mut warnings = Vec::new();
+    if options.path_tracing && !scene.volumes.is_empty() {
+        options.path_tracing = false;
+        warnings.push("the path tracer has no volumes: the renderer `default` draws this world".to_owned());
+    }
     if let Some(key) = &order.accumulate {
         if sums.key != *key {
             *sums = Accumulated { key: key.clone(), ..Accumulated::default() };
@@ -194,7 +199,6 @@ fn draw(order: &Order, job: &Job) -> Result<(Picture, Vec<String>), String> {
     let fail = |e: RenderError| e.to_string();
     let size = [options.width, options.height];
     let mut picture = Picture { samples: options.samples, ..Picture::default() };
-    let mut warnings = Vec::new();
     let Some(layers) = layers.or(has("channel.albedo").then_some(Layers::DISTANCE)) else { return Ok((picture, warnings)) };
     options.layers = layers;
     let output = render(&scene, camera, &options).map_err(fail)?;
