@@ -5,13 +5,26 @@ from vtkmodules.vtkCommonCore import vtkFloatArray, vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkImageData, vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkTexture
 
+# Depth travels as 24-bit whole numbers in three bytes: VTK keeps textures of floats in half precision, which is no depth.
+_STEPS = 16777215
+
+
+def _depth(texture):
+    return f"dot(floor(texture({texture}, uv).rgb * 255.0 + 0.5), vec3(65536.0, 256.0, 1.0)) / {_STEPS}.0"
+
+
+def _packed(depth):
+    whole = np.rint(depth[..., 0].astype(np.float64).clip(0, 1) * _STEPS).astype(np.uint32)
+    return np.stack([whole >> 16, whole >> 8 & 255, whole & 255], -1).astype(np.uint8)
+
+
 # What both rectangles begin with; texel centres lie on pixel centres.
-_FETCH = "vec2 uv = tcoordVCVSOutput; vec4 c = texture(rtvColor, uv); float d = texture(rtvDepth, uv).r; if (c.a <= 0.0) discard;"
+_FETCH = "vec2 uv = tcoordVCVSOutput; vec4 c = texture(rtvColor, uv); float d = " + _depth("rtvDepth") + "; if (c.a <= 0.0) discard;"
 _OPAQUE = _FETCH + " gl_FragData[0] = c; gl_FragDepth = d;"
 # Pixels with an opaque surface somewhere: what is in front of it is in the colour.
 _COVERED = _FETCH + " if (d >= 1.0) discard; gl_FragData[0] = vec4(c.rgb, 1.0); gl_FragDepth = d;"
 # Pixels with translucent surfaces only, blended by VTK with colours that are not premultiplied.
-_THROUGH = _FETCH + " if (d < 1.0) discard; gl_FragData[0] = vec4(c.rgb / c.a, c.a); gl_FragDepth = texture(rtvFirst, uv).r;"
+_THROUGH = _FETCH + " if (d < 1.0) discard; gl_FragData[0] = vec4(c.rgb / c.a, c.a); gl_FragDepth = " + _depth("rtvFirst") + ";"
 
 
 def _rectangle():
@@ -55,7 +68,8 @@ class _Layer:
             self.images[name] = image
         s = self.actor.GetShaderProperty()
         s.AddVertexShaderReplacement("//VTK::PositionVC::Impl", True, "//VTK::PositionVC::Impl\n  gl_Position = vec4(vertexMC.xy, 0.0, 1.0);\n", False)
-        s.AddFragmentShaderReplacement("//VTK::Light::Impl", True, "//VTK::Light::Impl\n  { " + shader + " }\n", False)
+        # In place of the code that would multiply the lit colour with every texture.
+        s.AddFragmentShaderReplacement("//VTK::TCoord::Impl", True, "  { " + shader + " }\n", False)
         s.AddFragmentShaderReplacement("//VTK::Depth::Impl", True, "  gl_FragDepth = gl_FragCoord.z;\n//VTK::Depth::Impl\n", False)
 
     def upload(self, **planes):
@@ -84,9 +98,9 @@ class Overlay:
             return a.reshape(*shape, components)
 
         if not picture.blended:
-            self._opaque.upload(rtvColor=plane(picture.opaque, 4), rtvDepth=plane(picture.depth))
+            self._opaque.upload(rtvColor=plane(picture.opaque, 4), rtvDepth=_packed(plane(picture.depth)))
             return [self._opaque.actor]
-        color, depth = plane(picture.blended, 4), plane(picture.depth)
+        color, depth = plane(picture.blended, 4), _packed(plane(picture.depth))
         self._covered.upload(rtvColor=color, rtvDepth=depth)
-        self._through.upload(rtvColor=color, rtvDepth=depth, rtvFirst=plane(picture.first_depth))
+        self._through.upload(rtvColor=color, rtvDepth=depth, rtvFirst=_packed(plane(picture.first_depth)))
         return [self._covered.actor, self._through.actor]

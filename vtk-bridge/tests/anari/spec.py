@@ -133,6 +133,50 @@ def isosurfaces_number_their_isovalues(d):
     close(depth[50, 60], 10 - 0.9 / np.sqrt(1.5), 5e-3)
 
 
+def sheet_colours(d, material, **attributes):
+    """A square over the whole picture under light that shows its colours; x and y of a pixel in 0..1."""
+    corners = F([[-1.01, -1.01, 0], [1.01, -1.01, 0], [1.01, 1.01, 0], [-1.01, 1.01, 0]])
+    g = d.new("Geometry", "quad", vertex__position=d.array(FLOAT32_VEC3, corners), **attributes)
+    f = ball(d, ambient=1.0)
+    p = draw(d, f.put(world=d.new("World", surface=[d.new("Surface", geometry=g, material=material)])))
+    x = (np.arange(101) + 0.5) / 101
+    return p, *np.meshgrid(x, x)
+
+
+def samplers_give_what_numpy_computes(d):
+    uv = d.array(FLOAT32_VEC3, F([[0, 0, 0.5], [1, 0, 0.5], [1, 1, 0.5], [0, 1, 0.5]]))
+    sampled = lambda kind, **p: sheet_colours(d, d.new("Material", "matte", color=d.new("Sampler", kind, **p)), vertex__attribute0=uv)
+    row = F([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1]])
+    p, x, _ = sampled("image1D", image=d.array(FLOAT32_VEC4, row))
+    for c in range(3):
+        close(p[..., c], np.interp(x, [1 / 6, 1 / 2, 5 / 6], row[:, c]))
+    checks = np.random.default_rng(4).random((5, 7, 4)).astype(F)
+    p, x, y = sampled("image2D", image=d.array(FLOAT32_VEC4, checks, 2), filter="nearest", wrapMode1="repeat", wrapMode2="mirrorRepeat",
+                      inTransform=np.diag([2, 3, 1, 1]).astype(F), inOffset=[0.25, 0.0, 0.0, 0.0])
+    i, j = np.floor((2 * x + 0.25) * 7).astype(int) % 7, np.floor(3 * y * 5).astype(int) % 10
+    same = np.isclose(p[..., :3], checks[np.where(j < 5, j, 9 - j), i][..., :3], atol=2e-3).all(-1)
+    assert same.mean() > 0.999, "all but pixels on edges of texels"
+    block = np.zeros((2, 2, 2, 4), F)
+    block[..., 0], block[..., 1], block[..., 2], block[..., 3] = *np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), 1
+    p, x, y = sampled("image3D", image=d.array(FLOAT32_VEC4, block, 3))
+    ramp = lambda v: np.clip(2 * v - 0.5, 0, 1)
+    close(p[..., :3], np.stack([0 * x + 0.5, ramp(y), ramp(x)], -1))
+    swap = np.zeros((4, 4), F)
+    swap[0, 1] = swap[1, 0] = swap[3, 3] = 1
+    p, x, y = sampled("transform", outTransform=swap, outOffset=[0.0, 0.0, 0.25, 0.0])
+    close(p[..., :3], np.stack([y, x, 0 * x + 0.25], -1))
+    p, _, _ = sampled("primitive", array=d.array(FLOAT32_VEC4, F([[9, 9, 9, 1], [0.1, 0.2, 0.3, 1]])))
+    close(p[50, 50, :3], [9, 9, 9])
+
+
+def opacity_blends_and_masks(d):
+    ramp = d.array(FLOAT32, F([0, 1, 1, 0]))
+    make = lambda **p: d.new("Material", "matte", color=[1.0, 0.0, 0.0], opacity="attribute0", **p)
+    for mode, alpha in (("opaque", lambda x: 0 * x + 1), ("blend", lambda x: x), ("mask", lambda x: (x >= 0.3).astype(float))):
+        p, x, _ = sheet_colours(d, make(alphaMode=mode, alphaCutoff=0.3), vertex__attribute0=ramp)
+        close(p[..., 0], alpha(x) + (1 - alpha(x)) * 0.1)
+
+
 def hdri_light_shows_its_middle_in_its_direction(d):
     sky = np.zeros((8, 16, 3), F)
     sky[:, 7:9] = [2, 1, 0]  # the middle
@@ -204,7 +248,7 @@ def introspection_lists_what_there_is(d):
 if __name__ == "__main__":
     failed = 0
     for name, test in list(globals().items()):
-        if callable(test) and getattr(test, "__module__", "") == "__main__" and name not in ("close", "ball"):
+        if callable(test) and getattr(test, "__module__", "") == "__main__" and name not in ("close", "ball", "sheet_colours"):
             d = Device("rtv")
             try:
                 test(d)
