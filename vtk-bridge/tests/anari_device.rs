@@ -9,7 +9,8 @@ fn python() -> Option<PathBuf> {
     let found = std::env::var_os("RTSV_PYTHON").map(PathBuf::from);
     if found.is_none() {
         assert!(std::env::var_os("RTSV_REQUIRE_PEERS").is_none(), "RTSV_PYTHON is not set");
-        writeln!(std::io::stderr(), "SKIPPED: tests of the ANARI device: RTSV_PYTHON is not set").expect("stderr");
+        writeln!(std::io::stderr(), "SKIPPED: tests of the ANARI device: RTSV_PYTHON is not set")
+            .expect("stderr");
     }
     found
 }

@@ -136,9 +136,7 @@ pub(super) fn incident_from(light: &PlacedLight, p: Vec3, at: Option<[f32; 2]>) 
         PlacedKind::Point { position } => (position, (p - position).as_dvec3().normalize_or_zero().as_vec3()),
         PlacedKind::Spot { position, direction, .. }
         | PlacedKind::Cone { position, direction, .. }
-        | PlacedKind::Disk { position, direction } => {
-            (position, direction)
-        }
+        | PlacedKind::Disk { position, direction } => (position, direction),
     };
     let from = if at.is_some() && normal != Vec3::ZERO {
         let (s, t) = orthonormal_basis(normal);

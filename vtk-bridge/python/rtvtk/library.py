@@ -87,7 +87,9 @@ def _load():
                 return C.CDLL(path), path
             except OSError as error:
                 raise RtvError(f"{path} cannot be loaded: {error}") from error
-    raise RtvError(f"the library libvtk_bridge.so was not found; tried {', '.join(tried)}; set RTVTK_LIBRARY to the file")
+        if name == "RTVTK_LIBRARY":
+            raise RtvError(f"RTVTK_LIBRARY is {path}, which is no file; set RTVTK_LIBRARY to the file libvtk_bridge.so, or leave it out")
+    raise RtvError(f"the library libvtk_bridge.so was not found; tried {', '.join(tried)}; set RTVTK_LIBRARY to the file libvtk_bridge.so")
 
 
 def _functions(library, path):

@@ -93,7 +93,9 @@ impl Array {
     /// Objects named by the elements, as far as they exist.
     pub fn objects(&self) -> &[Option<Arc<Object>>] {
         match self.region {
-            Some([a, _]) => &self.objects[a.min(self.objects.len())..(a + self.len()).min(self.objects.len())],
+            Some([a, _]) => {
+                &self.objects[a.min(self.objects.len())..(a + self.len()).min(self.objects.len())]
+            }
             None => &self.objects,
         }
     }
@@ -108,7 +110,9 @@ impl Array {
             Storage::App(m) => m.copy(),
             Storage::Own(m) => m.copy(),
         };
-        all.chunks_exact(8).map(|c| u64::from_ne_bytes([c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]])).collect()
+        all.chunks_exact(8)
+            .map(|c| u64::from_ne_bytes([c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]]))
+            .collect()
     }
 
     // ---- Elements as values ---------------------------------------------------------------------------------------
@@ -122,7 +126,11 @@ impl Array {
     /// The first component of each element.
     pub(crate) fn scalars(&self) -> Vec<f32> {
         if self.element == DataType::FLOAT32 {
-            return self.bytes().chunks_exact(4).map(|b| f32::from_ne_bytes([b[0], b[1], b[2], b[3]])).collect();
+            return self
+                .bytes()
+                .chunks_exact(4)
+                .map(|b| f32::from_ne_bytes([b[0], b[1], b[2], b[3]]))
+                .collect();
         }
         self.attributes().into_iter().map(|a| a[0]).collect()
     }
@@ -149,7 +157,10 @@ impl Array {
             }
         };
         let step = size / N;
-        self.bytes().chunks_exact(size).map(|b| std::array::from_fn(|i| one(&b[i * step..(i + 1) * step]))).collect()
+        self.bytes()
+            .chunks_exact(size)
+            .map(|b| std::array::from_fn(|i| one(&b[i * step..(i + 1) * step])))
+            .collect()
     }
 
     /// 4 x 4 matrices, column by column.

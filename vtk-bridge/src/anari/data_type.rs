@@ -74,7 +74,8 @@ enum Component {
 
 impl DataType {
     fn family(self) -> Option<(usize, usize, &'static str)> {
-        let &(first, bytes, name) = FAMILIES.iter().find(|(first, ..)| (*first..first + 4).contains(&self.0))?;
+        let &(first, bytes, name) =
+            FAMILIES.iter().find(|(first, ..)| (*first..first + 4).contains(&self.0))?;
         Some((bytes, (self.0 - first) as usize + 1, name))
     }
 
@@ -106,7 +107,10 @@ impl DataType {
         if let Some((_, components, name)) = self.family() {
             return if components == 1 { name.to_owned() } else { format!("{name}_VEC{components}") };
         }
-        NAMED.iter().find(|(t, _)| *t == self).map_or(format!("type number {}", self.0), |(_, n)| (*n).to_owned())
+        NAMED
+            .iter()
+            .find(|(t, _)| *t == self)
+            .map_or(format!("type number {}", self.0), |(_, n)| (*n).to_owned())
     }
 
     /// True for handles of objects.
@@ -170,7 +174,9 @@ impl DataType {
                 Component::Srgb if c == n - 1 && n % 2 == 0 => f32::from(b[0]) / 255.0,
                 Component::Srgb => srgb_to_linear(f32::from(b[0]) / 255.0),
                 Component::Fixed(s) => (unsigned(b) as f64 / unsigned_max(s)) as f32,
-                Component::FixedSigned(s) => (signed(b) as f64 / (unsigned_max(s) / 2.0).floor()).max(-1.0) as f32,
+                Component::FixedSigned(s) => {
+                    (signed(b) as f64 / (unsigned_max(s) / 2.0).floor()).max(-1.0) as f32
+                }
                 Component::Unsigned(_) => unsigned(b) as f32,
                 Component::Signed(_) => signed(b) as f32,
             };

@@ -1,15 +1,17 @@
 //! The device: makes objects, keeps count of who uses them, and answers questions. Every fault of the program is a message and nothing else happens.
 
+mod frames;
+
 use super::abi::memory::{AppMemory, OwnMemory};
 use super::array::{Array, Storage, byte_size};
 use super::data_type::DataType;
-use super::frame::{self, Accumulated, FrameState, Order, start};
+use super::frame::{self, Accumulated, FrameState};
 use super::object::{Extra, Handle, Object, Value};
+use super::scene::Notes;
 use super::scene::world::{Compiled, WorldCache};
-use super::scene::{Notes, camera_of, view_of};
 use super::schema;
 use super::status::{Code, Listener, Message, Severity, Status, lock};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::ffi::c_void;
 use std::sync::{Arc, Mutex, Weak};
 
@@ -103,7 +105,10 @@ impl Device {
             let text = if handle == Handle::NULL {
                 format!("{what}: the object is null")
             } else {
-                format!("{what}: {:#x} is no object of this device; it was released, or belongs to another device", handle.0)
+                format!(
+                    "{what}: {:#x} is no object of this device; it was released, or belongs to another device",
+                    handle.0
+                )
             };
             self.tell(handle, DataType::OBJECT, Severity::Error, text);
         }
@@ -121,7 +126,8 @@ impl Device {
         let known = schema::find(kind, subtype).is_some();
         if !known {
             let have: Vec<_> = schema::subtypes(kind).collect();
-            let text = format!("there is no {} `{subtype}`; this device has {have:?}", kind.name().to_lowercase());
+            let text =
+                format!("there is no {} `{subtype}`; this device has {have:?}", kind.name().to_lowercase());
             self.tell(Handle::NULL, kind, Severity::Error, text);
         }
         let extra = match kind {
@@ -146,11 +152,23 @@ impl Device {
     }
 
     /// A new array over the program's memory, or over the device's own when there is none.
-    pub(crate) fn new_array(&self, kind: DataType, element: DataType, dims: [u64; 3], app: Option<AppMemory>) -> Handle {
+    pub(crate) fn new_array(
+        &self,
+        kind: DataType,
+        element: DataType,
+        dims: [u64; 3],
+        app: Option<AppMemory>,
+    ) -> Handle {
         self.keep(self.array_object(kind, element, dims, app))
     }
 
-    fn array_object(&self, kind: DataType, element: DataType, dims: [u64; 3], app: Option<AppMemory>) -> Object {
+    fn array_object(
+        &self,
+        kind: DataType,
+        element: DataType,
+        dims: [u64; 3],
+        app: Option<AppMemory>,
+    ) -> Object {
         let storage = match app {
             Some(memory) => Storage::App(memory),
             None => Storage::Own(OwnMemory::zeroed(byte_size(element, dims).unwrap_or(0))),
@@ -171,7 +189,10 @@ impl Device {
         };
         let unknown = handles.iter().zip(&objects).filter(|(h, o)| **h != 0 && o.is_none()).count();
         if unknown > 0 {
-            let text = format!("{unknown} of its {} elements are no objects of this device; they are left out", handles.len());
+            let text = format!(
+                "{unknown} of its {} elements are no objects of this device; they are left out",
+                handles.len()
+            );
             self.about(array, Severity::Error, text);
         }
         // The old objects are dropped after the lock is free.
@@ -233,7 +254,11 @@ impl Device {
                 let what = format!("{}: parameter `{name}`", object.title());
                 let Some(other) = self.find(h, &what) else { return };
                 if !given.accepts(other.kind) {
-                    self.about(&object, Severity::Error, format!("`{name}` is given as {given}, but it is a {}: it is not set", other.kind));
+                    self.about(
+                        &object,
+                        Severity::Error,
+                        format!("`{name}` is given as {given}, but it is a {}: it is not set", other.kind),
+                    );
                     return;
                 }
                 Value::Object(other)
@@ -253,7 +278,11 @@ impl Device {
         }
         let near = schema.parameters().map(|p| p.name).filter(|p| p.eq_ignore_ascii_case(name)).next();
         let hint = near.map_or(String::new(), |n| format!("; did you mean `{n}`?"));
-        self.about(object, Severity::Warning, format!("there is no parameter `{name}` on this device: it changes nothing{hint}"));
+        self.about(
+            object,
+            Severity::Warning,
+            format!("there is no parameter `{name}` on this device: it changes nothing{hint}"),
+        );
         false
     }
 
@@ -289,7 +318,11 @@ impl Device {
                 (valid, std::mem::replace(&mut a.region, region) != region)
             });
             if let Some((false, _)) = changed {
-                self.about(&object, Severity::Error, format!("`region` {region:?} is not a part of its elements: all are used"));
+                self.about(
+                    &object,
+                    Severity::Error,
+                    format!("`region` {region:?} is not a part of its elements: all are used"),
+                );
             }
         }
     }
@@ -358,7 +391,11 @@ impl Device {
         let Some(object) = self.find(handle, "anariUnmapParameterArray") else { return };
         match object.staged(name) {
             Some(Value::Object(array)) if array.kind.is_array() => self.written(&array),
-            _ => self.about(&object, Severity::Error, format!("anariUnmapParameterArray: `{name}` is not set to an array")),
+            _ => self.about(
+                &object,
+                Severity::Error,
+                format!("anariUnmapParameterArray: `{name}` is not set to an array"),
+            ),
         }
     }
 
@@ -366,14 +403,17 @@ impl Device {
 
     /// A property of the device.
     pub fn device_property(&self, name: &str) -> Option<Property> {
-        let version = |i: usize| env!("CARGO_PKG_VERSION").split('.').nth(i).and_then(|v| v.parse().ok()).unwrap_or(0);
+        let version =
+            |i: usize| env!("CARGO_PKG_VERSION").split('.').nth(i).and_then(|v| v.parse().ok()).unwrap_or(0);
         Some(match name {
             "version" => Property::I32(version(0) * 10_000 + version(1) * 100 + version(2)),
             "version.major" => Property::I32(version(0)),
             "version.minor" => Property::I32(version(1)),
             "version.patch" => Property::I32(version(2)),
             "version.name" => Property::Text(format!("rtv {}", env!("CARGO_PKG_VERSION"))),
-            "version.name.size" => Property::U64(format!("rtv {}", env!("CARGO_PKG_VERSION")).len() as u64 + 1),
+            "version.name.size" => {
+                Property::U64(format!("rtv {}", env!("CARGO_PKG_VERSION")).len() as u64 + 1)
+            }
             // Of one geometry: 32-bit indices, of which the last means "none".
             "geometryMaxIndex" => Property::U64(u64::from(u32::MAX - 2)),
             _ => return None,
@@ -389,7 +429,9 @@ impl Device {
                 let bounds = Compiled::of(&object, &mut notes).bounds;
                 self.tell_notes(notes);
                 let [lo, hi] = bounds?;
-                Some(Property::Floats([lo.to_array(), hi.to_array()].concat().into_iter().map(|v| v as f32).collect()))
+                Some(Property::Floats(
+                    [lo.to_array(), hi.to_array()].concat().into_iter().map(|v| v as f32).collect(),
+                ))
             }
             (DataType::FRAME, "duration" | "numSamples" | "renderProgress") => {
                 let done = frame::current_job(&object).is_some_and(|j| j.is_done());
@@ -409,158 +451,6 @@ impl Device {
 
     fn tell_notes(&self, notes: Notes) {
         notes.0.iter().for_each(|m| self.status.tell_once(m));
-    }
-
-    // ---- Frames ---------------------------------------------------------------------------------------------------
-
-    fn frame(&self, handle: Handle, what: &str) -> Option<Arc<Object>> {
-        let frame = self.find(handle, what)?;
-        if frame.kind != DataType::FRAME {
-            self.about(&frame, Severity::Error, format!("{what}: it is no frame"));
-            return None;
-        }
-        Some(frame)
-    }
-
-    /// Starts drawing, after the frame's last drawing is done.
-    pub fn render_frame(&self, handle: Handle) {
-        let Some(frame) = self.frame(handle, "anariRenderFrame") else { return };
-        frame::finish(&frame);
-        let missing: Vec<_> =
-            ["world", "camera", "renderer", "size"].into_iter().filter(|n| !frame.parameters().contains_key(*n)).collect();
-        let (Some(world), Some(camera), Some(renderer)) = (frame.object("world"), frame.object("camera"), frame.object("renderer"))
-        else {
-            self.about(&frame, Severity::Error, format!("it is not drawn: {missing:?} not set or not committed"));
-            return;
-        };
-        let size = frame.vector("size", [0.0; 2]).map(|v| v as u32);
-        if size.contains(&0) || size.iter().any(|s| *s > 1 << 16) {
-            self.about(&frame, Severity::Error, format!("it is not drawn: `size` is {size:?}; it must be 1 to 65536 each way"));
-            return;
-        }
-        if !camera.known || !renderer.known {
-            let which = if camera.known { &renderer } else { &camera };
-            self.about(&frame, Severity::Error, format!("it is not drawn: this device has no {}", which.title()));
-            return;
-        }
-        let mut notes = Notes::default();
-        let compiled = Compiled::of(&world, &mut notes);
-        let view = view_of(&renderer, size, &mut notes);
-        let camera_made = camera_of(&camera, size, compiled.bounds, &mut notes);
-        self.tell_notes(notes);
-        let made = match camera_made {
-            Ok(made) => made,
-            Err(e) => return self.about(&camera, Severity::Error, format!("the frame is not drawn: {e}")),
-        };
-
-        let channels: BTreeMap<&'static str, DataType> = schema::find(DataType::FRAME, "")
-            .into_iter()
-            .flat_map(|s| s.parameters())
-            .filter(|p| p.name.starts_with("channel."))
-            .filter_map(|p| Some((p.name, DataType(frame.numbers(p.name)?[0] as u32))))
-            .filter(|(_, t)| *t != DataType::UNKNOWN)
-            .collect();
-        let accumulate = frame.bool("accumulation", false).then(|| {
-            let mut key: Vec<u64> = size.iter().map(|s| u64::from(*s)).collect();
-            [&world, &camera, &renderer].into_iter().for_each(|o| super::scene::world::fingerprint(o, &|_| true, &mut key));
-            key
-        });
-        let sums = lock(&self.sums).entry(handle).or_default().clone();
-        let order = Order {
-            compiled,
-            camera: made,
-            view,
-            channels,
-            accumulate,
-            sums,
-            tell: self.teller(&frame),
-            completed: self.completion(&frame),
-        };
-        let job = start(order);
-        let mut jobs = lock(&self.jobs);
-        jobs.retain(|j| j.strong_count() > 0);
-        jobs.push(Arc::downgrade(&job));
-        drop(jobs);
-        frame::set_job(&frame, job);
-    }
-
-    /// Takes what a drawing says, without holding on to the frame.
-    fn teller(&self, frame: &Object) -> Box<dyn FnOnce(Result<Vec<String>, String>) + Send> {
-        let (status, source, title) = (self.status.clone(), frame.handle, frame.title());
-        Box::new(move |said| {
-            let about = |severity, text: String| {
-                let text = format!("{title}: {text}");
-                Message { source, source_type: DataType::FRAME, severity, code: Code::InvalidArgument, text }
-            };
-            match said {
-                Ok(warnings) => warnings.into_iter().for_each(|w| status.tell_once(&about(Severity::Warning, w))),
-                Err(why) => status.tell(&about(Severity::Error, format!("it is not drawn: {why}"))),
-            }
-        })
-    }
-
-    fn completion(&self, frame: &Object) -> Box<dyn FnOnce() + Send> {
-        let pointer = |name: &str| match frame.parameters().get(name) {
-            Some(Value::Pointer(_, p)) => *p,
-            _ => 0,
-        };
-        let (function, user) = (pointer("frameCompletionCallback"), pointer("frameCompletionCallbackUserData"));
-        let (hooks, handle) = (self.hooks.clone(), frame.handle);
-        Box::new(move || {
-            if function != 0 {
-                hooks.frame_completed(function, user, handle);
-            }
-        })
-    }
-
-    /// Whether a frame is done; with `wait`, when it is.
-    pub fn frame_ready(&self, handle: Handle, wait: bool) -> bool {
-        let Some(frame) = self.frame(handle, "anariFrameReady") else { return true };
-        match frame::current_job(&frame) {
-            Some(job) if wait => {
-                job.wait();
-                true
-            }
-            Some(job) => job.is_done(),
-            // Never drawn: there is nothing to wait for.
-            None => true,
-        }
-    }
-
-    /// Stops drawing as soon as possible.
-    pub fn discard_frame(&self, handle: Handle) {
-        if let Some(frame) = self.frame(handle, "anariDiscardFrame")
-            && let Some(job) = frame::current_job(&frame)
-        {
-            job.cancel();
-        }
-    }
-
-    /// Pixels of a channel, with their type and the size of the picture; valid until the channel is unmapped.
-    pub fn map_frame(&self, handle: Handle, channel: &str) -> Option<(*const c_void, [u32; 2], DataType)> {
-        let frame = self.frame(handle, "anariMapFrame")?;
-        // Older programs leave out the prefix.
-        let name = if channel.starts_with("channel.") { channel.to_owned() } else { format!("channel.{channel}") };
-        let Some(picture) = frame::finish(&frame) else {
-            self.about(&frame, Severity::Error, format!("`{channel}` cannot be mapped: the frame has not been drawn"));
-            return None;
-        };
-        let Some(pixels) = picture.channels.get(name.as_str()) else {
-            let have: Vec<_> = picture.channels.keys().collect();
-            self.about(&frame, Severity::Error, format!("`{channel}` cannot be mapped: the frame has {have:?}; set the parameter to a type and draw again"));
-            return None;
-        };
-        let mapped = (pixels.pixels.address(), picture.size, pixels.data_type);
-        frame::hold(&frame, channel, picture.clone());
-        Some(mapped)
-    }
-
-    /// The program no longer looks at the pixels.
-    pub fn unmap_frame(&self, handle: Handle, channel: &str) {
-        let Some(frame) = self.frame(handle, "anariUnmapFrame") else { return };
-        if !frame::unhold(&frame, channel) {
-            self.about(&frame, Severity::Warning, format!("`{channel}` is unmapped without having been mapped"));
-        }
     }
 
     /// Number of objects that the program has not released.
@@ -597,7 +487,9 @@ fn misfit(p: &schema::Parameter, value: &Value) -> Option<String> {
             let types = || p.elements.iter().map(ToString::to_string).collect::<Vec<_>>().join(" or ");
             (!fits).then(|| format!("is an array of {element}; its elements must be {}", types()))
         }
-        Value::Text(t) if !p.values.is_empty() && !p.values.contains(&t.as_str()) => Some(format!("is \"{t}\"; it must be one of {:?}", p.values)),
+        Value::Text(t) if !p.values.is_empty() && !p.values.contains(&t.as_str()) => {
+            Some(format!("is \"{t}\"; it must be one of {:?}", p.values))
+        }
         Value::Bytes(_, b) if !p.type_values.is_empty() => {
             let chosen = DataType(u32::from_ne_bytes([b[0], b[1], b[2], b[3]]));
             let fits = chosen == DataType::UNKNOWN || p.type_values.contains(&chosen);

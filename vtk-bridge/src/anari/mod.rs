@@ -14,6 +14,6 @@ pub mod data_type;
 pub mod device;
 pub mod frame;
 pub mod object;
-pub mod schema;
 pub mod scene;
+pub mod schema;
 pub mod status;

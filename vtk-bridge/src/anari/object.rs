@@ -6,9 +6,9 @@
 
 use super::array::Array;
 use super::data_type::DataType;
+use super::frame::FrameState;
 use super::scene::world::WorldCache;
 use super::status::lock;
-use super::frame::FrameState;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
@@ -163,7 +163,11 @@ impl Object {
             Some(Value::Text(n)) => format!(" \"{n}\""),
             _ => String::new(),
         };
-        if self.subtype.is_empty() { format!("{kind}{name}") } else { format!("{kind} `{}`{name}", self.subtype) }
+        if self.subtype.is_empty() {
+            format!("{kind}{name}")
+        } else {
+            format!("{kind} `{}`{name}", self.subtype)
+        }
     }
 
     // ---- Committed parameters by type ---------------------------------------------------------------------------
@@ -209,7 +213,9 @@ impl Object {
 
     /// The objects in an array parameter, in order; nulls are left out.
     pub(crate) fn objects(&self, name: &str) -> Vec<Arc<Object>> {
-        self.object(name).map(|a| a.with_array(|a| a.objects().iter().flatten().cloned().collect()).unwrap_or_default()).unwrap_or_default()
+        self.object(name)
+            .map(|a| a.with_array(|a| a.objects().iter().flatten().cloned().collect()).unwrap_or_default())
+            .unwrap_or_default()
     }
 
     /// Looks at the data of an array; `None` for other objects.

@@ -29,7 +29,10 @@ fn each_effect_changes_the_picture_and_is_in_the_report() {
         let change = shot.brightness() - plain.brightness();
         let d = plain.difference(&shot);
         assert!(d.color_mean > 0.3, "{what}: nothing changed: {d:?}\n{said}");
-        assert!(change * f64::from(direction) >= 0.0 && (direction == 0 || change.abs() > 0.1), "{what}: {change}");
+        assert!(
+            change * f64::from(direction) >= 0.0 && (direction == 0 || change.abs() > 0.1),
+            "{what}: {change}"
+        );
         let r = report(&file);
         let effects = r["effects"].as_array().expect("a list");
         assert!(effects.iter().any(|e| e == effect), "{what}: {effects:?}");
@@ -42,7 +45,8 @@ fn each_effect_changes_the_picture_and_is_in_the_report() {
 fn without_options_no_secondary_ray_is_sent() {
     let Some(peers) = peers() else { return };
     let file = peers.out.join("plain.json");
-    let (_, said) = peers.shot(Program::Vtk, "vtk/shadow_scene", &Run::traced().with("RTV_REPORT", file.display()));
+    let (_, said) =
+        peers.shot(Program::Vtk, "vtk/shadow_scene", &Run::traced().with("RTV_REPORT", file.display()));
     let r = report(&file);
     assert_eq!(r["effects"], serde_json::json!([]), "{said}");
     let rays = r["rays"].as_array().expect("a list");

@@ -47,8 +47,11 @@ fn set_up() -> Option<Peers> {
     let found: Vec<_> = names.iter().filter_map(|n| variable(n)).collect();
     let [vtk91, pvbatch, xvfb] = found.as_slice() else {
         assert!(variable("RTSV_REQUIRE_PEERS").is_none(), "{names:?} are not all set");
-        writeln!(std::io::stderr(), "SKIPPED: tests of vtk-bridge in VTK and ParaView: {names:?} are not all set")
-            .expect("stderr");
+        writeln!(
+            std::io::stderr(),
+            "SKIPPED: tests of vtk-bridge in VTK and ParaView: {names:?} are not all set"
+        )
+        .expect("stderr");
         return None;
     };
     let out = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("vtk-bridge");
@@ -67,7 +70,9 @@ fn set_up() -> Option<Peers> {
         .spawn()
         .expect("Xvfb starts");
     let mut number = String::new();
-    BufReader::new(server.stdout.take().expect("piped")).read_line(&mut number).expect("Xvfb says its display");
+    BufReader::new(server.stdout.take().expect("piped"))
+        .read_line(&mut number)
+        .expect("Xvfb says its display");
     watch(server.id());
     Some(Peers {
         vtk91: vtk91.clone(),

@@ -16,6 +16,7 @@ fn the_panel_s_properties_change_the_picture() {
         .with("PV_PLUGIN_PATH", home.join("plugins/pv5.11").display())
         .with("RTV_HOME", home.display());
     let output = peers.python(Program::ParaView, &run, &[file.to_str().expect("UTF-8")]);
-    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    let said =
+        String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success() && said.contains("survived"), "{said}");
 }

@@ -23,9 +23,13 @@ fn compare(opacity: &str) {
         let out = peers.out.join(format!("ranks-{opacity}-{ranks}.png"));
         let _ = std::fs::remove_file(&out);
         let run = Run::traced().with("RTV_THREADS", 1);
-        let output =
-            peers.python(Program::Ranks(ranks), &run, &["--sym", script, out.to_str().expect("UTF-8"), opacity]);
-        let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+        let output = peers.python(
+            Program::Ranks(ranks),
+            &run,
+            &["--sym", script, out.to_str().expect("UTF-8"), opacity],
+        );
+        let said =
+            String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{ranks} ranks: {said}");
         assert!(said.contains("vtkRtvRenderer"), "{said}");
         let pixels = picture(&out);
@@ -33,7 +37,10 @@ fn compare(opacity: &str) {
             one = Some(pixels);
             continue;
         };
-        let apart = first.chunks_exact(3).zip(pixels.chunks_exact(3)).filter(|(a, b)| (0..3).any(|c| a[c].abs_diff(b[c]) > 1));
+        let apart = first
+            .chunks_exact(3)
+            .zip(pixels.chunks_exact(3))
+            .filter(|(a, b)| (0..3).any(|c| a[c].abs_diff(b[c]) > 1));
         let share = apart.count() as f64 / (first.len() / 3) as f64;
         assert!(share <= EDGES, "{ranks} ranks, opacity {opacity}: {share} of the pixels differ");
     }
@@ -48,4 +55,3 @@ fn one_to_four_ranks_show_the_same_opaque_picture() {
 fn one_to_four_ranks_show_the_same_translucent_picture() {
     compare("0.5");
 }
-

@@ -7,7 +7,8 @@ fn survives(program: Program, script: &str, run: &Run) {
     let Some(peers) = peers() else { return };
     let file = crate::peers::scripts().join(format!("{script}.py"));
     let output = peers.python(program, run, &[file.to_str().expect("UTF-8")]);
-    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    let said =
+        String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success() && said.contains("survived"), "{script}: {:?}\n{said}", output.status);
     assert!(!said.contains("internal error"), "{said}");
 }

@@ -4,8 +4,8 @@ use crate::anari::device::Hooks;
 use crate::anari::object::Handle;
 use crate::anari::status::{Listener, Message};
 use std::ffi::{CString, c_char, c_int, c_void};
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// ANARI's `ANARIStatusCallback`: user pointer, device, source, its type, severity, code, message.
 pub(super) type StatusCallback =

@@ -106,14 +106,24 @@ impl Introspection {
         self.objects.iter().find(|((k, s), _)| *k == kind && *s == subtype).map(|(_, o)| o)
     }
 
-    pub(super) fn object_info(&self, kind: DataType, subtype: &str, name: &str, wanted: DataType) -> *const c_void {
+    pub(super) fn object_info(
+        &self,
+        kind: DataType,
+        subtype: &str,
+        name: &str,
+        wanted: DataType,
+    ) -> *const c_void {
         let Some(object) = self.object(kind, subtype) else { return std::ptr::null() };
         match (name, wanted) {
             ("description", DataType::STRING) => object.about.cast(),
             ("sourceExtension", DataType::STRING) => object.extension.cast(),
             ("parameter", DataType::PARAMETER_LIST) => object.parameters.as_ptr().cast(),
-            ("channel", DataType::STRING_LIST) => object.channels.as_ref().map_or(std::ptr::null(), |l| l.0.as_ptr().cast()),
-            ("extension", DataType::STRING_LIST) if kind == DataType::DEVICE => self.extensions.0.as_ptr().cast(),
+            ("channel", DataType::STRING_LIST) => {
+                object.channels.as_ref().map_or(std::ptr::null(), |l| l.0.as_ptr().cast())
+            }
+            ("extension", DataType::STRING_LIST) if kind == DataType::DEVICE => {
+                self.extensions.0.as_ptr().cast()
+            }
             _ => std::ptr::null(),
         }
     }
@@ -131,7 +141,11 @@ impl Introspection {
         // Numbers are kept with as many components as any type needs; fewer are a part of them.
         let floats = |v: &Vec<f32>| {
             let bytes = wanted.size().unwrap_or(usize::MAX);
-            if bytes <= 4 * v.len() && matches!(wanted.0, 1068..=1071 | 2008..=2017) { v.as_ptr().cast() } else { none }
+            if bytes <= 4 * v.len() && matches!(wanted.0, 1068..=1071 | 2008..=2017) {
+                v.as_ptr().cast()
+            } else {
+                none
+            }
         };
         let is_whole = matches!(wanted, DataType::INT32 | DataType::UINT32 | DataType::BOOL);
         let whole = |v: Option<&u32>| v.filter(|_| is_whole).map_or(none, |v| std::ptr::from_ref(v).cast());
@@ -146,9 +160,15 @@ impl Introspection {
             "maximum" if is_whole => whole(p.whole_range.as_ref().map(|r| &r[1])),
             "minimum" => floats(&p.minimum),
             "maximum" => floats(&p.maximum),
-            "value" if wanted == DataType::STRING_LIST => p.values.as_ref().map_or(none, |l| l.0.as_ptr().cast()),
-            "value" if wanted == DataType::DATA_TYPE_LIST && p.type_values.len() > 1 => p.type_values.as_ptr().cast(),
-            "elementType" if wanted == DataType::DATA_TYPE_LIST && p.elements.len() > 1 => p.elements.as_ptr().cast(),
+            "value" if wanted == DataType::STRING_LIST => {
+                p.values.as_ref().map_or(none, |l| l.0.as_ptr().cast())
+            }
+            "value" if wanted == DataType::DATA_TYPE_LIST && p.type_values.len() > 1 => {
+                p.type_values.as_ptr().cast()
+            }
+            "elementType" if wanted == DataType::DATA_TYPE_LIST && p.elements.len() > 1 => {
+                p.elements.as_ptr().cast()
+            }
             _ => none,
         }
     }

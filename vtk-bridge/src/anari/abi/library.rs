@@ -142,7 +142,11 @@ unsafe extern "C" fn new_device(this: This, subtype: *const c_char) -> *mut c_vo
     DeviceObject::create(library.callback, library.user, own, callback)
 }
 
-unsafe extern "C" fn new_initialized_device(this: This, subtype: *const c_char, _values: *const c_void) -> *mut c_void {
+unsafe extern "C" fn new_initialized_device(
+    this: This,
+    subtype: *const c_char,
+    _values: *const c_void,
+) -> *mut c_void {
     // The device has no parameters that must be known before it is made.
     // SAFETY: the same arguments.
     unsafe { new_device(this, subtype) }

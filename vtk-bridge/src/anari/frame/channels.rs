@@ -68,7 +68,8 @@ pub(super) fn color<const N: usize>(pixels: impl Iterator<Item = [f32; 4]>, data
         DataType::FLOAT32_VEC4 | DataType::FLOAT32_VEC3 => Pixels::Floats(pixels.flat_map(linear).collect()),
         DataType::UFIXED8_RGBA_SRGB | DataType::UFIXED8_RGB_SRGB => {
             // Alpha stays linear.
-            let encode = |(c, v): (usize, f32)| byte(if c == 3 { v } else { linear_to_srgb(v.clamp(0.0, 1.0)) });
+            let encode =
+                |(c, v): (usize, f32)| byte(if c == 3 { v } else { linear_to_srgb(v.clamp(0.0, 1.0)) });
             Pixels::Bytes(pixels.flat_map(|p| linear(p).into_iter().enumerate().map(encode)).collect())
         }
         _ => Pixels::Bytes(pixels.flat_map(|p| linear(p).map(byte)).collect()),
@@ -101,7 +102,9 @@ pub(super) fn numbers(frame: &Frame, ids: &[Ids], number: impl Fn(&Ids, u32) -> 
     let primitives = upright(&frame.primitive, frame.width);
     let words = instances
         .zip(primitives)
-        .map(|(&instance, &primitive)| ids.get(instance as usize).map_or(u32::MAX, |id| number(id, primitive)))
+        .map(|(&instance, &primitive)| {
+            ids.get(instance as usize).map_or(u32::MAX, |id| number(id, primitive))
+        })
         .collect();
     Channel { data_type: DataType::UINT32, pixels: Pixels::Words(words) }
 }

@@ -3,8 +3,8 @@
 use super::channels::{albedo, blank, color, depth, normal, numbers, over};
 use super::{Accumulated, Picture};
 use crate::anari::data_type::DataType;
-use crate::anari::scene::world::Compiled;
 use crate::anari::scene::View;
+use crate::anari::scene::world::Compiled;
 use crate::anari::status::lock;
 use rt_core::accel::{BuildOptions, Geometry, World};
 use rt_core::camera::{Camera, ThinLens};
@@ -112,7 +112,8 @@ fn run(order: Order, job: &Job) {
     let size = [order.view.options.width, order.view.options.height];
     // rt-core reports a panic in a tile as an error; this is for everything else, so that nobody waits for ever.
     let drawn = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| draw(&order, job)));
-    let drawn = drawn.unwrap_or_else(|_| Err("internal error: the drawing panicked; please report it".to_owned()));
+    let drawn =
+        drawn.unwrap_or_else(|_| Err("internal error: the drawing panicked; please report it".to_owned()));
     let (mut picture, told) = match drawn {
         Ok((picture, warnings)) => (picture, Ok(warnings)),
         Err(why) => {
@@ -163,11 +164,14 @@ fn draw(order: &Order, job: &Job) -> Result<(Picture, Vec<String>), String> {
     let mut scene = Scene::new(world);
     scene.appearances.clone_from(&compiled.appearances);
     scene.materials.clone_from(&compiled.materials);
-    scene.lights = compiled.lights.iter().copied().map(|l| if view.shadows { l } else { l.without_shadows() }).collect();
+    scene.lights =
+        compiled.lights.iter().copied().map(|l| if view.shadows { l } else { l.without_shadows() }).collect();
     scene.lights.extend(view.ambient);
     scene.environment.clone_from(&compiled.sky);
-    scene.background = if scene.environment.is_some() { Background::Environment } else { Background::Transparent };
-    scene.ambient_occlusion = view.occlusion.filter(|_| view.ambient.is_some() || scene.environment.is_some());
+    scene.background =
+        if scene.environment.is_some() { Background::Environment } else { Background::Transparent };
+    scene.ambient_occlusion =
+        view.occlusion.filter(|_| view.ambient.is_some() || scene.environment.is_some());
     scene.volumes.clone_from(&compiled.volumes);
     scene.check().map_err(|e: SceneError| e.to_string())?;
 
@@ -199,7 +203,9 @@ fn draw(order: &Order, job: &Job) -> Result<(Picture, Vec<String>), String> {
     let fail = |e: RenderError| e.to_string();
     let size = [options.width, options.height];
     let mut picture = Picture { samples: options.samples, ..Picture::default() };
-    let Some(layers) = layers.or(has("channel.albedo").then_some(Layers::DISTANCE)) else { return Ok((picture, warnings)) };
+    let Some(layers) = layers.or(has("channel.albedo").then_some(Layers::DISTANCE)) else {
+        return Ok((picture, warnings));
+    };
     options.layers = layers;
     let output = render(&scene, camera, &options).map_err(fail)?;
     warnings.extend(output.report.warnings);
@@ -247,7 +253,11 @@ fn draw(order: &Order, job: &Job) -> Result<(Picture, Vec<String>), String> {
                 let once = RenderOptions { layers, path_tracing, samples: 1, ..options.clone() };
                 let pinhole = ThinLens { aperture_radius: 0.0, focus_distance: 1.0 };
                 // A camera without a lens stays as it is, so there is nothing to refuse.
-                let sharp = if camera.lens().is_some() { camera.with_lens(pinhole).unwrap_or(*camera) } else { *camera };
+                let sharp = if camera.lens().is_some() {
+                    camera.with_lens(pinhole).unwrap_or(*camera)
+                } else {
+                    *camera
+                };
                 let pass = render(&flat, &sharp, &once).map_err(fail)?;
                 albedo(&pass.frame.color, size[0], data_type)
             }

@@ -93,7 +93,9 @@ impl Source {
     /// The attribute `name` of `geometry`, in an instance that may replace it.
     pub(crate) fn of(name: &str, geometry: &Object, instance: Option<&Object>) -> Option<Source> {
         match name {
-            "worldPosition" | "objectPosition" => return Some(Source::Position { world: name.starts_with('w') }),
+            "worldPosition" | "objectPosition" => {
+                return Some(Source::Position { world: name.starts_with('w') });
+            }
             "worldNormal" | "objectNormal" => return Some(Source::Normal { world: name.starts_with('w') }),
             slot if SLOTS.contains(&slot) => {}
             _ => return None,

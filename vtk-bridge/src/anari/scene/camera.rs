@@ -37,12 +37,14 @@ pub(crate) fn camera_of(
     let crop = if [x0, y0, x1, y1] == [0.0, 0.0, 1.0, 1.0] {
         whole
     } else {
-        let (half, middle) = (DVec3::new(x1 - x0, y1 - y0, 1.0), DVec3::new(x0 + x1 - 1.0, y0 + y1 - 1.0, 0.0));
+        let (half, middle) =
+            (DVec3::new(x1 - x0, y1 - y0, 1.0), DVec3::new(x0 + x1 - 1.0, y0 + y1 - 1.0, 0.0));
         let scale = DMat4::from_cols(DVec4::X / half.x, DVec4::Y / half.y, DVec4::Z, DVec4::W);
         Camera::from_matrix(scale * DMat4::from_translation(-middle) * whole.clip_from_world())?
     };
     let crop = crop.with_near_far_clipping(orthographic || near.is_some() || far.is_some());
-    let (aperture_radius, focus_distance) = (number("apertureRadius").unwrap_or(0.0), number("focusDistance").unwrap_or(1.0));
+    let (aperture_radius, focus_distance) =
+        (number("apertureRadius").unwrap_or(0.0), number("focusDistance").unwrap_or(1.0));
     if aperture_radius == 0.0 {
         return Ok(crop);
     }

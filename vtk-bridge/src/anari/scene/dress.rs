@@ -26,7 +26,12 @@ pub(crate) struct Dressed {
 /// Puts the paint on a part.
 pub(crate) fn dress(part: &Part, model: &Material, paint: &Paint, world_from_object: &DAffine3) -> Dressed {
     let topology = part.topology.clone();
-    let bare = |material, appearance| Dressed { geometry: part.geometry(), material, appearance, topology: topology.clone() };
+    let bare = |material, appearance| Dressed {
+        geometry: part.geometry(),
+        material,
+        appearance,
+        topology: topology.clone(),
+    };
     let no_place = Place {
         topology: &topology,
         primitive: 0,
@@ -54,7 +59,9 @@ pub(crate) fn dress(part: &Part, model: &Material, paint: &Paint, world_from_obj
             bare(model.clone(), Appearance::new(0).with_colors(Attribute::per_vertex(colors)))
         }
         Domain::Texture => {
-            let Input::Sampler(sampler) = &paint.color else { return painted(part, model, paint, world_from_object) };
+            let Input::Sampler(sampler) = &paint.color else {
+                return painted(part, model, paint, world_from_object);
+            };
             let opacity = paint.opacity.at(&no_place)[0];
             let Some(texture) = sampler.texture(|texel| paint.finish(texel, || opacity)) else {
                 return painted(part, model, paint, world_from_object);
@@ -62,8 +69,17 @@ pub(crate) fn dress(part: &Part, model: &Material, paint: &Paint, world_from_obj
             let mut coordinates = vec![Default::default(); mesh.positions.len()];
             at_vertices(mesh, &no_place, |v, place| coordinates[v] = sampler.coordinate(place));
             let mesh = TriMesh { texcoords: Some(coordinates), ..TriMesh::clone(mesh) };
-            let material = Material { color_source: ColorSource::Texture(texture.into()), color: [1.0; 3], ..model.clone() };
-            Dressed { geometry: Geometry::Mesh(mesh.into()), material, appearance: Appearance::default(), topology: topology.clone() }
+            let material = Material {
+                color_source: ColorSource::Texture(texture.into()),
+                color: [1.0; 3],
+                ..model.clone()
+            };
+            Dressed {
+                geometry: Geometry::Mesh(mesh.into()),
+                material,
+                appearance: Appearance::default(),
+                topology: topology.clone(),
+            }
         }
         _ => painted(part, model, paint, world_from_object),
     }
@@ -92,7 +108,10 @@ fn domain_of(paint: &Paint) -> Domain {
         Input::Attribute(source) => source.domain(),
         Input::Sampler(sampler) => sampler.domain(),
     };
-    let (color, opacity) = (of(&paint.color), if paint.mode == AlphaMode::Opaque { Domain::Constant } else { of(&paint.opacity) });
+    let (color, opacity) = (
+        of(&paint.color),
+        if paint.mode == AlphaMode::Opaque { Domain::Constant } else { of(&paint.opacity) },
+    );
     let steps = matches!(paint.mode, AlphaMode::Mask { .. });
     match color.max(opacity) {
         // A threshold between vertices, or a product of two values that both change, is not linear.

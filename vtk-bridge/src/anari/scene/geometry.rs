@@ -87,7 +87,9 @@ pub(crate) fn prepare(geometry: &Object, notes: &mut Notes) -> Prepared {
 }
 
 fn shape_bounds(shape: &dyn Shape) -> Option<[DVec3; 2]> {
-    let boxes = (0..shape.num_primitives() as u32).map(|i| shape.bounds(i)).filter(|b| !b.is_empty() && b.min.is_finite() && b.max.is_finite());
+    let boxes = (0..shape.num_primitives() as u32)
+        .map(|i| shape.bounds(i))
+        .filter(|b| !b.is_empty() && b.min.is_finite() && b.max.is_finite());
     let all = boxes.reduce(|a, b| a.union(b))?;
     Some([shape.origin() + all.min.as_dvec3(), shape.origin() + all.max.as_dvec3()])
 }
@@ -97,18 +99,28 @@ fn shape_bounds(shape: &dyn Shape) -> Option<[DVec3; 2]> {
 fn positions(geometry: &Object, notes: &mut Notes) -> Option<Vec<Vec3>> {
     let found = geometry.object("vertex.position").and_then(|a| a.with_array(|a| a.vectors()));
     if found.is_none() {
-        notes.error(geometry, "`vertex.position` is not set, so it has no shape; set it to an array of FLOAT32_VEC3 and commit");
+        notes.error(
+            geometry,
+            "`vertex.position` is not set, so it has no shape; set it to an array of FLOAT32_VEC3 and commit",
+        );
     }
     let points: Vec<Vec3> = found?.into_iter().map(Vec3::from).collect();
     let bad = points.iter().filter(|p| !p.is_finite()).count();
     if bad > 0 {
-        notes.warn(geometry, format!("{bad} of {} vertices are NaN or infinite; what uses them is left out", points.len()));
+        notes.warn(
+            geometry,
+            format!("{bad} of {} vertices are NaN or infinite; what uses them is left out", points.len()),
+        );
     }
     Some(points)
 }
 
 /// Vertices of each primitive, without those past the end, and what remains' ANARI numbers.
-fn elements<const N: usize>(geometry: &Object, vertices: usize, notes: &mut Notes) -> (Vec<[u32; N]>, Numbers) {
+fn elements<const N: usize>(
+    geometry: &Object,
+    vertices: usize,
+    notes: &mut Notes,
+) -> (Vec<[u32; N]>, Numbers) {
     let listed = geometry.object("primitive.index").and_then(|a| a.with_array(|a| a.indices::<N>()));
     let all = listed.unwrap_or_else(|| {
         let one = |i: usize| std::array::from_fn(|k| (i * N + k) as u32);
@@ -167,16 +179,23 @@ fn polygons<const N: usize>(geometry: &Object, notes: &mut Notes) -> Option<Part
     let pick = |list: &[[f32; 3]], id: u32| list.get(id as usize).map_or(Vec3::ZERO, |n| Vec3::from(*n));
     let values: Option<Vec<Vec3>> = match (&of_corners, &of_vertices) {
         (Some(list), _) => Some(topology.corners.iter().flatten().map(|&c| pick(list, c)).collect()),
-        (None, Some(list)) if topology.unshared => Some(topology.vertices.iter().flatten().map(|&v| pick(list, v)).collect()),
+        (None, Some(list)) if topology.unshared => {
+            Some(topology.vertices.iter().flatten().map(|&v| pick(list, v)).collect())
+        }
         (None, Some(list)) => Some((0..points.len() as u32).map(|v| pick(list, v)).collect()),
         (None, None) => None,
     };
-    for (name, list, needed) in [
-        ("faceVarying.normal", &of_corners, faces.len() * N),
-        ("vertex.normal", &of_vertices, points.len()),
-    ] {
+    for (name, list, needed) in
+        [("faceVarying.normal", &of_corners, faces.len() * N), ("vertex.normal", &of_vertices, points.len())]
+    {
         if let Some(list) = list.as_ref().filter(|l| l.len() < needed) {
-            notes.warn(geometry, format!("`{name}` has {} elements, {needed} are needed; without the others faces are flat", list.len()));
+            notes.warn(
+                geometry,
+                format!(
+                    "`{name}` has {} elements, {needed} are needed; without the others faces are flat",
+                    list.len()
+                ),
+            );
         }
     }
 
@@ -216,7 +235,8 @@ fn spheres(geometry: &Object, notes: &mut Notes) -> Option<Part> {
     let radius = radii(geometry, "vertex.radius", geometry.f32("radius", 1.0));
     let centers = spheres.iter().map(|[v]| points[*v as usize]).collect();
     let each = spheres.iter().map(|[v]| radius(*v)).collect();
-    let topology = Topology { vertices: spheres.iter().map(|[v]| [*v; 3]).collect(), numbers, ..Topology::default() };
+    let topology =
+        Topology { vertices: spheres.iter().map(|[v]| [*v; 3]).collect(), numbers, ..Topology::default() };
     let shape = Spheres::new(centers, Radii::Each(each)).map(|s| Arc::new(s) as Arc<dyn Shape>);
     shape_part(geometry, shape, Weights::First, topology, notes)
 }
@@ -300,10 +320,20 @@ fn curve(geometry: &Object, notes: &mut Notes) -> Option<Part> {
     let total = listed.as_ref().map_or(points.len().saturating_sub(1), Vec::len);
     let all = listed.unwrap_or_else(|| (0..total as u32).map(|i| [i]).collect());
     // Segments in the order of their vertices, so that chains are found whatever order the program has them in.
-    let mut segments: Vec<(u32, u32)> =
-        (0..).zip(&all).map(|(number, [v])| (*v, number)).filter(|(v, _)| (*v as usize) + 1 < points.len()).collect();
+    let mut segments: Vec<(u32, u32)> = (0..)
+        .zip(&all)
+        .map(|(number, [v])| (*v, number))
+        .filter(|(v, _)| (*v as usize) + 1 < points.len())
+        .collect();
     if segments.len() < total {
-        notes.warn(geometry, format!("{} of {total} segments name vertices past the last one ({} vertices); they are left out", total - segments.len(), points.len()));
+        notes.warn(
+            geometry,
+            format!(
+                "{} of {total} segments name vertices past the last one ({} vertices); they are left out",
+                total - segments.len(),
+                points.len()
+            ),
+        );
     }
     segments.sort_unstable();
     let (mut chain, mut each, mut offsets) = (Vec::new(), Vec::new(), vec![0u32]);
@@ -350,7 +380,13 @@ fn isosurfaces(geometry: &Object, notes: &mut Notes) -> Prepared {
         match Isosurface::new(grid.clone(), &[isovalue], &Default::default()) {
             Ok(shape) => {
                 if shape.report().isovalues_out_of_range > 0 {
-                    notes.warn(geometry, format!("isovalue {isovalue} is outside of the field's range {:?}: nothing to draw", grid.range()));
+                    notes.warn(
+                        geometry,
+                        format!(
+                            "isovalue {isovalue} is outside of the field's range {:?}: nothing to draw",
+                            grid.range()
+                        ),
+                    );
                 }
                 let topology = Topology { numbers: Numbers::All(number), ..Topology::default() };
                 out.bounds = union(out.bounds, shape_bounds(&shape));

@@ -22,7 +22,10 @@ pub(crate) fn light_of(light: &Object, place: &DAffine3, notes: &mut Notes) -> O
     }
     let color = light.vector("color", [1.0; 3]);
     if !color.iter().all(|c| c.is_finite() && *c >= 0.0) {
-        notes.error(light, format!("`color` is {color:?}; it must be finite and not negative: it gives no light"));
+        notes.error(
+            light,
+            format!("`color` is {color:?}; it must be finite and not negative: it gives no light"),
+        );
         return None;
     }
     if light.subtype == "hdri" {
@@ -31,7 +34,10 @@ pub(crate) fn light_of(light: &Object, place: &DAffine3, notes: &mut Notes) -> O
     let position = place.transform_point3(DVec3::from_array(light.vector("position", [0.0; 3])));
     let direction = place.transform_vector3(DVec3::from_array(light.vector("direction", [0.0, 0.0, -1.0])));
     if !(position.is_finite() && direction.is_finite() && direction != DVec3::ZERO) {
-        notes.error(light, format!("its place {position} or direction {direction} is not finite or zero: it gives no light"));
+        notes.error(
+            light,
+            format!("its place {position} or direction {direction} is not finite or zero: it gives no light"),
+        );
         return None;
     }
     let number = |name: &str| light.numbers(name).map(|v| v[0]);
@@ -56,11 +62,18 @@ pub(crate) fn light_of(light: &Object, place: &DAffine3, notes: &mut Notes) -> O
                 notes.warn(light, "`openingAngle` is 0: it gives no light");
                 return None;
             }
-            (LightKind::Cone { position, direction, inner_rad: inner, outer_rad: outer }, per_angle, [0.0, 0.0, 1.0])
+            (
+                LightKind::Cone { position, direction, inner_rad: inner, outer_rad: outer },
+                per_angle,
+                [0.0, 0.0, 1.0],
+            )
         }
     };
     if !(strength.is_finite() && strength >= 0.0) {
-        notes.error(light, format!("its strength is {strength}; it must be finite and not negative: it gives no light"));
+        notes.error(
+            light,
+            format!("its strength is {strength}; it must be finite and not negative: it gives no light"),
+        );
         return None;
     }
     let lamp = Light { kind, attenuation, ..Light::directional(DVec3::Z) };
@@ -74,7 +87,8 @@ fn sky(light: &Object, color: [f64; 3], place: &DAffine3, notes: &mut Notes) -> 
         notes.error(light, "`radiance` is not set or has no texels: it gives no light");
         return None;
     };
-    let up = place.transform_vector3(DVec3::from_array(light.vector("up", [0.0, 0.0, 1.0]))).normalize_or_zero();
+    let up =
+        place.transform_vector3(DVec3::from_array(light.vector("up", [0.0, 0.0, 1.0]))).normalize_or_zero();
     let forward = place.transform_vector3(DVec3::from_array(light.vector("direction", [1.0, 0.0, 0.0])));
     let forward = (forward - up * up.dot(forward)).normalize_or_zero();
     if up == DVec3::ZERO || forward == DVec3::ZERO {
@@ -109,7 +123,10 @@ fn sky(light: &Object, color: [f64; 3], place: &DAffine3, notes: &mut Notes) -> 
     image.wrap = [Wrap::Repeat, Wrap::Clamp];
     let scale = light.f32("scale", 1.0);
     if !(scale.is_finite() && scale >= 0.0) {
-        notes.error(light, format!("`scale` is {scale}; it must be finite and not negative: it gives no light"));
+        notes.error(
+            light,
+            format!("`scale` is {scale}; it must be finite and not negative: it gives no light"),
+        );
         return None;
     }
     Some(Made::Sky(Environment::Image { image: image.into(), up: up.as_vec3(), scale }))

@@ -37,7 +37,8 @@ pub(crate) fn model_of(material: &Object, notes: &mut Notes) -> Material {
         // Beer and Lambert: white light has the attenuation colour after the attenuation distance.
         let distance = material.f32("attenuationDistance", f32::INFINITY);
         let color = material.vector("attenuationColor", [1.0; 3]);
-        let absorption = color.map(|c| (-(c.clamp(1e-6, 1.0) as f32).ln() / distance.max(f32::MIN_POSITIVE)).min(1e30));
+        let absorption =
+            color.map(|c| (-(c.clamp(1e-6, 1.0) as f32).ln() / distance.max(f32::MIN_POSITIVE)).min(1e30));
         SurfaceModel::Dielectric { ior, absorption }
     } else {
         // KHR_materials_specular, which ANARI follows: reflectance at normal incidence, scaled.
@@ -48,13 +49,21 @@ pub(crate) fn model_of(material: &Object, notes: &mut Notes) -> Material {
     if emission.iter().all(|v| v.is_finite() && *v >= 0.0) {
         out.emission = emission;
     } else {
-        notes.warn(material, format!("`emissive` is {emission:?}; it must be finite and not negative: it gives off no light"));
+        notes.warn(
+            material,
+            format!("`emissive` is {emission:?}; it must be finite and not negative: it gives off no light"),
+        );
     }
     out
 }
 
 /// Where colour and opacity come from on `geometry` in `instance`.
-pub(crate) fn paint_of(material: &Object, geometry: &Object, instance: Option<&Object>, notes: &mut Notes) -> Paint {
+pub(crate) fn paint_of(
+    material: &Object,
+    geometry: &Object,
+    instance: Option<&Object>,
+    notes: &mut Notes,
+) -> Paint {
     let name = if material.subtype == "physicallyBased" { "baseColor" } else { "color" };
     let default = if material.subtype == "physicallyBased" { [1.0; 4] } else { [0.8, 0.8, 0.8, 1.0] };
     let mut input = |name: &str, default: [f32; 4]| {
@@ -64,11 +73,16 @@ pub(crate) fn paint_of(material: &Object, geometry: &Object, instance: Option<&O
             Some(Value::Text(attribute)) => {
                 let source = Source::of(attribute, geometry, instance);
                 if source.is_none() {
-                    notes.error(material, format!("`{name}` is \"{attribute}\", which is no attribute; use one of {NAMES:?}"));
+                    notes.error(
+                        material,
+                        format!("`{name}` is \"{attribute}\", which is no attribute; use one of {NAMES:?}"),
+                    );
                 }
                 source.map(Input::Attribute)
             }
-            Some(Value::Object(sampler)) => Sampler::of(sampler, geometry, instance, notes).map(Input::Sampler),
+            Some(Value::Object(sampler)) => {
+                Sampler::of(sampler, geometry, instance, notes).map(Input::Sampler)
+            }
             Some(Value::Pointer(..)) => None,
         };
         found.unwrap_or(Input::Constant(default))

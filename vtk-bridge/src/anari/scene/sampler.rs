@@ -61,7 +61,13 @@ impl Sampler {
         } else {
             let input = Source::of(&name, geometry, instance);
             if input.is_none() {
-                notes.error(sampler, format!("`inAttribute` is \"{name}\", which is no attribute; use one of {:?}", super::attribute::NAMES));
+                notes.error(
+                    sampler,
+                    format!(
+                        "`inAttribute` is \"{name}\", which is no attribute; use one of {:?}",
+                        super::attribute::NAMES
+                    ),
+                );
             }
             input?
         };
@@ -78,7 +84,8 @@ impl Sampler {
             }
             _ => Step::Image(Arc::new(image(sampler, notes)?)),
         };
-        let (out_transform, out_offset) = (matrix(sampler, "outTransform"), DVec4::from_array(sampler.vector("outOffset", [0.0; 4])));
+        let (out_transform, out_offset) =
+            (matrix(sampler, "outTransform"), DVec4::from_array(sampler.vector("outOffset", [0.0; 4])));
         Some(Sampler { input, step, out_transform, out_offset })
     }
 
@@ -153,7 +160,10 @@ fn image(sampler: &Object, notes: &mut Notes) -> Option<Image> {
         Some("repeat") => Wrap::Repeat,
         Some("mirrorRepeat") => Wrap::Mirror,
         Some(other) => {
-            notes.warn(sampler, format!("`{name}` is \"{other}\", which this device does not have; \"clampToEdge\" is used"));
+            notes.warn(
+                sampler,
+                format!("`{name}` is \"{other}\", which this device does not have; \"clampToEdge\" is used"),
+            );
             Wrap::Clamp
         }
     };
@@ -162,9 +172,18 @@ fn image(sampler: &Object, notes: &mut Notes) -> Option<Image> {
         2 => [wrap("wrapMode1"), wrap("wrapMode2"), Wrap::Clamp],
         _ => [wrap("wrapMode1"), wrap("wrapMode2"), wrap("wrapMode3")],
     };
-    let filter = if sampler.text("filter").as_deref() == Some("nearest") { Filter::Nearest } else { Filter::Bilinear };
+    let filter =
+        if sampler.text("filter").as_deref() == Some("nearest") { Filter::Nearest } else { Filter::Bilinear };
     let in_offset = DVec4::from_array(sampler.vector("inOffset", [0.0; 4]));
-    Some(Image { dims, dimensions, texels, wrap, filter, in_transform: matrix(sampler, "inTransform"), in_offset })
+    Some(Image {
+        dims,
+        dimensions,
+        texels,
+        wrap,
+        filter,
+        in_transform: matrix(sampler, "inTransform"),
+        in_offset,
+    })
 }
 
 impl Image {

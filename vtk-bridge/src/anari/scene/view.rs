@@ -75,15 +75,24 @@ pub(crate) fn view_of(renderer: &Object, size: [u32; 2], notes: &mut Notes) -> V
     } else if distance > 0.0 {
         Some(AmbientOcclusion { distance, rays })
     } else {
-        notes.warn(renderer, format!("`ambientOcclusionDistance` is {distance}; it must be positive: ambient light is not dimmed"));
+        notes.warn(
+            renderer,
+            format!(
+                "`ambientOcclusionDistance` is {distance}; it must be positive: ambient light is not dimmed"
+            ),
+        );
         None
     };
 
     let backdrop = match renderer.parameters().get("background") {
         Some(Value::Bytes(t, b)) => Backdrop::Color(t.attribute(b)),
         Some(Value::Object(a)) => {
-            let picture = a.with_array(|a| ([a.dims[0], a.dims[1]], a.attributes())).filter(|(_, t)| !t.is_empty());
-            picture.map_or(Backdrop::Color([0.0, 0.0, 0.0, 1.0]), |(size, texels)| Backdrop::Picture { size, texels })
+            let picture =
+                a.with_array(|a| ([a.dims[0], a.dims[1]], a.attributes())).filter(|(_, t)| !t.is_empty());
+            picture.map_or(Backdrop::Color([0.0, 0.0, 0.0, 1.0]), |(size, texels)| Backdrop::Picture {
+                size,
+                texels,
+            })
         }
         _ => Backdrop::Color([0.0, 0.0, 0.0, 1.0]),
     };

@@ -21,7 +21,10 @@ pub(crate) fn grid_of(field: &Object, notes: &mut Notes) -> Option<Arc<Grid>> {
         return None;
     };
     if field.text("filter").is_some_and(|f| f != "linear") {
-        notes.warn(field, "`filter` is not \"linear\", which is all this device has: it interpolates linearly");
+        notes.warn(
+            field,
+            "`filter` is not \"linear\", which is all this device has: it interpolates linearly",
+        );
     }
     let origin = DVec3::from_array(field.vector("origin", [0.0; 3]));
     let spacing = DVec3::from_array(field.vector("spacing", [1.0; 3]));
@@ -64,7 +67,10 @@ pub(crate) fn volume_of(volume: &Object, notes: &mut Notes) -> Option<Arc<Volume
         *v = 0.0;
     }
     if bad > 0 {
-        notes.warn(volume, format!("{bad} components of `color` are NaN, infinite or negative; they count as 0"));
+        notes.warn(
+            volume,
+            format!("{bad} components of `color` are NaN, infinite or negative; they count as 0"),
+        );
     }
     // Opacity and the colours' alpha multiply; both are linear between their own points, so their product is sampled at the points of both.
     let points: Vec<[f32; 2]> = knots(opacities.len(), colors.len())
@@ -77,9 +83,9 @@ pub(crate) fn volume_of(volume: &Object, notes: &mut Notes) -> Option<Arc<Volume
         .collect();
     let unit = volume.f32("unitDistance", 1.0);
     let transfer = TransferFunction::from_opacity(ColorMap::new(colors, [low, high]), &points, unit);
-    let made = transfer.map_err(|e| e.to_string()).and_then(|t| {
-        Volume::new(grid, t, VolumeOptions::default()).map_err(|e| e.to_string())
-    });
+    let made = transfer
+        .map_err(|e| e.to_string())
+        .and_then(|t| Volume::new(grid, t, VolumeOptions::default()).map_err(|e| e.to_string()));
     match made {
         Ok(volume) => Some(Arc::new(volume)),
         Err(e) => {

@@ -102,7 +102,14 @@ impl Compiled {
         };
         let old = std::mem::take(cache);
         cache.built = old.built.clone();
-        let mut making = Making { old: &old, cache, out: Compiled::default(), known: HashMap::new(), materials: HashMap::new(), notes };
+        let mut making = Making {
+            old: &old,
+            cache,
+            out: Compiled::default(),
+            known: HashMap::new(),
+            materials: HashMap::new(),
+            notes,
+        };
         making.out.built = old.built.clone();
         let here = Spot { world_from_object: DAffine3::IDENTITY, instance: None, id: u32::MAX };
         match world.kind {
@@ -163,7 +170,13 @@ impl Making<'_> {
             self.content(&group, Spot { world_from_object, instance: Some(instance), id });
         }
         if singular > 0 {
-            self.notes.warn(instance, format!("{singular} of {} matrices are singular or not finite; they place nothing", matrices.len()));
+            self.notes.warn(
+                instance,
+                format!(
+                    "{singular} of {} matrices are singular or not finite; they place nothing",
+                    matrices.len()
+                ),
+            );
         }
     }
 
@@ -180,7 +193,9 @@ impl Making<'_> {
             let Some(medium) = made.as_ref() else { continue };
             let grid = medium.grid();
             self.grow(Some([grid.origin, grid.max_corner()]), &spot.world_from_object);
-            self.out.volumes.push(PlacedVolume { volume: medium.clone(), world_from_object: spot.world_from_object });
+            self.out
+                .volumes
+                .push(PlacedVolume { volume: medium.clone(), world_from_object: spot.world_from_object });
         }
         for light in group.objects("light") {
             match light_of(&light, &spot.world_from_object, self.notes) {
@@ -198,7 +213,8 @@ impl Making<'_> {
         if !surface.bool("visible", true) {
             return;
         }
-        let (Some(geometry), Some(material)) = (surface.object("geometry"), surface.object("material")) else {
+        let (Some(geometry), Some(material)) = (surface.object("geometry"), surface.object("material"))
+        else {
             self.notes.error(surface, "`geometry` or `material` is not set, so it is not drawn");
             return;
         };

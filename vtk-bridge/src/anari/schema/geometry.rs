@@ -8,7 +8,8 @@ const POSITIONS: &[DataType] = &[DataType::FLOAT32_VEC3];
 const RADII: &[DataType] = &[DataType::FLOAT32];
 const CAPS: &[&str] = &["none", "first", "second", "both"];
 
-const POSITION: Parameter = Parameter::array("vertex.position", POSITIONS, "places in object space").required();
+const POSITION: Parameter =
+    Parameter::array("vertex.position", POSITIONS, "places in object space").required();
 
 const UNIFORM: &[Parameter] = &[
     Parameter::new("color", VEC4, "colour of the whole geometry, for materials that ask for the attribute"),
@@ -48,8 +49,10 @@ const fn index(elements: &'static [DataType]) -> Parameter {
 
 const RADIUS: Parameter =
     Parameter::new("radius", &[DataType::FLOAT32], "radius where no array gives one").floats(&[1.0]);
-const CAP: Parameter = Parameter::new("caps", &[DataType::STRING], "which ends are closed").text("none", CAPS);
-const VERTEX_CAP: Parameter = Parameter::array("vertex.cap", &[DataType::UINT8], "1 to close the end at a vertex");
+const CAP: Parameter =
+    Parameter::new("caps", &[DataType::STRING], "which ends are closed").text("none", CAPS);
+const VERTEX_CAP: Parameter =
+    Parameter::array("vertex.cap", &[DataType::UINT8], "1 to close the end at a vertex");
 
 const fn geometry(
     subtype: &'static str,
@@ -145,7 +148,12 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
             &[
                 Parameter {
                     elements: &[DataType::FLOAT32],
-                    ..Parameter::new("isovalue", &[DataType::FLOAT32, DataType::ARRAY1D], "one value, or several").required()
+                    ..Parameter::new(
+                        "isovalue",
+                        &[DataType::FLOAT32, DataType::ARRAY1D],
+                        "one value, or several",
+                    )
+                    .required()
                 },
                 Parameter::new("field", &[DataType::SPATIAL_FIELD], "the field").required(),
             ],

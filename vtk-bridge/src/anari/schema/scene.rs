@@ -47,14 +47,22 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
                 Parameter::new("group", &[DataType::GROUP], "what is placed").required(),
                 Parameter {
                     elements: &[DataType::FLOAT32_MAT4],
-                    ..Parameter::new("transform", &[DataType::FLOAT32_MAT4, DataType::ARRAY1D], "object to world; an array for many copies")
-                        .floats(&[1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+                    ..Parameter::new(
+                        "transform",
+                        &[DataType::FLOAT32_MAT4, DataType::ARRAY1D],
+                        "object to world; an array for many copies",
+                    )
+                    .floats(&[1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0])
                 },
                 Parameter {
                     elements: &[DataType::UINT32],
-                    ..Parameter::new("id", &[DataType::UINT32, DataType::ARRAY1D], "value in the channel instanceId")
-                        .whole(u32::MAX)
-                        .of("KHR_FRAME_CHANNEL_INSTANCE_ID")
+                    ..Parameter::new(
+                        "id",
+                        &[DataType::UINT32, DataType::ARRAY1D],
+                        "value in the channel instanceId",
+                    )
+                    .whole(u32::MAX)
+                    .of("KHR_FRAME_CHANNEL_INSTANCE_ID")
                 },
             ],
             ATTRIBUTES,
@@ -69,7 +77,9 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
             Parameter::new("geometry", &[DataType::GEOMETRY], "the shape").required(),
             Parameter::new("material", &[DataType::MATERIAL], "the look").required(),
             Parameter::new("visible", &[DataType::BOOL], "whether it is drawn").whole(1),
-            Parameter::new("id", &[DataType::UINT32], "value in the channel objectId").whole(u32::MAX).of("KHR_FRAME_CHANNEL_OBJECT_ID"),
+            Parameter::new("id", &[DataType::UINT32], "value in the channel objectId")
+                .whole(u32::MAX)
+                .of("KHR_FRAME_CHANNEL_OBJECT_ID"),
         ]],
     ),
     object(
@@ -88,9 +98,11 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
                 ],
                 ..Parameter::new("data", &[DataType::ARRAY3D], "a scalar per grid point").required()
             },
-            Parameter::new("origin", &[DataType::FLOAT32_VEC3], "place of the first grid point").floats(&[0.0; 3]),
+            Parameter::new("origin", &[DataType::FLOAT32_VEC3], "place of the first grid point")
+                .floats(&[0.0; 3]),
             Parameter::new("spacing", &[DataType::FLOAT32_VEC3], "distance of grid points").floats(&[1.0; 3]),
-            Parameter::new("filter", &[DataType::STRING], "how scalars are combined").text("linear", &["linear"]),
+            Parameter::new("filter", &[DataType::STRING], "how scalars are combined")
+                .text("linear", &["linear"]),
         ]],
     ),
     object(
@@ -100,8 +112,12 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
         "a glowing, absorbing medium",
         &[&[
             Parameter::new("value", &[DataType::SPATIAL_FIELD], "the field").required(),
-            Parameter::new("valueRange", &[DataType::FLOAT32_BOX1, DataType::FLOAT64_BOX1], "scalars of the first and last colour")
-                .floats(&[0.0, 1.0]),
+            Parameter::new(
+                "valueRange",
+                &[DataType::FLOAT32_BOX1, DataType::FLOAT64_BOX1],
+                "scalars of the first and last colour",
+            )
+            .floats(&[0.0, 1.0]),
             Parameter {
                 elements: &[DataType::FLOAT32_VEC3, DataType::FLOAT32_VEC4],
                 ..Parameter::new(
@@ -113,9 +129,19 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
             },
             Parameter {
                 elements: &[DataType::FLOAT32],
-                ..Parameter::new("opacity", &[DataType::FLOAT32, DataType::ARRAY1D], "opacities spread over the range").floats(&[1.0])
+                ..Parameter::new(
+                    "opacity",
+                    &[DataType::FLOAT32, DataType::ARRAY1D],
+                    "opacities spread over the range",
+                )
+                .floats(&[1.0])
             },
-            Parameter::new("unitDistance", &[DataType::FLOAT32], "thickness of which a slab has these opacities").floats(&[1.0]),
+            Parameter::new(
+                "unitDistance",
+                &[DataType::FLOAT32],
+                "thickness of which a slab has these opacities",
+            )
+            .floats(&[1.0]),
             Parameter::new("visible", &[DataType::BOOL], "whether it is drawn").whole(1),
         ]],
     ),
