@@ -19,7 +19,7 @@ fn python() -> Option<PathBuf> {
 fn device_folder() -> PathBuf {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("anari");
     std::fs::create_dir_all(&folder).expect("a folder for the device");
-    let built = Path::new(env!("CARGO_BIN_EXE_vtk-bridge")).with_file_name("libvtk_bridge.so");
+    let built = std::env::current_exe().expect("a test is a file").with_file_name("libvtk_bridge.so");
     // Tests run side by side: each moves a complete copy into place.
     let copy = folder.join(format!("copy-{:?}", std::thread::current().id()));
     std::fs::copy(&built, &copy).unwrap_or_else(|e| panic!("{}: {e}", built.display()));

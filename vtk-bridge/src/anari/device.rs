@@ -276,7 +276,7 @@ impl Device {
         if schema.parameter(name).is_some() {
             return true;
         }
-        let near = schema.parameters().map(|p| p.name).filter(|p| p.eq_ignore_ascii_case(name)).next();
+        let near = schema.parameters().map(|p| p.name).find(|p| p.eq_ignore_ascii_case(name));
         let hint = near.map_or(String::new(), |n| format!("; did you mean `{n}`?"));
         self.about(
             object,

@@ -39,7 +39,7 @@ impl Pixels {
 }
 
 /// Values in the renderer's order, top row first, as rows from the bottom.
-fn upright<'a, T>(values: &'a [T], width: u32) -> impl Iterator<Item = &'a T> {
+fn upright<T>(values: &[T], width: u32) -> impl Iterator<Item = &T> {
     values.chunks_exact(width.max(1) as usize).rev().flatten()
 }
 
