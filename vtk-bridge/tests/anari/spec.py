@@ -50,6 +50,12 @@ def ambient_light_makes_a_surface_its_colour(d):
     close(draw(d, ball(d, ambient=1.0))[50, 50], [0.5, 0.25, 1.0, 1.0])
 
 
+def ambient_light_is_seen_in_metals(d):
+    metal = d.new("Material", "physicallyBased", baseColor=[0.9, 0.6, 0.3], metallic=1.0, roughness=0.0)
+    for renderer in ("default", "pathtracer"):
+        close(draw(d, ball(d, material=metal, ambient=1.0, renderer=renderer))[50, 50, :3], [0.9, 0.6, 0.3], 1e-2)
+
+
 def depth_normal_albedo_and_ids_describe_the_surface(d):
     f = ball(d, ambient=0.5, channels=[("depth", FLOAT32), ("normal", FLOAT32_VEC3), ("albedo", FLOAT32_VEC3), ("primitiveId", UINT32), ("objectId", UINT32),
                                        ("instanceId", UINT32)])

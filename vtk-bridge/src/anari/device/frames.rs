@@ -190,3 +190,100 @@ impl Device {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::anari::device::{Hooks, Raw};
+    use crate::anari::object::Extra;
+    use crate::anari::status::Listener;
+    use rt_core::accel::World;
+
+    struct Silent;
+
+    impl Listener for Silent {
+        fn message(&self, m: &Message) {
+            assert!(m.severity > Severity::Warning, "{}", m.text);
+        }
+    }
+
+    impl Hooks for Silent {
+        fn frame_completed(&self, _function: usize, _user: usize, _frame: Handle) {}
+    }
+
+    fn floats(v: &[f32]) -> Raw {
+        Raw::Bytes(v.iter().flat_map(|f| f.to_ne_bytes()).collect())
+    }
+
+    #[test]
+    fn colours_and_matrices_build_no_geometry_anew() {
+        let d = Device::new(Box::new(Silent), Arc::new(Silent));
+        let put = |o: Handle, name: &str, t: DataType, v: Raw| {
+            d.set_parameter(o, name, t, v);
+            d.commit(o);
+        };
+        // A ball at the origin (arrays of the device's own memory are zeros), placed by an instance.
+        let array = |t| d.new_array(DataType::ARRAY1D, t, [1, 1, 1], None);
+        let ball = d.new_object(DataType::GEOMETRY, "sphere");
+        put(ball, "vertex.position", DataType::ARRAY1D, Raw::Handle(array(DataType::FLOAT32_VEC3)));
+        let (material, surface) =
+            (d.new_object(DataType::MATERIAL, "matte"), d.new_object(DataType::SURFACE, ""));
+        d.set_parameter(surface, "geometry", DataType::GEOMETRY, Raw::Handle(ball));
+        put(surface, "material", DataType::MATERIAL, Raw::Handle(material));
+        let (group, instance) =
+            (d.new_object(DataType::GROUP, ""), d.new_object(DataType::INSTANCE, "transform"));
+        let (world, frame) = (d.new_object(DataType::WORLD, ""), d.new_object(DataType::FRAME, ""));
+        let fill = |o: Handle, name: &str, t: DataType, content: Handle| {
+            let a = array(t);
+            let find = |h| lock(&d.objects).get(&h).map(|e| e.object.clone());
+            let (array, content) = (find(a).expect("an array"), find(content));
+            array.with_array(|a| a.set_objects(vec![content]));
+            put(o, name, DataType::ARRAY1D, Raw::Handle(a));
+        };
+        fill(group, "surface", DataType::SURFACE, surface);
+        put(instance, "group", DataType::GROUP, Raw::Handle(group));
+        fill(world, "instance", DataType::INSTANCE, instance);
+        let (camera, renderer) =
+            (d.new_object(DataType::CAMERA, "perspective"), d.new_object(DataType::RENDERER, "default"));
+        for (name, t, o) in [
+            ("camera", DataType::CAMERA, camera),
+            ("renderer", DataType::RENDERER, renderer),
+            ("world", DataType::WORLD, world),
+        ] {
+            put(frame, name, t, Raw::Handle(o));
+        }
+        put(
+            frame,
+            "size",
+            DataType::UINT32_VEC2,
+            Raw::Bytes([8u32.to_ne_bytes(), 8u32.to_ne_bytes()].concat()),
+        );
+        let color_type = DataType::FLOAT32_VEC4.0.to_ne_bytes().to_vec();
+        put(frame, "channel.color", DataType::DATA_TYPE, Raw::Bytes(color_type));
+
+        let draw = || -> Arc<World> {
+            d.render_frame(frame);
+            assert!(d.frame_ready(frame, true));
+            let object = lock(&d.objects).get(&world).map(|e| e.object.clone()).expect("the world");
+            let extra = lock(&object.extra);
+            let Extra::World(cache) = &*extra else { panic!("a world") };
+            lock(&cache.built).clone().expect("it was drawn")
+        };
+        let first = draw();
+        assert_eq!(first.instances().len(), 1);
+        put(material, "color", DataType::FLOAT32_VEC3, floats(&[1.0, 0.0, 0.0]));
+        assert!(Arc::ptr_eq(&first, &draw()), "a colour builds nothing");
+        let mut matrix = [0.0; 16];
+        [0, 5, 10, 15].into_iter().for_each(|i| matrix[i] = 2.0);
+        put(instance, "transform", DataType::FLOAT32_MAT4, floats(&matrix));
+        let moved = draw();
+        assert!(!Arc::ptr_eq(&first, &moved), "a matrix moves the instance");
+        let shape = |w: &World| match &w.geometries()[0] {
+            rt_core::accel::Geometry::Shape(s) => Arc::as_ptr(s).cast::<()>(),
+            rt_core::accel::Geometry::Mesh(m) => Arc::as_ptr(m).cast::<()>(),
+        };
+        assert_eq!(shape(&first), shape(&moved), "and keeps the geometry with its tree");
+        put(ball, "radius", DataType::FLOAT32, floats(&[0.5]));
+        assert_ne!(shape(&moved), shape(&draw()), "a radius makes another geometry");
+    }
+}

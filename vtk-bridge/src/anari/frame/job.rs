@@ -8,8 +8,9 @@ use crate::anari::scene::world::Compiled;
 use crate::anari::status::lock;
 use rt_core::accel::{BuildOptions, Geometry, World};
 use rt_core::camera::{Camera, ThinLens};
-use rt_core::environment::Background;
+use rt_core::environment::{Background, Environment};
 use rt_core::frame::Layers;
+use rt_core::light::Light;
 use rt_core::material::SurfaceModel;
 use rt_core::render::{RenderError, RenderOptions, render};
 use rt_core::scene::{Scene, SceneError};
@@ -166,12 +167,15 @@ fn draw(order: &Order, job: &Job) -> Result<(Picture, Vec<String>), String> {
     scene.materials.clone_from(&compiled.materials);
     scene.lights =
         compiled.lights.iter().copied().map(|l| if view.shadows { l } else { l.without_shadows() }).collect();
-    scene.lights.extend(view.ambient);
     scene.environment.clone_from(&compiled.sky);
-    scene.background =
-        if scene.environment.is_some() { Background::Environment } else { Background::Transparent };
-    scene.ambient_occlusion =
-        view.occlusion.filter(|_| view.ambient.is_some() || scene.environment.is_some());
+    scene.background = if compiled.sky.is_some() { Background::Environment } else { Background::Transparent };
+    // Ambient light comes from everywhere, so mirrors see it; next to a picture of the sky it only adds to what is diffuse.
+    match view.ambient {
+        Some(color) if compiled.sky.is_none() => scene.environment = Some(Environment::Constant(color)),
+        Some(color) => scene.lights.push(Light::ambient(color)),
+        None => {}
+    }
+    scene.ambient_occlusion = view.occlusion.filter(|_| scene.environment.is_some());
     scene.volumes.clone_from(&compiled.volumes);
     scene.check().map_err(|e: SceneError| e.to_string())?;
 

@@ -2,7 +2,6 @@
 
 use super::Notes;
 use crate::anari::object::{Object, Value};
-use rt_core::light::Light;
 use rt_core::render::RenderOptions;
 use rt_core::scene::AmbientOcclusion;
 use rt_core::volume::VolumeQuality;
@@ -10,7 +9,8 @@ use rt_core::volume::VolumeQuality;
 /// How a frame is drawn.
 pub(crate) struct View {
     pub(crate) options: RenderOptions,
-    pub(crate) ambient: Option<Light>,
+    /// Radiance from everywhere.
+    pub(crate) ambient: Option<[f32; 3]>,
     pub(crate) occlusion: Option<AmbientOcclusion>,
     pub(crate) shadows: bool,
     pub(crate) backdrop: Backdrop,
@@ -68,7 +68,7 @@ pub(crate) fn view_of(renderer: &Object, size: [u32; 2], notes: &mut Notes) -> V
     if !usable {
         notes.warn(renderer, format!("the ambient light {color:?} is not finite or negative: there is none"));
     }
-    let ambient = (usable && color != [0.0; 3]).then(|| Light::ambient(color));
+    let ambient = (usable && color != [0.0; 3]).then_some(color);
     let distance = f64::from(renderer.f32("ambientOcclusionDistance", f32::INFINITY));
     let occlusion = if rays == 0 || options.path_tracing {
         None
