@@ -87,7 +87,7 @@ unsafe extern "C" fn __glx_Main(
         real::set_vendor((*imports)[1], false);
         (*imports)[1] = glx_address as *const ();
         // No patching of entry points behind our back.
-        (*imports)[5..9].fill(core::ptr::null());
+        (5..9).for_each(|i| (*imports)[i] = core::ptr::null());
     }
     1
 }
