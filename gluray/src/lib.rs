@@ -1,5 +1,6 @@
 //! Ray tracing inside unmodified OpenGL programs.
-//!
-//! **Status: not built yet.** This member holds its place in the workspace and has no code; ARCHITECTURE.md says
-//! what it will do and in which order the members come.
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
+
+pub mod config;
+pub mod folders;
+pub mod panel;
