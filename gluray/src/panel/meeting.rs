@@ -113,14 +113,14 @@ impl Meeting {
     /// Reads a file, if it is believable.
     pub fn read(path: &Path) -> Option<Meeting> {
         use std::io::Read;
-        let mut file = std::fs::File::open(path).ok()?;
+        let file = std::fs::File::open(path).ok()?;
         // Of what was opened, not of what may lie there by now.
         let about = file.metadata().ok()?;
         if !about.is_file() || about.mode() & 0o077 != 0 || Some(about.uid()) != folders::user_id() || about.len() > 4096 {
             return None;
         }
         let mut text = String::new();
-        file.by_ref().take(4096).read_to_string(&mut text).ok()?;
+        file.take(4096).read_to_string(&mut text).ok()?;
         serde_json::from_str::<Meeting>(&text).ok().filter(|m| m.address.ip().is_loopback())
     }
 

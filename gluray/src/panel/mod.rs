@@ -12,6 +12,18 @@ pub mod link;
 pub mod meeting;
 pub mod protocol;
 
+#[cfg(feature = "panel")]
+pub mod hub;
+#[cfg(feature = "panel")]
+mod links;
+#[cfg(feature = "panel")]
+mod routes;
+#[cfg(feature = "panel")]
+mod server;
+
+#[cfg(feature = "panel")]
+pub use server::{Opened, PanelError, serve};
+
 pub use link::Link;
 pub use meeting::{Meeting, Secret};
 pub use protocol::{FrameStats, Hello, ObjectInfo};

@@ -1,0 +1,63 @@
+//! The command line: what was typed becomes a call of the library.
+
+mod doctor;
+mod explain;
+mod export;
+#[cfg(feature = "panel")]
+mod panel;
+mod timeline;
+
+use clap::{Parser, Subcommand};
+use datasets::cli::{CommonArgs, CompletionsArgs, Status, run_main};
+use std::process::ExitCode;
+
+/// Ray tracing inside OpenGL programs that are not changed.
+#[derive(Debug, Parser)]
+#[command(name = "gluray", version, after_help = EXAMPLES)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    #[command(flatten)]
+    common: CommonArgs,
+}
+
+const EXAMPLES: &str = "Examples:
+  gluray doctor                          what there is to work with, and what will not work
+  gluray explain                         what was traced in the last run, what was not, and why
+  gluray panel                           a page that changes running programs
+  gluray export scene.gluray -o a.glb    a captured scene for other programs";
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Says which OpenGL there is, how programs can be reached, and what will not work
+    Doctor(doctor::DoctorArgs),
+    /// Says what was traced in the last run, what was left to the driver, and why
+    Explain(explain::ExplainArgs),
+    /// Writes a captured scene as PLY, glTF or VTP
+    Export(export::ExportArgs),
+    /// Serves the control panel for running programs
+    #[cfg(feature = "panel")]
+    Panel(panel::PanelArgs),
+    /// Draws when each phase of each frame ran
+    Timeline(timeline::TimelineArgs),
+    /// Prints a completion script for a shell
+    Completions(CompletionsArgs),
+}
+
+/// Runs the program. Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted.
+pub fn main() -> ExitCode {
+    run_main(|| execute(Cli::try_parse()?))
+}
+
+fn execute(cli: Cli) -> anyhow::Result<Status> {
+    let common = cli.common;
+    match cli.command {
+        Command::Doctor(args) => doctor::doctor(common, &args),
+        Command::Explain(args) => explain::explain(common, &args).map(Status::from),
+        Command::Export(args) => export::export(common, &args).map(Status::from),
+        #[cfg(feature = "panel")]
+        Command::Panel(args) => panel::panel(common, &args).map(Status::from),
+        Command::Timeline(args) => timeline::timeline(common, &args).map(Status::from),
+        Command::Completions(args) => args.print::<Cli>().map(Status::from),
+    }
+}
