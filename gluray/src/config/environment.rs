@@ -12,7 +12,8 @@ pub const OTHER_VARIABLES: &[(&str, &str)] = &[
     ("GLURAY_DUMP", "file that the scene is written to, see `gluray export`"),
     ("GLURAY_PANEL", "address of the control panel"),
     ("GLURAY_PANEL_SECRET", "its secret"),
-    ("GLURAY_REPORT", "file that the report is written to"),
+    ("GLURAY_RUN_DIR", "folder that reports are written to"),
+    ("GLURAY_LIBRARY", "the library that `gluray run` puts into programs"),
     ("GLURAY_GLX_VENDOR", "GLVND vendor that we stand in front of"),
     ("GLURAY_EGL_VENDOR", "the same for EGL"),
 ];

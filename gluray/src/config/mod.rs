@@ -10,12 +10,14 @@
 //! Nothing here knows OpenGL: plain data, read by the library in the program and by our own program.
 
 pub mod assign;
+mod current;
 pub mod environment;
 pub mod fields;
 pub mod file;
 pub mod load;
 pub mod settings;
 
+pub(crate) use current::{Config, current, program_name};
 pub use assign::{Assignment, SettingError, assign};
 pub use fields::{FIELDS, Field, Kind};
 pub use file::ConfigFile;

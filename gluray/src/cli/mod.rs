@@ -9,6 +9,7 @@ mod timeline;
 
 use clap::{Parser, Subcommand};
 use datasets::cli::{CommonArgs, CompletionsArgs, Status, run_main};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Ray tracing inside OpenGL programs that are not changed.
@@ -52,12 +53,26 @@ pub fn main() -> ExitCode {
 fn execute(cli: Cli) -> anyhow::Result<Status> {
     let common = cli.common;
     match cli.command {
-        Command::Doctor(args) => doctor::doctor(common, &args),
-        Command::Explain(args) => explain::explain(common, &args).map(Status::from),
+        Command::Doctor(args) => doctor::doctor(&args, &common),
+        Command::Explain(args) => explain::explain(&args, &common),
         Command::Export(args) => export::export(common, &args).map(Status::from),
         #[cfg(feature = "panel")]
         Command::Panel(args) => panel::panel(common, &args).map(Status::from),
         Command::Timeline(args) => timeline::timeline(common, &args).map(Status::from),
         Command::Completions(args) => args.print::<Cli>().map(Status::from),
     }
+}
+
+/// Where the account of the last run is kept.
+fn last_report() -> PathBuf {
+    crate::folders::state(crate::folders::variable).unwrap_or_default().join("last.json")
+}
+
+/// The shared library that belongs to this program.
+fn library() -> Option<PathBuf> {
+    let exe = std::env::current_exe().ok()?;
+    let folder = exe.parent()?;
+    let places = [folder.to_owned(), folder.join("deps"), folder.join("../lib"), folder.join("..")];
+    let named = std::env::var_os("GLURAY_LIBRARY").map(PathBuf::from);
+    named.into_iter().chain(places.map(|p| p.join("libgluray.so"))).find(|p| p.is_file())
 }

@@ -1,0 +1,44 @@
+//! A fault of ours must never become a fault of the program: it is logged, and from then on the driver draws everything.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+static HAPPENED: AtomicBool = AtomicBool::new(false);
+static MESSAGES: Mutex<Vec<String>> = Mutex::new(Vec::new());
+
+/// True once there was one.
+pub(crate) fn happened() -> bool {
+    HAPPENED.load(Relaxed)
+}
+
+/// What happened, for the report.
+pub(crate) fn messages() -> Vec<String> {
+    MESSAGES.lock().map_or_else(|e| e.into_inner().clone(), |m| m.clone())
+}
+
+/// Keeps Rust's panic message from the program's stderr.
+pub(crate) fn silence() {
+    let before = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        let ours = info.location().is_some_and(|l| l.file().contains("gluray") || l.file().contains("rt-core"));
+        let text = info.to_string();
+        if ours {
+            MESSAGES.lock().unwrap_or_else(|e| e.into_inner()).push(text);
+        } else {
+            before(info);
+        }
+    }));
+}
+
+/// Runs `f`. When it panics: `None`, and gluray retires.
+pub(crate) fn guard<R>(f: impl FnOnce() -> R) -> Option<R> {
+    match catch_unwind(AssertUnwindSafe(f)) {
+        Ok(r) => Some(r),
+        Err(_) => {
+            HAPPENED.store(true, Relaxed);
+            crate::symbols::retire();
+            None
+        }
+    }
+}
