@@ -44,6 +44,10 @@ fn class(name: &str) -> u32 {
     if starts(&["glLight", "glColorMaterial"]) {
         return 2;
     }
+    // Binding changes no texture; what is bound is asked for with the rest.
+    if starts(&["glBindTexture", "glActiveTexture", "glClientActiveTexture", "glTexEnv", "glTexGen"]) {
+        return 2;
+    }
     if starts(&["glTexParameter", "glTexEnv", "glTexGen", "glTexImage", "glTexSubImage", "glCopyTex", "glBindTexture"])
         || starts(&["glActiveTexture", "glDeleteTextures", "glCompressedTex", "glTexStorage", "glGenerateMipmap"])
         || starts(&["glTexBuffer", "glBindSampler", "glSamplerParameter", "glPrioritizeTextures", "glClientActiveTexture"])

@@ -10,6 +10,7 @@ use crate::context::{Context, Sink};
 use crate::decide::Verdict;
 use crate::enums::*;
 use crate::primitives::{is_filled, triangulate};
+use crate::programs::DrawCall;
 use crate::real::gl;
 use std::sync::Arc;
 
@@ -196,7 +197,8 @@ impl Elements {
         Ok(Elements::Indexed { indices, least: least as usize, count })
     }
 
-    fn span(&self) -> (usize, usize) {
+    /// First vertex, and how many there are from it on.
+    pub(crate) fn span(&self) -> (usize, usize) {
         match self {
             Elements::Range { first, count } => (*first, *count),
             Elements::Indexed { least, count, .. } => (*least, *count),
@@ -246,17 +248,25 @@ pub(crate) fn positions(p: &Packed) -> Result<Vec<[f32; 3]>, &'static str> {
 
 impl Context {
     pub(crate) fn draw_arrays(&mut self, mode: u32, first: i32, count: i32) -> bool {
-        self.array_draw(mode, || match (usize::try_from(first), usize::try_from(count)) {
+        let call = DrawCall { first: first.max(0) as usize, count: count.max(0) as usize, kind: 0, at: 0 };
+        self.array_draw(mode, call, || match (usize::try_from(first), usize::try_from(count)) {
             (Ok(first), Ok(count)) => Ok(Elements::Range { first, count }),
             _ => Err("a negative count"),
         })
     }
 
     pub(crate) fn draw_elements(&mut self, mode: u32, count: i32, kind: u32, at: usize, base: i32) -> bool {
-        self.array_draw(mode, || Elements::indexed(count, kind, at, base))
+        let buffer = gl::word(ELEMENT_ARRAY_BUFFER_BINDING) as usize;
+        let call = DrawCall { first: (buffer << 32) | base as u32 as usize, count: count.max(0) as usize, kind, at };
+        self.array_draw(mode, call, || Elements::indexed(count, kind, at, base))
     }
 
-    fn array_draw(&mut self, mode: u32, elements: impl FnOnce() -> Result<Elements, &'static str>) -> bool {
+    fn array_draw(
+        &mut self,
+        mode: u32,
+        call: DrawCall,
+        elements: impl FnOnce() -> Result<Elements, &'static str>,
+    ) -> bool {
         if self.sink == Sink::Trace {
             self.unswallow("a draw call between Begin and End");
             return false;
@@ -271,6 +281,9 @@ impl Context {
         self.keep_errors();
         let taken = match verdict {
             _ if !is_filled(mode) => Err("lines and points"),
+            _ if self.can.version >= 31 && gl::is_enabled(PRIMITIVE_RESTART) => Err("primitive restart"),
+            // Recognised programs decide for themselves what blending means.
+            _ if self.state.program != 0 => self.take_program_arrays(mode, call, elements),
             Verdict::Pass(why) => Err(why),
             Verdict::Trace | Verdict::TraceInOrder => self.take_arrays(mode, elements, verdict),
         };
@@ -292,12 +305,6 @@ impl Context {
         elements: impl FnOnce() -> Result<Elements, &'static str>,
         verdict: Verdict,
     ) -> Result<(), &'static str> {
-        if self.can.version >= 31 && gl::is_enabled(PRIMITIVE_RESTART) {
-            return Err("primitive restart");
-        }
-        if self.state.program != 0 {
-            return self.take_program_arrays(mode, elements, verdict);
-        }
         let arrays = Arrays::query(self.can.version)?;
         let elements = elements()?;
         let (first, count) = elements.span();
@@ -322,7 +329,7 @@ impl Context {
         if let Some(p) = tex {
             attributes.tex = Values::Packed(p);
         }
-        self.add_array_draw(geometry, attributes, Shading::Fixed, verdict);
+        self.add_array_draw(geometry, Arc::new(attributes), Shading::Fixed, verdict == Verdict::TraceInOrder);
         Ok(())
     }
 
@@ -330,16 +337,16 @@ impl Context {
     pub(crate) fn add_array_draw(
         &mut self,
         geometry: Arc<Geometry>,
-        attributes: Attributes,
+        attributes: Arc<Attributes>,
         shading: Shading,
-        verdict: Verdict,
+        in_order: bool,
     ) {
         let clip_from_object = match &shading {
             Shading::Fixed => crate::lighting::product(&self.state.projection, &self.state.model_view),
             Shading::Program(p) => p.clip_from_object,
         };
         let draw = Draw { geometry, attributes, state: self.state.clone(), shading, clip_from_object, calls: 1 };
-        self.add(draw, verdict == Verdict::TraceInOrder);
+        self.add(draw, in_order);
     }
 
     fn mark_current(&mut self) {

@@ -140,6 +140,15 @@ impl Cache {
         geometry
     }
 
+    /// Geometry that was found another way is in use.
+    pub(crate) fn touch(&mut self, geometry: &Arc<Geometry>) {
+        let frame = self.frame;
+        let fresh = || Entry { geometry: geometry.clone(), last_used: frame, frames: 0, improving: false };
+        let e = self.entries.entry(geometry.key).or_insert_with(fresh);
+        e.frames += u32::from(e.last_used != frame);
+        e.last_used = frame;
+    }
+
     /// A frame is over: what was not used for long goes, what rests gets a better structure.
     pub(crate) fn frame_done(&mut self, improve: impl Fn(Arc<Geometry>)) {
         self.frame += 1;

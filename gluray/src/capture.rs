@@ -124,7 +124,7 @@ pub(crate) enum Shading {
 #[derive(Clone)]
 pub(crate) struct Draw {
     pub(crate) geometry: Arc<Geometry>,
-    pub(crate) attributes: Attributes,
+    pub(crate) attributes: Arc<Attributes>,
     pub(crate) state: Arc<Snapshot>,
     pub(crate) shading: Shading,
     /// Clip from object, column by column, as the driver has it in f32.

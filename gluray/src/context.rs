@@ -121,7 +121,7 @@ pub(crate) fn leave() {
     symbols::with_context(|c| {
         c.flush("context switch");
         c.sync();
-        c.counters.publish(false);
+        c.counters.publish(true);
     });
 }
 
@@ -177,6 +177,12 @@ fn swaps() -> &'static [usize] {
         let damage = ["eglSwapBuffersWithDamageKHR", "eglSwapBuffersWithDamageEXT"];
         indices_of(&[&["glXSwapBuffers", "eglSwapBuffers", "glXSwapBuffersMscOML"][..], &damage].concat())
     })
+}
+
+/// Calls by which a program looks at what it drew.
+fn reads() -> &'static [usize] {
+    static READS: OnceLock<Vec<usize>> = OnceLock::new();
+    READS.get_or_init(|| indices_of(&["glReadPixels", "glReadnPixels", "glReadnPixelsARB", "glGetTexImage"]))
 }
 
 /// Calls that show something only when the front buffer is drawn to.
@@ -278,6 +284,8 @@ impl Context {
             }
             if swaps().contains(&index) {
                 self.frame_done();
+            } else if reads().contains(&index) {
+                self.read_back();
             }
         }
         self.sync();

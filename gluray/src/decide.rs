@@ -101,7 +101,7 @@ pub(crate) fn commutes(s: &Snapshot) -> bool {
         && !s.blend
         && !s.logic_op
         && !s.stencil_test
-        && s.render_mode == RENDER
+        && (s.render_mode == RENDER || s.render_mode == 0)
 }
 
 #[cfg(test)]

@@ -39,7 +39,7 @@ impl Context {
         let first = self.state.first_vertex_provokes;
         let (positions, runs) = (std::mem::take(&mut self.recorder.positions), std::mem::take(&mut self.recorder.runs));
         let geometry = self.cache.of_runs(&positions, &runs, first);
-        let attributes = self.recorder.take_attributes();
+        let attributes = Arc::new(self.recorder.take_attributes());
         let clip_from_object = product(&self.state.projection, &self.state.model_view);
         let calls = std::mem::take(&mut self.recorder.calls);
         // The memory serves the next batch.
@@ -86,7 +86,8 @@ impl Context {
         let setup = crate::lighting::Setup::new(&draw.state);
         let object = &draw.geometry.mesh.positions;
         let colors = (0..object.len()).map(|i| setup.vertex(&draw.attributes, i, object[i].to_array()).primary[0]);
-        draw.attributes.colors = crate::capture::Values::PerVertex(colors.collect());
+        let colors = crate::capture::Values::PerVertex(colors.collect());
+        Arc::make_mut(&mut draw.attributes).colors = colors;
         let mut state = (*draw.state).clone();
         state.lighting = false;
         state.model_view = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];

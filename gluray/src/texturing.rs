@@ -93,6 +93,11 @@ fn read(target: u32) -> Option<Image> {
 }
 
 impl Image {
+    /// True when no texel lets anything through.
+    pub(crate) fn is_opaque(&self) -> bool {
+        self.texels.iter().all(|t| t[3] == 1.0) && (self.wrap != [CLAMP_TO_BORDER; 2] || self.border[3] == 1.0)
+    }
+
     fn texel(&self, x: i64, y: i64) -> [f32; 4] {
         let (w, h) = (self.width as i64, self.height as i64);
         let place = |i: i64, n: i64, wrap: u32| match wrap {

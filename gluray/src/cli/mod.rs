@@ -5,6 +5,7 @@ mod explain;
 mod export;
 #[cfg(feature = "panel")]
 mod panel;
+mod run;
 mod timeline;
 
 use clap::{Parser, Subcommand};
@@ -23,6 +24,7 @@ struct Cli {
 }
 
 const EXAMPLES: &str = "Examples:
+  gluray run --mode rich -- gmsh a.stl   gmsh, ray traced
   gluray doctor                          what there is to work with, and what will not work
   gluray explain                         what was traced in the last run, what was not, and why
   gluray panel                           a page that changes running programs
@@ -30,6 +32,8 @@ const EXAMPLES: &str = "Examples:
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Runs a program with ray tracing inside it. Its exit code is that of the program
+    Run(Box<run::RunArgs>),
     /// Says which OpenGL there is, how programs can be reached, and what will not work
     Doctor(doctor::DoctorArgs),
     /// Says what was traced in the last run, what was left to the driver, and why
@@ -45,14 +49,20 @@ enum Command {
     Completions(CompletionsArgs),
 }
 
-/// Runs the program. Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted.
+/// Runs the program. Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted; with `run`, that of the program that was run.
 pub fn main() -> ExitCode {
-    run_main(|| execute(Cli::try_parse()?))
+    let mut code = None;
+    let status = run_main(|| execute(Cli::try_parse()?, &mut code));
+    code.map_or(status, ExitCode::from)
 }
 
-fn execute(cli: Cli) -> anyhow::Result<Status> {
+fn execute(cli: Cli, code: &mut Option<u8>) -> anyhow::Result<Status> {
     let common = cli.common;
     match cli.command {
+        Command::Run(args) => {
+            *code = Some(run::run(&args, common.quiet)?);
+            Ok(Status::Success)
+        }
         Command::Doctor(args) => doctor::doctor(&args, &common),
         Command::Explain(args) => explain::explain(&args, &common),
         Command::Export(args) => export::export(common, &args).map(Status::from),

@@ -88,6 +88,12 @@ pub fn look(library: Option<PathBuf>) -> Machine {
     }
 }
 
+/// GLVND's dispatch library.
+pub fn look_for_glvnd() -> Option<PathBuf> {
+    let folders = library_folders(crate::folders::variable("LD_LIBRARY_PATH").as_deref());
+    folders.iter().map(|f| f.join("libGLdispatch.so.0")).find(|p| p.exists())
+}
+
 /// Folders in which the loader looks, the first first.
 fn library_folders(path: Option<&str>) -> Vec<PathBuf> {
     let mut folders: Vec<PathBuf> = path.into_iter().flat_map(std::env::split_paths).collect();

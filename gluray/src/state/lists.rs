@@ -190,6 +190,12 @@ impl Context {
     }
 
     fn call_driver(&mut self, list: u32, draws: bool) {
+        self.before_driver(draws);
+        gl::call_list(list);
+    }
+
+    /// The driver is about to play lists of its own.
+    fn before_driver(&mut self, draws: bool) {
         if self.sink == Sink::Trace {
             self.unswallow("a list between Begin and End");
         }
@@ -203,7 +209,6 @@ impl Context {
             }
         }
         self.sync();
-        gl::call_list(list);
         self.dirty = class::ALL;
         self.texture_version += 1;
     }
@@ -273,6 +278,15 @@ impl Context {
             return true;
         }
         let base = gl::word(LIST_BASE);
+        let ours = {
+            let lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
+            names.iter().any(|n| lists.lists.contains_key(&base.wrapping_add(*n)))
+        };
+        if !ours {
+            // A line of text in a font of glXUseXFont: one call for the driver.
+            self.before_driver(true);
+            return false;
+        }
         for name in names {
             self.call_list(base.wrapping_add(name));
         }

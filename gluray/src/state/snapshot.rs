@@ -151,7 +151,7 @@ impl Snapshot {
         if dirty & (class::LIGHT | class::RASTER) != 0 {
             self.lighting();
         }
-        if dirty & (class::TEXTURE | class::RASTER | class::MATRIX) != 0 {
+        if dirty & (class::TEXTURE | class::RASTER | class::MATRIX | class::LIGHT) != 0 {
             self.texturing(can);
         }
     }
