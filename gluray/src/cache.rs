@@ -71,7 +71,11 @@ impl Geometry {
 }
 
 fn build(mesh: &Arc<TriMesh>, quality: BuildQuality) -> Option<Arc<World>> {
-    World::from_mesh(mesh.clone(), &BuildOptions { quality, ..BuildOptions::default() }).ok().map(Arc::new)
+    let start = std::time::Instant::now();
+    let world = World::from_mesh(mesh.clone(), &BuildOptions { quality, ..BuildOptions::default() }).ok().map(Arc::new);
+    let phase = if matches!(quality, BuildQuality::Fast) { "fast build" } else { "best build" };
+    crate::report::span("builds", phase, 0, start.elapsed());
+    world
 }
 
 struct Entry {

@@ -20,6 +20,7 @@ pub mod cli;
 mod client_memory;
 pub mod config;
 mod context;
+mod control;
 mod decide;
 pub mod doctor;
 mod enums;

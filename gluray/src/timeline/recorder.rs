@@ -42,6 +42,11 @@ impl Recorder {
         self.spans.push_back(Span { track: track.into(), phase: phase.into(), frame, start_ms, ms: ms(took) });
     }
 
+    /// Takes the spans out, oldest first. The clock goes on.
+    pub fn take(&mut self) -> Vec<Span> {
+        self.spans.drain(..).collect()
+    }
+
     /// The spans, oldest first.
     pub fn spans(&self) -> impl ExactSizeIterator<Item = &Span> {
         self.spans.iter()
