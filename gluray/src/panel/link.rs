@@ -45,6 +45,18 @@ struct Connection {
 }
 
 /// The link. Without a panel it does nothing but look for one now and then.
+///
+/// ```
+/// use gluray::panel::{Hello, Link, link::Wish};
+///
+/// let mut link = Link::new(Hello { program: "mine".into(), process: std::process::id(), ..Hello::default() });
+/// // Once a frame:
+/// match link.poll() {
+///     Some(Wish::Settings(settings)) => assert!(settings.samples >= 1, "what arrives is checked"),
+///     Some(Wish::Export) => link.exported(Err("this program has no scene")),
+///     None => {}
+/// }
+/// ```
 pub struct Link {
     hello: Hello,
     find: Box<dyn Fn() -> Option<Meeting> + Send>,
