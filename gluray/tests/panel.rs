@@ -39,8 +39,11 @@ fn a_change_on_the_page_reaches_the_program_and_ends_with_the_panel() {
     let written = Command::new(PROGRAM).args(["export", &file, "-q", "-o"]).arg(&ply).output().unwrap();
     assert!(written.status.success(), "{written:?}");
     let read = datasets::read::open(&ply).unwrap();
-    let datasets::read::Content::Scene(scene) = read.content else { panic!("a mesh was written") };
-    assert_eq!(scene.meshes[0].mesh.num_triangles(), 1);
+    let triangles = match read.content {
+        datasets::read::Content::Scene(s) => s.meshes[0].mesh.num_triangles(),
+        datasets::read::Content::Data(d) => d.to_trimesh(None).unwrap().0.num_triangles(),
+    };
+    assert_eq!(triangles, 1);
 
     // With the panel its settings go.
     drop(p);

@@ -25,7 +25,7 @@ fn look(b: &mut Browser, name: &str) {
 /// Sets a control as a person would.
 fn set(b: &mut Browser, path: &str, value: &str) {
     b.evaluate(&format!(
-        "(() => {{ const e = document.querySelector('[data-path=\"{path}\"] input:not([type=range]), [data-path=\"{path}\"] select'); if (e.type === 'checkbox') {{ if (e.checked !== ({value} === true)) e.click(); return; }} e.value = '{value}'; e.dispatchEvent(new Event('input', {{ bubbles: true }})); e.dispatchEvent(new Event('change', {{ bubbles: true }})); }})()"
+        "(() => {{ const e = document.querySelector('[data-path=\"{path}\"] input:not([type=range]), [data-path=\"{path}\"] select'); if (e.type === 'checkbox') {{ if (String(e.checked) !== '{value}') e.click(); return; }} e.value = '{value}'; e.dispatchEvent(new Event('input', {{ bubbles: true }})); e.dispatchEvent(new Event('change', {{ bubbles: true }})); }})()"
     ));
 }
 

@@ -39,7 +39,7 @@ function input(field, changed) {
       const whole = field.kind === "whole";
       const e = number({ min: field.low, max: field.high, step: whole ? 1 : "any" }, () => { slider.value = toSlider(Number(e.value)); changed(Number(e.value)); });
       // Wide ranges go by powers, from the least step that matters.
-      const least = whole ? 1 : Math.max(field.low, field.high / 1e4), wide = field.high > 10;
+      const least = whole ? 1 : Math.max(field.low, field.high / 1e4), wide = field.high >= 10;
       const toSlider = v => !wide ? (v - field.low) / (field.high - field.low) : v <= least ? 0 : Math.log(v / least) / Math.log(field.high / least);
       const fromSlider = s => { const v = !wide ? field.low + s * (field.high - field.low) : s <= 0 ? field.low : least * (field.high / least) ** s; return whole ? Math.round(v) : Number(v.toPrecision(3)); };
       const slider = element("input", { type: "range", min: 0, max: 1, step: 0.001 });
