@@ -285,7 +285,7 @@ impl Context {
             // Recognised programs decide for themselves what blending means.
             _ if self.state.program != 0 => self.take_program_arrays(mode, call, elements),
             Verdict::Pass(why) => Err(why),
-            Verdict::Trace | Verdict::TraceInOrder => self.take_arrays(mode, elements, verdict),
+            v => self.take_arrays(mode, elements, v),
         };
         self.drop_errors();
         match taken {
@@ -312,6 +312,17 @@ impl Context {
         let positions = positions(&packed)?;
         let read = |s: &Option<Source>| s.map(|s| s.read(first, count)).transpose();
         let (normal, color, tex) = (read(&arrays.normal)?, read(&arrays.color)?, read(&arrays.tex)?);
+        if let Verdict::TraceIfOpaque(why) = verdict {
+            let by_color = !self.state.lighting
+                || self.state.color_material.is_some_and(|(_, what)| matches!(what, DIFFUSE | AMBIENT_AND_DIFFUSE));
+            let opaque = match &color {
+                Some(p) if by_color => (0..count).all(|i| p.at::<4>(i, [1.0; 4])[3] == 1.0),
+                _ => self.is_opaque_now(),
+            };
+            if !opaque {
+                return Err(why);
+            }
+        }
         let triangles = elements.triangles(mode, self.state.first_vertex_provokes);
         self.sync();
         if verdict == Verdict::TraceInOrder {

@@ -367,12 +367,39 @@ impl Context {
     pub(crate) fn begin(&mut self, mode: u32) -> bool {
         const DRAWS: u8 = class::MATRIX | class::LIGHT | class::RASTER | class::TEXTURE | class::CURRENT;
         let ready = self.sink == Sink::Outside && self.dirty & DRAWS == 0;
-        if ready && self.verdict == Verdict::Trace && (TRIANGLES..=POLYGON).contains(&mode) {
+        let traced = match self.verdict {
+            Verdict::Trace => self.state.program == 0,
+            Verdict::TraceIfOpaque(_) => self.state.program == 0 && self.is_opaque_now(),
+            _ => false,
+        };
+        if ready && traced && (TRIANGLES..=POLYGON).contains(&mode) {
             self.recorder.begin(mode, &self.current);
             self.sink = Sink::Trace;
             return true;
         }
         guard(|| self.begin_slowly(mode)).unwrap_or(false)
+    }
+
+    /// True when a vertex now would have alpha 1.
+    #[inline]
+    pub(crate) fn is_opaque_now(&self) -> bool {
+        let s = &*self.state;
+        let tracked = s.color_material.is_some_and(|(_, what)| matches!(what, DIFFUSE | AMBIENT_AND_DIFFUSE));
+        match s.lighting {
+            true if !tracked => self.current.materials.iter().all(|m| m.diffuse[3] == 1.0),
+            _ => self.current.color[3] == 1.0,
+        }
+    }
+
+    /// Alpha left 1 while that was what a draw was traced for.
+    #[inline]
+    fn watch_alpha(&mut self) {
+        if self.sink == Sink::Trace
+            && let Verdict::TraceIfOpaque(why) = self.verdict
+            && !self.is_opaque_now()
+        {
+            guard(|| self.unswallow(why));
+        }
     }
 
     #[cold]
@@ -390,8 +417,12 @@ impl Context {
         let verdict = self.verdict();
         let filled = crate::primitives::is_filled(mode);
         let fixed = self.state.program == 0;
+        let verdict = match verdict {
+            Verdict::TraceIfOpaque(why) if !self.is_opaque_now() => Verdict::Pass(why),
+            v => v,
+        };
         match verdict {
-            Verdict::Trace | Verdict::TraceInOrder if filled && fixed => {
+            Verdict::Trace | Verdict::TraceInOrder | Verdict::TraceIfOpaque(_) if filled && fixed => {
                 if verdict == Verdict::TraceInOrder {
                     self.flush("a draw whose order matters");
                 }
@@ -525,6 +556,7 @@ impl Context {
         self.current.color = v;
         self.recorder.set_color(v);
         self.now_stale(stale::COLOR);
+        self.watch_alpha();
         true
     }
 
@@ -565,6 +597,7 @@ impl Context {
             self.current.materials = materials;
             self.recorder.set_materials(&materials);
             self.now_stale(stale::MATERIAL);
+            self.watch_alpha();
         }
         true
     }
@@ -585,7 +618,11 @@ impl Context {
             return self.list_rect([x, y, x2, y2]);
         }
         {
-            let traced = matches!(self.verdict(), Verdict::Trace | Verdict::TraceInOrder) && self.state.program == 0;
+            let traced = match self.verdict() {
+                Verdict::Trace | Verdict::TraceInOrder => self.state.program == 0,
+                Verdict::TraceIfOpaque(_) => self.state.program == 0 && self.is_opaque_now(),
+                Verdict::Pass(_) => false,
+            };
             if !traced {
                 self.passing("a rectangle in a state that is passed", true);
                 return false;

@@ -9,6 +9,8 @@ use crate::state::snapshot::Snapshot;
 pub(crate) enum Verdict {
     /// Traced with the frame's others; the nearest wins, as with any depth test.
     Trace,
+    /// Traced as long as every vertex has alpha 1: blending and alpha test then change nothing. Otherwise passed, for the reason.
+    TraceIfOpaque(&'static str),
     /// Traced at once, every layer in the order of the primitives: for states in which order matters.
     TraceInOrder,
     /// The driver draws it, for the reason given.
@@ -74,16 +76,19 @@ pub(crate) fn filled(s: &Snapshot, trace: Trace) -> Verdict {
         "logic operation"
     } else if !s.color_mask {
         "colour mask"
-    } else if s.blend {
-        "blending"
-    } else if s.alpha_test {
-        "alpha test"
     } else if !s.depth_test {
         "no depth test"
     } else if !s.depth_mask {
         "depth is not written"
     } else if !matches!(s.depth_func, LESS | LEQUAL) {
         "depth function"
+    } else if s.blend || s.alpha_test {
+        let harmless = (!s.blend || s.blend_is_over) && (!s.alpha_test || s.alpha_test_passes_one);
+        let why = if s.blend { "blending" } else { "alpha test" };
+        if harmless && s.texture.is_none() && trace == Trace::Surfaces {
+            return Verdict::TraceIfOpaque(why);
+        }
+        why
     } else if s.texture.is_some() && !s.lighting {
         // Text and pictures; surfaces with colour maps are lit.
         return if trace == Trace::All { Verdict::Trace } else { Pass("texture without lighting") };
@@ -146,6 +151,16 @@ mod tests {
             assert_eq!(filled(&s, Trace::Surfaces), Verdict::Pass(why));
             assert_eq!(filled(&s, Trace::All), Verdict::TraceInOrder, "{why}");
         }
+    }
+
+    #[test]
+    fn blending_of_opaque_surfaces_is_no_reason_to_pass_them() {
+        let s = Snapshot { blend: true, blend_is_over: true, ..surface() };
+        assert_eq!(filled(&s, Trace::Surfaces), Verdict::TraceIfOpaque("blending"));
+        let textured = Snapshot { texture: Some(crate::state::snapshot::TextureUnit::default()), ..s.clone() };
+        assert_eq!(filled(&textured, Trace::Surfaces), Verdict::Pass("blending"));
+        let tested = Snapshot { alpha_test: true, ..s };
+        assert_eq!(filled(&tested, Trace::Surfaces), Verdict::Pass("blending"), "the test may discard alpha 1");
     }
 
     #[test]

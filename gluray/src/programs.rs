@@ -394,12 +394,11 @@ impl Context {
         self.cache.touch(&geometry);
         // VTK leaves blending on; without transparency it changes nothing.
         let mut state = (*self.state).clone();
-        let over = gl::word(BLEND_SRC_RGB) == 0x0302 && gl::word(BLEND_DST_RGB) == 0x0303;
-        if state.blend && over && recognised.is_opaque(&attributes, geometry.mesh.positions.len()) {
+        if state.blend_is_over && recognised.is_opaque(&attributes, geometry.mesh.positions.len()) {
             state.blend = false;
         }
         let in_order = match decide::filled(&state, self.config.trace()) {
-            Verdict::Pass(why) => return Err(why),
+            Verdict::Pass(why) | Verdict::TraceIfOpaque(why) => return Err(why),
             v => v == Verdict::TraceInOrder,
         };
         if in_order {

@@ -86,6 +86,8 @@ struct Fragment {
     /// Perspective-correct weights of the corners.
     weights: [f64; 3],
     depth: f64,
+    /// The depth without polygon offset.
+    plain_depth: f64,
     front: bool,
 }
 
@@ -219,12 +221,13 @@ impl<'a> Prepared<'a> {
         let w = (0..3).map(|i| l[i] * f64::from(c[i][3])).sum::<f64>();
         let [n, f] = s.depth_range;
         let mut depth = n + (f - n) * (z / w * 0.5 + 0.5);
+        let plain_depth = depth;
         if let Some((factor, units)) = s.polygon_offset {
             depth += f64::from(factor) * steepness(&c, s.viewport, f - n) + f64::from(units) / DEPTH_STEPS;
         }
         let (lo, hi) = if n < f { (n, f) } else { (f, n) };
         let depth = if s.depth_clamp { depth.clamp(lo, hi) } else { depth.clamp(0.0, 1.0) };
-        Some(Fragment { weights, depth, front })
+        Some(Fragment { weights, depth, plain_depth, front })
     }
 
     /// What the pixel sees first. `ray` and `hit` are those of its centre.
@@ -233,7 +236,8 @@ impl<'a> Prepared<'a> {
         for step in 0..MOST_STEPS {
             let h = hit?;
             if let Some(f) = self.fragment(h.prim as usize, x, y) {
-                return Some((h.prim as usize, f));
+                let found = (h.prim as usize, f);
+                return Some(if f.depth > f.plain_depth { self.overtaken(found, ray, h.t, x, y) } else { found });
             }
             // On an edge the rule of the rasterizer may give the pixel to a neighbour that the ray saw beside it.
             if step == 0
@@ -246,6 +250,45 @@ impl<'a> Prepared<'a> {
             hit = self.world.closest(&ray);
         }
         None
+    }
+
+    /// Polygon offset pushes steep triangles far back, at silhouettes behind others of the same draw: the nearest *with* offset counts.
+    fn overtaken(&self, first: (usize, Fragment), mut ray: Ray, t: f32, x: i32, y: i32) -> (usize, Fragment) {
+        let mut best = first;
+        let mut t = t;
+        for _ in 0..8 {
+            let Some(limit) = self.parameter_at_depth(best.1.depth, x, y) else { break };
+            (ray.t_min, ray.t_max) = (t.next_up(), limit.min(ray.t_max));
+            if ray.t_min >= ray.t_max {
+                break;
+            }
+            self.rays.fetch_add(1, Relaxed);
+            let Some(h) = self.world.closest(&ray) else { break };
+            t = h.t;
+            if let Some(f) = self.fragment(h.prim as usize, x, y)
+                && f.depth < best.1.depth
+            {
+                best = (h.prim as usize, f);
+            }
+        }
+        best
+    }
+
+    /// Where the ray through a pixel's centre has a depth.
+    fn parameter_at_depth(&self, depth: f64, x: i32, y: i32) -> Option<f32> {
+        let s = &*self.draw.state;
+        let [n, f] = s.depth_range;
+        let [vx, vy, vw, vh] = s.viewport.map(f64::from);
+        let ndc = [2.0 * (f64::from(x) + 0.5 - vx) / vw - 1.0, 2.0 * (f64::from(y) + 0.5 - vy) / vh - 1.0];
+        let (origin, dir) = self.camera.world_ray(ndc);
+        let clip = matrix(&self.draw.clip_from_object);
+        let z = ((depth - n) / (f - n) - 0.5) * 2.0;
+        let (o, d) = (origin.extend(1.0), dir.extend(0.0));
+        let (a, b, aw, bw) = (clip.row(2).dot(o), clip.row(2).dot(d), clip.row(3).dot(o), clip.row(3).dot(d));
+        let t = (z * aw - a) / (b - z * bw);
+        let (_, shift) = self.ray(f64::from(x) + 0.5, f64::from(y) + 0.5)?;
+        let t = (t - shift) as f32;
+        t.is_finite().then_some(t)
     }
 
     fn beside(&self, t: f32, x: i32, y: i32) -> Option<(usize, Fragment)> {

@@ -69,7 +69,11 @@ pub(crate) struct Snapshot {
     pub(crate) depth_mask: bool,
     pub(crate) depth_clamp: bool,
     pub(crate) blend: bool,
+    /// Blending that leaves a fragment of alpha 1 as it is.
+    pub(crate) blend_is_over: bool,
     pub(crate) alpha_test: bool,
+    /// An alpha test that a fragment of alpha 1 passes.
+    pub(crate) alpha_test_passes_one: bool,
     pub(crate) stencil_test: bool,
     pub(crate) logic_op: bool,
     pub(crate) color_mask: bool,
@@ -101,7 +105,6 @@ pub(crate) struct Abilities {
     /// No fixed function.
     pub(crate) core: bool,
     pub(crate) es: bool,
-    /// Depth bits of the default framebuffer.
     pub(crate) texture_units: i32,
     pub(crate) rectangle: bool,
     pub(crate) depth_clamp: bool,
@@ -169,6 +172,7 @@ impl Snapshot {
         self.depth_mask = gl::int(DEPTH_WRITEMASK) != 0;
         self.depth_clamp = can.depth_clamp && gl::is_enabled(DEPTH_CLAMP);
         self.blend = gl::is_enabled(BLEND);
+        self.blend_is_over = self.blend && gl::word(BLEND_SRC_RGB) == 0x0302 && gl::word(BLEND_DST_RGB) == 0x0303;
         self.stencil_test = gl::is_enabled(STENCIL_TEST);
         self.logic_op = gl::is_enabled(COLOR_LOGIC_OP);
         self.color_mask = gl::ints::<4>(COLOR_WRITEMASK).iter().all(|v| *v != 0);
@@ -193,6 +197,15 @@ impl Snapshot {
             return;
         }
         self.alpha_test = gl::is_enabled(ALPHA_TEST);
+        self.alpha_test_passes_one = self.alpha_test && {
+            let reference = gl::floats::<1>(0x0bc2)[0];
+            match gl::word(0x0bc1) {
+                GREATER | NOTEQUAL => reference < 1.0,
+                GEQUAL | ALWAYS => true,
+                EQUAL | LEQUAL => reference >= 1.0,
+                _ => false,
+            }
+        };
         self.stipple = gl::is_enabled(POLYGON_STIPPLE);
         self.render_mode = gl::word(RENDER_MODE);
         self.arb_program =
