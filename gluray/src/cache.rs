@@ -41,6 +41,11 @@ impl Geometry {
         if let Some(best) = self.best.get() {
             return Some(best.clone());
         }
+        if crate::config::current().settings.quality == crate::config::Quality::Best {
+            *built += 1;
+            self.improve();
+            return self.best.get().cloned();
+        }
         let mut slot = self.world.lock().unwrap_or_else(|e| e.into_inner());
         if slot.is_none() {
             *built += 1;
@@ -154,15 +159,14 @@ impl Cache {
     }
 
     /// A frame is over: what was not used for long goes, what rests gets a better structure.
-    pub(crate) fn frame_done(&mut self, improve: impl Fn(Arc<Geometry>)) {
+    pub(crate) fn frame_done(&mut self, improve: impl Fn(Arc<Geometry>) -> bool) {
         self.frame += 1;
         let now = self.frame;
         self.entries.retain(|_, e| now - e.last_used <= KEPT_FRAMES);
         for e in self.entries.values_mut() {
             let rests = e.frames >= RESTING_FRAMES && e.geometry.mesh.num_triangles() >= WORTH_IMPROVING;
             if rests && !e.improving {
-                e.improving = true;
-                improve(e.geometry.clone());
+                e.improving = improve(e.geometry.clone());
             }
         }
     }

@@ -16,9 +16,6 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-/// Paths of settings that the library obeys today; the panel disables the others.
-const OBEYS: &[&str] = &["enabled", "trace"];
-
 /// Objects in a report, which is written often.
 const IN_REPORT: usize = 100;
 
@@ -126,7 +123,7 @@ fn hello() -> Hello {
         process: std::process::id(),
         settings: Settings::clone(&config.settings),
         problems: config.problems.clone(),
-        obeys: OBEYS.iter().map(|p| (*p).to_owned()).collect(),
+        obeys: config::OBEYED.iter().map(|p| (*p).to_owned()).collect(),
     }
 }
 
@@ -218,12 +215,5 @@ mod tests {
         let stats = between(&before, &now);
         assert_eq!((stats.frame, stats.traced, stats.phases_ms["trace"]), (4, 12, 2.5));
         assert_eq!(stats.rays, [("primary".to_owned(), 10)].into(), "kinds without rays are left out");
-    }
-
-    #[test]
-    fn what_is_obeyed_is_a_setting() {
-        for path in OBEYS {
-            assert!(config::fields::find(path).is_some(), "{path}");
-        }
     }
 }

@@ -154,7 +154,13 @@ impl Context {
         self.counters.report.frames += 1;
         self.frame.traced = false;
         (self.counters.report.cache_hits, self.counters.report.cache_misses) = (self.cache.hits, self.cache.misses);
-        self.cache.frame_done(|g| worker::in_background(move || g.improve()));
+        let fast = self.config.settings.quality == crate::config::Quality::Fast;
+        self.cache.frame_done(|g| {
+            if !fast {
+                worker::in_background(move || g.improve());
+            }
+            !fast
+        });
         let size = [2, 3].map(|i| self.state.viewport[i].max(0).cast_unsigned());
         self.counters.report.objects = self.frame.told.frame_done(&self.counters.report, size);
         self.take_up_settings();

@@ -117,6 +117,7 @@ fn programs_appear_are_changed_live_and_show_what_it_costs() {
     set(&mut b, "enabled", "false");
     octave.until(|s| !s.enabled);
     assert!(gmsh.settings().enabled && gmsh.settings().mode == Mode::Rich);
+    b.wait_for("!document.getElementById('reset').disabled");
     b.evaluate("document.getElementById('reset').click()");
     octave.until(|s| s.enabled);
     drop(gmsh);

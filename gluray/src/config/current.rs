@@ -1,5 +1,6 @@
 //! The settings of this process: read once when they are first asked for, replaced when the panel says so.
 
+use super::fields::{FIELDS, Field};
 use super::load::Sources;
 use super::settings::{Settings, Trace};
 use crate::decide;
@@ -15,6 +16,8 @@ pub(crate) struct Config {
     pub(crate) problems: Vec<String>,
     /// Where reports are written; `None` writes none.
     pub(crate) run_dir: Option<PathBuf>,
+    /// What people call the program.
+    pub(crate) program: String,
 }
 
 impl Config {
@@ -28,10 +31,35 @@ impl Config {
     }
 
     fn of_this_process() -> Config {
-        let loaded = Sources::of_this_process().load();
+        let sources = Sources::of_this_process();
+        let loaded = sources.load();
         let run_dir = crate::folders::variable("GLURAY_RUN_DIR").map(PathBuf::from);
-        Config { settings: loaded.settings, problems: loaded.problems, run_dir }
+        // The last is the one that people know it by: `view.py`, not `python3.11`.
+        let program = sources.program.last().cloned().unwrap_or_default();
+        let mut problems = loaded.problems;
+        problems.extend(not_obeyed(&loaded.settings));
+        Config { settings: loaded.settings, problems, run_dir, program }
     }
+}
+
+/// Paths of settings that the library obeys today. The panel disables the others, and whoever sets one is told in the report.
+pub(crate) const OBEYED: &[&str] = &["enabled", "trace", "quality", "threads"];
+
+/// What was set in vain.
+fn not_obeyed(settings: &Settings) -> Vec<String> {
+    let tree = |s: &Settings| serde_json::to_value(s).unwrap_or_default();
+    let (now, usual) = (tree(settings), tree(&Settings::default()));
+    let value = |tree: &serde_json::Value, path: &str| tree.pointer(&format!("/{}", path.replace('.', "/"))).cloned();
+    let in_vain = |f: &&Field| !OBEYED.contains(&f.path) && value(&now, f.path) != value(&usual, f.path);
+    let mut out: Vec<String> = FIELDS
+        .iter()
+        .filter(in_vain)
+        .map(|f| format!("`{}` is set, and this version of the library does not obey it yet", f.path))
+        .collect();
+    if !settings.objects.is_empty() && !OBEYED.iter().any(|p| p.starts_with("material.")) {
+        out.push("`objects` are set, and this version of the library does not obey them yet".into());
+    }
+    out
 }
 
 static CURRENT: RwLock<Option<Arc<Config>>> = RwLock::new(None);
@@ -51,8 +79,25 @@ pub(crate) fn replace(settings: Settings) {
     *CURRENT.write().unwrap_or_else(PoisonError::into_inner) = Some(Arc::new(config));
 }
 
-/// Name of the executable of this process.
+/// What people call this program.
 pub(crate) fn program_name() -> String {
-    let path = std::env::current_exe().unwrap_or_default();
-    path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
+    current().program.clone()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_obeyed_is_a_setting_and_the_rest_is_told() {
+        for path in OBEYED {
+            assert!(FIELDS.iter().any(|f| f.path == *path), "{path}");
+        }
+        assert_eq!(not_obeyed(&Settings::default()), Vec::<String>::new());
+        let settings = Settings { enabled: false, asynchronous: true, ..Settings::default() };
+        let told = not_obeyed(&settings);
+        let expected = usize::from(!OBEYED.contains(&"asynchronous"));
+        assert_eq!(told.iter().filter(|t| t.contains("`asynchronous`")).count(), expected, "{told:?}");
+        assert_eq!(told.len(), expected, "{told:?}");
+    }
 }

@@ -96,7 +96,7 @@ pub const FIELDS: &[Field] = &[
     field("trace", Kind::Word { words: &["scene", "all"] }, "which draws are traced"),
     field("samples", Kind::Whole { low: 1, high: 4096 }, "rays through each pixel").only_in(&["rich", "enhance", "path"]),
     field("quality", Kind::Word { words: &["auto", "fast", "best"] }, "how acceleration structures are built"),
-    field("threads", Kind::Whole { low: 0, high: 1024 }, "threads that render; 0 for all cores but one"),
+    field("threads", Kind::Whole { low: 0, high: 1024 }, "threads that render; 0 for all cores"),
     field("asynchronous", Kind::Switch, "show each frame one frame late and trace it meanwhile"),
     field("effects.shadows", Kind::Switch, "rays to the lights").only_in(RAYS),
     field("effects.light_radius_deg", real(0.0, 45.0), "half the angle of lights; 0 for sharp shadows")

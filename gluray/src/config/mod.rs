@@ -17,7 +17,7 @@ pub mod file;
 pub mod load;
 pub mod settings;
 
-pub(crate) use current::{Config, current, program_name, replace};
+pub(crate) use current::{Config, OBEYED, current, program_name, replace};
 pub use assign::{Assignment, SettingError, assign};
 pub use fields::{FIELDS, Field, Kind};
 pub use file::ConfigFile;

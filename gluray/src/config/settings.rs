@@ -218,7 +218,7 @@ pub struct Settings {
     pub samples: u32,
     /// How acceleration structures are built.
     pub quality: Quality,
-    /// Threads that render; 0 for all cores but one.
+    /// Threads that render; 0 for all cores.
     pub threads: u32,
     /// Show each frame one frame late, and trace it while the program makes the next (section 4.1.2).
     pub asynchronous: bool,

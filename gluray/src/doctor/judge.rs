@@ -85,7 +85,7 @@ pub fn findings(m: &Machine) -> Vec<Finding> {
 
     // Threads, settings, panel.
     let grade = if m.threads > 1 { Good } else { Note };
-    let threads = finding("threads", grade, format!("{}; rays take all but one (`threads`)", m.threads));
+    let threads = finding("threads", grade, format!("{} (`threads` says how many trace rays)", m.threads));
     out.push(if m.threads > 1 { threads } else { threads.cure("with one core the program waits for its own pictures") });
     match &m.settings {
         None => out.push(finding("settings", Good, "no file; defaults, environment and command line")),
