@@ -270,7 +270,7 @@ mod tests {
         for i in 0..50 {
             let p = vec![[i as f32; 3]; 30_000];
             cache.of_runs(&p, &[Run { mode: TRIANGLES, count: 3, times: 10_000 }], false);
-            cache.frame_done(|_| ());
+            cache.frame_done(|_| true);
         }
         assert!(cache.entries.len() <= KEPT_FRAMES as usize + 1, "{}", cache.entries.len());
     }

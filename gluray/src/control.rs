@@ -51,7 +51,11 @@ impl Told {
     /// These draws are being traced.
     pub(crate) fn traced<'a>(&mut self, frame: u64, draws: impl Iterator<Item = &'a Draw> + Clone) {
         for d in draws.clone() {
-            let seen = self.objects.entry(d.geometry.key).or_insert_with(|| Seen { triangles: 0, calls: 0, color: color(d, 0) });
+            let seen = self.objects.entry(d.geometry.key).or_insert_with(|| Seen {
+                triangles: 0,
+                calls: 0,
+                color: color(d, 0),
+            });
             seen.triangles = d.geometry.mesh.num_triangles() as u64;
             seen.calls += d.calls;
         }
@@ -129,7 +133,10 @@ fn hello() -> Hello {
 
 /// What happened between two accounts of the same context.
 fn between(before: &Report, now: &Report) -> FrameStats {
-    fn less<V: Copy + PartialOrd + Default + std::ops::Sub<Output = V>>(now: &BTreeMap<String, V>, before: &BTreeMap<String, V>) -> BTreeMap<String, V> {
+    fn less<V: Copy + PartialOrd + Default + std::ops::Sub<Output = V>>(
+        now: &BTreeMap<String, V>,
+        before: &BTreeMap<String, V>,
+    ) -> BTreeMap<String, V> {
         let one = |(k, v): (&String, &V)| (k.clone(), *v - before.get(k).copied().unwrap_or_default());
         now.iter().map(one).filter(|(_, v)| *v > V::default()).collect()
     }
@@ -169,7 +176,8 @@ fn scene<'a>(frame: u64, draws: impl Iterator<Item = &'a Draw> + Clone) -> Scene
         None => "the viewer's axes: x right, y up, z towards the viewer, in the program's unit",
         Some(_) => "the axes of the first object that a shader draws, in the program's unit",
     };
-    let objects = draws.map(|d| object(d, first.filter(|_| shaded(&d)).map(|first| first * clip(d)))).collect();
+    let objects =
+        draws.map(|d| object(d, first.filter(|_| shaded(&d)).map(|first| first * clip(d)))).collect();
     Scene { program: config::program_name(), frame, space: space.into(), objects }
 }
 
@@ -196,7 +204,8 @@ fn calls(n: u64) -> String {
 fn to_scenes_folder(scene: &Scene) -> Result<PathBuf, String> {
     let folder = scenes_folder(crate::folders::variable).ok_or("neither XDG_STATE_HOME nor HOME is set")?;
     std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    let program: String = scene.program.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+    let program: String =
+        scene.program.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     let file = folder.join(format!("{program}-{}-{}.gluray", std::process::id(), scene.frame));
     write_scene(&file, scene).map_err(|e| e.to_string())?;
     Ok(file)
@@ -210,8 +219,20 @@ mod tests {
     fn a_frame_is_the_difference_of_two_accounts() {
         let counts = |n: u64| [("primary".to_owned(), 10 * n), ("shadow".to_owned(), 5)].into();
         let ms = |v: f64| [("trace".to_owned(), v)].into();
-        let before = Report { frames: 3, traced_draws: 30, rays: counts(3), milliseconds: ms(1.5), ..Report::default() };
-        let now = Report { frames: 4, traced_draws: 42, rays: counts(4), milliseconds: ms(4.0), ..Report::default() };
+        let before = Report {
+            frames: 3,
+            traced_draws: 30,
+            rays: counts(3),
+            milliseconds: ms(1.5),
+            ..Report::default()
+        };
+        let now = Report {
+            frames: 4,
+            traced_draws: 42,
+            rays: counts(4),
+            milliseconds: ms(4.0),
+            ..Report::default()
+        };
         let stats = between(&before, &now);
         assert_eq!((stats.frame, stats.traced, stats.phases_ms["trace"]), (4, 12, 2.5));
         assert_eq!(stats.rays, [("primary".to_owned(), 10)].into(), "kinds without rays are left out");

@@ -27,7 +27,8 @@ pub fn state(variable: impl Fn(&str) -> Option<String>) -> Option<PathBuf> {
 /// only its owner may enter (whoever makes it checks that).
 pub fn runtime(variable: impl Fn(&str) -> Option<String>) -> Option<PathBuf> {
     let set = variable("XDG_RUNTIME_DIR").map(PathBuf::from).filter(|p| p.is_absolute());
-    set.map(|p| p.join("gluray")).or_else(|| Some(std::env::temp_dir().join(format!("gluray-{}", user_id()?))))
+    set.map(|p| p.join("gluray"))
+        .or_else(|| Some(std::env::temp_dir().join(format!("gluray-{}", user_id()?))))
 }
 
 /// The user this process runs as.
@@ -43,9 +44,14 @@ mod tests {
 
     #[test]
     fn folders_follow_the_variables_and_relative_ones_count_as_unset() {
-        let with = |set: &'static [(&'static str, &'static str)]| move |n: &str| set.iter().find(|(k, _)| *k == n).map(|(_, v)| (*v).to_owned());
+        let with = |set: &'static [(&'static str, &'static str)]| {
+            move |n: &str| set.iter().find(|(k, _)| *k == n).map(|(_, v)| (*v).to_owned())
+        };
         assert_eq!(config(with(&[("XDG_CONFIG_HOME", "/c"), ("HOME", "/h")])), Some("/c/gluray".into()));
-        assert_eq!(config(with(&[("XDG_CONFIG_HOME", "c"), ("HOME", "/h")])), Some("/h/.config/gluray".into()));
+        assert_eq!(
+            config(with(&[("XDG_CONFIG_HOME", "c"), ("HOME", "/h")])),
+            Some("/h/.config/gluray".into())
+        );
         assert_eq!(state(with(&[("HOME", "/h")])), Some("/h/.local/state/gluray".into()));
         assert_eq!(state(with(&[])), None);
         assert_eq!(runtime(with(&[("XDG_RUNTIME_DIR", "/r")])), Some("/r/gluray".into()));

@@ -10,7 +10,11 @@ use std::process::{Command, Output};
 
 fn gluray(arguments: &[&str], home: &Path) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_gluray"));
-    command.args(arguments).env("XDG_STATE_HOME", home).env("XDG_CONFIG_HOME", home).env("XDG_RUNTIME_DIR", home);
+    command
+        .args(arguments)
+        .env("XDG_STATE_HOME", home)
+        .env("XDG_CONFIG_HOME", home)
+        .env("XDG_RUNTIME_DIR", home);
     command.env_remove("DISPLAY").env_remove("GLURAY_CONFIG").output().expect("the program starts")
 }
 
@@ -23,7 +27,13 @@ fn err(o: &Output) -> String {
 }
 
 fn report() -> Report {
-    let span = |track: &str, phase: &str, frame, start_ms, ms| Span { track: track.into(), phase: phase.into(), frame, start_ms, ms };
+    let span = |track: &str, phase: &str, frame, start_ms, ms| Span {
+        track: track.into(),
+        phase: phase.into(),
+        frame,
+        start_ms,
+        ms,
+    };
     Report {
         program: "gmsh".into(),
         mode: "match".into(),
@@ -35,8 +45,17 @@ fn report() -> Report {
         rays: [("primary".to_owned(), 4_000_000)].into(),
         milliseconds: [("trace".to_owned(), 80.0)].into(),
         problems: vec!["gluray.toml: `mode` is 3".into()],
-        objects: vec![ObjectInfo { key: "3f2a".into(), name: "1 draw call".into(), triangles: 1000, color: None }],
-        timeline: vec![span("program", "capture", 1, 0.0, 5.0), span("program", "trace", 1, 5.0, 20.0), span("builds", "best build", 0, 10.0, 40.0)],
+        objects: vec![ObjectInfo {
+            key: "3f2a".into(),
+            name: "1 draw call".into(),
+            triangles: 1000,
+            color: None,
+        }],
+        timeline: vec![
+            span("program", "capture", 1, 0.0, 5.0),
+            span("program", "trace", 1, 5.0, 20.0),
+            span("builds", "best build", 0, 10.0, 40.0),
+        ],
         ..Report::default()
     }
 }
@@ -52,14 +71,28 @@ fn explain_says_what_was_traced_what_was_not_and_what_to_do() {
     std::fs::create_dir_all(last.parent().unwrap()).unwrap();
     std::fs::write(&last, serde_json::to_vec(&report()).unwrap()).unwrap();
     let text = out(&gluray(&["explain"], home.path()));
-    for part in ["gmsh: mode match", "12 draws (3.0 a frame)", "4000000 rays: primary", "6 no depth test", "--trace all", "2 an odd reason", "20.00 a frame", "3f2a", "SETTING NOT TAKEN: gluray.toml: `mode` is 3"] {
+    for part in [
+        "gmsh: mode match",
+        "12 draws (3.0 a frame)",
+        "4000000 rays: primary",
+        "6 no depth test",
+        "--trace all",
+        "2 an odd reason",
+        "20.00 a frame",
+        "3f2a",
+        "SETTING NOT TAKEN: gluray.toml: `mode` is 3",
+    ] {
         assert!(text.contains(part), "{part}:\n{text}");
     }
     let json: Report = serde_json::from_str(&out(&gluray(&["explain", "--json"], home.path()))).unwrap();
     assert_eq!(json, report());
     std::fs::write(&last, "{").unwrap();
     let broken = gluray(&["explain"], home.path());
-    assert!(broken.status.code() == Some(1) && err(&broken).contains("last.json: is no report"), "{}", err(&broken));
+    assert!(
+        broken.status.code() == Some(1) && err(&broken).contains("last.json: is no report"),
+        "{}",
+        err(&broken)
+    );
 }
 
 #[test]
@@ -76,7 +109,8 @@ fn a_run_becomes_a_chart_and_a_trace() {
     assert_eq!(events.iter().filter(|e| e["ph"] == "X").count(), 3);
     let wrong = gluray(&["timeline", &at("r.json"), "-o", &at("a.png")], home.path());
     assert!(wrong.status.code() == Some(2) && err(&wrong).contains(".svg or .json"), "{}", err(&wrong));
-    let empty = gluray(&["timeline", &at("r.json"), "-o", &at("a.svg"), "--from", "7", "--to", "7"], home.path());
+    let empty =
+        gluray(&["timeline", &at("r.json"), "-o", &at("a.svg"), "--from", "7", "--to", "7"], home.path());
     assert!(empty.status.code() == Some(2) && err(&empty).contains("0.0 to 50.0 ms"), "{}", err(&empty));
 }
 
@@ -93,7 +127,12 @@ fn scenes_become_files_that_other_programs_read() {
         normals: vec![[0., 0., 1.]; 3],
         ..Object::default()
     };
-    let scene = Scene { program: "t".into(), frame: 1, space: "s".into(), objects: vec![object("aa", 0.0), object("bb", 5.0)] };
+    let scene = Scene {
+        program: "t".into(),
+        frame: 1,
+        space: "s".into(),
+        objects: vec![object("aa", 0.0), object("bb", 5.0)],
+    };
     write_scene(Path::new(&at("s.gluray")), &scene).unwrap();
     for (file, triangles) in [("a.ply", 2), ("a.glb", 2), ("a.vtp", 2), ("a.obj", 2)] {
         let done = gluray(&["export", &at("s.gluray"), "-o", &at(file)], home.path());
@@ -135,7 +174,10 @@ fn settings_that_make_no_sense_stop_a_run_before_it_starts() {
         (vec!["--set", "samples=0"], "--set: `samples` is 0; give a whole number from 1 to 4096"),
         (vec!["--set", "mode"], "write NAME=VALUE"),
         (vec!["--set", "mods=rich"], "did you mean `mode`?"),
-        (vec!["--config", file.to_str().unwrap()], "[program.gmsh]: `effects.shadow` is no setting; did you mean `effects.shadows`?"),
+        (
+            vec!["--config", file.to_str().unwrap()],
+            "[program.gmsh]: `effects.shadow` is no setting; did you mean `effects.shadows`?",
+        ),
         (vec!["--config", "/nowhere.toml"], "/nowhere.toml: cannot be read"),
     ] {
         let mut arguments = vec!["run"];
@@ -152,14 +194,23 @@ fn settings_that_make_no_sense_stop_a_run_before_it_starts() {
 fn the_doctor_lists_variables_and_says_what_will_not_work() {
     let home = tempfile::tempdir().unwrap();
     let list = gluray(&["doctor", "--variables"], home.path());
-    assert!(list.status.success() && out(&list).contains("GLURAY_EFFECTS_AMBIENT_OCCLUSION_SAMPLES"), "{}", out(&list));
+    assert!(
+        list.status.success() && out(&list).contains("GLURAY_EFFECTS_AMBIENT_OCCLUSION_SAMPLES"),
+        "{}",
+        out(&list)
+    );
     std::fs::create_dir_all(home.path().join("gluray")).unwrap();
     std::fs::write(home.path().join("gluray/gluray.toml"), "mode = 3").unwrap();
     let found = gluray(&["doctor", "--json"], home.path());
     assert_eq!(found.status.code(), Some(1));
     let list: Vec<Value> = serde_json::from_str(&out(&found)).unwrap();
-    let of = |about: &str| list.iter().find(|f| f["about"] == about).unwrap_or_else(|| panic!("{about}: {list:?}"));
-    assert_eq!((&of("display")["grade"], &of("settings")["grade"]), (&Value::from("bad"), &Value::from("bad")));
+    let of = |about: &str| {
+        list.iter().find(|f| f["about"] == about).unwrap_or_else(|| panic!("{about}: {list:?}"))
+    };
+    assert_eq!(
+        (&of("display")["grade"], &of("settings")["grade"]),
+        (&Value::from("bad"), &Value::from("bad"))
+    );
     assert!(of("display")["cure"].as_str().unwrap().contains("Xvfb"));
     assert!(of("settings")["found"].as_str().unwrap().contains("`mode` is 3"));
 }

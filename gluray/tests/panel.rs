@@ -19,18 +19,38 @@ fn a_change_on_the_page_reaches_the_program_and_ends_with_the_panel() {
     let fake = Fake::start("gmsh", p.meeting(), scenes.path());
     let id = p.until("a program", |list| list.len() == 1)[0]["id"].clone();
     let change = |set: serde_json::Value| p.ask("POST", "change", &json!({"id": id, "set": set}).to_string());
-    assert_eq!(change(json!({"mode": "rich", "effects.ambient_occlusion_samples": 16, "objects.3f2a0000.mirror": 0.5})).status, 200);
-    fake.until(|s| s.mode == Mode::Rich && s.effects.ambient_occlusion_samples == 16 && s.material_of("3f2a0000").mirror == Some(0.5));
+    assert_eq!(
+        change(
+            json!({"mode": "rich", "effects.ambient_occlusion_samples": 16, "objects.3f2a0000.mirror": 0.5})
+        )
+        .status,
+        200
+    );
+    fake.until(|s| {
+        s.mode == Mode::Rich
+            && s.effects.ambient_occlusion_samples == 16
+            && s.material_of("3f2a0000").mirror == Some(0.5)
+    });
     let list = p.until("confirmed", |list| list[0]["settings"]["mode"] == "rich");
     assert_eq!(list[0]["base"]["mode"], "match");
-    p.until("rays", |list| list[0]["recent"].as_array().unwrap().last().is_some_and(|f| f["rays"]["ambient occlusion"].as_u64() > Some(1_000_000)));
+    p.until("rays", |list| {
+        list[0]["recent"]
+            .as_array()
+            .unwrap()
+            .last()
+            .is_some_and(|f| f["rays"]["ambient occlusion"].as_u64() > Some(1_000_000))
+    });
 
     let refused = change(json!({"samples": 0, "mode": "phong"}));
     assert_eq!(refused.status, 422);
     assert!(refused.body.contains("`samples` is 0; give a whole number from 1 to 4096"), "{}", refused.body);
     assert_eq!(fake.settings().mode, Mode::Rich, "all or nothing");
     let toml = p.ask("GET", &format!("toml?id={id}"), "");
-    assert!(toml.body.contains("[program.gmsh]") && toml.body.contains("ambient_occlusion_samples = 16"), "{}", toml.body);
+    assert!(
+        toml.body.contains("[program.gmsh]") && toml.body.contains("ambient_occlusion_samples = 16"),
+        "{}",
+        toml.body
+    );
 
     assert_eq!(p.ask("POST", "export", &json!({"id": id}).to_string()).status, 200);
     let list = p.until("exported", |list| !list[0]["exported"].is_null());
@@ -81,7 +101,10 @@ fn strangers_other_hosts_and_other_sites_are_told_nothing() {
     assert!(page.head.contains("content-security-policy: default-src 'none'"), "{}", page.head);
     for part in ["page.css", "main.js", "server.js", "controls.js", "charts.js", "objects.js"] {
         let text = p.ask("GET", part, "").body;
-        assert!(!text.is_empty() && !text.contains("http://") && !text.contains("https://"), "{part} needs something from elsewhere");
+        assert!(
+            !text.is_empty() && !text.contains("http://") && !text.contains("https://"),
+            "{part} needs something from elsewhere"
+        );
     }
 }
 
@@ -126,7 +149,14 @@ fn who_does_not_know_the_token_is_no_program() {
         json!({"type": "hello", "version": version, "token": token, "hello": hello}).to_string() + "\n"
     };
     let right = p.meeting().secret.token().to_owned();
-    for words in [hello(1, &"0".repeat(32)), hello(1, ""), hello(2, &right), "GET / HTTP/1.1\r\n\r\n".into(), "{\"type\":\"objects\",\"objects\":[],\"total\":0}\n".into(), "x".repeat(3 << 20)] {
+    for words in [
+        hello(1, &"0".repeat(32)),
+        hello(1, ""),
+        hello(2, &right),
+        "GET / HTTP/1.1\r\n\r\n".into(),
+        "{\"type\":\"objects\",\"objects\":[],\"total\":0}\n".into(),
+        "x".repeat(3 << 20),
+    ] {
         assert!(is_shown_the_door(&p, words.as_bytes()), "{words:.100}");
     }
     // The same words with the right token are a program: the test would notice a panel that lets nobody in.

@@ -57,7 +57,11 @@ fn programs_appear_are_changed_live_and_show_what_it_costs() {
         assert!(text(&mut b, "numbers").contains(word), "{word}: {}", text(&mut b, "numbers"));
     }
     assert!(text(&mut b, "reasons").contains("lines and points"));
-    assert!(b.evaluate("document.querySelector('[data-path=\"effects.shadows\"]').classList.contains('idle')") == true, "no shadows in mode match, and the page shows it");
+    assert!(
+        b.evaluate("document.querySelector('[data-path=\"effects.shadows\"]').classList.contains('idle')")
+            == true,
+        "no shadows in mode match, and the page shows it"
+    );
     let before = text(&mut b, "rays-legend");
     assert!(before.contains("primary") && !before.contains("occlusion"), "{before}");
 
@@ -69,10 +73,19 @@ fn programs_appear_are_changed_live_and_show_what_it_costs() {
     set(&mut b, "effects.shadows", "false");
     set(&mut b, "lights.added", "0.7");
     set(&mut b, "material.mirror", "0.25");
-    gmsh.until(|s| s.effects.ambient_occlusion_samples == 64 && s.quality == Quality::Best && !s.effects.shadows && s.lights.added == 0.7 && s.material.mirror == Some(0.25));
+    gmsh.until(|s| {
+        s.effects.ambient_occlusion_samples == 64
+            && s.quality == Quality::Best
+            && !s.effects.shadows
+            && s.lights.added == 0.7
+            && s.material.mirror == Some(0.25)
+    });
     b.wait_for("document.getElementById('rays-legend').innerText.includes('ambient occlusion') && document.getElementById('numbers').innerText.includes('rich')");
     b.wait_for("document.querySelector('[data-path=\"effects.shadows\"]').classList.contains('changed') && !document.querySelector('[data-path=\"effects.shadows\"]').classList.contains('idle')");
-    assert!(b.evaluate("document.querySelector('[data-path=\"effects.ambient_occlusion_samples\"] input').value") == "64");
+    assert!(
+        b.evaluate("document.querySelector('[data-path=\"effects.ambient_occlusion_samples\"] input').value")
+            == "64"
+    );
     // So that the charts have something to show.
     b.wait_for("Number(document.getElementById('times').dataset.frames) > 30");
     look(&mut b, "rich");
@@ -80,10 +93,17 @@ fn programs_appear_are_changed_live_and_show_what_it_costs() {
     // One object becomes glass of another colour; all others stay.
     assert_eq!(b.evaluate("document.querySelectorAll('.object').length"), 30);
     b.evaluate("document.querySelector('.object').click()");
-    let key = b.evaluate("document.querySelector('.object[aria-pressed=true]').dataset.key").as_str().unwrap().to_owned();
+    let key = b
+        .evaluate("document.querySelector('.object[aria-pressed=true]').dataset.key")
+        .as_str()
+        .unwrap()
+        .to_owned();
     set(&mut b, &format!("objects.{key}.surface"), "glass");
     set(&mut b, &format!("objects.{key}.color"), "#ff8000");
-    gmsh.until(|s| s.material_of(&key).surface == Some(Surface::Glass) && s.material_of(&key).color.is_some_and(|c| c[0] == 1.0 && (c[1] - 0.502).abs() < 0.001));
+    gmsh.until(|s| {
+        s.material_of(&key).surface == Some(Surface::Glass)
+            && s.material_of(&key).color.is_some_and(|c| c[0] == 1.0 && (c[1] - 0.502).abs() < 0.001)
+    });
     assert_eq!(gmsh.settings().material_of("other").surface, None);
     b.wait_for("document.querySelectorAll('.object.changed').length === 1");
     look(&mut b, "object");
@@ -106,8 +126,15 @@ fn programs_appear_are_changed_live_and_show_what_it_costs() {
     b.evaluate("document.getElementById('export').click()");
     b.wait_for("document.getElementById('exported').innerText.startsWith('written: ')");
     assert_eq!(std::fs::read_dir(scenes.path()).unwrap().count(), 1);
-    let toml = b.evaluate("fetch(document.getElementById('toml').href).then(r => r.text())").as_str().unwrap().to_owned();
-    assert!(toml.contains("[program.gmsh]") && toml.contains("mode = \"rich\"") && toml.contains("samples = 2"), "{toml}");
+    let toml = b
+        .evaluate("fetch(document.getElementById('toml').href).then(r => r.text())")
+        .as_str()
+        .unwrap()
+        .to_owned();
+    assert!(
+        toml.contains("[program.gmsh]") && toml.contains("mode = \"rich\"") && toml.contains("samples = 2"),
+        "{toml}"
+    );
 
     // A second program has settings of its own; the first one's end is seen, and switching off is one click.
     let octave = Fake::start("octave", p.meeting(), scenes.path());

@@ -41,25 +41,41 @@ fn a_real_program_is_switched_off_and_on_and_gives_its_scene() {
     // It appears by itself, with its objects and what it costs.
     let list = p.until("glxgears", |list| newest(list).is_some_and(|f| f["traced"].as_u64() > Some(0)));
     assert_eq!(list[0]["program"], "glxgears");
-    assert!(list[0]["objects"].as_array().unwrap().iter().any(|o| o["triangles"].as_u64() > Some(50)), "{list:?}");
+    assert!(
+        list[0]["objects"].as_array().unwrap().iter().any(|o| o["triangles"].as_u64() > Some(50)),
+        "{list:?}"
+    );
     assert!(newest(&list).unwrap()["rays"]["primary"].as_u64() > Some(10_000));
 
     // Off and on, live.
     change(json!({"enabled": false}), json!([]));
-    p.until("off", |list| newest(list).is_some_and(|f| f["traced"] == 0 && f["reasons"]["tracing is off"].as_u64() > Some(0)));
+    p.until("off", |list| {
+        newest(list).is_some_and(|f| f["traced"] == 0 && f["reasons"]["tracing is off"].as_u64() > Some(0))
+    });
     change(json!({}), json!(["enabled"]));
-    p.until("on again", |list| newest(list).is_some_and(|f| f["traced"].as_u64() > Some(0) && f["passed"] == 0));
+    p.until("on again", |list| {
+        newest(list).is_some_and(|f| f["traced"].as_u64() > Some(0) && f["passed"] == 0)
+    });
 
     // Its scene: three gears about 10 units wide, 40 units away.
     assert_eq!(p.ask("POST", "export", "{\"id\":1}").status, 200);
     p.until("exported", |list| !list[0]["exported"].is_null());
     let vtp = place.path().join("gears.vtp");
-    let done = Command::new(PROGRAM).args(["export", "-q", "-o"]).arg(&vtp).env("XDG_STATE_HOME", place.path()).output().unwrap();
+    let done = Command::new(PROGRAM)
+        .args(["export", "-q", "-o"])
+        .arg(&vtp)
+        .env("XDG_STATE_HOME", place.path())
+        .output()
+        .unwrap();
     assert!(done.status.success(), "{done:?}");
     let (mesh, _) = datasets::read::open(&vtp).unwrap().dataset().unwrap().to_trimesh(None).unwrap();
     let bounds = mesh.bounds();
     let size = (bounds.max - bounds.min).max_element();
-    assert!(mesh.num_triangles() > 500 && (8.0..40.0).contains(&size), "{} triangles, {size} units", mesh.num_triangles());
+    assert!(
+        mesh.num_triangles() > 500 && (8.0..40.0).contains(&size),
+        "{} triangles, {size} units",
+        mesh.num_triangles()
+    );
 
     // The end of the program is the end of the run, with a report, a timeline, and the panel knows.
     let pid = list[0]["process"].as_u64().unwrap().to_string();

@@ -1,10 +1,10 @@
 //! `gluray doctor`: what this machine has, and what is missing.
 
 use super::library;
-use datasets::cli::{CommonArgs, Status};
 use crate::config::FIELDS;
 use crate::config::environment::{OBJECTS, OTHER_VARIABLES, variable_of};
 use crate::doctor::{Finding, Grade, findings, look};
+use datasets::cli::{CommonArgs, Status};
 use serde_json::json;
 
 /// Options of `gluray doctor`.
@@ -46,6 +46,8 @@ fn variables(common: &CommonArgs) -> anyhow::Result<Status> {
     let others = OTHER_VARIABLES.iter().map(|(n, about)| ((*n).to_owned(), *about));
     let list: Vec<(String, &str)> = settings.chain([objects]).chain(others).collect();
     let value: Vec<_> = list.iter().map(|(name, about)| json!({ "name": name, "about": about })).collect();
-    common.result(&value, || list.iter().map(|(name, about)| format!("{name:<42} {about}")).collect::<Vec<_>>().join("\n"))?;
+    common.result(&value, || {
+        list.iter().map(|(name, about)| format!("{name:<42} {about}")).collect::<Vec<_>>().join("\n")
+    })?;
     Ok(Status::Success)
 }

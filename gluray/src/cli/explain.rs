@@ -1,10 +1,10 @@
 //! `gluray explain`: an account of a run, in words.
 
 use super::last_report;
-use anyhow::Context as _;
-use datasets::cli::{CommonArgs, CureExt as _, Status};
 use crate::reasons::advice;
 use crate::report::Report;
+use anyhow::Context as _;
+use datasets::cli::{CommonArgs, CureExt as _, Status};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -45,14 +45,19 @@ fn in_words(r: &Report) -> String {
         let _ = writeln!(s, "{text}");
     };
     line(format!("{}: mode {}, driver {}", r.program, or_none(&r.mode), or_none(&r.driver)));
-    let per_frame = |n: u64| if r.frames > 0 { format!(" ({:.1} a frame)", n as f64 / r.frames as f64) } else { String::new() };
+    let per_frame = |n: u64| {
+        if r.frames > 0 { format!(" ({:.1} a frame)", n as f64 / r.frames as f64) } else { String::new() }
+    };
     line(format!("{} frames", r.frames));
 
     // What was traced.
     line(format!("\ntraced  {:>12} draws{}", r.traced_draws, per_frame(r.traced_draws)));
     if r.traced_draws > 0 {
         line(format!("        {:>12} triangles, {} pixels", r.triangles, r.pixels));
-        line(format!("        {:>12} geometries were there already, {} were new, {} structures built", r.cache_hits, r.cache_misses, r.builds));
+        line(format!(
+            "        {:>12} geometries were there already, {} were new, {} structures built",
+            r.cache_hits, r.cache_misses, r.builds
+        ));
         for (kind, n) in by_size(&r.rays) {
             line(format!("        {n:>12} rays: {kind}"));
         }
@@ -67,7 +72,10 @@ fn in_words(r: &Report) -> String {
         }
     }
     if r.traced_draws + r.passed_draws == 0 {
-        line("        nothing was drawn: the library did not reach the program, or the program uses no OpenGL".into());
+        line(
+            "        nothing was drawn: the library did not reach the program, or the program uses no OpenGL"
+                .into(),
+        );
         line("                     → `gluray doctor` says how programs are reached".into());
     }
 
@@ -81,7 +89,8 @@ fn in_words(r: &Report) -> String {
         let mut phases: Vec<_> = r.milliseconds.iter().collect();
         phases.sort_by(|a, b| b.1.total_cmp(a.1));
         for (phase, ms) in phases {
-            let each = if r.frames > 0 { format!(", {:.2} a frame", ms / r.frames as f64) } else { String::new() };
+            let each =
+                if r.frames > 0 { format!(", {:.2} a frame", ms / r.frames as f64) } else { String::new() };
             line(format!("        {ms:>12.1} ms {phase}{each}"));
         }
     }

@@ -1,6 +1,6 @@
 //! `gluray export`.
 
-use crate::export::{Scene, ConvertReport, read_scene, scenes_folder, to_mesh, to_poly_data};
+use crate::export::{ConvertReport, Scene, read_scene, scenes_folder, to_mesh, to_poly_data};
 use anyhow::Context;
 use clap::Args;
 use datasets::cli::{CommonArgs, CureExt, UsageError};
@@ -11,13 +11,15 @@ use std::path::{Path, PathBuf};
 
 /// Options of `gluray export`.
 #[derive(Debug, Args)]
-#[command(after_help = "A program writes its scene when the panel's `export the scene` is pressed, or to the file that GLURAY_DUMP names.
+#[command(
+    after_help = "A program writes its scene when the panel's `export the scene` is pressed, or to the file that GLURAY_DUMP names.
 
 Examples:
   gluray export -o scene.glb                          the newest scene
   gluray export scene.gluray -o a.ply -o a.vtp
   gluray export scene.gluray --list
-  gluray export scene.gluray --object 3f2a -o part.ply")]
+  gluray export scene.gluray --object 3f2a -o part.ply"
+)]
 pub(super) struct ExportArgs {
     /// The scene; without it the newest that the panel asked for
     scene: Option<PathBuf>,
@@ -39,22 +41,32 @@ pub(super) fn export(common: CommonArgs, args: &ExportArgs) -> anyhow::Result<()
     const ENDINGS: [&str; 4] = ["ply", "glb", "vtp", "obj"];
     for file in &args.output {
         if !ending(file).is_some_and(|e| ENDINGS.contains(&e.as_str())) {
-            return Err(UsageError(format!("{}: no known ending; give {}", file.display(), ENDINGS.map(|e| format!(".{e}")).join(", "))).into());
+            return Err(UsageError(format!(
+                "{}: no known ending; give {}",
+                file.display(),
+                ENDINGS.map(|e| format!(".{e}")).join(", ")
+            ))
+            .into());
         }
     }
     let path = match &args.scene {
         Some(path) => path.clone(),
-        None => newest().context("no scene is named, and no program has written one").cure("press `export the scene` on the panel, or run the program with GLURAY_DUMP=scene.gluray")?,
+        None => newest().context("no scene is named, and no program has written one").cure(
+            "press `export the scene` on the panel, or run the program with GLURAY_DUMP=scene.gluray",
+        )?,
     };
     let scene = read_scene(&path)?;
     if let Some(key) = args.objects.iter().find(|k| !scene.objects.iter().any(|o| o.key == **k)) {
-        return Err(UsageError(format!("{}: there is no object `{key}`; --list shows them", path.display())).into());
+        return Err(
+            UsageError(format!("{}: there is no object `{key}`; --list shows them", path.display())).into()
+        );
     }
     if args.list {
         return list(common, &scene);
     }
     for file in &args.output {
-        let report = write(file, &scene, &args.objects).with_context(|| format!("from {}", path.display()))?;
+        let report =
+            write(file, &scene, &args.objects).with_context(|| format!("from {}", path.display()))?;
         report.warnings().iter().for_each(|w| common.warn(w));
         let written = json!({ "file": file, "scene": path, "program": scene.program, "frame": scene.frame, "left_out_triangles": report.nowhere });
         common.result(&written, || format!("{}", file.display()))?;
@@ -98,5 +110,7 @@ fn list(common: CommonArgs, scene: &Scene) -> anyhow::Result<()> {
 fn newest() -> Option<PathBuf> {
     let folder = scenes_folder(crate::folders::variable)?;
     let files = std::fs::read_dir(folder).ok()?.filter_map(Result::ok).map(|e| e.path());
-    files.filter(|p| ending(p).as_deref() == Some("gluray")).max_by_key(|p| p.metadata().and_then(|m| m.modified()).ok())
+    files
+        .filter(|p| ending(p).as_deref() == Some("gluray"))
+        .max_by_key(|p| p.metadata().and_then(|m| m.modified()).ok())
 }

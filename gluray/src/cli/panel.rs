@@ -8,11 +8,13 @@ use std::net::SocketAddr;
 
 /// Options of `gluray panel`.
 #[derive(Debug, Args)]
-#[command(after_help = "The page works for every program that `gluray run` started, before or after the panel. Only this user on this machine can open it.
+#[command(
+    after_help = "The page works for every program that `gluray run` started, before or after the panel. Only this user on this machine can open it.
 
 Examples:
   gluray panel
-  gluray panel --listen 127.0.0.1:8080 --quiet --json")]
+  gluray panel --listen 127.0.0.1:8080 --quiet --json"
+)]
 pub(super) struct PanelArgs {
     /// Where the page is; loopback only. Port 0 takes a free one
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:0")]

@@ -2,7 +2,7 @@
 
 use super::{last_report, library};
 use crate::config::environment::{OBJECTS, parse_pair, variable_of};
-use crate::config::{Assignment, ConfigFile, Settings, SettingError, assign};
+use crate::config::{Assignment, ConfigFile, SettingError, Settings, assign};
 use crate::report::Report;
 use anyhow::Context as _;
 use datasets::cli::{CureExt as _, UsageError};
@@ -57,7 +57,8 @@ pub(super) struct RunArgs {
 
 /// The settings of the command line as the variables that carry them, if they make sense.
 fn settings(args: &RunArgs) -> Result<Vec<(String, String)>, UsageError> {
-    let usage = |e: &[SettingError]| UsageError(e.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n  "));
+    let usage =
+        |e: &[SettingError]| UsageError(e.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n  "));
     if let Some(file) = &args.config {
         let read = ConfigFile::read(file).map_err(|e| UsageError(datasets::cli::report(&e.into())))?;
         let (_, errors) = assign(&Settings::default(), &read.all_assignments());
@@ -125,9 +126,9 @@ fn with_first(variable: &str, first: &Path) -> OsString {
 
 /// Runs the program; the result is its exit code.
 pub(super) fn run(args: &RunArgs, quiet: bool) -> anyhow::Result<u8> {
-    let library = library().context("libgluray.so is not beside this program").cure(
-        "build it with `cargo build --release -p gluray`, or name it in the variable GLURAY_LIBRARY",
-    )?;
+    let library = library()
+        .context("libgluray.so is not beside this program")
+        .cure("build it with `cargo build --release -p gluray`, or name it in the variable GLURAY_LIBRARY")?;
     let library = fs::canonicalize(&library)?;
     let variables = settings(args)?;
     let folder = RunFolder::new()?;
@@ -183,6 +184,7 @@ pub(super) fn run(args: &RunArgs, quiet: bool) -> anyhow::Result<u8> {
 /// All processes' accounts as one.
 fn collect(folder: &Path, program: &str) -> Report {
     let mut sum = Report { program: program.to_owned(), ..Report::default() };
+    let mut drew = 0;
     let mut files: Vec<PathBuf> =
         fs::read_dir(folder).into_iter().flatten().filter_map(|e| Some(e.ok()?.path())).collect();
     files.sort();
@@ -192,6 +194,11 @@ fn collect(folder: &Path, program: &str) -> Report {
             sum.add(&r);
             sum.mode.clone_from(&r.mode);
             sum.pid = r.pid;
+            // What was started may be `timeout` or a script; the account is that of the program that drew.
+            if r.traced_draws + r.passed_draws > drew {
+                drew = r.traced_draws + r.passed_draws;
+                sum.program.clone_from(&r.program);
+            }
         }
     }
     // A line for each phase that ran; the last may be half written.

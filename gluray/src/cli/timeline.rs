@@ -1,10 +1,10 @@
 //! `gluray timeline`.
 
 use super::explain::read_report;
+use crate::timeline::{GanttOptions, chrome_trace, gantt_svg};
 use anyhow::Context;
 use clap::Args;
 use datasets::cli::{CommonArgs, UsageError};
-use crate::timeline::{GanttOptions, chrome_trace, gantt_svg};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -43,16 +43,24 @@ pub(super) fn timeline(common: CommonArgs, args: &TimelineArgs) -> anyhow::Resul
     let window = [args.from.unwrap_or(first), args.to.unwrap_or(last)];
     let asked = args.from.is_some() || args.to.is_some();
     if asked && (window[0] >= window[1] || window.iter().any(|v| v.is_nan())) {
-        return Err(UsageError(format!("nothing lies between {} and {} ms; the run has {first:.1} to {last:.1} ms", window[0], window[1])).into());
+        return Err(UsageError(format!(
+            "nothing lies between {} and {} ms; the run has {first:.1} to {last:.1} ms",
+            window[0], window[1]
+        ))
+        .into());
     }
     if spans.is_empty() {
-        common.warn(format_args!("{}: no phase was recorded; nothing was traced in that run", path.display()));
+        common
+            .warn(format_args!("{}: no phase was recorded; nothing was traced in that run", path.display()));
     }
     for file in &args.output {
         let text = match ending(file).as_deref() {
             Some("svg") => {
                 let title = format!("{}, mode {}", report.program, report.mode);
-                gantt_svg(spans, &GanttOptions { title, width: args.width, window_ms: asked.then_some(window) })
+                gantt_svg(
+                    spans,
+                    &GanttOptions { title, width: args.width, window_ms: asked.then_some(window) },
+                )
             }
             _ => chrome_trace(&report.program, spans).to_string(),
         };

@@ -66,7 +66,12 @@ pub fn assign(base: &Settings, assignments: &[Assignment]) -> (Settings, Vec<Set
         // `checked` lets nothing through that does not fit (a test tries both ends of every range).
         Err(e) => {
             let cure = "please report it".to_owned();
-            errors.push(SettingError { origin: "gluray".into(), path: "settings".into(), what: format!("do not fit: {e}"), cure });
+            errors.push(SettingError {
+                origin: "gluray".into(),
+                path: "settings".into(),
+                what: format!("do not fit: {e}"),
+                cure,
+            });
             (base.clone(), errors)
         }
     }
@@ -92,7 +97,9 @@ fn put(tree: &mut Map<String, Value>, path: &str, value: Value) {
 
 /// The value if it may be assigned there.
 fn checked(a: &Assignment) -> Result<Value, SettingError> {
-    let wrong = |what: String, cure: String| Err(SettingError { origin: a.origin.clone(), path: shorten(&a.path), what, cure });
+    let wrong = |what: String, cure: String| {
+        Err(SettingError { origin: a.origin.clone(), path: shorten(&a.path), what, cure })
+    };
     let Some(field) = find(&a.path) else {
         return wrong("is no setting".into(), unknown(&a.path));
     };
@@ -101,14 +108,20 @@ fn checked(a: &Assignment) -> Result<Value, SettingError> {
         if key.is_empty() || key.len() > MAX_OBJECT_KEY || !key.chars().all(plain) {
             return wrong(
                 "has a key that no object has".into(),
-                format!("keys have 1 to {MAX_OBJECT_KEY} letters, digits, `-`, `_`, `:` or `#`; `gluray explain` lists them"),
+                format!(
+                    "keys have 1 to {MAX_OBJECT_KEY} letters, digits, `-`, `_`, `:` or `#`; `gluray explain` lists them"
+                ),
             );
         }
     }
     if a.value.is_null() && field.optional {
         return Ok(Value::Null);
     }
-    if fits(field.values, &a.value) { Ok(a.value.clone()) } else { wrong(format!("is {}", shorten(&a.value.to_string())), give(field)) }
+    if fits(field.values, &a.value) {
+        Ok(a.value.clone())
+    } else {
+        wrong(format!("is {}", shorten(&a.value.to_string())), give(field))
+    }
 }
 
 /// `KEY` of `objects.KEY.color`.
@@ -124,11 +137,15 @@ fn fits(kind: Kind, value: &Value) -> bool {
     };
     match kind {
         Kind::Switch => value.is_boolean(),
-        Kind::Whole { low, high } => value.as_u64().is_some_and(|v| (u64::from(low)..=u64::from(high)).contains(&v)),
+        Kind::Whole { low, high } => {
+            value.as_u64().is_some_and(|v| (u64::from(low)..=u64::from(high)).contains(&v))
+        }
         Kind::Real { low, high } => value.as_f64().is_some_and(|v| (low..=high).contains(&v)),
         Kind::Word { words } => value.as_str().is_some_and(|v| words.contains(&v)),
         Kind::Color => three().is_some_and(|v| v.iter().all(|c| (0.0..=1.0).contains(c))),
-        Kind::Direction => three().is_some_and(|v| v.iter().any(|c| c.abs() > 1e-6) && v.iter().all(|c| c.abs() < 1e6)),
+        Kind::Direction => {
+            three().is_some_and(|v| v.iter().any(|c| c.abs() > 1e-6) && v.iter().all(|c| c.abs() < 1e6))
+        }
     }
 }
 
@@ -147,7 +164,9 @@ pub(super) fn give(field: &Field) -> String {
 
 fn unknown(path: &str) -> String {
     let own = path.rsplit('.').next().unwrap_or(path);
-    let near = FIELDS.iter().map(|f| (distance(path, f.path).min(distance(own, f.path.rsplit('.').next().unwrap_or(f.path)) + 1), f.path));
+    let near = FIELDS.iter().map(|f| {
+        (distance(path, f.path).min(distance(own, f.path.rsplit('.').next().unwrap_or(f.path)) + 1), f.path)
+    });
     match near.min() {
         Some((d, name)) if d <= 3 => format!("did you mean `{name}`?"),
         _ => format!("there are: {}", FIELDS.iter().map(|f| f.path).collect::<Vec<_>>().join(", ")),
@@ -201,11 +220,22 @@ mod tests {
             one("samples", json!(0)).unwrap_err(),
             "test.toml: `samples` is 0; give a whole number from 1 to 4096"
         );
-        assert_eq!(one("mode", json!("ricj")).unwrap_err(), "test.toml: `mode` is \"ricj\"; give one of match, phong, rich, enhance, path");
-        assert_eq!(one("effects.shadow", json!(true)).unwrap_err(), "test.toml: `effects.shadow` is no setting; did you mean `effects.shadows`?");
-        assert_eq!(one("shadows", json!(true)).unwrap_err(), "test.toml: `shadows` is no setting; did you mean `effects.shadows`?");
+        assert_eq!(
+            one("mode", json!("ricj")).unwrap_err(),
+            "test.toml: `mode` is \"ricj\"; give one of match, phong, rich, enhance, path"
+        );
+        assert_eq!(
+            one("effects.shadow", json!(true)).unwrap_err(),
+            "test.toml: `effects.shadow` is no setting; did you mean `effects.shadows`?"
+        );
+        assert_eq!(
+            one("shadows", json!(true)).unwrap_err(),
+            "test.toml: `shadows` is no setting; did you mean `effects.shadows`?"
+        );
         assert!(one("a.b.c.d.e", json!(1)).unwrap_err().contains("there are: enabled, mode"));
-        assert!(one("effects.aperture_radius", json!(-1)).unwrap_err().contains("from 0 to 1 (of the diagonal)"));
+        assert!(
+            one("effects.aperture_radius", json!(-1)).unwrap_err().contains("from 0 to 1 (of the diagonal)")
+        );
     }
 
     #[test]
@@ -249,7 +279,8 @@ mod tests {
 
     #[test]
     fn distances_are_those_of_levenshtein() {
-        for (a, b, d) in [("", "abc", 3), ("kitten", "sitting", 3), ("shadow", "shadows", 1), ("ab", "ba", 2)] {
+        for (a, b, d) in [("", "abc", 3), ("kitten", "sitting", 3), ("shadow", "shadows", 1), ("ab", "ba", 2)]
+        {
             assert_eq!(distance(a, b), d, "{a} {b}");
         }
     }

@@ -49,7 +49,8 @@ pub(crate) const OBEYED: &[&str] = &["enabled", "trace", "quality", "threads"];
 fn not_obeyed(settings: &Settings) -> Vec<String> {
     let tree = |s: &Settings| serde_json::to_value(s).unwrap_or_default();
     let (now, usual) = (tree(settings), tree(&Settings::default()));
-    let value = |tree: &serde_json::Value, path: &str| tree.pointer(&format!("/{}", path.replace('.', "/"))).cloned();
+    let value =
+        |tree: &serde_json::Value, path: &str| tree.pointer(&format!("/{}", path.replace('.', "/"))).cloned();
     let in_vain = |f: &&Field| !OBEYED.contains(&f.path) && value(&now, f.path) != value(&usual, f.path);
     let mut out: Vec<String> = FIELDS
         .iter()

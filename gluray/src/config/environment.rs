@@ -27,7 +27,10 @@ pub fn variable_of(path: &str) -> String {
 pub fn parse(field: &Field, text: &str) -> Value {
     let text = text.trim();
     let numbers = |text: &str| -> Option<Vec<f64>> {
-        text.trim_matches(['[', ']']).split(',').map(|n| n.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect()
+        text.trim_matches(['[', ']'])
+            .split(',')
+            .map(|n| n.trim().parse().ok().filter(|v: &f64| v.is_finite()))
+            .collect()
     };
     let as_it_is = || json!(text);
     if text == "program" && field.optional && field.path != "material.surface" {
@@ -53,12 +56,19 @@ pub fn parse(field: &Field, text: &str) -> Value {
 /// `#ff8000`.
 fn hex_color(text: &str) -> Option<Vec<f64>> {
     let digits = text.strip_prefix('#').filter(|d| d.len() == 6 && d.is_ascii())?;
-    (0..3).map(|i| u8::from_str_radix(&digits[2 * i..2 * i + 2], 16).ok().map(|v| f64::from(v) / 255.0)).collect()
+    (0..3)
+        .map(|i| u8::from_str_radix(&digits[2 * i..2 * i + 2], 16).ok().map(|v| f64::from(v) / 255.0))
+        .collect()
 }
 
 /// `NAME=VALUE` of a command line as an assignment.
 pub fn parse_pair(origin: &str, text: &str) -> Result<Assignment, SettingError> {
-    let error = |what: String, cure: String| SettingError { origin: origin.into(), path: text.chars().take(80).collect(), what, cure };
+    let error = |what: String, cure: String| SettingError {
+        origin: origin.into(),
+        path: text.chars().take(80).collect(),
+        what,
+        cure,
+    };
     let Some((path, value)) = text.split_once('=') else {
         return Err(error("has no value".into(), "write NAME=VALUE, for example effects.shadows=on".into()));
     };
@@ -89,7 +99,9 @@ pub fn assignments(variables: &[(String, String)]) -> (Vec<Assignment>, Vec<Sett
             }
         }
     }
-    for (name, _) in variables.iter().filter(|(n, _)| n.starts_with("GLURAY_") && !known.contains(n) && n != OBJECTS) {
+    for (name, _) in
+        variables.iter().filter(|(n, _)| n.starts_with("GLURAY_") && !known.contains(n) && n != OBJECTS)
+    {
         errors.push(SettingError {
             origin: "environment".into(),
             path: name.chars().take(80).collect(),
@@ -134,8 +146,15 @@ mod tests {
 
     #[test]
     fn misspelt_variables_and_values_are_named() {
-        let (list, errors) = assignments(&variables(&[("GLURAY_MODUS", "rich"), ("GLURAY_SAMPLES", "many"), ("GLURAY_OBJECTS", "k")]));
-        assert!(errors.iter().any(|e| e.to_string().contains("`GLURAY_MODUS` is no variable of gluray")), "{errors:?}");
+        let (list, errors) = assignments(&variables(&[
+            ("GLURAY_MODUS", "rich"),
+            ("GLURAY_SAMPLES", "many"),
+            ("GLURAY_OBJECTS", "k"),
+        ]));
+        assert!(
+            errors.iter().any(|e| e.to_string().contains("`GLURAY_MODUS` is no variable of gluray")),
+            "{errors:?}"
+        );
         assert!(errors.iter().any(|e| e.to_string().contains("write NAME=VALUE")), "{errors:?}");
         let (_, errors) = assign(&Settings::default(), &list);
         assert_eq!(

@@ -94,21 +94,33 @@ pub const FIELDS: &[Field] = &[
         "how pictures are made",
     ),
     field("trace", Kind::Word { words: &["scene", "all"] }, "which draws are traced"),
-    field("samples", Kind::Whole { low: 1, high: 4096 }, "rays through each pixel").only_in(&["rich", "enhance", "path"]),
-    field("quality", Kind::Word { words: &["auto", "fast", "best"] }, "how acceleration structures are built"),
+    field("samples", Kind::Whole { low: 1, high: 4096 }, "rays through each pixel")
+        .only_in(&["rich", "enhance", "path"]),
+    field(
+        "quality",
+        Kind::Word { words: &["auto", "fast", "best"] },
+        "how acceleration structures are built",
+    ),
     field("threads", Kind::Whole { low: 0, high: 1024 }, "threads that render; 0 for all cores"),
     field("asynchronous", Kind::Switch, "show each frame one frame late and trace it meanwhile"),
     field("effects.shadows", Kind::Switch, "rays to the lights").only_in(RAYS),
     field("effects.light_radius_deg", real(0.0, 45.0), "half the angle of lights; 0 for sharp shadows")
         .unit("degrees")
         .only_in(&["rich", "enhance", "path"]),
-    field("effects.ambient_occlusion_samples", Kind::Whole { low: 0, high: 1024 }, "rays of ambient occlusion; 0 for none")
+    field(
+        "effects.ambient_occlusion_samples",
+        Kind::Whole { low: 0, high: 1024 },
+        "rays of ambient occlusion; 0 for none",
+    )
+    .only_in(RAYS),
+    field("effects.ambient_occlusion_radius", real(1e-6, 10.0), "their length")
+        .unit("of the diagonal")
         .only_in(RAYS),
-    field("effects.ambient_occlusion_radius", real(1e-6, 10.0), "their length").unit("of the diagonal").only_in(RAYS),
     field("effects.reflections", Kind::Switch, "mirrors").only_in(LONG),
     field("effects.refraction", Kind::Switch, "rays through glass").only_in(LONG),
     field("effects.transparency", Kind::Switch, "light through what is not opaque").only_in(LIT),
-    field("effects.max_bounces", Kind::Whole { low: 1, high: 64 }, "longest chain of reflections").only_in(LONG),
+    field("effects.max_bounces", Kind::Whole { low: 1, high: 64 }, "longest chain of reflections")
+        .only_in(LONG),
     field("effects.aperture_radius", real(0.0, 1.0), "radius of the lens; 0 for a pinhole")
         .unit("of the diagonal")
         .only_in(LONG),
@@ -117,10 +129,15 @@ pub const FIELDS: &[Field] = &[
     field("lights.ambient", real(0.0, 100.0), "times the program's ambient light").only_in(LIT),
     field("lights.sky", real(0.0, 100.0), "even light from all around").only_in(LONG),
     field("lights.added", real(0.0, 100.0), "strength of a light of our own").only_in(LIT),
-    field("lights.added_direction", Kind::Direction, "where it comes from: right, up, towards you").only_in(LIT),
+    field("lights.added_direction", Kind::Direction, "where it comes from: right, up, towards you")
+        .only_in(LIT),
     field("lights.added_color", Kind::Color, "its colour").only_in(LIT),
-    field("material.surface", Kind::Word { words: &["program", "matte", "metal", "glass"] }, "what surfaces are made of")
-        .optional(),
+    field(
+        "material.surface",
+        Kind::Word { words: &["program", "matte", "metal", "glass"] },
+        "what surfaces are made of",
+    )
+    .optional(),
     field("material.color", Kind::Color, "colour, as glColor takes it").optional(),
     field("material.opacity", real(0.0, 1.0), "0 invisible to 1 opaque").optional(),
     field("material.specular", real(0.0, 1.0), "strength of the highlight").optional(),
@@ -188,12 +205,21 @@ mod tests {
     fn both_ends_of_every_range_arrive_where_they_belong() {
         for f in FIELDS {
             for v in extremes(f.values) {
-                let (settings, errors) = assign(&Settings::default(), &[Assignment::new("test", f.path, v.clone())]);
+                let (settings, errors) =
+                    assign(&Settings::default(), &[Assignment::new("test", f.path, v.clone())]);
                 assert!(errors.is_empty(), "{} = {v}: {errors:?}", f.path);
                 let tree = serde_json::to_value(&settings).unwrap();
                 let found = tree.pointer(&format!("/{}", f.path.replace('.', "/"))).unwrap();
-                let numbers = |v: &Value| -> Vec<Option<f64>> { v.as_array().into_iter().flatten().map(Value::as_f64).collect() };
-                assert!(*found == v || found.as_f64().is_some() && found.as_f64() == v.as_f64() || numbers(found) == numbers(&v), "{}: {v} became {found}", f.path);
+                let numbers = |v: &Value| -> Vec<Option<f64>> {
+                    v.as_array().into_iter().flatten().map(Value::as_f64).collect()
+                };
+                assert!(
+                    *found == v
+                        || found.as_f64().is_some() && found.as_f64() == v.as_f64()
+                        || numbers(found) == numbers(&v),
+                    "{}: {v} became {found}",
+                    f.path
+                );
             }
         }
     }
@@ -202,6 +228,9 @@ mod tests {
     fn objects_have_the_fields_of_materials_only() {
         assert_eq!(find("objects.a1.color").unwrap().path, "material.color");
         assert!(find("objects.a1.samples").is_none() && find("objects.a1").is_none());
-        assert!(find("material.color").unwrap().matters_in("rich") && !find("material.color").unwrap().matters_in("match"));
+        assert!(
+            find("material.color").unwrap().matters_in("rich")
+                && !find("material.color").unwrap().matters_in("match")
+        );
     }
 }

@@ -46,7 +46,8 @@ pub struct ConfigFile {
 impl ConfigFile {
     /// Reads a file.
     pub fn read(path: &Path) -> Result<ConfigFile, FileError> {
-        let text = std::fs::read_to_string(path).map_err(|source| FileError::Read { path: path.into(), source })?;
+        let text =
+            std::fs::read_to_string(path).map_err(|source| FileError::Read { path: path.into(), source })?;
         ConfigFile::parse(path, &text)
     }
 
@@ -57,7 +58,10 @@ impl ConfigFile {
             let at = e.span().map_or_else(String::new, |s| {
                 let before = &text[..s.start.min(text.len())];
                 let line = before.matches('\n').count() + 1;
-                format!("line {line}, column {}: ", before.len() - before.rfind('\n').map_or(0, |n| n + 1) + 1)
+                format!(
+                    "line {line}, column {}: ",
+                    before.len() - before.rfind('\n').map_or(0, |n| n + 1) + 1
+                )
             });
             FileError::Syntax { path: path.into(), text: format!("{at}{}", e.message().replace('\n', ", ")) }
         })?;
@@ -92,7 +96,9 @@ impl ConfigFile {
                             let origin = format!("{origin} [program.{name}]");
                             own.iter().for_each(|(k, v)| flatten(&origin, k, v, &mut out));
                         }
-                        Some(other) => out.push(Assignment::new(&origin, format!("program.{name}"), json(other))),
+                        Some(other) => {
+                            out.push(Assignment::new(&origin, format!("program.{name}"), json(other)))
+                        }
                         None => {}
                     }
                 }
@@ -112,7 +118,9 @@ impl ConfigFile {
 /// Tables become longer paths. A table where a value belongs stays whole, so that it is named as the wrong value it is.
 fn flatten(origin: &str, path: &str, value: &toml::Value, out: &mut Vec<Assignment>) {
     match value {
-        toml::Value::Table(table) if super::fields::find(path).is_none() && !table.is_empty() && path.matches('.').count() < 3 => {
+        toml::Value::Table(table)
+            if super::fields::find(path).is_none() && !table.is_empty() && path.matches('.').count() < 3 =>
+        {
             table.iter().for_each(|(k, v)| flatten(origin, &format!("{path}.{k}"), v, out));
         }
         toml::Value::Table(table) if table.is_empty() => {}
@@ -158,9 +166,15 @@ mod tests {
     #[test]
     fn what_is_wrong_is_named_with_the_section() {
         for (text, expected) in [
-            ("[effects]\nshadow = true", "gluray.toml: `effects.shadow` is no setting; did you mean `effects.shadows`?"),
+            (
+                "[effects]\nshadow = true",
+                "gluray.toml: `effects.shadow` is no setting; did you mean `effects.shadows`?",
+            ),
             ("samples = 1.5", "gluray.toml: `samples` is 1.5; give a whole number from 1 to 4096"),
-            ("[program.gmsh]\nmode = 3", "gluray.toml [program.gmsh]: `mode` is 3; give one of match, phong, rich, enhance, path"),
+            (
+                "[program.gmsh]\nmode = 3",
+                "gluray.toml [program.gmsh]: `mode` is 3; give one of match, phong, rich, enhance, path",
+            ),
             ("[effects]\nfocus = nan", "gluray.toml: `effects.focus` is \"NaN\"; give a number from 0 to 1"),
             ("[mode]\nname = 3", "gluray.toml: `mode` is {\"name\":3}; give one of"),
             ("effects = 3", "gluray.toml: `effects` is no setting"),
@@ -175,7 +189,8 @@ mod tests {
 
     #[test]
     fn broken_files_say_where() {
-        let e = ConfigFile::parse(Path::new("a.toml"), "mode = \"rich\"\nsamples = = 4").unwrap_err().to_string();
+        let e =
+            ConfigFile::parse(Path::new("a.toml"), "mode = \"rich\"\nsamples = = 4").unwrap_err().to_string();
         assert!(e.starts_with("a.toml: line 2, column 11: "), "{e}");
         let e = ConfigFile::read(Path::new("/nowhere/a.toml")).unwrap_err().to_string();
         assert!(e.contains("/nowhere/a.toml") && e.contains("GLURAY_CONFIG"), "{e}");

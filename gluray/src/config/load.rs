@@ -33,16 +33,19 @@ pub struct Loaded {
 impl Sources {
     /// Of this process.
     pub fn of_this_process() -> Sources {
-        let variables: Vec<(String, String)> =
-            std::env::vars_os().filter_map(|(n, v)| Some((n.into_string().ok()?, v.into_string().ok()?))).collect();
-        let arguments: Vec<String> = std::env::args_os().take(8).map(|a| a.to_string_lossy().into_owned()).collect();
+        let variables: Vec<(String, String)> = std::env::vars_os()
+            .filter_map(|(n, v)| Some((n.into_string().ok()?, v.into_string().ok()?)))
+            .collect();
+        let arguments: Vec<String> =
+            std::env::args_os().take(8).map(|a| a.to_string_lossy().into_owned()).collect();
         let executable = std::fs::read_link("/proc/self/exe").ok();
         Sources::new(variables, program_names(executable.as_deref(), &arguments))
     }
 
     /// Of a program with these variables.
     pub fn new(variables: Vec<(String, String)>, program: Vec<String>) -> Sources {
-        let get = |name: &str| variables.iter().find(|(n, v)| n == name && !v.is_empty()).map(|(_, v)| v.clone());
+        let get =
+            |name: &str| variables.iter().find(|(n, v)| n == name && !v.is_empty()).map(|(_, v)| v.clone());
         let named = get("GLURAY_CONFIG").map(PathBuf::from);
         let file = named.clone().or_else(|| ConfigFile::usual_path(get));
         Sources { file, file_is_required: named.is_some(), program, variables }
@@ -58,9 +61,13 @@ impl Sources {
                     assignments = file.assignments(&self.program);
                     loaded.file = Some(path.clone());
                 }
-                Err(FileError::Read { source, .. }) if source.kind() == std::io::ErrorKind::NotFound && !self.file_is_required => {}
+                Err(FileError::Read { source, .. })
+                    if source.kind() == std::io::ErrorKind::NotFound && !self.file_is_required => {}
                 Err(FileError::Read { path, source }) => {
-                    loaded.problems.push(format!("{}: {source}", FileError::Read { path, source: std::io::Error::from(source.kind()) }));
+                    loaded.problems.push(format!(
+                        "{}: {source}",
+                        FileError::Read { path, source: std::io::Error::from(source.kind()) }
+                    ));
                 }
                 Err(e) => loaded.problems.push(e.to_string()),
             }
@@ -81,7 +88,11 @@ pub fn program_names(executable: Option<&Path>, arguments: &[String]) -> Vec<Str
     let mut names: Vec<String> = executable.and_then(base).into_iter().collect();
     names.extend(arguments.first().and_then(|a| base(Path::new(a))));
     const INTERPRETERS: [&str; 8] = ["python", "perl", "wish", "tclsh", "ruby", "sh", "bash", "java"];
-    let interpreted = names.iter().any(|n| INTERPRETERS.iter().any(|i| n.strip_prefix(i).is_some_and(|v| v.chars().all(|c| c.is_ascii_digit() || c == '.'))));
+    let interpreted = names.iter().any(|n| {
+        INTERPRETERS
+            .iter()
+            .any(|i| n.strip_prefix(i).is_some_and(|v| v.chars().all(|c| c.is_ascii_digit() || c == '.')))
+    });
     if interpreted {
         let script = arguments.iter().skip(1).find(|a| !a.starts_with('-'));
         if let Some(name) = script.and_then(|s| base(Path::new(s))) {
@@ -91,7 +102,12 @@ pub fn program_names(executable: Option<&Path>, arguments: &[String]) -> Vec<Str
         }
     }
     let mut seen = Vec::new();
-    names.retain(|n| !seen.contains(n) && { seen.push(n.clone()); true });
+    names.retain(|n| {
+        !seen.contains(n) && {
+            seen.push(n.clone());
+            true
+        }
+    });
     names
 }
 
@@ -110,9 +126,15 @@ mod tests {
         let path = dir.path().join("gluray.toml");
         std::fs::write(&path, "mode = \"phong\"\nsamples = 2\n[program.gmsh]\nsamples = 3\nquality = \"best\"\n[program.gmsh.effects]\nshadows = 7\n").unwrap();
         let config = path.to_str().unwrap();
-        let load = |variables: &[(&str, &str)], program: &str| Sources::new(pairs(variables), vec![program.into()]).load();
+        let load = |variables: &[(&str, &str)], program: &str| {
+            Sources::new(pairs(variables), vec![program.into()]).load()
+        };
 
-        assert_eq!(load(&[("XDG_CONFIG_HOME", "/nowhere")], "gmsh"), Loaded::default(), "no file is no fault");
+        assert_eq!(
+            load(&[("XDG_CONFIG_HOME", "/nowhere")], "gmsh"),
+            Loaded::default(),
+            "no file is no fault"
+        );
         let other = load(&[("GLURAY_CONFIG", config)], "glxgears");
         assert_eq!((other.settings.mode, other.settings.samples, other.problems.len()), (Mode::Phong, 2, 0));
         let gmsh = load(&[("GLURAY_CONFIG", config), ("GLURAY_SAMPLES", "5")], "gmsh");
@@ -126,21 +148,31 @@ mod tests {
     #[test]
     fn a_named_file_must_be_there_and_make_sense() {
         let missing = Sources::new(pairs(&[("GLURAY_CONFIG", "/nowhere/g.toml")]), Vec::new()).load();
-        assert!(missing.problems.len() == 1 && missing.problems[0].contains("/nowhere/g.toml"), "{:?}", missing.problems);
+        assert!(
+            missing.problems.len() == 1 && missing.problems[0].contains("/nowhere/g.toml"),
+            "{:?}",
+            missing.problems
+        );
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("gluray");
         std::fs::create_dir(&path).unwrap();
         std::fs::write(path.join("gluray.toml"), "mode = ").unwrap();
-        let broken = Sources::new(pairs(&[("XDG_CONFIG_HOME", dir.path().to_str().unwrap())]), Vec::new()).load();
+        let broken =
+            Sources::new(pairs(&[("XDG_CONFIG_HOME", dir.path().to_str().unwrap())]), Vec::new()).load();
         assert!(broken.problems.len() == 1 && broken.problems[0].contains("line 1"), "{:?}", broken.problems);
         assert_eq!(broken.settings, Settings::default());
     }
 
     #[test]
     fn scripts_go_by_their_own_name_too() {
-        let names = |exe: &str, args: &[&str]| program_names(Some(Path::new(exe)), &args.iter().map(|a| (*a).to_owned()).collect::<Vec<_>>());
+        let names = |exe: &str, args: &[&str]| {
+            program_names(Some(Path::new(exe)), &args.iter().map(|a| (*a).to_owned()).collect::<Vec<_>>())
+        };
         assert_eq!(names("/usr/bin/gmsh", &["gmsh", "a.geo"]), ["gmsh"]);
-        assert_eq!(names("/usr/bin/python3.11", &["/usr/bin/python3", "-u", "/opt/x/view.py", "--big"]), ["python3.11", "python3", "view", "view.py"]);
+        assert_eq!(
+            names("/usr/bin/python3.11", &["/usr/bin/python3", "-u", "/opt/x/view.py", "--big"]),
+            ["python3.11", "python3", "view", "view.py"]
+        );
         assert_eq!(names("/usr/bin/octave-cli", &["octave", "x.m"]), ["octave-cli", "octave"]);
     }
 }

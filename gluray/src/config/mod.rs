@@ -17,8 +17,8 @@ pub mod file;
 pub mod load;
 pub mod settings;
 
-pub(crate) use current::{Config, OBEYED, current, program_name, replace};
 pub use assign::{Assignment, SettingError, assign};
+pub(crate) use current::{Config, OBEYED, current, program_name, replace};
 pub use fields::{FIELDS, Field, Kind};
 pub use file::ConfigFile;
 pub use load::{Loaded, Sources};

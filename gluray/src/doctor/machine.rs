@@ -70,15 +70,21 @@ pub fn look(library: Option<PathBuf>) -> Machine {
     let folders = library_folders(get("LD_LIBRARY_PATH").as_deref());
     let find = |name: &str| folders.iter().map(|f| f.join(name)).find(|p| p.exists());
     let display = get("DISPLAY");
-    let mut variables: Vec<(String, String)> = MATTER.iter().filter_map(|n| Some(((*n).to_owned(), get(n)?))).collect();
-    variables.extend(std::env::vars().filter(|(n, v)| n.starts_with("GLURAY_") && !n.ends_with("SECRET") && !v.is_empty()));
+    let mut variables: Vec<(String, String)> =
+        MATTER.iter().filter_map(|n| Some(((*n).to_owned(), get(n)?))).collect();
+    variables.extend(
+        std::env::vars().filter(|(n, v)| n.starts_with("GLURAY_") && !n.ends_with("SECRET") && !v.is_empty()),
+    );
     Machine {
         library,
         lib_gl: find("libGL.so.1"),
         glvnd: find("libGLdispatch.so.0"),
         glx_vendors: glx_vendors(&folders),
         egl_vendors: egl_vendors(),
-        display_answers: display.as_deref().and_then(local_display).map(|n| Path::new(&format!("/tmp/.X11-unix/X{n}")).exists()),
+        display_answers: display
+            .as_deref()
+            .and_then(local_display)
+            .map(|n| Path::new(&format!("/tmp/.X11-unix/X{n}")).exists()),
         opengl: display.is_some().then(ask_driver),
         display: [display, get("WAYLAND_DISPLAY")],
         variables,
@@ -98,7 +104,18 @@ pub fn look_for_glvnd() -> Option<PathBuf> {
 fn library_folders(path: Option<&str>) -> Vec<PathBuf> {
     let mut folders: Vec<PathBuf> = path.into_iter().flat_map(std::env::split_paths).collect();
     let triple = format!("{}-linux-gnu", std::env::consts::ARCH);
-    folders.extend([format!("/usr/lib/{triple}"), format!("/lib/{triple}"), "/usr/lib64".into(), "/lib64".into(), "/usr/lib".into(), "/lib".into(), "/usr/local/lib".into()].map(PathBuf::from));
+    folders.extend(
+        [
+            format!("/usr/lib/{triple}"),
+            format!("/lib/{triple}"),
+            "/usr/lib64".into(),
+            "/lib64".into(),
+            "/usr/lib".into(),
+            "/lib".into(),
+            "/usr/local/lib".into(),
+        ]
+        .map(PathBuf::from),
+    );
     folders
 }
 
@@ -118,7 +135,8 @@ fn glx_vendors(folders: &[PathBuf]) -> Vec<String> {
 
 fn egl_vendors() -> Vec<String> {
     let folders = ["/usr/share/glvnd/egl_vendor.d", "/etc/glvnd/egl_vendor.d"];
-    let mut out: Vec<String> = folders.iter().flat_map(|f| names_in(Path::new(f))).filter(|n| n.ends_with(".json")).collect();
+    let mut out: Vec<String> =
+        folders.iter().flat_map(|f| names_in(Path::new(f))).filter(|n| n.ends_with(".json")).collect();
     out.sort();
     out
 }
@@ -133,7 +151,11 @@ fn ask_driver() -> Result<OpenGl, String> {
     const PATIENCE: Duration = Duration::from_secs(15);
     let mut command = Command::new("glxinfo");
     // Not through us: the driver itself is asked.
-    command.arg("-B").env_remove("LD_PRELOAD").env_remove("__GLX_VENDOR_LIBRARY_NAME").env_remove("GLURAY_RUN_DIR");
+    command
+        .arg("-B")
+        .env_remove("LD_PRELOAD")
+        .env_remove("__GLX_VENDOR_LIBRARY_NAME")
+        .env_remove("GLURAY_RUN_DIR");
     let child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
     let mut child = child.map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => "glxinfo is not installed".to_owned(),
@@ -176,7 +198,9 @@ fn settings() -> Option<(PathBuf, Vec<String>)> {
     let sources = Sources::new(std::env::vars().collect(), Vec::new());
     let path = sources.file.clone().filter(|p| sources.file_is_required || p.exists())?;
     let problems = match ConfigFile::read(&path) {
-        Ok(file) => assign(&Settings::default(), &file.all_assignments()).1.iter().map(ToString::to_string).collect(),
+        Ok(file) => {
+            assign(&Settings::default(), &file.all_assignments()).1.iter().map(ToString::to_string).collect()
+        }
         Err(e) => vec![datasets::cli::report(&e.into())],
     };
     Some((path, problems))
@@ -188,14 +212,22 @@ mod tests {
 
     #[test]
     fn displays_of_this_machine_have_numbers() {
-        assert_eq!([":7", ":7.1", "unix:3", "host:1", "", ":x"].map(local_display), [Some(7), Some(7), Some(3), None, None, None]);
+        assert_eq!(
+            [":7", ":7.1", "unix:3", "host:1", "", ":x"].map(local_display),
+            [Some(7), Some(7), Some(3), None, None, None]
+        );
     }
 
     #[test]
     fn the_lines_of_glxinfo_are_found() {
         let text = "name of display: :99\ndirect rendering: Yes\nExtended renderer info (GLX_MESA_query_renderer):\n    Vendor: Mesa (0xffffffff)\nOpenGL vendor string: Mesa/X.org\nOpenGL renderer string: llvmpipe (LLVM 15.0.6, 256 bits)\nOpenGL core profile version string: 4.5 (Core Profile) Mesa 22.3.6\nOpenGL version string: 4.5 (Compatibility Profile) Mesa 22.3.6\n";
         let gl = parse_glxinfo(text);
-        assert!(gl.direct && gl.renderer.starts_with("llvmpipe") && gl.core_version.contains("Core") && gl.version.contains("Compat"));
+        assert!(
+            gl.direct
+                && gl.renderer.starts_with("llvmpipe")
+                && gl.core_version.contains("Core")
+                && gl.version.contains("Compat")
+        );
         assert_eq!(parse_glxinfo("nonsense"), OpenGl::default());
     }
 }

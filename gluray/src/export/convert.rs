@@ -36,7 +36,8 @@ struct Placed {
 
 fn placed(o: &Object, with_normals: bool, report: &mut ConvertReport) -> Placed {
     let world = DMat4::from_cols_array(&o.world_from_object);
-    let positions: Vec<DVec3> = o.positions.iter().map(|p| world.project_point3(DVec3::from(p.map(f64::from)))).collect();
+    let positions: Vec<DVec3> =
+        o.positions.iter().map(|p| world.project_point3(DVec3::from(p.map(f64::from)))).collect();
     let there = |t: &[u32; 3]| t.iter().all(|i| positions[*i as usize].is_finite());
     let mut triangles: Vec<[u32; 3]> = o.indices.iter().copied().filter(there).collect();
     report.nowhere += o.indices.len() - triangles.len();
@@ -48,9 +49,16 @@ fn placed(o: &Object, with_normals: bool, report: &mut ConvertReport) -> Placed 
 
     let mut normals = Vec::new();
     if with_normals {
-        let cofactor = DMat3::from_cols(turn.y_axis.cross(turn.z_axis), turn.z_axis.cross(turn.x_axis), turn.x_axis.cross(turn.y_axis));
+        let cofactor = DMat3::from_cols(
+            turn.y_axis.cross(turn.z_axis),
+            turn.z_axis.cross(turn.x_axis),
+            turn.x_axis.cross(turn.y_axis),
+        );
         let side = if turn.determinant() < 0.0 { -1.0 } else { 1.0 };
-        let own = o.normals.iter().map(|n| (side * (cofactor * DVec3::from(n.map(f64::from)))).normalize_or_zero().as_vec3());
+        let own = o
+            .normals
+            .iter()
+            .map(|n| (side * (cofactor * DVec3::from(n.map(f64::from)))).normalize_or_zero().as_vec3());
         normals = own.collect();
         let computed = normals.is_empty();
         normals.resize(positions.len(), Vec3::ZERO);
@@ -99,7 +107,8 @@ pub fn to_poly_data(scene: &Scene, keys: &[String]) -> (PolyData, ConvertReport)
 fn joined(scene: &Scene, keys: &[String]) -> (TriMesh, Vec<(String, usize)>, ConvertReport) {
     let mut report = ConvertReport::default();
     let with_normals = scene.objects.iter().any(|o| wanted(o, keys) && !o.normals.is_empty());
-    let (mut positions, mut indices, mut normals, mut colors) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let (mut positions, mut indices, mut normals, mut colors) =
+        (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let mut triangles = Vec::new();
     for o in scene.objects.iter().filter(|o| wanted(o, keys)) {
         let p = placed(o, with_normals, &mut report);
@@ -133,9 +142,15 @@ mod tests {
         assert_eq!((at(1), at(5)), (DVec3::new(1.0, 0.0, 0.0), DVec3::new(11.0, 1.0, 0.0)));
         assert_eq!(mesh.indices[2], [3, 5, 6]);
         let normals = &mesh.normals.as_ref().unwrap().values;
-        assert!(normals.iter().all(|n| *n == Vec3::Z), "one object has normals, so all get some: {normals:?}");
+        assert!(
+            normals.iter().all(|n| *n == Vec3::Z),
+            "one object has normals, so all get some: {normals:?}"
+        );
         let colors = &mesh.colors.as_ref().unwrap().values;
-        assert!((colors[0][1] - srgb_to_linear(128.0 / 255.0)).abs() < 1e-6 && (colors[3][3] - 128.0 / 255.0).abs() < 1e-6);
+        assert!(
+            (colors[0][1] - srgb_to_linear(128.0 / 255.0)).abs() < 1e-6
+                && (colors[3][3] - 128.0 / 255.0).abs() < 1e-6
+        );
         assert_eq!(to_mesh(&example(), &["b2".into()]).0.indices.len(), 2);
     }
 

@@ -133,8 +133,10 @@ pub fn write_scene(path: &Path, scene: &Scene) -> Result<(), SceneError> {
     if let Some(what) = scene.objects.iter().find_map(Object::fault) {
         return Err(broken(path, what, "leave that object out"));
     }
-    let objects = scene.objects.iter().map(Object::counts).collect::<Result<_, _>>().map_err(|e| io(e.into()))?;
-    let header = Header { program: scene.program.clone(), frame: scene.frame, space: scene.space.clone(), objects };
+    let objects =
+        scene.objects.iter().map(Object::counts).collect::<Result<_, _>>().map_err(|e| io(e.into()))?;
+    let header =
+        Header { program: scene.program.clone(), frame: scene.frame, space: scene.space.clone(), objects };
     let name = path.file_name().ok_or_else(|| io(io::ErrorKind::InvalidInput.into()))?;
     let mut partial = name.to_os_string();
     partial.push(format!(".{}.partial", std::process::id()));
@@ -175,11 +177,16 @@ pub fn read_scene(path: &Path) -> Result<Scene, SceneError> {
     let mut first = vec![0; FIRST_LINE.len()];
     let is_scene = file.read_exact(&mut first).is_ok() && first == FIRST_LINE.as_bytes();
     if !is_scene {
-        return Err(broken(path, "is no scene of gluray, version 1", "give a file that the library wrote (GLURAY_DUMP, or `export the scene` on the panel)"));
+        return Err(broken(
+            path,
+            "is no scene of gluray, version 1",
+            "give a file that the library wrote (GLURAY_DUMP, or `export the scene` on the panel)",
+        ));
     }
     let mut line = Vec::new();
     file.by_ref().take(MAX_HEADER_BYTES).read_until(b'\n', &mut line).map_err(io)?;
-    let header: Header = serde_json::from_slice(&line).map_err(|e| broken(path, format!("its second line makes no sense: {e}"), AGAIN))?;
+    let header: Header = serde_json::from_slice(&line)
+        .map_err(|e| broken(path, format!("its second line makes no sense: {e}"), AGAIN))?;
     let begin = (FIRST_LINE.len() + line.len()) as u64;
 
     // Whether it is whole.
@@ -187,27 +194,44 @@ pub fn read_scene(path: &Path) -> Result<Scene, SceneError> {
     for c in &header.objects {
         let has = |what: &str| u64::from(c.has.iter().any(|h| h == what));
         let per_vertex = 12 + 12 * has("normals") + 4 * has("colors");
-        let bytes = c.vertices.checked_mul(per_vertex).zip(c.triangles.checked_mul(12)).and_then(|(v, t)| v.checked_add(t));
+        let bytes = c
+            .vertices
+            .checked_mul(per_vertex)
+            .zip(c.triangles.checked_mul(12))
+            .and_then(|(v, t)| v.checked_add(t));
         let sum = bytes.and_then(|b| expected.checked_add(b));
         expected = sum.ok_or_else(|| broken(path, "its counts are too large for any file", AGAIN))?;
     }
     if expected != length {
-        return Err(broken(path, format!("has {length} bytes, and its second line speaks of {expected}"), AGAIN));
+        return Err(broken(
+            path,
+            format!("has {length} bytes, and its second line speaks of {expected}"),
+            AGAIN,
+        ));
     }
 
-    let mut scene = Scene { program: header.program, frame: header.frame, space: header.space, objects: Vec::new() };
+    let mut scene =
+        Scene { program: header.program, frame: header.frame, space: header.space, objects: Vec::new() };
     for (i, c) in header.objects.into_iter().enumerate() {
         let (n, m) = (c.vertices as usize, c.triangles as usize);
         if let Some(other) = c.has.iter().find(|h| !["normals", "colors"].contains(&h.as_str())) {
-            return Err(broken(path, format!("object {i} has unknown `{other}`"), "read it with a newer gluray"));
+            return Err(broken(
+                path,
+                format!("object {i} has unknown `{other}`"),
+                "read it with a newer gluray",
+            ));
         }
         let has = |what: &str| if c.has.iter().any(|h| h == what) { n } else { 0 };
         let (normals, colors) = (has("normals"), has("colors"));
-        let mut o: Object = serde_json::from_value(c.object).map_err(|e| broken(path, format!("object {i}: {e}"), AGAIN))?;
+        let mut o: Object =
+            serde_json::from_value(c.object).map_err(|e| broken(path, format!("object {i}: {e}"), AGAIN))?;
         let mut triples = |count: usize| -> Result<Vec<[[u8; 4]; 3]>, SceneError> {
             let mut bytes = vec![0; 12 * count];
             file.read_exact(&mut bytes).map_err(io)?;
-            Ok(bytes.chunks_exact(12).map(|b| [0, 4, 8].map(|at| [b[at], b[at + 1], b[at + 2], b[at + 3]])).collect())
+            Ok(bytes
+                .chunks_exact(12)
+                .map(|b| [0, 4, 8].map(|at| [b[at], b[at + 1], b[at + 2], b[at + 3]]))
+                .collect())
         };
         o.positions = triples(n)?.into_iter().map(|t| t.map(f32::from_le_bytes)).collect();
         o.indices = triples(m)?.into_iter().map(|t| t.map(u32::from_le_bytes)).collect();
@@ -228,7 +252,8 @@ pub(super) mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    pub(in crate::export) const IDENTITY: [f64; 16] = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
+    pub(in crate::export) const IDENTITY: [f64; 16] =
+        [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
 
     pub(in crate::export) fn example() -> Scene {
         let mut moved = IDENTITY;
@@ -279,7 +304,10 @@ pub(super) mod tests {
             let e = read_scene(&path).unwrap_err().to_string();
             assert!(e.contains("a.gluray"), "{e}");
         }
-        let text = format!("{FIRST_LINE}{{\"program\":\"\",\"frame\":0,\"space\":\"\",\"objects\":[{{\"vertices\":{},\"triangles\":0,\"has\":[],\"key\":\"\",\"world_from_object\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],\"color\":[1,1,1,1]}}]}}\n", u64::MAX / 2);
+        let text = format!(
+            "{FIRST_LINE}{{\"program\":\"\",\"frame\":0,\"space\":\"\",\"objects\":[{{\"vertices\":{},\"triangles\":0,\"has\":[],\"key\":\"\",\"world_from_object\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],\"color\":[1,1,1,1]}}]}}\n",
+            u64::MAX / 2
+        );
         std::fs::write(&path, text).unwrap();
         assert!(read_scene(&path).unwrap_err().to_string().contains("too large"));
     }

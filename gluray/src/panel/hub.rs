@@ -122,7 +122,9 @@ impl Hub {
             exported: None,
             recent: Vec::new(),
         };
-        inner.programs.insert(id, Entry { shown, hello_problems: hello.problems, history: VecDeque::new(), outgoing });
+        inner
+            .programs
+            .insert(id, Entry { shown, hello_problems: hello.problems, history: VecDeque::new(), outgoing });
         drop(inner);
         self.tell();
         (id, receiver)
@@ -140,13 +142,16 @@ impl Hub {
                 }
                 e.history.push_back(*stats);
             }
-            ToPanel::Objects { objects, total } => (e.shown.objects, e.shown.objects_total) = (objects, total),
+            ToPanel::Objects { objects, total } => {
+                (e.shown.objects, e.shown.objects_total) = (objects, total)
+            }
             ToPanel::InForce { settings, refused } => {
                 e.shown.settings = *settings;
                 e.shown.problems = [e.hello_problems.clone(), refused].concat();
             }
             ToPanel::Exported { file, error } => {
-                e.shown.exported = Some(file.ok_or_else(|| error.unwrap_or_else(|| "no reason given".into())));
+                e.shown.exported =
+                    Some(file.ok_or_else(|| error.unwrap_or_else(|| "no reason given".into())));
             }
         }
         drop(inner);
@@ -159,7 +164,8 @@ impl Hub {
         if let Some(e) = inner.programs.get_mut(&id) {
             e.shown.running = false;
         }
-        let mut ended: Vec<u64> = inner.programs.iter().filter(|(_, e)| !e.shown.running).map(|(id, _)| *id).collect();
+        let mut ended: Vec<u64> =
+            inner.programs.iter().filter(|(_, e)| !e.shown.running).map(|(id, _)| *id).collect();
         ended.truncate(ended.len().saturating_sub(ENDED));
         ended.iter().for_each(|id| drop(inner.programs.remove(id)));
         drop(inner);
@@ -174,7 +180,8 @@ impl Hub {
     /// Every program on the list.
     pub fn programs(&self) -> Vec<Program> {
         let inner = self.lock();
-        let recent = |e: &Entry| e.history.iter().skip(e.history.len().saturating_sub(RECENT)).cloned().collect();
+        let recent =
+            |e: &Entry| e.history.iter().skip(e.history.len().saturating_sub(RECENT)).cloned().collect();
         inner.programs.values().map(|e| Program { recent: recent(e), ..e.shown.clone() }).collect()
     }
 
@@ -188,15 +195,22 @@ impl Hub {
         let mut inner = self.lock();
         let e = inner.programs.get_mut(&id).filter(|e| e.shown.running).ok_or(Refused::Gone(id))?;
         let mut assignments = e.shown.assignments.clone();
-        assignments.retain(|path, _| !reset.iter().any(|r| r == path || path.strip_prefix(r.as_str()).is_some_and(|rest| rest.starts_with('.'))));
+        assignments.retain(|path, _| {
+            !reset
+                .iter()
+                .any(|r| r == path || path.strip_prefix(r.as_str()).is_some_and(|rest| rest.starts_with('.')))
+        });
         assignments.extend(set);
         if assignments.len() > MAX_ASSIGNMENTS {
             return Err(Refused::TooMany);
         }
-        let list: Vec<Assignment> = assignments.iter().map(|(p, v)| Assignment::new("panel", p, v.clone())).collect();
+        let list: Vec<Assignment> =
+            assignments.iter().map(|(p, v)| Assignment::new("panel", p, v.clone())).collect();
         let (_, errors) = assign(&e.shown.base, &list);
         if !errors.is_empty() {
-            return Err(Refused::Setting(errors.iter().take(3).map(SettingError::to_string).collect::<Vec<_>>().join("; ")));
+            return Err(Refused::Setting(
+                errors.iter().take(3).map(SettingError::to_string).collect::<Vec<_>>().join("; "),
+            ));
         }
         let message = ToProgram::Change { assignments: assignments.clone() };
         e.outgoing.try_send(message).map_err(|_| Refused::Busy)?;
@@ -254,19 +268,26 @@ mod tests {
     fn changes_add_up_are_taken_back_and_become_a_file_that_means_the_same() {
         let hub = Hub::default();
         let (id, mut messages) = hub.join(Hello { program: "my prog".into(), ..Hello::default() });
-        hub.change(id, set(&[("mode", json!("rich")), ("objects.a1.color", json!([1, 0.5, 0]))]), &[]).unwrap();
-        hub.change(id, set(&[("samples", json!(4)), ("material.mirror", json!(0.5))]), &["mode".into()]).unwrap();
+        hub.change(id, set(&[("mode", json!("rich")), ("objects.a1.color", json!([1, 0.5, 0]))]), &[])
+            .unwrap();
+        hub.change(id, set(&[("samples", json!(4)), ("material.mirror", json!(0.5))]), &["mode".into()])
+            .unwrap();
         let mut last = None;
         while let Ok(m) = messages.try_recv() {
             last = Some(m);
         }
-        let expected = set(&[("objects.a1.color", json!([1, 0.5, 0])), ("samples", json!(4)), ("material.mirror", json!(0.5))]);
+        let expected = set(&[
+            ("objects.a1.color", json!([1, 0.5, 0])),
+            ("samples", json!(4)),
+            ("material.mirror", json!(0.5)),
+        ]);
         assert_eq!(last, Some(ToProgram::Change { assignments: expected.clone() }));
 
         let text = hub.toml(id).unwrap();
         let file = crate::config::ConfigFile::parse(std::path::Path::new("x"), &text).unwrap();
         let from_file = assign(&Settings::default(), &file.assignments(&["my prog".into()]));
-        let list: Vec<Assignment> = expected.iter().map(|(p, v)| Assignment::new("panel", p, v.clone())).collect();
+        let list: Vec<Assignment> =
+            expected.iter().map(|(p, v)| Assignment::new("panel", p, v.clone())).collect();
         assert_eq!(from_file, assign(&Settings::default(), &list), "{text}");
 
         hub.change(id, BTreeMap::new(), &["objects.a1".into()]).unwrap();

@@ -9,8 +9,8 @@
 
 use super::meeting::{Meeting, same};
 use super::protocol::{
-    FRAMES_PER_SEC, FrameStats, Hello, Lines, MAX_CHANGE_BYTES, MAX_OBJECTS, ObjectInfo, ToPanel, ToProgram, VERSION,
-    clipped, line,
+    FRAMES_PER_SEC, FrameStats, Hello, Lines, MAX_CHANGE_BYTES, MAX_OBJECTS, ObjectInfo, ToPanel, ToProgram,
+    VERSION, clipped, line,
 };
 use crate::config::{Assignment, Settings, assign};
 use std::collections::BTreeMap;
@@ -73,7 +73,10 @@ pub struct Link {
 
 impl std::fmt::Debug for Link {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Link").field("program", &self.hello.program).field("connected", &self.is_connected()).finish_non_exhaustive()
+        f.debug_struct("Link")
+            .field("program", &self.hello.program)
+            .field("connected", &self.is_connected())
+            .finish_non_exhaustive()
     }
 }
 
@@ -157,7 +160,8 @@ impl Link {
 
     /// Tells which objects there are. Cheap when they are those of last time.
     pub fn objects(&mut self, objects: &[ObjectInfo]) {
-        let mut kept: Vec<ObjectInfo> = objects.iter().map(|o| ObjectInfo { name: clipped(&o.name), ..o.clone() }).collect();
+        let mut kept: Vec<ObjectInfo> =
+            objects.iter().map(|o| ObjectInfo { name: clipped(&o.name), ..o.clone() }).collect();
         kept.sort_by(|a, b| b.triangles.cmp(&a.triangles).then_with(|| a.key.cmp(&b.key)));
         kept.truncate(MAX_OBJECTS);
         let message = line(&ToPanel::Objects { objects: kept, total: objects.len() as u64 });
@@ -202,8 +206,13 @@ impl Link {
         self.retry = RETRY[0];
         let secret = meeting.secret;
         let token = secret.token().to_owned();
-        self.connection =
-            Some(Connection { stream, welcome: false, incoming: Lines::default(), outgoing: Vec::new(), secret });
+        self.connection = Some(Connection {
+            stream,
+            welcome: false,
+            incoming: Lines::default(),
+            outgoing: Vec::new(),
+            secret,
+        });
         self.send(&ToPanel::Hello { version: VERSION, token, hello: Box::new(self.hello.clone()) });
     }
 
@@ -314,7 +323,11 @@ fn mean(mut sum: FrameStats, count: u32) -> FrameStats {
     sum.frame_ms /= f64::from(n);
     sum.phases_ms.values_mut().for_each(|v| *v /= f64::from(n));
     let whole = |v: &mut u64| *v = (*v + u64::from(n) / 2) / u64::from(n);
-    sum.rays.values_mut().chain(sum.reasons.values_mut()).chain([&mut sum.traced, &mut sum.passed]).for_each(whole);
+    sum.rays
+        .values_mut()
+        .chain(sum.reasons.values_mut())
+        .chain([&mut sum.traced, &mut sum.passed])
+        .for_each(whole);
     sum
 }
 

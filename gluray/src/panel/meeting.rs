@@ -116,7 +116,11 @@ impl Meeting {
         let file = std::fs::File::open(path).ok()?;
         // Of what was opened, not of what may lie there by now.
         let about = file.metadata().ok()?;
-        if !about.is_file() || about.mode() & 0o077 != 0 || Some(about.uid()) != folders::user_id() || about.len() > 4096 {
+        if !about.is_file()
+            || about.mode() & 0o077 != 0
+            || Some(about.uid()) != folders::user_id()
+            || about.len() > 4096
+        {
             return None;
         }
         let mut text = String::new();
@@ -126,7 +130,10 @@ impl Meeting {
 
     /// Writes the file into a folder, which is made when it is not there. It is removed when the guard goes.
     pub fn publish(&self, folder: &Path) -> Result<Published, MeetingError> {
-        let io = |path: &Path| { let path = path.to_path_buf(); move |source| MeetingError::Io { path, source } };
+        let io = |path: &Path| {
+            let path = path.to_path_buf();
+            move |source| MeetingError::Io { path, source }
+        };
         std::fs::DirBuilder::new().recursive(true).mode(0o700).create(folder).map_err(io(folder))?;
         let about = std::fs::symlink_metadata(folder).map_err(io(folder))?;
         if !about.is_dir() || Some(about.uid()) != folders::user_id() || about.mode() & 0o022 != 0 {
@@ -138,7 +145,8 @@ impl Meeting {
         let write = || -> io::Result<()> {
             // What an earlier process of this number left.
             let _ = std::fs::remove_file(&temporary);
-            let mut file = std::fs::OpenOptions::new().write(true).create_new(true).mode(0o600).open(&temporary)?;
+            let mut file =
+                std::fs::OpenOptions::new().write(true).create_new(true).mode(0o600).open(&temporary)?;
             file.write_all(&serde_json::to_vec(self).map_err(io::Error::other)?)?;
             std::fs::rename(&temporary, &path)
         };
@@ -214,8 +222,12 @@ mod tests {
             let set = [("GLURAY_PANEL", address.to_owned()), ("GLURAY_PANEL_SECRET", secret.to_owned())];
             Meeting::find(move |n| set.iter().find(|(k, _)| *k == n).map(|(_, v)| v.clone()))
         };
-        assert!(by_variables("127.0.0.1:80", &secret).is_some() && by_variables("[::1]:80", &secret).is_some());
-        for (address, secret) in [("10.0.0.1:80", secret.as_str()), ("localhost", &secret), ("127.0.0.1:80", "short")] {
+        assert!(
+            by_variables("127.0.0.1:80", &secret).is_some() && by_variables("[::1]:80", &secret).is_some()
+        );
+        for (address, secret) in
+            [("10.0.0.1:80", secret.as_str()), ("localhost", &secret), ("127.0.0.1:80", "short")]
+        {
             assert_eq!(by_variables(address, secret), None, "{address}");
         }
         std::fs::set_permissions(dir.path(), std::fs::Permissions::from_mode(0o777)).unwrap();

@@ -190,7 +190,10 @@ async fn settings_file(State(app): State<App>, Query(Which { id }): Query<Which>
         Ok(text) => {
             let mut headers = HeaderMap::new();
             headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/toml"));
-            headers.insert(header::CONTENT_DISPOSITION, HeaderValue::from_static("attachment; filename=\"gluray.toml\""));
+            headers.insert(
+                header::CONTENT_DISPOSITION,
+                HeaderValue::from_static("attachment; filename=\"gluray.toml\""),
+            );
             (headers, text).into_response()
         }
         Err(refused) => refused.into_response(),

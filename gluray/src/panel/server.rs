@@ -13,7 +13,9 @@ use std::time::Duration;
 #[derive(Debug, thiserror::Error)]
 pub enum PanelError {
     /// Off loopback.
-    #[error("{0} can be reached from other machines; the panel listens on loopback only: give 127.0.0.1 or [::1]")]
+    #[error(
+        "{0} can be reached from other machines; the panel listens on loopback only: give 127.0.0.1 or [::1]"
+    )]
     NotLoopback(IpAddr),
     /// Nothing can listen there.
     #[error("cannot listen on {address}; give another port (0 takes a free one)")]
@@ -59,7 +61,8 @@ pub fn serve(
     let (mut secret, mut token) = ([0; 32], [0; 16]);
     getrandom::fill(&mut secret).and_then(|()| getrandom::fill(&mut token)).map_err(|e| start(&e))?;
     let (secret, token) = (Secret::of(secret), token.iter().map(|b| format!("{b:02x}")).collect::<String>());
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(|e| start(&e))?;
+    let runtime =
+        tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(|e| start(&e))?;
     let bind = |address: SocketAddr| {
         let listen = move |source| PanelError::Listen { address, source };
         let listener = runtime.block_on(tokio::net::TcpListener::bind(address)).map_err(listen)?;
@@ -69,7 +72,8 @@ pub fn serve(
     let (page, page_address) = bind(address)?;
     let (link, link_address) = bind(SocketAddr::new(address.ip(), 0))?;
     let meeting = Meeting { address: link_address, secret: secret.clone() };
-    let folder = folder.or_else(|| crate::folders::runtime(crate::folders::variable)).ok_or(MeetingError::NoFolder)?;
+    let folder =
+        folder.or_else(|| crate::folders::runtime(crate::folders::variable)).ok_or(MeetingError::NoFolder)?;
     let _published = meeting.publish(&folder)?;
     ready(&Opened { url: format!("http://{page_address}/{token}/"), meeting });
 

@@ -26,7 +26,8 @@ const TOP: f64 = 34.0;
 const ROW: f64 = 30.0;
 const BOX: f64 = 22.0;
 /// Told apart by people who see colours otherwise, too (Okabe and Ito 2008), and beyond eight by their order.
-const COLORS: [&str; 8] = ["#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#0072b2", "#d55e00", "#f0e442", "#999999"];
+const COLORS: [&str; 8] =
+    ["#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#0072b2", "#d55e00", "#f0e442", "#999999"];
 /// Boxes narrower than this are joined with their neighbours of the same phase: a run of minutes would make a file of gigabytes.
 const NARROWEST: f64 = 0.25;
 
@@ -35,7 +36,9 @@ pub fn gantt_svg(spans: &[Span], options: &GanttOptions) -> String {
     let sound: Vec<&Span> = spans.iter().filter(|s| s.is_sound()).collect();
     let tracks = in_order(spans, |s| &s.track);
     let phases = in_order(spans, |s| &s.phase);
-    let all = sound.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], s| [a.min(s.start_ms), b.max(s.end_ms())]);
+    let all = sound
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], s| [a.min(s.start_ms), b.max(s.end_ms())]);
     let [from, to] = options.window_ms.unwrap_or(if sound.is_empty() { [0.0, 1.0] } else { all });
     let to = if to > from { to } else { from + 1.0 };
     let width = f64::from(options.width.max(300));
@@ -61,20 +64,43 @@ pub fn gantt_svg(spans: &[Span], options: &GanttOptions) -> String {
     let mut tick = (from / step).ceil() * step;
     while tick <= to {
         let at = x(tick);
-        line(format_args!("<line x1=\"{at:.2}\" y1=\"{TOP}\" x2=\"{at:.2}\" y2=\"{bottom}\" stroke=\"#ddd\"/>"));
+        line(format_args!(
+            "<line x1=\"{at:.2}\" y1=\"{TOP}\" x2=\"{at:.2}\" y2=\"{bottom}\" stroke=\"#ddd\"/>"
+        ));
         let decimals = if step < 1.0 { (-step.log10()).ceil() as usize } else { 0 };
         let label = format!("{:.decimals$}", tick + 0.0);
-        line(format_args!("<text x=\"{at:.2}\" y=\"{:.1}\" text-anchor=\"middle\" fill=\"#555\">{label}</text>", bottom + 15.0));
+        line(format_args!(
+            "<text x=\"{at:.2}\" y=\"{:.1}\" text-anchor=\"middle\" fill=\"#555\">{label}</text>",
+            bottom + 15.0
+        ));
         tick += step;
     }
-    line(format_args!("<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\" fill=\"#555\">milliseconds</text>", LEFT - 8.0, bottom + 15.0));
+    line(format_args!(
+        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\" fill=\"#555\">milliseconds</text>",
+        LEFT - 8.0,
+        bottom + 15.0
+    ));
 
     // Rows.
     for (row, track) in tracks.iter().enumerate() {
         let y = TOP + ROW * row as f64;
-        line(format_args!("<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>", LEFT - 8.0, y + 0.5 * ROW + 4.0, escaped(track)));
-        line(format_args!("<line x1=\"{LEFT}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" stroke=\"#ccc\"/>", y + ROW, width - RIGHT, y + ROW));
-        let mut own: Vec<&Span> = sound.iter().copied().filter(|s| s.track == **track && s.end_ms() >= from && s.start_ms <= to).collect();
+        line(format_args!(
+            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+            LEFT - 8.0,
+            y + 0.5 * ROW + 4.0,
+            escaped(track)
+        ));
+        line(format_args!(
+            "<line x1=\"{LEFT}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" stroke=\"#ccc\"/>",
+            y + ROW,
+            width - RIGHT,
+            y + ROW
+        ));
+        let mut own: Vec<&Span> = sound
+            .iter()
+            .copied()
+            .filter(|s| s.track == **track && s.end_ms() >= from && s.start_ms <= to)
+            .collect();
         own.sort_by(|a, b| a.start_ms.total_cmp(&b.start_ms));
         for b in boxes(&own, x(from), x(to), x) {
             let color = COLORS[phases.iter().position(|p| *p == b.phase).unwrap_or(0) % COLORS.len()];
@@ -84,37 +110,59 @@ pub fn gantt_svg(spans: &[Span], options: &GanttOptions) -> String {
             };
             line(format_args!(
                 "<rect x=\"{:.2}\" y=\"{:.1}\" width=\"{:.2}\" height=\"{BOX}\" fill=\"{color}\"><title>{}</title></rect>",
-                b.left, y + 0.5 * (ROW - BOX), (b.right - b.left).max(NARROWEST), escaped(&text)
+                b.left,
+                y + 0.5 * (ROW - BOX),
+                (b.right - b.left).max(NARROWEST),
+                escaped(&text)
             ));
         }
     }
     if sound.is_empty() {
-        line(format_args!("<text x=\"{:.1}\" y=\"{:.1}\" fill=\"#555\">nothing was recorded</text>", LEFT + 8.0, TOP + 20.0));
+        line(format_args!(
+            "<text x=\"{:.1}\" y=\"{:.1}\" fill=\"#555\">nothing was recorded</text>",
+            LEFT + 8.0,
+            TOP + 20.0
+        ));
     }
 
     // Ends of frames.
     let mut frame = None;
-    let mut marks: Vec<(f64, u64)> = Vec::new();
+    let mut marks: Vec<f64> = Vec::new();
     for s in sound.iter().filter(|s| s.frame > 0 && tracks.first() == Some(&s.track.as_str())) {
-        if frame.is_some_and(|f| f < s.frame) {
-            marks.push((s.start_ms, s.frame));
+        if frame.is_some_and(|f| f < s.frame) && (from..=to).contains(&s.start_ms) {
+            marks.push(s.start_ms);
         }
         frame = frame.max(Some(s.frame));
     }
     // Marks that would make a grey block say nothing.
     if marks.len() < inner as usize / 8 {
-        for (ms, _) in marks.iter().filter(|(ms, _)| (from..=to).contains(ms)) {
-            line(format_args!("<line x1=\"{0:.2}\" y1=\"{TOP}\" x2=\"{0:.2}\" y2=\"{bottom}\" stroke=\"#333\" stroke-dasharray=\"3 3\"/>", x(*ms)));
+        for ms in &marks {
+            line(format_args!(
+                "<line x1=\"{0:.2}\" y1=\"{TOP}\" x2=\"{0:.2}\" y2=\"{bottom}\" stroke=\"#333\" stroke-dasharray=\"3 3\"/>",
+                x(*ms)
+            ));
         }
     }
 
-    // Legend: each phase with its sum.
+    // Legend: each phase with its time in the chart.
     for (i, phase) in phases.iter().enumerate() {
         let columns = legend_columns(inner);
-        let (left, y) = (LEFT + inner / columns as f64 * (i % columns) as f64, bottom + 38.0 + 18.0 * (i / columns) as f64);
-        let sum: f64 = sound.iter().filter(|s| s.phase == **phase).map(|s| s.ms).sum();
-        line(format_args!("<rect x=\"{left:.1}\" y=\"{:.1}\" width=\"11\" height=\"11\" fill=\"{}\"/>", y - 10.0, COLORS[i % COLORS.len()]));
-        line(format_args!("<text x=\"{:.1}\" y=\"{y:.1}\">{} {sum:.1} ms</text>", left + 16.0, escaped(phase)));
+        let (left, y) = (
+            LEFT + inner / columns as f64 * (i % columns) as f64,
+            bottom + 38.0 + 18.0 * (i / columns) as f64,
+        );
+        let inside = |s: &&&Span| s.phase == **phase && s.end_ms() >= from && s.start_ms <= to;
+        let sum: f64 = sound.iter().filter(inside).map(|s| s.end_ms().min(to) - s.start_ms.max(from)).sum();
+        line(format_args!(
+            "<rect x=\"{left:.1}\" y=\"{:.1}\" width=\"11\" height=\"11\" fill=\"{}\"/>",
+            y - 10.0,
+            COLORS[i % COLORS.len()]
+        ));
+        line(format_args!(
+            "<text x=\"{:.1}\" y=\"{y:.1}\">{} {sum:.1} ms</text>",
+            left + 16.0,
+            escaped(phase)
+        ));
     }
     line(format_args!("</svg>"));
     s
@@ -135,7 +183,8 @@ fn boxes<'a>(own: &[&'a Span], least: f64, most: f64, x: impl Fn(f64) -> f64) ->
     for s in own {
         let (left, right) = (x(s.start_ms).clamp(least, most), x(s.end_ms()).clamp(least, most));
         let narrow = right - left < NARROWEST;
-        let last = out.iter_mut().rev().take(4).find(|l| narrow && l.phase == s.phase && left - l.right < NARROWEST);
+        let last =
+            out.iter_mut().rev().take(4).find(|l| narrow && l.phase == s.phase && left - l.right < NARROWEST);
         match last {
             Some(l) => {
                 l.right = l.right.max(right);
@@ -174,12 +223,18 @@ mod tests {
     fn attributes(svg: &str, tag: &str, name: &str) -> Vec<f64> {
         let begin = format!("<{tag} ");
         let elements = svg.lines().filter(|l| l.starts_with(&begin));
-        elements.filter_map(|l| l.split_once(&format!(" {name}=\""))?.1.split('"').next()?.parse().ok()).collect()
+        elements
+            .filter_map(|l| l.split_once(&format!(" {name}=\""))?.1.split('"').next()?.parse().ok())
+            .collect()
     }
 
     #[test]
     fn boxes_lie_where_the_clock_says() {
-        let spans = [span("program", "capture", 1, 0.0, 25.0), span("program", "trace", 1, 25.0, 75.0), span("build", "best", 1, 50.0, 50.0)];
+        let spans = [
+            span("program", "capture", 1, 0.0, 25.0),
+            span("program", "trace", 1, 25.0, 75.0),
+            span("build", "best", 1, 50.0, 50.0),
+        ];
         let options = GanttOptions { width: 1126, ..GanttOptions::default() };
         let svg = gantt_svg(&spans, &options);
         // 1000 pixels for 100 ms, from 110 on. The first rectangle is the ground, the last three are the legend.
@@ -190,7 +245,8 @@ mod tests {
 
     #[test]
     fn many_short_spans_make_a_small_picture_and_lose_no_time() {
-        let spans: Vec<Span> = (0..100_000).map(|i| span("program", "trace", i / 10, i as f64 * 0.01, 0.008)).collect();
+        let spans: Vec<Span> =
+            (0..100_000).map(|i| span("program", "trace", i / 10, i as f64 * 0.01, 0.008)).collect();
         let svg = gantt_svg(&spans, &GanttOptions::default());
         assert!(svg.len() < 1_000_000, "{} bytes", svg.len());
         assert!(svg.contains("trace 800.0 ms"));
@@ -198,7 +254,10 @@ mod tests {
 
     #[test]
     fn names_cannot_break_the_file_and_nothing_is_a_chart_too() {
-        let svg = gantt_svg(&[span("a<b", "\"c\"&", 1, 0.0, 1.0), span("x", "y", 1, f64::NAN, 1.0)], &GanttOptions { title: "<script>".into(), ..GanttOptions::default() });
+        let svg = gantt_svg(
+            &[span("a<b", "\"c\"&", 1, 0.0, 1.0), span("x", "y", 1, f64::NAN, 1.0)],
+            &GanttOptions { title: "<script>".into(), ..GanttOptions::default() },
+        );
         assert!(svg.contains("&lt;script&gt;") && svg.contains("a&lt;b") && !svg.contains("<script>"));
         assert!(gantt_svg(&[], &GanttOptions::default()).contains("nothing was recorded"));
     }

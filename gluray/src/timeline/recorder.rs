@@ -39,7 +39,13 @@ impl Recorder {
         if self.spans.len() == self.most {
             self.spans.pop_front();
         }
-        self.spans.push_back(Span { track: track.into(), phase: phase.into(), frame, start_ms, ms: ms(took) });
+        self.spans.push_back(Span {
+            track: track.into(),
+            phase: phase.into(),
+            frame,
+            start_ms,
+            ms: ms(took),
+        });
     }
 
     /// Takes the spans out, oldest first. The clock goes on.

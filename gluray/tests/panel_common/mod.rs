@@ -87,7 +87,9 @@ impl Panel {
     /// A request with these head lines below the token.
     pub(crate) fn ask_with(&self, method: &str, path: &str, head: &str, body: &str) -> Answer {
         let (base, length) = (&self.base, body.len());
-        let request = format!("{method} {base}{path} HTTP/1.1\r\n{head}Connection: close\r\nContent-Length: {length}\r\n\r\n{body}");
+        let request = format!(
+            "{method} {base}{path} HTTP/1.1\r\n{head}Connection: close\r\nContent-Length: {length}\r\n\r\n{body}"
+        );
         self.raw(request.as_bytes()).unwrap_or_else(|| panic!("{method} {path}: no answer"))
     }
 
@@ -131,7 +133,8 @@ impl Fake {
     pub(crate) fn start(name: &str, meeting: Meeting, scenes: &Path) -> Fake {
         let settings = Arc::new(Mutex::new(Settings::default()));
         let stop = Arc::new(AtomicBool::new(false));
-        let (mine, ends, name, scenes) = (settings.clone(), stop.clone(), name.to_owned(), scenes.to_path_buf());
+        let (mine, ends, name, scenes) =
+            (settings.clone(), stop.clone(), name.to_owned(), scenes.to_path_buf());
         let thread = std::thread::spawn(move || run(&name, meeting, &scenes, &mine, &ends));
         Fake { settings, stop, thread: Some(thread) }
     }
@@ -190,7 +193,8 @@ fn run(name: &str, meeting: Meeting, scenes: &Path, settings: &Mutex<Settings>, 
 
 fn stats(frame: u64, s: &Settings) -> FrameStats {
     let wave = 1.0 + 0.2 * (frame as f64 / 40.0).sin();
-    let occlusion = if s.mode == gluray::config::Mode::Rich { s.effects.ambient_occlusion_samples } else { 0 };
+    let occlusion =
+        if s.mode == gluray::config::Mode::Rich { s.effects.ambient_occlusion_samples } else { 0 };
     let (primary, occlusion) = (640_000 * u64::from(s.samples), 640_000 * u64::from(occlusion));
     let trace = wave * (6.0 + occlusion as f64 / 4e5);
     let mut rays = std::collections::BTreeMap::from([("primary".to_owned(), primary)]);
@@ -200,7 +204,12 @@ fn stats(frame: u64, s: &Settings) -> FrameStats {
     FrameStats {
         frame,
         frame_ms: trace + 9.0,
-        phases_ms: [("capture".to_owned(), 2.0 * wave), ("present".to_owned(), 4.0), ("trace".to_owned(), trace)].into(),
+        phases_ms: [
+            ("capture".to_owned(), 2.0 * wave),
+            ("present".to_owned(), 4.0),
+            ("trace".to_owned(), trace),
+        ]
+        .into(),
         rays,
         traced: 30,
         passed: 12,

@@ -18,7 +18,10 @@ fn hello() -> Hello {
 
 fn pair() -> Pair {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let meeting = Meeting { address: listener.local_addr().unwrap(), secret: Secret::of(std::array::from_fn(|i| i as u8)) };
+    let meeting = Meeting {
+        address: listener.local_addr().unwrap(),
+        secret: Secret::of(std::array::from_fn(|i| i as u8)),
+    };
     let mut link = Link::connect(meeting.clone(), hello());
     assert_eq!(link.poll(), None);
     let panel = listener.accept().unwrap().0;
@@ -62,9 +65,16 @@ fn change(list: &[(&str, serde_json::Value)]) -> ToProgram {
 fn settings_come_through_and_are_confirmed() {
     let mut p = pair();
     let ToPanel::Hello { version, token, hello } = p.heard() else { panic!() };
-    assert_eq!((version, token.as_str(), hello.program.as_str()), (VERSION, p.meeting.secret.token(), "test"));
+    assert_eq!(
+        (version, token.as_str(), hello.program.as_str()),
+        (VERSION, p.meeting.secret.token(), "test")
+    );
     p.welcome();
-    p.say(&change(&[("mode", "rich".into()), ("effects.ambient_occlusion_samples", 32.into()), ("samples", 0.into())]));
+    p.say(&change(&[
+        ("mode", "rich".into()),
+        ("effects.ambient_occlusion_samples", 32.into()),
+        ("samples", 0.into()),
+    ]));
     let wishes = p.until(|_, w| !w.is_empty());
     let Wish::Settings(s) = &wishes[0] else { panic!() };
     assert_eq!((s.mode, s.effects.ambient_occlusion_samples, s.samples), (Mode::Rich, 32, 1));
@@ -119,13 +129,17 @@ fn frames_are_thinned_to_means_and_a_panel_that_does_not_read_costs_nothing() {
     let ToPanel::Frame { stats: first } = p.heard() else { panic!() };
     assert_eq!((first.frame, first.frame_ms), (0, 2.0));
     let ToPanel::Frame { stats: second } = p.heard() else { panic!() };
-    assert!(second.frame > 1 && (second.frame_ms - 2.0).abs() < 1e-9 && second.rays["primary"] == 100, "{second:?}");
+    assert!(
+        second.frame > 1 && (second.frame_ms - 2.0).abs() < 1e-9 && second.rays["primary"] == 100,
+        "{second:?}"
+    );
     // Two system calls a poll on a loaded machine; the bound is for a wait that should not be there.
     assert!(elapsed < Duration::from_secs(10), "{elapsed:?} for 50 000 frames");
 
     // Megabytes that nobody reads.
-    let many: Vec<ObjectInfo> =
-        (0..MAX_OBJECTS as u64).map(|i| ObjectInfo { key: format!("k{i}"), name: "x".repeat(500), triangles: i, color: None }).collect();
+    let many: Vec<ObjectInfo> = (0..MAX_OBJECTS as u64)
+        .map(|i| ObjectInfo { key: format!("k{i}"), name: "x".repeat(500), triangles: i, color: None })
+        .collect();
     let begin = Instant::now();
     for i in 0..100 {
         p.link.objects(&many[i..]);
@@ -147,7 +161,10 @@ fn without_a_panel_frames_cost_a_look_at_the_clock() {
         link.frame(&FrameStats::default());
     }
     assert!(begin.elapsed() < Duration::from_secs(2), "{:?}", begin.elapsed());
-    let mut abroad = Link::connect(Meeting { address: "192.0.2.1:80".parse().unwrap(), secret: Secret::of([0; 32]) }, hello());
+    let mut abroad = Link::connect(
+        Meeting { address: "192.0.2.1:80".parse().unwrap(), secret: Secret::of([0; 32]) },
+        hello(),
+    );
     abroad.poll();
     assert!(abroad.connection.is_none(), "no other host");
 }
