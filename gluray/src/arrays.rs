@@ -206,12 +206,12 @@ impl Elements {
     }
 
     /// Triangles, in vertex numbers of the span.
-    pub(crate) fn triangles(&self, mode: u32, first_provokes: bool) -> Vec<[u32; 3]> {
+    pub(crate) fn triangles(&self, mode: u32, first_provokes: bool, flat: bool) -> Vec<[u32; 3]> {
         let mut out = Vec::new();
         match self {
-            Elements::Range { count, .. } => triangulate(mode, 0, *count as u32, first_provokes, &mut out),
+            Elements::Range { count, .. } => triangulate(mode, 0, *count as u32, first_provokes, flat, &mut out),
             Elements::Indexed { indices, least, .. } => {
-                triangulate(mode, 0, indices.len() as u32, first_provokes, &mut out);
+                triangulate(mode, 0, indices.len() as u32, first_provokes, flat, &mut out);
                 let vertex = |i: u32| indices[i as usize] - *least as u32;
                 out.iter_mut().for_each(|t| *t = t.map(vertex));
             }
@@ -323,7 +323,7 @@ impl Context {
                 return Err(why);
             }
         }
-        let triangles = elements.triangles(mode, self.state.first_vertex_provokes);
+        let triangles = elements.triangles(mode, self.state.first_vertex_provokes, self.state.flat);
         self.sync();
         if verdict == Verdict::TraceInOrder {
             self.flush("a draw whose order matters");

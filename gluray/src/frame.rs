@@ -38,9 +38,9 @@ impl Context {
             return;
         }
         let start = Instant::now();
-        let first = self.state.first_vertex_provokes;
+        let kind = [self.state.first_vertex_provokes, self.state.flat];
         let (positions, runs) = (std::mem::take(&mut self.recorder.positions), std::mem::take(&mut self.recorder.runs));
-        let geometry = self.cache.of_runs(&positions, &runs, first);
+        let geometry = self.cache.of_runs(&positions, &runs, kind);
         let attributes = Arc::new(self.recorder.take_attributes());
         let clip_from_object = product(&self.state.projection, &self.state.model_view);
         let calls = std::mem::take(&mut self.recorder.calls);
@@ -182,6 +182,7 @@ impl Context {
     pub(crate) fn read_back(&mut self) {
         if self.frame.traced {
             self.frame_done();
+            self.counters.publish(true);
         }
     }
 

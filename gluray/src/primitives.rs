@@ -9,8 +9,9 @@ pub(crate) fn is_filled(mode: u32) -> bool {
 }
 
 /// The triangles of a primitive whose vertices are numbered `first..first + count`; the vertex that gives the flat colour comes
-/// last. Incomplete primitives give nothing, as OpenGL has it.
-pub(crate) fn triangulate(mode: u32, first: u32, count: u32, first_provokes: bool, out: &mut Vec<[u32; 3]>) {
+/// last. Incomplete primitives give nothing, as OpenGL has it. `flat` says that only that vertex' colour counts: Mesa splits quads along
+/// another diagonal then.
+pub(crate) fn triangulate(mode: u32, first: u32, count: u32, first_provokes: bool, flat: bool, out: &mut Vec<[u32; 3]>) {
     let v = |i: u32| first + i;
     // Rotates so that vertex 0 (the first) comes last; the orientation stays.
     let provoked = |t: [u32; 3]| if first_provokes { [t[1], t[2], t[0]] } else { t };
@@ -25,7 +26,7 @@ pub(crate) fn triangulate(mode: u32, first: u32, count: u32, first_provokes: boo
             false => [v(0), v(i), v(i + 1)],
             true => [v(i + 1), v(0), v(i)],
         })),
-        QUADS => out.extend((0..count / 4).flat_map(|i| quad([0, 1, 2, 3].map(|k| v(4 * i + k)), first_provokes))),
+        QUADS => out.extend((0..count / 4).flat_map(|i| quad([0, 1, 2, 3].map(|k| v(4 * i + k)), first_provokes, flat))),
         QUAD_STRIP => out.extend((0..(count / 2).saturating_sub(1)).flat_map(|i| {
             let [a, b, c, d] = [0, 1, 2, 3].map(|k| v(2 * i + k));
             match first_provokes {
@@ -39,8 +40,9 @@ pub(crate) fn triangulate(mode: u32, first: u32, count: u32, first_provokes: boo
     }
 }
 
-fn quad([a, b, c, d]: [u32; 4], first_provokes: bool) -> [[u32; 3]; 2] {
+fn quad([a, b, c, d]: [u32; 4], first_provokes: bool, flat: bool) -> [[u32; 3]; 2] {
     match first_provokes {
+        false if !flat => [[a, b, c], [a, c, d]],
         false => [[a, b, d], [b, c, d]],
         true => [[b, c, a], [c, d, a]],
     }
@@ -52,7 +54,7 @@ mod tests {
 
     fn triangles(mode: u32, count: u32) -> Vec<[u32; 3]> {
         let mut out = Vec::new();
-        triangulate(mode, 10, count, false, &mut out);
+        triangulate(mode, 10, count, false, true, &mut out);
         out
     }
 
@@ -82,7 +84,7 @@ mod tests {
         for first in [false, true] {
             for mode in [TRIANGLE_STRIP, QUAD_STRIP] {
                 let mut out = Vec::new();
-                triangulate(mode, 10, 8, first, &mut out);
+                triangulate(mode, 10, 8, first, true, &mut out);
                 assert_eq!(out.len(), 6);
                 let place = if mode == QUAD_STRIP { |i: u32| [f64::from(i / 2), -f64::from(i % 2)] } else { zigzag };
                 let turns: Vec<bool> = out.iter().map(|t| turns_left(*t, place)).collect();
@@ -90,7 +92,7 @@ mod tests {
             }
             for mode in [TRIANGLES, TRIANGLE_FAN, QUADS, POLYGON] {
                 let mut out = Vec::new();
-                triangulate(mode, 10, 8, first, &mut out);
+                triangulate(mode, 10, 8, first, true, &mut out);
                 assert!(out.iter().all(|t| turns_left(*t, circle)), "mode {mode}: {out:?}");
             }
         }
@@ -99,9 +101,12 @@ mod tests {
     #[test]
     fn the_provoking_vertex_comes_last() {
         assert_eq!(triangles(QUADS, 4).iter().map(|t| t[2]).collect::<Vec<_>>(), [13, 13]);
+        let mut smooth = Vec::new();
+        triangulate(QUADS, 0, 4, false, false, &mut smooth);
+        assert_eq!(smooth, [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(triangles(POLYGON, 5).iter().map(|t| t[2]).collect::<Vec<_>>(), [10, 10, 10]);
         let mut out = Vec::new();
-        triangulate(TRIANGLE_STRIP, 0, 4, true, &mut out);
+        triangulate(TRIANGLE_STRIP, 0, 4, true, true, &mut out);
         assert_eq!(out.iter().map(|t| t[2]).collect::<Vec<_>>(), [0, 1]);
     }
 }

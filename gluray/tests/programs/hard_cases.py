@@ -19,7 +19,7 @@ class VisualInfo(c.Structure):
 
 
 class Attributes(c.Structure):
-    _fields_ = [("a", c_ulong * 9), ("override", c_int), ("pad", c_int), ("colormap", c_ulong), ("cursor", c_ulong)]
+    _fields_ = [("before", c_ulong * 12), ("colormap", c_ulong), ("cursor", c_ulong)]
 
 
 def F(name, *types):
