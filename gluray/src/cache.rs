@@ -41,6 +41,11 @@ impl Geometry {
         if let Some(best) = self.best.get() {
             return Some(best.clone());
         }
+        if crate::config::current().settings.quality == crate::config::Quality::Best {
+            *built += 1;
+            self.improve();
+            return self.best.get().cloned();
+        }
         let mut slot = self.world.lock().unwrap_or_else(|e| e.into_inner());
         if slot.is_none() {
             *built += 1;
@@ -71,7 +76,11 @@ impl Geometry {
 }
 
 fn build(mesh: &Arc<TriMesh>, quality: BuildQuality) -> Option<Arc<World>> {
-    World::from_mesh(mesh.clone(), &BuildOptions { quality, ..BuildOptions::default() }).ok().map(Arc::new)
+    let start = std::time::Instant::now();
+    let world = World::from_mesh(mesh.clone(), &BuildOptions { quality, ..BuildOptions::default() }).ok().map(Arc::new);
+    let phase = if matches!(quality, BuildQuality::Fast) { "fast build" } else { "best build" };
+    crate::report::span("builds", phase, 0, start.elapsed());
+    world
 }
 
 struct Entry {
@@ -150,15 +159,14 @@ impl Cache {
     }
 
     /// A frame is over: what was not used for long goes, what rests gets a better structure.
-    pub(crate) fn frame_done(&mut self, improve: impl Fn(Arc<Geometry>)) {
+    pub(crate) fn frame_done(&mut self, improve: impl Fn(Arc<Geometry>) -> bool) {
         self.frame += 1;
         let now = self.frame;
         self.entries.retain(|_, e| now - e.last_used <= KEPT_FRAMES);
         for e in self.entries.values_mut() {
             let rests = e.frames >= RESTING_FRAMES && e.geometry.mesh.num_triangles() >= WORTH_IMPROVING;
             if rests && !e.improving {
-                e.improving = true;
-                improve(e.geometry.clone());
+                e.improving = improve(e.geometry.clone());
             }
         }
     }
@@ -262,7 +270,7 @@ mod tests {
         for i in 0..50 {
             let p = vec![[i as f32; 3]; 30_000];
             cache.of_runs(&p, &[Run { mode: TRIANGLES, count: 3, times: 10_000 }], [false; 2]);
-            cache.frame_done(|_| ());
+            cache.frame_done(|_| true);
         }
         assert!(cache.entries.len() <= KEPT_FRAMES as usize + 1, "{}", cache.entries.len());
     }

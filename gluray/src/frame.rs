@@ -20,6 +20,8 @@ pub(crate) struct Frame {
     others: bool,
     /// Something was traced since the last frame ended.
     traced: bool,
+    /// What the control panel and reports are told of it.
+    told: crate::control::Told,
 }
 
 impl Frame {
@@ -106,6 +108,7 @@ impl Context {
         }
         self.frame.traced = true;
         self.counters.flushed(before);
+        self.frame.told.traced(self.counters.report.frames + 1, pending.iter().map(|(d, _)| d));
         let start = Instant::now();
         let mut builds = 0;
         let (layer, rays) = worker::on_pool(|| {
@@ -130,6 +133,7 @@ impl Context {
     fn trace_in_order(&mut self, draw: &Draw, image: Option<Arc<Image>>) {
         self.frame.traced = true;
         self.counters.flushed("in order");
+        self.frame.told.traced(self.counters.report.frames + 1, std::iter::once(draw));
         let start = Instant::now();
         let mut builds = 0;
         let (layers, rays) = worker::on_pool(|| match Prepared::new(draw, image, &mut builds) {
@@ -150,8 +154,28 @@ impl Context {
         self.counters.report.frames += 1;
         self.frame.traced = false;
         (self.counters.report.cache_hits, self.counters.report.cache_misses) = (self.cache.hits, self.cache.misses);
-        self.cache.frame_done(|g| worker::in_background(move || g.improve()));
+        let fast = self.config.settings.quality == crate::config::Quality::Fast;
+        self.cache.frame_done(|g| {
+            if !fast {
+                worker::in_background(move || g.improve());
+            }
+            !fast
+        });
+        let size = [2, 3].map(|i| self.state.viewport[i].max(0).cast_unsigned());
+        self.counters.report.objects = self.frame.told.frame_done(&self.counters.report, size);
+        self.take_up_settings();
         self.counters.publish(false);
+    }
+
+    /// Other settings hold from the next frame on.
+    fn take_up_settings(&mut self) {
+        let config = crate::config::current();
+        if !Arc::ptr_eq(&config, &self.config) {
+            self.config = config;
+            // Verdicts depend on settings.
+            self.dirty = crate::symbols::class::ALL;
+            crate::symbols::attend();
+        }
     }
 
     /// The program reads what was drawn: a frame, too, when something was traced for it.

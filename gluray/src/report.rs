@@ -2,8 +2,12 @@
 //! running any of their exit handlers.
 
 use serde::{Deserialize, Serialize};
+use crate::timeline::Recorder;
 use std::collections::BTreeMap;
+use std::io::Write as _;
+use std::path::Path;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
 /// The account of one process.
@@ -44,6 +48,12 @@ pub struct Report {
     pub milliseconds: BTreeMap<String, f64>,
     /// Errors of ours; the driver drew from then on.
     pub faults: Vec<String>,
+    /// Settings that made no sense and were not taken.
+    pub problems: Vec<String>,
+    /// Objects of the last frame, largest first.
+    pub objects: Vec<crate::panel::ObjectInfo>,
+    /// When each phase ran, in the order in which they ended.
+    pub timeline: Vec<crate::timeline::Span>,
 }
 
 impl Report {
@@ -71,6 +81,9 @@ impl Report {
         sum(&mut self.rays, &other.rays);
         sum(&mut self.milliseconds, &other.milliseconds);
         self.faults.extend(other.faults.iter().cloned());
+        self.problems.extend(other.problems.iter().cloned());
+        self.objects.extend(other.objects.iter().cloned());
+        self.timeline.extend(other.timeline.iter().cloned());
     }
 }
 
@@ -88,6 +101,32 @@ pub(crate) struct Counters {
     pub(crate) report: Report,
     /// Which slot of the process' sum this context has.
     slot: Option<usize>,
+}
+
+/// Phases that have ended since the last writing.
+static SPANS: Mutex<Recorder> = Mutex::new(Recorder::new(20_000));
+/// Lines of phases in the file; a run of hours must not fill a disk.
+static SPANS_WRITTEN: AtomicUsize = AtomicUsize::new(0);
+const MOST_SPANS: usize = 200_000;
+
+/// A phase ended just now that took so long; `track` says on which thread.
+pub(crate) fn span(track: &str, phase: &str, frame: u64, took: Duration) {
+    if crate::config::current().run_dir.is_some() {
+        SPANS.lock().unwrap_or_else(|e| e.into_inner()).ended(track, phase, frame, took);
+    }
+}
+
+/// Appends what is new; a program that ends without a word loses nothing that way.
+fn write_spans(file: &Path) {
+    let new = SPANS.lock().unwrap_or_else(|e| e.into_inner()).take();
+    if new.is_empty() || SPANS_WRITTEN.fetch_add(new.len(), Relaxed) > MOST_SPANS {
+        return;
+    }
+    let lines = new.iter().filter_map(|s| Some(serde_json::to_string(s).ok()? + "\n")).collect::<String>();
+    // A report that cannot be written must not trouble the program.
+    if let Ok(mut file) = std::fs::OpenOptions::new().create(true).append(true).open(file) {
+        file.write_all(lines.as_bytes()).ok();
+    }
 }
 
 static SLOTS: Mutex<Vec<Report>> = Mutex::new(Vec::new());
@@ -119,6 +158,7 @@ impl Counters {
     }
 
     pub(crate) fn spent(&mut self, phase: &str, time: Duration) {
+        span("program", phase, self.report.frames + 1, time);
         *self.report.milliseconds.entry(phase.to_owned()).or_default() += time.as_secs_f64() * 1e3;
     }
 
@@ -144,8 +184,10 @@ impl Counters {
         slots.iter().for_each(|s| sum.add(s));
         sum.program = crate::config::program_name();
         sum.pid = std::process::id();
-        sum.mode = crate::config::current().mode.name().to_owned();
+        sum.mode = crate::config::current().settings.mode.name().to_owned();
         sum.faults = crate::fault::messages();
+        sum.problems.clone_from(&crate::config::current().problems);
+        write_spans(&dir.join(format!("{}.spans", sum.pid)));
         let (file, fresh) = (dir.join(format!("{}.json", sum.pid)), dir.join(format!("{}.new", sum.pid)));
         // A report that cannot be written must not trouble the program.
         if let Ok(text) = serde_json::to_vec(&sum)

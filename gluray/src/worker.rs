@@ -1,10 +1,11 @@
 //! The threads that trace: a pool of our own, made when the first frame comes, so that a program that draws nothing gets no threads.
 
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, PoisonError};
 
 static PROCESS: AtomicU32 = AtomicU32::new(0);
-static POOL: OnceLock<Option<rayon::ThreadPool>> = OnceLock::new();
+/// The pool with the number of threads that was asked for.
+static POOL: Mutex<Option<(u32, Arc<rayon::ThreadPool>)>> = Mutex::new(None);
 
 /// True in a child that was forked after the pool was made: it has none of the pool's threads, so the driver draws there.
 pub(crate) fn forked() -> bool {
@@ -12,19 +13,25 @@ pub(crate) fn forked() -> bool {
     made != 0 && made != std::process::id()
 }
 
-fn pool() -> Option<&'static rayon::ThreadPool> {
-    POOL.get_or_init(|| {
+/// The pool with as many threads as are set now; all that there are when nothing is set.
+fn pool() -> Option<Arc<rayon::ThreadPool>> {
+    let threads = crate::config::current().settings.threads;
+    let mut slot = POOL.lock().unwrap_or_else(PoisonError::into_inner);
+    if slot.as_ref().is_none_or(|(n, _)| *n != threads) {
         PROCESS.store(std::process::id(), Relaxed);
-        rayon::ThreadPoolBuilder::new().thread_name(|i| format!("gluray {i}")).build().ok()
-    })
-    .as_ref()
+        let builder = rayon::ThreadPoolBuilder::new().num_threads(threads as usize);
+        let made = builder.thread_name(|i| format!("gluray {i}")).build().ok()?;
+        *slot = Some((threads, Arc::new(made)));
+    }
+    slot.as_ref().map(|(_, pool)| pool.clone())
 }
 
 /// Runs `f` on the pool; here when there can be none.
 pub(crate) fn on_pool<R: Send>(f: impl FnOnce() -> R + Send) -> R {
-    match pool() {
-        Some(pool) if !forked() => pool.install(f),
-        _ => f(),
+    // A child of a fork must not touch the pool: its lock and its threads are the parent's.
+    match if forked() { None } else { pool() } {
+        Some(pool) => pool.install(f),
+        None => f(),
     }
 }
 
