@@ -109,9 +109,7 @@ pub(crate) fn destroyed(handle: usize) {
     });
     if here != Some(true) {
         let gone = register().idle.remove(&handle);
-        if let Some(c) = gone {
-            c.counters.keep();
-        }
+        drop(gone);
     }
     register().lists.remove(&handle);
 }
@@ -132,13 +130,12 @@ pub(crate) fn stay() {
 
 /// `handle` is current on this thread now (0: none).
 pub(crate) fn enter(handle: usize) {
-    let before = CURRENT.with(|slot| slot.borrow_mut().take());
+    // Some programs leave their context in exit handlers, when the thread's storage is gone already.
+    let Ok(before) = CURRENT.try_with(|slot| slot.try_borrow_mut().ok().and_then(|mut s| s.take())) else { return };
     symbols::set_hot(None);
     if let Some(old) = before {
         THREADS.fetch_sub(1, Relaxed);
-        if old.doomed {
-            old.counters.keep();
-        } else {
+        if !old.doomed {
             register().idle.insert(old.handle, old);
         }
     }
@@ -152,13 +149,15 @@ pub(crate) fn enter(handle: usize) {
     };
     context.wake();
     let threads = THREADS.fetch_add(1, Relaxed) + 1;
-    CURRENT.with(|slot| {
-        let mut slot = slot.borrow_mut();
+    let placed = CURRENT.try_with(|slot| {
+        let Ok(mut slot) = slot.try_borrow_mut() else { return };
         *slot = Some(context);
         // With a second thread the short way would lead to the wrong context.
         symbols::set_hot(slot.as_deref_mut().filter(|_| threads == 1));
     });
-    symbols::attend();
+    if placed.is_ok() {
+        symbols::attend();
+    }
 }
 
 /// A watched call is about to run.
@@ -189,6 +188,14 @@ fn reads() -> &'static [usize] {
 fn front_only() -> &'static [usize] {
     static FRONT_ONLY: OnceLock<Vec<usize>> = OnceLock::new();
     FRONT_ONLY.get_or_init(|| indices_of(&["glFlush", "glFinish"]))
+}
+
+impl Drop for Context {
+    /// Also when a thread or the program ends with its context current.
+    fn drop(&mut self) {
+        symbols::set_hot(None);
+        crate::fault::guard(|| self.counters.publish(true));
+    }
 }
 
 impl Context {

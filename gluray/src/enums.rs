@@ -3,7 +3,7 @@
 
 macro_rules! constants { ($($n:ident = $v:literal),* $(,)?) => { $(pub(crate) const $n: u32 = $v;)* }; }
 constants! {
-    POINTS = 0, LINES = 1, LINE_LOOP = 2, LINE_STRIP = 3, TRIANGLES = 4, TRIANGLE_STRIP = 5, TRIANGLE_FAN = 6,
+    INVALID_OPERATION = 0x502, POINTS = 0, LINES = 1, LINE_LOOP = 2, LINE_STRIP = 3, TRIANGLES = 4, TRIANGLE_STRIP = 5, TRIANGLE_FAN = 6,
     QUADS = 7, QUAD_STRIP = 8, POLYGON = 9,
     NEVER = 0x200, LESS = 0x201, EQUAL = 0x202, LEQUAL = 0x203, GREATER = 0x204, NOTEQUAL = 0x205, GEQUAL = 0x206, ALWAYS = 0x207,
     FRONT = 0x404, BACK = 0x405, FRONT_AND_BACK = 0x408, FRONT_LEFT = 0x400, BACK_LEFT = 0x402,

@@ -2,9 +2,11 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 
 static HAPPENED: AtomicBool = AtomicBool::new(false);
+/// Calls of [`guard`] that are running.
+static GUARDED: AtomicUsize = AtomicUsize::new(0);
 static MESSAGES: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
 /// True once there was one.
@@ -21,7 +23,7 @@ pub(crate) fn messages() -> Vec<String> {
 pub(crate) fn silence() {
     let before = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
-        let ours = info.location().is_some_and(|l| l.file().contains("gluray") || l.file().contains("rt-core"));
+        let ours = GUARDED.load(Relaxed) > 0;
         let text = info.to_string();
         if ours {
             MESSAGES.lock().unwrap_or_else(|e| e.into_inner()).push(text);
@@ -33,7 +35,10 @@ pub(crate) fn silence() {
 
 /// Runs `f`. When it panics: `None`, and gluray retires.
 pub(crate) fn guard<R>(f: impl FnOnce() -> R) -> Option<R> {
-    match catch_unwind(AssertUnwindSafe(f)) {
+    GUARDED.fetch_add(1, Relaxed);
+    let outcome = catch_unwind(AssertUnwindSafe(f));
+    GUARDED.fetch_sub(1, Relaxed);
+    match outcome {
         Ok(r) => Some(r),
         Err(_) => {
             HAPPENED.store(true, Relaxed);

@@ -26,13 +26,11 @@ pub(crate) fn triangulate(mode: u32, first: u32, count: u32, first_provokes: boo
             false => [v(0), v(i), v(i + 1)],
             true => [v(i + 1), v(0), v(i)],
         })),
-        QUADS => out.extend((0..count / 4).flat_map(|i| quad([0, 1, 2, 3].map(|k| v(4 * i + k)), first_provokes, flat))),
+        // Mesa's quads do not follow the provoking vertex convention: their last vertex gives the colour.
+        QUADS => out.extend((0..count / 4).flat_map(|i| quad([0, 1, 2, 3].map(|k| v(4 * i + k)), flat))),
         QUAD_STRIP => out.extend((0..(count / 2).saturating_sub(1)).flat_map(|i| {
             let [a, b, c, d] = [0, 1, 2, 3].map(|k| v(2 * i + k));
-            match first_provokes {
-                false => [[c, a, d], [a, b, d]],
-                true => [[d, c, a], [b, d, a]],
-            }
+            [[c, a, d], [a, b, d]]
         })),
         // A polygon's flat colour is that of its first vertex, whatever the convention.
         POLYGON => out.extend((1..count.saturating_sub(1)).map(|i| [v(i), v(i + 1), v(0)])),
@@ -40,12 +38,8 @@ pub(crate) fn triangulate(mode: u32, first: u32, count: u32, first_provokes: boo
     }
 }
 
-fn quad([a, b, c, d]: [u32; 4], first_provokes: bool, flat: bool) -> [[u32; 3]; 2] {
-    match first_provokes {
-        false if !flat => [[a, b, c], [a, c, d]],
-        false => [[a, b, d], [b, c, d]],
-        true => [[b, c, a], [c, d, a]],
-    }
+fn quad([a, b, c, d]: [u32; 4], flat: bool) -> [[u32; 3]; 2] {
+    if flat { [[a, b, d], [b, c, d]] } else { [[a, b, c], [a, c, d]] }
 }
 
 #[cfg(test)]

@@ -162,11 +162,6 @@ impl Counters {
         *self.report.milliseconds.entry(phase.to_owned()).or_default() += time.as_secs_f64() * 1e3;
     }
 
-    /// The context is gone; its counts stay.
-    pub(crate) fn keep(&self) {
-        // They are in their slot already: `publish` copied them there.
-    }
-
     /// Brings the file up to date; unless `now`, not more often than the disk should see.
     pub(crate) fn publish(&mut self, now: bool) {
         let Some(dir) = crate::config::current().run_dir.clone() else { return };

@@ -72,6 +72,8 @@ pub(crate) struct Prepared<'a> {
     camera: Camera,
     /// Rows of planes in object space that points must be above: near, far, the user's.
     planes: Vec<[f64; 4]>,
+    /// The user's alone.
+    clip_planes: Vec<[f64; 4]>,
     pub(crate) rect: Rect,
     lighting: Setup<'a>,
     lit: Option<Vec<Lit>>,
@@ -130,13 +132,12 @@ impl<'a> Prepared<'a> {
             planes.push((row(3) - row(2)).to_array());
         }
         let eye_from_object = matrix(&s.model_view);
-        for p in &s.clip_planes {
-            let p = rt_core::glam::DVec4::from_array(*p);
-            planes.push((eye_from_object.transpose() * p).to_array());
-        }
+        let object = |p: &[f64; 4]| (eye_from_object.transpose() * rt_core::glam::DVec4::from_array(*p)).to_array();
+        let clip_planes: Vec<[f64; 4]> = s.clip_planes.iter().map(object).collect();
+        planes.extend(&clip_planes);
         let lighting = Setup::new(s);
         let mut out =
-            Prepared { draw, world, camera, planes, rect, lighting, lit: None, image, rays: AtomicU64::new(0) };
+            Prepared { draw, world, camera, planes, clip_planes, rect, lighting, lit: None, image, rays: AtomicU64::new(0) };
         let positions = &draw.geometry.mesh.positions;
         // Fewer vertices than pixels: light them all once. Else only those that are seen.
         let fixed = matches!(draw.shading, Shading::Fixed);
@@ -164,6 +165,9 @@ impl<'a> Prepared<'a> {
                 return None;
             }
         }
+        // A little more than is visible: the exact test is that of the fragment.
+        let slack = 1e-6 * (t0.abs().min(t1.abs()) + (t1 - t0).abs().min(1e30));
+        let (t0, t1) = (t0 - slack, t1 + slack);
         if t0.partial_cmp(&t1) != Some(std::cmp::Ordering::Less) {
             return None;
         }
@@ -217,13 +221,28 @@ impl<'a> Prepared<'a> {
             return None;
         }
         let weights = l.map(|v| v / sum);
+        // Clipped at the centre, whatever ray found the triangle.
+        for p in &self.clip_planes {
+            let corner = |i: usize| {
+                let v = self.draw.geometry.mesh.triangle(prim)[i].as_dvec3();
+                p[0] * v.x + p[1] * v.y + p[2] * v.z + p[3]
+            };
+            if (0..3).map(|i| weights[i] * corner(i)).sum::<f64>() < 0.0 {
+                return None;
+            }
+        }
         let z = (0..3).map(|i| l[i] * f64::from(c[i][2])).sum::<f64>();
         let w = (0..3).map(|i| l[i] * f64::from(c[i][3])).sum::<f64>();
         let [n, f] = s.depth_range;
         let mut depth = n + (f - n) * (z / w * 0.5 + 0.5);
         let plain_depth = depth;
+        // The unit of polygon offset is two steps of the depth buffer (Mesa).
         if let Some((factor, units)) = s.polygon_offset {
-            depth += f64::from(factor) * steepness(&c, s.viewport, f - n) + f64::from(units) / DEPTH_STEPS;
+            depth += f64::from(factor) * steepness(&c, s.viewport, f - n) + 2.0 * f64::from(units) / DEPTH_STEPS;
+        }
+        // Near and far: half a step of slack for rounding.
+        if !s.depth_clamp && z.abs() > w.abs() * (1.0 + 1.0 / DEPTH_STEPS) {
+            return None;
         }
         let (lo, hi) = if n < f { (n, f) } else { (f, n) };
         let depth = if s.depth_clamp { depth.clamp(lo, hi) } else { depth.clamp(0.0, 1.0) };

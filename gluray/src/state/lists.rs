@@ -94,6 +94,11 @@ impl Context {
         if self.sink == Sink::Trace {
             self.unswallow("glEndList between Begin and End");
         }
+        if self.recording.as_ref().is_some_and(|r| r.execute && r.open) {
+            // What is compiled is also executed, and there a primitive is open.
+            self.errors.push(INVALID_OPERATION);
+            return true;
+        }
         let Some(mut r) = self.recording.take() else { return false };
         gl::end_list();
         if r.used {
@@ -257,7 +262,7 @@ impl Context {
                     self.call_list(name);
                 }
                 Op::CallFromBase(name) => {
-                    let base = gl::word(LIST_BASE);
+                    let base = if self.sink == Sink::Pass { self.state.list_base } else { gl::word(LIST_BASE) };
                     self.call_list(base.wrapping_add(name));
                 }
                 Op::Rect(v) => {
@@ -277,7 +282,8 @@ impl Context {
             }
             return true;
         }
-        let base = gl::word(LIST_BASE);
+        // Between Begin and End of a primitive that the driver draws it answers no questions.
+        let base = if self.sink == Sink::Pass { self.state.list_base } else { gl::word(LIST_BASE) };
         let ours = {
             let lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
             names.iter().any(|n| lists.lists.contains_key(&base.wrapping_add(*n)))

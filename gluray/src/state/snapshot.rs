@@ -92,6 +92,7 @@ pub(crate) struct Snapshot {
     pub(crate) feedback_active: bool,
     pub(crate) first_vertex_provokes: bool,
     pub(crate) color_sum: bool,
+    pub(crate) list_base: u32,
     pub(crate) texture: Option<TextureUnit>,
     /// Texturing that we do not follow, in words.
     pub(crate) foreign_texturing: Option<&'static str>,
@@ -211,6 +212,7 @@ impl Snapshot {
         self.arb_program =
             can.arb_programs && (gl::is_enabled(VERTEX_PROGRAM_ARB) || gl::is_enabled(FRAGMENT_PROGRAM_ARB));
         self.flat = gl::word(SHADE_MODEL) == FLAT;
+        self.list_base = gl::word(LIST_BASE);
         self.normalize = gl::is_enabled(NORMALIZE);
         self.rescale_normal = can.version >= 12 && gl::is_enabled(RESCALE_NORMAL);
         self.color_sum = can.version >= 14 && gl::is_enabled(COLOR_SUM);
