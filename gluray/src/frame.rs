@@ -166,6 +166,9 @@ impl Context {
         });
         let size = [2, 3].map(|i| self.state.viewport[i].max(0).cast_unsigned());
         self.counters.report.objects = self.frame.told.frame_done(&self.counters.report, size);
+        if let Some(problem) = self.frame.told.take_problem() {
+            self.counters.report.problems = vec![problem];
+        }
         self.take_up_settings();
         self.counters.publish(false);
     }
