@@ -27,6 +27,8 @@
 pub mod cli;
 pub mod comm;
 pub mod rank_order;
+#[cfg(feature = "render")]
+pub mod render;
 #[cfg(feature = "rival")]
 pub mod rival;
 pub mod scenes;

@@ -68,7 +68,7 @@ fn threads_carry_every_strategy_to_the_bits_of_the_reference() {
 
 #[test]
 fn open_mpi_carries_every_strategy_to_the_bits_of_the_reference() {
-    let Some(mpirun) = peer("RTSV_OPENMPI") else { return };
+    let Some(mpirun) = peer("RTSV_MPIRUN") else { return };
     for ranks in [2, 3, 4, 5, 8] {
         check(ranks, &["--mpi"], &[("COMPOSITE_MPIRUN", &mpirun)], "Open MPI");
     }
@@ -76,13 +76,13 @@ fn open_mpi_carries_every_strategy_to_the_bits_of_the_reference() {
 
 #[test]
 fn mpich_carries_every_strategy_to_the_bits_of_the_reference() {
-    let Some(mpirun) = peer("RTSV_MPICH") else { return };
+    let Some(mpirun) = peer("RTSV_MPIRUN_MPICH") else { return };
     check(2, &["--mpi"], &[("COMPOSITE_MPIRUN", &mpirun)], "MPICH");
 }
 
 #[test]
 fn messages_cut_into_chunks_arrive_whole_and_in_order() {
-    for (variable, ranks) in [("RTSV_OPENMPI", 3), ("RTSV_MPICH", 2)] {
+    for (variable, ranks) in [("RTSV_MPIRUN", 3), ("RTSV_MPIRUN_MPICH", 2)] {
         let Some(mpirun) = peer(variable) else { continue };
         // Some of the lengths in `check` are multiples of this, some differ from one by a byte.
         check(ranks, &["--mpi", "--chunk-bytes", "1000"], &[("COMPOSITE_MPIRUN", &mpirun)], "");
@@ -142,7 +142,7 @@ fn icet_between_threads_gives_the_same_pixels() {
 
 #[test]
 fn icet_over_its_own_mpi_layer_gives_the_same_pixels() {
-    let (Some(icet), Some(mpirun)) = (peer("RTSV_ICET"), peer("RTSV_OPENMPI")) else { return };
+    let (Some(icet), Some(mpirun)) = (peer("RTSV_ICET"), peer("RTSV_MPIRUN")) else { return };
     for pixels in ["depth", "blend"] {
         let variables: [(&str, &Path); 2] = [("RTSV_ICET", &icet), ("COMPOSITE_MPIRUN", &mpirun)];
         compare(&["--mpi", "-n", "4", "--pixels", pixels], &variables);
@@ -151,7 +151,7 @@ fn icet_over_its_own_mpi_layer_gives_the_same_pixels() {
 
 #[test]
 fn icet_over_mpich_gives_the_same_pixels() {
-    let (Some(icet), Some(mpirun)) = (peer("RTSV_ICET"), peer("RTSV_MPICH")) else { return };
+    let (Some(icet), Some(mpirun)) = (peer("RTSV_ICET"), peer("RTSV_MPIRUN_MPICH")) else { return };
     compare(&["--mpi", "-n", "2"], &[("RTSV_ICET", &icet), ("COMPOSITE_MPIRUN", &mpirun)]);
 }
 
@@ -192,7 +192,7 @@ fn fault(kind: &str, words: &[&str], variables: &[(&str, &Path)], transport: &st
 
 #[test]
 fn faults_over_open_mpi_end_with_a_named_error_in_bounded_time() {
-    let Some(mpirun) = peer("RTSV_OPENMPI") else { return };
+    let Some(mpirun) = peer("RTSV_MPIRUN") else { return };
     let variables: [(&str, &Path); 1] = [("COMPOSITE_MPIRUN", &mpirun)];
     // The launcher's words, or ours.
     fault("killed", &["signal 9", "Killed"], &variables, "--mpi");
@@ -205,7 +205,7 @@ fn faults_over_open_mpi_end_with_a_named_error_in_bounded_time() {
 
 #[test]
 fn a_killed_and_a_stalled_rank_of_mpich_end_the_job() {
-    let Some(mpirun) = peer("RTSV_MPICH") else { return };
+    let Some(mpirun) = peer("RTSV_MPIRUN_MPICH") else { return };
     let variables: [(&str, &Path); 1] = [("COMPOSITE_MPIRUN", &mpirun)];
     fault("killed", &["EXIT CODE: 9", "signal", "Killed"], &variables, "--mpi");
     fault("stalled", &["message from rank 2"], &variables, "--mpi");

@@ -18,12 +18,47 @@ const PACKAGES: &[(&str, &str)] = &[
         "mesa-vulkan-drivers",
         "lavapipe, a Vulkan device on the CPU that schlieren's GPU kernels are tested on",
     ),
-    ("openmpi-bin", "Open MPI 4, over which composite runs; nothing is built with it"),
-    ("mpich", "MPICH 4, the other MPI that the same program must run over"),
-    ("libsimgrid-dev", "SimGrid's SMPI, which runs composite on 128 simulated nodes"),
-    ("paraview", "IceT, the compositing library that composite is measured against, and its MPI layer"),
     ("python3-venv", "a place for the wheels below"),
     ("chromium", "the browser that schlieren's interactive page is tested in"),
+    ("openmpi-bin", "Open MPI, one of the MPIs that composite runs over"),
+    ("mpich", "MPICH, the other"),
+    ("libsimgrid-dev", "SMPI, which runs 128 simulated ranks on one machine"),
+    ("g++", "compiles vtk-bridge's C++ shim, as on the machines of users"),
+    ("xvfb", "the X server of all programs below"),
+    ("mesa-utils", "glxgears"),
+    (
+        "paraview",
+        "ParaView 5.11, which vtk-bridge and gluray work in, and its IceT, which composite is measured against",
+    ),
+    ("python3-paraview", "pvbatch, and VTK 9.2 in Python"),
+    ("paraview-dev", "the headers that vtk-bridge's C++ shim and ParaView plugin are compiled with"),
+    ("libglew-dev", "headers that paraview-dev includes but does not depend on"),
+    ("cmake", "configures the ParaView plugin"),
+    ("gmsh", "an OpenGL program with vertex arrays"),
+    ("geomview", "an OpenGL program in immediate mode"),
+    ("octave", "an OpenGL program with materials per vertex"),
+    ("openscad", "an OpenGL program that renders off the screen"),
+    ("pymol", "an OpenGL program with fog"),
+    ("piglit", "tests of OpenGL itself"),
+];
+
+/// Debian packages that conflict with some above, so they are unpacked in `target/peers/vtk91` instead of installed.
+const UNPACKED: &[&str] = &["libvtk9-dev", "python3-vtk9", "libvtk9.1", "libvtk9.1-qt", "vtk9"];
+
+/// Programs: name, variable through which tests learn of it, and where Debian puts it.
+const PROGRAMS: &[(&str, &str, &str)] = &[
+    ("Chromium", "RTSV_CHROMIUM", "/usr/bin/chromium"),
+    ("Open MPI", "RTSV_MPIRUN", "/usr/bin/mpirun.openmpi"),
+    ("MPICH", "RTSV_MPIRUN_MPICH", "/usr/bin/mpirun.mpich"),
+    ("SMPI", "RTSV_SMPIRUN", "/usr/bin/smpirun"),
+    ("Xvfb", "RTSV_XVFB", "/usr/bin/Xvfb"),
+    ("ParaView", "RTSV_PVBATCH", "/usr/bin/pvbatch"),
+    ("gmsh", "RTSV_GMSH", "/usr/bin/gmsh"),
+    ("geomview", "RTSV_GEOMVIEW", "/usr/bin/geomview"),
+    ("Octave", "RTSV_OCTAVE", "/usr/bin/octave"),
+    ("OpenSCAD", "RTSV_OPENSCAD", "/usr/bin/openscad"),
+    ("PyMOL", "RTSV_PYMOL", "/usr/bin/pymol"),
+    ("glxgears", "RTSV_GLXGEARS", "/usr/bin/glxgears"),
 ];
 
 /// Wheels, with the versions that our numbers were measured with, and what each is for.
@@ -31,6 +66,7 @@ const WHEELS: &[(&str, &str, &str)] = &[
     ("numpy", "2.4.6", "arrays for the two below"),
     ("vtk", "9.7.2", "reads what we write, writes what we read"),
     ("embreex", "4.4.0.post1", "brings Embree 4.4 as a shared library"),
+    ("pynari", "1.2.6", "an ANARI program, and a device to compare with"),
 ];
 
 /// Whether missing peers may be installed.
@@ -42,65 +78,38 @@ pub(crate) enum Install {
     Forbidden,
 }
 
-/// The peers that were found. A field is `None` when there is no such peer.
+/// One piece of software, found or not.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Peer {
+    /// For people.
+    name: &'static str,
+    /// For tests.
+    variable: &'static str,
+    /// `None` when it was not found.
+    path: Option<PathBuf>,
+}
+
+/// The peers that were found and those that were not.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Peers {
     /// `target/peers`.
     folder: PathBuf,
-    /// Shared library of Embree 3.
-    embree3: Option<PathBuf>,
-    /// Shared library of Embree 4.
-    embree4: Option<PathBuf>,
-    /// Chromium's program.
-    chromium: Option<PathBuf>,
-    /// Open MPI's launcher.
-    openmpi: Option<PathBuf>,
-    /// MPICH's launcher.
-    mpich: Option<PathBuf>,
-    /// SimGrid's launcher.
-    smpirun: Option<PathBuf>,
-    /// Shared library of IceT's core.
-    icet: Option<PathBuf>,
-    /// The virtual environment's Python, with all [`WHEELS`] in their versions.
-    python: Option<PathBuf>,
+    /// All of them.
+    all: Vec<Peer>,
     /// What went wrong or was not allowed while installing.
     notes: Vec<String>,
 }
 
 impl Peers {
-    /// Every peer by name.
-    fn named(&self) -> [(&'static str, &Option<PathBuf>); 8] {
-        [
-            ("Embree 3", &self.embree3),
-            ("Embree 4", &self.embree4),
-            ("Chromium", &self.chromium),
-            ("Open MPI", &self.openmpi),
-            ("MPICH", &self.mpich),
-            ("SimGrid", &self.smpirun),
-            ("IceT", &self.icet),
-            ("Python with VTK", &self.python),
-        ]
-    }
-
     /// Names of the peers that were not found.
     pub(crate) fn missing(&self) -> Vec<&'static str> {
-        self.named().into_iter().filter(|(_, path)| path.is_none()).map(|(name, _)| name).collect()
+        self.all.iter().filter(|p| p.path.is_none()).map(|p| p.name).collect()
     }
 
     /// The variables through which tests find the peers.
     pub(crate) fn environment(&self, require: bool) -> Vec<(&'static str, PathBuf)> {
         let mut variables = vec![("RTSV_PEERS", self.folder.clone())];
-        let found = [
-            ("RTSV_EMBREE3", &self.embree3),
-            ("RTSV_EMBREE4", &self.embree4),
-            ("RTSV_CHROMIUM", &self.chromium),
-            ("RTSV_OPENMPI", &self.openmpi),
-            ("RTSV_MPICH", &self.mpich),
-            ("RTSV_SMPIRUN", &self.smpirun),
-            ("RTSV_ICET", &self.icet),
-            ("RTSV_PYTHON", &self.python),
-        ];
-        variables.extend(found.into_iter().filter_map(|(name, path)| Some((name, path.clone()?))));
+        variables.extend(self.all.iter().filter_map(|p| Some((p.variable, p.path.clone()?))));
         if require {
             variables.push(("RTSV_REQUIRE_PEERS", PathBuf::from("1")));
         }
@@ -110,7 +119,7 @@ impl Peers {
     /// One line per peer, and the notes.
     pub(crate) fn describe(&self) -> String {
         let mut text = String::new();
-        for (name, path) in self.named() {
+        for Peer { name, path, .. } in &self.all {
             let place = path.as_ref().map_or("not found".to_owned(), |p| p.display().to_string());
             writeln!(text, "peer {name:<16} {place}").expect("writing to a String cannot fail");
         }
@@ -129,23 +138,37 @@ pub(crate) fn set_up(root: &Path, install: Install) -> Peers {
     let mut notes = Vec::new();
     if install == Install::Allowed {
         install_packages(&mut notes);
+        if let Err(e) = unpack_packages(&folder.join("vtk91")) {
+            notes.push(e);
+        }
         if let Err(e) = install_wheels(&venv, &mut notes) {
             notes.push(e);
         }
     }
     let python = venv.join("bin/python");
-    Peers {
-        embree3: system_library_folders().iter().find_map(|d| library_in(d, "libembree3.so")),
-        embree4: wheel_library(&venv, "embreex.libs", "libembree4"),
-        chromium: program("chromium"),
-        openmpi: program("mpirun.openmpi"),
-        mpich: program("mpirun.mpich"),
-        smpirun: program("smpirun"),
-        icet: system_library_folders().iter().find_map(|d| library_in(d, "libvtkIceTCore-pv")),
-        python: wheels_are_there(&python).then_some(python),
-        folder,
-        notes,
-    }
+    let unpacked = folder.join("vtk91");
+    let in_system = |name: &str| system_library_folders().iter().find_map(|d| library_in(d, name));
+    let mut all = vec![
+        Peer { name: "Embree 3", variable: "RTSV_EMBREE3", path: in_system("libembree3.so") },
+        Peer {
+            name: "Embree 4",
+            variable: "RTSV_EMBREE4",
+            path: wheel_library(&venv, "embreex.libs", "libembree4"),
+        },
+        Peer { name: "IceT", variable: "RTSV_ICET", path: in_system("libvtkIceTCore-pv5.11.so.1") },
+        Peer { name: "VTK 9.1", variable: "RTSV_VTK91", path: vtk91_is_there(&unpacked).then_some(unpacked) },
+        Peer { name: "piglit", variable: "RTSV_PIGLIT", path: piglit() },
+        Peer {
+            name: "Python with VTK",
+            variable: "RTSV_PYTHON",
+            path: wheels_are_there(&python).then_some(python),
+        },
+    ];
+    all.extend(PROGRAMS.iter().map(|&(name, variable, path)| {
+        let path = Some(PathBuf::from(path)).filter(|p| p.is_file());
+        Peer { name, variable, path }
+    }));
+    Peers { folder, all, notes }
 }
 
 // ---- Debian packages ------------------------------------------------------------------------------------------
@@ -175,6 +198,32 @@ fn install_packages(notes: &mut Vec<String>) {
             notes.push(format!("`{}` failed: {status:?}", line.join(" ")));
         }
     }
+}
+
+/// Downloads [`UNPACKED`] and unpacks them below `root`, which needs no rights and installs nothing.
+fn unpack_packages(root: &Path) -> Result<(), String> {
+    if vtk91_is_there(root) || first_line_of("apt-get", &["--version"]).is_none() {
+        return Ok(());
+    }
+    let failed = |e: std::io::Error| format!("{}: {e}", root.display());
+    let downloads = root.join("downloads");
+    fs::create_dir_all(&downloads).map_err(failed)?;
+    run_noted(Command::new("apt-get").args(["-q", "download"]).args(UNPACKED).current_dir(&downloads))?;
+    for entry in fs::read_dir(&downloads).map_err(failed)? {
+        let package = entry.map_err(failed)?.path();
+        run_noted(Command::new("dpkg").arg("-x").args([&package, root]))?;
+    }
+    fs::remove_dir_all(&downloads).map_err(failed)
+}
+
+fn vtk91_is_there(root: &Path) -> bool {
+    root.join("usr/lib/python3/dist-packages/vtkmodules").is_dir()
+        && root.join("usr/include/vtk-9.1").is_dir()
+}
+
+/// The folder of piglit's test programs.
+fn piglit() -> Option<PathBuf> {
+    system_library_folders().iter().map(|d| d.join("piglit/bin")).find(|p| p.is_dir())
 }
 
 fn package_is_there(package: &str) -> bool {
@@ -246,11 +295,6 @@ fn wheels_are_there(python: &Path) -> bool {
     python.is_file() && first_line_of(python, &["-c", &script]).is_some()
 }
 
-/// A program of a Debian package.
-fn program(name: &str) -> Option<PathBuf> {
-    Some(Path::new("/usr/bin").join(name)).filter(|path| path.is_file())
-}
-
 // ---- Shared libraries -----------------------------------------------------------------------------------------
 
 fn system_library_folders() -> Vec<PathBuf> {
@@ -281,11 +325,13 @@ mod tests {
     fn tests_see_only_the_peers_that_were_found() {
         let peers = Peers {
             folder: "peers".into(),
-            embree3: Some("libembree3.so".into()),
+            all: vec![
+                Peer { name: "Embree 3", variable: "RTSV_EMBREE3", path: Some("libembree3.so".into()) },
+                Peer { name: "Embree 4", variable: "RTSV_EMBREE4", path: None },
+            ],
             notes: vec!["why".to_owned()],
-            ..Peers::default()
         };
-        assert_eq!(peers.missing(), ["Embree 4", "Chromium", "Open MPI", "MPICH", "SimGrid", "IceT", "Python with VTK"]);
+        assert_eq!(peers.missing(), ["Embree 4"]);
         let names = |require| peers.environment(require).into_iter().map(|(n, _)| n).collect::<Vec<_>>();
         assert_eq!(names(false), ["RTSV_PEERS", "RTSV_EMBREE3"]);
         assert_eq!(names(true), ["RTSV_PEERS", "RTSV_EMBREE3", "RTSV_REQUIRE_PEERS"]);
@@ -310,7 +356,21 @@ mod tests {
         let root = std::env::temp_dir().join(format!("xtask-no-install-{}", std::process::id()));
         let peers = set_up(&root, Install::Forbidden);
         assert!(!root.exists(), "something was written");
-        assert_eq!(peers.python, None);
-        assert_eq!(peers.embree4, None);
+        for missing in ["Embree 4", "VTK 9.1", "Python with VTK"] {
+            assert!(peers.missing().contains(&missing), "{missing} in an empty folder");
+        }
+    }
+
+    #[test]
+    fn names_and_variables_of_peers_are_unique() {
+        let all = set_up(Path::new("nowhere"), Install::Forbidden).all;
+        for (i, peer) in all.iter().enumerate() {
+            assert!(peer.variable.starts_with("RTSV_"), "{}", peer.variable);
+            assert!(
+                all[..i].iter().all(|p| p.name != peer.name && p.variable != peer.variable),
+                "{} twice",
+                peer.name
+            );
+        }
     }
 }

@@ -1,6 +1,7 @@
-//! `composite demo`: partitioned frames composited, with a plot of what each rank did when.
-use super::gantt;
+//! `composite demo`: a data set rendered in parts ([`demo_data`]), or frames made without a renderer composited; with a plot of what
+//! each rank did when.
 use super::ranks::{RankArgs, RankComm};
+use super::{demo_data, gantt};
 use crate::compositor::{Compositor, Options};
 use crate::frame::Frame;
 use crate::pixel::DepthPixel;
@@ -18,22 +19,42 @@ use std::time::Duration;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     composite demo -n 8\n  \
+    composite demo -n 5 --data mixing-layer --view RMI --headlight\n  \
+    composite demo -n 8 --scene discs\n  \
     composite demo -n 8 --mpi --size 2048 --out frames")]
 pub(super) struct DemoArgs {
     #[command(flatten)]
-    ranks: RankArgs,
+    pub(super) ranks: RankArgs,
+    /// The data set, one of triangles in the catalogue of `datasets`
+    #[arg(long, default_value = "wavelet", value_name = "NAME")]
+    pub(super) data: String,
+    /// Its size; the smallest if not given
+    #[arg(long, value_name = "SIZE")]
+    pub(super) data_size: Option<String>,
+    /// One of its views; the first if not given
+    #[arg(long, value_name = "VIEW")]
+    pub(super) view: Option<String>,
+    /// A headlight in place of a lamp with shadows and ambient occlusion
+    #[arg(long)]
+    pub(super) headlight: bool,
+    /// One grey for all parts in place of a colour for each rank
+    #[arg(long)]
+    pub(super) grey: bool,
+    /// Parts of the same work for this view in place of the same number of triangles
+    #[arg(long)]
+    pub(super) cut_by_view: bool,
     /// Width and height of the image, in pixels
     #[arg(long, default_value_t = 1024, value_name = "PIXELS")]
-    size: u32,
-    /// Which frames
-    #[arg(long, default_value = "discs", value_name = "discs|dense|frag")]
-    scene: Scene,
+    pub(super) size: u32,
+    /// In place of a data set: frames made without a renderer
+    #[arg(long, value_name = "discs|dense|frag")]
+    scene: Option<Scene>,
     /// Frames; the last is shown
     #[arg(long, default_value_t = 5, value_name = "N")]
-    frames: u64,
+    pub(super) frames: u64,
     /// Folder for picture and plot
     #[arg(long, default_value = ".", value_name = "FOLDER")]
-    out: PathBuf,
+    pub(super) out: PathBuf,
 }
 
 /// What one rank did in the frame that is shown, in seconds, and bytes.
@@ -113,10 +134,13 @@ pub(super) fn demo(common: CommonArgs, args: &DemoArgs, arguments: &[OsString]) 
     if args.size == 0 || args.size > 32_768 || args.frames == 0 {
         return Err(UsageError("give a size of 1 to 32768 pixels and at least one frame".to_string()).into());
     }
+    let Some(scene) = args.scene else {
+        return demo_data::demo(common, args, arguments);
+    };
     args.ranks.run(
         common,
         arguments,
-        |comm| frames(comm, args),
+        |comm| frames(comm, args, scene),
         |(transport, frame_secs, colors, lines): Finished| {
             std::fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
             let (picture, plot) = (args.out.join("composite_demo.png"), args.out.join("composite_demo.svg"));
@@ -126,13 +150,13 @@ pub(super) fn demo(common: CommonArgs, args: &DemoArgs, arguments: &[OsString]) 
                 lines.len(),
                 args.size,
                 args.size,
-                args.scene,
+                scene,
                 1e3 * frame_secs
             );
             std::fs::write(&plot, gantt::svg(&title, &lines)).with_context(|| plot.display().to_string())?;
             let shown = Shown {
                 transport,
-                scene: args.scene.name(),
+                scene: scene.name(),
                 size_px: args.size,
                 frame_ms: 1e3 * frame_secs,
                 picture,
@@ -161,7 +185,7 @@ fn write_picture(path: &std::path::Path, size: u32, colors: &[[u8; 4]]) -> anyho
     Ok(())
 }
 
-fn frames(comm: &mut RankComm, args: &DemoArgs) -> anyhow::Result<Finished> {
+fn frames(comm: &mut RankComm, args: &DemoArgs, scene: Scene) -> anyhow::Result<Finished> {
     let timeout: Duration = args.ranks.timeout();
     let transport = comm.transport();
     let comm = comm.comm();
@@ -175,7 +199,7 @@ fn frames(comm: &mut RankComm, args: &DemoArgs) -> anyhow::Result<Finished> {
     for moment in 0..args.frames {
         comm.barrier(timeout)?;
         let begin = comm.now();
-        args.scene.draw(moment, rank, ranks, &mut drawn);
+        scene.draw(moment, rank, ranks, &mut drawn);
         let render_secs = comm.now() - begin;
         let frame = Frame::with_depth(args.size, args.size, &drawn.colors, &drawn.depths)?;
         let done = compositor.composite(comm, &frame.bounded(drawn.bounds)?)?;

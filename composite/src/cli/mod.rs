@@ -3,11 +3,13 @@
 mod check;
 mod compare;
 mod demo;
+mod demo_data;
 mod doctor;
 mod gantt;
 mod mpirun;
 mod ranks;
 mod smpirun;
+mod timeline;
 
 use clap::{Parser, Subcommand};
 use datasets::cli::{CommonArgs, CompletionsArgs, Status, status_of};

@@ -2,6 +2,7 @@
 pub mod collective;
 #[cfg(all(unix, target_pointer_width = "64", target_endian = "little"))]
 pub mod mpi;
+pub mod sim;
 pub mod threads;
 
 mod error;

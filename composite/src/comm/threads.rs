@@ -80,12 +80,20 @@ pub fn group(size: usize) -> Vec<ThreadComm> {
 ///
 /// A panic of one rank is that rank's [`CommError::Panicked`]; the others see it as [`CommError::PeerLost`].
 pub fn run<T: Send>(size: usize, work: impl Fn(ThreadComm) -> T + Sync) -> Vec<Result<T, CommError>> {
+    run_group(group(size), work)
+}
+
+/// Runs `work` on every rank of a group, in rank order, each on a thread of its own.
+pub(super) fn run_group<C: Communicator + Send, T: Send>(
+    group: Vec<C>,
+    work: impl Fn(C) -> T + Sync,
+) -> Vec<Result<T, CommError>> {
     let work = &work;
     std::thread::scope(|scope| {
-        let threads: Vec<_> = group(size)
+        let threads: Vec<_> = group
             .into_iter()
-            .map(|comm| {
-                let rank = comm.rank;
+            .enumerate()
+            .map(|(rank, comm)| {
                 let name = format!("rank {rank}");
                 (rank, std::thread::Builder::new().name(name).spawn_scoped(scope, move || work(comm)))
             })

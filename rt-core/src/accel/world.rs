@@ -1,8 +1,9 @@
 //! The two-level structure that rays are traced against: instances of geometries.
 
 use super::blas::{Blas, IdWriter, leaf_ids};
-use super::build::{MAX_PRIMS, PrimRef, build_wide};
+use super::build::{PrimRef, build_wide};
 use super::options::{BuildOptions, BuildQuality, BuildReport, Robustness};
+use super::part::{Whole, blas_of};
 use super::placement::{Placement, distance_to_sphere};
 use super::wide::{ChildRef, Unit, WideBvh};
 use crate::math::{Aabb, exp2i, max_abs};
@@ -13,6 +14,7 @@ use crate::simd::SimdLevel;
 use crate::traverse::single::{LeafTest, RaySetup, beyond, traverse};
 use fearless_simd::{Level, Simd, dispatch};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -23,6 +25,18 @@ pub enum Geometry {
     Mesh(Arc<TriMesh>),
     /// Spheres, tubes, isosurfaces, user geometry.
     Shape(Arc<dyn Shape>),
+}
+
+impl Geometry {
+    /// Where the shared data lie: the same for two clones of one geometry and for two looks of one shape, and never for two others that are
+    /// both alive.
+    fn address(&self) -> usize {
+        let of_shape = |s: &Arc<dyn Shape>| Arc::as_ptr(s) as *const () as usize;
+        match self {
+            Geometry::Mesh(m) => Arc::as_ptr(m) as usize,
+            Geometry::Shape(s) => s.tree_of().as_ref().map_or_else(|| of_shape(s), of_shape),
+        }
+    }
 }
 
 /// A geometry placed in the world.
@@ -55,6 +69,16 @@ pub enum BuildError {
         /// How many there are.
         count: usize,
     },
+    /// A part does not match its whole.
+    #[error(
+        "a part has {found} geometries, the whole {expected}: give the part one for each, with no primitives where it has none"
+    )]
+    NotAPart {
+        /// Geometries of the whole.
+        expected: usize,
+        /// Geometries given.
+        found: usize,
+    },
     /// An instance's transform cannot be inverted.
     #[error(
         "instance {instance}: its transform has determinant {determinant}; give one that is finite and not singular, or leave the instance out"
@@ -74,7 +98,9 @@ pub struct World {
     origin: DVec3,
     bounds: Aabb,
     report: BuildReport,
-    pub(super) blas: Vec<Blas>,
+    /// Shared with worlds made from this one ([`World::build_sharing`]).
+    pub(super) blas: Vec<Arc<Blas>>,
+    pub(super) options: BuildOptions,
     pub(super) placements: Vec<Placement>,
     pub(super) tlas: WideBvh,
     pub(super) robustness: Robustness,
@@ -88,6 +114,30 @@ impl World {
         instances: Vec<Instance>,
         options: &BuildOptions,
     ) -> Result<World, BuildError> {
+        World::build_sharing(geometries, instances, options, None)
+    }
+
+    /// As [`World::build`], but a geometry that `previous` has as well (the same [`Arc`], whatever its index) keeps its acceleration
+    /// structure: when one of five hundred meshes changes, or only transforms do, the others cost nothing. The options must be those of
+    /// `previous`, or everything is built anew. The hits are those of a world built from nothing (after a [`World::refit`] of `previous`: those
+    /// of the refitted one).
+    pub fn build_sharing(
+        geometries: Vec<Geometry>,
+        instances: Vec<Instance>,
+        options: &BuildOptions,
+        previous: Option<&World>,
+    ) -> Result<World, BuildError> {
+        World::build_like(geometries, instances, options, None, previous)
+    }
+
+    /// Builds a world, or a part of one, with the structures of `previous` where it has the same geometries.
+    pub(super) fn build_like(
+        geometries: Vec<Geometry>,
+        instances: Vec<Instance>,
+        options: &BuildOptions,
+        whole: Option<&Whole>,
+        previous: Option<&World>,
+    ) -> Result<World, BuildError> {
         let start = Instant::now();
         let mut phases = Vec::new();
         for (i, inst) in instances.iter().enumerate() {
@@ -96,26 +146,16 @@ impl World {
                 return Err(BuildError::NoSuchGeometry { instance: i, geometry: inst.geometry, count });
             }
         }
-        for (i, g) in geometries.iter().enumerate() {
-            if let Geometry::Mesh(m) = g {
-                m.check().map_err(|source| BuildError::Mesh { geometry: i, source })?;
-                if m.indices.len() >= MAX_PRIMS {
-                    let source = MeshError::TooLarge {
-                        what: "triangles",
-                        found: m.indices.len(),
-                        limit: MAX_PRIMS - 1,
-                    };
-                    return Err(BuildError::Mesh { geometry: i, source });
-                }
-            }
-        }
-        let blas: Vec<Blas> = geometries
+        let known = previous.filter(|w| w.options == *options).map(World::trees_by_address);
+        let blas = geometries
             .iter()
-            .map(|g| match g {
-                Geometry::Mesh(m) => Blas::for_mesh(m, options),
-                Geometry::Shape(s) => Blas::for_shape(s.clone(), options),
+            .enumerate()
+            .map(|(i, g)| match (known.as_ref().and_then(|k| k.get(&g.address())), g) {
+                (Some(tree), Geometry::Mesh(_)) => Ok(Arc::clone(tree)),
+                (Some(tree), Geometry::Shape(s)) => Ok(Blas::with_shape(tree, s)),
+                (None, _) => blas_of(i, g, options, whole).map(Arc::new),
             })
-            .collect();
+            .collect::<Result<Vec<_>, _>>()?;
         phases.push(("geometries", start.elapsed()));
 
         let mut notes: Vec<String> = blas
@@ -123,7 +163,7 @@ impl World {
             .enumerate()
             .flat_map(|(i, b)| b.notes.iter().map(move |n| format!("geometry {i}: {n}")))
             .collect();
-        let Placed { origin, placements, tlas } = place(&instances, &blas, &mut notes)?;
+        let Placed { origin, placements, tlas } = place(&instances, &blas, whole, &mut notes)?;
         phases.push(("instances", start.elapsed() - phases[0].1));
         let report = BuildReport {
             total: start.elapsed(),
@@ -139,11 +179,12 @@ impl World {
             geometries,
             instances,
             origin,
-            bounds: tlas.bounds,
+            bounds: whole.map_or(tlas.bounds, |w| w.bounds),
             report,
             blas,
             placements,
             tlas,
+            options: *options,
             robustness: options.robustness,
             level: SimdLevel::resolve(options.simd),
         })
@@ -155,9 +196,13 @@ impl World {
         World::build(vec![Geometry::Mesh(mesh.into())], vec![instance], options)
     }
 
+    fn trees_by_address(&self) -> HashMap<usize, &Arc<Blas>> {
+        self.geometries.iter().map(Geometry::address).zip(&self.blas).collect()
+    }
+
     /// Makes the upper level anew after a geometry has changed.
     pub(super) fn place_again(&mut self) {
-        let placed = place(&self.instances, &self.blas, &mut self.report.notes);
+        let placed = place(&self.instances, &self.blas, None, &mut self.report.notes);
         let Placed { origin, placements, tlas } = placed.expect("the build accepted these transforms");
         self.report.primitives = self.blas.iter().map(|b| b.primitives).sum();
         self.report.skipped = self.blas.iter().map(|b| b.skipped).sum();
@@ -316,14 +361,20 @@ struct Placed {
 }
 
 /// Chooses render space (world space, moved when everything is far from zero) and places the instances in it.
-fn place(instances: &[Instance], blas: &[Blas], notes: &mut Vec<String>) -> Result<Placed, BuildError> {
-    let origin = choose_origin(instances, blas);
+fn place(
+    instances: &[Instance],
+    blas: &[Arc<Blas>],
+    whole: Option<&Whole>,
+    notes: &mut Vec<String>,
+) -> Result<Placed, BuildError> {
+    let origin = whole.map_or_else(|| choose_origin(instances, blas), |w| w.origin);
     let placements = instances
         .iter()
         .enumerate()
         .map(|(i, inst)| {
             let b = &blas[inst.geometry];
-            Placement::new(inst.geometry, &inst.world_from_object, &b.frame, b.bvh().bounds, origin).ok_or(
+            let bounds = [b.reach(), b.bvh().bounds];
+            Placement::new(inst.geometry, &inst.world_from_object, &b.frame, bounds, origin).ok_or(
                 BuildError::SingularTransform {
                     instance: i,
                     determinant: inst.world_from_object.matrix3.determinant(),
@@ -343,7 +394,7 @@ fn place(instances: &[Instance], blas: &[Blas], notes: &mut Vec<String>) -> Resu
 
 /// Zero, or the middle of the world's bounds when they lie more than four sizes away from it. A single geometry without rotation gets its own
 /// centre, so that its local space and render space coincide.
-fn choose_origin(instances: &[Instance], blas: &[Blas]) -> DVec3 {
+fn choose_origin(instances: &[Instance], blas: &[Arc<Blas>]) -> DVec3 {
     if let [only] = instances
         && only.world_from_object.matrix3 == DMat3::IDENTITY
         && only.world_from_object.is_finite()
