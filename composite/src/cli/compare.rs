@@ -6,6 +6,8 @@ use crate::frame::Frame;
 use crate::pixel::{DepthPixel, PremultipliedPixel};
 use crate::rival::{self, Icet, IcetFrame, IcetImage, IcetMode, IcetStrategy};
 use crate::scenes::{Drawn, Scene};
+use crate::simd::SimdLevel;
+use crate::strategies::Strategy;
 use anyhow::Context as _;
 use datasets::cli::{CommonArgs, Status, UsageError};
 use serde::Serialize;
@@ -14,7 +16,7 @@ use std::fmt;
 use std::path::Path;
 
 /// Frames before the clock counts: buffers are made and connections opened.
-const WARM_UP: u64 = 2;
+const WARM_UP: u64 = 3;
 /// Largest difference of a channel that counts as equal where floating-point colours are blended: IceT groups the ranks differently
 /// for every strategy, so its own strategies differ by about as much.
 const BLEND_TOLERANCE: f32 = 1e-5;
@@ -37,6 +39,12 @@ pub(super) struct CompareArgs {
     /// What is composited: RGBA8 with depth (depth), or premultiplied RGBA f32 in order (blend)
     #[arg(long, default_value = "depth")]
     pixels: Pixels,
+    /// Our strategy
+    #[arg(long, default_value = "direct", value_name = "direct|tree|bswap|radix-k[:K]|auto", value_parser = strategy_named)]
+    strategy: Strategy,
+    /// Our instruction set at most: scalar, sse2, sse4.2, avx2, avx512 or neon, as far as this machine has it
+    #[arg(long, value_name = "LEVEL", value_parser = simd_named)]
+    simd: Option<SimdLevel>,
     /// Timed frames; 7 of them, 5 simulated
     #[arg(long, value_name = "N")]
     frames: Option<u64>,
@@ -81,6 +89,9 @@ struct Row {
     pixels_differ: u64,
     ours_min_ms: f64,
     rival_min_ms: f64,
+    /// The strategy that was used for the last frame.
+    ours_strategy: String,
+    simd: &'static str,
     ours_mb: f64,
     ours_messages: u64,
     rivals_ms: std::collections::BTreeMap<&'static str, f64>,
@@ -144,8 +155,14 @@ impl<'a> Bench<'a> {
             RankComm::Thread(comm) => Icet::over_comm(path, comm, mode, args.size, args.size),
         };
         // IceT collects colours only. Its ranks do not wait for each other at the end either: the barrier is timed for both.
-        let options =
-            Options { depth: false, confirm: false, timeout: args.ranks.timeout(), ..Options::default() };
+        let options = Options {
+            strategy: args.strategy,
+            simd: args.simd,
+            depth: false,
+            confirm: false,
+            timeout: args.ranks.timeout(),
+            ..Options::default()
+        };
         Ok(Self {
             comm,
             args,
@@ -251,6 +268,11 @@ impl<'a> Bench<'a> {
             pixels_differ,
             ours_min_ms: smallest(&ours_ms),
             rival_min_ms: smallest(&rivals_ms[best]),
+            ours_strategy: format!(
+                "{:?}",
+                reports.last().map_or(self.args.strategy, |report| report.strategy)
+            ),
+            simd: self.args.simd.unwrap_or_else(SimdLevel::best).name(),
             ours_mb: total(0) as f64 / 1e6,
             ours_messages: total(8),
             rivals_ms: IcetStrategy::ALL.iter().map(|s| s.name()).zip(medians).collect(),
@@ -263,6 +285,25 @@ impl<'a> Bench<'a> {
             .into(),
         })
     }
+}
+
+fn strategy_named(name: &str) -> Result<Strategy, String> {
+    let (name, k) = name.split_once(':').unwrap_or((name, "8"));
+    match (name, k.parse()) {
+        ("direct", _) => Ok(Strategy::DirectSend),
+        ("tree", _) => Ok(Strategy::Tree),
+        ("bswap", _) => Ok(Strategy::BinarySwap),
+        ("radix-k", Ok(k)) => Ok(Strategy::RadixK { k }),
+        ("auto", _) => Ok(Strategy::Automatic),
+        _ => Err("use direct, tree, bswap, radix-k, radix-k:4 or auto".to_string()),
+    }
+}
+
+fn simd_named(name: &str) -> Result<SimdLevel, String> {
+    let levels = SimdLevel::available();
+    let names = || levels.iter().map(|level| level.name()).collect::<Vec<_>>().join(", ");
+    let found = levels.iter().find(|level| level.name() == name).copied();
+    found.ok_or_else(|| format!("this machine has {}", names()))
 }
 
 enum Ours {

@@ -60,6 +60,21 @@ pub(super) fn ranks_here(variable: impl Fn(&str) -> Option<String>) -> Option<us
         .find_map(|name| variable(name).and_then(|value| value.parse().ok()))
 }
 
+/// Processors of this machine. What the standard library says is less where the launcher has bound each rank to its own.
+pub(super) fn processors_here() -> usize {
+    let online = std::fs::read_to_string("/sys/devices/system/cpu/online").unwrap_or_default();
+    count_ranges(online.trim()).unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+}
+
+/// How many numbers are in a list like `0-3,8`.
+fn count_ranges(list: &str) -> Option<usize> {
+    list.split(',').try_fold(0, |count, range| {
+        let (first, last) = range.split_once('-').unwrap_or((range, range));
+        let (first, last): (usize, usize) = (first.parse().ok()?, last.parse().ok()?);
+        Some(count + last.checked_sub(first)? + 1)
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -75,6 +90,12 @@ mod tests {
         let both = with(&[("OMPI_COMM_WORLD_RANK", "0"), ("COMPOSITE_MPI", "/opt/x/libmpi.so")]).unwrap();
         assert_eq!(both.libraries, ["/opt/x/libmpi.so"]);
         assert_eq!(with(&[("COMPOSITE_MPI", "mpich")]).unwrap().libraries[0], "libmpich.so.12");
+    }
+
+    #[test]
+    fn processors_are_counted_from_ranges() {
+        assert_eq!(["0", "0-1", "0-3,8", ""].map(count_ranges), [Some(1), Some(2), Some(5), None]);
+        assert!(processors_here() >= 1);
     }
 
     #[test]

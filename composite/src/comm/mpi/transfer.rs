@@ -40,6 +40,8 @@ pub(super) struct Transfers {
     incoming: Vec<Incoming>,
     next_id: u64,
     pub(super) pool: BufferPool,
+    /// Receives that are complete and not yet taken.
+    finished: Vec<u64>,
     /// Used again by every poll.
     requests: Vec<Handle>,
     owners: Vec<usize>,
@@ -55,6 +57,7 @@ impl Transfers {
             incoming: Vec::new(),
             next_id: 0,
             pool: BufferPool::default(),
+            finished: Vec::new(),
             requests: Vec::new(),
             owners: Vec::new(),
         }
@@ -187,15 +190,14 @@ impl Transfers {
         if code == 0 { Ok(()) } else { Err(failed(mpi, self.rank, "MPI_Irecv", code)) }
     }
 
-    /// The message of receive `id` if it is complete.
-    pub(super) fn take(&mut self, id: u64) -> Option<Vec<u8>> {
-        let index = self.incoming.iter().position(|other| other.id == id && other.done)?;
-        Some(self.incoming.remove(index).buffer)
-    }
-
-    /// Whether receive `id` is one of this rank's.
-    pub(super) fn knows(&self, id: u64) -> bool {
-        self.incoming.iter().any(|other| other.id == id)
+    /// The first of `wanted` that is complete, and its message. Looks at complete ones only: with a hundred receives posted, a
+    /// walk over all of them after each message takes longer than the messages.
+    pub(super) fn take(&mut self, wanted: impl Fn(u64) -> Option<usize>) -> Option<(usize, Vec<u8>)> {
+        let found = self.finished.iter().enumerate().find_map(|(at, &id)| Some((at, id, wanted(id)?)));
+        let (at, id, position) = found?;
+        self.finished.remove(at);
+        let index = self.incoming.iter().position(|other| other.id == id)?;
+        Some((position, self.incoming.remove(index).buffer))
     }
 
     /// Lets MPI work and takes at most one chunk in; `wait` blocks until one has come, else it looks once. Says whether one came.
@@ -266,6 +268,7 @@ impl Transfers {
             return Ok(true);
         }
         this.done = true;
+        self.finished.push(this.id);
         // Whoever had to wait for this one.
         let (source, tag) = (this.source, this.tag);
         for index in owner + 1..self.incoming.len() {

@@ -1,5 +1,7 @@
 //! The program `composite` as a shared library, in which SimGrid's `smpirun` looks for `main`: it loads one private copy for each
-//! simulated rank. Made by `cargo build -p composite --example composite_smpi`; `composite compare --smpi` does that itself.
+//! simulated rank. Made by `cargo build -p composite-smpi`; `composite compare --smpi` does that itself.
+#![deny(unsafe_code)]
+#![allow(unsafe_code, reason = "the one function that SimGrid calls")]
 
 use std::ffi::{CStr, OsString, c_char, c_int};
 use std::os::unix::ffi::OsStringExt as _;

@@ -1,0 +1,45 @@
+# Parallel projection, off-centre window, a box of quads coloured by cell data, and a back with a property of its own.
+from vtkmodules.vtkRenderingCore import *
+import vtkmodules.vtkRenderingOpenGL2, vtkmodules.vtkRenderingFreeType, vtkmodules.vtkInteractionStyle
+from vtkmodules.vtkCommonCore import vtkFloatArray
+from vtkmodules.vtkFiltersSources import vtkCubeSource, vtkDiskSource
+
+cube = vtkCubeSource()
+cube.Update()
+values = vtkFloatArray()
+for i in range(cube.GetOutput().GetNumberOfCells()):
+    values.InsertNextValue(i)
+data = cube.GetOutput()
+data.GetCellData().SetScalars(values)
+mapper = vtkPolyDataMapper()
+mapper.SetInputData(data)
+mapper.SetScalarRange(0, 5)
+actor = vtkActor()
+actor.SetMapper(mapper)
+disk = vtkDiskSource()
+disk.SetOuterRadius(1.2)
+disk.SetCircumferentialResolution(30)
+ren = vtkRenderer()
+ren.AddActor(actor)
+for angle in (60, 150):
+    m = vtkPolyDataMapper()
+    m.SetInputConnection(disk.GetOutputPort())
+    a = vtkActor()
+    a.SetMapper(m)
+    a.RotateY(angle)
+    a.GetProperty().SetColor(0.2, 0.8, 0.3)
+    back = vtkProperty()
+    back.SetColor(0.9, 0.1, 0.5)
+    a.SetBackfaceProperty(back)
+    ren.AddActor(a)
+win = vtkRenderWindow()
+win.SetOffScreenRendering(1)
+win.SetMultiSamples(0)
+win.SetSize(400, 300)
+win.AddRenderer(ren)
+camera = ren.GetActiveCamera()
+camera.ParallelProjectionOn()
+camera.SetPosition(3, 2, 4)
+camera.SetWindowCenter(0.2, -0.1)
+ren.ResetCamera()
+win.Render()
