@@ -11,6 +11,9 @@ use rt_core::waves::{LightBits, LightPoint, Met, Pass, TileInWork, WaveFrame};
 /// Words of a ray in a message.
 const RAY_WORDS: usize = 8;
 
+/// By tile and ray.
+type FirstHits = Vec<Vec<Option<Met>>>;
+
 /// One pass beyond its camera rays.
 pub(super) struct Wave<'a> {
     pub(super) side: &'a Side<'a>,
@@ -201,9 +204,9 @@ impl Wave<'_> {
         talk: &mut Talk<'_>,
         rays: &[Vec<Ray>],
         pixels: Option<&[Vec<u32>]>,
-    ) -> Result<(bool, Vec<Vec<Option<Met>>>), FrameError> {
+    ) -> Result<(bool, FirstHits), FrameError> {
         let (rank, size, side) = (talk.rank(), talk.size(), self.side);
-        let mut met: Vec<Vec<Option<Met>>> = rays.iter().map(|r| vec![None; r.len()]).collect();
+        let mut met: FirstHits = rays.iter().map(|r| vec![None; r.len()]).collect();
         let mut questions: Vec<Vec<u32>> = vec![Vec::new(); size];
         let mut asked: Vec<Vec<(u32, u32)>> = vec![Vec::new(); size];
         let mut bits = vec![0; self.boxes.bit_words()];
@@ -228,7 +231,7 @@ impl Wave<'_> {
         talk.spent(Activity::Shade);
         let words = RAY_WORDS + pixels.is_some() as usize;
         let mut answer = |report: &mut RankReport, question: &[u32]| {
-            if question.len() % words != 0 {
+            if !question.len().is_multiple_of(words) {
                 return None;
             }
             let rays: Vec<Ray> = question.chunks_exact(words).map(read_ray).collect();

@@ -17,7 +17,7 @@ pub(super) fn to_message(words: &[u32], mut buffer: Vec<u8>) -> Vec<u8> {
 /// The words of a message; `None` when it is damaged.
 pub(super) fn from_message(message: &[u8]) -> Option<Vec<u32>> {
     let (head, body) = message.split_first_chunk::<8>()?;
-    if body.len() % 4 != 0 || checksum(body) != u64::from_le_bytes(*head) {
+    if !body.len().is_multiple_of(4) || checksum(body) != u64::from_le_bytes(*head) {
         return None;
     }
     Some(body.chunks_exact(4).map(|c| u32::from_le_bytes([c[0], c[1], c[2], c[3]])).collect())
