@@ -23,8 +23,8 @@ const SCRIPTS: &[&str] = &[
 const COLOR_MEAN: f64 = 0.5;
 /// Share of pixels whose silhouette differs.
 const SILHOUETTE: f64 = 0.0002;
-/// VTK's depth buffer has 24 bits, and so has what crosses to it: most pixels agree within two steps.
-const DEPTH: f32 = 2.0 / 16_777_215.0;
+/// VTK's depth buffer has 24 bits, and so has what crosses to it: nine of ten pixels agree within four steps.
+const DEPTH: f32 = 4.0 / 16_777_215.0;
 /// Where a surface is steep to the viewer, OpenGL's own interpolation is off by some steps more: all but a hundredth agree within these.
 const DEPTH_STEEP: f32 = 24.0 / 16_777_215.0;
 
