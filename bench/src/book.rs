@@ -14,6 +14,7 @@ macro_rules! chapters {
 }
 
 chapters! {
+    composite_rendering "../../docs/src/composite/rendering.md"
     datasets_generators "../../docs/src/datasets/generators.md"
     rt_core_embedding "../../docs/src/rt-core/embedding.md"
     rt_core_geometry "../../docs/src/rt-core/geometry.md"

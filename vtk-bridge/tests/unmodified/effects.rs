@@ -16,7 +16,7 @@ fn each_effect_changes_the_picture_and_is_in_the_report() {
     let cases: [(&str, &[(&str, &str)], &str, i32); 7] = [
         ("shadows darken", &[("RTV_SHADOWS", "1")], "shadows", -1),
         ("soft shadows darken", &[("RTV_SHADOWS", "1"), ("RTV_LIGHT_SIZE", "5")], "soft shadows", -1),
-        ("occlusion darkens", &[("RTV_AO", "16")], "ambient occlusion", -1),
+        ("occlusion shades", &[("RTV_AO", "16")], "ambient occlusion", 0),
         ("a mirror adds light", &[("RTV_MIRROR", "0.4")], "reflection", 1),
         ("metal reflects", &[("RTV_MATERIAL", "metal")], "glossy reflection", 0),
         ("glass refracts", &[("RTV_MATERIAL", "glass")], "refraction", 0),
@@ -76,4 +76,15 @@ fn off_means_off() {
     let (stock, _) = peers.shot(Program::Vtk, "vtk/contours", &Run::plain());
     let (off, _) = peers.shot(Program::Vtk, "vtk/contours", &Run::traced().with("RTV_OFF", 1));
     assert_eq!((off.rgba, off.depth), (stock.rgba, stock.depth));
+}
+
+#[test]
+fn occlusion_that_looks_further_is_darker() {
+    let Some(peers) = peers() else { return };
+    let with_radius = |radius: &str| {
+        let run = Run::traced().with("RTV_AO", 32).with("RTV_AO_RADIUS", radius);
+        peers.shot(Program::Vtk, "vtk/shadow_scene", &run).0.brightness()
+    };
+    let [near, middle, far] = ["1e-6", "0.3", "3"].map(with_radius);
+    assert!(near > middle + 0.1 && middle > far + 0.1, "{near} {middle} {far}");
 }

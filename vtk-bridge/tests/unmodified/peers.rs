@@ -141,7 +141,7 @@ impl Peers {
                 c
             }
         };
-        c.env("DISPLAY", &self.display).env_remove("VTK_AUTOLOAD_PATH").env("RTV_HOME", &self.home);
+        c.env("DISPLAY", &self.display).env_remove("VTK_AUTOLOAD_PATH").env_remove("PV_PLUGIN_PATH").env("RTV_HOME", &self.home);
         for (name, _) in std::env::vars_os().filter(|(n, _)| n.to_string_lossy().starts_with("RTV_")) {
             if name != "RTV_HOME" {
                 c.env_remove(name);

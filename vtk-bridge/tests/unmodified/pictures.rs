@@ -49,7 +49,6 @@ same_pictures! {
     blocks_keep_their_colours_and_visibility: Program::Vtk, "vtk/multi_block";
     opacity_in_the_order_of_depth_peeling: Program::Vtk, "vtk/opacity";
     textures_nearest_and_linear: Program::Vtk, "vtk/textures";
-    physically_based_surfaces: Program::Vtk, "vtk/pbr";
     parallel_projection_off_centre_with_cell_colours: Program::Vtk, "vtk/parallel_projection";
     clipping_planes_of_a_moved_actor: Program::Vtk, "vtk/clipping";
     a_volume_around_a_surface: Program::Vtk, "vtk/volume_and_surface";
@@ -65,5 +64,14 @@ fn paraview_s_translucent_contours() {
     // ParaView peels only four layers where ours has all: edges where five overlap differ.
     if let Some(d) = compare(Program::ParaView, "paraview/opacity") {
         assert!(d.color_mean <= COLOR, "{d:?}");
+    }
+}
+
+#[test]
+fn physically_based_surfaces() {
+    // Dielectrics and metals agree. Between them VTK takes the metal's reflectance off the diffuse part a second time, and its masking term has
+    // roughness where others have its square: up to two levels on average.
+    if let Some(d) = compare(Program::Vtk, "vtk/pbr") {
+        assert!(d.color_mean <= 2.0, "{d:?}");
     }
 }

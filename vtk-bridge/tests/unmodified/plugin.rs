@@ -15,7 +15,8 @@ fn the_panel_s_properties_change_the_picture() {
     let run = Run::plain()
         .with("PV_PLUGIN_PATH", home.join("plugins/pv5.11").display())
         .with("RTV_HOME", home.display());
-    let output = peers.python(Program::ParaView, &run, &[file.to_str().expect("UTF-8")]);
+    // Without --dr ParaView would save the settings for the user's next session.
+    let output = peers.python(Program::ParaView, &run, &["--dr", file.to_str().expect("UTF-8")]);
     let said =
         String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success() && said.contains("survived"), "{said}");

@@ -7,8 +7,8 @@ use std::path::Path;
 const EDGES: f64 = 0.01;
 
 fn picture(path: &Path) -> Vec<u8> {
-    let mut image = image::open(path).unwrap_or_else(|e| panic!("{}: {e}", path.display())).to_rgb8();
-    std::mem::take(&mut *image)
+    let image = image::open(path).unwrap_or_else(|e| panic!("{}: {e}", path.display())).to_rgb8();
+    image.into_raw()
 }
 
 fn compare(opacity: &str) {

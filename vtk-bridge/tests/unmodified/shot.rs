@@ -18,7 +18,7 @@ pub(crate) struct Shot {
 pub(crate) struct Difference {
     /// Share of pixels that are covered in one of them only.
     pub(crate) silhouette: f64,
-    /// Largest difference of depth away from edges, in units of 2^-24 (the step of a 24-bit depth buffer, and of f32 below 1).
+    /// Largest difference of depth away from edges, beyond what OpenGL's own grid makes of the slope, in units of 2^-24 (the step of a 24-bit depth buffer, and of f32 below 1).
     pub(crate) depth_steps: f64,
     /// Mean difference of colour over all pixels and channels, levels of 255.
     pub(crate) color_mean: f64,
@@ -75,6 +75,14 @@ impl Shot {
         })
     }
 
+    /// How much depth changes from pixel (`x`, `y`) to the next. OpenGL moves vertices to a grid of 1/256 of a pixel, so its depth is that of a
+    /// place up to that far away.
+    fn slope(&self, x: usize, y: usize) -> f64 {
+        let at = |dx: usize, dy: usize| f64::from(self.depth[(y + dy - 1) * self.width + x + dx - 1]);
+        let step = |dx, dy| (at(dx, dy) - at(1, 1)).abs();
+        step(0, 1).max(step(2, 1)) + step(1, 0).max(step(1, 2))
+    }
+
     pub(crate) fn difference(&self, other: &Shot) -> Difference {
         assert_eq!((self.width, self.height), (other.width, other.height));
         let mut d = Difference::default();
@@ -89,7 +97,8 @@ impl Shot {
                 if self.is_inner(other, x, y) {
                     inner += 1;
                     inner_colors += apart;
-                    let steps = (f64::from(self.depth[i]) - f64::from(other.depth[i])).abs() * 24f64.exp2();
+                    let apart = (f64::from(self.depth[i]) - f64::from(other.depth[i])).abs();
+                    let steps = (apart - self.slope(x, y) / 256.0) * 24f64.exp2();
                     d.depth_steps = d.depth_steps.max(steps);
                 }
             }

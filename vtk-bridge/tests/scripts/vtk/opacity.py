@@ -8,7 +8,7 @@ ren.SetBackground(0.3, 0.2, 0.1)
 ren.UseDepthPeelingOn()
 ren.SetMaximumNumberOfPeels(20)
 ren.SetOcclusionRatio(0)
-for radius, color, opacity in [(1.0, (1, 0, 0), 0.3), (0.7, (0, 1, 0), 0.4), (0.45, (0, 0, 1), 0.5), (0.2, (1, 1, 1), 1.0)]:
+for radius, color, opacity in [(1.0, (1, 0, 0), 0.3), (0.7, (0, 1, 0), 0.4), (0.45, (0, 0, 1), 0.5), (0.3, (1, 1, 1), 1.0)]:
     sphere = vtkSphereSource()
     sphere.SetRadius(radius)
     sphere.SetThetaResolution(40)
