@@ -30,7 +30,9 @@ def main():
     from .library import RtvError
 
     try:
-        import rtvtk  # noqa: F401  installs the renderer
+        from .renderer import install
+
+        install()
     except (RtvError, ImportError) as error:
         print(f"rtvtk: {error}", file=sys.stderr)
         return 2
