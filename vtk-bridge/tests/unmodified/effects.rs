@@ -2,6 +2,9 @@
 
 use crate::peers::{Program, Run, peers};
 
+/// What it shows, the variables, the effect that must be in the report, and where brightness must go (0: anywhere).
+type Case = (&'static str, &'static [(&'static str, &'static str)], &'static str, i32);
+
 fn report(path: &std::path::Path) -> serde_json::Value {
     let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     serde_json::from_str::<serde_json::Value>(&text).expect("JSON")["renderers"][0].clone()
@@ -13,7 +16,7 @@ fn each_effect_changes_the_picture_and_is_in_the_report() {
     let script = "vtk/shadow_scene";
     let (plain, _) = peers.shot(Program::Vtk, script, &Run::traced());
     let file = peers.out.join("effects.json");
-    let cases: [(&str, &[(&str, &str)], &str, i32); 7] = [
+    let cases: [Case; 7] = [
         ("shadows darken", &[("RTV_SHADOWS", "1")], "shadows", -1),
         ("soft shadows darken", &[("RTV_SHADOWS", "1"), ("RTV_LIGHT_SIZE", "5")], "soft shadows", -1),
         ("occlusion shades", &[("RTV_AO", "16")], "ambient occlusion", 0),

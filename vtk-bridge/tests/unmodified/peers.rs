@@ -86,6 +86,7 @@ fn set_up() -> Option<Peers> {
 }
 
 /// Ends the X server when the test process ends: nothing else would, because statics are not dropped.
+#[expect(clippy::zombie_processes, reason = "it ends after this process, so nobody can wait for it")]
 fn watch(server: u32) {
     let script = format!("while kill -0 {} 2>/dev/null; do sleep 1; done; kill {server}", std::process::id());
     Command::new("sh").args(["-c", &script]).stdin(Stdio::null()).spawn().expect("sh runs");

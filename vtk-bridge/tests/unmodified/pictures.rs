@@ -32,7 +32,7 @@ fn same_picture(program: Program, script: &str) {
 }
 
 macro_rules! same_pictures {
-    ($($name:ident: $program:expr, $script:literal;)*) => {
+    ($(fn $name:ident() = $program:expr, $script:literal;)*) => {
         $(#[test]
         fn $name() {
             same_picture($program, $script);
@@ -41,22 +41,22 @@ macro_rules! same_pictures {
 }
 
 same_pictures! {
-    contours_with_a_lookup_table: Program::Vtk, "vtk/contours";
-    highlights_flat_and_smooth_under_several_lights: Program::Vtk, "vtk/specular";
-    the_light_kit: Program::Vtk, "vtk/light_kit";
-    glyphs_are_instances_in_their_places: Program::Vtk, "vtk/glyphs";
-    streamlines_in_an_outline: Program::Vtk, "vtk/streamlines";
-    blocks_keep_their_colours_and_visibility: Program::Vtk, "vtk/multi_block";
-    opacity_in_the_order_of_depth_peeling: Program::Vtk, "vtk/opacity";
-    textures_nearest_and_linear: Program::Vtk, "vtk/textures";
-    parallel_projection_off_centre_with_cell_colours: Program::Vtk, "vtk/parallel_projection";
-    clipping_planes_of_a_moved_actor: Program::Vtk, "vtk/clipping";
-    a_volume_around_a_surface: Program::Vtk, "vtk/volume_and_surface";
-    annotations_and_wireframe_at_the_right_depth: Program::Vtk, "vtk/annotations";
-    two_viewports_and_a_layer: Program::Vtk, "vtk/two_viewports";
-    picks_and_selections: Program::Vtk, "vtk/selection";
-    unstructured_grids_culled_backs_and_scaled_actors: Program::Vtk, "vtk/data_set_mapper";
-    paraview_s_light_kit_axes_and_scalar_bar: Program::ParaView, "paraview/light_kit";
+    fn contours_with_a_lookup_table() = Program::Vtk, "vtk/contours";
+    fn highlights_flat_and_smooth_under_several_lights() = Program::Vtk, "vtk/specular";
+    fn the_light_kit() = Program::Vtk, "vtk/light_kit";
+    fn glyphs_are_instances_in_their_places() = Program::Vtk, "vtk/glyphs";
+    fn streamlines_in_an_outline() = Program::Vtk, "vtk/streamlines";
+    fn blocks_keep_their_colours_and_visibility() = Program::Vtk, "vtk/multi_block";
+    fn opacity_in_the_order_of_depth_peeling() = Program::Vtk, "vtk/opacity";
+    fn textures_nearest_and_linear() = Program::Vtk, "vtk/textures";
+    fn parallel_projection_off_centre_with_cell_colours() = Program::Vtk, "vtk/parallel_projection";
+    fn clipping_planes_of_a_moved_actor() = Program::Vtk, "vtk/clipping";
+    fn a_volume_around_a_surface() = Program::Vtk, "vtk/volume_and_surface";
+    fn annotations_and_wireframe_at_the_right_depth() = Program::Vtk, "vtk/annotations";
+    fn two_viewports_and_a_layer() = Program::Vtk, "vtk/two_viewports";
+    fn picks_and_selections() = Program::Vtk, "vtk/selection";
+    fn unstructured_grids_culled_backs_and_scaled_actors() = Program::Vtk, "vtk/data_set_mapper";
+    fn paraview_s_light_kit_axes_and_scalar_bar() = Program::ParaView, "paraview/light_kit";
 }
 
 #[test]
