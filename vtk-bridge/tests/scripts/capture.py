@@ -23,7 +23,6 @@ def save(window, name, **facts):
     """Writes NAME.png, NAME.npy and NAME.json into the folder that the first argument names. Does not render."""
     base = os.path.join(sys.argv[1], name)
     width, height = window.GetSize()
-    window.MakeCurrent()
     pixels = vtk.vtkUnsignedCharArray()
     window.GetPixelData(0, 0, width - 1, height - 1, 0, pixels, 0)
     image = vtk.vtkImageData()

@@ -23,6 +23,11 @@ for script in scripts:
         traceback.print_exc()
         print("raised", name, flush=True)
         failed = 1
+    if "paraview.simple" in sys.modules:
+        # Views that outlive their script would be drawn again by the next, and end in the wrong order with the process.
+        simple = sys.modules["paraview.simple"]
+        for view in simple.GetRenderViews():
+            simple.Delete(view)
     print("finished", name, round(time.time() - start, 2), flush=True)
 sys.stdout.flush()
 sys.exit(failed)

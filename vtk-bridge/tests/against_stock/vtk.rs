@@ -1,0 +1,160 @@
+//! The same unmodified scripts in Debian's VTK 9.1, without us and with us.
+
+use crate::capture::Capture;
+use crate::compare::{Bars, faults};
+use crate::peers::skip;
+use crate::session::{Program, Run, With, output, scripts_in};
+use std::sync::OnceLock;
+
+/// Stock, and with the bridge.
+struct Both {
+    stock: Run,
+    ours: Run,
+}
+
+fn both() -> Option<&'static Both> {
+    static BOTH: OnceLock<Result<Both, String>> = OnceLock::new();
+    let made = BOTH.get_or_init(|| {
+        let scripts = scripts_in("vtk");
+        let stock = Run::new(Program::Vtk, With::Stock, &scripts, output("vtk-stock"), &[])?;
+        let ours = Run::new(Program::Vtk, With::Bridge, &scripts, output("vtk-ours"), &[])?;
+        Ok(Both { stock, ours })
+    });
+    made.as_ref().map_err(|reason| skip(reason)).ok()
+}
+
+/// Pictures that are held to other bars than the rest, or to none, and why.
+const EXCEPTIONS: &[(&str, &str, Option<Bars>, &str)] = &[
+    (
+        "odd_inputs",
+        "not_a_number",
+        None,
+        "OpenGL shows nothing of a surface with one bad point; we show the rest (see below)",
+    ),
+];
+
+/// Pictures in which there is nothing to trace.
+const EMPTY: &[(&str, &str)] = &[("odd_inputs", "nothing"), ("windows", "no_renderer"), ("windows", "actor_gone")];
+
+fn same_as_stock(script: &str) {
+    let Some(both) = both() else { return };
+    let names = both.stock.pictures(script).unwrap_or_else(|e| panic!("stock: {e}"));
+    let ours = both.ours.pictures(script).unwrap_or_else(|e| panic!("with the bridge: {e}"));
+    assert_eq!(names, ours, "other pictures than stock VTK's");
+    let mut found = Vec::new();
+    for name in names {
+        let [stock, ours] = [&both.stock, &both.ours].map(|r| r.capture(script, &name).unwrap());
+        let path = both.ours.path(script, &name);
+        if ours.traced_triangles() == 0 && !EMPTY.contains(&(script, name.as_str())) {
+            found.push(format!("{}: nothing was ray traced: {:?}", path.display(), ours.report));
+        }
+        let bars = EXCEPTIONS.iter().find(|(s, p, ..)| (*s, *p) == (script, name.as_str()));
+        if let Some(bars) = bars.map_or(Some(Bars::STRICT), |(_, _, bars, _)| *bars) {
+            found.extend(faults(&stock, &ours, &bars).iter().map(|f| format!("{}: {f}", path.display())));
+        }
+    }
+    assert!(found.is_empty(), "\n{}\n", found.join("\n"));
+}
+
+macro_rules! scripts {
+    ($($test:ident: $script:literal,)*) => {
+        /// Every script has a test.
+        const TESTED: &[&str] = &[$($script),*];
+        $(#[test]
+        fn $test() {
+            same_as_stock($script);
+        })*
+    };
+}
+
+scripts! {
+    annotations_stay_opengl_in_the_same_picture: "annotations",
+    back_faces_are_as_in_stock_vtk: "backfaces",
+    data_that_changes_is_drawn_as_it_is_now: "changing",
+    clipping_planes_cut_as_in_stock_vtk: "clipping",
+    colors_of_points_cells_and_fields_are_stock: "colors",
+    contours_are_as_in_stock_vtk: "contours",
+    domains_of_any_size_and_place_show_the_same_picture_as_stock: "domains",
+    glyphs_are_as_in_stock_vtk: "glyphs",
+    lights_are_as_in_stock_vtk: "lights",
+    five_hundred_actors_are_as_in_stock_vtk: "many_actors",
+    blocks_have_their_own_color_opacity_and_visibility: "multiblock",
+    odd_inputs_are_survived: "odd_inputs",
+    opacity_is_as_with_depth_peeling: "opacity",
+    physically_based_surfaces_are_as_in_stock_vtk: "pbr",
+    projections_of_all_kinds_are_exact: "projections",
+    edges_points_and_mixed_cells_are_as_in_stock_vtk: "representations",
+    picks_and_selections_are_stock: "selection",
+    streamlines_are_as_in_stock_vtk: "streamlines",
+    textures_are_as_in_stock_vtk: "textures",
+    viewports_do_not_mix: "viewports",
+    volumes_mix_with_surfaces: "volume",
+    windows_come_and_go: "windows",
+}
+
+#[test]
+fn every_script_has_a_test() {
+    let there = scripts_in("vtk");
+    let names: Vec<&str> = there.iter().filter_map(|p| p.file_stem()?.to_str()).collect();
+    let mut tested = TESTED.to_vec();
+    tested.sort_unstable();
+    assert_eq!(names, tested);
+}
+
+/// So the bars measure us and not the chance of OpenGL's threads.
+#[test]
+fn stock_against_stock_passes_and_planted_faults_do_not() {
+    let Some(both) = both() else { return };
+    let script = scripts_in("vtk").into_iter().filter(|p| p.ends_with("contours.py") || p.ends_with("opacity.py"));
+    let again =
+        Run::new(Program::Vtk, With::Stock, &script.collect::<Vec<_>>(), output("vtk-stock-again"), &[]).unwrap();
+    for (script, name) in [("contours", "turned"), ("contours", "flat"), ("opacity", "opacity")] {
+        let [stock, second] = [&both.stock, &again].map(|r| r.capture(script, name).unwrap());
+        assert_eq!(faults(&stock, &second, &Bars::STRICT), Vec::<String>::new(), "{script}/{name}");
+        let mut shifted = second.clone();
+        shifted.rgb.rotate_right(1);
+        shifted.depth.rotate_right(1);
+        assert!(!faults(&stock, &shifted, &Bars::STRICT).is_empty(), "{script}/{name}: a shift by a pixel passed");
+        let mut brighter = second.clone();
+        brighter.rgb.iter_mut().flatten().for_each(|c| *c = c.saturating_add(2));
+        assert!(!faults(&stock, &brighter, &Bars::STRICT).is_empty(), "{script}/{name}: two of 255 brighter passed");
+    }
+}
+
+#[test]
+fn one_bad_point_costs_only_its_own_triangles() {
+    let Some(both) = both() else { return };
+    let pictures = ["odd", "not_a_number"].map(|p| both.ours.capture("odd_inputs", p).unwrap());
+    let shown = |c: &Capture| c.depth.iter().filter(|d| **d < 1.0).count();
+    let [whole, torn] = [shown(&pictures[0]), shown(&pictures[1])];
+    assert!(torn > whole / 2, "{torn} of {whole} pixels are left");
+    let told = pictures[1].warnings();
+    assert!(told.iter().any(|w| w.contains("not a number")), "{told:?}");
+}
+
+/// OpenGL's own pictures differ in the last digit between sizes; ours must be the same scene everywhere.
+#[test]
+fn size_and_place_do_not_change_our_picture() {
+    let Some(both) = both() else { return };
+    let names = both.ours.pictures("domains").unwrap();
+    let reference = both.ours.capture("domains", "size_1_at_0").unwrap();
+    for name in names {
+        let other = both.ours.capture("domains", &name).unwrap();
+        // At 1e9 the corners of a sphere of size 1 are rounded to 1e-7.
+        let bars = Bars { depth_ulp: 40, ..Bars::STRICT };
+        assert_eq!(faults(&reference, &other, &bars), Vec::<String>::new(), "{name}");
+    }
+}
+
+#[test]
+fn colors_and_matrices_do_not_rebuild() {
+    let Some(both) = both() else { return };
+    let rebuilt = |script: &str, picture: &str| -> u64 {
+        let capture = both.ours.capture(script, picture).unwrap();
+        capture.renderers().iter().filter_map(|r| r["rebuilt"].as_u64()).sum()
+    };
+    for (script, picture) in [("colors", "recolored"), ("changing", "moved"), ("contours", "turned"), ("multiblock", "changed")] {
+        assert_eq!(rebuilt(script, picture), 0, "{script}/{picture} built an acceleration structure again");
+    }
+    assert!(rebuilt("changing", "deformed") > 0, "points that moved must be built again");
+}
