@@ -45,12 +45,11 @@ save(
     # Floor and box meet: a concave corner. The top of the box is convex, the floor far away is open.
     concave=pixel(-0.2, -0.53, 0),
     convex=pixel(-0.3, -0.4, 1),
-    open=pixel(-2.5, -2.5, 0),
+    open=pixel(-2.2, -1.3, 0),
     # From here a mirror on the floor shows the box; from there the background.
     mirror_of_box=pixel(0, -0.75, 0),
     mirror_of_background=pixel(-2.2, -0.75, 0),
     # The left edges of the near and of the far box.
     near_edge=pixel(-0.5, -0.5, 0.5),
     far_edge=pixel(1.5, 8.5, 0.6),
-    silhouette=pixel(-0.5, 0.5, 1),
 )
