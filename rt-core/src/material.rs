@@ -27,6 +27,8 @@ pub enum Highlight {
     HalfVector,
     /// (R·V)^s with the mirrored light direction R: VTK (Phong 1975).
     Mirrored,
+    /// (N·L)^s, whatever the viewing direction: VTK's shader where a headlight is the only light.
+    TowardsLight,
 }
 
 /// How a surface answers light.

@@ -1,5 +1,57 @@
-//! Ray tracing inside unmodified VTK and ParaView.
+//! Ray tracing inside unmodified VTK and ParaView (thesis chapter 3), and for any program that has VTK-like arrays.
 //!
-//! **Status: not built yet.** This member holds its place in the workspace and has no code; ARCHITECTURE.md says
-//! what it will do and in which order the members come.
-#![forbid(unsafe_code)]
+//! Programs in Rust use [`bridge::Bridge`] with the types of [`input`]:
+//!
+//! ```
+//! use vtk_bridge::bridge::Bridge;
+//! use vtk_bridge::input::*;
+//! use vtk_bridge::options::Options;
+//! use rt_core::glam::DMat4;
+//!
+//! let points = [[-1.0f32, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]];
+//! let polys = Cells { offsets: Ids::I64(&[0, 3]), connectivity: Ids::I64(&[0, 1, 2]) };
+//! let mut bridge = Bridge::new();
+//! bridge.begin(&Options::default());
+//! bridge.add_surface(&Surface {
+//!     name: "a triangle",
+//!     shape: Shape::polygons(1, Points::F32(&points), polys),
+//!     world_from_data: DMat4::IDENTITY,
+//!     color: Color::Material,
+//!     texture: None,
+//!     property: Property { lighting: false, ..Property::default() },
+//!     back: None,
+//!     glyphs: None,
+//! });
+//! let view = View {
+//!     clip_from_world: DMat4::IDENTITY,
+//!     width: 8,
+//!     height: 8,
+//!     background: [[0.0; 3]; 2],
+//!     interactive: false,
+//!     shadows: false,
+//!     samples: 0,
+//!     lens: None,
+//! };
+//! let picture = bridge.render(&view)?;
+//! assert_eq!(picture.opaque[5 * 8 + 4], [255; 4]);
+//! assert_eq!(picture.depth[5 * 8 + 4], 0.5);
+//! # Ok::<(), vtk_bridge::bridge::BridgeError>(())
+//! ```
+//!
+//! VTK and ParaView come in through [`loader`] (found by `VTK_AUTOLOAD_PATH`), which loads the C++ shim built for the VTK in the process;
+//! the shim calls [`capi`]. [`setup`] builds and lays out these pieces; the program `vtk-bridge` is its command line.
+#![deny(unsafe_code)]
+
+mod assemble;
+pub mod bridge;
+pub mod capi;
+pub mod colors;
+pub mod geometry;
+pub mod input;
+pub mod lights;
+pub mod loader;
+pub mod materials;
+pub mod options;
+pub mod picture;
+pub mod report;
+pub mod setup;

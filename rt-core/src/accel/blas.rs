@@ -53,12 +53,14 @@ impl LocalFrame {
 }
 
 /// What the leaves hold.
+#[derive(Clone)]
 pub(crate) enum Content {
     Triangles(TriBvh),
     Shape { bvh: WideBvh, shape: Arc<dyn Shape> },
 }
 
 /// One geometry's structure.
+#[derive(Clone)]
 pub(crate) struct Blas {
     pub(crate) frame: LocalFrame,
     pub(crate) content: Content,

@@ -84,7 +84,7 @@ impl Robustness {
 }
 
 /// Options of [`crate::accel::World::build`].
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct BuildOptions {
     /// Build time against ray time.
     pub quality: BuildQuality,

@@ -119,7 +119,8 @@ impl World {
             return Err(RefitError::Indices { geometry, triangle: differs.unwrap_or(0) });
         }
 
-        let blas = &mut self.blas[geometry];
+        // A tree that another world uses too is copied first.
+        let blas = Arc::make_mut(&mut self.blas[geometry]);
         let absent = refit_blas(blas, &mesh);
         let (unusable, cost_growth) = (blas.skipped - absent, blas.cost_growth);
         self.geometries[geometry] = Geometry::Mesh(mesh);

@@ -127,3 +127,36 @@ fn empty_worlds_and_missing_rays() {
         assert!(hits.iter().all(|h| h.prim == [NO_HIT; LANES]));
     }
 }
+
+#[test]
+fn worlds_share_the_trees_of_geometries_they_have_in_common() {
+    use std::sync::Arc;
+    let mesh = |seed| Geometry::Mesh(Arc::new(noise_soup(300, seed)));
+    let (kept, changed, new) = (mesh(1), mesh(2), mesh(3));
+    let at = |geometry, x: f64| Instance {
+        geometry,
+        world_from_object: glam::DAffine3::from_translation(glam::DVec3::X * x),
+    };
+    let options = BuildOptions::default();
+    let build = |g: Vec<Geometry>, i, p| World::build_sharing(g, i, &options, p).expect("valid meshes");
+    let mut first = build(vec![changed, kept.clone()], vec![at(0, 0.0), at(1, 1.0)], None);
+    let geometries = vec![kept, new];
+    let instances = vec![at(1, 0.25), at(0, -0.5)];
+    let second = build(geometries.clone(), instances.clone(), Some(&first));
+    assert!(Arc::ptr_eq(&first.blas[1], &second.blas[0]), "the kept geometry has another index, but the same tree");
+    let fresh = build(geometries.clone(), instances.clone(), None);
+    let hits = |w: &World| random_rays(800, 5, 1.0).iter().map(|r| w.closest(r)).collect::<Vec<_>>();
+    let expected = hits(&fresh);
+    assert!(expected.iter().flatten().count() > 100, "the rays must hit something");
+    assert_eq!(hits(&second), expected);
+
+    // A refit of one world is none of the other's business.
+    first.refit(1, Arc::new(noise_soup(300, 1))).expect("the same triangles");
+    assert!(!Arc::ptr_eq(&first.blas[1], &second.blas[0]));
+    assert_eq!(hits(&second), expected);
+
+    // Other options: nothing of the old tree fits.
+    let other = BuildOptions { quality: BuildQuality::Fastest, ..options };
+    let third = World::build_sharing(geometries, instances, &other, Some(&second)).expect("valid meshes");
+    assert!(!Arc::ptr_eq(&third.blas[0], &second.blas[0]));
+}

@@ -119,6 +119,7 @@ pub(crate) fn widened(b: Aabb) -> Aabb {
 }
 
 /// A hierarchy over a mesh's triangles, in the mesh's object space.
+#[derive(Clone)]
 pub(crate) struct TriBvh {
     pub(crate) bvh: WideBvh,
     pub(crate) skipped: usize,

@@ -13,6 +13,7 @@ use crate::simd::SimdLevel;
 use crate::traverse::single::{LeafTest, RaySetup, beyond, traverse};
 use fearless_simd::{Level, Simd, dispatch};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -23,6 +24,16 @@ pub enum Geometry {
     Mesh(Arc<TriMesh>),
     /// Spheres, tubes, isosurfaces, user geometry.
     Shape(Arc<dyn Shape>),
+}
+
+impl Geometry {
+    /// Where the shared data lie: the same for two clones of one geometry, and never for two geometries that are both alive.
+    fn address(&self) -> usize {
+        match self {
+            Geometry::Mesh(m) => Arc::as_ptr(m) as usize,
+            Geometry::Shape(s) => Arc::as_ptr(s) as *const () as usize,
+        }
+    }
 }
 
 /// A geometry placed in the world.
@@ -74,7 +85,9 @@ pub struct World {
     origin: DVec3,
     bounds: Aabb,
     report: BuildReport,
-    pub(super) blas: Vec<Blas>,
+    /// Shared with worlds made from this one ([`World::build_sharing`]).
+    pub(super) blas: Vec<Arc<Blas>>,
+    pub(super) options: BuildOptions,
     pub(super) placements: Vec<Placement>,
     pub(super) tlas: WideBvh,
     pub(super) robustness: Robustness,
@@ -87,6 +100,19 @@ impl World {
         geometries: Vec<Geometry>,
         instances: Vec<Instance>,
         options: &BuildOptions,
+    ) -> Result<World, BuildError> {
+        World::build_sharing(geometries, instances, options, None)
+    }
+
+    /// As [`World::build`], but a geometry that `previous` has as well (the same [`Arc`], whatever its index) keeps its acceleration
+    /// structure: when one of five hundred meshes changes, or only transforms do, the others cost nothing. The options must be those of
+    /// `previous`, or everything is built anew. The hits are those of a world built from nothing (after a [`World::refit`] of `previous`: those
+    /// of the refitted one).
+    pub fn build_sharing(
+        geometries: Vec<Geometry>,
+        instances: Vec<Instance>,
+        options: &BuildOptions,
+        previous: Option<&World>,
     ) -> Result<World, BuildError> {
         let start = Instant::now();
         let mut phases = Vec::new();
@@ -109,11 +135,13 @@ impl World {
                 }
             }
         }
-        let blas: Vec<Blas> = geometries
+        let known = previous.filter(|w| w.options == *options).map(World::trees_by_address);
+        let blas: Vec<Arc<Blas>> = geometries
             .iter()
-            .map(|g| match g {
-                Geometry::Mesh(m) => Blas::for_mesh(m, options),
-                Geometry::Shape(s) => Blas::for_shape(s.clone(), options),
+            .map(|g| match (known.as_ref().and_then(|k| k.get(&g.address())), g) {
+                (Some(tree), _) => Arc::clone(tree),
+                (None, Geometry::Mesh(m)) => Arc::new(Blas::for_mesh(m, options)),
+                (None, Geometry::Shape(s)) => Arc::new(Blas::for_shape(s.clone(), options)),
             })
             .collect();
         phases.push(("geometries", start.elapsed()));
@@ -144,6 +172,7 @@ impl World {
             blas,
             placements,
             tlas,
+            options: *options,
             robustness: options.robustness,
             level: SimdLevel::resolve(options.simd),
         })
@@ -153,6 +182,10 @@ impl World {
     pub fn from_mesh(mesh: impl Into<Arc<TriMesh>>, options: &BuildOptions) -> Result<World, BuildError> {
         let instance = Instance { geometry: 0, world_from_object: DAffine3::IDENTITY };
         World::build(vec![Geometry::Mesh(mesh.into())], vec![instance], options)
+    }
+
+    fn trees_by_address(&self) -> HashMap<usize, &Arc<Blas>> {
+        self.geometries.iter().map(Geometry::address).zip(&self.blas).collect()
     }
 
     /// Makes the upper level anew after a geometry has changed.
@@ -316,7 +349,7 @@ struct Placed {
 }
 
 /// Chooses render space (world space, moved when everything is far from zero) and places the instances in it.
-fn place(instances: &[Instance], blas: &[Blas], notes: &mut Vec<String>) -> Result<Placed, BuildError> {
+fn place(instances: &[Instance], blas: &[Arc<Blas>], notes: &mut Vec<String>) -> Result<Placed, BuildError> {
     let origin = choose_origin(instances, blas);
     let placements = instances
         .iter()
@@ -343,7 +376,7 @@ fn place(instances: &[Instance], blas: &[Blas], notes: &mut Vec<String>) -> Resu
 
 /// Zero, or the middle of the world's bounds when they lie more than four sizes away from it. A single geometry without rotation gets its own
 /// centre, so that its local space and render space coincide.
-fn choose_origin(instances: &[Instance], blas: &[Blas]) -> DVec3 {
+fn choose_origin(instances: &[Instance], blas: &[Arc<Blas>]) -> DVec3 {
     if let [only] = instances
         && only.world_from_object.matrix3 == DMat3::IDENTITY
         && only.world_from_object.is_finite()

@@ -38,6 +38,7 @@ pub(crate) fn response(
             let base = match form {
                 Highlight::HalfVector => normal.dot((l + view).normalize_or_zero()),
                 Highlight::Mirrored => (normal * (2.0 * cos) - l).dot(view),
+                Highlight::TowardsLight => cos,
             };
             // 0^0 is 1 in OpenGL: shininess 0 lights the whole side.
             matte + specular * highlight * power(base.max(0.0), shininess)

@@ -114,6 +114,7 @@ fn respond<S: Simd>(
                         normal.dot(h.or_else(ok, Vec3x16::splat(simd, Vec3::ZERO)))
                     }
                     Highlight::Mirrored => normal.scale(v(2.0) * cos).sub(l).dot(view),
+                    Highlight::TowardsLight => cos,
                 };
                 let shine = power_block(simd, base.max(v(0.0)), shininess);
                 matte.add(Vec3x16::splat(simd, specular * light.highlight).scale(shine))

@@ -4,7 +4,7 @@ use crate::colormap::ColorMap;
 use crate::environment::Environment;
 use crate::frame::Layers;
 use crate::light::{Light, LightKind};
-use crate::material::{ColorSource, Sides};
+use crate::material::{ColorSource, Highlight, Sides, SurfaceModel};
 use crate::mesh::{Attribute, TriMesh};
 use crate::render::RenderOptions;
 use crate::scene::{Appearance, Scene, SceneBuilder};
@@ -33,6 +33,13 @@ fn dressed(mesh: TriMesh, face: bool, r: &mut Random) -> TriMesh {
     }
 }
 
+fn towards_light(mut m: Material) -> Material {
+    if let SurfaceModel::Phong { highlight, .. } = &mut m.model {
+        *highlight = Highlight::TowardsLight;
+    }
+    m
+}
+
 /// Every path through look-up and lighting, in pieces small enough for blocks to see several of them.
 fn mixed_scene() -> Scene {
     let mut r = Random::new(11);
@@ -49,6 +56,7 @@ fn mixed_scene() -> Scene {
         phong(3.0).colored_by_scalars(map(false)),
         Material::matte([1.0; 3]).colored_by_scalars(map(true)).with_emission([0.1, 0.0, 0.2]),
         Material::unlit([0.2, 0.9, 0.4]),
+        towards_light(phong(5.0)),
         Material::pbr([0.9, 0.7, 0.2], 0.5, 0.4),
         Material::dielectric(1.5),
     ];

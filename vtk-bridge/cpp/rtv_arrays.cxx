@@ -1,0 +1,296 @@
+#include "rtv_arrays.h"
+
+#include <vtkAbstractMapper.h>
+#include <vtkCellArray.h>
+#include <vtkCellData.h>
+#include <vtkDataArray.h>
+#include <vtkFloatArray.h>
+#include <vtkImageData.h>
+#include <vtkMapper.h>
+#include <vtkPointData.h>
+#include <vtkPolyData.h>
+#include <vtkScalarsToColors.h>
+#include <vtkTexture.h>
+#include <vtkUnsignedCharArray.h>
+
+double* RtvKeep::Doubles(size_t count)
+{
+  this->DoubleArrays.emplace_back(new double[count]);
+  return this->DoubleArrays.back().get();
+}
+
+int64_t* RtvKeep::Ids(size_t count)
+{
+  this->IdArrays.emplace_back(new int64_t[count]);
+  return this->IdArrays.back().get();
+}
+
+unsigned char* RtvKeep::Bytes(size_t count)
+{
+  this->ByteArrays.emplace_back(new unsigned char[count]);
+  return this->ByteArrays.back().get();
+}
+
+void RtvKeep::Clear()
+{
+  this->Objects.clear();
+  this->DoubleArrays.clear();
+  this->IdArrays.clear();
+  this->ByteArrays.clear();
+}
+
+namespace
+{
+const RtvArray NoArray = { nullptr, 0, 0, RTV_NONE };
+
+RtvArray ArrayOf(vtkDataArray* array, uint32_t kind)
+{
+  return RtvArray{ array->GetVoidPointer(0), static_cast<uint64_t>(array->GetNumberOfTuples()),
+    static_cast<uint32_t>(array->GetNumberOfComponents()), kind };
+}
+
+// `array` in single precision: itself, or a copy.
+RtvArray FloatArray(vtkDataArray* array, int components, RtvKeep& keep)
+{
+  if (!array || array->GetNumberOfComponents() < components)
+  {
+    return NoArray;
+  }
+  if (array->GetNumberOfComponents() == components && vtkFloatArray::FastDownCast(array))
+  {
+    return ArrayOf(array, RTV_F32);
+  }
+  auto copy = vtkSmartPointer<vtkFloatArray>::New();
+  copy->SetNumberOfComponents(components);
+  copy->SetNumberOfTuples(array->GetNumberOfTuples());
+  for (vtkIdType i = 0; i < array->GetNumberOfTuples(); ++i)
+  {
+    for (int c = 0; c < components; ++c)
+    {
+      copy->SetTypedComponent(i, c, static_cast<float>(array->GetComponent(i, c)));
+    }
+  }
+  keep.Object(copy);
+  return ArrayOf(copy, RTV_F32);
+}
+
+RtvArray PointArray(vtkDataArray* array, RtvKeep& keep)
+{
+  if (vtkFloatArray::FastDownCast(array))
+  {
+    return ArrayOf(array, RTV_F32);
+  }
+  if (array->GetDataType() == VTK_DOUBLE && array->HasStandardMemoryLayout())
+  {
+    return ArrayOf(array, RTV_F64);
+  }
+  // Whole numbers and other layouts: all of them fit into doubles.
+  double* copy = keep.Doubles(3 * array->GetNumberOfTuples());
+  for (vtkIdType i = 0; i < array->GetNumberOfTuples(); ++i)
+  {
+    array->GetTuple(i, copy + 3 * i);
+  }
+  return RtvArray{ copy, static_cast<uint64_t>(array->GetNumberOfTuples()), 3, RTV_F64 };
+}
+
+RtvCells CellsOf(vtkCellArray* cells, uint64_t& key)
+{
+  if (!cells || cells->GetNumberOfCells() == 0)
+  {
+    return RtvCells{ NoArray, NoArray };
+  }
+  vtkDataArray* offsets = cells->GetOffsetsArray();
+  vtkDataArray* connectivity = cells->GetConnectivityArray();
+  for (vtkObject* o : { static_cast<vtkObject*>(cells), static_cast<vtkObject*>(offsets), static_cast<vtkObject*>(connectivity) })
+  {
+    key = rtvMix(rtvMix(key, o), o->GetMTime());
+  }
+  const uint32_t kind = cells->IsStorage64Bit() ? RTV_I64 : RTV_I32;
+  return RtvCells{ ArrayOf(offsets, kind), ArrayOf(connectivity, kind) };
+}
+
+uint64_t Mixed(uint64_t key, vtkObject* object)
+{
+  key = rtvMix(key, object);
+  return object ? rtvMix(key, object->GetMTime()) : key;
+}
+}
+
+void rtvAddShape(RtvSurface& s, vtkPolyData* data, bool points, RtvKeep& keep)
+{
+  uint64_t key = 1469598103934665603ull;
+  vtkDataArray* coordinates = data->GetPoints()->GetData();
+  s.points = PointArray(coordinates, keep);
+  key = Mixed(Mixed(key, data->GetPoints()), coordinates);
+  if (points)
+  {
+    // Each point is a vertex of its own.
+    const vtkIdType count = coordinates->GetNumberOfTuples();
+    int64_t* ids = keep.Ids(count + 1);
+    for (vtkIdType i = 0; i <= count; ++i)
+    {
+      ids[i] = i;
+    }
+    s.verts.offsets = RtvArray{ ids, static_cast<uint64_t>(count) + 1, 1, RTV_I64 };
+    s.verts.connectivity = RtvArray{ ids, static_cast<uint64_t>(count), 1, RTV_I64 };
+    s.lines = s.polys = s.strips = RtvCells{ NoArray, NoArray };
+    s.shape_key = rtvMix(rtvMix(key, 1), s.point_radius);
+    return;
+  }
+  s.verts = CellsOf(data->GetVerts(), key);
+  s.lines = CellsOf(data->GetLines(), key);
+  s.polys = CellsOf(data->GetPolys(), key);
+  s.strips = CellsOf(data->GetStrips(), key);
+  vtkDataArray* ofPoints = data->GetPointData()->GetNormals();
+  vtkDataArray* ofCells = data->GetCellData()->GetNormals();
+  s.point_normals = s.property.flat ? NoArray : FloatArray(ofPoints, 3, keep);
+  s.cell_normals = FloatArray(ofCells, 3, keep);
+  vtkDataArray* texcoords = data->GetPointData()->GetTCoords();
+  s.texcoords = FloatArray(texcoords, 2, keep);
+  key = Mixed(Mixed(Mixed(key, s.property.flat ? nullptr : ofPoints), ofCells), texcoords);
+  key = rtvMix(rtvMix(rtvMix(key, s.point_radius), s.line_radius), s.edges_only);
+  s.shape_key = key;
+}
+
+void rtvAddColors(RtvBridge* bridge, RtvSurface& s, vtkMapper* mapper, vtkPolyData* data, RtvKeep& keep)
+{
+  if (!mapper->GetScalarVisibility())
+  {
+    return;
+  }
+  int cellFlag = 0;
+  vtkAbstractArray* scalars = vtkAbstractMapper::GetAbstractScalars(data, mapper->GetScalarMode(),
+    mapper->GetArrayAccessMode(), mapper->GetArrayId(), mapper->GetArrayName(), cellFlag);
+  if (!scalars)
+  {
+    return;
+  }
+  vtkScalarsToColors* table = mapper->GetLookupTable();
+  uint64_t key = Mixed(Mixed(1469598103934665603ull, scalars), table);
+  // A mapper's own time stamp also moves for things that do not change colours.
+  const double* range = mapper->GetScalarRange();
+  key = rtvMix(rtvMix(rtvMix(rtvMix(key, range[0]), range[1]), mapper->GetColorMode()), mapper->GetScalarMode());
+  key = rtvMix(rtvMix(rtvMix(key, mapper->GetInterpolateScalarsBeforeMapping()), mapper->GetUseLookupTableScalarRange()), cellFlag);
+  key = rtvMix(rtvMix(key, mapper->GetArrayComponent()), mapper->GetFieldDataTupleId());
+  s.color_key = key;
+  const bool mapped = mapper->CanUseTextureMapForColoring(data) != 0;
+  const uint32_t source = cellFlag == 1 ? RTV_COLOR_CELLS : mapped ? RTV_COLOR_MAPPED : RTV_COLOR_POINTS;
+  if (cellFlag != 2 && rtvApi->has_colors(bridge, s.shape_key, key))
+  {
+    s.color_source = source;
+    return;
+  }
+  // A mapper keeps one array of colours; that of another block must not be taken for this one's.
+  mapper->ClearColorArrays();
+  vtkUnsignedCharArray* colors = mapper->MapScalars(data, 1.0, cellFlag);
+  vtkFloatArray* coordinates = mapper->GetColorCoordinates();
+  vtkImageData* map = mapper->GetColorTextureMap();
+  if (mapped && coordinates && map && cellFlag == 0)
+  {
+    auto texels = vtkUnsignedCharArray::SafeDownCast(map->GetPointData()->GetScalars());
+    if (texels && texels->GetNumberOfComponents() == 4)
+    {
+      int size[3];
+      map->GetDimensions(size);
+      s.color_source = RTV_COLOR_MAPPED;
+      s.colors = ArrayOf(coordinates, RTV_F32);
+      s.map = RtvArray{ texels->GetPointer(0), static_cast<uint64_t>(size[0]), 4, RTV_U8 };
+      memcpy(s.nan_color, texels->GetPointer(4 * (texels->GetNumberOfTuples() - 1)), 4);
+      return;
+    }
+  }
+  if (!colors || colors->GetNumberOfTuples() == 0)
+  {
+    return;
+  }
+  vtkUnsignedCharArray* rgba = colors;
+  if (colors->GetNumberOfComponents() != 4)
+  {
+    auto copy = vtkSmartPointer<vtkUnsignedCharArray>::New();
+    copy->SetNumberOfComponents(4);
+    copy->SetNumberOfTuples(colors->GetNumberOfTuples());
+    const int n = colors->GetNumberOfComponents();
+    for (vtkIdType i = 0; i < colors->GetNumberOfTuples(); ++i)
+    {
+      const unsigned char* c = colors->GetPointer(n * i);
+      unsigned char* out = copy->GetPointer(4 * i);
+      for (int k = 0; k < 3; ++k)
+      {
+        out[k] = n >= 3 ? c[k] : c[0];
+      }
+      out[3] = n == 2 ? c[1] : 255;
+    }
+    rgba = copy;
+  }
+  keep.Object(rgba);
+  if (cellFlag == 2)
+  {
+    // One colour for everything, from a tuple of field data.
+    const unsigned char* c = rgba->GetPointer(0);
+    for (int k = 0; k < 3; ++k)
+    {
+      s.property.ambient_color[k] = s.property.diffuse_color[k] = c[k] / 255.0f;
+    }
+    s.property.opacity *= c[3] / 255.0f;
+    s.color_key = 0;
+    return;
+  }
+  s.color_source = cellFlag == 1 ? RTV_COLOR_CELLS : RTV_COLOR_POINTS;
+  s.colors = ArrayOf(rgba, RTV_U8);
+}
+
+const char* rtvTextureReason(vtkTexture* texture)
+{
+  if (texture->GetTransform())
+  {
+    return "a texture with a transform";
+  }
+  if (texture->GetUseSRGBColorSpace())
+  {
+    return "a texture in sRGB";
+  }
+  if (texture->GetCubeMap())
+  {
+    return "a cube map";
+  }
+  return nullptr;
+}
+
+void rtvAddTexture(RtvSurface& s, vtkTexture* texture, RtvKeep& keep)
+{
+  if (texture->GetInputAlgorithm())
+  {
+    texture->GetInputAlgorithm()->Update();
+  }
+  vtkImageData* image = texture->GetInput();
+  vtkDataArray* scalars = image ? image->GetPointData()->GetScalars() : nullptr;
+  if (!scalars || s.texcoords.kind == RTV_NONE)
+  {
+    return;
+  }
+  int size[3];
+  image->GetDimensions(size);
+  const bool direct = scalars->GetDataType() == VTK_UNSIGNED_CHAR && texture->GetColorMode() != VTK_COLOR_MODE_MAP_SCALARS;
+  const int n = direct ? scalars->GetNumberOfComponents() : 4;
+  const unsigned char* in = direct ? static_cast<const unsigned char*>(scalars->GetVoidPointer(0))
+                                   : texture->MapScalarsToColors(scalars);
+  const vtkIdType count = scalars->GetNumberOfTuples();
+  if (!in || count < static_cast<vtkIdType>(size[0]) * size[1])
+  {
+    return;
+  }
+  s.texture_key = Mixed(Mixed(Mixed(1469598103934665603ull, image), scalars), texture);
+  unsigned char* out = keep.Bytes(4 * count);
+  for (vtkIdType i = 0; i < count; ++i)
+  {
+    for (int c = 0; c < 3; ++c)
+    {
+      out[4 * i + c] = n >= 3 ? in[n * i + c] : in[n * i];
+    }
+    out[4 * i + 3] = n == 4 ? in[4 * i + 3] : n == 2 ? in[2 * i + 1] : 255;
+  }
+  s.texture = RtvArray{ out, static_cast<uint64_t>(size[0]) * size[1], 4, RTV_U8 };
+  s.texture_width = static_cast<uint32_t>(size[0]);
+  s.texture_interpolate = texture->GetInterpolate() ? 1 : 0;
+  s.texture_repeat = texture->GetRepeat() ? 1 : 0;
+}

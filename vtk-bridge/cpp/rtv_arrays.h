@@ -1,0 +1,57 @@
+// VTK's arrays as the bridge reads them.
+#pragma once
+#include "rtv_shim.h"
+
+#include <cstring>
+#include <memory>
+#include <string>
+#include <vector>
+#include <vtkObject.h>
+
+class vtkActor;
+class vtkDataArray;
+class vtkDataObject;
+class vtkGlyph3DMapper;
+class vtkPolyData;
+class vtkTexture;
+
+// Copies that must live until the bridge has read them: arrays of types it does not read itself.
+class RtvKeep
+{
+public:
+  void Object(vtkObject* object) { this->Objects.push_back(object); }
+  double* Doubles(size_t count);
+  int64_t* Ids(size_t count);
+  unsigned char* Bytes(size_t count);
+  void Clear();
+
+private:
+  std::vector<vtkSmartPointer<vtkObject>> Objects;
+  std::vector<std::unique_ptr<double[]>> DoubleArrays;
+  std::vector<std::unique_ptr<int64_t[]>> IdArrays;
+  std::vector<std::unique_ptr<unsigned char[]>> ByteArrays;
+};
+
+// A key of everything that was mixed in (FNV-1a).
+template <class T>
+uint64_t rtvMix(uint64_t key, const T& value)
+{
+  unsigned char bytes[sizeof(T)];
+  memcpy(bytes, &value, sizeof(T));
+  for (unsigned char b : bytes)
+  {
+    key = (key ^ b) * 1099511628211ull;
+  }
+  return key;
+}
+
+// Points, cells, normals, texture coordinates, and the key of all of them. `points`: every point is a vertex.
+void rtvAddShape(RtvSurface& s, vtkPolyData* data, bool points, RtvKeep& keep);
+// Colours of points, cells or a map, as the mapper makes them; only when the bridge does not have them.
+void rtvAddColors(RtvBridge* bridge, RtvSurface& s, vtkMapper* mapper, vtkPolyData* data, RtvKeep& keep);
+void rtvAddTexture(RtvSurface& s, vtkTexture* texture, RtvKeep& keep);
+// Why a texture cannot be traced, or null.
+const char* rtvTextureReason(vtkTexture* texture);
+// Copies of the sources of a glyph mapper. Returns why not, or null.
+const char* rtvAddGlyphs(RtvBridge* bridge, vtkActor* actor, vtkGlyph3DMapper* mapper, vtkDataObject* data,
+  const RtvProperty& property, const std::string& name);

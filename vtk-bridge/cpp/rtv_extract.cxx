@@ -1,0 +1,376 @@
+// Props to surfaces: which are traced, and why the others are not.
+#include "rtv_arrays.h"
+
+#include <cmath>
+#include <string>
+#include <vtkActor.h>
+#include <vtkAssembly.h>
+#include <vtkAssemblyNode.h>
+#include <vtkAssemblyPath.h>
+#include <vtkCompositeDataDisplayAttributes.h>
+#include <vtkCompositeDataSet.h>
+#include <vtkCompositePolyDataMapper2.h>
+#include <vtkDataSetSurfaceFilter.h>
+#include <vtkGlyph3DMapper.h>
+#include <vtkInformation.h>
+#include <vtkMapper.h>
+#include <vtkMatrix4x4.h>
+#include <vtkMultiBlockDataSet.h>
+#include <vtkPartitionedDataSet.h>
+#include <vtkPartitionedDataSetCollection.h>
+#include <vtkPlane.h>
+#include <vtkPlaneCollection.h>
+#include <vtkPolyData.h>
+#include <vtkProperty.h>
+#include <vtkShaderProperty.h>
+#include <vtkTexture.h>
+
+namespace
+{
+// What a block has of its parents in the tree.
+struct BlockState
+{
+  bool Visible = true;
+  bool HasColor = false;
+  double Color[3] = { 1.0, 1.0, 1.0 };
+  double Opacity;
+};
+
+struct Actor
+{
+  RtvBridge* Bridge;
+  vtkActor* Prop;
+  vtkMapper* Mapper;
+  vtkMatrix4x4* Matrix;
+  vtkCompositeDataDisplayAttributes* Attributes = nullptr;
+  RtvSurface Surface;
+  RtvKeep Keep;
+  std::string Name;
+  double PointRadius, LineRadius;
+  bool Edges = false, Points = false;
+  int Traced = 0;
+};
+
+void CopyColor(const double* from, float* to)
+{
+  for (int c = 0; c < 3; ++c)
+  {
+    to[c] = static_cast<float>(from[c]);
+  }
+}
+
+RtvProperty PropertyOf(vtkProperty* p)
+{
+  RtvProperty out = {};
+  CopyColor(p->GetAmbientColor(), out.ambient_color);
+  CopyColor(p->GetDiffuseColor(), out.diffuse_color);
+  CopyColor(p->GetSpecularColor(), out.specular_color);
+  out.ambient = static_cast<float>(p->GetAmbient());
+  out.diffuse = static_cast<float>(p->GetDiffuse());
+  out.specular = static_cast<float>(p->GetSpecular());
+  out.specular_power = static_cast<float>(p->GetSpecularPower());
+  out.opacity = static_cast<float>(p->GetOpacity());
+  out.metallic = static_cast<float>(p->GetMetallic());
+  out.roughness = static_cast<float>(p->GetRoughness());
+  out.base_ior = static_cast<float>(p->GetBaseIOR());
+  out.flat = p->GetInterpolation() == VTK_FLAT;
+  out.lighting = p->GetLighting() ? 1 : 0;
+  out.pbr = p->GetInterpolation() == VTK_PBR;
+  out.cull_front = p->GetFrontfaceCulling() ? 1 : 0;
+  out.cull_back = p->GetBackfaceCulling() ? 1 : 0;
+  return out;
+}
+
+// Clipping planes are given in world coordinates; a plane with normal n through o keeps n (M x - o) >= 0.
+void AddClipPlanes(Actor& a)
+{
+  vtkPlaneCollection* planes = a.Mapper->GetClippingPlanes();
+  const int count = planes ? planes->GetNumberOfItems() : 0;
+  if (count == 0)
+  {
+    return;
+  }
+  double* out = a.Keep.Doubles(4 * count);
+  for (int i = 0; i < count; ++i)
+  {
+    vtkPlane* plane = planes->GetItem(i);
+    double world[4];
+    plane->GetNormal(world);
+    const double* origin = plane->GetOrigin();
+    world[3] = -(world[0] * origin[0] + world[1] * origin[1] + world[2] * origin[2]);
+    for (int column = 0; column < 4; ++column)
+    {
+      out[4 * i + column] = 0.0;
+      for (int row = 0; row < 4; ++row)
+      {
+        out[4 * i + column] += world[row] * a.Matrix->GetElement(row, column);
+      }
+    }
+  }
+  a.Surface.clip_planes = RtvArray{ out, static_cast<uint64_t>(count), 4, RTV_F64 };
+  for (int i = 0; i < 4 * count; ++i)
+  {
+    a.Surface.shape_key = rtvMix(a.Surface.shape_key, out[i]);
+  }
+}
+
+// Polygons of one data set to the bridge. Returns why not, or null.
+const char* AddPolyData(Actor& a, vtkPolyData* data, const BlockState& block, const std::string& blockName)
+{
+  const bool surface = !a.Edges && !a.Points;
+  const bool others = data->GetNumberOfVerts() + data->GetNumberOfLines() > 0;
+  const bool polygons = data->GetNumberOfPolys() + data->GetNumberOfStrips() > 0;
+  if (surface && data->GetNumberOfVerts() > 0 && a.PointRadius <= 0.0)
+  {
+    return "it has vertices (set RTV_POINT_RADIUS to trace them as spheres)";
+  }
+  if (surface && data->GetNumberOfLines() > 0 && a.LineRadius <= 0.0)
+  {
+    return "it has lines (set RTV_LINE_RADIUS to trace them as tubes)";
+  }
+  if (data->GetNumberOfPoints() == 0 || (!polygons && !others && !a.Points))
+  {
+    return nullptr;
+  }
+  RtvSurface& s = a.Surface;
+  s = RtvSurface{};
+  const std::string name = blockName.empty() ? a.Name : a.Name + ", block " + blockName;
+  s.name = name.c_str();
+  s.property = PropertyOf(a.Prop->GetProperty());
+  s.property.opacity = static_cast<float>(block.Opacity);
+  if (block.HasColor)
+  {
+    CopyColor(block.Color, s.property.ambient_color);
+    CopyColor(block.Color, s.property.diffuse_color);
+  }
+  if (vtkProperty* back = a.Prop->GetBackfaceProperty())
+  {
+    s.back = PropertyOf(back);
+    s.has_back = 1;
+  }
+  std::copy(&a.Matrix->Element[0][0], &a.Matrix->Element[0][0] + 16, s.world_from_data);
+  s.point_radius = a.PointRadius;
+  s.line_radius = a.LineRadius;
+  s.edges_only = a.Edges ? 1 : 0;
+  rtvAddShape(s, data, a.Points, a.Keep);
+  AddClipPlanes(a);
+  if (!block.HasColor)
+  {
+    rtvAddColors(a.Bridge, s, a.Mapper, data, a.Keep);
+  }
+  if (vtkTexture* texture = a.Prop->GetTexture())
+  {
+    if (s.color_source != RTV_COLOR_PROPERTY)
+    {
+      return "it has a texture and colours";
+    }
+    rtvAddTexture(s, texture, a.Keep);
+  }
+  a.Traced += rtvApi->surface(a.Bridge, &s) > 0 ? 1 : 0;
+  a.Keep.Clear();
+  return nullptr;
+}
+
+const char* AddTree(Actor& a, vtkDataObject* data, BlockState block, const std::string& name)
+{
+  if (!data)
+  {
+    return nullptr;
+  }
+  if (vtkCompositeDataDisplayAttributes* attributes = a.Attributes)
+  {
+    // What a block says holds for all below it until one says otherwise.
+    if (attributes->HasBlockVisibility(data))
+    {
+      block.Visible = attributes->GetBlockVisibility(data);
+    }
+    if (attributes->HasBlockOpacity(data))
+    {
+      block.Opacity = attributes->GetBlockOpacity(data);
+    }
+    if (attributes->HasBlockColor(data))
+    {
+      block.HasColor = true;
+      attributes->GetBlockColor(data, block.Color);
+    }
+  }
+  const char* reason = nullptr;
+  auto child = [&](vtkDataObject* of, unsigned int i, vtkInformation* meta) {
+    const char* own = meta && meta->Has(vtkCompositeDataSet::NAME()) ? meta->Get(vtkCompositeDataSet::NAME()) : nullptr;
+    const std::string part = own ? own : std::to_string(i);
+    if (!reason)
+    {
+      reason = AddTree(a, of, block, name.empty() ? part : name + "/" + part);
+    }
+  };
+  if (auto polydata = vtkPolyData::SafeDownCast(data))
+  {
+    return block.Visible ? AddPolyData(a, polydata, block, name) : nullptr;
+  }
+  if (auto blocks = vtkMultiBlockDataSet::SafeDownCast(data))
+  {
+    for (unsigned int i = 0; i < blocks->GetNumberOfBlocks(); ++i)
+    {
+      child(blocks->GetBlock(i), i, blocks->HasMetaData(i) ? blocks->GetMetaData(i) : nullptr);
+    }
+    return reason;
+  }
+  if (auto parts = vtkPartitionedDataSet::SafeDownCast(data))
+  {
+    for (unsigned int i = 0; i < parts->GetNumberOfPartitions(); ++i)
+    {
+      child(parts->GetPartitionAsDataObject(i), i, nullptr);
+    }
+    return reason;
+  }
+  if (auto sets = vtkPartitionedDataSetCollection::SafeDownCast(data))
+  {
+    for (unsigned int i = 0; i < sets->GetNumberOfPartitionedDataSets(); ++i)
+    {
+      child(sets->GetPartitionedDataSet(i), i, sets->HasMetaData(i) ? sets->GetMetaData(i) : nullptr);
+    }
+    return reason;
+  }
+  return "its data are not polygons";
+}
+
+// Why OpenGL has to draw an actor, as far as the actor itself says; null when it can be traced.
+const char* WhyNot(vtkActor* actor, vtkMapper* mapper, double pointRadius, double lineRadius)
+{
+  static const char* const known[] = { "vtkActor", "vtkOpenGLActor", "vtkPVLODActor", "vtkLODActor", "vtkQuadricLODActor" };
+  bool plain = false;
+  for (const char* name : known)
+  {
+    plain = plain || !strcmp(actor->GetClassName(), name);
+  }
+  if (!plain)
+  {
+    return "OpenGL draws props of this class";
+  }
+  vtkProperty* property = actor->GetProperty();
+  if (property->GetRepresentation() == VTK_WIREFRAME && lineRadius <= 0.0)
+  {
+    return "wireframe (set RTV_LINE_RADIUS to trace edges as tubes)";
+  }
+  if (property->GetRepresentation() == VTK_POINTS && pointRadius <= 0.0)
+  {
+    return "points (set RTV_POINT_RADIUS to trace them as spheres)";
+  }
+  if (property->GetRepresentation() == VTK_SURFACE && property->GetEdgeVisibility())
+  {
+    return "edges on the surface";
+  }
+  if (property->GetNumberOfTextures() > 0)
+  {
+    return "textures of the property (albedo, material, normal)";
+  }
+  vtkShaderProperty* shader = actor->GetShaderProperty();
+  if (shader && (shader->HasFragmentShaderCode() || shader->HasVertexShaderCode() || shader->GetNumberOfShaderReplacements() > 0))
+  {
+    return "shader code of its own";
+  }
+  if (vtkTexture* texture = actor->GetTexture())
+  {
+    if (const char* reason = rtvTextureReason(texture))
+    {
+      return reason;
+    }
+  }
+  static const char* const mappers[] = { "vtkPolyDataMapper", "vtkOpenGLPolyDataMapper", "vtkCompositePolyDataMapper",
+    "vtkCompositePolyDataMapper2", "vtkDataSetMapper", "vtkGlyph3DMapper", "vtkOpenGLGlyph3DMapper" };
+  for (const char* name : mappers)
+  {
+    if (!strcmp(mapper->GetClassName(), name))
+    {
+      return nullptr;
+    }
+  }
+  return "OpenGL draws mappers of this class";
+}
+}
+
+vtkDataSet* RtvExtractor::SurfaceOf(vtkMapper* mapper, vtkDataSet* data)
+{
+  Kept& kept = this->Filters[mapper];
+  if (!kept.Filter)
+  {
+    kept.Filter = vtkSmartPointer<vtkDataSetSurfaceFilter>::New();
+  }
+  kept.Used = true;
+  // The input of a pipeline would be updated twice; the data themselves know when they changed.
+  kept.Filter->SetInputData(data);
+  kept.Filter->Update();
+  return kept.Filter->GetOutput();
+}
+
+void RtvExtractor::EndFrame()
+{
+  for (auto it = this->Filters.begin(); it != this->Filters.end();)
+  {
+    it = it->second.Used ? (it->second.Used = false, std::next(it)) : this->Filters.erase(it);
+  }
+}
+
+bool RtvExtractor::Add(RtvBridge* bridge, vtkProp* prop, int number)
+{
+  Actor a;
+  a.Bridge = bridge;
+  a.PointRadius = rtvApi->option("RTV_POINT_RADIUS");
+  a.LineRadius = rtvApi->option("RTV_LINE_RADIUS");
+  a.Name = std::string(prop->GetClassName()) + " " + std::to_string(number);
+  auto pass = [&](const char* reason) {
+    rtvApi->pass(bridge, a.Name.c_str(), reason);
+    return false;
+  };
+  a.Prop = vtkActor::SafeDownCast(prop);
+  a.Mapper = a.Prop ? a.Prop->GetMapper() : nullptr;
+  if (!a.Mapper)
+  {
+    return pass(prop->IsA("vtkVolume") ? "a volume (OpenGL's ray caster sees the depth of what is traced)"
+                                       : "OpenGL draws props of this class");
+  }
+  if (const char* reason = WhyNot(a.Prop, a.Mapper, a.PointRadius, a.LineRadius))
+  {
+    return pass(reason);
+  }
+  if (!a.Mapper->GetStatic() && a.Mapper->GetNumberOfInputConnections(0) > 0)
+  {
+    a.Mapper->Update();
+  }
+  vtkDataObject* data =
+    a.Mapper->GetNumberOfInputConnections(0) > 0 ? a.Mapper->GetInputDataObject(0, 0) : nullptr;
+  if (!data)
+  {
+    return pass("no data");
+  }
+  a.Points = a.Prop->GetProperty()->GetRepresentation() == VTK_POINTS;
+  a.Edges = a.Prop->GetProperty()->GetRepresentation() == VTK_WIREFRAME;
+  a.Matrix = a.Prop->GetMatrix();
+  if (auto composite = vtkCompositePolyDataMapper2::SafeDownCast(a.Mapper))
+  {
+    a.Attributes = composite->GetCompositeDataDisplayAttributes();
+  }
+  if (auto glyphs = vtkGlyph3DMapper::SafeDownCast(a.Mapper))
+  {
+    const char* reason = rtvAddGlyphs(bridge, a.Prop, glyphs, data, PropertyOf(a.Prop->GetProperty()), a.Name);
+    return reason ? pass(reason) : true;
+  }
+  vtkDataSet* set = vtkDataSet::SafeDownCast(data);
+  if (set && !vtkPolyData::SafeDownCast(data))
+  {
+    data = this->SurfaceOf(a.Mapper, set);
+  }
+  BlockState root;
+  root.Opacity = a.Prop->GetProperty()->GetOpacity();
+  const char* reason = AddTree(a, data, root, "");
+  if (reason && a.Traced > 0)
+  {
+    // Some blocks are traced already; OpenGL draws all of them again at the same depth, which shows the same picture.
+    return pass(reason);
+  }
+  if (reason)
+  {
+    return pass(reason);
+  }
+  return true;
+}

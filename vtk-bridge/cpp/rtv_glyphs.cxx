@@ -1,0 +1,170 @@
+// Glyphs as instances: the matrices vtkGlyph3DMapper makes for OpenGL, made again, because it does not give them away.
+#include "rtv_arrays.h"
+
+#include <algorithm>
+#include <vtkActor.h>
+#include <vtkDataArray.h>
+#include <vtkDataSet.h>
+#include <vtkGlyph3DMapper.h>
+#include <vtkMath.h>
+#include <vtkMatrix4x4.h>
+#include <vtkPolyData.h>
+#include <vtkTransform.h>
+#include <vtkUnsignedCharArray.h>
+
+namespace
+{
+vtkDataArray* InputArray(vtkGlyph3DMapper* mapper, int index, vtkDataSet* data)
+{
+  return vtkDataArray::SafeDownCast(mapper->GetInputAbstractArrayToProcess(index, data));
+}
+
+// The rotation of one glyph, as vtkGlyph3DMapper documents it.
+void Rotate(vtkTransform* transform, int mode, vtkDataArray* array, vtkIdType i)
+{
+  double o[4] = { 0.0, 0.0, 0.0, 0.0 };
+  array->GetTuple(i, o);
+  if (mode == vtkGlyph3DMapper::ROTATION)
+  {
+    transform->RotateZ(o[2]);
+    transform->RotateX(o[0]);
+    transform->RotateY(o[1]);
+  }
+  else if (mode == vtkGlyph3DMapper::DIRECTION)
+  {
+    if (o[1] == 0.0 && o[2] == 0.0)
+    {
+      if (o[0] < 0.0)
+      {
+        transform->RotateY(180.0);
+      }
+    }
+    else
+    {
+      const double length = vtkMath::Norm(o);
+      transform->RotateWXYZ(180.0, (o[0] + length) / 2.0, o[1] / 2.0, o[2] / 2.0);
+    }
+  }
+  else
+  {
+    const double angle = vtkMath::DegreesFromRadians(2.0 * std::acos(std::max(-1.0, std::min(1.0, o[0]))));
+    transform->RotateWXYZ(angle, o[1], o[2], o[3]);
+  }
+}
+
+void Scale(vtkGlyph3DMapper* mapper, vtkDataArray* array, vtkIdType i, double scale[3])
+{
+  std::fill(scale, scale + 3, 1.0);
+  const int mode = array ? mapper->GetScaleMode() : static_cast<int>(vtkGlyph3DMapper::NO_DATA_SCALING);
+  if (mode == vtkGlyph3DMapper::SCALE_BY_MAGNITUDE)
+  {
+    double sum = 0.0;
+    for (int c = 0; c < array->GetNumberOfComponents(); ++c)
+    {
+      sum += array->GetComponent(i, c) * array->GetComponent(i, c);
+    }
+    const double magnitude = array->GetNumberOfComponents() == 1 ? array->GetComponent(i, 0) : std::sqrt(sum);
+    std::fill(scale, scale + 3, magnitude);
+  }
+  else if (mode == vtkGlyph3DMapper::SCALE_BY_COMPONENTS && array->GetNumberOfComponents() == 3)
+  {
+    array->GetTuple(i, scale);
+  }
+  if (mapper->GetClamping() && mode != vtkGlyph3DMapper::NO_DATA_SCALING)
+  {
+    const double* range = mapper->GetRange();
+    const double width = range[1] != range[0] ? range[1] - range[0] : 1.0;
+    for (int c = 0; c < 3; ++c)
+    {
+      scale[c] = (std::max(range[0], std::min(range[1], scale[c])) - range[0]) / width;
+    }
+  }
+  for (int c = 0; c < 3; ++c)
+  {
+    scale[c] = mapper->GetScaling() ? scale[c] * mapper->GetScaleFactor() : 1.0;
+    scale[c] = scale[c] == 0.0 ? 1.0e-10 : scale[c];
+  }
+}
+}
+
+const char* rtvAddGlyphs(RtvBridge* bridge, vtkActor* actor, vtkGlyph3DMapper* mapper, vtkDataObject* input,
+  const RtvProperty& property, const std::string& name)
+{
+  vtkDataSet* data = vtkDataSet::SafeDownCast(input);
+  if (!data)
+  {
+    return "glyphs on composite data";
+  }
+  if (mapper->GetUseSourceTableTree() || mapper->GetSourceIndexing())
+  {
+    return "glyphs from several sources";
+  }
+  if (mapper->GetClippingPlanes() && mapper->GetClippingPlanes()->GetNumberOfItems() > 0)
+  {
+    return "glyphs with clipping planes";
+  }
+  if (mapper->GetNumberOfInputConnections(1) == 0)
+  {
+    return "glyphs without a source";
+  }
+  mapper->GetInputAlgorithm(1, 0)->Update();
+  vtkPolyData* source = vtkPolyData::SafeDownCast(mapper->GetInputDataObject(1, 0));
+  if (!source || source->GetNumberOfPolys() + source->GetNumberOfStrips() == 0 || source->GetNumberOfLines() + source->GetNumberOfVerts() > 0)
+  {
+    return "glyphs whose source is not polygons";
+  }
+  vtkDataArray* scales = InputArray(mapper, vtkGlyph3DMapper::SCALE, data);
+  vtkDataArray* directions = mapper->GetOrient() ? InputArray(mapper, vtkGlyph3DMapper::ORIENTATION, data) : nullptr;
+  vtkDataArray* mask = mapper->GetMasking() ? InputArray(mapper, vtkGlyph3DMapper::MASK, data) : nullptr;
+  vtkUnsignedCharArray* colors = nullptr;
+  int cellFlag = 0;
+  if (mapper->GetScalarVisibility())
+  {
+    mapper->ClearColorArrays();
+    colors = mapper->MapScalars(data, 1.0, cellFlag);
+    if (colors && (cellFlag != 0 || colors->GetNumberOfComponents() != 4))
+    {
+      return "glyphs with colours that are not of points";
+    }
+  }
+
+  std::vector<double> matrices;
+  std::vector<unsigned char> rgba;
+  auto transform = vtkSmartPointer<vtkTransform>::New();
+  for (vtkIdType i = 0; i < data->GetNumberOfPoints(); ++i)
+  {
+    if (mask && mask->GetComponent(i, 0) == 0.0)
+    {
+      continue;
+    }
+    double point[3], scale[3];
+    data->GetPoint(i, point);
+    Scale(mapper, scales, i, scale);
+    transform->Identity();
+    transform->Translate(point);
+    if (directions)
+    {
+      Rotate(transform, mapper->GetOrientationMode(), directions, i);
+    }
+    transform->Scale(scale);
+    const double* m = &transform->GetMatrix()->Element[0][0];
+    matrices.insert(matrices.end(), m, m + 16);
+    if (colors)
+    {
+      const unsigned char* c = colors->GetPointer(4 * i);
+      rgba.insert(rgba.end(), c, c + 4);
+    }
+  }
+
+  RtvKeep keep;
+  RtvSurface s = {};
+  s.name = name.c_str();
+  s.property = property;
+  const double* m = &actor->GetMatrix()->Element[0][0];
+  std::copy(m, m + 16, s.world_from_data);
+  rtvAddShape(s, source, false, keep);
+  s.glyph_matrices = RtvArray{ matrices.data(), matrices.size() / 16, 16, RTV_F64 };
+  s.glyph_colors = rgba.empty() ? RtvArray{ nullptr, 0, 0, RTV_NONE } : RtvArray{ rgba.data(), rgba.size() / 4, 4, RTV_U8 };
+  rtvApi->surface(bridge, &s);
+  return nullptr;
+}

@@ -1,0 +1,128 @@
+// The renderer: splits the props into those that are traced and the rest, which OpenGL draws into the same picture with correct depth.
+//
+// UpdateGeometry is where VTK's own DeviceRender, ParaView's passes and IceT's compositing pass all come by. The superclass draws the rest:
+// opaque, translucent, volumes, overlays. The picture goes in before its opaque props (opaque pixels) and after them (the others).
+#include "rtv_shim.h"
+
+#include <vtkFrameBufferObjectBase.h>
+#include <vtkObjectFactory.h>
+#include <vtkRenderTimerLog.h>
+#include <vtkTimeStamp.h>
+
+vtkStandardNewMacro(vtkRtvRenderer);
+
+vtkRtvRenderer::vtkRtvRenderer()
+{
+  this->Bridge = rtvApi ? rtvApi->new_bridge() : nullptr;
+}
+
+vtkRtvRenderer::~vtkRtvRenderer()
+{
+  if (rtvApi)
+  {
+    rtvApi->free_bridge(this->Bridge);
+  }
+}
+
+void vtkRtvRenderer::ReleaseGraphicsResources(vtkWindow* window)
+{
+  this->Blit.Release(window);
+  this->Superclass::ReleaseGraphicsResources(window);
+}
+
+int vtkRtvRenderer::UpdateGeometry(vtkFrameBufferObjectBase* fbo)
+{
+  // Selections are drawn by the hardware selector through the stock mappers: picks stay what they are.
+  if (!this->Bridge || this->Selector || this->UseHiddenLineRemoval || this->PropArrayCount == 0 ||
+    !rtvApi->begin(this->Bridge))
+  {
+    return this->Superclass::UpdateGeometry(fbo);
+  }
+  std::vector<vtkProp*> rest;
+  for (int i = 0; i < this->PropArrayCount; ++i)
+  {
+    if (!this->Extractor.Add(this->Bridge, this->PropArray[i], i))
+    {
+      rest.push_back(this->PropArray[i]);
+    }
+  }
+  this->Extractor.EndFrame();
+  const int traced = this->PropArrayCount - static_cast<int>(rest.size());
+  int x = 0, y = 0, width = 0, height = 0;
+  if (fbo)
+  {
+    fbo->GetLastSize(width, height);
+  }
+  else
+  {
+    this->GetTiledSizeAndOrigin(&width, &height, &x, &y);
+  }
+  bool drawn = false;
+  RtvPicture picture;
+  if (traced > 0 && width > 0 && height > 0)
+  {
+    rtvAddLights(this->Bridge, this);
+    if (this->UseSSAO)
+    {
+      rtvApi->warn(this->Bridge, "SSAO does not see what is ray traced; use RTV_AO for ambient occlusion");
+    }
+    RtvView view = rtvView(this, width, height);
+    view.shadows = this->UseShadows ? 1 : 0;
+    drawn = rtvApi->render(this->Bridge, &view, &picture) != 0;
+  }
+  if (drawn)
+  {
+    this->Blit.Upload(this, picture);
+    this->PictureIsBlended = picture.blended != nullptr;
+  }
+  rtvApi->end(this->Bridge);
+  if (!drawn)
+  {
+    return this->Superclass::UpdateGeometry(fbo);
+  }
+
+  const int area[4] = { x, y, width, height };
+  std::copy(area, area + 4, this->Area);
+  vtkProp** const props = this->PropArray;
+  const int count = this->PropArrayCount;
+  const vtkTypeBool shadows = this->UseShadows;
+  const bool ssao = this->UseSSAO;
+  this->HasPicture = true;
+  this->PropArray = rest.data();
+  this->PropArrayCount = static_cast<int>(rest.size());
+  this->UseShadows = 0;
+  this->UseSSAO = false;
+  int byOpenGL = 0;
+  if (rest.empty())
+  {
+    this->DrawPicture(0);
+    this->DrawPicture(1);
+    this->RenderTime.Modified();
+  }
+  else
+  {
+    byOpenGL = this->Superclass::UpdateGeometry(fbo);
+  }
+  this->HasPicture = false;
+  this->PropArray = props;
+  this->PropArrayCount = count;
+  this->UseShadows = shadows;
+  this->UseSSAO = ssao;
+  this->NumberOfPropsRendered = byOpenGL + traced;
+  return this->NumberOfPropsRendered;
+}
+
+void vtkRtvRenderer::DeviceRenderOpaqueGeometry(vtkFrameBufferObjectBase* fbo)
+{
+  this->DrawPicture(0);
+  this->Superclass::DeviceRenderOpaqueGeometry(fbo);
+  this->DrawPicture(1);
+}
+
+void vtkRtvRenderer::DrawPicture(int stage)
+{
+  if (this->HasPicture && (stage == 0 || this->PictureIsBlended))
+  {
+    this->Blit.Draw(this, this->Area[0], this->Area[1], this->Area[2], this->Area[3], stage);
+  }
+}

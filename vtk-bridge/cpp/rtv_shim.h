@@ -1,0 +1,85 @@
+// The C++ side of vtk-bridge: one subclass of vtkOpenGLRenderer. Everything that is not VTK's arrays or OpenGL is behind rtv.h.
+// Compiled by `vtk-bridge install` for each VTK on the machine, because the layout of VTK's classes differs from version to version.
+#pragma once
+#include "rtv.h"
+
+#include <map>
+#include <vector>
+#include <vtkOpenGLRenderer.h>
+#include <vtkSmartPointer.h>
+
+class vtkDataSet;
+class vtkDataSetSurfaceFilter;
+class vtkMapper;
+class vtkOpenGLQuadHelper;
+class vtkProp;
+class vtkTextureObject;
+
+// The bridge's functions; null until the loader or the plugin has set them.
+extern const RtvApi* rtvApi;
+
+// Props of a renderer to surfaces of the bridge.
+class RtvExtractor
+{
+public:
+  // Adds `prop` to the frame. False when OpenGL has to draw it; the report knows why then.
+  bool Add(RtvBridge* bridge, vtkProp* prop, int number);
+  // The surface of a data set that is not polygons, made with the filter kept for `mapper`.
+  vtkDataSet* SurfaceOf(vtkMapper* mapper, vtkDataSet* data);
+  // Forgets the filters of mappers that were not seen this frame.
+  void EndFrame();
+
+private:
+  struct Kept
+  {
+    vtkSmartPointer<vtkDataSetSurfaceFilter> Filter;
+    bool Used;
+  };
+  std::map<vtkMapper*, Kept> Filters;
+};
+
+// Lights and camera of a renderer.
+void rtvAddLights(RtvBridge* bridge, vtkRenderer* renderer);
+RtvView rtvView(vtkRenderer* renderer, int width, int height);
+
+// Draws a picture with its depth into the bound framebuffer.
+class RtvBlit
+{
+public:
+  ~RtvBlit();
+  void Upload(vtkRenderer* renderer, const RtvPicture& picture);
+  // Stage 0: opaque pixels, with depth. Stage 1: pixels through which the window shows, tested against the depth that is there.
+  void Draw(vtkRenderer* renderer, int x, int y, int width, int height, int stage);
+  void Release(vtkWindow* window);
+
+private:
+  vtkOpenGLQuadHelper* Quad = nullptr;
+  vtkSmartPointer<vtkTextureObject> Color, Depth, FirstDepth;
+  bool Blended = false;
+  int Height = 0;
+};
+
+class vtkRtvRenderer : public vtkOpenGLRenderer
+{
+public:
+  static vtkRtvRenderer* New();
+  vtkTypeMacro(vtkRtvRenderer, vtkOpenGLRenderer);
+  void DeviceRenderOpaqueGeometry(vtkFrameBufferObjectBase* fbo = nullptr) override;
+  void ReleaseGraphicsResources(vtkWindow* window) override;
+
+protected:
+  vtkRtvRenderer();
+  ~vtkRtvRenderer() override;
+  int UpdateGeometry(vtkFrameBufferObjectBase* fbo = nullptr) override;
+
+private:
+  void DrawPicture(int stage);
+
+  RtvBridge* Bridge = nullptr;
+  RtvExtractor Extractor;
+  RtvBlit Blit;
+  // Set while OpenGL draws the rest: where the picture goes.
+  bool HasPicture = false;
+  bool PictureIsBlended = false;
+  int Area[4] = { 0, 0, 0, 0 };
+};

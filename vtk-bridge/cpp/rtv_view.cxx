@@ -1,0 +1,64 @@
+// Lights and camera.
+#include "rtv_shim.h"
+
+#include <algorithm>
+#include <vtkCamera.h>
+#include <vtkLight.h>
+#include <vtkLightCollection.h>
+#include <vtkMatrix4x4.h>
+#include <vtkRenderWindow.h>
+
+void rtvAddLights(RtvBridge* bridge, vtkRenderer* renderer)
+{
+  vtkLightCollection* lights = renderer->GetLights();
+  vtkCollectionSimpleIterator it;
+  lights->InitTraversal(it);
+  while (vtkLight* light = lights->GetNextLight(it))
+  {
+    if (!light->GetSwitch())
+    {
+      continue;
+    }
+    RtvLight l = {};
+    light->GetTransformedPosition(l.position);
+    light->GetTransformedFocalPoint(l.focal_point);
+    const double* color = light->GetDiffuseColor();
+    const double* attenuation = light->GetAttenuationValues();
+    for (int c = 0; c < 3; ++c)
+    {
+      l.color[c] = static_cast<float>(color[c] * light->GetIntensity());
+      l.attenuation[c] = static_cast<float>(attenuation[c]);
+    }
+    l.cone_angle_deg = light->GetConeAngle();
+    l.exponent = light->GetExponent();
+    l.kind = !light->GetPositional() ? RTV_LIGHT_DIRECTIONAL
+      : light->GetConeAngle() < 90.0 ? RTV_LIGHT_SPOT
+                                     : RTV_LIGHT_POINT;
+    l.headlight = light->LightTypeIsHeadlight() && !light->GetPositional() ? 1 : 0;
+    rtvApi->light(bridge, &l);
+  }
+}
+
+RtvView rtvView(vtkRenderer* renderer, int width, int height)
+{
+  RtvView view = {};
+  vtkCamera* camera = renderer->GetActiveCamera();
+  // Everything is in it: window centre, explicit projections, tiles, the matrix IceT sets. Depth from -1 to 1, as OpenGL has it.
+  vtkMatrix4x4* matrix =
+    camera->GetCompositeProjectionTransformMatrix(renderer->GetTiledAspectRatio(), -1.0, 1.0);
+  std::copy(&matrix->Element[0][0], &matrix->Element[0][0] + 16, view.clip_from_world);
+  double bottom[3], top[3];
+  renderer->GetBackground(bottom);
+  renderer->GetBackground2(top);
+  for (int c = 0; c < 3; ++c)
+  {
+    view.background_bottom[c] = static_cast<float>(bottom[c]);
+    view.background_top[c] = static_cast<float>(renderer->GetGradientBackground() ? top[c] : bottom[c]);
+  }
+  view.focus_distance = camera->GetDistance();
+  view.width = static_cast<uint32_t>(width);
+  view.height = static_cast<uint32_t>(height);
+  // While the mouse turns the scene, interactors ask for several frames a second; still pictures for far less than one.
+  view.interactive = renderer->GetRenderWindow()->GetDesiredUpdateRate() > 1.0 ? 1 : 0;
+  return view;
+}

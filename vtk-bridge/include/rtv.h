@@ -1,0 +1,273 @@
+/* The C interface of vtk-bridge; src/capi tells how to use it.
+ * Made from the Rust sources by tests/c_header.rs: do not edit. */
+#ifndef RTV_H
+#define RTV_H
+#include <stdint.h>
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* A renderer's side of the bridge. */
+typedef struct RtvBridge RtvBridge;
+/* Kind of the numbers of an RtvArray: no array. */
+#define RTV_NONE 0u
+/* Unsigned bytes. */
+#define RTV_U8 1u
+/* 32-bit floating point. */
+#define RTV_F32 2u
+/* 64-bit floating point. */
+#define RTV_F64 3u
+/* 32-bit signed integers. */
+#define RTV_I32 4u
+/* 64-bit signed integers. */
+#define RTV_I64 5u
+/* Colours come from the property. */
+#define RTV_COLOR_PROPERTY 0u
+/* Four bytes per point. */
+#define RTV_COLOR_POINTS 1u
+/* Four bytes per cell. */
+#define RTV_COLOR_CELLS 2u
+/* Two floats per point: place in map, and above 0.5 for NaN. */
+#define RTV_COLOR_MAPPED 3u
+/* Parallel light. */
+#define RTV_LIGHT_DIRECTIONAL 0u
+/* Light from a point. */
+#define RTV_LIGHT_POINT 1u
+/* Light from a point in a cone. */
+#define RTV_LIGHT_SPOT 2u
+/* tuples times components numbers, one after the other. */
+typedef struct RtvArray {
+  /* First number; may be null when there are none. */
+  void const* data;
+  /* Tuples. */
+  uint64_t tuples;
+  /* Numbers per tuple. */
+  uint32_t components;
+  /* One of RTV_U8 to RTV_I64, or RTV_NONE. */
+  uint32_t kind;
+} RtvArray;
+/* Cell i is connectivityoffsetsi .. offsetsi + 1. */
+typedef struct RtvCells {
+  /* One more than there are cells. */
+  RtvArray offsets;
+  /* Point numbers. */
+  RtvArray connectivity;
+} RtvCells;
+/* vtkProperty. */
+typedef struct RtvProperty {
+  /* Ambient colour. */
+  float ambient_color[3];
+  /* Diffuse colour. */
+  float diffuse_color[3];
+  /* Specular colour. */
+  float specular_color[3];
+  /* Ambient coefficient. */
+  float ambient;
+  /* Diffuse coefficient. */
+  float diffuse;
+  /* Specular coefficient. */
+  float specular;
+  /* Specular exponent. */
+  float specular_power;
+  /* Opacity. */
+  float opacity;
+  /* Metallic, of the physically based model. */
+  float metallic;
+  /* Roughness, of the physically based model. */
+  float roughness;
+  /* Index of refraction, of the physically based model. */
+  float base_ior;
+  /* 1 for flat shading. */
+  uint32_t flat;
+  /* 0 for no lighting. */
+  uint32_t lighting;
+  /* 1 for the physically based model. */
+  uint32_t pbr;
+  /* 1 to leave out sides turned to the viewer. */
+  uint32_t cull_front;
+  /* 1 to leave out sides turned away. */
+  uint32_t cull_back;
+} RtvProperty;
+/* Something to draw. Arrays are read before rtv_surface returns and not kept. */
+typedef struct RtvSurface {
+  /* Name for messages, UTF-8. */
+  char const* name;
+  /* Changes whenever points, cells, normals, texture coordinates, clipping planes or radii do; 0: not known. */
+  uint64_t shape_key;
+  /* Changes whenever the colours do; 0: not known. */
+  uint64_t color_key;
+  /* Changes whenever the texture does. */
+  uint64_t texture_key;
+  /* Three RTV_F32 or RTV_F64. */
+  RtvArray points;
+  /* Vertices. */
+  RtvCells verts;
+  /* Polylines. */
+  RtvCells lines;
+  /* Polygons. */
+  RtvCells polys;
+  /* Strips. */
+  RtvCells strips;
+  /* Three RTV_F32 per point, or none. */
+  RtvArray point_normals;
+  /* Three RTV_F32 per cell, or none. */
+  RtvArray cell_normals;
+  /* Two RTV_F32 per point, or none. */
+  RtvArray texcoords;
+  /* Four RTV_F64 per plane: a x + b y + c z + d >= 0 remains. */
+  RtvArray clip_planes;
+  /* One of RTV_COLOR_*. */
+  uint32_t color_source;
+  /* 1: draw polygons as their edges (tubes). */
+  uint32_t edges_only;
+  /* The colours, as color_source says. */
+  RtvArray colors;
+  /* RTV_COLOR_MAPPED: four RTV_U8 per entry. */
+  RtvArray map;
+  /* RTV_COLOR_MAPPED: colour of NaN. */
+  uint8_t nan_color[4];
+  /* 1: linear between texels. */
+  uint8_t texture_interpolate;
+  /* 1: the texture is repeated. */
+  uint8_t texture_repeat;
+  /* Not used. */
+  uint8_t reserved[2];
+  /* Four RTV_U8 per texel, or none. */
+  RtvArray texture;
+  /* Texels per row. */
+  uint32_t texture_width;
+  /* 1 when back is valid. */
+  uint32_t has_back;
+  /* Answer to light. */
+  RtvProperty property;
+  /* Answer to light of the side turned away. */
+  RtvProperty back;
+  /* Row by row. */
+  double world_from_data[16];
+  /* Sixteen RTV_F64 per copy (row by row), or none. */
+  RtvArray glyph_matrices;
+  /* Four RTV_U8 per copy, or none. */
+  RtvArray glyph_colors;
+  /* Radius of spheres for vertices; 0 for none. */
+  double point_radius;
+  /* Radius of tubes for lines and edges; 0 for none. */
+  double line_radius;
+} RtvSurface;
+/* A light that is on. */
+typedef struct RtvLight {
+  /* World position. */
+  double position[3];
+  /* World point it looks at. */
+  double focal_point[3];
+  /* Half angle of a spot, degrees. */
+  double cone_angle_deg;
+  /* Exponent of a spot. */
+  double exponent;
+  /* Colour times intensity. */
+  float color[3];
+  /* Constant, linear, quadratic. */
+  float attenuation[3];
+  /* One of RTV_LIGHT_*. */
+  uint32_t kind;
+  /* 1 for a headlight. */
+  uint32_t headlight;
+} RtvLight;
+/* What is asked for. */
+typedef struct RtvView {
+  /* Projection times view, row by row, depth -1 to 1. */
+  double clip_from_world[16];
+  /* Background at the bottom. */
+  float background_bottom[3];
+  /* Background at the top. */
+  float background_top[3];
+  /* Distance from the camera to its focal point, world units. */
+  double focus_distance;
+  /* Pixels per row. */
+  uint32_t width;
+  /* Rows. */
+  uint32_t height;
+  /* 1 while the user turns the scene. */
+  uint32_t interactive;
+  /* 1 when the program itself asks for shadows. */
+  uint32_t shadows;
+} RtvView;
+/* A picture; rows from the top, memory of the bridge's until its next call. */
+typedef struct RtvPicture {
+  /* Pixels per row. */
+  uint32_t width;
+  /* Rows. */
+  uint32_t height;
+  /* RGBA bytes, or null when blended is not. */
+  uint8_t const* opaque;
+  /* Premultiplied RGBA, or null. */
+  float const* blended;
+  /* Window depth of the first opaque surface. */
+  float const* depth;
+  /* Window depth of the first surface, or null without blended. */
+  float const* first_depth;
+} RtvPicture;
+/* Number of this interface; it changes when a structure or a call does. A shim built for another one must not go on. */
+#define RTV_ABI 1u
+/* All calls in one table, so that a shim needs only one symbol. */
+typedef struct RtvApi {
+  /* rtv_abi. */
+  uint32_t (*abi)(void);
+  /* rtv_new. */
+  RtvBridge* (*new_bridge)(void);
+  /* rtv_free. */
+  void (*free_bridge)(RtvBridge*);
+  /* rtv_set_option. */
+  int32_t (*set_option)(char const*, char const*);
+  /* rtv_option. */
+  double (*option)(char const*);
+  /* rtv_begin. */
+  int32_t (*begin)(RtvBridge*);
+  /* rtv_surface. */
+  int32_t (*surface)(RtvBridge*, RtvSurface const*);
+  /* rtv_has_colors. */
+  int32_t (*has_colors)(RtvBridge*, uint64_t, uint64_t);
+  /* rtv_light. */
+  void (*light)(RtvBridge*, RtvLight const*);
+  /* rtv_pass. */
+  void (*pass)(RtvBridge*, char const*, char const*);
+  /* rtv_warn. */
+  void (*warn)(RtvBridge*, char const*);
+  /* rtv_render. */
+  int32_t (*render)(RtvBridge*, RtvView const*, RtvPicture*);
+  /* rtv_end. */
+  void (*end)(RtvBridge*);
+} RtvApi;
+
+/* RTV_ABI of the library. */
+uint32_t rtv_abi(void);
+/* A new bridge; free it with rtv_free. Null only when that is impossible. */
+RtvBridge* rtv_new(void);
+/* Frees a bridge; null is allowed. */
+void rtv_free(RtvBridge* bridge);
+/* Sets an option for all bridges of the process (RTV_AO, "16"); an empty value takes it back. 1 when it was understood. */
+int32_t rtv_set_option(char const* name, char const* value);
+/* An option's value as a number: RTV_POINT_RADIUS, RTV_LINE_RADIUS, RTV_OFF; -1 for others. */
+double rtv_option(char const* name);
+/* Begins a frame. 0 when everything is to be left to OpenGL (RTV_OFF). */
+int32_t rtv_begin(RtvBridge* bridge);
+/* Adds something to draw: 1 when it will be traced, 0 when there is nothing to trace in it, -1 when its arrays make no sense. */
+int32_t rtv_surface(RtvBridge* bridge, RtvSurface const* surface);
+/* 1 when colours of these keys are kept from the frame before: rtv_surface need not be given their arrays. */
+int32_t rtv_has_colors(RtvBridge* bridge, uint64_t shape_key, uint64_t color_key);
+/* Adds a light. */
+void rtv_light(RtvBridge* bridge, RtvLight const* light);
+/* Tells the report that OpenGL draws something, and why. */
+void rtv_pass(RtvBridge* bridge, char const* name, char const* reason);
+/* Warns the user, once for each text. */
+void rtv_warn(RtvBridge* bridge, char const* message);
+/* Draws what was added: 1 with a picture, 0 when it could not be drawn (the user is told why; OpenGL should draw everything). */
+int32_t rtv_render(RtvBridge* bridge, RtvView const* view, RtvPicture* picture);
+/* Ends the frame: warnings are printed and the report is written, also when nothing was drawn. */
+void rtv_end(RtvBridge* bridge);
+/* The table; valid as long as the library is loaded. */
+RtvApi const* rtv_api(void);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,132 @@
+//! The surfaces of a frame as rt-core's lists of geometries, instances, appearances and materials.
+
+use crate::bridge::Drawn;
+use crate::colors::Resolved;
+use crate::materials::{Encoding, Setting, material};
+use crate::options::{MaterialChoice, Options};
+use rt_core::accel::{Geometry, Instance};
+use rt_core::glam::DAffine3;
+use rt_core::material::{ColorSource, Material, Sides, SurfaceModel};
+use rt_core::scene::Appearance;
+use std::collections::HashMap;
+
+/// The lists. Appearances and encodings are one per instance.
+#[derive(Default)]
+pub(crate) struct Assembled {
+    pub(crate) geometries: Vec<Geometry>,
+    pub(crate) instances: Vec<Instance>,
+    pub(crate) appearances: Vec<Appearance>,
+    pub(crate) materials: Vec<Material>,
+    pub(crate) encodings: Vec<Encoding>,
+}
+
+/// Puts the lists together.
+pub(crate) fn assemble(drawn: &[Drawn], options: &Options, only_headlight: bool, dark: bool) -> Assembled {
+    let setting = Setting { options, only_headlight, dark };
+    let mut out = Assembled::default();
+    let mut known: HashMap<usize, usize> = HashMap::new();
+    for d in drawn {
+        let mut parts: Vec<(usize, Geometry, bool)> = Vec::new();
+        if let Some(m) = &d.built.mesh {
+            parts.push((std::sync::Arc::as_ptr(&m.mesh) as usize, m.geometry(), true));
+        }
+        if let Some(s) = &d.built.spheres {
+            parts.push((std::sync::Arc::as_ptr(s) as usize, Geometry::Shape(s.clone()), false));
+        }
+        if let Some(s) = &d.built.tubes {
+            parts.push((std::sync::Arc::as_ptr(s) as usize, Geometry::Shape(s.clone()), false));
+        }
+        for (address, geometry, is_mesh) in parts {
+            let index = *known.entry(address).or_insert_with(|| {
+                out.geometries.push(geometry);
+                out.geometries.len() - 1
+            });
+            out.add(d, index, is_mesh, &setting);
+        }
+    }
+    out
+}
+
+impl Assembled {
+    fn add(&mut self, d: &Drawn, geometry: usize, is_mesh: bool, setting: &Setting<'_>) {
+        // Another property on the back: two instances, one for each side.
+        let sides = match &d.back {
+            Some(back) if is_mesh => vec![(&d.property, Some(Sides::FrontOnly)), (back, Some(Sides::BackOnly))],
+            _ => vec![(&d.property, None)],
+        };
+        for (property, only) in sides {
+            // In VTK colours of points and cells are for both sides, unless the back has its own property.
+            let colors = d.color.as_ref().filter(|_| is_mesh && only != Some(Sides::BackOnly));
+            let (mut base, encoding) = material(property, colors.is_some(), setting);
+            if let Some(sides) = only {
+                base.sides = sides;
+            }
+            match &d.glyphs {
+                None => {
+                    let m = self.dressed(base, colors, d);
+                    self.place(geometry, d.world_from_data, m, colors, encoding);
+                }
+                Some(copies) => {
+                    let mut by_color: HashMap<Option<[u8; 4]>, usize> = HashMap::new();
+                    for (place, rgba) in copies {
+                        let m = *by_color.entry(*rgba).or_insert_with(|| match rgba {
+                            None => self.dressed(base.clone(), colors, d),
+                            Some([r, g, b, a]) => {
+                                let color = [*r, *g, *b].map(|c| f32::from(c) / 255.0);
+                                let opacity = base.opacity * f32::from(*a) / 255.0;
+                                let source = ColorSource::Constant;
+                                self.material(Material { color, opacity, color_source: source, ..base.clone() })
+                            }
+                        });
+                        self.place(geometry, *place, m, colors, encoding);
+                    }
+                }
+            }
+        }
+    }
+
+    fn dressed(&mut self, base: Material, colors: Option<&Resolved>, d: &Drawn) -> usize {
+        let color_source = match (colors, &d.texture) {
+            (Some(Resolved::Values(_)), _) => ColorSource::Attribute,
+            (Some(Resolved::Mapped(_, map)), _) => ColorSource::Scalars(map.clone()),
+            (None, Some(texture)) => ColorSource::Texture(texture.clone()),
+            (None, None) => ColorSource::Constant,
+        };
+        self.material(Material { color_source, ..base })
+    }
+
+    fn material(&mut self, m: Material) -> usize {
+        self.materials.push(m);
+        self.materials.len() - 1
+    }
+
+    fn place(
+        &mut self,
+        geometry: usize,
+        world_from_object: DAffine3,
+        material: usize,
+        colors: Option<&Resolved>,
+        encoding: Encoding,
+    ) {
+        let appearance = Appearance::new(material);
+        self.appearances.push(match colors {
+            Some(Resolved::Values(v)) => appearance.with_colors(v.clone()),
+            Some(Resolved::Mapped(v, _)) => appearance.with_scalars(v.clone()),
+            None => appearance,
+        });
+        self.instances.push(Instance { geometry, world_from_object });
+        self.encodings.push(encoding);
+    }
+}
+
+/// Whether ambient light would show.
+pub(crate) fn any_ambient(materials: &[Material]) -> bool {
+    materials.iter().any(|m| matches!(m.model, SurfaceModel::Phong { ambient, .. } if ambient > 0.0))
+}
+
+/// Whether rays are sent for mirrors: properties alone (every physically based surface reflects a little) do not ask for it.
+pub(crate) fn wants_reflections(options: &Options) -> bool {
+    options.reflections
+        || options.mirror > 0.0
+        || matches!(options.material, MaterialChoice::Metal | MaterialChoice::Glass)
+}

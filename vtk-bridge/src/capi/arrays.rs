@@ -1,0 +1,165 @@
+//! Foreign arrays as slices, after their kinds and lengths were checked.
+
+use super::types::*;
+use crate::input::{
+    Cells, Color, Glyphs, Ids, Image, LightKind, PerItem, Points, Property, SceneLight, Shape, Surface,
+};
+use rt_core::glam::DMat4;
+
+/// `array` as a slice of `N` numbers each; empty when there is none.
+///
+/// # Safety
+/// The array has the length it says, and nobody writes to it while the result lives.
+unsafe fn tuples<'a, T, const N: usize>(
+    array: &RtvArray,
+    what: &str,
+    kind: u32,
+) -> Result<&'a [[T; N]], String> {
+    if array.kind == RTV_NONE || array.tuples == 0 {
+        return Ok(&[]);
+    }
+    if array.kind != kind || array.components as usize != N {
+        return Err(format!(
+            "{what}: {} components of kind {}, expected {N} of kind {kind}",
+            array.components, array.kind
+        ));
+    }
+    let data = array.data.cast::<[T; N]>();
+    let bytes = usize::try_from(array.tuples).ok().and_then(|n| n.checked_mul(size_of::<[T; N]>()));
+    if data.is_null() || !data.is_aligned() || bytes.is_none_or(|b| b > isize::MAX as usize) {
+        return Err(format!("{what}: {} tuples at {data:?} cannot be read", array.tuples));
+    }
+    // SAFETY: not null, aligned, of a size that fits; the rest is the caller's promise.
+    Ok(unsafe { std::slice::from_raw_parts(data, array.tuples as usize) })
+}
+
+/// # Safety
+/// As [`tuples`].
+unsafe fn ids<'a>(array: &RtvArray, what: &str) -> Result<Ids<'a>, String> {
+    // SAFETY: the caller's promise.
+    Ok(unsafe {
+        match array.kind {
+            RTV_I32 => Ids::I32(tuples::<i32, 1>(array, what, RTV_I32)?.as_flattened()),
+            _ => Ids::I64(tuples::<i64, 1>(array, what, RTV_I64)?.as_flattened()),
+        }
+    })
+}
+
+/// # Safety
+/// As [`tuples`].
+unsafe fn cells<'a>(cells: &RtvCells, what: &str) -> Result<Cells<'a>, String> {
+    // SAFETY: the caller's promise.
+    Ok(unsafe { Cells { offsets: ids(&cells.offsets, what)?, connectivity: ids(&cells.connectivity, what)? } })
+}
+
+/// The surface with its arrays as slices.
+///
+/// # Safety
+/// Every array has the length it says, and nobody writes to it while the result lives.
+pub(super) unsafe fn surface<'a>(
+    s: &RtvSurface,
+    name: &'a str,
+) -> Result<Surface<'a>, String> {
+    // SAFETY: the caller's promise, for every array.
+    unsafe {
+        let points = match s.points.kind {
+            RTV_F64 => Points::F64(tuples(&s.points, "points", RTV_F64)?),
+            _ => Points::F32(tuples(&s.points, "points", RTV_F32)?),
+        };
+        let of_points: &[[f32; 3]] = tuples(&s.point_normals, "point normals", RTV_F32)?;
+        let of_cells: &[[f32; 3]] = tuples(&s.cell_normals, "cell normals", RTV_F32)?;
+        let normals = if !of_points.is_empty() {
+            Some(PerItem::Point(of_points))
+        } else {
+            (!of_cells.is_empty()).then_some(PerItem::Cell(of_cells))
+        };
+        let texcoords: &[[f32; 2]] = tuples(&s.texcoords, "texture coordinates", RTV_F32)?;
+        let shape = Shape {
+            key: s.shape_key,
+            points,
+            verts: cells(&s.verts, "vertices")?,
+            lines: cells(&s.lines, "lines")?,
+            polys: cells(&s.polys, "polygons")?,
+            strips: cells(&s.strips, "strips")?,
+            normals,
+            texcoords: (!texcoords.is_empty()).then_some(texcoords),
+            clip_planes: tuples(&s.clip_planes, "clipping planes", RTV_F64)?,
+            point_radius: s.point_radius,
+            line_radius: s.line_radius,
+            edges_only: s.edges_only != 0,
+        };
+        let key = s.color_key;
+        let color = match s.color_source {
+            RTV_COLOR_PROPERTY => Color::Material,
+            RTV_COLOR_POINTS => Color::Values { key, rgba: PerItem::Point(tuples(&s.colors, "colours", RTV_U8)?) },
+            RTV_COLOR_CELLS => Color::Values { key, rgba: PerItem::Cell(tuples(&s.colors, "colours", RTV_U8)?) },
+            RTV_COLOR_MAPPED => Color::Mapped {
+                key,
+                coordinates: tuples(&s.colors, "colour coordinates", RTV_F32)?,
+                row: tuples(&s.map, "colour map", RTV_U8)?,
+                nan: s.nan_color,
+            },
+            other => return Err(format!("colour source {other} does not exist")),
+        };
+        let texels: &[[u8; 4]] = tuples(&s.texture, "texture", RTV_U8)?;
+        let width = s.texture_width as usize;
+        let texture = (width > 0 && texels.len() >= width).then(|| Image {
+            key: s.texture_key,
+            width,
+            height: texels.len() / width,
+            rgba: &texels[..texels.len() / width * width],
+            interpolate: s.texture_interpolate != 0,
+            repeat: s.texture_repeat != 0,
+        });
+        let matrices: &[[f64; 16]] = tuples(&s.glyph_matrices, "glyphs", RTV_F64)?;
+        Ok(Surface {
+            name,
+            shape,
+            world_from_data: DMat4::from_cols_array(&s.world_from_data).transpose(),
+            color,
+            texture,
+            property: property(&s.property),
+            back: (s.has_back != 0).then(|| property(&s.back)),
+            glyphs: (s.glyph_matrices.kind != RTV_NONE)
+                .then(|| tuples(&s.glyph_colors, "glyph colours", RTV_U8).map(|rgba| Glyphs { matrices, rgba }))
+                .transpose()?,
+        })
+    }
+}
+
+fn property(p: &RtvProperty) -> Property {
+    Property {
+        ambient_color: p.ambient_color,
+        diffuse_color: p.diffuse_color,
+        specular_color: p.specular_color,
+        ambient: p.ambient,
+        diffuse: p.diffuse,
+        specular: p.specular,
+        specular_power: p.specular_power,
+        opacity: p.opacity,
+        flat: p.flat != 0,
+        lighting: p.lighting != 0,
+        pbr: p.pbr != 0,
+        metallic: p.metallic,
+        roughness: p.roughness,
+        base_ior: p.base_ior,
+        cull_front: p.cull_front != 0,
+        cull_back: p.cull_back != 0,
+    }
+}
+
+pub(super) fn light(l: &RtvLight) -> SceneLight {
+    let kind = match l.kind {
+        RTV_LIGHT_SPOT => LightKind::Spot { cutoff_rad: l.cone_angle_deg.to_radians(), exponent: l.exponent },
+        RTV_LIGHT_POINT => LightKind::Point,
+        _ => LightKind::Directional,
+    };
+    SceneLight {
+        kind,
+        position: l.position.into(),
+        focal_point: l.focal_point.into(),
+        color: l.color,
+        attenuation: l.attenuation,
+        headlight: l.headlight != 0,
+    }
+}

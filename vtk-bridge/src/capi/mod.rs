@@ -1,0 +1,275 @@
+//! The C ABI behind the C++ shim, the plugin and the Python package: `include/rtv.h`.
+//!
+//! A frame is `rtv_begin`, `rtv_surface` and `rtv_light` for everything there is, `rtv_render`. Arrays belong to the caller and are read
+//! before the call returns. Pictures and texts belong to the bridge. A panic never crosses the border: it becomes a warning, and the
+//! call fails. A bridge is used by one thread at a time; different bridges may be used at once.
+#![allow(unsafe_code, reason = "this is where foreign code calls us")]
+
+mod arrays;
+mod state;
+mod types;
+
+pub use types::*;
+
+use crate::bridge::Added;
+use crate::input::View;
+use crate::options::Options;
+use rt_core::glam::DMat4;
+use state::{Handle, set_option, with};
+use std::ffi::CStr;
+use std::os::raw::c_char;
+
+/// A renderer's side of the bridge.
+pub struct RtvBridge {
+    _private: [u8; 0],
+}
+
+/// Number of this interface; it changes when a structure or a call does. A shim built for another one must not go on.
+pub const RTV_ABI: u32 = 1;
+
+/// [`RTV_ABI`] of the library.
+#[unsafe(no_mangle)]
+pub extern "C" fn rtv_abi() -> u32 {
+    RTV_ABI
+}
+
+/// A new bridge; free it with `rtv_free`. Null only when that is impossible.
+#[unsafe(no_mangle)]
+pub extern "C" fn rtv_new() -> *mut RtvBridge {
+    Box::into_raw(Box::new(Handle::new())).cast()
+}
+
+/// Frees a bridge; null is allowed.
+///
+/// # Safety
+/// `bridge` is null or came from `rtv_new` and is not used afterwards.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtv_free(bridge: *mut RtvBridge) {
+    if !bridge.is_null() {
+        // SAFETY: made by `rtv_new` from a box of this type, and given back once (the caller's promise).
+        drop(unsafe { Box::from_raw(bridge.cast::<Handle>()) });
+    }
+}
+
+/// Sets an option for all bridges of the process (`RTV_AO`, "16"); an empty value takes it back. 1 when it was understood.
+///
+/// # Safety
+/// Both are null or end with a zero byte.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtv_set_option(name: *const c_char, value: *const c_char) -> i32 {
+    // SAFETY: the caller's promise.
+    let (name, value) = unsafe { (text(name), text(value)) };
+    i32::from(set_option(&name, &value))
+}
+
+/// An option's value as a number: `RTV_POINT_RADIUS`, `RTV_LINE_RADIUS`, `RTV_OFF`; -1 for others.
+///
+/// # Safety
+/// As `rtv_set_option`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtv_option(name: *const c_char) -> f64 {
+    let options = state::options().0;
+    // SAFETY: the caller's promise.
+    match unsafe { text(name) }.as_str() {
+        "RTV_OFF" => f64::from(u8::from(options.off)),
+        "RTV_POINT_RADIUS" => options.point_radius,
+        "RTV_LINE_RADIUS" => options.line_radius,
+        _ => -1.0,
+    }
+}
+
+/// Begins a frame. 0 when everything is to be left to OpenGL (`RTV_OFF`).
+///
+/// # Safety
+/// `bridge` is null or came from `rtv_new`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtv_begin(bridge: *mut RtvBridge) -> i32 {
+    // SAFETY: the caller's promise, for this and all calls below.
+    unsafe { with(bridge, 0, |h| h.begin()) }
+}
+
+/// Adds something to draw: 1 when it will be traced, 0 when there is nothing to trace in it, -1 when its arrays make no sense.
+///
+/// # Safety
+/// As `rtv_begin`; every array of `surface` has the length it says and is not written to during the call.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtv_surface(bridge: *mut RtvBridge, surface: *const RtvSurface) -> i32 {
+    // SAFETY: as above; a null surface is refused.
+    let Some(s) = (unsafe { surface.as_ref() }) else { return -1 };
+    // SAFETY: as above.
+    unsafe {
+        with(bridge, -1, |h| {
+            let name = text(s.name);
+            match arrays::surface(s, &name) {
+                Ok(surface) => match h.bridge.add_surface(&surface) {
+                    Added::Traced => 1,
+                    Added::Nothing(_) => 0,
+                },
+                Err(fault) => {
+                    h.bridge.warn(format!("{name}: {fault}; OpenGL draws it"));
+                    -1
+                }
+            }
+        })
+    }
+}
+
+/// 1 when colours of these keys are kept from the frame before: `rtv_surface` need not be given their arrays.
+///
+/// # Safety
+/// As `rtv_begin`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtv_has_colors(bridge: *mut RtvBridge, shape_key: u64, color_key: u64) -> i32 {
+    // SAFETY: as above.
+    unsafe { with(bridge, 0, |h| i32::from(h.bridge.has_colors(shape_key, color_key))) }
+}
+
+/// Adds a light.
+///
+/// # Safety
+/// As `rtv_begin`; `light` is null or valid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtv_light(bridge: *mut RtvBridge, light: *const RtvLight) {
+    // SAFETY: as above.
+    let Some(l) = (unsafe { light.as_ref() }) else { return };
+    // SAFETY: as above.
+    unsafe { with(bridge, (), |h| h.bridge.add_light(arrays::light(l))) }
+}
+
+/// Tells the report that OpenGL draws something, and why.
+///
+/// # Safety
+/// As `rtv_begin`; texts are null or end with a zero byte.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtv_pass(bridge: *mut RtvBridge, name: *const c_char, reason: *const c_char) {
+    // SAFETY: as above.
+    unsafe { with(bridge, (), |h| h.bridge.pass(&text(name), &text(reason))) }
+}
+
+/// Warns the user, once for each text.
+///
+/// # Safety
+/// As `rtv_pass`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtv_warn(bridge: *mut RtvBridge, message: *const c_char) {
+    // SAFETY: as above.
+    unsafe { with(bridge, (), |h| h.bridge.warn(text(message))) }
+}
+
+/// Draws what was added: 1 with a picture, 0 when it could not be drawn (the user is told why; OpenGL should draw everything).
+///
+/// # Safety
+/// As `rtv_begin`; `view` and `picture` are null or valid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtv_render(
+    bridge: *mut RtvBridge,
+    view: *const RtvView,
+    picture: *mut RtvPicture,
+) -> i32 {
+    // SAFETY: as above.
+    let (Some(v), false) = (unsafe { view.as_ref() }, picture.is_null()) else { return 0 };
+    let view = View {
+        clip_from_world: DMat4::from_cols_array(&v.clip_from_world).transpose(),
+        width: v.width,
+        height: v.height,
+        background: [v.background_bottom, v.background_top],
+        interactive: v.interactive != 0,
+        shadows: v.shadows != 0,
+        samples: 0,
+        lens: Some(crate::input::Lens { aperture_radius: 0.0, focus_distance: v.focus_distance }),
+    };
+    // SAFETY: as above; `picture` is not null.
+    unsafe {
+        with(bridge, 0, |h| match h.render(&view) {
+            Some(found) => {
+                picture.write(found);
+                1
+            }
+            None => 0,
+        })
+    }
+}
+
+/// Ends the frame: warnings are printed and the report is written, also when nothing was drawn.
+///
+/// # Safety
+/// As `rtv_begin`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtv_end(bridge: *mut RtvBridge) {
+    // SAFETY: as above.
+    unsafe { with(bridge, (), |h| h.end()) }
+}
+
+/// All calls in one table, so that a shim needs only one symbol.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct RtvApi {
+    /// [`rtv_abi`].
+    pub abi: extern "C" fn() -> u32,
+    /// [`rtv_new`].
+    pub new_bridge: extern "C" fn() -> *mut RtvBridge,
+    /// [`rtv_free`].
+    pub free_bridge: unsafe extern "C" fn(*mut RtvBridge),
+    /// [`rtv_set_option`].
+    pub set_option: unsafe extern "C" fn(*const c_char, *const c_char) -> i32,
+    /// [`rtv_option`].
+    pub option: unsafe extern "C" fn(*const c_char) -> f64,
+    /// [`rtv_begin`].
+    pub begin: unsafe extern "C" fn(*mut RtvBridge) -> i32,
+    /// [`rtv_surface`].
+    pub surface: unsafe extern "C" fn(*mut RtvBridge, *const RtvSurface) -> i32,
+    /// [`rtv_has_colors`].
+    pub has_colors: unsafe extern "C" fn(*mut RtvBridge, u64, u64) -> i32,
+    /// [`rtv_light`].
+    pub light: unsafe extern "C" fn(*mut RtvBridge, *const RtvLight),
+    /// [`rtv_pass`].
+    pub pass: unsafe extern "C" fn(*mut RtvBridge, *const c_char, *const c_char),
+    /// [`rtv_warn`].
+    pub warn: unsafe extern "C" fn(*mut RtvBridge, *const c_char),
+    /// [`rtv_render`].
+    pub render: unsafe extern "C" fn(*mut RtvBridge, *const RtvView, *mut RtvPicture) -> i32,
+    /// [`rtv_end`].
+    pub end: unsafe extern "C" fn(*mut RtvBridge),
+}
+
+static API: RtvApi = RtvApi {
+    abi: rtv_abi,
+    new_bridge: rtv_new,
+    free_bridge: rtv_free,
+    set_option: rtv_set_option,
+    option: rtv_option,
+    begin: rtv_begin,
+    surface: rtv_surface,
+    has_colors: rtv_has_colors,
+    light: rtv_light,
+    pass: rtv_pass,
+    warn: rtv_warn,
+    render: rtv_render,
+    end: rtv_end,
+};
+
+/// The table; valid as long as the library is loaded.
+#[unsafe(no_mangle)]
+pub extern "C" fn rtv_api() -> *const RtvApi {
+    &API
+}
+
+/// A C text; what is not UTF-8 is replaced.
+///
+/// # Safety
+/// Null, or ends with a zero byte.
+unsafe fn text(t: *const c_char) -> String {
+    if t.is_null() {
+        return String::new();
+    }
+    // SAFETY: not null, and ends with zero (the caller's promise).
+    unsafe { CStr::from_ptr(t) }.to_string_lossy().into_owned()
+}
+
+/// The options in force, for programs that use the library from Rust and want what the environment says.
+pub fn options_of_process() -> Options {
+    state::options().0
+}
+
+#[cfg(test)]
+mod tests;

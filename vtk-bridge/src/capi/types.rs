@@ -1,0 +1,224 @@
+//! The structures that cross the border, as C lays them out.
+
+use std::os::raw::{c_char, c_void};
+
+/// Kind of the numbers of an [`RtvArray`]: no array.
+pub const RTV_NONE: u32 = 0;
+/// Unsigned bytes.
+pub const RTV_U8: u32 = 1;
+/// 32-bit floating point.
+pub const RTV_F32: u32 = 2;
+/// 64-bit floating point.
+pub const RTV_F64: u32 = 3;
+/// 32-bit signed integers.
+pub const RTV_I32: u32 = 4;
+/// 64-bit signed integers.
+pub const RTV_I64: u32 = 5;
+
+/// Colours come from the property.
+pub const RTV_COLOR_PROPERTY: u32 = 0;
+/// Four bytes per point.
+pub const RTV_COLOR_POINTS: u32 = 1;
+/// Four bytes per cell.
+pub const RTV_COLOR_CELLS: u32 = 2;
+/// Two floats per point: place in `map`, and above 0.5 for NaN.
+pub const RTV_COLOR_MAPPED: u32 = 3;
+
+/// Parallel light.
+pub const RTV_LIGHT_DIRECTIONAL: u32 = 0;
+/// Light from a point.
+pub const RTV_LIGHT_POINT: u32 = 1;
+/// Light from a point in a cone.
+pub const RTV_LIGHT_SPOT: u32 = 2;
+
+/// `tuples` times `components` numbers, one after the other.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct RtvArray {
+    /// First number; may be null when there are none.
+    pub data: *const c_void,
+    /// Tuples.
+    pub tuples: u64,
+    /// Numbers per tuple.
+    pub components: u32,
+    /// One of RTV_U8 to RTV_I64, or RTV_NONE.
+    pub kind: u32,
+}
+
+/// Cell i is `connectivity[offsets[i] .. offsets[i + 1]]`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct RtvCells {
+    /// One more than there are cells.
+    pub offsets: RtvArray,
+    /// Point numbers.
+    pub connectivity: RtvArray,
+}
+
+/// `vtkProperty`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct RtvProperty {
+    /// Ambient colour.
+    pub ambient_color: [f32; 3],
+    /// Diffuse colour.
+    pub diffuse_color: [f32; 3],
+    /// Specular colour.
+    pub specular_color: [f32; 3],
+    /// Ambient coefficient.
+    pub ambient: f32,
+    /// Diffuse coefficient.
+    pub diffuse: f32,
+    /// Specular coefficient.
+    pub specular: f32,
+    /// Specular exponent.
+    pub specular_power: f32,
+    /// Opacity.
+    pub opacity: f32,
+    /// Metallic, of the physically based model.
+    pub metallic: f32,
+    /// Roughness, of the physically based model.
+    pub roughness: f32,
+    /// Index of refraction, of the physically based model.
+    pub base_ior: f32,
+    /// 1 for flat shading.
+    pub flat: u32,
+    /// 0 for no lighting.
+    pub lighting: u32,
+    /// 1 for the physically based model.
+    pub pbr: u32,
+    /// 1 to leave out sides turned to the viewer.
+    pub cull_front: u32,
+    /// 1 to leave out sides turned away.
+    pub cull_back: u32,
+}
+
+/// Something to draw. Arrays are read before `rtv_surface` returns and not kept.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct RtvSurface {
+    /// Name for messages, UTF-8.
+    pub name: *const c_char,
+    /// Changes whenever points, cells, normals, texture coordinates, clipping planes or radii do; 0: not known.
+    pub shape_key: u64,
+    /// Changes whenever the colours do; 0: not known.
+    pub color_key: u64,
+    /// Changes whenever the texture does.
+    pub texture_key: u64,
+    /// Three RTV_F32 or RTV_F64.
+    pub points: RtvArray,
+    /// Vertices.
+    pub verts: RtvCells,
+    /// Polylines.
+    pub lines: RtvCells,
+    /// Polygons.
+    pub polys: RtvCells,
+    /// Strips.
+    pub strips: RtvCells,
+    /// Three RTV_F32 per point, or none.
+    pub point_normals: RtvArray,
+    /// Three RTV_F32 per cell, or none.
+    pub cell_normals: RtvArray,
+    /// Two RTV_F32 per point, or none.
+    pub texcoords: RtvArray,
+    /// Four RTV_F64 per plane: a x + b y + c z + d >= 0 remains.
+    pub clip_planes: RtvArray,
+    /// One of RTV_COLOR_*.
+    pub color_source: u32,
+    /// 1: draw polygons as their edges (tubes).
+    pub edges_only: u32,
+    /// The colours, as `color_source` says.
+    pub colors: RtvArray,
+    /// RTV_COLOR_MAPPED: four RTV_U8 per entry.
+    pub map: RtvArray,
+    /// RTV_COLOR_MAPPED: colour of NaN.
+    pub nan_color: [u8; 4],
+    /// 1: linear between texels.
+    pub texture_interpolate: u8,
+    /// 1: the texture is repeated.
+    pub texture_repeat: u8,
+    /// Not used.
+    pub reserved: [u8; 2],
+    /// Four RTV_U8 per texel, or none.
+    pub texture: RtvArray,
+    /// Texels per row.
+    pub texture_width: u32,
+    /// 1 when `back` is valid.
+    pub has_back: u32,
+    /// Answer to light.
+    pub property: RtvProperty,
+    /// Answer to light of the side turned away.
+    pub back: RtvProperty,
+    /// Row by row.
+    pub world_from_data: [f64; 16],
+    /// Sixteen RTV_F64 per copy (row by row), or none.
+    pub glyph_matrices: RtvArray,
+    /// Four RTV_U8 per copy, or none.
+    pub glyph_colors: RtvArray,
+    /// Radius of spheres for vertices; 0 for none.
+    pub point_radius: f64,
+    /// Radius of tubes for lines and edges; 0 for none.
+    pub line_radius: f64,
+}
+
+/// A light that is on.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct RtvLight {
+    /// World position.
+    pub position: [f64; 3],
+    /// World point it looks at.
+    pub focal_point: [f64; 3],
+    /// Half angle of a spot, degrees.
+    pub cone_angle_deg: f64,
+    /// Exponent of a spot.
+    pub exponent: f64,
+    /// Colour times intensity.
+    pub color: [f32; 3],
+    /// Constant, linear, quadratic.
+    pub attenuation: [f32; 3],
+    /// One of RTV_LIGHT_*.
+    pub kind: u32,
+    /// 1 for a headlight.
+    pub headlight: u32,
+}
+
+/// What is asked for.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct RtvView {
+    /// Projection times view, row by row, depth -1 to 1.
+    pub clip_from_world: [f64; 16],
+    /// Background at the bottom.
+    pub background_bottom: [f32; 3],
+    /// Background at the top.
+    pub background_top: [f32; 3],
+    /// Distance from the camera to its focal point, world units.
+    pub focus_distance: f64,
+    /// Pixels per row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// 1 while the user turns the scene.
+    pub interactive: u32,
+    /// 1 when the program itself asks for shadows.
+    pub shadows: u32,
+}
+
+/// A picture; rows from the top, memory of the bridge's until its next call.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct RtvPicture {
+    /// Pixels per row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// RGBA bytes, or null when `blended` is not.
+    pub opaque: *const u8,
+    /// Premultiplied RGBA, or null.
+    pub blended: *const f32,
+    /// Window depth of the first opaque surface.
+    pub depth: *const f32,
+    /// Window depth of the first surface, or null without `blended`.
+    pub first_depth: *const f32,
+}

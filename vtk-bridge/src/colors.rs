@@ -1,0 +1,109 @@
+//! Colours of points and cells as rt-core wants them, kept as long as their key stays the same.
+
+use crate::geometry::BuiltMesh;
+use crate::input::{Color, Image, PerItem};
+use rayon::prelude::*;
+use rt_core::colormap::ColorMap;
+use rt_core::mesh::Attribute;
+use rt_core::texture::{Filter, Texture, Wrap};
+use std::sync::Arc;
+
+/// Colours for one mesh.
+#[derive(Clone)]
+pub enum Resolved {
+    /// RGBA of vertices or triangles.
+    Values(Arc<Attribute<[f32; 4]>>),
+    /// Positions on a map.
+    Mapped(Arc<Attribute<f32>>, Arc<ColorMap>),
+}
+
+/// Values a task works on.
+const CHUNK: usize = 1 << 14;
+
+/// VTK's colours are the numbers that end up in the picture: they are not decoded, and the picture is not encoded.
+fn float(c: [u8; 4]) -> [f32; 4] {
+    c.map(|v| f32::from(v) / 255.0)
+}
+
+/// `color` for `built`, or why it cannot be. `points` is the number of points that the colours were made for.
+pub fn resolve(color: &Color<'_>, built: &BuiltMesh, points: usize) -> Result<Option<Resolved>, String> {
+    let length = |what, expected: usize, found: usize| {
+        format!("{found} colours for {expected} {what}: the property's colour is used")
+    };
+    match color {
+        Color::Material => Ok(None),
+        Color::Values { rgba: PerItem::Point(values), .. } => {
+            if values.len() < points {
+                return Err(length("points", points, values.len()));
+            }
+            let values: Vec<[f32; 4]> = values[..points].par_iter().with_min_len(CHUNK).map(|c| float(*c)).collect();
+            let values = match &built.clipped {
+                Some(c) => c.vertex_values(&values, |a, b, t| std::array::from_fn(|k| a[k] + (b[k] - a[k]) * t)),
+                None => values,
+            };
+            Ok(Some(Resolved::Values(Arc::new(Attribute::per_vertex(values)))))
+        }
+        Color::Values { rgba: PerItem::Cell(values), .. } => {
+            let of_triangle = |i: usize| {
+                let before = built.clipped.as_ref().map_or(i, |c| c.triangles[i] as usize);
+                values.get(built.cells.at(before)).map(|c| float(*c))
+            };
+            let triangles = built.mesh.indices.len();
+            let list: Option<Vec<_>> = (0..triangles).into_par_iter().with_min_len(CHUNK).map(of_triangle).collect();
+            let list = list.ok_or_else(|| length("cells", triangles, values.len()))?;
+            Ok(Some(Resolved::Values(Arc::new(Attribute::per_face(list)))))
+        }
+        Color::Mapped { coordinates, row, nan, .. } => {
+            if coordinates.len() < points || row.is_empty() {
+                return Err(length("points", points, coordinates.len()));
+            }
+            let of = |c: &[f32; 2]| if c[1] > 0.5 { f32::NAN } else { c[0] };
+            let values: Vec<f32> = coordinates[..points].par_iter().with_min_len(CHUNK).map(of).collect();
+            let values = match &built.clipped {
+                Some(c) => c.vertex_values(&values, |a, b, t| a + (b - a) * t),
+                None => values,
+            };
+            Ok(Some(Resolved::Mapped(Arc::new(Attribute::per_vertex(values)), Arc::new(stepped(row, *nan)))))
+        }
+    }
+}
+
+/// Most entries of a map that steps are made of.
+const MAP_ENTRIES: usize = 4096;
+
+/// VTK takes the nearest colour of its row, rt-core's maps are linear between colours: each colour is repeated, so that only a small
+/// part of the range lies between two different ones.
+fn stepped(row: &[[u8; 4]], nan: [u8; 4]) -> ColorMap {
+    let repeat = (MAP_ENTRIES / row.len()).max(1);
+    let n = row.len() * repeat;
+    let colors = row.iter().flat_map(|c| std::iter::repeat_n(float(*c), repeat)).collect();
+    // Entry k of n belongs to the middle of its part of 0..1, as texels do.
+    let half = 0.5 / n as f32;
+    ColorMap { nan_color: float(nan), ..ColorMap::new(colors, [half, 1.0 - half]) }
+}
+
+/// A texture, not decoded (see [`float`]).
+pub fn texture(image: &Image<'_>) -> Option<Texture> {
+    let texels = image.rgba.par_iter().with_min_len(CHUNK).map(|c| float(*c)).collect();
+    let mut texture = Texture::from_linear(image.width, image.height, texels).ok()?;
+    texture.wrap = [if image.repeat { Wrap::Repeat } else { Wrap::Clamp }; 2];
+    texture.filter = if image.interpolate { Filter::Bilinear } else { Filter::Nearest };
+    Some(texture)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_of_colours_is_stepped_like_the_nearest_texel() {
+        let row = [[0, 0, 0, 255], [255, 0, 0, 255], [255, 255, 0, 255], [255, 255, 255, 255]];
+        let map = stepped(&row, [1, 2, 3, 255]);
+        for u in [0.01f32, 0.1, 0.24, 0.26, 0.49, 0.51, 0.74, 0.76, 0.99] {
+            let nearest = float(row[(u * 4.0) as usize]);
+            assert_eq!(map.lookup(u), nearest, "at {u}");
+        }
+        assert_eq!(map.lookup(f32::NAN), float([1, 2, 3, 255]));
+        assert_eq!(map.lookup(7.0), [1.0; 4]);
+    }
+}

@@ -1,0 +1,116 @@
+//! From points and cells to what rays can meet, and what is needed to put colours on it later.
+
+mod clip;
+mod points_and_lines;
+mod triangulate;
+mod vertices;
+
+use crate::input::{PerItem, Shape};
+use rt_core::accel::Geometry;
+use rt_core::glam::{Vec2, Vec3};
+use rt_core::mesh::{Attribute, TriMesh};
+use std::ops::Range;
+use std::sync::Arc;
+
+pub use clip::{Clipped, Origin};
+
+/// What became of one [`Shape`]; colours are put on it by [`crate::colors`].
+#[derive(Clone)]
+pub struct Built {
+    /// Triangles of polygons and strips, if there are any.
+    pub mesh: Option<BuiltMesh>,
+    /// Spheres of vertices.
+    pub spheres: Option<Arc<rt_core::shapes::Spheres>>,
+    /// Tubes of lines or edges.
+    pub tubes: Option<Arc<rt_core::shapes::Tubes>>,
+    /// Triangles that cannot be drawn (a NaN point, a point number that does not exist).
+    pub skipped: usize,
+}
+
+/// Triangles, and where each comes from.
+#[derive(Clone)]
+pub struct BuiltMesh {
+    /// The mesh, without colours.
+    pub mesh: Arc<TriMesh>,
+    /// Cell number of each triangle.
+    pub cells: CellOfTriangle,
+    /// Set when clipping planes made new vertices and triangles.
+    pub clipped: Option<Arc<Clipped>>,
+}
+
+impl BuiltMesh {
+    /// As rt-core wants it.
+    pub fn geometry(&self) -> Geometry {
+        Geometry::Mesh(Arc::clone(&self.mesh))
+    }
+}
+
+/// Which cell a triangle belongs to.
+#[derive(Clone)]
+pub enum CellOfTriangle {
+    /// Triangle i is cell `first + i`: all polygons are triangles, and a list is not needed.
+    Consecutive {
+        /// Number of the first polygon.
+        first: u32,
+    },
+    /// By triangle.
+    List(Arc<Vec<u32>>),
+}
+
+impl CellOfTriangle {
+    /// Cell of triangle `i`.
+    #[inline]
+    pub fn at(&self, i: usize) -> usize {
+        match self {
+            CellOfTriangle::Consecutive { first } => *first as usize + i,
+            CellOfTriangle::List(list) => list[i] as usize,
+        }
+    }
+}
+
+/// The numbers that `vtkPolyData` gives the cells of each kind.
+fn cell_numbers(shape: &Shape<'_>) -> [Range<usize>; 4] {
+    let mut start = 0;
+    [shape.verts, shape.lines, shape.polys, shape.strips].map(|cells| {
+        let range = start..start + cells.len();
+        start = range.end;
+        range
+    })
+}
+
+/// Builds everything that `shape` asks for.
+pub fn build(shape: &Shape<'_>) -> Built {
+    let [_, _, polys, strips] = cell_numbers(shape);
+    let mut built = Built { mesh: None, spheres: None, tubes: None, skipped: 0 };
+    points_and_lines::add(shape, &mut built);
+    if shape.edges_only {
+        return built;
+    }
+    let (indices, cells) = triangulate::triangles(shape, polys.start, strips.start);
+    if indices.is_empty() {
+        return built;
+    }
+    let (origin, positions) = vertices::relative(&shape.points);
+    let points = positions.len();
+    let mut mesh = TriMesh { origin, positions, indices, ..TriMesh::default() };
+    mesh.normals = shape.normals.and_then(|normals| match normals {
+        PerItem::Point(n) => (n.len() == points).then(|| Attribute::per_vertex(vertices::vectors(n))),
+        PerItem::Cell(n) => (n.len() >= strips.end).then(|| {
+            let of = |i| n.get(cells.at(i)).map_or(Vec3::ZERO, |v| Vec3::from(*v));
+            Attribute::per_face((0..mesh.indices.len()).map(of).collect())
+        }),
+    });
+    mesh.texcoords = shape
+        .texcoords
+        .filter(|t| t.len() == points)
+        .map(|t| t.iter().map(|v| Vec2::from(*v)).collect());
+    let (mesh, clipped) = if shape.clip_planes.is_empty() {
+        (mesh, None)
+    } else {
+        let (mesh, clipped) = clip::clip(&mesh, shape.clip_planes);
+        (mesh, Some(Arc::new(clipped)))
+    };
+    built.skipped = (0..mesh.indices.len()).filter(|&i| !mesh.is_renderable(i)).count();
+    built.mesh = Some(BuiltMesh { mesh: Arc::new(mesh), cells, clipped });
+    built
+}

@@ -1,0 +1,159 @@
+//! VTK's properties as rt-core's materials, so that without any effect the picture is VTK's.
+//!
+//! VTK 9's shader (measured: 0 to 0.1 levels of 255 apart): ambient coefficient times ambient colour, always; diffuse coefficient times colour
+//! times cosine; highlight (R·V)^p, and (N·L)^p where one headlight is the only light. Numbers are neither decoded nor encoded, except by the
+//! physically based shader, which ends with `pow(c, 1/2.2)` and divides diffuse light by π: [`Encoding::Pbr`] says so for the picture.
+
+use crate::input::Property;
+use crate::options::{MaterialChoice, Options};
+use rt_core::material::{ColorSource, Highlight, Material, Sides, SurfaceModel};
+
+/// How radiance becomes numbers in the picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Encoding {
+    /// As it is.
+    Direct,
+    /// Over π, then to the power 1/2.2.
+    Pbr,
+}
+
+/// What decides about all materials of a frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Setting<'a> {
+    /// The options.
+    pub options: &'a Options,
+    /// True when one headlight is the only light.
+    pub only_headlight: bool,
+    /// True when no light is on.
+    pub dark: bool,
+}
+
+/// Ambient occlusion needs light to occlude: this share of the diffuse coefficient answers ambient light instead of lights.
+fn ambient_share(options: &Options) -> f32 {
+    if options.ao > 0 && !options.path_tracing { options.ao_strength } else { 0.0 }
+}
+
+/// The material of `p`. `from_values` is true where colours of points, cells or a map replace the property's.
+pub fn material(p: &Property, from_values: bool, setting: &Setting<'_>) -> (Material, Encoding) {
+    let options = setting.options;
+    let sides = match (p.cull_front, p.cull_back) {
+        (false, false) | (true, true) => Sides::Both,
+        (true, false) => Sides::BackOnly,
+        (false, true) => Sides::FrontOnly,
+    };
+    let opacity = sane(p.opacity).min(1.0);
+    let base = Material {
+        model: SurfaceModel::Matte,
+        color: p.diffuse_color.map(sane),
+        color_source: ColorSource::Attribute,
+        opacity,
+        emission: [0.0; 3],
+        sides,
+        flat: p.flat,
+    };
+    match options.material {
+        MaterialChoice::Matte => {
+            let share = ambient_share(options);
+            let model = SurfaceModel::Phong {
+                ambient: share,
+                diffuse: 1.0 - share,
+                specular: [0.0; 3],
+                shininess: 1.0,
+                highlight: Highlight::Mirrored,
+                mirror: options.mirror,
+            };
+            return (Material { model, ..base }, Encoding::Direct);
+        }
+        MaterialChoice::Metal => {
+            return (
+                Material { model: SurfaceModel::Metal { roughness: options.roughness }, ..base },
+                Encoding::Direct,
+            );
+        }
+        MaterialChoice::Glass => {
+            let model = SurfaceModel::Dielectric { ior: options.ior, absorption: [0.0; 3] };
+            // Half of the way to white: two walls of a saturated colour would swallow all light.
+            let color = base.color.map(|c| 0.5 + 0.5 * c);
+            return (Material { model, color, opacity: 1.0, ..base }, Encoding::Direct);
+        }
+        MaterialChoice::Scene | MaterialChoice::Transparent => {}
+    }
+    let opacity = if options.material == MaterialChoice::Transparent { 0.5 * opacity } else { opacity };
+    let base = Material { opacity, ..base };
+    if !p.lighting || setting.dark {
+        // Complexity 0 of VTK's shader: ambient and diffuse as they are.
+        let color = if from_values {
+            [p.ambient + p.diffuse; 3]
+        } else {
+            std::array::from_fn(|c| sane(p.ambient * p.ambient_color[c] + p.diffuse * p.diffuse_color[c]))
+        };
+        return (Material { model: SurfaceModel::Unlit, color, ..base }, Encoding::Direct);
+    }
+    if p.pbr {
+        return pbr(p, base);
+    }
+    let share = ambient_share(options);
+    let same = from_values || p.ambient_color == p.diffuse_color;
+    let specular = p.specular_color.map(|c| sane(c * p.specular));
+    let model = SurfaceModel::Phong {
+        ambient: if same { sane(p.ambient) } else { 0.0 } + sane(p.diffuse) * share,
+        diffuse: sane(p.diffuse) * (1.0 - share),
+        specular,
+        shininess: sane(p.specular_power),
+        highlight: if setting.only_headlight { Highlight::TowardsLight } else { Highlight::Mirrored },
+        mirror: options.mirror,
+    };
+    let emission = if same { [0.0; 3] } else { p.ambient_color.map(|c| sane(c * p.ambient)) };
+    (Material { model, emission, ..base }, Encoding::Direct)
+}
+
+fn pbr(p: &Property, base: Material) -> (Material, Encoding) {
+    let f0 = {
+        let r = (p.base_ior - 1.0) / (p.base_ior + 1.0);
+        sane(r * r).min(1.0)
+    };
+    let model = SurfaceModel::Pbr {
+        metallic: sane(p.metallic).min(1.0),
+        roughness: sane(p.roughness).min(1.0),
+        specular: f0,
+    };
+    (Material { model, color: base.color.map(|c| c.powf(2.2)), ..base }, Encoding::Pbr)
+}
+
+/// Finite and not negative.
+fn sane(v: f32) -> f32 {
+    if v.is_finite() { v.max(0.0) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn setting(options: &Options) -> Setting<'_> {
+        Setting { options, only_headlight: false, dark: false }
+    }
+
+    #[test]
+    fn ambient_occlusion_takes_its_light_from_the_lights() {
+        let options = Options { ao: 8, ao_strength: 0.25, ..Options::default() };
+        let (m, _) = material(&Property { diffuse: 0.8, ..Property::default() }, false, &setting(&options));
+        let SurfaceModel::Phong { ambient, diffuse, .. } = m.model else { panic!("{m:?}") };
+        assert!((ambient - 0.2).abs() < 1e-6 && (diffuse - 0.6).abs() < 1e-6);
+    }
+
+    #[test]
+    fn an_ambient_colour_of_its_own_is_given_off() {
+        let p = Property { ambient: 0.5, ambient_color: [1.0, 0.0, 0.0], ..Property::default() };
+        let (m, _) = material(&p, false, &setting(&Options::default()));
+        assert_eq!(m.emission, [0.5, 0.0, 0.0]);
+        let (m, _) = material(&p, true, &setting(&Options::default()));
+        assert_eq!(m.emission, [0.0; 3], "colours of points replace both");
+    }
+
+    #[test]
+    fn nan_in_a_property_is_no_error_of_the_scene() {
+        let p = Property { specular_power: f32::NAN, diffuse: -1.0, opacity: f32::NAN, ..Property::default() };
+        let (m, _) = material(&p, false, &setting(&Options::default()));
+        assert!(matches!(m.model, SurfaceModel::Phong { shininess: 0.0, diffuse: 0.0, .. }), "{m:?}");
+    }
+}

@@ -1,0 +1,281 @@
+//! The options of the bridge: from environment variables `RTV_*`, or set by a program (ParaView's panel).
+//!
+//! What is not understood is not silently dropped: [`Options::parse`] names the variable, the value and the rule.
+
+use rt_core::accel::{BuildQuality, Robustness};
+
+/// What all surfaces are made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum MaterialChoice {
+    /// What the program's own properties say.
+    #[default]
+    Scene,
+    /// Ideal diffuse, in the surfaces' colours.
+    Matte,
+    /// Metal, with the surfaces' colours as reflectance.
+    Metal,
+    /// Glass, tinted in the surfaces' colours.
+    Glass,
+    /// The scene's, half transparent.
+    Transparent,
+}
+
+/// All options. The default is what looks like OpenGL: no effect is on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// Everything is left to OpenGL.
+    pub off: bool,
+    /// Threads; `None` for all.
+    pub threads: Option<usize>,
+    /// Samples per pixel.
+    pub samples: u32,
+    /// Frames that are averaged while nothing changes.
+    pub progressive: u32,
+    /// Shadows of all lights but headlights.
+    pub shadows: bool,
+    /// Angle under which lights are seen, radians (half); 0 for sharp shadows.
+    pub light_size_rad: f64,
+    /// Rays of ambient occlusion per point and sample; 0 for none.
+    pub ao: u32,
+    /// How far ambient occlusion looks, world units; `None` for a fifth of the scene's diagonal.
+    pub ao_radius: Option<f64>,
+    /// Share of light that is ambient while ambient occlusion is on.
+    pub ao_strength: f32,
+    /// Physically based and metallic surfaces reflect their surroundings.
+    pub reflections: bool,
+    /// Share of mirror reflection added to every surface.
+    pub mirror: f32,
+    /// What surfaces are made of.
+    pub material: MaterialChoice,
+    /// Roughness of the choice `metal`.
+    pub roughness: f32,
+    /// Refractive index of the choice `glass`.
+    pub ior: f32,
+    /// Light over many bounces.
+    pub path_tracing: bool,
+    /// Most bounces.
+    pub max_bounces: u32,
+    /// Radius of the lens, world units; 0 for a pinhole.
+    pub aperture: f64,
+    /// Distance in focus, world units; `None` for the camera's focal point.
+    pub focus: Option<f64>,
+    /// Edges and vertices.
+    pub robustness: Robustness,
+    /// Effort of building.
+    pub build: BuildQuality,
+    /// Vertices become spheres of this radius, data units; 0: they stay OpenGL's points.
+    pub point_radius: f64,
+    /// Lines and edges become tubes of this radius, data units; 0: they stay OpenGL's lines.
+    pub line_radius: f64,
+    /// Seed of the noise.
+    pub seed: u64,
+    /// Where the report is written after each frame.
+    pub report: Option<String>,
+    /// No warnings on stderr.
+    pub quiet: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Options {
+            off: false,
+            threads: None,
+            samples: 1,
+            progressive: 1,
+            shadows: false,
+            light_size_rad: 0.0,
+            ao: 0,
+            ao_radius: None,
+            ao_strength: 0.5,
+            reflections: false,
+            mirror: 0.0,
+            material: MaterialChoice::Scene,
+            roughness: 0.2,
+            ior: 1.5,
+            path_tracing: false,
+            max_bounces: 8,
+            aperture: 0.0,
+            focus: None,
+            robustness: Robustness::Watertight,
+            build: BuildQuality::Balanced,
+            point_radius: 0.0,
+            line_radius: 0.0,
+            seed: 0,
+            report: None,
+            quiet: false,
+        }
+    }
+}
+
+/// Name, what it does and what it may be: for `vtk-bridge --help`, the book, and the check for misspelt names.
+pub const NAMES: &[(&str, &str, &str)] = &[
+    ("RTV_OFF", "leave everything to OpenGL", "0 or 1"),
+    ("RTV_THREADS", "threads that trace", "1 to 1024; all by default"),
+    ("RTV_SAMPLES", "samples per pixel", "1 to 65536"),
+    ("RTV_PROGRESSIVE", "pictures averaged while nothing changes", "1 to 65536"),
+    ("RTV_SHADOWS", "shadows of all lights but headlights", "0 or 1"),
+    ("RTV_LIGHT_SIZE", "half angle under which lights are seen, degrees (soft shadows)", "0 to 45"),
+    ("RTV_AO", "rays of ambient occlusion per point and sample", "0 to 4096"),
+    ("RTV_AO_RADIUS", "how far ambient occlusion looks, world units", "positive, or auto"),
+    ("RTV_AO_STRENGTH", "share of the light that is ambient while ambient occlusion is on", "0 to 1"),
+    ("RTV_REFLECTIONS", "physically based and metallic surfaces mirror their surroundings", "0 or 1"),
+    ("RTV_MIRROR", "share of mirror reflection added to every surface", "0 to 1"),
+    ("RTV_MATERIAL", "what all surfaces are made of", "scene, matte, metal, glass or transparent"),
+    ("RTV_ROUGHNESS", "roughness of the material metal", "0 to 1"),
+    ("RTV_IOR", "refractive index of the material glass", "1 to 4"),
+    ("RTV_MODE", "scivis: effects one by one; path: light over many bounces", "scivis or path"),
+    ("RTV_MAX_BOUNCES", "most reflections and refractions in a row", "0 to 1000"),
+    ("RTV_APERTURE", "radius of the lens, world units (depth of field)", "0 or positive"),
+    ("RTV_FOCUS", "distance in focus, world units", "positive, or auto for the camera's focal point"),
+    ("RTV_ROBUSTNESS", "watertight: no ray between neighbours; fast", "watertight or fast"),
+    ("RTV_BUILD", "effort of building acceleration structures", "fastest, fast, balanced or best"),
+    ("RTV_POINT_RADIUS", "vertices become spheres of this radius, data units", "0 or positive"),
+    ("RTV_LINE_RADIUS", "lines and edges become tubes of this radius, data units", "0 or positive"),
+    ("RTV_SEED", "seed of the noise", "a whole number"),
+    ("RTV_REPORT", "file that tells after each frame what was traced, passed on, and what it cost", "a path"),
+    ("RTV_QUIET", "no warnings on stderr", "0 or 1"),
+    ("RTV_HOME", "where `vtk-bridge install` has put things (set by `vtk-bridge env`)", "a folder"),
+];
+
+impl Options {
+    /// Options from pairs of name and value; the second value says what was not understood.
+    pub fn parse(pairs: impl IntoIterator<Item = (String, String)>) -> (Options, Vec<String>) {
+        let (mut options, mut faults) = (Options::default(), Vec::new());
+        for (name, value) in pairs {
+            if let Err(fault) = options.set(&name, &value) {
+                faults.push(fault);
+            }
+        }
+        (options, faults)
+    }
+
+    /// Sets one option by the name of its variable.
+    pub fn set(&mut self, name: &str, value: &str) -> Result<(), String> {
+        let Some((_, _, rule)) = NAMES.iter().find(|(n, ..)| *n == name) else {
+            let near = NAMES.iter().map(|(n, ..)| *n).min_by_key(|n| distance(n, name)).unwrap_or("RTV_AO");
+            return Err(format!("{name} is no option of vtk-bridge; did you mean {near}?"));
+        };
+        let value = value.trim();
+        self.apply(name, value)
+            .ok_or_else(|| format!("{name}={value} is not understood: it must be {rule}; it is left out"))
+    }
+
+    fn apply(&mut self, name: &str, value: &str) -> Option<()> {
+        match name {
+            "RTV_OFF" => self.off = switch(value)?,
+            "RTV_THREADS" => self.threads = Some(within(value, 1, 1024)?),
+            "RTV_SAMPLES" => self.samples = within(value, 1, 65536)?,
+            "RTV_PROGRESSIVE" => self.progressive = within(value, 1, 65536)?,
+            "RTV_SHADOWS" => self.shadows = switch(value)?,
+            "RTV_LIGHT_SIZE" => self.light_size_rad = within::<f64>(value, 0.0, 45.0)?.to_radians(),
+            "RTV_AO" => self.ao = within(value, 0, 4096)?,
+            "RTV_AO_RADIUS" => self.ao_radius = automatic(value)?,
+            "RTV_AO_STRENGTH" => self.ao_strength = within(value, 0.0, 1.0)?,
+            "RTV_REFLECTIONS" => self.reflections = switch(value)?,
+            "RTV_MIRROR" => self.mirror = within(value, 0.0, 1.0)?,
+            "RTV_MATERIAL" => {
+                self.material = match value {
+                    "scene" | "default" | "none" => MaterialChoice::Scene,
+                    "matte" => MaterialChoice::Matte,
+                    "metal" => MaterialChoice::Metal,
+                    "glass" => MaterialChoice::Glass,
+                    "transparent" => MaterialChoice::Transparent,
+                    _ => return None,
+                }
+            }
+            "RTV_ROUGHNESS" => self.roughness = within(value, 0.0, 1.0)?,
+            "RTV_IOR" => self.ior = within(value, 1.0, 4.0)?,
+            "RTV_MODE" => {
+                self.path_tracing = match value {
+                    "scivis" => false,
+                    "path" | "pathtracer" => true,
+                    _ => return None,
+                }
+            }
+            "RTV_MAX_BOUNCES" => self.max_bounces = within(value, 0, 1000)?,
+            "RTV_APERTURE" => self.aperture = within(value, 0.0, f64::MAX)?,
+            "RTV_FOCUS" => self.focus = automatic(value)?,
+            "RTV_ROBUSTNESS" => {
+                self.robustness = *Robustness::ALL.iter().find(|r| r.name() == value)?;
+            }
+            "RTV_BUILD" => self.build = *BuildQuality::ALL.iter().find(|q| q.name() == value)?,
+            "RTV_POINT_RADIUS" => self.point_radius = within(value, 0.0, f64::MAX)?,
+            "RTV_LINE_RADIUS" => self.line_radius = within(value, 0.0, f64::MAX)?,
+            "RTV_SEED" => self.seed = value.parse().ok()?,
+            "RTV_REPORT" => self.report = (!value.is_empty()).then(|| value.to_owned()),
+            "RTV_QUIET" => self.quiet = switch(value)?,
+            _ => {}
+        }
+        Some(())
+    }
+}
+
+fn switch(value: &str) -> Option<bool> {
+    match value {
+        "1" | "on" | "true" | "yes" => Some(true),
+        "0" | "off" | "false" | "no" | "" => Some(false),
+        _ => None,
+    }
+}
+
+fn within<T: std::str::FromStr + PartialOrd>(value: &str, low: T, high: T) -> Option<T> {
+    value.parse().ok().filter(|v| *v >= low && *v <= high)
+}
+
+fn automatic(value: &str) -> Option<Option<f64>> {
+    if value == "auto" { Some(None) } else { within(value, f64::MIN_POSITIVE, f64::INFINITY).map(Some) }
+}
+
+/// Edit distance (Levenshtein 1966), to guess what a misspelt name means.
+fn distance(a: &str, b: &str) -> usize {
+    let b: Vec<u8> = b.bytes().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.bytes().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for j in 0..b.len() {
+            let cost = diagonal + usize::from(x != b[j]);
+            diagonal = row[j + 1];
+            row[j + 1] = cost.min(diagonal + 1).min(row[j] + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(pairs: &[(&str, &str)]) -> (Options, Vec<String>) {
+        Options::parse(pairs.iter().map(|(n, v)| ((*n).to_owned(), (*v).to_owned())))
+    }
+
+    #[test]
+    fn values_out_of_range_are_named_with_their_rule_and_left_out() {
+        let (options, faults) = parse(&[("RTV_AO", "-3"), ("RTV_SAMPLES", "16"), ("RTV_IOR", "NaN")]);
+        assert_eq!((options.ao, options.samples, options.ior), (0, 16, 1.5));
+        assert_eq!(faults.len(), 2);
+        assert!(faults[0].contains("RTV_AO=-3") && faults[0].contains("0 to 4096"), "{}", faults[0]);
+    }
+
+    #[test]
+    fn misspelt_names_get_a_suggestion() {
+        let (_, faults) = parse(&[("RTV_SHADOW", "1")]);
+        assert!(faults[0].contains("did you mean RTV_SHADOWS"), "{}", faults[0]);
+    }
+
+    #[test]
+    fn every_name_has_a_rule_that_some_value_obeys() {
+        for (name, what, rule) in NAMES {
+            assert!(!what.is_empty() && !rule.is_empty(), "{name}");
+            let examples = ["1", "matte", "path", "fast"];
+            assert!(examples.iter().any(|v| Options::default().set(name, v).is_ok()), "{name}");
+        }
+    }
+
+    #[test]
+    fn automatic_values_can_be_written() {
+        let (options, faults) = parse(&[("RTV_AO_RADIUS", "2.5"), ("RTV_FOCUS", "auto")]);
+        assert_eq!((options.ao_radius, options.focus, faults.len()), (Some(2.5), None, 0));
+    }
+}

@@ -1,0 +1,142 @@
+//! rt-core's frame as the window wants it: 8-bit colour where everything is opaque, premultiplied floating point elsewhere, and OpenGL's depth.
+
+use crate::bridge::{BridgeError, Ready, ms};
+use crate::input::View;
+use crate::materials::Encoding;
+use rayon::prelude::*;
+use rt_core::effects::Effects;
+use rt_core::environment::Background;
+use rt_core::frame::{Frame, Layers};
+use rt_core::ray_stats::RayStats;
+use rt_core::render::{RenderOptions, Renderer};
+use std::f32::consts::PI;
+use std::time::Instant;
+
+/// A picture; rows from the top.
+#[derive(Debug, Clone, Default)]
+pub struct Picture {
+    /// Pixels per row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// RGBA: alpha 255 where something is hit, else 0. Empty when [`Picture::blended`] is not.
+    pub opaque: Vec<[u8; 4]>,
+    /// Premultiplied RGBA, when some of it lets the window's contents through; else empty.
+    pub blended: Vec<[f32; 4]>,
+    /// Window depth of the first opaque surface, 1 where there is none.
+    pub depth: Vec<f32>,
+    /// Window depth of the first surface, opaque or not; only with [`Picture::blended`].
+    pub first_depth: Vec<f32>,
+}
+
+/// What drawing came to.
+pub(crate) struct Outcome {
+    pub(crate) rays: RayStats,
+    pub(crate) warnings: Vec<String>,
+    pub(crate) trace_ms: f64,
+    pub(crate) convert_ms: f64,
+}
+
+/// Pixels a task works on.
+const CHUNK: usize = 1 << 14;
+
+impl Picture {
+    /// What mirrors and glass see where nothing is.
+    pub(crate) fn surroundings(view: &View) -> Background {
+        let [bottom, top] = view.background;
+        Background::Gradient { bottom, top }
+    }
+
+    /// Draws; `mean_of` earlier pictures of the same are averaged with this one.
+    pub(crate) fn draw(
+        &mut self,
+        renderer: &mut Renderer,
+        ready: &Ready<'_>,
+        view: &View,
+        mean_of: u32,
+    ) -> Result<Outcome, BridgeError> {
+        let start = Instant::now();
+        let mixed = ready.encodings.windows(2).any(|e| e[0] != e[1]);
+        let effects = ready.options.effects.unwrap_or(Effects::NONE);
+        let soft_edges = ready.options.samples > 1 || effects.contains(Effects::DEPTH_OF_FIELD);
+        let blend = effects.contains(Effects::TRANSPARENCY) || soft_edges || ready.averaged;
+        let layers = Layers::COLOR | Layers::DEPTH;
+        let options = RenderOptions {
+            layers: if mixed { layers | Layers::IDS } else { layers },
+            depth_min_opacity: if effects.contains(Effects::TRANSPARENCY) { 1.0 } else { 0.0 },
+            ..ready.options.clone()
+        };
+        let output = renderer.render(ready.scene, ready.camera, &options)?;
+        let mut frame = output.frame;
+        let opaque_background = !matches!(ready.scene.background, Background::Transparent);
+        let first_depth = if effects.contains(Effects::TRANSPARENCY) || opaque_background {
+            let depth_only = RenderOptions { layers: Layers::DEPTH, samples: 1, ..ready.options.clone() };
+            renderer.render(ready.scene, ready.camera, &depth_only)?.frame.depth
+        } else {
+            Vec::new()
+        };
+        let trace_ms = ms(start);
+
+        let start = Instant::now();
+        if opaque_background {
+            uncover(&mut frame, &first_depth);
+        }
+        encode(&mut frame, ready.encodings, mixed);
+        (self.width, self.height) = (view.width, view.height);
+        std::mem::swap(&mut self.depth, &mut frame.depth);
+        if blend {
+            self.opaque.clear();
+            if mean_of > 0 && self.blended.len() == frame.color.len() {
+                let w = 1.0 / (mean_of as f32 + 1.0);
+                let mix = |(old, new): (&mut [f32; 4], &[f32; 4])| {
+                    *old = std::array::from_fn(|c| old[c] + (new[c] - old[c]) * w);
+                };
+                self.blended.par_iter_mut().with_min_len(CHUNK).zip(&frame.color).for_each(mix);
+            } else {
+                std::mem::swap(&mut self.blended, &mut frame.color);
+            }
+            self.first_depth = if first_depth.is_empty() { self.depth.clone() } else { first_depth };
+        } else {
+            self.blended.clear();
+            self.first_depth.clear();
+            let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
+            let pixels = frame.color.par_iter().with_min_len(CHUNK);
+            pixels.map(|c| c.map(byte)).collect_into_vec(&mut self.opaque);
+        }
+        let warnings = output.report.warnings;
+        renderer.recycle(frame);
+        Ok(Outcome { rays: output.report.rays, warnings, trace_ms, convert_ms: ms(start) })
+    }
+}
+
+/// Takes the background away again that mirrors and glass needed: pixels where nothing is are the window's.
+fn uncover(frame: &mut Frame, first_depth: &[f32]) {
+    let clear = |(c, d): (&mut [f32; 4], &f32)| {
+        if *d >= 1.0 {
+            *c = [0.0; 4];
+        }
+    };
+    frame.color.par_iter_mut().with_min_len(CHUNK).zip(first_depth).for_each(clear);
+}
+
+/// See [`Encoding`].
+fn encode(frame: &mut Frame, encodings: &[Encoding], mixed: bool) {
+    let pbr = |c: &mut [f32; 4]| {
+        let a = c[3];
+        if a > 0.0 {
+            for v in &mut c[..3] {
+                *v = a * (*v / (a * PI)).max(0.0).powf(1.0 / 2.2);
+            }
+        }
+    };
+    if mixed {
+        let choose = |(c, i): (&mut [f32; 4], &u32)| {
+            if encodings.get(*i as usize) == Some(&Encoding::Pbr) {
+                pbr(c);
+            }
+        };
+        frame.color.par_iter_mut().with_min_len(CHUNK).zip(&frame.instance).for_each(choose);
+    } else if encodings.first() == Some(&Encoding::Pbr) {
+        frame.color.par_iter_mut().with_min_len(CHUNK).for_each(pbr);
+    }
+}

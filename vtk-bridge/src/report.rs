@@ -1,0 +1,141 @@
+//! The account of a frame, and the file `RTV_REPORT` names.
+
+use rt_core::ray_stats::RayStats;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+/// Something that was traced.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Traced {
+    /// Its name.
+    pub name: String,
+    /// Triangles, all copies together.
+    pub triangles: usize,
+    /// How often it is drawn.
+    pub copies: usize,
+}
+
+/// Something that OpenGL draws.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Passed {
+    /// Its name.
+    pub name: String,
+    /// Why it is not traced.
+    pub reason: String,
+}
+
+/// Milliseconds by phase.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Milliseconds {
+    /// Arrays to geometry and colours.
+    pub extract: f64,
+    /// Acceleration structures.
+    pub build: f64,
+    /// Rays and shading.
+    pub trace: f64,
+    /// Floating point to the window's format.
+    pub convert: f64,
+    /// All of it.
+    pub frame: f64,
+}
+
+/// The account of one frame of one renderer.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct FrameReport {
+    /// Frames so far.
+    pub frame: u64,
+    /// What was traced.
+    pub traced: Vec<Traced>,
+    /// What OpenGL draws, and why.
+    pub passed: Vec<Passed>,
+    /// Effects that ran.
+    pub effects: Vec<String>,
+    /// What each effect adds to the frame: time with it minus time without it.
+    pub ms_by_effect: Vec<(String, f64)>,
+    /// Rays by kind.
+    pub rays: Vec<(String, u64)>,
+    /// Time by phase.
+    pub ms: Milliseconds,
+    /// Geometries that were built anew.
+    pub rebuilt: u32,
+    /// Bytes of acceleration structures.
+    pub bytes: usize,
+    /// True when nothing had changed and the last picture was shown again.
+    pub reused: bool,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// Rays by kind, those that were sent.
+pub(crate) fn rays(r: &RayStats) -> Vec<(String, u64)> {
+    let all = [
+        ("primary", r.primary),
+        ("shadow", r.shadow),
+        ("ambient occlusion", r.ambient_occlusion),
+        ("reflection", r.reflection),
+        ("refraction", r.refraction),
+        ("transparency", r.transparency),
+    ];
+    all.iter().filter(|(_, n)| *n > 0).map(|(k, n)| ((*k).to_owned(), *n)).collect()
+}
+
+/// Last reports of all renderers of the process, by number.
+static RENDERERS: Mutex<BTreeMap<u64, FrameReport>> = Mutex::new(BTreeMap::new());
+
+/// Writes the reports of all renderers that had something to draw. A rank of a parallel program writes its own file.
+pub fn write(renderer: u64, report: &FrameReport, path: &str) -> std::io::Result<()> {
+    #[derive(Serialize)]
+    struct Whole<'a> {
+        program: &'static str,
+        version: &'static str,
+        renderers: Vec<&'a FrameReport>,
+    }
+    let Ok(mut all) = RENDERERS.lock() else { return Ok(()) };
+    all.insert(renderer, report.clone());
+    let renderers = all.values().filter(|r| !r.traced.is_empty() || !r.passed.is_empty()).collect();
+    let whole = Whole { program: "vtk-bridge", version: env!("CARGO_PKG_VERSION"), renderers };
+    let text = serde_json::to_string_pretty(&whole).map_err(std::io::Error::other)?;
+    let path = of_rank(Path::new(path), |name| std::env::var(name).ok());
+    let beside = path.with_extension(format!("tmp{}", std::process::id()));
+    std::fs::write(&beside, text + "\n")?;
+    std::fs::rename(&beside, &path)
+}
+
+/// Forgets a renderer that is gone.
+pub fn forget(renderer: u64) {
+    if let Ok(mut all) = RENDERERS.lock() {
+        all.remove(&renderer);
+    }
+}
+
+/// `report.json` becomes `report.rank2.json` on rank 2 of several.
+fn of_rank(path: &Path, variable: impl Fn(&str) -> Option<String>) -> PathBuf {
+    let number = |names: [&str; 2]| names.iter().find_map(|n| variable(n)?.parse::<u32>().ok());
+    let rank = number(["OMPI_COMM_WORLD_RANK", "PMI_RANK"]);
+    let size = number(["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"]);
+    match (rank, size) {
+        (Some(rank), Some(2..)) => {
+            let extension = path.extension().map_or(String::new(), |e| format!(".{}", e.to_string_lossy()));
+            path.with_extension(format!("rank{rank}{extension}"))
+        }
+        _ => path.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranks_write_files_of_their_own() {
+        let mpi = |name: &str| match name {
+            "OMPI_COMM_WORLD_RANK" => Some("2".to_owned()),
+            "OMPI_COMM_WORLD_SIZE" => Some("4".to_owned()),
+            _ => None,
+        };
+        assert_eq!(of_rank(Path::new("a/report.json"), mpi), Path::new("a/report.rank2.json"));
+        assert_eq!(of_rank(Path::new("a/report.json"), |_| None), Path::new("a/report.json"));
+    }
+}

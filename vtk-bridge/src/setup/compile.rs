@@ -1,0 +1,77 @@
+//! The C++ shim: its sources are in this library, and the machine's compiler makes it for each VTK.
+
+use super::headers::Flavour;
+use super::{SetupError, io};
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+/// The sources by name.
+pub const SOURCES: &[(&str, &str)] = &[
+    ("rtv.h", include_str!("../../include/rtv.h")),
+    ("rtv_shim.h", include_str!("../../cpp/rtv_shim.h")),
+    ("rtv_arrays.h", include_str!("../../cpp/rtv_arrays.h")),
+    ("rtv_arrays.cxx", include_str!("../../cpp/rtv_arrays.cxx")),
+    ("rtv_blit.cxx", include_str!("../../cpp/rtv_blit.cxx")),
+    ("rtv_extract.cxx", include_str!("../../cpp/rtv_extract.cxx")),
+    ("rtv_factory.cxx", include_str!("../../cpp/rtv_factory.cxx")),
+    ("rtv_glyphs.cxx", include_str!("../../cpp/rtv_glyphs.cxx")),
+    ("rtv_renderer.cxx", include_str!("../../cpp/rtv_renderer.cxx")),
+    ("rtv_view.cxx", include_str!("../../cpp/rtv_view.cxx")),
+];
+
+/// The modules of VTK that the shim calls.
+pub const MODULES: &[&str] = &[
+    "RenderingOpenGL2",
+    "RenderingCore",
+    "FiltersGeometry",
+    "CommonExecutionModel",
+    "CommonDataModel",
+    "CommonTransforms",
+    "CommonMath",
+    "CommonSystem",
+    "CommonCore",
+];
+
+/// Writes the sources into `folder`.
+pub fn write_sources(folder: &Path) -> Result<(), SetupError> {
+    fs::create_dir_all(folder).map_err(io(folder, "make the folder"))?;
+    for (name, text) in SOURCES {
+        let path = folder.join(name);
+        fs::write(&path, text).map_err(io(&path, "write"))?;
+    }
+    Ok(())
+}
+
+/// Compiles the shim for `flavour` into `out`.
+pub fn shim(flavour: &Flavour, sources: &Path, out: &Path) -> Result<(), SetupError> {
+    let folder = out.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(folder).map_err(io(folder, "make the folder"))?;
+    // Beside, then renamed: a program that is running keeps the old file.
+    let beside = out.with_extension("so.new");
+    let compiler = std::env::var("CXX").ok().filter(|c| !c.is_empty()).unwrap_or_else(|| "g++".to_owned());
+    let mut command = Command::new(&compiler);
+    command.args(["-std=c++17", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-w"]);
+    command.arg("-I").arg(sources).arg("-isystem").arg(&flavour.include).arg("-o").arg(&beside);
+    let cxx = SOURCES.iter().filter(|(n, _)| n.ends_with(".cxx"));
+    command.args(cxx.map(|(n, _)| sources.join(n)));
+    // Libraries of VTK need others of it, which the process has already.
+    command.arg("-Wl,--allow-shlib-undefined");
+    command.args(MODULES.iter().filter_map(|m| flavour.library(m)));
+    command.arg("-lGL");
+    run(&mut command, &compiler, format!("the shim for VTK {}", flavour.name), "apt-get install g++")?;
+    fs::rename(&beside, out).map_err(io(out, "put in place"))
+}
+
+/// Runs a build command; its last lines are part of the error.
+pub(crate) fn run(command: &mut Command, program: &str, what: String, cure: &'static str) -> Result<(), SetupError> {
+    let output = command.output().map_err(|source| SetupError::NoProgram { program: program.to_owned(), source, cure })?;
+    if output.status.success() {
+        return Ok(());
+    }
+    let text = [output.stdout, output.stderr].concat();
+    let text = String::from_utf8_lossy(&text);
+    let lines: Vec<&str> = text.lines().filter(|l| l.contains("rror")).take(15).collect();
+    let lines = if lines.is_empty() { text.lines().rev().take(15).collect() } else { lines };
+    Err(SetupError::Build { what, output: lines.join("\n"), command: format!("{command:?}") })
+}

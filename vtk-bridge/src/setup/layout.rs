@@ -1,0 +1,127 @@
+//! Where the pieces lie, and installing them.
+
+use super::headers::Flavour;
+use super::{SetupError, compile, io};
+use crate::loader::SHIM;
+use serde::Serialize;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The folder of all pieces.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Layout {
+    prefix: PathBuf,
+}
+
+/// What [`Layout::install`] did.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Installed {
+    /// The folder of all pieces.
+    pub prefix: PathBuf,
+    /// VTKs for which a shim was built.
+    pub built: Vec<String>,
+    /// VTKs for which it could not be built, and why.
+    pub failed: Vec<(String, String)>,
+}
+
+impl Layout {
+    /// Pieces below `prefix`.
+    pub fn at(prefix: PathBuf) -> Layout {
+        Layout { prefix }
+    }
+
+    /// `RTV_HOME`, or the user's folder for data.
+    pub fn default_prefix(variable: impl Fn(&str) -> Option<String>) -> PathBuf {
+        let set = |name| variable(name).filter(|v: &String| !v.is_empty()).map(PathBuf::from);
+        set("RTV_HOME")
+            .or_else(|| Some(set("XDG_DATA_HOME")?.join("vtk-bridge")))
+            .or_else(|| Some(set("HOME")?.join(".local/share/vtk-bridge")))
+            .unwrap_or_else(|| PathBuf::from("/usr/local/lib/vtk-bridge"))
+    }
+
+    /// The folder of all pieces.
+    pub fn prefix(&self) -> &Path {
+        &self.prefix
+    }
+
+    /// The folder for `VTK_AUTOLOAD_PATH`.
+    pub fn autoload(&self) -> PathBuf {
+        self.prefix.join("autoload")
+    }
+
+    /// The library in it.
+    pub fn loader(&self) -> PathBuf {
+        self.autoload().join("librtv_loader.so")
+    }
+
+    /// The shim of a VTK.
+    pub fn shim(&self, flavour: &str) -> PathBuf {
+        self.prefix.join("lib").join(flavour).join(SHIM)
+    }
+
+    /// The plugin of a ParaView.
+    pub fn plugin_folder(&self, flavour: &str) -> PathBuf {
+        self.prefix.join("plugins").join(flavour)
+    }
+
+    /// VTKs with a shim.
+    pub fn shims(&self) -> Vec<String> {
+        let entries = fs::read_dir(self.prefix.join("lib")).into_iter().flatten();
+        let mut names: Vec<String> = entries
+            .filter_map(|e| Some(e.ok()?.path()))
+            .filter(|p| p.join(SHIM).is_file())
+            .filter_map(|p| Some(p.file_name()?.to_string_lossy().into_owned()))
+            .collect();
+        names.sort();
+        names
+    }
+
+    /// Installs the loader from `library`, and builds a shim for each of `flavours`. A shim that cannot be built does not keep the others
+    /// from being built.
+    pub fn install(&self, library: &Path, flavours: &[Flavour]) -> Result<Installed, SetupError> {
+        let mut done = Installed { prefix: self.prefix.clone(), ..Installed::default() };
+        let sources = self.prefix.join("src");
+        compile::write_sources(&sources)?;
+        let include = self.prefix.join("include");
+        fs::create_dir_all(&include).map_err(io(&include, "make the folder"))?;
+        let header = include.join("rtv.h");
+        fs::write(&header, compile::SOURCES[0].1).map_err(io(&header, "write"))?;
+        for flavour in flavours {
+            match compile::shim(flavour, &sources, &self.shim(&flavour.name)) {
+                Ok(()) => done.built.push(flavour.name.clone()),
+                Err(e) => done.failed.push((flavour.name.clone(), e.to_string())),
+            }
+        }
+        self.install_loader(library)?;
+        Ok(done)
+    }
+
+    /// Copies the library to where VTK finds it, unless it is there already.
+    pub fn install_loader(&self, library: &Path) -> Result<(), SetupError> {
+        let (folder, loader) = (self.autoload(), self.loader());
+        fs::create_dir_all(&folder).map_err(io(&folder, "make the folder"))?;
+        let beside = self.prefix.join("librtv_loader.so.new");
+        fs::copy(library, &beside).map_err(io(library, "copy"))?;
+        fs::rename(&beside, &loader).map_err(io(&loader, "put in place"))
+    }
+
+    /// True when the installed loader is the library `library`, byte for byte.
+    pub fn loader_is(&self, library: &Path) -> bool {
+        let read = |p: &Path| fs::read(p).ok();
+        read(&self.loader()).is_some_and(|a| read(library) == Some(a))
+    }
+}
+
+/// The library that VTK loads: `RTV_LIBRARY`, or beside the program, or in `deps` beside it, or in `lib` one folder up.
+pub fn library() -> Result<PathBuf, SetupError> {
+    if let Some(set) = std::env::var_os("RTV_LIBRARY").filter(|v| !v.is_empty()) {
+        return Ok(set.into());
+    }
+    let program = std::env::current_exe().unwrap_or_default();
+    let folder = program.parent().unwrap_or(Path::new("."));
+    let name = "libvtk_bridge.so";
+    let places = [folder.join("deps").join(name), folder.join(name), folder.join("../lib").join(name)];
+    // A build of the program alone renews only one of them.
+    let age = |p: &PathBuf| fs::metadata(p).and_then(|m| m.modified()).ok();
+    places.into_iter().filter(|p| p.is_file()).max_by_key(age).ok_or(SetupError::NoLibrary { program })
+}
