@@ -1,5 +1,5 @@
 // What happens when ParaView loads the plugin: the bridge and the shim for this ParaView are opened, the renderer's override is
-// registered, and the views' options are listened to. Whatever is missing is said once, and ParaView goes on as before.
+// registered, and ParaView learns of the views' options. Whatever is missing is said once, and ParaView goes on as before.
 //
 // Compiled by `vtk-bridge install --plugin` like the shim, with ParaView's headers only. ParaView's CMake package would write the class
 // below for us, but wants the headers of a dozen libraries that Debian's paraview-dev does not depend on.
@@ -80,7 +80,7 @@ std::string start()
   {
     return std::string("there is no build for ParaView ") + RTV_FLAVOUR + " above this plugin; run `vtk-bridge install --plugin`";
   }
-  void* bridge = dlopen((at + "/autoload/libvtk_bridge.so").c_str(), RTLD_NOW | RTLD_GLOBAL);
+  void* bridge = dlopen((at + "/autoload/librtv_loader.so").c_str(), RTLD_NOW | RTLD_LOCAL);
   void* shim = bridge ? dlopen((at + ShimName).c_str(), RTLD_NOW | RTLD_LOCAL) : nullptr;
   if (!shim)
   {
@@ -99,7 +99,7 @@ std::string start()
   {
     enroll();
   }
-  return rtvListenToViews(api) ? "" : "this ParaView has no render views";
+  return vtkRtvViewOptions::Enroll(api) ? "" : "this ParaView has no render views";
 }
 
 }

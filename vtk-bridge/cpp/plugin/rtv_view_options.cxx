@@ -1,131 +1,65 @@
-// ParaView sends a property of a view to the object on the server (each rank's) as a call by name. A build without OSPRay knows the
-// names and does nothing. Here these calls pass by first: names in the table below become options of the view, everything goes on to
-// ParaView's own function. A view's options are in force while its renderer draws, so that two views can differ.
 #include "rtv_view_options.h"
 
-#include <vtkCallbackCommand.h>
 #include <vtkClientServerInterpreter.h>
 #include <vtkClientServerInterpreterInitializer.h>
 #include <vtkClientServerStream.h>
-#include <vtkPVRenderView.h>
+#include <vtkCommand.h>
+#include <vtkObjectFactory.h>
 #include <vtkRenderer.h>
-#include <vtkSmartPointer.h>
 
+#include <cstdio>
+#include <cstdlib>
 #include <cstring>
-#include <map>
-#include <string>
+
+vtkStandardNewMacro(vtkRtvViewOptions);
 
 namespace
 {
-const char* const Class = "vtkPVRenderView";
-
-// A property's command, the option it sets, and the value that means "as if not set".
-struct Entry
-{
-  const char* Method;
-  const char* Option;
-  const char* Unset;
-  const char* const* Names; // of an enumeration
-};
-
-const char* const Materials[] = { "scene", "matte", "metal", "glass", "transparent", nullptr };
-const char* const Robustness[] = { "watertight", "fast", nullptr };
-
-const Entry Entries[] = {
-  // ParaView's own, as for OSPRay.
-  { "SetShadows", "RTV_SHADOWS", nullptr, nullptr },
-  { "SetAmbientOcclusionSamples", "RTV_AO", nullptr, nullptr },
-  { "SetSamplesPerPixel", "RTV_SAMPLES", nullptr, nullptr },
-  { "SetMaxFrames", "RTV_PROGRESSIVE", nullptr, nullptr },
-  { "SetOSPRayRendererType", "RTV_MODE", nullptr, nullptr },
-  // Those of rtv_view_properties.h.
-  { "SetRtvThreads", "RTV_THREADS", "0", nullptr },
-  { "SetRtvAmbientRadius", "RTV_AO_RADIUS", "0", nullptr },
-  { "SetRtvAmbientStrength", "RTV_AO_STRENGTH", nullptr, nullptr },
-  { "SetRtvLightSize", "RTV_LIGHT_SIZE", nullptr, nullptr },
-  { "SetRtvReflections", "RTV_REFLECTIONS", nullptr, nullptr },
-  { "SetRtvMirror", "RTV_MIRROR", nullptr, nullptr },
-  { "SetRtvMaterial", "RTV_MATERIAL", nullptr, Materials },
-  { "SetRtvRoughness", "RTV_ROUGHNESS", nullptr, nullptr },
-  { "SetRtvIndexOfRefraction", "RTV_IOR", nullptr, nullptr },
-  { "SetRtvMaximumBounces", "RTV_MAX_BOUNCES", nullptr, nullptr },
-  { "SetRtvLensRadius", "RTV_APERTURE", nullptr, nullptr },
-  { "SetRtvFocalDistance", "RTV_FOCUS", "0", nullptr },
-  { "SetRtvRobustness", "RTV_ROBUSTNESS", nullptr, Robustness },
-};
-
-struct ViewOptions
-{
-  bool Effects = false;  // "Enable Ray Tracing"
-  bool Geometry = true;  // "Ray Trace Geometry"
-  std::map<std::string, std::string> Values;
-};
-
 const RtvApi* theApi = nullptr;
-std::map<vtkObjectBase*, ViewOptions> theViews;
-// Knows ParaView's own functions; ours stands before them in all other interpreters.
-vtkSmartPointer<vtkClientServerInterpreter> theOriginal;
 
-// ---- While a view's renderer draws, its options are those of the process ----------------------------------------------------------
-
-void apply(const ViewOptions& view, bool on)
+// A property's command, the option it sets, its default, and the names of an enumeration. A property with its default value leaves the
+// option what the environment says, so that RTV_* variables work with the plugin too.
+struct Row
 {
-  const bool off = !view.Effects && !view.Geometry;
-  if (off)
-  {
-    theApi->set_option("RTV_OFF", on ? "1" : "");
-  }
-  if (view.Effects)
-  {
-    for (const auto& option : view.Values)
-    {
-      theApi->set_option(option.first.c_str(), on ? option.second.c_str() : "");
-    }
-  }
-}
+  const char* Command;
+  const char* Option;
+  const char* Default;
+  const char* Names[6];
+};
 
-void onRender(vtkObject*, unsigned long event, void* view, void*)
+const Row Table[] = {
+  { "SetEnableRayTracing", "RTV_OFF", "1", { "1", "0" } },
+  { "SetBackEnd", "RTV_MODE", "0", { "scivis", "path" } },
+  { "SetThreads", "RTV_THREADS", "0", {} },
+  { "SetSamplesPerPixel", "RTV_SAMPLES", "1", {} },
+  { "SetProgressivePasses", "RTV_PROGRESSIVE", "1", {} },
+  { "SetShadows", "RTV_SHADOWS", "0", {} },
+  { "SetLightSize", "RTV_LIGHT_SIZE", "0", {} },
+  { "SetAmbientSamples", "RTV_AO", "0", {} },
+  { "SetAmbientRadius", "RTV_AO_RADIUS", "0", {} },
+  { "SetAmbientStrength", "RTV_AO_STRENGTH", "0.5", {} },
+  { "SetReflections", "RTV_REFLECTIONS", "0", {} },
+  { "SetMirrorReflection", "RTV_MIRROR", "0", {} },
+  { "SetMaterial", "RTV_MATERIAL", "0", { "scene", "matte", "metal", "glass", "transparent" } },
+  { "SetRoughness", "RTV_ROUGHNESS", "0.20000000000000001", {} },
+  { "SetIndexOfRefraction", "RTV_IOR", "1.5", {} },
+  { "SetMaximumBounces", "RTV_MAX_BOUNCES", "8", {} },
+  { "SetLensRadius", "RTV_APERTURE", "0", {} },
+  { "SetFocalDistance", "RTV_FOCUS", "0", {} },
+  { "SetPointRadius", "RTV_POINT_RADIUS", "0", {} },
+  { "SetLineRadius", "RTV_LINE_RADIUS", "0", {} },
+  { "SetRobustness", "RTV_ROBUSTNESS", "0", { "watertight", "fast" } },
+};
+
+// The value ParaView sends with a command, as text.
+bool valueOf(const vtkClientServerStream& call, std::string& text)
 {
-  auto found = theViews.find(static_cast<vtkObjectBase*>(view));
-  if (found != theViews.end())
-  {
-    apply(found->second, event == vtkCommand::StartEvent);
-  }
-}
-
-void onDelete(vtkObject* view, unsigned long, void*, void*)
-{
-  theViews.erase(view);
-}
-
-ViewOptions& optionsOf(vtkPVRenderView* view)
-{
-  auto found = theViews.find(view);
-  if (found == theViews.end())
-  {
-    vtkNew<vtkCallbackCommand> render, gone;
-    render->SetCallback(onRender);
-    render->SetClientData(static_cast<vtkObjectBase*>(view));
-    view->GetRenderer()->AddObserver(vtkCommand::StartEvent, render);
-    view->GetRenderer()->AddObserver(vtkCommand::EndEvent, render);
-    gone->SetCallback(onDelete);
-    view->AddObserver(vtkCommand::DeleteEvent, gone);
-    found = theViews.emplace(view, ViewOptions()).first;
-  }
-  return found->second;
-}
-
-// ---- Calls ----------------------------------------------------------------------------------------------------------------------------
-
-// The call's only argument as text; false when it has none or several.
-bool argument(const vtkClientServerStream& call, std::string& text)
-{
+  const char* string = nullptr;
+  double number = 0;
   if (call.GetNumberOfArguments(0) != 3)
   {
     return false;
   }
-  double number = 0;
-  const char* string = nullptr;
   if (call.GetArgument(0, 2, &string) && string)
   {
     text = string;
@@ -141,88 +75,114 @@ bool argument(const vtkClientServerStream& call, std::string& text)
   return false;
 }
 
-// True when the call is one of ours.
-bool take(vtkPVRenderView* view, const char* method, const vtkClientServerStream& call)
+// What ParaView's wrapper generator would write for this class.
+int command(vtkClientServerInterpreter* interpreter, vtkObjectBase* object, const char* method,
+  const vtkClientServerStream& call, vtkClientServerStream& result, void*)
 {
+  vtkRtvViewOptions* options = vtkRtvViewOptions::SafeDownCast(object);
   std::string value;
-  if (std::strncmp(method, "Set", 3) != 0 || !argument(call, value))
+  if (options && valueOf(call, value) && options->Set(method, value))
   {
-    return false;
+    return 1;
   }
-  if (std::strcmp(method, "SetEnableOSPRay") == 0)
+  return interpreter->CallCommandFunction("vtkProp", object, method, call, result);
+}
+
+vtkObjectBase* make(void*)
+{
+  return vtkRtvViewOptions::New();
+}
+
+void enroll(vtkClientServerInterpreter* interpreter)
+{
+  interpreter->AddNewInstanceFunction("vtkRtvViewOptions", make);
+  interpreter->AddCommandFunction("vtkRtvViewOptions", command);
+}
+}
+
+bool vtkRtvViewOptions::Enroll(const RtvApi* api)
+{
+  theApi = api;
+  // Interpreters that there are, and those to come.
+  vtkClientServerInterpreterInitializer::GetInitializer()->RegisterCallback(enroll);
+  return vtkClientServerInterpreterInitializer::GetGlobalInterpreter()->HasCommandFunction("vtkPVRenderView");
+}
+
+vtkRtvViewOptions::vtkRtvViewOptions()
+{
+  this->VisibilityOff();
+  this->PickableOff();
+  this->UseBoundsOff();
+}
+
+vtkRtvViewOptions::~vtkRtvViewOptions() = default;
+
+bool vtkRtvViewOptions::Set(const std::string& command, const std::string& value)
+{
+  for (const Row& row : Table)
   {
-    optionsOf(view).Effects = value != "0";
-    return true;
-  }
-  if (std::strcmp(method, "SetRtvGeometry") == 0)
-  {
-    optionsOf(view).Geometry = value != "0";
-    return true;
-  }
-  for (const Entry& entry : Entries)
-  {
-    if (std::strcmp(method, entry.Method) != 0)
+    if (command != row.Command)
     {
       continue;
     }
-    ViewOptions& options = optionsOf(view);
-    if (entry.Names)
+    std::string text = value;
+    if (row.Names[0])
     {
       const int wanted = std::atoi(value.c_str());
-      for (int i = 0; i <= wanted && entry.Names[i]; ++i)
+      for (int i = 0; i <= wanted && i < 6 && row.Names[i]; ++i)
       {
-        value = entry.Names[i];
+        text = row.Names[i];
       }
     }
-    if (std::strcmp(entry.Option, "RTV_MODE") == 0)
+    if (value == row.Default)
     {
-      // "OSPRay raycaster", "OSPRay pathtracer", or OptiX'.
-      value = value.find("path") != std::string::npos ? "path" : "scivis";
-    }
-    if (entry.Unset && value == entry.Unset)
-    {
-      options.Values.erase(entry.Option);
+      this->Values.erase(row.Option);
     }
     else
     {
-      options.Values[entry.Option] = value;
+      this->Values[row.Option] = text;
     }
+    this->Modified();
     return true;
   }
   return false;
 }
 
-int call(vtkClientServerInterpreter*, vtkObjectBase* object, const char* method, const vtkClientServerStream& message,
-  vtkClientServerStream& result, void*)
+void vtkRtvViewOptions::Apply(bool on)
 {
-  vtkPVRenderView* view = vtkPVRenderView::SafeDownCast(object);
-  if (view && take(view, method, message))
+  for (const auto& option : this->Values)
   {
-    return 1;
+    theApi->set_option(option.first.c_str(), on ? option.second.c_str() : "");
   }
-  return theOriginal->CallCommandFunction(Class, object, method, message, result);
 }
 
-void listen(vtkClientServerInterpreter* interpreter)
+void vtkRtvViewOptions::OnRender(vtkObject* renderer, unsigned long event, void*)
 {
-  if (interpreter != theOriginal)
+  if (event == vtkCommand::DeleteEvent)
   {
-    interpreter->AddCommandFunction(Class, call);
+    this->Renderers.erase(renderer);
   }
-}
+  else if (this->IsConsumer(renderer))
+  {
+    this->Apply(event == vtkCommand::StartEvent);
+  }
 }
 
-bool rtvListenToViews(const RtvApi* api)
+vtkTypeBool vtkRtvViewOptions::GetVisibility()
 {
-  theApi = api;
-  auto initializer = vtkClientServerInterpreterInitializer::GetInitializer();
-  theOriginal.TakeReference(initializer->NewInterpreter());
-  for (const char* n : { "vtkPVRenderView", "vtkPVView", "vtkView", "vtkObject", "vtkObjectBase" }) std::fprintf(stderr, "HAS %s %d\n", n, (int)theOriginal->HasCommandFunction(n));
-  if (!theOriginal->HasCommandFunction(Class))
+  for (int i = 0; theApi && i < this->GetNumberOfConsumers(); ++i)
   {
-    return false;
+    vtkObject* renderer = this->GetConsumer(i);
+    if (vtkRenderer::SafeDownCast(renderer) && this->Renderers.insert(renderer).second)
+    {
+      // Observers with a method of a vtkObject end with it.
+      for (unsigned long event : { vtkCommand::StartEvent, vtkCommand::EndEvent, vtkCommand::DeleteEvent })
+      {
+        renderer->AddObserver(event, this, &vtkRtvViewOptions::OnRender);
+      }
+      // Its first frame may have begun.
+      this->Apply(true);
+    }
   }
-  // Those there are, and those to come.
-  initializer->RegisterCallback(listen);
-  return true;
+  return 0;
 }
