@@ -60,20 +60,41 @@ impl Capture {
         lists.flatten().filter_map(|w| w.as_str().map(str::to_owned)).collect()
     }
 
-    /// Mean brightness, 0 to 255, of the rectangle `[left, bottom, right, top]` given in parts of the picture.
-    pub(crate) fn brightness(&self, part: [f64; 4]) -> f64 {
-        let x = |f: f64| (f * self.width as f64) as usize;
-        let y = |f: f64| (f * self.height as f64) as usize;
-        let (mut sum, mut count) = (0.0, 0.0);
+    /// Mean colour, 0 to 255, of the rectangle `[left, bottom, right, top]` given in parts of the picture.
+    pub(crate) fn color(&self, part: [f64; 4]) -> [f64; 3] {
+        let x = |f: f64| ((f * self.width as f64) as usize).min(self.width);
+        let y = |f: f64| ((f * self.height as f64) as usize).min(self.height);
+        let (mut sum, mut count) = ([0.0; 3], 0.0);
         for row in y(part[1])..y(part[3]) {
             for p in &self.rgb[row * self.width + x(part[0])..row * self.width + x(part[2])] {
-                sum += p.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0;
+                (0..3).for_each(|c| sum[c] += f64::from(p[c]));
                 count += 1.0;
             }
         }
         assert!(count > 0.0, "the rectangle {part:?} has no pixel");
-        sum / count
+        sum.map(|s| s / count)
     }
+
+    /// Mean colour of 3 by 3 pixels around a place that the script named in its facts.
+    pub(crate) fn at(&self, place: &str) -> [f64; 3] {
+        let [x, y] = self.pixel(place);
+        let (w, h) = (self.width as f64, self.height as f64);
+        let [x, y] = [x as f64, y as f64];
+        self.color([(x - 0.5) / w, (y - 0.5) / h, (x + 2.5) / w, (y + 2.5) / h])
+    }
+
+    /// The pixel of such a place.
+    pub(crate) fn pixel(&self, place: &str) -> [usize; 2] {
+        [0, 1].map(|i| {
+            let v = self.facts[place][i].as_u64();
+            v.unwrap_or_else(|| panic!("the script named no pixel for {place}: {}", self.facts)) as usize
+        })
+    }
+}
+
+/// Mean of the channels.
+pub(crate) fn bright(color: [f64; 3]) -> f64 {
+    color.iter().sum::<f64>() / 3.0
 }
 
 /// A `.npy` file of version 1 with little-endian `f32`.

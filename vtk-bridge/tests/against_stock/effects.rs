@@ -1,6 +1,6 @@
 //! Every effect, switched on by its variable, changes the picture where and how geometry says.
 
-use crate::capture::Capture;
+use crate::capture::{Capture, bright};
 use crate::peers::skip;
 use crate::session::{Program, Run, With, output};
 use std::collections::BTreeMap;
@@ -24,28 +24,6 @@ fn pictures(with: With, name: &'static str, settings: &[(&str, &str)]) -> Option
 
 fn plain() -> Option<[Capture; 2]> {
     pictures(With::Bridge, "plain", &[])
-}
-
-/// Mean colour of 3 by 3 pixels around a place that the script named.
-fn at(picture: &Capture, place: &str) -> [f64; 3] {
-    let [x, y] = pixel(picture, place);
-    let mut sum = [0.0; 3];
-    for v in y - 1..=y + 1 {
-        for u in x - 1..=x + 1 {
-            let p = picture.rgb[v * picture.width + u];
-            (0..3).for_each(|c| sum[c] += f64::from(p[c]) / 9.0);
-        }
-    }
-    sum
-}
-
-fn pixel(picture: &Capture, place: &str) -> [usize; 2] {
-    let place = &picture.facts[place];
-    [0, 1].map(|i| place[i].as_u64().unwrap_or_else(|| panic!("no such place: {place}")) as usize)
-}
-
-fn bright(color: [f64; 3]) -> f64 {
-    color.iter().sum::<f64>() / 3.0
 }
 
 fn rays(picture: &Capture, kind: &str) -> u64 {
@@ -83,7 +61,7 @@ fn shadows_fall_where_the_light_does_not_reach() {
     else {
         return;
     };
-    let ratio = |place: &str| bright(at(&shadows, place)) / bright(at(&plain, place));
+    let ratio = |place: &str| bright(shadows.at(place)) / bright(plain.at(place));
     assert!(ratio("shadow") < 0.3, "behind the box: {}", ratio("shadow"));
     for place in ["lit", "far_from_shadow", "open", "convex"] {
         assert!((ratio(place) - 1.0).abs() < 0.01, "{place}: {}", ratio(place));
@@ -99,7 +77,7 @@ fn large_lights_soften_the_shadow_s_edge() {
     let settings = [("RTV_SHADOWS", "1"), ("RTV_LIGHT_SIZE", "6"), ("RTV_SAMPLES", "16")];
     let (Some([hard, _]), Some([soft, _])) = (hard, pictures(With::Bridge, "soft", &settings)) else { return };
     // Floor pixels between light and shadow.
-    let [x, y] = pixel(&hard, "shadow");
+    let [x, y] = hard.pixel("shadow");
     let row = |c: &Capture| (x..c.width - 1).map(|u| bright(c.rgb[y * c.width + u].map(f64::from))).collect::<Vec<_>>();
     let between = |c: &Capture| {
         let row = row(c);
@@ -116,7 +94,7 @@ fn ambient_occlusion_darkens_concave_corners_only() {
     assert!(rays(&occluded, "ambient occlusion") > 0);
     let none = [("RTV_AO", "64"), ("RTV_AO_RADIUS", "0.001")];
     let Some([unoccluded, _]) = pictures(With::Bridge, "ao-short", &none) else { return };
-    let ratio = |place: &str| bright(at(&occluded, place)) / bright(at(&unoccluded, place));
+    let ratio = |place: &str| bright(occluded.at(place)) / bright(unoccluded.at(place));
     let (concave, convex, open) = (ratio("concave"), ratio("convex"), ratio("open"));
     assert!(concave < 0.9, "where box and floor meet: {concave}");
     assert!((convex - 1.0).abs() < 0.02, "on top of the box: {convex}");
@@ -133,19 +111,19 @@ fn mirrors_show_what_stands_on_them() {
     };
     assert!(rays(&mirror, "reflection") > 0);
     let redness = |c: &Capture, place: &str| {
-        let p = at(c, place);
+        let p = c.at(place);
         p[0] - p[2]
     };
     assert!(
         redness(&mirror, "mirror_of_box") > redness(&plain, "mirror_of_box") + 20.0,
         "the floor before the red box: {:?}, without mirror {:?}",
-        at(&mirror, "mirror_of_box"),
-        at(&plain, "mirror_of_box")
+        mirror.at("mirror_of_box"),
+        plain.at("mirror_of_box")
     );
     assert!(
         redness(&mirror, "mirror_of_background") < redness(&plain, "mirror_of_background") + 1.0,
         "the floor before the blue background: {:?}",
-        at(&mirror, "mirror_of_background")
+        mirror.at("mirror_of_background")
     );
 }
 
@@ -182,7 +160,7 @@ fn depth_of_field_blurs_what_is_not_in_focus() {
     let (Some([sharp, _]), Some([blurred, _])) = (sharp, pictures(With::Bridge, "lens", &settings)) else { return };
     // The steepest step along 25 pixels across an edge.
     let steepest = |c: &Capture, place: &str| {
-        let [x, y] = pixel(c, place);
+        let [x, y] = c.pixel(place);
         let green = |u: usize| f64::from(c.rgb[y * c.width + u][1]);
         (x - 12..x + 12).map(|u| (green(u + 1) - green(u)).abs()).fold(0.0, f64::max)
     };
@@ -201,7 +179,7 @@ fn samples_smooth_silhouettes() {
     assert!(distinct(&smooth) > distinct(&plain) + 50, "{} colours, {} before", distinct(&smooth), distinct(&plain));
     // Inside surfaces nothing changes.
     for place in ["lit", "open", "convex"] {
-        assert!((bright(at(&smooth, place)) - bright(at(&plain, place))).abs() < 1.5, "{place}");
+        assert!((bright(smooth.at(place)) - bright(plain.at(place))).abs() < 1.5, "{place}");
     }
 }
 
@@ -209,12 +187,12 @@ fn samples_smooth_silhouettes() {
 fn paths_carry_color_from_surface_to_surface() {
     let settings = [("RTV_MODE", "path"), ("RTV_SAMPLES", "256"), ("RTV_SHADOWS", "1")];
     let Some([room, _]) = pictures(With::Bridge, "paths", &settings) else { return };
-    let red_part = |place: &str| at(&room, place)[0] / bright(at(&room, place));
+    let red_part = |place: &str| room.at(place)[0] / bright(room.at(place));
     assert!(
         red_part("concave") > red_part("open") + 0.03,
         "the floor beside the red box {:?}, far away {:?}",
-        at(&room, "concave"),
-        at(&room, "open")
+        room.at("concave"),
+        room.at("open")
     );
 }
 

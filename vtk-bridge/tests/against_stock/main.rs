@@ -5,6 +5,10 @@
 
 mod capture;
 mod compare;
+mod effects;
+mod paraview;
 mod peers;
+mod plugin;
+mod ranks;
 mod session;
 mod vtk;

@@ -36,7 +36,10 @@ pub(crate) fn installed() -> &'static Path {
         let mut install = Command::new(env!("CARGO_BIN_EXE_vtk-bridge"));
         install.args(["install", "--prefix"]).arg(&home);
         if let Some(root) = peers::vtk91() {
-            install.arg("--vtk-root").arg(root);
+            install.arg("--include").arg(root.join("usr/include/vtk-9.1"));
+        }
+        if Path::new("/usr/include/paraview-5.11").is_dir() {
+            install.arg("--plugin");
         }
         let out = install.output().expect("vtk-bridge starts");
         let text = |b: &[u8]| String::from_utf8_lossy(b).into_owned();

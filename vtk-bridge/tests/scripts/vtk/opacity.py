@@ -32,7 +32,7 @@ win.SetAlphaBitPlanes(1)
 look(ren, (2, -3, 2.5)).Zoom(1.3)
 ren.ResetCameraClippingRange()
 win.Render()
-save(win, "opacity", props=ren.GetNumberOfPropsRendered(), peeled=ren.GetLastRenderingUsedDepthPeeling())
+save(win, "opacity", props=ren.GetNumberOfPropsRendered())
 
 # Opacity that comes from the lookup table.
 table = vtk.vtkLookupTable()
