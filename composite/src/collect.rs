@@ -1,43 +1,182 @@
-//! Brings the pieces of a finished image to one rank. Pieces travel as sparse messages, so background costs no bytes.
+//! Brings the pieces of a finished image to one rank, as they are finished, or leaves them where they are.
+//!
+//! Pieces travel as sparse messages, so background costs a bit a pixel, and depth only where it is asked for. All ranks know from
+//! the beginning which pieces there will be, so their receives are posted before anything else is done.
 use crate::error::CompositeError;
-use crate::frame::Piece;
+use crate::frame::{Image, Piece};
+use crate::join::Scratch;
+use crate::layer::Layer;
 use crate::pixel::Composite;
+use crate::rect::Rect;
 use crate::session::{Session, Tag};
+use crate::wire;
 
-/// The whole image at the place `root`, `None` elsewhere.
-pub(crate) fn collect<P: Composite>(
-    session: &mut Session<'_>,
-    piece: &Piece<P>,
-    root: usize,
-) -> Result<Option<Vec<P>>, CompositeError> {
-    let own = piece.start..piece.start + piece.pixels.len();
-    if session.place != root {
-        session.send(root, Tag::Collect, own.clone(), |index| piece.pixels[index - own.start])?;
-        return Ok(None);
-    }
-    let mut image = vec![P::EMPTY; session.image_pixels()];
-    image[own.clone()].copy_from_slice(&piece.pixels);
-    let mut parts = vec![(own, root)];
-    for place in (0..session.places()).filter(|&place| place != root) {
-        let range = session.recv::<P, _>(place, Tag::Collect, None, |part| {
-            part.for_each_active(|index, pixel| image[part.range.start + index] = pixel);
-            part.range.clone()
-        })?;
-        parts.push((range, place));
-    }
+pub(crate) struct Collector<P: Composite> {
+    root: Option<usize>,
+    depths: bool,
+    /// At the root: pieces of others that have not come.
+    outstanding: Vec<(usize, Rect)>,
+    image: Option<Image<P>>,
+    /// Without a root: what this rank has finished.
+    kept: Vec<Layer<P>>,
+}
 
-    // Every pixel exactly once.
-    parts.retain(|(range, _)| !range.is_empty());
-    parts.sort_by_key(|(range, _)| range.start);
-    let mut next = 0;
-    for (range, place) in &parts {
-        if range.start != next {
-            return Err(CompositeError::Pieces { pixel: next as u64, rank: session.rank_at(*place) });
+impl<P: Composite> Collector<P> {
+    /// `pieces` are all that will be handed in, by place; `spare` is an image of this size that may be written over.
+    pub(crate) fn new(
+        session: &mut Session<'_>,
+        size_px: (u32, u32),
+        root: Option<usize>,
+        depths: bool,
+        pieces: &[(usize, Rect)],
+        spare: Option<Image<P>>,
+    ) -> Result<Self, CompositeError> {
+        let depths = depths && P::HAS_DEPTH;
+        let mut collector = Self { root, depths, outstanding: Vec::new(), image: None, kept: Vec::new() };
+        if root != Some(session.place) {
+            return Ok(collector);
         }
-        next = range.end;
+        for &(place, rect) in pieces {
+            if place != session.place {
+                session.post::<P>(place, Tag::Collect, &rect)?;
+                collector.outstanding.push((place, rect));
+            }
+        }
+        let begin = session.now();
+        collector.image = Some(blank(size_px, depths, pieces, spare));
+        session.report.collect_secs += session.now() - begin;
+        Ok(collector)
     }
-    if next != image.len() {
-        return Err(CompositeError::Pieces { pixel: next as u64, rank: session.rank_at(root) });
+
+    /// Takes a piece that this rank has finished.
+    pub(crate) fn hand_in(
+        &mut self,
+        session: &mut Session<'_>,
+        layer: Layer<P>,
+        scratch: &mut Scratch<P>,
+    ) -> Result<(), CompositeError> {
+        let Some(root) = self.root else {
+            self.kept.push(layer);
+            return Ok(());
+        };
+        if let Some(image) = &mut self.image {
+            let begin = session.now();
+            let width = image.width_px as usize;
+            let bounds = layer.bounds;
+            for y in bounds.y0..bounds.y1 {
+                let (colors, depths) = layer.view().row(y, bounds.x0, bounds.x1);
+                let start = y as usize * width + bounds.x0 as usize;
+                image.colors[start..start + colors.len()].copy_from_slice(colors);
+                if self.depths {
+                    image.depths[start..start + depths.len()].copy_from_slice(depths);
+                }
+            }
+            session.report.collect_secs += session.now() - begin;
+        } else {
+            session.send(root, Tag::Collect, &layer.view(), layer.bounds, self.depths)?;
+        }
+        scratch.layers.push(layer);
+        Ok(())
     }
-    Ok(Some(image))
+
+    /// Puts the piece of another rank in its place.
+    pub(crate) fn take(
+        &mut self,
+        session: &mut Session<'_>,
+        place: usize,
+        bytes: Vec<u8>,
+    ) -> Result<(), CompositeError> {
+        let begin = session.now();
+        // A rank finishes its pieces in any order, so the message itself says which one it is, if it is one of those expected.
+        let said = wire::rect_of(&bytes);
+        let mut of_place = self.outstanding.iter().enumerate().filter(|(_, piece)| piece.0 == place);
+        let first = of_place.next();
+        let index = of_place.find(|(_, piece)| Some(piece.1) == said).map(|(index, _)| index);
+        let index = match first {
+            Some((at, piece)) if Some(piece.1) == said => Some(at),
+            Some((at, _)) => index.or(Some(at)),
+            None => None,
+        };
+        let expected = index.map_or(Rect::EMPTY, |index| self.outstanding.swap_remove(index).1);
+        let part = session.codec.decode::<P>(&bytes, expected, self.depths);
+        let part = part.map_err(|reason| session.unusable(place, reason))?;
+        if let Some(image) = &mut self.image {
+            part.place::<P>(image.width_px as usize, &mut image.colors, &mut image.depths);
+        }
+        session.comm.recycle(bytes);
+        session.report.collect_secs += session.now() - begin;
+        Ok(())
+    }
+
+    /// Waits for what has not come; the image at the root, this rank's piece where there is no root.
+    pub(crate) fn finish(
+        mut self,
+        session: &mut Session<'_>,
+    ) -> Result<(Option<Image<P>>, Option<Piece<P>>), CompositeError> {
+        while session.is_waiting() {
+            if let Some((place, _, bytes)) = session.next(true)? {
+                self.take(session, place, bytes)?;
+            }
+        }
+        if self.root.is_some() {
+            return Ok((self.image, None));
+        }
+        Ok((None, Some(in_one_piece(self.kept))))
+    }
+}
+
+/// An image with background wherever no piece will come; elsewhere anything, because pieces bring their background with them.
+fn blank<P: Composite>(
+    (width_px, height_px): (u32, u32),
+    depths: bool,
+    pieces: &[(usize, Rect)],
+    spare: Option<Image<P>>,
+) -> Image<P> {
+    let pixels = Rect::of_size(width_px, height_px).pixels();
+    let depth_pixels = if depths { pixels } else { 0 };
+    let spare = spare.filter(|image| {
+        image.colors.len() == pixels && image.depths.len() == depth_pixels && image.width_px == width_px
+    });
+    let Some(mut image) = spare else {
+        let (colors, depths) = (vec![P::EMPTY.color(); pixels], vec![1.0; depth_pixels]);
+        return Image { width_px, height_px, colors, depths };
+    };
+    let whole = pieces.iter().fold(Rect::EMPTY, |all, piece| all.around(&piece.1));
+    let covered: usize = pieces.iter().map(|piece| piece.1.pixels()).sum();
+    if covered < whole.pixels() {
+        // Pieces with gaps between them: the simple way, because no strategy makes them but for empty pictures.
+        image.colors.fill(P::EMPTY.color());
+        image.depths.fill(1.0);
+        return image;
+    }
+    for y in 0..height_px {
+        let row = y as usize * width_px as usize;
+        let (left, right) = if y < whole.y0 || y >= whole.y1 {
+            (0..width_px, 0..0)
+        } else {
+            (0..whole.x0, whole.x1..width_px)
+        };
+        for columns in [left, right] {
+            let range = row + columns.start as usize..row + columns.end as usize;
+            image.colors[range.clone()].fill(P::EMPTY.color());
+            if depths {
+                image.depths[range].fill(1.0);
+            }
+        }
+    }
+    image
+}
+
+/// Slices of one tile, one above the other, as a single piece.
+fn in_one_piece<P: Composite>(mut layers: Vec<Layer<P>>) -> Piece<P> {
+    layers.retain(|layer| !layer.bounds.is_empty());
+    layers.sort_by_key(|layer| layer.bounds.y0);
+    let mut layers = layers.into_iter();
+    let Some(mut whole) = layers.next() else { return Piece::nothing() };
+    for layer in layers {
+        whole.bounds = whole.bounds.around(&layer.bounds);
+        whole.colors.extend_from_slice(&layer.colors);
+        whole.depths.extend_from_slice(&layer.depths);
+    }
+    whole.into()
 }

@@ -1,14 +1,16 @@
 //! The entry point: one call on every rank composites one frame.
-use crate::collect::collect;
+use crate::collect::Collector;
 use crate::comm::{CommError, Communicator};
 use crate::error::CompositeError;
 use crate::frame::{Frame, Image, Piece};
-use crate::pixel::Composite;
+use crate::join::Scratch;
+use crate::pixel::{Composite, PixelFormat};
 use crate::report::Report;
 use crate::session::Session;
+use crate::simd::{Kernels, SimdLevel};
 use crate::strategies::Strategy;
-use crate::wire::mix;
-use std::time::{Duration, Instant};
+use crate::wire::{Codec, mix};
+use std::time::Duration;
 
 /// Where the finished image goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,8 +21,8 @@ pub enum Destination {
     Distributed,
 }
 
-/// How to composite; the same on every rank. Ranks that differ get [`WireError::Fingerprint`](crate::WireError::Fingerprint),
-/// or a timeout where their strategies do not even exchange the same messages.
+/// How to composite; the same on every rank (but for `simd` and `timeout`). Ranks that differ get
+/// [`WireError::Fingerprint`](crate::WireError::Fingerprint).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
     /// Which way the pixels take; changes the time, never the image.
@@ -30,6 +32,16 @@ pub struct Options {
     /// Ranks from front to back, for premultiplied colours; each exactly once. `None` means rank 0 is in front. For images with
     /// depth it only says who wins a tie: the last one.
     pub order: Option<Vec<usize>>,
+    /// Whether the collected image has its depths too; they cost 4 bytes a drawn pixel on the way to the rank that collects.
+    pub depth: bool,
+    /// Whether checksums cover the pixels of messages and not their headers only. For transports that may change bytes; it costs
+    /// about a tenth of the time of a frame between threads.
+    pub verify: bool,
+    /// Pixels of one message at most, about: direct send cuts its tiles in slices of so many, so that one is compressed while
+    /// another travels. `None` chooses.
+    pub slice_px: Option<usize>,
+    /// The instruction set; `None` is the best this machine has. Changes the time, never the image.
+    pub simd: Option<SimdLevel>,
     /// Longest wait for one message. Must allow for the slowest rank's rendering if ranks do not meet at a barrier first.
     pub timeout: Duration,
     /// Whether all ranks meet at the end, so that success on one rank means success on all. Without it a rank that has sent its
@@ -38,12 +50,16 @@ pub struct Options {
 }
 
 impl Default for Options {
-    /// Direct send to rank 0, ranks in order, 60 seconds, confirmed.
+    /// Direct send to rank 0 with depths, ranks in order, 60 seconds, confirmed.
     fn default() -> Self {
         Self {
             strategy: Strategy::default(),
             destination: Destination::Rank(0),
             order: None,
+            depth: true,
+            verify: false,
+            slice_px: None,
+            simd: None,
             timeout: Duration::from_secs(60),
             confirm: true,
         }
@@ -52,7 +68,7 @@ impl Default for Options {
 
 /// What one rank gets.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Composited<P> {
+pub struct Composited<P: PixelFormat> {
     /// The whole image, on the rank it was to go to.
     pub image: Option<Image<P>>,
     /// The piece this rank holds, with [`Destination::Distributed`].
@@ -64,7 +80,8 @@ pub struct Composited<P> {
 /// Composites the frames of all ranks. Every rank of `comm` calls this once per frame with a frame of the same size.
 ///
 /// The result has the bits of [`composite_serial`](crate::composite_serial) over the frames in `options.order`, whatever the
-/// strategy, the transport and the order in which messages arrive.
+/// strategy, the transport and the order in which messages arrive. For frame after frame a [`Compositor`] is faster: it keeps
+/// its buffers.
 ///
 /// # Errors
 /// [`CompositeError`]. A rank that fails aborts the communicator, so all other ranks get an error too
@@ -74,66 +91,132 @@ pub fn composite<P: Composite>(
     frame: &Frame<'_, P>,
     options: &Options,
 ) -> Result<Composited<P>, CompositeError> {
-    let result = composite_or_fail(comm, frame, options);
-    if let Err(error) = &result
-        && !matches!(error, CompositeError::Comm(CommError::Aborted { .. }))
-    {
-        comm.abort(&error.to_string());
-    }
-    result
+    Compositor::new(options.clone()).composite(comm, frame)
 }
 
-fn composite_or_fail<P: Composite>(
-    comm: &mut dyn Communicator,
-    frame: &Frame<'_, P>,
-    options: &Options,
-) -> Result<Composited<P>, CompositeError> {
-    let begin = Instant::now();
+/// [`composite`] for frame after frame, with buffers that are kept.
+#[derive(Debug)]
+pub struct Compositor<P: Composite> {
+    options: Options,
+    scratch: Scratch<P>,
+    spare: Option<Image<P>>,
+}
 
-    // Options that can be refused before any message.
-    let size = comm.size();
-    options.strategy.check()?;
-    let order = front_to_back(options.order.as_deref(), size)?;
-    let place_of = |rank: usize| order.iter().position(|&other| other == rank);
-    let place = place_of(comm.rank()).ok_or(CommError::NoSuchRank { peer: comm.rank(), size })?;
-    let root = match options.destination {
-        Destination::Distributed => None,
-        Destination::Rank(rank) => Some(place_of(rank).ok_or_else(|| {
-            CompositeError::Options(format!("the image is to go to rank {rank} of a group of {size} ranks"))
-        })?),
-    };
-
-    // The strategy.
-    let fingerprint = fingerprint::<P>(frame, options.strategy, &order, root);
-    let mut session = Session::new(comm, &order, place, fingerprint, frame.len(), options.timeout);
-    session.report.nan_depths = frame.nan_depths();
-    let piece = options.strategy.run(&mut session, frame)?;
-
-    // Where the pieces go. What collecting costs is its own column and not part of the others.
-    let before = session.report;
-    let collecting = Instant::now();
-    let (image, piece) = match root {
-        None => (None, Some(piece)),
-        Some(root) => {
-            let pixels = collect(&mut session, &piece, root)?;
-            let (width_px, height_px) = (frame.width_px(), frame.height_px());
-            (pixels.map(|pixels| Image { width_px, height_px, pixels }), None)
-        }
-    };
-    let collect_secs = collecting.elapsed().as_secs_f64();
-    let report = Report {
-        compress_secs: before.compress_secs,
-        blend_secs: before.blend_secs,
-        exchange_secs: before.exchange_secs,
-        collect_secs,
-        ..session.report
-    };
-    if options.confirm {
-        // Longer than a wait for a message: the rank that misses one shall be the first to say so, because it knows which.
-        comm.barrier(options.timeout.saturating_mul(2))?;
+impl<P: Composite> Compositor<P> {
+    /// A compositor that has no buffers yet.
+    pub fn new(options: Options) -> Self {
+        let scratch = Scratch::new(Kernels::new(options.simd));
+        Self { options, scratch, spare: None }
     }
-    let report = Report { total_secs: begin.elapsed().as_secs_f64(), ..report };
-    Ok(Composited { image, piece, report })
+
+    /// How it composites.
+    pub fn options(&self) -> &Options {
+        &self.options
+    }
+
+    /// Takes back an image that is no longer needed, so that the next one is written over it.
+    pub fn recycle(&mut self, image: Image<P>) {
+        self.spare = Some(image);
+    }
+
+    /// As the function [`composite`].
+    ///
+    /// # Errors
+    /// As [`composite`].
+    pub fn composite(
+        &mut self,
+        comm: &mut dyn Communicator,
+        frame: &Frame<'_, P>,
+    ) -> Result<Composited<P>, CompositeError> {
+        let result = self.composite_or_fail(comm, frame);
+        if let Err(error) = &result {
+            give_up(comm, error);
+        }
+        result
+    }
+
+    fn composite_or_fail(
+        &mut self,
+        comm: &mut dyn Communicator,
+        frame: &Frame<'_, P>,
+    ) -> Result<Composited<P>, CompositeError> {
+        let begin = comm.now();
+        let options = &self.options;
+
+        // Options that can be refused before any message.
+        let places = Places::new(comm, options)?;
+        options.strategy.check()?;
+        let size_px = (frame.width_px(), frame.height_px());
+
+        // Where this rank drew, unless the renderer has said so.
+        let kernels = self.scratch.kernels;
+        let fingerprint = fingerprint::<P>(size_px, options, &places);
+        let codec = Codec { kernels, fingerprint, verify: options.verify };
+        let mut session = Session::new(comm, &places.order, places.own, codec, options.timeout);
+        session.counts_nan = frame.is_bounded();
+        let drawn = if frame.is_bounded() {
+            frame.bounds()
+        } else {
+            let (rect, counts) = frame.drawn(kernels);
+            session.report.nan_depths = counts.nan;
+            rect
+        };
+        session.report.compress_secs += session.now() - begin;
+        session.meet(drawn, [0.0, 1.0])?;
+
+        // The strategy, and what it hands in.
+        let slice_px = options.slice_px.unwrap_or(SLICE_PX);
+        let plan = options.strategy.plan(&session.drawn, slice_px);
+        let pieces = plan.pieces(&session.drawn);
+        let spare = self.spare.take();
+        let mut collector =
+            Collector::new(&mut session, size_px, places.root, options.depth, &pieces, spare)?;
+        plan.run(&mut session, &frame.view(drawn), &mut collector, &mut self.scratch)?;
+        let (image, piece) = collector.finish(&mut session)?;
+        let mut report = session.report;
+        if options.confirm {
+            // Longer than a wait for a message: the rank that misses one shall be the first to say so, because it knows which.
+            comm.barrier(options.timeout.saturating_mul(2))?;
+        }
+        report.strategy = options.strategy;
+        report.total_secs = comm.now() - begin;
+        Ok(Composited { image, piece, report })
+    }
+}
+
+/// Ends the group, unless somebody else has.
+pub(crate) fn give_up(comm: &mut dyn Communicator, error: &CompositeError) {
+    if !matches!(error, CompositeError::Comm(CommError::Aborted { .. })) {
+        comm.abort(&error.to_string());
+    }
+}
+
+/// Half a megabyte of RGBA8 with depth: long enough to be worth a message, short enough for a second-level cache.
+const SLICE_PX: usize = 1 << 16;
+
+/// Ranks in the order of compositing.
+pub(crate) struct Places {
+    pub(crate) order: Vec<usize>,
+    pub(crate) own: usize,
+    pub(crate) root: Option<usize>,
+}
+
+impl Places {
+    pub(crate) fn new(comm: &dyn Communicator, options: &Options) -> Result<Self, CompositeError> {
+        let size = comm.size();
+        let order = front_to_back(options.order.as_deref(), size)?;
+        let place_of = |rank: usize| order.iter().position(|&other| other == rank);
+        let own = place_of(comm.rank()).ok_or(CommError::NoSuchRank { peer: comm.rank(), size })?;
+        let root = match options.destination {
+            Destination::Distributed => None,
+            Destination::Rank(rank) => Some(place_of(rank).ok_or_else(|| {
+                CompositeError::Options(format!(
+                    "the image is to go to rank {rank} of a group of {size} ranks"
+                ))
+            })?),
+        };
+        Ok(Self { order, own, root })
+    }
 }
 
 fn front_to_back(order: Option<&[usize]>, size: usize) -> Result<Vec<usize>, CompositeError> {
@@ -151,19 +234,16 @@ fn front_to_back(order: Option<&[usize]>, size: usize) -> Result<Vec<usize>, Com
 }
 
 /// Differs (but for one chance in 2^64) between ranks that do not composite the same thing in the same way.
-fn fingerprint<P: Composite>(
-    frame: &Frame<'_, P>,
-    strategy: Strategy,
-    order: &[usize],
-    root: Option<usize>,
-) -> u64 {
+pub(crate) fn fingerprint<P: PixelFormat>(size_px: (u32, u32), options: &Options, places: &Places) -> u64 {
     let fixed = [
         u64::from(P::CODE),
-        u64::from(frame.width_px()),
-        u64::from(frame.height_px()),
-        strategy.code(),
-        root.map_or(u64::MAX, |root| root as u64),
+        u64::from(size_px.0),
+        u64::from(size_px.1),
+        options.strategy.code(),
+        places.root.map_or(u64::MAX, |root| root as u64),
+        u64::from(options.depth),
+        options.slice_px.map_or(u64::MAX, |pixels| pixels as u64),
     ];
-    let all = fixed.into_iter().chain(order.iter().map(|&rank| rank as u64));
-    all.fold(order.len() as u64, mix)
+    let all = fixed.into_iter().chain(places.order.iter().map(|&rank| rank as u64));
+    all.fold(places.order.len() as u64, mix)
 }

@@ -1,7 +1,11 @@
-//! Images in (borrowed slices) and images out (owned pixels).
+//! Images in (borrowed slices) and images out (owned planes).
+use crate::color::Color;
 use crate::error::CompositeError;
-use crate::pixel::{Color, Composite, DepthPixel, PixelFormat, PremultipliedPixel};
-use std::ops::Range;
+use crate::layer::{Layer, View};
+use crate::pixel::{Composite, DepthPixel, PixelFormat, PremultipliedPixel};
+use crate::rect::Rect;
+use crate::simd::mask::{Counts, row_words, row_words_scalar};
+use crate::simd::{Kernels, at_level};
 
 /// One rank's rendered image: slices of the caller, row after row, any row order as long as all ranks use the same.
 #[derive(Clone, Copy, Debug)]
@@ -10,6 +14,7 @@ pub struct Frame<'a, P: PixelFormat> {
     height_px: u32,
     color: &'a [P::Color],
     depth: &'a [f32],
+    bounds: Option<Rect>,
 }
 
 impl<'a, C: Color> Frame<'a, DepthPixel<C>>
@@ -28,7 +33,7 @@ where
     ) -> Result<Self, CompositeError> {
         check_length("colour", width_px, height_px, color.len())?;
         check_length("depth", width_px, height_px, depth.len())?;
-        Ok(Self { width_px, height_px, color, depth })
+        Ok(Self { width_px, height_px, color, depth, bounds: None })
     }
 }
 
@@ -42,7 +47,7 @@ where
     /// [`CompositeError::FrameSize`] if the slice has another length.
     pub fn premultiplied(width_px: u32, height_px: u32, color: &'a [C]) -> Result<Self, CompositeError> {
         check_length("colour", width_px, height_px, color.len())?;
-        Ok(Self { width_px, height_px, color, depth: &[] })
+        Ok(Self { width_px, height_px, color, depth: &[], bounds: None })
     }
 }
 
@@ -60,7 +65,22 @@ fn check_length(
     }
 }
 
-impl<P: PixelFormat> Frame<'_, P> {
+impl<'a, P: PixelFormat> Frame<'a, P> {
+    /// The same frame, of which only the pixels in `bounds` count: what the renderer knows of where it drew, so that nobody has
+    /// to look. What lies outside is background, whatever the slices hold there.
+    ///
+    /// # Errors
+    /// [`CompositeError::Options`] if `bounds` reaches beyond the image.
+    pub fn bounded(self, bounds: Rect) -> Result<Self, CompositeError> {
+        if !Rect::of_size(self.width_px, self.height_px).contains(&bounds) {
+            return Err(CompositeError::Options(format!(
+                "bounds of columns {}..{} and rows {}..{} reach beyond an image of {}x{}: clip them to the image",
+                bounds.x0, bounds.x1, bounds.y0, bounds.y1, self.width_px, self.height_px
+            )));
+        }
+        Ok(Self { bounds: Some(if bounds.is_empty() { Rect::EMPTY } else { bounds }), ..self })
+    }
+
     /// Width in pixels.
     pub fn width_px(&self) -> u32 {
         self.width_px
@@ -81,77 +101,183 @@ impl<P: PixelFormat> Frame<'_, P> {
         self.color.is_empty()
     }
 
-    /// Pixel number `index`, counted row by row.
+    /// Whether the renderer has said where it drew.
+    pub(crate) fn is_bounded(&self) -> bool {
+        self.bounds.is_some()
+    }
+
+    /// All pixels that count: the whole image, or less if the frame is [`bounded`](Self::bounded).
+    pub fn bounds(&self) -> Rect {
+        self.bounds.unwrap_or(Rect::of_size(self.width_px, self.height_px))
+    }
+
+    /// Pixel number `index`, counted row by row; [`PixelFormat::EMPTY`] outside the bounds.
     ///
     /// # Panics
     /// If `index >= self.len()`, as slices do.
     pub fn pixel(&self, index: usize) -> P {
+        if let Some(bounds) = self.bounds {
+            let (x, y) = (index % self.width_px as usize, index / self.width_px as usize);
+            if x < bounds.x0 as usize
+                || x >= bounds.x1 as usize
+                || y < bounds.y0 as usize
+                || y >= bounds.y1 as usize
+            {
+                return P::EMPTY;
+            }
+        }
         P::from_parts(self.color[index], if P::HAS_DEPTH { self.depth[index] } else { 1.0 })
     }
 
-    /// Depths that are not a number: they count as background, and [`crate::Report`] says how many there were.
-    pub fn nan_depths(&self) -> u64 {
-        self.depth.iter().filter(|depth| depth.is_nan()).count() as u64
+    /// Pixels of `bounds`, which must lie within the image.
+    pub(crate) fn view(&self, bounds: Rect) -> View<'a, P> {
+        View {
+            bounds,
+            origin: (0, 0),
+            stride: self.width_px as usize,
+            colors: self.color,
+            depths: self.depth,
+        }
     }
 }
 
 impl<P: Composite> Frame<'_, P> {
-    /// All pixels, inactive ones as [`PixelFormat::EMPTY`].
-    pub(crate) fn pixels(&self) -> Vec<P> {
-        self.pixels_of(0..self.len())
+    /// Depths that are not a number: they count as background, and [`crate::Report`] says how many there were.
+    pub fn nan_depths(&self) -> u64 {
+        self.drawn(Kernels::new(None)).1.nan
     }
 
-    pub(crate) fn pixels_of(&self, range: Range<usize>) -> Vec<P> {
-        let drawn = |pixel: P| if pixel.is_active() { pixel } else { P::EMPTY };
-        range.map(|index| drawn(self.pixel(index))).collect()
+    /// The smallest rectangle around the active pixels within the bounds, and how many there are.
+    pub(crate) fn drawn(&self, kernels: Kernels) -> (Rect, Counts) {
+        let bounds = self.bounds();
+        let (mut found, mut counts) = (Rect::EMPTY, Counts::default());
+        if bounds.is_empty() {
+            return (found, counts);
+        }
+        let view = self.view(bounds);
+        // Columns are found in the union of all rows' masks.
+        let mut columns = vec![0_u64; bounds.width().div_ceil(64)];
+        for y in bounds.y0..bounds.y1 {
+            let (colors, depths) = view.row(y, bounds.x0, bounds.x1);
+            let before = counts.active;
+            let mut words = columns.iter_mut();
+            let mut put = |word| {
+                if let Some(column) = words.next() {
+                    *column |= word;
+                }
+            };
+            at_level!(
+                kernels,
+                simd => row_words::<P, _>(simd, colors, depths, &mut counts, &mut put),
+                row_words_scalar::<P>(colors, depths, &mut counts, &mut put)
+            );
+            if counts.active > before {
+                if before == 0 {
+                    found.y0 = y;
+                }
+                found.y1 = y + 1;
+            }
+        }
+        let first = columns.iter().position(|&word| word != 0);
+        let last = columns.iter().rposition(|&word| word != 0);
+        if let (Some(first), Some(last)) = (first, last) {
+            found.x0 = bounds.x0 + 64 * first as u32 + columns[first].trailing_zeros();
+            found.x1 = bounds.x0 + 64 * last as u32 + 64 - columns[last].leading_zeros();
+        }
+        (found, counts)
     }
 }
 
 /// A composited image.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Image<P> {
-    /// Width in pixels.
-    pub width_px: u32,
-    /// Height in pixels.
-    pub height_px: u32,
-    /// `width_px * height_px` pixels, row after row; [`PixelFormat::EMPTY`] where nothing was drawn.
-    pub pixels: Vec<P>,
+pub struct Image<P: PixelFormat> {
+    pub(crate) width_px: u32,
+    pub(crate) height_px: u32,
+    pub(crate) colors: Vec<P::Color>,
+    pub(crate) depths: Vec<f32>,
 }
 
 impl<P: Composite> Image<P> {
-    /// The colour plane.
-    pub fn colors(&self) -> Vec<P::Color> {
-        self.pixels.iter().map(P::color).collect()
-    }
-
-    /// The depth plane; 1 everywhere for formats without depth.
-    pub fn depths(&self) -> Vec<f32> {
-        self.pixels.iter().map(P::depth).collect()
-    }
-
-    /// Every bit of the image, pixel after pixel, for comparisons that must tell `-0.0` from `0.0` and NaN from NaN.
-    pub fn to_bytes(&self) -> Vec<u8> {
-        let mut bytes = Vec::with_capacity(self.pixels.len() * P::BYTES);
-        for pixel in &self.pixels {
-            pixel.write(&mut bytes);
+    /// An image from its planes: `width_px * height_px` colours, and as many depths or none.
+    ///
+    /// # Errors
+    /// [`CompositeError::FrameSize`] if a plane has another length.
+    pub fn from_planes(
+        width_px: u32,
+        height_px: u32,
+        colors: Vec<P::Color>,
+        depths: Vec<f32>,
+    ) -> Result<Self, CompositeError> {
+        check_length("colour", width_px, height_px, colors.len())?;
+        if !depths.is_empty() {
+            check_length("depth", width_px, height_px, depths.len())?;
         }
+        Ok(Self { width_px, height_px, colors, depths })
+    }
+
+    /// Width in pixels.
+    pub fn width_px(&self) -> u32 {
+        self.width_px
+    }
+
+    /// Height in pixels.
+    pub fn height_px(&self) -> u32 {
+        self.height_px
+    }
+
+    /// The colour plane, row after row; all channels zero where nothing was drawn.
+    pub fn colors(&self) -> &[P::Color] {
+        &self.colors
+    }
+
+    /// The depth plane, 1 where nothing was drawn; empty for formats without depth, and where
+    /// [`Options::depth`](crate::Options::depth) did not ask for it.
+    pub fn depths(&self) -> &[f32] {
+        &self.depths
+    }
+
+    /// Both planes, moved out.
+    pub fn into_planes(self) -> (Vec<P::Color>, Vec<f32>) {
+        (self.colors, self.depths)
+    }
+
+    /// Pixel number `index`, counted row by row.
+    ///
+    /// # Panics
+    /// If there is no such pixel, as slices do.
+    pub fn pixel(&self, index: usize) -> P {
+        P::from_parts(self.colors[index], self.depths.get(index).copied().unwrap_or(1.0))
+    }
+
+    /// Every bit of the image, plane after plane, for comparisons that must tell `-0.0` from `0.0` and NaN from NaN.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut bytes = bytemuck::cast_slice::<_, u8>(&self.colors).to_vec();
+        bytes.extend_from_slice(bytemuck::cast_slice(&self.depths));
         bytes
     }
 }
 
-/// The contiguous part of the finished image that one rank holds.
+/// The part of the finished image that one rank holds. What is in no rank's piece is background.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Piece<P> {
-    /// Index of the first pixel.
-    pub start: usize,
-    /// The pixels, possibly none.
-    pub pixels: Vec<P>,
+pub struct Piece<P: PixelFormat> {
+    /// Which pixels; possibly none.
+    pub bounds: Rect,
+    /// Their colours, row after row.
+    pub colors: Vec<P::Color>,
+    /// Their depths; empty for formats without depth.
+    pub depths: Vec<f32>,
 }
 
-impl<P> Piece<P> {
+impl<P: PixelFormat> Piece<P> {
     /// A piece without pixels.
     pub fn nothing() -> Self {
-        Self { start: 0, pixels: Vec::new() }
+        Self { bounds: Rect::EMPTY, colors: Vec::new(), depths: Vec::new() }
+    }
+}
+
+impl<P: Composite> From<Layer<P>> for Piece<P> {
+    fn from(layer: Layer<P>) -> Self {
+        Self { bounds: layer.bounds, colors: layer.colors, depths: layer.depths }
     }
 }
 
@@ -173,5 +299,40 @@ mod tests {
     fn nan_depths_are_counted() {
         let frame = Frame::with_depth(3, 1, &[[0_u8; 4]; 3], &[f32::NAN, 0.5, -f32::NAN]).unwrap();
         assert_eq!(frame.nan_depths(), 2);
+    }
+
+    #[test]
+    fn the_drawn_rectangle_is_tight_wherever_the_pixels_are() {
+        let (width, height) = (150_u32, 9_u32);
+        for (x, y, x2, y2) in
+            [(0, 0, 0, 0), (149, 8, 149, 8), (63, 2, 64, 2), (70, 1, 3, 7), (128, 4, 127, 5)]
+        {
+            let mut color = vec![[0_u8; 4]; 150 * 9];
+            for (x, y) in [(x, y), (x2, y2)] {
+                color[y * 150 + x] = [0, 0, 0, 1];
+            }
+            let frame = Frame::premultiplied(width, height, &color).unwrap();
+            let expected = Rect {
+                x0: x.min(x2) as u32,
+                y0: y.min(y2) as u32,
+                x1: x.max(x2) as u32 + 1,
+                y1: y.max(y2) as u32 + 1,
+            };
+            for kernels in [Kernels::new(None), Kernels(None)] {
+                assert_eq!(frame.drawn(kernels).0, expected);
+                assert_eq!(frame.bounded(Rect::EMPTY).unwrap().drawn(kernels).0, Rect::EMPTY);
+            }
+        }
+    }
+
+    #[test]
+    fn bounds_beyond_the_image_are_refused() {
+        let color = [[1_u8; 4]; 6];
+        let frame = Frame::premultiplied(3, 2, &color).unwrap();
+        let error = frame.bounded(Rect { x0: 1, y0: 0, x1: 4, y1: 1 }).unwrap_err().to_string();
+        assert!(error.contains("columns 1..4 and rows 0..1 reach beyond an image of 3x2"), "{error}");
+        let bounded = frame.bounded(Rect { x0: 1, y0: 0, x1: 2, y1: 1 }).unwrap();
+        assert_eq!(bounded.pixel(1).color, [1; 4]);
+        assert_eq!(bounded.pixel(2).color, [0; 4]);
     }
 }

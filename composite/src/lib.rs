@@ -21,30 +21,38 @@
 //! assert_eq!(image.depths(), [0.7, 0.5]);
 //! ```
 //!
-//! Built so far: the library over threads. Not built: MPI, shared-memory merging, streaming, choosing a strategy
-//! automatically, 2-D bounding rectangles, SIMD, rendering.
 #![forbid(unsafe_code)]
 
 pub mod comm;
 pub mod rank_order;
-pub mod wire;
 
 mod collect;
+mod color;
 mod compositor;
 mod error;
 mod frame;
+mod join;
+mod layer;
 mod pixel;
+mod rect;
 mod reference;
 mod report;
 mod session;
+mod simd;
 mod strategies;
+mod tiles;
+mod wire;
 
+pub use color::Color;
 pub use comm::{CommError, Communicator, threads};
-pub use compositor::{Composited, Destination, Options, composite};
+pub use compositor::{Composited, Compositor, Destination, Options, composite};
 pub use error::CompositeError;
 pub use frame::{Frame, Image, Piece};
-pub use pixel::{Color, Composite, DepthPixel, PixelFormat, PremultipliedPixel, combine};
+pub use half::f16;
+pub use pixel::{Composite, DepthPixel, PixelFormat, PremultipliedPixel, combine};
+pub use rect::Rect;
 pub use reference::composite_serial;
 pub use report::Report;
+pub use simd::SimdLevel;
 pub use strategies::Strategy;
 pub use wire::WireError;

@@ -3,79 +3,11 @@
 //! A format is a colour ([`Color`]) with or without depth; [`PixelFormat`] is its storage and wire form, [`Composite`] its
 //! operator. An *inactive* pixel is the identity of every operator **by definition** ([`combine`]), so leaving it out of a
 //! message never changes a bit of the result.
+use crate::color::Color;
+use half::f16;
 use std::fmt::Debug;
 
-/// Four colour channels, red, green, blue, alpha.
-pub trait Color: Copy + PartialEq + Debug + Send + Sync + 'static {
-    /// Bytes of one colour in a message.
-    const BYTES: usize;
-    /// All channels zero.
-    const TRANSPARENT: Self;
-    /// Whether every bit is zero (so that `-0.0` counts as something that was drawn).
-    fn is_zero(&self) -> bool;
-    /// Porter and Duff's `front over back` for premultiplied colours (SIGGRAPH 1984, table of section 4.2).
-    fn over(front: Self, back: Self) -> Self;
-    /// Appends [`Self::BYTES`] little-endian bytes.
-    fn write(self, out: &mut Vec<u8>);
-    /// Reads what [`Self::write`] wrote; `bytes` holds exactly [`Self::BYTES`] bytes.
-    fn read(bytes: &[u8]) -> Self;
-}
-
-/// RGBA8. Blending rounds to nearest (IceT truncates, which loses faint layers); for many faint layers use `[f32; 4]`.
-impl Color for [u8; 4] {
-    const BYTES: usize = 4;
-    const TRANSPARENT: Self = [0; 4];
-
-    fn is_zero(&self) -> bool {
-        *self == [0; 4]
-    }
-
-    fn over(front: Self, back: Self) -> Self {
-        let see_through = 255 - u32::from(front[3]);
-        std::array::from_fn(|i| {
-            let behind = (u32::from(back[i]) * see_through + 127) / 255;
-            front[i].saturating_add(behind as u8)
-        })
-    }
-
-    fn write(self, out: &mut Vec<u8>) {
-        out.extend_from_slice(&self);
-    }
-
-    fn read(bytes: &[u8]) -> Self {
-        std::array::from_fn(|i| bytes[i])
-    }
-}
-
-impl Color for [f32; 4] {
-    const BYTES: usize = 16;
-    const TRANSPARENT: Self = [0.0; 4];
-
-    fn is_zero(&self) -> bool {
-        self.iter().all(|channel| channel.to_bits() == 0)
-    }
-
-    fn over(front: Self, back: Self) -> Self {
-        let see_through = 1.0 - front[3];
-        std::array::from_fn(|i| front[i] + see_through * back[i])
-    }
-
-    fn write(self, out: &mut Vec<u8>) {
-        for channel in self {
-            out.extend_from_slice(&channel.to_le_bytes());
-        }
-    }
-
-    fn read(bytes: &[u8]) -> Self {
-        std::array::from_fn(|i| read_f32(&bytes[4 * i..]))
-    }
-}
-
-fn read_f32(bytes: &[u8]) -> f32 {
-    f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])
-}
-
-/// How a pixel is stored and sent.
+/// How a pixel is stored and sent: a colour plane, and for some formats a depth plane of `f32`.
 pub trait PixelFormat: Copy + PartialEq + Debug + Send + Sync + 'static {
     /// The colour part.
     type Color: Color;
@@ -84,8 +16,8 @@ pub trait PixelFormat: Copy + PartialEq + Debug + Send + Sync + 'static {
     /// Number in message headers; differs between formats, so that ranks that disagree find out.
     const CODE: u32;
     /// Bytes of one pixel in a message.
-    const BYTES: usize;
-    /// Whether frames of this format bring a depth slice.
+    const BYTES: usize = <Self::Color as Color>::BYTES + if Self::HAS_DEPTH { 4 } else { 0 };
+    /// Whether frames of this format bring a depth slice, and the nearest pixel wins.
     const HAS_DEPTH: bool;
     /// The pixel where no rank drew anything.
     const EMPTY: Self;
@@ -95,10 +27,6 @@ pub trait PixelFormat: Copy + PartialEq + Debug + Send + Sync + 'static {
     fn color(&self) -> Self::Color;
     /// Depth in 0 (near) … 1 (far); 1 for formats without depth.
     fn depth(&self) -> f32;
-    /// Appends [`Self::BYTES`] bytes.
-    fn write(self, out: &mut Vec<u8>);
-    /// Reads what [`Self::write`] wrote; `bytes` holds exactly [`Self::BYTES`] bytes.
-    fn read(bytes: &[u8]) -> Self;
 }
 
 /// The operator that joins the pixels of two groups of ranks.
@@ -111,6 +39,7 @@ pub trait Composite: PixelFormat {
 }
 
 /// [`Composite::merge`] with inactive pixels as identities; two inactive pixels give [`PixelFormat::EMPTY`].
+#[inline(always)]
 pub fn combine<P: Composite>(lower: P, higher: P) -> P {
     match (lower.is_active(), higher.is_active()) {
         (true, true) => P::merge(lower, higher),
@@ -147,30 +76,22 @@ macro_rules! formats {
             type Color = $color;
             const NAME: &'static str = $depth_name;
             const CODE: u32 = $depth_code;
-            const BYTES: usize = <$color as Color>::BYTES + 4;
             const HAS_DEPTH: bool = true;
             const EMPTY: Self = Self { color: <$color as Color>::TRANSPARENT, depth: 1.0 };
 
+            #[inline(always)]
             fn from_parts(color: $color, depth: f32) -> Self {
                 Self { color, depth }
             }
 
+            #[inline(always)]
             fn color(&self) -> $color {
                 self.color
             }
 
+            #[inline(always)]
             fn depth(&self) -> f32 {
                 self.depth
-            }
-
-            fn write(self, out: &mut Vec<u8>) {
-                self.color.write(out);
-                out.extend_from_slice(&self.depth.to_le_bytes());
-            }
-
-            fn read(bytes: &[u8]) -> Self {
-                let (color, depth) = bytes.split_at(<$color as Color>::BYTES);
-                Self { color: Color::read(color), depth: read_f32(depth) }
             }
         }
 
@@ -178,28 +99,22 @@ macro_rules! formats {
             type Color = $color;
             const NAME: &'static str = $blend_name;
             const CODE: u32 = $blend_code;
-            const BYTES: usize = <$color as Color>::BYTES;
             const HAS_DEPTH: bool = false;
             const EMPTY: Self = Self { color: <$color as Color>::TRANSPARENT };
 
+            #[inline(always)]
             fn from_parts(color: $color, _depth: f32) -> Self {
                 Self { color }
             }
 
+            #[inline(always)]
             fn color(&self) -> $color {
                 self.color
             }
 
+            #[inline(always)]
             fn depth(&self) -> f32 {
                 1.0
-            }
-
-            fn write(self, out: &mut Vec<u8>) {
-                self.color.write(out);
-            }
-
-            fn read(bytes: &[u8]) -> Self {
-                Self { color: Color::read(bytes) }
             }
         }
     )*};
@@ -208,16 +123,20 @@ macro_rules! formats {
 formats! {
     [u8; 4], "RGBA8 + depth" 1, "premultiplied RGBA8" 2;
     [f32; 4], "RGBA f32 + depth" 3, "premultiplied RGBA f32" 4;
+    [u16; 4], "RGBA16 + depth" 5, "premultiplied RGBA16" 6;
+    [f16; 4], "RGBA f16 + depth" 7, "premultiplied RGBA f16" 8;
 }
 
 impl<C: Color> Composite for DepthPixel<C>
 where
     Self: PixelFormat,
 {
+    #[inline(always)]
     fn is_active(&self) -> bool {
         self.depth < 1.0
     }
 
+    #[inline(always)]
     fn merge(lower: Self, higher: Self) -> Self {
         if lower.depth < higher.depth { lower } else { higher }
     }
@@ -227,10 +146,12 @@ impl<C: Color> Composite for PremultipliedPixel<C>
 where
     Self: PixelFormat,
 {
+    #[inline(always)]
     fn is_active(&self) -> bool {
         !self.color.is_zero()
     }
 
+    #[inline(always)]
     fn merge(lower: Self, higher: Self) -> Self {
         Self { color: C::over(lower.color, higher.color) }
     }
@@ -240,12 +161,12 @@ where
 mod tests {
     use super::*;
 
-    fn at(depth: f32, mark: u8) -> DepthPixel<[u8; 4]> {
-        DepthPixel { color: [mark; 4], depth }
+    fn at(depth: f32, value: u8) -> DepthPixel<[u8; 4]> {
+        DepthPixel { color: [value; 4], depth }
     }
 
     #[test]
-    fn equal_depths_go_to_the_highest_rank_and_minus_zero_is_zero() {
+    fn equal_depths_go_to_the_highest_rank() {
         assert_eq!(combine(at(0.5, 1), at(0.5, 2)).color, [2; 4]);
         assert_eq!(combine(at(-0.0, 1), at(0.0, 2)).color, [2; 4]);
         assert_eq!(combine(at(0.0, 1), at(-0.0, 2)).color, [2; 4]);
@@ -264,13 +185,6 @@ mod tests {
     }
 
     #[test]
-    fn eight_bit_over_rounds_to_nearest_and_saturates() {
-        assert_eq!(<[u8; 4]>::over([10, 0, 0, 128], [255, 1, 2, 255]), [137, 0, 1, 255]);
-        assert_eq!(<[u8; 4]>::over([250, 0, 0, 0], [250, 0, 0, 0]), [255, 0, 0, 0]);
-        assert_eq!(<[u8; 4]>::over([7, 8, 9, 255], [255; 4]), [7, 8, 9, 255]);
-    }
-
-    #[test]
     fn inactive_pixels_change_no_bit_even_where_arithmetic_would() {
         let infinite = PremultipliedPixel { color: [f32::INFINITY, -0.0, 0.0, 1.0] };
         for joined in
@@ -281,11 +195,10 @@ mod tests {
     }
 
     #[test]
-    fn pixels_survive_their_wire_form() {
-        let pixel = DepthPixel { color: [1.0, -0.0, f32::MIN_POSITIVE, 0.25], depth: 0.125 };
-        let mut bytes = Vec::new();
-        pixel.write(&mut bytes);
-        assert_eq!(bytes.len(), DepthPixel::<[f32; 4]>::BYTES);
-        assert_eq!(DepthPixel::<[f32; 4]>::read(&bytes), pixel);
+    fn sizes_of_pixels_are_those_of_their_planes() {
+        assert_eq!(DepthPixel::<[u8; 4]>::BYTES, 8);
+        assert_eq!(PremultipliedPixel::<[u8; 4]>::BYTES, 4);
+        assert_eq!(DepthPixel::<[f16; 4]>::BYTES, 12);
+        assert_eq!(PremultipliedPixel::<[f32; 4]>::BYTES, 16);
     }
 }

@@ -21,15 +21,18 @@ pub fn composite_serial<P: Composite>(frames: &[Frame<'_, P>]) -> Result<Image<P
         }
     }
     let mut column = vec![P::EMPTY; frames.len()];
-    let pixels = (0..first.len())
-        .map(|index| {
-            for (pixel, frame) in column.iter_mut().zip(frames) {
-                *pixel = frame.pixel(index);
-            }
-            reduce_ranks(&mut column)
-        })
-        .collect();
-    Ok(Image { width_px, height_px, pixels })
+    let (mut colors, mut depths) = (Vec::with_capacity(first.len()), Vec::new());
+    for index in 0..first.len() {
+        for (pixel, frame) in column.iter_mut().zip(frames) {
+            *pixel = frame.pixel(index);
+        }
+        let pixel = reduce_ranks(&mut column);
+        colors.push(pixel.color());
+        if P::HAS_DEPTH {
+            depths.push(pixel.depth());
+        }
+    }
+    Ok(Image { width_px, height_px, colors, depths })
 }
 
 #[cfg(test)]
@@ -59,9 +62,9 @@ mod tests {
         let image = composite_serial(&frames).unwrap();
         let exact = 1.0 - (1.0 - f64::from(alpha)).powi(128);
         assert!(
-            (f64::from(image.pixels[0].color[3]) - exact).abs() < 2e-6,
+            (f64::from(image.colors()[0][3]) - exact).abs() < 2e-6,
             "{:?} against {exact}",
-            image.pixels[0]
+            image.colors()[0]
         );
     }
 }

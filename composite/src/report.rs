@@ -1,6 +1,6 @@
 //! What a frame cost on one rank, in IceT's columns.
 
-/// Times and counts of one rank for one frame.
+/// Times and counts of one rank for one frame. Seconds are those of [`Communicator::now`](crate::Communicator::now).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Report {
     /// Finding active pixels and writing messages (IceT: compress).
@@ -9,7 +9,7 @@ pub struct Report {
     pub blend_secs: f64,
     /// Handing over and waiting for messages of the strategy, load imbalance included (IceT: send).
     pub exchange_secs: f64,
-    /// Bringing the pieces to one rank, encoding and waiting included (IceT: collect).
+    /// Bringing the pieces to one rank: encoding them, placing them and waiting for them at the end (IceT: collect).
     pub collect_secs: f64,
     /// The whole frame.
     pub total_secs: f64,
@@ -21,4 +21,6 @@ pub struct Report {
     pub bytes_received: u64,
     /// Depths of this rank's frame that were not a number and counted as background.
     pub nan_depths: u64,
+    /// The strategy that was used, also where it was chosen automatically.
+    pub strategy: crate::Strategy,
 }

@@ -1,37 +1,46 @@
 //! One frame on one rank: the communicator in rank order, with costs counted and messages checked.
-use crate::comm::Communicator;
+use crate::comm::{Communicator, Receive};
 use crate::error::CompositeError;
-use crate::pixel::{Composite, combine};
+use crate::layer::View;
+use crate::pixel::Composite;
+use crate::rect::Rect;
 use crate::report::Report;
-use crate::wire::{self, WireError};
-use std::ops::Range;
-use std::time::{Duration, Instant};
+use crate::wire::{self, Codec, Part, WireError};
+use std::time::Duration;
 
 /// Which messages belong together; the order within a tag is kept by every communicator.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Tag {
-    Load = 1,
     Fold = 2,
     Exchange = 3,
     Collect = 4,
 }
 
-/// On which side of what a rank holds the received pixels come.
-#[derive(Clone, Copy)]
-pub(crate) enum Side {
-    Lower,
-    Higher,
+/// A message that has come and been checked.
+#[derive(Debug)]
+pub(crate) struct Message {
+    pub(crate) bytes: Vec<u8>,
+    rect: Rect,
+    depths: bool,
 }
+
+/// Longest string of [`Session::meet`]: fingerprint, rectangle, interval of depths.
+const GREETING_BYTES: usize = 8 + 16 + 8;
 
 /// Ranks in here are *places* in the order of compositing, not ranks of the communicator.
 pub(crate) struct Session<'a> {
-    comm: &'a mut dyn Communicator,
+    pub(crate) comm: &'a mut dyn Communicator,
     order: &'a [usize],
     pub(crate) place: usize,
-    fingerprint: u64,
-    image_pixels: usize,
+    pub(crate) codec: Codec,
     timeout: Duration,
+    /// What every place drew.
+    pub(crate) drawn: Vec<Rect>,
     pub(crate) report: Report,
+    /// Whether depths that are not numbers are counted on the way; else they have been when the frame was looked over.
+    pub(crate) counts_nan: bool,
+    /// Receives that have been posted, with what they are for.
+    posted: Vec<Receive>,
 }
 
 impl<'a> Session<'a> {
@@ -39,144 +48,168 @@ impl<'a> Session<'a> {
         comm: &'a mut dyn Communicator,
         order: &'a [usize],
         place: usize,
-        fingerprint: u64,
-        image_pixels: usize,
+        codec: Codec,
         timeout: Duration,
     ) -> Self {
-        Self { comm, order, place, fingerprint, image_pixels, timeout, report: Report::default() }
+        Self {
+            comm,
+            order,
+            place,
+            codec,
+            timeout,
+            drawn: Vec::new(),
+            report: Report::default(),
+            counts_nan: false,
+            posted: Vec::new(),
+        }
+    }
+
+    /// The communicator's time, in seconds.
+    pub(crate) fn now(&self) -> f64 {
+        self.comm.now()
     }
 
     pub(crate) fn places(&self) -> usize {
         self.order.len()
     }
 
-    pub(crate) fn image_pixels(&self) -> usize {
-        self.image_pixels
+    fn place_of(&self, rank: usize) -> usize {
+        // The order is a permutation, so every rank is in it.
+        self.order.iter().position(|&other| other == rank).unwrap_or(rank)
     }
 
-    /// The rank of the communicator at `place`.
-    pub(crate) fn rank_at(&self, place: usize) -> usize {
-        self.order[place]
+    /// Tells all places what each drew and how near and far, and finds out whether all are doing the same thing.
+    pub(crate) fn meet(&mut self, drawn: Rect, depths: [f32; 2]) -> Result<Vec<[f32; 2]>, CompositeError> {
+        let begin = self.now();
+        let mut greeting = self.codec.fingerprint.to_le_bytes().to_vec();
+        greeting.extend_from_slice(bytemuck::cast_slice(&[drawn.x0, drawn.y0, drawn.x1, drawn.y1]));
+        greeting.extend_from_slice(bytemuck::cast_slice(&depths));
+        let answers = self.comm.all_gather(&greeting, GREETING_BYTES, self.timeout)?;
+        let mut intervals = Vec::with_capacity(self.places());
+        self.drawn.clear();
+        for place in 0..self.places() {
+            let answer = &answers[self.order[place]];
+            let Ok(answer) = <&[u8; GREETING_BYTES]>::try_from(answer.as_slice()) else {
+                let (expected, found) = (GREETING_BYTES as u64, answer.len() as u64);
+                return Err(self.unusable(place, WireError::Length { expected, found }));
+            };
+            if answer[..8] != self.codec.fingerprint.to_le_bytes() {
+                return Err(self.unusable(place, WireError::Fingerprint));
+            }
+            let corner = |i: usize| bytemuck::pod_read_unaligned::<u32>(&answer[8 + 4 * i..12 + 4 * i]);
+            self.drawn.push(Rect { x0: corner(0), y0: corner(1), x1: corner(2), y1: corner(3) });
+            intervals.push(bytemuck::pod_read_unaligned(&answer[24..32]));
+        }
+        self.report.exchange_secs += self.now() - begin;
+        Ok(intervals)
     }
 
-    fn send_bytes(&mut self, place: usize, tag: Tag, message: Vec<u8>) -> Result<(), CompositeError> {
-        self.report.messages_sent += 1;
-        self.report.bytes_sent += message.len() as u64;
-        let begin = Instant::now();
-        self.comm.send(self.order[place], tag as u32, message)?;
-        self.report.exchange_secs += begin.elapsed().as_secs_f64();
-        Ok(())
-    }
-
-    fn recv_bytes(&mut self, place: usize, tag: Tag) -> Result<Vec<u8>, CompositeError> {
-        let begin = Instant::now();
-        let message = self.comm.recv(self.order[place], tag as u32, self.timeout)?;
-        self.report.exchange_secs += begin.elapsed().as_secs_f64();
-        self.report.bytes_received += message.len() as u64;
-        Ok(message)
-    }
-
-    /// Sends the part `range`; `pixel` gives the pixel at an index of the whole image.
+    /// Sends what `view` has in `rect`, which must be within its bounds.
     pub(crate) fn send<P: Composite>(
         &mut self,
         place: usize,
         tag: Tag,
-        range: Range<usize>,
-        pixel: impl Fn(usize) -> P,
+        view: &View<'_, P>,
+        rect: Rect,
+        depths: bool,
     ) -> Result<(), CompositeError> {
-        let begin = Instant::now();
-        let message = wire::encode(self.fingerprint, range, pixel);
-        self.report.compress_secs += begin.elapsed().as_secs_f64();
-        self.send_bytes(place, tag, message)
-    }
-
-    /// Receives a part and hands it to `use_part`; `expected` is `None` where only the sender knows which part it is.
-    pub(crate) fn recv<P: Composite, T>(
-        &mut self,
-        place: usize,
-        tag: Tag,
-        expected: Option<Range<usize>>,
-        use_part: impl FnOnce(&wire::Part<'_>) -> T,
-    ) -> Result<T, CompositeError> {
-        let message = self.recv_bytes(place, tag)?;
-        let begin = Instant::now();
-        let result = match wire::decode::<P>(&message, self.fingerprint, self.image_pixels, expected) {
-            Ok(part) => Ok(use_part(&part)),
-            Err(reason) => Err(self.unusable(place, reason)),
-        };
-        self.report.blend_secs += begin.elapsed().as_secs_f64();
-        result
-    }
-
-    /// Receives the part `range` and joins it to `held`, the same part of what this rank holds.
-    pub(crate) fn recv_joined<P: Composite>(
-        &mut self,
-        place: usize,
-        tag: Tag,
-        range: Range<usize>,
-        held: &mut [P],
-        side: Side,
-    ) -> Result<(), CompositeError> {
-        self.recv::<P, _>(place, tag, Some(range), |part| {
-            part.for_each_active(|index, pixel| {
-                held[index] = match side {
-                    Side::Lower => combine(pixel, held[index]),
-                    Side::Higher => combine(held[index], pixel),
-                };
-            });
-        })
-    }
-
-    /// Gives `numbers` of every place to every place; all must bring the same amount.
-    pub(crate) fn all_gather(&mut self, numbers: &[u64]) -> Result<Vec<Vec<u64>>, CompositeError> {
-        // Checksum, fingerprint, numbers.
-        let mut message = vec![0; 8];
-        message.extend_from_slice(&self.fingerprint.to_le_bytes());
-        for number in numbers {
-            message.extend_from_slice(&number.to_le_bytes());
+        let begin = self.now();
+        let mut message = self.comm.buffer(wire::longest::<P>(&rect));
+        let counts = self.codec.encode(view, rect, depths, &mut message);
+        if self.counts_nan {
+            // Joined pixels hold no NaN, so only those of the frame are counted here.
+            self.report.nan_depths += counts.nan;
         }
-        let sum = wire::checksum(&message[8..]);
-        message[..8].copy_from_slice(&sum.to_le_bytes());
-        for step in 1..self.places() {
-            // Every rank begins with its neighbour, so that no rank gets all first messages.
-            self.send_bytes((self.place + step) % self.places(), Tag::Load, message.clone())?;
+        let encoded = self.now();
+        self.report.messages_sent += 1;
+        self.report.bytes_sent += message.len() as u64;
+        self.comm.send(self.order[place], tag as u32, message)?;
+        let sent = self.now();
+        if tag == Tag::Collect {
+            self.report.collect_secs += sent - begin;
+        } else {
+            self.report.compress_secs += encoded - begin;
+            self.report.exchange_secs += sent - encoded;
         }
-        let mut all = Vec::with_capacity(self.places());
-        for place in 0..self.places() {
-            if place == self.place {
-                all.push(numbers.to_vec());
-                continue;
+        Ok(())
+    }
+
+    /// Counts depths of the frame in `part` that are not numbers; those of parts sent to others are counted when they are
+    /// compressed.
+    pub(crate) fn count_nan<P: Composite>(&mut self, view: &View<'_, P>, part: Rect) {
+        if P::HAS_DEPTH && self.counts_nan {
+            for y in part.y0..part.y1 {
+                let depths = view.row(y, part.x0, part.x1).1;
+                self.report.nan_depths += depths.iter().filter(|depth| depth.is_nan()).count() as u64;
             }
-            let bytes = self.recv_bytes(place, Tag::Load)?;
-            all.push(
-                read_numbers(&bytes, message.len(), self.fingerprint).map_err(|r| self.unusable(place, r))?,
-            );
         }
-        Ok(all)
     }
 
-    fn unusable(&self, place: usize, reason: WireError) -> CompositeError {
+    /// Announces a message with the pixels of `rect`.
+    pub(crate) fn post<P: Composite>(
+        &mut self,
+        place: usize,
+        tag: Tag,
+        rect: &Rect,
+    ) -> Result<(), CompositeError> {
+        // A little more than the longest honest message: one that is too long shall reach the decoder, which says what is wrong.
+        let capacity = wire::longest::<P>(rect) + 64;
+        let receive = self.comm.post_recv(self.order[place], tag as u32, capacity)?;
+        self.posted.push(receive);
+        Ok(())
+    }
+
+    /// Whether messages that were announced have not yet come.
+    pub(crate) fn is_waiting(&self) -> bool {
+        !self.posted.is_empty()
+    }
+
+    /// Whether a message announced with `tag` has not yet come.
+    pub(crate) fn is_waiting_for(&self, tag: Tag) -> bool {
+        self.posted.iter().any(|receive| receive.tag == tag as u32)
+    }
+
+    /// The next message that comes, of those announced: its place, whether it is one of [`Tag::Collect`], its bytes. Without
+    /// `patience`, only one that has already come.
+    pub(crate) fn next(&mut self, patience: bool) -> Result<Option<(usize, bool, Vec<u8>)>, CompositeError> {
+        let begin = self.now();
+        let arrival = if patience {
+            Some(self.comm.wait_any(&mut self.posted, self.timeout)?)
+        } else if self.posted.is_empty() {
+            None
+        } else {
+            self.comm.test_any(&mut self.posted)?
+        };
+        let Some(arrival) = arrival else { return Ok(None) };
+        let is_collect = arrival.tag == Tag::Collect as u32;
+        let waited = self.now() - begin;
+        *(if is_collect { &mut self.report.collect_secs } else { &mut self.report.exchange_secs }) += waited;
+        self.report.bytes_received += arrival.message.len() as u64;
+        Ok(Some((self.place_of(arrival.source), is_collect, arrival.message)))
+    }
+
+    /// Checks a message of the strategy.
+    pub(crate) fn check<P: Composite>(
+        &self,
+        place: usize,
+        bytes: Vec<u8>,
+        expected: Rect,
+        depths: bool,
+    ) -> Result<Message, CompositeError> {
+        match self.codec.decode::<P>(&bytes, expected, depths) {
+            Ok(_) => Ok(Message { bytes, rect: expected, depths }),
+            Err(reason) => Err(self.unusable(place, reason)),
+        }
+    }
+
+    pub(crate) fn unusable(&self, place: usize, reason: WireError) -> CompositeError {
         CompositeError::Message { rank: self.order[self.place], from: self.order[place], reason }
     }
 }
 
-/// Reads what [`Session::all_gather`] sends; `length` is that of this rank's own message.
-fn read_numbers(bytes: &[u8], length: usize, fingerprint: u64) -> Result<Vec<u64>, WireError> {
-    // A sender with another image size has another length: its fingerprint is the better explanation.
-    if bytes.len() < 16 {
-        return Err(WireError::Length { expected: length as u64, found: bytes.len() as u64 });
+impl Message {
+    /// The message as its pixels; it has been checked when it came.
+    pub(crate) fn part<P: Composite>(&self) -> Part<'_> {
+        Part::reopen::<P>(&self.bytes, self.rect, self.depths)
     }
-    let mut words =
-        bytes.chunks_exact(8).map(|c| u64::from_le_bytes([c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]]));
-    let (expected, found) = (words.next().unwrap_or(0), wire::checksum(&bytes[8..]));
-    if expected != found {
-        return Err(WireError::Checksum { expected, found });
-    }
-    if words.next() != Some(fingerprint) {
-        return Err(WireError::Fingerprint);
-    }
-    if bytes.len() != length {
-        return Err(WireError::Length { expected: length as u64, found: bytes.len() as u64 });
-    }
-    Ok(words.collect())
 }

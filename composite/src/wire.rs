@@ -1,23 +1,40 @@
-//! Messages: part of an image as a bit mask of active pixels followed by those pixels.
+//! Messages: a rectangle of an image as a bit mask of active pixels, followed by these, row after row.
 //!
 //! | bytes | content |
 //! |---|---|
-//! | 0..8 | `COMPOS01` |
-//! | 8..16 | checksum of everything behind it |
+//! | 0..8 | `COMPOS02` |
+//! | 8..16 | checksum of the header behind it, and of everything if the flag says so |
 //! | 16..24 | fingerprint of what is composited: sizes, format, strategy, rank order |
-//! | 24..40 | first pixel and number of pixels of the part |
-//! | 40..56 | first pixel, relative to the part, and length of the *span* from the first to the last active pixel |
-//! | 56..64 | number of active pixels |
-//! | then | mask of the span, 64 pixels a word, lowest bit first; left out if all of the span is active |
-//! | then | the active pixels in order |
+//! | 24..32 | flags: 1 mask present, 2 depths present, 4 checksum covers pixels |
+//! | 32..48 | `u32` each: first column, first row, end of columns, end of rows |
+//! | 48..56 | number of active pixels |
+//! | 56..64 | zero |
+//! | then | mask: for every row words of 64 pixels, lowest bit first; left out if all or no pixels are active |
+//! | then | for every row the colours of its active pixels, then (if the flag says so) their depths |
 //!
-//! All numbers are little-endian `u64`, also in arithmetic: no size is cut to 32 bits. The decoder trusts nothing.
+//! All numbers are little-endian, and pixels have the bytes they have in memory; counts have 64 bits, also in arithmetic. The
+//! decoder trusts nothing: whatever passes it can be read without a further check.
+use crate::color::Color;
+use crate::layer::{Layer, View};
 use crate::pixel::Composite;
-use std::ops::Range;
+use crate::rect::Rect;
+use crate::simd::compress::{append_active, append_active_scalar};
+use crate::simd::expand::{Side, SparseRow, join_row, join_row_scalar, place_row};
+use crate::simd::mask::{Counts, row_words, row_words_scalar};
+use crate::simd::{Kernels, at_level};
+use fearless_simd::Simd;
 
-const MAGIC: u64 = u64::from_le_bytes(*b"COMPOS01");
+#[cfg(not(target_endian = "little"))]
+compile_error!(
+    "messages hold pixels as they lie in memory, and this has only been done for little-endian machines"
+);
+
+const MAGIC: u64 = u64::from_le_bytes(*b"COMPOS02");
 /// Bytes in front of the mask.
-pub const HEADER_BYTES: usize = 64;
+pub(crate) const HEADER_BYTES: usize = 64;
+const HAS_MASK: u64 = 1;
+const HAS_DEPTHS: u64 = 2;
+const IS_SUMMED: u64 = 4;
 
 /// What is wrong with a message.
 #[derive(Debug, thiserror::Error, Clone, PartialEq, Eq)]
@@ -31,7 +48,7 @@ pub enum WireError {
         found: u64,
     },
     /// Not a message of this library or of this version of it.
-    #[error("it does not begin with COMPOS01")]
+    #[error("it does not begin with COMPOS02")]
     Magic,
     /// Bits changed on the way.
     #[error("its checksum is {found:#018x} instead of {expected:#018x}")]
@@ -47,25 +64,38 @@ pub enum WireError {
     )]
     Fingerprint,
     /// Another part of the image than agreed.
-    #[error("it holds pixels {start}..{end} instead of {expected_start}..{expected_end}")]
+    #[error(
+        "it holds columns {}..{} and rows {}..{} instead of {}..{} and {}..{}",
+        found.x0, found.x1, found.y0, found.y1, expected.x0, expected.x1, expected.y0, expected.y1
+    )]
     Part {
-        /// First pixel it holds.
-        start: u64,
-        /// End of the pixels it holds.
-        end: u64,
-        /// First pixel it should hold.
-        expected_start: u64,
-        /// End of the pixels it should hold.
-        expected_end: u64,
+        /// The rectangle it holds.
+        found: Rect,
+        /// The rectangle it should hold.
+        expected: Rect,
     },
-    /// Span, mask and count contradict each other.
-    #[error("its numbers of active pixels contradict each other")]
+    /// Flags, mask and count contradict each other.
+    #[error("its flags, mask and number of active pixels contradict each other")]
     Mask,
 }
 
+/// Sum of the bytes in eight independent chains, so that a processor works on all of them at once.
+///
 /// Every step is a bijection of the state and of the word, so a change within a single word never goes unnoticed.
 pub(crate) fn checksum(bytes: &[u8]) -> u64 {
-    bytes.chunks(8).fold(bytes.len() as u64, |state, chunk| mix(state, word(chunk)))
+    let (blocks, rest) = bytes.as_chunks::<64>();
+    let mut chains: [u64; 8] = std::array::from_fn(|i| i as u64);
+    for block in blocks {
+        for (chain, word) in chains.iter_mut().zip(block.as_chunks::<8>().0) {
+            *chain = mix(*chain, u64::from_le_bytes(*word));
+        }
+    }
+    let state = chains.into_iter().fold(bytes.len() as u64, mix);
+    rest.chunks(8).fold(state, |state, chunk| {
+        let mut whole = [0; 8];
+        whole[..chunk.len()].copy_from_slice(chunk);
+        mix(state, u64::from_le_bytes(whole))
+    })
 }
 
 /// One step of [`checksum`] and of fingerprints.
@@ -73,278 +103,345 @@ pub(crate) fn mix(state: u64, value: u64) -> u64 {
     (state ^ value).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
 }
 
-/// Up to eight bytes as a number; missing ones are zero.
-fn word(bytes: &[u8]) -> u64 {
-    let mut whole = [0; 8];
-    whole[..bytes.len()].copy_from_slice(bytes);
-    u64::from_le_bytes(whole)
+/// How messages of one frame are written and read.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Codec {
+    pub(crate) kernels: Kernels,
+    pub(crate) fingerprint: u64,
+    /// Whether checksums cover the pixels too.
+    pub(crate) verify: bool,
 }
 
-/// Encodes the pixels of the part `range`, of which `pixel` gives the one at an index of the whole image.
-pub fn encode<P: Composite>(fingerprint: u64, range: Range<usize>, pixel: impl Fn(usize) -> P) -> Vec<u8> {
-    // Extent and number of active pixels.
-    let mut active = 0_usize;
-    let mut span = range.start..range.start;
-    for index in range.clone() {
-        if pixel(index).is_active() {
-            if active == 0 {
-                span.start = index;
-            }
-            span.end = index + 1;
-            active += 1;
-        }
-    }
-    if active == 0 {
-        span = range.start..range.start;
-    }
-    let mask_words = if active == span.len() { 0 } else { span.len().div_ceil(64) };
+/// Bytes of the longest message of `rect`, dense or not.
+pub(crate) fn longest<P: Composite>(rect: &Rect) -> usize {
+    HEADER_BYTES + rect.height() * rect.width().div_ceil(64) * 8 + rect.pixels() * P::BYTES
+}
 
-    // Header; the checksum comes last.
-    let mut message = Vec::with_capacity(HEADER_BYTES + 8 * mask_words + active * P::BYTES);
-    let numbers = [
-        MAGIC,
-        0,
-        fingerprint,
-        range.start as u64,
-        range.len() as u64,
-        (span.start - range.start) as u64,
-        span.len() as u64,
-        active as u64,
-    ];
-    for number in numbers {
-        message.extend_from_slice(&number.to_le_bytes());
+/// The rectangle a message says it holds, not yet checked.
+pub(crate) fn rect_of(bytes: &[u8]) -> Option<Rect> {
+    let corner = |at: usize| bytes.get(at..at + 4).map(bytemuck::pod_read_unaligned::<u32>);
+    Some(Rect { x0: corner(32)?, y0: corner(36)?, x1: corner(40)?, y1: corner(44)? })
+}
+
+impl Codec {
+    /// Appends the message of the pixels that `view` has in `rect` to the empty buffer `out`. Without `depths` the receiver only
+    /// gets colours.
+    pub(crate) fn encode<P: Composite>(
+        &self,
+        view: &View<'_, P>,
+        rect: Rect,
+        depths: bool,
+        out: &mut Vec<u8>,
+    ) -> Counts {
+        out.clear();
+        out.resize(HEADER_BYTES, 0);
+        let depths = depths && P::HAS_DEPTH;
+        let mut counts = Counts::default();
+        if !rect.is_empty() {
+            counts = at_level!(
+                self.kernels,
+                simd => encode_rows(simd, view, rect, depths, out),
+                encode_rows_scalar(view, rect, depths, out)
+            );
+        }
+
+        // Header. A rectangle with all pixels active has no mask.
+        let mut flags = if depths { HAS_DEPTHS } else { 0 };
+        if counts.active == 0 {
+            out.truncate(HEADER_BYTES);
+        } else if counts.active < rect.pixels() {
+            flags |= HAS_MASK;
+        }
+        if self.verify {
+            flags |= IS_SUMMED;
+        }
+        let corners = |a: u32, b: u32| u64::from(a) | u64::from(b) << 32;
+        let (from, to) = (corners(rect.x0, rect.y0), corners(rect.x1, rect.y1));
+        for (slot, number) in
+            [MAGIC, 0, self.fingerprint, flags, from, to, counts.active as u64].into_iter().enumerate()
+        {
+            out[8 * slot..8 * slot + 8].copy_from_slice(&number.to_le_bytes());
+        }
+        let end = if self.verify { out.len() } else { HEADER_BYTES };
+        let sum = checksum(&out[16..end]);
+        out[8..16].copy_from_slice(&sum.to_le_bytes());
+        counts
     }
 
-    // Mask and pixels in one walk.
-    message.resize(HEADER_BYTES + 8 * mask_words, 0);
-    for (bit, index) in span.enumerate() {
-        let value = pixel(index);
-        if value.is_active() {
-            if mask_words > 0 {
-                message[HEADER_BYTES + bit / 8] |= 1 << (bit % 8);
-            }
-            value.write(&mut message);
+    /// Checks a message that must hold exactly `expected`, and `depths` or none.
+    ///
+    /// # Errors
+    /// [`WireError`], for any input that [`encode`](Self::encode) would not have made.
+    pub(crate) fn decode<'a, P: Composite>(
+        &self,
+        bytes: &'a [u8],
+        expected: Rect,
+        depths: bool,
+    ) -> Result<Part<'a>, WireError> {
+        let found = bytes.len() as u64;
+        if bytes.len() < HEADER_BYTES {
+            return Err(WireError::Length { expected: HEADER_BYTES as u64, found });
         }
+        let number = |slot: usize| bytemuck::pod_read_unaligned::<u64>(&bytes[8 * slot..8 * slot + 8]);
+        if number(0) != MAGIC {
+            return Err(WireError::Magic);
+        }
+        let flags = number(3);
+        let end = if flags & IS_SUMMED != 0 { bytes.len() } else { HEADER_BYTES };
+        let sum = checksum(&bytes[16..end]);
+        if sum != number(1) {
+            return Err(WireError::Checksum { expected: number(1), found: sum });
+        }
+        if number(2) != self.fingerprint {
+            return Err(WireError::Fingerprint);
+        }
+
+        // The rectangle is the expected one.
+        let rect = rect_of(bytes).unwrap_or(Rect::EMPTY);
+        if rect != expected {
+            return Err(WireError::Part { found: rect, expected });
+        }
+
+        // Flags and count fit the rectangle, and the length fits them.
+        let (pixels, active) = (rect.pixels() as u64, number(6));
+        let sparse = active > 0 && active < pixels;
+        if flags > 7 || number(7) != 0 || active > pixels || (flags & HAS_MASK != 0) != sparse {
+            return Err(WireError::Mask);
+        }
+        let has_depths = flags & HAS_DEPTHS != 0;
+        if has_depths != (depths && P::HAS_DEPTH) {
+            return Err(WireError::Mask);
+        }
+        let words_per_row = rect.width().div_ceil(64) as u64;
+        let mask_bytes = if sparse { 8 * words_per_row * rect.height() as u64 } else { 0 };
+        let pixel_bytes = P::Color::BYTES as u64 + if has_depths { 4 } else { 0 };
+        let needed = active
+            .checked_mul(pixel_bytes)
+            .and_then(|bytes| bytes.checked_add(mask_bytes + HEADER_BYTES as u64))
+            .ok_or(WireError::Mask)?;
+        if needed != found {
+            return Err(WireError::Length { expected: needed, found });
+        }
+        let part = Part::open(bytes, rect, active as usize, has_depths);
+        if sparse { part.check_mask().map(|()| part) } else { Ok(part) }
     }
-    let sum = checksum(&message[16..]);
-    message[8..16].copy_from_slice(&sum.to_le_bytes());
-    message
+}
+
+#[inline(always)]
+fn encode_rows<P: Composite, S: Simd>(
+    simd: S,
+    view: &View<'_, P>,
+    rect: Rect,
+    depths: bool,
+    out: &mut Vec<u8>,
+) -> Counts {
+    let mut counts = Counts::default();
+    let (width, words) = (rect.width(), rect.width().div_ceil(64));
+    out.reserve(rect.pixels() * P::BYTES);
+
+    // As long as all is active: rows as they are. Most rectangles are either dense or not so in their first row.
+    let mut y = rect.y0;
+    while y < rect.y1 {
+        let (colors, row_depths) = view.row(y, rect.x0, rect.x1);
+        let before = counts.active;
+        row_words::<P, S>(simd, colors, row_depths, &mut counts, |_| {});
+        if counts.active != before + width {
+            break;
+        }
+        out.extend_from_slice(bytemuck::cast_slice(colors));
+        if depths {
+            out.extend_from_slice(bytemuck::cast_slice(row_depths));
+        }
+        y += 1;
+    }
+    if y == rect.y1 {
+        return counts;
+    }
+
+    // With a mask, from the first row on.
+    counts = Counts::default();
+    out.truncate(HEADER_BYTES);
+    out.resize(HEADER_BYTES + 8 * words * rect.height(), 0);
+    let mut mask_at = HEADER_BYTES;
+    for y in rect.y0..rect.y1 {
+        let (colors, row_depths) = view.row(y, rect.x0, rect.x1);
+        let before = counts.active;
+        let mut word_at = mask_at;
+        row_words::<P, S>(simd, colors, row_depths, &mut counts, |word| {
+            out[word_at..word_at + 8].copy_from_slice(&word.to_le_bytes());
+            word_at += 8;
+        });
+        if counts.active > before {
+            let colors = bytemuck::cast_slice(colors);
+            match P::Color::BYTES {
+                4 => append_active::<4, S>(simd, out, mask_at, colors),
+                8 => append_active::<8, S>(simd, out, mask_at, colors),
+                _ => append_active::<16, S>(simd, out, mask_at, colors),
+            }
+            if depths {
+                append_active::<4, S>(simd, out, mask_at, bytemuck::cast_slice(row_depths));
+            }
+        }
+        mask_at = word_at;
+    }
+    counts
+}
+
+/// [`encode_rows`] one pixel after the other.
+fn encode_rows_scalar<P: Composite>(
+    view: &View<'_, P>,
+    rect: Rect,
+    depths: bool,
+    out: &mut Vec<u8>,
+) -> Counts {
+    let mut counts = Counts::default();
+    let words = rect.width().div_ceil(64);
+    out.resize(HEADER_BYTES + 8 * words * rect.height(), 0);
+    let mut mask_at = HEADER_BYTES;
+    for y in rect.y0..rect.y1 {
+        let (colors, row_depths) = view.row(y, rect.x0, rect.x1);
+        let mut word_at = mask_at;
+        row_words_scalar::<P>(colors, row_depths, &mut counts, |word| {
+            out[word_at..word_at + 8].copy_from_slice(&word.to_le_bytes());
+            word_at += 8;
+        });
+        let colors = bytemuck::cast_slice(colors);
+        match P::Color::BYTES {
+            4 => append_active_scalar::<4>(out, mask_at, colors),
+            8 => append_active_scalar::<8>(out, mask_at, colors),
+            _ => append_active_scalar::<16>(out, mask_at, colors),
+        }
+        if depths {
+            append_active_scalar::<4>(out, mask_at, bytemuck::cast_slice(row_depths));
+        }
+        mask_at = word_at;
+    }
+    if counts.active == rect.pixels() {
+        out.drain(HEADER_BYTES..mask_at);
+    }
+    counts
 }
 
 /// A message whose every number has been checked.
-#[derive(Debug)]
-pub struct Part<'a> {
-    /// The pixels of the whole image that it speaks of.
-    pub range: Range<usize>,
-    /// First active pixel, relative to the part.
-    first: usize,
-    span: usize,
-    /// Active pixels in it.
-    pub active: usize,
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Part<'a> {
+    pub(crate) rect: Rect,
+    pub(crate) active: usize,
+    has_depths: bool,
     mask: &'a [u8],
     pixels: &'a [u8],
 }
 
-/// Checks a message. `image_pixels` is the size of the whole image; `expected`, if known, the part it must hold.
-///
-/// # Errors
-/// [`WireError`], for any input that [`encode`] would not have made.
-pub fn decode<P: Composite>(
-    bytes: &[u8],
-    fingerprint: u64,
-    image_pixels: usize,
-    expected: Option<Range<usize>>,
-) -> Result<Part<'_>, WireError> {
-    let found = bytes.len() as u64;
-    if bytes.len() < HEADER_BYTES {
-        return Err(WireError::Length { expected: HEADER_BYTES as u64, found });
-    }
-    let number = |i: usize| word(&bytes[8 * i..8 * i + 8]);
-    if number(0) != MAGIC {
-        return Err(WireError::Magic);
-    }
-    let sum = checksum(&bytes[16..]);
-    if sum != number(1) {
-        return Err(WireError::Checksum { expected: number(1), found: sum });
-    }
-    if number(2) != fingerprint {
-        return Err(WireError::Fingerprint);
+impl<'a> Part<'a> {
+    /// A message that [`Codec::decode`] has accepted, from its own number of active pixels.
+    pub(crate) fn reopen<P: Composite>(bytes: &'a [u8], rect: Rect, depths: bool) -> Self {
+        let active = bytes.get(48..56).map_or(0, bytemuck::pod_read_unaligned::<u64>);
+        Self::open(bytes, rect, active as usize, depths && P::HAS_DEPTH)
     }
 
-    // The part lies within the image and is the expected one.
-    let (start, end) = (number(3), number(3).saturating_add(number(4)));
-    let agreed =
-        expected.unwrap_or(start.min(image_pixels as u64) as usize..end.min(image_pixels as u64) as usize);
-    if (start, end) != (agreed.start as u64, agreed.end as u64) {
-        return Err(WireError::Part {
-            start,
-            end,
-            expected_start: agreed.start as u64,
-            expected_end: agreed.end as u64,
-        });
+    fn open(bytes: &'a [u8], rect: Rect, active: usize, has_depths: bool) -> Self {
+        let sparse = active > 0 && active < rect.pixels();
+        let mask_bytes = if sparse { 8 * rect.width().div_ceil(64) * rect.height() } else { 0 };
+        let (mask, pixels) = bytes[HEADER_BYTES..].split_at(mask_bytes);
+        Self { rect, active, has_depths, mask, pixels }
     }
 
-    // Span and count fit the part, and the length fits them.
-    let (first, span, active) = (number(5), number(6), number(7));
-    if first.checked_add(span).is_none_or(|last| last > agreed.len() as u64) || active > span {
-        return Err(WireError::Mask);
-    }
-    let mask_bytes = if active == span { 0 } else { 8 * span.div_ceil(64) };
-    let pixel_bytes = active.checked_mul(P::BYTES as u64).ok_or(WireError::Mask)?;
-    let needed = (HEADER_BYTES as u64).saturating_add(mask_bytes).saturating_add(pixel_bytes);
-    if needed != found {
-        return Err(WireError::Length { expected: needed, found });
-    }
-    let (mask, pixels) = bytes[HEADER_BYTES..].split_at(mask_bytes as usize);
-    let ones: u64 = mask.iter().map(|byte| u64::from(byte.count_ones())).sum();
-    let past_the_end = (span..8 * mask_bytes).any(|bit| (mask[(bit / 8) as usize] >> (bit % 8)) & 1 == 1);
-    if mask_bytes > 0 && (ones != active || past_the_end) {
-        return Err(WireError::Mask);
-    }
-    Ok(Part {
-        range: agreed,
-        first: first as usize,
-        span: span as usize,
-        active: active as usize,
-        mask,
-        pixels,
-    })
-}
-
-impl Part<'_> {
-    /// Calls `visit` with every active pixel and its index within the part.
-    pub fn for_each_active<P: Composite>(&self, mut visit: impl FnMut(usize, P)) {
-        let mut pixels = self.pixels.chunks_exact(P::BYTES).map(P::read);
-        if self.mask.is_empty() {
-            for (index, pixel) in (self.first..self.first + self.span).zip(pixels) {
-                visit(index, pixel);
+    /// The mask has as many ones as announced, and none behind the end of a row.
+    fn check_mask(&self) -> Result<(), WireError> {
+        let width = self.rect.width();
+        let outside = if width.is_multiple_of(64) { 0 } else { u64::MAX << (width % 64) };
+        let row_bytes = 8 * width.div_ceil(64);
+        let mut ones = 0_usize;
+        for row in self.mask.chunks_exact(row_bytes) {
+            let mut last = 0;
+            for word in row.as_chunks::<8>().0 {
+                last = u64::from_le_bytes(*word);
+                ones += last.count_ones() as usize;
             }
+            if last & outside != 0 {
+                return Err(WireError::Mask);
+            }
+        }
+        if ones == self.active { Ok(()) } else { Err(WireError::Mask) }
+    }
+
+    /// Calls `visit` with every row, top to bottom, that may have active pixels.
+    #[inline(always)]
+    fn for_each_row<P: Composite>(&self, mut visit: impl FnMut(u32, SparseRow<'a>)) {
+        if self.active == 0 {
             return;
         }
-        for (word_index, bytes) in self.mask.chunks_exact(8).enumerate() {
-            let mut bits = word(bytes);
-            while bits != 0 {
-                let bit = bits.trailing_zeros() as usize;
-                bits &= bits - 1;
-                if let Some(pixel) = pixels.next() {
-                    visit(self.first + 64 * word_index + bit, pixel);
+        let row_bytes = 8 * self.rect.width().div_ceil(64);
+        let mut at = 0;
+        for (index, y) in (self.rect.y0..self.rect.y1).enumerate() {
+            let mask = if self.mask.is_empty() {
+                &[]
+            } else {
+                &self.mask[index * row_bytes..(index + 1) * row_bytes]
+            };
+            let active = if mask.is_empty() {
+                self.rect.width()
+            } else {
+                mask.as_chunks::<8>()
+                    .0
+                    .iter()
+                    .map(|word| u64::from_le_bytes(*word).count_ones() as usize)
+                    .sum()
+            };
+            let depths_at = at + active * P::Color::BYTES;
+            let end = depths_at + if self.has_depths { 4 * active } else { 0 };
+            visit(
+                y,
+                SparseRow {
+                    mask,
+                    colors: &self.pixels[at..depths_at],
+                    depths: &self.pixels[depths_at..end],
+                    behind_colors: &self.pixels[at..],
+                    behind_depths: &self.pixels[depths_at..],
+                },
+            );
+            at = end;
+        }
+    }
+
+    /// Joins its pixels to `layer`, whose bounds must hold the rectangle.
+    pub(crate) fn join_to<P: Composite>(&self, kernels: Kernels, layer: &mut Layer<P>, side: Side) {
+        at_level!(
+            kernels,
+            simd => self.for_each_row::<P>(
+                #[inline(always)]
+                |y, row| {
+                    let (colors, depths) = layer.row_mut(y, self.rect.x0, self.rect.x1);
+                    join_row::<P, _>(simd, row, colors, depths, side);
+                }
+            ),
+            self.for_each_row::<P>(|y, row| {
+                let (colors, depths) = layer.row_mut(y, self.rect.x0, self.rect.x1);
+                join_row_scalar::<P>(row, colors, depths, side);
+            })
+        );
+    }
+
+    /// Writes its rectangle into planes of `width` columns; `depths` may be empty.
+    pub(crate) fn place<P: Composite>(&self, width: usize, colors: &mut [P::Color], depths: &mut [f32]) {
+        let range = |y: u32| {
+            let start = y as usize * width + self.rect.x0 as usize;
+            start..start + self.rect.width()
+        };
+        if self.active == 0 {
+            for y in self.rect.y0..self.rect.y1 {
+                colors[range(y)].fill(P::EMPTY.color());
+                if !depths.is_empty() {
+                    depths[range(y)].fill(1.0);
                 }
             }
         }
-    }
-
-    /// All pixels of the part, [`EMPTY`](crate::PixelFormat::EMPTY) where nothing is active.
-    pub fn to_pixels<P: Composite>(&self) -> Vec<P> {
-        let mut all = vec![P::EMPTY; self.range.len()];
-        self.for_each_active(|index, pixel| all[index] = pixel);
-        all
+        self.for_each_row::<P>(|y, row| {
+            let to_depths = if depths.is_empty() { &mut [] } else { &mut depths[range(y)] };
+            place_row::<P>(row, &mut colors[range(y)], to_depths);
+        });
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::pixel::{DepthPixel, PixelFormat};
-
-    type P = DepthPixel<[u8; 4]>;
-
-    fn pattern(active: impl Fn(usize) -> bool) -> impl Fn(usize) -> P {
-        move |i| {
-            let depth = if active(i) { 0.5 } else { 1.0 };
-            if active(i) { P::from_parts([i as u8, 1, 2, 3], depth) } else { P::EMPTY }
-        }
-    }
-
-    fn random(state: &mut u64) -> u64 {
-        *state ^= *state << 13;
-        *state ^= *state >> 7;
-        *state ^= *state << 17;
-        *state
-    }
-
-    #[test]
-    fn every_pattern_of_runs_survives() {
-        let mut seed = 1;
-        for length in [0, 1, 2, 63, 64, 65, 127, 129, 300] {
-            for kind in 0..6 {
-                let salt = random(&mut seed);
-                let pixel = pattern(|i| match kind {
-                    0 => false,
-                    1 => true,
-                    2 => i % 3 == 0,
-                    3 => i == 10 + length / 2,
-                    4 => i > 10 + length / 3,
-                    _ => (salt >> (i % 64)) & 1 == 1,
-                });
-                let message = encode(9, 10..10 + length, &pixel);
-                let part = decode::<P>(&message, 9, 400, Some(10..10 + length)).unwrap();
-                let pixels: Vec<P> = (10..10 + length).map(&pixel).collect();
-                assert_eq!(part.to_pixels::<P>(), pixels, "length {length}, kind {kind}");
-                assert_eq!(part.active, pixels.iter().filter(|p| p.is_active()).count());
-            }
-        }
-    }
-
-    #[test]
-    fn an_empty_part_costs_its_header_and_a_dense_one_no_mask() {
-        assert_eq!(encode(0, 0..1000, pattern(|_| false)).len(), HEADER_BYTES);
-        assert_eq!(encode(0, 0..1000, pattern(|_| true)).len(), HEADER_BYTES + 1000 * P::BYTES);
-    }
-
-    #[test]
-    fn no_truncation_and_no_flipped_bit_goes_unnoticed() {
-        let good = encode(3, 5..105, pattern(|i| i % 3 != 0));
-        for length in 0..good.len() {
-            assert!(decode::<P>(&good[..length], 3, 200, Some(5..105)).is_err(), "cut to {length} bytes");
-        }
-        for bit in 0..8 * good.len() {
-            let mut bad = good.clone();
-            bad[bit / 8] ^= 1 << (bit % 8);
-            assert!(decode::<P>(&bad, 3, 200, Some(5..105)).is_err(), "bit {bit}");
-        }
-    }
-
-    /// Lies with a right checksum: the decoder must find the contradiction itself.
-    #[test]
-    fn consistent_checksums_do_not_make_the_decoder_trust_the_numbers() {
-        let good = encode(3, 5..105, pattern(|i| i % 3 != 0));
-        let mut seed = 77;
-        let mut refused = 0;
-        for _ in 0..20_000 {
-            let mut bad = good.clone();
-            for _ in 0..1 + random(&mut seed) % 3 {
-                let field = 3 + (random(&mut seed) % 8) as usize;
-                let value = match random(&mut seed) % 4 {
-                    0 => u64::MAX - random(&mut seed) % 200,
-                    1 => random(&mut seed) % 200,
-                    _ => random(&mut seed) >> (random(&mut seed) % 64),
-                };
-                bad[8 * field..8 * field + 8].copy_from_slice(&value.to_le_bytes());
-            }
-            let sum = checksum(&bad[16..]);
-            bad[8..16].copy_from_slice(&sum.to_le_bytes());
-            match decode::<P>(&bad, 3, 200, None) {
-                // Whatever is accepted must be readable without panic and keep its own count.
-                Ok(part) => {
-                    let mut count = 0;
-                    part.for_each_active::<P>(|index, _| {
-                        assert!(index < part.range.len());
-                        count += 1;
-                    });
-                    assert_eq!(count, part.active);
-                }
-                Err(_) => refused += 1,
-            }
-        }
-        assert!(refused > 15_000, "only {refused} of 20000 lies were refused");
-    }
-
-    #[test]
-    fn another_fingerprint_or_part_is_named() {
-        let good = encode(3, 0..4, pattern(|_| true));
-        assert_eq!(decode::<P>(&good, 4, 200, None).unwrap_err(), WireError::Fingerprint);
-        let error = decode::<P>(&good, 3, 200, Some(0..5)).unwrap_err();
-        assert_eq!(error.to_string(), "it holds pixels 0..4 instead of 0..5");
-        assert!(matches!(decode::<P>(&good, 3, 3, None), Err(WireError::Part { .. })));
-    }
-}
+mod tests;

@@ -34,3 +34,4 @@ mod traverse;
 pub mod volume;
 
 pub use glam;
+pub use shade::waves;

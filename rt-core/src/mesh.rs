@@ -1,6 +1,7 @@
 //! Indexed triangle meshes with attributes, and what is wrong with them.
 
 use crate::math::Aabb;
+use crate::scene::attribute_part;
 use glam::{DVec3, Vec2, Vec3};
 
 /// Whether an [`Attribute`] has one value per vertex or one per triangle.
@@ -135,6 +136,27 @@ impl TriMesh {
     #[inline]
     pub fn triangle(&self, i: usize) -> [Vec3; 3] {
         self.indices[i].map(|k| self.positions[k as usize])
+    }
+
+    /// The triangles `kept` with their vertices and attributes, relative to the same origin; and of each vertex its number here, in ascending
+    /// order. Triangles that name vertices past the end stay unusable. Panics when this mesh has no such triangle.
+    pub fn part(&self, kept: &[u32]) -> (TriMesh, Vec<u32>) {
+        let mut vertices: Vec<u32> = kept.iter().flat_map(|&t| self.indices[t as usize]).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        vertices.retain(|&v| (v as usize) < self.positions.len());
+        let new_index = |v: u32| vertices.binary_search(&v).map_or(u32::MAX, |i| i as u32);
+        let of_vertices = |i: &u32| *i as usize;
+        let part = TriMesh {
+            origin: self.origin,
+            positions: vertices.iter().map(|i| self.positions[of_vertices(i)]).collect(),
+            indices: kept.iter().map(|&t| self.indices[t as usize].map(new_index)).collect(),
+            normals: self.normals.as_ref().map(|n| attribute_part(n, &vertices, kept)),
+            colors: self.colors.as_ref().map(|c| attribute_part(c, &vertices, kept)),
+            scalars: self.scalars.as_ref().map(|s| attribute_part(s, &vertices, kept)),
+            texcoords: self.texcoords.as_ref().map(|t| vertices.iter().map(|i| t[of_vertices(i)]).collect()),
+        };
+        (part, vertices)
     }
 
     /// Checks the lengths of the attributes and the number of triangles.

@@ -15,6 +15,10 @@
 //! assert_eq!(output.report.rays.reflection, 0);
 //! ```
 
+mod part;
+
+pub(crate) use part::attribute_part;
+
 use crate::accel::{BuildError, BuildOptions, Geometry, Instance, World};
 use crate::effects::Effects;
 use crate::environment::{Background, Environment};

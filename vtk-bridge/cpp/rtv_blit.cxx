@@ -46,7 +46,8 @@ void RtvBlit::Upload(vtkRenderer* renderer, const RtvPicture& p)
     return texture.Get();
   };
   this->Blended = p.blended != nullptr;
-  this->Height = static_cast<int>(p.height);
+  this->Size[0] = static_cast<int>(p.width);
+  this->Size[1] = static_cast<int>(p.height);
   if (this->Blended)
   {
     ready(this->Color)->Create2DFromRaw(p.width, p.height, 4, VTK_FLOAT, const_cast<float*>(p.blended));
@@ -71,10 +72,10 @@ void RtvBlit::Draw(vtkRenderer* renderer, int x, int y, int width, int height, i
     std::string fragment = vtkOpenGLRenderUtilities::GetFullScreenQuadFragmentShaderTemplate();
     vtkShaderProgram::Substitute(fragment, "//VTK::FSQ::Decl",
       "uniform sampler2D color; uniform sampler2D depth; uniform sampler2D firstDepth;\n"
-      "uniform int stage; uniform int blended; uniform int originX; uniform int originY; uniform int rows;\n");
+      "uniform int stage; uniform int blended; uniform ivec2 size;\n");
     // Rows of the picture come from the top.
     vtkShaderProgram::Substitute(fragment, "//VTK::FSQ::Impl",
-      "ivec2 at = ivec2(int(gl_FragCoord.x) - originX, rows - 1 - (int(gl_FragCoord.y) - originY));\n"
+      "ivec2 at = ivec2(texCoord * vec2(size)); at.y = size.y - 1 - at.y;\n"
       "vec4 c = texelFetch(color, at, 0); float d = texelFetch(depth, at, 0).r;\n"
       "if (c.a <= 0.0) discard;\n"
       "if (blended != 0) { if ((d < 1.0) == (stage == 1)) discard;\n"
@@ -101,9 +102,7 @@ void RtvBlit::Draw(vtkRenderer* renderer, int x, int y, int width, int height, i
   program->SetUniformi("firstDepth", first->GetTextureUnit());
   program->SetUniformi("stage", stage);
   program->SetUniformi("blended", this->Blended ? 1 : 0);
-  program->SetUniformi("originX", x);
-  program->SetUniformi("originY", y);
-  program->SetUniformi("rows", this->Height);
+  program->SetUniform2i("size", this->Size);
   vtkOpenGLState* state = window->GetState();
   {
     vtkOpenGLState::ScopedglEnableDisable depthTest(state, GL_DEPTH_TEST), blend(state, GL_BLEND),

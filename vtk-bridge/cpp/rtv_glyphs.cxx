@@ -2,12 +2,16 @@
 #include "rtv_arrays.h"
 
 #include <algorithm>
+#include <cmath>
 #include <vtkActor.h>
 #include <vtkDataArray.h>
 #include <vtkDataSet.h>
 #include <vtkGlyph3DMapper.h>
+#include <vtkInformation.h>
 #include <vtkMath.h>
 #include <vtkMatrix4x4.h>
+#include <vtkPlaneCollection.h>
+#include <vtkPointData.h>
 #include <vtkPolyData.h>
 #include <vtkTransform.h>
 #include <vtkUnsignedCharArray.h>
@@ -16,7 +20,17 @@ namespace
 {
 vtkDataArray* InputArray(vtkGlyph3DMapper* mapper, int index, vtkDataSet* data)
 {
-  return vtkDataArray::SafeDownCast(mapper->GetInputAbstractArrayToProcess(index, data));
+  vtkInformation* info = mapper->GetInputArrayInformation(index);
+  vtkPointData* arrays = data->GetPointData();
+  if (info->Has(vtkDataObject::FIELD_NAME()))
+  {
+    return arrays->GetArray(info->Get(vtkDataObject::FIELD_NAME()));
+  }
+  if (info->Has(vtkDataObject::FIELD_ATTRIBUTE_TYPE()))
+  {
+    return vtkDataArray::SafeDownCast(arrays->GetAbstractAttribute(info->Get(vtkDataObject::FIELD_ATTRIBUTE_TYPE())));
+  }
+  return nullptr;
 }
 
 // The rotation of one glyph, as vtkGlyph3DMapper documents it.

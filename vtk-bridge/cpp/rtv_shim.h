@@ -56,7 +56,7 @@ private:
   vtkOpenGLQuadHelper* Quad = nullptr;
   vtkSmartPointer<vtkTextureObject> Color, Depth, FirstDepth;
   bool Blended = false;
-  int Height = 0;
+  int Size[2] = { 0, 0 };
 };
 
 class vtkRtvRenderer : public vtkOpenGLRenderer

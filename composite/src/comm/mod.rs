@@ -1,13 +1,51 @@
 //! How ranks talk. Compositing needs no more than this trait, so any transport can be plugged in.
+pub mod collective;
 pub mod threads;
+
+mod error;
+mod pool;
+
+pub use error::CommError;
+pub use pool::BufferPool;
 
 use std::time::Duration;
 
+/// Tags from here on are for [`collective`] and for the back ends themselves.
+pub const FIRST_RESERVED_TAG: u32 = 16_384;
+
+/// A receive that has been posted and not yet waited for. Made by [`Communicator::post_recv`], used up by
+/// [`Communicator::wait_any`]; dropping it leaves the message, when it comes, unread.
+#[derive(Debug)]
+pub struct Receive {
+    /// Which of the communicator's receives; for back ends.
+    pub id: u64,
+    /// From whom.
+    pub source: usize,
+    /// Tag of the message.
+    pub tag: u32,
+    /// Longest message allowed, in bytes.
+    pub capacity: usize,
+}
+
+/// A message that has come.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Arrival {
+    /// From whom.
+    pub source: usize,
+    /// Its tag.
+    pub tag: u32,
+    /// Its bytes. Give the buffer back with [`Communicator::recycle`] when it is read.
+    pub message: Vec<u8>,
+}
+
 /// A group of ranks, seen from one of them.
 ///
-/// Messages from one rank to another with one tag arrive in the order they were sent. No call waits for longer than its
-/// timeout, and a rank that gives up tells the others by [`abort`](Self::abort), so that a fault ends in an error on every
-/// rank and never in a hang.
+/// Messages from one rank to another with one tag arrive in the order they were sent, and receives of one source and tag are
+/// served in the order they were posted. Tags are below [`FIRST_RESERVED_TAG`]. Buffers are owned: what is sent is handed
+/// over, what comes is the receiver's.
+///
+/// No call waits for longer than its timeout, and a rank that gives up tells the others by [`abort`](Self::abort), so that a
+/// fault ends in an error on every rank and never in a hang.
 pub trait Communicator {
     /// This rank, below [`size`](Self::size).
     fn rank(&self) -> usize;
@@ -15,95 +53,90 @@ pub trait Communicator {
     /// Number of ranks.
     fn size(&self) -> usize;
 
+    /// Seconds since some moment in the past, the time in which costs are counted: wall-clock time, or the virtual time of a
+    /// simulated network.
+    fn now(&self) -> f64;
+
     /// Hands `message` over to `destination`; does not wait for it to be received.
     ///
     /// # Errors
-    /// [`CommError::NoSuchRank`], [`CommError::PeerLost`] or [`CommError::Aborted`].
+    /// [`CommError::NoSuchRank`], [`CommError::PeerLost`], [`CommError::Aborted`] or [`CommError::Transport`].
     fn send(&mut self, destination: usize, tag: u32, message: Vec<u8>) -> Result<(), CommError>;
 
-    /// The next message from `source` with this `tag`.
+    /// Announces that a message of at most `capacity` bytes from `source` with this `tag` will be waited for. Posted before it
+    /// comes, a message goes straight into its place while this rank works on something else.
     ///
     /// # Errors
-    /// As [`send`](Self::send), and [`CommError::Timeout`] when `timeout` has passed without one.
-    fn recv(&mut self, source: usize, tag: u32, timeout: Duration) -> Result<Vec<u8>, CommError>;
+    /// [`CommError::NoSuchRank`], [`CommError::Aborted`] or [`CommError::Transport`].
+    fn post_recv(&mut self, source: usize, tag: u32, capacity: usize) -> Result<Receive, CommError>;
 
-    /// Waits until all ranks have called it.
+    /// Waits until the message of one of `posted` is there, and takes that one out of the list (the others keep their order).
+    /// A `timeout` of zero looks once.
     ///
     /// # Errors
-    /// [`CommError::BarrierTimeout`], [`CommError::PeerLost`] or [`CommError::Aborted`].
-    fn barrier(&mut self, timeout: Duration) -> Result<(), CommError>;
+    /// [`CommError::Timeout`] when `timeout` has passed, [`CommError::PeerLost`] when one of the sources has left before it sent,
+    /// [`CommError::TooLong`], [`CommError::NothingPosted`] for an empty list, [`CommError::Aborted`], [`CommError::Transport`].
+    fn wait_any(&mut self, posted: &mut Vec<Receive>, timeout: Duration) -> Result<Arrival, CommError>;
 
     /// Ends the group: all waiting and later calls on every rank give [`CommError::Aborted`] with this rank and `reason`.
     /// Only the first call counts.
     fn abort(&mut self, reason: &str);
-}
 
-/// Why ranks could not talk.
-#[derive(Debug, thiserror::Error, Clone, PartialEq, Eq)]
-pub enum CommError {
-    /// A message did not come in time.
-    #[error(
-        "rank {rank} waited {waited_ms} ms for a message from rank {peer} (tag {tag}) in vain: \
-         is that rank stalled, or the timeout too short for its rendering?"
-    )]
-    Timeout {
-        /// Who waited.
-        rank: usize,
-        /// For whom.
-        peer: usize,
-        /// Tag of the message.
+    /// The message of one of `posted` if one is already there.
+    ///
+    /// # Errors
+    /// As [`wait_any`](Self::wait_any), without its timeout.
+    fn test_any(&mut self, posted: &mut Vec<Receive>) -> Result<Option<Arrival>, CommError> {
+        match self.wait_any(posted, Duration::ZERO) {
+            Ok(arrival) => Ok(Some(arrival)),
+            Err(CommError::Timeout { .. }) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The next message of at most `capacity` bytes from `source` with this `tag`.
+    ///
+    /// # Errors
+    /// As [`post_recv`](Self::post_recv) and [`wait_any`](Self::wait_any).
+    fn recv(
+        &mut self,
+        source: usize,
         tag: u32,
-        /// How long, in milliseconds.
-        waited_ms: u64,
-    },
-    /// Not all ranks came to a barrier in time.
-    #[error("rank {rank} waited {waited_ms} ms at a barrier in vain: rank {missing} did not come")]
-    BarrierTimeout {
-        /// Who waited.
-        rank: usize,
-        /// The lowest rank that did not come.
-        missing: usize,
-        /// How long, in milliseconds.
-        waited_ms: u64,
-    },
-    /// A rank has left the group (its program part ended or panicked).
-    #[error("rank {rank} lost rank {peer}: it has left the group")]
-    PeerLost {
-        /// Who noticed.
-        rank: usize,
-        /// Who is gone.
-        peer: usize,
-    },
-    /// Another rank, or this one, gave up.
-    #[error("rank {by} ended the group: {reason}")]
-    Aborted {
-        /// Who gave up.
-        by: usize,
-        /// Why.
-        reason: String,
-    },
-    /// A rank number that the group does not have.
-    #[error("there is no rank {peer} in a group of {size}")]
-    NoSuchRank {
-        /// The number.
-        peer: usize,
-        /// Size of the group.
-        size: usize,
-    },
-    /// A rank's thread panicked ([`threads::run`] only).
-    #[error("rank {rank} panicked: {message}")]
-    Panicked {
-        /// Who.
-        rank: usize,
-        /// The message of the panic.
-        message: String,
-    },
-    /// The operating system gave no thread ([`threads::run`] only).
-    #[error("no thread for rank {rank}: {reason}: use fewer ranks")]
-    NoThread {
-        /// Who.
-        rank: usize,
-        /// The system's words.
-        reason: String,
-    },
+        capacity: usize,
+        timeout: Duration,
+    ) -> Result<Vec<u8>, CommError> {
+        let mut posted = vec![self.post_recv(source, tag, capacity)?];
+        Ok(self.wait_any(&mut posted, timeout)?.message)
+    }
+
+    /// Waits until all ranks have called it.
+    ///
+    /// # Errors
+    /// [`CommError::BarrierTimeout`], [`CommError::PeerLost`], [`CommError::Aborted`] or [`CommError::Transport`].
+    fn barrier(&mut self, timeout: Duration) -> Result<(), CommError> {
+        collective::barrier(self, timeout)
+    }
+
+    /// Gives the bytes `mine` of every rank to every rank, in rank order. `longest` (bytes, the same on all ranks) bounds their
+    /// lengths, which may differ.
+    ///
+    /// # Errors
+    /// As [`send`](Self::send) and [`wait_any`](Self::wait_any); [`CommError::TooLong`] if `mine` is longer than `longest`.
+    fn all_gather(
+        &mut self,
+        mine: &[u8],
+        longest: usize,
+        timeout: Duration,
+    ) -> Result<Vec<Vec<u8>>, CommError> {
+        collective::all_gather(self, mine, longest, timeout)
+    }
+
+    /// An empty buffer with room for `capacity` bytes, from those given back if there is one: fresh memory costs a page fault
+    /// every 4 KiB, more than many a network takes to fill it.
+    fn buffer(&mut self, capacity: usize) -> Vec<u8> {
+        Vec::with_capacity(capacity)
+    }
+
+    /// Gives a buffer back for [`buffer`](Self::buffer) and for later receives.
+    fn recycle(&mut self, _buffer: Vec<u8>) {}
 }

@@ -1,8 +1,8 @@
 //! Ranks as threads of one process: every rank has a mailbox for each other rank, messages are moved and not copied.
 //!
 //! The whole group shares one lock. It is held for the move of one pointer, never while pixels are worked on.
-use super::{CommError, Communicator};
-use std::collections::VecDeque;
+use super::{Arrival, BufferPool, CommError, Communicator, Receive};
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -19,6 +19,8 @@ struct State {
 }
 
 struct Group {
+    /// When the group was made; all ranks count their time from here.
+    begin: Instant,
     state: Mutex<State>,
     /// One per rank, so that a message wakes its receiver alone.
     wake: Vec<Condvar>,
@@ -42,6 +44,12 @@ impl Group {
 pub struct ThreadComm {
     rank: usize,
     group: Arc<Group>,
+    /// Receives not yet served, oldest first, by source and tag.
+    posted: BTreeMap<(usize, u32), VecDeque<(u64, usize)>>,
+    /// Messages that belong to a receive that nobody has waited for yet.
+    early: Vec<(u64, Vec<u8>)>,
+    next_id: u64,
+    pool: BufferPool,
 }
 
 /// A group of `size` ranks; hand each element to its own thread.
@@ -54,8 +62,17 @@ pub fn group(size: usize) -> Vec<ThreadComm> {
         barriers_done: 0,
     };
     let wake = (0..size).map(|_| Condvar::new()).collect();
-    let group = Arc::new(Group { state: Mutex::new(state), wake });
-    (0..size).map(|rank| ThreadComm { rank, group: Arc::clone(&group) }).collect()
+    let group = Arc::new(Group { begin: Instant::now(), state: Mutex::new(state), wake });
+    (0..size)
+        .map(|rank| ThreadComm {
+            rank,
+            group: Arc::clone(&group),
+            posted: BTreeMap::new(),
+            early: Vec::new(),
+            next_id: 0,
+            pool: BufferPool::default(),
+        })
+        .collect()
 }
 
 /// Runs `work` on `size` ranks, each on a thread of its own, and returns their results in rank order.
@@ -94,15 +111,18 @@ impl ThreadComm {
         let size = self.group.wake.len();
         if peer < size { Ok(()) } else { Err(CommError::NoSuchRank { peer, size }) }
     }
+}
 
+impl Group {
     /// Waits until `ready` gives something, the group is aborted, or `timeout` has passed (then `None`).
     fn wait<T>(
         &self,
+        rank: usize,
         timeout: Duration,
         mut ready: impl FnMut(&mut State) -> Option<Result<T, CommError>>,
     ) -> Result<Option<T>, CommError> {
         let begin = Instant::now();
-        let mut state = self.group.lock();
+        let mut state = self.lock();
         loop {
             if let Some((by, reason)) = &state.aborted {
                 return Err(CommError::Aborted { by: *by, reason: reason.clone() });
@@ -113,7 +133,7 @@ impl ThreadComm {
             let Some(left) = timeout.checked_sub(begin.elapsed()).filter(|left| !left.is_zero()) else {
                 return Ok(None);
             };
-            let woken = self.group.wake[self.rank].wait_timeout(state, left);
+            let woken = self.wake[rank].wait_timeout(state, left);
             state = woken.unwrap_or_else(PoisonError::into_inner).0;
         }
     }
@@ -126,6 +146,10 @@ impl Communicator for ThreadComm {
 
     fn size(&self) -> usize {
         self.group.wake.len()
+    }
+
+    fn now(&self) -> f64 {
+        self.group.begin.elapsed().as_secs_f64()
     }
 
     fn send(&mut self, destination: usize, tag: u32, message: Vec<u8>) -> Result<(), CommError> {
@@ -142,17 +166,51 @@ impl Communicator for ThreadComm {
         Ok(())
     }
 
-    fn recv(&mut self, source: usize, tag: u32, timeout: Duration) -> Result<Vec<u8>, CommError> {
+    fn post_recv(&mut self, source: usize, tag: u32, capacity: usize) -> Result<Receive, CommError> {
         self.check_rank(source)?;
+        let id = self.next_id;
+        self.next_id += 1;
+        self.posted.entry((source, tag)).or_default().push_back((id, capacity));
+        Ok(Receive { id, source, tag, capacity })
+    }
+
+    fn wait_any(&mut self, posted: &mut Vec<Receive>, timeout: Duration) -> Result<Arrival, CommError> {
         let rank = self.rank;
-        let message = self.wait(timeout, |state| {
-            let mail = &mut state.mail[rank][source];
-            if let Some(position) = mail.iter().position(|(its_tag, _)| *its_tag == tag) {
-                return mail.remove(position).map(|(_, message)| Ok(message));
+        let first = posted.first().ok_or(CommError::NothingPosted { rank })?;
+        let silent = CommError::Timeout {
+            rank,
+            peer: first.source,
+            tag: first.tag,
+            waited_ms: timeout.as_millis() as u64,
+        };
+        // Every message goes to the oldest receive of its source and tag, whether that one is waited for now or later.
+        let (queues, early) = (&mut self.posted, &mut self.early);
+        let came = self.group.wait(rank, timeout, |state| {
+            for (position, receive) in posted.iter().enumerate() {
+                if let Some(at) = early.iter().position(|(id, _)| *id == receive.id) {
+                    return Some(Ok((position, early.swap_remove(at).1)));
+                }
+                let queue = queues.get_mut(&(receive.source, receive.tag))?;
+                let mail = &mut state.mail[rank][receive.source];
+                while let Some(at) = mail.iter().position(|(tag, _)| *tag == receive.tag) {
+                    let Some((id, capacity)) = queue.pop_front() else { break };
+                    let message = mail.remove(at).map(|(_, message)| message).unwrap_or_default();
+                    if message.len() > capacity {
+                        let (peer, tag) = (receive.source, receive.tag);
+                        return Some(Err(CommError::TooLong { rank, peer, tag, capacity }));
+                    }
+                    if id == receive.id {
+                        return Some(Ok((position, message)));
+                    }
+                    early.push((id, message));
+                }
             }
-            state.lost[source].then_some(Err(CommError::PeerLost { rank, peer: source }))
+            let lost = posted.iter().find(|receive| state.lost[receive.source])?;
+            Some(Err(CommError::PeerLost { rank, peer: lost.source }))
         })?;
-        message.ok_or(CommError::Timeout { rank, peer: source, tag, waited_ms: timeout.as_millis() as u64 })
+        let (position, message) = came.ok_or(silent)?;
+        let Receive { source, tag, .. } = posted.remove(position);
+        Ok(Arrival { source, tag, message })
     }
 
     fn barrier(&mut self, timeout: Duration) -> Result<(), CommError> {
@@ -168,7 +226,7 @@ impl Communicator for ThreadComm {
             }
             before
         };
-        let passed = self.wait(timeout, |state| {
+        let passed = self.group.wait(rank, timeout, |state| {
             if state.barriers_done > before {
                 return Some(Ok(()));
             }
@@ -195,6 +253,14 @@ impl Communicator for ThreadComm {
             state.aborted = Some((self.rank, reason.to_string()));
         }
         self.group.wake_all();
+    }
+
+    fn buffer(&mut self, capacity: usize) -> Vec<u8> {
+        self.pool.take(capacity)
+    }
+
+    fn recycle(&mut self, buffer: Vec<u8>) {
+        self.pool.put(buffer);
     }
 }
 
@@ -225,24 +291,67 @@ mod tests {
                 }
                 return Vec::new();
             }
-            [8, 7, 7].map(|tag| comm.recv(0, tag, LONG).unwrap()[0]).to_vec()
+            [8, 7, 7].map(|tag| comm.recv(0, tag, 8, LONG).unwrap()[0]).to_vec()
         });
         assert_eq!(received[1], [2, 1, 3]);
+    }
+
+    #[test]
+    fn receives_posted_in_advance_complete_in_the_order_of_arrival() {
+        let order = results(3, |mut comm| {
+            if comm.rank() == 0 {
+                let mut posted = vec![comm.post_recv(1, 5, 8).unwrap(), comm.post_recv(2, 5, 8).unwrap()];
+                assert_eq!(comm.test_any(&mut posted).unwrap(), None);
+                assert_eq!(posted.len(), 2, "looking takes nothing out of the list");
+                comm.barrier(LONG).unwrap();
+                let first = comm.wait_any(&mut posted, LONG).unwrap();
+                comm.send(1, 6, vec![]).unwrap();
+                let second = comm.wait_any(&mut posted, LONG).unwrap();
+                assert_eq!(comm.wait_any(&mut posted, LONG), Err(CommError::NothingPosted { rank: 0 }));
+                return vec![first.source, second.source];
+            }
+            comm.barrier(LONG).unwrap();
+            if comm.rank() == 1 {
+                // Sends only after the message of rank 2 has been taken.
+                comm.recv(0, 6, 8, LONG).unwrap();
+            }
+            comm.send(0, 5, vec![1]).unwrap();
+            vec![]
+        });
+        assert_eq!(order[0], [2, 1]);
+    }
+
+    #[test]
+    fn receives_of_one_source_are_served_as_posted_even_when_the_later_one_is_waited_for_first() {
+        let mut comms = group(2);
+        let (early, late) = (comms[1].post_recv(0, 3, 8).unwrap(), comms[1].post_recv(0, 3, 8).unwrap());
+        comms[0].send(1, 3, vec![1]).unwrap();
+        comms[0].send(1, 3, vec![2]).unwrap();
+        assert_eq!(comms[1].wait_any(&mut vec![late], LONG).unwrap().message, [2]);
+        assert_eq!(comms[1].wait_any(&mut vec![early], LONG).unwrap().message, [1]);
+    }
+
+    #[test]
+    fn a_message_longer_than_posted_for_is_an_error_as_it_is_over_mpi() {
+        let mut comms = group(2);
+        comms[0].send(1, 3, vec![0; 9]).unwrap();
+        let error = comms[1].recv(0, 3, 8, LONG).unwrap_err();
+        assert_eq!(error, CommError::TooLong { rank: 1, peer: 0, tag: 3, capacity: 8 });
     }
 
     #[test]
     fn a_rank_may_send_to_itself_and_to_no_rank_outside() {
         let mut comm = group(1).remove(0);
         comm.send(0, 1, vec![5]).unwrap();
-        assert_eq!(comm.recv(0, 1, LONG).unwrap(), [5]);
+        assert_eq!(comm.recv(0, 1, 8, LONG).unwrap(), [5]);
         assert_eq!(comm.send(1, 1, vec![]), Err(CommError::NoSuchRank { peer: 1, size: 1 }));
-        assert_eq!(comm.recv(9, 1, LONG), Err(CommError::NoSuchRank { peer: 9, size: 1 }));
+        assert_eq!(comm.recv(9, 1, 8, LONG), Err(CommError::NoSuchRank { peer: 9, size: 1 }));
     }
 
     #[test]
     fn silence_is_a_timeout_that_names_both_ranks() {
         let mut comms = group(2);
-        let error = comms[1].recv(0, 4, SHORT).unwrap_err();
+        let error = comms[1].recv(0, 4, 8, SHORT).unwrap_err();
         assert_eq!(error, CommError::Timeout { rank: 1, peer: 0, tag: 4, waited_ms: 30 });
     }
 
@@ -250,7 +359,7 @@ mod tests {
     fn a_panicking_rank_is_lost_to_those_who_wait_for_it() {
         let outcome = run(3, |mut comm| {
             assert!(comm.rank() != 1, "on purpose");
-            comm.recv(1, 0, LONG)
+            comm.recv(1, 0, 8, LONG)
         });
         assert_eq!(outcome[0], Ok(Err(CommError::PeerLost { rank: 0, peer: 1 })));
         assert_eq!(outcome[1], Err(CommError::Panicked { rank: 1, message: "on purpose".into() }));
@@ -263,8 +372,8 @@ mod tests {
         let mut first = comms.remove(0);
         first.send(1, 0, vec![1]).unwrap();
         drop(first);
-        assert_eq!(comms[0].recv(0, 0, LONG), Ok(vec![1]));
-        assert_eq!(comms[0].recv(0, 0, LONG), Err(CommError::PeerLost { rank: 1, peer: 0 }));
+        assert_eq!(comms[0].recv(0, 0, 8, LONG), Ok(vec![1]));
+        assert_eq!(comms[0].recv(0, 0, 8, LONG), Err(CommError::PeerLost { rank: 1, peer: 0 }));
         assert_eq!(comms[0].send(0, 0, vec![]), Err(CommError::PeerLost { rank: 1, peer: 0 }));
     }
 
@@ -278,7 +387,7 @@ mod tests {
                 comm.abort("something later");
                 return comm.barrier(LONG).unwrap_err();
             }
-            comm.recv(2, 0, LONG).unwrap_err()
+            comm.recv(2, 0, 8, LONG).unwrap_err()
         });
         for error in outcome {
             assert_eq!(error, CommError::Aborted { by: 2, reason: "out of memory".into() });

@@ -1,25 +1,28 @@
 //! Ways to bring the pixels of all ranks together, one a file, all with the signature
-//! `fn run<P>(&mut Session, &Frame<P>) -> Result<Piece<P>, CompositeError>` (radix-k takes its k as well) and all
-//! with the same bits as [`composite_serial`](crate::composite_serial).
+//! `fn run<P>(&mut Session, &View<P>, &mut Collector<P>, &mut Scratch<P>)` (direct send takes its plan, radix-k its k as well) and
+//! all with the same bits as [`composite_serial`](crate::composite_serial).
 //!
-//! Each returns the piece of the finished image that the rank holds; [`crate::collect`] brings pieces to one rank.
-pub(crate) mod bands;
+//! Each hands the pieces of the finished image that the rank holds to the [collector](crate::collect), as soon as they are
+//! finished; its function `pieces` says beforehand, and on all ranks alike, which these will be.
 pub(crate) mod binary_swap;
 pub(crate) mod direct_send;
 pub(crate) mod folding;
 pub(crate) mod radix_k;
 pub(crate) mod tree;
 
+use crate::collect::Collector;
 use crate::error::CompositeError;
-use crate::frame::{Frame, Piece};
+use crate::join::Scratch;
+use crate::layer::View;
 use crate::pixel::Composite;
+use crate::rect::Rect;
 use crate::session::Session;
 
 /// Which way the pixels take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Strategy {
-    /// Every rank owns a band of the image and gets that band from all others at once. Bands are balanced by what all ranks
-    /// have drawn, and ranks that drew nothing in a band send nothing to its owner.
+    /// Every rank owns a tile of the image and gets that tile from all others at once. Tiles are balanced by what all ranks
+    /// have drawn, and ranks that drew nothing in a tile send nothing to its owner.
     #[default]
     DirectSend,
     /// Half of the ranks hand their whole image to the other half, again and again; ends whole on one rank.
@@ -53,16 +56,48 @@ impl Strategy {
         }
     }
 
-    pub(crate) fn run<P: Composite>(
-        self,
-        session: &mut Session<'_>,
-        frame: &Frame<'_, P>,
-    ) -> Result<Piece<P>, CompositeError> {
+    /// What this rank, and every other, is going to do with what all have drawn.
+    pub(crate) fn plan(self, drawn: &[Rect], slice_pixels: usize) -> Plan {
         match self {
-            Self::DirectSend => direct_send::run(session, frame),
-            Self::Tree => tree::run(session, frame),
-            Self::BinarySwap => binary_swap::run(session, frame),
-            Self::RadixK { k } => radix_k::run(session, frame, k),
+            Self::DirectSend => Plan::DirectSend(direct_send::Plan::new(drawn, slice_pixels)),
+            Self::Tree => Plan::Tree,
+            Self::BinarySwap => Plan::BinarySwap,
+            Self::RadixK { k } => Plan::RadixK { k },
+        }
+    }
+}
+
+/// A strategy with what it has derived from the rectangles of a frame.
+pub(crate) enum Plan {
+    DirectSend(direct_send::Plan),
+    Tree,
+    BinarySwap,
+    RadixK { k: usize },
+}
+
+impl Plan {
+    /// Which pieces of the image are held in the end, and where.
+    pub(crate) fn pieces(&self, drawn: &[Rect]) -> Vec<(usize, Rect)> {
+        match self {
+            Self::DirectSend(plan) => plan.pieces(drawn),
+            Self::Tree => tree::pieces(drawn),
+            Self::BinarySwap => binary_swap::pieces(drawn),
+            Self::RadixK { k } => radix_k::pieces(drawn, *k),
+        }
+    }
+
+    pub(crate) fn run<P: Composite>(
+        &self,
+        session: &mut Session<'_>,
+        frame: &View<'_, P>,
+        collector: &mut Collector<P>,
+        scratch: &mut Scratch<P>,
+    ) -> Result<(), CompositeError> {
+        match self {
+            Self::DirectSend(plan) => direct_send::run(plan, session, frame, collector, scratch),
+            Self::Tree => tree::run(session, frame, collector, scratch),
+            Self::BinarySwap => binary_swap::run(session, frame, collector, scratch),
+            Self::RadixK { k } => radix_k::run(session, frame, *k, collector, scratch),
         }
     }
 }

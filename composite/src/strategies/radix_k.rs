@@ -4,71 +4,97 @@
 //!
 //! Fewer rounds than binary swap, more messages in each. Here group sizes are powers of two and the members of a group are
 //! joined as a balanced tree, so that the grouping is that of [`crate::rank_order`] for every k.
-use super::folding::fold;
+use super::folding::{Held, fold, join_members, reach};
+use crate::collect::Collector;
 use crate::error::CompositeError;
-use crate::frame::{Frame, Piece};
+use crate::join::Scratch;
+use crate::layer::View;
 use crate::pixel::Composite;
-use crate::rank_order::{Folding, reduce_slots};
+use crate::rank_order::Folding;
+use crate::rect::Rect;
 use crate::session::{Session, Tag};
-use std::ops::Range;
+
+/// What each leader holds after the last round.
+pub(crate) fn pieces(drawn: &[Rect], k: usize) -> Vec<(usize, Rect)> {
+    let folding = Folding::new(drawn.len());
+    let whole = drawn.iter().fold(Rect::EMPTY, |all, rect| all.around(rect));
+    let mut pieces = Vec::new();
+    for slot in 0..folding.slots {
+        let mut part = whole;
+        let mut stride = 1;
+        while stride < folding.slots {
+            let members = k.min(folding.slots / stride);
+            part = share(&part, (slot / stride) % members, members);
+            stride *= members;
+        }
+        if !part.is_empty() {
+            pieces.push((folding.leader(slot), part));
+        }
+    }
+    pieces
+}
 
 pub(crate) fn run<P: Composite>(
     session: &mut Session<'_>,
-    frame: &Frame<'_, P>,
+    frame: &View<'_, P>,
     k: usize,
-) -> Result<Piece<P>, CompositeError> {
+    collector: &mut Collector<P>,
+    scratch: &mut Scratch<P>,
+) -> Result<(), CompositeError> {
     let folding = Folding::new(session.places());
-    let Some((slot, mut held)) = fold(session, frame)? else {
-        return Ok(Piece::nothing());
+    let drawn = session.drawn.clone();
+    let Some((slot, mut held)) = fold(session, frame, collector, scratch)? else {
+        return Ok(());
     };
-    let mut part = 0..held.len();
+    let mut part = drawn.iter().fold(Rect::EMPTY, |all, rect| all.around(rect));
     let mut stride = 1;
     while stride < folding.slots {
         let members = k.min(folding.slots / stride);
         let digit = (slot / stride) % members;
         let first = slot - digit * stride;
-        let place = |member: usize| folding.leader(first + member * stride);
+        let places: Vec<usize> = (0..members).map(|member| folding.leader(first + member * stride)).collect();
+        // What the slots that a member has joined so far can have drawn.
+        let base = slot / (stride * members) * (stride * members);
+        let reaches: Vec<Rect> =
+            (0..members).map(|member| reach(&drawn, &folding, base + member * stride, stride)).collect();
+
+        let keep = share(&part, digit, members);
+        for (member, reach) in reaches.iter().enumerate() {
+            let theirs = reach.intersection(&keep);
+            if member != digit && !theirs.is_empty() {
+                session.post::<P>(places[member], Tag::Exchange, &theirs)?;
+            }
+        }
 
         // Give each member its share, beginning with the next one, so that nobody gets all first messages.
         for step in 1..members {
             let member = (digit + step) % members;
-            let give = share(&part, member, members);
+            let give = reaches[digit].intersection(&share(&part, member, members));
             if !give.is_empty() {
-                session.send(place(member), Tag::Exchange, give, |index| held[index])?;
+                session.send(places[member], Tag::Exchange, &held.view(), give, true)?;
             }
         }
 
         // Join the own share of all members.
-        let keep = share(&part, digit, members);
-        if !keep.is_empty() {
-            let mut layers = Vec::with_capacity(members);
-            for member in 0..members {
-                layers.push(if member == digit {
-                    held[keep.clone()].to_vec()
-                } else {
-                    session
-                        .recv::<P, _>(place(member), Tag::Exchange, Some(keep.clone()), |p| p.to_pixels())?
-                });
-            }
-            let mut column = vec![P::EMPTY; members];
-            for (offset, pixel) in held[keep.clone()].iter_mut().enumerate() {
-                for (value, layer) in column.iter_mut().zip(&layers) {
-                    *value = layer[offset];
-                }
-                *pixel = reduce_slots(&mut column);
-            }
-        }
+        let bounds = reaches.iter().fold(Rect::EMPTY, |all, rect| all.around(rect)).intersection(&keep);
+        let brings = |member: usize| reaches[member].intersection(&keep);
+        let layer = join_members(session, &held, digit, &places, bounds, brings, collector, scratch)?;
+        std::mem::replace(&mut held, Held::Joined(layer)).recycle(scratch);
         part = keep;
         stride *= members;
     }
-    Ok(Piece { start: part.start, pixels: held[part].to_vec() })
+    if part.is_empty() {
+        return Ok(());
+    }
+    let layer = held.into_layer(part, scratch);
+    collector.hand_in(session, layer, scratch)
 }
 
-/// Share number `member` of `part`, cut into `members` shares that differ by at most one pixel.
-fn share(part: &Range<usize>, member: usize, members: usize) -> Range<usize> {
-    // In u128 because the product may pass 64 bits before it is divided.
-    let cut = |i: usize| part.start + (part.len() as u128 * i as u128 / members as u128) as usize;
-    cut(member)..cut(member + 1)
+/// Share number `member` of `part`, cut into `members` shares of rows that differ by at most one row.
+fn share(part: &Rect, member: usize, members: usize) -> Rect {
+    let row = |i: usize| part.y0 + (part.height() as u64 * i as u64 / members as u64) as u32;
+    let share = Rect { y0: row(member), y1: row(member + 1), ..*part };
+    if share.is_empty() { Rect::EMPTY } else { share }
 }
 
 #[cfg(test)]
@@ -76,19 +102,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn shares_cover_a_part_without_gap_even_when_there_are_more_members_than_pixels() {
-        for length in [0, 1, 3, 8, 1001] {
+    fn shares_cover_a_part_without_gap_even_when_there_are_more_members_than_rows() {
+        for rows in [1, 3, 8, 1001, u32::MAX - 10] {
             for members in [1, 2, 8, 16] {
-                let mut next = 10;
-                for member in 0..members {
-                    let share = share(&(10..10 + length), member, members);
-                    assert_eq!(share.start, next);
-                    assert!(share.len() <= length / members + 1);
-                    next = share.end;
-                }
-                assert_eq!(next, 10 + length);
+                let part = Rect { x0: 5, y0: 10, x1: 6, y1: 10 + rows };
+                let shares: Vec<Rect> = (0..members).map(|member| share(&part, member, members)).collect();
+                assert_eq!(shares.iter().map(Rect::pixels).sum::<usize>(), part.pixels());
+                let whole = shares.iter().fold(Rect::EMPTY, |all, rect| all.around(rect));
+                assert_eq!(whole, part);
+                assert!(shares.iter().all(|share| share.height() <= rows as usize / members + 1));
             }
         }
-        assert_eq!(share(&(0..usize::MAX), 15, 16).end, usize::MAX);
     }
 }

@@ -63,6 +63,8 @@ pub(crate) enum Content {
 #[derive(Clone)]
 pub(crate) struct Blas {
     pub(crate) frame: LocalFrame,
+    /// Local bounds of the geometry that this is a part of.
+    whole: Option<Aabb>,
     pub(crate) content: Content,
     pub(crate) primitives: usize,
     pub(crate) skipped: usize,
@@ -88,15 +90,25 @@ pub(crate) fn leaf_ids(units: &[Unit], leaf: ChildRef) -> &[u32] {
 }
 
 impl Blas {
-    pub(crate) fn for_mesh(mesh: &TriMesh, options: &BuildOptions) -> Blas {
-        let frame = LocalFrame::choose(mesh.origin, mesh.bounds());
+    /// `given`: local space and bounds there of the geometry that this is a part of.
+    pub(crate) fn for_mesh(
+        mesh: &TriMesh,
+        options: &BuildOptions,
+        given: Option<(LocalFrame, Aabb)>,
+    ) -> Blas {
+        let frame = given.map_or_else(|| LocalFrame::choose(mesh.origin, mesh.bounds()), |(frame, _)| frame);
+        let whole = given.map(|(_, bounds)| bounds);
         let mut tris = TriBvh::build(mesh, &frame, options.quality);
         let (skipped, notes) = (tris.skipped, std::mem::take(&mut tris.notes));
         let primitives = mesh.indices.len() - skipped;
-        Blas { frame, primitives, skipped, cost_growth: 1.0, notes, content: Content::Triangles(tris) }
+        Blas { frame, whole, primitives, skipped, cost_growth: 1.0, notes, content: Content::Triangles(tris) }
     }
 
-    pub(crate) fn for_shape(shape: Arc<dyn Shape>, options: &BuildOptions) -> Blas {
+    pub(crate) fn for_shape(
+        shape: Arc<dyn Shape>,
+        options: &BuildOptions,
+        given: Option<(LocalFrame, Aabb)>,
+    ) -> Blas {
         let n = shape.num_primitives();
         let refs: Vec<PrimRef> = (0..n as u32)
             .into_par_iter()
@@ -112,6 +124,7 @@ impl Blas {
         let frame = LocalFrame { center: shape.origin(), scale: 1.0 };
         Blas {
             frame,
+            whole: given.map(|(_, bounds)| bounds),
             primitives,
             skipped: n - primitives,
             cost_growth: 1.0,
@@ -125,6 +138,15 @@ impl Blas {
             Content::Triangles(t) => &t.bvh,
             Content::Shape { bvh, .. } => bvh,
         }
+    }
+
+    /// Bounds that decide how rays come into local space: those of the whole geometry.
+    pub(crate) fn reach(&self) -> Aabb {
+        self.whole.unwrap_or(self.bvh().bounds)
+    }
+
+    pub(crate) fn is_part(&self) -> bool {
+        self.whole.is_some()
     }
 
     /// The closest hit of a local-space ray.

@@ -5,6 +5,7 @@ mod blas;
 mod brute_force;
 mod build;
 mod options;
+mod part;
 mod placement;
 mod refit;
 mod streams;
@@ -14,6 +15,7 @@ pub(crate) mod wide;
 mod world;
 
 pub use options::{BuildOptions, BuildQuality, BuildReport, Robustness};
+pub use part::{ShapePart, Whole};
 pub use refit::{RefitError, RefitReport};
 pub use validate::{InvalidTree, TreeFacts};
 pub(crate) use wide::{Unit, WideBvh};

@@ -31,13 +31,13 @@ pub(crate) struct Placement {
 }
 
 impl Placement {
-    /// `world_origin` is the world position of render space's origin; `local_bounds` are the geometry's. `None` when the transform cannot be
-    /// inverted.
+    /// `world_origin` is the world position of render space's origin. `reach` are the local bounds of the whole geometry, `local_bounds` those of
+    /// what is here of it. `None` when the transform cannot be inverted.
     pub(crate) fn new(
         geometry: usize,
         world_from_object: &DAffine3,
         frame: &LocalFrame,
-        local_bounds: Aabb,
+        [reach, local_bounds]: [Aabb; 2],
         world_origin: DVec3,
     ) -> Option<Placement> {
         let inverse = world_from_object.inverse();
@@ -52,10 +52,10 @@ impl Placement {
         };
         let identity =
             local_from_render.matrix3 == DMat3::IDENTITY && local_from_render.translation == DVec3::ZERO;
-        let (center, radius) = if local_bounds.is_empty() {
+        let (center, radius) = if reach.is_empty() {
             (DVec3::ZERO, 0.0)
         } else {
-            let (lo, hi) = (local_bounds.min.as_dvec3(), local_bounds.max.as_dvec3());
+            let (lo, hi) = (reach.min.as_dvec3(), reach.max.as_dvec3());
             (0.5 * (lo + hi), 0.5 * (hi - lo).length())
         };
         let bounds = if identity || local_bounds.is_empty() {

@@ -47,6 +47,14 @@ pub enum RefitError {
         /// The index given.
         geometry: usize,
     },
+    /// The world is a part of another one, whose bounds would have to be chosen anew as well.
+    #[error(
+        "geometry {geometry} is a part of a larger one; move the vertices of the whole, and build its parts again"
+    )]
+    OfAPart {
+        /// The index given.
+        geometry: usize,
+    },
     /// The new mesh is unusable.
     #[error("geometry {geometry}: {source}")]
     Mesh {
@@ -103,6 +111,9 @@ impl World {
         let old = match self.geometries.get(geometry) {
             None => return Err(RefitError::NoSuchGeometry { geometry, count }),
             Some(Geometry::Shape(_)) => return Err(RefitError::NotAMesh { geometry }),
+            Some(Geometry::Mesh(_)) if self.blas[geometry].is_part() => {
+                return Err(RefitError::OfAPart { geometry });
+            }
             Some(Geometry::Mesh(old)) => old,
         };
         mesh.check().map_err(|source| RefitError::Mesh { geometry, source })?;

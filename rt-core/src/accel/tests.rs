@@ -143,7 +143,10 @@ fn worlds_share_the_trees_of_geometries_they_have_in_common() {
     let geometries = vec![kept, new];
     let instances = vec![at(1, 0.25), at(0, -0.5)];
     let second = build(geometries.clone(), instances.clone(), Some(&first));
-    assert!(Arc::ptr_eq(&first.blas[1], &second.blas[0]), "the kept geometry has another index, but the same tree");
+    assert!(
+        Arc::ptr_eq(&first.blas[1], &second.blas[0]),
+        "the kept geometry has another index, but the same tree"
+    );
     let fresh = build(geometries.clone(), instances.clone(), None);
     let hits = |w: &World| random_rays(800, 5, 1.0).iter().map(|r| w.closest(r)).collect::<Vec<_>>();
     let expected = hits(&fresh);

@@ -1,8 +1,9 @@
 //! The two-level structure that rays are traced against: instances of geometries.
 
 use super::blas::{Blas, IdWriter, leaf_ids};
-use super::build::{MAX_PRIMS, PrimRef, build_wide};
+use super::build::{PrimRef, build_wide};
 use super::options::{BuildOptions, BuildQuality, BuildReport, Robustness};
+use super::part::{Whole, blas_of};
 use super::placement::{Placement, distance_to_sphere};
 use super::wide::{ChildRef, Unit, WideBvh};
 use crate::math::{Aabb, exp2i, max_abs};
@@ -66,6 +67,16 @@ pub enum BuildError {
         /// How many there are.
         count: usize,
     },
+    /// A part does not match its whole.
+    #[error(
+        "a part has {found} geometries, the whole {expected}: give the part one for each, with no primitives where it has none"
+    )]
+    NotAPart {
+        /// Geometries of the whole.
+        expected: usize,
+        /// Geometries given.
+        found: usize,
+    },
     /// An instance's transform cannot be inverted.
     #[error(
         "instance {instance}: its transform has determinant {determinant}; give one that is finite and not singular, or leave the instance out"
@@ -114,6 +125,17 @@ impl World {
         options: &BuildOptions,
         previous: Option<&World>,
     ) -> Result<World, BuildError> {
+        World::build_like(geometries, instances, options, None, previous)
+    }
+
+    /// Builds a world, or a part of one, with the structures of `previous` where it has the same geometries.
+    pub(super) fn build_like(
+        geometries: Vec<Geometry>,
+        instances: Vec<Instance>,
+        options: &BuildOptions,
+        whole: Option<&Whole>,
+        previous: Option<&World>,
+    ) -> Result<World, BuildError> {
         let start = Instant::now();
         let mut phases = Vec::new();
         for (i, inst) in instances.iter().enumerate() {
@@ -122,28 +144,15 @@ impl World {
                 return Err(BuildError::NoSuchGeometry { instance: i, geometry: inst.geometry, count });
             }
         }
-        for (i, g) in geometries.iter().enumerate() {
-            if let Geometry::Mesh(m) = g {
-                m.check().map_err(|source| BuildError::Mesh { geometry: i, source })?;
-                if m.indices.len() >= MAX_PRIMS {
-                    let source = MeshError::TooLarge {
-                        what: "triangles",
-                        found: m.indices.len(),
-                        limit: MAX_PRIMS - 1,
-                    };
-                    return Err(BuildError::Mesh { geometry: i, source });
-                }
-            }
-        }
         let known = previous.filter(|w| w.options == *options).map(World::trees_by_address);
-        let blas: Vec<Arc<Blas>> = geometries
+        let blas = geometries
             .iter()
-            .map(|g| match (known.as_ref().and_then(|k| k.get(&g.address())), g) {
-                (Some(tree), _) => Arc::clone(tree),
-                (None, Geometry::Mesh(m)) => Arc::new(Blas::for_mesh(m, options)),
-                (None, Geometry::Shape(s)) => Arc::new(Blas::for_shape(s.clone(), options)),
+            .enumerate()
+            .map(|(i, g)| match known.as_ref().and_then(|k| k.get(&g.address())) {
+                Some(tree) => Ok(Arc::clone(tree)),
+                None => blas_of(i, g, options, whole).map(Arc::new),
             })
-            .collect();
+            .collect::<Result<Vec<_>, _>>()?;
         phases.push(("geometries", start.elapsed()));
 
         let mut notes: Vec<String> = blas
@@ -151,7 +160,7 @@ impl World {
             .enumerate()
             .flat_map(|(i, b)| b.notes.iter().map(move |n| format!("geometry {i}: {n}")))
             .collect();
-        let Placed { origin, placements, tlas } = place(&instances, &blas, &mut notes)?;
+        let Placed { origin, placements, tlas } = place(&instances, &blas, whole, &mut notes)?;
         phases.push(("instances", start.elapsed() - phases[0].1));
         let report = BuildReport {
             total: start.elapsed(),
@@ -167,7 +176,7 @@ impl World {
             geometries,
             instances,
             origin,
-            bounds: tlas.bounds,
+            bounds: whole.map_or(tlas.bounds, |w| w.bounds),
             report,
             blas,
             placements,
@@ -190,7 +199,7 @@ impl World {
 
     /// Makes the upper level anew after a geometry has changed.
     pub(super) fn place_again(&mut self) {
-        let placed = place(&self.instances, &self.blas, &mut self.report.notes);
+        let placed = place(&self.instances, &self.blas, None, &mut self.report.notes);
         let Placed { origin, placements, tlas } = placed.expect("the build accepted these transforms");
         self.report.primitives = self.blas.iter().map(|b| b.primitives).sum();
         self.report.skipped = self.blas.iter().map(|b| b.skipped).sum();
@@ -349,14 +358,20 @@ struct Placed {
 }
 
 /// Chooses render space (world space, moved when everything is far from zero) and places the instances in it.
-fn place(instances: &[Instance], blas: &[Arc<Blas>], notes: &mut Vec<String>) -> Result<Placed, BuildError> {
-    let origin = choose_origin(instances, blas);
+fn place(
+    instances: &[Instance],
+    blas: &[Arc<Blas>],
+    whole: Option<&Whole>,
+    notes: &mut Vec<String>,
+) -> Result<Placed, BuildError> {
+    let origin = whole.map_or_else(|| choose_origin(instances, blas), |w| w.origin);
     let placements = instances
         .iter()
         .enumerate()
         .map(|(i, inst)| {
             let b = &blas[inst.geometry];
-            Placement::new(inst.geometry, &inst.world_from_object, &b.frame, b.bvh().bounds, origin).ok_or(
+            let bounds = [b.reach(), b.bvh().bounds];
+            Placement::new(inst.geometry, &inst.world_from_object, &b.frame, bounds, origin).ok_or(
                 BuildError::SingularTransform {
                     instance: i,
                     determinant: inst.world_from_object.matrix3.determinant(),

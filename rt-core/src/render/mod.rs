@@ -14,6 +14,7 @@ mod renderer;
 pub use asynchronous::AsyncRenderer;
 pub use error::RenderError;
 pub use options::{Crop, RenderOptions};
+pub(crate) use plan::plan_for;
 pub use progressive::{Progressive, RenderReport, StopReason};
 pub use renderer::Renderer;
 

@@ -7,20 +7,30 @@ use crate::ray_stats::RayStats;
 use crate::scene::Scene;
 
 /// What will run.
-pub(super) struct Plan {
-    pub(super) effects: Effects,
+pub(crate) struct Plan {
+    pub(crate) effects: Effects,
     /// Needed by the scene but not asked for.
-    pub(super) left_out: Effects,
-    pub(super) warnings: Vec<String>,
+    pub(crate) left_out: Effects,
+    pub(crate) warnings: Vec<String>,
 }
 
 pub(super) fn plan(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Result<Plan, RenderError> {
+    plan_for(scene, Effects::required_by(scene), camera, options)
+}
+
+/// As [`plan`] for a part of a scene: the whole scene needs `by_scene`.
+pub(crate) fn plan_for(
+    scene: &Scene,
+    by_scene: Effects,
+    camera: &Camera,
+    options: &RenderOptions,
+) -> Result<Plan, RenderError> {
     options.check()?;
     scene.check()?;
     let mut warnings = scene.warnings();
     let asked = options.effects.map(|e| e.with_if(e.contains(Effects::SOFT_SHADOWS), Effects::SHADOWS));
     let path = options.path_tracing || asked.is_some_and(|e| e.contains(Effects::PATH_TRACING));
-    let mut needed = Effects::required_by(scene) | Effects::required_by_camera(camera);
+    let mut needed = by_scene | Effects::required_by_camera(camera);
     if path {
         needed = needed.without(Effects::AMBIENT_OCCLUSION) | Effects::PATH_TRACING;
     }

@@ -11,6 +11,7 @@ use crate::ray::{LANES, Ray};
 use crate::ray_stats::RayStats;
 use crate::sampler::{Sampler, SamplerBlock};
 use crate::simd::vectors::Row;
+use crate::surface::SurfacePoint;
 use fearless_simd::{Simd, dispatch};
 use glam::Vec3;
 
@@ -63,26 +64,17 @@ pub(crate) fn add_ambient_light(
         dispatch!(stage.level, simd => directions(simd, stage, open, count, domes));
         // ---- Rays.
         rays.clear();
+        rays.first_point = start as u32;
         let mut sample = 0;
         for o in open.iter() {
             let first = rays.targets.len();
             let p = &points[start + o.index as usize];
-            // The lobe stands on the side that is seen, whatever side the shading normal is lit from.
-            let s = &p.surface;
-            let normal = if s.normal.dot(s.face_normal) < 0.0 { -s.normal } else { s.normal };
-            let (x, y) = orthonormal_basis(normal);
-            // A direction that leaves through the back of the face is never sent, so there is one origin.
-            let origin = s.point + s.face_normal * s.point_error;
-            for _ in 0..count {
-                let [dx, dy, dz] = &domes[sample / LANES];
-                let lane = sample % LANES;
-                sample += 1;
-                let dir = x * dx[lane] + y * dy[lane] + normal * dz[lane];
-                // A smooth normal's hemisphere dips below the face: no sky there to be hidden.
-                if dir.dot(s.face_normal) > 0.0 {
-                    let ray = Ray::new(origin, dir).with_t_max(occlusion.distance as f32);
-                    rays.push(&ray, o.index, o.light);
+            let over = Hemisphere::new(&p.surface);
+            for k in 0..count {
+                if let Some(ray) = over.ray(domes, sample, occlusion.distance) {
+                    rays.push(&ray, o.index, o.light, stage.sky_number + k);
                 }
+                sample += 1;
             }
             let sent = rays.targets.len() - first;
             for target in &mut rays.targets[first..] {
@@ -102,8 +94,38 @@ pub(crate) fn add_ambient_light(
     }
 }
 
+/// Where the rays of a point go.
+pub(super) struct Hemisphere {
+    axes: [Vec3; 3],
+    origin: Vec3,
+    face_normal: Vec3,
+}
+
+impl Hemisphere {
+    #[inline]
+    pub(super) fn new(s: &SurfacePoint) -> Hemisphere {
+        // The lobe stands on the side that is seen, whatever side the shading normal is lit from.
+        let normal = if s.normal.dot(s.face_normal) < 0.0 { -s.normal } else { s.normal };
+        let (x, y) = orthonormal_basis(normal);
+        // A direction that leaves through the back of the face is never sent, so there is one origin.
+        let origin = s.point + s.face_normal * s.point_error;
+        Hemisphere { axes: [x, y, normal], origin, face_normal: s.face_normal }
+    }
+
+    /// The ray in direction `sample` of `domes`.
+    #[inline]
+    pub(super) fn ray(&self, domes: &[Dome], sample: usize, distance: f64) -> Option<Ray> {
+        let [dx, dy, dz] = &domes[sample / LANES];
+        let lane = sample % LANES;
+        let [x, y, normal] = self.axes;
+        let dir = x * dx[lane] + y * dy[lane] + normal * dz[lane];
+        // A smooth normal's hemisphere dips below the face: no sky there to be hidden.
+        (dir.dot(self.face_normal) > 0.0).then(|| Ray::new(self.origin, dir).with_t_max(distance as f32))
+    }
+}
+
 /// Sixteen directions, a row per component.
-type Dome = [Row; 3];
+pub(super) type Dome = [Row; 3];
 
 /// Buffers of one thread.
 #[derive(Default)]
@@ -113,15 +135,21 @@ pub(crate) struct OcclusionBuffers {
 }
 
 /// A point that sends rays.
-struct OpenPoint {
-    index: u32,
-    light: Vec3,
-    sampler: Sampler,
-    dimension: u32,
+pub(super) struct OpenPoint {
+    pub(super) index: u32,
+    pub(super) light: Vec3,
+    pub(super) sampler: Sampler,
+    pub(super) dimension: u32,
 }
 
 /// `count` directions for each point, one after the other.
-fn directions<S: Simd>(simd: S, stage: &Stage<'_>, open: &[OpenPoint], count: u32, out: &mut Vec<Dome>) {
+pub(super) fn directions<S: Simd>(
+    simd: S,
+    stage: &Stage<'_>,
+    open: &[OpenPoint],
+    count: u32,
+    out: &mut Vec<Dome>,
+) {
     out.clear();
     let mut block = SamplerBlock::new(stage.options.sampling);
     let mut lane = 0;

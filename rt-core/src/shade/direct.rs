@@ -10,8 +10,8 @@ use crate::light::{PlacedKind, PlacedLight};
 use crate::math::{max_abs, orthonormal_basis};
 use crate::ray::Ray;
 use crate::ray_stats::RayStats;
-use crate::sampler::unit_disk;
-use crate::surface::length;
+use crate::sampler::{Sampler, unit_disk};
+use crate::surface::{SurfacePoint, length};
 use glam::Vec3;
 
 /// Light falling onto a point from one direction.
@@ -24,6 +24,43 @@ pub(super) struct Incident {
     pub(super) strength: f32,
 }
 
+/// The rays that every point sends to one light.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sending {
+    /// Whether there are shadow rays at all.
+    pub(crate) traced: bool,
+    /// Whether they go to different points of the light.
+    pub(crate) spread: bool,
+    /// How many.
+    pub(crate) count: u32,
+    /// Number of the first among all light rays of a point.
+    pub(crate) first_number: u32,
+}
+
+impl Sending {
+    /// One for each of `lights`, and the number of rays to them all.
+    pub(crate) fn of(lights: &[PlacedLight], effects: Effects, light_rays: u32) -> (Vec<Sending>, u32) {
+        let shadows = effects.contains(Effects::SHADOWS);
+        let soft = effects.contains(Effects::SOFT_SHADOWS);
+        let mut first_number = 0;
+        let of_light = |light: &PlacedLight| {
+            let traced = shadows && light.shadows;
+            let spread = soft && light.size > 0.0 && traced;
+            let count = if spread { light_rays } else { 1 };
+            let sending = Sending { traced, spread, count, first_number };
+            first_number += if traced { count } else { 0 };
+            sending
+        };
+        (lights.iter().map(of_light).collect(), first_number)
+    }
+}
+
+/// Point of the unit disk that ray `k` of `count` to light `number` goes to.
+#[inline]
+pub(super) fn light_point(sampler: &Sampler, stream: u32, number: usize, k: u32, count: u32) -> [f32; 2] {
+    unit_disk(sampler.square_of(stream.wrapping_add(Dimension::LIGHTS + number as u32), k, count))
+}
+
 /// Adds the light of every lamp to `points`.
 pub(crate) fn add_direct_light(
     stage: &Stage<'_>,
@@ -34,13 +71,9 @@ pub(crate) fn add_direct_light(
     stats: &mut RayStats,
     mut cost: Option<&mut [f32]>,
 ) {
-    let shadows = stage.effects.contains(Effects::SHADOWS);
-    let soft = stage.effects.contains(Effects::SOFT_SHADOWS);
     for (number, light) in stage.lights.iter().enumerate() {
         rays.clear();
-        let traced = shadows && light.shadows;
-        let spread = soft && light.size > 0.0 && traced;
-        let count = if spread { stage.options.light_rays } else { 1 };
+        let Sending { traced, spread, count, first_number } = stage.sending[number];
         for (i, p) in points.iter_mut().enumerate() {
             if !p.lit {
                 continue;
@@ -48,13 +81,9 @@ pub(crate) fn add_direct_light(
             let state = &states[p.lane as usize];
             let material = stage.instances[p.instance as usize].material;
             for k in 0..count {
-                let incident = if spread {
-                    let dimension = state.stream.wrapping_add(Dimension::LIGHTS + number as u32);
-                    let at = unit_disk(area.sampler(stage, state.slot).square_of(dimension, k, count));
-                    incident_from(light, p.surface.point, Some(at))
-                } else {
-                    incident_from(light, p.surface.point, None)
-                };
+                let at = spread
+                    .then(|| light_point(&area.sampler(stage, state.slot), state.stream, number, k, count));
+                let incident = incident_from(light, p.surface.point, at);
                 if incident.strength <= 0.0 {
                     continue;
                 }
@@ -67,7 +96,8 @@ pub(crate) fn add_direct_light(
                 }
                 if traced {
                     let common = !spread && !stage.light_passes_surfaces();
-                    rays.push(&shadow_ray(p, &incident, common), i as u32, radiance);
+                    let ray = shadow_ray(&p.surface, &incident, common);
+                    rays.push(&ray, i as u32, radiance, first_number + k);
                 } else {
                     p.radiance += radiance;
                 }
@@ -144,8 +174,8 @@ pub(super) fn incident_from(light: &PlacedLight, p: Vec3, at: Option<[f32; 2]>) 
 /// The ray between a point and a light. `from_light` asks for the light as its origin: all rays of a light then share it and are
 /// traced as one packet.
 #[inline]
-fn shadow_ray(p: &Point, incident: &Incident, from_light: bool) -> Ray {
-    let origin = p.surface.ray_origin(incident.dir);
+pub(super) fn shadow_ray(p: &SurfacePoint, incident: &Incident, from_light: bool) -> Ray {
+    let origin = p.ray_origin(incident.dir);
     let Some(light) = incident.from else {
         return Ray::new(origin, incident.dir);
     };

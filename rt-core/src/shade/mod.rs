@@ -19,6 +19,7 @@ mod stage;
 mod tile;
 mod volumes;
 mod wave;
+pub mod waves;
 
 pub(crate) use stage::Stage;
 pub(crate) use tile::{TILE, TileArea, TileLayers};
@@ -70,6 +71,8 @@ pub(crate) struct Workspace {
     behind: Wave,
     scattered: Wave,
     hits: Vec<HitBlock>,
+    /// Of each ray the surface at its hit, where somebody else has looked at it; empty where this scene's world is asked.
+    surfaces: Vec<SurfacePoint>,
     points: Vec<Point>,
     light_rays: LightRays,
     occlusion: ambient_occlusion::OcclusionBuffers,
@@ -374,7 +377,10 @@ fn meet_surfaces(
             continue;
         };
         let placed = stage.placed(&hit);
-        let mut surface = placed.surface(&ray, &hit);
+        let mut surface = match work.surfaces.get(i) {
+            Some(seen_elsewhere) => *seen_elsewhere,
+            None => placed.surface(&ray, &hit),
+        };
         if !transparent {
             stats.opacity_ignored += (surface.opacity < 1.0) as u64;
             surface.opacity = 1.0;
@@ -436,9 +442,22 @@ fn light_points(
     work: &mut Workspace,
     stats: &mut RayStats,
 ) {
-    let Workspace { current, points, light_rays, occlusion, pixels, .. } = work;
+    add_light(stage, area, work, stats, out.cost_mut());
+    add_up(stage, area, work);
+}
+
+/// Light that falls onto the wave's points.
+fn add_light(
+    stage: &Stage<'_>,
+    area: &TileArea,
+    work: &mut Workspace,
+    stats: &mut RayStats,
+    mut cost: Option<&mut [f32]>,
+) {
+    let Workspace { current, points, light_rays, occlusion, .. } = work;
     if !stage.lights.is_empty() {
-        direct::add_direct_light(stage, area, points, &current.states, light_rays, stats, out.cost_mut());
+        let cost = cost.as_deref_mut();
+        direct::add_direct_light(stage, area, points, &current.states, light_rays, stats, cost);
     }
     if stage.mean_radiance.is_some() && !stage.effects.contains(Effects::PATH_TRACING) {
         ambient_occlusion::add_ambient_light(
@@ -449,9 +468,14 @@ fn light_points(
             light_rays,
             occlusion,
             stats,
-            out.cost_mut(),
+            cost,
         );
     }
+}
+
+/// What the wave's points send to the eye, into the pixels.
+fn add_up(stage: &Stage<'_>, area: &TileArea, work: &mut Workspace) {
+    let Workspace { current, points, pixels, .. } = work;
     // The path tracer chooses between surface and what is behind by chance, with the same mean.
     let split = !stage.effects.contains(Effects::PATH_TRACING);
     for p in points.iter() {

@@ -2,11 +2,11 @@
 
 use super::microfacet::fresnel_dielectric;
 use super::stage::Stage;
-use super::wave::LightRays;
+use super::wave::{Answers, LightRays, Passage};
 use crate::effects::Effects;
-use crate::material::SurfaceModel;
-use crate::ray::{Hit, HitBlock, LANES, Ray};
-use crate::surface::length;
+use crate::material::{Material, SurfaceModel};
+use crate::ray::{HitBlock, LANES, Ray};
+use crate::surface::{SurfacePoint, length};
 use glam::Vec3;
 
 /// Rays traced and rays that met something.
@@ -39,6 +39,23 @@ pub(crate) fn trace_light_rays(
     if rays.targets.is_empty() {
         return counts;
     }
+    match &mut rays.answers {
+        Answers::World => {}
+        Answers::Recording(_) => {
+            rays.record();
+            return Blocking::default();
+        }
+        Answers::Given(given) => {
+            for (&(point, radiance), p) in rays.targets.iter().zip(given) {
+                counts.rays += p.continued as u64;
+                counts.blocked += p.met as u64;
+                if p.left != Vec3::ZERO {
+                    arrived(point, radiance * p.left);
+                }
+            }
+            return counts;
+        }
+    }
     let world = &stage.scene.world;
     if !stage.light_passes_surfaces() {
         rays.blocked.clear();
@@ -58,9 +75,8 @@ pub(crate) fn trace_light_rays(
     }
 
     // Follow each ray through its layers; transmittance is a product, so only the set of layers matters.
-    let mut transmittance = vec![(Vec3::ONE, Vec3::ZERO); rays.targets.len()];
+    let mut followed = vec![Following::default(); rays.targets.len()];
     let mut open = rays.targets.len();
-    let mut met = vec![false; rays.targets.len()];
     while open > 0 {
         rays.hits.clear();
         rays.hits.resize(rays.blocks.len(), HitBlock::MISS);
@@ -76,38 +92,82 @@ pub(crate) fn trace_light_rays(
             }
             let ray = block.get(lane);
             let behind = rays.hits[i / LANES].get(lane).and_then(|hit| {
-                met[i] = true;
-                let (left, depth) = &mut transmittance[i];
-                let t = pass(stage, &ray, &hit, left, depth);
-                (left.max_element() > DARK).then_some(t)
+                let placed = stage.placed(&hit);
+                followed[i].pass(stage, placed.material, &placed.surface(&ray, &hit), &ray, hit.t)
             });
             match behind {
-                Some(t_min) if t_min < ray.t_max => {
+                Some(t_min) => {
                     block.t_min[lane] = t_min;
                     open += 1;
                 }
-                _ => block.t_max[lane] = -1.0,
+                None => block.t_max[lane] = -1.0,
             }
         }
         counts.rays += open as u64;
     }
-    for (i, &(point, radiance)) in rays.targets.iter().enumerate() {
-        let (left, depth) = transmittance[i];
-        counts.blocked += met[i] as u64;
-        let left = if left.max_element() > DARK { left * (-depth.max(Vec3::ZERO)).exp() } else { Vec3::ZERO };
-        if left != Vec3::ZERO {
-            arrived(point, radiance * left);
+    for (&(point, radiance), f) in rays.targets.iter().zip(&followed) {
+        let p = f.passage();
+        counts.blocked += p.met as u64;
+        if p.left != Vec3::ZERO {
+            arrived(point, radiance * p.left);
         }
     }
     counts
 }
 
-/// Light through the surface at `hit`: multiplies `left`, adds to the optical `depth`, and returns where the ray goes on. Light is
+/// A light ray on its way through layers; transmittance is a product, so only the set of layers matters.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Following {
+    left: Vec3,
+    /// Optical depth inside dielectrics.
+    depth: Vec3,
+    met: bool,
+    continued: u32,
+}
+
+impl Default for Following {
+    fn default() -> Self {
+        Following { left: Vec3::ONE, depth: Vec3::ZERO, met: false, continued: 0 }
+    }
+}
+
+impl Following {
+    /// Meets a surface at `t`; returns from where `ray` goes on, if it does.
+    pub(crate) fn pass(
+        &mut self,
+        stage: &Stage<'_>,
+        material: &Material,
+        surface: &SurfacePoint,
+        ray: &Ray,
+        t: f32,
+    ) -> Option<f32> {
+        self.met = true;
+        let behind = pass(stage, material, surface, ray, t, &mut self.left, &mut self.depth);
+        let goes_on = self.left.max_element() > DARK && behind < ray.t_max;
+        self.continued += goes_on as u32;
+        goes_on.then_some(behind)
+    }
+
+    /// What has become of it.
+    pub(crate) fn passage(&self) -> Passage {
+        let Following { left, depth, met, continued } = *self;
+        let left = if left.max_element() > DARK { left * (-depth.max(Vec3::ZERO)).exp() } else { Vec3::ZERO };
+        Passage { left, met, continued }
+    }
+}
+
+/// Light through `surface`, met at `t`: multiplies `left`, adds to the optical `depth`, and returns where the ray goes on. Light is
 /// taken straight through dielectrics (no caustics): Fresnel loss at each interface and absorption in between.
-fn pass(stage: &Stage<'_>, ray: &Ray, hit: &Hit, left: &mut Vec3, depth: &mut Vec3) -> f32 {
-    let placed = stage.placed(hit);
-    let surface = placed.surface(ray, hit);
-    match placed.material.model {
+fn pass(
+    stage: &Stage<'_>,
+    material: &Material,
+    surface: &SurfacePoint,
+    ray: &Ray,
+    t: f32,
+    left: &mut Vec3,
+    depth: &mut Vec3,
+) -> f32 {
+    match material.model {
         SurfaceModel::Dielectric { ior, absorption } if stage.effects.contains(Effects::REFRACTION) => {
             let length = length(ray.dir);
             let cos = surface.face_normal.dot(ray.dir).abs() / length;
@@ -117,10 +177,10 @@ fn pass(stage: &Stage<'_>, ray: &Ray, hit: &Hit, left: &mut Vec3, depth: &mut Ve
             *left *= surface.color * (1.0 - reflected);
             // The way inside is where it leaves minus where it enters.
             let sign = if surface.outside { -1.0 } else { 1.0 };
-            *depth += Vec3::from(absorption) * (sign * hit.t * length);
+            *depth += Vec3::from(absorption) * (sign * t * length);
         }
         _ if stage.effects.contains(Effects::TRANSPARENCY) => *left *= 1.0 - surface.opacity,
         _ => *left = Vec3::ZERO,
     }
-    surface.t_behind(ray, hit.t)
+    surface.t_behind(ray, t)
 }

@@ -1,6 +1,7 @@
 //! A scene made ready for the tiles of one frame: instances resolved, lights in render space, rays set up.
 
 use super::camera_rays::CameraRays;
+use super::direct::Sending;
 use crate::camera::Camera;
 use crate::effects::Effects;
 use crate::environment::{Background, MeanRadiance};
@@ -24,6 +25,10 @@ pub(crate) struct Stage<'a> {
     pub(crate) effects: Effects,
     pub(crate) instances: Vec<Placed<'a>>,
     pub(crate) lights: Vec<PlacedLight>,
+    /// What points send to each of them.
+    pub(crate) sending: Vec<Sending>,
+    /// Number of the first ambient occlusion ray among all light rays of a point.
+    pub(crate) sky_number: u32,
     /// Ambient light and environment by normal.
     pub(crate) mean_radiance: Option<MeanRadiance>,
     /// Radiance of the ambient lights alone.
@@ -70,7 +75,7 @@ impl<'a> Stage<'a> {
         }
         let world_from_view = camera.world_from_view();
         let eye = camera.eye().unwrap_or_else(|| camera.world_ray([0.0, 0.0]).0);
-        let lights = scene
+        let lights: Vec<PlacedLight> = scene
             .lights
             .iter()
             .filter(|l| l.color != [0.0; 3] || l.highlight_color.is_some())
@@ -79,6 +84,7 @@ impl<'a> Stage<'a> {
         let ambient =
             scene.lights.iter().filter(|l| l.kind == LightKind::Ambient).map(|l| Vec3::from(l.color)).sum();
         let count = scene.world.instances().len();
+        let (sending, sky_number) = Sending::of(&lights, effects, options.light_rays);
         Stage {
             scene,
             camera: *camera,
@@ -86,6 +92,8 @@ impl<'a> Stage<'a> {
             effects,
             instances: (0..count).into_par_iter().with_min_len(1024).map(|i| Placed::new(scene, i)).collect(),
             lights,
+            sending,
+            sky_number,
             mean_radiance: MeanRadiance::new(scene.environment.as_ref(), ambient),
             ambient,
             camera_rays: CameraRays::new(camera, origin, bounds, effects.contains(Effects::DEPTH_OF_FIELD)),

@@ -169,6 +169,26 @@ impl TileLayers {
         }
     }
 
+    /// Fills the geometry layers of a pixel with what somebody else has found there: depth and distance, normal, instance and primitive.
+    pub(crate) fn record_given(&mut self, slot: u16, numbers: [f32; 2], normal: Vec3, ids: [u32; 2]) {
+        let i = slot as usize;
+        // There are no marks when no geometry layer is wanted.
+        if let Some(r) = self.recorded.get_mut(i) {
+            *r = true;
+        }
+        for (layer, number) in [&mut self.depth, &mut self.distance].into_iter().zip(numbers) {
+            if let Some(v) = layer.get_mut(i) {
+                *v = number;
+            }
+        }
+        if let Some(n) = self.normal.get_mut(i) {
+            *n = normal.to_array();
+        }
+        if let (Some(a), Some(b)) = (self.instance.get_mut(i), self.primitive.get_mut(i)) {
+            [*a, *b] = ids;
+        }
+    }
+
     /// Fills the normals of the lanes `lanes` of block `b`, if that layer is wanted.
     pub(crate) fn record_normals(&mut self, b: usize, lanes: u16, normal: impl Fn(usize) -> Vec3) {
         if let Some(normals) = self.normal.get_mut(b * LANES..(b + 1) * LANES) {

@@ -79,16 +79,61 @@ pub(crate) struct LightRays {
     pub(crate) blocked: Vec<u16>,
     /// For rays that pass through surfaces.
     pub(crate) hits: Vec<HitBlock>,
+    /// Who says what is in their way.
+    pub(crate) answers: Answers,
+    /// Point of the wave that the batch's points are counted from.
+    pub(crate) first_point: u32,
+    /// While recording: of each ray, its number among the light rays that its point could send.
+    numbers: Vec<u32>,
+}
+
+/// Who says what is in the way of light rays.
+#[derive(Default)]
+pub(crate) enum Answers {
+    /// The scene's own world.
+    #[default]
+    World,
+    /// Nobody yet: the rays are written down, and no light arrives.
+    Recording(Vec<RecordedRay>),
+    /// Somebody has said it for every recorded ray, in the order they were recorded.
+    Given(std::vec::IntoIter<Passage>),
+}
+
+/// A light ray that waits for an answer.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RecordedRay {
+    pub(crate) ray: Ray,
+    /// Point of the wave.
+    pub(crate) point: u32,
+    /// Its number among the light rays that a point could send.
+    pub(crate) number: u32,
+}
+
+/// What a light ray met.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Passage {
+    /// Share of the light that is left.
+    pub(crate) left: Vec3,
+    /// Whether anything was in the way.
+    pub(crate) met: bool,
+    /// How often it was continued behind a surface.
+    pub(crate) continued: u32,
 }
 
 impl LightRays {
     pub(crate) fn clear(&mut self) {
         self.blocks.clear();
         self.targets.clear();
+        self.numbers.clear();
+        self.first_point = 0;
     }
 
+    /// Appends the ray with the number `number` (see [`RecordedRay::number`]) of point `point`.
     #[inline]
-    pub(crate) fn push(&mut self, ray: &Ray, point: u32, radiance: Vec3) {
+    pub(crate) fn push(&mut self, ray: &Ray, point: u32, radiance: Vec3, number: u32) {
+        if !matches!(self.answers, Answers::World) {
+            self.numbers.push(number);
+        }
         let lane = self.targets.len() % LANES;
         if lane == 0 {
             self.blocks.push(RayBlock::INACTIVE);
@@ -96,6 +141,20 @@ impl LightRays {
         let last = self.blocks.len() - 1;
         self.blocks[last].set(lane, ray);
         self.targets.push((point, radiance));
+    }
+
+    /// Point and number of each ray, unless the world answers.
+    pub(crate) fn numbered(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
+        self.targets.iter().map(|(point, _)| *point).zip(self.numbers.iter().copied())
+    }
+
+    /// Writes the batch down for somebody else to trace.
+    pub(crate) fn record(&mut self) {
+        let Answers::Recording(list) = &mut self.answers else { return };
+        for (i, (&(point, _), &number)) in self.targets.iter().zip(&self.numbers).enumerate() {
+            let ray = self.blocks[i / LANES].get(i % LANES);
+            list.push(RecordedRay { ray, point: self.first_point + point, number });
+        }
     }
 
     #[inline]

@@ -43,15 +43,7 @@ pub(super) fn render_tile(
     let mut pixels = std::mem::take(if first { &mut out.color } else { &mut work.pixels });
     pixels.resize(PIXELS, [0.0; 4]);
     prefetch_surfaces(stage, &work.hits);
-    let has_place = |l: &crate::light::PlacedLight| !matches!(l.kind, PlacedKind::Directional { .. });
-    let points = stage.lights.iter().any(has_place);
-    dispatch!(stage.level, simd => {
-        if points {
-            light_hits::<_, true>(simd, stage, area, out, work, &mut pixels, record, stats);
-        } else {
-            light_hits::<_, false>(simd, stage, area, out, work, &mut pixels, record, stats);
-        }
-    });
+    light(stage, area, out, work, &mut pixels, record, stats);
     if first {
         out.start_samples(pixels);
     } else {
@@ -60,7 +52,28 @@ pub(super) fn render_tile(
     }
 }
 
-/// Colours of a tile. `POINT`: some light needs to know where the surface is.
+/// Colours of the tile whose camera rays and hits `work` has.
+pub(super) fn light(
+    stage: &Stage<'_>,
+    area: &TileArea,
+    out: &mut TileLayers,
+    work: &Workspace,
+    pixels: &mut [[f32; 4]],
+    record: bool,
+    stats: &mut RayStats,
+) {
+    let has_place = |l: &crate::light::PlacedLight| !matches!(l.kind, PlacedKind::Directional { .. });
+    let points = stage.lights.iter().any(has_place);
+    dispatch!(stage.level, simd => {
+        if points {
+            light_hits::<_, true>(simd, stage, area, out, work, pixels, record, stats);
+        } else {
+            light_hits::<_, false>(simd, stage, area, out, work, pixels, record, stats);
+        }
+    });
+}
+
+/// As [`light`]. `POINT`: some light needs to know where the surface is.
 fn light_hits<S: Simd, const POINT: bool>(
     simd: S,
     stage: &Stage<'_>,

@@ -1,0 +1,102 @@
+//! Why ranks could not talk, by name.
+
+/// Why ranks could not talk.
+#[derive(Debug, thiserror::Error, Clone, PartialEq, Eq)]
+pub enum CommError {
+    /// A message did not come in time.
+    #[error(
+        "rank {rank} waited {waited_ms} ms for a message from rank {peer} (tag {tag}) in vain: \
+         is that rank stalled, or the timeout too short for its rendering?"
+    )]
+    Timeout {
+        /// Who waited.
+        rank: usize,
+        /// For whom; of several the first that was posted.
+        peer: usize,
+        /// Tag of the message.
+        tag: u32,
+        /// How long, in milliseconds.
+        waited_ms: u64,
+    },
+    /// Not all ranks came to a barrier in time.
+    #[error("rank {rank} waited {waited_ms} ms at a barrier in vain: rank {missing} did not come")]
+    BarrierTimeout {
+        /// Who waited.
+        rank: usize,
+        /// The lowest rank that did not come.
+        missing: usize,
+        /// How long, in milliseconds.
+        waited_ms: u64,
+    },
+    /// A rank has left the group (its program part ended or panicked).
+    #[error("rank {rank} lost rank {peer}: it has left the group")]
+    PeerLost {
+        /// Who noticed.
+        rank: usize,
+        /// Who is gone.
+        peer: usize,
+    },
+    /// Another rank, or this one, gave up.
+    #[error("rank {by} ended the group: {reason}")]
+    Aborted {
+        /// Who gave up.
+        by: usize,
+        /// Why.
+        reason: String,
+    },
+    /// A rank number that the group does not have.
+    #[error("there is no rank {peer} in a group of {size}")]
+    NoSuchRank {
+        /// The number.
+        peer: usize,
+        /// Size of the group.
+        size: usize,
+    },
+    /// A message is longer than the receiver allowed for: the two do not agree about what is sent.
+    #[error(
+        "rank {rank} got a message from rank {peer} (tag {tag}) that is longer than the {capacity} bytes it allowed for: \
+         do all ranks use the same sizes and options?"
+    )]
+    TooLong {
+        /// The receiver.
+        rank: usize,
+        /// The sender.
+        peer: usize,
+        /// Tag of the message.
+        tag: u32,
+        /// What the receiver allowed for, in bytes.
+        capacity: usize,
+    },
+    /// A wait for nothing, which would never end.
+    #[error("rank {rank} waits for a message but has posted no receive")]
+    NothingPosted {
+        /// Who waits.
+        rank: usize,
+    },
+    /// The library that carries the messages reported a failure.
+    #[error("rank {rank}: {call} failed: {reason}")]
+    Transport {
+        /// Where.
+        rank: usize,
+        /// Which call.
+        call: String,
+        /// The library's words.
+        reason: String,
+    },
+    /// A rank's thread panicked ([`threads::run`](super::threads::run) only).
+    #[error("rank {rank} panicked: {message}")]
+    Panicked {
+        /// Who.
+        rank: usize,
+        /// The message of the panic.
+        message: String,
+    },
+    /// The operating system gave no thread ([`threads::run`](super::threads::run) only).
+    #[error("no thread for rank {rank}: {reason}: use fewer ranks")]
+    NoThread {
+        /// Who.
+        rank: usize,
+        /// The system's words.
+        reason: String,
+    },
+}

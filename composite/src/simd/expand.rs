@@ -1,0 +1,231 @@
+//! From the active pixels of a message back to rows: joined to what is held, or put in place.
+use crate::color::Color;
+use crate::pixel::{Composite, combine};
+use crate::simd::for_runs;
+use crate::simd::runs::nearest_run;
+#[cfg(target_arch = "x86_64")]
+use crate::simd::runs::{padded_16, take_nearer};
+use fearless_simd::Simd;
+
+/// Active pixels of one row of a message.
+#[derive(Clone, Copy)]
+pub(crate) struct SparseRow<'a> {
+    /// Words of eight bytes; empty if every pixel of the row is active.
+    pub(crate) mask: &'a [u8],
+    pub(crate) colors: &'a [u8],
+    /// Empty if the message has no depths.
+    pub(crate) depths: &'a [u8],
+    /// The whole message from the colours and from the depths on: what may be read, though not used.
+    pub(crate) behind_colors: &'a [u8],
+    pub(crate) behind_depths: &'a [u8],
+}
+
+/// How what comes is joined to what is held.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Side {
+    /// It comes from ranks before those held: in front, or the loser of ties.
+    Lower,
+    /// It comes from ranks behind those held.
+    Higher,
+}
+
+/// Joins consecutive pixels, active or not, to those held.
+#[inline(always)]
+pub(crate) fn join_run<P: Composite, S: Simd>(
+    simd: S,
+    colors: &[u8],
+    depths: &[u8],
+    held_colors: &mut [P::Color],
+    held_depths: &mut [f32],
+    side: Side,
+) {
+    if P::HAS_DEPTH {
+        nearest_run(simd, colors, depths, held_colors, held_depths, side == Side::Higher);
+    } else {
+        P::Color::over_run(simd, colors, held_colors, side == Side::Lower);
+    }
+}
+
+/// [`join_run`] one pixel after the other.
+pub(crate) fn join_run_scalar<P: Composite>(
+    colors: &[u8],
+    depths: &[u8],
+    held_colors: &mut [P::Color],
+    held_depths: &mut [f32],
+    side: Side,
+) {
+    for (index, held_color) in held_colors.iter_mut().enumerate() {
+        let color = bytemuck::pod_read_unaligned(&colors[index * P::Color::BYTES..][..P::Color::BYTES]);
+        let (depth, held_depth) = if P::HAS_DEPTH {
+            (bytemuck::pod_read_unaligned(&depths[4 * index..4 * index + 4]), held_depths[index])
+        } else {
+            (1.0, 1.0)
+        };
+        let (other, held) = (P::from_parts(color, depth), P::from_parts(*held_color, held_depth));
+        let joined = match side {
+            Side::Lower => combine(other, held),
+            Side::Higher => combine(held, other),
+        };
+        *held_color = joined.color();
+        if P::HAS_DEPTH {
+            held_depths[index] = joined.depth();
+        }
+    }
+}
+
+/// Joins a row of a message to the row held.
+#[inline(always)]
+pub(crate) fn join_row<P: Composite, S: Simd>(
+    simd: S,
+    row: SparseRow<'_>,
+    held_colors: &mut [P::Color],
+    held_depths: &mut [f32],
+    side: Side,
+) {
+    if row.mask.is_empty() {
+        join_run::<P, S>(simd, row.colors, row.depths, held_colors, held_depths, side);
+        return;
+    }
+    let mut taken = 0;
+    for (index, word) in words(row.mask).enumerate() {
+        if word == 0 {
+            continue;
+        }
+        let first = 64 * index;
+        if word != u64::MAX
+            && join_by_vectors::<P, S>(simd, row, taken, word, first, held_colors, held_depths, side)
+        {
+            taken += word.count_ones() as usize;
+            continue;
+        }
+        for_runs(word, |start, length| {
+            let (colors, depths) = taken_run::<P>(row, taken, length);
+            let at = first + start;
+            let held_depths = if P::HAS_DEPTH { &mut held_depths[at..at + length] } else { &mut [] };
+            join_run::<P, S>(simd, colors, depths, &mut held_colors[at..at + length], held_depths, side);
+            taken += length;
+        });
+    }
+}
+
+/// [`join_row`] one pixel after the other.
+pub(crate) fn join_row_scalar<P: Composite>(
+    row: SparseRow<'_>,
+    held_colors: &mut [P::Color],
+    held_depths: &mut [f32],
+    side: Side,
+) {
+    let mut taken = 0;
+    for at in 0..held_colors.len() {
+        if !row.mask.is_empty() && row.mask[at / 8] >> (at % 8) & 1 == 0 {
+            continue;
+        }
+        let (colors, depths) = taken_run::<P>(row, taken, 1);
+        let held_depths = if P::HAS_DEPTH { &mut held_depths[at..at + 1] } else { &mut [] };
+        join_run_scalar::<P>(colors, depths, &mut held_colors[at..at + 1], held_depths, side);
+        taken += 1;
+    }
+}
+
+/// Writes a row of a message over `colors` and, if it is not empty, `depths`: the background too.
+#[inline(always)]
+pub(crate) fn place_row<P: Composite>(row: SparseRow<'_>, colors: &mut [P::Color], depths: &mut [f32]) {
+    let with_depths = !depths.is_empty() && !row.depths.is_empty();
+    if row.mask.is_empty() {
+        bytemuck::cast_slice_mut::<_, u8>(colors).copy_from_slice(row.colors);
+        if with_depths {
+            bytemuck::cast_slice_mut::<_, u8>(depths).copy_from_slice(row.depths);
+        }
+        return;
+    }
+    let mut taken = 0;
+    for (index, word) in words(row.mask).enumerate() {
+        let first = 64 * index;
+        let last = (first + 64).min(colors.len());
+        if word != u64::MAX {
+            colors[first..last].fill(P::EMPTY.color());
+            if with_depths {
+                depths[first..last].fill(1.0);
+            }
+        }
+        for_runs(word, |start, length| {
+            let at = first + start;
+            let from = taken * P::Color::BYTES..(taken + length) * P::Color::BYTES;
+            bytemuck::cast_slice_mut::<_, u8>(&mut colors[at..at + length])
+                .copy_from_slice(&row.colors[from]);
+            if with_depths {
+                bytemuck::cast_slice_mut::<_, u8>(&mut depths[at..at + length])
+                    .copy_from_slice(&row.depths[4 * taken..4 * (taken + length)]);
+            }
+            taken += length;
+        });
+    }
+}
+
+#[inline(always)]
+fn taken_run<'a, P: Composite>(row: SparseRow<'a>, taken: usize, length: usize) -> (&'a [u8], &'a [u8]) {
+    let colors = &row.colors[taken * P::Color::BYTES..(taken + length) * P::Color::BYTES];
+    (colors, if P::HAS_DEPTH { &row.depths[4 * taken..4 * (taken + length)] } else { &[] })
+}
+
+#[inline(always)]
+fn words(mask: &[u8]) -> impl Iterator<Item = u64> {
+    mask.chunks_exact(8).map(bytemuck::pod_read_unaligned)
+}
+
+/// Whether there is an instruction for it: 64 pixels of a depth format with colours of four bytes.
+#[inline(always)]
+fn join_by_vectors<P: Composite, S: Simd>(
+    simd: S,
+    row: SparseRow<'_>,
+    taken: usize,
+    word: u64,
+    first: usize,
+    held_colors: &mut [P::Color],
+    held_depths: &mut [f32],
+    side: Side,
+) -> bool {
+    #[cfg(target_arch = "x86_64")]
+    if P::Color::BYTES == 4
+        && P::HAS_DEPTH
+        && let Some(avx512) = simd.level().as_avx512()
+    {
+        use fearless_simd::{Bytes, SimdInto, u32x16};
+        let held_bytes: &mut [u8] = bytemuck::cast_slice_mut(held_colors);
+        let (Some(held_bytes), Some(held_depths)) =
+            (held_bytes.get_mut(4 * first..4 * first + 256), held_depths.get_mut(first..first + 64))
+        else {
+            return false;
+        };
+        let mut taken = taken;
+        let quarters = held_bytes.as_chunks_mut::<64>().0.iter_mut().zip(held_depths.as_chunks_mut::<16>().0);
+        for (quarter, (held_color, held_depth)) in quarters.enumerate() {
+            let lanes = (word >> (16 * quarter)) as u16;
+            if lanes == 0 {
+                continue;
+            }
+            let color = padded_16(avx512, row.behind_colors, 4 * taken);
+            let depth = padded_16(avx512, row.behind_depths, 4 * taken);
+            let color: u32x16<_> = expand_16(avx512, color.into(), lanes).simd_into(avx512);
+            let depth: u32x16<_> = expand_16(avx512, depth.into(), lanes).simd_into(avx512);
+            let ties = side == Side::Higher;
+            take_nearer(avx512, color, depth.bitcast(), held_color, held_depth, ties, u64::from(lanes));
+            taken += lanes.count_ones() as usize;
+        }
+        return true;
+    }
+    let _ = (simd, row, taken, word, first, held_colors, held_depths, side);
+    false
+}
+
+#[cfg(target_arch = "x86_64")]
+fearless_simd::kernel!(
+    #[inline]
+    fn expand_16(
+        avx512: Avx512,
+        values: std::arch::x86_64::__m512i,
+        lanes: u16,
+    ) -> std::arch::x86_64::__m512i {
+        std::arch::x86_64::_mm512_maskz_expand_epi32(lanes, values)
+    }
+);

@@ -1,0 +1,147 @@
+//! Kernels over rows of pixels: active masks, compression to active pixels, depth tests and blending.
+//!
+//! Each is written once, generic over the vector type, and compiled for every instruction set; the best one is chosen at run
+//! time. [`SimdLevel::Scalar`] goes pixel by pixel through [`combine`](crate::combine) and is the reference the others are
+//! tested against: all levels give the same bits.
+pub(crate) mod compress;
+pub(crate) mod expand;
+pub(crate) mod mask;
+pub(crate) mod runs;
+
+use fearless_simd::Level;
+
+/// An instruction set the kernels can be limited to, for tests and for measurements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum SimdLevel {
+    /// One pixel after the other, for every machine.
+    Scalar,
+    /// 128-bit, the x86-64 baseline.
+    Sse2,
+    /// 128-bit with the instructions of x86-64-v2.
+    Sse42,
+    /// 256-bit (x86-64-v3).
+    Avx2,
+    /// 512-bit (Ice Lake and Zen 4 onwards).
+    Avx512,
+    /// 128-bit on ARM.
+    Neon,
+}
+
+impl SimdLevel {
+    /// The levels this machine can run, lowest first.
+    pub fn available() -> Vec<Self> {
+        let levels = [Self::Scalar, Self::Sse2, Self::Sse42, Self::Avx2, Self::Avx512, Self::Neon];
+        levels.into_iter().filter(|level| *level == Self::Scalar || level.token().is_some()).collect()
+    }
+
+    /// The best level of this machine.
+    pub fn best() -> Self {
+        Self::available().into_iter().next_back().unwrap_or(Self::Scalar)
+    }
+
+    /// The name used on command lines and in records.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Scalar => "scalar",
+            Self::Sse2 => "sse2",
+            Self::Sse42 => "sse4.2",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+            Self::Neon => "neon",
+        }
+    }
+
+    /// The level as fearless_simd knows it; `None` for [`SimdLevel::Scalar`] and where the machine lacks it.
+    fn token(self) -> Option<Level> {
+        let _best = Level::new();
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        return match self {
+            Self::Sse2 => _best.as_sse2().map(Level::Sse2),
+            Self::Sse42 => _best.as_sse4_2().map(Level::Sse4_2),
+            Self::Avx2 => _best.as_avx2().map(Level::Avx2),
+            Self::Avx512 => _best.as_avx512().map(Level::Avx512),
+            Self::Scalar | Self::Neon => None,
+        };
+        #[cfg(target_arch = "aarch64")]
+        return (self == Self::Neon).then_some(_best);
+        #[cfg(not(any(target_arch = "x86", target_arch = "x86_64", target_arch = "aarch64")))]
+        return None;
+    }
+}
+
+/// Which kernels to use: `None` is the scalar reference.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Kernels(pub(crate) Option<Level>);
+
+impl Kernels {
+    /// The wanted level, or the best one where it is not wanted or not there.
+    pub(crate) fn new(wanted: Option<SimdLevel>) -> Self {
+        match wanted {
+            Some(SimdLevel::Scalar) => Self(None),
+            Some(level) => Self(level.token().or_else(|| SimdLevel::best().token())),
+            None => Self(SimdLevel::best().token()),
+        }
+    }
+}
+
+/// Runs one expression compiled for the vectors of the chosen level, or the scalar one.
+macro_rules! at_level {
+    ($kernels:expr, $simd:ident => $vectors:expr, $scalar:expr) => {
+        match $kernels.0 {
+            Some(level) => fearless_simd::dispatch!(level, $simd => $vectors),
+            None => $scalar,
+        }
+    };
+}
+pub(crate) use at_level;
+
+/// Calls `visit(first, length)` for every run of ones in `word`.
+#[inline(always)]
+pub(crate) fn for_runs(mut word: u64, mut visit: impl FnMut(usize, usize)) {
+    while word != 0 {
+        let first = word.trailing_zeros();
+        let length = (word >> first).trailing_ones();
+        visit(first as usize, length as usize);
+        // Adding the lowest one carries through the run; what it sets behind the run must not stay set.
+        word &= !(u64::MAX >> (64 - length) << first);
+    }
+}
+
+/// 64 bytes from `at` on; zeros where `bytes` has ended.
+#[inline(always)]
+pub(crate) fn load_64(bytes: &[u8], at: usize) -> [u8; 64] {
+    if let Some(Ok(whole)) = bytes.get(at..at + 64).map(TryInto::try_into) {
+        return whole;
+    }
+    let rest = bytes.get(at..).unwrap_or(&[]);
+    let mut padded = [0; 64];
+    padded[..rest.len()].copy_from_slice(rest);
+    padded
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_of_a_word_are_all_of_its_ones() {
+        for word in [0, 1, u64::MAX, 1 << 63, 0xff00_0000_0000_00f1, 0x5555_5555_5555_5555, u64::MAX - 1] {
+            let mut again = 0_u64;
+            for_runs(word, |first, length| {
+                for bit in first..first + length {
+                    assert_eq!(again >> bit & 1, 0);
+                    again |= 1 << bit;
+                }
+            });
+            assert_eq!(again, word);
+        }
+    }
+
+    #[test]
+    fn scalar_is_always_there_and_the_best_level_is_available() {
+        let levels = SimdLevel::available();
+        assert_eq!(levels[0], SimdLevel::Scalar);
+        assert!(levels.contains(&SimdLevel::best()));
+        assert!(Kernels::new(Some(SimdLevel::Scalar)).0.is_none());
+    }
+}

@@ -1,0 +1,208 @@
+//! What a holder of geometry answers.
+
+use super::super::ambient_occlusion::{Dome, Hemisphere, OpenPoint, directions};
+use super::super::direct::{Sending, incident_from, light_point, shadow_ray};
+use super::super::tile::{PIXELS, TileArea};
+use super::super::wave::{Answers, LightRays};
+use super::super::{Dimension, Workspace, camera_blocks, local, prefetch_surfaces};
+use super::{LightPoint, Met, Pass, WaveFrame};
+use crate::frame::Layers;
+use crate::ray::{Hit, HitBlock, LANES, NO_HIT, Ray, RayBlock};
+use crate::ray_stats::RayStats;
+use crate::shade::TileLayers;
+use fearless_simd::dispatch;
+use glam::Vec3;
+
+/// Camera rays of one tile and what they meet in this world.
+#[derive(Default)]
+pub struct CameraHits {
+    work: Workspace,
+    area: Option<TileArea>,
+    rays: u64,
+}
+
+impl CameraHits {
+    /// Rays traced.
+    pub fn rays(&self) -> u64 {
+        self.rays
+    }
+
+    /// The hit of the pixel in slot `slot` (0..1024, see [`TileInWork`](super::TileInWork)).
+    pub fn get(&self, slot: usize) -> Option<Hit> {
+        self.work.hits.get(slot / LANES)?.get(slot % LANES)
+    }
+
+    /// Sixteen bits for every sixteen slots: set where something was hit.
+    pub fn mask(&self) -> impl Iterator<Item = u16> + '_ {
+        let bits = |h: &HitBlock| (0..LANES).fold(0u16, |m, l| m | ((h.prim[l] != NO_HIT) as u16) << l);
+        self.work.hits.iter().map(bits)
+    }
+
+    /// Colours of all slots where something was hit, in frames where [`WaveFrame::local_light_suffices`].
+    pub fn colors(&mut self, frame: &WaveFrame<'_>) -> &[[f32; 4]] {
+        let Some(area) = self.area else { return &[] };
+        let mut pixels = std::mem::take(&mut self.work.pixels);
+        pixels.clear();
+        pixels.resize(PIXELS, [0.0; 4]);
+        let mut layers = TileLayers::new(Layers::COLOR, 0.0, false);
+        let mut stats = RayStats::default();
+        local::light(&frame.stage, &area, &mut layers, &self.work, &mut pixels, false, &mut stats);
+        self.work.pixels = pixels;
+        &self.work.pixels
+    }
+
+    /// Everything about the hit in slot `slot`.
+    pub fn met(&self, frame: &WaveFrame<'_>, slot: usize) -> Option<Met> {
+        let (area, hit) = (self.area?, self.get(slot)?);
+        let ray = self.work.current.blocks[slot / LANES].get(slot % LANES);
+        let mut met = frame.met(&ray, &hit);
+        let layers = frame.stage.options.layers;
+        if layers.intersects(Layers::DEPTH | Layers::DISTANCE) {
+            (met.depth, met.distance) = frame.depth_and_distance(&area, slot as u16, &ray, &hit);
+        }
+        Some(met)
+    }
+}
+
+/// Memory of [`WaveFrame::blocked`].
+#[derive(Default)]
+pub struct LightBits {
+    rays: LightRays,
+    open: Vec<OpenPoint>,
+    domes: Vec<Dome>,
+    /// Rays traced so far.
+    pub traced: u64,
+}
+
+/// Light rays that are traced together.
+const BATCH_RAYS: usize = 4096;
+
+impl WaveFrame<'_> {
+    /// What the camera rays of tile `tile` meet here.
+    pub fn camera_hits(&self, tile: usize, pass: Pass, out: &mut CameraHits) {
+        let mut area = self.tiles[tile];
+        area.sample = if let Pass::Color(sample) = pass { sample } else { 0 };
+        let (sample, mut stats) = (self.sample_of(pass), RayStats::default());
+        let work = &mut out.work;
+        camera_blocks(&self.stage, &area, &mut work.current.blocks, sample, &mut stats, None);
+        work.hits.resize(PIXELS / LANES, HitBlock::MISS);
+        self.stage.scene.world.closest_coherent(&work.current.blocks, &mut work.hits);
+        prefetch_surfaces(&self.stage, &work.hits);
+        (out.area, out.rays) = (Some(area), stats.primary);
+    }
+
+    fn met(&self, ray: &Ray, hit: &Hit) -> Met {
+        let surface = self.stage.surface(ray, hit);
+        let (instance, primitive) = (hit.instance, hit.prim);
+        Met { t: hit.t, instance, primitive, depth: 0.0, distance: 0.0, surface }
+    }
+
+    fn depth_and_distance(&self, area: &TileArea, slot: u16, ray: &Ray, hit: &Hit) -> (f32, f32) {
+        let [x, y] = area.pixel(slot).unwrap_or_default();
+        let (point, origin) = self.stage.exact_point(self.stage.ndc(x, y, [0.5; 2]), ray, hit);
+        (self.stage.camera.window_depth(point) as f32, (point - origin).length() as f32)
+    }
+
+    /// What rays of any kind meet here, one answer each. Neighbouring rays should be similar. With `pixels` (tile and slot of each, for camera
+    /// rays of a pass that fills geometry layers) the answers have depth and distance.
+    pub fn closest(&self, rays: &[Ray], pixels: Option<&[(u32, u16)]>, out: &mut Vec<Option<Met>>) {
+        let blocks = RayBlock::from_rays(rays);
+        let mut hits = vec![HitBlock::MISS; blocks.len()];
+        self.stage.scene.world.closest_incoherent(&blocks, &mut hits);
+        out.clear();
+        for (i, ray) in rays.iter().enumerate() {
+            let met = hits[i / LANES].get(i % LANES).map(|hit| {
+                let mut met = self.met(ray, &hit);
+                let place = pixels.and_then(|p| p.get(i)).map(|&(t, s)| (self.tiles.get(t as usize), s));
+                if let Some((Some(area), slot)) = place {
+                    (met.depth, met.distance) = self.depth_and_distance(area, slot, ray, &hit);
+                }
+                met
+            });
+            out.push(met);
+        }
+    }
+
+    /// Of every light ray of every point, whether something here is in its way: [`WaveFrame::light_rays_per_point`] bits a point, in whole
+    /// words of 64, the lowest bit first. Rays that no material could need may be left out; their bits are 0.
+    pub fn blocked(&self, points: &[LightPoint], pass: Pass, work: &mut LightBits, out: &mut Vec<u64>) {
+        let words = (self.light_rays_per_point() as usize).div_ceil(64);
+        out.clear();
+        out.resize(words * points.len(), 0);
+        let sample = if let Pass::Color(sample) = pass { sample } else { 0 };
+        // Numbers of rays are kept for everything but the world's own light.
+        work.rays.answers = Answers::Recording(Vec::new());
+        let most = self.light_rays_per_point().max(1) as usize;
+        let per_batch = (BATCH_RAYS / most).max(1);
+        for (batch, out) in points.chunks(per_batch).zip(out.chunks_mut(per_batch * words)) {
+            for (number, sending) in self.stage.sending.iter().enumerate().filter(|(_, s)| s.traced) {
+                self.to_lamp(batch, sample, number, sending, &mut work.rays);
+                self.trace_bits(true, work, words, out);
+            }
+            if self.sky_rays() > 0 {
+                self.to_sky(batch, sample, work);
+                self.trace_bits(false, work, words, out);
+            }
+        }
+    }
+
+    fn to_lamp(&self, points: &[LightPoint], sample: u32, number: usize, s: &Sending, rays: &mut LightRays) {
+        let light = &self.stage.lights[number];
+        rays.clear();
+        for (i, p) in points.iter().enumerate().filter(|(_, p)| p.lamps) {
+            let sampler = self.stage.sampler(p.pixel[0], p.pixel[1], sample);
+            let surface = p.surface();
+            for k in 0..s.count {
+                let at = s.spread.then(|| light_point(&sampler, p.stream, number, k, s.count));
+                let incident = incident_from(light, p.point, at);
+                // No material answers light from behind its shading normal.
+                if incident.strength <= 0.0 || p.normal.dot(incident.dir) <= 0.0 {
+                    continue;
+                }
+                let ray = shadow_ray(&surface, &incident, !s.spread);
+                rays.push(&ray, i as u32, Vec3::ZERO, s.first_number + k);
+            }
+        }
+    }
+
+    fn to_sky(&self, points: &[LightPoint], sample: u32, work: &mut LightBits) {
+        let Some(ao) = self.stage.scene.ambient_occlusion else { return };
+        let LightBits { rays, open, domes, .. } = work;
+        rays.clear();
+        open.clear();
+        open.extend(points.iter().enumerate().filter(|(_, p)| p.sky).map(|(i, p)| OpenPoint {
+            index: i as u32,
+            light: Vec3::ZERO,
+            sampler: self.stage.sampler(p.pixel[0], p.pixel[1], sample),
+            dimension: p.stream.wrapping_add(Dimension::AMBIENT_OCCLUSION),
+        }));
+        dispatch!(self.stage.level, simd => directions(simd, &self.stage, open, ao.rays, domes));
+        let mut direction = 0;
+        for o in open.iter() {
+            let over = Hemisphere::new(&points[o.index as usize].surface());
+            for k in 0..ao.rays {
+                if let Some(ray) = over.ray(domes, direction, ao.distance) {
+                    rays.push(&ray, o.index, Vec3::ZERO, self.stage.sky_number + k);
+                }
+                direction += 1;
+            }
+        }
+    }
+
+    fn trace_bits(&self, alike: bool, work: &mut LightBits, words: usize, out: &mut [u64]) {
+        let rays = &mut work.rays;
+        work.traced += rays.targets.len() as u64;
+        rays.blocked.clear();
+        rays.blocked.resize(rays.blocks.len(), 0);
+        let world = &self.stage.scene.world;
+        if alike {
+            world.occluded_coherent(&rays.blocks, &mut rays.blocked);
+        } else {
+            world.occluded_incoherent(&rays.blocks, &mut rays.blocked);
+        }
+        for (i, (point, number)) in rays.numbered().enumerate() {
+            let bit = rays.is_blocked(i) as u64;
+            out[point as usize * words + number as usize / 64] |= bit << (number % 64);
+        }
+    }
+}

@@ -1,0 +1,290 @@
+//! Frames whose rays are answered by whoever calls.
+//!
+//! [`crate::render::render`] asks one world for every hit. Here the caller stands in between, so that a scene may be larger than what one
+//! process holds: those who hold parts of it (see [`crate::accel::World::build_part`]) say what rays meet, and those who own a part of the picture
+//! do everything else. Rays go in waves: all that a tile can send before it needs an answer. The same functions do the same arithmetic in the
+//! same order as in a frame of one piece, so the picture has the same bits.
+//!
+//! Of a tile, its owner asks in turn:
+//! 1. [`TileInWork::begin`], then for [`TileInWork::rays`] what each meets first; the answers go to [`TileInWork::meet`].
+//! 2. If there is light to be asked for: either [`TileInWork::light_points`], answered with one bit per ray
+//!    ([`TileInWork::arrive`]), or, where light passes through surfaces, [`TileInWork::light_rays`] layer by layer
+//!    ([`TileInWork::meet_light`]).
+//! 3. [`TileInWork::go_on`] shades and says whether there is another wave.
+//!
+//! Holders answer with [`WaveFrame::camera_hits`], [`WaveFrame::closest`] and [`WaveFrame::blocked`].
+
+mod holder;
+mod met;
+mod owner;
+
+pub use holder::{CameraHits, LightBits};
+pub use met::{LightPoint, Met};
+pub use owner::{TileInWork, WrongAnswer};
+
+use super::stage::Stage;
+use super::tile::{TILE, TileArea};
+use super::{Layers, local};
+use crate::camera::Camera;
+use crate::effects::Effects;
+use crate::frame::Frame;
+use crate::math::Aabb;
+use crate::render::{Crop, RenderError, RenderOptions, plan_for};
+use crate::scene::Scene;
+use glam::DVec3;
+
+/// Pixels along the side of a tile.
+pub const TILE_SIDE: u32 = TILE;
+
+/// One walk of rays over the whole picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pass {
+    /// Rays through the pixels' centres, for depth, normals and ids.
+    Geometry,
+    /// Colour of this sample.
+    Color(u32),
+}
+
+/// A scene, or a part of one, made ready for one frame.
+pub struct WaveFrame<'a> {
+    stage: Stage<'a>,
+    tiles: Vec<TileArea>,
+    warnings: Vec<String>,
+}
+
+impl<'a> WaveFrame<'a> {
+    /// Checks everything. `needed` are the effects that the whole scene needs ([`Effects::required_by`]): a part may seem to need less.
+    ///
+    /// # Errors
+    /// As [`crate::render::render`]; and [`RenderError::Unsupported`] for options that stop a frame early, which nobody alone can decide here.
+    pub fn new(
+        scene: &'a Scene,
+        needed: Effects,
+        camera: &Camera,
+        options: &'a RenderOptions,
+    ) -> Result<WaveFrame<'a>, RenderError> {
+        let plan = plan_for(scene, needed, camera, options)?;
+        if options.time_limit.is_some() || options.max_error_levels.is_some() || options.cancel.is_some() {
+            return Err(RenderError::Unsupported {
+                what: "stopping early (time_limit, max_error_levels, cancel)",
+                with: "in a frame that several render together",
+                cure: "leave these options out and give the number of samples",
+            });
+        }
+        let Crop { x: left, y: top, width, height } = options.area();
+        let mut tiles = Vec::new();
+        for y in (0..height).step_by(TILE as usize) {
+            for x in (0..width).step_by(TILE as usize) {
+                let (width, height) = (TILE.min(width - x), TILE.min(height - y));
+                tiles.push(TileArea { x: left + x, y: top + y, width, height, sample: 0 });
+            }
+        }
+        Ok(WaveFrame {
+            stage: Stage::new(scene, camera, options, plan.effects),
+            tiles,
+            warnings: plan.warnings,
+        })
+    }
+
+    /// Effects that run.
+    pub fn effects(&self) -> Effects {
+        self.stage.effects
+    }
+
+    /// Requests that change nothing, in words.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// Number of tiles, which go row by row from the top left.
+    pub fn num_tiles(&self) -> usize {
+        self.tiles.len()
+    }
+
+    /// Pixels of tile `tile`.
+    pub fn tile_area(&self, tile: usize) -> Crop {
+        let TileArea { x, y, width, height, .. } = self.tiles[tile];
+        Crop { x, y, width, height }
+    }
+
+    /// The passes of this frame, in order.
+    pub fn passes(&self) -> Vec<Pass> {
+        let options = self.stage.options;
+        let colors = if options.layers.contains(Layers::COLOR) { options.samples } else { 0 };
+        let geometry = self.wants_geometry() && !self.recorded_with_color();
+        geometry.then_some(Pass::Geometry).into_iter().chain((0..colors).map(Pass::Color)).collect()
+    }
+
+    /// True when colours need nothing but camera rays: holders then know the colours of their own hits
+    /// ([`CameraHits::colors`]), and owners only choose among them ([`TileInWork::choose`]).
+    pub fn local_light_suffices(&self) -> bool {
+        local::suffices(&self.stage)
+    }
+
+    /// True when [`Pass::Color`] also fills the geometry layers, from what [`TileInWork::record`] is given or `meet` meets.
+    pub fn records_geometry(&self, pass: Pass) -> bool {
+        match pass {
+            Pass::Geometry => true,
+            Pass::Color(sample) => sample == 0 && self.wants_geometry() && self.recorded_with_color(),
+        }
+    }
+
+    /// True when light rays pass through surfaces, so that they are followed layer by layer.
+    pub fn light_passes_surfaces(&self) -> bool {
+        self.stage.light_passes_surfaces()
+    }
+
+    /// Rays that a point may send towards light: bits that [`WaveFrame::blocked`] gives for each point.
+    pub fn light_rays_per_point(&self) -> u32 {
+        self.stage.sky_number + self.sky_rays()
+    }
+
+    /// How far ambient occlusion looks, when it is the only reason for rays that leave a camera ray's hit.
+    pub fn only_ambient_occlusion_within(&self) -> Option<f64> {
+        let alone = self.stage.effects.without(Effects::DEPTH_OF_FIELD) == Effects::AMBIENT_OCCLUSION;
+        self.stage.scene.ambient_occlusion.filter(|_| alone).map(|ao| ao.distance)
+    }
+
+    fn sky_rays(&self) -> u32 {
+        let ao = self.stage.scene.ambient_occlusion;
+        let traced = self.stage.effects.contains(Effects::AMBIENT_OCCLUSION);
+        ao.filter(|_| traced).map_or(0, |ao| ao.rays)
+    }
+
+    fn centered(&self) -> bool {
+        self.stage.options.samples <= 1 && !self.stage.effects.contains(Effects::DEPTH_OF_FIELD)
+    }
+
+    fn wants_geometry(&self) -> bool {
+        self.stage.options.layers.intersects(Layers::GEOMETRY)
+    }
+
+    fn recorded_with_color(&self) -> bool {
+        self.centered() && self.stage.options.layers.contains(Layers::COLOR)
+    }
+
+    /// Of the sample that a pass aims at, its number; `None` for the pixels' centres.
+    fn sample_of(&self, pass: Pass) -> Option<u32> {
+        match pass {
+            Pass::Color(sample) if !self.centered() => Some(sample),
+            _ => None,
+        }
+    }
+
+    /// Bounds of this scene's or part's own geometry, render space.
+    pub fn own_bounds(&self) -> Aabb {
+        self.stage.scene.world.own_bounds()
+    }
+
+    /// Of each tile, whether a camera ray of it can meet `bounds` (render space).
+    pub fn tiles_of(&self, bounds: Aabb) -> Vec<bool> {
+        if bounds.is_empty() {
+            return vec![false; self.tiles.len()];
+        }
+        let everywhere = vec![true; self.tiles.len()];
+        if self.stage.effects.contains(Effects::DEPTH_OF_FIELD) {
+            return everywhere;
+        }
+        let matrix = self.stage.camera.clip_from_world();
+        let (mut lo, mut hi) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for corner in bounds.corners() {
+            let world = self.stage.origin + corner.as_dvec3();
+            let row = |r: usize| matrix.row(r).truncate().dot(world) + matrix.row(r).w;
+            let (x, y, w) = (row(0), row(1), row(3));
+            // A corner beside or behind the eye has no place in the picture.
+            let reach = (world - self.eye()).length();
+            let in_front = w.is_finite() && (w > 1e-6 * reach || self.stage.camera.eye().is_none());
+            if !in_front {
+                return everywhere;
+            }
+            let size = [self.stage.options.width, self.stage.options.height].map(f64::from);
+            let pixel = [(x / w + 1.0) * 0.5 * size[0], (1.0 - y / w) * 0.5 * size[1]];
+            for a in 0..2 {
+                (lo[a], hi[a]) = (lo[a].min(pixel[a]), hi[a].max(pixel[a]));
+            }
+        }
+        // Rays are anywhere in their pixels, and f32.
+        let margin = 1.0 + 1e-4 * f64::from(self.stage.options.width.max(self.stage.options.height));
+        let meets = |t: &TileArea| {
+            let (x, y) = (f64::from(t.x), f64::from(t.y));
+            let right = x + f64::from(t.width) + margin;
+            let below = y + f64::from(t.height) + margin;
+            hi[0] >= x - margin && lo[0] <= right && hi[1] >= y - margin && lo[1] <= below
+        };
+        self.tiles.iter().map(meets).collect()
+    }
+
+    fn eye(&self) -> DVec3 {
+        self.stage.camera.eye().unwrap_or(self.stage.origin)
+    }
+
+    // ---- The finished picture -----------------------------------------------------------------------------------
+
+    /// A picture without any tile.
+    pub fn blank(&self) -> Frame {
+        let area = self.stage.options.area();
+        let n = area.width as usize * area.height as usize;
+        let has = |l| if self.stage.options.layers.contains(l) { n } else { 0 };
+        Frame {
+            width: area.width,
+            height: area.height,
+            color: vec![[0.0; 4]; has(Layers::COLOR)],
+            depth: vec![self.stage.camera.background_depth() as f32; has(Layers::DEPTH)],
+            distance: vec![f32::INFINITY; has(Layers::DISTANCE)],
+            normal: vec![[0.0; 3]; has(Layers::NORMAL)],
+            instance: vec![u32::MAX; has(Layers::IDS)],
+            primitive: vec![u32::MAX; has(Layers::IDS)],
+            cost: vec![0.0; has(Layers::COST)],
+        }
+    }
+
+    /// Words that a pixel has in [`TileInWork::words`].
+    pub fn words_per_pixel(&self) -> usize {
+        let sizes = [
+            (Layers::COLOR, 4),
+            (Layers::DEPTH, 1),
+            (Layers::DISTANCE, 1),
+            (Layers::NORMAL, 3),
+            (Layers::IDS, 2),
+            (Layers::COST, 1),
+        ];
+        sizes.iter().filter(|(l, _)| self.stage.options.layers.contains(*l)).map(|(_, n)| n).sum()
+    }
+
+    /// Puts what [`TileInWork::words`] gave for tile `tile` into the picture. False when it is no tile of this frame or of another length.
+    #[must_use]
+    pub fn place(&self, frame: &mut Frame, tile: usize, words: &[u32]) -> bool {
+        let Some(t) = self.tiles.get(tile) else { return false };
+        if words.len() != (t.width * t.height) as usize * self.words_per_pixel() {
+            return false;
+        }
+        let area = self.stage.options.area();
+        let mut words = words.iter().copied();
+        let mut next = || words.next().unwrap_or_default();
+        for y in 0..t.height {
+            for x in 0..t.width {
+                let i = (t.y - area.y + y) as usize * area.width as usize + (t.x - area.x + x) as usize;
+                if let Some(c) = frame.color.get_mut(i) {
+                    *c = std::array::from_fn(|_| f32::from_bits(next()));
+                }
+                for layer in [&mut frame.depth, &mut frame.distance] {
+                    if let Some(v) = layer.get_mut(i) {
+                        *v = f32::from_bits(next());
+                    }
+                }
+                if let Some(n) = frame.normal.get_mut(i) {
+                    *n = std::array::from_fn(|_| f32::from_bits(next()));
+                }
+                for layer in [&mut frame.instance, &mut frame.primitive] {
+                    if let Some(v) = layer.get_mut(i) {
+                        *v = next();
+                    }
+                }
+                if let Some(c) = frame.cost.get_mut(i) {
+                    *c = f32::from_bits(next());
+                }
+            }
+        }
+        true
+    }
+}
