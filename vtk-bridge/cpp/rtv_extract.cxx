@@ -143,11 +143,6 @@ const char* AddPolyData(Actor& a, vtkPolyData* data, const BlockState& block, co
     CopyColor(block.Color, s.property.ambient_color);
     CopyColor(block.Color, s.property.diffuse_color);
   }
-  if (vtkProperty* back = a.Prop->GetBackfaceProperty())
-  {
-    s.back = PropertyOf(back);
-    s.has_back = 1;
-  }
   std::copy(&a.Matrix->Element[0][0], &a.Matrix->Element[0][0] + 16, s.world_from_data);
   s.point_radius = a.PointRadius;
   s.line_radius = a.LineRadius;
@@ -259,6 +254,11 @@ const char* WhyNot(vtkActor* actor, vtkMapper* mapper, double pointRadius, doubl
   if (property->GetRepresentation() == VTK_SURFACE && property->GetEdgeVisibility())
   {
     return "edges on the surface";
+  }
+  if (actor->GetBackfaceProperty())
+  {
+    // Two coincident surfaces, one culled on each side, are one surface for a ray.
+    return "backs with a property of their own";
   }
   if (property->GetNumberOfTextures() > 0)
   {

@@ -136,12 +136,10 @@ typedef struct RtvSurface {
   RtvArray texture;
   /* Texels per row. */
   uint32_t texture_width;
-  /* 1 when back is valid. */
-  uint32_t has_back;
+  /* Not used. */
+  uint32_t reserved_2;
   /* Answer to light. */
   RtvProperty property;
-  /* Answer to light of the side turned away. */
-  RtvProperty back;
   /* Row by row. */
   double world_from_data[16];
   /* Sixteen RTV_F64 per copy (row by row), or none. */

@@ -6,7 +6,7 @@ use crate::materials::{Encoding, Setting, material};
 use crate::options::{MaterialChoice, Options};
 use rt_core::accel::{Geometry, Instance};
 use rt_core::glam::DAffine3;
-use rt_core::material::{ColorSource, Material, Sides, SurfaceModel};
+use rt_core::material::{ColorSource, Material, SurfaceModel};
 use rt_core::scene::Appearance;
 use std::collections::HashMap;
 
@@ -49,37 +49,26 @@ pub(crate) fn assemble(drawn: &[Drawn], options: &Options, only_headlight: bool,
 
 impl Assembled {
     fn add(&mut self, d: &Drawn, geometry: usize, is_mesh: bool, setting: &Setting<'_>) {
-        // Another property on the back: two instances, one for each side.
-        let sides = match &d.back {
-            Some(back) if is_mesh => vec![(&d.property, Some(Sides::FrontOnly)), (back, Some(Sides::BackOnly))],
-            _ => vec![(&d.property, None)],
-        };
-        for (property, only) in sides {
-            // In VTK colours of points and cells are for both sides, unless the back has its own property.
-            let colors = d.color.as_ref().filter(|_| is_mesh && only != Some(Sides::BackOnly));
-            let (mut base, encoding) = material(property, colors.is_some(), setting);
-            if let Some(sides) = only {
-                base.sides = sides;
+        let colors = d.color.as_ref().filter(|_| is_mesh);
+        let (base, encoding) = material(&d.property, colors.is_some(), setting);
+        match &d.glyphs {
+            None => {
+                let m = self.dressed(base, colors, d);
+                self.place(geometry, d.world_from_data, m, colors, encoding);
             }
-            match &d.glyphs {
-                None => {
-                    let m = self.dressed(base, colors, d);
-                    self.place(geometry, d.world_from_data, m, colors, encoding);
-                }
-                Some(copies) => {
-                    let mut by_color: HashMap<Option<[u8; 4]>, usize> = HashMap::new();
-                    for (place, rgba) in copies {
-                        let m = *by_color.entry(*rgba).or_insert_with(|| match rgba {
-                            None => self.dressed(base.clone(), colors, d),
-                            Some([r, g, b, a]) => {
-                                let color = [*r, *g, *b].map(|c| f32::from(c) / 255.0);
-                                let opacity = base.opacity * f32::from(*a) / 255.0;
-                                let source = ColorSource::Constant;
-                                self.material(Material { color, opacity, color_source: source, ..base.clone() })
-                            }
-                        });
-                        self.place(geometry, *place, m, colors, encoding);
-                    }
+            Some(copies) => {
+                let mut by_color: HashMap<Option<[u8; 4]>, usize> = HashMap::new();
+                for (place, rgba) in copies {
+                    let m = *by_color.entry(*rgba).or_insert_with(|| match rgba {
+                        None => self.dressed(base.clone(), colors, d),
+                        Some([r, g, b, a]) => {
+                            let color = [*r, *g, *b].map(|c| f32::from(c) / 255.0);
+                            let opacity = base.opacity * f32::from(*a) / 255.0;
+                            let source = ColorSource::Constant;
+                            self.material(Material { color, opacity, color_source: source, ..base.clone() })
+                        }
+                    });
+                    self.place(geometry, *place, m, colors, encoding);
                 }
             }
         }

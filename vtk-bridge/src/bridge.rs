@@ -36,7 +36,6 @@ pub(crate) struct Drawn {
     pub(crate) color: Option<Resolved>,
     pub(crate) texture: Option<Arc<Texture>>,
     pub(crate) property: crate::input::Property,
-    pub(crate) back: Option<crate::input::Property>,
     pub(crate) world_from_data: DAffine3,
     /// Place and colour of each copy; `None` without copies.
     pub(crate) glyphs: Option<Vec<(DAffine3, Option<[u8; 4]>)>>,
@@ -156,10 +155,10 @@ impl Bridge {
         }
         let color = self.color(surface, &built);
         let texture = surface.texture.as_ref().and_then(|image| {
-            let kept = self.textures.entry(image.key).or_insert_with(|| Kept {
-                value: colors::texture(image).map(Arc::new),
-                frame,
-            });
+            let kept = self
+                .textures
+                .entry(image.key)
+                .or_insert_with(|| Kept { value: colors::texture(image).map(Arc::new), frame });
             kept.frame = frame;
             kept.value.clone()
         });
@@ -182,7 +181,6 @@ impl Bridge {
             color,
             texture,
             property: surface.property,
-            back: surface.back,
             world_from_data: place,
             glyphs,
         });
@@ -228,7 +226,7 @@ impl Bridge {
         }
         (s.shape.key, color_key, s.texture.map(|t| t.key)).hash(h);
         // The numbers' text is as unique as the numbers.
-        format!("{:?}{:?}{:?}", s.property, s.back, s.world_from_data).hash(h);
+        format!("{:?}{:?}", s.property, s.world_from_data).hash(h);
         if let Some(g) = &s.glyphs {
             g.rgba.hash(h);
             g.matrices.iter().flatten().for_each(|v| v.to_bits().hash(h));
@@ -318,7 +316,8 @@ impl Bridge {
         scene.materials = materials;
         if options.ao > 0 && !options.path_tracing {
             let automatic = 0.2 * world.bounds().extent().as_dvec3().length();
-            let distance = options.ao_radius.unwrap_or(if automatic > 0.0 { automatic } else { f64::INFINITY });
+            let distance =
+                options.ao_radius.unwrap_or(if automatic > 0.0 { automatic } else { f64::INFINITY });
             scene.ambient_occlusion = Some(AmbientOcclusion { distance, rays: options.ao });
         }
         let camera = self.camera(view, &options)?;
@@ -326,7 +325,8 @@ impl Bridge {
         // ---- What it needs, of what is wanted.
         let needed = Effects::required_by(&scene) | Effects::required_by_camera(&camera);
         let mirrors = Effects::REFLECTION | Effects::GLOSSY_REFLECTION;
-        let effects = if crate::assemble::wants_reflections(&options) { needed } else { needed.without(mirrors) };
+        let effects =
+            if crate::assemble::wants_reflections(&options) { needed } else { needed.without(mirrors) };
         if effects.intersects(mirrors | Effects::REFRACTION) || options.path_tracing {
             scene.background = Picture::surroundings(view);
         }
@@ -343,10 +343,17 @@ impl Bridge {
         render.max_bounces = options.max_bounces;
         render.seed = options.seed.wrapping_add(u64::from(mean_of) << 32);
         render.effects = Some(effects);
-        let ready = Ready { scene: &scene, camera: &camera, options: render, averaged: options.progressive > 1, encodings: &encodings };
+        let ready = Ready {
+            scene: &scene,
+            camera: &camera,
+            options: render,
+            averaged: options.progressive > 1,
+            encodings: &encodings,
+        };
 
         // ---- Rays, and the picture for the window.
-        let (mut renderer, mut picture) = (std::mem::take(&mut self.renderer), std::mem::take(&mut self.picture));
+        let (mut renderer, mut picture) =
+            (std::mem::take(&mut self.renderer), std::mem::take(&mut self.picture));
         let outcome = self.in_pool(|| picture.draw(&mut renderer, &ready, view, mean_of));
         (self.renderer, self.picture) = (renderer, picture);
         let outcome = outcome?;
@@ -355,8 +362,10 @@ impl Bridge {
         self.report.effects = effects.names().map(str::to_owned).collect();
         self.report.rays = crate::report::rays(&outcome.rays);
         for w in outcome.warnings {
-            // Reflections that nobody asked for are left out on purpose; alpha of 1 at all corners comes out a rounding below 1 inside.
-            if !w.contains("left out") && !w.contains("drawn opaque") {
+            // Nobody asked for the effects one by one: reflections are left out on purpose, and others may happen not to be in view. Alpha of 1 at
+            // all corners comes out a rounding below 1 inside.
+            let of_no_use = ["left out", "drawn opaque", "changed no pixel of this picture"];
+            if !of_no_use.iter().any(|t| w.contains(t)) {
                 self.warn(w);
             }
         }
@@ -382,7 +391,8 @@ impl Bridge {
             let costs = Effects::ALL.iter().filter(|(e, _)| effects.contains(*e)).filter_map(|(e, name)| {
                 let without = effects.without(*e);
                 // Soft shadows are shadows.
-                let without = if *e == Effects::SHADOWS { without.without(Effects::SOFT_SHADOWS) } else { without };
+                let without =
+                    if *e == Effects::SHADOWS { without.without(Effects::SOFT_SHADOWS) } else { without };
                 Some(((*name).to_owned(), (whole? - time(without)?).max(0.0)))
             });
             let costs = costs.collect();
@@ -411,7 +421,8 @@ impl Bridge {
         geometries: Vec<Geometry>,
         instances: Vec<rt_core::accel::Instance>,
     ) -> Result<Arc<World>, BridgeError> {
-        let build = BuildOptions { quality: self.options.build, robustness: self.options.robustness, simd: None };
+        let build =
+            BuildOptions { quality: self.options.build, robustness: self.options.robustness, simd: None };
         if let Some((world, placed, options)) = &self.world
             && *placed == instances
             && *options == build

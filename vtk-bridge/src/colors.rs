@@ -36,9 +36,12 @@ pub fn resolve(color: &Color<'_>, built: &BuiltMesh, points: usize) -> Result<Op
             if values.len() < points {
                 return Err(length("points", points, values.len()));
             }
-            let values: Vec<[f32; 4]> = values[..points].par_iter().with_min_len(CHUNK).map(|c| float(*c)).collect();
+            let values: Vec<[f32; 4]> =
+                values[..points].par_iter().with_min_len(CHUNK).map(|c| float(*c)).collect();
             let values = match &built.clipped {
-                Some(c) => c.vertex_values(&values, |a, b, t| std::array::from_fn(|k| a[k] + (b[k] - a[k]) * t)),
+                Some(c) => {
+                    c.vertex_values(&values, |a, b, t| std::array::from_fn(|k| a[k] + (b[k] - a[k]) * t))
+                }
                 None => values,
             };
             Ok(Some(Resolved::Values(Arc::new(Attribute::per_vertex(values)))))
@@ -49,7 +52,8 @@ pub fn resolve(color: &Color<'_>, built: &BuiltMesh, points: usize) -> Result<Op
                 values.get(built.cells.at(before)).map(|c| float(*c))
             };
             let triangles = built.mesh.indices.len();
-            let list: Option<Vec<_>> = (0..triangles).into_par_iter().with_min_len(CHUNK).map(of_triangle).collect();
+            let list: Option<Vec<_>> =
+                (0..triangles).into_par_iter().with_min_len(CHUNK).map(of_triangle).collect();
             let list = list.ok_or_else(|| length("cells", triangles, values.len()))?;
             Ok(Some(Resolved::Values(Arc::new(Attribute::per_face(list)))))
         }

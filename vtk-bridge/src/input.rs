@@ -286,8 +286,6 @@ pub struct Surface<'a> {
     pub texture: Option<Image<'a>>,
     /// Its answer to light.
     pub property: Property,
-    /// Another answer on the side turned away, if any.
-    pub back: Option<Property>,
     /// Copies: each is drawn where its own matrix (data of the copy to `world_from_data`'s input) puts it.
     pub glyphs: Option<Glyphs<'a>>,
 }

@@ -19,7 +19,6 @@
 //!     color: Color::Material,
 //!     texture: None,
 //!     property: Property { lighting: false, ..Property::default() },
-//!     back: None,
 //!     glyphs: None,
 //! });
 //! let view = View {

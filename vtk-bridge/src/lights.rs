@@ -26,7 +26,9 @@ fn light(l: &SceneLight, shadows: bool, options: &Options) -> Option<Light> {
             Kind::Directional { to_light: -axis, angular_radius_rad: options.light_size_rad }
         }
         // A light that is seen under the angle asked for, from where it looks.
-        LightKind::Point => Kind::Point { position: l.position, radius: axis.length() * options.light_size_rad.tan() },
+        LightKind::Point => {
+            Kind::Point { position: l.position, radius: axis.length() * options.light_size_rad.tan() }
+        }
         LightKind::Spot { cutoff_rad, exponent } => Kind::Spot {
             position: l.position,
             direction: axis,

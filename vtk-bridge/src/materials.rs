@@ -117,7 +117,8 @@ fn pbr(p: &Property, base: Material) -> (Material, Encoding) {
         roughness: sane(p.roughness).min(1.0),
         specular: f0,
     };
-    (Material { model, color: base.color.map(|c| c.powf(2.2)), ..base }, Encoding::Pbr)
+    // VTK 9 takes the colour as linear here, although the result is encoded.
+    (Material { model, ..base }, Encoding::Pbr)
 }
 
 /// Finite and not negative.
@@ -152,7 +153,8 @@ mod tests {
 
     #[test]
     fn nan_in_a_property_is_no_error_of_the_scene() {
-        let p = Property { specular_power: f32::NAN, diffuse: -1.0, opacity: f32::NAN, ..Property::default() };
+        let p =
+            Property { specular_power: f32::NAN, diffuse: -1.0, opacity: f32::NAN, ..Property::default() };
         let (m, _) = material(&p, false, &setting(&Options::default()));
         assert!(matches!(m.model, SurfaceModel::Phong { shininess: 0.0, diffuse: 0.0, .. }), "{m:?}");
     }

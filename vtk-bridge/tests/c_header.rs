@@ -73,7 +73,10 @@ fn header(sources: &[&str]) -> String {
                 writeln!(out, "#define {name} {}u", value.trim_end_matches(';')).expect("to a string");
                 comment.clear();
             } else if line.starts_with("#[repr(C)]") {
-                let name_line = lines[i + 1..].iter().position(|l| l.starts_with("pub struct")).expect("a struct") + i + 1;
+                let name_line =
+                    lines[i + 1..].iter().position(|l| l.starts_with("pub struct")).expect("a struct")
+                        + i
+                        + 1;
                 let name = lines[name_line].trim_start_matches("pub struct ").trim_end_matches(" {");
                 describe(&mut out, "", &comment);
                 writeln!(out, "typedef struct {name} {{").expect("to a string");
@@ -84,7 +87,8 @@ fn header(sources: &[&str]) -> String {
                         comment.push(text);
                     } else if let Some(field) = lines[i].trim().strip_prefix("pub ") {
                         describe(&mut out, "  ", &comment);
-                        writeln!(out, "  {};", declaration(field.trim_end_matches(','))).expect("to a string");
+                        writeln!(out, "  {};", declaration(field.trim_end_matches(',')))
+                            .expect("to a string");
                         comment.clear();
                     }
                     i += 1;
@@ -96,12 +100,8 @@ fn header(sources: &[&str]) -> String {
                 let (_, rest) = text.split_once(" fn ").expect("a function");
                 let (name, rest) = rest.split_once('(').expect("arguments");
                 let (arguments, result) = rest.rsplit_once(')').expect("closed");
-                let arguments: Vec<String> = arguments
-                    .split(',')
-                    .map(str::trim)
-                    .filter(|a| !a.is_empty())
-                    .map(declaration)
-                    .collect();
+                let arguments: Vec<String> =
+                    arguments.split(',').map(str::trim).filter(|a| !a.is_empty()).map(declaration).collect();
                 let arguments = if arguments.is_empty() { "void".to_owned() } else { arguments.join(", ") };
                 let result = result.trim().trim_end_matches('{').trim();
                 let result = result.strip_prefix("-> ").map_or("void".to_owned(), c_type);

@@ -151,7 +151,8 @@ fn install(common: &CommonArgs, args: &InstallArgs) -> anyhow::Result<Status> {
 fn examine(common: &CommonArgs, args: &PrefixArgs) -> anyhow::Result<Status> {
     let findings = doctor::examine(&args.layout(), variable);
     common.result(&findings, || {
-        let line = |f: &doctor::Finding| format!("{} {:<18} {}", if f.ok { "ok " } else { "BAD" }, f.what, f.text);
+        let line =
+            |f: &doctor::Finding| format!("{} {:<18} {}", if f.ok { "ok " } else { "BAD" }, f.what, f.text);
         findings.iter().map(line).collect::<Vec<_>>().join("\n")
     })?;
     Ok(if findings.iter().all(|f| f.ok) { Status::Success } else { Status::Failure })
@@ -169,10 +170,18 @@ fn env(common: &CommonArgs, args: &EnvArgs) -> anyhow::Result<Status> {
     }
     let library = library();
     if !missing.is_empty() {
-        common.note(0, format!("building for VTK {} first", missing.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ")));
+        common.note(
+            0,
+            format!(
+                "building for VTK {} first",
+                missing.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ")
+            ),
+        );
         let done = layout.install(&library?, &missing)?;
         if let Some((name, why)) = done.failed.first() {
-            return Err(anyhow::anyhow!("{why}")).with_context(|| format!("VTK {name} could not be built for")).cure("run `vtk-bridge doctor`");
+            return Err(anyhow::anyhow!("{why}"))
+                .with_context(|| format!("VTK {name} could not be built for"))
+                .cure("run `vtk-bridge doctor`");
         }
     } else if let Ok(library) = library {
         if !layout.loader_is(&library) {

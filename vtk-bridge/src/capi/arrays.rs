@@ -49,17 +49,16 @@ unsafe fn ids<'a>(array: &RtvArray, what: &str) -> Result<Ids<'a>, String> {
 /// As [`tuples`].
 unsafe fn cells<'a>(cells: &RtvCells, what: &str) -> Result<Cells<'a>, String> {
     // SAFETY: the caller's promise.
-    Ok(unsafe { Cells { offsets: ids(&cells.offsets, what)?, connectivity: ids(&cells.connectivity, what)? } })
+    Ok(unsafe {
+        Cells { offsets: ids(&cells.offsets, what)?, connectivity: ids(&cells.connectivity, what)? }
+    })
 }
 
 /// The surface with its arrays as slices.
 ///
 /// # Safety
 /// Every array has the length it says, and nobody writes to it while the result lives.
-pub(super) unsafe fn surface<'a>(
-    s: &RtvSurface,
-    name: &'a str,
-) -> Result<Surface<'a>, String> {
+pub(super) unsafe fn surface<'a>(s: &RtvSurface, name: &'a str) -> Result<Surface<'a>, String> {
     // SAFETY: the caller's promise, for every array.
     unsafe {
         let points = match s.points.kind {
@@ -91,8 +90,12 @@ pub(super) unsafe fn surface<'a>(
         let key = s.color_key;
         let color = match s.color_source {
             RTV_COLOR_PROPERTY => Color::Material,
-            RTV_COLOR_POINTS => Color::Values { key, rgba: PerItem::Point(tuples(&s.colors, "colours", RTV_U8)?) },
-            RTV_COLOR_CELLS => Color::Values { key, rgba: PerItem::Cell(tuples(&s.colors, "colours", RTV_U8)?) },
+            RTV_COLOR_POINTS => {
+                Color::Values { key, rgba: PerItem::Point(tuples(&s.colors, "colours", RTV_U8)?) }
+            }
+            RTV_COLOR_CELLS => {
+                Color::Values { key, rgba: PerItem::Cell(tuples(&s.colors, "colours", RTV_U8)?) }
+            }
             RTV_COLOR_MAPPED => Color::Mapped {
                 key,
                 coordinates: tuples(&s.colors, "colour coordinates", RTV_F32)?,
@@ -119,9 +122,10 @@ pub(super) unsafe fn surface<'a>(
             color,
             texture,
             property: property(&s.property),
-            back: (s.has_back != 0).then(|| property(&s.back)),
             glyphs: (s.glyph_matrices.kind != RTV_NONE)
-                .then(|| tuples(&s.glyph_colors, "glyph colours", RTV_U8).map(|rgba| Glyphs { matrices, rgba }))
+                .then(|| {
+                    tuples(&s.glyph_colors, "glyph colours", RTV_U8).map(|rgba| Glyphs { matrices, rgba })
+                })
                 .transpose()?,
         })
     }

@@ -112,11 +112,7 @@ fn to_user_once(text: &str) {
 ///
 /// # Safety
 /// `bridge` is null or came from `rtv_new`, and no other thread uses it.
-pub(super) unsafe fn with<T>(
-    bridge: *mut RtvBridge,
-    otherwise: T,
-    work: impl FnOnce(&mut Handle) -> T,
-) -> T {
+pub(super) unsafe fn with<T>(bridge: *mut RtvBridge, otherwise: T, work: impl FnOnce(&mut Handle) -> T) -> T {
     // SAFETY: `rtv_new` made it from a `Handle`; the caller promises that it is alive and not in use.
     let Some(handle) = (unsafe { bridge.cast::<Handle>().as_mut() }) else { return otherwise };
     if handle.poisoned {

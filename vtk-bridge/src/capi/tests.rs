@@ -5,13 +5,17 @@ use std::os::raw::c_void;
 use std::ptr;
 
 fn array<T, const N: usize>(values: &[[T; N]], kind: u32) -> RtvArray {
-    RtvArray { data: values.as_ptr().cast::<c_void>(), tuples: values.len() as u64, components: N as u32, kind }
+    RtvArray {
+        data: values.as_ptr().cast::<c_void>(),
+        tuples: values.len() as u64,
+        components: N as u32,
+        kind,
+    }
 }
 
 const NO_ARRAY: RtvArray = RtvArray { data: ptr::null(), tuples: 0, components: 0, kind: RTV_NONE };
 const NO_CELLS: RtvCells = RtvCells { offsets: NO_ARRAY, connectivity: NO_ARRAY };
-const IDENTITY: [f64; 16] =
-    [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+const IDENTITY: [f64; 16] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
 
 fn property() -> RtvProperty {
     RtvProperty {
@@ -60,9 +64,8 @@ fn surface(points: &[[f32; 3]], offsets: &[[i64; 1]], connectivity: &[[i64; 1]])
         reserved: [0; 2],
         texture: NO_ARRAY,
         texture_width: 0,
-        has_back: 0,
+        reserved_2: 0,
         property: property(),
-        back: property(),
         world_from_data: IDENTITY,
         glyph_matrices: NO_ARRAY,
         glyph_colors: NO_ARRAY,

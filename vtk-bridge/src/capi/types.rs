@@ -143,12 +143,10 @@ pub struct RtvSurface {
     pub texture: RtvArray,
     /// Texels per row.
     pub texture_width: u32,
-    /// 1 when `back` is valid.
-    pub has_back: u32,
+    /// Not used.
+    pub reserved_2: u32,
     /// Answer to light.
     pub property: RtvProperty,
-    /// Answer to light of the side turned away.
-    pub back: RtvProperty,
     /// Row by row.
     pub world_from_data: [f64; 16],
     /// Sixteen RTV_F64 per copy (row by row), or none.

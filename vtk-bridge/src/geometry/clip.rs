@@ -157,10 +157,8 @@ mod tests {
 
     #[test]
     fn neighbours_share_the_vertices_on_the_cut() {
-        let mesh = TriMesh::new(
-            vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::X + Vec3::Y],
-            vec![[0, 1, 2], [1, 3, 2]],
-        );
+        let mesh =
+            TriMesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::X + Vec3::Y], vec![[0, 1, 2], [1, 3, 2]]);
         let (out, _) = clip(&mesh, &[[1.0, 0.0, 0.0, -0.5]]);
         assert_eq!(out.positions.len(), 5, "two corners and one new vertex on each of three edges");
     }

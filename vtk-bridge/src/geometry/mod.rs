@@ -100,10 +100,8 @@ pub fn build(shape: &Shape<'_>) -> Built {
             Attribute::per_face((0..mesh.indices.len()).map(of).collect())
         }),
     });
-    mesh.texcoords = shape
-        .texcoords
-        .filter(|t| t.len() == points)
-        .map(|t| t.iter().map(|v| Vec2::from(*v)).collect());
+    mesh.texcoords =
+        shape.texcoords.filter(|t| t.len() == points).map(|t| t.iter().map(|v| Vec2::from(*v)).collect());
     let (mesh, clipped) = if shape.clip_planes.is_empty() {
         (mesh, None)
     } else {

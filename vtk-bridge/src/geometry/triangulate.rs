@@ -21,10 +21,7 @@ pub(super) fn triangles(
     }
     let polys = expanded(&shape.polys, first_poly, |cells, run, cell, out| {
         for k in run.start + 1..run.end.saturating_sub(1) {
-            out.push((
-                [cells.vertex(run.start), cells.vertex(k), cells.vertex(k + 1)],
-                cell,
-            ));
+            out.push(([cells.vertex(run.start), cells.vertex(k), cells.vertex(k + 1)], cell));
         }
     });
     let strips = expanded(&shape.strips, first_strip, |cells, run, cell, out| {
@@ -62,16 +59,18 @@ fn all_triangles(cells: &Cells<'_>) -> bool {
     let n = cells.len();
     n == 0
         || cells.connectivity.len() == 3 * n
-        && (0..n + 1).into_par_iter().with_min_len(CHUNK).all(|i| cells.offsets.at(i) == 3 * i as i64)
+            && (0..n + 1).into_par_iter().with_min_len(CHUNK).all(|i| cells.offsets.at(i) == 3 * i as i64)
 }
 
 /// The connectivity of cells that all are triangles.
 fn copied(connectivity: &Ids<'_>, n: usize) -> Vec<[u32; 3]> {
     let vertex = |v: i64| u32::try_from(v).unwrap_or(u32::MAX);
     match connectivity {
-        Ids::I64(v) => {
-            v[..3 * n].par_chunks_exact(3).with_min_len(CHUNK).map(|t| [vertex(t[0]), vertex(t[1]), vertex(t[2])]).collect()
-        }
+        Ids::I64(v) => v[..3 * n]
+            .par_chunks_exact(3)
+            .with_min_len(CHUNK)
+            .map(|t| [vertex(t[0]), vertex(t[1]), vertex(t[2])])
+            .collect(),
         Ids::I32(v) => v[..3 * n]
             .par_chunks_exact(3)
             .with_min_len(CHUNK)
@@ -91,7 +90,8 @@ mod tests {
 
     #[test]
     fn polygons_are_fanned_and_strips_alternate() {
-        let polys = Cells { offsets: Ids::I64(&[0, 3, 8]), connectivity: Ids::I64(&[0, 1, 2, 3, 4, 5, 6, 7]) };
+        let polys =
+            Cells { offsets: Ids::I64(&[0, 3, 8]), connectivity: Ids::I64(&[0, 1, 2, 3, 4, 5, 6, 7]) };
         let strips = Cells { offsets: Ids::I32(&[0, 4]), connectivity: Ids::I32(&[10, 11, 12, 13]) };
         let (t, cells) = triangles(&shape(polys, strips), 5, 7);
         assert_eq!(t, [[0, 1, 2], [3, 4, 5], [3, 5, 6], [3, 6, 7], [10, 11, 12], [12, 11, 13]]);

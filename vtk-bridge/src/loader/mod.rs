@@ -37,14 +37,24 @@ fn shim() -> Result<&'static Shim, &'static CStr> {
 fn find_and_load() -> Result<Shim, String> {
     let modules = process::loaded_files();
     let flavours: Vec<String> = modules.iter().filter_map(|m| flavour_of(m)).collect();
-    let home = home().ok_or("cannot find out where this library lies; set RTV_HOME to the folder of `vtk-bridge install`")?;
+    let home = home().ok_or(
+        "cannot find out where this library lies; set RTV_HOME to the folder of `vtk-bridge install`",
+    )?;
     let (flavour, path) = choose(&flavours, &home, |p| p.is_file())?;
-    process::open_shim(&path)
-        .map_err(|e| format!("the build for VTK {flavour}, {}, cannot be used: {e}; run `vtk-bridge install` again", path.display()))
+    process::open_shim(&path).map_err(|e| {
+        format!(
+            "the build for VTK {flavour}, {}, cannot be used: {e}; run `vtk-bridge install` again",
+            path.display()
+        )
+    })
 }
 
 /// Which of the VTKs in the process to serve: the one we have a build for.
-fn choose(flavours: &[String], home: &Path, exists: impl Fn(&Path) -> bool) -> Result<(String, PathBuf), String> {
+fn choose(
+    flavours: &[String],
+    home: &Path,
+    exists: impl Fn(&Path) -> bool,
+) -> Result<(String, PathBuf), String> {
     if flavours.is_empty() {
         return Err("no VTK in this process (no libvtkCommonCore is loaded)".to_owned());
     }

@@ -48,7 +48,8 @@ pub(super) fn open_shim(path: &Path) -> Result<Shim, String> {
         // SAFETY: after a failure dlerror returns a C string, or null.
         let error = unsafe { libc::dlerror() };
         // SAFETY: checked for null.
-        let text = (!error.is_null()).then(|| unsafe { CStr::from_ptr(error) }.to_string_lossy().into_owned());
+        let text =
+            (!error.is_null()).then(|| unsafe { CStr::from_ptr(error) }.to_string_lossy().into_owned());
         return Err(text.unwrap_or_else(|| "dlopen failed without a reason".to_owned()));
     }
     let symbol = |name: &CStr| {

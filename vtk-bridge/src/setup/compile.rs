@@ -64,8 +64,17 @@ pub fn shim(flavour: &Flavour, sources: &Path, out: &Path) -> Result<(), SetupEr
 }
 
 /// Runs a build command; its last lines are part of the error.
-pub(crate) fn run(command: &mut Command, program: &str, what: String, cure: &'static str) -> Result<(), SetupError> {
-    let output = command.output().map_err(|source| SetupError::NoProgram { program: program.to_owned(), source, cure })?;
+pub(crate) fn run(
+    command: &mut Command,
+    program: &str,
+    what: String,
+    cure: &'static str,
+) -> Result<(), SetupError> {
+    let output = command.output().map_err(|source| SetupError::NoProgram {
+        program: program.to_owned(),
+        source,
+        cure,
+    })?;
     if output.status.success() {
         return Ok(());
     }

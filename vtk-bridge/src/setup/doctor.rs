@@ -29,15 +29,25 @@ pub fn examine(layout: &Layout, variable: impl Fn(&str) -> Option<String>) -> Ve
     }
     out.extend(faults.iter().map(|f| finding("headers", true, format!("not used: {f}"))));
     if flavours.is_empty() {
-        out.push(finding("headers", false, "none of VTK or ParaView; install libvtk9-dev, or paraview-dev and libglew-dev"));
+        out.push(finding(
+            "headers",
+            false,
+            "none of VTK or ParaView; install libvtk9-dev, or paraview-dev and libglew-dev",
+        ));
     }
     let compiler = variable("CXX").unwrap_or_else(|| "g++".to_owned());
     let version = Command::new(&compiler).arg("--version").output().ok().filter(|o| o.status.success());
     out.push(match version {
-        Some(o) => finding("compiler", true, String::from_utf8_lossy(&o.stdout).lines().next().unwrap_or("").to_owned()),
+        Some(o) => finding(
+            "compiler",
+            true,
+            String::from_utf8_lossy(&o.stdout).lines().next().unwrap_or("").to_owned(),
+        ),
         None => finding("compiler", false, format!("`{compiler}` does not run; apt-get install g++")),
     });
-    let glew = ["/usr/include/GL/glew.h", "/usr/local/include/GL/glew.h"].iter().any(|p| std::path::Path::new(p).is_file());
+    let glew = ["/usr/include/GL/glew.h", "/usr/local/include/GL/glew.h"]
+        .iter()
+        .any(|p| std::path::Path::new(p).is_file());
     out.push(if glew {
         finding("GL/glew.h", true, "there")
     } else {
@@ -60,9 +70,15 @@ pub fn examine(layout: &Layout, variable: impl Fn(&str) -> Option<String>) -> Ve
     });
     out.push(match variable("DISPLAY").filter(|d| !d.is_empty()) {
         Some(d) => finding("DISPLAY", true, d),
-        None => finding("DISPLAY", true, "not set: Debian's VTK and ParaView need an X server; `Xvfb :9 -noreset & export DISPLAY=:9`"),
+        None => finding(
+            "DISPLAY",
+            true,
+            "not set: Debian's VTK and ParaView need an X server; `Xvfb :9 -noreset & export DISPLAY=:9`",
+        ),
     });
-    let (_, faults) = crate::options::Options::parse(crate::options::NAMES.iter().filter_map(|(n, ..)| Some(((*n).to_owned(), variable(n)?))));
+    let (_, faults) = crate::options::Options::parse(
+        crate::options::NAMES.iter().filter_map(|(n, ..)| Some(((*n).to_owned(), variable(n)?))),
+    );
     out.extend(faults.into_iter().map(|f| finding("options", false, f)));
     out
 }
@@ -72,7 +88,13 @@ fn of_flavour(layout: &Layout, f: &Flavour) -> Finding {
     let shim = layout.shim(&f.name);
     let age = |p: &std::path::Path| std::fs::metadata(p).and_then(|m| m.modified()).ok();
     let text = match (age(&shim), age(&f.include.join("vtkVersionMacros.h"))) {
-        (None, _) => return finding(&name, false, format!("headers in {}, but no build; run `vtk-bridge install`", f.include.display())),
+        (None, _) => {
+            return finding(
+                &name,
+                false,
+                format!("headers in {}, but no build; run `vtk-bridge install`", f.include.display()),
+            );
+        }
         (Some(built), Some(headers)) if headers > built => {
             return finding(&name, false, "its headers are newer than our build; run `vtk-bridge install`");
         }

@@ -39,7 +39,8 @@ impl Program {
 /// Lines for `eval` in a POSIX shell.
 pub fn exports(layout: &Layout, autoload_before: Option<&str>) -> String {
     let ours = layout.autoload().display().to_string();
-    let others = autoload_before.into_iter().flat_map(|v| v.split(':')).filter(|p| !p.is_empty() && *p != ours);
+    let others =
+        autoload_before.into_iter().flat_map(|v| v.split(':')).filter(|p| !p.is_empty() && *p != ours);
     let path = std::iter::once(ours.as_str()).chain(others).collect::<Vec<_>>().join(":");
     format!(
         "export VTK_AUTOLOAD_PATH={}\nexport RTV_HOME={}\n",

@@ -24,7 +24,11 @@ impl Flavour {
 
     /// The file of VTK module `module`: the link without version, or the library itself.
     pub fn library(&self, module: &str) -> Option<PathBuf> {
-        let stem = if self.name == "unnamed" { format!("libvtk{module}.so") } else { format!("libvtk{module}-{}.so", self.name) };
+        let stem = if self.name == "unnamed" {
+            format!("libvtk{module}.so")
+        } else {
+            format!("libvtk{module}-{}.so", self.name)
+        };
         let plain = self.libraries.join(&stem);
         if plain.exists() {
             return Some(plain);
@@ -58,7 +62,11 @@ pub fn find(places: &[PathBuf]) -> (Vec<Flavour>, Vec<String>) {
     for place in places {
         match look_at(place) {
             Ok(f) if found.iter().any(|known| known.name == f.name) => {
-                faults.push(format!("{}: VTK {} was found before; this one is not used", place.display(), f.name));
+                faults.push(format!(
+                    "{}: VTK {} was found before; this one is not used",
+                    place.display(),
+                    f.name
+                ));
             }
             Ok(f) => found.push(f),
             Err(fault) => faults.push(format!("{}: {fault}", place.display())),
@@ -77,7 +85,10 @@ fn look_at(include: &Path) -> Result<Flavour, String> {
     let prefix = include.ancestors().nth(2).ok_or("the folder has no prefix")?;
     let machine = format!("lib/{}-linux-gnu", std::env::consts::ARCH);
     let wanted = include.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let wanted = wanted.strip_prefix("paraview-").map(|v| format!("pv{v}")).or_else(|| Some(wanted.strip_prefix("vtk-")?.to_owned()));
+    let wanted = wanted
+        .strip_prefix("paraview-")
+        .map(|v| format!("pv{v}"))
+        .or_else(|| Some(wanted.strip_prefix("vtk-")?.to_owned()));
     for folder in [machine.as_str(), "lib64", "lib"].map(|l| prefix.join(l)) {
         let entries = fs::read_dir(&folder).into_iter().flatten().filter_map(|e| Some(e.ok()?.path()));
         let mut names: Vec<String> = entries.filter_map(|p| flavour_of(&p.to_string_lossy())).collect();
@@ -112,11 +123,15 @@ mod tests {
         }
         make("lib/libvtkCommonCore-9.1.so.1");
         make("lib/libvtkCommonCore-pv5.11.so");
-        let places = ["vtk-9.1", "paraview-5.11", "vtk-9.4", "nothing"].map(|p| root.path().join("include").join(p));
+        let places =
+            ["vtk-9.1", "paraview-5.11", "vtk-9.4", "nothing"].map(|p| root.path().join("include").join(p));
         let (found, faults) = find(&places);
         let names: Vec<_> = found.iter().map(|f| f.name.as_str()).collect();
         assert_eq!(names, ["9.1", "pv5.11"]);
         assert_eq!(found[0].library("CommonCore"), Some(root.path().join("lib/libvtkCommonCore-9.1.so.1")));
-        assert!(faults[0].contains("no libvtkCommonCore") && faults[1].contains("vtkObjectFactory.h"), "{faults:?}");
+        assert!(
+            faults[0].contains("no libvtkCommonCore") && faults[1].contains("vtkObjectFactory.h"),
+            "{faults:?}"
+        );
     }
 }

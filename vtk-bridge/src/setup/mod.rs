@@ -77,6 +77,9 @@ pub enum SetupError {
 }
 
 /// [`SetupError::Io`] as an adapter.
-pub(crate) fn io<'a>(path: &'a std::path::Path, what: &'static str) -> impl Fn(std::io::Error) -> SetupError + 'a {
+pub(crate) fn io<'a>(
+    path: &'a std::path::Path,
+    what: &'static str,
+) -> impl Fn(std::io::Error) -> SetupError + 'a {
     move |source| SetupError::Io { path: path.to_owned(), what, source }
 }

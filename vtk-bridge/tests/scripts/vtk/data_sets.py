@@ -1,4 +1,4 @@
-# An unstructured grid through vtkDataSetMapper, parts in an assembly, culled backs, a scaled and mirrored actor.
+# An unstructured grid through vtkDataSetMapper, culled backs, a scaled actor.
 from vtkmodules.vtkRenderingCore import *
 import vtkmodules.vtkRenderingOpenGL2, vtkmodules.vtkRenderingFreeType, vtkmodules.vtkInteractionStyle
 from capture import save
@@ -26,7 +26,7 @@ for i in range(3):
     a = vtkActor()
     a.SetMapper(m)
     a.SetPosition(4.5, 1.2 * i, 1)
-    a.SetScale(-1.0 if i == 2 else 1.0, 1, 1)
+    a.SetScale(1.5 if i == 2 else 1.0, 1, 1)
     a.GetProperty().SetBackfaceCulling(i == 1)
     ren.AddActor(a)
 win = vtkRenderWindow()

@@ -1,0 +1,37 @@
+# A sphere and a cube on a floor under one light from the side.
+from vtkmodules.vtkRenderingCore import *
+import vtkmodules.vtkRenderingOpenGL2
+from vtkmodules.vtkFiltersSources import vtkCubeSource, vtkPlaneSource, vtkSphereSource
+
+ren = vtkRenderer()
+ren.SetBackground(0.3, 0.4, 0.5)
+sphere = vtkSphereSource()
+sphere.SetThetaResolution(40)
+sphere.SetPhiResolution(30)
+floor = vtkPlaneSource()
+floor.SetOrigin(-2, -2, -0.5)
+floor.SetPoint1(2, -2, -0.5)
+floor.SetPoint2(-2, 2, -0.5)
+cube = vtkCubeSource()
+cube.SetCenter(1.1, 0.3, 0)
+for source, color in [(sphere, (0.9, 0.6, 0.4)), (floor, (0.8, 0.8, 0.8)), (cube, (0.4, 0.6, 0.9))]:
+    mapper = vtkPolyDataMapper()
+    mapper.SetInputConnection(source.GetOutputPort())
+    actor = vtkActor()
+    actor.SetMapper(mapper)
+    actor.GetProperty().SetColor(*color)
+    ren.AddActor(actor)
+light = vtkLight()
+light.SetPosition(-3, -1, 4)
+light.SetFocalPoint(0, 0, 0)
+ren.AddLight(light)
+win = vtkRenderWindow()
+win.SetOffScreenRendering(1)
+win.SetMultiSamples(0)
+win.SetSize(240, 200)
+win.AddRenderer(ren)
+camera = ren.GetActiveCamera()
+camera.SetPosition(1, -6, 4)
+camera.SetViewUp(0, 0, 1)
+ren.ResetCamera()
+win.Render()
