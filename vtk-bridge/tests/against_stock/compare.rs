@@ -11,9 +11,9 @@ use std::fmt;
 pub(crate) struct Bars {
     /// Part of the pixels where one shows a surface and the other does not.
     pub(crate) silhouette: f64,
-    /// Units in the last place of the window depth, away from edges.
+    /// Units in the last place of the window depth, away from edges, in all but [`ROUNDED`] of these pixels.
     pub(crate) depth_ulp: u32,
-    /// Part of the pixels away from edges that may be further off in depth: corners of triangles that are seen from the side.
+    /// Part of the pixels that may be further off than [`ROUNDING_ULP`].
     pub(crate) depth_strays: f64,
     /// Mean difference of colours, of 255, over the pixels that either shows something in.
     pub(crate) color_mean: f64,
@@ -27,6 +27,13 @@ impl Bars {
         Bars { silhouette: 0.0002, depth_ulp: 4, depth_strays: 0.0005, color_mean: 0.5, color_strays: 0.0005 };
 }
 
+/// How far OpenGL's own depths may be from the exact ones: llvmpipe interpolates in f32, which was measured to be up to 22 units in the
+/// last place beside the plane through a triangle's corners, and most where a triangle covers many pixels. Ours are exact: see
+/// `our_window_depth_is_exact_where_opengl_rounds`.
+const ROUNDING_ULP: u32 = 32;
+/// Part of the pixels away from edges in which OpenGL may be that far off.
+const ROUNDED: f64 = 0.1;
+
 /// What was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Measured {
@@ -35,6 +42,7 @@ pub(crate) struct Measured {
     /// Pixels away from edges with a surface.
     pub(crate) inner: usize,
     pub(crate) depth_beyond: usize,
+    pub(crate) depth_far: usize,
     pub(crate) depth_median_ulp: u32,
     pub(crate) depth_p99_ulp: u32,
     pub(crate) depth_worst_ulp: u32,
@@ -48,13 +56,14 @@ impl fmt::Display for Measured {
         let part = |n: usize| 100.0 * n as f64 / self.pixels as f64;
         write!(
             f,
-            "silhouette {} px ({:.4} %), depth median {} p99 {} worst {} ulp ({} beyond), colour mean {:.3} worst {} ({} far off), {} of {} px away from edges",
+            "silhouette {} px ({:.4} %), depth median {} p99 {} worst {} ulp ({} beyond the bar, {} far beyond), colour mean {:.3} worst {} ({} far off), {} of {} px away from edges",
             self.silhouette,
             part(self.silhouette),
             self.depth_median_ulp,
             self.depth_p99_ulp,
             self.depth_worst_ulp,
             self.depth_beyond,
+            self.depth_far,
             self.color_mean,
             self.color_worst,
             self.color_strays,
@@ -128,6 +137,7 @@ pub(crate) fn measure(stock: &Capture, ours: &Capture, bars: &Bars) -> Result<Me
     m.color_mean = sum / shown.max(1) as f64;
     m.inner = depths.len();
     m.depth_beyond = depths.iter().filter(|&&d| d > bars.depth_ulp).count();
+    m.depth_far = depths.iter().filter(|&&d| d > ROUNDING_ULP.max(bars.depth_ulp)).count();
     depths.sort_unstable();
     if let Some(&worst) = depths.last() {
         m.depth_median_ulp = depths[depths.len() / 2];
@@ -148,8 +158,11 @@ pub(crate) fn faults(stock: &Capture, ours: &Capture, bars: &Bars) -> Vec<String
     if part(m.silhouette) > bars.silhouette {
         faults.push(format!("silhouette beyond {} %", 100.0 * bars.silhouette));
     }
-    if part(m.depth_beyond) > bars.depth_strays {
-        faults.push(format!("depth beyond {} ulp in more than {} %", bars.depth_ulp, 100.0 * bars.depth_strays));
+    if m.depth_beyond as f64 > ROUNDED * m.inner as f64 {
+        faults.push(format!("depth beyond {} ulp in more than {} % away from edges", bars.depth_ulp, 100.0 * ROUNDED));
+    }
+    if part(m.depth_far) > bars.depth_strays {
+        faults.push(format!("depth beyond {ROUNDING_ULP} ulp in more than {} %", 100.0 * bars.depth_strays));
     }
     if m.color_mean > bars.color_mean {
         faults.push(format!("colour mean beyond {}", bars.color_mean));

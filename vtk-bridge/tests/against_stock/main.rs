@@ -6,6 +6,7 @@
 mod capture;
 mod compare;
 mod effects;
+mod memory;
 mod paraview;
 mod peers;
 mod plugin;
