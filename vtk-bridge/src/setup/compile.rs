@@ -3,7 +3,7 @@
 use super::headers::Flavour;
 use super::{SetupError, io};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// The sources by name.
@@ -45,6 +45,18 @@ pub fn write_sources(folder: &Path) -> Result<(), SetupError> {
 
 /// Compiles the shim for `flavour` into `out`.
 pub fn shim(flavour: &Flavour, sources: &Path, out: &Path) -> Result<(), SetupError> {
+    library(flavour, sources, &[], &[], out, format!("the shim for VTK {}", flavour.name))
+}
+
+/// Compiles the shim's sources, and `more` with `modules`, into the shared library `out`.
+pub(crate) fn library(
+    flavour: &Flavour,
+    sources: &Path,
+    more: &[PathBuf],
+    modules: &[&str],
+    out: &Path,
+    what: String,
+) -> Result<(), SetupError> {
     let folder = out.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(folder).map_err(io(folder, "make the folder"))?;
     // Beside, then renamed: a program that is running keeps the old file.
@@ -54,12 +66,13 @@ pub fn shim(flavour: &Flavour, sources: &Path, out: &Path) -> Result<(), SetupEr
     command.args(["-std=c++17", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-w"]);
     command.arg("-I").arg(sources).arg("-isystem").arg(&flavour.include).arg("-o").arg(&beside);
     let cxx = SOURCES.iter().filter(|(n, _)| n.ends_with(".cxx"));
-    command.args(cxx.map(|(n, _)| sources.join(n)));
+    command.args(cxx.map(|(n, _)| sources.join(n))).args(more);
     // Libraries of VTK need others of it, which the process has already.
-    command.arg("-Wl,--allow-shlib-undefined");
-    command.args(MODULES.iter().filter_map(|m| flavour.library(m)));
-    command.arg("-lGL");
-    run(&mut command, &compiler, format!("the shim for VTK {}", flavour.name), "apt-get install g++")?;
+    // Never unloaded: VTK deletes our factory when the process ends, after ParaView has closed its plugins.
+    command.args(["-Wl,--allow-shlib-undefined", "-Wl,-z,nodelete"]);
+    command.args(MODULES.iter().chain(modules).filter_map(|m| flavour.library(m)));
+    command.args(["-lGL", "-ldl"]);
+    run(&mut command, &compiler, what, "apt-get install g++")?;
     fs::rename(&beside, out).map_err(io(out, "put in place"))
 }
 
