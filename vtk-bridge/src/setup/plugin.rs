@@ -42,7 +42,8 @@ pub fn install(layout: &Layout, flavour: &Flavour) -> Result<PathBuf, SetupError
     command.arg("-I").arg(layout.prefix().join("include")).arg("-isystem").arg(&flavour.include);
     command.arg("-o").arg(&beside);
     command.args(SOURCES.iter().filter(|(n, _)| n.ends_with(".cxx")).map(|(n, _)| sources.join(n)));
-    command.arg("-Wl,--allow-shlib-undefined").args(MODULES.iter().filter_map(|m| flavour.library(m))).arg("-ldl");
+    // Never unloaded: VTK keeps functions of it when ParaView has closed its plugins.
+    command.args(["-Wl,--allow-shlib-undefined", "-Wl,-z,nodelete"]).args(MODULES.iter().filter_map(|m| flavour.library(m))).arg("-ldl");
     let what = format!("the plugin for ParaView {}", flavour.name.trim_start_matches("pv"));
     compile::run(&mut command, &compiler, what, "apt-get install g++")?;
     fs::rename(&beside, &out).map_err(io(&out, "put in place"))?;

@@ -2,15 +2,16 @@
 from vtkmodules.vtkRenderingCore import *
 import vtkmodules.vtkRenderingOpenGL2, vtkmodules.vtkRenderingFreeType, vtkmodules.vtkInteractionStyle
 from capture import save
-from vtkmodules.vtkFiltersGeneral import vtkRandomAttributeGenerator
+from vtkmodules.vtkFiltersCore import vtkElevationFilter
 from vtkmodules.vtkFiltersSources import vtkCellTypeSource, vtkSphereSource
 
 grid = vtkCellTypeSource()
 grid.SetCellType(12)
 grid.SetBlocksDimensions(3, 3, 3)
-scalars = vtkRandomAttributeGenerator()
+scalars = vtkElevationFilter()
 scalars.SetInputConnection(grid.GetOutputPort())
-scalars.GenerateCellScalarsOn()
+scalars.SetLowPoint(0, 0, 0)
+scalars.SetHighPoint(3, 2, 1)
 mapper = vtkDataSetMapper()
 mapper.SetInputConnection(scalars.GetOutputPort())
 mapper.SetScalarRange(0, 1)
