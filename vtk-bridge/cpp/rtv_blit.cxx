@@ -47,6 +47,12 @@ void RtvBlit::Upload(vtkRenderer* renderer, const RtvPicture& p)
     texture->ResetFormatAndType();
     return texture.Get();
   };
+  if (this->Color && this->Blended != (p.blended != nullptr))
+  {
+    // A texture keeps the format of its first data.
+    this->Color->ReleaseGraphicsResources(window);
+    this->Color = nullptr;
+  }
   this->Blended = p.blended != nullptr;
   this->Size[0] = static_cast<int>(p.width);
   this->Size[1] = static_cast<int>(p.height);

@@ -108,8 +108,7 @@ fn work() -> anyhow::Result<Status> {
 }
 
 fn flavours(more: &[PathBuf]) -> (Vec<Flavour>, Vec<String>, String) {
-    let looked: Vec<PathBuf> =
-        more.iter().cloned().chain(places(variable("RTV_VTK_INCLUDE").as_deref())).collect();
+    let looked: Vec<PathBuf> = more.iter().cloned().chain(places(variable)).collect();
     let (found, faults) = find(&looked);
     let looked = looked.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", ");
     (found, faults, if looked.is_empty() { "/usr/include and /usr/local/include".to_owned() } else { looked })
@@ -164,7 +163,11 @@ fn env(common: &CommonArgs, args: &EnvArgs) -> anyhow::Result<Status> {
     let (found, ..) = flavours(&[]);
     let wanted: Vec<Flavour> = found.into_iter().filter(|f| program.runs(&f.name)).collect();
     let built = layout.shims();
-    let missing: Vec<Flavour> = wanted.iter().filter(|f| !built.contains(&f.name)).cloned().collect();
+    let missing: Vec<Flavour> = wanted
+        .iter()
+        .filter(|f| !built.contains(&f.name) || !layout.sources_are_current())
+        .cloned()
+        .collect();
     if wanted.is_empty() && !built.iter().any(|b| program.runs(b)) {
         return usage(SetupError::NotFound { asked: program.name(), cure: program.cure() });
     }

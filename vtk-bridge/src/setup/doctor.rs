@@ -23,7 +23,7 @@ fn finding(what: &str, ok: bool, text: impl Into<String>) -> Finding {
 /// Looks at everything.
 pub fn examine(layout: &Layout, variable: impl Fn(&str) -> Option<String>) -> Vec<Finding> {
     let mut out = Vec::new();
-    let (flavours, faults) = find(&places(variable("RTV_VTK_INCLUDE").as_deref()));
+    let (flavours, faults) = find(&places(&variable));
     for f in &flavours {
         out.push(of_flavour(layout, f));
     }

@@ -38,12 +38,19 @@ impl Flavour {
     }
 }
 
-/// Folders that are looked at: those of `RTV_VTK_INCLUDE` (separated by colons), then the system's.
-pub fn places(variable: Option<&str>) -> Vec<PathBuf> {
-    let own = variable.into_iter().flat_map(|v| v.split(':')).filter(|p| !p.is_empty()).map(PathBuf::from);
+/// Folders that are looked at: those of `RTV_VTK_INCLUDE` (separated by colons), those beside the libraries of `LD_LIBRARY_PATH`, the system's.
+pub fn places(variable: impl Fn(&str) -> Option<String>) -> Vec<PathBuf> {
+    let list = |name| {
+        let value = variable(name).unwrap_or_default();
+        value.split(':').filter(|p| !p.is_empty()).map(PathBuf::from).collect::<Vec<_>>()
+    };
+    let own = list("RTV_VTK_INCLUDE").into_iter();
+    // PREFIX/lib/MACHINE, PREFIX/lib: to PREFIX/include.
+    let beside = list("LD_LIBRARY_PATH");
+    let beside = beside.iter().flat_map(|p| p.ancestors().skip(1).take(2).map(|a| a.join("include")));
     let system = ["/usr/include", "/usr/local/include", "/opt/vtk/include", "/opt/paraview/include"];
-    let mut inside: Vec<PathBuf> = system
-        .iter()
+    let mut inside: Vec<PathBuf> = beside
+        .chain(system.map(PathBuf::from))
         .filter_map(|d| fs::read_dir(d).ok())
         .flatten()
         .filter_map(|e| Some(e.ok()?.path()))
@@ -53,6 +60,7 @@ pub fn places(variable: Option<&str>) -> Vec<PathBuf> {
         })
         .collect();
     inside.sort();
+    inside.dedup();
     own.chain(inside).collect()
 }
 

@@ -105,6 +105,14 @@ impl Layout {
         fs::rename(&beside, &loader).map_err(io(&loader, "put in place"))
     }
 
+    /// True when the shims were built from the sources of this program.
+    pub fn sources_are_current(&self) -> bool {
+        let same = |(name, text): &(&str, &str)| {
+            fs::read_to_string(self.prefix.join("src").join(name)).is_ok_and(|t| t == *text)
+        };
+        compile::SOURCES.iter().all(same)
+    }
+
     /// True when the installed loader is the library `library`, byte for byte.
     pub fn loader_is(&self, library: &Path) -> bool {
         let read = |p: &Path| fs::read(p).ok();

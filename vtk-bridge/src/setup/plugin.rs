@@ -16,8 +16,14 @@ const SOURCES: &[(&str, &str)] = &[
 ];
 
 /// The modules of ParaView and its VTK that the plugin calls.
-const MODULES: &[&str] =
-    &["RemotingCore", "RemotingClientServerStream", "RenderingCore", "CommonExecutionModel", "CommonCore", "sys"];
+const MODULES: &[&str] = &[
+    "RemotingCore",
+    "RemotingClientServerStream",
+    "RenderingCore",
+    "CommonExecutionModel",
+    "CommonCore",
+    "sys",
+];
 
 /// The plugin's file; ParaView calls the plugin by this name.
 const FILE: &str = "VtkBridge.so";
@@ -43,7 +49,10 @@ pub fn install(layout: &Layout, flavour: &Flavour) -> Result<PathBuf, SetupError
     command.arg("-o").arg(&beside);
     command.args(SOURCES.iter().filter(|(n, _)| n.ends_with(".cxx")).map(|(n, _)| sources.join(n)));
     // Never unloaded: VTK keeps functions of it when ParaView has closed its plugins.
-    command.args(["-Wl,--allow-shlib-undefined", "-Wl,-z,nodelete"]).args(MODULES.iter().filter_map(|m| flavour.library(m))).arg("-ldl");
+    command
+        .args(["-Wl,--allow-shlib-undefined", "-Wl,-z,nodelete"])
+        .args(MODULES.iter().filter_map(|m| flavour.library(m)))
+        .arg("-ldl");
     let what = format!("the plugin for ParaView {}", flavour.name.trim_start_matches("pv"));
     compile::run(&mut command, &compiler, what, "apt-get install g++")?;
     fs::rename(&beside, &out).map_err(io(&out, "put in place"))?;

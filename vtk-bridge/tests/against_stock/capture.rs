@@ -24,7 +24,8 @@ impl Capture {
     /// Reads `NAME.png` and what lies beside it.
     pub(crate) fn read(folder: &Path, name: &str) -> Result<Capture, String> {
         let file = |extension: &str| folder.join(format!("{name}.{extension}"));
-        let picture = image::open(file("png")).map_err(|e| format!("{}: {e}", file("png").display()))?.into_rgb8();
+        let picture =
+            image::open(file("png")).map_err(|e| format!("{}: {e}", file("png").display()))?.into_rgb8();
         let (width, height) = (picture.width() as usize, picture.height() as usize);
         let rows = picture.as_raw().chunks_exact(3 * width).rev();
         let rgb = rows.flat_map(|row| row.chunks_exact(3).map(|p| [p[0], p[1], p[2]])).collect();
@@ -111,5 +112,9 @@ fn read_npy(path: &Path, length: usize) -> Result<Vec<f32>, String> {
         .chunks_exact(4)
         .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
         .collect();
-    if values.len() == length { Ok(values) } else { Err(fault(&format!("{} values, not {length}", values.len()))) }
+    if values.len() == length {
+        Ok(values)
+    } else {
+        Err(fault(&format!("{} values, not {length}", values.len())))
+    }
 }

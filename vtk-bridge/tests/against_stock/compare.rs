@@ -23,8 +23,13 @@ pub(crate) struct Bars {
 
 impl Bars {
     /// The demands on the bridge.
-    pub(crate) const STRICT: Bars =
-        Bars { silhouette: 0.0002, depth_ulp: 4, depth_strays: 0.0005, color_mean: 0.5, color_strays: 0.0005 };
+    pub(crate) const STRICT: Bars = Bars {
+        silhouette: 0.0002,
+        depth_ulp: 4,
+        depth_strays: 0.0005,
+        color_mean: 0.5,
+        color_strays: 0.0005,
+    };
 }
 
 /// How far OpenGL's own depths may be from the exact ones: llvmpipe interpolates in f32, which was measured to be up to 22 units in the
@@ -106,7 +111,10 @@ fn ulps(a: f32, b: f32) -> u32 {
 /// Measures how far `ours` is from `stock`. An error when they cannot be compared at all.
 pub(crate) fn measure(stock: &Capture, ours: &Capture, bars: &Bars) -> Result<Measured, String> {
     if (stock.width, stock.height) != (ours.width, ours.height) {
-        return Err(format!("{} x {} pixels against {} x {}", stock.width, stock.height, ours.width, ours.height));
+        return Err(format!(
+            "{} x {} pixels against {} x {}",
+            stock.width, stock.height, ours.width, ours.height
+        ));
     }
     let pixels = stock.width * stock.height;
     let mut m = Measured { pixels, ..Measured::default() };
@@ -159,7 +167,11 @@ pub(crate) fn faults(stock: &Capture, ours: &Capture, bars: &Bars) -> Vec<String
         faults.push(format!("silhouette beyond {} %", 100.0 * bars.silhouette));
     }
     if m.depth_beyond as f64 > ROUNDED * m.inner as f64 {
-        faults.push(format!("depth beyond {} ulp in more than {} % away from edges", bars.depth_ulp, 100.0 * ROUNDED));
+        faults.push(format!(
+            "depth beyond {} ulp in more than {} % away from edges",
+            bars.depth_ulp,
+            100.0 * ROUNDED
+        ));
     }
     if part(m.depth_far) > bars.depth_strays {
         faults.push(format!("depth beyond {ROUNDING_ULP} ulp in more than {} %", 100.0 * bars.depth_strays));
@@ -171,7 +183,8 @@ pub(crate) fn faults(stock: &Capture, ours: &Capture, bars: &Bars) -> Vec<String
         faults.push(format!("colours far off in more than {} %", 100.0 * bars.color_strays));
     }
     if stock.facts != ours.facts {
-        faults.push(format!("facts (picks, selections, counts) differ:\n  {}\n  {}", stock.facts, ours.facts));
+        faults
+            .push(format!("facts (picks, selections, counts) differ:\n  {}\n  {}", stock.facts, ours.facts));
     }
     if !faults.is_empty() {
         faults.push(m.to_string());

@@ -6,7 +6,12 @@ use crate::session::{Launch, Outcome, Program, With, interpreter, output};
 use std::path::PathBuf;
 
 /// Runs the script on `ranks` ranks. Pictures come into the folder that is given back, reports too.
-fn run(ranks: usize, with: With, name: &str, settings: &[(&str, &str)]) -> Result<(PathBuf, Outcome), String> {
+fn run(
+    ranks: usize,
+    with: With,
+    name: &str,
+    settings: &[(&str, &str)],
+) -> Result<(PathBuf, Outcome), String> {
     let mpirun = mpirun().ok_or("mpirun.openmpi was not found (set RTSV_MPIRUN)")?;
     let folder = output(name);
     let _ = std::fs::remove_dir_all(&folder);
@@ -72,7 +77,8 @@ fn pictures_do_not_depend_on_the_number_of_ranks() {
         }
         for rank in 0..ranks {
             let path = folder.join(format!("report.rank{rank}.json"));
-            let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}\n{}", path.display(), outcome.stderr));
+            let text = std::fs::read_to_string(&path)
+                .unwrap_or_else(|e| panic!("{}: {e}\n{}", path.display(), outcome.stderr));
             assert!(text.contains("\"triangles\""), "rank {rank} of {ranks} traced nothing:\n{text}");
         }
     }
@@ -81,7 +87,8 @@ fn pictures_do_not_depend_on_the_number_of_ranks() {
 
 #[test]
 fn one_rank_with_the_bridge_is_as_stock() {
-    let [stock, ours] = [(With::Stock, "ranks-stock"), (With::Bridge, "ranks-ours")].map(|(w, n)| run(1, w, n, &[]));
+    let [stock, ours] =
+        [(With::Stock, "ranks-stock"), (With::Bridge, "ranks-ours")].map(|(w, n)| run(1, w, n, &[]));
     let (stock, ours) = match (stock, ours) {
         (Ok(stock), Ok(ours)) => (stock.0, ours.0),
         (Err(reason), _) | (_, Err(reason)) => return skip(&reason),
@@ -89,7 +96,10 @@ fn one_rank_with_the_bridge_is_as_stock() {
     for name in ["opaque", "translucent", "mixed", "annotated"] {
         let [a, b] = [&stock, &ours].map(|f| Capture::read(f, name).unwrap());
         let (strange, pixels) = (strangers(&a, &b), a.width * a.height);
-        assert!(strange * 1000 <= pixels, "{name}: {strange} of {pixels} pixels are not as in stock ParaView");
+        assert!(
+            strange * 1000 <= pixels,
+            "{name}: {strange} of {pixels} pixels are not as in stock ParaView"
+        );
     }
 }
 

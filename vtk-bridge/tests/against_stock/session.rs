@@ -62,7 +62,10 @@ impl Launch {
         if with == With::Bridge {
             let which = if program == Program::Vtk { "--vtk" } else { "--paraview" };
             let tool = env!("CARGO_BIN_EXE_vtk-bridge");
-            script = format!("exports=$('{tool}' env {which} --prefix '{}') || exit 97; eval \"$exports\"; ", installed().display());
+            script = format!(
+                "exports=$('{tool}' env {which} --prefix '{}') || exit 97; eval \"$exports\"; ",
+                installed().display()
+            );
         }
         command.args(["-k", "5", TIME_LIMIT, "sh", "-c", &(script + line), "sh"]);
         command.env("DISPLAY", display).env("PYTHONDONTWRITEBYTECODE", "1").env("LC_ALL", "C.UTF-8");
@@ -72,7 +75,8 @@ impl Launch {
         }
         command.env_remove("VTK_AUTOLOAD_PATH").env_remove("PV_PLUGIN_PATH").env_remove("PYTHONPATH");
         if program == Program::Vtk {
-            let root = peers::vtk91().ok_or("Debian's VTK 9.1 was not found (set RTSV_VTK91 to where it is unpacked)")?;
+            let root = peers::vtk91()
+                .ok_or("Debian's VTK 9.1 was not found (set RTSV_VTK91 to where it is unpacked)")?;
             let libraries = format!("usr/lib/{}-linux-gnu", std::env::consts::ARCH);
             command.env("LD_LIBRARY_PATH", root.join(libraries));
             command.env("PYTHONPATH", root.join("usr/lib/python3/dist-packages"));
@@ -176,7 +180,10 @@ impl Run {
             let finished = out.stdout.lines().filter(|l| l.starts_with("finished ")).count();
             if started == finished && (finished == left.len() || started == 0) {
                 if started == 0 {
-                    return Err(format!("no script was started ({:?}):\n{}\n{}", out.code, out.stdout, out.stderr));
+                    return Err(format!(
+                        "no script was started ({:?}):\n{}\n{}",
+                        out.code, out.stdout, out.stderr
+                    ));
                 }
                 break;
             }
@@ -195,7 +202,8 @@ impl Run {
         }
         let folder = self.folder.join(script);
         let entries = std::fs::read_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-        let names = entries.filter_map(|e| Some(e.ok()?.file_name().to_str()?.strip_suffix(".png")?.to_owned()));
+        let names =
+            entries.filter_map(|e| Some(e.ok()?.file_name().to_str()?.strip_suffix(".png")?.to_owned()));
         let mut names: Vec<String> = names.collect();
         names.sort();
         if names.is_empty() { Err(format!("{script} saved no picture:\n{}", self.stderr)) } else { Ok(names) }
@@ -216,8 +224,9 @@ impl Run {
 pub(crate) fn scripts_in(folder: &str) -> Vec<PathBuf> {
     let folder = peers::scripts().join(folder);
     let entries = std::fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
-    let mut scripts: Vec<PathBuf> =
-        entries.filter_map(|e| Some(e.ok()?.path()).filter(|p| p.extension().is_some_and(|x| x == "py"))).collect();
+    let mut scripts: Vec<PathBuf> = entries
+        .filter_map(|e| Some(e.ok()?.path()).filter(|p| p.extension().is_some_and(|x| x == "py")))
+        .collect();
     scripts.sort();
     scripts
 }

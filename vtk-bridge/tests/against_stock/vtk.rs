@@ -37,17 +37,29 @@ const EXCEPTIONS: &[(&str, &str, Option<Bars>, &str)] = &[
         Some(Bars { color_mean: 255.0, color_strays: 1.0, ..Bars::STRICT }),
         "OpenGL shades in sheared coordinates, where right angles are none: its light is wrong",
     ),
-    ("windows", "one_pixel", Some(Bars { color_mean: 1.0, ..Bars::STRICT }), "one level of one pixel is more than half a level"),
+    (
+        "pbr",
+        "pbr",
+        Some(Bars { color_mean: 2.5, ..Bars::STRICT }),
+        "VTK's formula is not rt-core's physically based material: a few levels at the rims of smooth balls",
+    ),
+    (
+        "windows",
+        "one_pixel",
+        Some(Bars { color_mean: 1.0, ..Bars::STRICT }),
+        "one level of one pixel is more than half a level",
+    ),
     (
         "textures",
         "transparent",
-        Some(Bars { silhouette: 1.0, depth_strays: 1.0, ..Bars::STRICT }),
+        Some(Bars { silhouette: 1.0, depth_ulp: u32::MAX, ..Bars::STRICT }),
         "OpenGL writes no depth for a surface with a translucent texture; we write it where the texture is opaque",
     ),
 ];
 
 /// Pictures in which there is nothing to trace.
-const EMPTY: &[(&str, &str)] = &[("odd_inputs", "nothing"), ("windows", "no_renderer"), ("windows", "actor_gone")];
+const EMPTY: &[(&str, &str)] =
+    &[("odd_inputs", "nothing"), ("windows", "no_renderer"), ("windows", "actor_gone")];
 
 fn same_as_stock(script: &str) {
     let Some(both) = both() else { return };
@@ -120,19 +132,27 @@ fn every_script_has_a_test() {
 #[test]
 fn stock_against_stock_passes_and_planted_faults_do_not() {
     let Some(both) = both() else { return };
-    let script = scripts_in("vtk").into_iter().filter(|p| p.ends_with("contours.py") || p.ends_with("opacity.py"));
+    let script =
+        scripts_in("vtk").into_iter().filter(|p| p.ends_with("contours.py") || p.ends_with("opacity.py"));
     let again =
-        Run::new(Program::Vtk, With::Stock, &script.collect::<Vec<_>>(), output("vtk-stock-again"), &[]).unwrap();
+        Run::new(Program::Vtk, With::Stock, &script.collect::<Vec<_>>(), output("vtk-stock-again"), &[])
+            .unwrap();
     for (script, name) in [("contours", "turned"), ("contours", "flat"), ("opacity", "opacity")] {
         let [stock, second] = [&both.stock, &again].map(|r| r.capture(script, name).unwrap());
         assert_eq!(faults(&stock, &second, &Bars::STRICT), Vec::<String>::new(), "{script}/{name}");
         let mut shifted = second.clone();
         shifted.rgb.rotate_right(1);
         shifted.depth.rotate_right(1);
-        assert!(!faults(&stock, &shifted, &Bars::STRICT).is_empty(), "{script}/{name}: a shift by a pixel passed");
+        assert!(
+            !faults(&stock, &shifted, &Bars::STRICT).is_empty(),
+            "{script}/{name}: a shift by a pixel passed"
+        );
         let mut brighter = second.clone();
         brighter.rgb.iter_mut().flatten().for_each(|c| *c = c.saturating_add(2));
-        assert!(!faults(&stock, &brighter, &Bars::STRICT).is_empty(), "{script}/{name}: two of 255 brighter passed");
+        assert!(
+            !faults(&stock, &brighter, &Bars::STRICT).is_empty(),
+            "{script}/{name}: two of 255 brighter passed"
+        );
     }
 }
 
@@ -167,9 +187,12 @@ fn colors_and_matrices_do_not_rebuild() {
     let Some(both) = both() else { return };
     let rebuilt = |script: &str, picture: &str| -> u64 {
         let capture = both.ours.capture(script, picture).unwrap();
-        capture.renderers().iter().filter_map(|r| r["rebuilt"].as_u64()).sum()
+        // The last is this script's; renderers of scripts before may be alive.
+        capture.renderers().last().and_then(|r| r["rebuilt"].as_u64()).expect("a report")
     };
-    for (script, picture) in [("colors", "recolored"), ("changing", "moved"), ("contours", "turned"), ("multiblock", "changed")] {
+    for (script, picture) in
+        [("colors", "recolored"), ("changing", "moved"), ("contours", "turned"), ("multiblock", "changed")]
+    {
         assert_eq!(rebuilt(script, picture), 0, "{script}/{picture} built an acceleration structure again");
     }
     assert!(rebuilt("changing", "deformed") > 0, "points that moved must be built again");
@@ -186,11 +209,13 @@ fn our_window_depth_is_exact_where_opengl_rounds() {
     };
     let [stock, ours] = [stock, ours].map(|r| r.capture("triangles", "triangles").unwrap());
     let worst = |c: &Capture| {
-        let corners: Vec<f64> = c.facts["corners"].as_array().expect("a list").iter().filter_map(|v| v.as_f64()).collect();
+        let corners: Vec<f64> =
+            c.facts["corners"].as_array().expect("a list").iter().filter_map(|v| v.as_f64()).collect();
         let mut worst = (0, 0);
         for y in 0..c.height {
             for x in 0..c.width {
-                let at = [(x as f64 + 0.5) / c.width as f64, (y as f64 + 0.5) / c.height as f64].map(|v| 2.0 * v - 1.0);
+                let at = [(x as f64 + 0.5) / c.width as f64, (y as f64 + 0.5) / c.height as f64]
+                    .map(|v| 2.0 * v - 1.0);
                 let depths = corners.chunks_exact(9).filter_map(|t| depth_at(t, at));
                 let exact = depths.fold(1.0, f64::min) as f32;
                 let seen = c.depth[y * c.width + x];
