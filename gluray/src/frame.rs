@@ -111,14 +111,17 @@ impl Context {
         self.frame.told.traced(self.counters.report.frames + 1, pending.iter().map(|(d, _)| d));
         let start = Instant::now();
         let mut builds = 0;
-        let (layer, rays) = worker::on_pool(|| {
+        let settings = &self.config.settings;
+        let (layer, extra, rays) = worker::on_pool(|| {
             let ready: Vec<Prepared<'_>> =
                 pending.iter().filter_map(|(d, image)| Prepared::new(d, image.clone(), &mut builds)).collect();
-            let layer = trace::nearest(&ready);
-            (layer, ready.iter().map(|p| p.rays.load(Relaxed)).sum::<u64>())
+            let (layer, extra) = trace::nearest(&ready, settings);
+            (layer, extra, ready.iter().map(|p| p.rays.load(Relaxed)).sum::<u64>())
         });
         self.counters.spent("trace", start.elapsed());
         self.counters.rays("primary", rays);
+        self.counters.rays("shadow", extra[0]);
+        self.counters.rays("ambient occlusion", extra[1]);
         self.counters.report.builds += builds;
         self.counters.report.pixels += layer.covered as u64;
         let start = Instant::now();

@@ -22,6 +22,7 @@ pub mod config;
 mod context;
 mod control;
 mod decide;
+mod effects;
 pub mod doctor;
 mod enums;
 pub mod export;

@@ -1,6 +1,7 @@
 //! OpenGL's lighting at a vertex (compatibility profile specification, section 12.2), in f32 and in the order of Mesa's vertex programs.
 
 use crate::capture::Attributes;
+use crate::effects::{Place, Visibility, vector};
 use crate::enums::*;
 use crate::state::current::{Material, sides};
 use crate::state::snapshot::{GlLight, Snapshot};
@@ -108,12 +109,37 @@ impl<'a> Setup<'a> {
         let eye = [eye[0] / eye[3], eye[1] / eye[3], eye[2] / eye[3]];
         let normal = self.eye_normal(attributes.normals.at(i));
         let materials = attributes.materials_at(i);
-        let front = self.side(&self.tracked(&materials[0], 0, color), eye, normal);
+        let full = &Visibility::FULL;
+        let front = self.side(&self.tracked(&materials[0], 0, color), eye, normal, full);
         let back = match self.state.two_side {
-            true => self.side(&self.tracked(&materials[1], 1, color), eye, scaled(normal, -1.0)),
+            true => self.side(&self.tracked(&materials[1], 1, color), eye, scaled(normal, -1.0), full),
             false => front,
         };
         Lit { primary: [front.0, back.0], secondary: [front.1, back.1] }
+    }
+
+    /// Colours of a point lit by itself: primary and secondary. `normal` and `color` are interpolated, the normal in eye space.
+    pub(crate) fn point(
+        &self,
+        materials: &[Material; 2],
+        color: [f32; 4],
+        eye: V3,
+        normal: V3,
+        back: bool,
+        reaches: &Visibility,
+    ) -> ([f32; 4], V3) {
+        let back = back && self.state.two_side;
+        let (side, normal) = if back { (1, scaled(normal, -1.0)) } else { (0, normal) };
+        self.side(&self.tracked(&materials[side], side, color), eye, normal, reaches)
+    }
+
+    /// Where the lights are, in eye space.
+    pub(crate) fn places(&self) -> Vec<Place> {
+        let place = |p: &PreparedLight<'_>| match p.directional {
+            true => Place::Far(vector(p.to_light)),
+            false => Place::Near(vector(p.to_light)),
+        };
+        self.lights.iter().map(place).collect()
     }
 
     /// The material with what GL_COLOR_MATERIAL takes from the colour.
@@ -133,12 +159,12 @@ impl<'a> Setup<'a> {
         m
     }
 
-    fn side(&self, m: &Material, eye: V3, normal: V3) -> ([f32; 4], V3) {
+    fn side(&self, m: &Material, eye: V3, normal: V3, reaches: &Visibility) -> ([f32; 4], V3) {
         let rgb = |v: [f32; 4]| [v[0], v[1], v[2]];
         let times = |a: [f32; 4], b: [f32; 4]| [a[0] * b[0], a[1] * b[1], a[2] * b[2]];
-        let mut primary = add(rgb(m.emission), times(m.ambient, self.state.model_ambient));
+        let mut primary = add(rgb(m.emission), scaled(times(m.ambient, self.state.model_ambient), reaches.ambient));
         let mut specular = [0.0; 3];
-        for p in &self.lights {
+        for (p, visible) in self.lights.iter().zip(&reaches.lights) {
             let (to_light, mut strength, distance) = if p.directional {
                 (p.to_light, 1.0, 0.0)
             } else {
@@ -154,7 +180,8 @@ impl<'a> Setup<'a> {
             if strength == 0.0 || distance.is_nan() {
                 continue;
             }
-            primary = add(primary, scaled(times(m.ambient, p.light.ambient), strength));
+            primary = add(primary, scaled(times(m.ambient, p.light.ambient), strength * reaches.ambient));
+            strength *= visible;
             let cosine = dot(normal, to_light);
             if cosine <= 0.0 {
                 continue;

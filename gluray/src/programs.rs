@@ -9,6 +9,7 @@ use crate::cache::Geometry;
 use crate::capture::{Attributes, Shading, Values};
 use crate::context::Context;
 use crate::decide::{self, Verdict};
+use crate::effects::{Place, Visibility, vector};
 use crate::enums::*;
 use crate::lighting::{normalized, transform};
 use crate::real::gl;
@@ -222,6 +223,11 @@ impl Recognised {
         }
     }
 
+    /// Where the lights are, in eye space.
+    pub(crate) fn places(&self) -> Vec<Place> {
+        self.lights.iter().map(|(d, _)| Place::Far(vector(d.map(|v| -v)))).collect()
+    }
+
     /// True when every fragment has alpha 1.
     fn is_opaque(&self, attributes: &Attributes, vertices: usize) -> bool {
         self.opacity == 1.0
@@ -233,7 +239,15 @@ impl Recognised {
     }
 
     /// The fragment's colour, as the shader computes it.
-    pub(crate) fn color(&self, a: &Attributes, mesh: &TriMesh, prim: usize, w: [f32; 3], front: bool) -> [f32; 4] {
+    pub(crate) fn color(
+        &self,
+        a: &Attributes,
+        mesh: &TriMesh,
+        prim: usize,
+        w: [f32; 3],
+        front: bool,
+        reaches: &Visibility,
+    ) -> [f32; 4] {
         let corners = mesh.indices[prim].map(|i| i as usize);
         let (surface, alpha) = match self.template.colors {
             _ if self.overrides => (None, 1.0),
@@ -277,7 +291,7 @@ impl Recognised {
         let mut lit = [0.0; 3];
         let mut shine = [0.0; 3];
         if self.template.headlight {
-            let df = normal[2].max(0.000_001);
+            let df = normal[2].max(0.000_001) * reaches.lights[0];
             let sf = df.powf(self.specular_power);
             for k in 0..3 {
                 lit[k] = df * self.lights[0].1[k];
@@ -285,7 +299,8 @@ impl Recognised {
             }
         } else {
             let to_eye = normalized(at.map(|v| -v));
-            for (direction, color) in &self.lights {
+            for ((direction, color), visible) in self.lights.iter().zip(&reaches.lights) {
+                let color = color.map(|c| c * visible);
                 let cosine = -dot(normal, *direction);
                 if cosine <= 0.0 {
                     continue;
@@ -299,7 +314,7 @@ impl Recognised {
                 }
             }
         }
-        let out: [f32; 3] = std::array::from_fn(|k| ambient[k] + diffuse[k] * lit[k] + self.specular[k] * shine[k]);
+        let out: [f32; 3] = std::array::from_fn(|k| ambient[k] * reaches.ambient + diffuse[k] * lit[k] + self.specular[k] * shine[k]);
         [out[0], out[1], out[2], alpha]
     }
 }

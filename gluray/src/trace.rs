@@ -4,6 +4,8 @@
 //! (homogeneous edge functions after Olano and Greer 1997), so they agree with what the driver makes of neighbouring lines and text.
 
 use crate::capture::{Draw, Shading};
+use crate::config::{Mode, Settings};
+use crate::effects::{Place, Surroundings, Visibility, vector};
 use crate::enums::*;
 use crate::lighting::{Lit, Setup, transform};
 use crate::texturing::{self, Image};
@@ -65,10 +67,14 @@ const TILE: i32 = 16;
 /// A depth buffer of 24 bits.
 const DEPTH_STEPS: f64 = 16_777_215.0;
 
+/// Share of w by which a point may be beyond the near or far plane: the driver clips in f32, and a plane that lies in the far plane is seen.
+const SLACK: f64 = 1e-6;
+
 /// A draw made ready for rays.
 pub(crate) struct Prepared<'a> {
     pub(crate) draw: &'a Draw,
-    world: Arc<World>,
+    pub(crate) world: Arc<World>,
+    places: Vec<Place>,
     camera: Camera,
     /// Rows of planes in object space that points must be above: near, far, the user's.
     planes: Vec<[f64; 4]>,
@@ -128,16 +134,20 @@ impl<'a> Prepared<'a> {
         if s.depth_clamp {
             planes.push(row(3).to_array());
         } else {
-            planes.push((row(3) + row(2)).to_array());
-            planes.push((row(3) - row(2)).to_array());
+            planes.push((row(3) * (1.0 + SLACK) + row(2)).to_array());
+            planes.push((row(3) * (1.0 + SLACK) - row(2)).to_array());
         }
         let eye_from_object = matrix(&s.model_view);
         let object = |p: &[f64; 4]| (eye_from_object.transpose() * rt_core::glam::DVec4::from_array(*p)).to_array();
         let clip_planes: Vec<[f64; 4]> = s.clip_planes.iter().map(object).collect();
         planes.extend(&clip_planes);
         let lighting = Setup::new(s);
+        let places = match &draw.shading {
+            Shading::Fixed => lighting.places(),
+            Shading::Program(program) => program.places(),
+        };
         let mut out =
-            Prepared { draw, world, camera, planes, clip_planes, rect, lighting, lit: None, image, rays: AtomicU64::new(0) };
+            Prepared { draw, world, places, camera, planes, clip_planes, rect, lighting, lit: None, image, rays: AtomicU64::new(0) };
         let positions = &draw.geometry.mesh.positions;
         // Fewer vertices than pixels: light them all once. Else only those that are seen.
         let fixed = matches!(draw.shading, Shading::Fixed);
@@ -155,7 +165,9 @@ impl<'a> Prepared<'a> {
         let (origin, dir) = self.camera.world_ray(ndc);
         let (mut t0, mut t1) = (f64::NEG_INFINITY, f64::INFINITY);
         for p in &self.planes {
-            let a = p[0] * origin.x + p[1] * origin.y + p[2] * origin.z + p[3];
+            let terms = [p[0] * origin.x, p[1] * origin.y, p[2] * origin.z, p[3]];
+            // A little more than is visible: the exact test is that of the fragment.
+            let a = terms.iter().sum::<f64>() + 1e-6 * terms.iter().map(|v| v.abs()).sum::<f64>();
             let b = p[0] * dir.x + p[1] * dir.y + p[2] * dir.z;
             if b > 0.0 {
                 t0 = t0.max(-a / b);
@@ -165,9 +177,6 @@ impl<'a> Prepared<'a> {
                 return None;
             }
         }
-        // A little more than is visible: the exact test is that of the fragment.
-        let slack = 1e-6 * (t0.abs().min(t1.abs()) + (t1 - t0).abs().min(1e30));
-        let (t0, t1) = (t0 - slack, t1 + slack);
         if t0.partial_cmp(&t1) != Some(std::cmp::Ordering::Less) {
             return None;
         }
@@ -240,8 +249,7 @@ impl<'a> Prepared<'a> {
         if let Some((factor, units)) = s.polygon_offset {
             depth += f64::from(factor) * steepness(&c, s.viewport, f - n) + 2.0 * f64::from(units) / DEPTH_STEPS;
         }
-        // Near and far: half a step of slack for rounding.
-        if !s.depth_clamp && z.abs() > w.abs() * (1.0 + 1.0 / DEPTH_STEPS) {
+        if !s.depth_clamp && z.abs() > w.abs() * (1.0 + SLACK) {
             return None;
         }
         let (lo, hi) = if n < f { (n, f) } else { (f, n) };
@@ -329,20 +337,27 @@ impl<'a> Prepared<'a> {
         best
     }
 
-    fn color(&self, prim: usize, f: &Fragment) -> [f32; 4] {
+    fn color(&self, prim: usize, f: &Fragment, per_pixel: bool, reaches: &Visibility) -> [f32; 4] {
         let mesh = &self.draw.geometry.mesh;
         let corners = mesh.indices[prim].map(|i| i as usize);
         if let Shading::Program(program) = &self.draw.shading {
-            return program.color(&self.draw.attributes, mesh, prim, f.weights.map(|w| w as f32), f.front);
+            return program.color(&self.draw.attributes, mesh, prim, f.weights.map(|w| w as f32), f.front, reaches);
         }
         let s = &*self.draw.state;
         let side = usize::from(!f.front && s.lighting && s.two_side);
         let lit = corners.map(|i| match &self.lit {
+            _ if per_pixel && s.lighting => Lit::default(),
             Some(all) => all[i],
             None => self.lighting.vertex(&self.draw.attributes, i, mesh.positions[i].to_array()),
         });
         let w = f.weights.map(|w| w as f32);
         let (mut color, secondary) = match s.flat {
+            _ if per_pixel && s.lighting => {
+                let (eye, normal) = self.eye_point(prim, w);
+                let color = if s.flat { self.draw.attributes.colors.at(corners[2]) } else { mixed(corners.map(|i| self.draw.attributes.colors.at(i)), w) };
+                let materials = self.draw.attributes.materials_at(corners[2]);
+                self.lighting.point(materials, color, eye, normal, !f.front, reaches)
+            }
             true => (lit[2].primary[side], lit[2].secondary[side]),
             false => (mixed(lit.map(|l| l.primary[side]), w), mixed(lit.map(|l| l.secondary[side]), w)),
         };
@@ -370,6 +385,59 @@ impl<'a> Prepared<'a> {
             }
         }
         color
+    }
+}
+
+impl Prepared<'_> {
+    /// Eye-space position and shading normal of a fragment.
+    fn eye_point(&self, prim: usize, w: [f32; 3]) -> ([f32; 3], [f32; 3]) {
+        let mesh = &self.draw.geometry.mesh;
+        let corners = mesh.indices[prim].map(|i| i as usize);
+        let matrix = match &self.draw.shading {
+            Shading::Fixed => &self.draw.state.model_view,
+            Shading::Program(program) => &program.view_from_object,
+        };
+        let eye = corners.map(|i| {
+            let v = transform(matrix, mesh.positions[i].to_array());
+            [v[0] / v[3], v[1] / v[3], v[2] / v[3]]
+        });
+        let normal = |i: usize| self.lighting.eye_normal(self.draw.attributes.normals.at(i));
+        let normal = if self.draw.state.flat { normal(corners[2]) } else { mixed(corners.map(normal), w) };
+        (mixed(eye, w), crate::lighting::normalized(normal))
+    }
+
+    /// The colour that the mode gives a fragment.
+    fn shaded(&self, prim: usize, f: &Fragment, mode: Mode, around: Option<&Surroundings<'_>>, pixel: (i32, i32)) -> [f32; 4] {
+        let per_pixel = matches!(mode, Mode::Phong | Mode::Rich | Mode::Path);
+        let lit = match &self.draw.shading {
+            Shading::Fixed => self.draw.state.lighting,
+            Shading::Program(_) => true,
+        };
+        let (Some(around), true) = (around, lit) else {
+            return self.color(prim, f, per_pixel, &Visibility::FULL);
+        };
+        // The plane of the triangle, turned to the viewer: what is in front of it is what the eye sees.
+        let weights = f.weights.map(|w| w as f32);
+        let (eye, _) = self.eye_point(prim, weights);
+        let at = |w| vector(self.eye_point(prim, w).0);
+        let [a, b, c] = [at([1.0, 0.0, 0.0]), at([0.0, 1.0, 0.0]), at([0.0, 0.0, 1.0])];
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let clip = matrix(&self.draw.state.projection);
+        let parallel = matches!(self.draw.shading, Shading::Fixed) && clip.row(3).truncate() == DVec3::ZERO;
+        let towards = if parallel { DVec3::Z } else { -vector(eye) };
+        let normal = if normal.dot(towards) < 0.0 { -normal } else { normal };
+        let reaches = around.at(vector(eye), normal, &self.places, pixel);
+        if mode != Mode::Enhance {
+            // Lights at the eye cast no shadow that it could see; corners dim them all the same.
+            let mut r = reaches;
+            r.lights.iter_mut().for_each(|l| *l *= 0.5 + 0.5 * reaches.ambient);
+            return self.color(prim, f, per_pixel, &r);
+        }
+        let color = self.color(prim, f, per_pixel, &Visibility::FULL);
+        let n = self.places.len().clamp(1, crate::effects::MOST_LIGHTS);
+        let light = reaches.lights[..n].iter().sum::<f32>() / n as f32;
+        let dim = (0.4 + 0.6 * light) * (0.3 + 0.7 * reaches.ambient);
+        [color[0] * dim, color[1] * dim, color[2] * dim, color[3]]
     }
 }
 
@@ -504,12 +572,14 @@ fn slot(x: i32, y: i32) -> (usize, usize) {
 }
 
 /// The nearest fragment of all draws at every pixel.
-pub(crate) fn nearest(draws: &[Prepared<'_>]) -> Layer {
+pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings) -> (Layer, [u64; 2]) {
+    let around = Surroundings::new(draws, settings);
+    let mode = settings.mode;
     let rect = draws.iter().fold(Rect::default(), |r, d| r.or(d.rect));
     let (w, h) = (rect.w.max(0) as usize, rect.h.max(0) as usize);
     let mut layer = Layer { rect, color: vec![[0; 4]; w * h], depth: vec![UNCOVERED; w * h], covered: 0 };
     if w * h == 0 {
-        return layer;
+        return (layer, [0; 2]);
     }
     let band = w * TILE as usize;
     let covered = AtomicU64::new(0);
@@ -526,7 +596,7 @@ pub(crate) fn nearest(draws: &[Prepared<'_>]) -> Layer {
             let (px, py) = (rect.x + (k % w) as i32, y + (k / w) as i32);
             let p = &draws[s.draw as usize];
             if let Some(f) = p.fragment(s.prim as usize, px, py) {
-                color[k] = to_bytes(p.color(s.prim as usize, &f));
+                color[k] = to_bytes(p.shaded(s.prim as usize, &f, mode, around.as_ref(), (px, py)));
                 depth[k] = s.depth;
                 n += 1;
             }
@@ -534,7 +604,8 @@ pub(crate) fn nearest(draws: &[Prepared<'_>]) -> Layer {
         covered.fetch_add(n, Relaxed);
     });
     layer.covered = covered.into_inner() as usize;
-    layer
+    let extra = around.map_or([0; 2], |a| [a.shadow_rays.into_inner(), a.occlusion_rays.into_inner()]);
+    (layer, extra)
 }
 
 /// One draw against what was seen so far.
@@ -576,7 +647,7 @@ pub(crate) fn in_order(p: &Prepared<'_>) -> Vec<Layer> {
                 if found.iter().all(|(o, ..)| *o != prim as u32)
                     && let Some(f) = p.fragment(prim, x, y)
                 {
-                    found.push((prim as u32, to_bytes(p.color(prim, &f)), f.depth as f32));
+                    found.push((prim as u32, to_bytes(p.color(prim, &f, false, &Visibility::FULL)), f.depth as f32));
                 }
             };
             const OFF: f64 = 1.0 / 200.0;

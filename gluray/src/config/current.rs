@@ -2,7 +2,7 @@
 
 use super::fields::{FIELDS, Field};
 use super::load::Sources;
-use super::settings::{Settings, Trace};
+use super::settings::{Mode, Settings, Trace};
 use crate::decide;
 use std::path::PathBuf;
 use std::sync::{Arc, PoisonError, RwLock};
@@ -43,7 +43,17 @@ impl Config {
 }
 
 /// Paths of settings that the library obeys today. The panel disables the others, and whoever sets one is told in the report.
-pub(crate) const OBEYED: &[&str] = &["enabled", "trace", "quality", "threads"];
+pub(crate) const OBEYED: &[&str] = &[
+    "enabled",
+    "mode",
+    "trace",
+    "quality",
+    "threads",
+    "effects.shadows",
+    "effects.light_radius_deg",
+    "effects.ambient_occlusion_samples",
+    "effects.ambient_occlusion_radius",
+];
 
 /// What was set in vain.
 fn not_obeyed(settings: &Settings) -> Vec<String> {
@@ -57,6 +67,9 @@ fn not_obeyed(settings: &Settings) -> Vec<String> {
         .filter(in_vain)
         .map(|f| format!("`{}` is set, and this version of the library does not obey it yet", f.path))
         .collect();
+    if settings.mode == Mode::Path {
+        out.push("`mode` is path, which is not built yet: `rich` is drawn".into());
+    }
     if !settings.objects.is_empty() && !OBEYED.iter().any(|p| p.starts_with("material.")) {
         out.push("`objects` are set, and this version of the library does not obey them yet".into());
     }
