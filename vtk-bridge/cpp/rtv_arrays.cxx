@@ -165,6 +165,12 @@ void rtvAddColors(RtvBridge* bridge, RtvSurface& s, vtkMapper* mapper, vtkPolyDa
   {
     return;
   }
+  if (cellFlag == 2 && mapper->GetFieldDataTupleId() < 0)
+  {
+    // An array of the field data with a value for each cell; with a tuple's number it would be one colour for everything.
+    cellFlag = 1;
+  }
+  const bool byCell = cellFlag == 1;
   vtkScalarsToColors* table = mapper->GetLookupTable();
   uint64_t key = Mixed(Mixed(1469598103934665603ull, scalars), table);
   // A mapper's own time stamp also moves for things that do not change colours.
@@ -174,7 +180,7 @@ void rtvAddColors(RtvBridge* bridge, RtvSurface& s, vtkMapper* mapper, vtkPolyDa
   key = rtvMix(rtvMix(key, mapper->GetArrayComponent()), mapper->GetFieldDataTupleId());
   s.color_key = key;
   const bool mapped = mapper->CanUseTextureMapForColoring(data) != 0;
-  const uint32_t source = cellFlag == 1 ? RTV_COLOR_CELLS : mapped ? RTV_COLOR_MAPPED : RTV_COLOR_POINTS;
+  const uint32_t source = byCell ? RTV_COLOR_CELLS : mapped ? RTV_COLOR_MAPPED : RTV_COLOR_POINTS;
   if (cellFlag != 2 && rtvApi->has_colors(bridge, s.shape_key, key))
   {
     s.color_source = source;
@@ -183,6 +189,7 @@ void rtvAddColors(RtvBridge* bridge, RtvSurface& s, vtkMapper* mapper, vtkPolyDa
   // A mapper keeps one array of colours; that of another block must not be taken for this one's.
   mapper->ClearColorArrays();
   vtkUnsignedCharArray* colors = mapper->MapScalars(data, 1.0, cellFlag);
+  cellFlag = byCell ? 1 : cellFlag;
   vtkFloatArray* coordinates = mapper->GetColorCoordinates();
   vtkImageData* map = mapper->GetColorTextureMap();
   if (mapped && coordinates && map && cellFlag == 0)

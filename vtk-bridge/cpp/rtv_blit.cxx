@@ -43,6 +43,8 @@ void RtvBlit::Upload(vtkRenderer* renderer, const RtvPicture& p)
       texture->AutoParametersOff();
     }
     texture->SetContext(window);
+    // It would keep the type of its first picture: bytes, when nothing was translucent then.
+    texture->ResetFormatAndType();
     return texture.Get();
   };
   if (this->Color && this->Blended != (p.blended != nullptr))

@@ -6,6 +6,7 @@
 #include <vtkLight.h>
 #include <vtkLightCollection.h>
 #include <vtkMatrix4x4.h>
+#include <vtkNew.h>
 #include <vtkRenderWindow.h>
 
 void rtvAddLights(RtvBridge* bridge, vtkRenderer* renderer)
@@ -43,9 +44,11 @@ RtvView rtvView(vtkRenderer* renderer, int width, int height)
 {
   RtvView view = {};
   vtkCamera* camera = renderer->GetActiveCamera();
-  // Everything is in it: window centre, explicit projections, tiles, the matrix IceT sets. Depth from -1 to 1, as OpenGL has it.
-  vtkMatrix4x4* matrix =
-    camera->GetCompositeProjectionTransformMatrix(renderer->GetTiledAspectRatio(), -1.0, 1.0);
+  // Everything is in them: window centre, explicit projections, tiles, the matrix IceT sets, the eye of a stereo pair (which
+  // GetCompositeProjectionTransformMatrix leaves out, being for picks). Depth from -1 to 1, as OpenGL has it.
+  vtkNew<vtkMatrix4x4> matrix;
+  vtkMatrix4x4::Multiply4x4(camera->GetProjectionTransformMatrix(renderer->GetTiledAspectRatio(), -1.0, 1.0),
+    camera->GetModelViewTransformMatrix(), matrix);
   std::copy(&matrix->Element[0][0], &matrix->Element[0][0] + 16, view.clip_from_world);
   double bottom[3], top[3];
   renderer->GetBackground(bottom);

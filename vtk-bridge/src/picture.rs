@@ -63,7 +63,8 @@ impl Picture {
         let layers = Layers::COLOR | Layers::DEPTH;
         let options = RenderOptions {
             layers: if mixed { layers | Layers::IDS } else { layers },
-            depth_min_opacity: if effects.contains(Effects::TRANSPARENCY) { 1.0 } else { 0.0 },
+            // Interpolated colours of opacity 1 come a rounding below it; what is 255 of 255 is opaque.
+            depth_min_opacity: if effects.contains(Effects::TRANSPARENCY) { 1.0 - 1.0 / 512.0 } else { 0.0 },
             ..ready.options.clone()
         };
         let output = renderer.render(ready.scene, ready.camera, &options)?;

@@ -66,7 +66,7 @@ struct InstallArgs {
     /// Folder with VTK's headers (vtkObjectFactory.h); may be given several times. RTV_VTK_INCLUDE and the system's are looked at as well.
     #[arg(long = "include")]
     includes: Vec<PathBuf>,
-    /// Build ParaView's plugin with its panel too (needs paraview-dev and libglew-dev).
+    /// Build ParaView's plugin with its panel too (needs paraview-dev).
     #[arg(long)]
     plugin: bool,
 }

@@ -3,7 +3,7 @@
 //! ```text
 //! PREFIX/autoload/librtv_loader.so        the only library in the folder that VTK_AUTOLOAD_PATH names
 //! PREFIX/lib/FLAVOUR/librtv_shim.so       the C++ shim for one VTK: 9.1, pv5.11, …
-//! PREFIX/plugins/pv5.11/RtvBridge.so      ParaView's plugin with its panel (`install --plugin`)
+//! PREFIX/plugins/pv5.11/VtkBridge.so      ParaView's plugin with its panel (`install --plugin`)
 //! PREFIX/include/rtv.h                    the C interface
 //! ```
 

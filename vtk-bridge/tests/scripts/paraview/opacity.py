@@ -1,20 +1,13 @@
-# A translucent contour around an opaque one, with a clip through both.
+# Translucent surfaces through an opaque one.
 from paraview.simple import *
 
-wavelet = Wavelet(WholeExtent=[-16, 16] * 3)
-view = CreateRenderView()
-view.ViewSize = [400, 300]
-view.UseFXAA = 0
-for value, opacity, color in [(130, 0.4, (0.9, 0.4, 0.3)), (220, 1.0, (0.3, 0.5, 0.9))]:
-    contour = Contour(Input=wavelet, ContourBy="RTData", Isosurfaces=[value])
-    clip = Clip(Input=contour, ClipType="Plane")
-    clip.ClipType.Normal = [0, 1, 0.3]
-    shown = Show(clip, view)
-    ColorBy(shown, None)
+from capture_view import save, view
+
+v = view([300, 260])
+for i, color in enumerate(([0.9, 0.2, 0.2], [0.2, 0.8, 0.2], [0.2, 0.3, 0.9])):
+    shown = Show(Sphere(Center=[0.3 * i, 0.2 * i, 0.1], ThetaResolution=32, PhiResolution=32), v)
     shown.DiffuseColor = color
-    shown.Opacity = opacity
-ResetCamera(view)
-view.CameraPosition = [30, -90, 50]
-view.CameraFocalPoint = [0, 0, 0]
-view.CameraViewUp = [0, 0, 1]
-Render(view)
+    shown.Opacity = 0.3 + 0.2 * i
+Show(Plane(Origin=[-1, -1, 0], Point1=[1.5, -1, 0], Point2=[-1, 1, 0]), v).DiffuseColor = [0.6, 0.6, 0.6]
+v.CameraPosition, v.CameraFocalPoint, v.CameraViewUp = [1.5, -2.5, 2], [0.3, 0, 0], [0, 0, 1]
+save(v, "opacity")

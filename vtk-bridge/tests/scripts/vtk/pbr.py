@@ -1,35 +1,30 @@
-# Physically based spheres: metallic from left to right, roughness from top to bottom.
-from vtkmodules.vtkRenderingCore import *
-import vtkmodules.vtkRenderingOpenGL2, vtkmodules.vtkRenderingFreeType, vtkmodules.vtkInteractionStyle
-from vtkmodules.vtkFiltersSources import vtkSphereSource
+# Physically based surfaces from rough plastic to polished metal, under two lights.
+import vtk
 
-ren = vtkRenderer()
+from capture import actor, look, save, window
+
+ren = vtk.vtkRenderer()
 ren.SetBackground(0.1, 0.1, 0.1)
-for i in range(9):
-    sphere = vtkSphereSource()
-    sphere.SetThetaResolution(60)
-    sphere.SetPhiResolution(40)
-    sphere.SetCenter(1.1 * (i % 3), 1.1 * (i // 3), 0)
-    mapper = vtkPolyDataMapper()
-    mapper.SetInputConnection(sphere.GetOutputPort())
-    actor = vtkActor()
-    actor.SetMapper(mapper)
-    p = actor.GetProperty()
-    p.SetInterpolationToPBR()
-    p.SetColor(0.8, 0.6, 0.3)
-    p.SetMetallic(0.5 * (i % 3))
-    p.SetRoughness(0.2 + 0.35 * (i // 3))
-    ren.AddActor(actor)
-for position in [(5, 5, 8), (-6, 2, 5)]:
-    light = vtkLight()
-    light.SetPosition(*position)
-    light.SetFocalPoint(1, 1, 0)
-    light.SetIntensity(1.5)
+for i in range(4):
+    for j in range(2):
+        ball = vtk.vtkSphereSource()
+        ball.SetThetaResolution(48)
+        ball.SetPhiResolution(48)
+        made = actor(ball, (0.95, 0.7, 0.3))
+        made.SetPosition(1.1 * i, 1.1 * j, 0)
+        made.GetProperty().SetInterpolationToPBR()
+        made.GetProperty().SetRoughness(0.15 + 0.25 * i)
+        made.GetProperty().SetMetallic(j)
+        ren.AddActor(made)
+for position, color in (((3, 4, 8), (1, 1, 1)), ((-6, -2, 5), (0.3, 0.4, 0.8))):
+    light = vtk.vtkLight()
+    light.SetLightTypeToSceneLight()
+    light.SetPosition(position)
+    light.SetFocalPoint(1.6, 0.5, 0)
+    light.SetColor(color)
     ren.AddLight(light)
-win = vtkRenderWindow()
-win.SetOffScreenRendering(1)
-win.SetMultiSamples(0)
-win.SetSize(300, 300)
-win.AddRenderer(ren)
-ren.ResetCamera()
+win = window(420, 240, ren)
+look(ren, (1.65, 0.55, 8), (1.65, 0.55, 0), (0, 1, 0)).Zoom(1.5)
+ren.ResetCameraClippingRange()
 win.Render()
+save(win, "pbr", props=ren.GetNumberOfPropsRendered())

@@ -1,6 +1,7 @@
 # Flat and smooth spheres with highlights and ambient colour, several lights.
 from vtkmodules.vtkRenderingCore import *
 import vtkmodules.vtkRenderingOpenGL2, vtkmodules.vtkRenderingFreeType, vtkmodules.vtkInteractionStyle
+from capture import save
 from vtkmodules.vtkFiltersSources import vtkSphereSource
 
 ren = vtkRenderer()
@@ -47,3 +48,4 @@ win.SetSize(400, 300)
 win.AddRenderer(ren)
 ren.ResetCamera()
 win.Render()
+save(win, "specular", props=ren.GetNumberOfPropsRendered())

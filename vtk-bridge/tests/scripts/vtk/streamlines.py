@@ -1,55 +1,47 @@
-# Streamlines as tubes, with a wireframe outline that stays OpenGL's.
-from vtkmodules.vtkRenderingCore import *
-import vtkmodules.vtkRenderingOpenGL2, vtkmodules.vtkRenderingFreeType, vtkmodules.vtkInteractionStyle
-from vtkmodules.vtkCommonDataModel import vtkImageData
-from vtkmodules.vtkCommonCore import vtkFloatArray
-from vtkmodules.vtkFiltersCore import vtkTubeFilter
-from vtkmodules.vtkFiltersFlowPaths import vtkStreamTracer
-from vtkmodules.vtkFiltersModeling import vtkOutlineFilter
-from vtkmodules.vtkFiltersSources import vtkPointSource
+# Streamlines of a swirl as tubes and as lines.
 import math
 
-image = vtkImageData()
-image.SetDimensions(16, 16, 16)
-image.SetSpacing(1 / 15.0, 1 / 15.0, 1 / 15.0)
-vectors = vtkFloatArray()
-vectors.SetName("v")
-vectors.SetNumberOfComponents(3)
+import vtk
+
+from capture import actor, look, save, window
+
+image = vtk.vtkImageData()
+n = 13
+image.SetDimensions(n, n, n)
+image.SetOrigin(-1, -1, -1)
+image.SetSpacing(2 / (n - 1), 2 / (n - 1), 2 / (n - 1))
+velocity = vtk.vtkFloatArray()
+velocity.SetName("velocity")
+velocity.SetNumberOfComponents(3)
 for i in range(image.GetNumberOfPoints()):
     x, y, z = image.GetPoint(i)
-    vectors.InsertNextTuple3(-(y - 0.5), x - 0.5, 0.3 + 0.2 * math.sin(5 * x))
-image.GetPointData().SetVectors(vectors)
-seeds = vtkPointSource()
-seeds.SetCenter(0.5, 0.5, 0.1)
-seeds.SetRadius(0.3)
-seeds.SetNumberOfPoints(25)
-tracer = vtkStreamTracer()
+    velocity.InsertNextTuple3(-y, x, 0.3 + 0.1 * math.sin(3 * x))
+image.GetPointData().SetVectors(velocity)
+seeds = vtk.vtkLineSource()
+seeds.SetPoint1(0.1, 0, -0.95)
+seeds.SetPoint2(0.9, 0, -0.95)
+seeds.SetResolution(6)
+tracer = vtk.vtkStreamTracer()
 tracer.SetInputData(image)
 tracer.SetSourceConnection(seeds.GetOutputPort())
-tracer.SetMaximumPropagation(3)
-tracer.SetIntegrationDirectionToBoth()
-tube = vtkTubeFilter()
+tracer.SetMaximumPropagation(20)
+tracer.SetIntegratorTypeToRungeKutta4()
+tube = vtk.vtkTubeFilter()
 tube.SetInputConnection(tracer.GetOutputPort())
-tube.SetRadius(0.012)
-tube.SetNumberOfSides(12)
-outline = vtkOutlineFilter()
-outline.SetInputData(image)
-ren = vtkRenderer()
-for f in (tube, outline):
-    mapper = vtkPolyDataMapper()
-    mapper.SetInputConnection(f.GetOutputPort())
-    mapper.SetScalarModeToUsePointFieldData()
-    mapper.SelectColorArray("IntegrationTime")
-    mapper.SetScalarRange(-2, 2)
-    actor = vtkActor()
-    actor.SetMapper(mapper)
-    ren.AddActor(actor)
-win = vtkRenderWindow()
-win.SetOffScreenRendering(1)
-win.SetMultiSamples(0)
-win.SetSize(400, 300)
-win.AddRenderer(ren)
-ren.ResetCamera()
-ren.GetActiveCamera().Elevation(-60)
+tube.SetRadius(0.03)
+tube.SetNumberOfSides(10)
+tubes = actor(tube)
+tubes.GetMapper().SetScalarModeToUsePointFieldData()
+tubes.GetMapper().SelectColorArray("IntegrationTime")
+tubes.GetMapper().SetScalarRange(0, 7)
+lines = actor(tracer, (1, 1, 0.6))
+lines.SetPosition(2.2, 0, 0)
+lines.GetProperty().SetLineWidth(2)
+ren = vtk.vtkRenderer()
+ren.AddActor(tubes)
+ren.AddActor(lines)
+win = window(420, 260, ren)
+look(ren, (1.1, -6, 2.5), (1.1, 0, 0)).Zoom(1.3)
 ren.ResetCameraClippingRange()
 win.Render()
+save(win, "streamlines", props=ren.GetNumberOfPropsRendered())

@@ -1,0 +1,64 @@
+//! The same unmodified scripts in Debian's ParaView 5.11, without us and with us.
+
+use crate::compare::{Bars, faults};
+use crate::peers::skip;
+use crate::session::{Program, Run, With, output, scripts_in};
+use std::sync::OnceLock;
+
+fn both() -> Option<&'static (Run, Run)> {
+    static BOTH: OnceLock<Result<(Run, Run), String>> = OnceLock::new();
+    let made = BOTH.get_or_init(|| {
+        let scripts = scripts_in("paraview");
+        let stock = Run::new(Program::ParaView, With::Stock, &scripts, output("paraview-stock"), &[])?;
+        Ok((stock, Run::new(Program::ParaView, With::Bridge, &scripts, output("paraview-ours"), &[])?))
+    });
+    made.as_ref().map_err(|reason| skip(reason)).ok()
+}
+
+fn same_as_stock(script: &str) {
+    let Some((stock, ours)) = both() else { return };
+    let names = stock.pictures(script).unwrap_or_else(|e| panic!("stock: {e}"));
+    assert_eq!(names, ours.pictures(script).unwrap_or_else(|e| panic!("with the bridge: {e}")));
+    let mut found = Vec::new();
+    for name in names.iter().filter(|n| !n.contains(".tmp")) {
+        let path = ours.path(script, name);
+        let [stock, ours] = [stock, ours].map(|r| r.capture(script, name).unwrap());
+        if ours.traced_triangles() == 0 {
+            found.push(format!("{}: nothing was ray traced: {:?}", path.display(), ours.report));
+        }
+        found.extend(faults(&stock, &ours, &Bars::STRICT).iter().map(|f| format!("{}: {f}", path.display())));
+    }
+    assert!(found.is_empty(), "\n{}\n", found.join("\n"));
+}
+
+macro_rules! scripts {
+    ($($test:ident: $script:literal,)*) => {
+        /// Every script has a test.
+        const TESTED: &[&str] = &[$($script),*];
+        $(#[test]
+        fn $test() {
+            same_as_stock($script);
+        })*
+    };
+}
+
+scripts! {
+    paraview_annotations_stay_opengl: "annotations",
+    paraview_blocks_have_their_colors: "blocks",
+    paraview_contours_are_stock: "contours",
+    paraview_glyphs_are_stock: "glyphs",
+    paraview_light_kit_and_lights_are_stock: "lights",
+    paraview_opacity_is_stock: "opacity",
+    paraview_selections_are_stock: "selection",
+    paraview_streamlines_are_stock: "streamlines",
+    paraview_textures_are_stock: "textures",
+    paraview_views_do_not_mix: "views",
+    paraview_volumes_mix_with_surfaces: "volume",
+}
+
+#[test]
+fn every_paraview_script_has_a_test() {
+    let there = scripts_in("paraview");
+    let names: Vec<&str> = there.iter().filter_map(|p| p.file_stem()?.to_str()).collect();
+    assert_eq!(names, TESTED);
+}

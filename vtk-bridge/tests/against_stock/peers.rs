@@ -1,0 +1,67 @@
+//! The programs that the bridge is compared with: found through the variables of `cargo xtask test`, or at their usual places.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+/// A program or folder by its variable, or the first of `places` that exists.
+pub(crate) fn find(variable: &str, places: &[&str]) -> Option<PathBuf> {
+    let from_variable = std::env::var_os(variable).map(PathBuf::from);
+    from_variable.into_iter().chain(places.iter().map(PathBuf::from)).find(|p| p.exists())
+}
+
+/// Says that a test does nothing and why; with `RTSV_REQUIRE_PEERS=1` it fails instead.
+pub(crate) fn skip(reason: &str) {
+    assert!(std::env::var_os("RTSV_REQUIRE_PEERS").is_none_or(|v| v != "1"), "{reason}");
+    // Not `eprintln!`: libtest swallows that in tests that pass.
+    let _ = writeln!(std::io::stderr(), "skipped: {reason}");
+}
+
+/// Debian's VTK 9.1, unpacked beside the system because it conflicts with ParaView's Python packages.
+pub(crate) fn vtk91() -> Option<PathBuf> {
+    let root = find("RTSV_VTK91", &[])
+        .or_else(|| std::env::var_os("RTSV_PEERS").map(|p| PathBuf::from(p).join("vtk91")))?;
+    root.join("usr/lib/python3/dist-packages/vtkmodules").is_dir().then_some(root)
+}
+
+/// ParaView's batch program.
+pub(crate) fn pvbatch() -> Option<PathBuf> {
+    find("RTSV_PVBATCH", &["/usr/bin/pvbatch"])
+}
+
+/// Open MPI's launcher, with which Debian's ParaView is built.
+pub(crate) fn mpirun() -> Option<PathBuf> {
+    find("RTSV_MPIRUN", &["/usr/bin/mpirun.openmpi"])
+}
+
+/// An X server of our own, or why there is none. It ends when this process ends, however that happens: a shell waits for the end of its
+/// input, which we hold, and then stops the server.
+pub(crate) fn display() -> Result<&'static str, String> {
+    static DISPLAY: OnceLock<Result<(String, std::process::Child), String>> = OnceLock::new();
+    let started = DISPLAY.get_or_init(|| {
+        let program = find("RTSV_XVFB", &["/usr/bin/Xvfb"]).ok_or("Xvfb was not found (set RTSV_XVFB)")?;
+        // -noreset: else the server begins anew when its last client goes, and the next one dies of that.
+        let script = r#""$0" -displayfd 1 -noreset -nolisten tcp -screen 0 1280x1024x24 2>/dev/null & cat >/dev/null; kill $!"#;
+        let mut child = Command::new("sh")
+            .args(["-c", script])
+            .arg(&program)
+            .stdin(std::process::Stdio::piped())
+            .stdout(std::process::Stdio::piped())
+            .spawn()
+            .map_err(|e| format!("sh: {e}"))?;
+        let mut number = String::new();
+        let stdout = child.stdout.as_mut().ok_or("no stdout")?;
+        std::io::BufRead::read_line(&mut std::io::BufReader::new(stdout), &mut number).map_err(|e| e.to_string())?;
+        match number.trim().parse::<u32>() {
+            Ok(n) => Ok((format!(":{n}"), child)),
+            Err(_) => Err(format!("{} did not start", program.display())),
+        }
+    });
+    started.as_ref().map(|(display, _)| display.as_str()).map_err(Clone::clone)
+}
+
+/// The folder with the scripts.
+pub(crate) fn scripts() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/scripts")
+}

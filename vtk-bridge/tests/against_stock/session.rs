@@ -1,0 +1,237 @@
+//! Runs the scripts in stock programs, and in the same programs with what `vtk-bridge env` prints.
+
+use crate::capture::Capture;
+use crate::peers;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+/// What runs a script.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Program {
+    /// Debian's VTK 9.1 in Python.
+    Vtk,
+    /// Debian's ParaView 5.11, `pvbatch`.
+    ParaView,
+}
+
+/// With us or without.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum With {
+    /// As Debian ships it.
+    Stock,
+    /// After `eval "$(vtk-bridge env ...)"`.
+    Bridge,
+}
+
+/// Seconds after which a process is stopped.
+const TIME_LIMIT: &str = "240";
+
+/// The bridge, installed once for all tests of this process, by its own program.
+pub(crate) fn installed() -> &'static Path {
+    static HOME: OnceLock<PathBuf> = OnceLock::new();
+    HOME.get_or_init(|| {
+        let home = Path::new(env!("CARGO_TARGET_TMPDIR")).join("bridge");
+        let mut install = Command::new(env!("CARGO_BIN_EXE_vtk-bridge"));
+        install.args(["install", "--prefix"]).arg(&home);
+        if let Some(root) = peers::vtk91() {
+            install.arg("--include").arg(root.join("usr/include/vtk-9.1"));
+        }
+        if Path::new("/usr/include/paraview-5.11").is_dir() {
+            install.arg("--plugin");
+        }
+        let out = install.output().expect("vtk-bridge starts");
+        let text = |b: &[u8]| String::from_utf8_lossy(b).into_owned();
+        assert!(out.status.success(), "vtk-bridge install:\n{}\n{}", text(&out.stdout), text(&out.stderr));
+        home
+    })
+}
+
+/// A command line for a shell, in the environment of `program`.
+pub(crate) struct Launch {
+    command: Command,
+}
+
+impl Launch {
+    /// Runs `line` (shell syntax; `"$@"` are `args`), or says why it cannot be run here.
+    pub(crate) fn new(program: Program, with: With, line: &str) -> Result<Launch, String> {
+        let display = peers::display()?;
+        let mut command = Command::new("timeout");
+        let mut script = String::new();
+        if with == With::Bridge {
+            let which = if program == Program::Vtk { "--vtk" } else { "--paraview" };
+            let tool = env!("CARGO_BIN_EXE_vtk-bridge");
+            script = format!(
+                "exports=$('{tool}' env {which} --prefix '{}') || exit 97; eval \"$exports\"; ",
+                installed().display()
+            );
+        }
+        command.args(["-k", "5", TIME_LIMIT, "sh", "-c", &(script + line), "sh"]);
+        command.env("DISPLAY", display).env("PYTHONDONTWRITEBYTECODE", "1").env("LC_ALL", "C.UTF-8");
+        // Nothing of the person who runs the tests.
+        for (name, _) in std::env::vars_os().filter(|(n, _)| n.to_string_lossy().starts_with("RTV_")) {
+            command.env_remove(name);
+        }
+        command.env_remove("VTK_AUTOLOAD_PATH").env_remove("PV_PLUGIN_PATH").env_remove("PYTHONPATH");
+        if program == Program::Vtk {
+            let root = peers::vtk91()
+                .ok_or("Debian's VTK 9.1 was not found (set RTSV_VTK91 to where it is unpacked)")?;
+            let libraries = format!("usr/lib/{}-linux-gnu", std::env::consts::ARCH);
+            command.env("LD_LIBRARY_PATH", root.join(libraries));
+            command.env("PYTHONPATH", root.join("usr/lib/python3/dist-packages"));
+        }
+        Ok(Launch { command })
+    }
+
+    /// What stands for `"$@"`.
+    pub(crate) fn args<S: AsRef<std::ffi::OsStr>>(mut self, args: impl IntoIterator<Item = S>) -> Launch {
+        self.command.args(args);
+        self
+    }
+
+    /// Sets a variable.
+    pub(crate) fn env(mut self, name: &str, value: impl AsRef<std::ffi::OsStr>) -> Launch {
+        self.command.env(name, value);
+        self
+    }
+
+    /// Everything it printed, and how it ended.
+    pub(crate) fn output(mut self) -> Outcome {
+        let out = self.command.output().expect("timeout (coreutils) starts");
+        let text = |b: &[u8]| String::from_utf8_lossy(b).into_owned();
+        Outcome { stdout: text(&out.stdout), stderr: text(&out.stderr), code: out.status.code() }
+    }
+}
+
+/// How a process ended.
+#[derive(Debug, Clone)]
+pub(crate) struct Outcome {
+    pub(crate) stdout: String,
+    pub(crate) stderr: String,
+    /// `None`: by a signal.
+    pub(crate) code: Option<i32>,
+}
+
+impl Outcome {
+    /// Fails with everything it printed unless it ended with 0.
+    pub(crate) fn expect_success(self, what: &str) -> Outcome {
+        assert!(self.code == Some(0), "{what}: ended with {:?}\n{}\n{}", self.code, self.stdout, self.stderr);
+        self
+    }
+}
+
+/// The command line that runs Python scripts in `program`.
+pub(crate) fn interpreter(program: Program) -> Result<String, String> {
+    match program {
+        // Debian's modules are for Debian's Python.
+        Program::Vtk => Ok("/usr/bin/python3".to_owned()),
+        Program::ParaView => {
+            let pvbatch = peers::pvbatch().ok_or("pvbatch was not found (set RTSV_PVBATCH)")?;
+            Ok(format!("'{}'", pvbatch.display()))
+        }
+    }
+}
+
+/// All scripts of a kind, run one after the other in as few processes as they survive.
+#[derive(Debug, Default)]
+pub(crate) struct Run {
+    folder: PathBuf,
+    /// How scripts failed, by name.
+    failed: BTreeMap<String, String>,
+    /// Everything on stderr.
+    pub(crate) stderr: String,
+}
+
+impl Run {
+    /// Runs `scripts` into `folder`. `settings` are variables.
+    pub(crate) fn new(
+        program: Program,
+        with: With,
+        scripts: &[PathBuf],
+        folder: PathBuf,
+        settings: &[(&str, &str)],
+    ) -> Result<Run, String> {
+        let _ = std::fs::remove_dir_all(&folder);
+        std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+        let line = format!("exec {} \"$@\"", interpreter(program)?);
+        let mut run = Run { folder, ..Run::default() };
+        let mut left = scripts;
+        while !left.is_empty() {
+            let beside = run.folder.join("report.json");
+            let mut launch = Launch::new(program, with, &line)?
+                .args([peers::scripts().join("run_all.py"), run.folder.clone()])
+                .args(left)
+                .env("CAPTURE_BESIDE", &beside);
+            if with == With::Bridge {
+                launch = launch.env("RTV_REPORT", &beside);
+            }
+            for (name, value) in settings {
+                launch = launch.env(name, value);
+            }
+            let out = launch.output();
+            run.stderr += &out.stderr;
+            for line in out.stdout.lines() {
+                if let Some(name) = line.strip_prefix("raised ") {
+                    run.failed.insert(name.to_owned(), format!("raised an exception:\n{}", out.stderr));
+                }
+            }
+            let started = out.stdout.lines().filter_map(|l| l.strip_prefix("running ")).count();
+            let finished = out.stdout.lines().filter(|l| l.starts_with("finished ")).count();
+            if started == finished && (finished == left.len() || started == 0) {
+                if started == 0 {
+                    return Err(format!(
+                        "no script was started ({:?}):\n{}\n{}",
+                        out.code, out.stdout, out.stderr
+                    ));
+                }
+                break;
+            }
+            // It died in the script that started last. The others must not suffer for that.
+            let name = left[finished].file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            run.failed.insert(name, format!("the process ended with {:?}:\n{}", out.code, out.stderr));
+            left = &left[finished + 1..];
+        }
+        Ok(run)
+    }
+
+    /// Names of all pictures of a script, sorted.
+    pub(crate) fn pictures(&self, script: &str) -> Result<Vec<String>, String> {
+        if let Some(how) = self.failed.get(script) {
+            return Err(format!("{script}: {how}"));
+        }
+        let folder = self.folder.join(script);
+        let entries = std::fs::read_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+        let names =
+            entries.filter_map(|e| Some(e.ok()?.file_name().to_str()?.strip_suffix(".png")?.to_owned()));
+        let mut names: Vec<String> = names.collect();
+        names.sort();
+        if names.is_empty() { Err(format!("{script} saved no picture:\n{}", self.stderr)) } else { Ok(names) }
+    }
+
+    /// One picture of a script.
+    pub(crate) fn capture(&self, script: &str, picture: &str) -> Result<Capture, String> {
+        Capture::read(&self.folder.join(script), picture)
+    }
+
+    /// Where a picture lies.
+    pub(crate) fn path(&self, script: &str, picture: &str) -> PathBuf {
+        self.folder.join(script).join(format!("{picture}.png"))
+    }
+}
+
+/// The scripts of a folder, sorted.
+pub(crate) fn scripts_in(folder: &str) -> Vec<PathBuf> {
+    let folder = peers::scripts().join(folder);
+    let entries = std::fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+    let mut scripts: Vec<PathBuf> = entries
+        .filter_map(|e| Some(e.ok()?.path()).filter(|p| p.extension().is_some_and(|x| x == "py")))
+        .collect();
+    scripts.sort();
+    scripts
+}
+
+/// A folder for the pictures of a run; kept after the tests, for people to look at.
+pub(crate) fn output(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_TARGET_TMPDIR")).join("pictures").join(name)
+}

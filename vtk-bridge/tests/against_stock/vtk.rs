@@ -1,0 +1,244 @@
+//! The same unmodified scripts in Debian's VTK 9.1, without us and with us.
+
+use crate::capture::Capture;
+use crate::compare::{Bars, faults};
+use crate::peers::skip;
+use crate::session::{Program, Run, With, output, scripts_in};
+use std::sync::OnceLock;
+
+/// Stock, and with the bridge.
+struct Both {
+    stock: Run,
+    ours: Run,
+}
+
+fn both() -> Option<&'static Both> {
+    static BOTH: OnceLock<Result<Both, String>> = OnceLock::new();
+    let made = BOTH.get_or_init(|| {
+        let scripts = scripts_in("vtk");
+        let stock = Run::new(Program::Vtk, With::Stock, &scripts, output("vtk-stock"), &[])?;
+        let ours = Run::new(Program::Vtk, With::Bridge, &scripts, output("vtk-ours"), &[])?;
+        Ok(Both { stock, ours })
+    });
+    made.as_ref().map_err(|reason| skip(reason)).ok()
+}
+
+/// Pictures that are held to other bars than the rest, or to none, and why.
+const EXCEPTIONS: &[(&str, &str, Option<Bars>, &str)] = &[
+    (
+        "odd_inputs",
+        "not_a_number",
+        None,
+        "OpenGL shows nothing of a surface with one bad point; we show the rest (`one_bad_point_costs_only_its_own_triangles`)",
+    ),
+    (
+        "projections",
+        "sheared",
+        Some(Bars { color_mean: 255.0, color_strays: 1.0, ..Bars::STRICT }),
+        "OpenGL shades in sheared coordinates, where right angles are none: its light is wrong",
+    ),
+    (
+        "pbr",
+        "pbr",
+        Some(Bars { color_mean: 2.5, ..Bars::STRICT }),
+        "VTK's formula is not rt-core's physically based material: a few levels at the rims of smooth balls",
+    ),
+    (
+        "windows",
+        "one_pixel",
+        Some(Bars { color_mean: 1.0, ..Bars::STRICT }),
+        "one level of one pixel is more than half a level",
+    ),
+    (
+        "textures",
+        "transparent",
+        Some(Bars { silhouette: 1.0, depth_ulp: u32::MAX, ..Bars::STRICT }),
+        "OpenGL writes no depth for a surface with a translucent texture; we write it where the texture is opaque",
+    ),
+];
+
+/// Pictures in which there is nothing to trace.
+const EMPTY: &[(&str, &str)] =
+    &[("odd_inputs", "nothing"), ("windows", "no_renderer"), ("windows", "actor_gone")];
+
+fn same_as_stock(script: &str) {
+    let Some(both) = both() else { return };
+    let names = both.stock.pictures(script).unwrap_or_else(|e| panic!("stock: {e}"));
+    let ours = both.ours.pictures(script).unwrap_or_else(|e| panic!("with the bridge: {e}"));
+    assert_eq!(names, ours, "other pictures than stock VTK's");
+    let mut found = Vec::new();
+    for name in names {
+        let [stock, ours] = [&both.stock, &both.ours].map(|r| r.capture(script, &name).unwrap());
+        let path = both.ours.path(script, &name);
+        if ours.traced_triangles() == 0 && !EMPTY.contains(&(script, name.as_str())) {
+            found.push(format!("{}: nothing was ray traced: {:?}", path.display(), ours.report));
+        }
+        let bars = EXCEPTIONS.iter().find(|(s, p, ..)| (*s, *p) == (script, name.as_str()));
+        if let Some(bars) = bars.map_or(Some(Bars::STRICT), |(_, _, bars, _)| *bars) {
+            found.extend(faults(&stock, &ours, &bars).iter().map(|f| format!("{}: {f}", path.display())));
+        }
+    }
+    assert!(found.is_empty(), "\n{}\n", found.join("\n"));
+}
+
+macro_rules! scripts {
+    ($($test:ident: $script:literal,)*) => {
+        /// Every script has a test.
+        const TESTED: &[&str] = &[$($script),*];
+        $(#[test]
+        fn $test() {
+            same_as_stock($script);
+        })*
+    };
+}
+
+scripts! {
+    annotations_stay_opengl_in_the_same_picture: "annotations",
+    back_faces_are_as_in_stock_vtk: "backfaces",
+    data_that_changes_is_drawn_as_it_is_now: "changing",
+    clipping_planes_cut_as_in_stock_vtk: "clipping",
+    colors_of_points_cells_and_fields_are_stock: "colors",
+    contours_are_as_in_stock_vtk: "contours",
+    data_sets_of_other_kinds_are_as_in_stock_vtk: "data_sets",
+    domains_of_any_size_and_place_show_the_same_picture_as_stock: "domains",
+    glyphs_are_as_in_stock_vtk: "glyphs",
+    lights_are_as_in_stock_vtk: "lights",
+    five_hundred_actors_are_as_in_stock_vtk: "many_actors",
+    blocks_have_their_own_color_opacity_and_visibility: "multiblock",
+    odd_inputs_are_survived: "odd_inputs",
+    opacity_is_as_with_depth_peeling: "opacity",
+    physically_based_surfaces_are_as_in_stock_vtk: "pbr",
+    projections_of_all_kinds_are_exact: "projections",
+    edges_points_and_mixed_cells_are_as_in_stock_vtk: "representations",
+    picks_and_selections_are_stock: "selection",
+    highlights_are_as_in_stock_vtk: "specular",
+    streamlines_are_as_in_stock_vtk: "streamlines",
+    textures_are_as_in_stock_vtk: "textures",
+    viewports_do_not_mix: "viewports",
+    volumes_mix_with_surfaces: "volume",
+    windows_come_and_go: "windows",
+}
+
+#[test]
+fn every_script_has_a_test() {
+    let there = scripts_in("vtk");
+    let names: Vec<&str> = there.iter().filter_map(|p| p.file_stem()?.to_str()).collect();
+    let mut tested = TESTED.to_vec();
+    tested.sort_unstable();
+    assert_eq!(names, tested);
+}
+
+/// So the bars measure us and not the chance of OpenGL's threads.
+#[test]
+fn stock_against_stock_passes_and_planted_faults_do_not() {
+    let Some(both) = both() else { return };
+    let script =
+        scripts_in("vtk").into_iter().filter(|p| p.ends_with("contours.py") || p.ends_with("opacity.py"));
+    let again =
+        Run::new(Program::Vtk, With::Stock, &script.collect::<Vec<_>>(), output("vtk-stock-again"), &[])
+            .unwrap();
+    for (script, name) in [("contours", "turned"), ("contours", "flat"), ("opacity", "opacity")] {
+        let [stock, second] = [&both.stock, &again].map(|r| r.capture(script, name).unwrap());
+        assert_eq!(faults(&stock, &second, &Bars::STRICT), Vec::<String>::new(), "{script}/{name}");
+        let mut shifted = second.clone();
+        shifted.rgb.rotate_right(1);
+        shifted.depth.rotate_right(1);
+        assert!(
+            !faults(&stock, &shifted, &Bars::STRICT).is_empty(),
+            "{script}/{name}: a shift by a pixel passed"
+        );
+        let mut brighter = second.clone();
+        brighter.rgb.iter_mut().flatten().for_each(|c| *c = c.saturating_add(2));
+        assert!(
+            !faults(&stock, &brighter, &Bars::STRICT).is_empty(),
+            "{script}/{name}: two of 255 brighter passed"
+        );
+    }
+}
+
+#[test]
+fn one_bad_point_costs_only_its_own_triangles() {
+    let Some(both) = both() else { return };
+    let pictures = ["odd", "not_a_number"].map(|p| both.ours.capture("odd_inputs", p).unwrap());
+    let shown = |c: &Capture| c.depth.iter().filter(|d| **d < 1.0).count();
+    let [whole, torn] = [shown(&pictures[0]), shown(&pictures[1])];
+    assert!(torn > whole / 2, "{torn} of {whole} pixels are left");
+    let told = pictures[1].warnings();
+    assert!(told.iter().any(|w| w.contains("not a number")), "{told:?}");
+}
+
+/// OpenGL's own pictures differ in the last digit between sizes; ours must be the same scene everywhere.
+#[test]
+fn size_and_place_do_not_change_our_picture() {
+    let Some(both) = both() else { return };
+    let names = both.ours.pictures("domains").unwrap();
+    let reference = both.ours.capture("domains", "size_1_at_0").unwrap();
+    for name in names {
+        let other = both.ours.capture("domains", &name).unwrap();
+        // At 1e9 the corners of a sphere of size 1 are rounded to 1e-7.
+        let bars = Bars { depth_ulp: 40, ..Bars::STRICT };
+        let found = faults(&reference, &other, &bars);
+        assert!(found.is_empty(), "{name}: {found:?}");
+    }
+}
+
+#[test]
+fn colors_and_matrices_do_not_rebuild() {
+    let Some(both) = both() else { return };
+    let rebuilt = |script: &str, picture: &str| -> u64 {
+        let capture = both.ours.capture(script, picture).unwrap();
+        // The last is this script's; renderers of scripts before may be alive.
+        capture.renderers().last().and_then(|r| r["rebuilt"].as_u64()).expect("a report")
+    };
+    for (script, picture) in
+        [("colors", "recolored"), ("changing", "moved"), ("contours", "turned"), ("multiblock", "changed")]
+    {
+        assert_eq!(rebuilt(script, picture), 0, "{script}/{picture} built an acceleration structure again");
+    }
+    assert!(rebuilt("changing", "deformed") > 0, "points that moved must be built again");
+}
+
+/// The depth of the plane through a triangle's corners, in f64, at every pixel: who is right where we and OpenGL differ.
+#[test]
+fn our_window_depth_is_exact_where_opengl_rounds() {
+    let scripts = [crate::peers::scripts().join("exact/triangles.py")];
+    let run = |with, name| Run::new(Program::Vtk, with, &scripts, output(name), &[]);
+    let (stock, ours) = match (run(With::Stock, "exact-stock"), run(With::Bridge, "exact-ours")) {
+        (Ok(stock), Ok(ours)) => (stock, ours),
+        (Err(reason), _) | (_, Err(reason)) => return skip(&reason),
+    };
+    let [stock, ours] = [stock, ours].map(|r| r.capture("triangles", "triangles").unwrap());
+    let worst = |c: &Capture| {
+        let corners: Vec<f64> =
+            c.facts["corners"].as_array().expect("a list").iter().filter_map(|v| v.as_f64()).collect();
+        let mut worst = (0, 0);
+        for y in 0..c.height {
+            for x in 0..c.width {
+                let at = [(x as f64 + 0.5) / c.width as f64, (y as f64 + 0.5) / c.height as f64]
+                    .map(|v| 2.0 * v - 1.0);
+                let depths = corners.chunks_exact(9).filter_map(|t| depth_at(t, at));
+                let exact = depths.fold(1.0, f64::min) as f32;
+                let seen = c.depth[y * c.width + x];
+                if exact < 1.0 && seen < 1.0 {
+                    worst = (worst.0.max(exact.to_bits().abs_diff(seen.to_bits())), worst.1 + 1);
+                }
+            }
+        }
+        assert!(worst.1 > 1000, "the triangles cover {} pixels", worst.1);
+        worst.0
+    };
+    let (opengl, rays) = (worst(&stock), worst(&ours));
+    assert!(rays <= 1, "our depth is {rays} units in the last place beside the exact one, OpenGL's {opengl}");
+}
+
+/// Window depth of the triangle with these projected corners (x, y, z from -1 to 1) at `p`, when it covers `p`.
+fn depth_at(t: &[f64], p: [f64; 2]) -> Option<f64> {
+    let edge = |i: usize| [t[3 * i] - t[0], t[3 * i + 1] - t[1], t[3 * i + 2] - t[2]];
+    let ([ux, uy, uz], [vx, vy, vz]) = (edge(1), edge(2));
+    let [px, py] = [p[0] - t[0], p[1] - t[1]];
+    let area = ux * vy - uy * vx;
+    let [a, b] = [(px * vy - py * vx) / area, (ux * py - uy * px) / area];
+    // A little inside: at the very edge the neighbour may be seen.
+    let inside = a > 1e-6 && b > 1e-6 && a + b < 1.0 - 1e-6;
+    inside.then_some(0.5 * (t[2] + a * uz + b * vz) + 0.5)
+}

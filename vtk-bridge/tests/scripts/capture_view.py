@@ -1,0 +1,28 @@
+"""What `capture.py` does, for views of ParaView."""
+from capture import save as save_window
+from paraview.simple import CreateRenderView, Render
+
+
+def view(size):
+    """A view without antialiasing and without the axes in its corner."""
+    made = CreateRenderView()
+    made.ViewSize = size
+    made.UseFXAA = 0
+    made.OrientationAxesVisibility = 0
+    # No smaller pictures while things move.
+    made.StillRenderImageReductionFactor = 1
+    return made
+
+
+def save(shown, name, **facts):
+    """Renders and saves."""
+    Render(shown)
+    save_window(shown.GetRenderWindow(), name, **facts)
+
+
+def facts_of_selection(source):
+    """What is selected of a source: sorted ids, a list for each node."""
+    selection = source.GetSelectionInput(source.Port)
+    if selection is None:
+        return None
+    return [sorted(node.IDs[1::2]) for node in selection.GetProperty("Input")]

@@ -1,0 +1,54 @@
+# Windows that come, go and change their size: two at once with shared actors, 1 by 1, wide, renderers deleted and moved.
+import vtk
+
+from capture import actor, look, save, window
+
+ball = vtk.vtkSphereSource()
+ball.SetThetaResolution(24)
+ball.SetPhiResolution(24)
+shared = actor(ball, (0.8, 0.7, 0.3))
+
+
+def renderer(color):
+    made = vtk.vtkRenderer()
+    made.SetBackground(color)
+    made.AddActor(shared)
+    look(made, (1, -4, 1))
+    return made
+
+
+one, two = renderer((0.3, 0.1, 0.1)), renderer((0.1, 0.1, 0.3))
+first, second = window(200, 150, one), window(150, 200, two)
+for k in range(3):
+    first.Render()
+    second.Render()
+save(second, "second")
+first.Render()
+save(first, "first")
+first.SetSize(1, 1)
+first.Render()
+save(first, "one_pixel")
+first.SetSize(333, 77)
+first.Render()
+save(first, "wide")
+first.SetSize(200, 150)
+# The renderer goes while the window stays, and another comes.
+first.RemoveRenderer(one)
+del one
+first.Render()
+save(first, "no_renderer")
+again = renderer((0.1, 0.3, 0.1))
+first.AddRenderer(again)
+first.Render()
+save(first, "again")
+# The window goes while the renderer stays.
+second.RemoveRenderer(two)
+second.Finalize()
+del second
+third = window(120, 120, two)
+third.Render()
+save(third, "third")
+two.RemoveActor(shared)
+del shared
+third.Render()
+save(third, "actor_gone")
