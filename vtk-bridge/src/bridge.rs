@@ -330,6 +330,14 @@ impl Bridge {
         if effects.intersects(mirrors | Effects::REFRACTION) || options.path_tracing {
             scene.background = Picture::surroundings(view);
         }
+        let secondary = mirrors | Effects::REFRACTION | Effects::SHADOWS | Effects::AMBIENT_OCCLUSION;
+        if effects.intersects(secondary) && crate::report::ranks() > 1 {
+            self.warn(
+                "several ranks: shadows, ambient occlusion, mirrors and glass see only the data of their own rank; run on one rank for the \
+                 whole"
+                    .to_owned(),
+            );
+        }
         if shadows && !effects.contains(Effects::SHADOWS) {
             self.warn(
                 "shadows change no pixel: the only lights are headlights, which stand where the eye is; add a light (vtkLight, vtkLightKit, \

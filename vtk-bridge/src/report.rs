@@ -110,11 +110,22 @@ pub fn forget(renderer: u64) {
     }
 }
 
+/// Variables in which Open MPI and MPICH say how many ranks there are.
+const RANKS: [&str; 2] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"];
+
+fn number(variable: impl Fn(&str) -> Option<String>, names: [&str; 2]) -> Option<u32> {
+    names.iter().find_map(|n| variable(n)?.parse().ok())
+}
+
+/// Of how many ranks this process is one.
+pub(crate) fn ranks() -> u32 {
+    number(|name| std::env::var(name).ok(), RANKS).unwrap_or(1)
+}
+
 /// `report.json` becomes `report.rank2.json` on rank 2 of several.
 fn of_rank(path: &Path, variable: impl Fn(&str) -> Option<String>) -> PathBuf {
-    let number = |names: [&str; 2]| names.iter().find_map(|n| variable(n)?.parse::<u32>().ok());
-    let rank = number(["OMPI_COMM_WORLD_RANK", "PMI_RANK"]);
-    let size = number(["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"]);
+    let rank = number(&variable, ["OMPI_COMM_WORLD_RANK", "PMI_RANK"]);
+    let size = number(&variable, RANKS);
     match (rank, size) {
         (Some(rank), Some(2..)) => {
             let extension = path.extension().map_or(String::new(), |e| format!(".{}", e.to_string_lossy()));

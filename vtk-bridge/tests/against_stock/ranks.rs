@@ -34,12 +34,12 @@ fn run(
     Ok((folder, launch.output()))
 }
 
-/// Pixels that are not within 1 of 255 of any pixel of the other picture that touches their place. So edges may lie one pixel
+/// Pixels that are not within `levels` of 255 of any pixel of the other picture that touches their place. So edges may lie one pixel
 /// beside, and nothing else may differ.
-fn strangers(a: &Capture, b: &Capture) -> usize {
+fn strangers(a: &Capture, b: &Capture, levels: u8) -> usize {
     let (w, h) = (a.width, a.height);
     assert_eq!((w, h), (b.width, b.height));
-    let near = |p: [u8; 3], q: [u8; 3]| (0..3).all(|c| p[c].abs_diff(q[c]) <= 1);
+    let near = |p: [u8; 3], q: [u8; 3]| (0..3).all(|c| p[c].abs_diff(q[c]) <= levels);
     let strange = |a: &Capture, b: &Capture, x: usize, y: usize| {
         let around = (y.saturating_sub(1)..(y + 2).min(h))
             .flat_map(|v| (x.saturating_sub(1)..(x + 2).min(w)).map(move |u| v * w + u));
@@ -51,6 +51,12 @@ fn strangers(a: &Capture, b: &Capture) -> usize {
 /// Pixels that differ by more than 1 of 255 at their own place.
 fn different(a: &Capture, b: &Capture) -> usize {
     a.rgb.iter().zip(&b.rgb).filter(|(p, q)| (0..3).any(|c| p[c].abs_diff(q[c]) > 1)).count()
+}
+
+/// Mean difference of the channels.
+fn difference(a: &Capture, b: &Capture) -> f64 {
+    let pairs = a.rgb.as_flattened().iter().zip(b.rgb.as_flattened());
+    pairs.map(|(p, q)| f64::from(p.abs_diff(*q))).sum::<f64>() / a.rgb.as_flattened().len() as f64
 }
 
 #[test]
@@ -67,11 +73,15 @@ fn pictures_do_not_depend_on_the_number_of_ranks() {
         let outcome = outcome.expect_success(&format!("{ranks} ranks"));
         for name in ["opaque", "translucent", "mixed", "annotated"] {
             let [a, b] = [&one, &folder].map(|f| Capture::read(f, name).unwrap());
-            let (strange, different) = (strangers(&a, &b), different(&a, &b));
+            // IceT blends 8-bit pictures of ranks, and each blend after the first may round once more.
+            let levels = if ranks > 2 && name != "opaque" { 2 } else { 1 };
+            let (strange, different) = (strangers(&a, &b, levels), different(&a, &b));
             let pixels = a.width * a.height;
-            if strange * 5000 > pixels || different * 200 > pixels {
+            // Lines and text of the axes are OpenGL's, and move by a pixel in stock ParaView too.
+            let allowed = if name == "annotated" { pixels / 2000 } else { pixels / 5000 };
+            if strange > allowed || different * 200 > pixels {
                 found.push(format!(
-                    "{ranks} ranks, {name}: {strange} of {pixels} pixels are not within 1/255 edges aside, {different} at their place"
+                    "{ranks} ranks, {name}: {strange} of {pixels} pixels are not within {levels}/255 edges aside, {different} are not within 1 at their place"
                 ));
             }
         }
@@ -127,9 +137,9 @@ fn planted_differences_between_ranks_are_noticed() {
     };
     let plain = |x: usize, _: usize| if x < 30 { [200, 40, 40] } else { [40, 40, (60 + x) as u8] };
     let (a, moved) = (picture(&plain), picture(&|x, y| plain(x + 1, y)));
-    assert_eq!(strangers(&a, &a), 0);
-    assert_eq!(strangers(&a, &moved), 0, "an edge may lie one pixel beside");
+    assert_eq!(strangers(&a, &a, 1), 0);
+    assert_eq!(strangers(&a, &moved, 1), 0, "an edge may lie one pixel beside");
     let seam = picture(&|x, y| if x == 12 { [190, 40, 40] } else { plain(x, y) });
-    assert_eq!(strangers(&a, &seam), 40, "a seam of one pixel is a fault");
+    assert_eq!(strangers(&a, &seam, 1), 40, "a seam of one pixel is a fault");
     assert!(different(&a, &moved) > 0);
 }

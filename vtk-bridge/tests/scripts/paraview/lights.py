@@ -9,8 +9,6 @@ shown = [Show(ball, v) for ball in balls]
 shown[0].DiffuseColor = [0.9, 0.5, 0.2]
 shown[0].Specular = 0.8
 shown[0].SpecularPower = 30
-shown[1].Ambient = 0.3
-shown[1].Diffuse = 0.6
 shown[2].Interpolation = "PBR"
 shown[2].Metallic = 0.7
 shown[2].Roughness = 0.4
@@ -27,3 +25,8 @@ light.FocalPoint = [1, 0, 0]
 light.DiffuseColor = [1, 0.9, 0.8]
 light.Intensity = 0.9
 save(v, "one_light")
+# Ambient light is an answer of this surface; the physically based one is away.
+Hide(balls[2], v)
+shown[1].Ambient = 0.3
+shown[1].Diffuse = 0.6
+save(v, "ambient")
