@@ -132,7 +132,7 @@ impl Told {
                 color: Some(s.color),
             })
             .collect();
-        list.sort_by(|a, b| b.triangles.cmp(&a.triangles));
+        list.sort_by_key(|o| std::cmp::Reverse(o.triangles));
         list
     }
 }

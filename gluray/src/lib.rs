@@ -30,6 +30,7 @@ mod fault;
 pub mod folders;
 mod frame;
 mod lighting;
+mod overrides;
 pub mod panel;
 mod present;
 mod primitives;
