@@ -8,7 +8,8 @@ use crate::config::{Mode, Settings};
 use crate::effects::{Place, Surroundings, Visibility, vector};
 use crate::enums::*;
 use crate::lighting::{Lit, Setup, transform};
-use crate::texturing::{self, Image};
+use crate::raster::{covers, steepness};
+use crate::texturing::Image;
 use rayon::prelude::*;
 use rt_core::accel::World;
 use rt_core::camera::Camera;
@@ -74,42 +75,47 @@ const SLACK: f64 = 1e-6;
 pub(crate) struct Prepared<'a> {
     pub(crate) draw: &'a Draw,
     pub(crate) world: Arc<World>,
-    places: Vec<Place>,
+    pub(crate) places: Vec<Place>,
     camera: Camera,
     /// Rows of planes in object space that points must be above: near, far, the user's.
     planes: Vec<[f64; 4]>,
     /// The user's alone.
     clip_planes: Vec<[f64; 4]>,
     pub(crate) rect: Rect,
-    lighting: Setup<'a>,
-    lit: Option<Vec<Lit>>,
-    image: Option<Arc<Image>>,
+    pub(crate) lighting: Setup<'a>,
+    pub(crate) lit: Option<Vec<Lit>>,
+    pub(crate) image: Option<Arc<Image>>,
     /// A mirrored projection or `glFrontFace` changes what counts as front.
     pub(crate) rays: AtomicU64,
 }
 
 /// A fragment.
 #[derive(Debug, Clone, Copy)]
-struct Fragment {
+pub(crate) struct Fragment {
     /// Perspective-correct weights of the corners.
-    weights: [f64; 3],
-    depth: f64,
+    pub(crate) weights: [f64; 3],
+    pub(crate) depth: f64,
     /// The depth without polygon offset.
-    plain_depth: f64,
-    front: bool,
+    pub(crate) plain_depth: f64,
+    pub(crate) front: bool,
 }
 
 #[derive(Clone, Copy)]
 struct Seen {
     depth_bits: u32,
-    depth: f32,
     draw: u32,
     prim: u32,
+    fragment: Fragment,
 }
 
-const NOTHING: Seen = Seen { depth_bits: u32::MAX, depth: UNCOVERED, draw: u32::MAX, prim: 0 };
+const NOTHING: Seen = Seen {
+    depth_bits: u32::MAX,
+    draw: u32::MAX,
+    prim: 0,
+    fragment: Fragment { weights: [0.0; 3], depth: 0.0, plain_depth: 0.0, front: true },
+};
 
-fn matrix(m: &[f32; 16]) -> DMat4 {
+pub(crate) fn matrix(m: &[f32; 16]) -> DMat4 {
     DMat4::from_cols_array(&m.map(f64::from))
 }
 
@@ -336,109 +342,6 @@ impl<'a> Prepared<'a> {
         }
         best
     }
-
-    fn color(&self, prim: usize, f: &Fragment, per_pixel: bool, reaches: &Visibility) -> [f32; 4] {
-        let mesh = &self.draw.geometry.mesh;
-        let corners = mesh.indices[prim].map(|i| i as usize);
-        if let Shading::Program(program) = &self.draw.shading {
-            return program.color(&self.draw.attributes, mesh, prim, f.weights.map(|w| w as f32), f.front, reaches);
-        }
-        let s = &*self.draw.state;
-        let side = usize::from(!f.front && s.lighting && s.two_side);
-        let lit = corners.map(|i| match &self.lit {
-            _ if per_pixel && s.lighting => Lit::default(),
-            Some(all) => all[i],
-            None => self.lighting.vertex(&self.draw.attributes, i, mesh.positions[i].to_array()),
-        });
-        let w = f.weights.map(|w| w as f32);
-        let (mut color, secondary) = match s.flat {
-            _ if per_pixel && s.lighting => {
-                let (eye, normal) = self.eye_point(prim, w);
-                let color = if s.flat { self.draw.attributes.colors.at(corners[2]) } else { mixed(corners.map(|i| self.draw.attributes.colors.at(i)), w) };
-                let materials = self.draw.attributes.materials_at(corners[2]);
-                self.lighting.point(materials, color, eye, normal, !f.front, reaches)
-            }
-            true => (lit[2].primary[side], lit[2].secondary[side]),
-            false => (mixed(lit.map(|l| l.primary[side]), w), mixed(lit.map(|l| l.secondary[side]), w)),
-        };
-        if let (Some(unit), Some(image)) = (&s.texture, &self.image) {
-            let coords = corners.map(|i| {
-                texturing::coordinates(unit, s, &self.draw.attributes, &self.lighting, i, mesh.positions[i].to_array())
-            });
-            color = texturing::apply(unit, image, color, mixed(coords, w));
-        }
-        for k in 0..3 {
-            color[k] = (color[k] + secondary[k]).clamp(0.0, 1.0);
-        }
-        if let Some(fog) = &s.fog {
-            let m = &s.model_view;
-            let z = corners.map(|i| [transform(m, mesh.positions[i].to_array())[2].abs()]);
-            let d = mixed(z, w)[0];
-            let factor = match fog.mode {
-                EXP => (-fog.density * d).exp(),
-                EXP2 => (-(fog.density * d) * (fog.density * d)).exp(),
-                _ => (fog.end - d) / (fog.end - fog.start),
-            };
-            let factor = if factor.is_nan() { 0.0 } else { factor.clamp(0.0, 1.0) };
-            for k in 0..3 {
-                color[k] = fog.color[k].clamp(0.0, 1.0) * (1.0 - factor) + color[k] * factor;
-            }
-        }
-        color
-    }
-}
-
-impl Prepared<'_> {
-    /// Eye-space position and shading normal of a fragment.
-    fn eye_point(&self, prim: usize, w: [f32; 3]) -> ([f32; 3], [f32; 3]) {
-        let mesh = &self.draw.geometry.mesh;
-        let corners = mesh.indices[prim].map(|i| i as usize);
-        let matrix = match &self.draw.shading {
-            Shading::Fixed => &self.draw.state.model_view,
-            Shading::Program(program) => &program.view_from_object,
-        };
-        let eye = corners.map(|i| {
-            let v = transform(matrix, mesh.positions[i].to_array());
-            [v[0] / v[3], v[1] / v[3], v[2] / v[3]]
-        });
-        let normal = |i: usize| self.lighting.eye_normal(self.draw.attributes.normals.at(i));
-        let normal = if self.draw.state.flat { normal(corners[2]) } else { mixed(corners.map(normal), w) };
-        (mixed(eye, w), crate::lighting::normalized(normal))
-    }
-
-    /// The colour that the mode gives a fragment.
-    fn shaded(&self, prim: usize, f: &Fragment, mode: Mode, around: Option<&Surroundings<'_>>, pixel: (i32, i32)) -> [f32; 4] {
-        let per_pixel = matches!(mode, Mode::Phong | Mode::Rich | Mode::Path);
-        let lit = match &self.draw.shading {
-            Shading::Fixed => self.draw.state.lighting,
-            Shading::Program(_) => true,
-        };
-        let (Some(around), true) = (around, lit) else {
-            return self.color(prim, f, per_pixel, &Visibility::FULL);
-        };
-        // The plane of the triangle, turned to the viewer: what is in front of it is what the eye sees.
-        let weights = f.weights.map(|w| w as f32);
-        let (eye, _) = self.eye_point(prim, weights);
-        let at = |w| vector(self.eye_point(prim, w).0);
-        let [a, b, c] = [at([1.0, 0.0, 0.0]), at([0.0, 1.0, 0.0]), at([0.0, 0.0, 1.0])];
-        let normal = (b - a).cross(c - a).normalize_or_zero();
-        let clip = matrix(&self.draw.state.projection);
-        let parallel = matches!(self.draw.shading, Shading::Fixed) && clip.row(3).truncate() == DVec3::ZERO;
-        let towards = if parallel { DVec3::Z } else { -vector(eye) };
-        let normal = if normal.dot(towards) < 0.0 { -normal } else { normal };
-        let reaches = around.at(vector(eye), normal, &self.places, pixel);
-        if mode != Mode::Enhance {
-            // Lights at the eye cast no shadow that it could see; corners dim them all the same.
-            let mut r = reaches;
-            r.lights.iter_mut().for_each(|l| *l *= 0.5 + 0.5 * reaches.ambient);
-            return self.color(prim, f, per_pixel, &r);
-        }
-        let color = self.color(prim, f, per_pixel, &Visibility::FULL);
-        let n = self.places.len().clamp(1, crate::effects::MOST_LIGHTS);
-        let light = reaches.lights[..n].iter().sum::<f32>() / n as f32;
-        let dim = (0.4 + 0.6 * light) * (0.3 + 0.7 * reaches.ambient);
-        [color[0] * dim, color[1] * dim, color[2] * dim, color[3]]
-    }
 }
 
 /// Culled and fill-rule rejected triangles that a ray may pass through before it is given up.
@@ -450,57 +353,6 @@ pub(crate) fn mixed<const N: usize>(v: [[f32; N]; 3], w: [f32; 3]) -> [f32; N] {
 
 fn to_bytes(c: [f32; 4]) -> [u8; 4] {
     c.map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
-}
-
-/// Window coordinates of a corner in units of 1/256 pixel, as the driver's rasterizer takes them.
-fn snapped(c: &[f32; 4], viewport: [i32; 4]) -> [i64; 2] {
-    let [vx, vy, vw, vh] = viewport.map(|v| v as f32);
-    let inverse = 1.0 / c[3];
-    let x = c[0] * inverse * (0.5 * vw) + (0.5 * vw + vx);
-    let y = c[1] * inverse * (0.5 * vh) + (0.5 * vh + vy);
-    [x, y].map(|v| (f64::from(v) * 256.0).round().clamp(-1e12, 1e12) as i64)
-}
-
-/// Whether the triangle covers the pixel's centre. A centre on an edge belongs to the triangle above or to the right of it.
-fn covers(c: &[[f32; 4]; 3], viewport: [i32; 4], x: i32, y: i32) -> bool {
-    let p = c.each_ref().map(|v| snapped(v, viewport));
-    let (cx, cy) = (i64::from(x) * 256 + 128, i64::from(y) * 256 + 128);
-    let edge = |a: [i64; 2], b: [i64; 2], x: i64, y: i64| {
-        i128::from(b[0] - a[0]) * i128::from(y - a[1]) - i128::from(b[1] - a[1]) * i128::from(x - a[0])
-    };
-    let area = edge(p[0], p[1], p[2][0], p[2][1]);
-    if area == 0 {
-        return false;
-    }
-    let p = if area > 0 { p } else { [p[0], p[2], p[1]] };
-    (0..3).all(|i| {
-        let (a, b) = (p[i], p[(i + 1) % 3]);
-        let e = edge(a, b, cx, cy);
-        // Counter-clockwise: an edge that goes down has the triangle on its right side in x, one that goes right has it above.
-        let inclusive = b[1] < a[1] || (b[1] == a[1] && b[0] > a[0]);
-        e > 0 || (e == 0 && inclusive)
-    })
-}
-
-/// The greater of |dz/dx| and |dz/dy| in window coordinates, for polygon offset.
-fn steepness(c: &[[f32; 4]; 3], viewport: [i32; 4], depth_scale: f64) -> f64 {
-    let w = c.map(|v| {
-        let i = 1.0 / f64::from(v[3]);
-        let half = |size: i32| f64::from(size) * 0.5;
-        [
-            f64::from(v[0]) * i * half(viewport[2]),
-            f64::from(v[1]) * i * half(viewport[3]),
-            f64::from(v[2]) * i * 0.5 * depth_scale,
-        ]
-    });
-    let d = |a: usize, k: usize| w[a][k] - w[0][k];
-    let det = d(1, 0) * d(2, 1) - d(2, 0) * d(1, 1);
-    if det == 0.0 {
-        return 0.0;
-    }
-    let dx = (d(1, 2) * d(2, 1) - d(2, 2) * d(1, 1)) / det;
-    let dy = (d(2, 2) * d(1, 0) - d(1, 2) * d(2, 0)) / det;
-    dx.abs().max(dy.abs())
 }
 
 /// The pixels that a draw may cover: its box on the screen within viewport and scissor.
@@ -595,11 +447,9 @@ pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings) -> (Layer, [u
         for (k, s) in seen.iter().enumerate().filter(|(_, s)| s.draw != u32::MAX) {
             let (px, py) = (rect.x + (k % w) as i32, y + (k / w) as i32);
             let p = &draws[s.draw as usize];
-            if let Some(f) = p.fragment(s.prim as usize, px, py) {
-                color[k] = to_bytes(p.shaded(s.prim as usize, &f, mode, around.as_ref(), (px, py)));
-                depth[k] = s.depth;
-                n += 1;
-            }
+            color[k] = to_bytes(p.shaded(s.prim as usize, &s.fragment, mode, around.as_ref(), (px, py)));
+            depth[k] = s.fragment.depth as f32;
+            n += 1;
         }
         covered.fetch_add(n, Relaxed);
     });
@@ -627,7 +477,7 @@ fn see(p: &Prepared<'_>, index: u32, area: Rect, rays: &mut TileRays, seen: &mut
                 let at = &mut seen[((py - area.y) * area.w + px - area.x) as usize];
                 let bits = (f.depth * DEPTH_STEPS).round() as u32;
                 if bits < at.depth_bits || (later_wins_ties && bits == at.depth_bits) {
-                    *at = Seen { depth_bits: bits, depth: f.depth as f32, draw: index, prim: prim as u32 };
+                    *at = Seen { depth_bits: bits, draw: index, prim: prim as u32, fragment: f };
                 }
             }
         }
@@ -678,33 +528,4 @@ pub(crate) fn in_order(p: &Prepared<'_>) -> Vec<Layer> {
             layer
         })
         .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn two_triangles_of_a_square_cover_each_pixel_once_and_the_far_edges_not_at_all() {
-        let viewport = [0, 0, 4, 4];
-        // Corners on pixel centres: (0.5, 0.5) to (2.5, 2.5) of a 4 x 4 window.
-        let at = |x: f32, y: f32| [x / 2.0 - 1.0, y / 2.0 - 1.0, 0.0, 1.0];
-        let [a, b, c, d] = [at(0.5, 0.5), at(2.5, 0.5), at(2.5, 2.5), at(0.5, 2.5)];
-        for (first, second) in [([a, b, c], [a, c, d]), ([c, b, a], [d, a, c])] {
-            for y in 0..4 {
-                for x in 0..4 {
-                    let n = u32::from(covers(&first, viewport, x, y)) + u32::from(covers(&second, viewport, x, y));
-                    assert_eq!(n, u32::from(x < 2 && y < 2), "pixel ({x}, {y})");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn steepness_is_that_of_the_plane() {
-        let viewport = [0, 0, 100, 50];
-        // z_window rises by 0.1 per 50 pixels in x, falls by 0.4 per 25 in y.
-        let c = [[0.0, 0.0, 0.0, 1.0], [1.0, 0.0, 0.2, 1.0], [0.0, 1.0, -0.8, 1.0]];
-        assert!((steepness(&c, viewport, 1.0) - 0.4 / 25.0).abs() < 1e-9);
-    }
 }
