@@ -13,7 +13,7 @@ use rt_core::glam::DMat4;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use std::sync::{Mutex, TryLockError};
+use std::sync::{Mutex, OnceLock, TryLockError};
 use std::time::Instant;
 
 /// Objects in a report, which is written often.
@@ -62,7 +62,7 @@ impl Told {
             seen.triangles = d.geometry.mesh.num_triangles() as u64;
             seen.calls += d.calls;
         }
-        let named = crate::folders::variable("GLURAY_DUMP").filter(|_| frame >= self.next_dump);
+        let named = dump_file().filter(|_| frame >= self.next_dump);
         if named.is_none() && !EXPORT.load(Relaxed) {
             return;
         }
@@ -70,7 +70,7 @@ impl Told {
         if let Some(file) = named {
             // Frames 1, 2, 4, 8…: in the end it is a late one, and writing costs little.
             self.next_dump = (2 * frame).max(1);
-            self.problem = write_scene(Path::new(&file), &scene).err().map(|e| format!("GLURAY_DUMP: {e}"));
+            self.problem = write_scene(file, &scene).err().map(|e| format!("GLURAY_DUMP: {e}"));
         }
         if EXPORT.swap(false, Relaxed) {
             self.exported = Some(to_scenes_folder(&scene));
@@ -132,9 +132,15 @@ impl Told {
                 color: Some(s.color),
             })
             .collect();
-        list.sort_by(|a, b| b.triangles.cmp(&a.triangles));
+        list.sort_by_key(|o| std::cmp::Reverse(o.triangles));
         list
     }
+}
+
+/// The file that `GLURAY_DUMP` names. Read once: the program may change its environment while we look.
+fn dump_file() -> Option<&'static Path> {
+    static FILE: OnceLock<Option<PathBuf>> = OnceLock::new();
+    FILE.get_or_init(|| crate::folders::variable("GLURAY_DUMP").map(PathBuf::from)).as_deref()
 }
 
 fn hello() -> Hello {

@@ -68,6 +68,7 @@ impl Context {
         if draw.geometry.mesh.indices.is_empty() {
             return;
         }
+        crate::overrides::apply(&mut draw, &self.config.settings);
         if !trace::has_rays(&draw.clip_from_object) {
             // A model-view that flattens everything (a shadow on a floor): rays need the flattened triangles themselves.
             self.flatten(&mut draw);

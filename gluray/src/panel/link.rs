@@ -84,7 +84,12 @@ impl Link {
     /// A link that finds its panel by the environment or the file, see [`Meeting::find`]. Nothing is tried before the first
     /// [`Link::poll`].
     pub fn new(hello: Hello) -> Link {
-        Link::with(hello, || Meeting::find(crate::folders::variable))
+        // Read once: the program may change its environment while we look.
+        let names = ["GLURAY_PANEL", "GLURAY_PANEL_SECRET", "XDG_RUNTIME_DIR"];
+        let set = names.map(|n| (n, crate::folders::variable(n)));
+        Link::with(hello, move || {
+            Meeting::find(|name| set.iter().find(|(n, _)| *n == name).and_then(|(_, v)| v.clone()))
+        })
     }
 
     /// A link to a known panel.
