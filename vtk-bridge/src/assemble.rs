@@ -2,7 +2,7 @@
 
 use crate::bridge::Drawn;
 use crate::colors::Resolved;
-use crate::materials::{Encoding, Setting, material};
+use crate::materials::{Encoding, Setting, material, without_ambient_light};
 use crate::options::{MaterialChoice, Options};
 use rt_core::accel::{Geometry, Instance};
 use rt_core::glam::DAffine3;
@@ -43,6 +43,9 @@ pub(crate) fn assemble(drawn: &[Drawn], options: &Options, only_headlight: bool,
             });
             out.add(d, index, is_mesh, &setting);
         }
+    }
+    if options.ao == 0 && !options.path_tracing {
+        out.materials = std::mem::take(&mut out.materials).into_iter().map(without_ambient_light).collect();
     }
     out
 }

@@ -121,6 +121,16 @@ fn pbr(p: &Property, base: Material) -> (Material, Encoding) {
     (Material { model, ..base }, Encoding::Pbr)
 }
 
+/// The ambient part of a surface of one colour as light that it gives off. An ambient light in the scene would show on every surface, also
+/// on physically based ones, whose shader knows no ambient coefficient; so it is left to surfaces whose colour varies, and to ambient occlusion.
+pub fn without_ambient_light(mut m: Material) -> Material {
+    if let (ColorSource::Constant, SurfaceModel::Phong { ambient, .. }) = (&m.color_source, &mut m.model) {
+        m.emission = std::array::from_fn(|c| m.emission[c] + m.color[c] * *ambient);
+        *ambient = 0.0;
+    }
+    m
+}
+
 /// Finite and not negative.
 fn sane(v: f32) -> f32 {
     if v.is_finite() { v.max(0.0) } else { 0.0 }
@@ -149,6 +159,22 @@ mod tests {
         assert_eq!(m.emission, [0.5, 0.0, 0.0]);
         let (m, _) = material(&p, true, &setting(&Options::default()));
         assert_eq!(m.emission, [0.0; 3], "colours of points replace both");
+    }
+
+    #[test]
+    fn surfaces_of_one_colour_need_no_ambient_light() {
+        let p = Property {
+            ambient: 0.3,
+            diffuse_color: [1.0, 0.5, 0.0],
+            ambient_color: [1.0, 0.5, 0.0],
+            ..Property::default()
+        };
+        let (m, _) = material(&p, false, &setting(&Options::default()));
+        let constant = without_ambient_light(Material { color_source: ColorSource::Constant, ..m.clone() });
+        assert!(matches!(constant.model, SurfaceModel::Phong { ambient: 0.0, .. }), "{constant:?}");
+        assert_eq!(constant.emission, [0.3, 0.15, 0.0]);
+        let varying = Material { color_source: ColorSource::Attribute, ..m };
+        assert_eq!(without_ambient_light(varying.clone()), varying);
     }
 
     #[test]
