@@ -14,6 +14,8 @@ macro_rules! chapters {
 }
 
 chapters! {
+    composite_rendering "../../docs/src/composite/rendering.md"
+    composite_running "../../docs/src/composite/running.md"
     datasets_generators "../../docs/src/datasets/generators.md"
     rt_core_embedding "../../docs/src/rt-core/embedding.md"
     rt_core_geometry "../../docs/src/rt-core/geometry.md"

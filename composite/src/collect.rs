@@ -11,6 +11,9 @@ use crate::rect::Rect;
 use crate::session::{Session, Tag};
 use crate::wire;
 
+/// The image at the root; elsewhere nothing, or this rank's piece where there is no root.
+pub(crate) type Outcome<P> = (Option<Image<P>>, Option<Piece<P>>);
+
 pub(crate) struct Collector<P: Composite> {
     root: Option<usize>,
     depths: bool,
@@ -36,11 +39,14 @@ impl<P: Composite> Collector<P> {
         if root != Some(session.place) {
             return Ok(collector);
         }
-        for &(place, rect) in pieces {
-            if place != session.place {
-                session.post::<P>(place, Tag::Collect, &rect)?;
-                collector.outstanding.push((place, rect));
-            }
+        for &(place, rect) in pieces.iter().filter(|piece| piece.0 != session.place) {
+            collector.outstanding.push((place, rect));
+        }
+        for &(place, _) in &collector.outstanding {
+            // Pieces of one place come in any order, so each receive has room for the largest.
+            let of_place = collector.outstanding.iter().filter(|piece| piece.0 == place);
+            let largest = of_place.map(|piece| piece.1).max_by_key(wire::longest::<P>);
+            session.post::<P>(place, Tag::Collect, &largest.unwrap_or(Rect::EMPTY))?;
         }
         let begin = session.now();
         collector.image = Some(blank(size_px, depths, pieces, spare));
@@ -109,10 +115,7 @@ impl<P: Composite> Collector<P> {
     }
 
     /// Waits for what has not come; the image at the root, this rank's piece where there is no root.
-    pub(crate) fn finish(
-        mut self,
-        session: &mut Session<'_>,
-    ) -> Result<(Option<Image<P>>, Option<Piece<P>>), CompositeError> {
+    pub(crate) fn finish(mut self, session: &mut Session<'_>) -> Result<Outcome<P>, CompositeError> {
         while session.is_waiting() {
             if let Some((place, _, bytes)) = session.next(true)? {
                 self.take(session, place, bytes)?;

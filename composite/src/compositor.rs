@@ -4,7 +4,9 @@ use crate::comm::{CommError, Communicator};
 use crate::error::CompositeError;
 use crate::frame::{Frame, Image, Piece};
 use crate::join::Scratch;
+use crate::network::Network;
 use crate::pixel::{Composite, PixelFormat};
+use crate::rect::Rect;
 use crate::report::Report;
 use crate::session::Session;
 use crate::simd::{Kernels, SimdLevel};
@@ -97,21 +99,34 @@ pub fn composite<P: Composite>(
 /// [`composite`] for frame after frame, with buffers that are kept.
 #[derive(Debug)]
 pub struct Compositor<P: Composite> {
-    options: Options,
-    scratch: Scratch<P>,
-    spare: Option<Image<P>>,
+    pub(crate) options: Options,
+    pub(crate) scratch: Scratch<P>,
+    pub(crate) spare: Option<Image<P>>,
+    network: Option<Network>,
+    /// Where the frames of one node are merged.
+    pub(crate) node_image: Option<Image<P>>,
 }
 
 impl<P: Composite> Compositor<P> {
     /// A compositor that has no buffers yet.
     pub fn new(options: Options) -> Self {
         let scratch = Scratch::new(Kernels::new(options.simd));
-        Self { options, scratch, spare: None }
+        Self { options, scratch, spare: None, network: None, node_image: None }
+    }
+
+    /// The same with a network that is known, so that [`Strategy::Automatic`] need not measure it; the same on every rank.
+    pub fn with_network(self, network: Network) -> Self {
+        Self { network: Some(network), ..self }
     }
 
     /// How it composites.
     pub fn options(&self) -> &Options {
         &self.options
+    }
+
+    /// Another order from front to back ([`Options::order`]) for the frames to come.
+    pub fn set_order(&mut self, order: Option<Vec<usize>>) {
+        self.options.order = order;
     }
 
     /// Takes back an image that is no longer needed, so that the next one is written over it.
@@ -147,12 +162,15 @@ impl<P: Composite> Compositor<P> {
         let places = Places::new(comm, options)?;
         options.strategy.check()?;
         let size_px = (frame.width_px(), frame.height_px());
+        if options.strategy == Strategy::Automatic && self.network.is_none() {
+            self.network = Some(Network::measure(comm, options.timeout)?);
+        }
 
         // Where this rank drew, unless the renderer has said so.
         let kernels = self.scratch.kernels;
-        let fingerprint = fingerprint::<P>(size_px, options, &places);
+        let fingerprint = fingerprint::<P>(size_px, options, &places, self.network.as_ref());
         let codec = Codec { kernels, fingerprint, verify: options.verify };
-        let mut session = Session::new(comm, &places.order, places.own, codec, options.timeout);
+        let mut session = Session::new(comm, places.order.clone(), places.own, codec, options.timeout);
         session.counts_nan = frame.is_bounded();
         let drawn = if frame.is_bounded() {
             frame.bounds()
@@ -162,24 +180,32 @@ impl<P: Composite> Compositor<P> {
             rect
         };
         session.report.compress_secs += session.now() - begin;
-        session.meet(drawn, [0.0, 1.0])?;
+        let ranges = session.meet(drawn, frame.depth_range().unwrap_or([f32::NAN; 2]))?;
+        if !P::HAS_DEPTH {
+            check_order(&session.drawn, &ranges, &places.order)?;
+        }
 
         // The strategy, and what it hands in.
         let slice_px = options.slice_px.unwrap_or(SLICE_PX);
-        let plan = options.strategy.plan(&session.drawn, slice_px);
+        let strategy = match (options.strategy, &self.network) {
+            (Strategy::Automatic, Some(network)) => {
+                network.choose::<P>(&session.drawn, places.root.is_some())
+            }
+            (strategy, _) => strategy,
+        };
+        let plan = strategy.plan(&session.drawn, slice_px);
         let pieces = plan.pieces(&session.drawn);
         let spare = self.spare.take();
         let mut collector =
             Collector::new(&mut session, size_px, places.root, options.depth, &pieces, spare)?;
         plan.run(&mut session, &frame.view(drawn), &mut collector, &mut self.scratch)?;
         let (image, piece) = collector.finish(&mut session)?;
-        let mut report = session.report;
         if options.confirm {
-            // Longer than a wait for a message: the rank that misses one shall be the first to say so, because it knows which.
-            comm.barrier(options.timeout.saturating_mul(2))?;
+            session.barrier()?;
         }
-        report.strategy = options.strategy;
-        report.total_secs = comm.now() - begin;
+        let mut report = session.report;
+        report.strategy = strategy;
+        report.total_secs = session.now() - begin;
         Ok(Composited { image, piece, report })
     }
 }
@@ -191,8 +217,9 @@ pub(crate) fn give_up(comm: &mut dyn Communicator, error: &CompositeError) {
     }
 }
 
-/// Half a megabyte of RGBA8 with depth: long enough to be worth a message, short enough for a second-level cache.
-const SLICE_PX: usize = 1 << 16;
+/// A megabyte of RGBA8 with depth: long enough to be worth a message (half as much costs a tenth more processor time at eight ranks), short
+/// enough for a second-level cache, and several slices a tile at few ranks.
+pub(crate) const SLICE_PX: usize = 1 << 17;
 
 /// Ranks in the order of compositing.
 pub(crate) struct Places {
@@ -233,8 +260,31 @@ fn front_to_back(order: Option<&[usize]>, size: usize) -> Result<Vec<usize>, Com
     )))
 }
 
+/// Ranks whose rectangles meet are one behind the other, in the order of compositing, where they say how far they reach.
+fn check_order(drawn: &[Rect], ranges: &[[f32; 2]], order: &[usize]) -> Result<(), CompositeError> {
+    for behind in 0..drawn.len() {
+        for front in 0..behind {
+            // NaN, the range of those who say nothing, is in conflict with nobody.
+            if ranges[front][1] > ranges[behind][0] && !drawn[front].intersection(&drawn[behind]).is_empty() {
+                return Err(CompositeError::Order {
+                    front: order[front],
+                    behind: order[behind],
+                    far_of_front: ranges[front][1].to_string(),
+                    near_of_behind: ranges[behind][0].to_string(),
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
 /// Differs (but for one chance in 2^64) between ranks that do not composite the same thing in the same way.
-pub(crate) fn fingerprint<P: PixelFormat>(size_px: (u32, u32), options: &Options, places: &Places) -> u64 {
+pub(crate) fn fingerprint<P: PixelFormat>(
+    size_px: (u32, u32),
+    options: &Options,
+    places: &Places,
+    network: Option<&Network>,
+) -> u64 {
     let fixed = [
         u64::from(P::CODE),
         u64::from(size_px.0),
@@ -243,6 +293,7 @@ pub(crate) fn fingerprint<P: PixelFormat>(size_px: (u32, u32), options: &Options
         places.root.map_or(u64::MAX, |root| root as u64),
         u64::from(options.depth),
         options.slice_px.map_or(u64::MAX, |pixels| pixels as u64),
+        network.map_or(0, Network::code),
     ];
     let all = fixed.into_iter().chain(places.order.iter().map(|&rank| rank as u64));
     all.fold(places.order.len() as u64, mix)

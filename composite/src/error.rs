@@ -50,16 +50,24 @@ pub enum CompositeError {
         /// What is wrong with it.
         reason: WireError,
     },
-    /// Two ranks hold the same part of the finished image, or nobody holds a part.
+    /// Ranks of a blended image are not one behind the other.
     #[error(
-        "the pieces of the image do not fit together at pixel {pixel} (piece of rank {rank}): all ranks must use the same options"
+        "rank {front} is to be in front of rank {behind}, but reaches to depth {far_of_front}, behind its nearest {near_of_behind}: \
+         give the order from front to back in Options::order, or, if they reach into each other, use composite_deep"
     )]
-    Pieces {
-        /// Where.
-        pixel: u64,
-        /// Whose piece.
-        rank: usize,
+    Order {
+        /// Comes first in the order of compositing.
+        front: usize,
+        /// Comes later.
+        behind: usize,
+        /// Farthest depth of the rank in front.
+        far_of_front: String,
+        /// Nearest depth of the rank behind.
+        near_of_behind: String,
     },
+    /// A tile of a stream was handed in twice, or lies outside the bounds given at its beginning.
+    #[error("{0}")]
+    Stream(String),
     /// The transport failed.
     #[error(transparent)]
     Comm(#[from] CommError),

@@ -15,6 +15,7 @@ pub struct Frame<'a, P: PixelFormat> {
     color: &'a [P::Color],
     depth: &'a [f32],
     bounds: Option<Rect>,
+    depth_range: Option<[f32; 2]>,
 }
 
 impl<'a, C: Color> Frame<'a, DepthPixel<C>>
@@ -33,7 +34,7 @@ where
     ) -> Result<Self, CompositeError> {
         check_length("colour", width_px, height_px, color.len())?;
         check_length("depth", width_px, height_px, depth.len())?;
-        Ok(Self { width_px, height_px, color, depth, bounds: None })
+        Ok(Self { width_px, height_px, color, depth, bounds: None, depth_range: None })
     }
 }
 
@@ -47,7 +48,7 @@ where
     /// [`CompositeError::FrameSize`] if the slice has another length.
     pub fn premultiplied(width_px: u32, height_px: u32, color: &'a [C]) -> Result<Self, CompositeError> {
         check_length("colour", width_px, height_px, color.len())?;
-        Ok(Self { width_px, height_px, color, depth: &[], bounds: None })
+        Ok(Self { width_px, height_px, color, depth: &[], bounds: None, depth_range: None })
     }
 }
 
@@ -72,13 +73,19 @@ impl<'a, P: PixelFormat> Frame<'a, P> {
     /// # Errors
     /// [`CompositeError::Options`] if `bounds` reaches beyond the image.
     pub fn bounded(self, bounds: Rect) -> Result<Self, CompositeError> {
-        if !Rect::of_size(self.width_px, self.height_px).contains(&bounds) {
-            return Err(CompositeError::Options(format!(
-                "bounds of columns {}..{} and rows {}..{} reach beyond an image of {}x{}: clip them to the image",
-                bounds.x0, bounds.x1, bounds.y0, bounds.y1, self.width_px, self.height_px
-            )));
-        }
+        Rect::of_size(self.width_px, self.height_px).must_contain(&bounds)?;
         Ok(Self { bounds: Some(if bounds.is_empty() { Rect::EMPTY } else { bounds }), ..self })
+    }
+
+    /// The same frame, with the nearest and farthest depth of what this rank drew, in any unit that all ranks share. Blended frames
+    /// that say so are checked: a rank that reaches behind the nearest of one that comes after it, where their rectangles meet, is
+    /// [`CompositeError::Order`] and not a wrong picture.
+    pub fn reaching(self, near_to_far: [f32; 2]) -> Self {
+        Self { depth_range: Some(near_to_far), ..self }
+    }
+
+    pub(crate) fn depth_range(&self) -> Option<[f32; 2]> {
+        self.depth_range
     }
 
     /// Width in pixels.
@@ -99,6 +106,18 @@ impl<'a, P: PixelFormat> Frame<'a, P> {
     /// Whether the image has no pixel at all.
     pub fn is_empty(&self) -> bool {
         self.color.is_empty()
+    }
+
+    /// An image composited before, as a frame.
+    pub(crate) fn of_image(image: &'a Image<P>) -> Self {
+        Self {
+            width_px: image.width_px,
+            height_px: image.height_px,
+            color: &image.colors,
+            depth: &image.depths,
+            bounds: None,
+            depth_range: None,
+        }
     }
 
     /// Whether the renderer has said where it drew.

@@ -18,6 +18,16 @@ pub(crate) enum Item<'a, P: Composite> {
     Layer(Layer<P>),
 }
 
+impl<P: Composite> Item<'_, P> {
+    fn rect(&self) -> Rect {
+        match self {
+            Self::View(view) => view.bounds,
+            Self::Message(message) => message.rect(),
+            Self::Layer(layer) => layer.bounds,
+        }
+    }
+}
+
 /// Buffers to work in, kept from frame to frame.
 #[derive(Debug)]
 pub(crate) struct Scratch<P: Composite> {
@@ -41,12 +51,17 @@ impl<P: Composite> Scratch<P> {
     fn layer(&mut self, item: Item<'_, P>, bounds: Rect) -> Layer<P> {
         match item {
             Item::Layer(layer) => {
-                let spare = self.layers.pop();
+                let spare = if layer.bounds.contains(&bounds) { None } else { self.layers.pop() };
                 layer.grown(bounds, spare)
             }
-            other => {
+            Item::View(view) => {
+                let spare = self.layers.pop();
+                Layer::copied(bounds, &view, self.kernels, spare)
+            }
+            Item::Message(message) => {
                 let mut layer = self.empty(bounds);
-                self.join(&mut layer, other, Side::Higher);
+                message.part::<P>().place_in(&mut layer);
+                self.read.push(message.bytes);
                 layer
             }
         }
@@ -158,7 +173,7 @@ impl<'a, P: Composite> Join<'a, P> {
                     let (lower, higher) =
                         if node & 1 == 0 { (item.take(), other) } else { (other, item.take()) };
                     item = match (lower, higher) {
-                        (Some(lower), Some(higher)) => Some(joined(lower, higher, self.bounds, scratch)),
+                        (Some(lower), Some(higher)) => Some(joined(lower, higher, scratch)),
                         (one, None) | (None, one) => one,
                     };
                     node /= 2;
@@ -190,15 +205,16 @@ fn leaf(folding: &Folding, place: usize) -> usize {
 fn joined<'a, P: Composite>(
     lower: Item<'a, P>,
     higher: Item<'a, P>,
-    bounds: Rect,
     scratch: &mut Scratch<P>,
 ) -> Item<'a, P> {
     match (lower, higher) {
-        (lower @ (Item::View(_) | Item::Message(_)), Item::Layer(mut layer)) => {
+        (lower @ (Item::View(_) | Item::Message(_)), Item::Layer(layer)) => {
+            let mut layer = scratch.layer(Item::Layer(layer), lower.rect());
             scratch.join(&mut layer, lower, Side::Lower);
             Item::Layer(layer)
         }
         (lower, higher) => {
+            let bounds = lower.rect().around(&higher.rect());
             let mut layer = scratch.layer(lower, bounds);
             scratch.join(&mut layer, higher, Side::Higher);
             Item::Layer(layer)

@@ -21,38 +21,55 @@
 //! assert_eq!(image.depths(), [0.7, 0.5]);
 //! ```
 //!
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
+#[cfg(feature = "cli")]
+pub mod cli;
 pub mod comm;
 pub mod rank_order;
+#[cfg(feature = "render")]
+pub mod render;
+#[cfg(feature = "rival")]
+pub mod rival;
+pub mod scenes;
 
 mod collect;
 mod color;
 mod compositor;
+mod deep;
 mod error;
 mod frame;
 mod join;
 mod layer;
+mod network;
 mod pixel;
 mod rect;
 mod reference;
 mod report;
+mod seats;
 mod session;
+mod shared;
 mod simd;
 mod strategies;
+mod stream;
 mod tiles;
 mod wire;
 
 pub use color::Color;
 pub use comm::{CommError, Communicator, threads};
 pub use compositor::{Composited, Compositor, Destination, Options, composite};
+pub use deep::{DeepFrame, Fragment, composite_deep, composite_deep_serial};
 pub use error::CompositeError;
 pub use frame::{Frame, Image, Piece};
 pub use half::f16;
+pub use network::Network;
 pub use pixel::{Composite, DepthPixel, PixelFormat, PremultipliedPixel, combine};
 pub use rect::Rect;
 pub use reference::composite_serial;
 pub use report::Report;
+pub use seats::{Seat, seats};
+pub use shared::composite_shared;
 pub use simd::SimdLevel;
 pub use strategies::Strategy;
+pub use stream::Stream;
 pub use wire::WireError;

@@ -9,17 +9,8 @@ use crate::rank_order::reduce_ranks;
 /// # Errors
 /// [`CompositeError::NoFrames`] for an empty slice, [`CompositeError::SizesDiffer`] if the frames are not all of one size.
 pub fn composite_serial<P: Composite>(frames: &[Frame<'_, P>]) -> Result<Image<P>, CompositeError> {
-    let first = frames.first().ok_or(CompositeError::NoFrames)?;
-    let (width_px, height_px) = (first.width_px(), first.height_px());
-    for (rank, frame) in frames.iter().enumerate() {
-        if (frame.width_px(), frame.height_px()) != (width_px, height_px) {
-            return Err(CompositeError::SizesDiffer {
-                rank,
-                found_px: (frame.width_px(), frame.height_px()),
-                expected_px: (width_px, height_px),
-            });
-        }
-    }
+    let (width_px, height_px) = check_sizes(frames)?;
+    let first = &frames[0];
     let mut column = vec![P::EMPTY; frames.len()];
     let (mut colors, mut depths) = (Vec::with_capacity(first.len()), Vec::new());
     for index in 0..first.len() {
@@ -33,6 +24,22 @@ pub fn composite_serial<P: Composite>(frames: &[Frame<'_, P>]) -> Result<Image<P
         }
     }
     Ok(Image { width_px, height_px, colors, depths })
+}
+
+/// Width and height of all frames.
+pub(crate) fn check_sizes<P: Composite>(frames: &[Frame<'_, P>]) -> Result<(u32, u32), CompositeError> {
+    let first = frames.first().ok_or(CompositeError::NoFrames)?;
+    let (width_px, height_px) = (first.width_px(), first.height_px());
+    for (rank, frame) in frames.iter().enumerate() {
+        if (frame.width_px(), frame.height_px()) != (width_px, height_px) {
+            return Err(CompositeError::SizesDiffer {
+                rank,
+                found_px: (frame.width_px(), frame.height_px()),
+                expected_px: (width_px, height_px),
+            });
+        }
+    }
+    Ok((width_px, height_px))
 }
 
 #[cfg(test)]

@@ -30,7 +30,7 @@ const GREETING_BYTES: usize = 8 + 16 + 8;
 /// Ranks in here are *places* in the order of compositing, not ranks of the communicator.
 pub(crate) struct Session<'a> {
     pub(crate) comm: &'a mut dyn Communicator,
-    order: &'a [usize],
+    order: Vec<usize>,
     pub(crate) place: usize,
     pub(crate) codec: Codec,
     timeout: Duration,
@@ -46,7 +46,7 @@ pub(crate) struct Session<'a> {
 impl<'a> Session<'a> {
     pub(crate) fn new(
         comm: &'a mut dyn Communicator,
-        order: &'a [usize],
+        order: Vec<usize>,
         place: usize,
         codec: Codec,
         timeout: Duration,
@@ -145,6 +145,54 @@ impl<'a> Session<'a> {
         }
     }
 
+    /// Waits until all have come here; longer than for a message: the rank that misses one shall be the first to say so, because it
+    /// knows which.
+    pub(crate) fn barrier(&mut self) -> Result<(), CompositeError> {
+        Ok(self.comm.barrier(self.timeout.saturating_mul(2))?)
+    }
+
+    /// One number of every place, at every place.
+    pub(crate) fn tell_all(&mut self, number: u64) -> Result<Vec<u64>, CompositeError> {
+        let answers = self.comm.all_gather(&number.to_le_bytes(), 8, self.timeout)?;
+        let mut numbers = Vec::with_capacity(self.places());
+        for place in 0..self.places() {
+            let answer = &answers[self.order[place]];
+            let found = answer.len() as u64;
+            let bytes = answer.as_slice().try_into();
+            numbers.push(u64::from_le_bytes(
+                bytes.map_err(|_| self.unusable(place, WireError::Length { expected: 8, found }))?,
+            ));
+        }
+        Ok(numbers)
+    }
+
+    /// Sends a message that is not made of rows of pixels.
+    pub(crate) fn send_bytes(
+        &mut self,
+        place: usize,
+        tag: Tag,
+        message: Vec<u8>,
+    ) -> Result<(), CompositeError> {
+        let begin = self.now();
+        self.report.messages_sent += 1;
+        self.report.bytes_sent += message.len() as u64;
+        self.comm.send(self.order[place], tag as u32, message)?;
+        self.report.exchange_secs += self.now() - begin;
+        Ok(())
+    }
+
+    /// Announces a message of at most `capacity` bytes.
+    pub(crate) fn post_bytes(
+        &mut self,
+        place: usize,
+        tag: Tag,
+        capacity: usize,
+    ) -> Result<(), CompositeError> {
+        let receive = self.comm.post_recv(self.order[place], tag as u32, capacity)?;
+        self.posted.push(receive);
+        Ok(())
+    }
+
     /// Announces a message with the pixels of `rect`.
     pub(crate) fn post<P: Composite>(
         &mut self,
@@ -153,10 +201,7 @@ impl<'a> Session<'a> {
         rect: &Rect,
     ) -> Result<(), CompositeError> {
         // A little more than the longest honest message: one that is too long shall reach the decoder, which says what is wrong.
-        let capacity = wire::longest::<P>(rect) + 64;
-        let receive = self.comm.post_recv(self.order[place], tag as u32, capacity)?;
-        self.posted.push(receive);
-        Ok(())
+        self.post_bytes(place, tag, wire::longest::<P>(rect) + 64)
     }
 
     /// Whether messages that were announced have not yet come.
@@ -208,6 +253,10 @@ impl<'a> Session<'a> {
 }
 
 impl Message {
+    pub(crate) fn rect(&self) -> Rect {
+        self.rect
+    }
+
     /// The message as its pixels; it has been checked when it came.
     pub(crate) fn part<P: Composite>(&self) -> Part<'_> {
         Part::reopen::<P>(&self.bytes, self.rect, self.depths)

@@ -1,6 +1,6 @@
 //! Who owns which part of the image in direct send: rectangles of about equal work, near to what their owners drew.
 //!
-//! The image is halved again and again, across its longer side, and so are the ranks: those that drew further left (or up) get
+//! The image is halved again and again, and so are the ranks: those that drew further left (or up) get
 //! the left (or upper) part, which is as large as their share of the work. Compared with bands of rows this needs fewer messages
 //! (a small object meets a few tiles and not many bands; at 127 ranks in slabs it is a few instead of all), and part of what is
 //! to be joined is already where it must go.
@@ -31,7 +31,17 @@ fn divide(region: Rect, places: &mut [usize], present: &[Rect], drawn: &[Rect], 
     if region.is_empty() || places.is_empty() {
         return;
     }
-    let across_columns = region.width() > region.height();
+    let half = places.len() / 2;
+    let share = |columns: bool| cut(region, columns, present, half, places.len());
+    let (row, column) = (share(false), share(true));
+
+    // A rectangle that a cut crosses is one message more. Rows lie in one piece in memory and columns do not, so the image is cut
+    // across its columns only where that saves many messages: below, between or beside small objects, and across slabs.
+    let crossed_by_row = present.iter().filter(|rect| rect.y0 < row && row < rect.y1).count();
+    let crossed_by_column = present.iter().filter(|rect| rect.x0 < column && column < rect.x1).count();
+    let is_flat = region.height() < 2;
+    let across_columns = region.width() > 1 && (is_flat || crossed_by_row > 2 * crossed_by_column + 1);
+    let at = if across_columns { column } else { row };
 
     // Ranks by the centre of what they drew; those that drew nothing work in the middle, where they fill up.
     places.sort_by_key(|&place| {
@@ -39,11 +49,7 @@ fn divide(region: Rect, places: &mut [usize], present: &[Rect], drawn: &[Rect], 
         let (from, to) = if across_columns { (rect.x0, rect.x1) } else { (rect.y0, rect.y1) };
         (u64::from(from) + u64::from(to), place)
     });
-    let half = places.len() / 2;
     let (first, second) = places.split_at_mut(half);
-
-    // The cut that gives both sides work in proportion.
-    let at = cut(region, across_columns, present, half, half + second.len());
     let (mut before, mut behind) = (region, region);
     if across_columns {
         (before.x1, behind.x0) = (at, at);

@@ -422,6 +422,15 @@ impl<'a> Part<'a> {
         );
     }
 
+    /// Writes its rectangle over `layer`, whose bounds must hold it.
+    pub(crate) fn place_in<P: Composite>(&self, layer: &mut Layer<P>) {
+        let (x0, x1) = (self.rect.x0, self.rect.x1);
+        self.for_each_row::<P>(|y, row| {
+            let (colors, depths) = layer.row_mut(y, x0, x1);
+            place_row::<P>(row, colors, depths);
+        });
+    }
+
     /// Writes its rectangle into planes of `width` columns; `depths` may be empty.
     pub(crate) fn place<P: Composite>(&self, width: usize, colors: &mut [P::Color], depths: &mut [f32]) {
         let range = |y: u32| {

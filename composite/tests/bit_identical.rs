@@ -4,7 +4,8 @@ use composite::{
     Strategy, composite_serial, threads,
 };
 
-const STRATEGIES: [Strategy; 6] = [
+const STRATEGIES: [Strategy; 7] = [
+    Strategy::Automatic,
     Strategy::DirectSend,
     Strategy::Tree,
     Strategy::BinarySwap,

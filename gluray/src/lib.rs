@@ -1,5 +1,48 @@
-//! Ray tracing inside unmodified OpenGL programs.
+//! Ray tracing inside unmodified OpenGL programs (chapter 4 of the dissertation).
 //!
-//! **Status: not built yet.** This member holds its place in the workspace and has no code; ARCHITECTURE.md says
-//! what it will do and in which order the members come.
-#![forbid(unsafe_code)]
+//! The shared library stands between a program and its OpenGL driver. The life of a frame:
+//!
+//! 1. A call comes to a trampoline ([`symbols`]); most go straight on to the driver, which keeps all state.
+//! 2. A draw of filled primitives asks what the state is ([`state`]) and whether rays can stand for it ([`decide`]).
+//! 3. If so it becomes a mesh ([`capture`], [`arrays`], [`primitives`]) whose hierarchy may be there already ([`cache`]).
+//! 4. When the program is about to see the picture ([`frame`]) rays find the nearest triangle of every pixel ([`trace`]), which is lit as
+//!    OpenGL lights it ([`lighting`], [`texturing`]).
+//! 5. Colours and depths go into the program's framebuffer as one pass of fragments ([`present`]).
+//!
+//! Whatever is not understood the driver draws, and depth brings both together. A fault of ours ends the tracing, not the
+//! program ([`fault`]).
+#![deny(unsafe_code)]
+
+mod arrays;
+mod cache;
+mod capture;
+pub mod cli;
+mod client_memory;
+pub mod config;
+mod context;
+mod control;
+mod decide;
+pub mod doctor;
+mod effects;
+mod enums;
+pub mod export;
+mod fault;
+pub mod folders;
+mod frame;
+mod immediate;
+mod lighting;
+pub mod panel;
+mod present;
+mod primitives;
+mod programs;
+mod raster;
+mod real;
+pub mod reasons;
+pub mod report;
+mod shading;
+mod state;
+mod symbols;
+mod texturing;
+pub mod timeline;
+mod trace;
+mod worker;

@@ -48,6 +48,18 @@ pub enum LightKind {
         /// Radius of the disk the light comes from, world units; 0 for sharp shadows.
         radius: f64,
     },
+    /// A cone of light with a soft rim: full inside of the inner angle, none outside of the outer, and between them linear in the cosine
+    /// to the axis (OSPRay's and ANARI's spot light).
+    Cone {
+        /// Tip of the cone.
+        position: DVec3,
+        /// Axis, away from the light.
+        direction: DVec3,
+        /// Half angle of full light, radians.
+        inner_rad: f64,
+        /// Half angle of any light, radians; not less than the inner one.
+        outer_rad: f64,
+    },
     /// A flat disk that shines to one side, with the cosine to its normal.
     Disk {
         /// Centre.
@@ -134,7 +146,7 @@ impl Light {
             | LightKind::Point { radius: r, .. }
             | LightKind::Spot { radius: r, .. }
             | LightKind::Disk { radius: r, .. } => *r = size,
-            LightKind::Ambient => {}
+            LightKind::Ambient | LightKind::Cone { .. } => {}
         }
         self
     }
@@ -154,7 +166,7 @@ impl Light {
     /// Radius or angular radius; 0 for a light without size.
     pub fn size(&self) -> f64 {
         match self.kind {
-            LightKind::Ambient => 0.0,
+            LightKind::Ambient | LightKind::Cone { .. } => 0.0,
             LightKind::Directional { angular_radius_rad: r, .. }
             | LightKind::Point { radius: r, .. }
             | LightKind::Spot { radius: r, .. }
@@ -174,6 +186,7 @@ impl Light {
             }
             LightKind::Point { position, .. }
             | LightKind::Spot { position, .. }
+            | LightKind::Cone { position, .. }
             | LightKind::Disk { position, .. } => position == DVec3::ZERO,
         }
     }
@@ -184,6 +197,18 @@ impl Light {
             && !matches!(self.kind, LightKind::Ambient)
             && !self.is_at_eye()
             && self.color != [0.0; 3]
+    }
+}
+
+/// Share of a [`LightKind::Cone`]'s light at an angle with cosine `cos` to its axis.
+#[inline(always)]
+pub(crate) fn cone_share(cos: f32, cos_inner: f32, cos_outer: f32) -> f32 {
+    if cos >= cos_inner {
+        1.0
+    } else if cos <= cos_outer {
+        0.0
+    } else {
+        (cos - cos_outer) / (cos_inner - cos_outer)
     }
 }
 
@@ -203,6 +228,7 @@ pub(crate) enum PlacedKind {
     Directional { to_light: Vec3 },
     Point { position: Vec3 },
     Spot { position: Vec3, direction: Vec3, cos_cutoff: f32, exponent: f32 },
+    Cone { position: Vec3, direction: Vec3, cos_inner: f32, cos_outer: f32 },
     Disk { position: Vec3, direction: Vec3 },
 }
 
@@ -232,6 +258,12 @@ impl PlacedLight {
                 direction: vector(direction),
                 cos_cutoff: cutoff_rad.cos() as f32,
                 exponent: exponent as f32,
+            },
+            LightKind::Cone { position, direction, inner_rad, outer_rad } => PlacedKind::Cone {
+                position: point(position),
+                direction: vector(direction),
+                cos_inner: inner_rad.cos() as f32,
+                cos_outer: outer_rad.cos() as f32,
             },
             LightKind::Disk { position, direction, .. } => {
                 PlacedKind::Disk { position: point(position), direction: vector(direction) }

@@ -400,6 +400,15 @@ fn check_light(l: &Light) -> Result<(), (&'static str, String, &'static str)> {
             let ok = exponent >= 0.0 && exponent.is_finite();
             if ok { Ok(()) } else { Err(("exponent", exponent.to_string(), "0 or positive, finite")) }
         }
+        K::Cone { position, direction, inner_rad, outer_rad } => {
+            point(position)?;
+            vector("direction", direction)?;
+            if !(outer_rad > 0.0 && outer_rad <= std::f64::consts::PI) {
+                return Err(("outer_rad", outer_rad.to_string(), "above 0 and at most pi"));
+            }
+            let ok = (0.0..=outer_rad).contains(&inner_rad);
+            if ok { Ok(()) } else { Err(("inner_rad", inner_rad.to_string(), "0 to outer_rad")) }
+        }
         K::Disk { position, direction, radius } => {
             point(position)?;
             vector("direction", direction)?;

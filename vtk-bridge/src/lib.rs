@@ -41,6 +41,7 @@
 //! the shim calls [`capi`]. [`setup`] builds and lays out these pieces; the program `vtk-bridge` is its command line.
 #![deny(unsafe_code)]
 
+pub mod anari;
 mod assemble;
 pub mod bridge;
 pub mod capi;

@@ -135,6 +135,12 @@ pub const NAMES: &[(&str, &str, &str)] = &[
     ("RTV_REPORT", "file that tells after each frame what was traced, passed on, and what it cost", "a path"),
     ("RTV_QUIET", "no warnings on stderr", "0 or 1"),
     ("RTV_HOME", "where `vtk-bridge install` has put things (set by `vtk-bridge env`)", "a folder"),
+    (
+        "RTV_VTK_INCLUDE",
+        "folders with VTK's headers, for `vtk-bridge install`",
+        "folders, separated by colons",
+    ),
+    ("RTV_LIBRARY", "the library that `vtk-bridge install` copies", "a file"),
 ];
 
 impl Options {

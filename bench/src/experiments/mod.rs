@@ -1,11 +1,15 @@
 //! The experiments, one file each, named after the table or figure.
 
 mod accuracy_build;
+mod accuracy_composite;
 mod accuracy_robust;
 mod accuracy_sampling;
 mod accuracy_schlieren;
 mod compare;
 mod effects;
+mod fig3_5;
+mod fig3_6;
+mod fig4_10;
 mod fig4_7;
 mod fig4_9;
 mod fig5_11;
@@ -13,11 +17,15 @@ mod fig5_12;
 mod fig5_13;
 mod fig5_14;
 mod lineup;
+mod many_ranks;
+mod partition_view;
 mod peers;
 mod peers_schlieren;
 mod pictures;
 mod shock_angles;
+mod smpi;
 mod speed_schlieren;
+mod strong_scaling;
 mod table5_1;
 mod test_section;
 
@@ -46,6 +54,49 @@ pub struct Experiment {
 /// All experiments, in the order of the report.
 pub const ALL: &[Experiment] = &[
     Experiment {
+        id: "fig3.5",
+        chapter: 3,
+        title: "Frames per second of compositing, 2 to 128 ranks: binary swap, direct send, IceT",
+        run: fig3_5::run,
+    },
+    Experiment {
+        id: "fig3.6",
+        chapter: 3,
+        title: "Weak scaling of data-parallel rendering, 1 to 128 ranks",
+        run: fig3_6::run,
+    },
+    Experiment {
+        id: "fig3.7",
+        chapter: 3,
+        title: "Strong scaling, mixing layer from outside (RMO)",
+        run: strong_scaling::rmo,
+    },
+    Experiment {
+        id: "fig3.8",
+        chapter: 3,
+        title: "Strong scaling, mixing layer from within (RMI)",
+        run: strong_scaling::rmi,
+    },
+    Experiment {
+        id: "fig3.9",
+        chapter: 3,
+        title: "Strong scaling, plasma (in place of VPIC)",
+        run: strong_scaling::vpic,
+    },
+    Experiment { id: "fig3.10", chapter: 3, title: "Strong scaling, wavelet", run: strong_scaling::wavelet },
+    Experiment {
+        id: "partition-view",
+        chapter: 3,
+        title: "Parts of as many triangles against parts of as much work for the view",
+        run: partition_view::run,
+    },
+    Experiment {
+        id: "accuracy-composite",
+        chapter: 3,
+        title: "Error against bytes and time of blending 128 faint layers, by pixel format",
+        run: accuracy_composite::run,
+    },
+    Experiment {
         id: "fig4.7",
         chapter: 4,
         title: "Time to build the acceleration structure, by preset, against the number of triangles",
@@ -56,6 +107,12 @@ pub const ALL: &[Experiment] = &[
         chapter: 4,
         title: "Time of a frame against the number of triangles",
         run: fig4_9::run,
+    },
+    Experiment {
+        id: "fig4.10",
+        chapter: 4,
+        title: "Replicated data against data in parts, 1 to 64 ranks",
+        run: fig4_10::run,
     },
     Experiment {
         id: "effects",

@@ -1,5 +1,8 @@
 //! How ranks talk. Compositing needs no more than this trait, so any transport can be plugged in.
 pub mod collective;
+#[cfg(all(unix, target_pointer_width = "64", target_endian = "little"))]
+pub mod mpi;
+pub mod sim;
 pub mod threads;
 
 mod error;

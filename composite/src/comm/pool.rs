@@ -1,35 +1,47 @@
 //! Buffers that are used again, frame after frame.
 
+use std::collections::BTreeMap;
+
 /// Most buffers kept; a rank of direct send has one message for each other rank in flight, twice.
 const MOST: usize = 512;
 
-/// Empty buffers in order of use.
+/// Empty buffers by capacity.
 #[derive(Debug, Default)]
 pub struct BufferPool {
-    free: Vec<Vec<u8>>,
+    free: BTreeMap<usize, Vec<Vec<u8>>>,
+    count: usize,
 }
 
 impl BufferPool {
     /// The smallest free buffer that holds `capacity` bytes, or a new one.
     pub fn take(&mut self, capacity: usize) -> Vec<u8> {
-        let fitting = self.free.iter().enumerate().filter(|(_, buffer)| buffer.capacity() >= capacity);
-        match fitting.min_by_key(|(_, buffer)| buffer.capacity()).map(|(position, _)| position) {
-            Some(position) => self.free.swap_remove(position),
-            None => {
-                // The frames ask for about the same sizes again and again: the largest misfit is replaced rather than kept beside it.
-                if self.free.len() >= MOST / 2 {
-                    self.free.pop();
-                }
-                Vec::with_capacity(capacity)
-            }
+        let Some((&size, buffers)) = self.free.range_mut(capacity.max(1)..).next() else {
+            return Vec::with_capacity(capacity);
+        };
+        let buffer = buffers.pop();
+        if buffers.is_empty() {
+            self.free.remove(&size);
         }
+        self.count -= usize::from(buffer.is_some());
+        buffer.unwrap_or_else(|| Vec::with_capacity(capacity))
     }
 
-    /// Keeps a buffer, emptied.
+    /// Keeps a buffer, emptied. Of too many the smallest goes: it is the cheapest to make again.
     pub fn put(&mut self, mut buffer: Vec<u8>) {
-        if buffer.capacity() > 0 && self.free.len() < MOST {
-            buffer.clear();
-            self.free.push(buffer);
+        if buffer.capacity() == 0 {
+            return;
+        }
+        buffer.clear();
+        self.free.entry(buffer.capacity()).or_default().push(buffer);
+        self.count += 1;
+        if self.count > MOST
+            && let Some(mut smallest) = self.free.first_entry()
+        {
+            smallest.get_mut().pop();
+            self.count -= 1;
+            if smallest.get().is_empty() {
+                smallest.remove();
+            }
         }
     }
 }
@@ -57,6 +69,6 @@ mod tests {
         for _ in 0..10_000 {
             pool.put(vec![0; 8]);
         }
-        assert!(pool.free.len() <= MOST);
+        assert_eq!((pool.count, pool.free[&8].len()), (MOST, MOST));
     }
 }

@@ -24,6 +24,8 @@ struct Group {
     state: Mutex<State>,
     /// One per rank, so that a message wakes its receiver alone.
     wake: Vec<Condvar>,
+    /// Of all ranks together: buffers travel with their messages, and a rank that only receives would hoard them.
+    pool: Mutex<BufferPool>,
 }
 
 impl Group {
@@ -49,7 +51,6 @@ pub struct ThreadComm {
     /// Messages that belong to a receive that nobody has waited for yet.
     early: Vec<(u64, Vec<u8>)>,
     next_id: u64,
-    pool: BufferPool,
 }
 
 /// A group of `size` ranks; hand each element to its own thread.
@@ -62,7 +63,8 @@ pub fn group(size: usize) -> Vec<ThreadComm> {
         barriers_done: 0,
     };
     let wake = (0..size).map(|_| Condvar::new()).collect();
-    let group = Arc::new(Group { begin: Instant::now(), state: Mutex::new(state), wake });
+    let group =
+        Arc::new(Group { begin: Instant::now(), state: Mutex::new(state), wake, pool: Mutex::default() });
     (0..size)
         .map(|rank| ThreadComm {
             rank,
@@ -70,7 +72,6 @@ pub fn group(size: usize) -> Vec<ThreadComm> {
             posted: BTreeMap::new(),
             early: Vec::new(),
             next_id: 0,
-            pool: BufferPool::default(),
         })
         .collect()
 }
@@ -79,12 +80,20 @@ pub fn group(size: usize) -> Vec<ThreadComm> {
 ///
 /// A panic of one rank is that rank's [`CommError::Panicked`]; the others see it as [`CommError::PeerLost`].
 pub fn run<T: Send>(size: usize, work: impl Fn(ThreadComm) -> T + Sync) -> Vec<Result<T, CommError>> {
+    run_group(group(size), work)
+}
+
+/// Runs `work` on every rank of a group, in rank order, each on a thread of its own.
+pub(super) fn run_group<C: Communicator + Send, T: Send>(
+    group: Vec<C>,
+    work: impl Fn(C) -> T + Sync,
+) -> Vec<Result<T, CommError>> {
     let work = &work;
     std::thread::scope(|scope| {
-        let threads: Vec<_> = group(size)
+        let threads: Vec<_> = group
             .into_iter()
-            .map(|comm| {
-                let rank = comm.rank;
+            .enumerate()
+            .map(|(rank, comm)| {
                 let name = format!("rank {rank}");
                 (rank, std::thread::Builder::new().name(name).spawn_scoped(scope, move || work(comm)))
             })
@@ -256,11 +265,11 @@ impl Communicator for ThreadComm {
     }
 
     fn buffer(&mut self, capacity: usize) -> Vec<u8> {
-        self.pool.take(capacity)
+        self.group.pool.lock().unwrap_or_else(PoisonError::into_inner).take(capacity)
     }
 
     fn recycle(&mut self, buffer: Vec<u8>) {
-        self.pool.put(buffer);
+        self.group.pool.lock().unwrap_or_else(PoisonError::into_inner).put(buffer);
     }
 }
 

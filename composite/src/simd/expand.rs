@@ -73,6 +73,30 @@ pub(crate) fn join_run_scalar<P: Composite>(
     }
 }
 
+/// Makes inactive pixels of a depth format [empty](crate::PixelFormat::EMPTY).
+#[inline(always)]
+pub(crate) fn clean_run<P: Composite, S: Simd>(simd: S, colors: &mut [P::Color], depths: &mut [f32]) {
+    use fearless_simd::{SimdBase, SimdMask, f32x16};
+    let whole = depths.len() / 16 * 16;
+    for first in (0..whole).step_by(16) {
+        let active = f32x16::from_slice(simd, &depths[first..first + 16]).simd_lt(f32x16::splat(simd, 1.0));
+        if !active.all_true() {
+            clean_run_scalar::<P>(&mut colors[first..first + 16], &mut depths[first..first + 16]);
+        }
+    }
+    clean_run_scalar::<P>(&mut colors[whole..], &mut depths[whole..]);
+}
+
+/// [`clean_run`] one pixel after the other.
+#[inline(always)]
+pub(crate) fn clean_run_scalar<P: Composite>(colors: &mut [P::Color], depths: &mut [f32]) {
+    for (color, depth) in colors.iter_mut().zip(depths) {
+        let active = *depth < 1.0;
+        *color = if active { *color } else { P::EMPTY.color() };
+        *depth = if active { *depth } else { 1.0 };
+    }
+}
+
 /// Joins a row of a message to the row held.
 #[inline(always)]
 pub(crate) fn join_row<P: Composite, S: Simd>(
@@ -127,10 +151,11 @@ pub(crate) fn join_row_scalar<P: Composite>(
     }
 }
 
-/// Writes a row of a message over `colors` and, if it is not empty, `depths`: the background too.
+/// Writes a row of a message over `colors` and, if it is not empty, `depths`: the background too. A message for rows with depths
+/// must bring depths.
 #[inline(always)]
 pub(crate) fn place_row<P: Composite>(row: SparseRow<'_>, colors: &mut [P::Color], depths: &mut [f32]) {
-    let with_depths = !depths.is_empty() && !row.depths.is_empty();
+    let with_depths = !depths.is_empty();
     if row.mask.is_empty() {
         bytemuck::cast_slice_mut::<_, u8>(colors).copy_from_slice(row.colors);
         if with_depths {
@@ -204,12 +229,22 @@ fn join_by_vectors<P: Composite, S: Simd>(
             if lanes == 0 {
                 continue;
             }
-            let color = padded_16(avx512, row.behind_colors, 4 * taken);
             let depth = padded_16(avx512, row.behind_depths, 4 * taken);
-            let color: u32x16<_> = expand_16(avx512, color.into(), lanes).simd_into(avx512);
             let depth: u32x16<_> = expand_16(avx512, depth.into(), lanes).simd_into(avx512);
             let ties = side == Side::Higher;
-            take_nearer(avx512, color, depth.bitcast(), held_color, held_depth, ties, u64::from(lanes));
+            take_nearer(
+                avx512,
+                #[inline(always)]
+                || -> u32x16<_> {
+                    let packed = padded_16(avx512, row.behind_colors, 4 * taken);
+                    expand_16(avx512, packed.into(), lanes).simd_into(avx512)
+                },
+                depth.bitcast(),
+                held_color,
+                held_depth,
+                ties,
+                u64::from(lanes),
+            );
             taken += lanes.count_ones() as usize;
         }
         return true;

@@ -15,8 +15,6 @@ use fearless_simd::Level;
 pub enum SimdLevel {
     /// One pixel after the other, for every machine.
     Scalar,
-    /// 128-bit, the x86-64 baseline.
-    Sse2,
     /// 128-bit with the instructions of x86-64-v2.
     Sse42,
     /// 256-bit (x86-64-v3).
@@ -30,7 +28,7 @@ pub enum SimdLevel {
 impl SimdLevel {
     /// The levels this machine can run, lowest first.
     pub fn available() -> Vec<Self> {
-        let levels = [Self::Scalar, Self::Sse2, Self::Sse42, Self::Avx2, Self::Avx512, Self::Neon];
+        let levels = [Self::Scalar, Self::Sse42, Self::Avx2, Self::Avx512, Self::Neon];
         levels.into_iter().filter(|level| *level == Self::Scalar || level.token().is_some()).collect()
     }
 
@@ -43,7 +41,6 @@ impl SimdLevel {
     pub fn name(self) -> &'static str {
         match self {
             Self::Scalar => "scalar",
-            Self::Sse2 => "sse2",
             Self::Sse42 => "sse4.2",
             Self::Avx2 => "avx2",
             Self::Avx512 => "avx512",
@@ -54,9 +51,8 @@ impl SimdLevel {
     /// The level as fearless_simd knows it; `None` for [`SimdLevel::Scalar`] and where the machine lacks it.
     fn token(self) -> Option<Level> {
         let _best = Level::new();
-        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        #[cfg(target_arch = "x86_64")]
         return match self {
-            Self::Sse2 => _best.as_sse2().map(Level::Sse2),
             Self::Sse42 => _best.as_sse4_2().map(Level::Sse4_2),
             Self::Avx2 => _best.as_avx2().map(Level::Avx2),
             Self::Avx512 => _best.as_avx512().map(Level::Avx512),
@@ -64,7 +60,7 @@ impl SimdLevel {
         };
         #[cfg(target_arch = "aarch64")]
         return (self == Self::Neon).then_some(_best);
-        #[cfg(not(any(target_arch = "x86", target_arch = "x86_64", target_arch = "aarch64")))]
+        #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
         return None;
     }
 }
@@ -85,11 +81,36 @@ impl Kernels {
 }
 
 /// Runs one expression compiled for the vectors of the chosen level, or the scalar one.
+///
+/// Not `fearless_simd::dispatch!`, which makes one more copy of every kernel, for processors without SSE4.2: those of before 2008.
 macro_rules! at_level {
     ($kernels:expr, $simd:ident => $vectors:expr, $scalar:expr) => {
         match $kernels.0 {
-            Some(level) => fearless_simd::dispatch!(level, $simd => $vectors),
-            None => $scalar,
+            #[cfg(target_arch = "x86_64")]
+            Some(fearless_simd::Level::Avx512($simd)) => fearless_simd::Simd::vectorize(
+                $simd,
+                #[inline(always)]
+                || $vectors,
+            ),
+            #[cfg(target_arch = "x86_64")]
+            Some(fearless_simd::Level::Avx2($simd)) => fearless_simd::Simd::vectorize(
+                $simd,
+                #[inline(always)]
+                || $vectors,
+            ),
+            #[cfg(target_arch = "x86_64")]
+            Some(fearless_simd::Level::Sse4_2($simd)) => fearless_simd::Simd::vectorize(
+                $simd,
+                #[inline(always)]
+                || $vectors,
+            ),
+            #[cfg(target_arch = "aarch64")]
+            Some(fearless_simd::Level::Neon($simd)) => fearless_simd::Simd::vectorize(
+                $simd,
+                #[inline(always)]
+                || $vectors,
+            ),
+            _ => $scalar,
         }
     };
 }

@@ -3,7 +3,7 @@
 //! One exchange instead of log p rounds. All ranks know from the rectangles they drew in which tiles there are and which messages
 //! will come, so nobody waits for a rank that has nothing to give, and every receive is posted before the first message is made.
 //! Tiles are cut in slices: while one slice travels the next is compressed, and a slice that is complete goes to the collecting
-//! rank while others are still being joined.
+//! rank while others are still being joined. [`crate::stream`] hands slices in while the frame is still being rendered.
 use crate::collect::Collector;
 use crate::error::CompositeError;
 use crate::join::{Item, Join, Scratch};
@@ -12,10 +12,12 @@ use crate::pixel::Composite;
 use crate::rect::Rect;
 use crate::session::{Session, Tag};
 use crate::tiles::{balanced, slices};
+use crate::wire;
 
 /// Slices of every place's tile, in the order in which they are sent.
+#[derive(Clone, Debug)]
 pub(crate) struct Plan {
-    slices: Vec<Vec<Rect>>,
+    pub(crate) slices: Vec<Vec<Rect>>,
 }
 
 impl Plan {
@@ -46,21 +48,7 @@ pub(crate) fn run<P: Composite>(
     scratch: &mut Scratch<P>,
 ) -> Result<(), CompositeError> {
     let (place, places) = (session.place, session.places());
-    let drawn = session.drawn.clone();
-    let own = &plan.slices[place];
-
-    // Receives, in the order in which each sender will send.
-    let mut joins = Vec::with_capacity(own.len());
-    for slice in own {
-        for (from, rect) in drawn.iter().enumerate() {
-            let part = rect.intersection(slice);
-            if from != place && !part.is_empty() {
-                session.post::<P>(from, Tag::Exchange, &part)?;
-            }
-        }
-        let contributes = |from: usize| !drawn[from].intersection(slice).is_empty();
-        joins.push(Some(Join::new(*slice, places, contributes)));
-    }
+    let mut exchange = Exchange::new(plan, session)?;
 
     // Everybody's first slices, then everybody's second …; the next place first, so that no rank gets all first messages.
     let most = plan.slices.iter().map(Vec::len).max().unwrap_or(0);
@@ -77,45 +65,113 @@ pub(crate) fn run<P: Composite>(
     }
 
     // Own pixels, and what has come meanwhile.
-    let mut done = Progress { joins, served: vec![0; places], drawn: &drawn, own };
-    for (index, slice) in own.iter().enumerate() {
+    for (index, slice) in plan.slices[place].iter().enumerate() {
         let part = view.bounds.intersection(slice);
         if !part.is_empty() {
-            let begin = session.now();
             session.count_nan(view, part);
-            if let Some(join) = &mut done.joins[index] {
-                join.put(place, Item::View(View { bounds: part, ..*view }), scratch);
-            }
-            session.report.blend_secs += session.now() - begin;
-            done.hand_in(index, session, collector, scratch)?;
+            let item = Item::View(View { bounds: part, ..*view });
+            exchange.put(index, place, item, session, collector, scratch)?;
         }
-        while let Some((from, is_collect, bytes)) = session.next(false)? {
-            done.take(from, is_collect, bytes, session, collector, scratch)?;
-        }
+        exchange.take_what_has_come(session, collector, scratch)?;
     }
-    while session.is_waiting_for(Tag::Exchange) {
-        if let Some((from, is_collect, bytes)) = session.next(true)? {
-            done.take(from, is_collect, bytes, session, collector, scratch)?;
-        }
-    }
-    Ok(())
+    exchange.finish(session, collector, scratch)
 }
 
-/// Slices of this place and how far they are.
-struct Progress<'a, P: Composite> {
+/// The slices of this place and how far they are.
+pub(crate) struct Exchange<'a, P: Composite> {
+    own: Vec<Rect>,
     joins: Vec<Option<Join<'a, P>>>,
-    /// How many of its slices each place has served; those it has no part of count as served.
-    served: Vec<usize>,
-    drawn: &'a [Rect],
-    own: &'a [Rect],
+    /// For every place the parts of own slices that have not come from it.
+    outstanding: Vec<Vec<(usize, Rect)>>,
 }
 
-impl<P: Composite> Progress<'_, P> {
+impl<'a, P: Composite> Exchange<'a, P> {
+    /// Posts the receives of this place.
+    pub(crate) fn new(plan: &Plan, session: &mut Session<'_>) -> Result<Self, CompositeError> {
+        let (place, places) = (session.place, session.places());
+        let own = plan.slices[place].clone();
+        let drawn = session.drawn.clone();
+        let mut outstanding = vec![Vec::new(); places];
+        for (from, parts) in outstanding.iter_mut().enumerate().filter(|(from, _)| *from != place) {
+            for (index, slice) in own.iter().enumerate() {
+                let part = drawn[from].intersection(slice);
+                if !part.is_empty() {
+                    parts.push((index, part));
+                }
+            }
+            // A renderer hands slices in in any order, so each receive has room for the largest.
+            let largest = parts.iter().map(|part| part.1).max_by_key(wire::longest::<P>);
+            for _ in 0..parts.len() {
+                session.post::<P>(from, Tag::Exchange, &largest.unwrap_or(Rect::EMPTY))?;
+            }
+        }
+        let join = |slice: &Rect| {
+            Some(Join::new(*slice, places, |from| !drawn[from].intersection(slice).is_empty()))
+        };
+        let joins = own.iter().map(join).collect();
+        Ok(Self { own, joins, outstanding })
+    }
+
+    /// Takes what `from` has in the own slice `index`, and hands the slice in if it is complete.
+    pub(crate) fn put(
+        &mut self,
+        index: usize,
+        from: usize,
+        item: Item<'a, P>,
+        session: &mut Session<'_>,
+        collector: &mut Collector<P>,
+        scratch: &mut Scratch<P>,
+    ) -> Result<(), CompositeError> {
+        let begin = session.now();
+        if let Some(join) = &mut self.joins[index] {
+            join.put(from, item, scratch);
+        }
+        for read in scratch.read.drain(..) {
+            session.comm.recycle(read);
+        }
+        session.report.blend_secs += session.now() - begin;
+        let complete = self.joins[index].take_if(|join| join.is_complete());
+        match complete.and_then(|join| join.finish(scratch)) {
+            Some(layer) => collector.hand_in(session, layer, scratch),
+            None => Ok(()),
+        }
+    }
+
+    /// Slices that are complete.
+    pub(crate) fn complete(&self) -> usize {
+        self.joins.iter().filter(|join| join.is_none()).count()
+    }
+
+    pub(crate) fn take_what_has_come(
+        &mut self,
+        session: &mut Session<'_>,
+        collector: &mut Collector<P>,
+        scratch: &mut Scratch<P>,
+    ) -> Result<(), CompositeError> {
+        while let Some(arrival) = session.next(false)? {
+            self.take(arrival, session, collector, scratch)?;
+        }
+        Ok(())
+    }
+
+    /// Waits for all messages of other places.
+    pub(crate) fn finish(
+        &mut self,
+        session: &mut Session<'_>,
+        collector: &mut Collector<P>,
+        scratch: &mut Scratch<P>,
+    ) -> Result<(), CompositeError> {
+        while session.is_waiting_for(Tag::Exchange) {
+            if let Some(arrival) = session.next(true)? {
+                self.take(arrival, session, collector, scratch)?;
+            }
+        }
+        Ok(())
+    }
+
     fn take(
         &mut self,
-        from: usize,
-        is_collect: bool,
-        bytes: Vec<u8>,
+        (from, is_collect, bytes): (usize, bool, Vec<u8>),
         session: &mut Session<'_>,
         collector: &mut Collector<P>,
         scratch: &mut Scratch<P>,
@@ -123,37 +179,17 @@ impl<P: Composite> Progress<'_, P> {
         if is_collect {
             return collector.take(session, from, bytes);
         }
-        // Messages of one place come in the order of slices.
-        let mut index = self.served[from];
-        while index < self.own.len() && self.drawn[from].intersection(&self.own[index]).is_empty() {
-            index += 1;
-        }
-        self.served[from] = index + 1;
-        let Some(slice) = self.own.get(index) else { return Ok(()) };
+        // The message itself says which slice it is for, if it is one of those expected.
+        let said = wire::rect_of(&bytes);
+        let parts = &mut self.outstanding[from];
+        let position = parts.iter().position(|part| Some(part.1) == said).unwrap_or(0);
+        let (index, part) = if parts.is_empty() { (0, Rect::EMPTY) } else { parts.remove(position) };
         let begin = session.now();
-        let message = session.check::<P>(from, bytes, self.drawn[from].intersection(slice), true)?;
-        if let Some(join) = &mut self.joins[index] {
-            join.put(from, Item::Message(message), scratch);
-        }
-        for read in scratch.read.drain(..) {
-            session.comm.recycle(read);
-        }
+        let message = session.check::<P>(from, bytes, part, true)?;
         session.report.blend_secs += session.now() - begin;
-        self.hand_in(index, session, collector, scratch)
-    }
-
-    /// Hands a slice in if it is complete.
-    fn hand_in(
-        &mut self,
-        index: usize,
-        session: &mut Session<'_>,
-        collector: &mut Collector<P>,
-        scratch: &mut Scratch<P>,
-    ) -> Result<(), CompositeError> {
-        let Some(join) = self.joins[index].take_if(|join| join.is_complete()) else { return Ok(()) };
-        match join.finish(scratch) {
-            Some(layer) => collector.hand_in(session, layer, scratch),
-            None => Ok(()),
+        if index < self.own.len() {
+            self.put(index, from, Item::Message(message), session, collector, scratch)?;
         }
+        Ok(())
     }
 }

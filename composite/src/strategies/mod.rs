@@ -34,6 +34,9 @@ pub enum Strategy {
         /// Largest group of a round.
         k: usize,
     },
+    /// The one that should be fastest for the rectangles of this frame, by a [model](crate::Network) of the network that is
+    /// measured before the first frame.
+    Automatic,
 }
 
 impl Strategy {
@@ -44,6 +47,7 @@ impl Strategy {
             Self::Tree => 2,
             Self::BinarySwap => 3,
             Self::RadixK { k } => 4 + k as u64,
+            Self::Automatic => 0,
         }
     }
 
@@ -59,7 +63,10 @@ impl Strategy {
     /// What this rank, and every other, is going to do with what all have drawn.
     pub(crate) fn plan(self, drawn: &[Rect], slice_pixels: usize) -> Plan {
         match self {
-            Self::DirectSend => Plan::DirectSend(direct_send::Plan::new(drawn, slice_pixels)),
+            // Automatic has been replaced by what was chosen.
+            Self::DirectSend | Self::Automatic => {
+                Plan::DirectSend(direct_send::Plan::new(drawn, slice_pixels))
+            }
             Self::Tree => Plan::Tree,
             Self::BinarySwap => Plan::BinarySwap,
             Self::RadixK { k } => Plan::RadixK { k },

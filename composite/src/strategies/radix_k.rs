@@ -91,7 +91,7 @@ pub(crate) fn run<P: Composite>(
 }
 
 /// Share number `member` of `part`, cut into `members` shares of rows that differ by at most one row.
-fn share(part: &Rect, member: usize, members: usize) -> Rect {
+pub(crate) fn share(part: &Rect, member: usize, members: usize) -> Rect {
     let row = |i: usize| part.y0 + (part.height() as u64 * i as u64 / members as u64) as u32;
     let share = Rect { y0: row(member), y1: row(member + 1), ..*part };
     if share.is_empty() { Rect::EMPTY } else { share }

@@ -133,6 +133,17 @@ impl Blas {
         }
     }
 
+    /// The tree of a shape that has the same primitives, bounds and hits: shared when it is the same shape, else copied.
+    pub(crate) fn with_shape(this: &Arc<Blas>, shape: &Arc<dyn Shape>) -> Arc<Blas> {
+        match &this.content {
+            Content::Shape { bvh, shape: old } if !Arc::ptr_eq(old, shape) => {
+                let content = Content::Shape { bvh: bvh.clone(), shape: Arc::clone(shape) };
+                Arc::new(Blas { content, notes: this.notes.clone(), ..**this })
+            }
+            _ => Arc::clone(this),
+        }
+    }
+
     pub(crate) fn bvh(&self) -> &WideBvh {
         match &self.content {
             Content::Triangles(t) => &t.bvh,

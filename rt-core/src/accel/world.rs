@@ -28,11 +28,13 @@ pub enum Geometry {
 }
 
 impl Geometry {
-    /// Where the shared data lie: the same for two clones of one geometry, and never for two geometries that are both alive.
+    /// Where the shared data lie: the same for two clones of one geometry and for two looks of one shape, and never for two others that are
+    /// both alive.
     fn address(&self) -> usize {
+        let of_shape = |s: &Arc<dyn Shape>| Arc::as_ptr(s) as *const () as usize;
         match self {
             Geometry::Mesh(m) => Arc::as_ptr(m) as usize,
-            Geometry::Shape(s) => Arc::as_ptr(s) as *const () as usize,
+            Geometry::Shape(s) => s.tree_of().as_ref().map_or_else(|| of_shape(s), of_shape),
         }
     }
 }
@@ -148,9 +150,10 @@ impl World {
         let blas = geometries
             .iter()
             .enumerate()
-            .map(|(i, g)| match known.as_ref().and_then(|k| k.get(&g.address())) {
-                Some(tree) => Ok(Arc::clone(tree)),
-                None => blas_of(i, g, options, whole).map(Arc::new),
+            .map(|(i, g)| match (known.as_ref().and_then(|k| k.get(&g.address())), g) {
+                (Some(tree), Geometry::Mesh(_)) => Ok(Arc::clone(tree)),
+                (Some(tree), Geometry::Shape(s)) => Ok(Blas::with_shape(tree, s)),
+                (None, _) => blas_of(i, g, options, whole).map(Arc::new),
             })
             .collect::<Result<Vec<_>, _>>()?;
         phases.push(("geometries", start.elapsed()));

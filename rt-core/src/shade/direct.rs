@@ -6,7 +6,7 @@ use super::stage::Stage;
 use super::wave::{LightRays, RayState};
 use super::{Dimension, Point, TileArea};
 use crate::effects::Effects;
-use crate::light::{PlacedKind, PlacedLight};
+use crate::light::{PlacedKind, PlacedLight, cone_share};
 use crate::math::{max_abs, orthonormal_basis};
 use crate::ray::Ray;
 use crate::ray_stats::RayStats;
@@ -134,9 +134,9 @@ pub(super) fn incident_from(light: &PlacedLight, p: Vec3, at: Option<[f32; 2]>) 
             return Incident { dir, from: None, strength: 1.0 };
         }
         PlacedKind::Point { position } => (position, (p - position).as_dvec3().normalize_or_zero().as_vec3()),
-        PlacedKind::Spot { position, direction, .. } | PlacedKind::Disk { position, direction } => {
-            (position, direction)
-        }
+        PlacedKind::Spot { position, direction, .. }
+        | PlacedKind::Cone { position, direction, .. }
+        | PlacedKind::Disk { position, direction } => (position, direction),
     };
     let from = if at.is_some() && normal != Vec3::ZERO {
         let (s, t) = orthonormal_basis(normal);
@@ -164,6 +164,9 @@ pub(super) fn incident_from(light: &PlacedLight, p: Vec3, at: Option<[f32; 2]>) 
             } else {
                 cos.max(0.0).powf(exponent)
             };
+        }
+        PlacedKind::Cone { direction, cos_inner, cos_outer, .. } => {
+            strength *= cone_share(-dir.dot(direction), cos_inner, cos_outer);
         }
         PlacedKind::Disk { direction, .. } => strength *= (-dir.dot(direction)).max(0.0),
         PlacedKind::Directional { .. } | PlacedKind::Point { .. } => {}

@@ -18,6 +18,7 @@ pub use tube::Tubes;
 use crate::math::Aabb;
 use crate::ray::Ray;
 use glam::{DVec3, Vec3};
+use std::sync::Arc;
 
 /// What [`Shape::closest`] found on one primitive.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,6 +78,12 @@ pub trait Shape: Send + Sync {
     /// [`crate::ray_stats::RayStats::opacity_ignored`].
     fn has_transparency(&self) -> bool {
         false
+    }
+
+    /// For a shape that only gives another one's hits a new look: that other shape. Its primitives, bounds and hits must be the same; then a world made
+    /// from one that has it ([`crate::accel::World::build_sharing`]) takes over its tree.
+    fn tree_of(&self) -> Option<Arc<dyn Shape>> {
+        None
     }
 }
 

@@ -3,7 +3,7 @@
 use super::Stage;
 use crate::effects::Effects;
 use crate::environment::MeanRadiance;
-use crate::light::{PlacedKind, PlacedLight};
+use crate::light::{PlacedKind, PlacedLight, cone_share};
 use crate::material::{Highlight, Material, SurfaceModel};
 use crate::ray::{LANES, RayBlock};
 use crate::shade::lobes::power;
@@ -154,6 +154,7 @@ fn incident<S: Simd>(simd: S, light: &PlacedLight, points: &Rows3) -> (Vec3x16<S
         PlacedKind::Directional { to_light } => return (Vec3x16::splat(simd, to_light), one),
         PlacedKind::Point { position }
         | PlacedKind::Spot { position, .. }
+        | PlacedKind::Cone { position, .. }
         | PlacedKind::Disk { position, .. } => position,
     };
     let to_light = Vec3x16::splat(simd, from).sub(Vec3x16::load(simd, points));
@@ -177,6 +178,14 @@ fn incident<S: Simd>(simd: S, light: &PlacedLight, points: &Rows3) -> (Vec3x16<S
                 f32x16::from_slice(simd, &row)
             };
             strength *= cos.simd_lt(v(cos_cutoff)).select(zero, falloff);
+        }
+        PlacedKind::Cone { direction, cos_inner, cos_outer, .. } => {
+            let cos = -dir.dot(Vec3x16::splat(simd, direction));
+            let mut row: Row = [0.0; LANES];
+            for lane in 0..LANES {
+                row[lane] = cone_share(cos[lane], cos_inner, cos_outer);
+            }
+            strength *= f32x16::from_slice(simd, &row);
         }
         PlacedKind::Disk { direction, .. } => {
             strength *= (-dir.dot(Vec3x16::splat(simd, direction))).max(zero);

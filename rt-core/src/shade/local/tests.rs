@@ -93,6 +93,11 @@ fn mixed_scene() -> Scene {
         let kind = LightKind::Spot { position, direction, cutoff_rad: 0.4, exponent, radius: 0.0 };
         b.light(Light { kind, shadows: false, ..Light::headlight() });
     }
+    for inner_rad in [0.1, 0.5] {
+        let (position, direction) = (DVec3::new(-2.0, 1.0, 3.0), DVec3::new(2.0, -1.0, -3.0));
+        let kind = LightKind::Cone { position, direction, inner_rad, outer_rad: 0.5 };
+        b.light(Light { kind, shadows: false, ..Light::headlight() });
+    }
     b.environment = Some(Environment::Gradient { bottom: [0.1; 3], top: [0.2, 0.3, 0.5], up: Vec3::Y });
     b.background = Background::Gradient { bottom: [0.0; 3], top: [0.3; 3] };
     b.build().unwrap()

@@ -96,6 +96,11 @@ impl<'a> WaveFrame<'a> {
         &self.warnings
     }
 
+    /// Instances of the scene, the same in every part.
+    pub fn num_instances(&self) -> usize {
+        self.stage.instances.len()
+    }
+
     /// Number of tiles, which go row by row from the top left.
     pub fn num_tiles(&self) -> usize {
         self.tiles.len()

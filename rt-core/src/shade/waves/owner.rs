@@ -262,6 +262,12 @@ impl TileInWork {
         &self.points
     }
 
+    /// Of each of [`TileInWork::light_points`] the slot of its pixel.
+    pub fn slots_of_points(&self) -> impl Iterator<Item = u16> + '_ {
+        let slot = |p: &LightPoint| TileArea::slot(p.pixel[0] - self.area.x, p.pixel[1] - self.area.y) as u16;
+        self.points.iter().map(slot)
+    }
+
     /// Of each light ray that matters, its point among [`TileInWork::light_points`] and the ray: to find out whom to ask.
     pub fn light_rays_of_points(&self) -> impl Iterator<Item = (usize, Ray)> + '_ {
         self.waiting.iter().map(|r| (self.place[r.point as usize] as usize, r.ray))

@@ -1,0 +1,223 @@
+//! Figure 3.5: frames per second of compositing alone, 2 to 128 ranks: binary swap against direct send and IceT.
+
+use super::Context;
+use super::many_ranks::{CAVEAT, powers, simulated};
+use super::smpi;
+use crate::plot::{Axis, Plot, Series};
+use crate::record::{Record, Row};
+use crate::runner::Ratio;
+use crate::stats::Summary;
+use composite::comm::sim::SimComm;
+use composite::rival::{self, Icet, IcetFrame, IcetMode, IcetStrategy};
+use composite::scenes::{Drawn, Scene};
+use composite::{Communicator, Compositor, DepthPixel, Destination, Frame, Options, Strategy};
+use std::path::Path;
+use std::time::Duration;
+
+const TIMEOUT: Duration = Duration::from_secs(600);
+
+/// Who composites.
+#[derive(Clone, Copy)]
+enum Who {
+    Ours(Strategy),
+    Icet(IcetStrategy),
+}
+
+const ALL: [(&str, Who); 5] = [
+    ("direct send", Who::Ours(Strategy::DirectSend)),
+    ("binary swap", Who::Ours(Strategy::BinarySwap)),
+    ("radix-k", Who::Ours(Strategy::RadixK { k: 8 })),
+    ("IceT binary swap", Who::Icet(IcetStrategy::BinarySwap)),
+    ("IceT radix-kr", Who::Icet(IcetStrategy::RadixKr)),
+];
+
+pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
+    record.column("ranks", "", "ranks");
+    record.column("compositor", "", "strategy; IceT is the library of the dissertation, over the same ranks");
+    record.column("time", "ms", "median over the frames, from the common begin until the image is on rank 0");
+    record.column("fps", "1/s", "frames per second at that time");
+    record.column("time_low", "ms", "fastest frame");
+    record.column("time_high", "ms", "slowest frame");
+    record.column(
+        "smpi",
+        "ms",
+        "the same under SimGrid's SMPI, of IceT its best strategy; empty where that is not installed",
+    );
+    record.column("model_over_smpi", "", "time by our model over that by SMPI, of direct send");
+    record.column("differ", "", "pixels that differ from direct send's image");
+    let (size, frames, most) = if context.quick { (512, 2, 64) } else { (1024, 5, 128) };
+    record.notes.push(format!(
+        "Frames of {size} x {size} pixels, RGBA8 and f32 depth, as ranks would have drawn a volume cut into bricks (`discs` of `composite \
+         compare`). All compositors take turns on the same frames and ranks. The dissertation: binary swap above 20 frames per second at 128 nodes, \
+         IceT near 100."
+    ));
+    record.notes.push(CAVEAT.into());
+    let icet = rival::find();
+    if let Err(why) = &icet {
+        record.missing.push(why.to_string());
+    }
+    let icet = icet.ok();
+    let mut smpi_is_there = true;
+    for ranks in powers(2, most) {
+        context.say(format!("{ranks} ranks"))?;
+        measure(record, ranks, size, frames, icet.as_deref())?;
+        // SimGrid takes minutes for many ranks.
+        if smpi_is_there && ranks <= if context.quick { 8 } else { 64 } {
+            context.say(format!("{ranks} ranks under SMPI"))?;
+            match smpi::compare_ms(ranks, size, frames) {
+                Ok(times) => beside_smpi(record, ranks, times),
+                Err(why) => {
+                    record.missing.push(format!("times under SMPI: {why}"));
+                    smpi_is_there = false;
+                }
+            }
+        }
+    }
+    let mut plot = Plot::lines("Compositing", Axis::log("ranks", ""), Axis::log("frames per second", "1/s"));
+    for (name, _) in ALL {
+        let of = |r: &&Row| r.text("compositor") == Some(name);
+        let points: Vec<(f64, f64)> =
+            record.rows.iter().filter(of).filter_map(|r| r.number("ranks").zip(r.number("fps"))).collect();
+        if !points.is_empty() {
+            plot.series.push(Series::new(name, points));
+        }
+    }
+    record.plots.push(plot);
+    Ok(())
+}
+
+fn measure(
+    record: &mut Record,
+    ranks: usize,
+    size: u32,
+    frames: usize,
+    icet: Option<&Path>,
+) -> anyhow::Result<()> {
+    let all: Vec<(&str, Who)> =
+        ALL.into_iter().filter(|(_, w)| icet.is_some() || matches!(w, Who::Ours(_))).collect();
+    let results = simulated(ranks, |mut comm| one_rank(&mut comm, &all, size, frames, icet))?;
+    // By compositor and frame: the slowest rank.
+    let secs = |k: usize, f: usize| results.iter().map(|r| r.secs[k][f]).fold(0.0, f64::max);
+    for (k, (name, _)) in all.iter().enumerate() {
+        let times: Vec<f64> = (0..frames).map(|f| secs(k, f)).collect();
+        let Some(s) = Summary::of(&times) else { continue };
+        record.rows.push(
+            Row::new()
+                .with("ranks", ranks)
+                .with("compositor", *name)
+                .with("time", s.median * 1e3)
+                .with("fps", 1.0 / s.median)
+                .with("time_low", s.low * 1e3)
+                .with("time_high", s.high * 1e3)
+                .with("differ", results[0].differ[k]),
+        );
+        if k > 0 {
+            let ratios: Vec<f64> = (0..frames).map(|f| secs(k, f) / secs(0, f)).collect();
+            if let Some(r) = Summary::of(&ratios) {
+                record.ratios.push(Ratio {
+                    name: format!("direct send, {ranks} ranks"),
+                    rival: (*name).into(),
+                    value: r.median,
+                    spread: r.interquartile_range(),
+                    low: r.low,
+                    high: r.high,
+                    rounds: frames,
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Puts SMPI's times of direct send and of the best of IceT beside ours.
+fn beside_smpi(record: &mut Record, ranks: usize, [ours_ms, icet_ms]: [f64; 2]) {
+    let of_ranks = record.rows.iter_mut().filter(|r| r.number("ranks") == Some(ranks as f64));
+    for row in of_ranks {
+        let name = row.text("compositor").unwrap_or_default().to_string();
+        let time = row.number("time");
+        *row = match name.as_str() {
+            "direct send" => {
+                std::mem::take(row).with("smpi", ours_ms).with("model_over_smpi", time.map(|t| t / ours_ms))
+            }
+            "IceT radix-kr" => std::mem::take(row).with("smpi", icet_ms),
+            _ => continue,
+        };
+    }
+}
+
+/// One rank's times by compositor and frame, and on rank 0 the pixels that differ from the first compositor's.
+struct OneRank {
+    secs: Vec<Vec<f64>>,
+    differ: Vec<u64>,
+}
+
+fn one_rank(
+    comm: &mut SimComm,
+    all: &[(&str, Who)],
+    size: u32,
+    frames: usize,
+    icet: Option<&Path>,
+) -> anyhow::Result<OneRank> {
+    let (rank, ranks) = (comm.rank(), comm.size());
+    let mut drawn = Drawn::new(size, size);
+    let mut ours: Vec<Option<Compositor<DepthPixel<[u8; 4]>>>> = all
+        .iter()
+        .map(|(_, who)| match who {
+            Who::Ours(strategy) => Some(Compositor::new(Options {
+                strategy: *strategy,
+                destination: Destination::Rank(0),
+                depth: false,
+                timeout: TIMEOUT,
+                confirm: false,
+                ..Options::default()
+            })),
+            Who::Icet(_) => None,
+        })
+        .collect();
+    let mut theirs = icet.map(|path| Icet::over_comm(path, comm, IcetMode::Depth, size, size)).transpose()?;
+    let mut out = OneRank { secs: vec![Vec::new(); all.len()], differ: vec![0; all.len()] };
+    for n in 0..=frames {
+        Scene::Discs.draw(n as u64, rank, ranks, &mut drawn);
+        let frame = Frame::with_depth(size, size, &drawn.colors, &drawn.depths)?.bounded(drawn.bounds)?;
+        let mut first: Vec<[u8; 4]> = Vec::new();
+        for (k, (_, who)) in all.iter().enumerate() {
+            comm.barrier(TIMEOUT)?;
+            let begin = comm.now();
+            let image: Option<Vec<[u8; 4]>> = match who {
+                Who::Ours(_) => {
+                    let Some(compositor) = ours[k].as_mut() else { continue };
+                    let image = compositor.composite(comm, &frame)?.image;
+                    let end = comm.now();
+                    out.secs[k].push(end - begin);
+                    image.map(|i| {
+                        let colors = i.colors().to_vec();
+                        compositor.recycle(i);
+                        colors
+                    })
+                }
+                Who::Icet(strategy) => {
+                    let Some(icet) = theirs.as_mut() else { continue };
+                    icet.set_strategy(*strategy);
+                    let pixels = IcetFrame::Depth(&drawn.colors, &drawn.depths);
+                    let image = icet.composite(comm, pixels, drawn.bounds)?;
+                    let end = comm.now();
+                    out.secs[k].push(end - begin);
+                    image.and_then(|i| match i {
+                        rival::IcetImage::Rgba8(colors) => Some(colors.to_vec()),
+                        rival::IcetImage::RgbaF32(_) => None,
+                    })
+                }
+            };
+            if let Some(image) = image {
+                if k == 0 {
+                    first = image;
+                } else {
+                    out.differ[k] += image.iter().zip(&first).filter(|(a, b)| a != b).count() as u64;
+                }
+            }
+        }
+    }
+    // The first frame warmed up.
+    out.secs.iter_mut().for_each(|s| drop(s.drain(..1)));
+    Ok(out)
+}

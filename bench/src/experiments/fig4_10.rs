@@ -1,0 +1,50 @@
+//! Figure 4.10: replicated data, bands of the picture to ranks (section 4.2.3), beside the same scene in parts.
+
+use super::Context;
+use super::many_ranks::{Sharing, cost_columns, frames, powers, with_cost};
+use crate::plot::{Axis, Plot, Series};
+use crate::record::{Record, Row};
+use composite::render::demo::Demo;
+use composite::render::{FrameOptions, Partition, Split};
+
+pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
+    cost_columns(record);
+    record.column("sharing", "", "replicated: every rank has the scene; parts: every rank has a share of it");
+    record.column("speedup", "", "frame time of one rank over that of this many, same sharing");
+    record.notes.push(
+        "The wavelet with a lamp’s shadows and ambient occlusion. Replicated data need a whole scene’s memory on every rank, and then no ray leaves \
+         its rank; parts need a share of it, and rays travel. Both give the picture of one node, bit for bit."
+            .into(),
+    );
+    let (size, pixels, count) = if context.quick { ("1M", 320, 1) } else { ("4M", 1024, 3) };
+    let demo =
+        Demo { size: Some(size.into()), size_px: [pixels; 2], color_by_rank: false, ..Demo::default() };
+    context.say("data")?;
+    let mut prepared = demo.prepare(1, &mut |_, _| true)?;
+    let quick = context.quick;
+    for (name, sharing) in [("replicated", Sharing::RayParallel), ("parts", Sharing::SortLast)] {
+        let mut alone = None;
+        for ranks in powers(1, 64).filter(|r| !quick || matches!(r, 1 | 4 | 16 | 64)) {
+            context.say(format!("{name}, {ranks} ranks"))?;
+            if matches!(sharing, Sharing::SortLast) {
+                prepared.partition = Partition::new(&prepared.scene, ranks, &Split::Triangles);
+            }
+            let measured = frames(&prepared, ranks, count, sharing, &FrameOptions::default())?;
+            let cost = measured.median();
+            let alone: f64 = *alone.get_or_insert(cost.frame_secs);
+            record.rows.push(
+                with_cost(Row::new(), ranks, &measured)
+                    .with("sharing", name)
+                    .with("speedup", alone / cost.frame_secs),
+            );
+        }
+    }
+    let mut plot = Plot::lines("Sharing", Axis::log("ranks", ""), Axis::log("time of a frame", "ms"));
+    for name in ["replicated", "parts"] {
+        let of = record.rows.iter().filter(|r| r.text("sharing") == Some(name));
+        plot.series
+            .push(Series::new(name, of.filter_map(|r| r.number("ranks").zip(r.number("frame"))).collect()));
+    }
+    record.plots.push(plot);
+    Ok(())
+}

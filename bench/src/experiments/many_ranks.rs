@@ -1,0 +1,196 @@
+//! What the experiments of many ranks share: ranks simulated in this process, frames measured, columns and words.
+
+use crate::record::{Record, Row};
+use crate::stats::Summary;
+use composite::Communicator;
+use composite::comm::CommError;
+use composite::comm::sim::{Compute, Network, SimComm, run_on};
+use composite::render::demo::Prepared;
+use composite::render::{Activity, DataParallel, FrameOptions, FrameOutput, RankReport, ray_parallel};
+use rt_core::accel::BuildOptions;
+use std::time::Duration;
+
+/// What stands beside every figure of many ranks.
+pub(super) const CAVEAT: &str = "Computing is measured for real: every rank is a thread, one at a time has a core, and its clock advances by \
+     the processor time of its thread. The network is simulated in this process by the LogGP model of 4X QDR InfiniBand (3.2 GB/s and 1 µs, an \
+     interface per rank that sends and receives one message after the other, nothing in the way between interfaces). Not modelled: contention inside \
+     the network, noise of the operating system, and that a node has its caches and its memory to itself. One thread a rank.";
+
+/// Longest wait for a message, on the ranks' own clocks.
+const TIMEOUT: Duration = Duration::from_secs(600);
+
+/// The network of all these figures.
+pub(super) const NETWORK: Network = Network::QDR;
+
+/// What a frame cost a group of ranks, in seconds.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct FrameCost {
+    /// From the first rank's begin to the last rank's end.
+    pub(super) frame_secs: f64,
+    /// Tracing and shading, mean over the ranks, and the slowest rank.
+    pub(super) render_mean_secs: f64,
+    pub(super) render_max_secs: f64,
+    /// Choosing hits, collecting tiles, messages and waiting: mean over the ranks.
+    pub(super) rest_mean_secs: f64,
+    /// Bytes sent by all ranks.
+    pub(super) bytes: f64,
+    /// Rounds of questions.
+    pub(super) rounds: f64,
+    /// Camera rays of all ranks.
+    pub(super) camera_rays: f64,
+}
+
+impl FrameCost {
+    fn of(reports: &[&RankReport]) -> FrameCost {
+        let begin = reports.iter().map(|r| r.begin_at_secs).fold(f64::INFINITY, f64::min);
+        let end = reports.iter().map(|r| r.begin_at_secs + r.total_secs()).fold(0.0, f64::max);
+        let render =
+            |r: &RankReport| r.secs(Activity::Render) + r.secs(Activity::Shade) + r.secs(Activity::Answer);
+        let mean =
+            |f: &dyn Fn(&RankReport) -> f64| reports.iter().map(|r| f(r)).sum::<f64>() / reports.len() as f64;
+        FrameCost {
+            frame_secs: end - begin,
+            render_mean_secs: mean(&render),
+            render_max_secs: reports.iter().map(|r| render(r)).fold(0.0, f64::max),
+            rest_mean_secs: mean(&|r| r.total_secs() - render(r)),
+            bytes: reports.iter().map(|r| r.bytes_sent as f64).sum(),
+            rounds: reports.iter().map(|r| f64::from(r.rounds)).fold(0.0, f64::max),
+            camera_rays: reports.iter().map(|r| r.camera_rays as f64).sum(),
+        }
+    }
+}
+
+/// Frames of a group, the last one's reports by rank, and how light crossed borders.
+pub(super) struct Frames {
+    /// One per counted frame.
+    pub(super) costs: Vec<FrameCost>,
+    /// Of the last frame.
+    pub(super) last: Vec<RankReport>,
+}
+
+impl Frames {
+    /// The frame of median time.
+    pub(super) fn median(&self) -> FrameCost {
+        let mut sorted = self.costs.clone();
+        sorted.sort_by(|a, b| a.frame_secs.total_cmp(&b.frame_secs));
+        sorted.get(sorted.len() / 2).copied().unwrap_or_default()
+    }
+
+    /// Fastest and slowest frame.
+    pub(super) fn range(&self) -> Option<(f64, f64)> {
+        let s = Summary::of(&self.costs.iter().map(|c| c.frame_secs).collect::<Vec<_>>())?;
+        Some((s.low, s.high))
+    }
+}
+
+/// How the ranks share the work.
+#[derive(Clone, Copy)]
+pub(super) enum Sharing {
+    /// Every rank has a part of the data.
+    SortLast,
+    /// Every rank has all data, and bands of the picture.
+    RayParallel,
+}
+
+/// Renders one frame to warm up and then `frames` counted ones on `ranks` simulated ranks.
+pub(super) fn frames(
+    prepared: &Prepared,
+    ranks: usize,
+    frames: usize,
+    sharing: Sharing,
+    options: &FrameOptions,
+) -> anyhow::Result<Frames> {
+    let outputs = run_on(ranks, NETWORK, Compute::Measured(1.0), 1, |mut comm| {
+        let options = FrameOptions { timeout: TIMEOUT, ..options.clone() };
+        match sharing {
+            Sharing::SortLast => {
+                let part = prepared.partition.part(&prepared.scene, comm.rank(), &BuildOptions::default())?;
+                let mut renderer = DataParallel::new(&mut comm, part, options)?;
+                counted(&mut comm, frames, |comm| {
+                    Ok(renderer.frame(comm, &prepared.camera, &prepared.options)?)
+                })
+            }
+            Sharing::RayParallel => counted(&mut comm, frames, |comm| {
+                let Prepared { scene, camera, options: render, .. } = prepared;
+                Ok(ray_parallel(comm, scene, camera, render, &options)?)
+            }),
+        }
+    });
+    let mut reports: Vec<Vec<RankReport>> = Vec::with_capacity(ranks);
+    for output in outputs {
+        let output: anyhow::Result<Vec<RankReport>> = output?;
+        reports.push(output?);
+    }
+    let costs =
+        (0..frames).map(|f| FrameCost::of(&reports.iter().map(|r| &r[f]).collect::<Vec<_>>())).collect();
+    Ok(Frames { costs, last: reports.into_iter().filter_map(|mut r| r.pop()).collect() })
+}
+
+/// The reports of the counted frames. All ranks begin each frame together.
+fn counted(
+    comm: &mut SimComm,
+    frames: usize,
+    mut frame: impl FnMut(&mut SimComm) -> anyhow::Result<FrameOutput>,
+) -> anyhow::Result<Vec<RankReport>> {
+    let mut reports = Vec::with_capacity(frames);
+    for n in 0..=frames {
+        comm.barrier(TIMEOUT)?;
+        let report = frame(comm)?.report;
+        if n > 0 {
+            reports.push(report);
+        }
+    }
+    Ok(reports)
+}
+
+/// Numbers of ranks that are powers of two, from `first` to `last`.
+pub(super) fn powers(first: usize, last: usize) -> impl Iterator<Item = usize> {
+    std::iter::successors(Some(first), |n| Some(2 * n)).take_while(move |n| *n <= last)
+}
+
+/// Columns of [`with_cost`].
+pub(super) fn cost_columns(record: &mut Record) {
+    record.column("ranks", "", "ranks, one thread each");
+    record.column(
+        "frame",
+        "ms",
+        "median over the frames: from the first rank's begin to the picture on rank 0",
+    );
+    record.column("frame_low", "ms", "fastest frame");
+    record.column("frame_high", "ms", "slowest frame");
+    record.column(
+        "render_mean",
+        "ms",
+        "tracing and shading of the median frame, mean over the ranks (CPU time)",
+    );
+    record.column("render_max", "ms", "the same of the slowest rank");
+    record.column("rest_mean", "ms", "compositing, collecting, messages and waiting, mean over the ranks");
+    record.column("sent", "MB", "bytes sent by all ranks");
+    record.column("camera_rays", "Mray", "camera rays of all ranks: more than pixels where parts overlap");
+    record.notes.push(CAVEAT.into());
+}
+
+/// A row with what frames cost.
+pub(super) fn with_cost(row: Row, ranks: usize, frames: &Frames) -> Row {
+    let c = frames.median();
+    let (low, high) = frames.range().unwrap_or_default();
+    row.with("ranks", ranks)
+        .with("frame", c.frame_secs * 1e3)
+        .with("frame_low", low * 1e3)
+        .with("frame_high", high * 1e3)
+        .with("render_mean", c.render_mean_secs * 1e3)
+        .with("render_max", c.render_max_secs * 1e3)
+        .with("rest_mean", c.rest_mean_secs * 1e3)
+        .with("sent", c.bytes * 1e-6)
+        .with("camera_rays", c.camera_rays * 1e-6)
+}
+
+/// Runs `work` on simulated ranks of which every result must be there.
+pub(super) fn simulated<T: Send>(
+    ranks: usize,
+    work: impl Fn(SimComm) -> anyhow::Result<T> + Sync,
+) -> anyhow::Result<Vec<T>> {
+    let results: Vec<Result<anyhow::Result<T>, CommError>> =
+        run_on(ranks, NETWORK, Compute::Measured(1.0), 1, work);
+    results.into_iter().map(|r| r?).collect()
+}

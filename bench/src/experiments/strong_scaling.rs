@@ -1,0 +1,108 @@
+//! Figures 3.7 to 3.10: strong scaling of data-parallel rendering: the same scene cut into ever more parts.
+
+use super::Context;
+use super::many_ranks::{Sharing, cost_columns, frames, powers, with_cost};
+use crate::picture::save;
+use crate::plot::{Axis, Plot, Series};
+use crate::record::{Picture, Record, Row};
+use anyhow::Context as _;
+use composite::render::demo::Demo;
+use composite::render::{FrameOptions, Partition, Split};
+use composite::threads;
+
+/// Figure 3.7: the mixing layer from outside.
+pub(super) fn rmo(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
+    run(context, record, "mixing-layer", "RMO", ["small", "medium"])
+}
+
+/// Figure 3.8: the mixing layer from within.
+pub(super) fn rmi(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
+    run(context, record, "mixing-layer", "RMI", ["small", "medium"])
+}
+
+/// Figure 3.9: flux ropes, in place of the VPIC simulation.
+pub(super) fn vpic(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
+    run(context, record, "plasma", "whole", ["small", "medium"])
+}
+
+/// Figure 3.10: the wavelet.
+pub(super) fn wavelet(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
+    run(context, record, "wavelet", "orbit", ["1M", "4M"])
+}
+
+fn run(
+    context: &mut Context<'_>,
+    record: &mut Record,
+    data: &str,
+    view: &str,
+    [small, large]: [&str; 2],
+) -> anyhow::Result<()> {
+    cost_columns(record);
+    record.column("light", "", "headlight (no ray leaves a hit), or lamp with shadows and ambient occlusion");
+    record.column("speedup", "", "frame time of one rank over that of this many");
+    record.column("rounds", "", "rounds of questions between ranks");
+    record.column("choice", "", "how light crosses the borders of parts, on rank 0");
+    let quick = context.quick;
+    let (size, pixels, count) = if quick { (small, 320, 1) } else { (large, 1024, 3) };
+    let demo = Demo {
+        data: data.into(),
+        size: Some(size.into()),
+        view: Some(view.into()),
+        size_px: [pixels; 2],
+        color_by_rank: false,
+        ..Demo::default()
+    };
+    for (light, global_light) in [("headlight", false), ("lamp and occlusion", true)] {
+        context.say(format!("{data} {size}, {light}: data"))?;
+        let demo = Demo { global_light, ..demo.clone() };
+        let mut prepared = demo.prepare(1, &mut |_, _| true)?;
+        let mut alone = None;
+        for ranks in powers(1, 128).filter(|r| !quick || matches!(r, 1 | 2 | 8 | 32 | 128)) {
+            context.say(format!("{data} {size}, {light}: {ranks} ranks"))?;
+            prepared.partition = Partition::new(&prepared.scene, ranks, &Split::Triangles);
+            let count = if global_light { 1 } else { count };
+            let measured = frames(&prepared, ranks, count, Sharing::SortLast, &FrameOptions::default())?;
+            let cost = measured.median();
+            let alone: f64 = *alone.get_or_insert(cost.frame_secs);
+            record.rows.push(
+                with_cost(Row::new(), ranks, &measured)
+                    .with("light", light)
+                    .with("speedup", alone / cost.frame_secs)
+                    .with("rounds", cost.rounds)
+                    .with("choice", measured.last.first().map(|r| r.light.clone())),
+            );
+        }
+    }
+    context.say(format!("{data} {size}: picture"))?;
+    record.pictures.push(picture(&demo)?);
+    let mut plot = Plot::lines("Strong scaling", Axis::log("ranks", ""), Axis::log("time of a frame", "ms"));
+    for (light, column, name) in [
+        ("headlight", "frame", "frame, headlight"),
+        ("headlight", "render_max", "slowest rank’s render, headlight"),
+        ("lamp and occlusion", "frame", "frame, lamp and occlusion"),
+        ("lamp and occlusion", "render_max", "slowest rank’s render, lamp and occlusion"),
+    ] {
+        let of = record.rows.iter().filter(|r| r.text("light") == Some(light));
+        plot.series
+            .push(Series::new(name, of.filter_map(|r| r.number("ranks").zip(r.number(column))).collect()));
+    }
+    record.plots.push(plot);
+    Ok(())
+}
+
+/// The scene in eight parts, each in a colour of its own.
+fn picture(demo: &Demo) -> anyhow::Result<Picture> {
+    const RANKS: usize = 8;
+    let demo = Demo { color_by_rank: true, global_light: true, ..demo.clone() };
+    let prepared = demo.prepare(RANKS, &mut |_, _| true)?;
+    let mut outputs = threads::run(RANKS, |mut comm| prepared.run(&mut comm, &FrameOptions::default()));
+    let frame = outputs.swap_remove(0)??.frame.context("rank 0 has the picture")?;
+    Ok(Picture {
+        name: format!("{}-{}-parts", demo.data, demo.view.unwrap_or_default()),
+        caption: format!(
+            "{} in {RANKS} parts, a colour for each rank, rendered by {RANKS} ranks: shadows and ambient occlusion cross the borders of parts.",
+            demo.data
+        ),
+        png: save::png_bytes(&frame)?,
+    })
+}

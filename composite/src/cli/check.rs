@@ -1,0 +1,199 @@
+//! `composite check`: does this machine's transport carry every strategy to the bits of the serial reference? And, for tests, do faults
+//! end as they should?
+use super::ranks::{RankArgs, RankComm};
+use crate::compositor::{Options, composite};
+use crate::frame::Frame;
+use crate::pixel::{Composite, DepthPixel, PremultipliedPixel};
+use crate::reference::composite_serial;
+use crate::scenes::{Drawn, Scene};
+use crate::strategies::Strategy;
+use datasets::cli::{CommonArgs, Status};
+use serde::Serialize;
+use std::ffi::OsString;
+use std::time::Duration;
+
+/// Arguments of `composite check`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    composite check --ranks 5 --mpi\n  \
+    mpirun -n 64 --hostfile nodes composite check --mpi")]
+pub(super) struct CheckArgs {
+    #[command(flatten)]
+    ranks: RankArgs,
+    /// Let the highest rank fail in this way
+    #[arg(long, hide = true)]
+    fault: Option<Fault>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Fault {
+    /// Ended by a signal, as when memory runs out.
+    Killed,
+    /// Alive, but busy with something else.
+    Stalled,
+    /// A panic.
+    Panic,
+    /// Composites another size.
+    Size,
+    /// Calls a barrier while the others composite.
+    Order,
+    /// Returns early and leaves.
+    Leaves,
+}
+
+/// Odd sizes, fewer pixels than ranks, and one that needs more than one word a row.
+const SIZES_PX: [(u32, u32); 4] = [(1, 1), (7, 3), (67, 5), (150, 41)];
+const STRATEGIES: [Strategy; 5] = [
+    Strategy::DirectSend,
+    Strategy::Tree,
+    Strategy::BinarySwap,
+    Strategy::RadixK { k: 2 },
+    Strategy::RadixK { k: 8 },
+];
+
+#[derive(Debug, Serialize)]
+struct Checked {
+    ranks: usize,
+    transport: String,
+    images: u64,
+    images_differ: u64,
+}
+
+pub(super) fn check(common: CommonArgs, args: &CheckArgs, arguments: &[OsString]) -> anyhow::Result<Status> {
+    args.ranks.run(
+        common,
+        arguments,
+        |comm| {
+            let timeout = args.ranks.timeout();
+            if let Some(fault) = args.fault {
+                fail(comm, fault, timeout)?;
+            }
+            let transport = comm.transport();
+            let (mut images, mut images_differ) = (0, 0);
+            for scene in Scene::ALL {
+                for size_px in SIZES_PX {
+                    for strategy in STRATEGIES {
+                        for same in one_frame(comm, scene, size_px, strategy, timeout)? {
+                            images += 1;
+                            images_differ += u64::from(!same);
+                        }
+                    }
+                }
+            }
+            big_messages(comm, timeout)?;
+            Ok(Checked { ranks: comm.comm().size(), transport, images, images_differ })
+        },
+        |checked| {
+            common.result(&checked, || {
+                format!(
+                    "{} ranks over {}: {} images, {} differ from the serial reference",
+                    checked.ranks, checked.transport, checked.images, checked.images_differ
+                )
+            })?;
+            Ok(if checked.images_differ == 0 { Status::Success } else { Status::Failure })
+        },
+    )
+}
+
+/// Composites one scene with depth and blended; on rank 0, whether each image has the bits of the reference.
+fn one_frame(
+    comm: &mut RankComm,
+    scene: Scene,
+    (width_px, height_px): (u32, u32),
+    strategy: Strategy,
+    timeout: Duration,
+) -> anyhow::Result<Vec<bool>> {
+    let (rank, ranks) = (comm.comm().rank(), comm.comm().size());
+    let draw = |rank: usize| {
+        let mut drawn = Drawn::new(width_px, height_px);
+        scene.draw(1, rank, ranks, &mut drawn);
+        let mut glass = Vec::new();
+        drawn.premultiplied(&mut glass);
+        (drawn, glass)
+    };
+    let (drawn, glass) = draw(rank);
+    let order = scene.front_to_back(1, ranks);
+    // Everybody's frames, in the order of compositing, where they are compared.
+    let everybody: Vec<_> =
+        if rank == 0 { order.iter().map(|&rank| draw(rank)).collect() } else { Vec::new() };
+    let options = Options { strategy, order: Some(order), timeout, ..Options::default() };
+    let comm = comm.comm();
+
+    let frame = Frame::<DepthPixel<[u8; 4]>>::with_depth(width_px, height_px, &drawn.colors, &drawn.depths)?;
+    let depth = composite(comm, &frame, &options)?.image;
+    let frame = Frame::<PremultipliedPixel<[f32; 4]>>::premultiplied(width_px, height_px, &glass)?;
+    let blend = composite(comm, &frame, &options)?.image;
+
+    let mut same = Vec::new();
+    if let Some(image) = depth {
+        let frames: Result<Vec<_>, _> = everybody
+            .iter()
+            .map(|(drawn, _)| Frame::with_depth(width_px, height_px, &drawn.colors, &drawn.depths))
+            .collect();
+        same.push(bits_are_equal(&image, &composite_serial(&frames?)?));
+    }
+    if let Some(image) = blend {
+        let frames: Result<Vec<_>, _> =
+            everybody.iter().map(|(_, glass)| Frame::premultiplied(width_px, height_px, glass)).collect();
+        same.push(bits_are_equal(&image, &composite_serial(&frames?)?));
+    }
+    Ok(same)
+}
+
+fn bits_are_equal<P: Composite>(a: &crate::Image<P>, b: &crate::Image<P>) -> bool {
+    a.to_bytes() == b.to_bytes()
+}
+
+/// Messages of many lengths around the ring, each byte checked.
+fn big_messages(comm: &mut RankComm, timeout: Duration) -> anyhow::Result<()> {
+    let comm = comm.comm();
+    let (rank, size) = (comm.rank(), comm.size());
+    let byte = |rank: usize, at: usize| (at.wrapping_mul(31) ^ rank ^ (at >> 8)) as u8;
+    let (next, previous) = ((rank + 1) % size, (rank + size - 1) % size);
+    const LENGTHS: [usize; 9] = [0, 1, 999, 1000, 1001, 2000, 65_536, 100_000, 3_000_000];
+    // All are posted before the first is sent, and taken in the order of arrival.
+    let mut posted = Vec::new();
+    for length in LENGTHS {
+        posted.push(comm.post_recv(previous, 77, length)?);
+    }
+    for length in LENGTHS {
+        comm.send(next, 77, (0..length).map(|at| byte(rank, at)).collect())?;
+    }
+    let mut seen = Vec::new();
+    while !posted.is_empty() {
+        let message = comm.wait_any(&mut posted, timeout)?.message;
+        let good = message.iter().enumerate().all(|(at, &found)| found == byte(previous, at));
+        anyhow::ensure!(good, "a message of {} bytes from rank {previous} has changed", message.len());
+        seen.push(message.len());
+        comm.recycle(message);
+    }
+    anyhow::ensure!(seen == LENGTHS, "messages came as {seen:?} instead of {LENGTHS:?}");
+    Ok(())
+}
+
+/// What the highest rank does instead of its part.
+fn fail(comm: &mut RankComm, fault: Fault, timeout: Duration) -> anyhow::Result<()> {
+    let comm = comm.comm();
+    if comm.rank() + 1 != comm.size() {
+        return Ok(());
+    }
+    match fault {
+        Fault::Killed => {
+            let me = std::process::id().to_string();
+            std::process::Command::new("kill").args(["-9", &me]).status()?;
+            Ok(())
+        }
+        Fault::Stalled => {
+            std::thread::sleep(10 * timeout);
+            Ok(())
+        }
+        Fault::Panic => panic!("on purpose"),
+        Fault::Size => {
+            let frame = Frame::<DepthPixel<[u8; 4]>>::with_depth(2, 1, &[[1; 4]; 2], &[0.5; 2])?;
+            composite(comm, &frame, &Options { timeout, ..Options::default() })?;
+            Ok(())
+        }
+        Fault::Order => Ok(comm.barrier(timeout)?),
+        Fault::Leaves => anyhow::bail!("this rank has had enough"),
+    }
+}

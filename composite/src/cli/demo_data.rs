@@ -1,0 +1,182 @@
+//! `composite demo` of a data set: generated, cut into parts, rendered by all ranks.
+use super::demo::DemoArgs;
+use super::ranks::RankComm;
+use super::timeline;
+use crate::render::demo::{Demo, Prepared};
+use crate::render::{Activity, DataParallel, FrameOptions, Light, RankReport, Span};
+use anyhow::Context as _;
+use datasets::cli::{CommonArgs, Status, UsageError};
+use datasets::image_io::{Picture, PngDepth, write_png};
+use rt_core::accel::BuildOptions;
+use serde::{Deserialize, Serialize};
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// What one rank did in the frame that is shown.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct RankLine {
+    pub(super) rank: usize,
+    pub(super) triangles: usize,
+    /// Milliseconds by activity, in the order of [`Activity::ALL`].
+    pub(super) render_ms: f64,
+    pub(super) composite_ms: f64,
+    pub(super) shade_ms: f64,
+    pub(super) answer_ms: f64,
+    pub(super) exchange_ms: f64,
+    pub(super) collect_ms: f64,
+    pub(super) total_ms: f64,
+    pub(super) camera_rays: u64,
+    pub(super) answered_rays: u64,
+    pub(super) rounds: u32,
+    pub(super) bytes_sent: u64,
+    /// Activity (place in [`Activity::ALL`]), begin and end in milliseconds.
+    pub(super) spans: Vec<(usize, f64, f64)>,
+}
+
+impl RankLine {
+    fn new(rank: usize, triangles: usize, report: &RankReport) -> Self {
+        let ms = |activity| 1e3 * report.secs(activity);
+        let span = |s: &Span| {
+            let place = Activity::ALL.iter().position(|a| *a == s.activity).unwrap_or(0);
+            (place, 1e3 * s.begin_secs, 1e3 * s.end_secs)
+        };
+        Self {
+            rank,
+            triangles,
+            render_ms: ms(Activity::Render),
+            composite_ms: ms(Activity::Composite),
+            shade_ms: ms(Activity::Shade),
+            answer_ms: ms(Activity::Answer),
+            exchange_ms: ms(Activity::Exchange),
+            collect_ms: ms(Activity::Collect),
+            total_ms: 1e3 * report.total_secs(),
+            camera_rays: report.camera_rays,
+            answered_rays: report.answered_rays,
+            rounds: report.rounds,
+            bytes_sent: report.bytes_sent,
+            spans: report.spans.iter().map(span).collect(),
+        }
+    }
+}
+
+#[derive(Debug, Serialize)]
+struct Shown {
+    transport: String,
+    data: String,
+    size_px: u32,
+    frame_ms: f64,
+    light: String,
+    picture: PathBuf,
+    plot: PathBuf,
+    ranks: Vec<RankLine>,
+}
+
+/// The frame that is shown, on rank 0.
+struct Finished {
+    transport: String,
+    light: String,
+    colors: Vec<[f32; 4]>,
+    lines: Vec<RankLine>,
+}
+
+pub(super) fn demo(common: CommonArgs, args: &DemoArgs, arguments: &[OsString]) -> anyhow::Result<Status> {
+    let wanted = Demo {
+        data: args.data.clone(),
+        size: args.data_size.clone(),
+        view: args.view.clone(),
+        size_px: [args.size; 2],
+        global_light: !args.headlight,
+        color_by_rank: !args.grey,
+        cut_by_view: args.cut_by_view,
+        ..Demo::default()
+    };
+    // Ranks that are threads share what is made before the frame.
+    let shared: Mutex<Option<Arc<Prepared>>> = Mutex::new(None);
+    args.ranks.run(
+        common,
+        arguments,
+        |comm| {
+            let ranks = comm.comm().size();
+            let prepared = {
+                let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
+                match &*shared {
+                    Some(prepared) => prepared.clone(),
+                    None => {
+                        let prepared = wanted.prepare(ranks, &mut |_, _| true);
+                        let prepared = Arc::new(prepared.map_err(|e| match e {
+                            crate::render::demo::DemoError::Frame(e) => anyhow::Error::new(e),
+                            e => UsageError(e.to_string()).into(),
+                        })?);
+                        shared.insert(prepared).clone()
+                    }
+                }
+            };
+            frames(comm, args, &prepared)
+        },
+        |f: Finished| finish(common, args, f),
+    )
+}
+
+fn finish(common: CommonArgs, args: &DemoArgs, f: Finished) -> anyhow::Result<Status> {
+    std::fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
+    let (picture, plot) = (args.out.join("composite_demo.png"), args.out.join("composite_demo.svg"));
+    let mut png = Picture::new(args.size, args.size);
+    png.add_rgba(&f.colors)?;
+    write_png(&picture, &png, PngDepth::Eight)?;
+    let frame_ms = f.lines.iter().map(|l| l.total_ms).fold(0.0, f64::max);
+    let title = format!(
+        "{} in {} parts over {}, {}x{}: {frame_ms:.2} ms",
+        args.data,
+        f.lines.len(),
+        f.transport,
+        args.size,
+        args.size
+    );
+    std::fs::write(&plot, timeline::svg(&title, &f.lines)).with_context(|| plot.display().to_string())?;
+    let shown = Shown {
+        transport: f.transport,
+        data: args.data.clone(),
+        size_px: args.size,
+        frame_ms,
+        light: f.light,
+        picture,
+        plot,
+        ranks: f.lines,
+    };
+    common.result(&shown, || {
+        format!(
+            "{title}\nlight: {}\n{}\npicture: {}\nplot:    {}",
+            shown.light,
+            timeline::table(&shown.ranks),
+            shown.picture.display(),
+            shown.plot.display()
+        )
+    })?;
+    Ok(Status::Success)
+}
+
+fn frames(comm: &mut RankComm, args: &DemoArgs, prepared: &Prepared) -> anyhow::Result<Finished> {
+    let (timeout, transport) = (args.ranks.timeout(), comm.transport());
+    let comm = comm.comm();
+    let rank = comm.rank();
+    let part = prepared.partition.part(&prepared.scene, rank, &BuildOptions::default())?;
+    let triangles = part.primitives();
+    let options = FrameOptions { timeout, light: Light::Auto { frames: 100 }, ..FrameOptions::default() };
+    let mut renderer = DataParallel::new(comm, part, options)?;
+    let (mut colors, mut report) = (Vec::new(), RankReport::default());
+    for _ in 0..args.frames {
+        comm.barrier(timeout)?;
+        let done = renderer.frame(comm, &prepared.camera, &prepared.options)?;
+        colors = done.frame.map(|f| f.color).unwrap_or(colors);
+        report = done.report;
+    }
+    // Lengths first: how many spans a rank has is its own affair.
+    let mine = serde_json::to_vec(&RankLine::new(rank, triangles, &report))?;
+    let lengths = comm.all_gather(&(mine.len() as u64).to_le_bytes(), 8, timeout)?;
+    let length = |bytes: &Vec<u8>| bytes.as_slice().try_into().map_or(0, u64::from_le_bytes) as usize;
+    let longest = lengths.iter().map(length).max().unwrap_or(0);
+    let all = comm.all_gather(&mine, longest, timeout)?;
+    let lines = all.iter().map(|bytes| serde_json::from_slice(bytes)).collect::<Result<_, _>>()?;
+    Ok(Finished { transport, light: report.light, colors, lines })
+}

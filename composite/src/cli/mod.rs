@@ -1,0 +1,61 @@
+//! The command line: ranks are started, or joined, and one of the jobs below is done on them.
+
+mod check;
+mod compare;
+mod demo;
+mod demo_data;
+mod doctor;
+mod gantt;
+mod mpirun;
+mod ranks;
+mod smpirun;
+mod timeline;
+
+use clap::{Parser, Subcommand};
+use datasets::cli::{CommonArgs, CompletionsArgs, Status, status_of};
+use std::ffi::OsString;
+
+/// Brings the images of many ranks together into one.
+///
+/// Ranks are threads of this process (--threads), processes of an MPI job (--mpi) or simulated (--smpi).
+#[derive(Debug, Parser)]
+#[command(name = "composite", version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    #[command(flatten)]
+    common: CommonArgs,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Measures against IceT, on the same ranks and frames
+    Compare(compare::CompareArgs),
+    /// Composites partitioned frames and shows what each rank did when
+    Demo(demo::DemoArgs),
+    /// Checks every strategy against the serial reference on the ranks it is run on
+    Check(check::CheckArgs),
+    /// Tells which MPI, SimGrid and IceT there are, and what to do about those that are not
+    Doctor,
+    /// Prints a completion script for a shell
+    Completions(CompletionsArgs),
+}
+
+/// Runs the program. Exit codes: 0 done, 1 failed, 2 wrong usage or something missing, 130 interrupted.
+pub fn main(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> Status {
+    let arguments: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
+    status_of(execute(&arguments))
+}
+
+fn execute(arguments: &[OsString]) -> anyhow::Result<Status> {
+    let cli = Cli::try_parse_from(arguments)?;
+    let common = cli.common;
+    let own = arguments.get(1..).unwrap_or_default();
+    match cli.command {
+        Command::Compare(args) => compare::compare(common, &args, own),
+        Command::Demo(args) => demo::demo(common, &args, own),
+        Command::Check(args) => check::check(common, &args, own),
+        Command::Doctor => doctor::doctor(common),
+        Command::Completions(args) => args.print::<Cli>().map(Into::into),
+    }
+}

@@ -1,0 +1,179 @@
+//! Where the ranks of a job run, and how they are started.
+use super::{mpirun, smpirun};
+use crate::comm::mpi::{MpiComm, launcher};
+use crate::comm::{CommError, Communicator, threads};
+use crate::error::CompositeError;
+use datasets::cli::{CommonArgs, Status, UsageError};
+use std::ffi::OsString;
+use std::time::Duration;
+
+/// The largest job that is started: more threads or processes on one machine measure nothing.
+const MOST_RANKS: usize = 4096;
+
+/// What every job takes.
+#[derive(Debug, clap::Args)]
+pub(super) struct RankArgs {
+    /// Number of ranks; under an MPI launcher those it has started
+    #[arg(long, short = 'n', value_name = "N")]
+    ranks: Option<usize>,
+    /// Ranks are threads of this process (the default)
+    #[arg(long, group = "where")]
+    threads: bool,
+    /// Ranks are processes of an MPI job; mpirun is started unless this already is a rank
+    #[arg(long, group = "where")]
+    mpi: bool,
+    /// Ranks are simulated by SimGrid on a network of 4X QDR InfiniBand
+    #[arg(long, group = "where")]
+    smpi: bool,
+    /// Longest wait for one message, in seconds
+    #[arg(long, default_value_t = 60.0, value_name = "SECONDS")]
+    timeout: f64,
+    /// Cut messages over MPI into chunks of this many bytes, as those of more than 1 GiB are
+    #[arg(long, hide = true, default_value_t = 1 << 30)]
+    chunk_bytes: usize,
+}
+
+/// One rank, whatever it is.
+pub(super) enum RankComm {
+    Thread(threads::ThreadComm),
+    Mpi(Box<MpiComm>),
+}
+
+impl RankComm {
+    pub(super) fn comm(&mut self) -> &mut dyn Communicator {
+        match self {
+            Self::Thread(comm) => comm,
+            Self::Mpi(comm) => &mut **comm,
+        }
+    }
+
+    /// What carries the messages.
+    pub(super) fn transport(&self) -> String {
+        match self {
+            Self::Thread(_) => "threads".to_string(),
+            Self::Mpi(comm) => comm.library_version().to_string(),
+        }
+    }
+
+    fn place(&self) -> String {
+        match self {
+            Self::Thread(comm) => format!("rank {}", comm.rank()),
+            Self::Mpi(comm) => format!("rank {} on {}", comm.rank(), comm.processor_name()),
+        }
+    }
+}
+
+impl RankArgs {
+    pub(super) fn timeout(&self) -> Duration {
+        Duration::from_secs_f64(self.timeout.clamp(0.001, 1e6))
+    }
+
+    /// Simulated ranks share this machine's processors, so a frame of all of them takes long.
+    pub(super) fn is_simulated(&self) -> bool {
+        self.smpi
+    }
+
+    fn is_rank(&self) -> bool {
+        smpirun::inside() || (self.mpi && launcher::launched(|name| std::env::var(name).ok()))
+    }
+
+    fn count(&self) -> Result<usize, UsageError> {
+        match self.ranks.unwrap_or(4) {
+            0 => Err(UsageError("0 ranks can do nothing; give at least 1".to_string())),
+            many if many > MOST_RANKS => Err(UsageError(format!(
+                "{many} ranks on one machine are too many; give at most {MOST_RANKS}"
+            ))),
+            ranks => Ok(ranks),
+        }
+    }
+
+    /// Does `work` on every rank, starting them if this is not one, and hands what rank 0 made to `finish`. `arguments` are this
+    /// program's own, for processes that are to do the same.
+    pub(super) fn run<T: Send>(
+        &self,
+        common: CommonArgs,
+        arguments: &[OsString],
+        work: impl Fn(&mut RankComm) -> anyhow::Result<T> + Sync,
+        finish: impl FnOnce(T) -> anyhow::Result<Status>,
+    ) -> anyhow::Result<Status> {
+        if self.is_rank() {
+            return self.run_as_rank(work, finish);
+        }
+        let ranks = self.count()?;
+        if self.mpi {
+            return mpirun::start(common, ranks, arguments);
+        }
+        if self.smpi {
+            return smpirun::start(common, ranks, arguments);
+        }
+        let results = threads::run(ranks, |comm| {
+            let mut comm = RankComm::Thread(comm);
+            let result = work(&mut comm);
+            if let Err(error) = &result {
+                comm.comm().abort(&format!("{error:#}"));
+            }
+            result
+        });
+        let mut root = None;
+        let mut first_error: Option<anyhow::Error> = None;
+        for (rank, result) in results.into_iter().enumerate() {
+            match result.map_err(anyhow::Error::from).and_then(|inner| inner) {
+                Ok(value) if rank == 0 => root = Some(value),
+                Ok(_) => {}
+                // That somebody gave up is said by all; why, by that one.
+                Err(error) => {
+                    if first_error.as_ref().is_none_or(is_echo) {
+                        first_error = Some(error.context(format!("rank {rank}")));
+                    }
+                }
+            }
+        }
+        match (first_error, root) {
+            (Some(error), _) => Err(error),
+            (None, Some(value)) => finish(value),
+            (None, None) => Ok(Status::Success),
+        }
+    }
+
+    fn run_as_rank<T>(
+        &self,
+        work: impl Fn(&mut RankComm) -> anyhow::Result<T>,
+        finish: impl FnOnce(T) -> anyhow::Result<Status>,
+    ) -> anyhow::Result<Status> {
+        let mut comm = RankComm::Mpi(Box::new(MpiComm::with_chunks(self.chunk_bytes)?));
+        let size = comm.comm().size();
+        let result = match self.ranks {
+            Some(wanted) if wanted != size => Err(anyhow::Error::new(UsageError(format!(
+                "--ranks {wanted}, but the launcher has started {size}: leave --ranks out, or start {wanted}"
+            )))),
+            _ => work(&mut comm),
+        };
+        match result {
+            Ok(value) => {
+                if comm.comm().rank() == 0 {
+                    finish(value)
+                } else {
+                    Ok(Status::Success)
+                }
+            }
+            Err(error) => {
+                eprintln!("error: {}: {error:#}", comm.place());
+                comm.comm().abort(&format!("{error:#}"));
+                let status = if error.is::<UsageError>() { Status::Usage } else { Status::Failure };
+                if let RankComm::Mpi(comm) = comm {
+                    comm.end_job(status as i32);
+                }
+                Ok(status)
+            }
+        }
+    }
+}
+
+/// Whether an error only says that another rank has one.
+fn is_echo(error: &anyhow::Error) -> bool {
+    let of_comm = |error: &CommError| matches!(error, CommError::Aborted { .. } | CommError::PeerLost { .. });
+    error.chain().any(|cause| {
+        cause.downcast_ref::<CommError>().is_some_and(of_comm)
+            || matches!(cause.downcast_ref::<CompositeError>(), Some(CompositeError::Comm(inner)) if of_comm(inner))
+    })
+}

@@ -1,0 +1,51 @@
+//! Why there is no MPI to talk over.
+
+/// Why MPI could not be started.
+#[derive(Debug, thiserror::Error, Clone, PartialEq, Eq)]
+pub enum MpiError {
+    /// The process was not started by a launcher.
+    #[error(
+        "this process was not started by an MPI launcher: start it with `mpirun -n RANKS ...`, \
+         or name the library in COMPOSITE_MPI (openmpi, mpich or a path)"
+    )]
+    NotLaunched,
+    /// No library could be loaded.
+    #[error(
+        "no MPI library for this launcher ({reason}): {tried}: install it (Debian: openmpi-bin or mpich), \
+         or name the library in COMPOSITE_MPI"
+    )]
+    NoLibrary {
+        /// Why these libraries were looked for.
+        reason: String,
+        /// The loader's words about each.
+        tried: String,
+    },
+    /// The library lacks a function.
+    #[error("{library} has no function {symbol}: it is no MPI library, or an old one")]
+    MissingSymbol {
+        /// Which library.
+        library: String,
+        /// Which function.
+        symbol: String,
+    },
+    /// The library's binary interface is not known.
+    #[error(
+        "the MPI library calls itself `{version}`, whose binary interface is not known here: \
+         use Open MPI 4 or 5, MPICH 3 or 4 (or a library with MPICH's ABI), or SimGrid's SMPI 3"
+    )]
+    UnknownAbi {
+        /// First line of what the library says of itself.
+        version: String,
+    },
+    /// A second communicator for all ranks of the job.
+    #[error("MPI was started before in this process: keep the communicator that was made then")]
+    StartedTwice,
+    /// A call failed while starting.
+    #[error("{call} failed while starting MPI: {reason}")]
+    Call {
+        /// Which call.
+        call: String,
+        /// The library's words.
+        reason: String,
+    },
+}

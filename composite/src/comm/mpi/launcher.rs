@@ -1,0 +1,106 @@
+//! Which MPI a process belongs to: the one whose launcher started it.
+use super::MpiError;
+
+/// Names this variable may have, or the path of a library.
+pub const CHOICE_VARIABLE: &str = "COMPOSITE_MPI";
+
+/// Libraries to look for, in this order.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Choice {
+    /// File names, as for `dlopen`.
+    pub libraries: Vec<String>,
+    /// Why these.
+    pub reason: String,
+}
+
+/// File names of Open MPI's library.
+pub const OPEN_MPI: &[&str] = &["libmpi.so.40", "libmpi.so"];
+/// File names of MPICH's library; Intel MPI and MVAPICH use the second.
+pub const MPICH: &[&str] = &["libmpich.so.12", "libmpi.so.12", "libmpich.so"];
+
+/// Whether this process looks like a rank of an MPI job.
+pub fn launched(variable: impl Fn(&str) -> Option<String>) -> bool {
+    choose(variable).is_ok()
+}
+
+/// Chooses by the variables that launchers set for their ranks.
+///
+/// # Errors
+/// [`MpiError::NotLaunched`] if there are none.
+pub fn choose(variable: impl Fn(&str) -> Option<String>) -> Result<Choice, MpiError> {
+    let choice = |names: &[&str], reason: String| {
+        Ok(Choice { libraries: names.iter().map(ToString::to_string).collect(), reason })
+    };
+    if let Some(wish) = variable(CHOICE_VARIABLE).filter(|wish| !wish.is_empty()) {
+        let reason = format!("{CHOICE_VARIABLE}={wish}");
+        return match wish.as_str() {
+            "openmpi" => choice(OPEN_MPI, reason),
+            "mpich" => choice(MPICH, reason),
+            path => choice(&[path], reason),
+        };
+    }
+    if variable("OMPI_COMM_WORLD_RANK").is_some() {
+        return choice(OPEN_MPI, "OMPI_COMM_WORLD_RANK is set".to_string());
+    }
+    // Hydra and its relatives (MPICH, Intel MPI, MVAPICH), and Slurm with PMI 1 or 2, which those use.
+    if variable("PMI_RANK").is_some() {
+        return choice(MPICH, "PMI_RANK is set".to_string());
+    }
+    // PMIx alone: Slurm or PRRTE, which Open MPI 5 uses.
+    if variable("PMIX_RANK").is_some() {
+        return choice(OPEN_MPI, "PMIX_RANK is set".to_string());
+    }
+    Err(MpiError::NotLaunched)
+}
+
+/// Ranks of this job on this machine, as far as the launcher tells.
+pub(super) fn ranks_here(variable: impl Fn(&str) -> Option<String>) -> Option<usize> {
+    ["OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS"]
+        .iter()
+        .find_map(|name| variable(name).and_then(|value| value.parse().ok()))
+}
+
+/// Processors of this machine. What the standard library says is less where the launcher has bound each rank to its own.
+pub(super) fn processors_here() -> usize {
+    let online = std::fs::read_to_string("/sys/devices/system/cpu/online").unwrap_or_default();
+    count_ranges(online.trim()).unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+}
+
+/// How many numbers are in a list like `0-3,8`.
+fn count_ranges(list: &str) -> Option<usize> {
+    list.split(',').try_fold(0, |count, range| {
+        let (first, last) = range.split_once('-').unwrap_or((range, range));
+        let (first, last): (usize, usize) = (first.parse().ok()?, last.parse().ok()?);
+        Some(count + last.checked_sub(first)? + 1)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn with(set: &[(&str, &str)]) -> Result<Choice, MpiError> {
+        choose(|name| set.iter().find(|(n, _)| *n == name).map(|(_, value)| value.to_string()))
+    }
+
+    #[test]
+    fn each_launcher_gets_its_own_library_and_the_user_the_last_word() {
+        assert_eq!(with(&[("OMPI_COMM_WORLD_RANK", "0")]).unwrap().libraries[0], "libmpi.so.40");
+        assert_eq!(with(&[("PMI_RANK", "1")]).unwrap().libraries[0], "libmpich.so.12");
+        let both = with(&[("OMPI_COMM_WORLD_RANK", "0"), ("COMPOSITE_MPI", "/opt/x/libmpi.so")]).unwrap();
+        assert_eq!(both.libraries, ["/opt/x/libmpi.so"]);
+        assert_eq!(with(&[("COMPOSITE_MPI", "mpich")]).unwrap().libraries[0], "libmpich.so.12");
+    }
+
+    #[test]
+    fn processors_are_counted_from_ranges() {
+        assert_eq!(["0", "0-1", "0-3,8", ""].map(count_ranges), [Some(1), Some(2), Some(5), None]);
+        assert!(processors_here() >= 1);
+    }
+
+    #[test]
+    fn without_a_launcher_the_error_says_how_to_start() {
+        let text = with(&[]).unwrap_err().to_string();
+        assert!(text.contains("mpirun") && text.contains(CHOICE_VARIABLE), "{text}");
+    }
+}

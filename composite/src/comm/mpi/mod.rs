@@ -1,0 +1,380 @@
+//! Ranks as processes of an MPI job: Open MPI, MPICH or SimGrid's SMPI, whichever started them.
+//!
+//! The library is looked for when the program runs (`dlopen`), so that one binary serves all and building needs none. Which one
+//! is the launcher's choice ([`launcher`]); what calls itself by an unknown name is refused ([`Abi`]).
+//!
+//! Faults: waits poll, so they end at their timeout; a rank that gives up tells the others by a notice. MPI itself cannot go on
+//! after that, so a program ends with [`MpiComm::end_job`]. A killed rank is noticed by the launcher, which ends the job (Open
+//! MPI and MPICH both do). Under SMPI time is simulated and waits block: SimGrid itself finds ranks that wait for ever.
+#![allow(unsafe_code, reason = "calls into an MPI library found at run time")]
+
+mod abi;
+mod clock;
+mod error;
+pub mod launcher;
+mod library;
+mod notice;
+mod transfer;
+
+pub use abi::Abi;
+pub use error::MpiError;
+pub use library::inspect;
+pub(crate) use library::{Handle, Mpi};
+
+use super::{Arrival, CommError, Communicator, Receive};
+use clock::Clock;
+use notice::{Notice, Notices};
+use std::ffi::c_int;
+use std::rc::Rc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use transfer::Transfers;
+
+/// Bytes of a full chunk: MPI counts in `int`, and some transports have trouble near 2 GiB.
+const CHUNK_BYTES: usize = 1 << 30;
+/// `MPI_THREAD_FUNNELED` in all three ABIs: there may be other threads, but this one calls.
+const FUNNELED: c_int = 1;
+/// How long a message of a rank that has left may still be on its way.
+const LAST_MESSAGES: Duration = Duration::from_millis(200);
+/// How long a rank that leaves waits for its messages to be taken.
+const PARTING: Duration = Duration::from_secs(2);
+/// Messages on their way from which on a sender looks which of them have left.
+const REAP_AT: usize = 16;
+/// Polls before the processor is offered to others, where every rank has its own.
+const SPINS: u32 = 2000;
+/// Offers of the processor before a rank sleeps, where ranks share processors.
+const YIELDS: u32 = 100;
+/// How long it sleeps then.
+const NAP: Duration = Duration::from_micros(20);
+/// How often a waiting rank looks for notices.
+const NOTICE_INTERVAL: Duration = Duration::from_millis(1);
+
+/// All ranks of the MPI job that this process belongs to. There is one per process; it is used by the thread that made it.
+///
+/// Dropping it leaves the group and ends MPI (`MPI_Finalize`) if this object started it, unless the group was aborted.
+pub struct MpiComm {
+    mpi: Rc<Mpi>,
+    rank: usize,
+    size: usize,
+    clock: Clock,
+    transfers: Transfers,
+    notices: Notices,
+    left: Vec<bool>,
+    aborted: Option<(usize, String)>,
+    /// Whether there are more ranks here than processors.
+    oversubscribed: bool,
+    finalize: bool,
+}
+
+static STARTED: AtomicBool = AtomicBool::new(false);
+
+impl MpiComm {
+    /// Starts MPI, if nobody has yet, with all ranks of the job.
+    ///
+    /// # Errors
+    /// [`MpiError`]: no launcher, no library, one with an unknown binary interface, or a second call.
+    pub fn world() -> Result<Self, MpiError> {
+        Self::with_chunks(CHUNK_BYTES)
+    }
+
+    /// As [`world`](Self::world), with messages cut into chunks of this many bytes; for tests, because 1 GiB takes long.
+    ///
+    /// # Errors
+    /// As [`world`](Self::world).
+    pub fn with_chunks(chunk_bytes: usize) -> Result<Self, MpiError> {
+        let chunk_bytes = chunk_bytes.clamp(1, CHUNK_BYTES);
+        let mut mpi = Mpi::load()?;
+        // Under SMPI all ranks share this library's statics unless it is privatised, and each rank has its own world.
+        if mpi.abi != Abi::Smpi && STARTED.swap(true, Ordering::SeqCst) {
+            return Err(MpiError::StartedTwice);
+        }
+
+        // Start, unless the program around us has.
+        let mut initialized: c_int = 0;
+        let check = |mpi: &Mpi, call: &str, code: c_int| match code {
+            0 => Ok(()),
+            _ => Err(MpiError::Call { call: call.to_string(), reason: mpi.words(code) }),
+        };
+        // SAFETY: MPI_Initialized may be called at any time.
+        check(&mpi, "MPI_Initialized", unsafe { (mpi.functions.initialized)(&raw mut initialized) })?;
+        if initialized == 0 {
+            let mut provided: c_int = 0;
+            // SAFETY: null arguments are allowed since MPI 2; called once a process (a rank, under SMPI).
+            let code = unsafe {
+                if mpi.abi == Abi::Smpi {
+                    (mpi.functions.init)(std::ptr::null_mut(), std::ptr::null_mut())
+                } else {
+                    (mpi.functions.init_thread)(
+                        std::ptr::null_mut(),
+                        std::ptr::null_mut(),
+                        FUNNELED,
+                        &raw mut provided,
+                    )
+                }
+            };
+            check(&mpi, "MPI_Init", code)?;
+        }
+        mpi.started();
+
+        // Communicators of our own, so that no message is mistaken for one of the program around us.
+        let duplicate = || {
+            let mut comm: Handle = 0;
+            // SAFETY: every rank of the job makes the same calls in the same order.
+            let code = unsafe { (mpi.functions.comm_dup)(mpi.world, &raw mut comm) };
+            check(&mpi, "MPI_Comm_dup", code)?;
+            // SAFETY: a communicator that was just made, and a predefined error handler.
+            let code = unsafe { (mpi.functions.set_error_handler)(comm, mpi.errors_return) };
+            check(&mpi, "MPI_Comm_set_errhandler", code)?;
+            Ok(comm)
+        };
+        let (messages, notices) = (duplicate()?, duplicate()?);
+        let (mut rank, mut size): (c_int, c_int) = (0, 0);
+        // SAFETY: plain queries of a valid communicator.
+        unsafe {
+            check(&mpi, "MPI_Comm_rank", (mpi.functions.comm_rank)(messages, &raw mut rank))?;
+            check(&mpi, "MPI_Comm_size", (mpi.functions.comm_size)(messages, &raw mut size))?;
+        }
+        let (rank, size) = (rank as usize, size as usize);
+
+        // More ranks than processors: a rank that spins takes the processor from the one it waits for.
+        let processors = launcher::processors_here();
+        let here = launcher::ranks_here(|name| std::env::var(name).ok()).unwrap_or(size);
+        Ok(Self {
+            rank,
+            size,
+            clock: Clock::new(mpi.abi),
+            transfers: Transfers::new(rank, messages, chunk_bytes),
+            notices: Notices::new(notices),
+            left: vec![false; size],
+            aborted: None,
+            oversubscribed: here > processors,
+            finalize: initialized == 0,
+            mpi: Rc::new(mpi),
+        })
+    }
+
+    /// Which binary interface the library has.
+    pub fn abi(&self) -> Abi {
+        self.mpi.abi
+    }
+
+    /// What the library says of itself, first line.
+    pub fn library_version(&self) -> &str {
+        self.mpi.version.lines().next().unwrap_or_default()
+    }
+
+    /// The name of the machine this rank runs on.
+    pub fn processor_name(&self) -> String {
+        let mut text = vec![0_u8; 4096];
+        let mut length: c_int = 0;
+        // SAFETY: the buffer is longer than MPI_MAX_PROCESSOR_NAME of every ABI (256 at most).
+        unsafe { (self.mpi.functions.processor_name)(text.as_mut_ptr().cast(), &raw mut length) };
+        text.truncate(usize::try_from(length).unwrap_or(0));
+        String::from_utf8_lossy(&text).trim_end_matches('\0').to_string()
+    }
+
+    /// Ends all processes of the job, this one included, with exit code `code` (`MPI_Abort`). For programs, after an error: say
+    /// what went wrong before. Gives the others a moment to say it as well.
+    pub fn end_job(mut self, code: i32) {
+        let begin = Instant::now();
+        while begin.elapsed() < LAST_MESSAGES && self.mpi.abi != Abi::Smpi {
+            self.notices.delivered(&self.mpi);
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        // SAFETY: the world's handle; the call does not return where the library can end the job.
+        unsafe { (self.mpi.functions.abort)(self.mpi.world, code) };
+    }
+
+    /// The library, for a rival that is to use the same one.
+    pub(crate) fn library(&self) -> Rc<Mpi> {
+        Rc::clone(&self.mpi)
+    }
+
+    fn check_peer(&self, peer: usize) -> Result<(), CommError> {
+        if let Some((by, reason)) = &self.aborted {
+            return Err(CommError::Aborted { by: *by, reason: reason.clone() });
+        }
+        if peer < self.size { Ok(()) } else { Err(CommError::NoSuchRank { peer, size: self.size }) }
+    }
+
+    fn others(&self) -> impl Iterator<Item = usize> + use<> {
+        let rank = self.rank;
+        (0..self.size).filter(move |&other| other != rank)
+    }
+
+    fn hear(&mut self) -> Result<(), CommError> {
+        while let Some(notice) = self.notices.heard(&self.mpi) {
+            match notice {
+                Notice::Left { rank } if rank < self.size => self.left[rank] = true,
+                Notice::Left { .. } => {}
+                Notice::Aborted { by, reason } => {
+                    self.aborted.get_or_insert((by, reason));
+                }
+            }
+        }
+        match &self.aborted {
+            Some((by, reason)) => Err(CommError::Aborted { by: *by, reason: reason.clone() }),
+            None => Ok(()),
+        }
+    }
+
+    /// One of `posted` that is complete.
+    fn complete(&mut self, posted: &mut Vec<Receive>) -> Option<Arrival> {
+        let position_of = |id| posted.iter().position(|receive| receive.id == id);
+        let (position, message) = self.transfers.take(position_of)?;
+        let Receive { source, tag, .. } = posted.remove(position);
+        Some(Arrival { source, tag, message })
+    }
+}
+
+impl Communicator for MpiComm {
+    fn rank(&self) -> usize {
+        self.rank
+    }
+
+    fn size(&self) -> usize {
+        self.size
+    }
+
+    fn now(&self) -> f64 {
+        self.clock.now(&self.mpi)
+    }
+
+    fn send(&mut self, destination: usize, tag: u32, message: Vec<u8>) -> Result<(), CommError> {
+        self.check_peer(destination)?;
+        if self.left[destination] {
+            return Err(CommError::PeerLost { rank: self.rank, peer: destination });
+        }
+        self.transfers.send(&self.mpi, destination, tag, message)?;
+        // Asking costs as much as sending a small message, so not for every one.
+        if self.transfers.outgoing() >= REAP_AT {
+            self.transfers.reap(&self.mpi);
+        }
+        self.clock.set(&self.mpi);
+        Ok(())
+    }
+
+    fn post_recv(&mut self, source: usize, tag: u32, capacity: usize) -> Result<Receive, CommError> {
+        self.check_peer(source)?;
+        let id = self.transfers.post(&self.mpi, source, tag, capacity)?;
+        self.clock.set(&self.mpi);
+        Ok(Receive { id, source, tag, capacity })
+    }
+
+    fn wait_any(&mut self, posted: &mut Vec<Receive>, timeout: Duration) -> Result<Arrival, CommError> {
+        let rank = self.rank;
+        let first = posted.first().ok_or(CommError::NothingPosted { rank })?;
+        let silent = CommError::Timeout {
+            rank,
+            peer: first.source,
+            tag: first.tag,
+            waited_ms: timeout.as_millis() as u64,
+        };
+        self.check_peer(first.source)?;
+        // Simulated time does not pass while polling, so SMPI has to block.
+        let block = self.mpi.abi == Abi::Smpi && !timeout.is_zero();
+        let begin = Instant::now();
+        let mut heard = begin;
+        let mut lost_since: Option<Instant> = None;
+        let mut polls = 0_u32;
+        if let Some(arrival) = self.complete(posted) {
+            return Ok(arrival);
+        }
+        loop {
+            let came = self.transfers.progress(&self.mpi, block)?;
+            self.clock.set(&self.mpi);
+            if came {
+                match self.complete(posted) {
+                    Some(arrival) => return Ok(arrival),
+                    None => continue,
+                }
+            }
+            let now = Instant::now();
+            if now.duration_since(begin) >= timeout {
+                // Whoever gave up first knows better what is wrong.
+                if self.mpi.abi != Abi::Smpi {
+                    self.hear()?;
+                }
+                return Err(silent);
+            }
+            polls += 1;
+            if self.oversubscribed && polls > YIELDS {
+                // Whoever only yields uses up its share of the processor and is served last when its message has come.
+                std::thread::sleep(NAP);
+            } else if self.oversubscribed || polls > SPINS {
+                std::thread::yield_now();
+            }
+            if now.duration_since(heard) >= NOTICE_INTERVAL {
+                heard = now;
+                self.hear()?;
+                self.transfers.reap(&self.mpi);
+                if let Some(lost) = posted.iter().find(|receive| self.left[receive.source]) {
+                    let since = *lost_since.get_or_insert(now);
+                    if now.duration_since(since) >= LAST_MESSAGES {
+                        return Err(CommError::PeerLost { rank, peer: lost.source });
+                    }
+                }
+            }
+        }
+    }
+
+    fn abort(&mut self, reason: &str) {
+        if self.aborted.is_none() {
+            self.aborted = Some((self.rank, reason.to_string()));
+            let others = self.others();
+            self.notices.tell_aborted(&self.mpi, others, reason);
+        }
+    }
+
+    fn buffer(&mut self, capacity: usize) -> Vec<u8> {
+        self.transfers.pool.take(capacity)
+    }
+
+    fn recycle(&mut self, buffer: Vec<u8>) {
+        self.transfers.pool.put(buffer);
+    }
+}
+
+impl Drop for MpiComm {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            self.abort("this rank panicked");
+        }
+        if self.mpi.abi == Abi::Smpi {
+            if self.finalize {
+                // SAFETY: called once, by the object that started MPI. SimGrid finds ranks that wait here for ever.
+                unsafe { (self.mpi.functions.finalize)() };
+            }
+            return;
+        }
+
+        // What was sent shall arrive before the news that this rank has left.
+        let begin = Instant::now();
+        self.transfers.reap(&self.mpi);
+        while self.transfers.outgoing() > 0 && begin.elapsed() < PARTING && self.aborted.is_none() {
+            std::thread::yield_now();
+            self.transfers.reap(&self.mpi);
+        }
+        if self.aborted.is_none() {
+            let others = self.others();
+            self.notices.tell_left(&self.mpi, others);
+        }
+        while !self.notices.delivered(&self.mpi) && begin.elapsed() < PARTING {
+            std::thread::yield_now();
+        }
+
+        // MPI_Finalize waits for all ranks, as every MPI program does at its end; after a fault there is no such end, and whoever
+        // still works may yet report one.
+        if self.finalize && self.aborted.is_none() {
+            while self.others().any(|other| !self.left[other]) {
+                if self.hear().is_err() {
+                    return;
+                }
+                self.transfers.reap(&self.mpi);
+                std::thread::sleep(Duration::from_micros(100));
+            }
+            // SAFETY: called once, by the object that started MPI.
+            unsafe { (self.mpi.functions.finalize)() };
+        }
+    }
+}

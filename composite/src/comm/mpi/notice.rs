@@ -1,0 +1,121 @@
+//! News about the group itself: a rank gives up, or has left. They go beside the messages, on a communicator of their own, and
+//! are looked for while waiting.
+use super::library::{Handle, Mpi, Status};
+use std::ffi::c_int;
+
+const TAG: c_int = 1;
+const LEFT: u8 = 0;
+const ABORTED: u8 = 1;
+/// Longer reasons are cut; a notice must be small enough to travel without its receiver's help.
+const LONGEST: usize = 2000;
+
+/// What was heard.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Notice {
+    Left { rank: usize },
+    Aborted { by: usize, reason: String },
+}
+
+pub(super) struct Notices {
+    comm: Handle,
+    /// Kept until the process ends: MPI may still be reading them.
+    sent: Vec<Vec<u8>>,
+    requests: Vec<Handle>,
+}
+
+impl Notices {
+    pub(super) fn new(comm: Handle) -> Self {
+        Self { comm, sent: Vec::new(), requests: Vec::new() }
+    }
+
+    pub(super) fn tell_left(&mut self, mpi: &Mpi, others: impl Iterator<Item = usize>) {
+        self.tell(mpi, others, vec![LEFT]);
+    }
+
+    pub(super) fn tell_aborted(&mut self, mpi: &Mpi, others: impl Iterator<Item = usize>, reason: &str) {
+        let mut end = reason.len().min(LONGEST);
+        while !reason.is_char_boundary(end) {
+            end -= 1;
+        }
+        self.tell(mpi, others, [&[ABORTED], &reason.as_bytes()[..end]].concat());
+    }
+
+    fn tell(&mut self, mpi: &Mpi, others: impl Iterator<Item = usize>, message: Vec<u8>) {
+        for rank in others {
+            let mut request: Handle = 0;
+            // SAFETY: `sent` owns the bytes from here on and is leaked rather than freed while MPI may read them. Whether the
+            // notice could be sent changes nothing: its receivers have their timeouts.
+            unsafe {
+                (mpi.functions.isend)(
+                    message.as_ptr().cast(),
+                    message.len() as c_int,
+                    mpi.byte,
+                    rank as c_int,
+                    TAG,
+                    self.comm,
+                    &raw mut request,
+                );
+            }
+            self.requests.push(request);
+        }
+        self.sent.push(message);
+    }
+
+    /// Whether all notices have left.
+    pub(super) fn delivered(&mut self, mpi: &Mpi) -> bool {
+        self.requests.retain_mut(|request| {
+            let mut flag: c_int = 0;
+            // SAFETY: a request of MPI_Isend that has not been completed.
+            let code = unsafe { (mpi.functions.test)(&raw mut *request, &raw mut flag, mpi.status_ignore()) };
+            code == 0 && flag == 0
+        });
+        self.requests.is_empty()
+    }
+
+    /// The next notice that has come.
+    pub(super) fn heard(&mut self, mpi: &Mpi) -> Option<Notice> {
+        let mut status: Status = [0; 8];
+        let mut flag: c_int = 0;
+        // SAFETY: looks for a message on this object's communicator; a status is at most as large as `Status`.
+        let code = unsafe {
+            (mpi.functions.iprobe)(mpi.constants.any_source, TAG, self.comm, &raw mut flag, &raw mut status)
+        };
+        if code != 0 || flag == 0 {
+            return None;
+        }
+        // SAFETY: MPI_SOURCE is an int at this offset of a status of this ABI.
+        let source =
+            unsafe { status.as_ptr().cast::<u8>().add(mpi.constants.status_source).cast::<c_int>().read() };
+        let mut message = vec![0_u8; LONGEST + 1];
+        let mut bytes: c_int = 0;
+        // SAFETY: the probed message is from another `Notices`, so it is not longer than the buffer.
+        let code = unsafe {
+            (mpi.functions.get_count)(&raw const status, mpi.byte, &raw mut bytes);
+            (mpi.functions.recv)(
+                message.as_mut_ptr().cast(),
+                message.len() as c_int,
+                mpi.byte,
+                source,
+                TAG,
+                self.comm,
+                mpi.status_ignore(),
+            )
+        };
+        message.truncate(usize::try_from(bytes).unwrap_or(0));
+        let rank = usize::try_from(source).ok().filter(|_| code == 0)?;
+        match message.split_first() {
+            Some((&ABORTED, reason)) => {
+                Some(Notice::Aborted { by: rank, reason: String::from_utf8_lossy(reason).into_owned() })
+            }
+            _ => Some(Notice::Left { rank }),
+        }
+    }
+}
+
+impl Drop for Notices {
+    fn drop(&mut self) {
+        if !self.requests.is_empty() {
+            std::mem::forget(std::mem::take(&mut self.sent));
+        }
+    }
+}

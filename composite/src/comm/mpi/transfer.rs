@@ -1,0 +1,299 @@
+//! Messages on their way: buffers that MPI reads or writes stay here until it is done with them.
+//!
+//! MPI counts bytes in an `int`, so a message travels as *chunks*: any number of full ones and one that is not full, possibly
+//! empty. A message shorter than a chunk, which is nearly every one, is one MPI message.
+use super::library::{Handle, Mpi, Status};
+use crate::comm::{BufferPool, CommError};
+use std::collections::VecDeque;
+use std::ffi::c_int;
+
+/// A message that MPI may still be reading.
+struct Outgoing {
+    requests: Vec<Handle>,
+    buffer: Vec<u8>,
+}
+
+/// A receive that was posted and not yet waited for.
+struct Incoming {
+    id: u64,
+    source: usize,
+    tag: u32,
+    capacity: usize,
+    /// Its capacity is at least one byte more than the receive's, so that a message that is too long shows.
+    buffer: Vec<u8>,
+    /// Bytes of complete chunks.
+    received: usize,
+    /// Null when no chunk is being received.
+    request: Handle,
+    /// Bytes that the present chunk may have.
+    posted: usize,
+    done: bool,
+}
+
+/// All that is on its way from and to this rank.
+pub(super) struct Transfers {
+    rank: usize,
+    comm: Handle,
+    chunk_bytes: usize,
+    outgoing: VecDeque<Outgoing>,
+    /// In the order of posting.
+    incoming: Vec<Incoming>,
+    next_id: u64,
+    pub(super) pool: BufferPool,
+    /// Receives that are complete and not yet taken.
+    finished: Vec<u64>,
+    /// Used again by every poll.
+    requests: Vec<Handle>,
+    owners: Vec<usize>,
+}
+
+impl Transfers {
+    pub(super) fn new(rank: usize, comm: Handle, chunk_bytes: usize) -> Self {
+        Self {
+            rank,
+            comm,
+            chunk_bytes,
+            outgoing: VecDeque::new(),
+            incoming: Vec::new(),
+            next_id: 0,
+            pool: BufferPool::default(),
+            finished: Vec::new(),
+            requests: Vec::new(),
+            owners: Vec::new(),
+        }
+    }
+
+    pub(super) fn send(
+        &mut self,
+        mpi: &Mpi,
+        destination: usize,
+        tag: u32,
+        message: Vec<u8>,
+    ) -> Result<(), CommError> {
+        let mut requests = Vec::with_capacity(1);
+        let mut begin = 0;
+        let mut result = Ok(());
+        loop {
+            let chunk = (message.len() - begin).min(self.chunk_bytes);
+            let mut request: Handle = 0;
+            // SAFETY: the chunk lies within `message`, whose heap buffer neither moves nor changes until the request is complete:
+            // `outgoing` owns it. chunk_bytes fits a c_int.
+            let code = unsafe {
+                (mpi.functions.isend)(
+                    message.as_ptr().add(begin).cast(),
+                    chunk as c_int,
+                    mpi.byte,
+                    destination as c_int,
+                    tag as c_int,
+                    self.comm,
+                    &raw mut request,
+                )
+            };
+            if code != 0 {
+                result = Err(failed(mpi, self.rank, "MPI_Isend", code));
+                break;
+            }
+            requests.push(request);
+            begin += chunk;
+            if chunk < self.chunk_bytes {
+                break;
+            }
+        }
+        self.outgoing.push_back(Outgoing { requests, buffer: message });
+        result
+    }
+
+    /// Takes back the buffers of messages that have left. Looks at the oldest only: they leave in about that order.
+    pub(super) fn reap(&mut self, mpi: &Mpi) {
+        while let Some(oldest) = self.outgoing.front_mut() {
+            while let Some(request) = oldest.requests.last_mut() {
+                let mut flag: c_int = 0;
+                // SAFETY: a request of MPI_Isend that has not been completed.
+                let code =
+                    unsafe { (mpi.functions.test)(&raw mut *request, &raw mut flag, mpi.status_ignore()) };
+                if code != 0 || flag == 0 {
+                    return;
+                }
+                oldest.requests.pop();
+            }
+            if let Some(done) = self.outgoing.pop_front() {
+                self.pool.put(done.buffer);
+            }
+        }
+    }
+
+    /// Messages that MPI may still be reading.
+    pub(super) fn outgoing(&self) -> usize {
+        self.outgoing.len()
+    }
+
+    pub(super) fn post(
+        &mut self,
+        mpi: &Mpi,
+        source: usize,
+        tag: u32,
+        capacity: usize,
+    ) -> Result<u64, CommError> {
+        let buffer = self.pool.take(capacity.saturating_add(1).min(self.chunk_bytes));
+        let id = self.next_id;
+        self.next_id += 1;
+        self.incoming.push(Incoming {
+            id,
+            source,
+            tag,
+            capacity,
+            buffer,
+            received: 0,
+            request: mpi.request_null,
+            posted: 0,
+            done: false,
+        });
+        let last = self.incoming.len() - 1;
+        if self.may_start(last) { self.start_chunk(mpi, last).map(|()| id) } else { Ok(id) }
+    }
+
+    /// Whether the next chunk of its source and tag belongs to this receive: those before it must not need another one.
+    fn may_start(&self, index: usize) -> bool {
+        let this = &self.incoming[index];
+        let ahead = self.incoming[..index]
+            .iter()
+            .filter(|other| (other.source, other.tag) == (this.source, this.tag));
+        ahead.into_iter().all(|other| other.done || other.capacity < self.chunk_bytes)
+    }
+
+    fn start_chunk(&mut self, mpi: &Mpi, index: usize) -> Result<(), CommError> {
+        let this = &mut self.incoming[index];
+        let room = (this.capacity - this.received).saturating_add(1).min(self.chunk_bytes);
+        if this.buffer.capacity() < this.received + room {
+            this.buffer.try_reserve_exact(this.received + room - this.buffer.len()).map_err(|error| {
+                CommError::Transport {
+                    rank: self.rank,
+                    call: format!("allocating {} bytes", this.received + room),
+                    reason: error.to_string(),
+                }
+            })?;
+        }
+        this.posted = room;
+        // SAFETY: the `room` bytes behind `received` are within the buffer's capacity; `incoming` owns the buffer, which does not
+        // move or grow until the request is complete.
+        let code = unsafe {
+            (mpi.functions.irecv)(
+                this.buffer.as_mut_ptr().add(this.received).cast(),
+                room as c_int,
+                mpi.byte,
+                this.source as c_int,
+                this.tag as c_int,
+                self.comm,
+                &raw mut this.request,
+            )
+        };
+        if code == 0 { Ok(()) } else { Err(failed(mpi, self.rank, "MPI_Irecv", code)) }
+    }
+
+    /// The first of `wanted` that is complete, and its message. Looks at complete ones only: with a hundred receives posted, a
+    /// walk over all of them after each message takes longer than the messages.
+    pub(super) fn take(&mut self, wanted: impl Fn(u64) -> Option<usize>) -> Option<(usize, Vec<u8>)> {
+        let found = self.finished.iter().enumerate().find_map(|(at, &id)| Some((at, id, wanted(id)?)));
+        let (at, id, position) = found?;
+        self.finished.remove(at);
+        let index = self.incoming.iter().position(|other| other.id == id)?;
+        Some((position, self.incoming.remove(index).buffer))
+    }
+
+    /// Lets MPI work and takes at most one chunk in; `wait` blocks until one has come, else it looks once. Says whether one came.
+    pub(super) fn progress(&mut self, mpi: &Mpi, wait: bool) -> Result<bool, CommError> {
+        self.requests.clear();
+        self.owners.clear();
+        for (index, incoming) in self.incoming.iter().enumerate() {
+            if incoming.request != mpi.request_null {
+                self.requests.push(incoming.request);
+                self.owners.push(index);
+            }
+        }
+        if self.requests.is_empty() {
+            return Ok(false);
+        }
+        let count = self.requests.len() as c_int;
+        let mut narrow: Vec<u32> = Vec::new();
+        let array = if mpi.constants.request_bytes == 4 {
+            narrow.extend(self.requests.iter().map(|&request| request as u32));
+            narrow.as_mut_ptr().cast()
+        } else {
+            self.requests.as_mut_ptr().cast()
+        };
+        let mut index: c_int = -1;
+        let mut flag: c_int = 1;
+        let mut status: Status = [0; 8];
+        // SAFETY: `count` active requests in an array of the ABI's width; a status is at most as large as `Status`.
+        let code = unsafe {
+            if wait {
+                (mpi.functions.wait_any)(count, array, &raw mut index, &raw mut status)
+            } else {
+                (mpi.functions.test_any)(count, array, &raw mut index, &raw mut flag, &raw mut status)
+            }
+        };
+        if code == 0 && flag == 0 {
+            return Ok(false);
+        }
+        let owner = usize::try_from(index).ok().and_then(|index| self.owners.get(index).copied());
+        let call = if wait { "MPI_Waitany" } else { "MPI_Testany" };
+        let Some(owner) = owner else {
+            return if code == 0 { Ok(false) } else { Err(failed(mpi, self.rank, call, code)) };
+        };
+        let (rank, chunk_bytes) = (self.rank, self.chunk_bytes);
+        let this = &mut self.incoming[owner];
+        this.request = mpi.request_null;
+        let too_long = CommError::TooLong { rank, peer: this.source, tag: this.tag, capacity: this.capacity };
+        if code != 0 {
+            let words = mpi.words(code);
+            // The class's number differs between libraries, its name does not.
+            return Err(if words.to_lowercase().contains("truncat") {
+                too_long
+            } else {
+                failed(mpi, rank, call, code)
+            });
+        }
+        let mut bytes: c_int = 0;
+        // SAFETY: the status of a completed receive of bytes.
+        unsafe { (mpi.functions.get_count)(&raw const status, mpi.byte, &raw mut bytes) };
+        let bytes = usize::try_from(bytes).unwrap_or(0).min(this.posted);
+        this.received += bytes;
+        if this.received > this.capacity {
+            return Err(too_long);
+        }
+        // SAFETY: MPI has written the first `received` bytes of the buffer.
+        unsafe { this.buffer.set_len(this.received) };
+        if bytes == chunk_bytes {
+            self.start_chunk(mpi, owner)?;
+            return Ok(true);
+        }
+        this.done = true;
+        self.finished.push(this.id);
+        // Whoever had to wait for this one.
+        let (source, tag) = (this.source, this.tag);
+        for index in owner + 1..self.incoming.len() {
+            let other = &self.incoming[index];
+            let idle = other.request == mpi.request_null && !other.done;
+            if (other.source, other.tag) == (source, tag) && idle && self.may_start(index) {
+                self.start_chunk(mpi, index)?;
+            }
+        }
+        Ok(true)
+    }
+}
+
+pub(super) fn failed(mpi: &Mpi, rank: usize, call: &str, code: c_int) -> CommError {
+    CommError::Transport { rank, call: call.to_string(), reason: mpi.words(code) }
+}
+
+impl Drop for Transfers {
+    fn drop(&mut self) {
+        // MPI may still read or write these; a leak is better than memory that changes under its next owner.
+        for outgoing in self.outgoing.drain(..) {
+            std::mem::forget(outgoing.buffer);
+        }
+        for incoming in self.incoming.drain(..).filter(|incoming| !incoming.done) {
+            std::mem::forget(incoming.buffer);
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! Whose turn it is: what has the lowest virtual time is done first, so that every message finds the network as it would be then.
+//!
+//! Ranks are threads. Between two calls a rank computes, and up to a few ranks do so at once: they cannot disturb each other. A call takes effect when no
+//! other rank can do anything earlier: a computing rank counts with the time at which it began.
+use super::network::{Interface, Network};
+use std::collections::VecDeque;
+
+/// A message under way or arrived.
+pub(super) struct Mail {
+    pub(super) tag: u32,
+    pub(super) arrival_secs: f64,
+    pub(super) message: Vec<u8>,
+}
+
+/// What a waiting rank would take: the `place`-th message from `source` with `tag`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wanted {
+    pub(super) source: usize,
+    pub(super) tag: u32,
+    pub(super) place: usize,
+}
+
+/// What a rank is doing.
+#[derive(Debug)]
+pub(super) enum State {
+    /// Between two calls, on its thread.
+    Computing,
+    /// Wants to compute, and waits for a core.
+    Ready,
+    /// In a call that takes effect at its clock.
+    Acting,
+    /// In a call that takes effect when one of these is there, or at the deadline: at `earliest_secs`, as far as is known.
+    Waiting { wanted: Vec<Wanted>, deadline_secs: f64, earliest_secs: f64 },
+    /// Its call may take effect.
+    Granted,
+    /// It has left.
+    Gone,
+}
+
+pub(super) struct Rank {
+    pub(super) clock_secs: f64,
+    pub(super) state: State,
+    /// By sender.
+    pub(super) mail: Vec<VecDeque<Mail>>,
+}
+
+pub(super) struct Schedule {
+    pub(super) ranks: Vec<Rank>,
+    pub(super) interfaces: Vec<Interface>,
+    pub(super) network: Network,
+    pub(super) aborted: Option<(usize, String)>,
+    cores: usize,
+}
+
+impl Schedule {
+    pub(super) fn new(size: usize, network: Network, cores: usize) -> Schedule {
+        let rank = || Rank {
+            clock_secs: 0.0,
+            state: State::Ready,
+            mail: (0..size).map(|_| VecDeque::new()).collect(),
+        };
+        Schedule {
+            ranks: (0..size).map(|_| rank()).collect(),
+            interfaces: vec![Interface::default(); size],
+            network,
+            aborted: None,
+            cores: cores.max(1),
+        }
+    }
+
+    /// The message a rank wants, if it has been sent.
+    pub(super) fn find(&self, rank: usize, wanted: &Wanted) -> Option<(usize, f64)> {
+        let mail = self.ranks[rank].mail[wanted.source].iter().enumerate();
+        let (at, mail) = mail.filter(|(_, m)| m.tag == wanted.tag).nth(wanted.place)?;
+        Some((at, mail.arrival_secs))
+    }
+
+    /// Whether a wanted message will never come.
+    pub(super) fn is_lost(&self, rank: usize, wanted: &Wanted) -> bool {
+        matches!(self.ranks[wanted.source].state, State::Gone) && self.find(rank, wanted).is_none()
+    }
+
+    /// Makes a rank wait.
+    pub(super) fn wait(&mut self, rank: usize, wanted: Vec<Wanted>, deadline_secs: f64) {
+        self.ranks[rank].state = State::Waiting { wanted, deadline_secs, earliest_secs: deadline_secs };
+        self.look_again(rank);
+    }
+
+    /// To be called when something has changed for a rank that may wait: a message was sent to it, or another rank has gone.
+    pub(super) fn look_again(&mut self, rank: usize) {
+        let r = &self.ranks[rank];
+        let State::Waiting { wanted, deadline_secs, .. } = &r.state else { return };
+        let time = if wanted.iter().any(|w| self.is_lost(rank, w)) {
+            r.clock_secs
+        } else {
+            let arrivals = wanted.iter().filter_map(|w| self.find(rank, w));
+            arrivals.map(|(_, arrival)| arrival).fold(*deadline_secs, f64::min).max(r.clock_secs)
+        };
+        if let State::Waiting { earliest_secs, .. } = &mut self.ranks[rank].state {
+            *earliest_secs = time;
+        }
+    }
+
+    /// The earliest time at which a rank can do something that others notice.
+    fn earliest_secs(&self, rank: usize) -> f64 {
+        match &self.ranks[rank].state {
+            State::Gone => f64::INFINITY,
+            State::Waiting { earliest_secs, .. } => *earliest_secs,
+            _ => self.ranks[rank].clock_secs,
+        }
+    }
+
+    /// Lets go on who may; `wake` is called for each of them.
+    pub(super) fn dispatch(&mut self, mut wake: impl FnMut(usize)) {
+        let computing = self.ranks.iter().filter(|r| matches!(r.state, State::Computing)).count();
+        let mut free = self.cores.saturating_sub(computing);
+        while free > 0 {
+            let ready = (0..self.ranks.len()).filter(|&r| matches!(self.ranks[r].state, State::Ready));
+            let first = ready.min_by(|&a, &b| self.ranks[a].clock_secs.total_cmp(&self.ranks[b].clock_secs));
+            let Some(rank) = first else { break };
+            self.ranks[rank].state = State::Computing;
+            wake(rank);
+            free -= 1;
+        }
+        let times = (0..self.ranks.len()).map(|r| (self.earliest_secs(r), r));
+        let next = times.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        if let Some((_, rank)) = next
+            && matches!(self.ranks[rank].state, State::Acting | State::Waiting { .. })
+        {
+            wake(rank);
+            // A waiting rank keeps what it wants in its call.
+            self.ranks[rank].state = State::Granted;
+        }
+    }
+}

@@ -1,0 +1,249 @@
+//! What a message costs: the LogGP model of A. Alexandrov, M. Ionescu, K. Schauser, C. Scheiman (SPAA 1995), measured once over the
+//! communicator itself, and what follows from it for each strategy.
+use crate::comm::{CommError, Communicator};
+use crate::pixel::Composite;
+use crate::rank_order::Folding;
+use crate::rect::Rect;
+use crate::strategies::Strategy;
+use crate::strategies::direct_send;
+use crate::strategies::folding::reach;
+use crate::strategies::radix_k::share;
+use std::time::Duration;
+
+/// Costs of messages between two ranks, in seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Network {
+    /// From the beginning of a send until a short message has been received (LogGP: L + 2o).
+    pub latency_secs: f64,
+    /// Time a rank is busy with one message, on either side (LogGP: o, with the gap g).
+    pub overhead_secs: f64,
+    /// Each byte of a long message (LogGP: G).
+    pub byte_secs: f64,
+}
+
+const PING_TAG: u32 = 11;
+const ROUNDS: usize = 8;
+const LONG_BYTES: usize = 1 << 18;
+/// Reading or writing a byte of a message on one core, about; measured on a server of 2023. Only its ratio to the network counts.
+const LOCAL_BYTE_SECS: f64 = 1.5e-10;
+
+impl Network {
+    /// InfiniBand QDR as in the thesis' cluster: 3.2 GB/s, about a microsecond.
+    pub const QDR: Self = Self { latency_secs: 1.5e-6, overhead_secs: 0.5e-6, byte_secs: 1.0 / 3.2e9 };
+
+    /// Measures with messages between the first and the last rank; all ranks must call it, and all get the numbers of rank 0.
+    ///
+    /// # Errors
+    /// As the calls of the communicator.
+    pub fn measure(comm: &mut dyn Communicator, timeout: Duration) -> Result<Self, CommError> {
+        let (rank, last) = (comm.rank(), comm.size() - 1);
+        let mut measured = [0.0_f64; 3];
+        if last > 0 && (rank == 0 || rank == last) {
+            let peer = last - rank;
+            for (slot, bytes) in [(0, 8), (2, LONG_BYTES)] {
+                let mut best = f64::INFINITY;
+                for _ in 0..ROUNDS {
+                    let begin = comm.now();
+                    if rank == 0 {
+                        let mut ping = comm.buffer(bytes);
+                        ping.resize(bytes, 1);
+                        let sending = comm.now();
+                        comm.send(peer, PING_TAG, ping)?;
+                        if slot == 0 {
+                            measured[1] += (comm.now() - sending) / ROUNDS as f64;
+                        }
+                    }
+                    let pong = comm.recv(peer, PING_TAG, bytes, timeout)?;
+                    if rank == 0 {
+                        comm.recycle(pong);
+                    } else {
+                        comm.send(peer, PING_TAG, pong)?;
+                    }
+                    best = best.min((comm.now() - begin) / 2.0);
+                }
+                measured[slot] = best;
+            }
+        }
+        // Rank 0 decides, so that everybody will choose alike.
+        let mine: &[u8] = bytemuck::cast_slice(&measured);
+        let all = comm.all_gather(mine, size_of_val(&measured), timeout)?;
+        let Some(of_first) = all.first().filter(|bytes| bytes.len() == mine.len()) else {
+            return Ok(Self::QDR);
+        };
+        let number = |i: usize| bytemuck::pod_read_unaligned::<f64>(&of_first[8 * i..8 * i + 8]);
+        let (latency_secs, long_secs) = (number(0).max(0.0), number(2).max(0.0));
+        Ok(Self {
+            latency_secs,
+            overhead_secs: number(1).clamp(0.0, latency_secs / 2.0),
+            byte_secs: ((long_secs - latency_secs) / LONG_BYTES as f64).max(1e-12),
+        })
+    }
+
+    /// A number for fingerprints.
+    pub(crate) fn code(&self) -> u64 {
+        let numbers = [self.latency_secs, self.overhead_secs, self.byte_secs];
+        numbers.into_iter().map(f64::to_bits).fold(3, crate::wire::mix)
+    }
+
+    /// Seconds that a frame will take about, from the rectangles that ranks drew in, as if these were dense. `root` collects.
+    ///
+    /// One exchange costs the latency, the overhead of a rank's messages, and the bytes of the rank that sends or receives most;
+    /// compressing and joining them costs as much again where a round must be complete before the next, and is hidden behind the
+    /// transfer in direct send, which works slice by slice.
+    pub fn estimate_secs<P: Composite>(&self, strategy: Strategy, drawn: &[Rect], root: bool) -> f64 {
+        let ranks = drawn.len();
+        let whole = drawn.iter().fold(Rect::EMPTY, |all, rect| all.around(rect));
+        if ranks < 2 || whole.is_empty() {
+            return 0.0;
+        }
+        let bytes = |rect: &Rect| (rect.pixels() * P::BYTES) as f64;
+        let collect = |messages: usize, pixels: f64| {
+            let color_bytes = pixels * size_of::<P::Color>() as f64;
+            if root { self.exchange_secs(messages as f64, color_bytes) } else { 0.0 }
+        };
+        let folding = Folding::new(ranks);
+        match strategy {
+            Strategy::DirectSend | Strategy::Automatic => {
+                let plan = direct_send::Plan::new(drawn, usize::MAX);
+                let mut worst = 0.0_f64;
+                for (place, tiles) in plan.slices.iter().enumerate() {
+                    let (mut sent, mut received, mut messages) = (0.0, 0.0, 0.0);
+                    for (other, its_tiles) in
+                        plan.slices.iter().enumerate().filter(|(other, _)| *other != place)
+                    {
+                        let gives: f64 =
+                            its_tiles.iter().map(|tile| bytes(&drawn[place].intersection(tile))).sum();
+                        let gets: f64 =
+                            tiles.iter().map(|tile| bytes(&drawn[other].intersection(tile))).sum();
+                        messages += f64::from(gives > 0.0) + f64::from(gets > 0.0);
+                        (sent, received) = (sent + gives, received + gets);
+                    }
+                    worst = worst.max(self.sliced_secs(messages, f64::max(sent, received)));
+                }
+                worst + collect(ranks - 1, whole.pixels() as f64 * (ranks - 1) as f64 / ranks as f64)
+            }
+            Strategy::Tree => {
+                let mut total = self.fold_secs::<P>(&folding, drawn);
+                let mut stride = 1;
+                while stride < folding.slots {
+                    let of_slot = |slot| bytes(&reach(drawn, &folding, slot, stride));
+                    let most = (stride..folding.slots).step_by(2 * stride).map(of_slot).fold(0.0, f64::max);
+                    total += self.exchange_secs(1.0, most);
+                    stride *= 2;
+                }
+                total
+            }
+            Strategy::BinarySwap | Strategy::RadixK { .. } => {
+                let k = if let Strategy::RadixK { k } = strategy { k } else { 2 };
+                let mut total = self.fold_secs::<P>(&folding, drawn);
+                let (mut stride, mut parts) = (1, 1);
+                while stride < folding.slots {
+                    let members = k.min(folding.slots / stride);
+                    // Shares of one round are about equal: the first and the middle one stand for all.
+                    let mut most = 0.0_f64;
+                    for index in [0, parts * members / 2] {
+                        let part = share(&whole, index, parts * members);
+                        for base in (0..folding.slots).step_by(stride * members) {
+                            let of = |m: usize| {
+                                bytes(&reach(drawn, &folding, base + m * stride, stride).intersection(&part))
+                            };
+                            most = most.max((1..members).map(of).sum());
+                        }
+                    }
+                    total += self.exchange_secs(2.0 * (members - 1) as f64, most);
+                    (stride, parts) = (stride * members, parts * members);
+                }
+                total
+                    + collect(
+                        folding.slots - 1,
+                        whole.pixels() as f64 * (folding.slots - 1) as f64 / folding.slots as f64,
+                    )
+            }
+        }
+    }
+
+    /// The strategy of the smallest estimate.
+    pub(crate) fn choose<P: Composite>(&self, drawn: &[Rect], root: bool) -> Strategy {
+        let mut best = (Strategy::DirectSend, self.estimate_secs::<P>(Strategy::DirectSend, drawn, root));
+        for strategy in
+            [Strategy::RadixK { k: 16 }, Strategy::RadixK { k: 8 }, Strategy::BinarySwap, Strategy::Tree]
+        {
+            let secs = self.estimate_secs::<P>(strategy, drawn, root);
+            if secs < best.1 {
+                best = (strategy, secs);
+            }
+        }
+        best.0
+    }
+
+    fn exchange_secs(&self, messages: f64, bytes: f64) -> f64 {
+        self.latency_secs + messages * self.overhead_secs + bytes * (self.byte_secs + 2.0 * LOCAL_BYTE_SECS)
+    }
+
+    /// The same where one slice is compressed and joined while another travels: the slower of both counts.
+    fn sliced_secs(&self, messages: f64, bytes: f64) -> f64 {
+        self.latency_secs + messages * self.overhead_secs + bytes * self.byte_secs.max(2.0 * LOCAL_BYTE_SECS)
+    }
+
+    fn fold_secs<P: Composite>(&self, folding: &Folding, drawn: &[Rect]) -> f64 {
+        let handed = |pair: usize| (drawn[2 * pair + 1].pixels() * P::BYTES) as f64;
+        let most = (0..folding.pairs).map(handed).fold(0.0, f64::max);
+        if folding.pairs == 0 { 0.0 } else { self.exchange_secs(1.0, most) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::threads;
+    use crate::pixel::DepthPixel;
+
+    type P = DepthPixel<[u8; 4]>;
+
+    #[test]
+    fn all_ranks_measure_the_same_network_and_it_is_one() {
+        for size in [1, 2, 5] {
+            let found =
+                threads::run(size, |mut comm| Network::measure(&mut comm, Duration::from_secs(20)).unwrap());
+            let found: Vec<Network> = found.into_iter().map(|network| network.unwrap()).collect();
+            assert!(found.iter().all(|network| *network == found[0]), "{found:?}");
+            if size > 1 {
+                assert!(
+                    found[0].latency_secs > 0.0 && found[0].latency_secs < 1.0 && found[0].byte_secs > 0.0
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn the_choice_follows_the_network() {
+        let dense = vec![Rect::of_size(1024, 1024); 64];
+        // Bandwidth counts: every byte once.
+        assert_eq!(Network::QDR.choose::<P>(&dense, true), Strategy::DirectSend);
+        // Messages count: few of them.
+        let slow_messages = Network { overhead_secs: 1e-3, latency_secs: 2e-3, byte_secs: 1e-12 };
+        assert!(matches!(slow_messages.choose::<P>(&dense, true), Strategy::Tree));
+        // Messages count, but so do bytes: groups.
+        let both = Network { overhead_secs: 2e-4, latency_secs: 4e-4, byte_secs: 3e-9 };
+        assert!(matches!(both.choose::<P>(&dense, true), Strategy::RadixK { .. } | Strategy::BinarySwap));
+    }
+
+    #[test]
+    fn estimates_grow_with_bytes_and_are_zero_without_partners() {
+        let network = Network::QDR;
+        let small = vec![Rect::of_size(100, 100); 8];
+        let large = vec![Rect::of_size(1000, 1000); 8];
+        for strategy in
+            [Strategy::DirectSend, Strategy::Tree, Strategy::BinarySwap, Strategy::RadixK { k: 4 }]
+        {
+            assert!(
+                network.estimate_secs::<P>(strategy, &small, true)
+                    < network.estimate_secs::<P>(strategy, &large, true)
+            );
+            assert_eq!(network.estimate_secs::<P>(strategy, &large[..1], true), 0.0);
+        }
+        // The physical limit of dense images: 8 MB in and 4 MB of colours to the root, over 3.2 GB/s.
+        let secs = network.estimate_secs::<P>(Strategy::DirectSend, &large, true);
+        assert!(secs > 3e-3 && secs < 9e-3, "{secs}");
+    }
+}

@@ -1,0 +1,153 @@
+//! Questions to other ranks and their answers, all at once: the shape of every exchange of a frame.
+use super::words::{from_message, message_bytes, to_message};
+use super::{Activity, FrameError, RankReport};
+use crate::comm::Communicator;
+use std::time::Duration;
+
+/// Which messages belong together.
+#[derive(Clone, Copy)]
+pub(super) enum Tag {
+    Hits = 100,
+    Won = 101,
+    Question = 102,
+    Answer = 103,
+    Tiles = 104,
+}
+
+/// One frame's conversation of one rank, with its costs counted.
+pub(super) struct Talk<'a> {
+    comm: &'a mut dyn Communicator,
+    timeout: Duration,
+    pub(super) report: RankReport,
+}
+
+impl<'a> Talk<'a> {
+    pub(super) fn new(comm: &'a mut dyn Communicator, timeout: Duration) -> Talk<'a> {
+        let report = RankReport { begin_at_secs: comm.now(), ..RankReport::default() };
+        Talk { comm, timeout, report }
+    }
+
+    pub(super) fn rank(&self) -> usize {
+        self.comm.rank()
+    }
+
+    pub(super) fn size(&self) -> usize {
+        self.comm.size()
+    }
+
+    /// Books the time since the last booking.
+    pub(super) fn spent(&mut self, activity: Activity) {
+        self.report.spent(activity, self.comm.now());
+    }
+
+    pub(super) fn wrong(&self, from: usize, what: &'static str, words: usize) -> FrameError {
+        FrameError::Message { rank: self.rank(), from, what, words }
+    }
+
+    pub(super) fn send(&mut self, to: usize, tag: Tag, words: &[u32]) -> Result<(), FrameError> {
+        let buffer = self.comm.buffer(message_bytes(words.len()));
+        let message = to_message(words, buffer);
+        self.report.messages_sent += 1;
+        self.report.bytes_sent += message.len() as u64;
+        self.comm.send(to, tag as u32, message)?;
+        Ok(())
+    }
+
+    /// Receives one message from each of `sources` (rank and most words), in any order, and hands them to `take`.
+    pub(super) fn receive(
+        &mut self,
+        tag: Tag,
+        what: &'static str,
+        sources: impl IntoIterator<Item = (usize, usize)>,
+        mut take: impl FnMut(&mut Self, usize, Vec<u32>) -> Result<(), FrameError>,
+    ) -> Result<(), FrameError> {
+        let mut posted = Vec::new();
+        for (source, words) in sources {
+            posted.push(self.comm.post_recv(source, tag as u32, message_bytes(words))?);
+        }
+        while !posted.is_empty() {
+            let arrival = self.comm.wait_any(&mut posted, self.timeout)?;
+            self.report.bytes_received += arrival.message.len() as u64;
+            self.spent(Activity::Exchange);
+            let words = from_message(&arrival.message);
+            let words = words.ok_or_else(|| self.wrong(arrival.source, what, arrival.message.len() / 4))?;
+            self.comm.recycle(arrival.message);
+            take(self, arrival.source, words)?;
+        }
+        Ok(())
+    }
+
+    /// Gives numbers of every rank to every rank.
+    pub(super) fn all_gather(&mut self, mine: &[u32]) -> Result<Vec<Vec<u32>>, FrameError> {
+        let message = to_message(mine, Vec::new());
+        self.report.bytes_sent += (message.len() * self.size().saturating_sub(1)) as u64;
+        let all = self.comm.all_gather(&message, message.len(), self.timeout)?;
+        let mut out = Vec::with_capacity(all.len());
+        for (from, message) in all.iter().enumerate() {
+            let words = from_message(message).filter(|w| w.len() == mine.len());
+            out.push(words.ok_or_else(|| self.wrong(from, "numbers for all", message.len() / 4))?);
+        }
+        Ok(out)
+    }
+
+    /// Asks `questions[r]` of each rank r (nothing where it is empty) and answers what others ask. `answer` turns a question into an answer;
+    /// `longest` bounds the words of the answer to a question; `take` gets the answers in any order. False when no rank had a question.
+    pub(super) fn ask(
+        &mut self,
+        what: &'static str,
+        questions: &[Vec<u32>],
+        longest: impl Fn(&[u32]) -> usize,
+        mut answer: impl FnMut(&mut RankReport, &[u32]) -> Option<Vec<u32>>,
+        mut take: impl FnMut(usize, Vec<u32>) -> Result<(), FrameError>,
+    ) -> Result<bool, FrameError> {
+        let (rank, size) = (self.rank(), self.size());
+        // ---- Who asks whom, and how much.
+        let lengths: Vec<u32> = questions.iter().map(|q| q.len() as u32).collect();
+        let lengths = if size > 1 { self.all_gather(&lengths)? } else { vec![lengths] };
+        self.spent(Activity::Exchange);
+        if lengths.iter().flatten().all(|&l| l == 0) {
+            return Ok(false);
+        }
+        self.report.rounds += 1;
+        // ---- Questions, to the next rank first, so that nobody gets all at once.
+        for step in 1..size {
+            let to = (rank + step) % size;
+            if !questions[to].is_empty() {
+                self.send(to, Tag::Question, &questions[to])?;
+            }
+        }
+        self.spent(Activity::Exchange);
+        // ---- One's own question first: others' are on their way meanwhile.
+        if !questions[rank].is_empty() {
+            let own = answer(&mut self.report, &questions[rank]);
+            self.spent(Activity::Answer);
+            let own = own.ok_or_else(|| self.wrong(rank, what, questions[rank].len()))?;
+            take(rank, own)?;
+            self.spent(Activity::Shade);
+        }
+        let asked_by = (0..size).filter(|&from| from != rank && lengths[from][rank] > 0);
+        let sources: Vec<(usize, usize)> =
+            asked_by.map(|from| (from, lengths[from][rank] as usize)).collect();
+        self.receive(Tag::Question, what, sources, |talk, from, question| {
+            let reply = answer(&mut talk.report, &question);
+            talk.spent(Activity::Answer);
+            let reply = reply.ok_or_else(|| talk.wrong(from, what, question.len()))?;
+            talk.send(from, Tag::Answer, &reply)?;
+            talk.spent(Activity::Exchange);
+            Ok(())
+        })?;
+        let asked = (0..size).filter(|&to| to != rank && !questions[to].is_empty());
+        let sources: Vec<(usize, usize)> = asked.map(|to| (to, longest(&questions[to]))).collect();
+        self.receive(Tag::Answer, what, sources, |talk, from, reply| {
+            take(from, reply)?;
+            talk.spent(Activity::Shade);
+            Ok(())
+        })?;
+        Ok(true)
+    }
+
+    /// Ends the group for all.
+    pub(super) fn abort(&mut self, reason: &str) {
+        self.comm.abort(reason);
+    }
+}

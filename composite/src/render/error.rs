@@ -1,0 +1,49 @@
+//! What can go wrong in a frame of many ranks.
+use crate::comm::CommError;
+use rt_core::render::RenderError;
+use rt_core::scene::SceneError;
+use rt_core::waves::WrongAnswer;
+
+/// Why a frame could not be made. After an error no rank gets a picture: the communicator is aborted.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FrameError {
+    /// Scene, camera or options.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// A part of the scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The transport.
+    #[error(transparent)]
+    Comm(#[from] CommError),
+    /// A message does not say what it should.
+    #[error(
+        "rank {rank} got an unusable message from rank {from} ({what}, {words} words): all ranks must render the same scene, camera and options"
+    )]
+    Message {
+        /// The receiver.
+        rank: usize,
+        /// The sender.
+        from: usize,
+        /// What it was about.
+        what: &'static str,
+        /// Its length in 32-bit words.
+        words: usize,
+    },
+    /// An answer that no part of this scene can have given.
+    #[error("rank {rank}: {source}: all ranks must render parts of the same scene")]
+    Answer {
+        /// The receiver.
+        rank: usize,
+        /// What does not fit.
+        source: WrongAnswer,
+    },
+    /// The partition and the group do not match.
+    #[error("the scene was cut into {parts} parts, but there are {ranks} ranks: cut it into as many")]
+    Ranks {
+        /// Parts of the partition.
+        parts: usize,
+        /// Ranks of the communicator.
+        ranks: usize,
+    },
+}

@@ -1,0 +1,219 @@
+//! Ghost zones: every rank also holds what lies within the distance of ambient occlusion around its part, and then answers for its
+//! own hits alone. Exact, because no such ray leaves the zone. They cost memory and a build once, and nothing per frame; asking costs messages and
+//! repeated rays every frame. [`choose`] estimates both.
+use super::ask::{Tag, Talk};
+use super::boxes::Boxes;
+use super::sort_last::{FrameOptions, Light};
+use super::{FrameError, Part};
+use rt_core::accel::{Geometry, World};
+use rt_core::glam::Vec3;
+use rt_core::math::Aabb;
+use rt_core::mesh::TriMesh;
+use rt_core::render::{RenderError, RenderOptions};
+use rt_core::scene::{Appearance, Scene, SceneError};
+use std::sync::Arc;
+
+/// What was decided.
+#[derive(Debug, Clone)]
+pub(super) struct Choice {
+    pub(super) distance: f64,
+    pub(super) way: Light,
+    pub(super) words: String,
+}
+
+/// Prices of the estimate, for one thread of a 2020s server core and a network of 3 GB/s. Only their order of size matters: near the point where
+/// both cost the same, either will do.
+pub mod price {
+    /// Seconds for a secondary ray, with the work of making it.
+    pub const RAY_SECS: f64 = 150e-9;
+    /// Seconds for a byte on the network.
+    pub const BYTE_SECS: f64 = 1.0 / 3e9;
+    /// Seconds for a round of messages.
+    pub const ROUND_SECS: f64 = 20e-6;
+    /// Seconds to build the structure over a triangle.
+    pub const BUILD_SECS: f64 = 400e-9;
+    /// Bytes of a triangle in a message: half a vertex of 12 bytes, with neighbours on the rim, and three indices.
+    pub const TRIANGLE_BYTES: f64 = 24.0;
+    /// Bytes of a point and its answer.
+    pub const POINT_BYTES: f64 = 52.0;
+    /// Share of a picture that is covered, as long as nobody has seen it.
+    pub const COVERED: f64 = 0.5;
+}
+
+/// Of a triangle, its boxes in render space, one for each instance.
+fn placed_boxes(scene: &Scene, geometry: usize, mesh: &TriMesh) -> Vec<Aabb> {
+    let origin = scene.world.origin();
+    let mut boxes = vec![Aabb::EMPTY; mesh.indices.len()];
+    for instance in scene.world.instances().iter().filter(|i| i.geometry == geometry) {
+        for (b, corners) in boxes.iter_mut().zip(&mesh.indices) {
+            for &k in corners {
+                let Some(p) = mesh.positions.get(k as usize) else { continue };
+                let world = instance.world_from_object.transform_point3(mesh.origin + p.as_dvec3());
+                *b = b.grown((world - origin).as_vec3());
+            }
+        }
+    }
+    boxes
+}
+
+fn apart(a: &Aabb, b: &Aabb) -> bool {
+    (0..3).any(|axis| a.min[axis] > b.max[axis] || b.min[axis] > a.max[axis])
+}
+
+/// `bounds` with everything that a ray of length `distance` from inside may meet.
+fn zone(bounds: &Aabb, distance: f64, whole: Aabb) -> Aabb {
+    let size = whole.min.abs().max(whole.max.abs()).max_element();
+    let rim = Vec3::splat((distance * 1.0001) as f32 + 1e-4 * size);
+    if bounds.is_empty() { Aabb::EMPTY } else { Aabb::new(bounds.min - rim, bounds.max + rim) }
+}
+
+/// Decides between asking and ghost zones, the same on all ranks, and builds the zones where they win.
+pub(super) fn choose(
+    talk: &mut Talk<'_>,
+    part: &mut Part,
+    boxes: &Boxes,
+    options: &FrameOptions,
+    render: &RenderOptions,
+    distance: f64,
+) -> Result<Choice, FrameError> {
+    let ask = |words: String| Choice { distance, way: Light::Ask, words };
+    if options.light == Light::Ask {
+        return Ok(ask("asked of the ranks in whose bounds rays come".into()));
+    }
+    let mut meshes = Vec::new();
+    for geometry in part.scene.world.geometries() {
+        match geometry {
+            Geometry::Mesh(mesh) => meshes.push(mesh.clone()),
+            Geometry::Shape(_) => {
+                return Ok(ask(
+                    "asked of the ranks in whose bounds rays come: ghost zones are made of triangles only, and the scene has other shapes"
+                        .into(),
+                ));
+            }
+        }
+    }
+    let (rank, size) = (talk.rank(), talk.size());
+    let whole = part.scene.world.bounds();
+    let zones: Vec<Aabb> = boxes.bounds.iter().map(|b| zone(b, distance, whole)).collect();
+    let placed: Vec<Vec<Aabb>> =
+        meshes.iter().enumerate().map(|(g, mesh)| placed_boxes(&part.scene, g, mesh)).collect();
+
+    // ---- Triangles for each other rank's zone, and how many other parts are near a triangle of this one.
+    let others = || (0..size).filter(|&r| r != rank && !apart(&zones[r], &boxes.bounds[rank]));
+    let mut wanted: Vec<Vec<Vec<u32>>> = vec![vec![Vec::new(); meshes.len()]; size];
+    let (mut near_parts, mut triangles) = (0u64, 0u64);
+    for (g, placed) in placed.iter().enumerate() {
+        triangles += placed.len() as u64;
+        for (t, b) in placed.iter().enumerate() {
+            for r in others() {
+                if !apart(b, &zones[r]) {
+                    wanted[r][g].push(t as u32);
+                    near_parts += 1;
+                }
+            }
+        }
+    }
+    let give: Vec<u32> = wanted.iter().map(|w| w.iter().map(Vec::len).sum::<usize>() as u32).collect();
+    let mut numbers = give;
+    numbers.extend([triangles as u32, near_parts.min(u64::from(u32::MAX)) as u32]);
+    let all = talk.all_gather(&numbers)?;
+
+    // ---- Both costs, for the rank that has most to do.
+    let sum = |f: &dyn Fn(&[u32]) -> f64| all.iter().map(|n| f(n)).sum::<f64>();
+    let total = sum(&|n| f64::from(n[size])).max(1.0);
+    let near = sum(&|n| f64::from(n[size + 1])) / total;
+    let area = render.area();
+    let pixels = f64::from(area.width) * f64::from(area.height) * f64::from(render.samples);
+    let points = price::COVERED * pixels / size as f64;
+    let rays = f64::from(part.scene.ambient_occlusion.map_or(0, |ao| ao.rays));
+    let ask_secs = 2.0 * price::ROUND_SECS
+        + points * near * (rays * price::RAY_SECS + price::POINT_BYTES * price::BYTE_SECS);
+    let frames = if let Light::Auto { frames } = options.light { frames.max(1) } else { 1 };
+    let zone_secs = (0..size)
+        .map(|r| {
+            let rim: f64 = all.iter().map(|n| f64::from(n[r])).sum();
+            let own = f64::from(all[r][size]);
+            rim * price::TRIANGLE_BYTES * price::BYTE_SECS + (own + rim) * price::BUILD_SECS
+        })
+        .fold(0.0, f64::max)
+        / f64::from(frames);
+    let rim_share = sum(&|n| n[..size].iter().map(|&v| f64::from(v)).sum()) / total;
+    let estimate = format!(
+        "estimated {:.2} ms a frame to ask ({near:.2} other parts near a triangle), {:.2} ms for ghost zones ({:.2}x the geometry, {frames} frames)",
+        ask_secs * 1e3,
+        zone_secs * 1e3,
+        1.0 + rim_share
+    );
+    if options.light != Light::Ghost && ask_secs <= zone_secs {
+        return Ok(ask(format!("asked of the ranks in whose bounds rays come: {estimate}")));
+    }
+    part.rim = Some((distance, fetch(talk, part, &meshes, &wanted, &all, options)?));
+    Ok(Choice { distance, way: Light::Ghost, words: format!("ghost zones: {estimate}") })
+}
+
+/// Exchanges the triangles and builds this rank's part with its rim.
+fn fetch(
+    talk: &mut Talk<'_>,
+    part: &Part,
+    meshes: &[Arc<TriMesh>],
+    wanted: &[Vec<Vec<u32>>],
+    all: &[Vec<u32>],
+    options: &FrameOptions,
+) -> Result<Scene, FrameError> {
+    let (rank, size) = (talk.rank(), talk.size());
+    for step in 1..size {
+        let to = (rank + step) % size;
+        if all[rank][to] == 0 {
+            continue;
+        }
+        let mut words = Vec::new();
+        for (mesh, kept) in meshes.iter().zip(&wanted[to]) {
+            let (some, _) = mesh.part(kept);
+            words.extend([some.positions.len() as u32, some.indices.len() as u32]);
+            words.extend(some.positions.iter().flat_map(|p| p.to_array().map(f32::to_bits)));
+            words.extend(some.indices.as_flattened());
+        }
+        talk.send(to, Tag::Hits, &words)?;
+    }
+    // Light needs no attributes.
+    let mut merged: Vec<TriMesh> = meshes
+        .iter()
+        .map(|m| TriMesh { origin: m.origin, ..TriMesh::new(m.positions.clone(), m.indices.clone()) })
+        .collect();
+    let most = |from: usize| 2 * merged.len() + 12 * all[from][rank] as usize;
+    let sources: Vec<_> =
+        (0..size).filter(|&r| r != rank && all[r][rank] > 0).map(|from| (from, most(from))).collect();
+    let mut came: Vec<(usize, Vec<u32>)> = Vec::new();
+    talk.receive(Tag::Hits, "ghost triangles", sources, |_, from, words| {
+        came.push((from, words));
+        Ok(())
+    })?;
+    for (from, words) in came {
+        add_triangles(&mut merged, &words).ok_or_else(|| talk.wrong(from, "ghost triangles", words.len()))?;
+    }
+    let geometries = merged.into_iter().map(|m| Geometry::Mesh(Arc::new(m))).collect();
+    let instances = part.scene.world.instances().to_vec();
+    let whole = part.scene.world.whole();
+    let build = |e| FrameError::Render(RenderError::Scene(SceneError::Build(e)));
+    let world = World::build_part(geometries, instances, &whole, &options.build).map_err(build)?;
+    let appearances = part.scene.appearances.iter().map(|a| Appearance::new(a.material)).collect();
+    let mut scene = part.scene.clone();
+    (scene.world, scene.appearances) = (Arc::new(world), appearances);
+    Ok(scene)
+}
+
+fn add_triangles(meshes: &mut [TriMesh], mut words: &[u32]) -> Option<()> {
+    for mesh in meshes {
+        let (&[vertices, triangles], rest) = words.split_first_chunk::<2>()?;
+        let (positions, rest) = rest.split_at_checked((vertices as usize).checked_mul(3)?)?;
+        let (indices, rest) = rest.split_at_checked((triangles as usize).checked_mul(3)?)?;
+        words = rest;
+        let first = mesh.positions.len() as u32;
+        let corner = |p: &[u32; 3]| Vec3::from_array(p.map(f32::from_bits));
+        mesh.positions.extend(positions.as_chunks::<3>().0.iter().map(corner));
+        // Numbers past the end stay so: such triangles are left out of the structure.
+        let moved = |t: &[u32; 3]| t.map(|k| if k < vertices { k + first } else { u32::MAX });
+        mesh.indices.extend(indices.as_chunks::<3>().0.iter().map(moved));
+    }
+    words.is_empty().then_some(())
+}

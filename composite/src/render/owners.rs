@@ -1,0 +1,76 @@
+//! Who owns which tiles. All ranks know all bounds, so all find the same owners without a message.
+use rt_core::math::Aabb;
+use rt_core::waves::WaveFrame;
+use std::ops::Range;
+
+/// Tiles of each rank, and which ranks have something to say about which tile.
+pub(super) struct Owners {
+    /// Consecutive tiles of each rank.
+    pub(super) tiles: Vec<Range<usize>>,
+    /// Of each rank, whether a camera ray of a tile can meet its part.
+    touched: Vec<Vec<bool>>,
+}
+
+impl Owners {
+    /// Tiles in `bounds.len()` runs of about the same work: a tile counts once, and once more for each part that may be seen in it.
+    pub(super) fn new(frame: &WaveFrame<'_>, bounds: &[Aabb]) -> Owners {
+        let touched: Vec<Vec<bool>> = bounds.iter().map(|b| frame.tiles_of(*b)).collect();
+        let work = |tile: usize| {
+            let parts = touched.iter().filter(|t| t[tile]).count() as u64;
+            // Uncovered tiles are filled with background; covered ones are shaded as well, whatever number of parts is there.
+            if parts == 0 { 1 } else { 8 + parts }
+        };
+        let work: Vec<u64> = (0..frame.num_tiles()).map(work).collect();
+        Owners { tiles: cut(&work, bounds.len()), touched }
+    }
+
+    /// The tiles of `owner` that rank `from` may see something in.
+    pub(super) fn shared(&self, from: usize, owner: usize) -> impl Iterator<Item = usize> + '_ {
+        self.tiles[owner].clone().filter(move |&tile| self.touched[from][tile])
+    }
+
+    /// Whether `from` has anything to say to `owner`.
+    pub(super) fn talks(&self, from: usize, owner: usize) -> bool {
+        self.shared(from, owner).next().is_some()
+    }
+}
+
+/// Cuts items of the given work into `ranks` runs.
+pub(super) fn cut(work: &[u64], ranks: usize) -> Vec<Range<usize>> {
+    let total: u64 = work.iter().sum();
+    let (mut start, mut done) = (0, 0);
+    (0..ranks)
+        .map(|rank| {
+            let share = total * (rank as u64 + 1) / ranks as u64;
+            let mut end = start;
+            while end < work.len() && done + work[end] / 2 < share {
+                done += work[end];
+                end += 1;
+            }
+            if rank + 1 == ranks {
+                end = work.len();
+            }
+            let run = start..end;
+            start = end;
+            run
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_cover_everything_once_and_are_balanced() {
+        let work: Vec<u64> = (0..1000).map(|k| 1 + (k / 100) as u64).collect();
+        for ranks in [1, 2, 3, 7, 64, 999, 1000, 1500] {
+            let runs = cut(&work, ranks);
+            assert_eq!(runs.len(), ranks);
+            assert_eq!((runs[0].start, runs[ranks - 1].end), (0, 1000));
+            assert!(runs.windows(2).all(|w| w[0].end == w[1].start));
+            let most = runs.iter().map(|r| work[r.clone()].iter().sum::<u64>()).max().unwrap();
+            assert!(most <= 5500 / ranks as u64 + 20, "{ranks} ranks: {most}");
+        }
+    }
+}

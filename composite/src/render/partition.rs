@@ -1,0 +1,291 @@
+//! Data to ranks: bricks of space by k-d splits, with about the same number of primitives, or the same work for a view.
+use super::FrameError;
+use rt_core::accel::{BuildOptions, Geometry};
+use rt_core::camera::Camera;
+use rt_core::effects::Effects;
+use rt_core::glam::swizzles::Vec4Swizzles;
+use rt_core::glam::{DAffine3, DVec3};
+use rt_core::scene::Scene;
+
+/// How primitives are dealt to ranks.
+#[derive(Debug, Clone)]
+pub enum Split {
+    /// Bricks with the same number of primitives: the data-parallel partition of section 3.2.1. Does not depend on the view.
+    Triangles,
+    /// Bricks with the same expected work for one view: a primitive counts a little for being there, and more the larger it is in the
+    /// picture. The view-dependent partition of section 3.2.2; another view needs another one.
+    View {
+        /// The view.
+        camera: Box<Camera>,
+        /// Width and height of the picture, pixels.
+        size_px: [u32; 2],
+    },
+    /// Every primitive anywhere: nothing is left of locality. For tests.
+    Random {
+        /// Another seed deals otherwise.
+        seed: u64,
+    },
+}
+
+/// Which primitives every rank holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Partition {
+    /// By rank and geometry, in ascending order.
+    kept: Vec<Vec<Vec<u32>>>,
+}
+
+/// What one rank holds.
+#[derive(Clone)]
+pub struct Part {
+    /// The scene with this rank's primitives.
+    pub scene: Scene,
+    /// Which part of how many.
+    pub rank: usize,
+    /// Number of parts.
+    pub parts: usize,
+    /// Of each geometry, the numbers in the whole of the primitives here.
+    pub(super) kept: Vec<Vec<u32>>,
+    /// What the whole scene needs.
+    pub(super) needed: Effects,
+    /// This part with a rim, see [`super::ghost`].
+    pub(super) rim: Option<(f64, Scene)>,
+}
+
+impl Part {
+    /// Primitives here.
+    pub fn primitives(&self) -> usize {
+        self.kept.iter().map(Vec::len).sum()
+    }
+}
+
+/// A primitive on its way to a rank.
+struct Item {
+    geometry: u32,
+    primitive: u32,
+    center: DVec3,
+    work: f64,
+}
+
+impl Partition {
+    /// Cuts `scene` into `parts` parts. Geometries with several instances are cut where their first one stands.
+    pub fn new(scene: &Scene, parts: usize, split: &Split) -> Partition {
+        let parts = parts.max(1);
+        let geometries = scene.world.geometries().len();
+        let mut kept = vec![vec![Vec::new(); geometries]; parts];
+        if let Split::Random { seed } = split {
+            for (g, geometry) in scene.world.geometries().iter().enumerate() {
+                for p in 0..count(geometry) as u32 {
+                    let rank = mixed(*seed ^ (g as u64) << 40 ^ u64::from(p)) % parts as u64;
+                    kept[rank as usize][g].push(p);
+                }
+            }
+            return Partition { kept };
+        }
+        let mut items = items(scene, split);
+        let mut give = |rank: usize, items: &[Item]| {
+            for i in items {
+                kept[rank][i.geometry as usize].push(i.primitive);
+            }
+        };
+        split_items(&mut items, 0, parts, &mut give);
+        for list in kept.iter_mut().flatten() {
+            list.sort_unstable();
+        }
+        Partition { kept }
+    }
+
+    /// Number of parts.
+    pub fn parts(&self) -> usize {
+        self.kept.len()
+    }
+
+    /// Primitives of each part.
+    pub fn sizes(&self) -> Vec<usize> {
+        self.kept.iter().map(|part| part.iter().map(Vec::len).sum()).collect()
+    }
+
+    /// Of each geometry, the primitives of part `rank`.
+    pub fn primitives(&self, rank: usize) -> &[Vec<u32>] {
+        &self.kept[rank]
+    }
+
+    /// Builds part `rank` of `scene`, the scene that was cut.
+    ///
+    /// # Errors
+    /// [`FrameError::Ranks`] when there is no such part, [`FrameError::Scene`] when it cannot be built.
+    pub fn part(&self, scene: &Scene, rank: usize, options: &BuildOptions) -> Result<Part, FrameError> {
+        let parts = self.parts();
+        let kept = self.kept.get(rank).ok_or(FrameError::Ranks { parts, ranks: rank + 1 })?.clone();
+        let part = scene.part(&kept, options)?;
+        Ok(Part { scene: part, rank, parts, kept, needed: Effects::required_by(scene), rim: None })
+    }
+}
+
+fn count(geometry: &Geometry) -> usize {
+    match geometry {
+        Geometry::Mesh(mesh) => mesh.indices.len(),
+        Geometry::Shape(shape) => shape.num_primitives(),
+    }
+}
+
+/// A well-mixed number (the finalizer of splitmix64).
+fn mixed(mut x: u64) -> u64 {
+    x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ x >> 31
+}
+
+fn items(scene: &Scene, split: &Split) -> Vec<Item> {
+    let mut out = Vec::new();
+    for (g, geometry) in scene.world.geometries().iter().enumerate() {
+        let first = scene.world.instances().iter().find(|i| i.geometry == g);
+        let place = first.map_or(DAffine3::IDENTITY, |i| i.world_from_object);
+        for p in 0..count(geometry) {
+            let [lo, hi] = box_of(geometry, p);
+            // What cannot be hit may be anywhere.
+            let (lo, hi) =
+                if lo.is_finite() && hi.is_finite() { (lo, hi) } else { (DVec3::ZERO, DVec3::ZERO) };
+            let center = place.transform_point3(0.5 * (lo + hi));
+            let radius = place.transform_vector3(0.5 * (hi - lo)).length();
+            let work = match split {
+                Split::View { camera, size_px } => 0.05 + pixels_of(camera, *size_px, center, radius),
+                _ => 1.0,
+            };
+            out.push(Item { geometry: g as u32, primitive: p as u32, center, work });
+        }
+    }
+    out
+}
+
+/// Corners of a primitive's box, object space in f64.
+fn box_of(geometry: &Geometry, primitive: usize) -> [DVec3; 2] {
+    match geometry {
+        Geometry::Mesh(mesh) => {
+            let corners = mesh.indices[primitive]
+                .map(|k| mesh.positions.get(k as usize).map_or(DVec3::NAN, |p| mesh.origin + p.as_dvec3()));
+            // Minima of f64 would pass over NaN.
+            if corners.iter().any(|c| !c.is_finite()) {
+                return [DVec3::NAN; 2];
+            }
+            let [a, b, c] = corners;
+            [a.min(b).min(c), a.max(b).max(c)]
+        }
+        Geometry::Shape(shape) => {
+            let b = shape.bounds(primitive as u32);
+            [shape.origin() + b.min.as_dvec3(), shape.origin() + b.max.as_dvec3()]
+        }
+    }
+}
+
+/// Pixels that a ball about covers in the picture; 0 outside of it. What hides it is not known here.
+fn pixels_of(camera: &Camera, size_px: [u32; 2], center: DVec3, radius: f64) -> f64 {
+    let matrix = camera.clip_from_world();
+    let clip = matrix * center.extend(1.0);
+    let size = size_px.map(f64::from);
+    // Scale of the picture at the ball's depth.
+    let across = matrix.row(0).xyz().length() * 0.5 * size[0];
+    let w = clip.w.abs().max(1e-9 * radius.max(f64::MIN_POSITIVE));
+    let reach = radius * across / w;
+    let x = (clip.x / w + 1.0) * 0.5 * size[0];
+    let y = (1.0 - clip.y / w) * 0.5 * size[1];
+    let inside = clip.w > 0.0 && x >= -reach && y >= -reach && x <= size[0] + reach && y <= size[1] + reach;
+    if inside { (reach * reach).min(size[0] * size[1]) } else { 0.0 }
+}
+
+/// Gives `items` to `ranks` ranks from `first_rank` on: halves along the longest axis of their centres, again and again.
+fn split_items(items: &mut [Item], first_rank: usize, ranks: usize, give: &mut impl FnMut(usize, &[Item])) {
+    if ranks == 1 {
+        give(first_rank, items);
+        return;
+    }
+    let lower = ranks / 2;
+    let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for i in items.iter() {
+        (lo, hi) = (lo.min(i.center), hi.max(i.center));
+    }
+    let axis = (0..3).max_by(|&a, &b| (hi[a] - lo[a]).total_cmp(&(hi[b] - lo[b]))).unwrap_or(0);
+    // By number where centres agree: every rank must cut in the same way.
+    items.sort_unstable_by(|a, b| {
+        let key = |i: &Item| (i.geometry, i.primitive);
+        a.center[axis].total_cmp(&b.center[axis]).then(key(a).cmp(&key(b)))
+    });
+    let total: f64 = items.iter().map(|i| i.work).sum();
+    let share = total * lower as f64 / ranks as f64;
+    let mut done = 0.0;
+    let cut = items
+        .iter()
+        .position(|i| {
+            done += i.work;
+            done - 0.5 * i.work >= share
+        })
+        .unwrap_or(items.len());
+    let (below, above) = items.split_at_mut(cut);
+    split_items(below, first_rank, lower, give);
+    split_items(above, first_rank + lower, ranks - lower, give);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rt_core::accel::World;
+    use rt_core::glam::Vec3;
+    use rt_core::mesh::TriMesh;
+
+    fn line(triangles: u32) -> Scene {
+        let mut mesh = TriMesh::default();
+        for k in 0..triangles {
+            let x = k as f32;
+            mesh.positions.extend([
+                Vec3::new(x, 0.0, 0.0),
+                Vec3::new(x + 0.5, 0.0, 0.0),
+                Vec3::new(x, 1.0, 0.0),
+            ]);
+            mesh.indices.push([3 * k, 3 * k + 1, 3 * k + 2]);
+        }
+        Scene::new(World::from_mesh(mesh, &BuildOptions::default()).unwrap())
+    }
+
+    #[test]
+    fn every_primitive_is_dealt_once_and_bricks_are_balanced() {
+        let scene = line(1000);
+        for parts in [1, 2, 3, 5, 64, 127, 1000, 1200] {
+            for split in [Split::Triangles, Split::Random { seed: 4 }] {
+                let partition = Partition::new(&scene, parts, &split);
+                let mut all: Vec<u32> = (0..parts).flat_map(|r| partition.primitives(r)[0].clone()).collect();
+                all.sort_unstable();
+                assert!(all.iter().copied().eq(0..1000), "{parts} parts, {split:?}");
+                if matches!(split, Split::Triangles) {
+                    let sizes = partition.sizes();
+                    let (least, most) = (sizes.iter().min().unwrap(), sizes.iter().max().unwrap());
+                    assert!(most - least <= 1 + 1000 / parts / 4, "{parts} parts: {least}..{most}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_same_cuts_on_every_rank_also_where_centres_agree() {
+        let mut mesh = TriMesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]; 64]);
+        mesh.indices.push([0, 1, 99]);
+        let scene = Scene::new(World::from_mesh(mesh, &BuildOptions::default()).unwrap());
+        let cut = || Partition::new(&scene, 7, &Split::Triangles);
+        assert_eq!(cut(), cut());
+        assert_eq!(cut().sizes().iter().sum::<usize>(), 65, "unusable triangles are somewhere, too");
+    }
+
+    #[test]
+    fn a_view_gives_more_ranks_to_what_is_large_in_it() {
+        // The camera looks at the first hundred triangles only.
+        let eye = DVec3::new(50.0, 0.5, 40.0);
+        let at = DVec3::new(50.0, 0.5, 0.0);
+        let camera = Camera::perspective(eye, at, DVec3::Y, 1.79, 1.0, [0.1, 1e4]).unwrap();
+        let scene = line(1000);
+        let split = Split::View { camera: Box::new(camera), size_px: [512, 512] };
+        let partition = Partition::new(&scene, 8, &split);
+        let in_view = (0..8).filter(|&r| partition.primitives(r)[0].iter().all(|&t| t < 120)).count();
+        assert!(in_view >= 5, "{:?}", partition.sizes());
+        let plain = Partition::new(&scene, 8, &Split::Triangles);
+        assert_eq!((0..8).filter(|&r| plain.primitives(r)[0].iter().all(|&t| t < 120)).count(), 0);
+    }
+}

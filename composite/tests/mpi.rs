@@ -1,0 +1,247 @@
+//! The program over real transports: Open MPI, MPICH, SimGrid; IceT beside it; and faults that must end in bounded time.
+//!
+//! These are peers (CONTRIBUTING.md): a missing one skips its tests with a note, or fails them where RTSV_REQUIRE_PEERS is set.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// Far beyond what any of these runs needs, on a slow and busy machine too; a hang fails here.
+const BOUND: Duration = Duration::from_secs(100);
+
+fn peer(variable: &str) -> Option<PathBuf> {
+    let found = std::env::var_os(variable).map(PathBuf::from);
+    if found.is_none() {
+        assert!(
+            std::env::var_os("RTSV_REQUIRE_PEERS").is_none(),
+            "{variable} is not set, but RTSV_REQUIRE_PEERS is: `cargo xtask` sets both"
+        );
+        eprintln!("SKIPPED: {variable} is not set");
+    }
+    found
+}
+
+struct Ran {
+    code: Option<i32>,
+    stdout: String,
+    /// With stderr.
+    text: String,
+    took: Duration,
+}
+
+/// Runs the program; fails the test if it does not end in time.
+fn run(arguments: &[&str], variables: &[(&str, &Path)]) -> Ran {
+    let begin = Instant::now();
+    let mut command = Command::new("timeout");
+    command.args(["--kill-after=5", &BOUND.as_secs().to_string()]);
+    command.arg(env!("CARGO_BIN_EXE_composite")).args(arguments).stdin(Stdio::null());
+    for launcher in ["OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK", "COMPOSITE_MPI", "COMPOSITE_MPIRUN"] {
+        command.env_remove(launcher);
+    }
+    command.envs(variables.iter().copied());
+    let Output { status, stdout, stderr } = command.output().expect("coreutils' timeout runs");
+    let stdout = String::from_utf8_lossy(&stdout).into_owned();
+    let text = stdout.clone() + &String::from_utf8_lossy(&stderr);
+    let took = begin.elapsed();
+    assert!(took < BOUND, "{arguments:?} did not end:\n{text}");
+    Ran { code: status.code(), stdout, text, took }
+}
+
+/// `composite check` on `ranks` ranks: every strategy, scene and size, with depth and blended.
+fn check(ranks: usize, more: &[&str], variables: &[(&str, &Path)], transport: &str) {
+    let ranks = ranks.to_string();
+    let arguments = [&["check", "--json", "-n", &ranks], more].concat();
+    let ran = run(&arguments, variables);
+    assert_eq!(ran.code, Some(0), "{arguments:?}: {}", ran.text);
+    let checked: serde_json::Value = serde_json::from_str(ran.stdout.trim()).expect("one line of JSON");
+    assert_eq!(checked["ranks"].to_string(), ranks);
+    assert!(checked["transport"].as_str().is_some_and(|t| t.contains(transport)), "{checked}");
+    assert_eq!((checked["images"].as_u64(), checked["images_differ"].as_u64()), (Some(120), Some(0)));
+}
+
+#[test]
+fn threads_carry_every_strategy_to_the_bits_of_the_reference() {
+    for ranks in [1, 4, 9] {
+        check(ranks, &["--threads"], &[], "threads");
+    }
+}
+
+#[test]
+fn open_mpi_carries_every_strategy_to_the_bits_of_the_reference() {
+    let Some(mpirun) = peer("RTSV_MPIRUN") else { return };
+    for ranks in [2, 3, 4, 5, 8] {
+        check(ranks, &["--mpi"], &[("COMPOSITE_MPIRUN", &mpirun)], "Open MPI");
+    }
+}
+
+#[test]
+fn mpich_carries_every_strategy_to_the_bits_of_the_reference() {
+    let Some(mpirun) = peer("RTSV_MPIRUN_MPICH") else { return };
+    check(2, &["--mpi"], &[("COMPOSITE_MPIRUN", &mpirun)], "MPICH");
+}
+
+#[test]
+fn messages_cut_into_chunks_arrive_whole_and_in_order() {
+    for (variable, ranks) in [("RTSV_MPIRUN", 3), ("RTSV_MPIRUN_MPICH", 2)] {
+        let Some(mpirun) = peer(variable) else { continue };
+        // Some of the lengths in `check` are multiples of this, some differ from one by a byte.
+        check(ranks, &["--mpi", "--chunk-bytes", "1000"], &[("COMPOSITE_MPIRUN", &mpirun)], "");
+    }
+}
+
+/// The shared library if cargo has made it with this test (`cargo test --workspace` does); else the program makes it.
+fn simulated_program() -> Vec<(&'static str, PathBuf)> {
+    let program = Path::new(env!("CARGO_BIN_EXE_composite"));
+    let folder = program.parent().expect("a program is in a folder");
+    let places = ["libcomposite_smpi.so", "deps/libcomposite_smpi.so"].map(|name| folder.join(name));
+    places.into_iter().find(|p| p.is_file()).map(|p| ("COMPOSITE_SMPI_LIBRARY", p)).into_iter().collect()
+}
+
+#[test]
+fn simulated_ranks_carry_every_strategy_to_the_bits_of_the_reference() {
+    if peer("RTSV_SMPIRUN").is_none() {
+        return;
+    }
+    let library = simulated_program();
+    let variables: Vec<(&str, &Path)> = library.iter().map(|(name, path)| (*name, path.as_path())).collect();
+    for ranks in [3, 16] {
+        check(ranks, &["--smpi"], &variables, "SMPI");
+    }
+}
+
+// ---- IceT -------------------------------------------------------------------------------------------------------
+
+/// Runs `composite compare` and checks what it prints.
+fn compare(more: &[&str], variables: &[(&str, &Path)]) {
+    let arguments = [&["compare", "--json", "--size", "200", "--frames", "2"], more].concat();
+    let ran = run(&arguments, variables);
+    assert_eq!(ran.code, Some(0), "{arguments:?}: {}", ran.text);
+    let all: serde_json::Value = serde_json::from_str(ran.stdout.trim()).expect("one line of JSON");
+    assert!(all["machine"].is_object());
+    let rows = all["rows"].as_array().expect("rows");
+    let scenes: Vec<&str> = rows.iter().filter_map(|row| row["scene"].as_str()).collect();
+    assert_eq!(scenes, ["discs", "dense", "frag"]);
+    for row in rows {
+        assert_eq!(row["pixels_differ"].as_u64(), Some(0), "{arguments:?}: {row}");
+        let number = |key: &str| row[key].as_f64().unwrap_or_else(|| panic!("{key} in {row}"));
+        assert!((number("rival_ms") / number("ours_ms") - number("ratio")).abs() < 1e-9 * number("ratio"));
+        assert!(["bswap", "radix-k", "radix-kr", "tree"].contains(&row["rival"].as_str().expect("rival")));
+        assert!(row["ranks"].is_u64());
+    }
+}
+
+#[test]
+fn icet_between_threads_gives_the_same_pixels() {
+    let Some(icet) = peer("RTSV_ICET") else { return };
+    for ranks in ["1", "3", "8"] {
+        for pixels in ["depth", "blend"] {
+            compare(&["--threads", "-n", ranks, "--pixels", pixels], &[("RTSV_ICET", &icet)]);
+        }
+    }
+}
+
+#[test]
+fn icet_over_its_own_mpi_layer_gives_the_same_pixels() {
+    let (Some(icet), Some(mpirun)) = (peer("RTSV_ICET"), peer("RTSV_MPIRUN")) else { return };
+    for pixels in ["depth", "blend"] {
+        let variables: [(&str, &Path); 2] = [("RTSV_ICET", &icet), ("COMPOSITE_MPIRUN", &mpirun)];
+        compare(&["--mpi", "-n", "4", "--pixels", pixels], &variables);
+    }
+}
+
+#[test]
+fn icet_over_mpich_gives_the_same_pixels() {
+    let (Some(icet), Some(mpirun)) = (peer("RTSV_ICET"), peer("RTSV_MPIRUN_MPICH")) else { return };
+    compare(&["--mpi", "-n", "2"], &[("RTSV_ICET", &icet), ("COMPOSITE_MPIRUN", &mpirun)]);
+}
+
+#[test]
+fn icet_on_simulated_ranks_gives_the_same_pixels() {
+    let (Some(icet), Some(_)) = (peer("RTSV_ICET"), peer("RTSV_SMPIRUN")) else { return };
+    let library = simulated_program();
+    let mut variables: Vec<(&str, &Path)> =
+        library.iter().map(|(name, path)| (*name, path.as_path())).collect();
+    variables.push(("RTSV_ICET", &icet));
+    compare(&["--smpi", "-n", "7"], &variables);
+}
+
+#[test]
+fn without_icet_compare_says_so_and_ends_with_2() {
+    let ran = run(&["compare", "--threads"], &[("RTSV_ICET", Path::new("no-such-library.so"))]);
+    assert_eq!(ran.code, Some(2), "{}", ran.text);
+    assert!(ran.text.contains("IceT was not found") && ran.text.contains("paraview"), "{}", ran.text);
+}
+
+#[test]
+fn without_a_launcher_mpi_says_so_and_ends_with_2() {
+    let ran = run(&["check", "--mpi"], &[("COMPOSITE_MPIRUN", Path::new("no-such-mpirun"))]);
+    assert_eq!(ran.code, Some(2), "{}", ran.text);
+    assert!(ran.text.contains("no-such-mpirun") && ran.text.contains("openmpi-bin"), "{}", ran.text);
+}
+
+// ---- Faults -----------------------------------------------------------------------------------------------------
+
+/// The highest of three ranks fails; all must end, without success, and say these words.
+fn fault(kind: &str, words: &[&str], variables: &[(&str, &Path)], transport: &str) {
+    let arguments = ["check", transport, "-n", "3", "--timeout", "2", "--fault", kind];
+    let ran = run(&arguments, variables);
+    assert_ne!(ran.code, Some(0), "{kind}: {}", ran.text);
+    assert!(words.iter().any(|words| ran.text.contains(words)), "{kind}: none of {words:?} in\n{}", ran.text);
+    assert!(ran.took < Duration::from_secs(60), "{kind} took {:?}", ran.took);
+}
+
+#[test]
+fn faults_over_open_mpi_end_with_a_named_error_in_bounded_time() {
+    let Some(mpirun) = peer("RTSV_MPIRUN") else { return };
+    let variables: [(&str, &Path); 1] = [("COMPOSITE_MPIRUN", &mpirun)];
+    // The launcher's words, or ours.
+    fault("killed", &["signal 9", "Killed"], &variables, "--mpi");
+    fault("stalled", &["message from rank 2"], &variables, "--mpi");
+    fault("panic", &["rank 2 ended the group: this rank panicked", "on purpose"], &variables, "--mpi");
+    fault("size", &["another size", "unusable message"], &variables, "--mpi");
+    fault("order", &["from rank 2", "at a barrier in vain"], &variables, "--mpi");
+    fault("leaves", &["rank 2 on", "had enough"], &variables, "--mpi");
+}
+
+#[test]
+fn a_killed_and_a_stalled_rank_of_mpich_end_the_job() {
+    let Some(mpirun) = peer("RTSV_MPIRUN_MPICH") else { return };
+    let variables: [(&str, &Path); 1] = [("COMPOSITE_MPIRUN", &mpirun)];
+    fault("killed", &["EXIT CODE: 9", "signal", "Killed"], &variables, "--mpi");
+    fault("stalled", &["message from rank 2"], &variables, "--mpi");
+}
+
+#[test]
+fn faults_between_threads_end_with_a_named_error_in_bounded_time() {
+    fault("panic", &["rank 2 panicked: on purpose"], &[], "--threads");
+    fault("size", &["another size", "unusable message"], &[], "--threads");
+    fault("leaves", &["had enough"], &[], "--threads");
+}
+
+// ---- The other commands -------------------------------------------------------------------------------------------
+
+#[test]
+fn doctor_names_what_there_is_and_a_cure_for_what_is_not() {
+    let ran = run(&["doctor"], &[("RTSV_ICET", Path::new("no-such-library.so"))]);
+    assert_eq!(ran.code, Some(0), "{}", ran.text);
+    for what in ["threads", "Open MPI", "MPICH", "SMPI", "IceT", "cure: for `composite compare`"] {
+        assert!(ran.stdout.contains(what), "{what} in\n{}", ran.stdout);
+    }
+}
+
+#[test]
+fn demo_draws_a_bar_for_every_rank() {
+    let folder = std::env::temp_dir().join(format!("composite-demo-{}", std::process::id()));
+    let out = folder.to_str().expect("a path in UTF-8");
+    let ran = run(&["demo", "-n", "5", "--size", "120", "--frames", "1", "--json", "--out", out], &[]);
+    assert_eq!(ran.code, Some(0), "{}", ran.text);
+    let shown: serde_json::Value = serde_json::from_str(ran.stdout.trim()).expect("one line of JSON");
+    assert_eq!(shown["ranks"].as_array().map(Vec::len), Some(5));
+    let plot = std::fs::read_to_string(folder.join("composite_demo.svg")).expect("the plot");
+    let png = std::fs::read(folder.join("composite_demo.png")).expect("the picture");
+    std::fs::remove_dir_all(&folder).expect("the folder");
+    for rank in 0..5 {
+        assert!(plot.contains(&format!(">rank {rank}<")));
+    }
+    assert!(png.starts_with(b"\x89PNG"));
+}

@@ -1,0 +1,150 @@
+//! Scenes that have light across borders of parts.
+use rt_core::accel::Geometry;
+use rt_core::camera::Camera;
+use rt_core::environment::Background;
+use rt_core::frame::Layers;
+use rt_core::glam::{DAffine3, DVec3, Vec3};
+use rt_core::light::Light;
+use rt_core::material::Material;
+use rt_core::mesh::{Attribute, TriMesh};
+use rt_core::render::RenderOptions;
+use rt_core::scene::{AmbientOcclusion, Appearance, Scene, SceneBuilder};
+use rt_core::shapes::{Radii, Spheres};
+use std::sync::Arc;
+
+/// A scene with a view of it.
+pub(crate) struct Case {
+    pub(crate) name: &'static str,
+    pub(crate) scene: Scene,
+    pub(crate) camera: Camera,
+    pub(crate) options: RenderOptions,
+}
+
+/// Bumps over a square of 4 x 4 that stand on edge at some places, with smooth normals and a colour per triangle.
+pub(crate) fn bumps(shift: DVec3, cells: u32) -> TriMesh {
+    let n = cells + 1;
+    let at = |k: u32| {
+        let (x, y) = ((k % n) as f32 / cells as f32 * 4.0 - 2.0, (k / n) as f32 / cells as f32 * 4.0 - 2.0);
+        Vec3::new(x, y, 0.5 * (4.0 * x).sin() * (3.5 * y).cos())
+    };
+    let mut mesh = TriMesh::new((0..n * n).map(at).collect(), vec![]);
+    mesh.origin = shift;
+    for j in 0..cells {
+        for i in 0..cells {
+            let k = j * n + i;
+            mesh.indices.extend([[k, k + 1, k + n], [k + 1, k + n + 1, k + n]]);
+        }
+    }
+    let up = |k: u32| (at(k) * Vec3::new(0.3, 0.3, 0.0) + Vec3::Z).normalize();
+    mesh.normals = Some(Attribute::per_vertex((0..n * n).map(up).collect()));
+    let color = |k: usize| [0.3 + 0.7 * (k % 7) as f32 / 7.0, 0.8, 0.5, 1.0];
+    mesh.colors = Some(Attribute::per_face((0..mesh.indices.len()).map(color).collect()));
+    mesh
+}
+
+pub(crate) fn camera(shift: DVec3) -> Camera {
+    let eye = shift + DVec3::new(2.5, -4.0, 3.0);
+    Camera::perspective(eye, shift + DVec3::new(0.0, 0.0, 0.3), DVec3::Z, 0.8, 1.25, [0.1, 100.0]).unwrap()
+}
+
+fn scene(
+    shift: DVec3,
+    ground: Material,
+    balls: Option<Material>,
+    lights: &[Light],
+    ao: Option<f64>,
+) -> Scene {
+    let mut b = SceneBuilder::new();
+    b.mesh(bumps(shift, 48), ground);
+    if let Some(balls) = balls {
+        let m = b.material(balls);
+        let center = |k: i32| {
+            let a = f64::from(k) * 0.7;
+            DVec3::new(1.5 * a.cos(), 1.5 * (1.3 * a).sin(), 0.7 + 0.05 * f64::from(k))
+        };
+        let centers: Vec<DVec3> = (0..24).map(center).collect();
+        let spheres = Spheres::from_f64_centers(&centers, Radii::Common(0.28)).unwrap();
+        let g = b.geometry(Geometry::Shape(Arc::new(spheres)));
+        for k in 0..2 {
+            let turned = DAffine3::from_rotation_z(1.0 + 2.0 * f64::from(k));
+            b.instance(g, DAffine3::from_translation(shift) * turned, Appearance::new(m));
+        }
+    }
+    for l in lights {
+        b.light(*l);
+    }
+    let mut scene = b.build().unwrap();
+    scene.ambient_occlusion = ao.map(|distance| AmbientOcclusion { distance, rays: 12 });
+    scene.background = Background::Gradient { bottom: [0.1, 0.1, 0.2], top: [0.6, 0.7, 0.9] };
+    scene
+}
+
+fn matte() -> Material {
+    Material::matte([0.7, 0.6, 0.5])
+}
+
+fn options() -> RenderOptions {
+    RenderOptions { layers: Layers::ALL, ..RenderOptions::new(150, 121) }
+}
+
+const AMBIENT: [f32; 3] = [0.3; 3];
+
+/// Shadows, area lights and ambient occlusion, with light at a finite place: what the exchange of light bits is for.
+pub(crate) fn shadows_and_occlusion(shift: DVec3) -> Case {
+    let lamp = Light::point(shift + DVec3::new(1.0, 1.0, 4.0));
+    let sun = Light::directional(DVec3::new(0.6, -0.3, 0.7)).with_color([0.7; 3]).with_size(0.05);
+    let lights = [lamp, sun, Light::ambient(AMBIENT)];
+    Case {
+        name: "shadows, area light, ambient occlusion",
+        scene: scene(shift, matte(), Some(matte()), &lights, Some(0.6)),
+        camera: camera(shift),
+        options: options(),
+    }
+}
+
+/// Ambient occlusion alone, on triangles alone: the case of ghost zones.
+pub(crate) fn occlusion_alone() -> Case {
+    let lights = [Light::ambient(AMBIENT)];
+    Case {
+        name: "ambient occlusion alone",
+        scene: scene(DVec3::ZERO, matte(), None, &lights, Some(0.4)),
+        camera: camera(DVec3::ZERO),
+        options: options(),
+    }
+}
+
+/// No light that leaves a hit.
+pub(crate) fn headlight(samples: u32) -> Case {
+    Case {
+        name: "headlight",
+        scene: scene(DVec3::ZERO, matte(), Some(matte()), &[Light::headlight()], None),
+        camera: camera(DVec3::ZERO),
+        options: RenderOptions { samples, ..options() },
+    }
+}
+
+/// Several waves: mirror, gloss and glass, transparent layers, paths.
+pub(crate) fn several_waves() -> Vec<Case> {
+    let sun = Light::directional(DVec3::new(0.4, -0.3, 1.0));
+    let ambient = Light::ambient(AMBIENT);
+    let small = || RenderOptions { samples: 2, ..RenderOptions { width: 75, height: 61, ..options() } };
+    let metal = Material::metal([0.9, 0.8, 0.7], 0.15);
+    let case = |name, scene, options| Case { name, scene, camera: camera(DVec3::ZERO), options };
+    vec![
+        case(
+            "gloss and glass",
+            scene(DVec3::ZERO, metal, Some(Material::dielectric(1.5)), &[sun, ambient], Some(1.0)),
+            small(),
+        ),
+        case(
+            "transparent layers",
+            scene(DVec3::ZERO, matte(), Some(matte().with_opacity(0.4)), &[sun, ambient], Some(0.5)),
+            RenderOptions { depth_min_opacity: 0.7, ..small() },
+        ),
+        case(
+            "paths",
+            scene(DVec3::ZERO, matte(), Some(Material::metal([0.9; 3], 0.0)), &[sun, ambient], None),
+            RenderOptions { path_tracing: true, max_bounces: 4, ..small() },
+        ),
+    ]
+}

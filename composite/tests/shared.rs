@@ -1,0 +1,193 @@
+//! Frames of one memory, merged without messages, and nodes of several ranks: the bits of the serial reference.
+use composite::{
+    Communicator, Composite, CompositeError, Compositor, DepthPixel, Destination, Frame, Image, Options,
+    PremultipliedPixel, Rect, composite_serial, composite_shared, seats, threads,
+};
+use std::num::NonZeroUsize;
+use std::sync::{Arc, Mutex};
+
+const SIZE: (u32, u32) = (70, 37);
+
+/// One rank's planes, and a rectangle around what it drew (odd ranks only; others leave it to be found).
+struct Drawn {
+    bytes: Vec<[u8; 4]>,
+    floats: Vec<[f32; 4]>,
+    depth: Vec<f32>,
+    bounds: Option<Rect>,
+}
+
+fn draw(rank: usize) -> Drawn {
+    let mut seed = 1 + rank as u64 * 977;
+    let mut random = move || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 40) as u32
+    };
+    let (x0, y0) = (random() % 40, random() % 20);
+    let bounds = Rect { x0, y0, x1: x0 + random() % 31, y1: y0 + random() % 18 };
+    let mut drawn =
+        Drawn { bytes: vec![], floats: vec![], depth: vec![], bounds: (rank % 2 == 1).then_some(bounds) };
+    for y in 0..SIZE.1 {
+        for x in 0..SIZE.0 {
+            let inside = bounds.x0 <= x && x < bounds.x1 && bounds.y0 <= y && y < bounds.y1;
+            let on = inside && random() % 4 > 0;
+            let alpha = (random() % 256) as f32 / 255.0;
+            drawn.floats.push(if on { [alpha * 0.3, alpha * 0.1, alpha, alpha] } else { [0.0; 4] });
+            drawn.bytes.push(if on { [rank as u8 + 1, x as u8, y as u8, 255] } else { [0; 4] });
+            drawn.depth.push(match random() % 8 {
+                _ if !on => 1.0,
+                0 => f32::NAN,
+                1 => -0.0,
+                2 => 0.0,
+                other => other as f32 / 8.0,
+            });
+        }
+    }
+    drawn
+}
+
+fn z(drawn: &Drawn) -> Frame<'_, DepthPixel<[u8; 4]>> {
+    let frame = Frame::with_depth(SIZE.0, SIZE.1, &drawn.bytes, &drawn.depth).unwrap();
+    drawn.bounds.map_or(frame, |bounds| frame.bounded(bounds).unwrap())
+}
+
+fn blended(drawn: &Drawn) -> Frame<'_, PremultipliedPixel<[f32; 4]>> {
+    let frame = Frame::premultiplied(SIZE.0, SIZE.1, &drawn.floats).unwrap();
+    drawn.bounds.map_or(frame, |bounds| frame.bounded(bounds).unwrap())
+}
+
+fn check_shared<P: Composite>(frames: &[Frame<'_, P>]) {
+    let expected = composite_serial(frames).unwrap();
+    let mut spare = None;
+    for threads in [1, 3, 100] {
+        let threads = NonZeroUsize::new(threads).unwrap();
+        let image = composite_shared(frames, threads, true, spare.take()).unwrap();
+        assert!(image.to_bytes() == expected.to_bytes(), "{} ranks", frames.len());
+        let colors = composite_shared(frames, threads, false, None).unwrap();
+        assert!(colors.colors() == expected.colors() && colors.depths().is_empty());
+        spare = Some(image);
+    }
+}
+
+#[test]
+fn merging_in_one_memory_gives_the_bits_of_the_serial_reference() {
+    for ranks in (1..=17).chain([64]) {
+        let drawn: Vec<Drawn> = (0..ranks).map(draw).collect();
+        check_shared(&drawn.iter().map(z).collect::<Vec<_>>());
+        check_shared(&drawn.iter().map(blended).collect::<Vec<_>>());
+    }
+}
+
+/// Threads as nodes, each with ranks of its own; the image at the first node.
+fn over_nodes<P: Composite>(nodes: &[&[Frame<'_, P>]]) -> Vec<u8> {
+    let results = threads::run(nodes.len(), |mut comm| {
+        let mut compositor = Compositor::new(Options::default());
+        let frames = nodes[comm.rank()];
+        // Twice, so that buffers of the first frame are written over.
+        let threads = NonZeroUsize::new(2).unwrap();
+        compositor.composite_node(&mut comm, frames, threads).unwrap();
+        compositor.composite_node(&mut comm, frames, threads).unwrap()
+    });
+    let results: Vec<_> = results.into_iter().map(|result| result.unwrap()).collect();
+    results[0].image.as_ref().unwrap().to_bytes()
+}
+
+#[test]
+fn nodes_of_several_ranks_give_the_bits_of_all_ranks() {
+    for sizes in [vec![4], vec![2, 2], vec![1, 3, 2], vec![5, 1], vec![2; 4], vec![1; 5], vec![3, 3, 3]] {
+        let drawn: Vec<Drawn> = (0..sizes.iter().sum()).map(draw).collect();
+        let (z, blended): (Vec<_>, Vec<_>) = drawn.iter().map(|d| (z(d), blended(d))).unzip();
+        let (mut z_nodes, mut blended_nodes, mut first) = (Vec::new(), Vec::new(), 0);
+        for size in &sizes {
+            z_nodes.push(&z[first..first + size]);
+            blended_nodes.push(&blended[first..first + size]);
+            first += size;
+        }
+        let flat = composite_serial(&z).unwrap().to_bytes();
+        assert!(over_nodes(&z_nodes) == flat, "depth, nodes of {sizes:?}");
+
+        // Blending: the reference of the nodes' references, which is that of all ranks if all numbers are powers of two.
+        let found = over_nodes(&blended_nodes);
+        let of_nodes: Vec<_> = blended_nodes.iter().map(|node| composite_serial(node).unwrap()).collect();
+        let as_frames: Vec<_> = of_nodes
+            .iter()
+            .map(|image| {
+                Frame::<PremultipliedPixel<[f32; 4]>>::premultiplied(SIZE.0, SIZE.1, image.colors()).unwrap()
+            })
+            .collect();
+        assert!(found == composite_serial(&as_frames).unwrap().to_bytes(), "blended, nodes of {sizes:?}");
+        let equal = sizes.iter().all(|size| *size == sizes[0]);
+        if equal && sizes[0].is_power_of_two() && sizes.len().is_power_of_two() {
+            assert!(found == composite_serial(&blended).unwrap().to_bytes(), "blended, nodes of {sizes:?}");
+        }
+    }
+}
+
+#[test]
+fn nan_depths_of_all_ranks_of_a_node_are_counted() {
+    let drawn: Vec<Drawn> = (0..4).map(draw).collect();
+    let frames: Vec<_> = drawn.iter().map(z).collect();
+    let nan: u64 = frames.iter().map(Frame::nan_depths).sum();
+    assert!(nan > 0);
+    let mut comm = threads::group(1).remove(0);
+    let mut compositor = Compositor::new(Options::default());
+    let done = compositor.composite_node(&mut comm, &frames, NonZeroUsize::MIN).unwrap();
+    assert_eq!(done.report.nan_depths, nan);
+}
+
+#[test]
+fn ranks_at_a_table_give_the_bits_of_the_serial_reference_frame_after_frame() {
+    for ranks in [1, 2, 5, 8] {
+        let drawn: Vec<Drawn> = (0..ranks).map(draw).collect();
+        let frames: Vec<_> = drawn.iter().map(z).collect();
+        let images: Vec<Arc<Image<DepthPixel<[u8; 4]>>>> = drawn
+            .iter()
+            .map(|d| Arc::new(Image::from_planes(SIZE.0, SIZE.1, d.bytes.clone(), d.depth.clone()).unwrap()))
+            .collect();
+        let expected = composite_serial(&frames).unwrap();
+        let places: Vec<_> = seats(ranks).into_iter().map(|seat| Mutex::new(Some(seat))).collect();
+        let results = threads::run(ranks, |mut comm| {
+            let rank = comm.rank();
+            let mut seat = places[rank].lock().unwrap().take().unwrap();
+            for repeat in 0..4 {
+                // With depths and without, to the first rank and to the last.
+                let root = if repeat < 2 { 0 } else { ranks - 1 };
+                let options = Options {
+                    depth: repeat % 2 == 0,
+                    destination: Destination::Rank(root),
+                    ..Options::default()
+                };
+                let bounds = frames[rank].bounds();
+                let done = seat.composite(&mut comm, &images[rank], bounds, &options).unwrap();
+                assert_eq!(done.report.nan_depths, frames[rank].nan_depths());
+                assert_eq!(done.image.is_some(), rank == root);
+                if let Some(image) = done.image {
+                    assert!(image.colors() == expected.colors());
+                    assert!(image.depths() == if options.depth { expected.depths() } else { &[] });
+                    seat.recycle(image);
+                }
+            }
+        });
+        assert!(results.iter().all(Result::is_ok));
+    }
+}
+
+#[test]
+fn a_table_names_what_it_cannot_do_and_who_did_not_come() {
+    let image =
+        Arc::new(Image::<PremultipliedPixel<[u8; 4]>>::from_planes(1, 1, vec![[1; 4]], vec![]).unwrap());
+    let places: Vec<_> = seats(2).into_iter().map(|seat| Mutex::new(Some(seat))).collect();
+    let results = threads::run(2, |mut comm| {
+        let mut seat = places[comm.rank()].lock().unwrap().take().unwrap();
+        if comm.rank() == 1 {
+            return Ok(());
+        }
+        let options = Options { timeout: std::time::Duration::from_secs(20), ..Options::default() };
+        seat.composite(&mut comm, &image, Rect::of_size(1, 1), &options).map(|_| ())
+    });
+    assert!(results[0].as_ref().unwrap().as_ref().unwrap_err().to_string().contains("rank 1"));
+    let mut comm = threads::group(1).remove(0);
+    let mut seat = seats(1).remove(0);
+    let options = Options { destination: Destination::Distributed, ..Options::default() };
+    let error = seat.composite(&mut comm, &image, Rect::of_size(1, 1), &options).unwrap_err();
+    assert!(matches!(error, CompositeError::Options(_)));
+}

@@ -1,0 +1,388 @@
+//! Writes one trampoline per OpenGL, GLX and EGL entry point of `src/symbols/names.txt`, and the hooks of the calls that
+//! come per vertex. Nothing of OpenGL is needed on the machine that builds.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// How a trampoline reaches its target.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    /// Straight through the table: our own hooks, which look after themselves.
+    Direct,
+    /// Through the table unless `ATTENTION` is set: then we are told first.
+    Watched,
+    /// We are always told first.
+    Always,
+}
+
+/// What a call may change; see `symbols::class`.
+fn class(name: &str) -> u32 {
+    const PURE: u32 = 0;
+    let starts = |list: &[&str]| list.iter().any(|p| name.starts_with(p));
+    let any = |list: &[&str]| list.contains(&name);
+    if name.starts_with("glX") || name.starts_with("egl") {
+        return PURE;
+    }
+    if any(&["glPopAttrib", "glPopClientAttrib"]) {
+        return 0xff;
+    }
+    if starts(&["glGet", "glIs", "glGen", "glAreTextures", "glFence", "glObjectLabel", "glPushAttrib"])
+        || starts(&[
+            "glHint",
+            "glPixelStore",
+            "glDebug",
+            "glPushDebug",
+            "glPopDebug",
+            "glRasterPos",
+            "glWindowPos",
+        ])
+        || starts(&[
+            "glInitNames",
+            "glPushName",
+            "glPopName",
+            "glLoadName",
+            "glSelectBuffer",
+            "glFeedbackBuffer",
+        ])
+        || starts(&[
+            "glClearColor",
+            "glClearDepth",
+            "glClearStencil",
+            "glBitmap",
+            "glLineWidth",
+            "glLineStipple",
+        ])
+        || starts(&["glPointSize", "glPixelZoom", "glPixelTransfer", "glPixelMap", "glFlush", "glFinish"])
+    {
+        return PURE;
+    }
+    if any(&["glMatrixMode", "glOrtho", "glFrustum"])
+        || starts(&[
+            "glLoadMatrix",
+            "glMultMatrix",
+            "glLoadIdentity",
+            "glPushMatrix",
+            "glPopMatrix",
+            "glRotate",
+        ])
+        || starts(&["glTranslate", "glScale", "glLoadTranspose", "glMultTranspose"])
+            && !name.starts_with("glScissor")
+    {
+        return 1;
+    }
+    if starts(&["glLight", "glColorMaterial"]) {
+        return 2;
+    }
+    // Binding changes no texture; what is bound is asked for with the rest.
+    if starts(&["glBindTexture", "glActiveTexture", "glClientActiveTexture", "glTexEnv", "glTexGen"]) {
+        return 2;
+    }
+    if starts(&[
+        "glTexParameter",
+        "glTexEnv",
+        "glTexGen",
+        "glTexImage",
+        "glTexSubImage",
+        "glCopyTex",
+        "glBindTexture",
+    ]) || starts(&[
+        "glActiveTexture",
+        "glDeleteTextures",
+        "glCompressedTex",
+        "glTexStorage",
+        "glGenerateMipmap",
+    ]) || starts(&[
+        "glTexBuffer",
+        "glBindSampler",
+        "glSamplerParameter",
+        "glPrioritizeTextures",
+        "glClientActiveTexture",
+    ]) {
+        return 8;
+    }
+    if starts(&[
+        "glBufferData",
+        "glBufferSubData",
+        "glMapBuffer",
+        "glUnmapBuffer",
+        "glFlushMapped",
+        "glCopyBuffer",
+    ]) || starts(&[
+        "glNamedBuffer",
+        "glClearBufferData",
+        "glClearBufferSubData",
+        "glDeleteBuffers",
+        "glBufferStorage",
+    ]) || starts(&[
+        "glMapNamed",
+        "glUnmapNamed",
+        "glEndTransformFeedback",
+        "glDispatchCompute",
+        "glInvalidateBuffer",
+    ]) {
+        return 32;
+    }
+    if starts(&["glUniform", "glProgramUniform", "glBindAttribLocation", "glBindFragDataLocation"]) {
+        return 64;
+    }
+    if starts(&[
+        "glVertexPointer",
+        "glNormalPointer",
+        "glColorPointer",
+        "glTexCoordPointer",
+        "glVertexAttrib",
+    ]) || starts(&["glBindBuffer", "glEnableVertexAttrib", "glDisableVertexAttrib", "glEnableClientState"])
+        || starts(&["glDisableClientState", "glBindVertexArray", "glInterleavedArrays", "glEdgeFlagPointer"])
+        || starts(&["glIndexPointer", "glFogCoordPointer", "glSecondaryColorPointer", "glDeleteVertexArrays"])
+        || starts(&["glBindVertexBuffer", "glLockArrays", "glUnlockArrays"])
+    {
+        return 128;
+    }
+    0xff
+}
+
+/// Calls before which what was traced has to be in the framebuffer.
+fn flushes(name: &str) -> bool {
+    const NAMES: &[&str] = &[
+        "glXSwapBuffers",
+        "glXCopyContext",
+        "glXWaitGL",
+        "glXSwapBuffersMscOML",
+        "eglSwapBuffers",
+        "eglSwapBuffersWithDamageKHR",
+        "eglSwapBuffersWithDamageEXT",
+        "eglCopyBuffers",
+        "eglWaitGL",
+        "eglWaitClient",
+        "glReadPixels",
+        "glReadnPixels",
+        "glReadnPixelsARB",
+        "glCopyPixels",
+        "glCopyTexImage1D",
+        "glCopyTexImage2D",
+        "glCopyTexSubImage1D",
+        "glCopyTexSubImage2D",
+        "glCopyTexSubImage3D",
+        "glBlitFramebuffer",
+        "glBlitNamedFramebuffer",
+        "glBlitFramebufferEXT",
+        "glBindFramebuffer",
+        "glBindFramebufferEXT",
+        "glFramebufferTexture2D",
+        "glFramebufferTexture2DEXT",
+        "glFramebufferTexture",
+        "glFramebufferRenderbuffer",
+        "glFramebufferRenderbufferEXT",
+        "glDeleteFramebuffers",
+        "glDeleteFramebuffersEXT",
+        "glAccum",
+        "glDrawPixels",
+        "glDrawBuffer",
+        "glDrawBuffers",
+        "glDrawBuffersARB",
+        "glBeginQuery",
+        "glEndQuery",
+        "glBeginQueryARB",
+        "glEndQueryARB",
+        "glRenderMode",
+        "glFlush",
+        "glFinish",
+        "glClearBufferfv",
+        "glClearBufferiv",
+        "glClearBufferuiv",
+        "glClearBufferfi",
+        "glGetTexImage",
+        "glXBindTexImageEXT",
+        "glEvalMesh1",
+        "glEvalMesh2",
+        "glBitmap",
+        "glXMakeAssociatedContextCurrentAMD",
+        "glCopyImageSubData",
+        "glBeginConditionalRender",
+        "glEndConditionalRender",
+        "glDeleteTextures",
+        "glDeleteRenderbuffers",
+    ];
+    NAMES.contains(&name) || is_other_draw(name)
+}
+
+/// Draws that we do not take apart: the driver draws them over what was traced before.
+fn is_other_draw(name: &str) -> bool {
+    name.starts_with("glMultiDraw")
+        || name.contains("Indirect") && name.starts_with("glDraw")
+        || name.starts_with("glDrawTransformFeedback")
+        || name.starts_with("glDrawTex")
+        || (name.starts_with("glDraw") && name.contains("Instanced"))
+        || name.starts_with("glDrawMesh")
+}
+
+struct Hot {
+    name: String,
+    c_type: &'static str,
+    count: usize,
+    pointer: bool,
+    body: String,
+}
+
+/// The calls of immediate mode that set an attribute or give a vertex.
+fn hot_calls() -> Vec<Hot> {
+    let mut out = Vec::new();
+    let plain = |e: &str| format!("({e}) as f32");
+    let signed = |bits: u32| {
+        let most = (1_u64 << bits) - 1;
+        move |e: &str| format!("(2.0 * (({e}) as f32) + 1.0) * (1.0 / {most}_f32)")
+    };
+    let unsigned = |bits: u32| {
+        let most = (1_u64 << bits) - 1;
+        move |e: &str| format!("(({e}) as f32) / {most}_f32")
+    };
+    let mut add = |family: &str,
+                   method: &str,
+                   counts: &[usize],
+                   letter: &str,
+                   c_type: &'static str,
+                   conv: &dyn Fn(&str) -> String,
+                   fill: [&str; 4],
+                   size: usize| {
+        for &count in counts {
+            for pointer in [false, true] {
+                let name = format!("gl{family}{count}{letter}{}", if pointer { "v" } else { "" });
+                let values: Vec<String> = (0..size)
+                    .map(|i| match (i < count, pointer) {
+                        (false, _) => fill[i].to_owned(),
+                        (true, true) => conv(&format!("v[{i}]")),
+                        (true, false) => conv(&format!("a{i}")),
+                    })
+                    .collect();
+                let body = format!("c.{method}([{}])", values.join(", "));
+                out.push(Hot { name, c_type, count, pointer, body });
+            }
+        }
+    };
+    let zero_one = ["0.0", "0.0", "0.0", "1.0"];
+    for (letter, t) in [("d", "f64"), ("f", "f32"), ("i", "i32"), ("s", "i16")] {
+        add("Vertex", "vertex", &[2, 3, 4], letter, t, &plain, zero_one, 4);
+        add("TexCoord", "tex_coord", &[1, 2, 3, 4], letter, t, &plain, zero_one, 4);
+    }
+    for (letter, t) in [("d", "f64"), ("f", "f32")] {
+        add("Normal", "normal", &[3], letter, t, &plain, zero_one, 3);
+        add("Color", "color", &[3, 4], letter, t, &plain, zero_one, 4);
+    }
+    for (letter, t, bits) in [("b", "i8", 8), ("s", "i16", 16), ("i", "i32", 32)] {
+        add("Normal", "normal", &[3], letter, t, &signed(bits), zero_one, 3);
+        add("Color", "color", &[3, 4], letter, t, &signed(bits), zero_one, 4);
+    }
+    for (letter, t, bits) in [("ub", "u8", 8), ("us", "u16", 16), ("ui", "u32", 32)] {
+        add("Color", "color", &[3, 4], letter, t, &unsigned(bits), zero_one, 4);
+    }
+    out
+}
+
+/// Hooks written by hand in `src/symbols/hooks.rs`.
+fn hand_written() -> Vec<String> {
+    let text = std::fs::read_to_string("src/symbols/hooks.rs").expect("src/symbols/hooks.rs can be read");
+    let named = |n: &&str| n.starts_with("gl") || n.starts_with("egl");
+    let functions = text.lines().filter_map(|l| {
+        let l = l.trim_start();
+        let l = l.strip_prefix("pub(in crate::symbols) unsafe extern \"C\" ").unwrap_or(l);
+        l.strip_prefix("fn ")?.split('(').next()
+    });
+    let addresses =
+        text.lines().filter_map(|l| l.strip_prefix("get_proc_address! {")).flat_map(str::split_whitespace);
+    functions.chain(addresses).filter(named).map(str::to_owned).collect()
+}
+
+fn main() {
+    println!("cargo:rerun-if-changed=build.rs");
+    println!("cargo:rerun-if-changed=src/symbols/names.txt");
+    println!("cargo:rerun-if-changed=src/symbols/hooks.rs");
+    // Without -Bsymbolic the addresses of our own functions bind to libGL's of the same name when we are a vendor
+    // library: an endless loop of jumps. nodelete: our threads must not lose their code.
+    println!("cargo:rustc-cdylib-link-arg=-Wl,-Bsymbolic");
+    println!("cargo:rustc-cdylib-link-arg=-Wl,-z,nodelete");
+    let text = std::fs::read_to_string("src/symbols/names.txt").expect("src/symbols/names.txt can be read");
+    let names: Vec<&str> = text.split_whitespace().collect();
+    assert!(
+        names.windows(2).all(|w| w[0] < w[1]),
+        "names.txt must be sorted, each name once: `LC_ALL=C sort -u`"
+    );
+    let hot = hot_calls();
+    let by_hand = hand_written();
+    let hooked = |n: &str| by_hand.iter().any(|h| h == n) || hot.iter().any(|h| h.name == n);
+    for h in by_hand.iter().chain(hot.iter().map(|h| &h.name)) {
+        assert!(names.contains(&h.as_str()), "hook {h} is not in names.txt");
+    }
+    let mut s = String::new();
+    let n = names.len();
+    writeln!(s, "/// How many entry points there are.\npub(crate) const COUNT: usize = {n};").unwrap();
+    writeln!(s, "/// Their names, sorted.\npub(crate) static NAMES: [&CStr; COUNT] = [").unwrap();
+    names.iter().for_each(|x| writeln!(s, "c\"{x}\",").unwrap());
+    writeln!(s, "];\nstatic CLASSES: [u8; COUNT] = [").unwrap();
+    names.iter().for_each(|x| write!(s, "{},", class(x)).unwrap());
+    writeln!(s, "];\nstatic FLUSHES: [u8; COUNT] = [").unwrap();
+    names
+        .iter()
+        .for_each(|x| write!(s, "{},", u8::from(flushes(x)) + 2 * u8::from(is_other_draw(x))).unwrap());
+    writeln!(s, "];\nstatic HOOKS: [Option<Target>; COUNT] = [").unwrap();
+    for x in &names {
+        match hooked(x) {
+            true if by_hand.iter().any(|h| h == x) => {
+                writeln!(s, "Some(Target(hooks::{x} as *const ())),").unwrap()
+            }
+            true => writeln!(s, "Some(Target(hot_hooks::{x} as *const ())),").unwrap(),
+            false => write!(s, "None,").unwrap(),
+        }
+    }
+    writeln!(s, "];\n/// The trampolines' addresses.\npub(super) static TRAMPOLINES: [unsafe extern \"C\" fn(); COUNT] = [").unwrap();
+    names.iter().for_each(|x| writeln!(s, "trampolines::{x},").unwrap());
+    writeln!(s, "];\nmod trampolines {{ use super::{{TABLE, ATTENTION, slow, CALLS}};").unwrap();
+    for (i, x) in names.iter().enumerate() {
+        let kind = match (hooked(x), flushes(x)) {
+            (true, _) => Kind::Direct,
+            (_, true) => Kind::Always,
+            _ => Kind::Watched,
+        };
+        let at = 8 * i;
+        let code = match kind {
+            Kind::Direct => {
+                format!("\"mov r11d, {i}\", \"jmp qword ptr [rip + {{t}} + {at}]\", t = sym TABLE")
+            }
+            Kind::Watched => format!(
+                "\"cmp dword ptr [rip + {{a}}], 0\", \"jne 2f\", \"inc qword ptr [rip + {{c}}]\", \"mov r11d, {i}\", \"jmp qword ptr [rip + {{t}} + {at}]\", \"2:\", \"mov r11d, {i}\", \"jmp {{s}}\", a = sym ATTENTION, c = sym CALLS, t = sym TABLE, s = sym slow"
+            ),
+            Kind::Always => format!("\"mov r11d, {i}\", \"jmp {{s}}\", s = sym slow"),
+        };
+        writeln!(s, "#[unsafe(naked)] #[unsafe(no_mangle)] pub(in crate::symbols) unsafe extern \"C\" fn {x}() {{ core::arch::naked_asm!({code}) }}").unwrap();
+    }
+    writeln!(s, "}}\nmod hot_hooks {{ use super::hot::with; use crate::real::forward;").unwrap();
+    for h in &hot {
+        let (args, call, types) = if h.pointer {
+            (format!("p: *const {}", h.c_type), "p".to_owned(), format!("*const {}", h.c_type))
+        } else {
+            let each = |f: &dyn Fn(usize) -> String| (0..h.count).map(f).collect::<Vec<_>>().join(", ");
+            (
+                each(&|i| format!("a{i}: {}", h.c_type)),
+                each(&|i| format!("a{i}")),
+                each(&|_| h.c_type.to_owned()),
+            )
+        };
+        let index = names.binary_search(&h.name.as_str()).expect("checked above");
+        let read = if h.pointer {
+            format!(
+                "// SAFETY: the program gives {} values, as OpenGL asks.\n let v = unsafe {{ *p.cast::<[{}; {}]>() }};",
+                h.count, h.c_type, h.count
+            )
+        } else {
+            String::new()
+        };
+        writeln!(
+            s,
+            "pub(in crate::symbols) unsafe extern \"C\" fn {}({args}) {{ {read} if !with(|c| {}) {{ \n// SAFETY: the driver's function of this name and signature.\n let f: unsafe extern \"C\" fn({types}) = unsafe {{ core::mem::transmute(forward({index})) }}; \n// SAFETY: the program's own arguments.\n unsafe {{ f({call}) }} }} }}",
+            h.name, h.body
+        )
+        .unwrap();
+    }
+    writeln!(s, "}}").unwrap();
+    let out = std::env::var("OUT_DIR").expect("cargo sets OUT_DIR");
+    std::fs::write(Path::new(&out).join("trampolines.rs"), s).expect("OUT_DIR can be written");
+}

@@ -1,0 +1,292 @@
+//! Geometry that is there already: keyed by positions and connectivity alone, so that a moved camera, other colours or flipped normals
+//! (geomview turns them to the viewer each frame) rebuild nothing.
+
+use crate::capture::Run;
+use crate::primitives::triangulate;
+use rt_core::accel::{BuildOptions, BuildQuality, World};
+use rt_core::glam::Vec3;
+use rt_core::math::Aabb;
+use rt_core::mesh::TriMesh;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, OnceLock};
+
+/// A mesh with the structure that rays need, made when the first ray comes.
+pub(crate) struct Geometry {
+    /// Triangles; the provoking vertex of each comes last.
+    pub(crate) mesh: Arc<TriMesh>,
+    /// Names the content.
+    pub(crate) key: u128,
+    world: Mutex<Option<Arc<World>>>,
+    best: OnceLock<Arc<World>>,
+    bounds: OnceLock<Aabb>,
+}
+
+/// Positions as bytes, and back as vectors.
+fn vectors(p: &[[f32; 3]]) -> Vec<Vec3> {
+    p.iter().map(|v| Vec3::from_array(*v)).collect()
+}
+
+impl Geometry {
+    fn new(key: u128, mesh: TriMesh) -> Geometry {
+        Geometry {
+            mesh: Arc::new(mesh),
+            key,
+            world: Mutex::new(None),
+            best: OnceLock::new(),
+            bounds: OnceLock::new(),
+        }
+    }
+
+    /// Bounds of the finite positions.
+    pub(crate) fn bounds(&self) -> Aabb {
+        *self.bounds.get_or_init(|| self.mesh.bounds())
+    }
+
+    /// The structure, built now if need be; `None` when the mesh cannot be built.
+    pub(crate) fn world(&self, built: &mut u64) -> Option<Arc<World>> {
+        if let Some(best) = self.best.get() {
+            return Some(best.clone());
+        }
+        if crate::config::current().settings.quality == crate::config::Quality::Best {
+            *built += 1;
+            self.improve();
+            return self.best.get().cloned();
+        }
+        let mut slot = self.world.lock().unwrap_or_else(|e| e.into_inner());
+        if slot.is_none() {
+            *built += 1;
+            *slot = build(&self.mesh, BuildQuality::Fast);
+        }
+        slot.clone()
+    }
+
+    /// Builds the best structure and keeps it: for geometry that rests, in the background.
+    pub(crate) fn improve(&self) {
+        if self.best.get().is_none()
+            && let Some(world) = build(&self.mesh, BuildQuality::Best)
+        {
+            self.best.set(world).ok();
+            *self.world.lock().unwrap_or_else(|e| e.into_inner()) = None;
+        }
+    }
+
+    /// True once the best structure is there.
+    pub(crate) fn is_best(&self) -> bool {
+        self.best.get().is_some()
+    }
+
+    fn bytes(&self) -> usize {
+        // Positions, indices, and about 60 bytes of tree per triangle.
+        self.mesh.positions.len() * 12 + self.mesh.indices.len() * 72
+    }
+}
+
+fn build(mesh: &Arc<TriMesh>, quality: BuildQuality) -> Option<Arc<World>> {
+    let start = std::time::Instant::now();
+    let world = World::from_mesh(mesh.clone(), &BuildOptions { quality, ..BuildOptions::default() })
+        .ok()
+        .map(Arc::new);
+    let phase = if matches!(quality, BuildQuality::Fast) { "fast build" } else { "best build" };
+    crate::report::span("builds", phase, 0, start.elapsed());
+    world
+}
+
+struct Entry {
+    geometry: Arc<Geometry>,
+    /// Frame in which it was used last, and in how many frames it was.
+    last_used: u64,
+    frames: u32,
+    improving: bool,
+}
+
+/// All geometry of a context.
+#[derive(Default)]
+pub(crate) struct Cache {
+    entries: HashMap<u128, Entry>,
+    frame: u64,
+    /// Look-ups that found something, and those that did not.
+    pub(crate) hits: u64,
+    pub(crate) misses: u64,
+}
+
+/// Frames after which unused geometry goes.
+const KEPT_FRAMES: u64 = 3;
+/// Frames after which geometry counts as resting.
+const RESTING_FRAMES: u32 = 4;
+/// Triangles from which a better structure is worth a thread.
+const WORTH_IMPROVING: usize = 20_000;
+
+impl Cache {
+    /// The geometry of primitives in a row.
+    pub(crate) fn of_runs(
+        &mut self,
+        positions: &[[f32; 3]],
+        runs: &[Run],
+        [first_provokes, flat]: [bool; 2],
+    ) -> Arc<Geometry> {
+        let mut key = hash(&[bytes_of(positions)]);
+        for r in runs {
+            key = mix(key, u64::from(r.mode) << 32 | u64::from(r.count));
+            key = mix(key, u64::from(r.times) << 2 | u64::from(first_provokes) << 1 | u64::from(flat));
+        }
+        self.find(key, || {
+            let mut indices = Vec::new();
+            let mut first = 0;
+            for r in runs {
+                for _ in 0..r.times {
+                    triangulate(r.mode, first, r.count, first_provokes, flat, &mut indices);
+                    first += r.count;
+                }
+            }
+            TriMesh::new(vectors(positions), indices)
+        })
+    }
+
+    /// The geometry of an indexed draw.
+    pub(crate) fn of_indices(&mut self, positions: &[[f32; 3]], indices: &[[u32; 3]]) -> Arc<Geometry> {
+        let key = hash(&[bytes_of(positions), bytes_of(indices)]);
+        self.find(key, || TriMesh::new(vectors(positions), indices.to_vec()))
+    }
+
+    fn find(&mut self, key: u128, make: impl FnOnce() -> TriMesh) -> Arc<Geometry> {
+        let frame = self.frame;
+        if let Some(e) = self.entries.get_mut(&key) {
+            self.hits += 1;
+            e.frames += u32::from(e.last_used != frame);
+            e.last_used = frame;
+            return e.geometry.clone();
+        }
+        self.misses += 1;
+        let geometry = Arc::new(Geometry::new(key, make()));
+        self.entries
+            .insert(key, Entry { geometry: geometry.clone(), last_used: frame, frames: 1, improving: false });
+        geometry
+    }
+
+    /// Geometry that was found another way is in use.
+    pub(crate) fn touch(&mut self, geometry: &Arc<Geometry>) {
+        let frame = self.frame;
+        let fresh = || Entry { geometry: geometry.clone(), last_used: frame, frames: 0, improving: false };
+        let e = self.entries.entry(geometry.key).or_insert_with(fresh);
+        e.frames += u32::from(e.last_used != frame);
+        e.last_used = frame;
+    }
+
+    /// A frame is over: what was not used for long goes, what rests gets a better structure.
+    pub(crate) fn frame_done(&mut self, improve: impl Fn(Arc<Geometry>) -> bool) {
+        self.frame += 1;
+        let now = self.frame;
+        self.entries.retain(|_, e| now - e.last_used <= KEPT_FRAMES);
+        for e in self.entries.values_mut() {
+            let rests = e.frames >= RESTING_FRAMES && e.geometry.mesh.num_triangles() >= WORTH_IMPROVING;
+            if rests && !e.improving {
+                e.improving = improve(e.geometry.clone());
+            }
+        }
+    }
+
+    /// Bytes in use, about.
+    pub(crate) fn bytes(&self) -> usize {
+        self.entries.values().map(|e| e.geometry.bytes()).sum()
+    }
+}
+
+// ---- Content hash ---------------------------------------------------------------------------------------------------
+
+/// Arrays of 4-byte values as 12-byte records.
+fn bytes_of<T: bytemuck::Pod>(v: &[T]) -> &[u8] {
+    bytemuck::cast_slice(v)
+}
+
+fn mix(h: u128, v: u64) -> u128 {
+    let (a, b) = (h as u64, (h >> 64) as u64);
+    let fold = |x: u64, k: u64| {
+        let p = u128::from(x) * u128::from(k);
+        (p as u64) ^ ((p >> 64) as u64)
+    };
+    let a2 = fold(a ^ v, 0x9e37_79b9_7f4a_7c15);
+    let b2 = fold(b ^ v.rotate_left(32), 0xd6e8_feb8_6659_fd93);
+    u128::from(a2 ^ b.rotate_left(17)) | u128::from(b2 ^ a.rotate_left(31)) << 64
+}
+
+/// A 128-bit hash of the arrays' bytes, on all threads. Not meant against malice: a collision shows another frame's shape.
+pub(crate) fn hash(arrays: &[&[u8]]) -> u128 {
+    use rayon::prelude::*;
+    const CHUNK: usize = 1 << 18;
+    let mut h = 0x0123_4567_89ab_cdef_u128 << 64 | 0xfedc_ba98_7654_3210;
+    for a in arrays {
+        h = mix(h, a.len() as u64);
+        if a.len() <= CHUNK {
+            h = mix2(h, hash_chunk(a));
+            continue;
+        }
+        let parts: Vec<u128> = a.par_chunks(CHUNK).map(hash_chunk).collect();
+        h = parts.iter().fold(h, |h, p| mix2(h, *p));
+    }
+    h
+}
+
+fn mix2(h: u128, v: u128) -> u128 {
+    mix(mix(h, v as u64), (v >> 64) as u64)
+}
+
+/// Four lanes, so that multiplications overlap.
+fn hash_chunk(bytes: &[u8]) -> u128 {
+    let mut lanes =
+        [0x243f_6a88_85a3_08d3_u64, 0x1319_8a2e_0370_7344, 0xa409_3822_299f_31d0, 0x082e_fa98_ec4e_6c89];
+    let mut blocks = bytes.chunks_exact(32);
+    for block in &mut blocks {
+        for (lane, w) in lanes.iter_mut().zip(block.chunks_exact(8)) {
+            let w = u64::from_ne_bytes(w.try_into().expect("eight bytes"));
+            let p = u128::from(*lane ^ w) * 0x9e37_79b9_7f4a_7c15;
+            *lane = (p as u64) ^ ((p >> 64) as u64).rotate_left(23) ^ w;
+        }
+    }
+    let mut h = u128::from(bytes.len() as u64);
+    for lane in lanes {
+        h = mix(h, lane);
+    }
+    for tail in blocks.remainder().chunks(8) {
+        let mut w = [0; 8];
+        w[..tail.len()].copy_from_slice(tail);
+        h = mix(h, u64::from_ne_bytes(w));
+    }
+    h
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::enums::TRIANGLES;
+
+    fn grid(n: usize) -> Vec<[f32; 3]> {
+        (0..n).map(|i| [i as f32, (i * i % 17) as f32, (i % 5) as f32]).collect()
+    }
+
+    #[test]
+    fn the_key_is_positions_and_connectivity_alone() {
+        let mut cache = Cache::default();
+        let p = grid(300_000);
+        let runs = [Run { mode: TRIANGLES, count: 3, times: 100_000 }];
+        let a = cache.of_runs(&p, &runs, [false; 2]);
+        let b = cache.of_runs(&p, &runs, [false; 2]);
+        assert!(Arc::ptr_eq(&a, &b));
+        let mut moved = p.clone();
+        moved[299_999][2] = f32::from_bits(moved[299_999][2].to_bits() ^ 1);
+        assert!(!Arc::ptr_eq(&a, &cache.of_runs(&moved, &runs, [false; 2])));
+        let c = cache.of_runs(&p, &[Run { mode: TRIANGLES, count: 300_000, times: 1 }], [false; 2]);
+        assert!(!Arc::ptr_eq(&a, &c));
+        assert_eq!((cache.hits, cache.misses), (1, 3));
+    }
+
+    #[test]
+    fn geometry_made_anew_each_frame_does_not_pile_up() {
+        let mut cache = Cache::default();
+        for i in 0..50 {
+            let p = vec![[i as f32; 3]; 30_000];
+            cache.of_runs(&p, &[Run { mode: TRIANGLES, count: 3, times: 10_000 }], [false; 2]);
+            cache.frame_done(|_| true);
+        }
+        assert!(cache.entries.len() <= KEPT_FRAMES as usize + 1, "{}", cache.entries.len());
+    }
+}

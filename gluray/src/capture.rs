@@ -1,0 +1,378 @@
+//! Draw calls as meshes: what is drawn, with which attributes, under which state.
+
+use crate::cache::Geometry;
+use crate::enums::*;
+use crate::programs::Recognised;
+use crate::state::current::{Current, Materials};
+use crate::state::snapshot::Snapshot;
+use std::sync::Arc;
+
+/// An attribute of `N` components.
+#[derive(Debug, Clone)]
+pub(crate) enum Values<const N: usize> {
+    /// The same everywhere.
+    Constant([f32; N]),
+    /// One per vertex.
+    PerVertex(Vec<[f32; N]>),
+    /// One per vertex, as the program's arrays have them.
+    Packed(Packed),
+}
+
+/// A tightly packed array as the program gave it.
+#[derive(Debug, Clone)]
+pub(crate) struct Packed {
+    pub(crate) bytes: Vec<u8>,
+    pub(crate) kind: u32,
+    pub(crate) size: usize,
+    pub(crate) normalized: bool,
+}
+
+/// Bytes of one component of a type; 0 for types that we do not read.
+pub(crate) fn component_bytes(kind: u32) -> usize {
+    match kind {
+        BYTE | UNSIGNED_BYTE => 1,
+        SHORT | UNSIGNED_SHORT => 2,
+        INT | UNSIGNED_INT | FLOAT => 4,
+        DOUBLE => 8,
+        _ => 0,
+    }
+}
+
+/// One component. Signed normalised values are c / (2^(b-1) - 1), at least -1 (OpenGL 4.2, equation 2.2), as Mesa's arrays have it.
+pub(crate) fn component(b: &[u8], kind: u32, normalized: bool) -> f32 {
+    let signed = |v: f64, most: f64| if normalized { (v / most).max(-1.0) as f32 } else { v as f32 };
+    let unsigned = |v: f64, most: f64| if normalized { (v / most) as f32 } else { v as f32 };
+    match (kind, b) {
+        (FLOAT, &[a, b, c, d]) => f32::from_ne_bytes([a, b, c, d]),
+        (DOUBLE, &[a, b, c, d, e, f, g, h]) => f64::from_ne_bytes([a, b, c, d, e, f, g, h]) as f32,
+        (BYTE, &[a]) => signed(f64::from(a.cast_signed()), 127.0),
+        (UNSIGNED_BYTE, &[a]) => unsigned(f64::from(a), 255.0),
+        (SHORT, &[a, b]) => signed(f64::from(i16::from_ne_bytes([a, b])), 32767.0),
+        (UNSIGNED_SHORT, &[a, b]) => unsigned(f64::from(u16::from_ne_bytes([a, b])), 65535.0),
+        (INT, &[a, b, c, d]) => signed(f64::from(i32::from_ne_bytes([a, b, c, d])), 2_147_483_647.0),
+        (UNSIGNED_INT, &[a, b, c, d]) => {
+            unsigned(f64::from(u32::from_ne_bytes([a, b, c, d])), 4_294_967_295.0)
+        }
+        _ => 0.0,
+    }
+}
+
+impl Packed {
+    /// The value of vertex `i`; components that are not there come from `fill`.
+    pub(crate) fn at<const N: usize>(&self, i: usize, fill: [f32; N]) -> [f32; N] {
+        let one = component_bytes(self.kind);
+        let start = i * one * self.size;
+        std::array::from_fn(|k| {
+            if k >= self.size {
+                return fill[k];
+            }
+            let b = self.bytes.get(start + k * one..start + (k + 1) * one);
+            b.map_or(fill[k], |b| component(b, self.kind, self.normalized))
+        })
+    }
+}
+
+impl<const N: usize> Values<N> {
+    /// The value of vertex `i`.
+    pub(crate) fn at(&self, i: usize) -> [f32; N] {
+        let fill = || std::array::from_fn(|k| if k == 3 { 1.0 } else { 0.0 });
+        match self {
+            Values::Constant(v) => *v,
+            Values::PerVertex(v) => v.get(i).copied().unwrap_or_else(fill),
+            Values::Packed(p) => p.at(i, fill()),
+        }
+    }
+}
+
+/// Attributes of a draw.
+#[derive(Debug, Clone)]
+pub(crate) struct Attributes {
+    pub(crate) normals: Values<3>,
+    pub(crate) colors: Values<4>,
+    pub(crate) tex: Values<4>,
+    /// The materials that occur, and which a vertex has (empty: all the first).
+    pub(crate) materials: Vec<Materials>,
+    pub(crate) material_of: Vec<u32>,
+}
+
+impl Attributes {
+    /// The same for all vertices.
+    pub(crate) fn constant(current: &Current) -> Attributes {
+        Attributes {
+            normals: Values::Constant(current.normal),
+            colors: Values::Constant(current.color),
+            tex: Values::Constant(current.tex),
+            materials: vec![current.materials],
+            material_of: Vec::new(),
+        }
+    }
+
+    /// Materials of vertex `i`.
+    pub(crate) fn materials_at(&self, i: usize) -> &Materials {
+        &self.materials[self.material_of.get(i).map_or(0, |m| *m as usize)]
+    }
+}
+
+/// Who gives a draw its colours.
+#[derive(Debug, Clone)]
+pub(crate) enum Shading {
+    /// OpenGL's fixed function.
+    Fixed,
+    /// A shader that we know.
+    Program(Arc<Recognised>),
+}
+
+/// A draw to trace.
+#[derive(Clone)]
+pub(crate) struct Draw {
+    pub(crate) geometry: Arc<Geometry>,
+    pub(crate) attributes: Arc<Attributes>,
+    pub(crate) state: Arc<Snapshot>,
+    pub(crate) shading: Shading,
+    /// Clip from object, column by column, as the driver has it in f32.
+    pub(crate) clip_from_object: [f32; 16],
+    /// Counts the program's draw calls in it.
+    pub(crate) calls: u64,
+}
+
+/// Primitives of one kind and size that follow one another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct Run {
+    pub(crate) mode: u32,
+    pub(crate) count: u32,
+    pub(crate) times: u32,
+}
+
+/// A stream of one attribute that costs nothing while it does not change.
+struct Stream<const N: usize> {
+    varying: bool,
+    constant: [f32; N],
+    values: Vec<[f32; N]>,
+}
+
+impl<const N: usize> Default for Stream<N> {
+    fn default() -> Self {
+        Stream { varying: false, constant: [0.0; N], values: Vec::new() }
+    }
+}
+
+impl<const N: usize> Stream<N> {
+    #[inline(always)]
+    fn set(&mut self, v: [f32; N], vertices: usize) {
+        if self.varying {
+            return;
+        }
+        if vertices == 0 {
+            self.constant = v;
+        } else if v != self.constant {
+            self.vary(vertices);
+        }
+    }
+
+    #[cold]
+    fn vary(&mut self, vertices: usize) {
+        self.values.clear();
+        self.values.resize(vertices, self.constant);
+        self.varying = true;
+    }
+
+    fn take(&mut self) -> Values<N> {
+        let varying = std::mem::take(&mut self.varying);
+        match varying {
+            true => Values::PerVertex(std::mem::take(&mut self.values)),
+            false => Values::Constant(self.constant),
+        }
+    }
+}
+
+/// Immediate mode: the vertices since the state changed last.
+#[derive(Default)]
+pub(crate) struct Recorder {
+    pub(crate) positions: Vec<[f32; 3]>,
+    normals: Stream<3>,
+    colors: Stream<4>,
+    tex: Stream<4>,
+    materials: Vec<Materials>,
+    material_of: Vec<u32>,
+    pub(crate) runs: Vec<Run>,
+    /// First vertex of the primitive between Begin and End, and its mode.
+    open: usize,
+    mode: u32,
+    /// Begin/End pairs.
+    pub(crate) calls: u64,
+}
+
+impl Recorder {
+    /// No vertex yet.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.positions.is_empty()
+    }
+
+    /// A primitive begins.
+    #[inline]
+    pub(crate) fn begin(&mut self, mode: u32, current: &Current) {
+        self.open = self.positions.len();
+        self.mode = mode;
+        if self.open == 0 {
+            self.start(current);
+        }
+    }
+
+    fn start(&mut self, current: &Current) {
+        (self.normals.constant, self.colors.constant, self.tex.constant) =
+            (current.normal, current.color, current.tex);
+        self.materials.clear();
+        self.materials.push(current.materials);
+        self.material_of.clear();
+    }
+
+    /// The primitive ends.
+    #[inline]
+    pub(crate) fn end(&mut self) {
+        let count = (self.positions.len() - self.open) as u32;
+        self.calls += 1;
+        match self.runs.last_mut() {
+            Some(r) if r.mode == self.mode && r.count == count => r.times += 1,
+            _ => self.runs.push(Run { mode: self.mode, count, times: 1 }),
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn set_normal(&mut self, v: [f32; 3]) {
+        self.normals.set(v, self.positions.len());
+    }
+
+    #[inline(always)]
+    pub(crate) fn set_color(&mut self, v: [f32; 4]) {
+        self.colors.set(v, self.positions.len());
+    }
+
+    #[inline(always)]
+    pub(crate) fn set_tex(&mut self, v: [f32; 4]) {
+        self.tex.set(v, self.positions.len());
+    }
+
+    /// The material is another from the next vertex on.
+    pub(crate) fn set_materials(&mut self, m: &Materials) {
+        let n = self.positions.len();
+        if n == 0 {
+            self.materials.clear();
+        } else if self.materials.last() == Some(m) {
+            return;
+        } else if self.material_of.is_empty() {
+            self.material_of.resize(n, 0);
+        }
+        self.materials.push(*m);
+    }
+
+    /// A vertex with what is current.
+    #[inline(always)]
+    pub(crate) fn vertex(&mut self, v: [f32; 3], current: &Current) {
+        self.positions.push(v);
+        if self.normals.varying {
+            self.normals.values.push(current.normal);
+        }
+        if self.colors.varying {
+            self.colors.values.push(current.color);
+        }
+        if self.tex.varying {
+            self.tex.values.push(current.tex);
+        }
+        if !self.material_of.is_empty() {
+            self.material_of.push(self.materials.len() as u32 - 1);
+        }
+    }
+
+    /// The vertices of the open primitive with their attributes, taken out again: for the driver.
+    pub(crate) fn withdraw(&mut self) -> (u32, Vec<([f32; 3], Current)>) {
+        let all = self.attributes_now();
+        let out = (self.open..self.positions.len())
+            .map(|i| {
+                let current = Current {
+                    normal: all.normals.at(i),
+                    color: all.colors.at(i),
+                    tex: all.tex.at(i),
+                    materials: *all.materials_at(i),
+                };
+                (self.positions[i], current)
+            })
+            .collect();
+        self.positions.truncate(self.open);
+        for (varying, values) in [(self.normals.varying, &mut self.normals.values)] {
+            if varying {
+                values.truncate(self.open);
+            }
+        }
+        for s in [&mut self.colors, &mut self.tex] {
+            if s.varying {
+                s.values.truncate(self.open);
+            }
+        }
+        self.material_of.truncate(self.open);
+        (self.mode, out)
+    }
+
+    fn attributes_now(&self) -> Attributes {
+        fn values<const N: usize>(s: &Stream<N>) -> Values<N> {
+            if s.varying { Values::PerVertex(s.values.clone()) } else { Values::Constant(s.constant) }
+        }
+        Attributes {
+            normals: values(&self.normals),
+            colors: values(&self.colors),
+            tex: values(&self.tex),
+            materials: self.materials.clone(),
+            material_of: self.material_of.clone(),
+        }
+    }
+
+    /// Everything recorded; the recorder is empty then. Positions and runs stay for the caller to look at and clear.
+    pub(crate) fn take_attributes(&mut self) -> Attributes {
+        Attributes {
+            normals: self.normals.take(),
+            colors: self.colors.take(),
+            tex: self.tex.take(),
+            materials: std::mem::take(&mut self.materials),
+            material_of: std::mem::take(&mut self.material_of),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn byte_normals_are_read_as_arrays_have_them() {
+        let p = Packed { bytes: vec![127, 129, 128, 0], kind: BYTE, size: 3, normalized: true };
+        assert_eq!(p.at::<3>(0, [0.0; 3]), [1.0, -1.0, -1.0]);
+        let p = Packed { bytes: vec![255, 0, 51, 255], kind: UNSIGNED_BYTE, size: 4, normalized: true };
+        assert_eq!(p.at::<4>(0, [0.0; 4]), [1.0, 0.0, 0.2, 1.0]);
+    }
+
+    #[test]
+    fn attributes_that_change_late_keep_their_first_values_and_a_primitive_can_be_withdrawn() {
+        let mut r = Recorder::default();
+        let mut c = Current { color: [1.0; 4], ..Current::default() };
+        r.begin(TRIANGLES, &c);
+        for i in 0..3 {
+            r.vertex([i as f32; 3], &c);
+        }
+        r.end();
+        r.begin(POLYGON, &c);
+        r.vertex([7.0; 3], &c);
+        c.color = [0.5; 4];
+        r.set_color(c.color);
+        c.materials[0].shininess = 9.0;
+        r.set_materials(&c.materials);
+        r.vertex([8.0; 3], &c);
+        let (mode, open) = r.withdraw();
+        assert_eq!(mode, POLYGON);
+        assert_eq!(open.len(), 2);
+        assert_eq!((open[0].1.color, open[1].1.color), ([1.0; 4], [0.5; 4]));
+        assert_eq!((open[0].1.materials[0].shininess, open[1].1.materials[0].shininess), (0.0, 9.0));
+        assert_eq!(r.positions.len(), 3);
+        let all = r.take_attributes();
+        assert_eq!(all.colors.at(2), [1.0; 4]);
+        assert_eq!(r.runs, [Run { mode: TRIANGLES, count: 3, times: 1 }]);
+    }
+}

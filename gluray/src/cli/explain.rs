@@ -1,0 +1,120 @@
+//! `gluray explain`: an account of a run, in words.
+
+use super::last_report;
+use crate::reasons::advice;
+use crate::report::Report;
+use anyhow::Context as _;
+use datasets::cli::{CommonArgs, CureExt as _, Status};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Options of `gluray explain`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  gluray explain
+  gluray explain report.json
+  gluray explain --json | jq .passed_reasons")]
+pub(super) struct ExplainArgs {
+    /// A report of `gluray run --report`; without it, that of the last run
+    report: Option<PathBuf>,
+}
+
+pub(super) fn explain(args: &ExplainArgs, common: &CommonArgs) -> anyhow::Result<Status> {
+    let (_, report) = read_report(args.report.as_deref())?;
+    common.result(&report, || in_words(&report))?;
+    Ok(Status::Success)
+}
+
+/// A report by name, or that of the last run.
+pub(super) fn read_report(named: Option<&Path>) -> anyhow::Result<(PathBuf, Report)> {
+    let file = named.map_or_else(last_report, Path::to_path_buf);
+    let text = std::fs::read_to_string(&file)
+        .with_context(|| format!("cannot read {}", file.display()))
+        .cure("run a program first: `gluray run -- PROGRAM`")?;
+    let report = serde_json::from_str(&text)
+        .with_context(|| format!("{}: is no report", file.display()))
+        .cure("give a file that `gluray run --report` wrote")?;
+    Ok((file, report))
+}
+
+fn in_words(r: &Report) -> String {
+    let mut s = String::new();
+    let mut line = |text: String| {
+        // Writing to a String cannot fail.
+        let _ = writeln!(s, "{text}");
+    };
+    line(format!("{}: mode {}, driver {}", r.program, or_none(&r.mode), or_none(&r.driver)));
+    let per_frame = |n: u64| {
+        if r.frames > 0 { format!(" ({:.1} a frame)", n as f64 / r.frames as f64) } else { String::new() }
+    };
+    line(format!("{} frames", r.frames));
+
+    // What was traced.
+    line(format!("\ntraced  {:>12} draws{}", r.traced_draws, per_frame(r.traced_draws)));
+    if r.traced_draws > 0 {
+        line(format!("        {:>12} triangles, {} pixels", r.triangles, r.pixels));
+        line(format!(
+            "        {:>12} geometries were there already, {} were new, {} structures built",
+            r.cache_hits, r.cache_misses, r.builds
+        ));
+        for (kind, n) in by_size(&r.rays) {
+            line(format!("        {n:>12} rays: {kind}"));
+        }
+    }
+
+    // What was not, and why.
+    line(format!("\npassed  {:>12} draws{}", r.passed_draws, per_frame(r.passed_draws)));
+    for (why, n) in by_size(&r.passed_reasons) {
+        line(format!("        {n:>12} {why}"));
+        if let Some(text) = advice(why) {
+            line(format!("                     → {text}"));
+        }
+    }
+    if r.traced_draws + r.passed_draws == 0 {
+        line(
+            "        nothing was drawn: the library did not reach the program, or the program uses no OpenGL"
+                .into(),
+        );
+        line("                     → `gluray doctor` says how programs are reached".into());
+    }
+
+    // When pictures were finished, and the time.
+    if !r.flushes.is_empty() {
+        line("\npictures were finished before".into());
+        by_size(&r.flushes).into_iter().for_each(|(before, n)| line(format!("        {n:>12} {before}")));
+    }
+    if !r.milliseconds.is_empty() {
+        line("\ntime".into());
+        let mut phases: Vec<_> = r.milliseconds.iter().collect();
+        phases.sort_by(|a, b| b.1.total_cmp(a.1));
+        for (phase, ms) in phases {
+            let each =
+                if r.frames > 0 { format!(", {:.2} a frame", ms / r.frames as f64) } else { String::new() };
+            line(format!("        {ms:>12.1} ms {phase}{each}"));
+        }
+    }
+    if !r.objects.is_empty() {
+        line("\nobjects, by the keys that [objects.KEY] takes".into());
+        for o in r.objects.iter().take(20) {
+            line(format!("        {:>12} triangles  {}  {}", o.triangles, o.key, o.name));
+        }
+        if r.objects.len() > 20 {
+            line(format!("        {:>12} more, see --json", r.objects.len() - 20));
+        }
+    }
+    r.problems.iter().for_each(|p| line(format!("\nSETTING NOT TAKEN: {p}")));
+    r.faults.iter().for_each(|f| line(format!("\nFAULT (the driver drew from here on): {f}")));
+    s.truncate(s.trim_end().len());
+    s
+}
+
+fn or_none(text: &str) -> &str {
+    if text.is_empty() { "unknown" } else { text }
+}
+
+fn by_size(map: &BTreeMap<String, u64>) -> Vec<(&str, u64)> {
+    let mut list: Vec<(&str, u64)> = map.iter().map(|(k, n)| (k.as_str(), *n)).collect();
+    list.sort_by(|a, b| b.1.cmp(&a.1));
+    list
+}

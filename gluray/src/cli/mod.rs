@@ -1,0 +1,88 @@
+//! The command line: what was typed becomes a call of the library.
+
+mod doctor;
+mod explain;
+mod export;
+#[cfg(feature = "panel")]
+mod panel;
+mod run;
+mod timeline;
+
+use clap::{Parser, Subcommand};
+use datasets::cli::{CommonArgs, CompletionsArgs, Status, run_main};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Ray tracing inside OpenGL programs that are not changed.
+#[derive(Debug, Parser)]
+#[command(name = "gluray", version, after_help = EXAMPLES)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    #[command(flatten)]
+    common: CommonArgs,
+}
+
+const EXAMPLES: &str = "Examples:
+  gluray run --mode rich -- gmsh a.stl   gmsh, ray traced
+  gluray doctor                          what there is to work with, and what will not work
+  gluray explain                         what was traced in the last run, what was not, and why
+  gluray panel                           a page that changes running programs
+  gluray export scene.gluray -o a.glb    a captured scene for other programs";
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Runs a program with ray tracing inside it. Its exit code is that of the program
+    Run(Box<run::RunArgs>),
+    /// Says which OpenGL there is, how programs can be reached, and what will not work
+    Doctor(doctor::DoctorArgs),
+    /// Says what was traced in the last run, what was left to the driver, and why
+    Explain(explain::ExplainArgs),
+    /// Writes a captured scene as PLY, glTF or VTP
+    Export(export::ExportArgs),
+    /// Serves the control panel for running programs
+    #[cfg(feature = "panel")]
+    Panel(panel::PanelArgs),
+    /// Draws when each phase of each frame ran
+    Timeline(timeline::TimelineArgs),
+    /// Prints a completion script for a shell
+    Completions(CompletionsArgs),
+}
+
+/// Runs the program. Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted; with `run`, that of the program that was run.
+pub fn main() -> ExitCode {
+    let mut code = None;
+    let status = run_main(|| execute(Cli::try_parse()?, &mut code));
+    code.map_or(status, ExitCode::from)
+}
+
+fn execute(cli: Cli, code: &mut Option<u8>) -> anyhow::Result<Status> {
+    let common = cli.common;
+    match cli.command {
+        Command::Run(args) => {
+            *code = Some(run::run(&args, common.quiet)?);
+            Ok(Status::Success)
+        }
+        Command::Doctor(args) => doctor::doctor(&args, &common),
+        Command::Explain(args) => explain::explain(&args, &common),
+        Command::Export(args) => export::export(common, &args).map(Status::from),
+        #[cfg(feature = "panel")]
+        Command::Panel(args) => panel::panel(common, &args).map(Status::from),
+        Command::Timeline(args) => timeline::timeline(common, &args).map(Status::from),
+        Command::Completions(args) => args.print::<Cli>().map(Status::from),
+    }
+}
+
+/// Where the account of the last run is kept.
+fn last_report() -> PathBuf {
+    crate::folders::state(crate::folders::variable).unwrap_or_default().join("last.json")
+}
+
+/// The shared library that belongs to this program.
+fn library() -> Option<PathBuf> {
+    let exe = std::env::current_exe().ok()?;
+    let folder = exe.parent()?;
+    let places = [folder.to_owned(), folder.join("deps"), folder.join("../lib"), folder.join("..")];
+    let named = std::env::var_os("GLURAY_LIBRARY").map(PathBuf::from);
+    named.into_iter().chain(places.map(|p| p.join("libgluray.so"))).find(|p| p.is_file())
+}

@@ -1,0 +1,210 @@
+//! `gluray run`: the environment for the library, the program, and the account of what happened.
+
+use super::{last_report, library};
+use crate::config::environment::{OBJECTS, parse_pair, variable_of};
+use crate::config::{Assignment, ConfigFile, SettingError, Settings, assign};
+use crate::report::Report;
+use anyhow::Context as _;
+use datasets::cli::{CureExt as _, UsageError};
+use std::ffi::OsString;
+use std::fs;
+use std::os::unix::process::ExitStatusExt as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// How the library gets into the program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum Via {
+    /// As GLVND's vendor library where there is GLVND, else by LD_PRELOAD.
+    Auto,
+    /// As GLVND's vendor library.
+    Vendor,
+    /// By LD_PRELOAD.
+    Preload,
+}
+
+/// Options of `gluray run`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Exit code: that of the program; 2 for wrong options.
+
+Examples:
+  gluray run -- gmsh model.stl
+  gluray run --mode rich --report r.json -- geomview bunny.off
+  gluray run --mode rich --set effects.ambient_occlusion_samples=32 --set objects.3f2a.surface=glass -- paraview")]
+pub(super) struct RunArgs {
+    /// Look of traced surfaces: match (the driver's picture), phong, rich, enhance, path, or off (nothing is traced).
+    #[arg(long, value_parser = ["match", "phong", "rich", "enhance", "path", "off"])]
+    mode: Option<String>,
+    /// `all` traces every filled primitive, in the order drawn, also without a depth test or with blending.
+    #[arg(long, value_parser = ["all", "scene"])]
+    trace: Option<String>,
+    /// Write the account of the run here, as JSON.
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+    /// Settings by program name, TOML; without it `gluray/gluray.toml` in the folder for settings, if there is one.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// A setting by name, over the file's; several times for several. `gluray doctor --variables` lists them.
+    #[arg(long, value_name = "NAME=VALUE")]
+    set: Vec<String>,
+    /// How the library gets into the program.
+    #[arg(long, value_enum, default_value = "auto")]
+    via: Via,
+    /// The program and its arguments.
+    #[arg(required = true, trailing_var_arg = true, allow_hyphen_values = true, value_name = "PROGRAM")]
+    program: Vec<OsString>,
+}
+
+/// The settings of the command line as the variables that carry them, if they make sense.
+fn settings(args: &RunArgs) -> Result<Vec<(String, String)>, UsageError> {
+    let usage =
+        |e: &[SettingError]| UsageError(e.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n  "));
+    if let Some(file) = &args.config {
+        let read = ConfigFile::read(file).map_err(|e| UsageError(datasets::cli::report(&e.into())))?;
+        let (_, errors) = assign(&Settings::default(), &read.all_assignments());
+        if !errors.is_empty() {
+            return Err(usage(&errors));
+        }
+    }
+    let mut variables: Vec<(String, String)> = Vec::new();
+    match args.mode.as_deref() {
+        Some("off") => variables.push((variable_of("enabled"), "false".into())),
+        Some(mode) => variables.push((variable_of("mode"), mode.into())),
+        None => {}
+    }
+    variables.extend(args.trace.iter().map(|t| (variable_of("trace"), t.clone())));
+    let mut objects: Vec<String> = std::env::var(OBJECTS).into_iter().collect();
+    let mut all: Vec<Assignment> = Vec::new();
+    for pair in &args.set {
+        let assignment = parse_pair("--set", pair).map_err(|e| usage(&[e]))?;
+        let value = pair.split_once('=').map_or("", |(_, v)| v).replace(char::is_whitespace, "");
+        match assignment.path.strip_prefix("objects.") {
+            Some(object) => objects.push(format!("{object}={value}")),
+            None => variables.push((variable_of(&assignment.path), value)),
+        }
+        all.push(assignment);
+    }
+    if args.set.iter().any(|s| s.starts_with("objects.")) {
+        variables.push((OBJECTS.into(), objects.join(" ")));
+    }
+    match assign(&Settings::default(), &all).1 {
+        errors if errors.is_empty() => Ok(variables),
+        errors => Err(usage(&errors)),
+    }
+}
+
+/// True when OpenGL here is GLVND's, which takes vendor libraries.
+fn has_glvnd() -> bool {
+    crate::doctor::look_for_glvnd().is_some()
+}
+
+/// A folder that goes when the run is over.
+struct RunFolder(PathBuf);
+
+impl RunFolder {
+    fn new() -> anyhow::Result<RunFolder> {
+        let path = std::env::temp_dir().join(format!("gluray-run-{}", std::process::id()));
+        fs::create_dir_all(&path).with_context(|| format!("cannot make the folder {}", path.display()))?;
+        Ok(RunFolder(path))
+    }
+}
+
+impl Drop for RunFolder {
+    fn drop(&mut self) {
+        fs::remove_dir_all(&self.0).ok();
+    }
+}
+
+fn with_first(variable: &str, first: &Path) -> OsString {
+    let mut value = first.as_os_str().to_owned();
+    if let Some(old) = std::env::var_os(variable).filter(|v| !v.is_empty()) {
+        value.push(":");
+        value.push(old);
+    }
+    value
+}
+
+/// Runs the program; the result is its exit code.
+pub(super) fn run(args: &RunArgs, quiet: bool) -> anyhow::Result<u8> {
+    let library = library()
+        .context("libgluray.so is not beside this program")
+        .cure("build it with `cargo build --release -p gluray`, or name it in the variable GLURAY_LIBRARY")?;
+    let library = fs::canonicalize(&library)?;
+    let variables = settings(args)?;
+    let folder = RunFolder::new()?;
+    let reports = folder.0.join("reports");
+    fs::create_dir_all(&reports)?;
+    let mut command = Command::new(&args.program[0]);
+    command.args(&args.program[1..]).env("GLURAY_RUN_DIR", &reports);
+    command.envs(variables);
+    if let Some(file) = &args.config {
+        command.env("GLURAY_CONFIG", fs::canonicalize(file)?);
+    }
+    let vendor = args.via == Via::Vendor || (args.via == Via::Auto && has_glvnd());
+    if vendor {
+        for name in ["libGLX_gluray.so.0", "libEGL_gluray.so.0"] {
+            std::os::unix::fs::symlink(&library, folder.0.join(name))?;
+        }
+        let egl = folder.0.join("egl.json");
+        let icd = folder.0.join("libEGL_gluray.so.0");
+        let text = serde_json::json!({ "file_format_version": "1.0.0", "ICD": { "library_path": icd } });
+        fs::write(&egl, text.to_string())?;
+        command
+            .env("GLURAY_GLX_VENDOR", std::env::var_os("__GLX_VENDOR_LIBRARY_NAME").unwrap_or_default())
+            .env("LD_LIBRARY_PATH", with_first("LD_LIBRARY_PATH", &folder.0))
+            .env("__GLX_VENDOR_LIBRARY_NAME", "gluray")
+            .env("__EGL_VENDOR_LIBRARY_FILENAMES", &egl);
+    } else {
+        command.env("LD_PRELOAD", with_first("LD_PRELOAD", &library));
+    }
+    let name = args.program[0].to_string_lossy().into_owned();
+    let mut child = command
+        .spawn()
+        .with_context(|| format!("cannot start {name}"))
+        .cure("check the name and the PATH; everything behind `--` is the program and its arguments")?;
+    // Ctrl-C goes to the program, too, which decides what to do about it; we stay to write the report.
+    if !quiet {
+        datasets::cli::Cancel::on_ctrl_c().ok();
+    }
+    let status = child.wait()?;
+    let report = collect(&reports, &name);
+    let text = serde_json::to_string_pretty(&report)?;
+    if let Some(file) = &args.report {
+        fs::write(file, &text).with_context(|| format!("cannot write {}", file.display()))?;
+    }
+    let last = last_report();
+    if let Some(parent) = last.parent() {
+        // Convenience for `gluray explain`: a home that cannot be written is no reason to fail.
+        fs::create_dir_all(parent).and_then(|()| fs::write(&last, &text)).ok();
+    }
+    let code = status.code().unwrap_or_else(|| 128 + status.signal().unwrap_or(0));
+    Ok(u8::try_from(code).unwrap_or(1))
+}
+
+/// All processes' accounts as one.
+fn collect(folder: &Path, program: &str) -> Report {
+    let mut sum = Report { program: program.to_owned(), ..Report::default() };
+    let mut drew = 0;
+    let mut files: Vec<PathBuf> =
+        fs::read_dir(folder).into_iter().flatten().filter_map(|e| Some(e.ok()?.path())).collect();
+    files.sort();
+    for file in files.iter().filter(|f| f.extension().is_some_and(|e| e == "json")) {
+        let report = fs::read(file).ok().and_then(|t| serde_json::from_slice::<Report>(&t).ok());
+        if let Some(r) = report {
+            sum.add(&r);
+            sum.mode.clone_from(&r.mode);
+            sum.pid = r.pid;
+            // What was started may be `timeout` or a script; the account is that of the program that drew.
+            if r.traced_draws + r.passed_draws > drew {
+                drew = r.traced_draws + r.passed_draws;
+                sum.program.clone_from(&r.program);
+            }
+        }
+    }
+    // A line for each phase that ran; the last may be half written.
+    for file in files.iter().filter(|f| f.extension().is_some_and(|e| e == "spans")) {
+        let text = fs::read_to_string(file).unwrap_or_default();
+        sum.timeline.extend(text.lines().filter_map(|l| serde_json::from_str(l).ok()));
+    }
+    sum
+}

@@ -1,0 +1,373 @@
+//! The books of contexts: which is current where, and what each knows.
+//!
+//! A context is owned by the thread it is current on (in [`CURRENT`]) or, while it is current nowhere, by the register. So no call needs a
+//! lock, and a context that is destroyed in flight lives on until its thread leaves it, as OpenGL says.
+
+use crate::cache::Cache;
+use crate::capture::Recorder;
+use crate::config::Config;
+use crate::decide::{self, Verdict};
+use crate::enums::*;
+use crate::fault::guard;
+use crate::frame::Frame;
+use crate::present::Presenter;
+use crate::programs::Programs;
+use crate::real::gl;
+use crate::report::Counters;
+use crate::state::current::{Current, set_material, stale};
+use crate::state::lists::{Lists, Recording};
+use crate::state::snapshot::{Abilities, Snapshot};
+use crate::symbols::{self, class};
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, OnceLock};
+
+thread_local! {
+    /// The context of this thread.
+    pub(crate) static CURRENT: RefCell<Option<Box<Context>>> = const { RefCell::new(None) };
+}
+
+/// Where the calls of immediate mode go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Sink {
+    /// Not between Begin and End.
+    Outside,
+    /// Between Begin and End of a traced primitive.
+    Trace,
+    /// Between Begin and End of a primitive that the driver draws.
+    Pass,
+    /// Into a display list.
+    List,
+}
+
+/// What we know of one OpenGL context.
+pub(crate) struct Context {
+    handle: usize,
+    doomed: bool,
+    pub(crate) can: Abilities,
+    pub(crate) config: Arc<Config>,
+    pub(crate) sink: Sink,
+    /// Classes of state to ask the driver about again.
+    pub(crate) dirty: u8,
+    pub(crate) state: Arc<Snapshot>,
+    pub(crate) verdict: Verdict,
+    pub(crate) current: Current,
+    /// What of `current` the driver does not know yet.
+    pub(crate) stale: u8,
+    pub(crate) recorder: Recorder,
+    pub(crate) lists: Arc<Mutex<Lists>>,
+    pub(crate) recording: Option<Recording>,
+    pub(crate) depth_of_lists: u32,
+    pub(crate) cache: Cache,
+    pub(crate) frame: Frame,
+    pub(crate) presenter: Presenter,
+    pub(crate) programs: Programs,
+    pub(crate) counters: Counters,
+    /// Errors that came up behind the program's back or were kept for it.
+    pub(crate) errors: Vec<u32>,
+    /// Counts what may have changed buffers and textures.
+    pub(crate) buffer_version: u64,
+    pub(crate) texture_version: u64,
+    watched: u32,
+}
+
+struct Register {
+    idle: HashMap<usize, Box<Context>>,
+    lists: HashMap<usize, Arc<Mutex<Lists>>>,
+}
+
+static REGISTER: OnceLock<Mutex<Register>> = OnceLock::new();
+/// Threads that have a context.
+static THREADS: AtomicUsize = AtomicUsize::new(0);
+/// Contexts that were ever current, and the process that counted them.
+static BORN: AtomicU64 = AtomicU64::new(0);
+
+fn register() -> std::sync::MutexGuard<'static, Register> {
+    let new = || Mutex::new(Register { idle: HashMap::new(), lists: HashMap::new() });
+    REGISTER.get_or_init(new).lock().unwrap_or_else(|e| e.into_inner())
+}
+
+/// A context was created; `share` is one whose lists it shares.
+pub(crate) fn created(handle: usize, share: usize) {
+    if handle == 0 {
+        return;
+    }
+    let mut r = register();
+    let lists = r.lists.get(&share).filter(|_| share != 0).cloned().unwrap_or_default();
+    r.lists.insert(handle, lists);
+    // The address of a context that was destroyed may come again.
+    r.idle.remove(&handle);
+}
+
+/// A context was destroyed; when it is current it lives until it is left.
+pub(crate) fn destroyed(handle: usize) {
+    let here = symbols::with_context(|c| {
+        let mine = c.handle == handle;
+        c.doomed |= mine;
+        mine
+    });
+    if here != Some(true) {
+        let gone = register().idle.remove(&handle);
+        drop(gone);
+    }
+    register().lists.remove(&handle);
+}
+
+/// Before the current context changes: what is pending is drawn.
+pub(crate) fn leave() {
+    symbols::with_context(|c| {
+        c.flush("context switch");
+        c.sync();
+        c.counters.publish(true);
+    });
+}
+
+/// The change was refused: all stays as it was.
+pub(crate) fn stay() {
+    symbols::with_context(|c| c.dirty = class::ALL);
+}
+
+/// `handle` is current on this thread now (0: none).
+pub(crate) fn enter(handle: usize) {
+    // Some programs leave their context in exit handlers, when the thread's storage is gone already.
+    let Ok(before) = CURRENT.try_with(|slot| slot.try_borrow_mut().ok().and_then(|mut s| s.take())) else {
+        return;
+    };
+    symbols::set_hot(None);
+    if let Some(old) = before {
+        THREADS.fetch_sub(1, Relaxed);
+        if !old.doomed {
+            register().idle.insert(old.handle, old);
+        }
+    }
+    if handle == 0 || crate::fault::happened() {
+        return;
+    }
+    let mut context = {
+        let mut r = register();
+        let lists = r.lists.entry(handle).or_default().clone();
+        r.idle.remove(&handle).unwrap_or_else(|| Box::new(Context::new(handle, lists)))
+    };
+    context.wake();
+    let threads = THREADS.fetch_add(1, Relaxed) + 1;
+    let placed = CURRENT.try_with(|slot| {
+        let Ok(mut slot) = slot.try_borrow_mut() else { return };
+        *slot = Some(context);
+        // With a second thread the short way would lead to the wrong context.
+        symbols::set_hot(slot.as_deref_mut().filter(|_| threads == 1));
+    });
+    if placed.is_ok() {
+        symbols::attend();
+    }
+}
+
+/// A watched call is about to run.
+pub(crate) fn watched(index: usize, class: u8, flushes: bool, draws: bool) {
+    symbols::with_context(|c| c.watched_call(index, class, flushes, draws));
+}
+
+fn indices_of(names: &[&str]) -> Vec<usize> {
+    names.iter().filter_map(|n| symbols::index_of(n.as_bytes())).collect()
+}
+
+/// Calls that end a frame for the one who looks at the screen.
+fn swaps() -> &'static [usize] {
+    static SWAPS: OnceLock<Vec<usize>> = OnceLock::new();
+    SWAPS.get_or_init(|| {
+        let damage = ["eglSwapBuffersWithDamageKHR", "eglSwapBuffersWithDamageEXT"];
+        indices_of(&[&["glXSwapBuffers", "eglSwapBuffers", "glXSwapBuffersMscOML"][..], &damage].concat())
+    })
+}
+
+/// Calls by which a program looks at what it drew.
+fn reads() -> &'static [usize] {
+    static READS: OnceLock<Vec<usize>> = OnceLock::new();
+    READS.get_or_init(|| indices_of(&["glReadPixels", "glReadnPixels", "glReadnPixelsARB", "glGetTexImage"]))
+}
+
+/// Calls that show something only when the front buffer is drawn to.
+fn front_only() -> &'static [usize] {
+    static FRONT_ONLY: OnceLock<Vec<usize>> = OnceLock::new();
+    FRONT_ONLY.get_or_init(|| indices_of(&["glFlush", "glFinish"]))
+}
+
+impl Drop for Context {
+    /// Also when a thread or the program ends with its context current.
+    fn drop(&mut self) {
+        symbols::set_hot(None);
+        crate::fault::guard(|| self.counters.publish(true));
+    }
+}
+
+impl Context {
+    fn new(handle: usize, lists: Arc<Mutex<Lists>>) -> Context {
+        if BORN.fetch_add(1, Relaxed) == 0 {
+            crate::fault::silence();
+        }
+        Context {
+            handle,
+            doomed: false,
+            can: Abilities::default(),
+            config: crate::config::current(),
+            sink: Sink::Outside,
+            dirty: class::ALL,
+            state: Arc::default(),
+            verdict: Verdict::Pass("nothing drawn yet"),
+            current: Current::default(),
+            stale: 0,
+            recorder: Recorder::default(),
+            lists,
+            recording: None,
+            depth_of_lists: 0,
+            cache: Cache::default(),
+            frame: Frame::default(),
+            presenter: Presenter::default(),
+            programs: Programs::default(),
+            counters: Counters::default(),
+            errors: Vec::new(),
+            buffer_version: 1,
+            texture_version: 1,
+            watched: 0,
+        }
+    }
+
+    /// Current again: the driver may have been told anything meanwhile.
+    fn wake(&mut self) {
+        self.dirty = class::ALL;
+        self.stale = 0;
+        if self.can.version == 0 {
+            self.keep_errors();
+            self.can = Abilities::query();
+            self.drop_errors();
+            self.counters.set_driver(&gl::string(RENDERER), &gl::string(VERSION));
+        }
+    }
+
+    // ---- Errors: ours must not be seen, the program's must not be lost ------------------------------------------------
+
+    /// Takes the driver's pending errors into our keeping.
+    pub(crate) fn keep_errors(&mut self) {
+        for _ in 0..8 {
+            match gl::get_error() {
+                0 => return,
+                e if self.errors.contains(&e) => {}
+                e => self.errors.push(e),
+            }
+        }
+    }
+
+    /// Forgets errors that our own calls made.
+    pub(crate) fn drop_errors(&mut self) {
+        for _ in 0..8 {
+            if gl::get_error() == 0 {
+                return;
+            }
+        }
+    }
+
+    /// An error kept for the program; the driver is asked when there is none.
+    pub(crate) fn take_error(&mut self) -> Option<u32> {
+        if self.sink == Sink::Trace {
+            self.unswallow("glGetError between Begin and End");
+        }
+        if self.errors.is_empty() { None } else { Some(self.errors.remove(0)) }
+    }
+
+    // ---- Watched calls ------------------------------------------------------------------------------------------------
+
+    fn watched_call(&mut self, index: usize, class: u8, flushes: bool, draws: bool) {
+        if self.sink == Sink::Trace {
+            self.unswallow("another call between Begin and End");
+        }
+        if let Some(r) = &mut self.recording {
+            r.note_driver_call(flushes, draws);
+        }
+        if flushes {
+            let invisible =
+                front_only().contains(&index) && self.can.double_buffered && !self.draws_to_front();
+            if !invisible && self.recording.is_none() {
+                self.flush(symbols::NAMES[index].to_str().unwrap_or("a call"));
+            }
+            if draws && self.recording.is_none() {
+                self.counters.pass("a draw call that is not followed", 1);
+            }
+            if swaps().contains(&index) {
+                self.frame_done();
+            } else if reads().contains(&index) {
+                self.read_back();
+            }
+        }
+        self.sync();
+        self.mark(class);
+        self.watched += 1;
+        // A program that sets much state between draws pays for the first calls only.
+        let told_enough = self.watched > 12 && class & !(class::UNIFORM | class::ARRAYS) != 0;
+        if told_enough && self.recording.is_none() && THREADS.load(Relaxed) == 1 {
+            self.mark(class::ALL);
+            symbols::relax();
+        }
+    }
+
+    fn mark(&mut self, class: u8) {
+        self.dirty |= class;
+        self.buffer_version += u64::from(class & class::BUFFER != 0);
+        self.texture_version += u64::from(class & class::TEXTURE != 0);
+    }
+
+    fn draws_to_front(&self) -> bool {
+        self.state.draw_buffer != BACK && self.state.draw_buffer != BACK_LEFT && self.state.framebuffer == 0
+    }
+
+    /// Tells the driver the current attributes it does not know.
+    pub(crate) fn sync(&mut self) {
+        if self.stale != 0 {
+            let bits = std::mem::take(&mut self.stale);
+            self.current.send(bits);
+        }
+    }
+
+    // ---- State --------------------------------------------------------------------------------------------------------
+
+    /// The state now. Ends the batch of immediate mode when it changed.
+    pub(crate) fn refresh(&mut self) {
+        const DRAWS: u8 = class::MATRIX | class::LIGHT | class::RASTER | class::TEXTURE | class::CURRENT;
+        self.watched = 0;
+        symbols::attend();
+        if self.dirty & DRAWS == 0 {
+            return;
+        }
+        self.sync();
+        self.keep_errors();
+        let mut fresh = (*self.state).clone();
+        fresh.refresh(self.dirty, &self.can);
+        if let Some(t) = &mut fresh.texture {
+            t.version = self.texture_version;
+        }
+        if self.dirty & class::CURRENT != 0 && !self.can.core {
+            let now = Current::query();
+            if now != self.current {
+                self.end_batch();
+                self.current = now;
+            }
+        }
+        self.drop_errors();
+        self.dirty &= !DRAWS;
+        if fresh != *self.state {
+            self.end_batch();
+            self.state = Arc::new(fresh);
+            self.verdict = decide::filled(&self.state, self.config.trace());
+        } else {
+            self.verdict = decide::filled(&self.state, self.config.trace());
+        }
+    }
+
+    /// What becomes of filled primitives in the state now.
+    pub(crate) fn verdict(&mut self) -> Verdict {
+        self.refresh();
+        match self.verdict {
+            _ if crate::worker::forked() => Verdict::Pass("a forked process"),
+            v => v,
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! What rays add to OpenGL's lighting: lights that are hidden, and corners that see little of the surroundings.
+//!
+//! Only what is asked for and can change a pixel is computed: no shadow rays to lights at the eye, none where a surface faces away, and no
+//! occlusion rays when none are set. Rays are made in eye space, where all draws of a frame meet, and go through each draw's own structure.
+
+use crate::capture::Shading;
+use crate::config::{Mode, Settings};
+use crate::trace::Prepared;
+use rt_core::glam::{DMat4, DVec3, Vec3};
+use rt_core::ray::Ray;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+/// Most lights of one draw.
+pub(crate) const MOST_LIGHTS: usize = 8;
+
+/// What reaches a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Visibility {
+    /// Share of each light that is not hidden.
+    pub(crate) lights: [f32; MOST_LIGHTS],
+    /// Share of the surroundings that is near nothing.
+    pub(crate) ambient: f32,
+}
+
+impl Visibility {
+    /// Nothing is hidden.
+    pub(crate) const FULL: Visibility = Visibility { lights: [1.0; MOST_LIGHTS], ambient: 1.0 };
+}
+
+/// Where a light of a draw is, in eye space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Place {
+    /// Direction to it.
+    Far(DVec3),
+    /// A point.
+    Near(DVec3),
+}
+
+impl Place {
+    /// What a light at the eye misses the eye cannot see.
+    fn is_at_eye(self) -> bool {
+        match self {
+            Place::Far(d) => d.x == 0.0 && d.y == 0.0 && d.z > 0.0,
+            Place::Near(p) => p == DVec3::ZERO,
+        }
+    }
+}
+
+/// All draws of a frame, for rays that begin on one and end on any.
+pub(crate) struct Surroundings<'a> {
+    draws: &'a [Prepared<'a>],
+    object_from_eye: Vec<Option<DMat4>>,
+    diagonal: f64,
+    settings: &'a Settings,
+    pub(crate) shadow_rays: AtomicU64,
+    pub(crate) occlusion_rays: AtomicU64,
+}
+
+fn eye_from_object(p: &Prepared<'_>) -> DMat4 {
+    let m = match &p.draw.shading {
+        Shading::Fixed => &p.draw.state.model_view,
+        Shading::Program(program) => &program.view_from_object,
+    };
+    DMat4::from_cols_array(&m.map(f64::from))
+}
+
+impl<'a> Surroundings<'a> {
+    /// `None` when the mode asks for nothing beyond OpenGL's lighting.
+    pub(crate) fn new(draws: &'a [Prepared<'a>], settings: &'a Settings) -> Option<Surroundings<'a>> {
+        let wanted = settings.effects.shadows || settings.effects.ambient_occlusion_samples > 0;
+        if !matches!(settings.mode, Mode::Rich | Mode::Enhance | Mode::Path) || !wanted {
+            return None;
+        }
+        let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for p in draws {
+            let (m, b) = (eye_from_object(p), p.draw.geometry.bounds());
+            for corner in 0..8 {
+                let pick =
+                    |bit: i32, k: usize| f64::from(if corner & bit == 0 { b.min[k] } else { b.max[k] });
+                let c = m.transform_point3(DVec3::new(pick(1, 0), pick(2, 1), pick(4, 2)));
+                (lo, hi) = (lo.min(c), hi.max(c));
+            }
+        }
+        let invert = |p: &Prepared<'_>| {
+            let m = eye_from_object(p);
+            (m.determinant() != 0.0).then(|| m.inverse())
+        };
+        Some(Surroundings {
+            object_from_eye: draws.iter().map(invert).collect(),
+            draws,
+            diagonal: (hi - lo).length(),
+            settings,
+            shadow_rays: AtomicU64::new(0),
+            occlusion_rays: AtomicU64::new(0),
+        })
+    }
+
+    /// Whether anything is between `from` and `from + dir * most` (eye space).
+    fn hidden(&self, from: DVec3, dir: DVec3, most: f64) -> bool {
+        self.draws.iter().zip(&self.object_from_eye).any(|(p, m)| {
+            let Some(m) = m else { return false };
+            let (origin, dir) = (m.transform_point3(from), m.transform_vector3(dir));
+            let (ray, moved) = p.world.ray_from_world(origin, dir);
+            let t_max = (most - moved) as f32;
+            p.world.occluded(&Ray { t_max: if t_max.is_finite() { t_max } else { f32::INFINITY }, ..ray })
+        })
+    }
+
+    /// What reaches a point with the given normal (towards the viewer), both in eye space.
+    pub(crate) fn at(&self, point: DVec3, normal: DVec3, lights: &[Place], pixel: (i32, i32)) -> Visibility {
+        let mut v = Visibility::FULL;
+        // Off the surface by a share of the scene that f32 positions in any of its parts cannot reach.
+        let from = point + normal * (self.diagonal * 2e-5);
+        let effects = &self.settings.effects;
+        let mut random = Random::new(pixel);
+        if effects.shadows {
+            for (light, share) in lights.iter().zip(&mut v.lights) {
+                if light.is_at_eye() && effects.light_radius_deg == 0.0 {
+                    continue;
+                }
+                let (dir, most) = match *light {
+                    Place::Far(d) => (d.normalize_or_zero(), f64::INFINITY),
+                    Place::Near(p) => ((p - from).normalize_or_zero(), (p - from).length()),
+                };
+                if dir.dot(normal) <= 0.0 {
+                    continue;
+                }
+                let rays = if effects.light_radius_deg > 0.0 { 8 } else { 1 };
+                let spread = effects.light_radius_deg.to_radians().tan();
+                let seen = (0..rays).filter(|_| {
+                    let (x, y) = random.on_disk();
+                    let (u, w) = dir.any_orthonormal_pair();
+                    let dir = if spread > 0.0 { (dir + (u * x + w * y) * spread).normalize() } else { dir };
+                    !self.hidden(from, dir, most)
+                });
+                *share = seen.count() as f32 / rays as f32;
+                self.shadow_rays.fetch_add(rays, Relaxed);
+            }
+        }
+        let n = effects.ambient_occlusion_samples;
+        if n > 0 {
+            let most = effects.ambient_occlusion_radius * self.diagonal;
+            let (u, w) = normal.any_orthonormal_pair();
+            let open = (0..n).filter(|_| {
+                // Cosine-weighted: a disk lifted onto the hemisphere (Malley's method).
+                let (x, y) = random.on_disk();
+                let dir = u * x + w * y + normal * (1.0 - x * x - y * y).max(0.0).sqrt();
+                !self.hidden(from, dir, most)
+            });
+            v.ambient = open.count() as f32 / n as f32;
+            self.occlusion_rays.fetch_add(u64::from(n), Relaxed);
+        }
+        v
+    }
+}
+
+/// Numbers that depend on the pixel alone, so that a still picture does not flicker.
+struct Random(u64);
+
+impl Random {
+    fn new((x, y): (i32, i32)) -> Random {
+        Random((x as u64) << 32 ^ (y as u64) ^ 0x9e37_79b9_7f4a_7c15)
+    }
+
+    fn next(&mut self) -> f64 {
+        // SplitMix64 (Steele, Lea and Flood 2014).
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn on_disk(&mut self) -> (f64, f64) {
+        let (r, a) = (self.next().sqrt(), std::f64::consts::TAU * self.next());
+        (r * a.cos(), r * a.sin())
+    }
+}
+
+/// A direction or normal as doubles.
+pub(crate) fn vector(v: [f32; 3]) -> DVec3 {
+    Vec3::from_array(v).as_dvec3()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lights_at_the_eye_are_known() {
+        assert!(Place::Far(DVec3::Z).is_at_eye() && Place::Near(DVec3::ZERO).is_at_eye());
+        assert!(!Place::Far(DVec3::new(0.1, 0.0, 1.0)).is_at_eye() && !Place::Far(DVec3::NEG_Z).is_at_eye());
+    }
+
+    #[test]
+    fn numbers_of_a_pixel_are_the_same_in_every_frame_and_fill_the_disk() {
+        let points: Vec<_> =
+            (0..256).map(|_| 0).scan(Random::new((3, 7)), |r, _| Some(r.on_disk())).collect();
+        let again: Vec<_> = (0..256).map(|_| 0).scan(Random::new((3, 7)), |r, _| Some(r.on_disk())).collect();
+        assert_eq!(points, again);
+        assert!(points.iter().all(|(x, y)| x * x + y * y <= 1.0));
+        let mean = points.iter().map(|p| p.0).sum::<f64>() / 256.0;
+        assert!(mean.abs() < 0.1, "{mean}");
+    }
+}

@@ -1,0 +1,60 @@
+//! Where files of the user's lie (XDG Base Directory Specification 0.8).
+
+use std::path::PathBuf;
+
+fn base(variable: impl Fn(&str) -> Option<String>, name: &str, below_home: &str) -> Option<PathBuf> {
+    // "All paths set in these environment variables must be absolute. If ... relative ... consider the path invalid."
+    let set = variable(name).map(PathBuf::from).filter(|p| p.is_absolute());
+    set.or_else(|| Some(PathBuf::from(variable("HOME")?).join(below_home))).map(|p| p.join("gluray"))
+}
+
+/// An environment variable of this process, when set and text.
+pub fn variable(name: &str) -> Option<String> {
+    std::env::var(name).ok().filter(|v| !v.is_empty())
+}
+
+/// Settings: `$XDG_CONFIG_HOME/gluray`.
+pub fn config(variable: impl Fn(&str) -> Option<String>) -> Option<PathBuf> {
+    base(variable, "XDG_CONFIG_HOME", ".config")
+}
+
+/// Reports of runs: `$XDG_STATE_HOME/gluray`.
+pub fn state(variable: impl Fn(&str) -> Option<String>) -> Option<PathBuf> {
+    base(variable, "XDG_STATE_HOME", ".local/state")
+}
+
+/// Where running processes meet: `$XDG_RUNTIME_DIR/gluray`. Without that variable `gluray-UID` in the folder for temporary files, which
+/// only its owner may enter (whoever makes it checks that).
+pub fn runtime(variable: impl Fn(&str) -> Option<String>) -> Option<PathBuf> {
+    let set = variable("XDG_RUNTIME_DIR").map(PathBuf::from).filter(|p| p.is_absolute());
+    set.map(|p| p.join("gluray"))
+        .or_else(|| Some(std::env::temp_dir().join(format!("gluray-{}", user_id()?))))
+}
+
+/// The user this process runs as.
+pub fn user_id() -> Option<u32> {
+    use std::os::unix::fs::MetadataExt;
+    // /proc/self belongs to the process's effective user.
+    std::fs::metadata("/proc/self").ok().map(|m| m.uid())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_follow_the_variables_and_relative_ones_count_as_unset() {
+        let with = |set: &'static [(&'static str, &'static str)]| {
+            move |n: &str| set.iter().find(|(k, _)| *k == n).map(|(_, v)| (*v).to_owned())
+        };
+        assert_eq!(config(with(&[("XDG_CONFIG_HOME", "/c"), ("HOME", "/h")])), Some("/c/gluray".into()));
+        assert_eq!(
+            config(with(&[("XDG_CONFIG_HOME", "c"), ("HOME", "/h")])),
+            Some("/h/.config/gluray".into())
+        );
+        assert_eq!(state(with(&[("HOME", "/h")])), Some("/h/.local/state/gluray".into()));
+        assert_eq!(state(with(&[])), None);
+        assert_eq!(runtime(with(&[("XDG_RUNTIME_DIR", "/r")])), Some("/r/gluray".into()));
+        assert!(runtime(with(&[])).unwrap().file_name().unwrap().to_string_lossy().starts_with("gluray-"));
+    }
+}

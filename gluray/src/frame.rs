@@ -1,0 +1,237 @@
+//! What is drawn but not in the framebuffer yet, and when it has to be there.
+
+use crate::capture::{Draw, Shading};
+use crate::context::Context;
+use crate::enums::*;
+use crate::lighting::{product, transform};
+use crate::present::Fate;
+use crate::texturing::Image;
+use crate::trace::{self, Prepared};
+use crate::worker;
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
+use std::time::Instant;
+
+/// Draws that wait for the end of the frame.
+#[derive(Default)]
+pub(crate) struct Frame {
+    pending: Vec<(Draw, Option<Arc<Image>>)>,
+    /// The driver drew something that commutes since the first of them.
+    others: bool,
+    /// Something was traced since the last frame ended.
+    traced: bool,
+    /// What the control panel and reports are told of it.
+    told: crate::control::Told,
+}
+
+impl Frame {
+    /// The driver drew lines or points whose order does not matter but for ties.
+    pub(crate) fn others_drew(&mut self) {
+        self.others |= !self.pending.is_empty();
+    }
+}
+
+impl Context {
+    /// The recorded immediate mode becomes a draw.
+    pub(crate) fn end_batch(&mut self) {
+        if self.recorder.runs.is_empty() {
+            return;
+        }
+        let start = Instant::now();
+        let kind = [self.state.first_vertex_provokes, self.state.flat];
+        let (positions, runs) =
+            (std::mem::take(&mut self.recorder.positions), std::mem::take(&mut self.recorder.runs));
+        let geometry = self.cache.of_runs(&positions, &runs, kind);
+        let attributes = Arc::new(self.recorder.take_attributes());
+        let clip_from_object = product(&self.state.projection, &self.state.model_view);
+        let calls = std::mem::take(&mut self.recorder.calls);
+        // The memory serves the next batch.
+        (self.recorder.positions, self.recorder.runs) = (positions, runs);
+        self.recorder.positions.clear();
+        self.recorder.runs.clear();
+        let state = self.state.clone();
+        let in_order = matches!(
+            crate::decide::filled(&state, self.config.trace()),
+            crate::decide::Verdict::TraceInOrder
+        );
+        self.counters.spent("capture", start.elapsed());
+        self.add(
+            Draw { geometry, attributes, state, shading: Shading::Fixed, clip_from_object, calls },
+            in_order,
+        );
+    }
+
+    /// Takes a draw into the frame, or traces it at once when its order matters.
+    pub(crate) fn add(&mut self, mut draw: Draw, in_order: bool) {
+        self.counters.report.traced_draws += draw.calls;
+        self.counters.report.triangles += draw.geometry.mesh.num_triangles() as u64;
+        if draw.geometry.mesh.indices.is_empty() {
+            return;
+        }
+        if !trace::has_rays(&draw.clip_from_object) {
+            // A model-view that flattens everything (a shadow on a floor): rays need the flattened triangles themselves.
+            self.flatten(&mut draw);
+        }
+        let image = match &draw.state.texture {
+            Some(t) => self.presenter.images.get(t.target, t.name, t.version),
+            None => None,
+        };
+        if in_order {
+            self.trace_in_order(&draw, image);
+        } else {
+            self.frame.pending.push((draw, image));
+        }
+    }
+
+    fn flatten(&mut self, draw: &mut Draw) {
+        let m = draw.state.model_view;
+        let eye = |p: &rt_core::glam::Vec3| {
+            let v = transform(&m, p.to_array());
+            [v[0], v[1], v[2]]
+        };
+        let positions: Vec<[f32; 3]> = draw.geometry.mesh.positions.iter().map(eye).collect();
+        let indices = draw.geometry.mesh.indices.clone();
+        // Lit where the program lit it: normals cannot be found again from a singular matrix, colours are lit beforehand.
+        let setup = crate::lighting::Setup::new(&draw.state);
+        let object = &draw.geometry.mesh.positions;
+        let colors =
+            (0..object.len()).map(|i| setup.vertex(&draw.attributes, i, object[i].to_array()).primary[0]);
+        let colors = crate::capture::Values::PerVertex(colors.collect());
+        Arc::make_mut(&mut draw.attributes).colors = colors;
+        let mut state = (*draw.state).clone();
+        state.lighting = false;
+        state.model_view = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
+        draw.clip_from_object = state.projection;
+        draw.state = Arc::new(state);
+        draw.geometry = self.cache.of_indices(&positions, &indices);
+    }
+
+    /// Draws what is pending into the framebuffer.
+    pub(crate) fn flush(&mut self, before: &str) {
+        self.end_batch();
+        let pending = std::mem::take(&mut self.frame.pending);
+        let others = std::mem::take(&mut self.frame.others);
+        if pending.is_empty() {
+            return;
+        }
+        self.frame.traced = true;
+        self.counters.flushed(before);
+        self.frame.told.traced(self.counters.report.frames + 1, pending.iter().map(|(d, _)| d));
+        let start = Instant::now();
+        let mut builds = 0;
+        let settings = &self.config.settings;
+        let (layer, extra, rays) = worker::on_pool(|| {
+            let ready: Vec<Prepared<'_>> = pending
+                .iter()
+                .filter_map(|(d, image)| Prepared::new(d, image.clone(), &mut builds))
+                .collect();
+            let (layer, extra) = trace::nearest(&ready, settings);
+            (layer, extra, ready.iter().map(|p| p.rays.load(Relaxed)).sum::<u64>())
+        });
+        self.counters.spent("trace", start.elapsed());
+        self.counters.rays("primary", rays);
+        self.counters.rays("shadow", extra[0]);
+        self.counters.rays("ambient occlusion", extra[1]);
+        self.counters.report.builds += builds;
+        self.counters.report.pixels += layer.covered as u64;
+        let start = Instant::now();
+        if layer.covered > 0 {
+            // What the driver drew after a traced surface wins ties with it, as LEQUAL says; what it drew before loses them.
+            let func = if others { LESS } else { pending[0].0.state.depth_func };
+            self.present(&[layer], Fate::Surface(func));
+        }
+        self.counters.spent("present", start.elapsed());
+    }
+
+    fn trace_in_order(&mut self, draw: &Draw, image: Option<Arc<Image>>) {
+        self.frame.traced = true;
+        self.counters.flushed("in order");
+        self.frame.told.traced(self.counters.report.frames + 1, std::iter::once(draw));
+        let start = Instant::now();
+        let mut builds = 0;
+        let (layers, rays) = worker::on_pool(|| match Prepared::new(draw, image, &mut builds) {
+            Some(p) => (trace::in_order(&p), p.rays.load(Relaxed)),
+            None => (Vec::new(), 0),
+        });
+        self.counters.spent("trace", start.elapsed());
+        self.counters.rays("primary", rays);
+        self.counters.report.builds += builds;
+        self.counters.report.pixels += layers.iter().map(|l| l.covered as u64).sum::<u64>();
+        if !layers.is_empty() {
+            self.present(&layers, Fate::AsDrawn);
+        }
+    }
+
+    /// Whoever looks at the screen sees a picture now.
+    pub(crate) fn frame_done(&mut self) {
+        self.counters.report.frames += 1;
+        self.frame.traced = false;
+        (self.counters.report.cache_hits, self.counters.report.cache_misses) =
+            (self.cache.hits, self.cache.misses);
+        let fast = self.config.settings.quality == crate::config::Quality::Fast;
+        self.cache.frame_done(|g| {
+            if !fast {
+                worker::in_background(move || g.improve());
+            }
+            !fast
+        });
+        let size = [2, 3].map(|i| self.state.viewport[i].max(0).cast_unsigned());
+        self.counters.report.objects = self.frame.told.frame_done(&self.counters.report, size);
+        if let Some(problem) = self.frame.told.take_problem() {
+            self.counters.report.problems = vec![problem];
+        }
+        self.take_up_settings();
+        self.counters.publish(false);
+    }
+
+    /// Other settings hold from the next frame on.
+    fn take_up_settings(&mut self) {
+        let config = crate::config::current();
+        if !Arc::ptr_eq(&config, &self.config) {
+            self.config = config;
+            // Verdicts depend on settings.
+            self.dirty = crate::symbols::class::ALL;
+            crate::symbols::attend();
+        }
+    }
+
+    /// The program reads what was drawn: a frame, too, when something was traced for it.
+    pub(crate) fn read_back(&mut self) {
+        if self.frame.traced {
+            self.frame_done();
+            self.counters.publish(true);
+        }
+    }
+
+    /// `glClear`. A clear of everything makes what is pending invisible; a clear of a part comes after it.
+    pub(crate) fn clear(&mut self, mask: u32) -> bool {
+        if self.recording.is_some() {
+            if let Some(r) = &mut self.recording {
+                r.note_driver_call(true, true);
+            }
+            return false;
+        }
+        if self.sink == crate::context::Sink::Trace {
+            self.unswallow("glClear between Begin and End");
+            return false;
+        }
+        self.end_batch();
+        if !self.frame.pending.is_empty() {
+            const COLOR_AND_DEPTH: u32 = 0x4100;
+            self.refresh();
+            let whole = mask & COLOR_AND_DEPTH == COLOR_AND_DEPTH
+                && self.state.scissor.is_none()
+                && self.state.color_mask
+                && self.state.depth_mask
+                && self.frame.pending.iter().all(|(d, _)| d.state.framebuffer == self.state.framebuffer);
+            if whole {
+                self.frame.pending.clear();
+                self.frame.others = false;
+            } else {
+                self.flush("glClear of a part");
+            }
+        }
+        self.sync();
+        false
+    }
+}

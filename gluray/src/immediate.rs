@@ -1,0 +1,283 @@
+//! Immediate mode: Begin and End, and the attributes that vertices take with them.
+
+use crate::context::{Context, Sink};
+use crate::decide::{self, Verdict};
+use crate::enums::*;
+use crate::fault::guard;
+use crate::real::gl;
+use crate::state::current::{Current, set_material, stale};
+use crate::symbols::{self, class};
+
+impl Context {
+    #[inline]
+    pub(crate) fn begin(&mut self, mode: u32) -> bool {
+        const DRAWS: u8 = class::MATRIX | class::LIGHT | class::RASTER | class::TEXTURE | class::CURRENT;
+        let ready = self.sink == Sink::Outside && self.dirty & DRAWS == 0;
+        let traced = match self.verdict {
+            Verdict::Trace => self.state.program == 0,
+            Verdict::TraceIfOpaque(_) => self.state.program == 0 && self.is_opaque_now(),
+            _ => false,
+        };
+        if ready && traced && (TRIANGLES..=POLYGON).contains(&mode) {
+            self.recorder.begin(mode, &self.current);
+            self.sink = Sink::Trace;
+            return true;
+        }
+        guard(|| self.begin_slowly(mode)).unwrap_or(false)
+    }
+
+    /// True when a vertex now would have alpha 1.
+    #[inline]
+    pub(crate) fn is_opaque_now(&self) -> bool {
+        let s = &*self.state;
+        let tracked = s.color_material.is_some_and(|(_, what)| matches!(what, DIFFUSE | AMBIENT_AND_DIFFUSE));
+        match s.lighting {
+            true if !tracked => self.current.materials.iter().all(|m| m.diffuse[3] == 1.0),
+            _ => self.current.color[3] == 1.0,
+        }
+    }
+
+    /// Alpha left 1 while that was what a draw was traced for.
+    #[inline]
+    fn watch_alpha(&mut self) {
+        if self.sink == Sink::Trace
+            && let Verdict::TraceIfOpaque(why) = self.verdict
+            && !self.is_opaque_now()
+        {
+            guard(|| self.unswallow(why));
+        }
+    }
+
+    #[cold]
+    fn begin_slowly(&mut self, mode: u32) -> bool {
+        match self.sink {
+            Sink::List => return self.list_begin(mode),
+            // An error, which the driver is to report.
+            Sink::Trace => {
+                self.unswallow("Begin between Begin and End");
+                return false;
+            }
+            Sink::Pass => return false,
+            Sink::Outside => {}
+        }
+        let verdict = self.verdict();
+        let filled = crate::primitives::is_filled(mode);
+        let fixed = self.state.program == 0;
+        let verdict = match verdict {
+            Verdict::TraceIfOpaque(why) if !self.is_opaque_now() => Verdict::Pass(why),
+            v => v,
+        };
+        match verdict {
+            Verdict::Trace | Verdict::TraceInOrder | Verdict::TraceIfOpaque(_) if filled && fixed => {
+                if verdict == Verdict::TraceInOrder {
+                    self.flush("a draw whose order matters");
+                }
+                self.recorder.begin(mode, &self.current);
+                self.sink = Sink::Trace;
+                symbols::attend();
+                true
+            }
+            _ => {
+                let why = match verdict {
+                    _ if !filled => "lines and points",
+                    Verdict::Pass(why) => why,
+                    _ => "immediate mode with a program",
+                };
+                self.passing(why, filled);
+                self.sink = Sink::Pass;
+                false
+            }
+        }
+    }
+
+    /// The driver is about to draw something.
+    pub(crate) fn passing(&mut self, why: &'static str, filled: bool) {
+        self.end_batch();
+        if decide::commutes(&self.state) && !filled {
+            self.frame.others_drew();
+        } else {
+            self.flush("a draw of the driver's whose order matters");
+        }
+        self.sync();
+        self.counters.pass(why, 1);
+    }
+
+    #[inline]
+    pub(crate) fn end(&mut self) -> bool {
+        if self.sink == Sink::Trace {
+            self.recorder.end();
+            self.sink = Sink::Outside;
+            if self.verdict == Verdict::TraceInOrder {
+                guard(|| self.end_batch());
+            }
+            return true;
+        }
+        guard(|| self.end_slowly()).unwrap_or(false)
+    }
+
+    #[cold]
+    fn end_slowly(&mut self) -> bool {
+        match self.sink {
+            Sink::List => self.list_end(),
+            Sink::Pass => {
+                self.sink = Sink::Outside;
+                false
+            }
+            _ => false,
+        }
+    }
+
+    /// The primitive that is being recorded goes to the driver after all.
+    pub(crate) fn unswallow(&mut self, why: &'static str) {
+        self.sink = Sink::Pass;
+        let (mode, vertices) = self.recorder.withdraw();
+        let end = self.current;
+        self.passing(why, true);
+        if let Some((_, first)) = vertices.first() {
+            first.send(0xf);
+        }
+        gl::begin(mode);
+        let mut before: Option<Current> = None;
+        for (p, c) in vertices {
+            let changed = before.is_none_or(|b| b.materials != c.materials);
+            c.send(stale::NORMAL | stale::COLOR | stale::TEX | if changed { stale::MATERIAL } else { 0 });
+            gl::vertex4f(p[0], p[1], p[2], 1.0);
+            before = Some(c);
+        }
+        end.send(0xf);
+        self.stale = 0;
+    }
+
+    #[inline(always)]
+    pub(crate) fn vertex(&mut self, v: [f32; 4]) -> bool {
+        if self.sink == Sink::Trace && v[3] == 1.0 {
+            self.recorder.vertex([v[0], v[1], v[2]], &self.current);
+            return true;
+        }
+        guard(|| self.vertex_slowly(v)).unwrap_or(false)
+    }
+
+    #[cold]
+    fn vertex_slowly(&mut self, v: [f32; 4]) -> bool {
+        match self.sink {
+            Sink::List => self.list_vertex(v),
+            Sink::Trace if v[3] > 0.0 && v[3].is_finite() => {
+                self.recorder.vertex([v[0] / v[3], v[1] / v[3], v[2] / v[3]], &self.current);
+                true
+            }
+            Sink::Trace => {
+                self.unswallow("vertices with w not positive");
+                false
+            }
+            _ => false,
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn normal(&mut self, v: [f32; 3]) -> bool {
+        match self.sink {
+            Sink::List => return guard(|| self.list_normal(v)).unwrap_or(false),
+            Sink::Pass => {
+                self.current.normal = v;
+                return false;
+            }
+            Sink::Trace | Sink::Outside => {}
+        }
+        self.current.normal = v;
+        self.recorder.set_normal(v);
+        self.now_stale(stale::NORMAL);
+        true
+    }
+
+    #[inline(always)]
+    pub(crate) fn color(&mut self, v: [f32; 4]) -> bool {
+        match self.sink {
+            Sink::List => return guard(|| self.list_color(v)).unwrap_or(false),
+            Sink::Pass => {
+                self.current.color = v;
+                return false;
+            }
+            Sink::Trace | Sink::Outside => {}
+        }
+        self.current.color = v;
+        self.recorder.set_color(v);
+        self.now_stale(stale::COLOR);
+        self.watch_alpha();
+        true
+    }
+
+    #[inline(always)]
+    pub(crate) fn tex_coord(&mut self, v: [f32; 4]) -> bool {
+        match self.sink {
+            Sink::List => return guard(|| self.list_tex(v)).unwrap_or(false),
+            Sink::Pass => {
+                self.current.tex = v;
+                return false;
+            }
+            Sink::Trace | Sink::Outside => {}
+        }
+        self.current.tex = v;
+        self.recorder.set_tex(v);
+        self.now_stale(stale::TEX);
+        true
+    }
+
+    pub(crate) fn material(&mut self, face: u32, what: u32, v: [f32; 4]) -> bool {
+        if self.sink == Sink::List {
+            return guard(|| self.list_material(face, what, v)).unwrap_or(false);
+        }
+        let mut materials = self.current.materials;
+        if !set_material(&mut materials, face, what, v) {
+            // An error, which the driver is to report.
+            if self.sink == Sink::Trace {
+                guard(|| self.unswallow("an invalid material"));
+            }
+            return false;
+        }
+        // Ours may be behind the driver's (after PopAttrib, say): then the driver alone is told.
+        if self.sink == Sink::Pass || self.dirty & class::CURRENT != 0 {
+            self.current.materials = materials;
+            return false;
+        }
+        if materials != self.current.materials {
+            self.current.materials = materials;
+            self.recorder.set_materials(&materials);
+            self.now_stale(stale::MATERIAL);
+            self.watch_alpha();
+        }
+        true
+    }
+
+    #[inline(always)]
+    fn now_stale(&mut self, bit: u8) {
+        if self.stale == 0 {
+            symbols::attend();
+        }
+        self.stale |= bit;
+    }
+
+    pub(crate) fn rect(&mut self, [x, y, x2, y2]: [f32; 4]) -> bool {
+        if self.sink == Sink::Trace || self.sink == Sink::Pass {
+            return false;
+        }
+        if self.sink == Sink::List {
+            return self.list_rect([x, y, x2, y2]);
+        }
+        {
+            let traced = match self.verdict() {
+                Verdict::Trace | Verdict::TraceInOrder => self.state.program == 0,
+                Verdict::TraceIfOpaque(_) => self.state.program == 0 && self.is_opaque_now(),
+                Verdict::Pass(_) => false,
+            };
+            if !traced {
+                self.passing("a rectangle in a state that is passed", true);
+                return false;
+            }
+        }
+        self.begin(POLYGON);
+        for [x, y] in [[x, y], [x2, y], [x2, y2], [x, y2]] {
+            self.vertex([x, y, 0.0, 1.0]);
+        }
+        self.end()
+    }
+}

@@ -1,0 +1,316 @@
+//! Traced fragments into the program's framebuffer: one triangle-strip pass of the driver's whose shader takes colour and depth from
+//! textures.
+//!
+//! The fragments meet the program's own depth test (and blending, stencil, logic operation, when it is that draw's turn), so whatever the driver drew
+//! before and after is composited by the driver, in any kind of framebuffer, without reading anything back.
+
+use crate::context::Context;
+use crate::enums::*;
+use crate::real::gl;
+use crate::texturing::Images;
+use crate::trace::{Layer, Rect};
+
+/// What the fragments meet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Fate {
+    /// The depth test with this function, nothing else: the nearest surfaces of a frame.
+    Surface(u32),
+    /// Everything the program has set: a draw whose order matters.
+    AsDrawn,
+}
+
+/// The objects of the pass.
+#[derive(Default)]
+pub(crate) struct Presenter {
+    pub(crate) images: Images,
+    program: u32,
+    places: Option<[i32; 2]>,
+    textures: [u32; 2],
+    size: [i32; 2],
+    vertex_array: u32,
+    failed: bool,
+}
+
+const VERTEX_120: &str = "#version 120
+void main() { gl_Position = gl_Vertex; }
+";
+const FRAGMENT_120: &str = "#version 120
+uniform sampler2D colors, depths;
+uniform vec4 window;
+void main() {
+    vec2 at = (gl_FragCoord.xy - window.xy) * window.zw;
+    float z = texture2D(depths, at).r;
+    if (z > 1.5) discard;
+    gl_FragDepth = z;
+    gl_FragColor = texture2D(colors, at);
+}
+";
+const VERTEX_150: &str = "#version 150
+uniform vec4 quad;
+void main() {
+    vec2 c = vec2(gl_VertexID & 1, gl_VertexID >> 1);
+    gl_Position = vec4(mix(quad.xy, quad.zw, c), 0.0, 1.0);
+}
+";
+const FRAGMENT_150: &str = "#version 150
+uniform sampler2D colors, depths;
+uniform vec4 window;
+out vec4 color;
+void main() {
+    ivec2 at = ivec2(gl_FragCoord.xy - window.xy);
+    float z = texelFetch(depths, at, 0).r;
+    if (z > 1.5) discard;
+    gl_FragDepth = z;
+    color = texelFetch(colors, at, 0);
+}
+";
+
+fn compile(kind: u32, text: &str) -> u32 {
+    let shader = gl::create_shader(kind);
+    gl::shader_source(shader, text);
+    gl::compile_shader(shader);
+    shader
+}
+
+impl Presenter {
+    /// Makes the objects; false when the driver refuses them.
+    fn prepare(&mut self, core: bool) -> bool {
+        if self.program != 0 || self.failed {
+            return !self.failed;
+        }
+        let (vertex, fragment) = if core { (VERTEX_150, FRAGMENT_150) } else { (VERTEX_120, FRAGMENT_120) };
+        let program = gl::create_program();
+        let shaders = [compile(VERTEX_SHADER, vertex), compile(FRAGMENT_SHADER, fragment)];
+        for s in shaders {
+            gl::attach_shader(program, s);
+        }
+        gl::link_program(program);
+        shaders.into_iter().for_each(gl::delete_shader);
+        if gl::program_i::<1>(program, LINK_STATUS)[0] == 0 {
+            self.failed = true;
+            return false;
+        }
+        self.program = program;
+        self.places = Some([gl::uniform_location(program, "window"), gl::uniform_location(program, "quad")]);
+        gl::use_program(program);
+        gl::uniform1i(gl::uniform_location(program, "colors"), 0);
+        gl::uniform1i(gl::uniform_location(program, "depths"), 1);
+        self.textures = [gl::gen_texture(), gl::gen_texture()];
+        if core {
+            self.vertex_array = gl::gen_vertex_array();
+        }
+        true
+    }
+
+    /// Puts a layer into the textures, bound to units 0 and 1.
+    fn upload(&mut self, layer: &Layer) {
+        let grow = layer.rect.w > self.size[0] || layer.rect.h > self.size[1];
+        if grow {
+            self.size = [layer.rect.w.max(self.size[0]), layer.rect.h.max(self.size[1])];
+        }
+        let formats = [(RGBA8, RGBA, UNSIGNED_BYTE), (R32F, RED, FLOAT)];
+        let data: [&[u8]; 2] = [layer.color.as_flattened(), bytemuck::cast_slice(&layer.depth)];
+        for (unit, (inner, format, kind)) in formats.into_iter().enumerate() {
+            gl::active_texture(TEXTURE0 + unit as u32);
+            gl::bind_texture(TEXTURE_2D, self.textures[unit]);
+            if grow {
+                gl::tex_image(inner.cast_signed(), self.size[0], self.size[1], format, kind);
+                for (what, value) in [
+                    (TEXTURE_MIN_FILTER, NEAREST),
+                    (TEXTURE_MAG_FILTER, NEAREST),
+                    (TEXTURE_WRAP_S, CLAMP_TO_EDGE),
+                    (TEXTURE_WRAP_T, CLAMP_TO_EDGE),
+                ] {
+                    gl::tex_parameteri(TEXTURE_2D, what, value.cast_signed());
+                }
+            }
+            gl::tex_sub_image(layer.rect.w, layer.rect.h, format, kind, data[unit]);
+        }
+    }
+}
+
+/// The part of core state that the pass changes; in compatibility contexts the attribute stacks keep the rest.
+struct Kept {
+    program: i32,
+    vertex_array: i32,
+    unpack_buffer: i32,
+    active: i32,
+    textures: [i32; 2],
+    samplers: [i32; 2],
+    unpack: [i32; 6],
+    caps: Vec<(u32, bool)>,
+    depth_func: i32,
+    depth_mask: i32,
+    color_mask: [i32; 4],
+    polygon_mode: i32,
+    viewport: [i32; 4],
+    depth_range: [f64; 2],
+    core: bool,
+    samplers_exist: bool,
+}
+
+const UNPACK: [u32; 6] = [
+    UNPACK_ALIGNMENT,
+    UNPACK_ROW_LENGTH,
+    UNPACK_SKIP_ROWS,
+    UNPACK_SKIP_PIXELS,
+    UNPACK_SWAP_BYTES,
+    UNPACK_LSB_FIRST,
+];
+/// What must be off for our two triangles whatever their fate.
+const OFF: [u32; 4] = [CULL_FACE, POLYGON_OFFSET_FILL, POLYGON_SMOOTH, RASTERIZER_DISCARD];
+/// Per-fragment operations that only fragments in order meet.
+const OPERATIONS: [u32; 3] = [BLEND, STENCIL_TEST, COLOR_LOGIC_OP];
+/// The same of fixed function.
+const LEGACY: [u32; 2] = [POLYGON_STIPPLE, VERTEX_PROGRAM_ARB];
+
+impl Kept {
+    fn keep(core: bool, version: u32) -> Kept {
+        let samplers_exist = version >= 33;
+        let mut textures = [0; 2];
+        let mut samplers = [0; 2];
+        let active = gl::int(ACTIVE_TEXTURE);
+        for unit in 0..2 {
+            gl::active_texture(TEXTURE0 + unit as u32);
+            textures[unit] = gl::int(TEXTURE_BINDING_2D);
+            samplers[unit] = if samplers_exist { gl::int(SAMPLER_BINDING) } else { 0 };
+        }
+        let caps = match core {
+            true => [&OFF[..], &OPERATIONS, &[DEPTH_TEST, DEPTH_CLAMP]].concat(),
+            false => Vec::new(),
+        };
+        Kept {
+            program: gl::int(CURRENT_PROGRAM),
+            vertex_array: if core { gl::int(VERTEX_ARRAY_BINDING) } else { 0 },
+            unpack_buffer: if version >= 21 { gl::int(PIXEL_UNPACK_BUFFER_BINDING) } else { 0 },
+            active,
+            textures,
+            samplers,
+            unpack: UNPACK.map(gl::int),
+            caps: caps.into_iter().map(|c| (c, gl::is_enabled(c))).collect(),
+            depth_func: gl::int(DEPTH_FUNC),
+            depth_mask: gl::int(DEPTH_WRITEMASK),
+            color_mask: gl::ints(COLOR_WRITEMASK),
+            polygon_mode: gl::int(POLYGON_MODE),
+            viewport: gl::ints(VIEWPORT),
+            depth_range: gl::doubles(DEPTH_RANGE),
+            core,
+            samplers_exist,
+        }
+    }
+
+    fn restore(&self) {
+        for unit in 0..2 {
+            gl::active_texture(TEXTURE0 + unit as u32);
+            gl::bind_texture(TEXTURE_2D, self.textures[unit].cast_unsigned());
+            if self.samplers_exist {
+                gl::bind_sampler(unit as u32, self.samplers[unit].cast_unsigned());
+            }
+        }
+        gl::active_texture(self.active.cast_unsigned());
+        UNPACK.into_iter().zip(self.unpack).for_each(|(what, v)| gl::pixel_storei(what, v));
+        if self.unpack_buffer != 0 {
+            gl::bind_buffer(PIXEL_UNPACK_BUFFER, self.unpack_buffer.cast_unsigned());
+        }
+        gl::use_program(self.program.cast_unsigned());
+        if self.core {
+            gl::bind_vertex_array(self.vertex_array.cast_unsigned());
+            self.caps.iter().for_each(|(cap, on)| if *on { gl::enable(*cap) } else { gl::disable(*cap) });
+            gl::depth_func(self.depth_func.cast_unsigned());
+            gl::depth_mask(self.depth_mask as u8);
+            let [r, g, b, a] = self.color_mask.map(|v| v as u8);
+            gl::color_mask(r, g, b, a);
+            gl::polygon_mode(FRONT_AND_BACK, self.polygon_mode.cast_unsigned());
+            let [x, y, w, h] = self.viewport;
+            gl::viewport(x, y, w, h);
+            gl::depth_range(self.depth_range[0], self.depth_range[1]);
+        }
+    }
+}
+
+impl Context {
+    /// Draws the layers over one another.
+    pub(crate) fn present(&mut self, layers: &[Layer], fate: Fate) {
+        self.keep_errors();
+        let core = self.can.core;
+        let kept = Kept::keep(core, self.can.version);
+        if !core {
+            gl::push_attrib(0x000f_ffff);
+        }
+        UNPACK.into_iter().for_each(|what| gl::pixel_storei(what, i32::from(what == UNPACK_ALIGNMENT)));
+        if kept.unpack_buffer != 0 {
+            gl::bind_buffer(PIXEL_UNPACK_BUFFER, 0);
+        }
+        if self.presenter.prepare(core) {
+            self.pass(layers, fate, &kept);
+        } else {
+            self.counters.pass("the driver refuses our shader: what was traced is lost", 1);
+        }
+        if !core {
+            gl::pop_attrib();
+        }
+        kept.restore();
+        self.drop_errors();
+    }
+
+    fn pass(&mut self, layers: &[Layer], fate: Fate, kept: &Kept) {
+        let core = self.can.core;
+        let p = &mut self.presenter;
+        gl::use_program(p.program);
+        if kept.samplers_exist {
+            (0..2).for_each(|unit| gl::bind_sampler(unit, 0));
+        }
+        OFF.into_iter().filter(|c| *c != RASTERIZER_DISCARD || self.can.version >= 30).for_each(gl::disable);
+        if !core {
+            (0..6).for_each(|i| gl::disable(CLIP_PLANE0 + i));
+            let vp = self.can.arb_programs;
+            LEGACY.into_iter().filter(|c| *c != VERTEX_PROGRAM_ARB || vp).for_each(gl::disable);
+            if vp {
+                gl::disable(FRAGMENT_PROGRAM_ARB);
+            }
+        }
+        gl::polygon_mode(FRONT_AND_BACK, FILL);
+        gl::depth_range(0.0, 1.0);
+        if let Fate::Surface(func) = fate {
+            OPERATIONS.into_iter().for_each(gl::disable);
+            if !core {
+                gl::disable(ALPHA_TEST);
+            }
+            // Scissors were those of each draw; their pixels are cut already.
+            gl::disable(SCISSOR_TEST);
+            gl::enable(DEPTH_TEST);
+            gl::depth_func(func);
+            gl::depth_mask(1);
+            gl::color_mask(1, 1, 1, 1);
+        }
+        if core {
+            gl::bind_vertex_array(p.vertex_array);
+        }
+        for layer in layers {
+            let Rect { x, y, w, h } = layer.rect;
+            p.upload(layer);
+            // One pixel of the viewport is one texel: the viewport is the rectangle itself.
+            gl::viewport(x, y, w, h);
+            let [window, quad] = p.places.unwrap_or([-1; 2]);
+            if core {
+                gl::uniform4f(window, x as f32, y as f32, 0.0, 0.0);
+                gl::uniform4f(quad, -1.0, -1.0, 1.0, 1.0);
+                gl::draw_arrays(TRIANGLE_STRIP, 0, 4);
+            } else {
+                gl::uniform4f(window, x as f32, y as f32, 1.0 / p.size[0] as f32, 1.0 / p.size[1] as f32);
+                gl::begin(TRIANGLE_STRIP);
+                for (x, y) in [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)] {
+                    gl::vertex4f(x, y, 0.0, 1.0);
+                }
+                gl::end();
+            }
+        }
+        if core
+            && kept.caps.iter().all(|(c, _)| *c != SCISSOR_TEST)
+            && matches!(fate, Fate::Surface(_))
+            && self.state.scissor.is_some()
+        {
+            gl::enable(SCISSOR_TEST);
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! The rasterizer's rules: which pixel centres a triangle covers, and how steep it is.
+
+/// Window coordinates of a corner in units of 1/256 pixel, as the driver's rasterizer takes them.
+fn snapped(c: &[f32; 4], viewport: [i32; 4]) -> [i64; 2] {
+    let [vx, vy, vw, vh] = viewport.map(|v| v as f32);
+    let inverse = 1.0 / c[3];
+    let x = c[0] * inverse * (0.5 * vw) + (0.5 * vw + vx);
+    let y = c[1] * inverse * (0.5 * vh) + (0.5 * vh + vy);
+    // At most two million pixels off, so that products of differences fit into 64 bits.
+    [x, y].map(|v| (v * 256.0).round().clamp(-5e8, 5e8) as i64)
+}
+
+/// Whether the triangle covers the pixel's centre. A centre on an edge belongs to the triangle above or to the right of it.
+pub(crate) fn covers(c: &[[f32; 4]; 3], viewport: [i32; 4], x: i32, y: i32) -> bool {
+    let p = c.each_ref().map(|v| snapped(v, viewport));
+    let (cx, cy) = (i64::from(x) * 256 + 128, i64::from(y) * 256 + 128);
+    let edge =
+        |a: [i64; 2], b: [i64; 2], x: i64, y: i64| (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]);
+    let area = edge(p[0], p[1], p[2][0], p[2][1]);
+    if area == 0 {
+        return false;
+    }
+    let p = if area > 0 { p } else { [p[0], p[2], p[1]] };
+    (0..3).all(|i| {
+        let (a, b) = (p[i], p[(i + 1) % 3]);
+        let e = edge(a, b, cx, cy);
+        // Counter-clockwise: an edge that goes down has the triangle on its right side in x, one that goes right has it above.
+        let inclusive = b[1] < a[1] || (b[1] == a[1] && b[0] > a[0]);
+        e > 0 || (e == 0 && inclusive)
+    })
+}
+
+/// The greater of |dz/dx| and |dz/dy| in window coordinates, for polygon offset.
+pub(crate) fn steepness(c: &[[f32; 4]; 3], viewport: [i32; 4], depth_scale: f64) -> f64 {
+    let w = c.map(|v| {
+        let i = 1.0 / f64::from(v[3]);
+        let half = |size: i32| f64::from(size) * 0.5;
+        [
+            f64::from(v[0]) * i * half(viewport[2]),
+            f64::from(v[1]) * i * half(viewport[3]),
+            f64::from(v[2]) * i * 0.5 * depth_scale,
+        ]
+    });
+    let d = |a: usize, k: usize| w[a][k] - w[0][k];
+    let det = d(1, 0) * d(2, 1) - d(2, 0) * d(1, 1);
+    if det == 0.0 {
+        return 0.0;
+    }
+    let dx = (d(1, 2) * d(2, 1) - d(2, 2) * d(1, 1)) / det;
+    let dy = (d(2, 2) * d(1, 0) - d(1, 2) * d(2, 0)) / det;
+    dx.abs().max(dy.abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_triangles_of_a_square_cover_each_pixel_once_and_the_far_edges_not_at_all() {
+        let viewport = [0, 0, 4, 4];
+        // Corners on pixel centres: (0.5, 0.5) to (2.5, 2.5) of a 4 x 4 window.
+        let at = |x: f32, y: f32| [x / 2.0 - 1.0, y / 2.0 - 1.0, 0.0, 1.0];
+        let [a, b, c, d] = [at(0.5, 0.5), at(2.5, 0.5), at(2.5, 2.5), at(0.5, 2.5)];
+        for (first, second) in [([a, b, c], [a, c, d]), ([c, b, a], [d, a, c])] {
+            for y in 0..4 {
+                for x in 0..4 {
+                    let n = u32::from(covers(&first, viewport, x, y))
+                        + u32::from(covers(&second, viewport, x, y));
+                    assert_eq!(n, u32::from(x < 2 && y < 2), "pixel ({x}, {y})");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn steepness_is_that_of_the_plane() {
+        let viewport = [0, 0, 100, 50];
+        // z_window rises by 0.1 per 50 pixels in x, falls by 0.4 per 25 in y.
+        let c = [[0.0, 0.0, 0.0, 1.0], [1.0, 0.0, 0.2, 1.0], [0.0, 1.0, -0.8, 1.0]];
+        assert!((steepness(&c, viewport, 1.0) - 0.4 / 25.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,311 @@
+//! The driver's functions that we call, with slices in place of pointers.
+//!
+//! All of them act on the context that is current on the thread, as all of OpenGL.
+
+use super::driver;
+use core::ffi::{c_char, c_void};
+use std::sync::atomic::AtomicPtr;
+
+driver! {
+    pub(crate) fn begin = "glBegin"(mode: u32);
+    pub(crate) fn end = "glEnd"();
+    pub(crate) fn color4f = "glColor4f"(r: f32, g: f32, b: f32, a: f32);
+    pub(crate) fn normal3f = "glNormal3f"(x: f32, y: f32, z: f32);
+    pub(crate) fn tex_coord4f = "glTexCoord4f"(s: f32, t: f32, r: f32, q: f32);
+    pub(crate) fn vertex4f = "glVertex4f"(x: f32, y: f32, z: f32, w: f32);
+    pub(crate) fn rectf = "glRectf"(x: f32, y: f32, x2: f32, y2: f32);
+    pub(crate) fn enable = "glEnable"(cap: u32);
+    pub(crate) fn disable = "glDisable"(cap: u32);
+    fn is_enabled_raw = "glIsEnabled"(cap: u32) -> u8;
+    pub(crate) fn get_error = "glGetError"() -> u32;
+    fn get_floatv = "glGetFloatv"(what: u32, out: *mut f32);
+    fn get_doublev = "glGetDoublev"(what: u32, out: *mut f64);
+    fn get_integerv = "glGetIntegerv"(what: u32, out: *mut i32);
+    fn get_pointerv = "glGetPointerv"(what: u32, out: *mut *mut c_void);
+    fn get_string = "glGetString"(what: u32) -> *const c_char;
+    fn get_light = "glGetLightfv"(light: u32, what: u32, out: *mut f32);
+    fn get_material = "glGetMaterialfv"(face: u32, what: u32, out: *mut f32);
+    fn get_tex_env_i = "glGetTexEnviv"(target: u32, what: u32, out: *mut i32);
+    fn get_tex_env_f = "glGetTexEnvfv"(target: u32, what: u32, out: *mut f32);
+    fn get_tex_gen_i = "glGetTexGeniv"(coord: u32, what: u32, out: *mut i32);
+    fn get_tex_gen_f = "glGetTexGenfv"(coord: u32, what: u32, out: *mut f32);
+    fn get_clip_plane = "glGetClipPlane"(plane: u32, out: *mut f64);
+    fn get_tex_level_i = "glGetTexLevelParameteriv"(target: u32, level: i32, what: u32, out: *mut i32);
+    fn get_tex_parameter_i = "glGetTexParameteriv"(target: u32, what: u32, out: *mut i32);
+    fn get_tex_parameter_f = "glGetTexParameterfv"(target: u32, what: u32, out: *mut f32);
+    fn get_tex_image = "glGetTexImage"(target: u32, level: i32, format: u32, kind: u32, out: *mut c_void);
+    fn materialfv_raw = "glMaterialfv"(face: u32, what: u32, values: *const f32);
+    pub(crate) fn new_list = "glNewList"(list: u32, mode: u32);
+    pub(crate) fn end_list = "glEndList"();
+    pub(crate) fn call_list = "glCallList"(list: u32);
+    pub(crate) fn delete_lists = "glDeleteLists"(list: u32, range: i32);
+    pub(crate) fn gen_lists = "glGenLists"(range: i32) -> u32;
+    pub(crate) fn push_attrib = "glPushAttrib"(mask: u32);
+    pub(crate) fn pop_attrib = "glPopAttrib"();
+    pub(crate) fn push_client_attrib = "glPushClientAttrib"(mask: u32);
+    pub(crate) fn pop_client_attrib = "glPopClientAttrib"();
+    pub(crate) fn viewport = "glViewport"(x: i32, y: i32, w: i32, h: i32);
+    pub(crate) fn scissor = "glScissor"(x: i32, y: i32, w: i32, h: i32);
+    pub(crate) fn depth_func = "glDepthFunc"(func: u32);
+    pub(crate) fn depth_mask = "glDepthMask"(on: u8);
+    pub(crate) fn depth_range = "glDepthRange"(near: f64, far: f64);
+    pub(crate) fn polygon_mode = "glPolygonMode"(face: u32, mode: u32);
+    pub(crate) fn color_mask = "glColorMask"(r: u8, g: u8, b: u8, a: u8);
+    pub(crate) fn active_texture = "glActiveTexture"(unit: u32);
+    pub(crate) fn bind_texture = "glBindTexture"(target: u32, name: u32);
+    pub(crate) fn tex_parameteri = "glTexParameteri"(target: u32, what: u32, value: i32);
+    pub(crate) fn pixel_storei = "glPixelStorei"(what: u32, value: i32);
+    pub(crate) fn bind_sampler = "glBindSampler"(unit: u32, name: u32);
+    fn gen_textures = "glGenTextures"(n: i32, out: *mut u32);
+    fn tex_image_2d = "glTexImage2D"(target: u32, level: i32, inner: i32, w: i32, h: i32, border: i32, format: u32, kind: u32, data: *const c_void);
+    fn tex_sub_image_2d = "glTexSubImage2D"(target: u32, level: i32, x: i32, y: i32, w: i32, h: i32, format: u32, kind: u32, data: *const c_void);
+    fn read_pixels_raw = "glReadPixels"(x: i32, y: i32, w: i32, h: i32, format: u32, kind: u32, out: *mut c_void);
+    pub(crate) fn create_shader = "glCreateShader"(kind: u32) -> u32;
+    fn shader_source_raw = "glShaderSource"(shader: u32, n: i32, text: *const *const c_char, lengths: *const i32);
+    pub(crate) fn compile_shader = "glCompileShader"(shader: u32);
+    pub(crate) fn create_program = "glCreateProgram"() -> u32;
+    pub(crate) fn attach_shader = "glAttachShader"(program: u32, shader: u32);
+    pub(crate) fn link_program = "glLinkProgram"(program: u32);
+    pub(crate) fn use_program = "glUseProgram"(program: u32);
+    pub(crate) fn delete_shader = "glDeleteShader"(shader: u32);
+    fn get_programiv = "glGetProgramiv"(program: u32, what: u32, out: *mut i32);
+    fn get_shaderiv = "glGetShaderiv"(shader: u32, what: u32, out: *mut i32);
+    fn get_shader_source_raw = "glGetShaderSource"(shader: u32, room: i32, length: *mut i32, out: *mut c_char);
+    fn get_attached_raw = "glGetAttachedShaders"(program: u32, room: i32, count: *mut i32, out: *mut u32);
+    fn get_uniform_location_raw = "glGetUniformLocation"(program: u32, name: *const c_char) -> i32;
+    fn get_attrib_location_raw = "glGetAttribLocation"(program: u32, name: *const c_char) -> i32;
+    fn bind_attrib_location_raw = "glBindAttribLocation"(program: u32, at: u32, name: *const c_char);
+    fn get_active_attrib_raw = "glGetActiveAttrib"(program: u32, i: u32, room: i32, length: *mut i32, size: *mut i32, kind: *mut u32, name: *mut c_char);
+    fn get_active_uniform_raw = "glGetActiveUniform"(program: u32, i: u32, room: i32, length: *mut i32, size: *mut i32, kind: *mut u32, name: *mut c_char);
+    fn get_uniformfv = "glGetUniformfv"(program: u32, at: i32, out: *mut f32);
+    fn get_uniformiv = "glGetUniformiv"(program: u32, at: i32, out: *mut i32);
+    pub(crate) fn uniform1i = "glUniform1i"(at: i32, v: i32);
+    pub(crate) fn uniform2f = "glUniform2f"(at: i32, x: f32, y: f32);
+    pub(crate) fn uniform4f = "glUniform4f"(at: i32, x: f32, y: f32, z: f32, w: f32);
+    fn get_vertex_attrib_i = "glGetVertexAttribiv"(at: u32, what: u32, out: *mut i32);
+    fn get_vertex_attrib_f = "glGetVertexAttribfv"(at: u32, what: u32, out: *mut f32);
+    fn get_vertex_attrib_pointer = "glGetVertexAttribPointerv"(at: u32, what: u32, out: *mut *mut c_void);
+    pub(crate) fn bind_buffer = "glBindBuffer"(target: u32, name: u32);
+    fn get_buffer_sub_data = "glGetBufferSubData"(target: u32, at: isize, bytes: isize, out: *mut c_void);
+    fn get_buffer_parameter_i = "glGetBufferParameteriv"(target: u32, what: u32, out: *mut i32);
+    fn gen_vertex_arrays = "glGenVertexArrays"(n: i32, out: *mut u32);
+    pub(crate) fn bind_vertex_array = "glBindVertexArray"(name: u32);
+    pub(crate) fn bind_framebuffer = "glBindFramebuffer"(target: u32, name: u32);
+    pub(crate) fn draw_arrays = "glDrawArrays"(mode: u32, first: i32, count: i32);
+    pub(crate) fn light_model_i = "glLightModeli"(what: u32, value: i32);
+    fn get_framebuffer_attachment_i = "glGetFramebufferAttachmentParameteriv"(target: u32, attachment: u32, what: u32, out: *mut i32);
+}
+
+/// Whether capability `cap` is on.
+pub(crate) fn is_enabled(cap: u32) -> bool {
+    is_enabled_raw(cap) != 0
+}
+
+// More than any query returns, so that no answer can overrun.
+const ROOM: usize = 32;
+
+/// `N` floats of state (at most 16).
+pub(crate) fn floats<const N: usize>(what: u32) -> [f32; N] {
+    let mut out = [0.0; ROOM];
+    get_floatv(what, out.as_mut_ptr());
+    std::array::from_fn(|i| out[i])
+}
+
+/// `N` doubles of state.
+pub(crate) fn doubles<const N: usize>(what: u32) -> [f64; N] {
+    let mut out = [0.0; ROOM];
+    get_doublev(what, out.as_mut_ptr());
+    std::array::from_fn(|i| out[i])
+}
+
+/// `N` integers of state.
+pub(crate) fn ints<const N: usize>(what: u32) -> [i32; N] {
+    let mut out = [0; ROOM];
+    get_integerv(what, out.as_mut_ptr());
+    std::array::from_fn(|i| out[i])
+}
+
+/// One integer of state.
+pub(crate) fn int(what: u32) -> i32 {
+    ints::<1>(what)[0]
+}
+
+/// One integer of state as a GL enum or name.
+pub(crate) fn word(what: u32) -> u32 {
+    int(what).cast_unsigned()
+}
+
+/// An address kept as state.
+pub(crate) fn pointer(what: u32) -> usize {
+    let mut out = core::ptr::null_mut();
+    get_pointerv(what, &raw mut out);
+    out as usize
+}
+
+/// A string of the driver; empty without a context.
+pub(crate) fn string(what: u32) -> String {
+    let p = get_string(what);
+    if p.is_null() {
+        return String::new();
+    }
+    // SAFETY: the driver's own string, which lives as long as the driver.
+    unsafe { core::ffi::CStr::from_ptr(p) }.to_string_lossy().into_owned()
+}
+
+macro_rules! queries {
+    ($($name:ident($($a:ident: $t:ty),*) -> $v:ty = $raw:ident;)*) => { $(
+        /// Values of one query.
+        pub(crate) fn $name<const N: usize>($($a: $t),*) -> [$v; N] {
+            let mut out = [<$v>::default(); ROOM];
+            $raw($($a,)* out.as_mut_ptr());
+            std::array::from_fn(|i| out[i])
+        }
+    )* };
+}
+queries! {
+    light(light: u32, what: u32) -> f32 = get_light;
+    material(face: u32, what: u32) -> f32 = get_material;
+    tex_env_i(target: u32, what: u32) -> i32 = get_tex_env_i;
+    tex_env_f(target: u32, what: u32) -> f32 = get_tex_env_f;
+    tex_gen_i(coord: u32, what: u32) -> i32 = get_tex_gen_i;
+    tex_gen_f(coord: u32, what: u32) -> f32 = get_tex_gen_f;
+    clip_plane(plane: u32) -> f64 = get_clip_plane;
+    tex_level_i(target: u32, level: i32, what: u32) -> i32 = get_tex_level_i;
+    tex_parameter_i(target: u32, what: u32) -> i32 = get_tex_parameter_i;
+    tex_parameter_f(target: u32, what: u32) -> f32 = get_tex_parameter_f;
+    program_i(program: u32, what: u32) -> i32 = get_programiv;
+    shader_i(shader: u32, what: u32) -> i32 = get_shaderiv;
+    vertex_attrib_i(at: u32, what: u32) -> i32 = get_vertex_attrib_i;
+    vertex_attrib_f(at: u32, what: u32) -> f32 = get_vertex_attrib_f;
+    buffer_i(target: u32, what: u32) -> i32 = get_buffer_parameter_i;
+    uniform_f(program: u32, at: i32) -> f32 = get_uniformfv;
+    uniform_i(program: u32, at: i32) -> i32 = get_uniformiv;
+    attachment_i(target: u32, attachment: u32, what: u32) -> i32 = get_framebuffer_attachment_i;
+}
+
+/// `glMaterialfv`.
+pub(crate) fn materialfv(face: u32, what: u32, values: &[f32; 4]) {
+    materialfv_raw(face, what, values.as_ptr());
+}
+
+/// Address or offset of a generic attribute's array.
+pub(crate) fn vertex_attrib_address(at: u32) -> usize {
+    let mut out = core::ptr::null_mut();
+    get_vertex_attrib_pointer(at, 0x8645, &raw mut out);
+    out as usize
+}
+
+/// A new texture.
+pub(crate) fn gen_texture() -> u32 {
+    let mut out = 0;
+    gen_textures(1, &raw mut out);
+    out
+}
+
+/// A new vertex array object; 0 where there are none.
+pub(crate) fn gen_vertex_array() -> u32 {
+    let mut out = 0;
+    gen_vertex_arrays(1, &raw mut out);
+    out
+}
+
+/// Gives the bound 2-D texture its size. `None` leaves its texels open.
+pub(crate) fn tex_image(inner: i32, w: i32, h: i32, format: u32, kind: u32) {
+    tex_image_2d(0x0de1, 0, inner, w, h, 0, format, kind, core::ptr::null());
+}
+
+/// Fills the corner of the bound 2-D texture. Panics when `data` is too short for `w` x `h` texels of four bytes.
+pub(crate) fn tex_sub_image(w: i32, h: i32, format: u32, kind: u32, data: &[u8]) {
+    assert!(data.len() as i64 >= i64::from(w) * i64::from(h) * 4, "too few texels");
+    tex_sub_image_2d(0x0de1, 0, 0, 0, w, h, format, kind, data.as_ptr().cast());
+}
+
+/// Level 0 of the bound texture as floats, RGBA. The caller asks for the size first.
+pub(crate) fn tex_image_rgba(target: u32, texels: usize) -> Vec<[f32; 4]> {
+    let mut out = vec![[0.0_f32; 4]; texels];
+    get_tex_image(target, 0, 0x1908, 0x1406, out.as_mut_ptr().cast());
+    out
+}
+
+/// A rectangle of the read buffer, four bytes a pixel (`GL_RGBA`/`GL_UNSIGNED_BYTE`, or `GL_DEPTH_COMPONENT`/`GL_FLOAT`).
+pub(crate) fn read_pixels(x: i32, y: i32, w: i32, h: i32, format: u32, kind: u32) -> Vec<u8> {
+    let mut out = vec![0_u8; (w.max(0) as usize) * (h.max(0) as usize) * 4];
+    read_pixels_raw(x, y, w, h, format, kind, out.as_mut_ptr().cast());
+    out
+}
+
+/// A part of the buffer bound to `target`.
+pub(crate) fn buffer_bytes(target: u32, at: usize, bytes: usize) -> Vec<u8> {
+    let mut out = vec![0_u8; bytes];
+    if bytes > 0 {
+        get_buffer_sub_data(target, at as isize, bytes as isize, out.as_mut_ptr().cast());
+    }
+    out
+}
+
+/// Source of a shader of ours.
+pub(crate) fn shader_source(shader: u32, text: &str) {
+    let (p, n) = (text.as_ptr().cast::<c_char>(), text.len() as i32);
+    shader_source_raw(shader, 1, &raw const p, &raw const n);
+}
+
+/// Source of a shader of the program.
+pub(crate) fn source_of(shader: u32) -> String {
+    let room = shader_i::<1>(shader, 0x8b88)[0].max(0);
+    let mut out = vec![0_u8; room as usize + 1];
+    let mut n = 0;
+    get_shader_source_raw(shader, room, &raw mut n, out.as_mut_ptr().cast());
+    out.truncate(n.max(0) as usize);
+    String::from_utf8_lossy(&out).into_owned()
+}
+
+/// Shaders attached to a program (at most 16).
+pub(crate) fn attached(program: u32) -> Vec<u32> {
+    let (mut out, mut n) = ([0; 16], 0);
+    get_attached_raw(program, 16, &raw mut n, out.as_mut_ptr());
+    out[..n.clamp(0, 16) as usize].to_vec()
+}
+
+fn with_c_string<R>(name: &str, f: impl FnOnce(*const c_char) -> R) -> Option<R> {
+    let text = std::ffi::CString::new(name).ok()?;
+    Some(f(text.as_ptr()))
+}
+
+/// Location of a uniform, -1 for none.
+pub(crate) fn uniform_location(program: u32, name: &str) -> i32 {
+    with_c_string(name, |p| get_uniform_location_raw(program, p)).unwrap_or(-1)
+}
+
+/// Location of an attribute, -1 for none.
+pub(crate) fn attrib_location(program: u32, name: &str) -> i32 {
+    with_c_string(name, |p| get_attrib_location_raw(program, p)).unwrap_or(-1)
+}
+
+/// `glBindAttribLocation`.
+pub(crate) fn bind_attrib_location(program: u32, at: u32, name: &str) {
+    with_c_string(name, |p| bind_attrib_location_raw(program, at, p));
+}
+
+type ActiveQuery = fn(u32, u32, i32, *mut i32, *mut i32, *mut u32, *mut c_char);
+
+fn active(program: u32, count: u32, query: ActiveQuery) -> Vec<(String, i32, u32)> {
+    let n = program_i::<1>(program, count)[0].max(0) as u32;
+    (0..n)
+        .map(|i| {
+            let mut name = [0_u8; 256];
+            let (mut length, mut size, mut kind) = (0, 0, 0);
+            query(program, i, 256, &raw mut length, &raw mut size, &raw mut kind, name.as_mut_ptr().cast());
+            (String::from_utf8_lossy(&name[..length.clamp(0, 255) as usize]).into_owned(), size, kind)
+        })
+        .collect()
+}
+
+/// Active attributes: name, array size, type.
+pub(crate) fn active_attributes(program: u32) -> Vec<(String, i32, u32)> {
+    active(program, 0x8b89, get_active_attrib_raw)
+}
+
+/// Active uniforms: name, array size, type.
+pub(crate) fn active_uniforms(program: u32) -> Vec<(String, i32, u32)> {
+    active(program, 0x8b86, get_active_uniform_raw)
+}

@@ -1,0 +1,53 @@
+//! Why draws are left to the driver, in more words, and what can be done about it.
+
+/// What a reason in a report means, and the cure, if there is one. `None` for a reason that speaks for itself.
+pub fn advice(reason: &str) -> Option<&'static str> {
+    TABLE.iter().find(|(start, _)| reason.starts_with(start)).map(|(_, text)| *text)
+}
+
+/// By the beginning of the reason.
+const TABLE: &[(&str, &str)] = &[
+    ("lines", "lines and points are drawn by the driver and joined with the picture by depth"),
+    ("points", "lines and points are drawn by the driver and joined with the picture by depth"),
+    ("polygons drawn as lines", "a wireframe; show surfaces to have them traced"),
+    ("selection or feedback", "the program finds out what is under the mouse; nothing is seen of that"),
+    ("tracing is off", "mode off, or `enabled = false`: switch it on with --mode or on the panel"),
+    ("an assembly program", "ARB programs are not understood; --mode enhance needs no understanding"),
+    (
+        "several colour buffers",
+        "as in dual depth peeling or deferred shading; try the program's settings for translucency",
+    ),
+    ("several texture units", "more than one texture at once is not traced"),
+    ("a texture that is neither", "cube maps and volumes are not traced"),
+    ("texture combiners", "GL_COMBINE is not traced"),
+    ("texture without lighting", "labels and pictures on the screen mostly; --trace all traces them, too"),
+    (
+        "stippled or smoothed",
+        "a pattern of holes, or edges smoothed by blending, which the driver knows best",
+    ),
+    ("fog coordinates", "fog by coordinate is not traced; fog by depth is"),
+    ("transform feedback", "the program reads vertices back; nothing is seen of that"),
+    ("depth test", "such draws are mostly text, legends and menus; --trace all traces them, too"),
+    ("no depth test", "such draws are mostly text, legends and menus; --trace all traces them, too"),
+    ("blending", "translucent in a way that is not followed; --trace all traces it in the order drawn"),
+    ("stencil", "drawn through a mask, as constructive solid geometry in image space is"),
+    ("a shader", "not of a family that is recognised; --mode enhance needs no understanding"),
+    ("a program", "not of a family that is recognised; --mode enhance needs no understanding"),
+    ("a forked process", "a child made by fork has none of our threads"),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_known_is_explained_and_what_is_not_is_left_alone() {
+        assert!(advice("tracing is off").unwrap().contains("--mode"));
+        assert!(advice("no depth test, or no depth mask").is_some());
+        assert_eq!(advice("an empty viewport"), None);
+        for (i, (a, _)) in TABLE.iter().enumerate() {
+            let hidden = TABLE[..i].iter().any(|(b, _)| a.starts_with(b));
+            assert!(!hidden, "`{a}` is never reached");
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! The colour of a fragment: vertex colours, texture, fog; or lighting at the fragment itself with what rays found out about it.
+
+use crate::capture::Shading;
+use crate::config::Mode;
+use crate::effects::{Surroundings, Visibility, vector};
+use crate::enums::*;
+use crate::lighting::{Lit, transform};
+use crate::texturing;
+use crate::trace::{Fragment, Prepared, matrix, mixed};
+use rt_core::glam::DVec3;
+
+impl Prepared<'_> {
+    /// Eye-space position and shading normal of a fragment.
+    fn eye_point(&self, prim: usize, w: [f32; 3]) -> ([f32; 3], [f32; 3]) {
+        let mesh = &self.draw.geometry.mesh;
+        let corners = mesh.indices[prim].map(|i| i as usize);
+        let matrix = match &self.draw.shading {
+            Shading::Fixed => &self.draw.state.model_view,
+            Shading::Program(program) => &program.view_from_object,
+        };
+        let eye = corners.map(|i| {
+            let v = transform(matrix, mesh.positions[i].to_array());
+            [v[0] / v[3], v[1] / v[3], v[2] / v[3]]
+        });
+        let normal = |i: usize| self.lighting.eye_normal(self.draw.attributes.normals.at(i));
+        let normal = if self.draw.state.flat { normal(corners[2]) } else { mixed(corners.map(normal), w) };
+        (mixed(eye, w), crate::lighting::normalized(normal))
+    }
+
+    /// The colour that the mode gives a fragment.
+    pub(crate) fn shaded(
+        &self,
+        prim: usize,
+        f: &Fragment,
+        mode: Mode,
+        around: Option<&Surroundings<'_>>,
+        pixel: (i32, i32),
+    ) -> [f32; 4] {
+        let per_pixel = matches!(mode, Mode::Phong | Mode::Rich | Mode::Path);
+        let lit = match &self.draw.shading {
+            Shading::Fixed => self.draw.state.lighting,
+            Shading::Program(_) => true,
+        };
+        let (Some(around), true) = (around, lit) else {
+            return self.color(prim, f, per_pixel, &Visibility::FULL);
+        };
+        // The plane of the triangle, turned to the viewer: what is in front of it is what the eye sees.
+        let weights = f.weights.map(|w| w as f32);
+        let (eye, _) = self.eye_point(prim, weights);
+        let at = |w| vector(self.eye_point(prim, w).0);
+        let [a, b, c] = [at([1.0, 0.0, 0.0]), at([0.0, 1.0, 0.0]), at([0.0, 0.0, 1.0])];
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let clip = matrix(&self.draw.state.projection);
+        let parallel = matches!(self.draw.shading, Shading::Fixed) && clip.row(3).truncate() == DVec3::ZERO;
+        let towards = if parallel { DVec3::Z } else { -vector(eye) };
+        let normal = if normal.dot(towards) < 0.0 { -normal } else { normal };
+        let reaches = around.at(vector(eye), normal, &self.places, pixel);
+        if mode != Mode::Enhance {
+            // Lights at the eye cast no shadow that it could see; corners dim them all the same.
+            let mut r = reaches;
+            r.lights.iter_mut().for_each(|l| *l *= 0.5 + 0.5 * reaches.ambient);
+            return self.color(prim, f, per_pixel, &r);
+        }
+        let color = self.color(prim, f, per_pixel, &Visibility::FULL);
+        let n = self.places.len().clamp(1, crate::effects::MOST_LIGHTS);
+        let light = reaches.lights[..n].iter().sum::<f32>() / n as f32;
+        let dim = (0.4 + 0.6 * light) * (0.3 + 0.7 * reaches.ambient);
+        [color[0] * dim, color[1] * dim, color[2] * dim, color[3]]
+    }
+
+    /// The colour of OpenGL's lighting: at the vertices, or at the fragment itself.
+    pub(crate) fn color(&self, prim: usize, f: &Fragment, per_pixel: bool, reaches: &Visibility) -> [f32; 4] {
+        let mesh = &self.draw.geometry.mesh;
+        let corners = mesh.indices[prim].map(|i| i as usize);
+        if let Shading::Program(program) = &self.draw.shading {
+            return program.color(
+                &self.draw.attributes,
+                mesh,
+                prim,
+                f.weights.map(|w| w as f32),
+                f.front,
+                reaches,
+            );
+        }
+        let s = &*self.draw.state;
+        let side = usize::from(!f.front && s.lighting && s.two_side);
+        let lit = corners.map(|i| match &self.lit {
+            _ if per_pixel && s.lighting => Lit::default(),
+            Some(all) => all[i],
+            None => self.lighting.vertex(&self.draw.attributes, i, mesh.positions[i].to_array()),
+        });
+        let w = f.weights.map(|w| w as f32);
+        let (mut color, secondary) = match s.flat {
+            _ if per_pixel && s.lighting => {
+                let (eye, normal) = self.eye_point(prim, w);
+                let color = if s.flat {
+                    self.draw.attributes.colors.at(corners[2])
+                } else {
+                    mixed(corners.map(|i| self.draw.attributes.colors.at(i)), w)
+                };
+                let materials = self.draw.attributes.materials_at(corners[2]);
+                self.lighting.point(materials, color, eye, normal, !f.front, reaches)
+            }
+            true => (lit[2].primary[side], lit[2].secondary[side]),
+            false => (mixed(lit.map(|l| l.primary[side]), w), mixed(lit.map(|l| l.secondary[side]), w)),
+        };
+        if let (Some(unit), Some(image)) = (&s.texture, &self.image) {
+            let coords = corners.map(|i| {
+                texturing::coordinates(
+                    unit,
+                    s,
+                    &self.draw.attributes,
+                    &self.lighting,
+                    i,
+                    mesh.positions[i].to_array(),
+                )
+            });
+            color = texturing::apply(unit, image, color, mixed(coords, w));
+        }
+        for k in 0..3 {
+            color[k] = (color[k] + secondary[k]).clamp(0.0, 1.0);
+        }
+        if let Some(fog) = &s.fog {
+            let m = &s.model_view;
+            let z = corners.map(|i| [transform(m, mesh.positions[i].to_array())[2].abs()]);
+            let d = mixed(z, w)[0];
+            let factor = match fog.mode {
+                EXP => (-fog.density * d).exp(),
+                EXP2 => (-(fog.density * d) * (fog.density * d)).exp(),
+                _ => (fog.end - d) / (fog.end - fog.start),
+            };
+            let factor = if factor.is_nan() { 0.0 } else { factor.clamp(0.0, 1.0) };
+            for k in 0..3 {
+                color[k] = fog.color[k].clamp(0.0, 1.0) * (1.0 - factor) + color[k] * factor;
+            }
+        }
+        color
+    }
+}

@@ -1,0 +1,369 @@
+//! Display lists: our own streams of immediate mode, with the driver's lists for everything else between them.
+//!
+//! While a list is compiled, attribute and vertex calls go into our stream and all other calls into a list of the driver's. Where they
+//! alternate, the driver's list is closed and another begun; calling the list plays both in order, through the same methods that the
+//! program calls. So state is what it is at the time of the call, nested lists work, and the driver gets a primitive only when it is to draw it.
+
+use crate::context::{Context, Sink};
+use crate::enums::*;
+use crate::real::gl;
+use crate::symbols::{self, class};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// A step of a list.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Op {
+    Begin(u32),
+    End,
+    Vertex([f32; 4]),
+    Normal([f32; 3]),
+    Color([f32; 4]),
+    Tex([f32; 4]),
+    /// Index into the list's materials.
+    Material(u32),
+    /// A list of the driver's, and whether it draws things whose order matters.
+    Driver {
+        list: u32,
+        draws: bool,
+    },
+    Call(u32),
+    /// Names relative to the list base at the time of the call.
+    CallFromBase(u32),
+    Rect([f32; 4]),
+}
+
+/// A finished list.
+#[derive(Debug, Default)]
+pub(crate) struct List {
+    ops: Vec<Op>,
+    materials: Vec<(u32, u32, [f32; 4])>,
+    /// The driver's lists beside the one of the same name.
+    pieces: Vec<u32>,
+}
+
+/// The lists of a share group.
+#[derive(Debug, Default)]
+pub(crate) struct Lists {
+    lists: HashMap<u32, Arc<List>>,
+    next_piece: u32,
+}
+
+/// Names of our pieces begin here: no program counts its lists so far.
+const FIRST_PIECE: u32 = 0x4000_0000;
+
+/// A list while it is compiled.
+pub(crate) struct Recording {
+    name: u32,
+    execute: bool,
+    list: List,
+    piece: u32,
+    used: bool,
+    draws: bool,
+    /// Between a Begin and its End.
+    open: bool,
+}
+
+impl Recording {
+    /// A call goes into the driver's piece.
+    pub(crate) fn note_driver_call(&mut self, flushes: bool, draws: bool) {
+        self.used = true;
+        self.draws |= flushes || draws;
+    }
+}
+
+const DEEPEST: u32 = 64;
+
+impl Context {
+    pub(crate) fn new_list(&mut self, name: u32, mode: u32) -> bool {
+        if self.sink == Sink::Trace {
+            self.unswallow("glNewList between Begin and End");
+        }
+        let wrong = name == 0 || self.recording.is_some() || self.sink == Sink::Pass;
+        if wrong || !(mode == COMPILE || mode == COMPILE_AND_EXECUTE) || self.can.core {
+            return false;
+        }
+        self.sync();
+        gl::new_list(name, COMPILE);
+        let execute = mode == COMPILE_AND_EXECUTE;
+        self.recording = Some(Recording {
+            name,
+            execute,
+            list: List::default(),
+            piece: name,
+            used: false,
+            draws: false,
+            open: false,
+        });
+        self.sink = Sink::List;
+        symbols::attend();
+        true
+    }
+
+    pub(crate) fn end_list(&mut self) -> bool {
+        if self.sink == Sink::Trace {
+            self.unswallow("glEndList between Begin and End");
+        }
+        if self.recording.as_ref().is_some_and(|r| r.execute && r.open) {
+            // What is compiled is also executed, and there a primitive is open.
+            self.errors.push(INVALID_OPERATION);
+            return true;
+        }
+        let Some(mut r) = self.recording.take() else { return false };
+        gl::end_list();
+        if r.used {
+            r.list.ops.push(Op::Driver { list: r.piece, draws: r.draws });
+        }
+        self.sink = Sink::Outside;
+        let old = {
+            let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
+            lists.lists.insert(r.name, Arc::new(r.list))
+        };
+        delete_pieces(old);
+        if r.execute {
+            self.call_list(r.name);
+        }
+        true
+    }
+
+    /// Puts a step of ours into the list; calls that went to the driver before it end their piece.
+    fn list_op(&mut self, op: Op) -> bool {
+        let Some(r) = &mut self.recording else { return false };
+        if r.used {
+            gl::end_list();
+            r.list.ops.push(Op::Driver { list: r.piece, draws: r.draws });
+            let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
+            lists.next_piece += 1;
+            r.piece = FIRST_PIECE + lists.next_piece;
+            r.list.pieces.push(r.piece);
+            (r.used, r.draws) = (false, false);
+            gl::new_list(r.piece, COMPILE);
+        }
+        r.list.ops.push(op);
+        true
+    }
+
+    pub(crate) fn list_begin(&mut self, mode: u32) -> bool {
+        if let Some(r) = &mut self.recording {
+            r.open = true;
+        }
+        self.list_op(Op::Begin(mode))
+    }
+
+    pub(crate) fn list_end(&mut self) -> bool {
+        if let Some(r) = &mut self.recording {
+            r.open = false;
+        }
+        self.list_op(Op::End)
+    }
+
+    pub(crate) fn list_vertex(&mut self, v: [f32; 4]) -> bool {
+        self.list_op(Op::Vertex(v))
+    }
+
+    pub(crate) fn list_normal(&mut self, v: [f32; 3]) -> bool {
+        self.list_op(Op::Normal(v))
+    }
+
+    pub(crate) fn list_color(&mut self, v: [f32; 4]) -> bool {
+        self.list_op(Op::Color(v))
+    }
+
+    pub(crate) fn list_tex(&mut self, v: [f32; 4]) -> bool {
+        self.list_op(Op::Tex(v))
+    }
+
+    pub(crate) fn list_material(&mut self, face: u32, what: u32, v: [f32; 4]) -> bool {
+        let Some(r) = &mut self.recording else { return false };
+        let at = r.list.materials.len() as u32;
+        r.list.materials.push((face, what, v));
+        self.list_op(Op::Material(at))
+    }
+
+    /// A rectangle, a primitive of its own.
+    pub(crate) fn list_rect(&mut self, v: [f32; 4]) -> bool {
+        self.list_op(Op::Rect(v))
+    }
+
+    pub(crate) fn call_list(&mut self, name: u32) -> bool {
+        if self.recording.is_some() {
+            return self.list_op(Op::Call(name));
+        }
+        let known = self.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.get(&name).cloned();
+        let Some(list) = known else {
+            // Not compiled by calls that we saw (fonts of glXUseXFont), or not there.
+            self.call_driver(name, true);
+            return true;
+        };
+        if self.depth_of_lists >= DEEPEST {
+            return true;
+        }
+        self.depth_of_lists += 1;
+        self.play(&list);
+        self.depth_of_lists -= 1;
+        true
+    }
+
+    fn call_driver(&mut self, list: u32, draws: bool) {
+        self.before_driver(draws);
+        gl::call_list(list);
+    }
+
+    /// The driver is about to play lists of its own.
+    fn before_driver(&mut self, draws: bool) {
+        if self.sink == Sink::Trace {
+            self.unswallow("a list between Begin and End");
+        }
+        self.end_batch();
+        if draws && self.sink == Sink::Outside {
+            self.refresh();
+            if crate::decide::commutes(&self.state) {
+                self.frame.others_drew();
+            } else {
+                self.flush("a display list of the driver's");
+            }
+        }
+        self.sync();
+        self.dirty = class::ALL;
+        self.texture_version += 1;
+    }
+
+    fn play(&mut self, list: &List) {
+        for op in &list.ops {
+            match *op {
+                Op::Begin(mode) => {
+                    if !self.begin(mode) {
+                        gl::begin(mode);
+                    }
+                }
+                Op::End => {
+                    if !self.end() {
+                        gl::end();
+                    }
+                }
+                Op::Vertex(v) => {
+                    if !self.vertex(v) {
+                        gl::vertex4f(v[0], v[1], v[2], v[3]);
+                    }
+                }
+                Op::Normal(v) => {
+                    if !self.normal(v) {
+                        gl::normal3f(v[0], v[1], v[2]);
+                    }
+                }
+                Op::Color(v) => {
+                    if !self.color(v) {
+                        gl::color4f(v[0], v[1], v[2], v[3]);
+                    }
+                }
+                Op::Tex(v) => {
+                    if !self.tex_coord(v) {
+                        gl::tex_coord4f(v[0], v[1], v[2], v[3]);
+                    }
+                }
+                Op::Material(at) => {
+                    let (face, what, v) = list.materials[at as usize];
+                    if !self.material(face, what, v) {
+                        gl::materialfv(face, what, &v);
+                    }
+                }
+                Op::Driver { list, draws } => self.call_driver(list, draws),
+                Op::Call(name) => {
+                    self.call_list(name);
+                }
+                Op::CallFromBase(name) => {
+                    let base =
+                        if self.sink == Sink::Pass { self.state.list_base } else { gl::word(LIST_BASE) };
+                    self.call_list(base.wrapping_add(name));
+                }
+                Op::Rect(v) => {
+                    if !self.rect(v) {
+                        gl::rectf(v[0], v[1], v[2], v[3]);
+                    }
+                }
+            }
+        }
+    }
+
+    pub(crate) fn call_lists(&mut self, n: i32, kind: u32, names: usize) -> bool {
+        let Some(names) = decode_names(n, kind, names) else { return false };
+        if self.recording.is_some() {
+            for name in names {
+                self.list_op(Op::CallFromBase(name));
+            }
+            return true;
+        }
+        // Between Begin and End of a primitive that the driver draws it answers no questions.
+        let base = if self.sink == Sink::Pass { self.state.list_base } else { gl::word(LIST_BASE) };
+        let ours = {
+            let lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
+            names.iter().any(|n| lists.lists.contains_key(&base.wrapping_add(*n)))
+        };
+        if !ours {
+            // A line of text in a font of glXUseXFont: one call for the driver.
+            self.before_driver(true);
+            return false;
+        }
+        for name in names {
+            self.call_list(base.wrapping_add(name));
+        }
+        true
+    }
+
+    /// Forgets our part; the driver then deletes its own.
+    pub(crate) fn delete_lists(&mut self, first: u32, n: i32) -> bool {
+        if self.sink == Sink::Trace {
+            self.unswallow("glDeleteLists between Begin and End");
+        }
+        for name in first..first.saturating_add(n.max(0).cast_unsigned()) {
+            let old = self.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.remove(&name);
+            delete_pieces(old);
+        }
+        false
+    }
+}
+
+fn delete_pieces(list: Option<Arc<List>>) {
+    for piece in list.iter().flat_map(|l| &l.pieces) {
+        gl::delete_lists(*piece, 1);
+    }
+}
+
+/// The names of `glCallLists`; `None` for a type that OpenGL refuses.
+fn decode_names(n: i32, kind: u32, address: usize) -> Option<Vec<u32>> {
+    let width = match kind {
+        BYTE | UNSIGNED_BYTE => 1,
+        SHORT | UNSIGNED_SHORT | 0x1407 => 2,
+        INT | UNSIGNED_INT | FLOAT | 0x1409 => 4,
+        0x1408 => 3,
+        _ => return None,
+    };
+    let bytes = crate::client_memory::view(address, usize::try_from(n).ok()? * width);
+    let name = |b: &[u8]| match (kind, b) {
+        (BYTE, &[a]) => i32::from(a.cast_signed()).cast_unsigned(),
+        (SHORT, &[a, b]) => i32::from(i16::from_ne_bytes([a, b])).cast_unsigned(),
+        (UNSIGNED_SHORT, &[a, b]) => u32::from(u16::from_ne_bytes([a, b])),
+        (FLOAT, &[a, b, c, d]) => (f32::from_ne_bytes([a, b, c, d]) as i32).cast_unsigned(),
+        (INT | UNSIGNED_INT, &[a, b, c, d]) => u32::from_ne_bytes([a, b, c, d]),
+        // The types GL_2_BYTES and so on: the high byte first.
+        (_, b) => b.iter().fold(0, |h, x| h << 8 | u32::from(*x)),
+    };
+    Some(bytes.chunks_exact(width).map(name).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_lists_are_read_in_every_type() {
+        let bytes: Vec<u8> = vec![1, 2, 3, 4];
+        let at = bytes.as_ptr() as usize;
+        assert_eq!(decode_names(4, UNSIGNED_BYTE, at), Some(vec![1, 2, 3, 4]));
+        assert_eq!(decode_names(2, 0x1407, at), Some(vec![0x0102, 0x0304]));
+        assert_eq!(decode_names(1, 0x1409, at), Some(vec![0x0102_0304]));
+        assert_eq!(decode_names(1, 0x1234, at), None);
+        let minus_one = [255_u8];
+        assert_eq!(decode_names(1, BYTE, minus_one.as_ptr() as usize), Some(vec![u32::MAX]));
+    }
+}

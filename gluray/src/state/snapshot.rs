@@ -1,0 +1,316 @@
+//! The state that decides how filled primitives look, as the driver tells it.
+
+use crate::enums::*;
+use crate::real::gl;
+use crate::symbols::class;
+
+/// A light source; places and directions in eye space, as OpenGL keeps them.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct GlLight {
+    pub(crate) ambient: [f32; 4],
+    pub(crate) diffuse: [f32; 4],
+    pub(crate) specular: [f32; 4],
+    pub(crate) position: [f32; 4],
+    pub(crate) spot_direction: [f32; 3],
+    pub(crate) spot_exponent: f32,
+    pub(crate) spot_cutoff_deg: f32,
+    pub(crate) attenuation: [f32; 3],
+}
+
+/// Fog.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Fog {
+    pub(crate) mode: u32,
+    pub(crate) density: f32,
+    pub(crate) start: f32,
+    pub(crate) end: f32,
+    pub(crate) color: [f32; 4],
+}
+
+/// Texture unit 0, where it is all there is.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct TextureUnit {
+    pub(crate) target: u32,
+    pub(crate) name: u32,
+    pub(crate) env_mode: u32,
+    pub(crate) env_color: [f32; 4],
+    /// Generation of s, t, r, q: mode (0 for none) and plane.
+    pub(crate) generate: [(u32, [f32; 4]); 4],
+    pub(crate) matrix: [f32; 16],
+    /// Counts the calls that may have changed a texture.
+    pub(crate) version: u64,
+}
+
+/// Everything at one draw.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Snapshot {
+    pub(crate) model_view: [f32; 16],
+    pub(crate) projection: [f32; 16],
+    pub(crate) viewport: [i32; 4],
+    pub(crate) depth_range: [f64; 2],
+    pub(crate) cull: Option<u32>,
+    pub(crate) front_is_ccw: bool,
+    pub(crate) flat: bool,
+    pub(crate) lighting: bool,
+    pub(crate) lights: Vec<GlLight>,
+    pub(crate) model_ambient: [f32; 4],
+    pub(crate) two_side: bool,
+    pub(crate) local_viewer: bool,
+    pub(crate) separate_specular: bool,
+    pub(crate) color_material: Option<(u32, u32)>,
+    pub(crate) normalize: bool,
+    pub(crate) rescale_normal: bool,
+    pub(crate) fog: Option<Fog>,
+    /// Eye-space planes.
+    pub(crate) clip_planes: Vec<[f64; 4]>,
+    pub(crate) polygon_offset: Option<(f32, f32)>,
+    pub(crate) depth_test: bool,
+    pub(crate) depth_func: u32,
+    pub(crate) depth_mask: bool,
+    pub(crate) depth_clamp: bool,
+    pub(crate) blend: bool,
+    /// Blending that leaves a fragment of alpha 1 as it is.
+    pub(crate) blend_is_over: bool,
+    pub(crate) alpha_test: bool,
+    /// An alpha test that a fragment of alpha 1 passes.
+    pub(crate) alpha_test_passes_one: bool,
+    pub(crate) stencil_test: bool,
+    pub(crate) logic_op: bool,
+    pub(crate) color_mask: bool,
+    pub(crate) polygon_mode: [u32; 2],
+    pub(crate) stipple: bool,
+    pub(crate) smooth_polygons: bool,
+    pub(crate) scissor: Option<[i32; 4]>,
+    pub(crate) render_mode: u32,
+    pub(crate) program: u32,
+    pub(crate) arb_program: bool,
+    pub(crate) framebuffer: u32,
+    pub(crate) draw_buffer: u32,
+    pub(crate) more_draw_buffers: bool,
+    pub(crate) samples: i32,
+    pub(crate) discard: bool,
+    pub(crate) feedback_active: bool,
+    pub(crate) first_vertex_provokes: bool,
+    pub(crate) color_sum: bool,
+    pub(crate) list_base: u32,
+    pub(crate) texture: Option<TextureUnit>,
+    /// Texturing that we do not follow, in words.
+    pub(crate) foreign_texturing: Option<&'static str>,
+}
+
+/// What a context can be asked.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Abilities {
+    /// Version times ten.
+    pub(crate) version: u32,
+    /// No fixed function.
+    pub(crate) core: bool,
+    pub(crate) es: bool,
+    pub(crate) texture_units: i32,
+    pub(crate) rectangle: bool,
+    pub(crate) depth_clamp: bool,
+    pub(crate) arb_programs: bool,
+    pub(crate) double_buffered: bool,
+}
+
+impl Abilities {
+    /// Asks the driver.
+    pub(crate) fn query() -> Abilities {
+        let text = gl::string(VERSION);
+        let es = text.starts_with("OpenGL ES");
+        let digits = text.trim_start_matches(|c: char| !c.is_ascii_digit());
+        let mut parts = digits.split(|c: char| !c.is_ascii_digit());
+        let mut next = || parts.next().and_then(|p| p.parse::<u32>().ok()).unwrap_or(0);
+        let version = next() * 10 + next().min(9);
+        let core = !es && version >= 32 && gl::int(CONTEXT_PROFILE_MASK) & 1 != 0;
+        let legacy = !core && !es;
+        let extensions = if legacy { gl::string(0x1f03) } else { String::new() };
+        let has = |e: &str| extensions.split(' ').any(|x| x == e);
+        Abilities {
+            version,
+            core,
+            es,
+            texture_units: if legacy { gl::int(MAX_TEXTURE_UNITS).clamp(1, 8) } else { 0 },
+            rectangle: has("GL_ARB_texture_rectangle"),
+            depth_clamp: core || has("GL_ARB_depth_clamp"),
+            arb_programs: has("GL_ARB_vertex_program") && has("GL_ARB_fragment_program"),
+            double_buffered: !es && gl::int(DOUBLEBUFFER) != 0,
+        }
+    }
+}
+
+impl Snapshot {
+    /// Asks the driver again about the classes in `dirty`.
+    pub(crate) fn refresh(&mut self, dirty: u8, can: &Abilities) {
+        if dirty & class::RASTER != 0 {
+            self.raster(can);
+        }
+        if can.core {
+            return;
+        }
+        if dirty & (class::MATRIX | class::RASTER) != 0 {
+            self.model_view = gl::floats(MODELVIEW_MATRIX);
+            self.projection = gl::floats(PROJECTION_MATRIX);
+        }
+        if dirty & (class::LIGHT | class::RASTER) != 0 {
+            self.lighting();
+        }
+        if dirty & (class::TEXTURE | class::RASTER | class::MATRIX | class::LIGHT) != 0 {
+            self.texturing(can);
+        }
+    }
+
+    fn raster(&mut self, can: &Abilities) {
+        self.viewport = gl::ints(VIEWPORT);
+        self.depth_range = gl::doubles(DEPTH_RANGE);
+        self.cull = gl::is_enabled(CULL_FACE).then(|| gl::word(CULL_FACE_MODE));
+        self.front_is_ccw = gl::word(FRONT_FACE) == CCW;
+        self.polygon_offset = gl::is_enabled(POLYGON_OFFSET_FILL)
+            .then(|| (gl::floats::<1>(POLYGON_OFFSET_FACTOR)[0], gl::floats::<1>(POLYGON_OFFSET_UNITS)[0]));
+        self.depth_test = gl::is_enabled(DEPTH_TEST);
+        self.depth_func = gl::word(DEPTH_FUNC);
+        self.depth_mask = gl::int(DEPTH_WRITEMASK) != 0;
+        self.depth_clamp = can.depth_clamp && gl::is_enabled(DEPTH_CLAMP);
+        self.blend = gl::is_enabled(BLEND);
+        self.blend_is_over =
+            self.blend && gl::word(BLEND_SRC_RGB) == 0x0302 && gl::word(BLEND_DST_RGB) == 0x0303;
+        self.stencil_test = gl::is_enabled(STENCIL_TEST);
+        self.logic_op = gl::is_enabled(COLOR_LOGIC_OP);
+        self.color_mask = gl::ints::<4>(COLOR_WRITEMASK).iter().all(|v| *v != 0);
+        self.polygon_mode = match can.core {
+            true => [gl::word(POLYGON_MODE); 2],
+            false => gl::ints::<2>(POLYGON_MODE).map(i32::cast_unsigned),
+        };
+        self.scissor = gl::is_enabled(SCISSOR_TEST).then(|| gl::ints(SCISSOR_BOX));
+        self.program = if can.version >= 20 { gl::word(CURRENT_PROGRAM) } else { 0 };
+        self.framebuffer = if can.version >= 30 { gl::word(FRAMEBUFFER_BINDING) } else { 0 };
+        self.draw_buffer = gl::word(DRAW_BUFFER);
+        self.more_draw_buffers = can.version >= 20 && gl::word(DRAW_BUFFER0 + 1) != 0;
+        self.samples = match gl::int(SAMPLE_BUFFERS) != 0 && gl::is_enabled(MULTISAMPLE) {
+            true => gl::int(SAMPLES),
+            false => 0,
+        };
+        self.discard = can.version >= 30 && gl::is_enabled(RASTERIZER_DISCARD);
+        self.feedback_active = can.version >= 40 && gl::int(TRANSFORM_FEEDBACK_ACTIVE) != 0;
+        self.first_vertex_provokes =
+            can.version >= 32 && gl::word(PROVOKING_VERTEX) == FIRST_VERTEX_CONVENTION;
+        self.smooth_polygons = gl::is_enabled(POLYGON_SMOOTH);
+        if can.core {
+            return;
+        }
+        self.alpha_test = gl::is_enabled(ALPHA_TEST);
+        self.alpha_test_passes_one = self.alpha_test && {
+            let reference = gl::floats::<1>(0x0bc2)[0];
+            match gl::word(0x0bc1) {
+                GREATER | NOTEQUAL => reference < 1.0,
+                GEQUAL | ALWAYS => true,
+                EQUAL | LEQUAL => reference >= 1.0,
+                _ => false,
+            }
+        };
+        self.stipple = gl::is_enabled(POLYGON_STIPPLE);
+        self.render_mode = gl::word(RENDER_MODE);
+        self.arb_program =
+            can.arb_programs && (gl::is_enabled(VERTEX_PROGRAM_ARB) || gl::is_enabled(FRAGMENT_PROGRAM_ARB));
+        self.flat = gl::word(SHADE_MODEL) == FLAT;
+        self.list_base = gl::word(LIST_BASE);
+        self.normalize = gl::is_enabled(NORMALIZE);
+        self.rescale_normal = can.version >= 12 && gl::is_enabled(RESCALE_NORMAL);
+        self.color_sum = can.version >= 14 && gl::is_enabled(COLOR_SUM);
+        self.clip_planes = (0..6)
+            .filter(|i| gl::is_enabled(CLIP_PLANE0 + i))
+            .map(|i| gl::clip_plane(CLIP_PLANE0 + i))
+            .collect();
+        self.fog = gl::is_enabled(FOG).then(|| Fog {
+            mode: gl::word(FOG_MODE),
+            density: gl::floats::<1>(FOG_DENSITY)[0],
+            start: gl::floats::<1>(FOG_START)[0],
+            end: gl::floats::<1>(FOG_END)[0],
+            color: gl::floats(FOG_COLOR),
+        });
+    }
+
+    fn lighting(&mut self) {
+        self.lighting = gl::is_enabled(LIGHTING);
+        self.color_material = gl::is_enabled(COLOR_MATERIAL)
+            .then(|| (gl::word(COLOR_MATERIAL_FACE), gl::word(COLOR_MATERIAL_PARAMETER)));
+        self.lights.clear();
+        if !self.lighting {
+            return;
+        }
+        self.model_ambient = gl::floats(LIGHT_MODEL_AMBIENT);
+        self.two_side = gl::int(LIGHT_MODEL_TWO_SIDE) != 0;
+        self.local_viewer = gl::int(LIGHT_MODEL_LOCAL_VIEWER) != 0;
+        self.separate_specular = gl::word(LIGHT_MODEL_COLOR_CONTROL) == SEPARATE_SPECULAR_COLOR;
+        self.lights.extend((0..8).map(|i| LIGHT0 + i).filter(|l| gl::is_enabled(*l)).map(|l| {
+            GlLight {
+                ambient: gl::light(l, AMBIENT),
+                diffuse: gl::light(l, DIFFUSE),
+                specular: gl::light(l, SPECULAR),
+                position: gl::light(l, POSITION),
+                spot_direction: gl::light(l, SPOT_DIRECTION),
+                spot_exponent: gl::light::<1>(l, SPOT_EXPONENT)[0],
+                spot_cutoff_deg: gl::light::<1>(l, SPOT_CUTOFF)[0],
+                attenuation: [CONSTANT_ATTENUATION, LINEAR_ATTENUATION, QUADRATIC_ATTENUATION]
+                    .map(|what| gl::light::<1>(l, what)[0]),
+            }
+        }));
+    }
+
+    fn texturing(&mut self, can: &Abilities) {
+        self.texture = None;
+        self.foreign_texturing = None;
+        let active = gl::word(ACTIVE_TEXTURE);
+        let mut targets = vec![TEXTURE_1D, TEXTURE_2D, TEXTURE_3D, TEXTURE_CUBE_MAP];
+        if can.rectangle {
+            targets.push(TEXTURE_RECTANGLE);
+        }
+        let units = can.texture_units.max(1) as u32;
+        for unit in 0..units {
+            if units > 1 {
+                gl::active_texture(TEXTURE0 + unit);
+            }
+            let enabled: Vec<u32> = targets.iter().copied().filter(|t| gl::is_enabled(*t)).collect();
+            let Some(&target) = enabled.iter().max_by_key(|t| targets.iter().position(|x| x == *t)) else {
+                continue;
+            };
+            if unit > 0 {
+                self.foreign_texturing = Some("several texture units");
+            } else if target == TEXTURE_1D || target == TEXTURE_2D {
+                self.texture = Some(unit_0(target));
+            } else {
+                self.foreign_texturing = Some("a texture that is neither 1-D nor 2-D");
+            }
+        }
+        if units > 1 {
+            gl::active_texture(active);
+        }
+        if let Some(t) = &self.texture
+            && ![MODULATE, REPLACE, DECAL, BLEND, ADD].contains(&t.env_mode)
+        {
+            self.foreign_texturing = Some("texture combiners");
+        }
+    }
+}
+
+/// Texture unit 0, which is active now.
+fn unit_0(target: u32) -> TextureUnit {
+    let generate = [TEXTURE_GEN_S, TEXTURE_GEN_T, TEXTURE_GEN_R, TEXTURE_GEN_Q];
+    TextureUnit {
+        target,
+        name: gl::word(if target == TEXTURE_1D { TEXTURE_BINDING_1D } else { TEXTURE_BINDING_2D }),
+        env_mode: gl::tex_env_i::<1>(TEXTURE_ENV, TEXTURE_ENV_MODE)[0].cast_unsigned(),
+        env_color: gl::tex_env_f(TEXTURE_ENV, TEXTURE_ENV_COLOR),
+        generate: std::array::from_fn(|i| {
+            if !gl::is_enabled(generate[i]) {
+                return (0, [0.0; 4]);
+            }
+            let coord = 0x2000 + i as u32;
+            let mode = gl::tex_gen_i::<1>(coord, TEXTURE_GEN_MODE)[0].cast_unsigned();
+            let plane = if mode == EYE_LINEAR { EYE_PLANE } else { OBJECT_PLANE };
+            (mode, gl::tex_gen_f(coord, plane))
+        }),
+        matrix: gl::floats(TEXTURE_MATRIX),
+        version: 0,
+    }
+}

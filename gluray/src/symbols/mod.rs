@@ -1,0 +1,140 @@
+//! The OpenGL library that programs see: one trampoline per entry point, a table of where each goes, and the hooks.
+//!
+//! A trampoline has no prototype: it jumps through [`TABLE`] with all registers as the program left them. Calls that may change
+//! state are *watched*: while [`ATTENTION`] is set we are told before they run (`slow`), at a price of some ten nanoseconds; as soon as
+//! nobody needs to know, they cost one comparison. This is what lets the driver keep all state: we ask it when a draw comes, and
+//! only again after a watched call.
+//!
+//! This is a room for unsafe code: everything here is called by programs we do not know.
+#![allow(unsafe_code, reason = "a room: exported OpenGL symbols are called by programs we do not know")]
+#![allow(non_snake_case, reason = "the names of OpenGL")]
+
+mod entry;
+pub(crate) mod hooks;
+mod hot;
+
+pub(crate) use hot::{set_hot, with_context};
+
+use crate::real;
+use std::ffi::CStr;
+use std::sync::atomic::{AtomicPtr, AtomicU32, AtomicU64, Ordering::Relaxed};
+
+/// Classes of state that a call can change; the driver is asked again about those only.
+pub(crate) mod class {
+    /// Matrices.
+    pub(crate) const MATRIX: u8 = 1;
+    /// Lights and the lighting model.
+    pub(crate) const LIGHT: u8 = 2;
+    /// Everything about rasters, enables, framebuffers.
+    pub(crate) const RASTER: u8 = 4;
+    /// Textures and their environment.
+    pub(crate) const TEXTURE: u8 = 8;
+    /// Current colour, normal, texture coordinate, material.
+    pub(crate) const CURRENT: u8 = 16;
+    /// Contents of buffers.
+    pub(crate) const BUFFER: u8 = 32;
+    /// Uniforms.
+    pub(crate) const UNIFORM: u8 = 64;
+    /// Vertex arrays and buffer bindings.
+    pub(crate) const ARRAYS: u8 = 128;
+    /// All of it.
+    pub(crate) const ALL: u8 = 255;
+}
+
+#[derive(Clone, Copy)]
+struct Target(*const ());
+// SAFETY: addresses of functions.
+unsafe impl Sync for Target {}
+
+include!(concat!(env!("OUT_DIR"), "/trampolines.rs"));
+
+/// Where each trampoline goes: `lazy` at first, then our hook or the driver's function.
+static TABLE: [AtomicPtr<()>; COUNT] = [const { AtomicPtr::new(lazy as *mut ()) }; COUNT];
+/// Not zero while watched calls are to be reported.
+static ATTENTION: AtomicU32 = AtomicU32::new(0);
+/// Watched calls that went straight to the driver.
+static CALLS: AtomicU64 = AtomicU64::new(0);
+
+/// Asks to be told of the next watched call.
+#[inline]
+pub(crate) fn attend() {
+    ATTENTION.store(1, Relaxed);
+}
+
+/// Lets watched calls pass without a word.
+pub(crate) fn relax() {
+    ATTENTION.store(0, Relaxed);
+}
+
+/// Watched calls that passed without a word so far.
+pub(crate) fn calls_passed() -> u64 {
+    CALLS.load(Relaxed)
+}
+
+/// From now on every entry point is the driver's: after a fault of ours.
+pub(crate) fn retire() {
+    for (i, slot) in TABLE.iter().enumerate() {
+        // What keeps the books of contexts and what gives out addresses stays, so that threads are left in order.
+        let name = NAMES[i].to_bytes();
+        let book = name.ends_with(b"ProcAddress") || name.ends_with(b"ProcAddressARB");
+        if !book && HOOKS[i].is_some() {
+            slot.store(real::forward(i).cast_mut(), Relaxed);
+        }
+    }
+    relax();
+}
+
+/// Index of an entry point.
+pub(crate) fn index_of(name: &[u8]) -> Option<usize> {
+    NAMES.binary_search_by(|n| n.to_bytes().cmp(name)).ok()
+}
+
+/// The trampoline of an entry point.
+fn trampoline(name: &CStr) -> Option<*const ()> {
+    index_of(name.to_bytes()).map(|i| TRAMPOLINES[i] as *const ())
+}
+
+extern "C" fn resolve(index: usize) -> *const () {
+    let target = match HOOKS[index] {
+        Some(hook) if !crate::fault::happened() => hook.0,
+        _ => real::forward(index),
+    };
+    TABLE[index].store(target.cast_mut(), Relaxed);
+    target
+}
+
+extern "C" fn told(index: usize) {
+    let (class, flush) = (CLASSES[index], FLUSHES[index]);
+    crate::fault::guard(|| crate::context::watched(index, class, flush & 1 != 0, flush & 2 != 0));
+}
+
+/// Finds the target of entry r11 and goes there, with all argument registers as they were.
+#[unsafe(naked)]
+unsafe extern "C" fn lazy() {
+    core::arch::naked_asm!(
+        "push rbp", "mov rbp, rsp", "push rdi", "push rsi", "push rdx", "push rcx", "push r8", "push r9", "push rax", "push r11",
+        "sub rsp, 128", "movdqu [rsp], xmm0", "movdqu [rsp+16], xmm1", "movdqu [rsp+32], xmm2", "movdqu [rsp+48], xmm3",
+        "movdqu [rsp+64], xmm4", "movdqu [rsp+80], xmm5", "movdqu [rsp+96], xmm6", "movdqu [rsp+112], xmm7",
+        "mov edi, r11d", "call {resolve}", "mov r10, rax",
+        "movdqu xmm0, [rsp]", "movdqu xmm1, [rsp+16]", "movdqu xmm2, [rsp+32]", "movdqu xmm3, [rsp+48]",
+        "movdqu xmm4, [rsp+64]", "movdqu xmm5, [rsp+80]", "movdqu xmm6, [rsp+96]", "movdqu xmm7, [rsp+112]",
+        "add rsp, 128", "pop r11", "pop rax", "pop r9", "pop r8", "pop rcx", "pop rdx", "pop rsi", "pop rdi", "pop rbp", "jmp r10",
+        resolve = sym resolve
+    )
+}
+
+/// Reports entry r11, then goes where the table says, with all argument registers as they were.
+#[unsafe(naked)]
+unsafe extern "C" fn slow() {
+    core::arch::naked_asm!(
+        "push rbp", "mov rbp, rsp", "push rdi", "push rsi", "push rdx", "push rcx", "push r8", "push r9", "push rax", "push r11",
+        "sub rsp, 128", "movdqu [rsp], xmm0", "movdqu [rsp+16], xmm1", "movdqu [rsp+32], xmm2", "movdqu [rsp+48], xmm3",
+        "movdqu [rsp+64], xmm4", "movdqu [rsp+80], xmm5", "movdqu [rsp+96], xmm6", "movdqu [rsp+112], xmm7",
+        "mov edi, r11d", "call {told}",
+        "movdqu xmm0, [rsp]", "movdqu xmm1, [rsp+16]", "movdqu xmm2, [rsp+32]", "movdqu xmm3, [rsp+48]",
+        "movdqu xmm4, [rsp+64]", "movdqu xmm5, [rsp+80]", "movdqu xmm6, [rsp+96]", "movdqu xmm7, [rsp+112]",
+        "add rsp, 128", "pop r11", "pop rax", "pop r9", "pop r8", "pop rcx", "pop rdx", "pop rsi", "pop rdi", "pop rbp",
+        "lea r10, [rip + {table}]", "jmp qword ptr [r10 + 8*r11]",
+        told = sym told, table = sym TABLE
+    )
+}

@@ -1,0 +1,565 @@
+//! Rays through pixel centres: which triangle each pixel sees, and its colour and depth as the driver would have made them.
+//!
+//! Rays only find the triangle. Depth and attributes are then evaluated on it at the pixel centre with the rasterizer's own arithmetic
+//! (homogeneous edge functions after Olano and Greer 1997), so they agree with what the driver makes of neighbouring lines and text.
+
+use crate::capture::{Draw, Shading};
+use crate::config::{Mode, Settings};
+use crate::effects::{Place, Surroundings, Visibility, vector};
+use crate::enums::*;
+use crate::lighting::{Lit, Setup, transform};
+use crate::raster::{covers, steepness};
+use crate::texturing::Image;
+use rayon::prelude::*;
+use rt_core::accel::World;
+use rt_core::camera::Camera;
+use rt_core::glam::{DMat4, DVec3};
+use rt_core::ray::{HitBlock, Ray, RayBlock};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+/// A rectangle of window pixels, y up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Rect {
+    pub(crate) x: i32,
+    pub(crate) y: i32,
+    pub(crate) w: i32,
+    pub(crate) h: i32,
+}
+
+impl Rect {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.w <= 0 || self.h <= 0
+    }
+
+    pub(crate) fn and(self, o: Rect) -> Rect {
+        let (x, y) = (self.x.max(o.x), self.y.max(o.y));
+        let w = (self.x + self.w).min(o.x + o.w) - x;
+        let h = (self.y + self.h).min(o.y + o.h) - y;
+        Rect { x, y, w: w.max(0), h: h.max(0) }
+    }
+
+    pub(crate) fn or(self, o: Rect) -> Rect {
+        if self.is_empty() {
+            return o;
+        }
+        if o.is_empty() {
+            return self;
+        }
+        let (x, y) = (self.x.min(o.x), self.y.min(o.y));
+        Rect { x, y, w: (self.x + self.w).max(o.x + o.w) - x, h: (self.y + self.h).max(o.y + o.h) - y }
+    }
+}
+
+/// Fragments, at most one a pixel.
+pub(crate) struct Layer {
+    pub(crate) rect: Rect,
+    pub(crate) color: Vec<[u8; 4]>,
+    /// Window depth; [`UNCOVERED`] where there is no fragment.
+    pub(crate) depth: Vec<f32>,
+    pub(crate) covered: usize,
+}
+
+/// Depth where there is no fragment.
+pub(crate) const UNCOVERED: f32 = 2.0;
+
+/// Side of the tiles that rays are sent in: a packet of 256.
+const TILE: i32 = 16;
+/// A depth buffer of 24 bits.
+const DEPTH_STEPS: f64 = 16_777_215.0;
+
+/// Share of w by which a point may be beyond the near or far plane: the driver clips in f32, and a plane that lies in the far plane is seen.
+const SLACK: f64 = 1e-6;
+
+/// A draw made ready for rays.
+pub(crate) struct Prepared<'a> {
+    pub(crate) draw: &'a Draw,
+    pub(crate) world: Arc<World>,
+    pub(crate) places: Vec<Place>,
+    camera: Camera,
+    /// Rows of planes in object space that points must be above: near, far, the user's.
+    planes: Vec<[f64; 4]>,
+    /// The user's alone.
+    clip_planes: Vec<[f64; 4]>,
+    pub(crate) rect: Rect,
+    pub(crate) lighting: Setup<'a>,
+    pub(crate) lit: Option<Vec<Lit>>,
+    pub(crate) image: Option<Arc<Image>>,
+    /// A mirrored projection or `glFrontFace` changes what counts as front.
+    pub(crate) rays: AtomicU64,
+}
+
+/// A fragment.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Fragment {
+    /// Perspective-correct weights of the corners.
+    pub(crate) weights: [f64; 3],
+    pub(crate) depth: f64,
+    /// The depth without polygon offset.
+    pub(crate) plain_depth: f64,
+    pub(crate) front: bool,
+}
+
+#[derive(Clone, Copy)]
+struct Seen {
+    depth_bits: u32,
+    draw: u32,
+    prim: u32,
+    fragment: Fragment,
+}
+
+const NOTHING: Seen = Seen {
+    depth_bits: u32::MAX,
+    draw: u32::MAX,
+    prim: 0,
+    fragment: Fragment { weights: [0.0; 3], depth: 0.0, plain_depth: 0.0, front: true },
+};
+
+pub(crate) fn matrix(m: &[f32; 16]) -> DMat4 {
+    DMat4::from_cols_array(&m.map(f64::from))
+}
+
+/// True when rays can be made for this matrix.
+pub(crate) fn has_rays(clip_from_object: &[f32; 16]) -> bool {
+    Camera::from_matrix(matrix(clip_from_object)).is_ok()
+}
+
+impl<'a> Prepared<'a> {
+    /// `None` when nothing of it can be seen.
+    pub(crate) fn new(draw: &'a Draw, image: Option<Arc<Image>>, builds: &mut u64) -> Option<Prepared<'a>> {
+        let s = &*draw.state;
+        let clip = matrix(&draw.clip_from_object);
+        let camera = Camera::from_matrix(clip).ok()?;
+        let rect = screen_bounds(draw, clip);
+        if rect.is_empty() {
+            return None;
+        }
+        let world = draw.geometry.world(builds)?;
+        let row = |i: usize| clip.row(i);
+        let mut planes = Vec::new();
+        if s.depth_clamp {
+            planes.push(row(3).to_array());
+        } else {
+            planes.push((row(3) * (1.0 + SLACK) + row(2)).to_array());
+            planes.push((row(3) * (1.0 + SLACK) - row(2)).to_array());
+        }
+        let eye_from_object = matrix(&s.model_view);
+        let object =
+            |p: &[f64; 4]| (eye_from_object.transpose() * rt_core::glam::DVec4::from_array(*p)).to_array();
+        let clip_planes: Vec<[f64; 4]> = s.clip_planes.iter().map(object).collect();
+        planes.extend(&clip_planes);
+        let lighting = Setup::new(s);
+        let places = match &draw.shading {
+            Shading::Fixed => lighting.places(),
+            Shading::Program(program) => program.places(),
+        };
+        let mut out = Prepared {
+            draw,
+            world,
+            places,
+            camera,
+            planes,
+            clip_planes,
+            rect,
+            lighting,
+            lit: None,
+            image,
+            rays: AtomicU64::new(0),
+        };
+        let positions = &draw.geometry.mesh.positions;
+        // Fewer vertices than pixels: light them all once. Else only those that are seen.
+        let fixed = matches!(draw.shading, Shading::Fixed);
+        if fixed && positions.len() <= 2 * rect.w as usize * rect.h as usize {
+            let light = |(i, p): (usize, &rt_core::glam::Vec3)| {
+                out.lighting.vertex(&draw.attributes, i, p.to_array())
+            };
+            out.lit = Some(positions.par_iter().enumerate().map(light).collect());
+        }
+        Some(out)
+    }
+
+    /// The ray through a point of the window, with the part of it that is not clipped; `None` when all of it is.
+    fn ray(&self, x: f64, y: f64) -> Option<(Ray, f64)> {
+        let [vx, vy, vw, vh] = self.draw.state.viewport.map(f64::from);
+        let ndc = [2.0 * (x - vx) / vw - 1.0, 2.0 * (y - vy) / vh - 1.0];
+        let (origin, dir) = self.camera.world_ray(ndc);
+        let (mut t0, mut t1) = (f64::NEG_INFINITY, f64::INFINITY);
+        for p in &self.planes {
+            let terms = [p[0] * origin.x, p[1] * origin.y, p[2] * origin.z, p[3]];
+            // A little more than is visible: the exact test is that of the fragment.
+            let a = terms.iter().sum::<f64>() + 1e-6 * terms.iter().map(|v| v.abs()).sum::<f64>();
+            let b = p[0] * dir.x + p[1] * dir.y + p[2] * dir.z;
+            if b > 0.0 {
+                t0 = t0.max(-a / b);
+            } else if b < 0.0 {
+                t1 = t1.min(-a / b);
+            } else if a < 0.0 {
+                return None;
+            }
+        }
+        if t0.partial_cmp(&t1) != Some(std::cmp::Ordering::Less) {
+            return None;
+        }
+        // Rays of a parallel projection begin where the program's near plane is; a plane before it may be the first.
+        let back = if t0 < 0.0 && t0.is_finite() { t0 } else { 0.0 };
+        let origin = origin + dir * back;
+        let (ray, moved) = self.world.ray_from_world(origin, dir);
+        let shift = back + moved;
+        let t_min = ((t0 - shift) as f32).max(0.0);
+        let t_max = (t1 - shift) as f32;
+        Some((
+            Ray { t_min, t_max: if t_max.is_finite() { t_max.next_up() } else { f32::INFINITY }, ..ray },
+            shift,
+        ))
+    }
+
+    fn corners(&self, prim: usize) -> [[f32; 4]; 3] {
+        let mesh = &self.draw.geometry.mesh;
+        mesh.triangle(prim).map(|p| transform(&self.draw.clip_from_object, p.to_array()))
+    }
+
+    /// The fragment of triangle `prim` at the centre of pixel (`x`, `y`), if the rasterizer makes one.
+    fn fragment(&self, prim: usize, x: i32, y: i32) -> Option<Fragment> {
+        let s = &*self.draw.state;
+        let c = self.corners(prim);
+        let [vx, vy, vw, vh] = s.viewport.map(f64::from);
+        let (px, py) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
+        let at = DVec3::new(2.0 * (px - vx) / vw - 1.0, 2.0 * (py - vy) / vh - 1.0, 1.0);
+        let h = c.map(|v| DVec3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[3])));
+        let l = [h[1].cross(h[2]).dot(at), h[2].cross(h[0]).dot(at), h[0].cross(h[1]).dot(at)];
+        let area = h[0].dot(h[1].cross(h[2]));
+        if area == 0.0 || !area.is_finite() {
+            return None;
+        }
+        let front = (area > 0.0) == s.front_is_ccw;
+        let culled = match s.cull {
+            None => false,
+            Some(FRONT) => front,
+            Some(BACK) => !front,
+            Some(_) => true,
+        };
+        if culled {
+            return None;
+        }
+        if c.iter().all(|v| v[3] > 0.0) {
+            if !covers(&c, s.viewport, x, y) {
+                return None;
+            }
+        } else if l.iter().any(|v| v * area.signum() < 0.0) {
+            return None;
+        }
+        let sum = l[0] + l[1] + l[2];
+        if sum == 0.0 {
+            return None;
+        }
+        let weights = l.map(|v| v / sum);
+        // Clipped at the centre, whatever ray found the triangle.
+        for p in &self.clip_planes {
+            let corner = |i: usize| {
+                let v = self.draw.geometry.mesh.triangle(prim)[i].as_dvec3();
+                p[0] * v.x + p[1] * v.y + p[2] * v.z + p[3]
+            };
+            if (0..3).map(|i| weights[i] * corner(i)).sum::<f64>() < 0.0 {
+                return None;
+            }
+        }
+        let z = (0..3).map(|i| l[i] * f64::from(c[i][2])).sum::<f64>();
+        let w = (0..3).map(|i| l[i] * f64::from(c[i][3])).sum::<f64>();
+        let [n, f] = s.depth_range;
+        let mut depth = n + (f - n) * (z / w * 0.5 + 0.5);
+        let plain_depth = depth;
+        // The unit of polygon offset is two steps of the depth buffer (Mesa).
+        if let Some((factor, units)) = s.polygon_offset {
+            depth +=
+                f64::from(factor) * steepness(&c, s.viewport, f - n) + 2.0 * f64::from(units) / DEPTH_STEPS;
+        }
+        if !s.depth_clamp && z.abs() > w.abs() * (1.0 + SLACK) {
+            return None;
+        }
+        let (lo, hi) = if n < f { (n, f) } else { (f, n) };
+        let depth = if s.depth_clamp { depth.clamp(lo, hi) } else { depth.clamp(0.0, 1.0) };
+        Some(Fragment { weights, depth, plain_depth, front })
+    }
+
+    /// What the pixel sees first. `ray` and `hit` are those of its centre.
+    fn resolve(
+        &self,
+        mut ray: Ray,
+        hit: Option<rt_core::ray::Hit>,
+        x: i32,
+        y: i32,
+    ) -> Option<(usize, Fragment)> {
+        let mut hit = hit;
+        for step in 0..MOST_STEPS {
+            let h = hit?;
+            if let Some(f) = self.fragment(h.prim as usize, x, y) {
+                let found = (h.prim as usize, f);
+                return Some(if f.depth > f.plain_depth {
+                    self.overtaken(found, ray, h.t, x, y)
+                } else {
+                    found
+                });
+            }
+            // On an edge the rule of the rasterizer may give the pixel to a neighbour that the ray saw beside it.
+            if step == 0
+                && let Some(found) = self.beside(h.t, x, y)
+            {
+                return Some(found);
+            }
+            ray.t_min = h.t.next_up();
+            self.rays.fetch_add(1, Relaxed);
+            hit = self.world.closest(&ray);
+        }
+        None
+    }
+
+    /// Polygon offset pushes steep triangles far back, at silhouettes behind others of the same draw: the nearest *with* offset counts.
+    fn overtaken(&self, first: (usize, Fragment), mut ray: Ray, t: f32, x: i32, y: i32) -> (usize, Fragment) {
+        let mut best = first;
+        let mut t = t;
+        for _ in 0..8 {
+            let Some(limit) = self.parameter_at_depth(best.1.depth, x, y) else { break };
+            (ray.t_min, ray.t_max) = (t.next_up(), limit.min(ray.t_max));
+            if ray.t_min >= ray.t_max {
+                break;
+            }
+            self.rays.fetch_add(1, Relaxed);
+            let Some(h) = self.world.closest(&ray) else { break };
+            t = h.t;
+            if let Some(f) = self.fragment(h.prim as usize, x, y)
+                && f.depth < best.1.depth
+            {
+                best = (h.prim as usize, f);
+            }
+        }
+        best
+    }
+
+    /// Where the ray through a pixel's centre has a depth.
+    fn parameter_at_depth(&self, depth: f64, x: i32, y: i32) -> Option<f32> {
+        let s = &*self.draw.state;
+        let [n, f] = s.depth_range;
+        let [vx, vy, vw, vh] = s.viewport.map(f64::from);
+        let ndc = [2.0 * (f64::from(x) + 0.5 - vx) / vw - 1.0, 2.0 * (f64::from(y) + 0.5 - vy) / vh - 1.0];
+        let (origin, dir) = self.camera.world_ray(ndc);
+        let clip = matrix(&self.draw.clip_from_object);
+        let z = ((depth - n) / (f - n) - 0.5) * 2.0;
+        let (o, d) = (origin.extend(1.0), dir.extend(0.0));
+        let (a, b, aw, bw) = (clip.row(2).dot(o), clip.row(2).dot(d), clip.row(3).dot(o), clip.row(3).dot(d));
+        let t = (z * aw - a) / (b - z * bw);
+        let (_, shift) = self.ray(f64::from(x) + 0.5, f64::from(y) + 0.5)?;
+        let t = (t - shift) as f32;
+        t.is_finite().then_some(t)
+    }
+
+    fn beside(&self, t: f32, x: i32, y: i32) -> Option<(usize, Fragment)> {
+        const OFF: f64 = 1.0 / 200.0;
+        let mut best: Option<(usize, Fragment)> = None;
+        for (dx, dy) in [(-OFF, -OFF), (OFF, -OFF), (-OFF, OFF), (OFF, OFF)] {
+            let (ray, _) = self.ray(f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy)?;
+            self.rays.fetch_add(1, Relaxed);
+            let Some(h) = self.world.closest(&ray) else { continue };
+            if (h.t - t).abs() > 1e-3 * t.abs() {
+                continue;
+            }
+            if let Some(f) = self.fragment(h.prim as usize, x, y)
+                && best.is_none_or(|(_, b)| f.depth < b.depth)
+            {
+                best = Some((h.prim as usize, f));
+            }
+        }
+        best
+    }
+}
+
+/// Culled and fill-rule rejected triangles that a ray may pass through before it is given up.
+const MOST_STEPS: usize = 4096;
+
+pub(crate) fn mixed<const N: usize>(v: [[f32; N]; 3], w: [f32; 3]) -> [f32; N] {
+    std::array::from_fn(|k| v[0][k] * w[0] + v[1][k] * w[1] + v[2][k] * w[2])
+}
+
+fn to_bytes(c: [f32; 4]) -> [u8; 4] {
+    c.map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
+}
+
+/// The pixels that a draw may cover: its box on the screen within viewport and scissor.
+fn screen_bounds(draw: &Draw, clip: DMat4) -> Rect {
+    let s = &*draw.state;
+    let [x, y, w, h] = s.viewport;
+    let mut rect = Rect { x, y, w, h };
+    if let Some([x, y, w, h]) = s.scissor {
+        rect = rect.and(Rect { x, y, w, h });
+    }
+    let b = draw.geometry.bounds();
+    if b.is_empty() {
+        return Rect::default();
+    }
+    let (mut lo, mut hi) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    for corner in 0..8 {
+        let pick = |bit: i32, k: usize| if corner & bit == 0 { b.min[k] } else { b.max[k] };
+        let p = DVec3::new(f64::from(pick(1, 0)), f64::from(pick(2, 1)), f64::from(pick(4, 2)));
+        let c = clip * p.extend(1.0);
+        if c.w <= 0.0 || !c.is_finite() {
+            return rect;
+        }
+        for k in 0..2 {
+            lo[k] = lo[k].min(c[k] / c.w);
+            hi[k] = hi[k].max(c[k] / c.w);
+        }
+    }
+    let pixel =
+        |ndc: f64, at: i32, size: i32| (f64::from(at) + (ndc + 1.0) * 0.5 * f64::from(size)).clamp(-1e9, 1e9);
+    let (x0, y0) = (pixel(lo[0], x, w).floor() as i32 - 1, pixel(lo[1], y, h).floor() as i32 - 1);
+    let (x1, y1) = (pixel(hi[0], x, w).ceil() as i32 + 1, pixel(hi[1], y, h).ceil() as i32 + 1);
+    rect.and(Rect { x: x0, y: y0, w: x1.saturating_sub(x0), h: y1.saturating_sub(y0) })
+}
+
+/// The hits of a tile's rays: pixel (x, y) of the tile is lane `x % 4 + 4 (y % 4)` of block `x / 4 + 4 (y / 4)`.
+struct TileRays {
+    blocks: Vec<RayBlock>,
+    hits: Vec<HitBlock>,
+}
+
+impl TileRays {
+    fn new() -> TileRays {
+        TileRays { blocks: vec![RayBlock::INACTIVE; 16], hits: vec![HitBlock::MISS; 16] }
+    }
+
+    /// Sends rays through the pixels of `area`, which lies in the tile at (`x`, `y`).
+    fn send(&mut self, p: &Prepared<'_>, area: Rect) {
+        self.blocks.fill(RayBlock::INACTIVE);
+        let mut sent = 0;
+        for y in 0..area.h {
+            for x in 0..area.w {
+                let center = |a: i32, d: i32| f64::from(a + d) + 0.5;
+                if let Some((ray, _)) = p.ray(center(area.x, x), center(area.y, y)) {
+                    let (b, l) = slot(x, y);
+                    self.blocks[b].set(l, &ray);
+                    sent += 1;
+                }
+            }
+        }
+        self.hits.fill(HitBlock::MISS);
+        p.world.closest_coherent(&self.blocks, &mut self.hits);
+        p.rays.fetch_add(sent, Relaxed);
+    }
+}
+
+fn slot(x: i32, y: i32) -> (usize, usize) {
+    ((x / 4 + 4 * (y / 4)) as usize, (x % 4 + 4 * (y % 4)) as usize)
+}
+
+/// The nearest fragment of all draws at every pixel.
+pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings) -> (Layer, [u64; 2]) {
+    let around = Surroundings::new(draws, settings);
+    let mode = settings.mode;
+    let rect = draws.iter().fold(Rect::default(), |r, d| r.or(d.rect));
+    let (w, h) = (rect.w.max(0) as usize, rect.h.max(0) as usize);
+    let mut layer = Layer { rect, color: vec![[0; 4]; w * h], depth: vec![UNCOVERED; w * h], covered: 0 };
+    if w * h == 0 {
+        return (layer, [0; 2]);
+    }
+    let band = w * TILE as usize;
+    let covered = AtomicU64::new(0);
+    let bands = layer.color.par_chunks_mut(band).zip(layer.depth.par_chunks_mut(band)).enumerate();
+    bands.for_each_init(TileRays::new, |rays, (i, (color, depth))| {
+        let y = rect.y + i as i32 * TILE;
+        let area = Rect { x: rect.x, y, w: rect.w, h: (color.len() / w) as i32 };
+        let mut seen = vec![NOTHING; color.len()];
+        for (d, p) in draws.iter().enumerate() {
+            see(p, d as u32, area, rays, &mut seen);
+        }
+        let mut n = 0;
+        for (k, s) in seen.iter().enumerate().filter(|(_, s)| s.draw != u32::MAX) {
+            let (px, py) = (rect.x + (k % w) as i32, y + (k / w) as i32);
+            let p = &draws[s.draw as usize];
+            color[k] = to_bytes(p.shaded(s.prim as usize, &s.fragment, mode, around.as_ref(), (px, py)));
+            depth[k] = s.fragment.depth as f32;
+            n += 1;
+        }
+        covered.fetch_add(n, Relaxed);
+    });
+    layer.covered = covered.into_inner() as usize;
+    let extra = around.map_or([0; 2], |a| [a.shadow_rays.into_inner(), a.occlusion_rays.into_inner()]);
+    (layer, extra)
+}
+
+/// One draw against what was seen so far.
+fn see(p: &Prepared<'_>, index: u32, area: Rect, rays: &mut TileRays, seen: &mut [Seen]) {
+    let part = area.and(p.rect);
+    if part.is_empty() {
+        return;
+    }
+    let later_wins_ties = p.draw.state.depth_func == LEQUAL;
+    for x in (part.x..part.x + part.w).step_by(TILE as usize) {
+        let tile = Rect { x, y: part.y, w: TILE.min(part.x + part.w - x), h: part.h };
+        rays.send(p, tile);
+        for y in 0..tile.h {
+            for x in 0..tile.w {
+                let (b, l) = slot(x, y);
+                let Some(hit) = rays.hits[b].get(l) else { continue };
+                let (px, py) = (tile.x + x, tile.y + y);
+                let Some((prim, f)) = p.resolve(rays.blocks[b].get(l), Some(hit), px, py) else { continue };
+                let at = &mut seen[((py - area.y) * area.w + px - area.x) as usize];
+                let bits = (f.depth * DEPTH_STEPS).round() as u32;
+                if bits < at.depth_bits || (later_wins_ties && bits == at.depth_bits) {
+                    *at = Seen { depth_bits: bits, draw: index, prim: prim as u32, fragment: f };
+                }
+            }
+        }
+    }
+}
+
+/// Every fragment of one draw, as layers: the n-th layer has the n-th fragment of each pixel in the order of the triangles.
+pub(crate) fn in_order(p: &Prepared<'_>) -> Vec<Layer> {
+    let rect = p.rect;
+    let (w, h) = (rect.w.max(0) as usize, rect.h.max(0) as usize);
+    let fragments: Vec<Vec<(u32, [u8; 4], f32)>> = (0..w * h)
+        .into_par_iter()
+        .map(|k| {
+            let (x, y) = (rect.x + (k % w) as i32, rect.y + (k / w) as i32);
+            let mut found: Vec<(u32, [u8; 4], f32)> = Vec::new();
+            let mut keep = |prim: usize| {
+                if found.iter().all(|(o, ..)| *o != prim as u32)
+                    && let Some(f) = p.fragment(prim, x, y)
+                {
+                    found.push((
+                        prim as u32,
+                        to_bytes(p.color(prim, &f, false, &Visibility::FULL)),
+                        f.depth as f32,
+                    ));
+                }
+            };
+            const OFF: f64 = 1.0 / 200.0;
+            // The centre, and beside it for edges that go through it.
+            for (dx, dy) in [(0.0, 0.0), (-OFF, -OFF), (OFF, OFF), (OFF, -OFF), (-OFF, OFF)] {
+                let Some((mut ray, _)) = p.ray(f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy) else {
+                    continue;
+                };
+                for _ in 0..MOST_STEPS {
+                    p.rays.fetch_add(1, Relaxed);
+                    let Some(hit) = p.world.closest(&ray) else { break };
+                    keep(hit.prim as usize);
+                    ray.t_min = hit.t.next_up();
+                }
+            }
+            found.sort_unstable_by_key(|f| f.0);
+            found
+        })
+        .collect();
+    let layers = fragments.iter().map(Vec::len).max().unwrap_or(0);
+    (0..layers)
+        .map(|n| {
+            let mut layer =
+                Layer { rect, color: vec![[0; 4]; w * h], depth: vec![UNCOVERED; w * h], covered: 0 };
+            for (k, f) in fragments.iter().enumerate() {
+                if let Some((_, c, d)) = f.get(n) {
+                    (layer.color[k], layer.depth[k]) = (*c, *d);
+                    layer.covered += 1;
+                }
+            }
+            layer
+        })
+        .collect()
+}

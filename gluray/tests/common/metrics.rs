@@ -1,0 +1,102 @@
+//! How far a traced picture is from a rasterized one. One number alone misses some error (a shift by a pixel, a hole, a tint), so there are
+//! four, each with a bar that two valid rasterizers keep between them.
+
+use super::Picture;
+
+/// Differences of two pictures.
+#[derive(Debug, Clone, Copy)]
+pub struct Metrics {
+    /// Percent of pixels with a channel off by more than 8.
+    pub raw: f64,
+    /// The same when the best of the 3 x 3 neighbours counts, both ways.
+    pub tolerant: f64,
+    /// Mean difference where both pictures are smooth.
+    pub interior: f64,
+    /// Its 99th percentile.
+    pub interior_p99: f64,
+    /// Overlap of what is not background.
+    pub overlap: f64,
+}
+
+fn off(a: [u8; 3], b: [u8; 3]) -> i32 {
+    (0..3).map(|k| (i32::from(a[k]) - i32::from(b[k])).abs()).max().unwrap_or(0)
+}
+
+fn neighbours(p: &Picture, x: usize, y: usize) -> impl Iterator<Item = [u8; 3]> + '_ {
+    (0..9).map(move |k| {
+        let at = |c: usize, d: usize, n: usize| (c + d).saturating_sub(1).min(n - 1);
+        p.pixels[at(y, k / 3, p.height) * p.width + at(x, k % 3, p.width)]
+    })
+}
+
+fn contrast(p: &Picture, x: usize, y: usize) -> i32 {
+    let (mut lo, mut hi) = ([255; 3], [0; 3]);
+    for n in neighbours(p, x, y) {
+        for k in 0..3 {
+            lo[k] = lo[k].min(i32::from(n[k]));
+            hi[k] = hi[k].max(i32::from(n[k]));
+        }
+    }
+    (0..3).map(|k| hi[k] - lo[k]).max().unwrap_or(0)
+}
+
+/// Compares pictures of one size; `counts` says which pixels are looked at.
+pub fn compare_where(a: &Picture, b: &Picture, counts: impl Fn(usize, usize) -> bool) -> Metrics {
+    assert_eq!((a.width, a.height), (b.width, b.height), "sizes of the pictures");
+    let (mut n, mut raw, mut tolerant, mut both, mut either) = (0, 0, 0, 0, 0);
+    let mut interior = Vec::new();
+    for y in 0..a.height {
+        for x in 0..a.width {
+            if !counts(x, y) {
+                continue;
+            }
+            let i = y * a.width + x;
+            let (p, q) = (a.pixels[i], b.pixels[i]);
+            let d = off(p, q);
+            n += 1;
+            raw += usize::from(d > 8);
+            if d > 8 {
+                let one = neighbours(a, x, y).map(|v| off(v, q)).min().unwrap_or(0);
+                let two = neighbours(b, x, y).map(|v| off(v, p)).min().unwrap_or(0);
+                tolerant += usize::from(one.max(two) > 8);
+            }
+            let (fa, fb) = (off(p, a.pixels[0]) > 2, off(q, b.pixels[0]) > 2);
+            both += usize::from(fa && fb);
+            either += usize::from(fa || fb);
+            if (fa || fb) && contrast(a, x, y).min(contrast(b, x, y)) <= 16 {
+                interior.push(d);
+            }
+        }
+    }
+    interior.sort_unstable();
+    let percent = |v: usize| 100.0 * v as f64 / n.max(1) as f64;
+    Metrics {
+        raw: percent(raw),
+        tolerant: percent(tolerant),
+        interior: interior.iter().map(|v| f64::from(*v)).sum::<f64>() / interior.len().max(1) as f64,
+        interior_p99: interior.get(interior.len() * 99 / 100).map_or(0.0, |v| f64::from(*v)),
+        overlap: if either == 0 { 1.0 } else { both as f64 / either as f64 },
+    }
+}
+
+/// Compares all pixels.
+pub fn compare(a: &Picture, b: &Picture) -> Metrics {
+    compare_where(a, b, |_, _| true)
+}
+
+impl Metrics {
+    /// The bars for filled surfaces.
+    pub fn assert_filled(&self, what: &str) {
+        let ok = self.tolerant <= 0.02
+            && self.raw <= 0.2
+            && self.interior <= 1.0
+            && self.interior_p99 <= 4.0
+            && self.overlap >= 0.999;
+        assert!(ok, "{what}: {self:?}");
+    }
+
+    /// The bars for pictures full of lines.
+    pub fn assert_lines(&self, what: &str) {
+        assert!(self.tolerant <= 0.1 && self.overlap >= 0.97, "{what}: {self:?}");
+    }
+}

@@ -1,0 +1,157 @@
+//! What tests of real programs share: an X server of their own, running a program natively and through us, comparing pictures.
+#![allow(dead_code, reason = "each test file uses its part")]
+
+pub mod metrics;
+
+use gluray::report::Report;
+use std::io::{BufRead as _, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+
+/// A peer by the variable that `cargo xtask test` sets. Without it: `None` and a loud word, or a failure where peers are required.
+pub fn peer(variable: &str) -> Option<PathBuf> {
+    let found = std::env::var_os(variable).map(PathBuf::from).filter(|p| p.exists());
+    if found.is_none() {
+        assert!(
+            std::env::var_os("RTSV_REQUIRE_PEERS").is_none(),
+            "{variable} names no file, and peers are required"
+        );
+        eprintln!("SKIPPED: {variable} names no program; `cargo xtask test` installs it");
+    }
+    found
+}
+
+/// An X server without a screen, on a display of its own.
+pub struct Xvfb {
+    server: Child,
+    pub display: String,
+}
+
+impl Xvfb {
+    pub fn start() -> Option<Xvfb> {
+        let program = peer("RTSV_XVFB")?;
+        let mut server = Command::new(program)
+            .args([
+                "-displayfd",
+                "1",
+                "-screen",
+                "0",
+                "1280x1280x24",
+                "+extension",
+                "GLX",
+                "-noreset",
+                "-nolisten",
+                "tcp",
+            ])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("Xvfb starts");
+        let mut line = String::new();
+        BufReader::new(server.stdout.take().expect("piped"))
+            .read_line(&mut line)
+            .expect("Xvfb says its display");
+        Some(Xvfb { server, display: format!(":{}", line.trim()) })
+    }
+}
+
+impl Drop for Xvfb {
+    fn drop(&mut self) {
+        self.server.kill().ok();
+        self.server.wait().ok();
+    }
+}
+
+/// A folder that goes with the test.
+pub fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().expect("a temporary folder")
+}
+
+/// How to run a program.
+pub struct Run<'a> {
+    pub x: &'a Xvfb,
+    pub folder: &'a Path,
+    /// Arguments of `gluray run`; `None` runs natively.
+    pub through: Option<&'a [&'a str]>,
+    pub environment: &'a [(&'a str, &'a str)],
+}
+
+impl Run<'_> {
+    /// Runs it to its end and gives what it printed, with our account.
+    pub fn program(&self, program: &Path, arguments: &[&str]) -> (Output, Report) {
+        let report = self.folder.join("report.json");
+        let mut command = match self.through {
+            None => Command::new(program),
+            Some(options) => {
+                let mut c = Command::new(env!("CARGO_BIN_EXE_gluray"));
+                c.args(["--quiet", "run", "--report"]).arg(&report).args(options).arg("--").arg(program);
+                c
+            }
+        };
+        command.args(arguments).current_dir(self.folder).stdin(Stdio::null());
+        command
+            .env("DISPLAY", &self.x.display)
+            .env("LIBGL_ALWAYS_SOFTWARE", "1")
+            .env("GALLIUM_DRIVER", "llvmpipe")
+            .env("PATH", "/usr/bin:/bin")
+            .env("XDG_STATE_HOME", self.folder)
+            .env_remove("LD_LIBRARY_PATH");
+        self.environment.iter().for_each(|(k, v)| {
+            command.env(k, v);
+        });
+        let output = command.output().expect("the program starts");
+        let report = match self.through {
+            None => Report::default(),
+            Some(_) => {
+                let text = std::fs::read_to_string(&report).expect("a report");
+                serde_json::from_str(&text).expect("a report in JSON")
+            }
+        };
+        assert_eq!(report.faults, Vec::<String>::new(), "our own faults");
+        (output, report)
+    }
+}
+
+/// A picture of 8-bit RGB, top row first.
+pub struct Picture {
+    pub width: usize,
+    pub height: usize,
+    pub pixels: Vec<[u8; 3]>,
+}
+
+impl Picture {
+    /// From a PNG, or a binary PPM.
+    pub fn read(file: &Path) -> Picture {
+        if file.extension().is_some_and(|e| e == "ppm") {
+            return Picture::read_ppm(file);
+        }
+        let image = image::open(file).unwrap_or_else(|e| panic!("{}: {e}", file.display())).to_rgb8();
+        let (width, height) = (image.width() as usize, image.height() as usize);
+        Picture { width, height, pixels: image.pixels().map(|p| p.0).collect() }
+    }
+
+    fn read_ppm(file: &Path) -> Picture {
+        let bytes = std::fs::read(file).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
+        let (mut words, mut at, mut word) = (Vec::new(), 0, Vec::new());
+        while words.len() < 4 {
+            match bytes[at] {
+                b'#' => {
+                    while bytes[at] != b'\n' {
+                        at += 1
+                    }
+                }
+                b if b.is_ascii_whitespace() => {
+                    if !word.is_empty() {
+                        words.push(String::from_utf8(std::mem::take(&mut word)).expect("text"));
+                    }
+                }
+                b => word.push(b),
+            }
+            at += 1;
+        }
+        assert_eq!(words[0], "P6", "{}", file.display());
+        let size = |i: usize| words[i].parse::<usize>().expect("a size");
+        let pixels = bytes[at..].chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
+        Picture { width: size(1), height: size(2), pixels }
+    }
+}

@@ -1,0 +1,83 @@
+//! Conformance tests of others (piglit) in `match` mode: what passes natively passes through us, and is traced where it draws filled primitives.
+
+mod common;
+
+use common::{Run, Xvfb, folder, peer};
+use std::path::Path;
+
+/// Tests that draw filled primitives, and so must be traced.
+const FILLED: &[&str] = &[
+    "gl-1.0-dlist-shademodel -auto -fbo",
+    "gl-1.0-texgen -auto -fbo",
+    "gl-1.0-user-clip-all-planes -auto -fbo",
+    "gl-1.1-color-material-array -auto -fbo",
+    "gl-1.1-draw-arrays-start -auto -fbo",
+    "gl-1.1-set-vertex-color-after-draw -auto -fbo",
+    "clipflat -auto -fbo",
+    "dlist-color-material -auto -fbo",
+    "dlist-fdo3129-02 -auto -fbo",
+    "draw-arrays-colormaterial -auto -fbo",
+    "fragment-center -auto -fbo",
+    "polygon-offset -auto -fbo",
+    "readpix-z -auto -fbo",
+    "texgen -auto -fbo",
+    "user-clip -auto -fbo",
+    "two-sided-lighting-separate-specular -auto -fbo",
+    "triangle-rasterization -auto -fbo",
+    "draw-vertices -auto -fbo",
+    "depth_clamp -auto -fbo",
+    "pos-array -auto -fbo",
+    "provoking-vertex -auto",
+];
+/// Tests of errors, selection and what else must not suffer.
+const OTHERS: &[&str] = &[
+    "gl-1.0-beginend-coverage -auto -fbo",
+    "gl-1.0-dlist-bitmap -auto -fbo",
+    "gl-1.0-edgeflag-const -auto -fbo",
+    "gl-1.0-empty-begin-end-clause -auto -fbo",
+    "gl-1.0-rendermode-feedback -auto -fbo",
+    "gl-1.0-push-no-attribs -auto -fbo",
+    "gl-1.0-no-op-paths -auto -fbo",
+    "degenerate-prims -auto -fbo",
+    "longprim -auto -fbo",
+    "select depth -auto -fbo",
+    "windowoverlap -auto -fbo",
+    "vao-element-array-buffer -auto -fbo",
+    "vbo-map-remap -auto -fbo",
+];
+
+fn verdict(x: &Xvfb, piglit: &Path, line: &str, through: Option<&[&str]>) -> (String, u64) {
+    let words: Vec<&str> = line.split(' ').collect();
+    let place = folder();
+    let source = piglit.parent().expect("bin lies in a folder").to_str().expect("UTF-8").to_owned();
+    let environment = [("PIGLIT_SOURCE_DIR", source.as_str()), ("PIGLIT_PLATFORM", "glx")];
+    let run = Run { x, folder: place.path(), through, environment: &environment };
+    let (output, report) = run.program(&piglit.join(words[0]), &words[1..]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let last = text.lines().rev().find_map(|l| l.strip_prefix("PIGLIT: {\"result\": \"")).map(str::to_owned);
+    (last.unwrap_or_default().split('"').next().unwrap_or_default().to_owned(), report.traced_draws)
+}
+
+fn all(lines: &[&str], must_trace: bool) {
+    let Some(piglit) = peer("RTSV_PIGLIT") else { return };
+    let Some(x) = Xvfb::start() else { return };
+    let mut faults = Vec::new();
+    for line in lines {
+        let (native, _) = verdict(&x, &piglit, line, None);
+        let (ours, traced) = verdict(&x, &piglit, line, Some(&["--trace", "all"]));
+        if native == "pass" && (ours != "pass" || (must_trace && traced == 0)) {
+            faults.push(format!("{line}: `{ours}`, {traced} draws traced"));
+        }
+    }
+    assert!(faults.is_empty(), "\n{}", faults.join("\n"));
+}
+
+#[test]
+fn conformance_tests_of_filled_primitives_pass_and_are_traced() {
+    all(FILLED, true);
+}
+
+#[test]
+fn conformance_tests_of_errors_lists_and_selection_pass() {
+    all(OTHERS, false);
+}

@@ -1,0 +1,191 @@
+//! Real programs, natively and through us: in `match` mode the pictures must be the driver's.
+
+mod common;
+
+use common::metrics::{Metrics, compare};
+use common::{Picture, Run, Xvfb, folder, peer};
+use gluray::report::Report;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// A bumpy sphere of 2 (n - 1)² triangles.
+fn bumpy_sphere(n: usize) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
+    let angle = |i: usize, from: f64, to: f64| from + (to - from) * i as f64 / (n - 1) as f64;
+    let mut points = Vec::new();
+    for j in 0..n {
+        for i in 0..n {
+            let (u, v) = (angle(i, 0.0, std::f64::consts::TAU), angle(j, 0.02, std::f64::consts::PI - 0.02));
+            let r = 1.0 + 0.15 * (9.0 * u).sin() * (7.0 * v).sin();
+            points.push([r * v.sin() * u.cos(), r * v.sin() * u.sin(), r * v.cos()].map(|x| x as f32));
+        }
+    }
+    let mut triangles = Vec::new();
+    for j in 0..n - 1 {
+        for i in 0..n - 1 {
+            let a = (j * n + i) as u32;
+            let (b, c, d) = (a + 1, a + n as u32, a + n as u32 + 1);
+            triangles.extend([[a, c, b], [b, c, d]]);
+        }
+    }
+    (points, triangles)
+}
+
+fn write_stl(file: &Path) {
+    let (points, triangles) = bumpy_sphere(81);
+    let mut bytes = vec![0; 80];
+    bytes.extend((triangles.len() as u32).to_le_bytes());
+    for t in triangles {
+        bytes.extend([0; 12]);
+        t.iter().flat_map(|i| points[*i as usize]).for_each(|v| bytes.extend(v.to_le_bytes()));
+        bytes.extend([0; 2]);
+    }
+    std::fs::write(file, bytes).expect("a temporary file");
+}
+
+fn write_off(file: &Path) {
+    let (points, triangles) = bumpy_sphere(81);
+    let mut text = format!("OFF\n{} {} 0\n", points.len(), triangles.len());
+    points.iter().for_each(|p| writeln!(text, "{} {} {}", p[0], p[1], p[2]).expect("a String"));
+    triangles.iter().for_each(|t| writeln!(text, "3 {} {} {}", t[0], t[1], t[2]).expect("a String"));
+    std::fs::write(file, text).expect("a temporary file");
+}
+
+fn script(name: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs").join(name);
+    path.to_str().expect("UTF-8").to_owned()
+}
+
+/// Both pictures of a program, and our account.
+fn both(
+    program: &Path,
+    arguments: &[&str],
+    picture: &str,
+    prepare: impl Fn(&Path),
+) -> Option<(Metrics, Report)> {
+    let x = Xvfb::start()?;
+    let run = |through: Option<&[&str]>| {
+        let place = folder();
+        prepare(place.path());
+        let environment = [("HOME", place.path().to_str().expect("UTF-8")), ("QT_QPA_PLATFORM", "xcb")];
+        let run = Run { x: &x, folder: place.path(), through, environment: &environment };
+        let (output, report) = run.program(program, arguments);
+        let file = place.path().join(picture);
+        assert!(file.is_file(), "{}: {}", program.display(), String::from_utf8_lossy(&output.stderr));
+        (Picture::read(&file), report)
+    };
+    let (native, _) = run(None);
+    let (ours, report) = run(Some(&["--mode", "match"]));
+    let m = compare(&native, &ours);
+    eprintln!(
+        "{}: {m:?}, traced {}, passed {:?}",
+        program.display(),
+        report.traced_draws,
+        report.passed_reasons
+    );
+    assert!(report.traced_draws > 0, "{report:?}");
+    Some((m, report))
+}
+
+fn program(variable: &str) -> Option<PathBuf> {
+    peer(variable)
+}
+
+#[test]
+fn gmsh_draws_the_drivers_picture() {
+    let Some(gmsh) = program("RTSV_GMSH") else { return };
+    let lines = "Merge \"s.stl\";\nGeneral.GraphicsWidth=768; General.GraphicsHeight=768; General.MenuWidth=0;\nGeneral.Trackball=0; \
+                 General.RotationX=-60; General.RotationZ=30;\nMesh.SurfaceFaces=1; Mesh.SurfaceEdges=0;\nDraw;\nPrint \"out.png\";\nExit;\n";
+    let prepare = |f: &Path| {
+        write_stl(&f.join("s.stl"));
+        std::fs::write(f.join("s.geo"), lines).expect("a temporary file");
+    };
+    if let Some((m, _)) = both(&gmsh, &["s.geo"], "out.png", prepare) {
+        m.assert_filled("gmsh");
+    }
+}
+
+#[test]
+fn geomview_draws_the_drivers_picture() {
+    let Some(geomview) = program("RTSV_GEOMVIEW") else { return };
+    let lines = "(load s.off)\n(window c0 {size 768 768})\n(bbox-draw g1 no)\n(backcolor c0 0.1 0.1 0.2)\n(normalization g1 none)\n\
+                 (merge-ap g1 { shading smooth -edge })\n(look g1)\n(redraw c0)\n(snapshot c0 out.ppm ppmscreen 768 768)\n(exit)\n";
+    let prepare = |f: &Path| {
+        write_off(&f.join("s.off"));
+        std::fs::write(f.join("s.gcl"), lines).expect("a temporary file");
+    };
+    if let Some((m, _)) = both(&geomview, &["-nopanels", "-c", "s.gcl"], "out.ppm", prepare) {
+        m.assert_filled("geomview");
+    }
+}
+
+#[test]
+fn openscad_draws_the_drivers_picture() {
+    let Some(openscad) = program("RTSV_OPENSCAD") else { return };
+    let scene = "$fn=32;\ndifference(){ sphere(r=20); cylinder(r=8,h=50,center=true); }\ntranslate([30,0,0]) cube([10,20,30],center=true);\n";
+    let prepare = |f: &Path| std::fs::write(f.join("s.scad"), scene).expect("a temporary file");
+    let arguments =
+        ["-o", "out.png", "--imgsize=768,768", "--render", "--camera=0,0,0,60,0,30,150", "s.scad"];
+    if let Some((m, _)) = both(&openscad, &arguments, "out.png", prepare) {
+        m.assert_filled("openscad");
+    }
+}
+
+#[test]
+fn octave_draws_the_drivers_picture() {
+    let Some(octave) = program("RTSV_OCTAVE") else { return };
+    let file = script("octave.m");
+    let arguments = ["--no-gui", "--quiet", "--no-init-file", file.as_str()];
+    if let Some((m, _)) = both(&octave, &arguments, "out.png", |_| ()) {
+        m.assert_lines("octave");
+    }
+}
+
+#[test]
+fn pymol_without_shaders_draws_the_drivers_picture() {
+    let Some(pymol) = program("RTSV_PYMOL") else { return };
+    let lines = "set internal_gui, 0\nfragment trp\nviewport 768,768\nhide everything\nshow sticks\nshow spheres\nset use_shaders, 0\n\
+                 bg_color white\norient\npng out.png, ray=0\nquit\n";
+    let prepare = |f: &Path| std::fs::write(f.join("s.pml"), lines).expect("a temporary file");
+    if let Some((m, _)) = both(&pymol, &["-q", "s.pml"], "out.png", prepare) {
+        m.assert_filled("pymol");
+    }
+}
+
+#[test]
+fn paraview_draws_the_drivers_picture() {
+    let Some(pvbatch) = program("RTSV_PVBATCH") else { return };
+    let file = script("paraview.py");
+    if let Some((m, _)) = both(&pvbatch, &[file.as_str()], "out.png", |_| ()) {
+        m.assert_filled("pvbatch");
+    }
+}
+
+#[test]
+fn vtk_in_python_draws_the_drivers_picture() {
+    let (Some(python), Some(_)) = (program("RTSV_SYSTEM_PYTHON"), program("RTSV_PVBATCH")) else { return };
+    let file = script("vtk_scene.py");
+    if let Some((m, _)) = both(&python, &[file.as_str()], "out.png", |_| ()) {
+        m.assert_filled("python vtk");
+    }
+}
+
+#[test]
+fn passing_everything_changes_no_pixel() {
+    let Some(gmsh) = program("RTSV_GMSH") else { return };
+    let Some(x) = Xvfb::start() else { return };
+    let lines = "Merge \"s.stl\";\nGeneral.GraphicsWidth=400; General.GraphicsHeight=400; General.MenuWidth=0;\nDraw;\nPrint \"out.png\";\nExit;\n";
+    let picture = |through: Option<&[&str]>| {
+        let place = folder();
+        write_stl(&place.path().join("s.stl"));
+        std::fs::write(place.path().join("s.geo"), lines).expect("a temporary file");
+        let environment = [("HOME", place.path().to_str().expect("UTF-8"))];
+        let run = Run { x: &x, folder: place.path(), through, environment: &environment };
+        run.program(&gmsh, &["s.geo"]);
+        Picture::read(&place.path().join("out.png"))
+    };
+    let native = picture(None);
+    for via in ["vendor", "preload"] {
+        let ours = picture(Some(&["--mode", "off", "--via", via]));
+        assert!(native.pixels == ours.pixels, "pixels differ by way of {via}");
+    }
+}

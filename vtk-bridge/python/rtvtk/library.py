@@ -1,0 +1,138 @@
+"""The shared library and its structures: include/rtv.h in ctypes."""
+import ctypes as C
+import os
+
+import numpy as np
+
+ABI = 1
+NONE, U8, F32, F64, I32, I64 = range(6)
+COLOR_PROPERTY, COLOR_POINTS, COLOR_CELLS, COLOR_MAPPED = range(4)
+LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT = range(3)
+_KINDS = {np.dtype(np.uint8): U8, np.dtype(np.float32): F32, np.dtype(np.float64): F64, np.dtype(np.int32): I32, np.dtype(np.int64): I64}
+
+
+class RtvError(Exception):
+    """The library cannot be used; the text says why and what to do."""
+
+
+class Array(C.Structure):
+    _fields_ = [("data", C.c_void_p), ("tuples", C.c_uint64), ("components", C.c_uint32), ("kind", C.c_uint32)]
+
+    @classmethod
+    def of(cls, numbers):
+        """Over a contiguous numpy array, which must outlive the call that it is for."""
+        tuples = numbers.shape[0]
+        return cls(numbers.ctypes.data, tuples, numbers.size // tuples if tuples else 1, _KINDS[numbers.dtype])
+
+
+class Cells(C.Structure):
+    _fields_ = [("offsets", Array), ("connectivity", Array)]
+
+
+class Property(C.Structure):
+    _fields_ = [(n, C.c_float * 3) for n in ("ambient_color", "diffuse_color", "specular_color")]
+    _fields_ += [(n, C.c_float) for n in ("ambient", "diffuse", "specular", "specular_power", "opacity", "metallic", "roughness", "base_ior")]
+    _fields_ += [(n, C.c_uint32) for n in ("flat", "lighting", "pbr", "cull_front", "cull_back")]
+
+
+class Surface(C.Structure):
+    _fields_ = [
+        ("name", C.c_char_p), ("shape_key", C.c_uint64), ("color_key", C.c_uint64), ("texture_key", C.c_uint64), ("points", Array),
+        ("verts", Cells), ("lines", Cells), ("polys", Cells), ("strips", Cells), ("point_normals", Array), ("cell_normals", Array),
+        ("texcoords", Array), ("clip_planes", Array), ("color_source", C.c_uint32), ("edges_only", C.c_uint32), ("colors", Array), ("map", Array),
+        ("nan_color", C.c_uint8 * 4), ("texture_interpolate", C.c_uint8), ("texture_repeat", C.c_uint8), ("reserved", C.c_uint8 * 2),
+        ("texture", Array), ("texture_width", C.c_uint32), ("reserved_2", C.c_uint32), ("property", Property),
+        ("world_from_data", C.c_double * 16), ("glyph_matrices", Array), ("glyph_colors", Array), ("point_radius", C.c_double),
+        ("line_radius", C.c_double),
+    ]
+
+
+class Light(C.Structure):
+    _fields_ = [
+        ("position", C.c_double * 3), ("focal_point", C.c_double * 3), ("cone_angle_deg", C.c_double), ("exponent", C.c_double),
+        ("color", C.c_float * 3), ("attenuation", C.c_float * 3), ("kind", C.c_uint32), ("headlight", C.c_uint32),
+    ]
+
+
+class View(C.Structure):
+    _fields_ = [
+        ("clip_from_world", C.c_double * 16), ("background_bottom", C.c_float * 3), ("background_top", C.c_float * 3),
+        ("focus_distance", C.c_double), ("width", C.c_uint32), ("height", C.c_uint32), ("interactive", C.c_uint32), ("shadows", C.c_uint32),
+    ]
+
+
+class Picture(C.Structure):
+    _fields_ = [
+        ("width", C.c_uint32), ("height", C.c_uint32), ("opaque", C.POINTER(C.c_uint8)), ("blended", C.POINTER(C.c_float)),
+        ("depth", C.POINTER(C.c_float)), ("first_depth", C.POINTER(C.c_float)),
+    ]
+
+
+def _places():
+    here = os.path.dirname(os.path.abspath(__file__))
+    yield "RTVTK_LIBRARY", os.environ.get("RTVTK_LIBRARY")
+    yield "the package", os.path.join(here, "libvtk_bridge.so")
+    home = os.environ.get("RTV_HOME")
+    yield "RTV_HOME", home and os.path.join(home, "libvtk_bridge.so")
+
+
+def _load():
+    tried = []
+    for name, path in _places():
+        if not path:
+            continue
+        tried.append(f"{path} ({name})")
+        if os.path.isfile(path):
+            try:
+                return C.CDLL(path), path
+            except OSError as error:
+                raise RtvError(f"{path} cannot be loaded: {error}") from error
+        if name == "RTVTK_LIBRARY":
+            raise RtvError(f"RTVTK_LIBRARY is {path}, which is no file; set RTVTK_LIBRARY to the file libvtk_bridge.so, or leave it out")
+    raise RtvError(f"the library libvtk_bridge.so was not found; tried {', '.join(tried)}; set RTVTK_LIBRARY to the file libvtk_bridge.so")
+
+
+def _functions(library, path):
+    def bind(name, result, *arguments):
+        try:
+            function = getattr(library, name)
+        except AttributeError as error:
+            raise RtvError(f"{path} has no function {name}: it is not, or another version of, vtk-bridge's library") from error
+        function.restype, function.argtypes = result, arguments
+        return function
+
+    p, text = C.c_void_p, C.c_char_p
+    found = bind("rtv_abi", C.c_uint32)()
+    if found != ABI:
+        raise RtvError(f"{path} has interface {found}, this package needs {ABI}: install the package that belongs to the library")
+    return dict(
+        new=bind("rtv_new", p), free=bind("rtv_free", None, p), option=bind("rtv_option", C.c_double, text), begin=bind("rtv_begin", C.c_int32, p),
+        surface=bind("rtv_surface", C.c_int32, p, C.POINTER(Surface)), has_colors=bind("rtv_has_colors", C.c_int32, p, C.c_uint64, C.c_uint64),
+        light=bind("rtv_light", None, p, C.POINTER(Light)), pass_on=bind("rtv_pass", None, p, text, text), warn=bind("rtv_warn", None, p, text),
+        render=bind("rtv_render", C.c_int32, p, C.POINTER(View), C.POINTER(Picture)), end=bind("rtv_end", None, p),
+    )
+
+
+class Bridge:
+    """A renderer's side of the library."""
+
+    _calls = None
+
+    def __init__(self):
+        if Bridge._calls is None:
+            Bridge._calls = _functions(*_load())
+        self._handle = Bridge._calls["new"]()
+
+    def __del__(self):
+        if Bridge._calls and getattr(self, "_handle", None):
+            Bridge._calls["free"](self._handle)
+
+    def __getattr__(self, name):
+        if name.startswith("_"):
+            raise AttributeError(name)
+        function = Bridge._calls[name]
+        if name == "option":
+            return lambda key: function(key.encode())
+        if name in ("warn", "pass_on"):
+            return lambda *texts: function(self._handle, *(t.encode() for t in texts))
+        return lambda *arguments: function(self._handle, *arguments)

@@ -1,0 +1,57 @@
+//! Which of the two forms of `anari::LibraryImpl` the loader in this process has.
+//!
+//! Between two releases of the SDK a virtual function was put into the middle of the class. Both forms are in use (pynari 1.2.6 brings the older), nothing that is
+//! passed tells them apart, and the loader that has the new function also exports `anariNewInitializedDevice`: that is looked for.
+
+use std::ffi::{CStr, c_char, c_int, c_void};
+
+const MARK: &CStr = c"anariNewInitializedDevice";
+
+/// What was seen of ANARI's loaders in the process.
+#[derive(Default)]
+struct Seen {
+    any: bool,
+    initialized_devices: bool,
+}
+
+/// Whether the loader calls `newInitializedDevice`. A loader that cannot be found (it may be linked into the program) is taken for a current one.
+pub(super) fn has_initialized_devices() -> bool {
+    // SAFETY: looks a name up in the modules that are visible to all.
+    let global = unsafe { !libc::dlsym(libc::RTLD_DEFAULT, MARK.as_ptr()).is_null() };
+    if global {
+        return true;
+    }
+    let mut seen = Seen::default();
+    // SAFETY: `look` is called for each module before this returns, with the address of `seen`.
+    unsafe { libc::dl_iterate_phdr(Some(look), (&raw mut seen).cast()) };
+    seen.initialized_devices || !seen.any
+}
+
+unsafe extern "C" fn look(module: *mut libc::dl_phdr_info, _size: usize, seen: *mut c_void) -> c_int {
+    // SAFETY: the C library gives a valid module; `seen` is what `has_initialized_devices` passed.
+    let (name, seen) = unsafe { ((*module).dlpi_name, &mut *seen.cast::<Seen>()) };
+    // SAFETY: names of modules end with 0.
+    if !name.is_null() && is_loader(unsafe { CStr::from_ptr(name) }) {
+        seen.any = true;
+        seen.initialized_devices |= exports_mark(name);
+    }
+    0
+}
+
+fn is_loader(name: &CStr) -> bool {
+    let name = name.to_string_lossy();
+    name.rsplit('/').next().is_some_and(|file| file.starts_with("libanari.so"))
+}
+
+fn exports_mark(name: *const c_char) -> bool {
+    // SAFETY: NOLOAD only gives another reference to a module that is in the process; it is given back below.
+    unsafe {
+        let module = libc::dlopen(name, libc::RTLD_LAZY | libc::RTLD_NOLOAD);
+        if module.is_null() {
+            return false;
+        }
+        let found = !libc::dlsym(module, MARK.as_ptr()).is_null();
+        libc::dlclose(module);
+        found
+    }
+}

@@ -1,0 +1,176 @@
+//! Arrays: whose memory they use, and their elements as values.
+//!
+//! Three owners (ANARI 1.0, section "Array objects"): the program's memory, shared until the program releases the array (then it is copied, because the program
+//! may free it); the program's memory handed over with a deleter; memory of the device, which the program fills by mapping it.
+
+use super::abi::memory::{AppMemory, OwnMemory};
+use super::data_type::DataType;
+use super::object::Object;
+use std::sync::Arc;
+
+/// Whose memory it is.
+pub(crate) enum Storage {
+    /// The program's: shared, or captured when it has a deleter.
+    App(AppMemory),
+    /// The device's.
+    Own(OwnMemory),
+}
+
+/// The data of an array object.
+pub struct Array {
+    storage: Storage,
+    /// Type of an element.
+    pub element: DataType,
+    /// Number of elements per dimension; 1 where the array has fewer dimensions.
+    pub dims: [usize; 3],
+    /// Strong references to objects named in the data.
+    objects: Vec<Option<Arc<Object>>>,
+    /// Whether the program may be writing now.
+    pub(crate) mapped: bool,
+    /// First and past-the-last element in use, of one-dimensional arrays.
+    pub(crate) region: Option<[usize; 2]>,
+}
+
+/// More bytes than any array can have.
+const MOST_BYTES: usize = isize::MAX as usize / 2;
+
+/// Bytes of `dims` elements; `None` when that is more than an address can count.
+pub(crate) fn byte_size(element: DataType, dims: [u64; 3]) -> Option<usize> {
+    let mut bytes = element.size()?;
+    for d in dims {
+        bytes = bytes.checked_mul(usize::try_from(d).ok()?)?;
+    }
+    (bytes <= MOST_BYTES).then_some(bytes)
+}
+
+impl Array {
+    pub(crate) fn new(storage: Storage, element: DataType, dims: [u64; 3]) -> Array {
+        let dims = dims.map(|d| d as usize);
+        Array { storage, element, dims, objects: Vec::new(), mapped: false, region: None }
+    }
+
+    /// Number of elements in use.
+    pub fn len(&self) -> usize {
+        let all = self.dims.iter().product();
+        self.region.map_or(all, |[a, b]| b.min(all).saturating_sub(a))
+    }
+
+    /// True without elements.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The elements' bytes, copied: the program may change its memory at any time after.
+    pub(crate) fn bytes(&self) -> Vec<u8> {
+        let all = match &self.storage {
+            Storage::App(m) => m.copy(),
+            Storage::Own(m) => m.copy(),
+        };
+        match (self.region, self.element.size()) {
+            (Some([a, _]), Some(size)) => all[a * size..(a + self.len()) * size].to_vec(),
+            _ => all,
+        }
+    }
+
+    /// Address for the program to write to.
+    pub(crate) fn address(&self) -> *mut std::ffi::c_void {
+        match &self.storage {
+            Storage::App(m) => m.address(),
+            Storage::Own(m) => m.address(),
+        }
+    }
+
+    /// Copies shared memory that the program may free from now on. True when a copy was made.
+    pub(crate) fn privatize(&mut self) -> bool {
+        let Storage::App(shared) = &self.storage else { return false };
+        if shared.is_captured() {
+            return false;
+        }
+        self.storage = Storage::Own(OwnMemory::from_bytes(&shared.copy()));
+        true
+    }
+
+    /// Objects named by the elements, as far as they exist.
+    pub fn objects(&self) -> &[Option<Arc<Object>>] {
+        match self.region {
+            Some([a, _]) => {
+                &self.objects[a.min(self.objects.len())..(a + self.len()).min(self.objects.len())]
+            }
+            None => &self.objects,
+        }
+    }
+
+    pub(crate) fn set_objects(&mut self, objects: Vec<Option<Arc<Object>>>) -> Vec<Option<Arc<Object>>> {
+        std::mem::replace(&mut self.objects, objects)
+    }
+
+    /// All handles in the memory, whatever the region.
+    pub(crate) fn handles(&self) -> Vec<u64> {
+        let all = match &self.storage {
+            Storage::App(m) => m.copy(),
+            Storage::Own(m) => m.copy(),
+        };
+        all.chunks_exact(8)
+            .map(|c| u64::from_ne_bytes([c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]]))
+            .collect()
+    }
+
+    // ---- Elements as values ---------------------------------------------------------------------------------------
+
+    /// Attribute values: see [`DataType::attribute`].
+    pub(crate) fn attributes(&self) -> Vec<[f32; 4]> {
+        let Some(size) = self.element.size() else { return Vec::new() };
+        self.bytes().chunks_exact(size).map(|b| self.element.attribute(b)).collect()
+    }
+
+    /// The first component of each element.
+    pub(crate) fn scalars(&self) -> Vec<f32> {
+        if self.element == DataType::FLOAT32 {
+            return self
+                .bytes()
+                .chunks_exact(4)
+                .map(|b| f32::from_ne_bytes([b[0], b[1], b[2], b[3]]))
+                .collect();
+        }
+        self.attributes().into_iter().map(|a| a[0]).collect()
+    }
+
+    /// Three-component vectors.
+    pub(crate) fn vectors(&self) -> Vec<[f32; 3]> {
+        if self.element == DataType::FLOAT32_VEC3 {
+            let f = |b: &[u8]| f32::from_ne_bytes([b[0], b[1], b[2], b[3]]);
+            return self.bytes().chunks_exact(12).map(|b| [f(&b[..4]), f(&b[4..8]), f(&b[8..])]).collect();
+        }
+        self.attributes().into_iter().map(|a| [a[0], a[1], a[2]]).collect()
+    }
+
+    /// Indices, `N` an element; what does not fit into 32 bits becomes `u32::MAX`, which is past every end.
+    pub(crate) fn indices<const N: usize>(&self) -> Vec<[u32; N]> {
+        let Some(size) = self.element.size() else { return Vec::new() };
+        let wide = size / N == 8;
+        let one = |b: &[u8]| {
+            if wide {
+                let v = u64::from_ne_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]);
+                u32::try_from(v).unwrap_or(u32::MAX)
+            } else {
+                u32::from_ne_bytes([b[0], b[1], b[2], b[3]])
+            }
+        };
+        let step = size / N;
+        self.bytes()
+            .chunks_exact(size)
+            .map(|b| std::array::from_fn(|i| one(&b[i * step..(i + 1) * step])))
+            .collect()
+    }
+
+    /// 4 x 4 matrices, column by column.
+    pub(crate) fn matrices(&self) -> Vec<[f64; 16]> {
+        self.bytes()
+            .chunks_exact(64)
+            .map(|m| {
+                let f = |i: usize| f32::from_ne_bytes([m[4 * i], m[4 * i + 1], m[4 * i + 2], m[4 * i + 3]]);
+                std::array::from_fn(|i| f64::from(f(i)))
+            })
+            .collect()
+    }
+}

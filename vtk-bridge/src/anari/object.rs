@@ -1,0 +1,228 @@
+//! Objects: parameters that take effect when they are committed, and who keeps an object alive.
+//!
+//! A program knows an object by its [`Handle`], a number that is never a memory address and never used again: a handle that was released once too
+//! often, or that belongs to another device, is found out and reported. Objects that other objects refer to live on after the program has released
+//! them: parameters hold [`Arc`]s.
+
+use super::array::Array;
+use super::data_type::DataType;
+use super::frame::FrameState;
+use super::scene::world::WorldCache;
+use super::status::lock;
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+
+/// The program's name for an object; 0 is none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub struct Handle(pub u64);
+
+impl Handle {
+    /// No object.
+    pub const NULL: Handle = Handle(0);
+
+    /// A handle that no device of this process has given out before.
+    pub(crate) fn fresh() -> Handle {
+        // Steps of 16 from a number that is no small integer: programs that look at handles as pointers see aligned ones.
+        static NEXT: AtomicU64 = AtomicU64::new(0x1000);
+        Handle(NEXT.fetch_add(16, Ordering::Relaxed))
+    }
+}
+
+/// The value of a parameter.
+#[derive(Clone)]
+pub enum Value {
+    /// Numbers, by their type and bytes.
+    Bytes(DataType, Vec<u8>),
+    /// A string.
+    Text(String),
+    /// Another object, with the type it was given as.
+    Object(Arc<Object>),
+    /// A pointer of the program, handed back to it and never followed.
+    Pointer(DataType, usize),
+}
+
+impl Value {
+    /// Its type; objects have that of the object.
+    pub fn data_type(&self) -> DataType {
+        match self {
+            Value::Bytes(t, _) | Value::Pointer(t, _) => *t,
+            Value::Text(_) => DataType::STRING,
+            Value::Object(o) => o.kind,
+        }
+    }
+
+    /// A number that changes when the value, or the data of an array that it names, changes.
+    pub(crate) fn fingerprint(&self, out: &mut Vec<u64>) {
+        out.push(u64::from(self.data_type().0));
+        match self {
+            Value::Bytes(_, b) => out.extend(b.chunks(8).map(|c| {
+                let mut wide = [0; 8];
+                wide[..c.len()].copy_from_slice(c);
+                u64::from_ne_bytes(wide)
+            })),
+            Value::Text(t) => out.extend(t.bytes().map(u64::from)),
+            Value::Object(o) => out.extend([o.handle.0, o.version()]),
+            Value::Pointer(_, p) => out.push(*p as u64),
+        }
+    }
+}
+
+/// Committed parameters by name.
+pub type Parameters = BTreeMap<String, Value>;
+
+/// What only some kinds of objects have.
+#[derive(Default)]
+pub enum Extra {
+    /// Nothing.
+    #[default]
+    None,
+    /// An array's data.
+    Array(Box<Array>),
+    /// A frame's pictures.
+    Frame(Box<FrameState>),
+    /// What a world has built.
+    World(Box<WorldCache>),
+}
+
+/// An object of a device.
+pub struct Object {
+    /// The program's name for it.
+    pub handle: Handle,
+    /// What it is.
+    pub kind: DataType,
+    /// Which of its kind; empty for kinds without subtypes, and for unknown subtypes what the program asked for.
+    pub subtype: String,
+    /// False when the device does not have this subtype: the object takes parameters and draws nothing.
+    pub known: bool,
+    staged: Mutex<Parameters>,
+    committed: Mutex<Arc<Parameters>>,
+    version: AtomicU64,
+    pub(crate) extra: Mutex<Extra>,
+}
+
+impl Object {
+    pub(crate) fn new(kind: DataType, subtype: &str, known: bool, extra: Extra) -> Object {
+        Object {
+            handle: Handle::fresh(),
+            kind,
+            subtype: subtype.to_owned(),
+            known,
+            staged: Mutex::default(),
+            committed: Mutex::default(),
+            version: AtomicU64::new(0),
+            extra: Mutex::new(extra),
+        }
+    }
+
+    /// Sets a parameter; it takes effect with the next commit.
+    pub(crate) fn set(&self, name: &str, value: Value) {
+        // The old value is dropped after the lock is free: it may be the last reference to an array whose deleter calls back.
+        let _old = lock(&self.staged).insert(name.to_owned(), value);
+    }
+
+    pub(crate) fn unset(&self, name: &str) {
+        let _old = lock(&self.staged).remove(name);
+    }
+
+    pub(crate) fn unset_all(&self) {
+        let _old = std::mem::take(&mut *lock(&self.staged));
+    }
+
+    pub(crate) fn staged(&self, name: &str) -> Option<Value> {
+        lock(&self.staged).get(name).cloned()
+    }
+
+    /// Makes what was set effective, but for what `usable` refuses.
+    pub(crate) fn commit(&self, mut usable: impl FnMut(&str, &Value) -> bool) {
+        let staged = lock(&self.staged).clone();
+        let fresh: Parameters = staged.into_iter().filter(|(name, value)| usable(name, value)).collect();
+        let old = std::mem::replace(&mut *lock(&self.committed), Arc::new(fresh));
+        self.touch();
+        drop(old);
+    }
+
+    /// The parameters in effect.
+    pub fn parameters(&self) -> Arc<Parameters> {
+        lock(&self.committed).clone()
+    }
+
+    /// Counts commits and changes of array data.
+    pub fn version(&self) -> u64 {
+        self.version.load(Ordering::Acquire)
+    }
+
+    pub(crate) fn touch(&self) {
+        self.version.fetch_add(1, Ordering::AcqRel);
+    }
+
+    /// What a status message calls it: "geometry `sphere`".
+    pub fn title(&self) -> String {
+        let kind = self.kind.name().to_lowercase();
+        let name = match self.parameters().get("name") {
+            Some(Value::Text(n)) => format!(" \"{n}\""),
+            _ => String::new(),
+        };
+        if self.subtype.is_empty() {
+            format!("{kind}{name}")
+        } else {
+            format!("{kind} `{}`{name}", self.subtype)
+        }
+    }
+
+    // ---- Committed parameters by type ---------------------------------------------------------------------------
+
+    /// Numbers of a parameter with any numeric type.
+    pub(crate) fn numbers(&self, name: &str) -> Option<Vec<f64>> {
+        match self.parameters().get(name)? {
+            Value::Bytes(t, b) => Some(t.numbers(b)),
+            _ => None,
+        }
+    }
+
+    pub(crate) fn f32(&self, name: &str, default: f32) -> f32 {
+        self.numbers(name).and_then(|v| v.first().copied()).map_or(default, |v| v as f32)
+    }
+
+    pub(crate) fn u32(&self, name: &str, default: u32) -> u32 {
+        self.numbers(name).and_then(|v| v.first().copied()).map_or(default, |v| v as u32)
+    }
+
+    pub(crate) fn bool(&self, name: &str, default: bool) -> bool {
+        self.numbers(name).and_then(|v| v.first().copied()).map_or(default, |v| v != 0.0)
+    }
+
+    pub(crate) fn vector<const N: usize>(&self, name: &str, default: [f64; N]) -> [f64; N] {
+        let given = self.numbers(name);
+        std::array::from_fn(|i| given.as_ref().and_then(|v| v.get(i)).copied().unwrap_or(default[i]))
+    }
+
+    pub(crate) fn text(&self, name: &str) -> Option<String> {
+        match self.parameters().get(name)? {
+            Value::Text(t) => Some(t.clone()),
+            _ => None,
+        }
+    }
+
+    pub(crate) fn object(&self, name: &str) -> Option<Arc<Object>> {
+        match self.parameters().get(name)? {
+            Value::Object(o) => Some(o.clone()),
+            _ => None,
+        }
+    }
+
+    /// The objects in an array parameter, in order; nulls are left out.
+    pub(crate) fn objects(&self, name: &str) -> Vec<Arc<Object>> {
+        self.object(name)
+            .map(|a| a.with_array(|a| a.objects().iter().flatten().cloned().collect()).unwrap_or_default())
+            .unwrap_or_default()
+    }
+
+    /// Looks at the data of an array; `None` for other objects.
+    pub(crate) fn with_array<T>(&self, f: impl FnOnce(&mut Array) -> T) -> Option<T> {
+        match &mut *lock(&self.extra) {
+            Extra::Array(a) => Some(f(a)),
+            _ => None,
+        }
+    }
+}

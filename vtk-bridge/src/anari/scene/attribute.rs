@@ -1,0 +1,177 @@
+//! Attributes: named values on geometries that materials and samplers ask for.
+//!
+//! An attribute comes from the instance, else from the geometry: per corner of a face, per vertex, per primitive or for the whole (ANARI 1.0, section
+//! "Geometry"). What nobody gives is (0, 0, 0, 1).
+
+use crate::anari::object::{Object, Value};
+use rt_core::glam::{DAffine3, DMat3, DVec3};
+use std::sync::Arc;
+
+/// Names that a material or sampler may ask for.
+pub const NAMES: &[&str] = &[
+    "color",
+    "attribute0",
+    "attribute1",
+    "attribute2",
+    "attribute3",
+    "worldPosition",
+    "worldNormal",
+    "objectPosition",
+    "objectNormal",
+];
+
+/// Names of the attributes that geometries and instances carry.
+pub(crate) const SLOTS: &[&str] = &["color", "attribute0", "attribute1", "attribute2", "attribute3"];
+
+/// Where an attribute comes from.
+#[derive(Clone)]
+pub(crate) enum Source {
+    /// The same everywhere.
+    Uniform([f32; 4]),
+    /// Per primitive of the ANARI geometry.
+    Primitive(Arc<Vec<[f32; 4]>>),
+    /// Per vertex, interpolated.
+    Vertex(Arc<Vec<[f32; 4]>>),
+    /// Per corner of each primitive, interpolated.
+    FaceVarying(Arc<Vec<[f32; 4]>>),
+    /// The point itself, before or after the instance's transform.
+    Position { world: bool },
+    /// The shading normal, before or after the instance's transform.
+    Normal { world: bool },
+}
+
+/// How primitives of the renderer belong to vertices and primitives of the ANARI geometry.
+#[derive(Default)]
+pub(crate) struct Topology {
+    /// Vertices of each primitive of the renderer: one, two or three in use. Empty when there are no vertices.
+    pub(crate) vertices: Vec<[u32; 3]>,
+    /// Elements of the arrays `faceVarying.*`.
+    pub(crate) corners: Vec<[u32; 3]>,
+    /// ANARI's number of each primitive.
+    pub(crate) numbers: Numbers,
+    /// Whether vertex 3t + k of the renderer's mesh is corner k of triangle t; else it has ANARI's vertices.
+    pub(crate) unshared: bool,
+}
+
+/// ANARI's numbers of the renderer's primitives.
+#[derive(Default)]
+pub(crate) enum Numbers {
+    /// The same.
+    #[default]
+    Same,
+    /// By the renderer's number.
+    Listed(Vec<u32>),
+    /// One for all.
+    All(u32),
+}
+
+impl Topology {
+    pub(crate) fn number(&self, primitive: u32) -> u32 {
+        match &self.numbers {
+            Numbers::Same => primitive,
+            Numbers::Listed(list) => list.get(primitive as usize).copied().unwrap_or(u32::MAX),
+            Numbers::All(n) => *n,
+        }
+    }
+}
+
+/// A point on a geometry, as far as attributes need it.
+pub(crate) struct Place<'a> {
+    pub(crate) topology: &'a Topology,
+    /// The renderer's primitive.
+    pub(crate) primitive: u32,
+    /// Weights of its vertices.
+    pub(crate) weights: [f32; 3],
+    /// In object space.
+    pub(crate) point: DVec3,
+    /// In object space, unit length.
+    pub(crate) normal: DVec3,
+    pub(crate) world_from_object: &'a DAffine3,
+}
+
+impl Source {
+    /// The attribute `name` of `geometry`, in an instance that may replace it.
+    pub(crate) fn of(name: &str, geometry: &Object, instance: Option<&Object>) -> Option<Source> {
+        match name {
+            "worldPosition" | "objectPosition" => {
+                return Some(Source::Position { world: name.starts_with('w') });
+            }
+            "worldNormal" | "objectNormal" => return Some(Source::Normal { world: name.starts_with('w') }),
+            slot if SLOTS.contains(&slot) => {}
+            _ => return None,
+        }
+        let uniform = |o: &Object| match o.parameters().get(name) {
+            Some(Value::Bytes(t, b)) => Some(t.attribute(b)),
+            _ => None,
+        };
+        if let Some(v) = instance.and_then(uniform) {
+            return Some(Source::Uniform(v));
+        }
+        let array = |prefix: &str| {
+            let values = geometry.object(&format!("{prefix}.{name}"))?.with_array(|a| a.attributes())?;
+            (!values.is_empty()).then(|| Arc::new(values))
+        };
+        Some(if let Some(v) = array("faceVarying") {
+            Source::FaceVarying(v)
+        } else if let Some(v) = array("vertex") {
+            Source::Vertex(v)
+        } else if let Some(v) = array("primitive") {
+            Source::Primitive(v)
+        } else {
+            Source::Uniform(uniform(geometry).unwrap_or([0.0, 0.0, 0.0, 1.0]))
+        })
+    }
+
+    /// The value at a place; elements past the end of an array are (0, 0, 0, 1).
+    pub(crate) fn at(&self, p: &Place<'_>) -> [f32; 4] {
+        let get = |v: &[[f32; 4]], i: u32| v.get(i as usize).copied().unwrap_or([0.0, 0.0, 0.0, 1.0]);
+        let mix = |v: &[[f32; 4]], ids: &[[u32; 3]]| {
+            let Some(ids) = ids.get(p.primitive as usize) else { return [0.0, 0.0, 0.0, 1.0] };
+            let mut sum = [0f32; 4];
+            for (id, w) in ids.iter().zip(p.weights).filter(|(_, w)| *w != 0.0) {
+                let value = get(v, *id);
+                (0..4).for_each(|c| sum[c] += w * value[c]);
+            }
+            sum
+        };
+        let vector = |v: DVec3| [v.x as f32, v.y as f32, v.z as f32, 1.0];
+        match self {
+            Source::Uniform(v) => *v,
+            Source::Primitive(v) => get(v, p.topology.number(p.primitive)),
+            Source::Vertex(v) => mix(v, &p.topology.vertices),
+            Source::FaceVarying(v) => mix(v, &p.topology.corners),
+            Source::Position { world: false } => vector(p.point),
+            Source::Position { world: true } => vector(p.world_from_object.transform_point3(p.point)),
+            Source::Normal { world: false } => vector(p.normal),
+            Source::Normal { world: true } => {
+                let m: DMat3 = p.world_from_object.matrix3.inverse().transpose();
+                vector((m * p.normal).normalize_or_zero())
+            }
+        }
+    }
+
+    /// What the renderer has to do to get it right everywhere.
+    pub(crate) fn domain(&self) -> Domain {
+        match self {
+            Source::Uniform(_) => Domain::Constant,
+            Source::Primitive(_) => Domain::Face,
+            Source::Vertex(_) | Source::FaceVarying(_) | Source::Position { .. } => Domain::Linear,
+            Source::Normal { .. } => Domain::Hit,
+        }
+    }
+}
+
+/// On what a value depends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Domain {
+    /// The same everywhere.
+    Constant,
+    /// Constant on each primitive.
+    Face,
+    /// Linear between vertices.
+    Linear,
+    /// A texture at coordinates that are linear between vertices.
+    Texture,
+    /// Anything: to be computed at every hit.
+    Hit,
+}

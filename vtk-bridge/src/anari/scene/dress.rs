@@ -1,0 +1,140 @@
+//! A geometry with its look: the cheapest way of the renderer that shows the material's colour exactly.
+//!
+//! Constant colours go into the material, values per face and per vertex into the appearance, pictures become textures (all three need no
+//! new acceleration structure on meshes, pictures one when they come and go). Everything else is computed at the hits: see [`super::paint`].
+
+use super::attribute::{Domain, Place, Topology};
+use super::geometry::{Body, Part};
+use super::paint::{AlphaMode, Input, Paint, Painted};
+use rt_core::accel::Geometry;
+use rt_core::glam::{DAffine3, DVec3};
+use rt_core::material::{ColorSource, Material};
+use rt_core::mesh::{Attribute, TriMesh};
+use rt_core::scene::Appearance;
+use std::sync::Arc;
+
+/// Ready to be placed.
+#[derive(Clone)]
+pub(crate) struct Dressed {
+    pub(crate) geometry: Geometry,
+    pub(crate) material: Material,
+    /// Its material's index is not set yet.
+    pub(crate) appearance: Appearance,
+    pub(crate) topology: Arc<Topology>,
+}
+
+/// Puts the paint on a part.
+pub(crate) fn dress(part: &Part, model: &Material, paint: &Paint, world_from_object: &DAffine3) -> Dressed {
+    let topology = part.topology.clone();
+    let bare = |material, appearance| Dressed {
+        geometry: part.geometry(),
+        material,
+        appearance,
+        topology: topology.clone(),
+    };
+    let no_place = Place {
+        topology: &topology,
+        primitive: 0,
+        weights: [1.0, 0.0, 0.0],
+        point: DVec3::ZERO,
+        normal: DVec3::Z,
+        world_from_object,
+    };
+    let domain = domain_of(paint);
+    if domain == Domain::Constant {
+        let [r, g, b, a] = paint.at(&no_place);
+        let material = Material { color: [r, g, b], opacity: a, ..model.clone() };
+        return bare(material, Appearance::default());
+    }
+    let Body::Mesh(mesh) = &part.body else { return painted(part, model, paint, world_from_object) };
+    match domain {
+        Domain::Face => {
+            let of = |t: usize| paint.at(&Place { primitive: t as u32, ..no_place });
+            let colors = Attribute::per_face((0..mesh.indices.len()).map(of).collect());
+            bare(model.clone(), Appearance::new(0).with_colors(colors))
+        }
+        Domain::Linear => {
+            let mut colors = vec![[0.0, 0.0, 0.0, 1.0]; mesh.positions.len()];
+            at_vertices(mesh, &no_place, |v, place| colors[v] = paint.at(place));
+            bare(model.clone(), Appearance::new(0).with_colors(Attribute::per_vertex(colors)))
+        }
+        Domain::Texture => {
+            let Input::Sampler(sampler) = &paint.color else {
+                return painted(part, model, paint, world_from_object);
+            };
+            let opacity = paint.opacity.at(&no_place)[0];
+            let Some(texture) = sampler.texture(|texel| paint.finish(texel, || opacity)) else {
+                return painted(part, model, paint, world_from_object);
+            };
+            let mut coordinates = vec![Default::default(); mesh.positions.len()];
+            at_vertices(mesh, &no_place, |v, place| coordinates[v] = sampler.coordinate(place));
+            let mesh = TriMesh { texcoords: Some(coordinates), ..TriMesh::clone(mesh) };
+            let material = Material {
+                color_source: ColorSource::Texture(texture.into()),
+                color: [1.0; 3],
+                ..model.clone()
+            };
+            Dressed {
+                geometry: Geometry::Mesh(mesh.into()),
+                material,
+                appearance: Appearance::default(),
+                topology: topology.clone(),
+            }
+        }
+        _ => painted(part, model, paint, world_from_object),
+    }
+}
+
+fn painted(part: &Part, model: &Material, paint: &Paint, world_from_object: &DAffine3) -> Dressed {
+    let (shape, weights) = part.as_shape();
+    let shape = Painted {
+        shape,
+        weights,
+        topology: part.topology.clone(),
+        paint: paint.clone(),
+        world_from_object: *world_from_object,
+    };
+    Dressed {
+        geometry: Geometry::Shape(Arc::new(shape)),
+        material: model.clone(),
+        appearance: Appearance::default(),
+        topology: part.topology.clone(),
+    }
+}
+
+fn domain_of(paint: &Paint) -> Domain {
+    let of = |input: &Input| match input {
+        Input::Constant(_) => Domain::Constant,
+        Input::Attribute(source) => source.domain(),
+        Input::Sampler(sampler) => sampler.domain(),
+    };
+    let (color, opacity) = (
+        of(&paint.color),
+        if paint.mode == AlphaMode::Opaque { Domain::Constant } else { of(&paint.opacity) },
+    );
+    let steps = matches!(paint.mode, AlphaMode::Mask { .. });
+    match color.max(opacity) {
+        // A threshold between vertices, or a product of two values that both change, is not linear.
+        Domain::Linear | Domain::Texture if steps || color.min(opacity) > Domain::Constant => Domain::Hit,
+        // Textures hold colours, not opacities.
+        Domain::Texture if color != Domain::Texture => Domain::Hit,
+        domain => domain,
+    }
+}
+
+/// Calls `f` for every vertex of the mesh that a triangle uses, with its place.
+fn at_vertices(mesh: &TriMesh, base: &Place<'_>, mut f: impl FnMut(usize, &Place<'_>)) {
+    let mut seen = vec![false; mesh.positions.len()];
+    for (t, triangle) in mesh.indices.iter().enumerate() {
+        for k in 0..3 {
+            let v = triangle[k] as usize;
+            if std::mem::replace(&mut seen[v], true) {
+                continue;
+            }
+            let mut weights = [0.0; 3];
+            weights[k] = 1.0;
+            let point = mesh.origin + mesh.positions[v].as_dvec3();
+            f(v, &Place { primitive: t as u32, weights, point, ..*base });
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! From committed objects to a scene of rt-core: each file turns one kind of object into what the renderer takes.
+
+pub mod attribute;
+mod camera;
+mod dress;
+mod geometry;
+mod light;
+mod material;
+mod paint;
+mod sampler;
+mod view;
+mod volume;
+pub mod world;
+
+pub(crate) use camera::camera_of;
+pub(crate) use view::{Backdrop, View, view_of};
+
+use super::object::Object;
+use super::status::{Code, Message, Severity};
+
+/// Faults found while looking at objects, for the program.
+#[derive(Default)]
+pub(crate) struct Notes(pub(crate) Vec<Message>);
+
+impl Notes {
+    pub(crate) fn add(&mut self, about: &Object, severity: Severity, text: impl std::fmt::Display) {
+        let code = if severity <= Severity::Warning { Code::InvalidArgument } else { Code::Ok };
+        let text = format!("{}: {text}", about.title());
+        self.0.push(Message { source: about.handle, source_type: about.kind, severity, code, text });
+    }
+
+    pub(crate) fn warn(&mut self, about: &Object, text: impl std::fmt::Display) {
+        self.add(about, Severity::Warning, text);
+    }
+
+    pub(crate) fn error(&mut self, about: &Object, text: impl std::fmt::Display) {
+        self.add(about, Severity::Error, text);
+    }
+}

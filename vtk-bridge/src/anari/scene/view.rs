@@ -1,0 +1,100 @@
+//! Renderers: options of a frame, and what is behind the scene.
+
+use super::Notes;
+use crate::anari::object::{Object, Value};
+use rt_core::render::RenderOptions;
+use rt_core::scene::AmbientOcclusion;
+use rt_core::volume::VolumeQuality;
+
+/// How a frame is drawn.
+pub(crate) struct View {
+    pub(crate) options: RenderOptions,
+    /// Radiance from everywhere.
+    pub(crate) ambient: Option<[f32; 3]>,
+    pub(crate) occlusion: Option<AmbientOcclusion>,
+    pub(crate) shadows: bool,
+    pub(crate) backdrop: Backdrop,
+}
+
+/// What fills the pixels behind everything.
+pub(crate) enum Backdrop {
+    /// Linear, not premultiplied.
+    Color([f32; 4]),
+    /// Spread over the frame; rows from the bottom.
+    Picture { size: [usize; 2], texels: Vec<[f32; 4]> },
+}
+
+impl Backdrop {
+    /// At `x`, `y` in 0..1, y upwards; linear between texels.
+    pub(crate) fn at(&self, x: f32, y: f32) -> [f32; 4] {
+        let (size, texels) = match self {
+            Backdrop::Color(c) => return *c,
+            Backdrop::Picture { size, texels } => (size, texels),
+        };
+        let split = |v: f32, n: usize| {
+            let p = (v * n as f32 - 0.5).clamp(0.0, (n - 1) as f32);
+            let low = p as usize;
+            (low, (low + 1).min(n - 1), p - low as f32)
+        };
+        let ((x0, x1, fx), (y0, y1, fy)) = (split(x, size[0]), split(y, size[1]));
+        let t = |x: usize, y: usize| texels[y * size[0] + x];
+        let mix = |a: [f32; 4], b: [f32; 4], f: f32| std::array::from_fn(|c| a[c] + (b[c] - a[c]) * f);
+        mix(mix(t(x0, y0), t(x1, y0), fx), mix(t(x0, y1), t(x1, y1), fx), fy)
+    }
+}
+
+/// The options that `renderer` asks for.
+pub(crate) fn view_of(renderer: &Object, size: [u32; 2], notes: &mut Notes) -> View {
+    let mut options = RenderOptions::new(size[0], size[1]);
+    let mut count = |name: &str, default: u32, least: u32, most: u32| {
+        let Some(v) = renderer.numbers(name).map(|v| v[0]) else { return default };
+        let used = v.clamp(f64::from(least), f64::from(most)) as u32;
+        if f64::from(used) != v {
+            notes.warn(renderer, format!("`{name}` is {v}; it must be {least} to {most}: {used} is used"));
+        }
+        used
+    };
+    options.samples = count("pixelSamples", 1, 1, 1 << 16);
+    options.max_bounces = count("maxDepth", 8, 0, 65535);
+    options.light_rays = count("lightSamples", 4, 1, 4096);
+    let rays = count("ambientSamples", 0, 0, 4096);
+    options.path_tracing = renderer.subtype == "pathtracer";
+    let levels = renderer.f32("volumeTolerance", 0.5);
+    options.volume_quality = VolumeQuality::Tolerance { levels: levels.max(1e-6) };
+
+    let radiance = renderer.f32("ambientRadiance", 0.0);
+    let color = renderer.vector("ambientColor", [1.0; 3]).map(|c| c as f32 * radiance);
+    let usable = color.iter().all(|c| c.is_finite() && *c >= 0.0);
+    if !usable {
+        notes.warn(renderer, format!("the ambient light {color:?} is not finite or negative: there is none"));
+    }
+    let ambient = (usable && color != [0.0; 3]).then_some(color);
+    let distance = f64::from(renderer.f32("ambientOcclusionDistance", f32::INFINITY));
+    let occlusion = if rays == 0 || options.path_tracing {
+        None
+    } else if distance > 0.0 {
+        Some(AmbientOcclusion { distance, rays })
+    } else {
+        notes.warn(
+            renderer,
+            format!(
+                "`ambientOcclusionDistance` is {distance}; it must be positive: ambient light is not dimmed"
+            ),
+        );
+        None
+    };
+
+    let backdrop = match renderer.parameters().get("background") {
+        Some(Value::Bytes(t, b)) => Backdrop::Color(t.attribute(b)),
+        Some(Value::Object(a)) => {
+            let picture =
+                a.with_array(|a| ([a.dims[0], a.dims[1]], a.attributes())).filter(|(_, t)| !t.is_empty());
+            picture.map_or(Backdrop::Color([0.0, 0.0, 0.0, 1.0]), |(size, texels)| Backdrop::Picture {
+                size,
+                texels,
+            })
+        }
+        _ => Backdrop::Color([0.0, 0.0, 0.0, 1.0]),
+    };
+    View { options, ambient, occlusion, shadows: renderer.bool("shadows", true), backdrop }
+}
