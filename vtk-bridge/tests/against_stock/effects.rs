@@ -6,9 +6,12 @@ use crate::session::{Program, Run, With, output};
 use std::collections::BTreeMap;
 use std::sync::{Mutex, OnceLock};
 
+/// Room and ball, or why there are none.
+type Pictures = Result<[Capture; 2], String>;
+
 /// The pictures of `scripts/effects` with some variables set; each combination is drawn once.
 fn pictures(with: With, name: &'static str, settings: &[(&str, &str)]) -> Option<[Capture; 2]> {
-    static MADE: OnceLock<Mutex<BTreeMap<&str, Result<[Capture; 2], String>>>> = OnceLock::new();
+    static MADE: OnceLock<Mutex<BTreeMap<&str, Pictures>>> = OnceLock::new();
     let made = MADE.get_or_init(Mutex::default);
     let mut made = made.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     let result = made.entry(name).or_insert_with(|| {

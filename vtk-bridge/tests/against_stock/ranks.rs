@@ -105,10 +105,12 @@ fn one_rank_with_the_bridge_is_as_stock() {
     };
     for name in ["opaque", "translucent", "mixed", "annotated"] {
         let [a, b] = [&stock, &ours].map(|f| Capture::read(f, name).unwrap());
-        let (strange, pixels) = (strangers(&a, &b), a.width * a.height);
+        // Peeled layers of translucent surfaces are bytes in OpenGL.
+        let strange = strangers(&a, &b, if name == "opaque" { 1 } else { 3 });
+        let (mean, pixels) = (difference(&a, &b), a.width * a.height);
         assert!(
-            strange * 1000 <= pixels,
-            "{name}: {strange} of {pixels} pixels are not as in stock ParaView"
+            strange * 5000 <= pixels && mean <= 0.5,
+            "{name}: {strange} of {pixels} pixels are not as in stock ParaView, mean difference {mean}"
         );
     }
 }
