@@ -27,17 +27,46 @@ fn class(name: &str) -> u32 {
         return 0xff;
     }
     if starts(&["glGet", "glIs", "glGen", "glAreTextures", "glFence", "glObjectLabel", "glPushAttrib"])
-        || starts(&["glHint", "glPixelStore", "glDebug", "glPushDebug", "glPopDebug", "glRasterPos", "glWindowPos"])
-        || starts(&["glInitNames", "glPushName", "glPopName", "glLoadName", "glSelectBuffer", "glFeedbackBuffer"])
-        || starts(&["glClearColor", "glClearDepth", "glClearStencil", "glBitmap", "glLineWidth", "glLineStipple"])
+        || starts(&[
+            "glHint",
+            "glPixelStore",
+            "glDebug",
+            "glPushDebug",
+            "glPopDebug",
+            "glRasterPos",
+            "glWindowPos",
+        ])
+        || starts(&[
+            "glInitNames",
+            "glPushName",
+            "glPopName",
+            "glLoadName",
+            "glSelectBuffer",
+            "glFeedbackBuffer",
+        ])
+        || starts(&[
+            "glClearColor",
+            "glClearDepth",
+            "glClearStencil",
+            "glBitmap",
+            "glLineWidth",
+            "glLineStipple",
+        ])
         || starts(&["glPointSize", "glPixelZoom", "glPixelTransfer", "glPixelMap", "glFlush", "glFinish"])
     {
         return PURE;
     }
     if any(&["glMatrixMode", "glOrtho", "glFrustum"])
-        || starts(&["glLoadMatrix", "glMultMatrix", "glLoadIdentity", "glPushMatrix", "glPopMatrix", "glRotate"])
+        || starts(&[
+            "glLoadMatrix",
+            "glMultMatrix",
+            "glLoadIdentity",
+            "glPushMatrix",
+            "glPopMatrix",
+            "glRotate",
+        ])
         || starts(&["glTranslate", "glScale", "glLoadTranspose", "glMultTranspose"])
-        && !name.starts_with("glScissor")
+            && !name.starts_with("glScissor")
     {
         return 1;
     }
@@ -48,23 +77,61 @@ fn class(name: &str) -> u32 {
     if starts(&["glBindTexture", "glActiveTexture", "glClientActiveTexture", "glTexEnv", "glTexGen"]) {
         return 2;
     }
-    if starts(&["glTexParameter", "glTexEnv", "glTexGen", "glTexImage", "glTexSubImage", "glCopyTex", "glBindTexture"])
-        || starts(&["glActiveTexture", "glDeleteTextures", "glCompressedTex", "glTexStorage", "glGenerateMipmap"])
-        || starts(&["glTexBuffer", "glBindSampler", "glSamplerParameter", "glPrioritizeTextures", "glClientActiveTexture"])
-    {
+    if starts(&[
+        "glTexParameter",
+        "glTexEnv",
+        "glTexGen",
+        "glTexImage",
+        "glTexSubImage",
+        "glCopyTex",
+        "glBindTexture",
+    ]) || starts(&[
+        "glActiveTexture",
+        "glDeleteTextures",
+        "glCompressedTex",
+        "glTexStorage",
+        "glGenerateMipmap",
+    ]) || starts(&[
+        "glTexBuffer",
+        "glBindSampler",
+        "glSamplerParameter",
+        "glPrioritizeTextures",
+        "glClientActiveTexture",
+    ]) {
         return 8;
     }
-    if starts(&["glBufferData", "glBufferSubData", "glMapBuffer", "glUnmapBuffer", "glFlushMapped", "glCopyBuffer"])
-        || starts(&["glNamedBuffer", "glClearBufferData", "glClearBufferSubData", "glDeleteBuffers", "glBufferStorage"])
-        || starts(&["glMapNamed", "glUnmapNamed", "glEndTransformFeedback", "glDispatchCompute", "glInvalidateBuffer"])
-    {
+    if starts(&[
+        "glBufferData",
+        "glBufferSubData",
+        "glMapBuffer",
+        "glUnmapBuffer",
+        "glFlushMapped",
+        "glCopyBuffer",
+    ]) || starts(&[
+        "glNamedBuffer",
+        "glClearBufferData",
+        "glClearBufferSubData",
+        "glDeleteBuffers",
+        "glBufferStorage",
+    ]) || starts(&[
+        "glMapNamed",
+        "glUnmapNamed",
+        "glEndTransformFeedback",
+        "glDispatchCompute",
+        "glInvalidateBuffer",
+    ]) {
         return 32;
     }
     if starts(&["glUniform", "glProgramUniform", "glBindAttribLocation", "glBindFragDataLocation"]) {
         return 64;
     }
-    if starts(&["glVertexPointer", "glNormalPointer", "glColorPointer", "glTexCoordPointer", "glVertexAttrib"])
-        || starts(&["glBindBuffer", "glEnableVertexAttrib", "glDisableVertexAttrib", "glEnableClientState"])
+    if starts(&[
+        "glVertexPointer",
+        "glNormalPointer",
+        "glColorPointer",
+        "glTexCoordPointer",
+        "glVertexAttrib",
+    ]) || starts(&["glBindBuffer", "glEnableVertexAttrib", "glDisableVertexAttrib", "glEnableClientState"])
         || starts(&["glDisableClientState", "glBindVertexArray", "glInterleavedArrays", "glEdgeFlagPointer"])
         || starts(&["glIndexPointer", "glFogCoordPointer", "glSecondaryColorPointer", "glDeleteVertexArrays"])
         || starts(&["glBindVertexBuffer", "glLockArrays", "glUnlockArrays"])
@@ -77,25 +144,74 @@ fn class(name: &str) -> u32 {
 /// Calls before which what was traced has to be in the framebuffer.
 fn flushes(name: &str) -> bool {
     const NAMES: &[&str] = &[
-        "glXSwapBuffers", "glXCopyContext", "glXWaitGL", "glXSwapBuffersMscOML", "eglSwapBuffers",
-        "eglSwapBuffersWithDamageKHR", "eglSwapBuffersWithDamageEXT", "eglCopyBuffers", "eglWaitGL",
-        "eglWaitClient", "glReadPixels", "glReadnPixels", "glReadnPixelsARB", "glCopyPixels", "glCopyTexImage1D", "glCopyTexImage2D",
-        "glCopyTexSubImage1D", "glCopyTexSubImage2D", "glCopyTexSubImage3D", "glBlitFramebuffer", "glBlitNamedFramebuffer",
-        "glBlitFramebufferEXT", "glBindFramebuffer", "glBindFramebufferEXT", "glFramebufferTexture2D", "glFramebufferTexture2DEXT",
-        "glFramebufferTexture", "glFramebufferRenderbuffer", "glFramebufferRenderbufferEXT", "glDeleteFramebuffers",
-        "glDeleteFramebuffersEXT", "glAccum", "glDrawPixels", "glDrawBuffer", "glDrawBuffers", "glDrawBuffersARB",
-        "glBeginQuery", "glEndQuery", "glBeginQueryARB", "glEndQueryARB", "glRenderMode", "glFlush", "glFinish",
-        "glClearBufferfv", "glClearBufferiv", "glClearBufferuiv", "glClearBufferfi", "glGetTexImage", "glXBindTexImageEXT",
-        "glEvalMesh1", "glEvalMesh2", "glBitmap", "glXMakeAssociatedContextCurrentAMD", "glCopyImageSubData",
-        "glBeginConditionalRender", "glEndConditionalRender", "glDeleteTextures", "glDeleteRenderbuffers",
+        "glXSwapBuffers",
+        "glXCopyContext",
+        "glXWaitGL",
+        "glXSwapBuffersMscOML",
+        "eglSwapBuffers",
+        "eglSwapBuffersWithDamageKHR",
+        "eglSwapBuffersWithDamageEXT",
+        "eglCopyBuffers",
+        "eglWaitGL",
+        "eglWaitClient",
+        "glReadPixels",
+        "glReadnPixels",
+        "glReadnPixelsARB",
+        "glCopyPixels",
+        "glCopyTexImage1D",
+        "glCopyTexImage2D",
+        "glCopyTexSubImage1D",
+        "glCopyTexSubImage2D",
+        "glCopyTexSubImage3D",
+        "glBlitFramebuffer",
+        "glBlitNamedFramebuffer",
+        "glBlitFramebufferEXT",
+        "glBindFramebuffer",
+        "glBindFramebufferEXT",
+        "glFramebufferTexture2D",
+        "glFramebufferTexture2DEXT",
+        "glFramebufferTexture",
+        "glFramebufferRenderbuffer",
+        "glFramebufferRenderbufferEXT",
+        "glDeleteFramebuffers",
+        "glDeleteFramebuffersEXT",
+        "glAccum",
+        "glDrawPixels",
+        "glDrawBuffer",
+        "glDrawBuffers",
+        "glDrawBuffersARB",
+        "glBeginQuery",
+        "glEndQuery",
+        "glBeginQueryARB",
+        "glEndQueryARB",
+        "glRenderMode",
+        "glFlush",
+        "glFinish",
+        "glClearBufferfv",
+        "glClearBufferiv",
+        "glClearBufferuiv",
+        "glClearBufferfi",
+        "glGetTexImage",
+        "glXBindTexImageEXT",
+        "glEvalMesh1",
+        "glEvalMesh2",
+        "glBitmap",
+        "glXMakeAssociatedContextCurrentAMD",
+        "glCopyImageSubData",
+        "glBeginConditionalRender",
+        "glEndConditionalRender",
+        "glDeleteTextures",
+        "glDeleteRenderbuffers",
     ];
     NAMES.contains(&name) || is_other_draw(name)
 }
 
 /// Draws that we do not take apart: the driver draws them over what was traced before.
 fn is_other_draw(name: &str) -> bool {
-    name.starts_with("glMultiDraw") || name.contains("Indirect") && name.starts_with("glDraw")
-        || name.starts_with("glDrawTransformFeedback") || name.starts_with("glDrawTex")
+    name.starts_with("glMultiDraw")
+        || name.contains("Indirect") && name.starts_with("glDraw")
+        || name.starts_with("glDrawTransformFeedback")
+        || name.starts_with("glDrawTex")
         || (name.starts_with("glDraw") && name.contains("Instanced"))
         || name.starts_with("glDrawMesh")
 }
@@ -120,7 +236,14 @@ fn hot_calls() -> Vec<Hot> {
         let most = (1_u64 << bits) - 1;
         move |e: &str| format!("(({e}) as f32) / {most}_f32")
     };
-    let mut add = |family: &str, method: &str, counts: &[usize], letter: &str, c_type: &'static str, conv: &dyn Fn(&str) -> String, fill: [&str; 4], size: usize| {
+    let mut add = |family: &str,
+                   method: &str,
+                   counts: &[usize],
+                   letter: &str,
+                   c_type: &'static str,
+                   conv: &dyn Fn(&str) -> String,
+                   fill: [&str; 4],
+                   size: usize| {
         for &count in counts {
             for pointer in [false, true] {
                 let name = format!("gl{family}{count}{letter}{}", if pointer { "v" } else { "" });
@@ -164,7 +287,8 @@ fn hand_written() -> Vec<String> {
         let l = l.strip_prefix("pub(in crate::symbols) unsafe extern \"C\" ").unwrap_or(l);
         l.strip_prefix("fn ")?.split('(').next()
     });
-    let addresses = text.lines().filter_map(|l| l.strip_prefix("get_proc_address! {")).flat_map(str::split_whitespace);
+    let addresses =
+        text.lines().filter_map(|l| l.strip_prefix("get_proc_address! {")).flat_map(str::split_whitespace);
     functions.chain(addresses).filter(named).map(str::to_owned).collect()
 }
 
@@ -178,7 +302,10 @@ fn main() {
     println!("cargo:rustc-cdylib-link-arg=-Wl,-z,nodelete");
     let text = std::fs::read_to_string("src/symbols/names.txt").expect("src/symbols/names.txt can be read");
     let names: Vec<&str> = text.split_whitespace().collect();
-    assert!(names.windows(2).all(|w| w[0] < w[1]), "names.txt must be sorted, each name once: `LC_ALL=C sort -u`");
+    assert!(
+        names.windows(2).all(|w| w[0] < w[1]),
+        "names.txt must be sorted, each name once: `LC_ALL=C sort -u`"
+    );
     let hot = hot_calls();
     let by_hand = hand_written();
     let hooked = |n: &str| by_hand.iter().any(|h| h == n) || hot.iter().any(|h| h.name == n);
@@ -193,11 +320,15 @@ fn main() {
     writeln!(s, "];\nstatic CLASSES: [u8; COUNT] = [").unwrap();
     names.iter().for_each(|x| write!(s, "{},", class(x)).unwrap());
     writeln!(s, "];\nstatic FLUSHES: [u8; COUNT] = [").unwrap();
-    names.iter().for_each(|x| write!(s, "{},", u8::from(flushes(x)) + 2 * u8::from(is_other_draw(x))).unwrap());
+    names
+        .iter()
+        .for_each(|x| write!(s, "{},", u8::from(flushes(x)) + 2 * u8::from(is_other_draw(x))).unwrap());
     writeln!(s, "];\nstatic HOOKS: [Option<Target>; COUNT] = [").unwrap();
     for x in &names {
         match hooked(x) {
-            true if by_hand.iter().any(|h| h == x) => writeln!(s, "Some(Target(hooks::{x} as *const ())),").unwrap(),
+            true if by_hand.iter().any(|h| h == x) => {
+                writeln!(s, "Some(Target(hooks::{x} as *const ())),").unwrap()
+            }
             true => writeln!(s, "Some(Target(hot_hooks::{x} as *const ())),").unwrap(),
             false => write!(s, "None,").unwrap(),
         }
@@ -213,7 +344,9 @@ fn main() {
         };
         let at = 8 * i;
         let code = match kind {
-            Kind::Direct => format!("\"mov r11d, {i}\", \"jmp qword ptr [rip + {{t}} + {at}]\", t = sym TABLE"),
+            Kind::Direct => {
+                format!("\"mov r11d, {i}\", \"jmp qword ptr [rip + {{t}} + {at}]\", t = sym TABLE")
+            }
             Kind::Watched => format!(
                 "\"cmp dword ptr [rip + {{a}}], 0\", \"jne 2f\", \"inc qword ptr [rip + {{c}}]\", \"mov r11d, {i}\", \"jmp qword ptr [rip + {{t}} + {at}]\", \"2:\", \"mov r11d, {i}\", \"jmp {{s}}\", a = sym ATTENTION, c = sym CALLS, t = sym TABLE, s = sym slow"
             ),
@@ -227,11 +360,18 @@ fn main() {
             (format!("p: *const {}", h.c_type), "p".to_owned(), format!("*const {}", h.c_type))
         } else {
             let each = |f: &dyn Fn(usize) -> String| (0..h.count).map(f).collect::<Vec<_>>().join(", ");
-            (each(&|i| format!("a{i}: {}", h.c_type)), each(&|i| format!("a{i}")), each(&|_| h.c_type.to_owned()))
+            (
+                each(&|i| format!("a{i}: {}", h.c_type)),
+                each(&|i| format!("a{i}")),
+                each(&|_| h.c_type.to_owned()),
+            )
         };
         let index = names.binary_search(&h.name.as_str()).expect("checked above");
         let read = if h.pointer {
-            format!("// SAFETY: the program gives {} values, as OpenGL asks.\n let v = unsafe {{ *p.cast::<[{}; {}]>() }};", h.count, h.c_type, h.count)
+            format!(
+                "// SAFETY: the program gives {} values, as OpenGL asks.\n let v = unsafe {{ *p.cast::<[{}; {}]>() }};",
+                h.count, h.c_type, h.count
+            )
         } else {
             String::new()
         };

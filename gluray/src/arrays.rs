@@ -87,7 +87,15 @@ pub(crate) struct Arrays {
     pub(crate) tex: Option<Source>,
 }
 
-fn source(size: usize, kind: u32, stride: u32, pointer: u32, buffer: u32, normalized: bool, buffers: bool) -> Source {
+fn source(
+    size: usize,
+    kind: u32,
+    stride: u32,
+    pointer: u32,
+    buffer: u32,
+    normalized: bool,
+    buffers: bool,
+) -> Source {
     Source {
         size,
         kind: gl::word(kind),
@@ -134,7 +142,15 @@ impl Arrays {
                 if components == BGRA {
                     return Err("colours in the order BGRA");
                 }
-                let s = source(components as usize, COLOR_ARRAY_TYPE, COLOR_ARRAY_STRIDE, COLOR_ARRAY_POINTER, b, true, buffers);
+                let s = source(
+                    components as usize,
+                    COLOR_ARRAY_TYPE,
+                    COLOR_ARRAY_STRIDE,
+                    COLOR_ARRAY_POINTER,
+                    b,
+                    true,
+                    buffers,
+                );
                 Some(s)
             }
             false => None,
@@ -145,7 +161,8 @@ impl Arrays {
         }
         let tex = gl::is_enabled(TEXTURE_COORD_ARRAY).then(|| {
             let (s, b) = (size(TEXTURE_COORD_ARRAY_SIZE), TEXTURE_COORD_ARRAY_BUFFER_BINDING);
-            let (k, t, p) = (TEXTURE_COORD_ARRAY_TYPE, TEXTURE_COORD_ARRAY_STRIDE, TEXTURE_COORD_ARRAY_POINTER);
+            let (k, t, p) =
+                (TEXTURE_COORD_ARRAY_TYPE, TEXTURE_COORD_ARRAY_STRIDE, TEXTURE_COORD_ARRAY_POINTER);
             source(s, k, t, p, b, false, buffers)
         });
         Ok(Arrays { position, normal, color, tex })
@@ -185,7 +202,8 @@ impl Elements {
             [a, b, c, d] => u32::from_ne_bytes([a, b, c, d]),
             _ => 0,
         };
-        let indices: Vec<u32> = bytes.chunks_exact(width).map(|b| decode(b).wrapping_add_signed(base)).collect();
+        let indices: Vec<u32> =
+            bytes.chunks_exact(width).map(|b| decode(b).wrapping_add_signed(base)).collect();
         let (Some(&least), Some(&most)) = (indices.iter().min(), indices.iter().max()) else {
             return Ok(Elements::Indexed { indices, least: 0, count: 0 });
         };
@@ -209,7 +227,9 @@ impl Elements {
     pub(crate) fn triangles(&self, mode: u32, first_provokes: bool, flat: bool) -> Vec<[u32; 3]> {
         let mut out = Vec::new();
         match self {
-            Elements::Range { count, .. } => triangulate(mode, 0, *count as u32, first_provokes, flat, &mut out),
+            Elements::Range { count, .. } => {
+                triangulate(mode, 0, *count as u32, first_provokes, flat, &mut out)
+            }
             Elements::Indexed { indices, least, .. } => {
                 triangulate(mode, 0, indices.len() as u32, first_provokes, flat, &mut out);
                 let vertex = |i: u32| indices[i as usize] - *least as u32;
@@ -223,7 +243,9 @@ impl Elements {
     fn order(&self) -> Box<dyn Iterator<Item = usize> + '_> {
         match self {
             Elements::Range { count, .. } => Box::new(0..*count),
-            Elements::Indexed { indices, least, .. } => Box::new(indices.iter().map(move |i| *i as usize - least)),
+            Elements::Indexed { indices, least, .. } => {
+                Box::new(indices.iter().map(move |i| *i as usize - least))
+            }
         }
     }
 }
@@ -257,7 +279,8 @@ impl Context {
 
     pub(crate) fn draw_elements(&mut self, mode: u32, count: i32, kind: u32, at: usize, base: i32) -> bool {
         let buffer = gl::word(ELEMENT_ARRAY_BUFFER_BINDING) as usize;
-        let call = DrawCall { first: (buffer << 32) | base as u32 as usize, count: count.max(0) as usize, kind, at };
+        let call =
+            DrawCall { first: (buffer << 32) | base as u32 as usize, count: count.max(0) as usize, kind, at };
         self.array_draw(mode, call, || Elements::indexed(count, kind, at, base))
     }
 
@@ -314,7 +337,10 @@ impl Context {
         let (normal, color, tex) = (read(&arrays.normal)?, read(&arrays.color)?, read(&arrays.tex)?);
         if let Verdict::TraceIfOpaque(why) = verdict {
             let by_color = !self.state.lighting
-                || self.state.color_material.is_some_and(|(_, what)| matches!(what, DIFFUSE | AMBIENT_AND_DIFFUSE));
+                || self
+                    .state
+                    .color_material
+                    .is_some_and(|(_, what)| matches!(what, DIFFUSE | AMBIENT_AND_DIFFUSE));
             let opaque = match &color {
                 Some(p) if by_color => (0..count).all(|i| p.at::<4>(i, [1.0; 4])[3] == 1.0),
                 _ => self.is_opaque_now(),
@@ -356,7 +382,8 @@ impl Context {
             Shading::Fixed => crate::lighting::product(&self.state.projection, &self.state.model_view),
             Shading::Program(p) => p.clip_from_object,
         };
-        let draw = Draw { geometry, attributes, state: self.state.clone(), shading, clip_from_object, calls: 1 };
+        let draw =
+            Draw { geometry, attributes, state: self.state.clone(), shading, clip_from_object, calls: 1 };
         self.add(draw, in_order);
     }
 
@@ -367,7 +394,11 @@ impl Context {
     }
 
     /// While a list is compiled the arrays are read at once, as OpenGL says, and become steps of it.
-    fn array_into_list(&mut self, mode: u32, elements: impl FnOnce() -> Result<Elements, &'static str>) -> bool {
+    fn array_into_list(
+        &mut self,
+        mode: u32,
+        elements: impl FnOnce() -> Result<Elements, &'static str>,
+    ) -> bool {
         if !is_filled(mode) {
             if let Some(r) = &mut self.recording {
                 r.note_driver_call(false, true);

@@ -28,7 +28,13 @@ fn vectors(p: &[[f32; 3]]) -> Vec<Vec3> {
 
 impl Geometry {
     fn new(key: u128, mesh: TriMesh) -> Geometry {
-        Geometry { mesh: Arc::new(mesh), key, world: Mutex::new(None), best: OnceLock::new(), bounds: OnceLock::new() }
+        Geometry {
+            mesh: Arc::new(mesh),
+            key,
+            world: Mutex::new(None),
+            best: OnceLock::new(),
+            bounds: OnceLock::new(),
+        }
     }
 
     /// Bounds of the finite positions.
@@ -77,7 +83,9 @@ impl Geometry {
 
 fn build(mesh: &Arc<TriMesh>, quality: BuildQuality) -> Option<Arc<World>> {
     let start = std::time::Instant::now();
-    let world = World::from_mesh(mesh.clone(), &BuildOptions { quality, ..BuildOptions::default() }).ok().map(Arc::new);
+    let world = World::from_mesh(mesh.clone(), &BuildOptions { quality, ..BuildOptions::default() })
+        .ok()
+        .map(Arc::new);
     let phase = if matches!(quality, BuildQuality::Fast) { "fast build" } else { "best build" };
     crate::report::span("builds", phase, 0, start.elapsed());
     world
@@ -110,7 +118,12 @@ const WORTH_IMPROVING: usize = 20_000;
 
 impl Cache {
     /// The geometry of primitives in a row.
-    pub(crate) fn of_runs(&mut self, positions: &[[f32; 3]], runs: &[Run], [first_provokes, flat]: [bool; 2]) -> Arc<Geometry> {
+    pub(crate) fn of_runs(
+        &mut self,
+        positions: &[[f32; 3]],
+        runs: &[Run],
+        [first_provokes, flat]: [bool; 2],
+    ) -> Arc<Geometry> {
         let mut key = hash(&[bytes_of(positions)]);
         for r in runs {
             key = mix(key, u64::from(r.mode) << 32 | u64::from(r.count));
@@ -145,7 +158,8 @@ impl Cache {
         }
         self.misses += 1;
         let geometry = Arc::new(Geometry::new(key, make()));
-        self.entries.insert(key, Entry { geometry: geometry.clone(), last_used: frame, frames: 1, improving: false });
+        self.entries
+            .insert(key, Entry { geometry: geometry.clone(), last_used: frame, frames: 1, improving: false });
         geometry
     }
 
@@ -218,7 +232,8 @@ fn mix2(h: u128, v: u128) -> u128 {
 
 /// Four lanes, so that multiplications overlap.
 fn hash_chunk(bytes: &[u8]) -> u128 {
-    let mut lanes = [0x243f_6a88_85a3_08d3_u64, 0x1319_8a2e_0370_7344, 0xa409_3822_299f_31d0, 0x082e_fa98_ec4e_6c89];
+    let mut lanes =
+        [0x243f_6a88_85a3_08d3_u64, 0x1319_8a2e_0370_7344, 0xa409_3822_299f_31d0, 0x082e_fa98_ec4e_6c89];
     let mut blocks = bytes.chunks_exact(32);
     for block in &mut blocks {
         for (lane, w) in lanes.iter_mut().zip(block.chunks_exact(8)) {

@@ -50,7 +50,9 @@ pub(crate) fn component(b: &[u8], kind: u32, normalized: bool) -> f32 {
         (SHORT, &[a, b]) => signed(f64::from(i16::from_ne_bytes([a, b])), 32767.0),
         (UNSIGNED_SHORT, &[a, b]) => unsigned(f64::from(u16::from_ne_bytes([a, b])), 65535.0),
         (INT, &[a, b, c, d]) => signed(f64::from(i32::from_ne_bytes([a, b, c, d])), 2_147_483_647.0),
-        (UNSIGNED_INT, &[a, b, c, d]) => unsigned(f64::from(u32::from_ne_bytes([a, b, c, d])), 4_294_967_295.0),
+        (UNSIGNED_INT, &[a, b, c, d]) => {
+            unsigned(f64::from(u32::from_ne_bytes([a, b, c, d])), 4_294_967_295.0)
+        }
         _ => 0.0,
     }
 }

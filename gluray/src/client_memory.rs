@@ -21,7 +21,9 @@ pub(crate) fn view<'a>(address: usize, length: usize) -> &'a [u8] {
 /// `N` floats behind a parameter pointer; zeros behind null.
 pub(crate) fn floats<const N: usize>(address: usize) -> [f32; N] {
     let v = view(address, 4 * N);
-    std::array::from_fn(|i| v.get(4 * i..4 * i + 4).map_or(0.0, |b| f32::from_ne_bytes([b[0], b[1], b[2], b[3]])))
+    std::array::from_fn(|i| {
+        v.get(4 * i..4 * i + 4).map_or(0.0, |b| f32::from_ne_bytes([b[0], b[1], b[2], b[3]]))
+    })
 }
 
 /// `N` integers behind a parameter pointer; zeros behind null.

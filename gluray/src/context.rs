@@ -3,8 +3,8 @@
 //! A context is owned by the thread it is current on (in [`CURRENT`]) or, while it is current nowhere, by the register. So no call needs a
 //! lock, and a context that is destroyed in flight lives on until its thread leaves it, as OpenGL says.
 
-use crate::capture::Recorder;
 use crate::cache::Cache;
+use crate::capture::Recorder;
 use crate::config::Config;
 use crate::decide::{self, Verdict};
 use crate::enums::*;
@@ -131,7 +131,9 @@ pub(crate) fn stay() {
 /// `handle` is current on this thread now (0: none).
 pub(crate) fn enter(handle: usize) {
     // Some programs leave their context in exit handlers, when the thread's storage is gone already.
-    let Ok(before) = CURRENT.try_with(|slot| slot.try_borrow_mut().ok().and_then(|mut s| s.take())) else { return };
+    let Ok(before) = CURRENT.try_with(|slot| slot.try_borrow_mut().ok().and_then(|mut s| s.take())) else {
+        return;
+    };
     symbols::set_hot(None);
     if let Some(old) = before {
         THREADS.fetch_sub(1, Relaxed);
@@ -282,7 +284,8 @@ impl Context {
             r.note_driver_call(flushes, draws);
         }
         if flushes {
-            let invisible = front_only().contains(&index) && self.can.double_buffered && !self.draws_to_front();
+            let invisible =
+                front_only().contains(&index) && self.can.double_buffered && !self.draws_to_front();
             if !invisible && self.recording.is_none() {
                 self.flush(symbols::NAMES[index].to_str().unwrap_or("a call"));
             }

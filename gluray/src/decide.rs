@@ -157,10 +157,15 @@ mod tests {
     fn blending_of_opaque_surfaces_is_no_reason_to_pass_them() {
         let s = Snapshot { blend: true, blend_is_over: true, ..surface() };
         assert_eq!(filled(&s, Trace::Surfaces), Verdict::TraceIfOpaque("blending"));
-        let textured = Snapshot { texture: Some(crate::state::snapshot::TextureUnit::default()), ..s.clone() };
+        let textured =
+            Snapshot { texture: Some(crate::state::snapshot::TextureUnit::default()), ..s.clone() };
         assert_eq!(filled(&textured, Trace::Surfaces), Verdict::Pass("blending"));
         let tested = Snapshot { alpha_test: true, ..s };
-        assert_eq!(filled(&tested, Trace::Surfaces), Verdict::Pass("blending"), "the test may discard alpha 1");
+        assert_eq!(
+            filled(&tested, Trace::Surfaces),
+            Verdict::Pass("blending"),
+            "the test may discard alpha 1"
+        );
     }
 
     #[test]

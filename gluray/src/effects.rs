@@ -75,7 +75,8 @@ impl<'a> Surroundings<'a> {
         for p in draws {
             let (m, b) = (eye_from_object(p), p.draw.geometry.bounds());
             for corner in 0..8 {
-                let pick = |bit: i32, k: usize| f64::from(if corner & bit == 0 { b.min[k] } else { b.max[k] });
+                let pick =
+                    |bit: i32, k: usize| f64::from(if corner & bit == 0 { b.min[k] } else { b.max[k] });
                 let c = m.transform_point3(DVec3::new(pick(1, 0), pick(2, 1), pick(4, 2)));
                 (lo, hi) = (lo.min(c), hi.max(c));
             }
@@ -193,7 +194,8 @@ mod tests {
 
     #[test]
     fn numbers_of_a_pixel_are_the_same_in_every_frame_and_fill_the_disk() {
-        let points: Vec<_> = (0..256).map(|_| 0).scan(Random::new((3, 7)), |r, _| Some(r.on_disk())).collect();
+        let points: Vec<_> =
+            (0..256).map(|_| 0).scan(Random::new((3, 7)), |r, _| Some(r.on_disk())).collect();
         let again: Vec<_> = (0..256).map(|_| 0).scan(Random::new((3, 7)), |r, _| Some(r.on_disk())).collect();
         assert_eq!(points, again);
         assert!(points.iter().all(|(x, y)| x * x + y * y <= 1.0));

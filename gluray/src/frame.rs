@@ -39,7 +39,8 @@ impl Context {
         }
         let start = Instant::now();
         let kind = [self.state.first_vertex_provokes, self.state.flat];
-        let (positions, runs) = (std::mem::take(&mut self.recorder.positions), std::mem::take(&mut self.recorder.runs));
+        let (positions, runs) =
+            (std::mem::take(&mut self.recorder.positions), std::mem::take(&mut self.recorder.runs));
         let geometry = self.cache.of_runs(&positions, &runs, kind);
         let attributes = Arc::new(self.recorder.take_attributes());
         let clip_from_object = product(&self.state.projection, &self.state.model_view);
@@ -49,9 +50,15 @@ impl Context {
         self.recorder.positions.clear();
         self.recorder.runs.clear();
         let state = self.state.clone();
-        let in_order = matches!(crate::decide::filled(&state, self.config.trace()), crate::decide::Verdict::TraceInOrder);
+        let in_order = matches!(
+            crate::decide::filled(&state, self.config.trace()),
+            crate::decide::Verdict::TraceInOrder
+        );
         self.counters.spent("capture", start.elapsed());
-        self.add(Draw { geometry, attributes, state, shading: Shading::Fixed, clip_from_object, calls }, in_order);
+        self.add(
+            Draw { geometry, attributes, state, shading: Shading::Fixed, clip_from_object, calls },
+            in_order,
+        );
     }
 
     /// Takes a draw into the frame, or traces it at once when its order matters.
@@ -87,7 +94,8 @@ impl Context {
         // Lit where the program lit it: normals cannot be found again from a singular matrix, colours are lit beforehand.
         let setup = crate::lighting::Setup::new(&draw.state);
         let object = &draw.geometry.mesh.positions;
-        let colors = (0..object.len()).map(|i| setup.vertex(&draw.attributes, i, object[i].to_array()).primary[0]);
+        let colors =
+            (0..object.len()).map(|i| setup.vertex(&draw.attributes, i, object[i].to_array()).primary[0]);
         let colors = crate::capture::Values::PerVertex(colors.collect());
         Arc::make_mut(&mut draw.attributes).colors = colors;
         let mut state = (*draw.state).clone();
@@ -113,8 +121,10 @@ impl Context {
         let mut builds = 0;
         let settings = &self.config.settings;
         let (layer, extra, rays) = worker::on_pool(|| {
-            let ready: Vec<Prepared<'_>> =
-                pending.iter().filter_map(|(d, image)| Prepared::new(d, image.clone(), &mut builds)).collect();
+            let ready: Vec<Prepared<'_>> = pending
+                .iter()
+                .filter_map(|(d, image)| Prepared::new(d, image.clone(), &mut builds))
+                .collect();
             let (layer, extra) = trace::nearest(&ready, settings);
             (layer, extra, ready.iter().map(|p| p.rays.load(Relaxed)).sum::<u64>())
         });
@@ -156,7 +166,8 @@ impl Context {
     pub(crate) fn frame_done(&mut self) {
         self.counters.report.frames += 1;
         self.frame.traced = false;
-        (self.counters.report.cache_hits, self.counters.report.cache_misses) = (self.cache.hits, self.cache.misses);
+        (self.counters.report.cache_hits, self.counters.report.cache_misses) =
+            (self.cache.hits, self.cache.misses);
         let fast = self.config.settings.quality == crate::config::Quality::Fast;
         self.cache.frame_done(|g| {
             if !fast {

@@ -78,7 +78,8 @@ impl<'a> Setup<'a> {
             .map(|light| {
                 let p = light.position;
                 let directional = p[3] == 0.0;
-                let at = if directional { [p[0], p[1], p[2]] } else { [p[0] / p[3], p[1] / p[3], p[2] / p[3]] };
+                let at =
+                    if directional { [p[0], p[1], p[2]] } else { [p[0] / p[3], p[1] / p[3], p[2] / p[3]] };
                 let to_light = if directional { normalized(at) } else { at };
                 let half = normalized(add(to_light, [0.0, 0.0, 1.0]));
                 let spot = (light.spot_cutoff_deg != 180.0)
@@ -162,7 +163,8 @@ impl<'a> Setup<'a> {
     fn side(&self, m: &Material, eye: V3, normal: V3, reaches: &Visibility) -> ([f32; 4], V3) {
         let rgb = |v: [f32; 4]| [v[0], v[1], v[2]];
         let times = |a: [f32; 4], b: [f32; 4]| [a[0] * b[0], a[1] * b[1], a[2] * b[2]];
-        let mut primary = add(rgb(m.emission), scaled(times(m.ambient, self.state.model_ambient), reaches.ambient));
+        let mut primary =
+            add(rgb(m.emission), scaled(times(m.ambient, self.state.model_ambient), reaches.ambient));
         let mut specular = [0.0; 3];
         for (p, visible) in self.lights.iter().zip(&reaches.lights) {
             let (to_light, mut strength, distance) = if p.directional {
@@ -239,12 +241,35 @@ mod tests {
     const IDENTITY: [f32; 16] = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
 
     fn lit(change: impl Fn(&mut Snapshot, &mut Attributes)) -> Lit {
-        let mut material = Material { diffuse: [1.0, 0.5, 0.25, 0.5], specular: [1.0; 4], shininess: 2.0, ..Material::default() };
+        let mut material = Material {
+            diffuse: [1.0, 0.5, 0.25, 0.5],
+            specular: [1.0; 4],
+            shininess: 2.0,
+            ..Material::default()
+        };
         material.ambient = [0.1, 0.1, 0.1, 1.0];
-        let current = Current { normal: [0.0, 0.0, 1.0], color: [0.0, 1.0, 0.0, 1.0], tex: [0.0; 4], materials: [material; 2] };
+        let current = Current {
+            normal: [0.0, 0.0, 1.0],
+            color: [0.0, 1.0, 0.0, 1.0],
+            tex: [0.0; 4],
+            materials: [material; 2],
+        };
         let mut attributes = Attributes::constant(&current);
-        let light = GlLight { diffuse: [1.0; 4], position: [0.0, 0.0, 1.0, 0.0], spot_cutoff_deg: 180.0, attenuation: [1.0, 0.0, 0.0], ..GlLight::default() };
-        let mut state = Snapshot { model_view: IDENTITY, projection: IDENTITY, lighting: true, lights: vec![light], model_ambient: [1.0; 4], ..Snapshot::default() };
+        let light = GlLight {
+            diffuse: [1.0; 4],
+            position: [0.0, 0.0, 1.0, 0.0],
+            spot_cutoff_deg: 180.0,
+            attenuation: [1.0, 0.0, 0.0],
+            ..GlLight::default()
+        };
+        let mut state = Snapshot {
+            model_view: IDENTITY,
+            projection: IDENTITY,
+            lighting: true,
+            lights: vec![light],
+            model_ambient: [1.0; 4],
+            ..Snapshot::default()
+        };
         change(&mut state, &mut attributes);
         Setup::new(&state).vertex(&attributes, 0, [0.0, 0.0, -2.0])
     }
@@ -297,7 +322,8 @@ mod tests {
         let spot = |direction: [f32; 3]| {
             lit(|s, _| {
                 let l = &mut s.lights[0];
-                (l.position, l.spot_direction, l.spot_cutoff_deg, l.spot_exponent) = ([0.0, 0.0, 0.0, 1.0], direction, 10.0, 4.0);
+                (l.position, l.spot_direction, l.spot_cutoff_deg, l.spot_exponent) =
+                    ([0.0, 0.0, 0.0, 1.0], direction, 10.0, 4.0);
             })
         };
         assert_eq!(spot([0.0, 0.0, -1.0]).primary[0][0], 1.0);
@@ -307,7 +333,12 @@ mod tests {
     #[test]
     fn byte_normals_light_like_floats() {
         let l = lit(|_, a| {
-            a.normals = Values::Packed(crate::capture::Packed { bytes: vec![0, 0, 127], kind: BYTE, size: 3, normalized: true });
+            a.normals = Values::Packed(crate::capture::Packed {
+                bytes: vec![0, 0, 127],
+                kind: BYTE,
+                size: 3,
+                normalized: true,
+            });
         });
         assert_eq!(l.primary[0], [1.0, 0.6, 0.35, 0.5]);
     }

@@ -115,7 +115,12 @@ impl Presenter {
             gl::bind_texture(TEXTURE_2D, self.textures[unit]);
             if grow {
                 gl::tex_image(inner.cast_signed(), self.size[0], self.size[1], format, kind);
-                for (what, value) in [(TEXTURE_MIN_FILTER, NEAREST), (TEXTURE_MAG_FILTER, NEAREST), (TEXTURE_WRAP_S, CLAMP_TO_EDGE), (TEXTURE_WRAP_T, CLAMP_TO_EDGE)] {
+                for (what, value) in [
+                    (TEXTURE_MIN_FILTER, NEAREST),
+                    (TEXTURE_MAG_FILTER, NEAREST),
+                    (TEXTURE_WRAP_S, CLAMP_TO_EDGE),
+                    (TEXTURE_WRAP_T, CLAMP_TO_EDGE),
+                ] {
                     gl::tex_parameteri(TEXTURE_2D, what, value.cast_signed());
                 }
             }
@@ -144,7 +149,14 @@ struct Kept {
     samplers_exist: bool,
 }
 
-const UNPACK: [u32; 6] = [UNPACK_ALIGNMENT, UNPACK_ROW_LENGTH, UNPACK_SKIP_ROWS, UNPACK_SKIP_PIXELS, UNPACK_SWAP_BYTES, UNPACK_LSB_FIRST];
+const UNPACK: [u32; 6] = [
+    UNPACK_ALIGNMENT,
+    UNPACK_ROW_LENGTH,
+    UNPACK_SKIP_ROWS,
+    UNPACK_SKIP_PIXELS,
+    UNPACK_SWAP_BYTES,
+    UNPACK_LSB_FIRST,
+];
 /// What must be off for our two triangles whatever their fate.
 const OFF: [u32; 4] = [CULL_FACE, POLYGON_OFFSET_FILL, POLYGON_SMOOTH, RASTERIZER_DISCARD];
 /// Per-fragment operations that only fragments in order meet.
@@ -293,7 +305,11 @@ impl Context {
                 gl::end();
             }
         }
-        if core && kept.caps.iter().all(|(c, _)| *c != SCISSOR_TEST) && matches!(fate, Fate::Surface(_)) && self.state.scissor.is_some() {
+        if core
+            && kept.caps.iter().all(|(c, _)| *c != SCISSOR_TEST)
+            && matches!(fate, Fate::Surface(_))
+            && self.state.scissor.is_some()
+        {
             gl::enable(SCISSOR_TEST);
         }
     }

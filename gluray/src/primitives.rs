@@ -11,17 +11,26 @@ pub(crate) fn is_filled(mode: u32) -> bool {
 /// The triangles of a primitive whose vertices are numbered `first..first + count`; the vertex that gives the flat colour comes
 /// last. Incomplete primitives give nothing, as OpenGL has it. `flat` says that only that vertex' colour counts: Mesa splits quads along
 /// another diagonal then.
-pub(crate) fn triangulate(mode: u32, first: u32, count: u32, first_provokes: bool, flat: bool, out: &mut Vec<[u32; 3]>) {
+pub(crate) fn triangulate(
+    mode: u32,
+    first: u32,
+    count: u32,
+    first_provokes: bool,
+    flat: bool,
+    out: &mut Vec<[u32; 3]>,
+) {
     let v = |i: u32| first + i;
     // Rotates so that vertex 0 (the first) comes last; the orientation stays.
     let provoked = |t: [u32; 3]| if first_provokes { [t[1], t[2], t[0]] } else { t };
     match mode {
         TRIANGLES => out.extend((0..count / 3).map(|i| provoked([v(3 * i), v(3 * i + 1), v(3 * i + 2)]))),
-        TRIANGLE_STRIP => out.extend((0..count.saturating_sub(2)).map(|i| match (i % 2 == 0, first_provokes) {
-            (true, _) => provoked([v(i), v(i + 1), v(i + 2)]),
-            (false, false) => [v(i + 1), v(i), v(i + 2)],
-            (false, true) => [v(i + 2), v(i + 1), v(i)],
-        })),
+        TRIANGLE_STRIP => {
+            out.extend((0..count.saturating_sub(2)).map(|i| match (i % 2 == 0, first_provokes) {
+                (true, _) => provoked([v(i), v(i + 1), v(i + 2)]),
+                (false, false) => [v(i + 1), v(i), v(i + 2)],
+                (false, true) => [v(i + 2), v(i + 1), v(i)],
+            }))
+        }
         TRIANGLE_FAN => out.extend((1..count.saturating_sub(1)).map(|i| match first_provokes {
             false => [v(0), v(i), v(i + 1)],
             true => [v(i + 1), v(0), v(i)],
@@ -80,7 +89,8 @@ mod tests {
                 let mut out = Vec::new();
                 triangulate(mode, 10, 8, first, true, &mut out);
                 assert_eq!(out.len(), 6);
-                let place = if mode == QUAD_STRIP { |i: u32| [f64::from(i / 2), -f64::from(i % 2)] } else { zigzag };
+                let place =
+                    if mode == QUAD_STRIP { |i: u32| [f64::from(i / 2), -f64::from(i % 2)] } else { zigzag };
                 let turns: Vec<bool> = out.iter().map(|t| turns_left(*t, place)).collect();
                 assert!(turns.iter().all(|t| *t == turns[0]), "mode {mode}: {out:?} {turns:?}");
             }

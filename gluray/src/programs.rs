@@ -132,7 +132,8 @@ impl Template {
                 | "floatsf=pow(df,specularPower)"
                 | "vec3diffuse=df*diffuseColor*lightColor"
                 | "vec3specular=sf*specularColor*lightColor"
-                | "sf=sign(df)*pow(max(1e-5,dot(reflect(lightDirectionVC,normalVCVSOutput),normalize(-vertexVC.xyz))),specularPower)" => {}
+                | "sf=sign(df)*pow(max(1e-5,dot(reflect(lightDirectionVC,normalVCVSOutput),normalize(-vertexVC.xyz))),specularPower)" =>
+                    {}
                 "vec4texColor=texture(colortexture,tcoordVCVSOutput.st)" => t.colors = Colors::Map,
                 "vec3ambientColor=ambientIntensity*texColor.rgb"
                 | "vec3diffuseColor=diffuseIntensity*texColor.rgb"
@@ -201,7 +202,12 @@ impl Recognised {
         let lights = match template.headlight {
             true => vec![([0.0, 0.0, -1.0], value(program, "lightColor0"))],
             false => (0..template.directional)
-                .map(|i| (value(program, &format!("lightDirectionVC{i}")), value(program, &format!("lightColor{i}"))))
+                .map(|i| {
+                    (
+                        value(program, &format!("lightDirectionVC{i}")),
+                        value(program, &format!("lightColor{i}")),
+                    )
+                })
                 .collect(),
         };
         Recognised {
@@ -276,7 +282,8 @@ impl Recognised {
         let normal = if self.template.flat {
             let e = |k: usize| -> [f32; 3] { std::array::from_fn(|c| view[k][c] - view[0][c]) };
             let (p, q) = (e(1), e(2));
-            let n = normalized([p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]);
+            let n =
+                normalized([p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]);
             let away = if self.parallel { n[2] < 0.0 } else { dot(n, at) > 0.0 };
             if away { n.map(|v| -v) } else { n }
         } else {
@@ -314,7 +321,9 @@ impl Recognised {
                 }
             }
         }
-        let out: [f32; 3] = std::array::from_fn(|k| ambient[k] * reaches.ambient + diffuse[k] * lit[k] + self.specular[k] * shine[k]);
+        let out: [f32; 3] = std::array::from_fn(|k| {
+            ambient[k] * reaches.ambient + diffuse[k] * lit[k] + self.specular[k] * shine[k]
+        });
         [out[0], out[1], out[2], alpha]
     }
 }
@@ -363,7 +372,8 @@ impl Context {
             }
         }
         self.drop_errors();
-        let template = if other { Err("a geometry or tessellation shader") } else { Template::read(&vertex, &fragment) };
+        let template =
+            if other { Err("a geometry or tessellation shader") } else { Template::read(&vertex, &fragment) };
         self.programs.templates.insert(program, template);
         true
     }
@@ -376,7 +386,8 @@ impl Context {
         elements: impl FnOnce() -> Result<Elements, &'static str>,
     ) -> Result<(), &'static str> {
         let program = self.state.program;
-        let template = self.programs.templates.get(&program).copied().unwrap_or(Err("a program linked before us"))?;
+        let template =
+            self.programs.templates.get(&program).copied().unwrap_or(Err("a program linked before us"))?;
         let position = attribute(program, "vertexMC").ok_or("a program without positions")?;
         let sources = [
             Some(position),
@@ -488,7 +499,8 @@ mod tests {
 
     #[test]
     fn headlights_and_light_kits_are_told_apart() {
-        let head = Template::read(VERTEX, &fragment("float df = max(0.000001, normalVCVSOutput.z);")).expect("known");
+        let head = Template::read(VERTEX, &fragment("float df = max(0.000001, normalVCVSOutput.z);"))
+            .expect("known");
         assert!(head.headlight && head.lit && head.directional == 0);
         let kit = "df = max(0.0, dot(normalVCVSOutput, -lightDirectionVC0)); df = max(0.0, dot(normalVCVSOutput, -lightDirectionVC4));";
         assert_eq!(Template::read(VERTEX, &fragment(kit)).expect("known").directional, 5);

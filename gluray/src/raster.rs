@@ -14,9 +14,8 @@ fn snapped(c: &[f32; 4], viewport: [i32; 4]) -> [i64; 2] {
 pub(crate) fn covers(c: &[[f32; 4]; 3], viewport: [i32; 4], x: i32, y: i32) -> bool {
     let p = c.each_ref().map(|v| snapped(v, viewport));
     let (cx, cy) = (i64::from(x) * 256 + 128, i64::from(y) * 256 + 128);
-    let edge = |a: [i64; 2], b: [i64; 2], x: i64, y: i64| {
-        (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])
-    };
+    let edge =
+        |a: [i64; 2], b: [i64; 2], x: i64, y: i64| (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]);
     let area = edge(p[0], p[1], p[2][0], p[2][1]);
     if area == 0 {
         return false;
@@ -65,7 +64,8 @@ mod tests {
         for (first, second) in [([a, b, c], [a, c, d]), ([c, b, a], [d, a, c])] {
             for y in 0..4 {
                 for x in 0..4 {
-                    let n = u32::from(covers(&first, viewport, x, y)) + u32::from(covers(&second, viewport, x, y));
+                    let n = u32::from(covers(&first, viewport, x, y))
+                        + u32::from(covers(&second, viewport, x, y));
                     assert_eq!(n, u32::from(x < 2 && y < 2), "pixel ({x}, {y})");
                 }
             }

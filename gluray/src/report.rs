@@ -1,8 +1,8 @@
 //! What was traced, what was passed and why: a JSON file per process, rewritten as frames come, because many programs end without
 //! running any of their exit handlers.
 
-use serde::{Deserialize, Serialize};
 use crate::timeline::Recorder;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::path::Path;
@@ -59,7 +59,10 @@ pub struct Report {
 impl Report {
     /// Adds another process' account.
     pub fn add(&mut self, other: &Report) {
-        fn sum<V: Copy + Default + std::ops::Add<Output = V>>(a: &mut BTreeMap<String, V>, b: &BTreeMap<String, V>) {
+        fn sum<V: Copy + Default + std::ops::Add<Output = V>>(
+            a: &mut BTreeMap<String, V>,
+            b: &BTreeMap<String, V>,
+        ) {
             for (k, v) in b {
                 let e = a.entry(k.clone()).or_default();
                 *e = *e + *v;

@@ -28,7 +28,14 @@ impl Prepared<'_> {
     }
 
     /// The colour that the mode gives a fragment.
-    pub(crate) fn shaded(&self, prim: usize, f: &Fragment, mode: Mode, around: Option<&Surroundings<'_>>, pixel: (i32, i32)) -> [f32; 4] {
+    pub(crate) fn shaded(
+        &self,
+        prim: usize,
+        f: &Fragment,
+        mode: Mode,
+        around: Option<&Surroundings<'_>>,
+        pixel: (i32, i32),
+    ) -> [f32; 4] {
         let per_pixel = matches!(mode, Mode::Phong | Mode::Rich | Mode::Path);
         let lit = match &self.draw.shading {
             Shading::Fixed => self.draw.state.lighting,
@@ -66,7 +73,14 @@ impl Prepared<'_> {
         let mesh = &self.draw.geometry.mesh;
         let corners = mesh.indices[prim].map(|i| i as usize);
         if let Shading::Program(program) = &self.draw.shading {
-            return program.color(&self.draw.attributes, mesh, prim, f.weights.map(|w| w as f32), f.front, reaches);
+            return program.color(
+                &self.draw.attributes,
+                mesh,
+                prim,
+                f.weights.map(|w| w as f32),
+                f.front,
+                reaches,
+            );
         }
         let s = &*self.draw.state;
         let side = usize::from(!f.front && s.lighting && s.two_side);
@@ -79,7 +93,11 @@ impl Prepared<'_> {
         let (mut color, secondary) = match s.flat {
             _ if per_pixel && s.lighting => {
                 let (eye, normal) = self.eye_point(prim, w);
-                let color = if s.flat { self.draw.attributes.colors.at(corners[2]) } else { mixed(corners.map(|i| self.draw.attributes.colors.at(i)), w) };
+                let color = if s.flat {
+                    self.draw.attributes.colors.at(corners[2])
+                } else {
+                    mixed(corners.map(|i| self.draw.attributes.colors.at(i)), w)
+                };
                 let materials = self.draw.attributes.materials_at(corners[2]);
                 self.lighting.point(materials, color, eye, normal, !f.front, reaches)
             }
@@ -88,7 +106,14 @@ impl Prepared<'_> {
         };
         if let (Some(unit), Some(image)) = (&s.texture, &self.image) {
             let coords = corners.map(|i| {
-                texturing::coordinates(unit, s, &self.draw.attributes, &self.lighting, i, mesh.positions[i].to_array())
+                texturing::coordinates(
+                    unit,
+                    s,
+                    &self.draw.attributes,
+                    &self.lighting,
+                    i,
+                    mesh.positions[i].to_array(),
+                )
             });
             color = texturing::apply(unit, image, color, mixed(coords, w));
         }

@@ -87,7 +87,10 @@ fn read(target: u32) -> Option<Image> {
         texels: gl::tex_image_rgba(target, width * height),
         base,
         linear: parameter(TEXTURE_MAG_FILTER) == LINEAR,
-        wrap: [parameter(TEXTURE_WRAP_S), if target == TEXTURE_1D { CLAMP_TO_EDGE } else { parameter(TEXTURE_WRAP_T) }],
+        wrap: [
+            parameter(TEXTURE_WRAP_S),
+            if target == TEXTURE_1D { CLAMP_TO_EDGE } else { parameter(TEXTURE_WRAP_T) },
+        ],
         border: gl::tex_parameter_f(target, TEXTURE_BORDER_COLOR),
     })
 }
@@ -95,7 +98,8 @@ fn read(target: u32) -> Option<Image> {
 impl Image {
     /// True when no texel lets anything through.
     pub(crate) fn is_opaque(&self) -> bool {
-        self.texels.iter().all(|t| t[3] == 1.0) && (self.wrap != [CLAMP_TO_BORDER; 2] || self.border[3] == 1.0)
+        self.texels.iter().all(|t| t[3] == 1.0)
+            && (self.wrap != [CLAMP_TO_BORDER; 2] || self.border[3] == 1.0)
     }
 
     fn texel(&self, x: i64, y: i64) -> [f32; 4] {
@@ -211,7 +215,11 @@ fn environment(mode: u32, constant: [f32; 4], base: Base, f: [f32; 4], t: [f32; 
         _ if !has_alpha => f[3],
         REPLACE => at,
         BLEND | ADD if base == Base::Intensity => {
-            if mode == ADD { f[3] + at } else { f[3] * (1.0 - at) + constant[3] * at }
+            if mode == ADD {
+                f[3] + at
+            } else {
+                f[3] * (1.0 - at) + constant[3] * at
+            }
         }
         _ => f[3] * at,
     };
@@ -224,7 +232,15 @@ mod tests {
 
     fn image(linear: bool, wrap: u32) -> Image {
         let texels = vec![[0.0; 4], [1.0; 4]];
-        Image { width: 2, height: 1, texels, base: Base::Rgba, linear, wrap: [wrap, CLAMP_TO_EDGE], border: [0.5; 4] }
+        Image {
+            width: 2,
+            height: 1,
+            texels,
+            base: Base::Rgba,
+            linear,
+            wrap: [wrap, CLAMP_TO_EDGE],
+            border: [0.5; 4],
+        }
     }
 
     #[test]

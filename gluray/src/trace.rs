@@ -144,7 +144,8 @@ impl<'a> Prepared<'a> {
             planes.push((row(3) * (1.0 + SLACK) - row(2)).to_array());
         }
         let eye_from_object = matrix(&s.model_view);
-        let object = |p: &[f64; 4]| (eye_from_object.transpose() * rt_core::glam::DVec4::from_array(*p)).to_array();
+        let object =
+            |p: &[f64; 4]| (eye_from_object.transpose() * rt_core::glam::DVec4::from_array(*p)).to_array();
         let clip_planes: Vec<[f64; 4]> = s.clip_planes.iter().map(object).collect();
         planes.extend(&clip_planes);
         let lighting = Setup::new(s);
@@ -152,13 +153,26 @@ impl<'a> Prepared<'a> {
             Shading::Fixed => lighting.places(),
             Shading::Program(program) => program.places(),
         };
-        let mut out =
-            Prepared { draw, world, places, camera, planes, clip_planes, rect, lighting, lit: None, image, rays: AtomicU64::new(0) };
+        let mut out = Prepared {
+            draw,
+            world,
+            places,
+            camera,
+            planes,
+            clip_planes,
+            rect,
+            lighting,
+            lit: None,
+            image,
+            rays: AtomicU64::new(0),
+        };
         let positions = &draw.geometry.mesh.positions;
         // Fewer vertices than pixels: light them all once. Else only those that are seen.
         let fixed = matches!(draw.shading, Shading::Fixed);
         if fixed && positions.len() <= 2 * rect.w as usize * rect.h as usize {
-            let light = |(i, p): (usize, &rt_core::glam::Vec3)| out.lighting.vertex(&draw.attributes, i, p.to_array());
+            let light = |(i, p): (usize, &rt_core::glam::Vec3)| {
+                out.lighting.vertex(&draw.attributes, i, p.to_array())
+            };
             out.lit = Some(positions.par_iter().enumerate().map(light).collect());
         }
         Some(out)
@@ -193,7 +207,10 @@ impl<'a> Prepared<'a> {
         let shift = back + moved;
         let t_min = ((t0 - shift) as f32).max(0.0);
         let t_max = (t1 - shift) as f32;
-        Some((Ray { t_min, t_max: if t_max.is_finite() { t_max.next_up() } else { f32::INFINITY }, ..ray }, shift))
+        Some((
+            Ray { t_min, t_max: if t_max.is_finite() { t_max.next_up() } else { f32::INFINITY }, ..ray },
+            shift,
+        ))
     }
 
     fn corners(&self, prim: usize) -> [[f32; 4]; 3] {
@@ -242,7 +259,9 @@ impl<'a> Prepared<'a> {
                 let v = self.draw.geometry.mesh.triangle(prim)[i].as_dvec3();
                 p[0] * v.x + p[1] * v.y + p[2] * v.z + p[3]
             };
-            if (0..3).map(|i| weights[i] * corner(i)).sum::<f64>() < 0.0 {
+            let terms = [0, 1, 2].map(|i| weights[i] * corner(i));
+            // Centres in the plane are kept: whatever triangle they lie on, the answer is the same.
+            if terms.iter().sum::<f64>() < -1e-6 * terms.iter().map(|v| v.abs()).sum::<f64>() {
                 return None;
             }
         }
@@ -253,7 +272,8 @@ impl<'a> Prepared<'a> {
         let plain_depth = depth;
         // The unit of polygon offset is two steps of the depth buffer (Mesa).
         if let Some((factor, units)) = s.polygon_offset {
-            depth += f64::from(factor) * steepness(&c, s.viewport, f - n) + 2.0 * f64::from(units) / DEPTH_STEPS;
+            depth +=
+                f64::from(factor) * steepness(&c, s.viewport, f - n) + 2.0 * f64::from(units) / DEPTH_STEPS;
         }
         if !s.depth_clamp && z.abs() > w.abs() * (1.0 + SLACK) {
             return None;
@@ -264,13 +284,23 @@ impl<'a> Prepared<'a> {
     }
 
     /// What the pixel sees first. `ray` and `hit` are those of its centre.
-    fn resolve(&self, mut ray: Ray, hit: Option<rt_core::ray::Hit>, x: i32, y: i32) -> Option<(usize, Fragment)> {
+    fn resolve(
+        &self,
+        mut ray: Ray,
+        hit: Option<rt_core::ray::Hit>,
+        x: i32,
+        y: i32,
+    ) -> Option<(usize, Fragment)> {
         let mut hit = hit;
         for step in 0..MOST_STEPS {
             let h = hit?;
             if let Some(f) = self.fragment(h.prim as usize, x, y) {
                 let found = (h.prim as usize, f);
-                return Some(if f.depth > f.plain_depth { self.overtaken(found, ray, h.t, x, y) } else { found });
+                return Some(if f.depth > f.plain_depth {
+                    self.overtaken(found, ray, h.t, x, y)
+                } else {
+                    found
+                });
             }
             // On an edge the rule of the rasterizer may give the pixel to a neighbour that the ray saw beside it.
             if step == 0
@@ -380,9 +410,8 @@ fn screen_bounds(draw: &Draw, clip: DMat4) -> Rect {
             hi[k] = hi[k].max(c[k] / c.w);
         }
     }
-    let pixel = |ndc: f64, at: i32, size: i32| {
-        (f64::from(at) + (ndc + 1.0) * 0.5 * f64::from(size)).clamp(-1e9, 1e9)
-    };
+    let pixel =
+        |ndc: f64, at: i32, size: i32| (f64::from(at) + (ndc + 1.0) * 0.5 * f64::from(size)).clamp(-1e9, 1e9);
     let (x0, y0) = (pixel(lo[0], x, w).floor() as i32 - 1, pixel(lo[1], y, h).floor() as i32 - 1);
     let (x1, y1) = (pixel(hi[0], x, w).ceil() as i32 + 1, pixel(hi[1], y, h).ceil() as i32 + 1);
     rect.and(Rect { x: x0, y: y0, w: x1.saturating_sub(x0), h: y1.saturating_sub(y0) })
@@ -497,13 +526,19 @@ pub(crate) fn in_order(p: &Prepared<'_>) -> Vec<Layer> {
                 if found.iter().all(|(o, ..)| *o != prim as u32)
                     && let Some(f) = p.fragment(prim, x, y)
                 {
-                    found.push((prim as u32, to_bytes(p.color(prim, &f, false, &Visibility::FULL)), f.depth as f32));
+                    found.push((
+                        prim as u32,
+                        to_bytes(p.color(prim, &f, false, &Visibility::FULL)),
+                        f.depth as f32,
+                    ));
                 }
             };
             const OFF: f64 = 1.0 / 200.0;
             // The centre, and beside it for edges that go through it.
             for (dx, dy) in [(0.0, 0.0), (-OFF, -OFF), (OFF, OFF), (OFF, -OFF), (-OFF, OFF)] {
-                let Some((mut ray, _)) = p.ray(f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy) else { continue };
+                let Some((mut ray, _)) = p.ray(f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy) else {
+                    continue;
+                };
                 for _ in 0..MOST_STEPS {
                     p.rays.fetch_add(1, Relaxed);
                     let Some(hit) = p.world.closest(&ray) else { break };
@@ -518,7 +553,8 @@ pub(crate) fn in_order(p: &Prepared<'_>) -> Vec<Layer> {
     let layers = fragments.iter().map(Vec::len).max().unwrap_or(0);
     (0..layers)
         .map(|n| {
-            let mut layer = Layer { rect, color: vec![[0; 4]; w * h], depth: vec![UNCOVERED; w * h], covered: 0 };
+            let mut layer =
+                Layer { rect, color: vec![[0; 4]; w * h], depth: vec![UNCOVERED; w * h], covered: 0 };
             for (k, f) in fragments.iter().enumerate() {
                 if let Some((_, c, d)) = f.get(n) {
                     (layer.color[k], layer.depth[k]) = (*c, *d);

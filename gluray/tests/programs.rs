@@ -56,7 +56,12 @@ fn script(name: &str) -> String {
 }
 
 /// Both pictures of a program, and our account.
-fn both(program: &Path, arguments: &[&str], picture: &str, prepare: impl Fn(&Path)) -> Option<(Metrics, Report)> {
+fn both(
+    program: &Path,
+    arguments: &[&str],
+    picture: &str,
+    prepare: impl Fn(&Path),
+) -> Option<(Metrics, Report)> {
     let x = Xvfb::start()?;
     let run = |through: Option<&[&str]>| {
         let place = folder();
@@ -71,7 +76,12 @@ fn both(program: &Path, arguments: &[&str], picture: &str, prepare: impl Fn(&Pat
     let (native, _) = run(None);
     let (ours, report) = run(Some(&["--mode", "match"]));
     let m = compare(&native, &ours);
-    eprintln!("{}: {m:?}, traced {}, passed {:?}", program.display(), report.traced_draws, report.passed_reasons);
+    eprintln!(
+        "{}: {m:?}, traced {}, passed {:?}",
+        program.display(),
+        report.traced_draws,
+        report.passed_reasons
+    );
     assert!(report.traced_draws > 0, "{report:?}");
     Some((m, report))
 }
@@ -113,7 +123,8 @@ fn openscad_draws_the_drivers_picture() {
     let Some(openscad) = program("RTSV_OPENSCAD") else { return };
     let scene = "$fn=32;\ndifference(){ sphere(r=20); cylinder(r=8,h=50,center=true); }\ntranslate([30,0,0]) cube([10,20,30],center=true);\n";
     let prepare = |f: &Path| std::fs::write(f.join("s.scad"), scene).expect("a temporary file");
-    let arguments = ["-o", "out.png", "--imgsize=768,768", "--render", "--camera=0,0,0,60,0,30,150", "s.scad"];
+    let arguments =
+        ["-o", "out.png", "--imgsize=768,768", "--render", "--camera=0,0,0,60,0,30,150", "s.scad"];
     if let Some((m, _)) = both(&openscad, &arguments, "out.png", prepare) {
         m.assert_filled("openscad");
     }

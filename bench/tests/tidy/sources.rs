@@ -12,7 +12,10 @@ const UNSAFE_ROOMS: &[(&str, &str)] = &[
     ("vtk-bridge/src/loader", "finds the VTK that is in the process and loads what fits it"),
     ("vtk-bridge/src/anari/abi", "the C++ vtables through which ANARI programs call a device"),
     ("composite/src/comm/mpi", "calls into an MPI library found at run time"),
-    ("composite/src/rival", "calls into IceT, found at run time; a measurement against a rival is a call into it"),
+    (
+        "composite/src/rival",
+        "calls into IceT, found at run time; a measurement against a rival is a call into it",
+    ),
     ("bench/src/peers", "calls into C libraries that we measure against"),
 ];
 

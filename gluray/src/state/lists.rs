@@ -23,7 +23,10 @@ pub(crate) enum Op {
     /// Index into the list's materials.
     Material(u32),
     /// A list of the driver's, and whether it draws things whose order matters.
-    Driver { list: u32, draws: bool },
+    Driver {
+        list: u32,
+        draws: bool,
+    },
     Call(u32),
     /// Names relative to the list base at the time of the call.
     CallFromBase(u32),
@@ -83,8 +86,15 @@ impl Context {
         self.sync();
         gl::new_list(name, COMPILE);
         let execute = mode == COMPILE_AND_EXECUTE;
-        self.recording =
-            Some(Recording { name, execute, list: List::default(), piece: name, used: false, draws: false, open: false });
+        self.recording = Some(Recording {
+            name,
+            execute,
+            list: List::default(),
+            piece: name,
+            used: false,
+            draws: false,
+            open: false,
+        });
         self.sink = Sink::List;
         symbols::attend();
         true
@@ -262,7 +272,8 @@ impl Context {
                     self.call_list(name);
                 }
                 Op::CallFromBase(name) => {
-                    let base = if self.sink == Sink::Pass { self.state.list_base } else { gl::word(LIST_BASE) };
+                    let base =
+                        if self.sink == Sink::Pass { self.state.list_base } else { gl::word(LIST_BASE) };
                     self.call_list(base.wrapping_add(name));
                 }
                 Op::Rect(v) => {

@@ -165,15 +165,15 @@ impl Snapshot {
         self.depth_range = gl::doubles(DEPTH_RANGE);
         self.cull = gl::is_enabled(CULL_FACE).then(|| gl::word(CULL_FACE_MODE));
         self.front_is_ccw = gl::word(FRONT_FACE) == CCW;
-        self.polygon_offset = gl::is_enabled(POLYGON_OFFSET_FILL).then(|| {
-            (gl::floats::<1>(POLYGON_OFFSET_FACTOR)[0], gl::floats::<1>(POLYGON_OFFSET_UNITS)[0])
-        });
+        self.polygon_offset = gl::is_enabled(POLYGON_OFFSET_FILL)
+            .then(|| (gl::floats::<1>(POLYGON_OFFSET_FACTOR)[0], gl::floats::<1>(POLYGON_OFFSET_UNITS)[0]));
         self.depth_test = gl::is_enabled(DEPTH_TEST);
         self.depth_func = gl::word(DEPTH_FUNC);
         self.depth_mask = gl::int(DEPTH_WRITEMASK) != 0;
         self.depth_clamp = can.depth_clamp && gl::is_enabled(DEPTH_CLAMP);
         self.blend = gl::is_enabled(BLEND);
-        self.blend_is_over = self.blend && gl::word(BLEND_SRC_RGB) == 0x0302 && gl::word(BLEND_DST_RGB) == 0x0303;
+        self.blend_is_over =
+            self.blend && gl::word(BLEND_SRC_RGB) == 0x0302 && gl::word(BLEND_DST_RGB) == 0x0303;
         self.stencil_test = gl::is_enabled(STENCIL_TEST);
         self.logic_op = gl::is_enabled(COLOR_LOGIC_OP);
         self.color_mask = gl::ints::<4>(COLOR_WRITEMASK).iter().all(|v| *v != 0);
@@ -192,7 +192,8 @@ impl Snapshot {
         };
         self.discard = can.version >= 30 && gl::is_enabled(RASTERIZER_DISCARD);
         self.feedback_active = can.version >= 40 && gl::int(TRANSFORM_FEEDBACK_ACTIVE) != 0;
-        self.first_vertex_provokes = can.version >= 32 && gl::word(PROVOKING_VERTEX) == FIRST_VERTEX_CONVENTION;
+        self.first_vertex_provokes =
+            can.version >= 32 && gl::word(PROVOKING_VERTEX) == FIRST_VERTEX_CONVENTION;
         self.smooth_polygons = gl::is_enabled(POLYGON_SMOOTH);
         if can.core {
             return;
@@ -241,16 +242,18 @@ impl Snapshot {
         self.two_side = gl::int(LIGHT_MODEL_TWO_SIDE) != 0;
         self.local_viewer = gl::int(LIGHT_MODEL_LOCAL_VIEWER) != 0;
         self.separate_specular = gl::word(LIGHT_MODEL_COLOR_CONTROL) == SEPARATE_SPECULAR_COLOR;
-        self.lights.extend((0..8).map(|i| LIGHT0 + i).filter(|l| gl::is_enabled(*l)).map(|l| GlLight {
-            ambient: gl::light(l, AMBIENT),
-            diffuse: gl::light(l, DIFFUSE),
-            specular: gl::light(l, SPECULAR),
-            position: gl::light(l, POSITION),
-            spot_direction: gl::light(l, SPOT_DIRECTION),
-            spot_exponent: gl::light::<1>(l, SPOT_EXPONENT)[0],
-            spot_cutoff_deg: gl::light::<1>(l, SPOT_CUTOFF)[0],
-            attenuation: [CONSTANT_ATTENUATION, LINEAR_ATTENUATION, QUADRATIC_ATTENUATION]
-                .map(|what| gl::light::<1>(l, what)[0]),
+        self.lights.extend((0..8).map(|i| LIGHT0 + i).filter(|l| gl::is_enabled(*l)).map(|l| {
+            GlLight {
+                ambient: gl::light(l, AMBIENT),
+                diffuse: gl::light(l, DIFFUSE),
+                specular: gl::light(l, SPECULAR),
+                position: gl::light(l, POSITION),
+                spot_direction: gl::light(l, SPOT_DIRECTION),
+                spot_exponent: gl::light::<1>(l, SPOT_EXPONENT)[0],
+                spot_cutoff_deg: gl::light::<1>(l, SPOT_CUTOFF)[0],
+                attenuation: [CONSTANT_ATTENUATION, LINEAR_ATTENUATION, QUADRATIC_ATTENUATION]
+                    .map(|what| gl::light::<1>(l, what)[0]),
+            }
         }));
     }
 
@@ -268,7 +271,9 @@ impl Snapshot {
                 gl::active_texture(TEXTURE0 + unit);
             }
             let enabled: Vec<u32> = targets.iter().copied().filter(|t| gl::is_enabled(*t)).collect();
-            let Some(&target) = enabled.iter().max_by_key(|t| targets.iter().position(|x| x == *t)) else { continue };
+            let Some(&target) = enabled.iter().max_by_key(|t| targets.iter().position(|x| x == *t)) else {
+                continue;
+            };
             if unit > 0 {
                 self.foreign_texturing = Some("several texture units");
             } else if target == TEXTURE_1D || target == TEXTURE_2D {

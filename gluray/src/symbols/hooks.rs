@@ -68,7 +68,9 @@ fn material_values(what: u32, address: Address, integers: bool) -> [f32; 4] {
         let at = address as usize + 4 * i;
         *v = match integers {
             false => client_memory::floats::<1>(at)[0],
-            true if count == 4 => ((2.0 * f64::from(client_memory::ints::<1>(at)[0]) + 1.0) / f64::from(u32::MAX)) as f32,
+            true if count == 4 => {
+                ((2.0 * f64::from(client_memory::ints::<1>(at)[0]) + 1.0) / f64::from(u32::MAX)) as f32
+            }
             true => client_memory::ints::<1>(at)[0] as f32,
         };
     }
@@ -141,20 +143,51 @@ fn making_current(context: Handle, real: impl FnOnce() -> u32) -> u32 {
     done
 }
 
-pub(in crate::symbols) unsafe extern "C" fn glXMakeCurrent(display: Handle, drawable: usize, context: Handle) -> u32 {
-    making_current(context, || driver!(glXMakeCurrent(display, drawable, context): (Handle, usize, Handle) -> u32))
+pub(in crate::symbols) unsafe extern "C" fn glXMakeCurrent(
+    display: Handle,
+    drawable: usize,
+    context: Handle,
+) -> u32 {
+    making_current(
+        context,
+        || driver!(glXMakeCurrent(display, drawable, context): (Handle, usize, Handle) -> u32),
+    )
 }
 
-pub(in crate::symbols) unsafe extern "C" fn glXMakeContextCurrent(display: Handle, draw: usize, read: usize, context: Handle) -> u32 {
-    making_current(context, || driver!(glXMakeContextCurrent(display, draw, read, context): (Handle, usize, usize, Handle) -> u32))
+pub(in crate::symbols) unsafe extern "C" fn glXMakeContextCurrent(
+    display: Handle,
+    draw: usize,
+    read: usize,
+    context: Handle,
+) -> u32 {
+    making_current(
+        context,
+        || driver!(glXMakeContextCurrent(display, draw, read, context): (Handle, usize, usize, Handle) -> u32),
+    )
 }
 
-pub(in crate::symbols) unsafe extern "C" fn glXMakeCurrentReadSGI(display: Handle, draw: usize, read: usize, context: Handle) -> u32 {
-    making_current(context, || driver!(glXMakeCurrentReadSGI(display, draw, read, context): (Handle, usize, usize, Handle) -> u32))
+pub(in crate::symbols) unsafe extern "C" fn glXMakeCurrentReadSGI(
+    display: Handle,
+    draw: usize,
+    read: usize,
+    context: Handle,
+) -> u32 {
+    making_current(
+        context,
+        || driver!(glXMakeCurrentReadSGI(display, draw, read, context): (Handle, usize, usize, Handle) -> u32),
+    )
 }
 
-pub(in crate::symbols) unsafe extern "C" fn eglMakeCurrent(display: Handle, draw: Handle, read: Handle, context: Handle) -> u32 {
-    making_current(context, || driver!(eglMakeCurrent(display, draw, read, context): (Handle, Handle, Handle, Handle) -> u32))
+pub(in crate::symbols) unsafe extern "C" fn eglMakeCurrent(
+    display: Handle,
+    draw: Handle,
+    read: Handle,
+    context: Handle,
+) -> u32 {
+    making_current(
+        context,
+        || driver!(eglMakeCurrent(display, draw, read, context): (Handle, Handle, Handle, Handle) -> u32),
+    )
 }
 
 fn created(context: Handle, share: Handle) -> Handle {
@@ -162,20 +195,54 @@ fn created(context: Handle, share: Handle) -> Handle {
     context
 }
 
-pub(in crate::symbols) unsafe extern "C" fn glXCreateContext(display: Handle, visual: Handle, share: Handle, direct: Int) -> Handle {
-    created(driver!(glXCreateContext(display, visual, share, direct): (Handle, Handle, Handle, Int) -> Handle), share)
+pub(in crate::symbols) unsafe extern "C" fn glXCreateContext(
+    display: Handle,
+    visual: Handle,
+    share: Handle,
+    direct: Int,
+) -> Handle {
+    created(
+        driver!(glXCreateContext(display, visual, share, direct): (Handle, Handle, Handle, Int) -> Handle),
+        share,
+    )
 }
 
-pub(in crate::symbols) unsafe extern "C" fn glXCreateNewContext(display: Handle, config: Handle, kind: Int, share: Handle, direct: Int) -> Handle {
-    created(driver!(glXCreateNewContext(display, config, kind, share, direct): (Handle, Handle, Int, Handle, Int) -> Handle), share)
+pub(in crate::symbols) unsafe extern "C" fn glXCreateNewContext(
+    display: Handle,
+    config: Handle,
+    kind: Int,
+    share: Handle,
+    direct: Int,
+) -> Handle {
+    created(
+        driver!(glXCreateNewContext(display, config, kind, share, direct): (Handle, Handle, Int, Handle, Int) -> Handle),
+        share,
+    )
 }
 
-pub(in crate::symbols) unsafe extern "C" fn glXCreateContextAttribsARB(display: Handle, config: Handle, share: Handle, direct: Int, attributes: Address) -> Handle {
-    created(driver!(glXCreateContextAttribsARB(display, config, share, direct, attributes): (Handle, Handle, Handle, Int, Address) -> Handle), share)
+pub(in crate::symbols) unsafe extern "C" fn glXCreateContextAttribsARB(
+    display: Handle,
+    config: Handle,
+    share: Handle,
+    direct: Int,
+    attributes: Address,
+) -> Handle {
+    created(
+        driver!(glXCreateContextAttribsARB(display, config, share, direct, attributes): (Handle, Handle, Handle, Int, Address) -> Handle),
+        share,
+    )
 }
 
-pub(in crate::symbols) unsafe extern "C" fn eglCreateContext(display: Handle, config: Handle, share: Handle, attributes: Address) -> Handle {
-    created(driver!(eglCreateContext(display, config, share, attributes): (Handle, Handle, Handle, Address) -> Handle), share)
+pub(in crate::symbols) unsafe extern "C" fn eglCreateContext(
+    display: Handle,
+    config: Handle,
+    share: Handle,
+    attributes: Address,
+) -> Handle {
+    created(
+        driver!(eglCreateContext(display, config, share, attributes): (Handle, Handle, Handle, Address) -> Handle),
+        share,
+    )
 }
 
 pub(in crate::symbols) unsafe extern "C" fn glXDestroyContext(display: Handle, context: Handle) {

@@ -87,7 +87,11 @@ pub fn compare(a: &Picture, b: &Picture) -> Metrics {
 impl Metrics {
     /// The bars for filled surfaces.
     pub fn assert_filled(&self, what: &str) {
-        let ok = self.tolerant <= 0.02 && self.raw <= 0.2 && self.interior <= 1.0 && self.interior_p99 <= 4.0 && self.overlap >= 0.999;
+        let ok = self.tolerant <= 0.02
+            && self.raw <= 0.2
+            && self.interior <= 1.0
+            && self.interior_p99 <= 4.0
+            && self.overlap >= 0.999;
         assert!(ok, "{what}: {self:?}");
     }
 

@@ -12,7 +12,10 @@ use std::process::{Child, Command, Output, Stdio};
 pub fn peer(variable: &str) -> Option<PathBuf> {
     let found = std::env::var_os(variable).map(PathBuf::from).filter(|p| p.exists());
     if found.is_none() {
-        assert!(std::env::var_os("RTSV_REQUIRE_PEERS").is_none(), "{variable} names no file, and peers are required");
+        assert!(
+            std::env::var_os("RTSV_REQUIRE_PEERS").is_none(),
+            "{variable} names no file, and peers are required"
+        );
         eprintln!("SKIPPED: {variable} names no program; `cargo xtask test` installs it");
     }
     found
@@ -28,13 +31,26 @@ impl Xvfb {
     pub fn start() -> Option<Xvfb> {
         let program = peer("RTSV_XVFB")?;
         let mut server = Command::new(program)
-            .args(["-displayfd", "1", "-screen", "0", "1280x1280x24", "+extension", "GLX", "-noreset", "-nolisten", "tcp"])
+            .args([
+                "-displayfd",
+                "1",
+                "-screen",
+                "0",
+                "1280x1280x24",
+                "+extension",
+                "GLX",
+                "-noreset",
+                "-nolisten",
+                "tcp",
+            ])
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
             .expect("Xvfb starts");
         let mut line = String::new();
-        BufReader::new(server.stdout.take().expect("piped")).read_line(&mut line).expect("Xvfb says its display");
+        BufReader::new(server.stdout.take().expect("piped"))
+            .read_line(&mut line)
+            .expect("Xvfb says its display");
         Some(Xvfb { server, display: format!(":{}", line.trim()) })
     }
 }
@@ -119,7 +135,11 @@ impl Picture {
         let (mut words, mut at, mut word) = (Vec::new(), 0, Vec::new());
         while words.len() < 4 {
             match bytes[at] {
-                b'#' => while bytes[at] != b'\n' { at += 1 },
+                b'#' => {
+                    while bytes[at] != b'\n' {
+                        at += 1
+                    }
+                }
                 b if b.is_ascii_whitespace() => {
                     if !word.is_empty() {
                         words.push(String::from_utf8(std::mem::take(&mut word)).expect("text"));
