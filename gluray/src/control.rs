@@ -13,7 +13,7 @@ use rt_core::glam::DMat4;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, TryLockError};
 use std::time::Instant;
 
 /// Objects in a report, which is written often.
@@ -29,6 +29,9 @@ pub(crate) struct Told {
     objects: BTreeMap<u128, Seen>,
     /// Frame at which `GLURAY_DUMP` is written next.
     next_dump: u64,
+    /// The answer to the panel's wish for the scene.
+    exported: Option<Result<PathBuf, String>>,
+    problem: Option<String>,
 }
 
 struct Seen {
@@ -67,16 +70,16 @@ impl Told {
         if let Some(file) = named {
             // Frames 1, 2, 4, 8…: in the end it is a late one, and writing costs little.
             self.next_dump = (2 * frame).max(1);
-            // A file that cannot be written must not trouble the program; its absence says enough.
-            let _ = write_scene(Path::new(&file), &scene);
+            self.problem = write_scene(Path::new(&file), &scene).err().map(|e| format!("GLURAY_DUMP: {e}"));
         }
         if EXPORT.swap(false, Relaxed) {
-            let outcome = to_scenes_folder(&scene);
-            let mut link = LINK.lock().unwrap_or_else(PoisonError::into_inner);
-            if let Some(link) = link.as_mut() {
-                link.exported(outcome.as_deref().map_err(String::as_str));
-            }
+            self.exported = Some(to_scenes_folder(&scene));
         }
+    }
+
+    /// What went wrong since it was asked last.
+    pub(crate) fn take_problem(&mut self) -> Option<String> {
+        self.problem.take()
     }
 
     /// A frame has ended; `report` counts since the context was made. The objects of the frame for the report, largest first.
@@ -84,14 +87,28 @@ impl Told {
         let now = Instant::now();
         let took = self.frame_ended.replace(now).map_or(0.0, |t| now.duration_since(t).as_secs_f64() * 1e3);
         let mut objects = self.take_objects();
-        let mut slot = LINK.lock().unwrap_or_else(PoisonError::into_inner);
+        // Never waits: another thread talks to the panel just now, or did so when this process was forked.
+        let mut slot = match LINK.try_lock() {
+            Ok(slot) => slot,
+            Err(TryLockError::Poisoned(slot)) => slot.into_inner(),
+            Err(TryLockError::WouldBlock) => {
+                objects.truncate(IN_REPORT);
+                return objects;
+            }
+        };
         let link = slot.get_or_insert_with(|| Link::new(hello()));
         let wish = link.poll();
         if link.is_connected() {
             link.objects(&objects);
-            let mut stats = between(&self.before, report);
-            (stats.frame_ms, stats.size) = (took, size);
-            link.frame(&stats);
+            if let Some(outcome) = self.exported.take() {
+                link.exported(outcome.as_deref().map_err(String::as_str));
+            }
+            // Between two frames in a row only: what was before the panel came is no frame.
+            if self.before.frames + 1 == report.frames {
+                let mut stats = between(&self.before, report);
+                (stats.frame_ms, stats.size) = (took, size);
+                link.frame(&stats);
+            }
             self.before = report.clone();
         }
         drop(slot);
@@ -115,7 +132,7 @@ impl Told {
                 color: Some(s.color),
             })
             .collect();
-        list.sort_by(|a, b| b.triangles.cmp(&a.triangles));
+        list.sort_by_key(|o| std::cmp::Reverse(o.triangles));
         list
     }
 }

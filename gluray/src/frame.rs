@@ -68,6 +68,7 @@ impl Context {
         if draw.geometry.mesh.indices.is_empty() {
             return;
         }
+        crate::overrides::apply(&mut draw, &self.config.settings);
         if !trace::has_rays(&draw.clip_from_object) {
             // A model-view that flattens everything (a shadow on a floor): rays need the flattened triangles themselves.
             self.flatten(&mut draw);
@@ -177,6 +178,9 @@ impl Context {
         });
         let size = [2, 3].map(|i| self.state.viewport[i].max(0).cast_unsigned());
         self.counters.report.objects = self.frame.told.frame_done(&self.counters.report, size);
+        if let Some(problem) = self.frame.told.take_problem() {
+            self.counters.report.problems = vec![problem];
+        }
         self.take_up_settings();
         self.counters.publish(false);
     }

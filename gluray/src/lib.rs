@@ -31,6 +31,7 @@ pub mod folders;
 mod frame;
 mod immediate;
 mod lighting;
+mod overrides;
 pub mod panel;
 mod present;
 mod primitives;

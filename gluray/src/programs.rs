@@ -229,6 +229,12 @@ impl Recognised {
         }
     }
 
+    /// One colour everywhere, instead of colour maps and colours of vertices.
+    pub(crate) fn paint(&mut self, color: [f32; 3]) {
+        (self.ambient, self.diffuse) = (color, color);
+        self.template.colors = Colors::Uniform;
+    }
+
     /// Where the lights are, in eye space.
     pub(crate) fn places(&self) -> Vec<Place> {
         self.lights.iter().map(|(d, _)| Place::Far(vector(d.map(|v| -v)))).collect()

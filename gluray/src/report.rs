@@ -52,7 +52,7 @@ pub struct Report {
     pub problems: Vec<String>,
     /// Objects of the last frame, largest first.
     pub objects: Vec<crate::panel::ObjectInfo>,
-    /// When each phase ran, in the order in which they ended.
+    /// When each phase ran, in the order in which they ended: the first two hundred thousand.
     pub timeline: Vec<crate::timeline::Span>,
 }
 
@@ -189,7 +189,7 @@ impl Counters {
         sum.pid = std::process::id();
         sum.mode = crate::config::current().settings.mode.name().to_owned();
         sum.faults = crate::fault::messages();
-        sum.problems.clone_from(&crate::config::current().problems);
+        sum.problems.extend(crate::config::current().problems.iter().cloned());
         write_spans(&dir.join(format!("{}.spans", sum.pid)));
         let (file, fresh) = (dir.join(format!("{}.json", sum.pid)), dir.join(format!("{}.new", sum.pid)));
         // A report that cannot be written must not trouble the program.

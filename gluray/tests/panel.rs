@@ -6,6 +6,7 @@ mod panel_common;
 use gluray::config::Mode;
 use panel_common::{Fake, PROGRAM, Panel};
 use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
 use serde_json::json;
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -168,24 +169,28 @@ fn who_does_not_know_the_token_is_no_program() {
     p.until("put out", |list| list[0]["running"] == false);
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(40))]
-    #[test]
-    fn whatever_comes_to_the_link_or_the_page_changes_nothing(
-        bytes in prop_oneof![
-            proptest::collection::vec(any::<u8>(), 0..500),
-            "\\{\"type\":\"(hello|frame|inforce)\"[ -~]{0,120}\\}\n".prop_map(String::into_bytes),
-            "(GET|POST) /[ -~]{0,60} HTTP/1.1\r\n([A-Za-z-]{1,12}: [ -~]{0,20}\r\n){0,4}\r\n[ -~]{0,40}".prop_map(String::into_bytes),
-        ],
-    ) {
-        static PANEL: std::sync::OnceLock<Panel> = std::sync::OnceLock::new();
-        let p = PANEL.get_or_init(Panel::start);
-        prop_assert!(is_shown_the_door(p, &bytes));
-        let mut stream = TcpStream::connect(&p.address).unwrap();
-        let _ = stream.write_all(&bytes);
-        drop(stream);
-        prop_assert!(p.programs().is_empty());
-    }
+#[test]
+fn whatever_comes_to_the_link_or_the_page_changes_nothing() {
+    // One panel for all cases, ended with the test: a static one would outlive it.
+    let p = Panel::start();
+    let bytes = prop_oneof![
+        proptest::collection::vec(any::<u8>(), 0..500),
+        "\\{\"type\":\"(hello|frame|inforce)\"[ -~]{0,120}\\}\n".prop_map(String::into_bytes),
+        "(GET|POST) /[ -~]{0,60} HTTP/1.1\r\n([A-Za-z-]{1,12}: [ -~]{0,20}\r\n){0,4}\r\n[ -~]{0,40}"
+            .prop_map(String::into_bytes),
+    ];
+    let mut runner =
+        TestRunner::new(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(40) });
+    runner
+        .run(&bytes, |bytes| {
+            prop_assert!(is_shown_the_door(&p, &bytes));
+            let mut stream = TcpStream::connect(&p.address).unwrap();
+            let _ = stream.write_all(&bytes);
+            drop(stream);
+            prop_assert!(p.programs().is_empty());
+            Ok(())
+        })
+        .unwrap_or_else(|e| panic!("{e}"));
 }
 
 #[test]

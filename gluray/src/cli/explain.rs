@@ -115,6 +115,6 @@ fn or_none(text: &str) -> &str {
 
 fn by_size(map: &BTreeMap<String, u64>) -> Vec<(&str, u64)> {
     let mut list: Vec<(&str, u64)> = map.iter().map(|(k, n)| (k.as_str(), *n)).collect();
-    list.sort_by(|a, b| b.1.cmp(&a.1));
+    list.sort_by_key(|(_, n)| std::cmp::Reverse(*n));
     list
 }

@@ -66,7 +66,7 @@ pub(super) fn export(common: CommonArgs, args: &ExportArgs) -> anyhow::Result<()
     }
     for file in &args.output {
         let report =
-            write(file, &scene, &args.objects).with_context(|| format!("from {}", path.display()))?;
+            write(common, file, &scene, &args.objects).with_context(|| format!("from {}", path.display()))?;
         report.warnings().iter().for_each(|w| common.warn(w));
         let written = json!({ "file": file, "scene": path, "program": scene.program, "frame": scene.frame, "left_out_triangles": report.nowhere });
         common.result(&written, || format!("{}", file.display()))?;
@@ -78,7 +78,12 @@ fn ending(file: &Path) -> Option<String> {
     file.extension().map(|e| e.to_string_lossy().to_ascii_lowercase())
 }
 
-fn write(file: &Path, scene: &Scene, objects: &[String]) -> anyhow::Result<ConvertReport> {
+fn write(
+    common: CommonArgs,
+    file: &Path,
+    scene: &Scene,
+    objects: &[String],
+) -> anyhow::Result<ConvertReport> {
     let report = match ending(file).as_deref() {
         Some("vtp") => {
             let (poly, report) = to_poly_data(scene, objects);
@@ -86,10 +91,17 @@ fn write(file: &Path, scene: &Scene, objects: &[String]) -> anyhow::Result<Conve
             report
         }
         Some(other) => {
-            let (mesh, report) = to_mesh(scene, objects);
+            let (mut mesh, report) = to_mesh(scene, objects);
             match other {
                 "ply" => write_ply(file, &mesh)?,
-                "obj" => write_obj(file, &mesh)?,
+                "obj" => {
+                    mesh.colors = None;
+                    common.warn(format_args!(
+                        "{}: OBJ cannot hold colours; PLY, GLB and VTP can",
+                        file.display()
+                    ));
+                    write_obj(file, &mesh)?;
+                }
                 _ => write_glb(file, &mesh)?,
             }
             report

@@ -53,6 +53,15 @@ pub(crate) const OBEYED: &[&str] = &[
     "effects.light_radius_deg",
     "effects.ambient_occlusion_samples",
     "effects.ambient_occlusion_radius",
+    "lights.program",
+    "lights.ambient",
+    "lights.added",
+    "lights.added_direction",
+    "lights.added_color",
+    "material.color",
+    "material.specular",
+    "material.shininess",
+    "material.emission",
 ];
 
 /// What was set in vain.
