@@ -69,16 +69,6 @@ impl Geometry {
             *self.world.lock().unwrap_or_else(|e| e.into_inner()) = None;
         }
     }
-
-    /// True once the best structure is there.
-    pub(crate) fn is_best(&self) -> bool {
-        self.best.get().is_some()
-    }
-
-    fn bytes(&self) -> usize {
-        // Positions, indices, and about 60 bytes of tree per triangle.
-        self.mesh.positions.len() * 12 + self.mesh.indices.len() * 72
-    }
 }
 
 fn build(mesh: &Arc<TriMesh>, quality: BuildQuality) -> Option<Arc<World>> {
@@ -183,11 +173,6 @@ impl Cache {
                 e.improving = improve(e.geometry.clone());
             }
         }
-    }
-
-    /// Bytes in use, about.
-    pub(crate) fn bytes(&self) -> usize {
-        self.entries.values().map(|e| e.geometry.bytes()).sum()
     }
 }
 

@@ -4,8 +4,8 @@
 //! (homogeneous edge functions after Olano and Greer 1997), so they agree with what the driver makes of neighbouring lines and text.
 
 use crate::capture::{Draw, Shading};
-use crate::config::{Mode, Settings};
-use crate::effects::{Place, Surroundings, Visibility, vector};
+use crate::config::Settings;
+use crate::effects::{Place, Surroundings, Visibility};
 use crate::enums::*;
 use crate::lighting::{Lit, Setup, transform};
 use crate::raster::{covers, steepness};

@@ -66,11 +66,6 @@ pub(crate) fn relax() {
     ATTENTION.store(0, Relaxed);
 }
 
-/// Watched calls that passed without a word so far.
-pub(crate) fn calls_passed() -> u64 {
-    CALLS.load(Relaxed)
-}
-
 /// From now on every entry point is the driver's: after a fault of ours.
 pub(crate) fn retire() {
     for (i, slot) in TABLE.iter().enumerate() {
