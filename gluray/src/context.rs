@@ -301,7 +301,7 @@ impl Context {
         self.mark(class);
         self.watched += 1;
         // A program that sets much state between draws pays for the first calls only.
-        let told_enough = self.watched > 12 && class & !(class::UNIFORM | class::ARRAYS) != 0;
+        let told_enough = self.watched > 12;
         if told_enough && self.recording.is_none() && THREADS.load(Relaxed) == 1 {
             self.mark(class::ALL);
             symbols::relax();
