@@ -167,6 +167,7 @@ impl Cache {
         self.frame += 1;
         let now = self.frame;
         self.entries.retain(|_, e| now - e.last_used <= KEPT_FRAMES);
+        #[expect(clippy::iter_over_hash_type, reason = "each entry for itself")]
         for e in self.entries.values_mut() {
             let rests = e.frames >= RESTING_FRAMES && e.geometry.mesh.num_triangles() >= WORTH_IMPROVING;
             if rests && !e.improving {

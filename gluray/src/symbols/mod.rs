@@ -20,6 +20,7 @@ use std::ffi::CStr;
 use std::sync::atomic::{AtomicPtr, AtomicU32, AtomicU64, Ordering::Relaxed};
 
 /// Classes of state that a call can change; the driver is asked again about those only.
+#[allow(dead_code, reason = "some classes are only told apart by the build script")]
 pub(crate) mod class {
     /// Matrices.
     pub(crate) const MATRIX: u8 = 1;
