@@ -354,7 +354,7 @@ fn main() {
         };
         writeln!(s, "#[unsafe(naked)] #[unsafe(no_mangle)] pub(in crate::symbols) unsafe extern \"C\" fn {x}() {{ core::arch::naked_asm!({code}) }}").unwrap();
     }
-    writeln!(s, "}}\nmod hot_hooks {{ use super::hot::with; use crate::real::forward;").unwrap();
+    writeln!(s, "}}\n#[allow(clippy::unnecessary_cast, reason = \"written by a program\")] mod hot_hooks {{ use super::hot::with; use crate::real::forward;").unwrap();
     for h in &hot {
         let (args, call, types) = if h.pointer {
             (format!("p: *const {}", h.c_type), "p".to_owned(), format!("*const {}", h.c_type))
@@ -369,7 +369,11 @@ fn main() {
         let index = names.binary_search(&h.name.as_str()).expect("checked above");
         let read = if h.pointer {
             format!(
+<<<<<<< HEAD
                 "// SAFETY: the program gives {} values, as OpenGL asks.\n let v = unsafe {{ *p.cast::<[{}; {}]>() }};",
+=======
+                "\n// SAFETY: the program gives {} values, as OpenGL asks.\n let v = unsafe {{ *p.cast::<[{}; {}]>() }};",
+>>>>>>> s4-gluray
                 h.count, h.c_type, h.count
             )
         } else {

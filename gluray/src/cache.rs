@@ -69,16 +69,6 @@ impl Geometry {
             *self.world.lock().unwrap_or_else(|e| e.into_inner()) = None;
         }
     }
-
-    /// True once the best structure is there.
-    pub(crate) fn is_best(&self) -> bool {
-        self.best.get().is_some()
-    }
-
-    fn bytes(&self) -> usize {
-        // Positions, indices, and about 60 bytes of tree per triangle.
-        self.mesh.positions.len() * 12 + self.mesh.indices.len() * 72
-    }
 }
 
 fn build(mesh: &Arc<TriMesh>, quality: BuildQuality) -> Option<Arc<World>> {
@@ -177,17 +167,13 @@ impl Cache {
         self.frame += 1;
         let now = self.frame;
         self.entries.retain(|_, e| now - e.last_used <= KEPT_FRAMES);
+        #[expect(clippy::iter_over_hash_type, reason = "each entry for itself")]
         for e in self.entries.values_mut() {
             let rests = e.frames >= RESTING_FRAMES && e.geometry.mesh.num_triangles() >= WORTH_IMPROVING;
             if rests && !e.improving {
                 e.improving = improve(e.geometry.clone());
             }
         }
-    }
-
-    /// Bytes in use, about.
-    pub(crate) fn bytes(&self) -> usize {
-        self.entries.values().map(|e| e.geometry.bytes()).sum()
     }
 }
 

@@ -203,11 +203,6 @@ pub(crate) struct Recorder {
 }
 
 impl Recorder {
-    /// No vertex yet.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.positions.is_empty()
-    }
-
     /// A primitive begins.
     #[inline]
     pub(crate) fn begin(&mut self, mode: u32, current: &Current) {

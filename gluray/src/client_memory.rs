@@ -4,11 +4,6 @@
 //! unsafe code.
 #![allow(unsafe_code, reason = "a room: vertex arrays live in the program's memory")]
 
-/// Bytes of the program's memory, copied.
-pub(crate) fn bytes(address: usize, length: usize) -> Vec<u8> {
-    view(address, length).to_vec()
-}
-
 /// Bytes of the program's memory, for the time of one call: the program is waiting in it.
 pub(crate) fn view<'a>(address: usize, length: usize) -> &'a [u8] {
     if address == 0 || length == 0 {

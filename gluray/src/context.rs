@@ -8,13 +8,12 @@ use crate::capture::Recorder;
 use crate::config::Config;
 use crate::decide::{self, Verdict};
 use crate::enums::*;
-use crate::fault::guard;
 use crate::frame::Frame;
 use crate::present::Presenter;
 use crate::programs::Programs;
 use crate::real::gl;
 use crate::report::Counters;
-use crate::state::current::{Current, set_material, stale};
+use crate::state::current::Current;
 use crate::state::lists::{Lists, Recording};
 use crate::state::snapshot::{Abilities, Snapshot};
 use crate::symbols::{self, class};
@@ -302,7 +301,7 @@ impl Context {
         self.mark(class);
         self.watched += 1;
         // A program that sets much state between draws pays for the first calls only.
-        let told_enough = self.watched > 12 && class & !(class::UNIFORM | class::ARRAYS) != 0;
+        let told_enough = self.watched > 12;
         if told_enough && self.recording.is_none() && THREADS.load(Relaxed) == 1 {
             self.mark(class::ALL);
             symbols::relax();

@@ -43,10 +43,13 @@ fn base_of(format: u32) -> Base {
     }
 }
 
+/// The version at which a texture was read, and what it was.
+type Versioned = (u64, Option<Arc<Image>>);
+
 /// Images by texture name, with the version they were read at.
 #[derive(Default)]
 pub(crate) struct Images {
-    images: HashMap<(u32, u32), (u64, Option<Arc<Image>>)>,
+    images: HashMap<(u32, u32), Versioned>,
 }
 
 impl Images {

@@ -4,8 +4,8 @@
 //! (homogeneous edge functions after Olano and Greer 1997), so they agree with what the driver makes of neighbouring lines and text.
 
 use crate::capture::{Draw, Shading};
-use crate::config::{Mode, Settings};
-use crate::effects::{Place, Surroundings, Visibility, vector};
+use crate::config::Settings;
+use crate::effects::{Place, Surroundings, Visibility};
 use crate::enums::*;
 use crate::lighting::{Lit, Setup, transform};
 use crate::raster::{covers, steepness};
@@ -259,7 +259,9 @@ impl<'a> Prepared<'a> {
                 let v = self.draw.geometry.mesh.triangle(prim)[i].as_dvec3();
                 p[0] * v.x + p[1] * v.y + p[2] * v.z + p[3]
             };
-            if (0..3).map(|i| weights[i] * corner(i)).sum::<f64>() < 0.0 {
+            let terms = [0, 1, 2].map(|i| weights[i] * corner(i));
+            // Centres in the plane are kept: whatever triangle they lie on, the answer is the same.
+            if terms.iter().sum::<f64>() < -1e-6 * terms.iter().map(|v| v.abs()).sum::<f64>() {
                 return None;
             }
         }

@@ -9,10 +9,8 @@ use std::path::Path;
 const FILLED: &[&str] = &[
     "gl-1.0-dlist-shademodel -auto -fbo",
     "gl-1.0-texgen -auto -fbo",
-    "gl-1.0-user-clip-all-planes -auto -fbo",
     "gl-1.1-color-material-array -auto -fbo",
     "gl-1.1-draw-arrays-start -auto -fbo",
-    "gl-1.1-set-vertex-color-after-draw -auto -fbo",
     "clipflat -auto -fbo",
     "dlist-color-material -auto -fbo",
     "dlist-fdo3129-02 -auto -fbo",
@@ -39,6 +37,7 @@ const OTHERS: &[&str] = &[
     "gl-1.0-push-no-attribs -auto -fbo",
     "gl-1.0-no-op-paths -auto -fbo",
     "degenerate-prims -auto -fbo",
+    "gl-1.1-set-vertex-color-after-draw -auto -fbo",
     "longprim -auto -fbo",
     "select depth -auto -fbo",
     "windowoverlap -auto -fbo",

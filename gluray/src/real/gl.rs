@@ -39,13 +39,9 @@ driver! {
     pub(crate) fn end_list = "glEndList"();
     pub(crate) fn call_list = "glCallList"(list: u32);
     pub(crate) fn delete_lists = "glDeleteLists"(list: u32, range: i32);
-    pub(crate) fn gen_lists = "glGenLists"(range: i32) -> u32;
     pub(crate) fn push_attrib = "glPushAttrib"(mask: u32);
     pub(crate) fn pop_attrib = "glPopAttrib"();
-    pub(crate) fn push_client_attrib = "glPushClientAttrib"(mask: u32);
-    pub(crate) fn pop_client_attrib = "glPopClientAttrib"();
     pub(crate) fn viewport = "glViewport"(x: i32, y: i32, w: i32, h: i32);
-    pub(crate) fn scissor = "glScissor"(x: i32, y: i32, w: i32, h: i32);
     pub(crate) fn depth_func = "glDepthFunc"(func: u32);
     pub(crate) fn depth_mask = "glDepthMask"(on: u8);
     pub(crate) fn depth_range = "glDepthRange"(near: f64, far: f64);
@@ -59,7 +55,6 @@ driver! {
     fn gen_textures = "glGenTextures"(n: i32, out: *mut u32);
     fn tex_image_2d = "glTexImage2D"(target: u32, level: i32, inner: i32, w: i32, h: i32, border: i32, format: u32, kind: u32, data: *const c_void);
     fn tex_sub_image_2d = "glTexSubImage2D"(target: u32, level: i32, x: i32, y: i32, w: i32, h: i32, format: u32, kind: u32, data: *const c_void);
-    fn read_pixels_raw = "glReadPixels"(x: i32, y: i32, w: i32, h: i32, format: u32, kind: u32, out: *mut c_void);
     pub(crate) fn create_shader = "glCreateShader"(kind: u32) -> u32;
     fn shader_source_raw = "glShaderSource"(shader: u32, n: i32, text: *const *const c_char, lengths: *const i32);
     pub(crate) fn compile_shader = "glCompileShader"(shader: u32);
@@ -74,26 +69,18 @@ driver! {
     fn get_attached_raw = "glGetAttachedShaders"(program: u32, room: i32, count: *mut i32, out: *mut u32);
     fn get_uniform_location_raw = "glGetUniformLocation"(program: u32, name: *const c_char) -> i32;
     fn get_attrib_location_raw = "glGetAttribLocation"(program: u32, name: *const c_char) -> i32;
-    fn bind_attrib_location_raw = "glBindAttribLocation"(program: u32, at: u32, name: *const c_char);
-    fn get_active_attrib_raw = "glGetActiveAttrib"(program: u32, i: u32, room: i32, length: *mut i32, size: *mut i32, kind: *mut u32, name: *mut c_char);
-    fn get_active_uniform_raw = "glGetActiveUniform"(program: u32, i: u32, room: i32, length: *mut i32, size: *mut i32, kind: *mut u32, name: *mut c_char);
     fn get_uniformfv = "glGetUniformfv"(program: u32, at: i32, out: *mut f32);
     fn get_uniformiv = "glGetUniformiv"(program: u32, at: i32, out: *mut i32);
     pub(crate) fn uniform1i = "glUniform1i"(at: i32, v: i32);
-    pub(crate) fn uniform2f = "glUniform2f"(at: i32, x: f32, y: f32);
     pub(crate) fn uniform4f = "glUniform4f"(at: i32, x: f32, y: f32, z: f32, w: f32);
     fn get_vertex_attrib_i = "glGetVertexAttribiv"(at: u32, what: u32, out: *mut i32);
-    fn get_vertex_attrib_f = "glGetVertexAttribfv"(at: u32, what: u32, out: *mut f32);
     fn get_vertex_attrib_pointer = "glGetVertexAttribPointerv"(at: u32, what: u32, out: *mut *mut c_void);
     pub(crate) fn bind_buffer = "glBindBuffer"(target: u32, name: u32);
     fn get_buffer_sub_data = "glGetBufferSubData"(target: u32, at: isize, bytes: isize, out: *mut c_void);
     fn get_buffer_parameter_i = "glGetBufferParameteriv"(target: u32, what: u32, out: *mut i32);
     fn gen_vertex_arrays = "glGenVertexArrays"(n: i32, out: *mut u32);
     pub(crate) fn bind_vertex_array = "glBindVertexArray"(name: u32);
-    pub(crate) fn bind_framebuffer = "glBindFramebuffer"(target: u32, name: u32);
     pub(crate) fn draw_arrays = "glDrawArrays"(mode: u32, first: i32, count: i32);
-    pub(crate) fn light_model_i = "glLightModeli"(what: u32, value: i32);
-    fn get_framebuffer_attachment_i = "glGetFramebufferAttachmentParameteriv"(target: u32, attachment: u32, what: u32, out: *mut i32);
 }
 
 /// Whether capability `cap` is on.
@@ -176,11 +163,9 @@ queries! {
     program_i(program: u32, what: u32) -> i32 = get_programiv;
     shader_i(shader: u32, what: u32) -> i32 = get_shaderiv;
     vertex_attrib_i(at: u32, what: u32) -> i32 = get_vertex_attrib_i;
-    vertex_attrib_f(at: u32, what: u32) -> f32 = get_vertex_attrib_f;
     buffer_i(target: u32, what: u32) -> i32 = get_buffer_parameter_i;
     uniform_f(program: u32, at: i32) -> f32 = get_uniformfv;
     uniform_i(program: u32, at: i32) -> i32 = get_uniformiv;
-    attachment_i(target: u32, attachment: u32, what: u32) -> i32 = get_framebuffer_attachment_i;
 }
 
 /// `glMaterialfv`.
@@ -224,13 +209,6 @@ pub(crate) fn tex_sub_image(w: i32, h: i32, format: u32, kind: u32, data: &[u8])
 pub(crate) fn tex_image_rgba(target: u32, texels: usize) -> Vec<[f32; 4]> {
     let mut out = vec![[0.0_f32; 4]; texels];
     get_tex_image(target, 0, 0x1908, 0x1406, out.as_mut_ptr().cast());
-    out
-}
-
-/// A rectangle of the read buffer, four bytes a pixel (`GL_RGBA`/`GL_UNSIGNED_BYTE`, or `GL_DEPTH_COMPONENT`/`GL_FLOAT`).
-pub(crate) fn read_pixels(x: i32, y: i32, w: i32, h: i32, format: u32, kind: u32) -> Vec<u8> {
-    let mut out = vec![0_u8; (w.max(0) as usize) * (h.max(0) as usize) * 4];
-    read_pixels_raw(x, y, w, h, format, kind, out.as_mut_ptr().cast());
     out
 }
 
@@ -279,33 +257,4 @@ pub(crate) fn uniform_location(program: u32, name: &str) -> i32 {
 /// Location of an attribute, -1 for none.
 pub(crate) fn attrib_location(program: u32, name: &str) -> i32 {
     with_c_string(name, |p| get_attrib_location_raw(program, p)).unwrap_or(-1)
-}
-
-/// `glBindAttribLocation`.
-pub(crate) fn bind_attrib_location(program: u32, at: u32, name: &str) {
-    with_c_string(name, |p| bind_attrib_location_raw(program, at, p));
-}
-
-type ActiveQuery = fn(u32, u32, i32, *mut i32, *mut i32, *mut u32, *mut c_char);
-
-fn active(program: u32, count: u32, query: ActiveQuery) -> Vec<(String, i32, u32)> {
-    let n = program_i::<1>(program, count)[0].max(0) as u32;
-    (0..n)
-        .map(|i| {
-            let mut name = [0_u8; 256];
-            let (mut length, mut size, mut kind) = (0, 0, 0);
-            query(program, i, 256, &raw mut length, &raw mut size, &raw mut kind, name.as_mut_ptr().cast());
-            (String::from_utf8_lossy(&name[..length.clamp(0, 255) as usize]).into_owned(), size, kind)
-        })
-        .collect()
-}
-
-/// Active attributes: name, array size, type.
-pub(crate) fn active_attributes(program: u32) -> Vec<(String, i32, u32)> {
-    active(program, 0x8b89, get_active_attrib_raw)
-}
-
-/// Active uniforms: name, array size, type.
-pub(crate) fn active_uniforms(program: u32) -> Vec<(String, i32, u32)> {
-    active(program, 0x8b86, get_active_uniform_raw)
 }

@@ -155,11 +155,6 @@ pub(crate) fn forward(index: usize) -> *const () {
     p
 }
 
-/// True when the driver has entry `name`. (GLVND's own stubs also count; ask for the extension, too.)
-pub(crate) fn has(name: &str) -> bool {
-    crate::symbols::index_of(name.as_bytes()).is_some_and(|i| forward(i) != no_context as *const ())
-}
-
 /// The driver's function `name`, looked up once.
 #[inline]
 fn cached(slot: &AtomicPtr<()>, name: &str) -> *const () {

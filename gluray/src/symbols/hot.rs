@@ -11,7 +11,7 @@ static HOT: AtomicPtr<Context> = AtomicPtr::new(core::ptr::null_mut());
 /// Says which context all calls belong to, or `None` when that has to be looked up thread by thread. The context must stay where it
 /// is until the next call of this function: it is boxed in its thread's [`CURRENT`], which calls this whenever that changes.
 pub(crate) fn set_hot(context: Option<&mut Context>) {
-    HOT.store(context.map_or(core::ptr::null_mut(), |c| core::ptr::from_mut(c)), Relaxed);
+    HOT.store(context.map_or(core::ptr::null_mut(), core::ptr::from_mut), Relaxed);
 }
 
 /// Calls `f` with the current context; false when there is none that we follow.

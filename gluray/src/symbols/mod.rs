@@ -20,6 +20,7 @@ use std::ffi::CStr;
 use std::sync::atomic::{AtomicPtr, AtomicU32, AtomicU64, Ordering::Relaxed};
 
 /// Classes of state that a call can change; the driver is asked again about those only.
+#[allow(dead_code, reason = "some classes are only told apart by the build script")]
 pub(crate) mod class {
     /// Matrices.
     pub(crate) const MATRIX: u8 = 1;
@@ -64,11 +65,6 @@ pub(crate) fn attend() {
 /// Lets watched calls pass without a word.
 pub(crate) fn relax() {
     ATTENTION.store(0, Relaxed);
-}
-
-/// Watched calls that passed without a word so far.
-pub(crate) fn calls_passed() -> u64 {
-    CALLS.load(Relaxed)
 }
 
 /// From now on every entry point is the driver's: after a fault of ours.
