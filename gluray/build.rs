@@ -369,11 +369,7 @@ fn main() {
         let index = names.binary_search(&h.name.as_str()).expect("checked above");
         let read = if h.pointer {
             format!(
-<<<<<<< HEAD
-                "// SAFETY: the program gives {} values, as OpenGL asks.\n let v = unsafe {{ *p.cast::<[{}; {}]>() }};",
-=======
                 "\n// SAFETY: the program gives {} values, as OpenGL asks.\n let v = unsafe {{ *p.cast::<[{}; {}]>() }};",
->>>>>>> s4-gluray
                 h.count, h.c_type, h.count
             )
         } else {
