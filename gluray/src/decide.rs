@@ -135,7 +135,8 @@ mod tests {
 
     #[test]
     fn each_state_that_depends_on_order_is_passed_and_traced_in_order_when_all_is_asked_for() {
-        let cases: [(&str, fn(&mut Snapshot)); 8] = [
+        type Change = fn(&mut Snapshot);
+        let cases: [(&str, Change); 8] = [
             ("stencil test", |s| s.stencil_test = true),
             ("logic operation", |s| s.logic_op = true),
             ("colour mask", |s| s.color_mask = false),

@@ -5,17 +5,17 @@ use super::Picture;
 
 /// Differences of two pictures.
 #[derive(Debug, Clone, Copy)]
-pub struct Metrics {
+pub(crate) struct Metrics {
     /// Percent of pixels with a channel off by more than 8.
-    pub raw: f64,
+    pub(crate) raw: f64,
     /// The same when the best of the 3 x 3 neighbours counts, both ways.
-    pub tolerant: f64,
+    pub(crate) tolerant: f64,
     /// Mean difference where both pictures are smooth.
-    pub interior: f64,
+    pub(crate) interior: f64,
     /// Its 99th percentile.
     pub interior_p99: f64,
     /// Overlap of what is not background.
-    pub overlap: f64,
+    pub(crate) overlap: f64,
 }
 
 fn off(a: [u8; 3], b: [u8; 3]) -> i32 {
@@ -41,7 +41,7 @@ fn contrast(p: &Picture, x: usize, y: usize) -> i32 {
 }
 
 /// Compares pictures of one size; `counts` says which pixels are looked at.
-pub fn compare_where(a: &Picture, b: &Picture, counts: impl Fn(usize, usize) -> bool) -> Metrics {
+pub(crate) fn compare_where(a: &Picture, b: &Picture, counts: impl Fn(usize, usize) -> bool) -> Metrics {
     assert_eq!((a.width, a.height), (b.width, b.height), "sizes of the pictures");
     let (mut n, mut raw, mut tolerant, mut both, mut either) = (0, 0, 0, 0, 0);
     let mut interior = Vec::new();
@@ -80,13 +80,13 @@ pub fn compare_where(a: &Picture, b: &Picture, counts: impl Fn(usize, usize) -> 
 }
 
 /// Compares all pixels.
-pub fn compare(a: &Picture, b: &Picture) -> Metrics {
+pub(crate) fn compare(a: &Picture, b: &Picture) -> Metrics {
     compare_where(a, b, |_, _| true)
 }
 
 impl Metrics {
     /// The bars for filled surfaces.
-    pub fn assert_filled(&self, what: &str) {
+    pub(crate) fn assert_filled(&self, what: &str) {
         let ok = self.tolerant <= 0.02
             && self.raw <= 0.2
             && self.interior <= 1.0
@@ -96,7 +96,7 @@ impl Metrics {
     }
 
     /// The bars for pictures full of lines.
-    pub fn assert_lines(&self, what: &str) {
+    pub(crate) fn assert_lines(&self, what: &str) {
         assert!(self.tolerant <= 0.1 && self.overlap >= 0.97, "{what}: {self:?}");
     }
 }

@@ -1,7 +1,7 @@
 //! What tests of real programs share: an X server of their own, running a program natively and through us, comparing pictures.
 #![allow(dead_code, reason = "each test file uses its part")]
 
-pub mod metrics;
+pub(crate) mod metrics;
 
 use gluray::report::Report;
 use std::io::{BufRead as _, BufReader};
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
 /// A peer by the variable that `cargo xtask test` sets. Without it: `None` and a loud word, or a failure where peers are required.
-pub fn peer(variable: &str) -> Option<PathBuf> {
+pub(crate) fn peer(variable: &str) -> Option<PathBuf> {
     let found = std::env::var_os(variable).map(PathBuf::from).filter(|p| p.exists());
     if found.is_none() {
         assert!(
@@ -22,13 +22,13 @@ pub fn peer(variable: &str) -> Option<PathBuf> {
 }
 
 /// An X server without a screen, on a display of its own.
-pub struct Xvfb {
+pub(crate) struct Xvfb {
     server: Child,
-    pub display: String,
+    pub(crate) display: String,
 }
 
 impl Xvfb {
-    pub fn start() -> Option<Xvfb> {
+    pub(crate) fn start() -> Option<Xvfb> {
         let program = peer("RTSV_XVFB")?;
         let mut server = Command::new(program)
             .args([
@@ -63,22 +63,22 @@ impl Drop for Xvfb {
 }
 
 /// A folder that goes with the test.
-pub fn folder() -> tempfile::TempDir {
+pub(crate) fn folder() -> tempfile::TempDir {
     tempfile::tempdir().expect("a temporary folder")
 }
 
 /// How to run a program.
-pub struct Run<'a> {
-    pub x: &'a Xvfb,
-    pub folder: &'a Path,
+pub(crate) struct Run<'a> {
+    pub(crate) x: &'a Xvfb,
+    pub(crate) folder: &'a Path,
     /// Arguments of `gluray run`; `None` runs natively.
-    pub through: Option<&'a [&'a str]>,
-    pub environment: &'a [(&'a str, &'a str)],
+    pub(crate) through: Option<&'a [&'a str]>,
+    pub(crate) environment: &'a [(&'a str, &'a str)],
 }
 
 impl Run<'_> {
     /// Runs it to its end and gives what it printed, with our account.
-    pub fn program(&self, program: &Path, arguments: &[&str]) -> (Output, Report) {
+    pub(crate) fn program(&self, program: &Path, arguments: &[&str]) -> (Output, Report) {
         let report = self.folder.join("report.json");
         let mut command = match self.through {
             None => Command::new(program),
@@ -113,15 +113,15 @@ impl Run<'_> {
 }
 
 /// A picture of 8-bit RGB, top row first.
-pub struct Picture {
-    pub width: usize,
-    pub height: usize,
-    pub pixels: Vec<[u8; 3]>,
+pub(crate) struct Picture {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) pixels: Vec<[u8; 3]>,
 }
 
 impl Picture {
     /// From a PNG, or a binary PPM.
-    pub fn read(file: &Path) -> Picture {
+    pub(crate) fn read(file: &Path) -> Picture {
         if file.extension().is_some_and(|e| e == "ppm") {
             return Picture::read_ppm(file);
         }
