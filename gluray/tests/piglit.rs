@@ -40,7 +40,6 @@ const OTHERS: &[&str] = &[
     "gl-1.1-set-vertex-color-after-draw -auto -fbo",
     "longprim -auto -fbo",
     "select depth -auto -fbo",
-    "windowoverlap -auto -fbo",
     "vao-element-array-buffer -auto -fbo",
     "vbo-map-remap -auto -fbo",
 ];

@@ -154,7 +154,7 @@ fn pymol_without_shaders_draws_the_drivers_picture() {
 #[test]
 fn paraview_draws_the_drivers_picture() {
     let Some(pvbatch) = program("RTSV_PVBATCH") else { return };
-    let file = script("paraview.py");
+    let file = script("paraview_scene.py");
     if let Some((m, _)) = both(&pvbatch, &[file.as_str()], "out.png", |_| ()) {
         m.assert_filled("pvbatch");
     }
