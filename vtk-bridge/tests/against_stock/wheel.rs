@@ -1,0 +1,52 @@
+//! The same unmodified scripts in the `vtk` wheel of PyPI, alone and started by `python -m rtvtk`.
+
+use crate::compare::{Bars, faults};
+use crate::peers::skip;
+use crate::session::{Program, Run, With, output, scripts_in};
+use std::path::PathBuf;
+
+/// Scripts with props that are traced in a current VTK.
+const SCRIPTS: &[&str] = &["changing", "clipping", "glyphs", "lights", "selection", "streamlines", "volume"];
+
+fn runs(folder: &str, names: &[&str], settings: &[(&str, &str)]) -> Option<[Run; 2]> {
+    let chosen = |p: &PathBuf| names.iter().any(|n| p.file_stem().is_some_and(|stem| stem == *n));
+    let scripts: Vec<PathBuf> = scripts_in(folder).into_iter().filter(chosen).collect();
+    assert_eq!(scripts.len(), names.len(), "every script is there");
+    let run = |with, settings: &[(&str, &str)]| {
+        let folder = output(&format!("wheel-{folder}-{with:?}{}", settings.len()).to_lowercase());
+        Run::new(Program::Wheel, with, &scripts, folder, settings)
+    };
+    let made = run(With::Stock, &[]).and_then(|stock| Ok([stock, run(With::Bridge, settings)?]));
+    made.map_err(|reason| skip(&reason)).ok()
+}
+
+#[test]
+fn unmodified_scripts_look_the_same_in_the_stock_wheel() {
+    let Some([stock, ours]) = runs("vtk", SCRIPTS, &[]) else { return };
+    let mut found = Vec::new();
+    for script in SCRIPTS {
+        let names = stock.pictures(script).unwrap_or_else(|e| panic!("stock: {e}"));
+        assert_eq!(Ok(&names), ours.pictures(script).as_ref(), "{script}: other pictures than stock's");
+        for name in names {
+            let [a, b] = [&stock, &ours].map(|r| r.capture(script, &name).unwrap());
+            let off = faults(&a, &b, &Bars::STRICT);
+            found.extend(off.iter().map(|f| format!("{}: {f}", ours.path(script, &name).display())));
+        }
+    }
+    assert!(found.is_empty(), "\n{}\n", found.join("\n"));
+}
+
+#[test]
+fn shadows_come_to_the_wheel_by_their_variable() {
+    let (Some([_, plain]), Some([_, shadows])) =
+        (runs("effects", &["room"], &[]), runs("effects", &["room"], &[("RTV_SHADOWS", "1")]))
+    else {
+        return;
+    };
+    let [plain, shadows] = [plain, shadows].map(|r| r.capture("room", "room").unwrap());
+    let by_20 = |a: &[[u8; 3]], b: &[[u8; 3]]| {
+        a.iter().zip(b).filter(|(a, b)| a[1] > b[1].saturating_add(20)).count()
+    };
+    let (darker, brighter) = (by_20(&plain.rgb, &shadows.rgb), by_20(&shadows.rgb, &plain.rgb));
+    assert!(darker > 500 && brighter < darker / 20, "{darker} darker, {brighter} brighter");
+}
