@@ -160,11 +160,13 @@ pub(super) fn run(args: &RunArgs) -> anyhow::Result<u8> {
         command.env("LD_PRELOAD", with_first("LD_PRELOAD", &library));
     }
     let name = args.program[0].to_string_lossy().into_owned();
+    // Before there is a program, so that no signal finds one of us without the other.
+    let signals = Signals::new([SIGINT, SIGTERM, SIGHUP]).context("cannot watch for signals")?;
     let mut child = command
         .spawn()
         .with_context(|| format!("cannot start {name}"))
         .cure("check the name and the PATH; everything behind `--` is the program and its arguments")?;
-    pass_signals_to(&child)?;
+    pass_to(&child, signals);
     let status = child.wait()?;
     let report = collect(&reports, &name);
     let text = serde_json::to_string_pretty(&report)?;
@@ -182,9 +184,8 @@ pub(super) fn run(args: &RunArgs) -> anyhow::Result<u8> {
 
 /// From now on signals end the program and not us, who stay to write the report. Ctrl-C goes to both by the terminal; a TERM or HUP
 /// (of batch systems, `timeout`, a closed terminal) goes to us alone and is passed on.
-fn pass_signals_to(child: &Child) -> anyhow::Result<()> {
+fn pass_to(child: &Child, mut signals: Signals) {
     let program = rustix::process::Pid::from_child(child);
-    let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP]).context("cannot watch for signals")?;
     std::thread::spawn(move || {
         for signal in signals.forever() {
             let passed = match signal {
@@ -196,7 +197,6 @@ fn pass_signals_to(child: &Child) -> anyhow::Result<()> {
             let _ = rustix::process::kill_process(program, passed);
         }
     });
-    Ok(())
 }
 
 /// All processes' accounts as one.
