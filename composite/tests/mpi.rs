@@ -93,7 +93,7 @@ fn messages_cut_into_chunks_arrive_whole_and_in_order() {
 fn simulated_program() -> Vec<(&'static str, PathBuf)> {
     let program = Path::new(env!("CARGO_BIN_EXE_composite"));
     let folder = program.parent().expect("a program is in a folder");
-    let places = ["libcomposite_smpi.so", "deps/libcomposite_smpi.so"].map(|name| folder.join(name));
+    let places = ["libcomposite_smpi.so", "examples/libcomposite_smpi.so"].map(|name| folder.join(name));
     places.into_iter().find(|p| p.is_file()).map(|p| ("COMPOSITE_SMPI_LIBRARY", p)).into_iter().collect()
 }
 

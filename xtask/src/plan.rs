@@ -79,6 +79,11 @@ pub(crate) const STEPS: &[Step] = &[
         action: cargo(&["clippy", "--workspace", "--all-targets", "--all-features", "--", "-D", "warnings"]),
     },
     Step {
+        name: "compositor-alone",
+        tells: "who embeds the compositor builds it without the renderer, the data sets and the program",
+        action: cargo(&["clippy", "-p", "composite", "--lib", "--no-default-features", "--", "-D", "warnings"]),
+    },
+    Step {
         name: "clippy-xtask",
         tells: "nor in this program",
         action: cargo(&[

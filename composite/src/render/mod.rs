@@ -35,6 +35,7 @@
 mod ask;
 mod boxes;
 mod camera_wave;
+mod collect;
 pub mod demo;
 mod error;
 pub mod ghost;
