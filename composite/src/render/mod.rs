@@ -44,6 +44,7 @@ mod partition;
 mod ray_parallel;
 mod report;
 mod sort_last;
+mod subject;
 mod waves;
 mod words;
 
