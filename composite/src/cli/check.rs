@@ -97,7 +97,9 @@ pub(super) fn check(common: CommonArgs, args: &CheckArgs, arguments: &[OsString]
             }
             let (mut images, mut images_differ, mut hard) = (0, 0, [0; 2]);
             for &count in &counts {
-                comm.comm().barrier(timeout)?;
+                if counts.len() > 1 {
+                    comm.comm().barrier(timeout)?;
+                }
                 let Some(mut group) = FirstRanks::new(comm.comm(), count) else { continue };
                 for scene in Scene::ALL {
                     for size_px in SIZES_PX {

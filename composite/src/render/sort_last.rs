@@ -160,6 +160,9 @@ impl DataParallel {
         };
         talk.report.effects = frame.effects();
         talk.report.warnings = frame.warnings().to_vec();
+        if !part.scene.volumes.is_empty() {
+            talk.report.warnings.push("volumes are not cut: every rank holds them whole".into());
+        }
         let owners = Owners::new(&frame, &self.boxes.bounds);
         let mine = owners.tiles[talk.rank()].clone();
         let mut tiles: Vec<TileInWork> = mine.map(|t| frame.tile(t)).collect();
