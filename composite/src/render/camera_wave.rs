@@ -11,8 +11,13 @@ use super::{Activity, FrameError};
 use rayon::prelude::*;
 use rt_core::waves::{CameraHits, Met, Pass, WaveFrame};
 
-/// Chunks of an owner's tiles, one after the other by all ranks. With more, less is left to send at the end, in more messages.
+/// Chunks of an owner's tiles at most, one after the other by all ranks. With more, less is left to send at the end, in more messages.
 const CHUNKS: usize = 4;
+/// Tiles of a chunk at least: with fewer, messages and looking for them cost more than travelling while others trace gains (measured with 100 tiles
+/// and 128 ranks).
+const CHUNK_TILES: usize = 8;
+/// Tiles traced between two looks for messages.
+const TILES_PER_LOOK: usize = 4;
 
 /// Slots of a tile.
 pub(super) const SLOTS: usize = 1024;
@@ -92,7 +97,8 @@ pub(super) fn run(
     collect: Option<&mut Collect<'_>>,
 ) -> Result<Vec<TileAnswer>, FrameError> {
     let (rank, size) = (talk.rank(), talk.size());
-    let chunks = if wanted.stream { CHUNKS } else { 1 };
+    let tiles_per_owner = side.frame.num_tiles() / size;
+    let chunks = if wanted.stream { (tiles_per_owner / CHUNK_TILES).clamp(1, CHUNKS) } else { 1 };
     let mut wave = CameraWave {
         side,
         owners,
@@ -111,6 +117,7 @@ pub(super) fn run(
     wave.announce(talk)?;
     // ---- Rays, and hits to the owners of their tiles: to the next rank first, so that nobody gets all at once, and one's own last.
     let to = |step: usize| (rank + 1 + step) % size;
+    let mut traced = 0;
     for chunk in 0..chunks {
         if side.parallel {
             let all = (0..size).flat_map(|owner| owners.shared(rank, owner, (chunk, chunks)));
@@ -118,10 +125,15 @@ pub(super) fn run(
         }
         for owner in (0..size).map(to) {
             if !side.parallel {
-                wave.trace(talk, owners.shared(rank, owner, (chunk, chunks)).collect());
+                let tiles: Vec<usize> = owners.shared(rank, owner, (chunk, chunks)).collect();
+                traced += tiles.len();
+                wave.trace(talk, tiles);
             }
             if wanted.stream {
                 wave.hand_over(talk, owner, chunk)?;
+            }
+            if wanted.stream && (side.parallel || traced >= TILES_PER_LOOK) {
+                traced = 0;
                 while let Some(incoming) = talk.next(&mut wave.inbox, false)? {
                     wave.take(talk, incoming)?;
                 }

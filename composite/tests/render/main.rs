@@ -126,6 +126,7 @@ fn streamed_frames_have_the_bits_of_one_node_and_send_tiles_while_rays_are_trace
     let mut case = scenes::headlight(1);
     // Colours alone: nothing is left to do after the camera rays.
     case.options.layers = Layers::COLOR;
+    (case.options.width, case.options.height) = (384, 320);
     for samples in [1, 3] {
         case.options.samples = samples;
         let expected = one_node(&case);
@@ -153,14 +154,14 @@ fn streamed_frames_have_the_bits_of_one_node_and_send_tiles_while_rays_are_trace
                     &outputs,
                     &format!("{samples} samples, {ranks} ranks, stream {stream}"),
                 );
-                // Some rank has finished tiles before it has traced its last ray, or none has.
+                // Some rank has finished tiles before it has traced its last ray, or none has. (With few tiles for each rank it does not pay.)
                 let overlaps = |o: &FrameOutput| {
                     let mut spans = o.report.spans.iter().map(|s| s.activity);
                     let last = spans.clone().rposition(|a| a == Activity::Render);
                     let shaded = spans.position(|a| a == Activity::Shade);
                     shaded.zip(last).is_some_and(|(shaded, last)| shaded < last)
                 };
-                if samples == 1 && ranks > 1 && ranks < 100 {
+                if samples == 1 && (2..=5).contains(&ranks) {
                     assert_eq!(outputs.iter().any(overlaps), stream, "{ranks} ranks");
                 }
             }
