@@ -17,7 +17,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
          its rank; parts need a share of it, and rays travel. Both give the picture of one node, bit for bit."
             .into(),
     );
-    let (size, pixels, count) = if context.quick { ("1M", 320, 1) } else { ("4M", 1024, 3) };
+    // One frame after the first is enough: a frame is seconds of computing.
+    let (size, pixels, count) = if context.quick { ("1M", 320, 1) } else { ("4M", 1024, 1) };
     let demo =
         Demo { size: Some(size.into()), size_px: [pixels; 2], color_by_rank: false, ..Demo::default() };
     context.say("data")?;
