@@ -61,8 +61,8 @@ fn check(counts: &[usize], hard: bool, more: &[&str], variables: &[(&str, &Path)
     assert_eq!(checked["ranks"].to_string(), ranks);
     assert!(checked["transport"].as_str().is_some_and(|t| t.contains(transport)), "{checked}");
     assert_eq!((number("images"), number("images_differ")), (120 * counts.len() as u64, 0));
-    // Equal depths alone are composited a thousand times for each number of ranks.
-    assert_eq!(number("hard_images") > 1000 * counts.len() as u64, hard, "{checked}");
+    // Equal depths alone are composited a hundred times or a thousand for each number of ranks.
+    assert_eq!(number("hard_images") > 100 * counts.len() as u64, hard, "{checked}");
     assert_eq!(number("hard_images_differ"), 0);
 }
 
@@ -81,8 +81,8 @@ fn open_mpi_carries_every_strategy_to_the_bits_of_the_reference() {
 #[test]
 fn open_mpi_carries_the_hard_cases_to_the_bits_of_the_reference() {
     let Some(mpirun) = peer("RTSV_MPIRUN") else { return };
-    // Few ranks, because they share this machine's processors: equal depths are composited a thousand times.
-    check(&[2, 3], true, &["--mpi"], &[("COMPOSITE_MPIRUN", &mpirun)], "Open MPI");
+    // Few ranks and repeats, because ranks share this machine's processors; between threads there are a thousand.
+    check(&[2, 3], true, &["--mpi", "--repeats", "100"], &[("COMPOSITE_MPIRUN", &mpirun)], "Open MPI");
 }
 
 #[test]
@@ -128,8 +128,8 @@ fn simulated_ranks_carry_every_strategy_to_the_bits_of_the_reference() {
     }
     let library = simulated_program();
     let variables: Vec<(&str, &Path)> = library.iter().map(|(name, path)| (*name, path.as_path())).collect();
-    check(&[3, 16], true, &["--smpi", "--repeats", "1000"], &variables, "SMPI");
-    check(&[127], false, &["--smpi"], &variables, "SMPI");
+    check(&[3], true, &["--smpi", "--repeats", "100"], &variables, "SMPI");
+    check(&[16], false, &["--smpi"], &variables, "SMPI");
 }
 
 // ---- IceT -------------------------------------------------------------------------------------------------------

@@ -217,7 +217,19 @@ fn big_messages(comm: &mut dyn Communicator, timeout: Duration) -> anyhow::Resul
 /// What the highest rank does instead of its part.
 fn fail(comm: &mut RankComm, fault: Fault, timeout: Duration) -> anyhow::Result<()> {
     let comm = comm.comm();
-    if comm.rank() + 1 != comm.size() {
+    let culprit = comm.rank() + 1 == comm.size();
+    if fault == Fault::Corrupt {
+        // All composite the same frame.
+        let frame = Frame::<DepthPixel<[u8; 4]>>::with_depth(150, 41, &[[1; 4]; 6150], &[0.5; 6150])?;
+        let options = Options { timeout, ..Options::default() };
+        if culprit {
+            composite(&mut FirstRanks::damaged(comm), &frame, &options)?;
+        } else {
+            composite(comm, &frame, &options)?;
+        }
+        return Ok(());
+    }
+    if !culprit {
         return Ok(());
     }
     match fault {
@@ -237,11 +249,6 @@ fn fail(comm: &mut RankComm, fault: Fault, timeout: Duration) -> anyhow::Result<
             Ok(())
         }
         Fault::Order => Ok(comm.barrier(timeout)?),
-        Fault::Corrupt => {
-            let frame = Frame::<DepthPixel<[u8; 4]>>::with_depth(150, 41, &[[1; 4]; 6150], &[0.5; 6150])?;
-            composite(&mut FirstRanks::damaged(comm), &frame, &Options { timeout, ..Options::default() })?;
-            Ok(())
-        }
-        Fault::Leaves => anyhow::bail!("this rank has had enough"),
+        Fault::Corrupt | Fault::Leaves => anyhow::bail!("this rank has had enough"),
     }
 }
