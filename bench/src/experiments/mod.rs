@@ -111,7 +111,7 @@ pub const ALL: &[Experiment] = &[
     Experiment {
         id: "fig4.10",
         chapter: 4,
-        title: "Replicated data against data in parts, 1 to 64 ranks",
+        title: "Replicated data against data in parts, 1 to 128 ranks",
         run: fig4_10::run,
     },
     Experiment {
