@@ -24,6 +24,7 @@
 #include <vtkProperty.h>
 #include <vtkShaderProperty.h>
 #include <vtkTexture.h>
+#include <vtkVolume.h>
 
 namespace
 {
@@ -311,7 +312,7 @@ void RtvExtractor::EndFrame()
   }
 }
 
-bool RtvExtractor::Add(RtvBridge* bridge, vtkProp* prop, int number)
+bool RtvExtractor::Add(RtvBridge* bridge, vtkRenderer* renderer, vtkProp* prop, int number)
 {
   Actor a;
   a.Bridge = bridge;
@@ -326,8 +327,17 @@ bool RtvExtractor::Add(RtvBridge* bridge, vtkProp* prop, int number)
   a.Mapper = a.Prop ? a.Prop->GetMapper() : nullptr;
   if (!a.Mapper)
   {
-    return pass(prop->IsA("vtkVolume") ? "a volume (OpenGL's ray caster sees the depth of what is traced)"
-                                       : "OpenGL draws props of this class");
+    if (auto volume = vtkVolume::SafeDownCast(prop))
+    {
+      std::string answer;
+      const char* reason = rtvAddVolume(bridge, volume, renderer, a.Name, answer);
+      if (reason)
+      {
+        rtvApi->warn(bridge, (a.Name + ": " + reason + "; OpenGL draws it").c_str());
+      }
+      return reason ? pass(reason) : true;
+    }
+    return pass("OpenGL draws props of this class");
   }
   if (const char* reason = WhyNot(a.Prop, a.Mapper, a.PointRadius, a.LineRadius))
   {

@@ -299,6 +299,63 @@ pub struct Glyphs<'a> {
     pub rgba: &'a [[u8; 4]],
 }
 
+/// Values of any kind that a grid can have.
+#[derive(Debug, Clone, Copy)]
+pub enum Scalars<'a> {
+    /// Unsigned bytes.
+    U8(&'a [u8]),
+    /// 32-bit integers.
+    I32(&'a [i32]),
+    /// 64-bit integers.
+    I64(&'a [i64]),
+    /// Single precision.
+    F32(&'a [f32]),
+    /// Double precision.
+    F64(&'a [f64]),
+}
+
+/// A uniform grid of scalars as a glowing, absorbing medium: `vtkImageData` through a volume mapper, blended front to back.
+#[derive(Debug, Clone, Copy)]
+pub struct Volume<'a> {
+    /// Name for messages and the report.
+    pub name: &'a str,
+    /// Changes whenever the scalars do; 0 is never kept.
+    pub key: u64,
+    /// One per point, x fastest. Not read when [`crate::bridge::Bridge::has_volume`] says so.
+    pub scalars: Scalars<'a>,
+    /// Points per axis.
+    pub dims: [u32; 3],
+    /// Distance of neighbouring points, data units; positive.
+    pub spacing: [f64; 3],
+    /// Data coordinates (point (0,0,0) at zero) to world.
+    pub world_from_data: DMat4,
+    /// The value of the nearest point instead of linear interpolation.
+    pub nearest: bool,
+    /// Scalars of the first and the last entry of the tables.
+    pub range: [f64; 2],
+    /// Colours, evenly spaced, linear between.
+    pub colors: &'a [[f32; 3]],
+    /// Opacities of a slab of `unit_distance`, evenly spaced, linear between.
+    pub opacities: &'a [f32],
+    /// Thickness that the opacities are for, data units.
+    pub unit_distance: f64,
+    /// Answer to a headlight; `None` for none.
+    pub shading: Option<Shading>,
+}
+
+/// Answer of a volume to a headlight, by its gradient (`vtkVolumeProperty`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shading {
+    /// Part of the colour that needs no light.
+    pub ambient: f32,
+    /// Part that is lit.
+    pub diffuse: f32,
+    /// White highlight.
+    pub specular: f32,
+    /// Its exponent.
+    pub specular_power: f32,
+}
+
 /// Shape of a light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LightKind {

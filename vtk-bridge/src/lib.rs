@@ -55,3 +55,4 @@ pub mod options;
 pub mod picture;
 pub mod report;
 pub mod setup;
+mod volumes;

@@ -159,6 +159,46 @@ pub struct RtvSurface {
     pub line_radius: f64,
 }
 
+/// A uniform grid of scalars as a medium. Arrays are read before rtv_volume returns and not kept.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct RtvVolume {
+    /// Name for messages, UTF-8.
+    pub name: *const c_char,
+    /// Changes whenever the scalars do; 0: not known.
+    pub scalar_key: u64,
+    /// One number of any kind per point, x fastest; none when rtv_has_volume says that they are kept.
+    pub scalars: RtvArray,
+    /// Points per axis.
+    pub dims: [u32; 3],
+    /// 1: the value of the nearest point; 0: linear.
+    pub nearest: u32,
+    /// Distance of neighbouring points.
+    pub spacing: [f64; 3],
+    /// Row by row; the first point is at zero of the data.
+    pub world_from_data: [f64; 16],
+    /// Scalars of the first and the last entry of both tables.
+    pub range: [f64; 2],
+    /// Three RTV_F32 per entry.
+    pub colors: RtvArray,
+    /// One RTV_F32 per entry: opacity of a slab of unit_distance.
+    pub opacities: RtvArray,
+    /// See opacities.
+    pub unit_distance: f64,
+    /// 1 for shading by the gradient with a headlight.
+    pub shade: u32,
+    /// Of the shading.
+    pub ambient: f32,
+    /// Of the shading.
+    pub diffuse: f32,
+    /// Of the shading.
+    pub specular: f32,
+    /// Of the shading.
+    pub specular_power: f32,
+    /// Not used.
+    pub reserved: u32,
+}
+
 /// A light that is on.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
