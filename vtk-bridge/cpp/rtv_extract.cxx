@@ -2,6 +2,7 @@
 #include "rtv_arrays.h"
 
 #include <cmath>
+#include <cstddef>
 #include <string>
 #include <vtkActor.h>
 #include <vtkAssembly.h>
@@ -79,6 +80,8 @@ RtvProperty PropertyOf(vtkProperty* p)
   out.pbr = p->GetInterpolation() == VTK_PBR;
   out.cull_front = p->GetFrontfaceCulling() ? 1 : 0;
   out.cull_back = p->GetBackfaceCulling() ? 1 : 0;
+  CopyColor(p->GetEdgeColor(), out.edge_color);
+  out.edge_width = p->GetEdgeVisibility() && p->GetRepresentation() == VTK_SURFACE ? p->GetLineWidth() : 0.0f;
   return out;
 }
 
@@ -145,6 +148,15 @@ const char* AddPolyData(Actor& a, vtkPolyData* data, const BlockState& block, co
     CopyColor(block.Color, s.property.diffuse_color);
   }
   std::copy(&a.Matrix->Element[0][0], &a.Matrix->Element[0][0] + 16, s.world_from_data);
+  if (vtkProperty* back = a.Prop->GetBackfaceProperty())
+  {
+    // The back has the shading model of the front.
+    s.has_back = 1;
+    s.back = s.property;
+    const RtvProperty own = PropertyOf(back);
+    memcpy(&s.back, &own, offsetof(RtvProperty, metallic));
+    s.back.opacity = 1.0f;
+  }
   s.point_radius = a.PointRadius;
   s.line_radius = a.LineRadius;
   s.edges_only = a.Edges ? 1 : 0;
@@ -154,8 +166,24 @@ const char* AddPolyData(Actor& a, vtkPolyData* data, const BlockState& block, co
   {
     rtvAddColors(a.Bridge, s, a.Mapper, data, a.Keep);
   }
-  if (vtkTexture* texture = a.Prop->GetTexture())
+  if (s.has_back && s.color_source != RTV_COLOR_PROPERTY)
   {
+    // Colours of points and cells show on both sides.
+    s.has_back = 0;
+  }
+  vtkTexture* texture = a.Prop->GetTexture();
+  for (const auto& own : a.Prop->GetProperty()->GetAllTextures())
+  {
+    texture = own.second;
+    // Its alpha takes the place of the opacity.
+    s.property.opacity = 1.0f;
+  }
+  if (texture)
+  {
+    if (s.has_back)
+    {
+      return "a texture on a surface whose backs have a property of their own";
+    }
     if (s.color_source != RTV_COLOR_PROPERTY)
     {
       return "it has a texture and colours";
@@ -254,16 +282,52 @@ const char* WhyNot(vtkActor* actor, vtkMapper* mapper, double pointRadius, doubl
   }
   if (property->GetRepresentation() == VTK_SURFACE && property->GetEdgeVisibility())
   {
-    return "edges on the surface";
+    if (property->GetRenderLinesAsTubes())
+    {
+      return "edges as shaded tubes on the surface";
+    }
+    if (actor->HasTranslucentPolygonalGeometry())
+    {
+      return "edges on a translucent surface";
+    }
+    if (mapper->GetClippingPlanes() && mapper->GetClippingPlanes()->GetNumberOfItems() > 0)
+    {
+      return "edges on a clipped surface";
+    }
   }
-  if (actor->GetBackfaceProperty())
+  if (property->GetRepresentation() == VTK_SURFACE && property->GetVertexVisibility())
   {
-    // Two coincident surfaces, one culled on each side, are one surface for a ray.
-    return "backs with a property of their own";
+    return "vertices on the surface";
   }
-  if (property->GetNumberOfTextures() > 0)
+  if (vtkProperty* back = actor->GetBackfaceProperty())
   {
-    return "textures of the property (albedo, material, normal)";
+    if (actor->HasTranslucentPolygonalGeometry() || back->GetOpacity() < 1.0)
+    {
+      return "translucent backs with a property of their own";
+    }
+    if (mapper->IsA("vtkGlyph3DMapper"))
+    {
+      return "glyphs whose backs have a property of their own";
+    }
+  }
+  for (const auto& texture : property->GetAllTextures())
+  {
+    if (texture.first != "albedoTex")
+    {
+      return "textures of the property other than its base colour (normal, material, emissive, coat, anisotropy)";
+    }
+    if (actor->GetTexture())
+    {
+      return "a texture and a texture of the property";
+    }
+    if (property->GetInterpolation() != VTK_PBR)
+    {
+      return "textures of the property without physically based shading";
+    }
+    if (const char* reason = rtvTextureReason(texture.second))
+    {
+      return reason;
+    }
   }
   vtkShaderProperty* shader = actor->GetShaderProperty();
   if (shader && (shader->HasFragmentShaderCode() || shader->HasVertexShaderCode() || shader->GetNumberOfShaderReplacements() > 0))

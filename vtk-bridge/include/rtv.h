@@ -87,6 +87,10 @@ typedef struct RtvProperty {
   uint32_t cull_front;
   /* 1 to leave out sides turned away. */
   uint32_t cull_back;
+  /* Colour of the edges of polygons. */
+  float edge_color[3];
+  /* Their width in pixels; 0 for none. */
+  float edge_width;
 } RtvProperty;
 /* Something to draw. Arrays are read before rtv_surface returns and not kept. */
 typedef struct RtvSurface {
@@ -130,16 +134,20 @@ typedef struct RtvSurface {
   uint8_t texture_interpolate;
   /* 1: the texture is repeated. */
   uint8_t texture_repeat;
+  /* 1: the texture is encoded as sRGB. */
+  uint8_t texture_srgb;
   /* Not used. */
-  uint8_t reserved[2];
+  uint8_t reserved;
   /* Four RTV_U8 per texel, or none. */
   RtvArray texture;
   /* Texels per row. */
   uint32_t texture_width;
-  /* Not used. */
-  uint32_t reserved_2;
+  /* 1: backs of polygons answer light as back says. */
+  uint32_t has_back;
   /* Answer to light. */
   RtvProperty property;
+  /* Answer of backs. */
+  RtvProperty back;
   /* Row by row. */
   double world_from_data[16];
   /* Sixteen RTV_F64 per copy (row by row), or none. */
@@ -242,7 +250,7 @@ typedef struct RtvPicture {
   float const* first_depth;
 } RtvPicture;
 /* Number of this interface, made from its structures and calls (a test says which). A shim built for another one must not go on. */
-#define RTV_ABI 4092826016u
+#define RTV_ABI 220021418u
 /* All calls in one table, so that a shim needs only one symbol. */
 typedef struct RtvApi {
   /* rtv_abi. */

@@ -36,6 +36,7 @@ pub(crate) struct Drawn {
     pub(crate) color: Option<Resolved>,
     pub(crate) texture: Option<Arc<Texture>>,
     pub(crate) property: crate::input::Property,
+    pub(crate) back: Option<crate::input::Property>,
     pub(crate) world_from_data: DAffine3,
     /// Place and colour of each copy; `None` without copies.
     pub(crate) glyphs: Option<Vec<(DAffine3, Option<[u8; 4]>)>>,
@@ -184,6 +185,7 @@ impl Bridge {
             color,
             texture,
             property: surface.property,
+            back: surface.back,
             world_from_data: place,
             glyphs,
         });
@@ -257,7 +259,7 @@ impl Bridge {
         }
         (s.shape.key, color_key, s.texture.map(|t| t.key)).hash(h);
         // The numbers' text is as unique as the numbers.
-        format!("{:?}{:?}", s.property, s.world_from_data).hash(h);
+        format!("{:?}{:?}{:?}", s.property, s.back, s.world_from_data).hash(h);
         if let Some(g) = &s.glyphs {
             g.rgba.hash(h);
             g.matrices.iter().flatten().for_each(|v| v.to_bits().hash(h));
@@ -331,7 +333,7 @@ impl Bridge {
         let shadows = options.shadows || view.shadows;
         let headlight_only = matches!(self.lights.as_slice(), [only] if only.headlight);
         let start = Instant::now();
-        let Assembled { geometries, instances, appearances, materials, encodings } =
+        let Assembled { geometries, instances, appearances, materials, encodings, edges } =
             assemble(&self.drawn, &options, headlight_only, self.lights.is_empty());
         let world = self.world(geometries, instances)?;
         self.report.ms.build += ms(start);
@@ -396,6 +398,7 @@ impl Bridge {
             options: render,
             averaged: options.progressive > 1,
             encodings: &encodings,
+            edges: &edges,
         };
 
         // ---- Rays, and the picture for the window.
@@ -520,6 +523,8 @@ pub(crate) struct Ready<'a> {
     pub(crate) averaged: bool,
     /// One per instance.
     pub(crate) encodings: &'a [crate::materials::Encoding],
+    /// One per instance, or none at all.
+    pub(crate) edges: &'a [Option<crate::edges::Edges>],
 }
 
 fn same(a: &Geometry, b: &Geometry) -> bool {

@@ -146,6 +146,8 @@ pub struct Shape<'a> {
     pub line_radius: f64,
     /// Polygons are drawn as their edges, with tubes of `line_radius`.
     pub edges_only: bool,
+    /// The backs of polygons look different ([`Surface::back`]).
+    pub has_backs: bool,
 }
 
 impl<'a> Shape<'a> {
@@ -164,6 +166,7 @@ impl<'a> Shape<'a> {
             point_radius: 0.0,
             line_radius: 0.0,
             edges_only: false,
+            has_backs: false,
         }
     }
 }
@@ -183,6 +186,8 @@ pub struct Image<'a> {
     pub interpolate: bool,
     /// Repeated outside 0..1 instead of its edge.
     pub repeat: bool,
+    /// Encoded as sRGB: decoded before it is interpolated.
+    pub srgb: bool,
 }
 
 /// Where the colour of a surface comes from.
@@ -245,6 +250,10 @@ pub struct Property {
     pub cull_front: bool,
     /// Sides turned away from the viewer are left out.
     pub cull_back: bool,
+    /// Colour of the edges of polygons.
+    pub edge_color: [f32; 3],
+    /// Their width, pixels; 0 for none. Only on opaque surfaces that are not clipped.
+    pub edge_width: f32,
 }
 
 impl Default for Property {
@@ -267,6 +276,8 @@ impl Default for Property {
             base_ior: 1.5,
             cull_front: false,
             cull_back: false,
+            edge_color: [0.0; 3],
+            edge_width: 0.0,
         }
     }
 }
@@ -286,6 +297,8 @@ pub struct Surface<'a> {
     pub texture: Option<Image<'a>>,
     /// Its answer to light.
     pub property: Property,
+    /// Another answer on the backs of its polygons, opaque and of one colour (needs [`Shape::has_backs`]).
+    pub back: Option<Property>,
     /// Copies: each is drawn where its own matrix (data of the copy to `world_from_data`'s input) puts it.
     pub glyphs: Option<Glyphs<'a>>,
 }

@@ -46,6 +46,7 @@ mod assemble;
 pub mod bridge;
 pub mod capi;
 pub mod colors;
+mod edges;
 pub mod geometry;
 pub mod input;
 pub mod lights;

@@ -63,7 +63,7 @@ impl Picture {
         let blend = effects.intersects(see_through) || soft_edges || ready.averaged;
         let layers = Layers::COLOR | Layers::DEPTH;
         let options = RenderOptions {
-            layers: if mixed { layers | Layers::IDS } else { layers },
+            layers: if mixed || !ready.edges.is_empty() { layers | Layers::IDS } else { layers },
             // Interpolated colours of opacity 1 come a rounding below it; what is 255 of 255 is opaque.
             depth_min_opacity: if effects.contains(Effects::TRANSPARENCY) { 1.0 - 1.0 / 512.0 } else { 0.0 },
             ..ready.options.clone()
@@ -90,6 +90,7 @@ impl Picture {
             uncover(&mut frame, &first_depth);
         }
         encode(&mut frame, ready.encodings, mixed);
+        crate::edges::draw(&mut frame, ready.edges, view);
         (self.width, self.height) = (view.width, view.height);
         std::mem::swap(&mut self.depth, &mut frame.depth);
         if blend {

@@ -212,7 +212,10 @@ mod tests {
     #[test]
     fn a_volume_lies_in_the_middle_of_its_box() {
         use rt_core::glam::DMat4;
-        let clip_from_world = DMat4::orthographic_rh_gl(-2.0, 2.0, -2.0, 2.0, 0.0, 10.0);
+        let clip_from_world = DMat4::from_cols_array(&[
+            0.5, 0.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, -0.2, -1.0, 0.0, 0.0, 0.0, 1.0,
+        ])
+        .transpose();
         let grid = Grid::new(UVec3::splat(2), DVec3::ZERO, DVec3::ONE, vec![1.0; 8]).unwrap();
         let transfer =
             TransferFunction::new(ColorMap::new(vec![[1.0; 4]], [0.0, 1.0]), vec![[0.0, 1.0]]).unwrap();

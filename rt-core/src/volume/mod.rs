@@ -389,15 +389,23 @@ impl Volume {
 
     #[inline]
     fn shade(&self, ray: &IndexRay, t: f64, color: [f64; 3]) -> [f64; 3] {
-        let Some(s) = &self.options.shading else { return color };
+        match self.light_at(ray, t) {
+            Some(light) => light.on(color),
+            None => color,
+        }
+    }
+
+    /// What shading makes of colours at `t`; `None` without shading.
+    fn light_at(&self, ray: &IndexRay, t: f64) -> Option<Lit> {
+        let s = self.options.shading.as_ref()?;
         let at = DVec3::from_array(ray.at(t)).as_vec3();
         // In indices moved by half a cell, the point around which the box lies.
         let at = if self.options.interpolation == Interpolation::Nearest { at.floor() } else { at };
         let g = smooth_gradient(&self.grid, at).as_dvec3();
         let steepness = g.length();
         if !(steepness > 0.0 && steepness.is_finite()) {
-            let rest = if s.half_gradient > 0.0 { 1.0 } else { f64::from(s.ambient) };
-            return color.map(|c| c * rest);
+            let factor = if s.half_gradient > 0.0 { 1.0 } else { f64::from(s.ambient) };
+            return Some(Lit { factor, highlight: 0.0 });
         }
         let dir = DVec3::from_array(ray.d) * self.grid.spacing;
         let light = match s.light {
@@ -412,15 +420,48 @@ impl Volume {
             let half = light.normalize_or_zero() + towards_viewer.normalize_or_zero();
             let base = (g.dot(half) / (steepness * half.length())).abs();
             // Two opposite directions have no half vector.
-            if base.is_finite() {
-                weight * f64::from(s.specular) * base.powf(s.shininess.into())
-            } else {
-                0.0
-            }
+            if base.is_finite() { weight * f64::from(s.specular) * base.powf(s.shininess.into()) } else { 0.0 }
         } else {
             0.0
         };
-        color.map(|c| c * (1.0 + weight * (lit - 1.0)) + highlight)
+        Some(Lit { factor: 1.0 + weight * (lit - 1.0), highlight })
+    }
+}
+
+/// What shading makes of a colour.
+#[derive(Debug, Clone, Copy)]
+struct Lit {
+    factor: f64,
+    highlight: f64,
+}
+
+impl Lit {
+    #[inline]
+    fn on(&self, color: [f64; 3]) -> [f64; 3] {
+        color.map(|c| c * self.factor + self.highlight)
+    }
+}
+
+/// Shading along a ray's way through a cell: the parabola through its values at both ends and in the middle. Gradients cost as much as everything else of
+/// a sample, and between grid points they bend no more than that.
+#[derive(Debug, Clone, Copy)]
+struct LitStretch {
+    t0: f64,
+    per_t: f64,
+    ends: [Lit; 3],
+}
+
+impl LitStretch {
+    #[inline]
+    fn at(&self, t: f64) -> Lit {
+        let x = (t - self.t0) * self.per_t;
+        let [a, b, c] = self.ends;
+        let weights = [(1.0 - x) * (1.0 - 2.0 * x), 4.0 * x * (1.0 - x), x * (2.0 * x - 1.0)];
+        let mix = |v: [f64; 3]| (v[0] * weights[0] + v[1] * weights[1] + v[2] * weights[2]).max(0.0);
+        Lit {
+            factor: mix([a.factor, b.factor, c.factor]),
+            highlight: mix([a.highlight, b.highlight, c.highlight]),
+        }
     }
 }
 

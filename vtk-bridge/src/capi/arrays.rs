@@ -87,6 +87,7 @@ pub(super) unsafe fn surface<'a>(s: &RtvSurface, name: &'a str) -> Result<Surfac
             point_radius: s.point_radius,
             line_radius: s.line_radius,
             edges_only: s.edges_only != 0,
+            has_backs: s.has_back != 0,
         };
         let key = s.color_key;
         let color = match s.color_source {
@@ -114,6 +115,7 @@ pub(super) unsafe fn surface<'a>(s: &RtvSurface, name: &'a str) -> Result<Surfac
             rgba: &texels[..texels.len() / width * width],
             interpolate: s.texture_interpolate != 0,
             repeat: s.texture_repeat != 0,
+            srgb: s.texture_srgb != 0,
         });
         let matrices: &[[f64; 16]] = tuples(&s.glyph_matrices, "glyphs", RTV_F64)?;
         Ok(Surface {
@@ -123,6 +125,7 @@ pub(super) unsafe fn surface<'a>(s: &RtvSurface, name: &'a str) -> Result<Surfac
             color,
             texture,
             property: property(&s.property),
+            back: (s.has_back != 0).then(|| property(&s.back)),
             glyphs: (s.glyph_matrices.kind != RTV_NONE)
                 .then(|| {
                     tuples(&s.glyph_colors, "glyph colours", RTV_U8).map(|rgba| Glyphs { matrices, rgba })
@@ -188,6 +191,8 @@ fn property(p: &RtvProperty) -> Property {
         base_ior: p.base_ior,
         cull_front: p.cull_front != 0,
         cull_back: p.cull_back != 0,
+        edge_color: p.edge_color,
+        edge_width: p.edge_width,
     }
 }
 

@@ -91,6 +91,10 @@ pub struct RtvProperty {
     pub cull_front: u32,
     /// 1 to leave out sides turned away.
     pub cull_back: u32,
+    /// Colour of the edges of polygons.
+    pub edge_color: [f32; 3],
+    /// Their width in pixels; 0 for none.
+    pub edge_width: f32,
 }
 
 /// Something to draw. Arrays are read before `rtv_surface` returns and not kept.
@@ -137,16 +141,20 @@ pub struct RtvSurface {
     pub texture_interpolate: u8,
     /// 1: the texture is repeated.
     pub texture_repeat: u8,
+    /// 1: the texture is encoded as sRGB.
+    pub texture_srgb: u8,
     /// Not used.
-    pub reserved: [u8; 2],
+    pub reserved: u8,
     /// Four RTV_U8 per texel, or none.
     pub texture: RtvArray,
     /// Texels per row.
     pub texture_width: u32,
-    /// Not used.
-    pub reserved_2: u32,
+    /// 1: backs of polygons answer light as back says.
+    pub has_back: u32,
     /// Answer to light.
     pub property: RtvProperty,
+    /// Answer of backs.
+    pub back: RtvProperty,
     /// Row by row.
     pub world_from_data: [f64; 16],
     /// Sixteen RTV_F64 per copy (row by row), or none.
