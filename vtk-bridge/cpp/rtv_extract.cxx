@@ -1,6 +1,7 @@
 // Props to surfaces: which are traced, and why the others are not.
 #include "rtv_arrays.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <string>
@@ -81,7 +82,8 @@ RtvProperty PropertyOf(vtkProperty* p)
   out.cull_front = p->GetFrontfaceCulling() ? 1 : 0;
   out.cull_back = p->GetBackfaceCulling() ? 1 : 0;
   CopyColor(p->GetEdgeColor(), out.edge_color);
-  out.edge_width = p->GetEdgeVisibility() && p->GetRepresentation() == VTK_SURFACE ? p->GetLineWidth() : 0.0f;
+  // OpenGL's are never thinner than this.
+  out.edge_width = p->GetEdgeVisibility() && p->GetRepresentation() == VTK_SURFACE ? std::max(1.1f, p->GetLineWidth()) : 0.0f;
   return out;
 }
 

@@ -102,8 +102,6 @@ void Scale(vtkGlyph3DMapper* mapper, vtkDataArray* array, vtkIdType i, double sc
     scale[c] = scale[c] == 0.0 ? 1.0e-10 : scale[c];
   }
 }
-}
-
 // The sources by number. Why not, or null.
 const char* Sources(vtkGlyph3DMapper* mapper, std::vector<vtkPolyData*>& sources)
 {

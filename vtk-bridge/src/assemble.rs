@@ -41,7 +41,12 @@ pub(crate) fn assemble(drawn: &[Drawn], options: &Options, only_headlight: bool,
             parts.push((std::sync::Arc::as_ptr(s) as usize, Geometry::Shape(s.clone()), false, &d.property));
         }
         if let (Some(s), Some(back)) = (&d.built.backs, &d.back) {
-            parts.push((std::sync::Arc::as_ptr(s).cast::<()>() as usize, Geometry::Shape(s.clone()), false, back));
+            parts.push((
+                std::sync::Arc::as_ptr(s).cast::<()>() as usize,
+                Geometry::Shape(s.clone()),
+                false,
+                back,
+            ));
         }
         for (address, geometry, is_mesh, property) in parts {
             let index = *known.entry(address).or_insert_with(|| {
@@ -75,14 +80,7 @@ impl Assembled {
         }
     }
 
-    fn add(
-        &mut self,
-        d: &Drawn,
-        property: &Property,
-        geometry: usize,
-        is_mesh: bool,
-        setting: &Setting<'_>,
-    ) {
+    fn add(&mut self, d: &Drawn, property: &Property, geometry: usize, is_mesh: bool, setting: &Setting<'_>) {
         let colors = d.color.as_ref().filter(|_| is_mesh);
         let (base, encoding) = material(property, colors.is_some(), setting);
         match &d.glyphs {

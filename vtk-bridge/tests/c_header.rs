@@ -155,7 +155,8 @@ fn the_header_says_what_the_library_does() {
     // A shim built for one interface must not be used with another: the number is that of the interface itself.
     let number = fingerprint(&made);
     assert_eq!(vtk_bridge::capi::RTV_ABI, number, "the interface has changed: set RTV_ABI to {number}");
-    let python = std::fs::read_to_string(folder.join("python/rtvtk/library.py")).expect("library.py is there");
+    let python =
+        std::fs::read_to_string(folder.join("python/rtvtk/library.py")).expect("library.py is there");
     assert!(python.contains(&format!("\nABI = {number}\n")), "python/rtvtk/library.py needs ABI = {number}");
     for expected in [
         "int32_t rtv_surface(RtvBridge* bridge, RtvSurface const* surface);",

@@ -27,7 +27,7 @@ cargo xtask setup
 
 cargo xtask vtk [--release] [OPTIONS OF vtk-bridge install]
     Builds vtk-bridge from this checkout and installs it for the VTK and ParaView of this machine; then
-    `eval "$(target/debug/vtk-bridge env --vtk)"` (or --paraview) makes any script in this shell ray traced.
+    `eval \"$(target/debug/vtk-bridge env --vtk)\"` (or --paraview) makes any script in this shell ray traced.
       --release         build it optimised, into target/release
       --prefix FOLDER, --include FOLDER, --plugin    as of `vtk-bridge install`
 

@@ -106,8 +106,10 @@ fn order(subject: &Subject, pixels: u32, quick: bool, folder: &Path) -> anyhow::
         })
     });
     let views: Vec<Value> = views.collect();
-    let mut order = json!({ "pixels": pixels, "frames": subject.frames, "views": views, "isovalues": [], "points": 201 });
-    if let Some(size) = Size::ALL.into_iter().find(|s| subject.data == "wavelet" && s.name() == subject.size) {
+    let mut order =
+        json!({ "pixels": pixels, "frames": subject.frames, "views": views, "isovalues": [], "points": 201 });
+    if let Some(size) = Size::ALL.into_iter().find(|s| subject.data == "wavelet" && s.name() == subject.size)
+    {
         order["isovalues"] = json!(size.isovalues());
         if quick {
             order["points"] = json!(101);
@@ -127,15 +129,18 @@ fn order(subject: &Subject, pixels: u32, quick: bool, folder: &Path) -> anyhow::
 /// Rows and ratios of one data set from all rounds, each with a result per program.
 fn rows(record: &mut Record, data: &str, rounds: &[Vec<Value>]) -> anyhow::Result<()> {
     let first = rounds.first().and_then(|r| r.first()).context("no round was measured")?;
-    let views: Vec<String> = first["views"].as_object().into_iter().flatten().map(|(n, _)| n.clone()).collect();
+    let views: Vec<String> =
+        first["views"].as_object().into_iter().flatten().map(|(n, _)| n.clone()).collect();
     let triangles = first["triangles"].as_u64().unwrap_or(0);
-    let list = |v: &Value| -> Vec<f64> { v.as_array().into_iter().flatten().filter_map(Value::as_f64).collect() };
+    let list =
+        |v: &Value| -> Vec<f64> { v.as_array().into_iter().flatten().filter_map(Value::as_f64).collect() };
     for view in &views {
         for (p, program) in PROGRAMS.iter().enumerate() {
             let of = |name: &str| -> Vec<f64> {
                 rounds.iter().flat_map(|r| list(&r[p]["views"][view.as_str()][name])).collect()
             };
-            let once = |name: &str| -> Vec<f64> { rounds.iter().filter_map(|r| r[p][name].as_f64()).collect() };
+            let once =
+                |name: &str| -> Vec<f64> { rounds.iter().filter_map(|r| r[p][name].as_f64()).collect() };
             let (cpu, wall) = (of("cpu"), of("wall"));
             let low = |v: &[f64]| v.iter().copied().fold(f64::INFINITY, f64::min);
             let high = |v: &[f64]| v.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -185,7 +190,8 @@ fn median(values: &[f64]) -> f64 {
 }
 
 fn ratio(name: String, rounds: Vec<f64>) -> Ratio {
-    let (low, high) = rounds.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    let (low, high) =
+        rounds.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
     Ratio {
         name: format!("vtk-bridge: {name}"),
         rival: "ParaView with llvmpipe".into(),
@@ -208,7 +214,8 @@ fn plots(record: &mut Record) {
         for program in PROGRAMS {
             for data in ["wavelet", "mixing-layer", "plasma"] {
                 let of = |r: &&Row| r.text("program") == Some(program) && r.text("data") == Some(data);
-                let mut views: Vec<&str> = record.rows.iter().filter(of).filter_map(|r| r.text("view")).collect();
+                let mut views: Vec<&str> =
+                    record.rows.iter().filter(of).filter_map(|r| r.text("view")).collect();
                 views.dedup();
                 views.sort_unstable();
                 views.dedup();
@@ -238,16 +245,24 @@ impl Host {
             UsageError("pvbatch is not here: install ParaView (Debian: `apt-get install paraview python3-paraview`), or name it in RTSV_PVBATCH".into())
         })?;
         let xvfb = program("RTSV_XVFB", "Xvfb").ok_or_else(|| {
-            UsageError("Xvfb is not here: install it (Debian: `apt-get install xvfb`), or name it in RTSV_XVFB".into())
+            UsageError(
+                "Xvfb is not here: install it (Debian: `apt-get install xvfb`), or name it in RTSV_XVFB"
+                    .into(),
+            )
         })?;
         let beside = std::env::current_exe().ok().map(|p| p.with_file_name("vtk-bridge"));
-        let bridge = std::env::var_os("RTSV_VTK_BRIDGE").map(PathBuf::from).or(beside).filter(|p| p.is_file());
+        let bridge =
+            std::env::var_os("RTSV_VTK_BRIDGE").map(PathBuf::from).or(beside).filter(|p| p.is_file());
         let bridge = bridge.ok_or_else(|| {
             UsageError("the program `vtk-bridge` is not beside this one: `cargo build -p vtk-bridge` (with the same --release), or name it in RTSV_VTK_BRIDGE".into())
         })?;
         let said = Command::new(&pvbatch).arg("--version").output().context("pvbatch --version")?;
         let text = [said.stdout, said.stderr].concat();
-        let version = String::from_utf8_lossy(&text).lines().next().unwrap_or("ParaView").replace("paraview version", "ParaView");
+        let version = String::from_utf8_lossy(&text)
+            .lines()
+            .next()
+            .unwrap_or("ParaView")
+            .replace("paraview version", "ParaView");
         Ok(Host { pvbatch, bridge, version, display: Display::start(&xvfb)? })
     }
 
@@ -265,14 +280,18 @@ impl Host {
         let mut command = Command::new("sh");
         command.args(["-c", line, "sh"]).arg(&self.bridge).arg(folder.join("bridge"));
         command.arg(&self.pvbatch).arg(&script).arg(&file);
-        command.env("DISPLAY", &self.display.name).env_remove("VTK_AUTOLOAD_PATH").env_remove("PV_PLUGIN_PATH");
+        command
+            .env("DISPLAY", &self.display.name)
+            .env_remove("VTK_AUTOLOAD_PATH")
+            .env_remove("PV_PLUGIN_PATH");
         for (name, _) in std::env::vars_os().filter(|(n, _)| n.to_string_lossy().starts_with("RTV_")) {
             command.env_remove(name);
         }
         let out = command.output().context("sh")?;
         let said = String::from_utf8_lossy(&out.stdout);
         let errors = String::from_utf8_lossy(&out.stderr);
-        let last = || errors.lines().rev().find(|l| !l.trim().is_empty()).unwrap_or("it said nothing").to_owned();
+        let last =
+            || errors.lines().rev().find(|l| !l.trim().is_empty()).unwrap_or("it said nothing").to_owned();
         let Some(line) = said.lines().find_map(|l| l.strip_prefix("RESULT ")) else {
             bail!("pvbatch with {drawn_by} ended with {}: {}", out.status, last());
         };
@@ -380,7 +399,8 @@ mod tests {
         for data in ["wavelet", "mixing-layer", "plasma"] {
             assert!(!catalogue::find(data).unwrap().views().is_empty(), "{data}");
         }
-        let names: Vec<String> = catalogue::find("mixing-layer").unwrap().views().into_iter().map(|v| v.name).collect();
+        let names: Vec<String> =
+            catalogue::find("mixing-layer").unwrap().views().into_iter().map(|v| v.name).collect();
         assert!(names.contains(&"RMO".to_owned()) && names.contains(&"RMI".to_owned()), "{names:?}");
     }
 }

@@ -129,7 +129,9 @@ pub(crate) fn ambient_albedo(m: &Material, color: Vec3, effects: Effects) -> Vec
             }
         }
         // VTK's physically based shader knows no ambient light; where occlusion is asked for, there must be something to occlude.
-        SurfaceModel::Pbr { form: PbrForm::Vtk, .. } if !effects.contains(Effects::AMBIENT_OCCLUSION) => Vec3::ZERO,
+        SurfaceModel::Pbr { form: PbrForm::Vtk, .. } if !effects.contains(Effects::AMBIENT_OCCLUSION) => {
+            Vec3::ZERO
+        }
         SurfaceModel::Pbr { metallic, .. } => {
             if reflects {
                 color * (1.0 - metallic)

@@ -420,7 +420,11 @@ impl Volume {
             let half = light.normalize_or_zero() + towards_viewer.normalize_or_zero();
             let base = (g.dot(half) / (steepness * half.length())).abs();
             // Two opposite directions have no half vector.
-            if base.is_finite() { weight * f64::from(s.specular) * base.powf(s.shininess.into()) } else { 0.0 }
+            if base.is_finite() {
+                weight * f64::from(s.specular) * base.powf(s.shininess.into())
+            } else {
+                0.0
+            }
         } else {
             0.0
         };
