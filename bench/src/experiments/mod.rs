@@ -18,6 +18,7 @@ mod fig5_13;
 mod fig5_14;
 mod lineup;
 mod many_ranks;
+mod paraview;
 mod partition_view;
 mod peers;
 mod peers_schlieren;
@@ -84,6 +85,12 @@ pub const ALL: &[Experiment] = &[
         run: strong_scaling::vpic,
     },
     Experiment { id: "fig3.10", chapter: 3, title: "Strong scaling, wavelet", run: strong_scaling::wavelet },
+    Experiment {
+        id: "paraview",
+        chapter: 3,
+        title: "One node of figures 3.6 to 3.10: ParaView with llvmpipe against the same ParaView with vtk-bridge",
+        run: paraview::run,
+    },
     Experiment {
         id: "partition-view",
         chapter: 3,

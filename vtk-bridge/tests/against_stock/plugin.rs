@@ -57,8 +57,8 @@ fn names_are_those_of_ospray_where_there_is_one() {
 #[test]
 fn the_plugin_alone_traces_and_the_picture_is_stock() {
     let (Some(plain), Some(off)) = (picture("plain"), picture("off")) else { return };
-    assert!(plain.traced_triangles() > 0, "{:?}", plain.report);
-    assert_eq!(off.traced_triangles(), 0, "EnableRayTracing=0 must leave everything to OpenGL");
+    assert!(plain.traced_elements() > 0, "{:?}", plain.report);
+    assert_eq!(off.traced_elements(), 0, "EnableRayTracing=0 must leave everything to OpenGL");
     let mut off = off;
     off.facts = plain.facts.clone();
     assert_eq!(faults(&off, &plain, &Bars::STRICT), Vec::<String>::new());
