@@ -24,7 +24,7 @@ fn both() -> Option<&'static Both> {
 }
 
 /// Pictures that are held to other bars than the rest, or to none, and why.
-const EXCEPTIONS: &[(&str, &str, Option<Bars>, &str)] = &[
+pub(crate) const EXCEPTIONS: &[(&str, &str, Option<Bars>, &str)] = &[
     (
         "odd_inputs",
         "not_a_number",
@@ -58,7 +58,7 @@ const EXCEPTIONS: &[(&str, &str, Option<Bars>, &str)] = &[
 ];
 
 /// Pictures in which there is nothing to trace.
-const EMPTY: &[(&str, &str)] =
+pub(crate) const EMPTY: &[(&str, &str)] =
     &[("odd_inputs", "nothing"), ("windows", "no_renderer"), ("windows", "actor_gone")];
 
 fn same_as_stock(script: &str) {
