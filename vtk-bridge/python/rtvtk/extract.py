@@ -154,8 +154,8 @@ def _planes(mapper, matrix):
 
 def _check(actor, mapper, point_radius, line_radius):
     p = actor.GetProperty()
-    # Subclasses in Python have their own names; what counts is VTK's class below them.
-    if not ACTORS & {c.__name__ for c in type(actor).__mro__[:3]}:
+    # Classes that Python derives (PyVista's) have the names of VTK's classes below them.
+    if actor.GetClassName() not in ACTORS:
         raise Untraceable("OpenGL draws props of this class")
     if p.GetRepresentation() == WIREFRAME and line_radius <= 0:
         raise Untraceable("wireframe (set RTV_LINE_RADIUS to trace edges as tubes)")
@@ -176,7 +176,7 @@ def _check(actor, mapper, point_radius, line_radius):
         reason = arrays.why_not_texture(actor.GetTexture())
         if reason:
             raise Untraceable(reason)
-    if not MAPPERS & {c.__name__ for c in type(mapper).__mro__[:2]}:
+    if mapper.GetClassName() not in MAPPERS:
         raise Untraceable("OpenGL draws mappers of this class")
 
 

@@ -1,5 +1,6 @@
 """Glyphs as instances: the matrices vtkGlyph3DMapper makes for OpenGL, made again, because it does not give them away."""
 import numpy as np
+from vtkmodules.vtkCommonCore import vtkBitArray
 from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkDataSet, vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkGlyph3DMapper
 
@@ -100,6 +101,8 @@ class Glyphs:
         scale = _array(mapper, _SCALE, data)
         turn = _array(mapper, _ORIENTATION, data) if mapper.GetOrient() else None
         mask = _array(mapper, _MASK, data) if mapper.GetMasking() else None
+        # VTK takes nothing else for a mask.
+        mask = mask if isinstance(mask, vtkBitArray) else None
         settings = (mapper.GetScaleMode(), mapper.GetScaling(), mapper.GetScaleFactor(), mapper.GetClamping(), mapper.GetRange(),
                     mapper.GetOrientationMode(), mapper.GetScalarVisibility(), mapper.GetColorMode(), mapper.GetScalarMode(),
                     mapper.GetScalarRange(), mapper.GetArrayName(), mapper.GetArrayId(), mapper.GetArrayComponent(),

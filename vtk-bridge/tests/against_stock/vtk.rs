@@ -102,6 +102,7 @@ scripts! {
     data_sets_of_other_kinds_are_as_in_stock_vtk: "data_sets",
     domains_of_any_size_and_place_show_the_same_picture_as_stock: "domains",
     glyphs_are_as_in_stock_vtk: "glyphs",
+    glyphs_of_one_source_are_instances: "instances",
     lights_are_as_in_stock_vtk: "lights",
     five_hundred_actors_are_as_in_stock_vtk: "many_actors",
     blocks_have_their_own_color_opacity_and_visibility: "multiblock",
