@@ -7,19 +7,45 @@ while a selector is at work nothing is touched.
 import ctypes as C
 
 import vtkmodules.vtkRenderingOpenGL2 as gl
+from vtkmodules.vtkCommonCore import vtkWeakReference
 
 from . import library as rtv
 from .extract import Extractor, Untraceable
 from .overlay import Overlay
 from .view import add_lights, size_of, view_of
 
-# By address, because VTK makes a new Python object for a renderer whenever the last one is gone, but only one renderer.
-_tracers = {}
-_watched = set()
+
+class _Watched:
+    """What was attached to VTK objects, by address: VTK makes a new Python object for a renderer whenever the last one is gone, but only one
+    renderer. Events tell when it goes, if nobody removed all observers (PyVista does): so each is asked whether it is there and still watched."""
+
+    def __init__(self):
+        self._entries = {}
+
+    @staticmethod
+    def _address(thing):
+        return thing.__this__.split("_")[1]
+
+    def get(self, thing):
+        entry = self._entries.get(self._address(thing))
+        if entry is None:
+            return None
+        weak, tag, command, value = entry
+        found = thing.GetCommand(tag) if weak.Get() is not None else None
+        return value if found is not None and found.__this__ == command.__this__ else None
+
+    def add(self, thing, observe, value):
+        for address in [a for a, entry in self._entries.items() if entry[0].Get() is None]:
+            del self._entries[address]
+        address, weak = self._address(thing), vtkWeakReference()
+        weak.Set(thing)
+        tag = thing.AddObserver("StartEvent", observe)
+        self._entries[address] = weak, tag, thing.GetCommand(tag), value
+        # Events of objects that are going come without the object.
+        thing.AddObserver("DeleteEvent", lambda *_: self._entries.pop(address, None))
 
 
-def _address(thing):
-    return thing.__this__.split("_")[1]
+_renderers, _windows = _Watched(), _Watched()
 
 
 class _Tracer:
@@ -30,16 +56,38 @@ class _Tracer:
         self.hidden, self.shown, self.switched = [], [], []
         # How many props more than OpenGL knows of were drawn.
         self.uncounted = 0
+        self.failed = False
 
     def start(self, renderer, _event):
         self.end(renderer, None)
         self.uncounted = 0
+        if self.failed:
+            return
+        try:
+            self._trace(renderer)
+        except Exception as error:
+            # We are a guest in somebody's program: OpenGL draws everything, as without us.
+            self.end(renderer, None)
+            self.failed = True
+            self.bridge.warn(f"internal error, OpenGL draws from now on; please report it: {type(error).__name__}: {error}")
+            self.bridge.end()
+
+    def _trace(self, renderer):
         if renderer.GetSelector() is not None or renderer.GetUseHiddenLineRemoval() or renderer.GetRenderWindow() is None:
             return
         width, height = size_of(renderer)
         props = renderer.GetViewProps()
         visible = [p for p in (props.GetItemAsObject(i) for i in range(props.GetNumberOfItems())) if p.GetVisibility()]
         if width < 1 or height < 1 or not visible or not self.bridge.begin():
+            return
+        # Passes read props, depths and normals on their own; this one only draws larger.
+        render_pass = renderer.GetPass()
+        if render_pass is not None and render_pass.GetClassName() != "vtkSSAAPass":
+            reason = f"a render pass draws this renderer ({render_pass.GetClassName()})"
+            self.bridge.warn(f"nothing is ray traced: {reason}; take it out, and ask for RTV_SHADOWS or RTV_AO instead")
+            for i, prop in enumerate(visible):
+                self.bridge.pass_on(f"{prop.GetClassName()} {i}", reason)
+            self.bridge.end()
             return
         # Both are made on first use, from what is visible: before anything is hidden.
         camera = renderer.GetActiveCamera()
@@ -88,19 +136,21 @@ class _Tracer:
 
 def attach(renderer):
     """Makes a renderer trace, unless it does already."""
-    address = _address(renderer)
-    if address in _tracers or not renderer.IsA("vtkOpenGLRenderer"):
-        return
-    tracer = _tracers[address] = _Tracer()
-    renderer.AddObserver("StartEvent", tracer.start)
-    renderer.AddObserver("EndEvent", tracer.end)
-    renderer.AddObserver("DeleteEvent", lambda *_: _tracers.pop(address, None))
+    if renderer.IsA("vtkOpenGLRenderer") and _renderers.get(renderer) is None:
+        tracer = _Tracer()
+        _renderers.add(renderer, tracer.start, tracer)
+        renderer.AddObserver("EndEvent", tracer.end)
 
 
 def _attach_all(window, _event):
     renderers = window.GetRenderers()
     for i in range(renderers.GetNumberOfItems()):
         attach(renderers.GetItemAsObject(i))
+
+
+def _watch(window):
+    if _windows.get(window) is None:
+        _windows.add(window, _attach_all, window.GetClassName())
 
 
 def install():
@@ -115,7 +165,7 @@ def install():
             attach(self)
 
         def GetNumberOfPropsRendered(self):
-            tracer = _tracers.get(_address(self))
+            tracer = _renderers.get(self)
             return super().GetNumberOfPropsRendered() + (tracer.uncounted if tracer else 0)
 
         number_of_props_rendered = property(GetNumberOfPropsRendered)
@@ -127,12 +177,3 @@ def install():
         plain = getattr(gl, name, None)
         if plain is not None:
             plain.override(type(f"Rtv{name[3:]}", (plain,), {"__init__": _watch}))
-
-
-def _watch(window):
-    address = _address(window)
-    if address not in _watched:
-        _watched.add(address)
-        window.AddObserver("StartEvent", _attach_all)
-        # Events of objects that are going come without the object.
-        window.AddObserver("DeleteEvent", lambda *_: _watched.discard(address))
