@@ -39,14 +39,22 @@ impl Context {
         }
         let start = Instant::now();
         let kind = [self.state.first_vertex_provokes, self.state.flat];
-        let (positions, runs) =
-            (std::mem::take(&mut self.recorder.positions), std::mem::take(&mut self.recorder.runs));
-        let geometry = self.cache.of_runs(&positions, &runs, kind);
+        let geometry = match self.recorder.followed(kind) {
+            Some(geometry) => {
+                self.cache.hits += 1;
+                self.cache.touch(&geometry);
+                geometry
+            }
+            None => {
+                self.recorder.write_down();
+                let geometry = self.cache.of_runs(&self.recorder.positions, &self.recorder.runs, kind);
+                self.recorder.expect(&geometry, kind);
+                geometry
+            }
+        };
         let attributes = Arc::new(self.recorder.take_attributes());
         let clip_from_object = product(&self.state.projection, &self.state.model_view);
         let calls = std::mem::take(&mut self.recorder.calls);
-        // The memory serves the next batch.
-        (self.recorder.positions, self.recorder.runs) = (positions, runs);
         self.recorder.positions.clear();
         self.recorder.runs.clear();
         let state = self.state.clone();
@@ -142,6 +150,11 @@ impl Context {
             self.present(&[layer], Fate::Surface(func));
         }
         self.counters.spent("present", start.elapsed());
+        for (draw, _) in pending {
+            if let Some(attributes) = Arc::into_inner(draw.attributes) {
+                self.recorder.give_back(attributes);
+            }
+        }
     }
 
     fn trace_in_order(&mut self, draw: &Draw, image: Option<Arc<Image>>) {
@@ -170,6 +183,9 @@ impl Context {
         (self.counters.report.cache_hits, self.counters.report.cache_misses) =
             (self.cache.hits, self.cache.misses);
         let fast = self.config.settings.quality == crate::config::Quality::Fast;
+        self.programs.frame_done();
+        self.packed.frame_done();
+        self.recorder.frame_done();
         self.cache.frame_done(|g| {
             if !fast {
                 worker::in_background(move || g.improve());

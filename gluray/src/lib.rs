@@ -14,6 +14,7 @@
 #![deny(unsafe_code)]
 
 mod arrays;
+mod buffers;
 mod cache;
 mod capture;
 pub mod cli;
@@ -32,12 +33,14 @@ mod frame;
 mod immediate;
 mod lighting;
 mod overrides;
+mod packs;
 pub mod panel;
 mod present;
 mod primitives;
 mod programs;
 mod raster;
 mod real;
+mod recorder;
 pub mod reasons;
 pub mod report;
 mod shading;
