@@ -221,7 +221,11 @@ pub(crate) fn hash(arrays: &[&[u8]]) -> u128 {
             h = mix2(h, hash_chunk(a));
             continue;
         }
-        let parts: Vec<u128> = crate::worker::on_pool(|| a.par_chunks(CHUNK).map(hash_chunk).collect());
+        let parts: Vec<u128> = match crate::config::current().settings.asynchronous {
+            // The pool is busy with the frame before.
+            true => a.chunks(CHUNK).map(hash_chunk).collect(),
+            false => crate::worker::on_pool(|| a.par_chunks(CHUNK).map(hash_chunk).collect()),
+        };
         h = parts.iter().fold(h, |h, p| mix2(h, *p));
     }
     h

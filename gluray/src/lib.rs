@@ -31,6 +31,7 @@ mod fault;
 pub mod folders;
 mod frame;
 mod immediate;
+mod late;
 mod lighting;
 mod overrides;
 mod packs;

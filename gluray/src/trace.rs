@@ -58,6 +58,7 @@ impl Rect {
 }
 
 /// Fragments, at most one a pixel.
+#[derive(Clone, Default)]
 pub(crate) struct Layer {
     pub(crate) rect: Rect,
     pub(crate) color: Vec<[u8; 4]>,
