@@ -14,6 +14,7 @@
 #![deny(unsafe_code)]
 
 mod arrays;
+mod buffers;
 mod cache;
 mod capture;
 pub mod cli;
@@ -30,14 +31,17 @@ mod fault;
 pub mod folders;
 mod frame;
 mod immediate;
+mod late;
 mod lighting;
 mod overrides;
+mod packs;
 pub mod panel;
 mod present;
 mod primitives;
 mod programs;
 mod raster;
 mod real;
+mod recorder;
 pub mod reasons;
 pub mod report;
 mod shading;
