@@ -9,6 +9,7 @@ use crate::client_memory;
 use crate::context::{Context, Sink};
 use crate::decide::Verdict;
 use crate::enums::*;
+use crate::overrides::Look;
 use crate::primitives::{is_filled, triangulate};
 use crate::programs::DrawCall;
 use crate::real::gl;
@@ -383,7 +384,7 @@ impl Context {
             Shading::Program(p) => p.clip_from_object,
         };
         let draw =
-            Draw { geometry, attributes, state: self.state.clone(), shading, clip_from_object, calls: 1 };
+            Draw { geometry, attributes, state: self.state.clone(), shading, clip_from_object, calls: 1, look: Look::default() };
         self.add(draw, in_order);
     }
 

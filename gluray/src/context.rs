@@ -14,6 +14,7 @@ use crate::programs::Programs;
 use crate::real::gl;
 use crate::report::Counters;
 use crate::state::current::Current;
+use crate::studio::Studio;
 use crate::state::lists::{Lists, Recording};
 use crate::state::snapshot::{Abilities, Snapshot};
 use crate::symbols::{self, class};
@@ -61,6 +62,7 @@ pub(crate) struct Context {
     pub(crate) cache: Cache,
     pub(crate) frame: Frame,
     pub(crate) presenter: Presenter,
+    pub(crate) studio: Studio,
     pub(crate) programs: Programs,
     pub(crate) counters: Counters,
     /// Errors that came up behind the program's back or were kept for it.
@@ -222,6 +224,7 @@ impl Context {
             cache: Cache::default(),
             frame: Frame::default(),
             presenter: Presenter::default(),
+            studio: Studio::default(),
             programs: Programs::default(),
             counters: Counters::default(),
             errors: Vec::new(),

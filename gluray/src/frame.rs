@@ -4,6 +4,7 @@ use crate::capture::{Draw, Shading};
 use crate::context::Context;
 use crate::enums::*;
 use crate::lighting::{product, transform};
+use crate::overrides::Look;
 use crate::present::Fate;
 use crate::texturing::Image;
 use crate::trace::{self, Prepared};
@@ -56,7 +57,7 @@ impl Context {
         );
         self.counters.spent("capture", start.elapsed());
         self.add(
-            Draw { geometry, attributes, state, shading: Shading::Fixed, clip_from_object, calls },
+            Draw { geometry, attributes, state, shading: Shading::Fixed, clip_from_object, calls, look: Look::default() },
             in_order,
         );
     }
@@ -72,6 +73,10 @@ impl Context {
         if !trace::has_rays(&draw.clip_from_object) {
             // A model-view that flattens everything (a shadow on a floor): rays need the flattened triangles themselves.
             self.flatten(&mut draw);
+        }
+        if draw.state.blend && self.config.settings.sees_through() && draw.has_full_alpha() {
+            // Programs leave blending on; what lets no light through is opaque all the same.
+            Arc::make_mut(&mut draw.state).blend = false;
         }
         let image = match &draw.state.texture {
             Some(t) => self.presenter.images.get(t.target, t.name, t.version),
@@ -118,6 +123,10 @@ impl Context {
         self.frame.traced = true;
         self.counters.flushed(before);
         self.frame.told.traced(self.counters.report.frames + 1, pending.iter().map(|(d, _)| d));
+        if crate::picture::is_for(&self.config.settings) {
+            let func = if others { LESS } else { pending[0].0.state.depth_func };
+            return self.draw_picture(&pending, func);
+        }
         let start = Instant::now();
         let mut builds = 0;
         let settings = &self.config.settings;
@@ -169,6 +178,7 @@ impl Context {
         self.frame.traced = false;
         (self.counters.report.cache_hits, self.counters.report.cache_misses) =
             (self.cache.hits, self.cache.misses);
+        self.studio.frame_done();
         let fast = self.config.settings.quality == crate::config::Quality::Fast;
         self.cache.frame_done(|g| {
             if !fast {
@@ -179,7 +189,7 @@ impl Context {
         let size = [2, 3].map(|i| self.state.viewport[i].max(0).cast_unsigned());
         self.counters.report.objects = self.frame.told.frame_done(&self.counters.report, size);
         if let Some(problem) = self.frame.told.take_problem() {
-            self.counters.report.problems = vec![problem];
+            self.counters.warn(problem);
         }
         self.take_up_settings();
         self.counters.publish(false);

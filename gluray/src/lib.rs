@@ -14,6 +14,7 @@
 #![deny(unsafe_code)]
 
 mod arrays;
+mod beyond;
 mod cache;
 mod capture;
 pub mod cli;
@@ -33,6 +34,7 @@ mod immediate;
 mod lighting;
 mod overrides;
 pub mod panel;
+mod picture;
 mod present;
 mod primitives;
 mod programs;
@@ -42,8 +44,10 @@ pub mod reasons;
 pub mod report;
 mod shading;
 mod state;
+mod studio;
 mod symbols;
 mod texturing;
 pub mod timeline;
 mod trace;
+mod view;
 mod worker;

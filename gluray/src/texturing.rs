@@ -6,6 +6,7 @@ use crate::enums::*;
 use crate::lighting::{Setup, normalized, transform};
 use crate::real::gl;
 use crate::state::snapshot::{Snapshot, TextureUnit};
+use rt_core::texture::{Filter, Texture, Wrap};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -103,6 +104,28 @@ impl Image {
     pub(crate) fn is_opaque(&self) -> bool {
         self.texels.iter().all(|t| t[3] == 1.0)
             && (self.wrap != [CLAMP_TO_BORDER; 2] || self.border[3] == 1.0)
+    }
+
+    /// The picture as a texture of rt-core's, with what its components stand for; `None` when it cannot be one.
+    pub(crate) fn as_texture(&self) -> Option<Texture> {
+        let rgba = |t: &[f32; 4]| match self.base {
+            Base::Alpha => [1.0, 1.0, 1.0, t[3]],
+            Base::Luminance => [t[0], t[0], t[0], 1.0],
+            Base::LuminanceAlpha => [t[0], t[0], t[0], t[3]],
+            Base::Intensity => [t[0]; 4],
+            Base::Rgb => [t[0], t[1], t[2], 1.0],
+            Base::Rgba => *t,
+        };
+        let texels = self.texels.iter().map(rgba).collect();
+        let wrap = self.wrap.map(|w| match w {
+            REPEAT => Wrap::Repeat,
+            MIRRORED_REPEAT => Wrap::Mirror,
+            _ => Wrap::Clamp,
+        });
+        let filter = if self.linear { Filter::Bilinear } else { Filter::Nearest };
+        let mut texture = Texture::from_linear(self.width, self.height, texels).ok()?;
+        (texture.wrap, texture.filter) = (wrap, filter);
+        Some(texture)
     }
 
     fn texel(&self, x: i64, y: i64) -> [f32; 4] {

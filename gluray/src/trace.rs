@@ -178,6 +178,11 @@ impl<'a> Prepared<'a> {
         Some(out)
     }
 
+    /// The user's clip planes, in object space.
+    pub(crate) fn clip_planes(&self) -> &[[f64; 4]] {
+        &self.clip_planes
+    }
+
     /// The ray through a point of the window, with the part of it that is not clipped; `None` when all of it is.
     fn ray(&self, x: f64, y: f64) -> Option<(Ray, f64)> {
         let [vx, vy, vw, vh] = self.draw.state.viewport.map(f64::from);

@@ -26,6 +26,7 @@ impl Config {
         match (self.settings.enabled, self.settings.trace) {
             (false, _) => decide::Trace::Nothing,
             (true, Trace::All) => decide::Trace::All,
+            (true, Trace::Scene) if self.settings.sees_through() => decide::Trace::Translucent,
             (true, Trace::Scene) => decide::Trace::Surfaces,
         }
     }
