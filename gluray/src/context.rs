@@ -10,6 +10,7 @@ use crate::decide::{self, Verdict};
 use crate::enums::*;
 use crate::frame::Frame;
 use crate::present::Presenter;
+use crate::probe::Probes;
 use crate::programs::Programs;
 use crate::real::gl;
 use crate::report::Counters;
@@ -63,6 +64,7 @@ pub(crate) struct Context {
     pub(crate) frame: Frame,
     pub(crate) presenter: Presenter,
     pub(crate) studio: Studio,
+    pub(crate) probes: Probes,
     pub(crate) programs: Programs,
     pub(crate) counters: Counters,
     /// Errors that came up behind the program's back or were kept for it.
@@ -225,6 +227,7 @@ impl Context {
             frame: Frame::default(),
             presenter: Presenter::default(),
             studio: Studio::default(),
+            probes: Probes::default(),
             programs: Programs::default(),
             counters: Counters::default(),
             errors: Vec::new(),

@@ -114,9 +114,15 @@ impl Context {
 
     /// Draws what is pending into the framebuffer.
     pub(crate) fn flush(&mut self, before: &str) {
+        crate::fault::injected("flush");
         self.end_batch();
         let pending = std::mem::take(&mut self.frame.pending);
         let others = std::mem::take(&mut self.frame.others);
+        if !self.probes.draws.is_empty() {
+            self.counters.flushed(before);
+            self.frame.traced = true;
+            self.darken();
+        }
         if pending.is_empty() {
             return;
         }
@@ -227,7 +233,7 @@ impl Context {
             return false;
         }
         self.end_batch();
-        if !self.frame.pending.is_empty() {
+        if !self.frame.pending.is_empty() || !self.probes.draws.is_empty() {
             const COLOR_AND_DEPTH: u32 = 0x4100;
             self.refresh();
             let whole = mask & COLOR_AND_DEPTH == COLOR_AND_DEPTH
@@ -237,6 +243,7 @@ impl Context {
                 && self.frame.pending.iter().all(|(d, _)| d.state.framebuffer == self.state.framebuffer);
             if whole {
                 self.frame.pending.clear();
+                self.probes.draws.clear();
                 self.frame.others = false;
             } else {
                 self.flush("glClear of a part");

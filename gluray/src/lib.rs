@@ -37,6 +37,7 @@ pub mod panel;
 mod picture;
 mod present;
 mod primitives;
+mod probe;
 mod programs;
 mod raster;
 mod real;

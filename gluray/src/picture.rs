@@ -102,6 +102,43 @@ impl Context {
     }
 }
 
+impl Context {
+    /// Multiplies what the driver drew of these by how light they are.
+    pub(crate) fn shade_over(&mut self, draws: &[Draw], settings: &Settings) {
+        let start = Instant::now();
+        let settings = crate::probe::factor_settings(settings);
+        let (mut builds, mut rays) = (0, [0; 3]);
+        let groups = views(draws.iter());
+        let mut layers = Vec::new();
+        worker::on_pool(|| {
+            for (_, members) in &groups {
+                let ready: Vec<Prepared<'_>> =
+                    members.iter().filter_map(|i| Prepared::new(&draws[*i], None, &mut builds)).collect();
+                let (mut layer, extra) = trace::nearest(&ready, &settings);
+                // The driver's own depth may be some roundings nearer.
+                layer.depth.iter_mut().filter(|d| **d < 1.5).for_each(|d| *d = (*d - DEPTH_ROUNDINGS).max(0.0));
+                rays[0] += ready.iter().map(|p| p.rays.load(Relaxed)).sum::<u64>();
+                (rays[1], rays[2]) = (rays[1] + extra[0], rays[2] + extra[1]);
+                layers.push(layer);
+            }
+        });
+        self.counters.spent("trace", start.elapsed());
+        self.counters.report.builds += builds;
+        for (kind, n) in ["primary", "shadow", "ambient occlusion"].into_iter().zip(rays) {
+            self.counters.rays(kind, n);
+        }
+        let start = Instant::now();
+        for layer in layers.into_iter().filter(|l| l.covered > 0) {
+            self.counters.report.pixels += layer.covered as u64;
+            self.present(&[layer], Fate::Times);
+        }
+        self.counters.spent("present", start.elapsed());
+    }
+}
+
+/// Sixteen steps of a depth buffer of 24 bits.
+const DEPTH_ROUNDINGS: f32 = 1e-6;
+
 fn make(
     ready: &[Prepared<'_>],
     view: &View,

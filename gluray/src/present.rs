@@ -17,6 +17,8 @@ pub(crate) enum Fate {
     Surface(u32),
     /// The same with premultiplied colours over what is there: several samples a pixel, or surfaces that let light through.
     Over(u32),
+    /// What is there times the colours, where it has this depth or is behind: no depths are written.
+    Times,
     /// The same again without depths: pixels whose centre sees no opaque surface.
     Fringe(u32),
     /// Everything the program has set: a draw whose order matters.
@@ -274,7 +276,7 @@ impl Context {
         }
         OFF.into_iter().filter(|c| *c != RASTERIZER_DISCARD || self.can.version >= 30).for_each(gl::disable);
         if !core {
-            (0..6).for_each(|i| gl::disable(CLIP_PLANE0 + i));
+            (0..self.can.clip_planes).for_each(|i| gl::disable(CLIP_PLANE0 + i));
             let vp = self.can.arb_programs;
             LEGACY.into_iter().filter(|c| *c != VERTEX_PROGRAM_ARB || vp).for_each(gl::disable);
             if vp {
@@ -283,6 +285,20 @@ impl Context {
         }
         gl::polygon_mode(FRONT_AND_BACK, FILL);
         gl::depth_range(0.0, 1.0);
+        if fate == Fate::Times {
+            OPERATIONS.into_iter().for_each(gl::disable);
+            if !core {
+                gl::disable(ALPHA_TEST);
+            }
+            gl::disable(SCISSOR_TEST);
+            gl::enable(BLEND);
+            gl::blend_equation(FUNC_ADD);
+            gl::blend_func(ZERO, SRC_COLOR);
+            gl::enable(DEPTH_TEST);
+            gl::depth_func(LEQUAL);
+            gl::depth_mask(0);
+            gl::color_mask(1, 1, 1, 0);
+        }
         if let Fate::Surface(func) | Fate::Over(func) | Fate::Fringe(func) = fate {
             OPERATIONS.into_iter().for_each(gl::disable);
             if !matches!(fate, Fate::Surface(_)) {

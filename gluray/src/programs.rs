@@ -4,9 +4,10 @@
 //! when every statement is one whose meaning is written down below: a shader with anything else in it (picking, edges, depth peeling,
 //! physically based materials) is left to the driver.
 
-use crate::arrays::{Elements, Source, positions};
+use crate::arrays::{Elements, Source, Taken, positions};
 use crate::cache::Geometry;
 use crate::capture::{Attributes, Shading, Values};
+use crate::config::Mode;
 use crate::context::Context;
 use crate::decide::{self, Verdict};
 use crate::effects::{Place, Visibility, vector};
@@ -423,7 +424,7 @@ pub(crate) struct Programs {
 }
 
 /// A generic attribute's array by name; `None` when the program has no such attribute or its array is off.
-fn attribute(program: u32, name: &str) -> Option<Source> {
+pub(crate) fn attribute(program: u32, name: &str) -> Option<Source> {
     let at = u32::try_from(gl::attrib_location(program, name)).ok()?;
     let get = |what| gl::vertex_attrib_i::<1>(at, what)[0];
     (get(VERTEX_ATTRIB_ARRAY_ENABLED) != 0).then(|| Source {
@@ -453,6 +454,10 @@ impl Context {
         self.drop_errors();
         let template =
             if other { Err("a geometry or tessellation shader") } else { Template::read(&vertex, &fragment) };
+        if template.is_err() && !other {
+            self.prepare_probe(program);
+            self.drop_errors();
+        }
         self.programs.templates.insert(program, template);
         true
     }
@@ -463,10 +468,14 @@ impl Context {
         mode: u32,
         call: DrawCall,
         elements: impl FnOnce() -> Result<Elements, &'static str>,
-    ) -> Result<(), &'static str> {
+    ) -> Result<Taken, &'static str> {
         let program = self.state.program;
         let template =
-            self.programs.templates.get(&program).copied().unwrap_or(Err("a program linked before us"))?;
+            self.programs.templates.get(&program).copied().unwrap_or(Err("a program linked before us"));
+        if template.is_err() && self.config.settings.mode == Mode::Enhance && self.config.settings.enabled {
+            return self.take_shape(mode, call, elements).map(|()| Taken::Shape);
+        }
+        let template = template?;
         let position = attribute(program, "vertexMC").ok_or("a program without positions")?;
         let sources = [
             Some(position),
@@ -511,7 +520,7 @@ impl Context {
         }
         self.end_batch();
         self.add_array_draw(geometry, attributes, Shading::Program(Arc::new(recognised)), in_order);
-        Ok(())
+        Ok(Taken::Traced)
     }
 
     fn color_map(&mut self, program: u32) -> Result<Arc<Image>, &'static str> {

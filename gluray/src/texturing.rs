@@ -77,6 +77,30 @@ pub(crate) fn followed(target: u32) -> Result<(), &'static str> {
     Ok(())
 }
 
+/// Why fixed function's sampling of the bound texture cannot be followed; `None` when it can, or when the texture is incomplete and so left out.
+pub(crate) fn unfollowed(target: u32) -> Option<&'static str> {
+    let level = |what| gl::tex_level_i::<1>(target, 0, what)[0];
+    const TEXTURE_BASE_LEVEL: u32 = 0x813c;
+    if gl::tex_parameter_i::<1>(target, TEXTURE_BASE_LEVEL)[0] != 0 {
+        return Some("a texture whose base level is not 0");
+    }
+    if level(TEXTURE_WIDTH) <= 0 || level(TEXTURE_HEIGHT) <= 0 {
+        return None;
+    }
+    match level(TEXTURE_INTERNAL_FORMAT).cast_unsigned() {
+        0x1902 | 0x84f9 | 0x81a5..=0x81a7 | 0x88f0 | 0x8cac | 0x8cad => return Some("a texture of depths"),
+        0x8d70..=0x8d8f => return Some("a texture of integers"),
+        _ => {}
+    }
+    let min = gl::tex_parameter_i::<1>(target, TEXTURE_MIN_FILTER)[0].cast_unsigned();
+    let mag = gl::tex_parameter_i::<1>(target, TEXTURE_MAG_FILTER)[0].cast_unsigned();
+    match min {
+        NEAREST | LINEAR if min == mag => None,
+        NEAREST | LINEAR => Some("a texture with two filters"),
+        _ => Some("a texture with mipmaps"),
+    }
+}
+
 fn read(target: u32) -> Option<Image> {
     let level = |what| gl::tex_level_i::<1>(target, 0, what)[0];
     let (width, height) = (level(TEXTURE_WIDTH).max(0) as usize, level(TEXTURE_HEIGHT).max(0) as usize);

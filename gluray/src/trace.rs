@@ -265,9 +265,19 @@ impl<'a> Prepared<'a> {
                 p[0] * v.x + p[1] * v.y + p[2] * v.z + p[3]
             };
             let terms = [0, 1, 2].map(|i| weights[i] * corner(i));
-            // Centres in the plane are kept: whatever triangle they lie on, the answer is the same.
-            if terms.iter().sum::<f64>() < -1e-6 * terms.iter().map(|v| v.abs()).sum::<f64>() {
+            let (height, slack) =
+                (terms.iter().sum::<f64>(), 1e-6 * terms.iter().map(|v| v.abs()).sum::<f64>());
+            if height < -slack {
                 return None;
+            }
+            if height <= slack {
+                // The driver cuts the triangle along the plane: a centre on the cut belongs to what is above or to the right of it.
+                let across = [h[1].cross(h[2]), h[2].cross(h[0]), h[0].cross(h[1])];
+                let slope = (0..3).map(|i| across[i] * corner(i)).sum::<DVec3>() * sum.signum();
+                let upright = slope.x.abs() > 1e-9 * slope.y.abs();
+                if (if upright { slope.x } else { slope.y }) < 0.0 {
+                    return None;
+                }
             }
         }
         let z = (0..3).map(|i| l[i] * f64::from(c[i][2])).sum::<f64>();

@@ -127,7 +127,11 @@ impl Studio {
                 return nothing(warnings);
             }
         };
-        warnings.extend(output.report.warnings);
+        for w in output.report.warnings {
+            // The number is another in every picture.
+            let cut = w.contains("max_bounces");
+            warnings.push(if cut { "mode path: paths were cut at `effects.max_bounces`".into() } else { w });
+        }
         let (w, h) = (rect.w as usize, rect.h as usize);
         let fresh = |x: usize, y: usize| output.frame.color[(h - 1 - y) * w + x];
         let share = samples as f32 / (done + samples) as f32;
