@@ -127,11 +127,9 @@ impl Studio {
                 return nothing(warnings);
             }
         };
-        for w in output.report.warnings {
-            // The number is another in every picture.
-            let cut = w.contains("max_bounces");
-            warnings.push(if cut { "mode path: paths were cut at `effects.max_bounces`".into() } else { w });
-        }
+        // Every path ends some time, and colours that are mixed may have an alpha of one less a rounding: neither is news.
+        let known = |w: &String| w.contains("max_bounces") || w.contains("drawn opaque");
+        warnings.extend(output.report.warnings.into_iter().filter(|w| !known(w)).map(|w| format!("mode path: {w}")));
         let (w, h) = (rect.w as usize, rect.h as usize);
         let fresh = |x: usize, y: usize| output.frame.color[(h - 1 - y) * w + x];
         let share = samples as f32 / (done + samples) as f32;

@@ -102,6 +102,9 @@ extern "C" fn resolve(index: usize) -> *const () {
 }
 
 extern "C" fn told(index: usize) {
+    if crate::fault::happened() {
+        return;
+    }
     let (class, flush) = (CLASSES[index], FLUSHES[index]);
     crate::fault::guard(|| crate::context::watched(index, class, flush & 1 != 0, flush & 2 != 0));
 }

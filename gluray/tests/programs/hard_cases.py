@@ -521,21 +521,25 @@ def floor():
     end()
 
 
-def box_on_floor(parallel=False):
-    """A red box above a white floor, seen from a little above; light from the upper left."""
+def scene(parallel):
     start(perspective=not parallel)
     lit()
     rotate(20, 1, 0, 0)
     F("glLightfv", c_uint, c_uint, c_void_p)(0x4000, 0x1203, (c_float * 4)(-0.8, 1, 0.4, 0))
     F("glMaterialfv", c_uint, c_uint, c_void_p)(0x0408, 0x1202, (c_float * 4)(0, 0, 0, 1))
-    color(1, 1, 1, 1)
+    color(0.5, 0.5, 0.5, 1)
     floor()
     color(0.9, 0.1, 0.1, 1)
     box((0, -0.25, -0.6), 0.45)
 
 
+def box_on_floor():
+    """A red box on a grey floor, seen from a little above; light from the upper left."""
+    scene(False)
+
+
 def box_on_floor_parallel():
-    box_on_floor(parallel=True)
+    scene(True)
 
 
 def sheets_blended_in_the_wrong_order():
@@ -589,10 +593,10 @@ def corner_by_shader(vertex_text):
                     points.extend(at(a, b))
                     normals.extend(n)
 
-    quad((-1, -1, -2.5), (2, 0, 0), (0, 2, 0), (0, 0, 1))
-    quad((-1, -1, -2.5), (0, 0, 1.5), (2, 0, 0), (0, 1, 0))
-    quad((-1, -1, -2.5), (0, 2, 0), (0, 0, 1.5), (1, 0, 0))
-    quad((0.1, -1, -1.9), (0.3, 0, 0), (0, 1.2, 0), (0, 0, 1))
+    quad((-1, -1, -0.6), (2, 0, 0), (0, 2, 0), (0, 0, 1))
+    quad((-1, -1, -0.6), (0, 0, 1.5), (2, 0, 0), (0, 1, 0))
+    quad((-1, -1, -0.6), (0, 2, 0), (0, 0, 1.5), (1, 0, 0))
+    quad((0.1, -1, 0), (0.3, 0, 0), (0, 1.2, 0), (0, 0, 1))
     fragment = "#version 120\nvarying vec3 n;\nvoid main() { gl_FragColor = vec4(0.5 + 0.4 * normalize(n), 1.0); }\n"
     program = glsl(vertex_text, fragment, ("place", "up"))
     model_view, projection = (c_float * 16)(), (c_float * 16)()
