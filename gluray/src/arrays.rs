@@ -3,7 +3,7 @@
 //! The driver is asked which arrays are on when the draw comes. Client memory is copied then and there, because the program may change
 //! it as soon as the call returns.
 
-use crate::cache::Geometry;
+use crate::cache::{Geometry, hash};
 use crate::capture::{Attributes, Draw, Packed, Shading, Values, component_bytes};
 use crate::client_memory;
 use crate::context::{Context, Sink};
@@ -13,6 +13,8 @@ use crate::overrides::Look;
 use crate::primitives::{is_filled, triangulate};
 use crate::programs::DrawCall;
 use crate::real::gl;
+use crate::state::snapshot::Snapshot;
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// Where an array is.
@@ -32,34 +34,51 @@ impl Source {
         component_bytes(self.kind) * self.size
     }
 
-    /// Vertices `first..first + count`, tightly packed; an error in words when they cannot be read.
-    pub(crate) fn read(&self, first: usize, count: usize) -> Result<Packed, &'static str> {
+    /// Bytes from one vertex to the next.
+    fn step(&self) -> usize {
+        if self.stride == 0 { self.element() } else { self.stride }
+    }
+
+    /// Vertices `first..first + count` where they are, with gaps; an error in words when they cannot be read.
+    pub(crate) fn view(&self, first: usize, count: usize) -> Result<Cow<'static, [u8]>, &'static str> {
         let element = self.element();
         if element == 0 || self.size > 4 {
             return Err("an array of a type that is not read");
         }
-        let stride = if self.stride == 0 { element } else { self.stride };
-        let start = self.address + first * stride;
-        let length = if count == 0 { 0 } else { (count - 1) * stride + element };
-        let owned;
-        let bytes: &[u8] = if self.buffer == 0 {
-            if self.address == 0 {
-                return Err("an array without an address");
-            }
-            client_memory::view(start, length)
-        } else {
-            owned = read_buffer(self.buffer, start, length)?;
-            &owned
-        };
-        let bytes = match stride == element {
-            true => bytes.to_vec(),
+        let start = self.address + first * self.step();
+        let length = if count == 0 { 0 } else { (count - 1) * self.step() + element };
+        match self.buffer {
+            0 if self.address == 0 => Err("an array without an address"),
+            // For the time of this call: nobody keeps it.
+            0 => Ok(Cow::Borrowed(client_memory::view(start, length))),
+            buffer => read_buffer(buffer, start, length).map(Cow::Owned),
+        }
+    }
+
+    /// Bytes of [`Source::view`] tightly packed.
+    pub(crate) fn pack(&self, bytes: Cow<'_, [u8]>) -> Packed {
+        let (element, step) = (self.element(), self.step());
+        let bytes = match step == element {
+            true => bytes.into_owned(),
             false => {
-                let mut out = Vec::with_capacity(count * element);
-                (0..count).for_each(|i| out.extend_from_slice(&bytes[i * stride..i * stride + element]));
+                let mut out = Vec::with_capacity(bytes.len() / step * element + element);
+                for vertex in bytes.chunks(step).filter(|v| v.len() >= element) {
+                    out.extend_from_slice(&vertex[..element]);
+                }
                 out
             }
         };
-        Ok(Packed { bytes, kind: self.kind, size: self.size, normalized: self.normalized })
+        Packed { bytes, kind: self.kind, size: self.size, normalized: self.normalized }
+    }
+
+    /// Vertices `first..first + count`, tightly packed; an error in words when they cannot be read.
+    pub(crate) fn read(&self, first: usize, count: usize) -> Result<Packed, &'static str> {
+        Ok(self.pack(self.view(first, count)?))
+    }
+
+    /// What makes the same bytes another array.
+    pub(crate) fn layout(&self) -> (usize, u32, usize, bool) {
+        (self.step(), self.kind, self.size, self.normalized)
     }
 }
 
@@ -235,6 +254,21 @@ impl Elements {
         Ok(Elements::Indexed { indices, least: least as usize, count })
     }
 
+    /// Names the geometry of these elements of an array of positions, whose bytes are given.
+    fn key(&self, mode: u32, bytes: &[u8], layout: (usize, u32, usize, bool), s: &Snapshot) -> u128 {
+        let (stride, kind, size, _) = layout;
+        let rules = u64::from(s.first_vertex_provokes) << 1 | u64::from(s.flat);
+        let (_, count) = self.span();
+        let tail = [stride as u64, u64::from(kind), size as u64, u64::from(mode), rules, count as u64];
+        let tail = bytemuck::cast_slice(&tail);
+        match self {
+            Elements::Range { .. } => hash(&[bytes, tail]),
+            Elements::Indexed { indices, least, .. } => {
+                hash(&[bytes, bytemuck::cast_slice(indices), &least.to_ne_bytes(), tail])
+            }
+        }
+    }
+
     /// First vertex, and how many there are from it on.
     pub(crate) fn span(&self) -> (usize, usize) {
         match self {
@@ -374,9 +408,22 @@ impl Context {
         let arrays = Arrays::query(self.can.version)?;
         let elements = elements()?;
         let (first, count) = elements.span();
-        let packed = arrays.position.read(first, count)?;
-        let positions = positions(&packed)?;
-        let read = |s: &Option<Source>| s.map(|s| s.read(first, count)).transpose();
+        let seen = arrays.position.view(first, count)?;
+        let key = elements.key(mode, &seen, arrays.position.layout(), &self.state);
+        let geometry = match self.cache.known(key) {
+            Some(geometry) => geometry,
+            None => {
+                let positions = positions(&arrays.position.pack(seen))?;
+                let triangles =
+                    elements.triangles(mode, self.state.first_vertex_provokes, self.state.flat);
+                self.cache.put(key, &positions, triangles)
+            }
+        };
+        let mut read = |s: &Option<Source>| -> Result<Option<Arc<Packed>>, &'static str> {
+            let Some(s) = s else { return Ok(None) };
+            let bytes = s.view(first, count)?;
+            Ok(Some(self.packed.get(&bytes, s.layout(), || s.pack(Cow::Borrowed(&bytes)))))
+        };
         let (normal, color, tex) = (read(&arrays.normal)?, read(&arrays.color)?, read(&arrays.tex)?);
         if let Verdict::TraceIfOpaque(why) = verdict {
             let by_color = !self.state.lighting
@@ -392,13 +439,11 @@ impl Context {
                 return Err(why);
             }
         }
-        let triangles = elements.triangles(mode, self.state.first_vertex_provokes, self.state.flat);
         self.sync();
         if verdict == Verdict::TraceInOrder {
             self.flush("a draw whose order matters");
         }
         self.end_batch();
-        let geometry = self.cache.of_indices(&positions, &triangles);
         let mut attributes = Attributes::constant(&self.current);
         if let Some(p) = normal {
             attributes.normals = Values::Packed(p);

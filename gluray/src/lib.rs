@@ -15,6 +15,7 @@
 
 mod arrays;
 mod beyond;
+mod buffers;
 mod cache;
 mod capture;
 pub mod cli;
@@ -31,8 +32,10 @@ mod fault;
 pub mod folders;
 mod frame;
 mod immediate;
+mod late;
 mod lighting;
 mod overrides;
+mod packs;
 pub mod panel;
 mod picture;
 mod present;
@@ -41,6 +44,7 @@ mod probe;
 mod programs;
 mod raster;
 mod real;
+mod recorder;
 pub mod reasons;
 pub mod report;
 mod shading;

@@ -411,16 +411,35 @@ impl Recognised {
 /// Which buffers a draw reads: while none was written, what was made of them serves again.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 struct Key {
-    sources: Vec<Option<Source>>,
+    sources: [Option<Source>; 4],
     elements: (u32, usize, usize, u32, usize),
-    version: u64,
+    /// When each of them was written last.
+    written: [u64; 5],
 }
 
 /// The programs of a context.
 #[derive(Default)]
 pub(crate) struct Programs {
     templates: HashMap<u32, Result<Template, &'static str>>,
-    made: HashMap<Key, (Arc<Geometry>, Arc<Attributes>)>,
+    made: HashMap<Key, Made>,
+    frame: u64,
+}
+
+/// What was made of a draw's buffers, and the frame that used it last.
+struct Made {
+    geometry: Arc<Geometry>,
+    attributes: Arc<Attributes>,
+    used: u64,
+}
+
+impl Programs {
+    /// A frame is over: what no draw asked for goes.
+    pub(crate) fn frame_done(&mut self) {
+        const KEPT_FRAMES: u64 = 3;
+        self.frame += 1;
+        let now = self.frame;
+        self.made.retain(|_, m| now - m.used <= KEPT_FRAMES);
+    }
 }
 
 /// A generic attribute's array by name; `None` when the program has no such attribute or its array is off.
@@ -492,17 +511,25 @@ impl Context {
         };
         let recognised = Recognised::query(program, template, map);
         let key = Key {
-            sources: sources.to_vec(),
+            sources,
             elements: (mode, call.first, call.count, call.kind, call.at),
-            version: self.buffer_version,
+            written: self.writes().last(&sources, (call.first >> 32) as u32),
         };
-        let (geometry, attributes) = match self.programs.made.get(&key) {
-            Some(made) => made.clone(),
+        let now = self.programs.frame;
+        let known = self.programs.made.get_mut(&key).map(|m| {
+            m.used = now;
+            (m.geometry.clone(), m.attributes.clone())
+        });
+        let (geometry, attributes) = match known {
+            Some(known) => known,
             None => {
-                let made = self.read_program_arrays(mode, &sources, elements)?;
-                self.programs.made.retain(|k, _| k.version == key.version);
-                self.programs.made.insert(key, made.clone());
-                made
+                let (geometry, attributes) = self.read_program_arrays(mode, &sources, elements)?;
+                self.programs
+                    .made
+                    .retain(|k, _| (&k.sources, k.elements) != (&key.sources, key.elements));
+                let made = Made { geometry: geometry.clone(), attributes: attributes.clone(), used: now };
+                self.programs.made.insert(key, made);
+                (geometry, attributes)
             }
         };
         self.cache.touch(&geometry);
@@ -551,13 +578,13 @@ impl Context {
         let geometry = self.cache.of_indices(&positions, &triangles);
         let mut attributes = Attributes::constant(&Current::default());
         if let Some(p) = read(normal)? {
-            attributes.normals = Values::Packed(p);
+            attributes.normals = Values::Packed(Arc::new(p));
         }
         if let Some(p) = read(color)? {
-            attributes.colors = Values::Packed(p);
+            attributes.colors = Values::Packed(Arc::new(p));
         }
         if let Some(p) = read(tex)? {
-            attributes.tex = Values::Packed(p);
+            attributes.tex = Values::Packed(Arc::new(p));
         }
         Ok((geometry, Arc::new(attributes)))
     }

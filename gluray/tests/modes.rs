@@ -113,7 +113,7 @@ fn translucent_surfaces_are_sorted_by_rays() {
 fn a_lens_blurs_what_is_out_of_focus_and_is_refused_by_name_without_perspective() {
     let options = |aperture| ["--mode", "rich", "--set", "samples=16", "--set", aperture, "--set", "effects.focus=1"];
     let Some((sharp, _)) = draw("box_on_floor", Some(&options("effects.aperture_radius=0"))) else { return };
-    let (blurred, report) = draw("box_on_floor", Some(&options("effects.aperture_radius=0.02"))).expect("it ran");
+    let (blurred, report) = draw("box_on_floor", Some(&options("effects.aperture_radius=0.05"))).expect("it ran");
     let steepest = |p: &Picture| {
         // Along a row through the box.
         (1..SIZE).map(|x| {

@@ -45,6 +45,7 @@ impl Config {
 
 /// Paths of settings that the library obeys today. The panel disables the others, and whoever sets one is told in the report.
 pub(crate) const OBEYED: &[&str] = &[
+    "asynchronous",
     "enabled",
     "mode",
     "trace",
