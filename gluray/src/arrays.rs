@@ -414,8 +414,7 @@ impl Context {
             Some(geometry) => geometry,
             None => {
                 let positions = positions(&arrays.position.pack(seen))?;
-                let triangles =
-                    elements.triangles(mode, self.state.first_vertex_provokes, self.state.flat);
+                let triangles = elements.triangles(mode, self.state.first_vertex_provokes, self.state.flat);
                 self.cache.put(key, &positions, triangles)
             }
         };
@@ -470,8 +469,15 @@ impl Context {
             Shading::Fixed => crate::lighting::product(&self.state.projection, &self.state.model_view),
             Shading::Program(p) => p.clip_from_object,
         };
-        let draw =
-            Draw { geometry, attributes, state: self.state.clone(), shading, clip_from_object, calls: 1, look: Look::default() };
+        let draw = Draw {
+            geometry,
+            attributes,
+            state: self.state.clone(),
+            shading,
+            clip_from_object,
+            calls: 1,
+            look: Look::default(),
+        };
         self.add(draw, in_order);
     }
 

@@ -148,7 +148,9 @@ pub(crate) fn lens(
         return Ok(None);
     }
     if view.parallel {
-        return Err("`effects.aperture_radius` is set, but a view is a parallel projection, which has no lens".into());
+        return Err(
+            "`effects.aperture_radius` is set, but a view is a parallel projection, which has no lens".into(),
+        );
     }
     let [near, far] = distances(draws);
     Ok(Some([e.aperture_radius * diagonal, near + (far - near) * e.focus]))
@@ -175,7 +177,10 @@ impl Beyond<'_> {
             let (cx, cy) = (f64::from(sample % side), f64::from(sample / side));
             let (dx, dy) = match n {
                 1 => (0.5, 0.5),
-                _ => ((cx + random.next()) / f64::from(side), (cy + random.next()) / f64::from(n.div_ceil(side))),
+                _ => (
+                    (cx + random.next()) / f64::from(side),
+                    (cy + random.next()) / f64::from(n.div_ceil(side)),
+                ),
             };
             let Some(mut path) = self.primary(f64::from(x) + dx, f64::from(y) + dy, seed) else { continue };
             if let Some([radius, focus]) = lens {
@@ -258,14 +263,24 @@ impl Beyond<'_> {
             let (u, v) = (f64::from(hit.u), f64::from(hit.v));
             let weights = [1.0 - u - v, u, v];
             let point = a * weights[0] + b * weights[1] + c * weights[2];
-            let clipped = || s.clip_planes.iter().any(|q| q[0] * point.x + q[1] * point.y + q[2] * point.z + q[3] < 0.0);
+            let clipped = || {
+                s.clip_planes.iter().any(|q| q[0] * point.x + q[1] * point.y + q[2] * point.z + q[3] < 0.0)
+            };
             if culled || clipped() {
                 ray.t_min = hit.t.next_up();
                 continue;
             }
             let normal = if left { across } else { -across };
             let fragment = Fragment { weights, depth: 0.0, plain_depth: 0.0, front };
-            return Some(Met { draw, prim, fragment, t: f64::from(hit.t) + moved, point, normal, outside: left });
+            return Some(Met {
+                draw,
+                prim,
+                fragment,
+                t: f64::from(hit.t) + moved,
+                point,
+                normal,
+                outside: left,
+            });
         }
         None
     }
@@ -315,7 +330,8 @@ impl Beyond<'_> {
         if look.surface == Surface::Glass && e.refraction && more {
             return (self.glass(met, path, dir, weight), 1.0);
         }
-        let lit = || p.shaded_from(met.prim, &met.fragment, settings.mode, Some(&self.around), path.pixel, -dir);
+        let lit =
+            || p.shaded_from(met.prim, &met.fragment, settings.mode, Some(&self.around), path.pixel, -dir);
         if look.surface == Surface::Metal && e.reflections && more {
             let base = rgb(p.base_color(met.prim, &met.fragment));
             let grazing = (1.0 - cosine.clamp(0.0, 1.0)).powi(5) as f32;
@@ -362,7 +378,10 @@ impl Beyond<'_> {
             (1.0, DVec3::ZERO)
         } else {
             let cos_t = (1.0 - sin2_t).sqrt();
-            let (a, b) = ((eta * cos_i - cos_t) / (eta * cos_i + cos_t), (cos_i - eta * cos_t) / (cos_i + eta * cos_t));
+            let (a, b) = (
+                (eta * cos_i - cos_t) / (eta * cos_i + cos_t),
+                (cos_i - eta * cos_t) / (cos_i + eta * cos_t),
+            );
             (0.5 * (a * a + b * b), dir * eta + n * (eta * cos_i - cos_t))
         };
         let share = share as f32;

@@ -148,7 +148,9 @@ impl Draw {
             _ if s.lighting && !tracked => a.materials.iter().flatten().all(|m| m.diffuse[3] == 1.0),
             (_, Values::Constant(c)) => c[3] == 1.0,
             (_, Values::PerVertex(all)) => all.iter().all(|c| c[3] == 1.0),
-            (_, Values::Packed(_)) => (0..self.geometry.mesh.positions.len()).all(|i| a.colors.at(i)[3] == 1.0),
+            (_, Values::Packed(_)) => {
+                (0..self.geometry.mesh.positions.len()).all(|i| a.colors.at(i)[3] == 1.0)
+            }
         }
     }
 }

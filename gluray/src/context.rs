@@ -3,8 +3,8 @@
 //! A context is owned by the thread it is current on (in [`CURRENT`]) or, while it is current nowhere, by the register. So no call needs a
 //! lock, and a context that is destroyed in flight lives on until its thread leaves it, as OpenGL says.
 
-use crate::cache::Cache;
 use crate::buffers::Writes;
+use crate::cache::Cache;
 use crate::config::Config;
 use crate::decide::{self, Verdict};
 use crate::enums::*;
@@ -17,9 +17,9 @@ use crate::real::gl;
 use crate::recorder::Recorder;
 use crate::report::Counters;
 use crate::state::current::Current;
-use crate::studio::Studio;
 use crate::state::lists::{Lists, Recording};
 use crate::state::snapshot::{Abilities, Snapshot};
+use crate::studio::Studio;
 use crate::symbols::{self, class};
 use std::cell::RefCell;
 use std::collections::HashMap;

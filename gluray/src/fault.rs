@@ -2,8 +2,8 @@
 
 use crate::context::Context;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Mutex, OnceLock};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
+use std::sync::{Mutex, OnceLock};
 
 static HAPPENED: AtomicBool = AtomicBool::new(false);
 /// Calls of [`guard`] that are running.

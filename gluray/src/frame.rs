@@ -71,7 +71,15 @@ impl Context {
         );
         self.counters.spent("capture", start.elapsed());
         self.add(
-            Draw { geometry, attributes, state, shading: Shading::Fixed, clip_from_object, calls, look: Look::default() },
+            Draw {
+                geometry,
+                attributes,
+                state,
+                shading: Shading::Fixed,
+                clip_from_object,
+                calls,
+                look: Look::default(),
+            },
             in_order,
         );
     }

@@ -26,7 +26,14 @@ pub(crate) struct Look {
 
 impl Default for Look {
     fn default() -> Self {
-        Look { surface: Surface::Program, opacity: 1.0, mirror: 0.0, roughness: 0.2, ior: 1.5, tint: [1.0; 3] }
+        Look {
+            surface: Surface::Program,
+            opacity: 1.0,
+            mirror: 0.0,
+            roughness: 0.2,
+            ior: 1.5,
+            tint: [1.0; 3],
+        }
     }
 }
 

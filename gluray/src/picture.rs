@@ -116,7 +116,11 @@ impl Context {
                     members.iter().filter_map(|i| Prepared::new(&draws[*i], None, &mut builds)).collect();
                 let (mut layer, extra) = trace::nearest(&ready, &settings);
                 // The driver's own depth may be some roundings nearer.
-                layer.depth.iter_mut().filter(|d| **d < 1.5).for_each(|d| *d = (*d - DEPTH_ROUNDINGS).max(0.0));
+                layer
+                    .depth
+                    .iter_mut()
+                    .filter(|d| **d < 1.5)
+                    .for_each(|d| *d = (*d - DEPTH_ROUNDINGS).max(0.0));
                 rays[0] += ready.iter().map(|p| p.rays.load(Relaxed)).sum::<u64>();
                 (rays[1], rays[2]) = (rays[1] + extra[0], rays[2] + extra[1]);
                 layers.push(layer);
@@ -158,7 +162,8 @@ fn make(
         _ => beyond::colors(ready, view, all.rect, settings, background),
     };
     warnings.append(&mut colors.warnings);
-    let clear: Vec<bool> = ready.iter().map(|p| p.draw.state.blend && beyond::is_clear(p, settings)).collect();
+    let clear: Vec<bool> =
+        ready.iter().map(|p| p.draw.state.blend && beyond::is_clear(p, settings)).collect();
     let opaque = match clear.contains(&true) {
         false => Layer { rect: all.rect, color: Vec::new(), depth: all.depth.clone(), covered: all.covered },
         true => {

@@ -232,7 +232,8 @@ impl Kept {
             let [r, g, b, a] = self.color_mask.map(|v| v as u8);
             gl::color_mask(r, g, b, a);
             gl::polygon_mode(FRONT_AND_BACK, self.polygon_mode.cast_unsigned());
-            let [src, dst, src_alpha, dst_alpha, equation, equation_alpha] = self.blend.map(i32::cast_unsigned);
+            let [src, dst, src_alpha, dst_alpha, equation, equation_alpha] =
+                self.blend.map(i32::cast_unsigned);
             gl::blend_func_separate(src, dst, src_alpha, dst_alpha);
             gl::blend_equation_separate(equation, equation_alpha);
             let [x, y, w, h] = self.viewport;

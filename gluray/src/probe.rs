@@ -26,13 +26,15 @@ const ASKED: usize = 48;
 /// Share of the largest clip coordinate by which an affine function may miss the shader's: a few roundings of f32.
 const RESIDUAL: f64 = 3e-5;
 
+/// Draws whose shapes are kept.
+const MOST_KEPT: usize = 4096;
+
 /// What is kept of the programs that were asked.
 #[derive(Default)]
 pub(crate) struct Probes {
     /// Programs whose positions can be captured.
     ready: HashMap<u32, bool>,
     made: HashMap<u128, Arc<Geometry>>,
-    version: u64,
     /// Matrix and eye space of the first draw of the frame; the others are placed by it.
     reference: Option<(DMat4, DMat4)>,
     /// Draws of this frame.
@@ -143,6 +145,7 @@ impl Context {
         let elements = elements()?;
         let numbers = elements.some(ASKED);
         let (first, count) = elements.span();
+        let indices = gl::word(ELEMENT_ARRAY_BUFFER_BINDING);
         if numbers.len() < 4 {
             return Err("fewer vertices than a matrix needs");
         }
@@ -150,14 +153,9 @@ impl Context {
         if clip.iter().flatten().any(|v| !v.is_finite()) {
             return Err("positions that are not finite");
         }
-        if self.probes.version != self.buffer_version {
-            self.probes.version = self.buffer_version;
-            self.probes.made.clear();
-        }
         for source in sources {
-            let key = hash(&[
-                format!("{source:?} {mode} {call:?} {first} {count}").as_bytes(),
-            ]);
+            let written = self.writes().last(&[Some(source), None, None, None], indices);
+            let key = hash(&[format!("{source:?} {mode} {call:?} {first} {count} {written:?}").as_bytes()]);
             let geometry = match self.probes.made.get(&key) {
                 // Client memory may have other contents by now.
                 Some(made) if source.buffer != 0 => made.clone(),
@@ -175,6 +173,9 @@ impl Context {
                 None => by_uniforms(program, &points, &clip),
             };
             let Some(m) = found else { continue };
+            if self.probes.made.len() > MOST_KEPT {
+                self.probes.made.clear();
+            }
             self.probes.made.insert(key, geometry.clone());
             self.cache.touch(&geometry);
             return self.add_shape(geometry, m);
@@ -293,7 +294,10 @@ mod tests {
     use super::*;
 
     fn cloud() -> Vec<[f32; 3]> {
-        (0..48).map(|i| i as f32).map(|i| [100.0 + (i * 0.7).sin(), (i * 1.3).cos() * 3.0, i * 0.05]).collect()
+        (0..48)
+            .map(|i| i as f32)
+            .map(|i| [100.0 + (i * 0.7).sin(), (i * 1.3).cos() * 3.0, i * 0.05])
+            .collect()
     }
 
     fn through(m: &DMat4, points: &[[f32; 3]]) -> Vec<[f32; 4]> {
@@ -305,7 +309,8 @@ mod tests {
 
     #[test]
     fn matrices_are_found_from_what_a_shader_makes_of_points() {
-        let m = DMat4::perspective_rh_gl(0.7, 1.5, 0.1, 300.0) * DMat4::from_translation(DVec3::new(-100.0, 1.0, -9.0));
+        let m = DMat4::perspective_rh_gl(0.7, 1.5, 0.1, 300.0)
+            * DMat4::from_translation(DVec3::new(-100.0, 1.0, -9.0));
         let points = cloud();
         let (found, residual) = fit(&points, &through(&m, &points)).expect("points in space");
         assert!(residual < 1e-6, "{residual}");
@@ -315,7 +320,8 @@ mod tests {
     #[test]
     fn shaders_that_bend_things_are_told_from_matrices() {
         let points = cloud();
-        let bent: Vec<[f32; 4]> = points.iter().map(|p| [p[0], p[1] + 0.05 * (3.0 * p[0]).sin(), p[2], 1.0]).collect();
+        let bent: Vec<[f32; 4]> =
+            points.iter().map(|p| [p[0], p[1] + 0.05 * (3.0 * p[0]).sin(), p[2], 1.0]).collect();
         assert!(fit(&points, &bent).expect("points in space").1 > RESIDUAL);
         let flat: Vec<[f32; 3]> = points.iter().map(|p| [p[0], p[1], 2.0]).collect();
         assert!(fit(&flat, &through(&DMat4::IDENTITY, &flat)).is_none(), "a plane tells no matrix");

@@ -284,7 +284,9 @@ impl Recognised {
         let unlit = if self.template.lit { 0.0 } else { self.ambient_intensity };
         let color: [f32; 3] = match own {
             Some(c) => c.map(|v| v * (self.diffuse_intensity + unlit)),
-            None => std::array::from_fn(|k| self.diffuse[k] * self.diffuse_intensity + self.ambient[k] * unlit),
+            None => {
+                std::array::from_fn(|k| self.diffuse[k] * self.diffuse_intensity + self.ambient[k] * unlit)
+            }
         };
         (color, alpha * self.opacity)
     }
@@ -524,9 +526,7 @@ impl Context {
             Some(known) => known,
             None => {
                 let (geometry, attributes) = self.read_program_arrays(mode, &sources, elements)?;
-                self.programs
-                    .made
-                    .retain(|k, _| (&k.sources, k.elements) != (&key.sources, key.elements));
+                self.programs.made.retain(|k, _| (&k.sources, k.elements) != (&key.sources, key.elements));
                 let made = Made { geometry: geometry.clone(), attributes: attributes.clone(), used: now };
                 self.programs.made.insert(key, made);
                 (geometry, attributes)

@@ -4,17 +4,19 @@
 //! (homogeneous edge functions after Olano and Greer 1997), so they agree with what the driver makes of neighbouring lines and text.
 
 mod fragments;
+mod in_order;
 mod rays;
 
 use crate::capture::{Draw, Shading};
 use crate::config::{Mode, Settings};
-use crate::effects::{Place, Surroundings, Visibility};
+use crate::effects::{Place, Surroundings};
 use crate::enums::*;
 use crate::lighting::{Lit, Setup, transform};
 use crate::raster::{covers, steepness};
 use crate::texturing::Image;
 use fearless_simd::{Level, dispatch};
 use fragments::{FragmentBlock, Lane};
+pub(crate) use in_order::in_order;
 use rayon::prelude::*;
 use rays::{Bundle, TileRays, slot};
 use rt_core::accel::World;
@@ -595,57 +597,4 @@ fn fill(
         out.fill(p, &hits[b], tile.x + x, tile.y + y);
         out.moved_back(range, &mut moved[b * LANES..(b + 1) * LANES]);
     }
-}
-
-/// Every fragment of one draw, as layers: the n-th layer has the n-th fragment of each pixel in the order of the triangles.
-pub(crate) fn in_order(p: &Prepared<'_>) -> Vec<Layer> {
-    let rect = p.rect;
-    let (w, h) = (rect.w.max(0) as usize, rect.h.max(0) as usize);
-    let fragments: Vec<Vec<(u32, [u8; 4], f32)>> = (0..w * h)
-        .into_par_iter()
-        .map(|k| {
-            let (x, y) = (rect.x + (k % w) as i32, rect.y + (k / w) as i32);
-            let mut found: Vec<(u32, [u8; 4], f32)> = Vec::new();
-            let mut keep = |prim: usize| {
-                if found.iter().all(|(o, ..)| *o != prim as u32)
-                    && let Some(f) = p.fragment(prim, x, y)
-                {
-                    found.push((
-                        prim as u32,
-                        to_bytes(p.color(prim, &f, false, &Visibility::FULL)),
-                        f.depth as f32,
-                    ));
-                }
-            };
-            const OFF: f64 = 1.0 / 200.0;
-            // The centre, and beside it for edges that go through it.
-            for (dx, dy) in [(0.0, 0.0), (-OFF, -OFF), (OFF, OFF), (OFF, -OFF), (-OFF, OFF)] {
-                let Some((mut ray, _)) = p.ray(f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy) else {
-                    continue;
-                };
-                for _ in 0..MOST_STEPS {
-                    p.rays.fetch_add(1, Relaxed);
-                    let Some(hit) = p.world.closest(&ray) else { break };
-                    keep(hit.prim as usize);
-                    ray.t_min = hit.t.next_up();
-                }
-            }
-            found.sort_unstable_by_key(|f| f.0);
-            found
-        })
-        .collect();
-    let layers = fragments.iter().map(Vec::len).max().unwrap_or(0);
-    (0..layers)
-        .map(|n| {
-            let mut layer =
-                Layer { rect, color: vec![[0; 4]; w * h], depth: vec![UNCOVERED; w * h], covered: 0 };
-            for (k, f) in fragments.iter().enumerate() {
-                if let Some((_, c, d)) = f.get(n) {
-                    (layer.color[k], layer.depth[k]) = (*c, *d);
-                    layer.covered += 1;
-                }
-            }
-            layer
-        })
-        .collect()
 }

@@ -99,27 +99,33 @@ fn translucent_surfaces_are_sorted_by_rays() {
     let center = [50, 50, 28, 28];
     let Some((native, _)) = draw("sheets_blended_in_the_wrong_order", None) else { return };
     assert!(mean(&native, center)[1] < 60.0, "OpenGL loses the far sheet behind the near one");
-    let (rich, report) = draw("sheets_blended_in_the_wrong_order", Some(&["--mode", "rich"])).expect("it ran");
+    let (rich, report) =
+        draw("sheets_blended_in_the_wrong_order", Some(&["--mode", "rich"])).expect("it ran");
     // Half red over half green over (0.1, 0.1, 0.2).
     let [r, g, b] = mean(&rich, center);
     let expected = [0.5 + 0.25 * 0.1, 0.25 + 0.25 * 0.1, 0.25 * 0.2].map(|v| v * 255.0);
     assert!((r - expected[0]).abs() < 3.0 && (g - expected[1]).abs() < 3.0 && (b - expected[2]).abs() < 3.0);
     assert!(rays(&report, "transparency") > 1000 && report.traced_draws == 2, "{report:?}");
-    let (matched, report) = draw("sheets_blended_in_the_wrong_order", Some(&["--mode", "match"])).expect("it ran");
+    let (matched, report) =
+        draw("sheets_blended_in_the_wrong_order", Some(&["--mode", "match"])).expect("it ran");
     assert!(matched.pixels == native.pixels && report.traced_draws == 0, "match is the driver's picture");
 }
 
 #[test]
 fn a_lens_blurs_what_is_out_of_focus_and_is_refused_by_name_without_perspective() {
-    let options = |aperture| ["--mode", "rich", "--set", "samples=16", "--set", aperture, "--set", "effects.focus=1"];
+    let options =
+        |aperture| ["--mode", "rich", "--set", "samples=16", "--set", aperture, "--set", "effects.focus=1"];
     let Some((sharp, _)) = draw("box_on_floor", Some(&options("effects.aperture_radius=0"))) else { return };
-    let (blurred, report) = draw("box_on_floor", Some(&options("effects.aperture_radius=0.05"))).expect("it ran");
+    let (blurred, report) =
+        draw("box_on_floor", Some(&options("effects.aperture_radius=0.05"))).expect("it ran");
     let steepest = |p: &Picture| {
         // Along a row through the box.
-        (1..SIZE).map(|x| {
-            let at = |x: usize| f64::from(p.pixels[56 * SIZE + x][1]);
-            (at(x) - at(x - 1)).abs()
-        }).fold(0.0, f64::max)
+        (1..SIZE)
+            .map(|x| {
+                let at = |x: usize| f64::from(p.pixels[56 * SIZE + x][1]);
+                (at(x) - at(x - 1)).abs()
+            })
+            .fold(0.0, f64::max)
     };
     let (a, b) = (steepest(&sharp), steepest(&blurred));
     assert!(b < 0.6 * a, "edges of {a} and {b} levels");
@@ -150,7 +156,10 @@ fn enhance_darkens_corners_of_any_shader_that_is_a_matrix() {
     // In the corner of the three walls, and in the middle of the back wall far from the pillar.
     let (corner, open) = (factor([41, 41, 4, 4]), factor([50, 74, 8, 8]));
     assert!(corner < 0.8 * open && open > 0.5, "factors {corner} and {open}");
-    assert!(picture.pixels.iter().zip(&native.pixels).all(|(a, b)| (0..3).all(|k| a[k] <= b[k])), "only darker");
+    assert!(
+        picture.pixels.iter().zip(&native.pixels).all(|(a, b)| (0..3).all(|k| a[k] <= b[k])),
+        "only darker"
+    );
     assert!(native.pixels[0] == picture.pixels[0], "the background stays");
     let (matched, report) = draw("shader_of_ones_own", Some(&["--mode", "match"])).expect("it ran before");
     assert!(matched.pixels == native.pixels && report.traced_draws == 0);
@@ -173,7 +182,8 @@ fn a_fault_of_ours_leaves_the_program_the_drivers_picture_and_is_logged() {
     let place = folder();
     let picture = |through, environment: &[(&str, &str)]| {
         let run = Run { x: &x, folder: place.path(), through, environment };
-        let (output, report) = run.faulty_program(&python, &[script.to_str().expect("UTF-8"), "lists_over_several_frames", "out"]);
+        let (output, report) = run
+            .faulty_program(&python, &[script.to_str().expect("UTF-8"), "lists_over_several_frames", "out"]);
         assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
         (std::fs::read(place.path().join("out")).expect("a picture"), report)
     };
@@ -181,5 +191,8 @@ fn a_fault_of_ours_leaves_the_program_the_drivers_picture_and_is_logged() {
     let (ours, report) = picture(Some(&[]), &[("GLURAY_INJECT_FAULT", "flush")]);
     assert_eq!(report.faults.len(), 1, "{:?}", report.faults);
     assert!(report.faults[0].contains("GLURAY_INJECT_FAULT"), "{:?}", report.faults);
-    assert!(native == ours, "lists compiled before the fault, and the colour that was set before it, are the driver's now");
+    assert!(
+        native == ours,
+        "lists compiled before the fault, and the colour that was set before it, are the driver's now"
+    );
 }

@@ -94,15 +94,20 @@ pub const FIELDS: &[Field] = &[
         "how pictures are made",
     ),
     field("trace", Kind::Word { words: &["scene", "all"] }, "which draws are traced"),
-    field("samples", Kind::Whole { low: 1, high: 4096 }, "rays through each pixel; mode path takes at least 16")
-        .only_in(&["rich", "enhance", "path"]),
+    field(
+        "samples",
+        Kind::Whole { low: 1, high: 4096 },
+        "rays through each pixel; mode path takes at least 16",
+    )
+    .only_in(&["rich", "enhance", "path"]),
     field(
         "quality",
         Kind::Word { words: &["auto", "fast", "best"] },
         "how acceleration structures are built",
     ),
     field("threads", Kind::Whole { low: 0, high: 1024 }, "threads that render; 0 for all cores"),
-    field("asynchronous", Kind::Switch, "show each frame one frame late and trace it meanwhile"),
+    field("asynchronous", Kind::Switch, "show each frame one frame late and trace it meanwhile")
+        .only_in(&["match", "phong", "enhance"]),
     field("effects.shadows", Kind::Switch, "rays to the lights").only_in(RAYS),
     field("effects.light_radius_deg", real(0.0, 45.0), "half the angle of lights; 0 for sharp shadows")
         .unit("degrees")
@@ -129,15 +134,20 @@ pub const FIELDS: &[Field] = &[
     field("lights.ambient", real(0.0, 100.0), "times the program's ambient light").only_in(LIT),
     field("lights.sky", real(0.0, 100.0), "even light from all around").only_in(LONG),
     field("lights.added", real(0.0, 100.0), "strength of a light of our own").only_in(LIT),
-    field("lights.added_direction", Kind::Direction, "where it comes from: right, up, towards you; in enhance, where shaders' shadows come from")
-        .only_in(&["phong", "rich", "enhance", "path"]),
+    field(
+        "lights.added_direction",
+        Kind::Direction,
+        "where it comes from: right, up, towards you; in enhance, where shaders' shadows come from",
+    )
+    .only_in(&["phong", "rich", "enhance", "path"]),
     field("lights.added_color", Kind::Color, "its colour").only_in(LIT),
     field(
         "material.surface",
         Kind::Word { words: &["program", "matte", "metal", "glass"] },
         "what surfaces are made of",
     )
-    .optional().only_in(LONG),
+    .optional()
+    .only_in(LONG),
     field("material.color", Kind::Color, "colour, as glColor takes it").optional(),
     field("material.opacity", real(0.0, 1.0), "0 invisible to 1 opaque").optional().only_in(LONG),
     field("material.specular", real(0.0, 1.0), "strength of the highlight").optional(),

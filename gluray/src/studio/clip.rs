@@ -8,9 +8,7 @@ pub(super) fn above(mesh: &TriMesh, plane: [f64; 4]) -> TriMesh {
     let height: Vec<f64> = mesh
         .positions
         .iter()
-        .map(|p| {
-            plane[0] * f64::from(p.x) + plane[1] * f64::from(p.y) + plane[2] * f64::from(p.z) + plane[3]
-        })
+        .map(|p| plane[0] * f64::from(p.x) + plane[1] * f64::from(p.y) + plane[2] * f64::from(p.z) + plane[3])
         .collect();
     let mut out = Cut { mesh: mesh.clone() };
     out.mesh.indices.clear();
@@ -58,7 +56,9 @@ impl Cut {
         let at = m.positions[p as usize].lerp(m.positions[q as usize], t);
         m.positions.push(at);
         push(&mut m.normals, p, q, |a: Vec3, b| a.lerp(b, t));
-        push(&mut m.colors, p, q, |a: [f32; 4], b: [f32; 4]| std::array::from_fn(|k| a[k] + (b[k] - a[k]) * t));
+        push(&mut m.colors, p, q, |a: [f32; 4], b: [f32; 4]| {
+            std::array::from_fn(|k| a[k] + (b[k] - a[k]) * t)
+        });
         if let Some(c) = &mut m.texcoords {
             let v: Vec2 = c[p as usize].lerp(c[q as usize], t);
             c.push(v);

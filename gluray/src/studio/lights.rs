@@ -72,7 +72,8 @@ pub(super) fn of(
         Shading::Fixed => {
             let s = &first.draw.state;
             if lit.iter().any(|p| p.draw.state.lights != s.lights) {
-                warnings.push("mode path: lights differ between draws; those of the largest light all".into());
+                warnings
+                    .push("mode path: lights differ between draws; those of the largest light all".into());
             }
             // Ambient light as light from everywhere: as bright on a diffuse surface as OpenGL's on the ambient colours that there are.
             let total: [f32; 3] = s.lights.iter().fold(sane(s.model_ambient), |sum, l| {
@@ -82,7 +83,8 @@ pub(super) fn of(
             let m = &first.draw.attributes.materials_at(0)[0];
             let tracked = s.color_material.is_some_and(|(_, what)| what == crate::enums::AMBIENT_AND_DIFFUSE);
             let sum = |c: [f32; 4]| c[0] + c[1] + c[2];
-            let share = if tracked { 1.0 } else { (sum(m.ambient) / sum(m.diffuse).max(1e-6)).clamp(0.0, 1.0) };
+            let share =
+                if tracked { 1.0 } else { (sum(m.ambient) / sum(m.diffuse).max(1e-6)).clamp(0.0, 1.0) };
             (0..3).for_each(|k| ambient[k] += total[k] * share);
             s.lights.iter().filter_map(|l| of_opengl(l, radius_rad)).collect()
         }

@@ -68,7 +68,8 @@ impl Studio {
     ) -> Colors {
         let rect = rect.and(view.viewport);
         let mut warnings = Vec::new();
-        let nothing = |warnings| Colors { rect: Rect::default(), rgba: Vec::new(), rays: Vec::new(), warnings };
+        let nothing =
+            |warnings| Colors { rect: Rect::default(), rgba: Vec::new(), rays: Vec::new(), warnings };
         if rect.is_empty() {
             return nothing(warnings);
         }
@@ -94,10 +95,7 @@ impl Studio {
         let (vw, vh) = (view.viewport.w.cast_unsigned(), view.viewport.h.cast_unsigned());
         let top = view.viewport.y + view.viewport.h;
         let samples = settings.samples.max(LEAST_SAMPLES);
-        let key = hash(&[
-            &key.to_ne_bytes(),
-            format!("{rect:?} {camera:?} {settings:?}").as_bytes(),
-        ]);
+        let key = hash(&[&key.to_ne_bytes(), format!("{rect:?} {camera:?} {settings:?}").as_bytes()]);
         let before = self.stills.remove(&number).filter(|s| s.key == key);
         if let Some(still) = before.as_ref().filter(|s| s.samples >= MOST_SAMPLES) {
             let rgba = still.mean.clone();
@@ -129,7 +127,9 @@ impl Studio {
         };
         // Every path ends some time, and colours that are mixed may have an alpha of one less a rounding: neither is news.
         let known = |w: &String| w.contains("max_bounces") || w.contains("drawn opaque");
-        warnings.extend(output.report.warnings.into_iter().filter(|w| !known(w)).map(|w| format!("mode path: {w}")));
+        warnings.extend(
+            output.report.warnings.into_iter().filter(|w| !known(w)).map(|w| format!("mode path: {w}")),
+        );
         let (w, h) = (rect.w as usize, rect.h as usize);
         let fresh = |x: usize, y: usize| output.frame.color[(h - 1 - y) * w + x];
         let share = samples as f32 / (done + samples) as f32;
@@ -155,7 +155,8 @@ impl Studio {
         let (mut geometries, mut instances) = (Vec::new(), Vec::new());
         let (mut materials, mut appearances) = (Vec::new(), Vec::new());
         for p in draws {
-            let Some(Part { mesh, material, world_from_object, key }) = parts::part(p, view, settings, warnings)
+            let Some(Part { mesh, material, world_from_object, key }) =
+                parts::part(p, view, settings, warnings)
             else {
                 continue;
             };

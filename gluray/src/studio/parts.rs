@@ -48,7 +48,12 @@ fn warn(warnings: &mut Vec<String>, text: &str) {
 }
 
 /// `None` for what a scene cannot have, with a word about it.
-pub(super) fn part(p: &Prepared<'_>, view: &View, settings: &Settings, warnings: &mut Vec<String>) -> Option<Part> {
+pub(super) fn part(
+    p: &Prepared<'_>,
+    view: &View,
+    settings: &Settings,
+    warnings: &mut Vec<String>,
+) -> Option<Part> {
     let m = eye_from_object(p);
     if m.row(3).truncate().length() > 1e-9 || m.row(3).w == 0.0 || !m.is_finite() {
         warn(warnings, "a draw whose model-view matrix is projective is left out");
@@ -89,7 +94,13 @@ pub(super) fn part(p: &Prepared<'_>, view: &View, settings: &Settings, warnings:
         bytemuck::cast_slice(&mesh.indices),
         &bytes(&mesh.normals),
         mesh.colors.as_ref().map_or(&[], |c| bytemuck::cast_slice(&c.values)),
-        &mesh.texcoords.iter().flatten().flat_map(|t| [t.x, t.y]).flat_map(f32::to_ne_bytes).collect::<Vec<u8>>(),
+        &mesh
+            .texcoords
+            .iter()
+            .flatten()
+            .flat_map(|t| [t.x, t.y])
+            .flat_map(f32::to_ne_bytes)
+            .collect::<Vec<u8>>(),
         format!("{:?}", p.clip_planes()).as_bytes(),
     ]);
     Some(Part { mesh, material, world_from_object: DAffine3::from_mat4(m), key })
@@ -118,7 +129,13 @@ fn material(p: &Prepared<'_>, skin: &Skin, settings: &Settings) -> Material {
         Surface::Metal if e.reflections => SurfaceModel::Metal { roughness: look.roughness },
         Surface::Glass if e.refraction => {
             let model = SurfaceModel::Dielectric { ior: look.ior, absorption: [0.0; 3] };
-            return Material { model, color: look.tint, color_source: ColorSource::Constant, opacity: 1.0, ..base };
+            return Material {
+                model,
+                color: look.tint,
+                color_source: ColorSource::Constant,
+                opacity: 1.0,
+                ..base
+            };
         }
         _ => SurfaceModel::Phong {
             ambient: 1.0,
@@ -179,9 +196,8 @@ fn fixed(p: &Prepared<'_>, warnings: &mut Vec<String>) -> Skin {
         color: rgb(first),
         colors,
         texture,
-        normals: (s.lighting && !s.flat).then(|| {
-            Attribute::per_vertex((0..n).map(|i| Vec3::from_array(a.normals.at(i))).collect())
-        }),
+        normals: (s.lighting && !s.flat)
+            .then(|| Attribute::per_vertex((0..n).map(|i| Vec3::from_array(a.normals.at(i))).collect())),
         emission: if s.lighting { rgb(m.emission) } else { [0.0; 3] },
         opacity: if s.blend && !varies { first[3] } else { 1.0 },
         lit: s.lighting.then_some((rgb(m.specular), m.shininess, Highlight::HalfVector)),
@@ -234,7 +250,11 @@ fn program(p: &Prepared<'_>) -> Skin {
         texture,
         normals,
         opacity: if p.draw.state.blend { opacity.clamp(0.0, 1.0) } else { 1.0 },
-        lit: program.is_lit().then_some((program.specular.map(|v| v.max(0.0)), program.specular_power, highlight)),
+        lit: program.is_lit().then_some((
+            program.specular.map(|v| v.max(0.0)),
+            program.specular_power,
+            highlight,
+        )),
         sides: sides(p, if smooth { Sides::Both } else { Sides::BothByNormal }),
     }
 }

@@ -74,7 +74,8 @@ pub(crate) fn retire() {
         let name = NAMES[i].to_bytes();
         // Lists that we compiled are ours to play.
         let lists: [&[u8]; 5] = [b"glCallList", b"glCallLists", b"glNewList", b"glEndList", b"glDeleteLists"];
-        let book = name.ends_with(b"ProcAddress") || name.ends_with(b"ProcAddressARB") || lists.contains(&name);
+        let book =
+            name.ends_with(b"ProcAddress") || name.ends_with(b"ProcAddressARB") || lists.contains(&name);
         if !book && HOOKS[i].is_some() {
             slot.store(real::forward(i).cast_mut(), Relaxed);
         }
