@@ -14,6 +14,7 @@
 #![deny(unsafe_code)]
 
 mod arrays;
+mod beyond;
 mod buffers;
 mod cache;
 mod capture;
@@ -36,18 +37,22 @@ mod lighting;
 mod overrides;
 mod packs;
 pub mod panel;
+mod picture;
 mod present;
 mod primitives;
+mod probe;
 mod programs;
 mod raster;
 mod real;
-mod recorder;
 pub mod reasons;
+mod recorder;
 pub mod report;
 mod shading;
 mod state;
+mod studio;
 mod symbols;
 mod texturing;
 pub mod timeline;
 mod trace;
+mod view;
 mod worker;

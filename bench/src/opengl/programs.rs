@@ -46,7 +46,9 @@ impl Program {
             Program::Gmsh => ("RTSV_GMSH", "/usr/bin/gmsh", "gmsh"),
             Program::Geomview => ("RTSV_GEOMVIEW", "/usr/bin/geomview", "geomview"),
             Program::ParaView => ("RTSV_PVBATCH", "/usr/bin/pvbatch", "paraview python3-paraview"),
-            Program::Vtk => ("RTSV_PYTHON", "/usr/bin/python3", "python3-vtk9, or a Python with the package vtk"),
+            Program::Vtk => {
+                ("RTSV_PYTHON", "/usr/bin/python3", "python3-vtk9, or a Python with the package vtk")
+            }
         };
         let found = find(variable, place)
             .ok_or_else(|| format!("{}: install {package}, or name it in {variable}", self.name()))?;

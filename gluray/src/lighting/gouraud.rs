@@ -240,13 +240,7 @@ impl Setup<'_> {
 
     /// The material of the side that is seen, with what `glColorMaterial` takes from the colour.
     #[inline(always)]
-    fn surface(
-        &self,
-        materials: &[Material; 2],
-        color: &[F; 4],
-        back: &[bool; LANES],
-        two: bool,
-    ) -> Surface {
+    fn surface(&self, materials: &[Material; 2], color: &[F; 4], back: &[bool; LANES], two: bool) -> Surface {
         let tracked = |side: usize, what: &[u32]| {
             self.state.color_material.is_some_and(|(f, w)| sides(f).contains(&side) && what.contains(&w))
         };
@@ -397,8 +391,9 @@ mod tests {
             spot_cutoff_deg: cutoff,
             attenuation: [1.0, 0.1, 0.01],
         };
-        let positions: Vec<Vec3> =
-            (0..48).map(|i| Vec3::new((i % 7) as f32 - 3.0, (i % 5) as f32 - 2.0, -4.0 - (i % 3) as f32)).collect();
+        let positions: Vec<Vec3> = (0..48)
+            .map(|i| Vec3::new((i % 7) as f32 - 3.0, (i % 5) as f32 - 2.0, -4.0 - (i % 3) as f32))
+            .collect();
         let normals =
             (0..48).map(|i| [((i * 5) % 9) as f32 - 4.0, ((i * 7) % 11) as f32 - 5.0, 1.0 + (i % 4) as f32]);
         let colors = (0..48).map(|i| [(i % 3) as f32 * 0.5, 0.25, (i % 2) as f32, 0.5]).collect();
@@ -422,7 +417,8 @@ mod tests {
             };
             let setup = Setup::new(&state);
             assert!(setup.lights_blocks(&a));
-            let triangles: [[u32; 3]; LANES] = std::array::from_fn(|l| [l as u32, l as u32 + 16, l as u32 + 32]);
+            let triangles: [[u32; 3]; LANES] =
+                std::array::from_fn(|l| [l as u32, l as u32 + 16, l as u32 + 32]);
             let weights = [[0.2; LANES], [0.3; LANES], [0.5; LANES]];
             let back = std::array::from_fn(|l| l % 3 == 0);
             let all = setup.fragments(&a, &positions, &triangles, &weights, &back, u16::MAX);
@@ -433,7 +429,8 @@ mod tests {
                     let i = triangles[l][k] as usize;
                     let lit = setup.vertex(&a, i, positions[i].to_array());
                     for c in 0..4 {
-                        wanted[c] += w * lit.primary[side][c] + if c < 3 { w * lit.secondary[side][c] } else { 0.0 };
+                        wanted[c] +=
+                            w * lit.primary[side][c] + if c < 3 { w * lit.secondary[side][c] } else { 0.0 };
                     }
                 }
                 for c in 0..4 {
