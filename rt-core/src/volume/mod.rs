@@ -8,10 +8,12 @@
 //! Empty space is skipped by blocks of cells ([`MACROCELL`]) whose range of values has no extinction, then by cells.
 
 mod adaptive;
+mod brick;
 mod layer;
 mod overlap;
 mod reference;
 
+pub use brick::{Brick, Marched};
 pub use overlap::integrate_overlapping;
 pub use reference::integrate_reference;
 
@@ -145,6 +147,12 @@ pub struct Volume {
     grid: Arc<Grid>,
     transfer: TransferFunction,
     options: VolumeOptions,
+    /// Points per axis of the whole; those of `grid` unless this is a part.
+    dims: UVec3,
+    /// The origin of the whole.
+    origin: DVec3,
+    /// Point of the whole where `grid` begins.
+    first_point: UVec3,
     /// Smallest and largest finite value of each block, x fastest.
     ranges: Vec<[f32; 2]>,
     /// Whether a block has any extinction.
@@ -196,7 +204,19 @@ impl Volume {
             macrocells_clear: 0,
         };
         let ranges = scans.into_iter().map(|s| s.0).collect();
-        let mut v = Volume { grid, transfer, options, ranges, occupied: Vec::new(), blocks, report };
+        let (dims, origin) = (grid.dims, grid.origin);
+        let mut v = Volume {
+            grid,
+            transfer,
+            options,
+            dims,
+            origin,
+            first_point: UVec3::ZERO,
+            ranges,
+            occupied: Vec::new(),
+            blocks,
+            report,
+        };
         v.find_occupied();
         Ok(v)
     }
@@ -213,17 +233,18 @@ impl Volume {
         self.report.macrocells_clear = self.occupied.iter().filter(|o| !**o).count() as u64;
     }
 
-    /// World position of object space's origin: the grid's.
+    /// World position of object space's origin: that of the grid, of the whole one for a part.
     pub fn origin(&self) -> DVec3 {
-        self.grid.origin
+        self.origin
     }
 
-    /// Bounds relative to [`Volume::origin`].
+    /// Bounds relative to [`Volume::origin`], of the whole.
     pub fn bounds(&self) -> Aabb {
-        outward_box(DVec3::ZERO, self.grid.max_corner() - self.grid.origin)
+        let max_corner = self.origin + self.grid.spacing * (self.dims - UVec3::ONE).as_dvec3();
+        outward_box(DVec3::ZERO, max_corner - self.origin)
     }
 
-    /// The grid.
+    /// The grid; of a part, what it holds.
     pub fn grid(&self) -> &Arc<Grid> {
         &self.grid
     }
@@ -245,21 +266,15 @@ impl Volume {
         if !(ray.is_valid() && t0 < t1) {
             return VolumeSample::CLEAR;
         }
-        let m = self.march(ray, t0, t1, quality);
-        let [r, g, b] = m.color.map(|c| c as f32);
-        VolumeSample {
-            rgba: [r, g, b, (1.0 - m.transmittance) as f32],
-            depth: m.depth as f32,
-            samples: m.samples,
-        }
+        Marched::from(self.march(ray, t0, t1, quality, &Marched::default())).sample()
     }
 
-    /// As [`Volume::integrate`], in f64.
-    fn march(&self, ray: &Ray, t0: f64, t1: f64, quality: &VolumeQuality) -> March {
+    /// As [`Volume::carry_on`], in f64.
+    fn march(&self, ray: &Ray, t0: f64, t1: f64, quality: &VolumeQuality, before: &Marched) -> March {
         let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
         let per_t = d.length();
         let index_ray = IndexRay::new(o, d, self.grid.spacing);
-        let cells = (self.grid.dims - UVec3::ONE).to_array().map(i64::from);
+        let cells = (self.dims - UVec3::ONE).to_array().map(i64::from);
         // The error budget is handed out by length of path through the grid.
         let mut inside = (0.0, 0.0);
         let whole = cells.iter().max().copied().unwrap_or(1);
@@ -267,7 +282,7 @@ impl Volume {
             inside = if inside.1 > inside.0 { (inside.0, c.t1) } else { (c.t0, c.t1) };
             true
         });
-        let mut m = March::new(*quality, (inside.1 - inside.0) * per_t);
+        let mut m = before.march(*quality, (inside.1 - inside.0) * per_t);
         if inside.1 <= inside.0 {
             return m;
         }
@@ -292,7 +307,8 @@ impl Volume {
         if c.t1 <= c.t0 {
             return;
         }
-        let corners = self.grid.corners(UVec3::from_array(c.cell.map(|i| i as u32)));
+        let cell = UVec3::from_array(c.cell.map(|i| i as u32));
+        let corners = self.grid.corners(cell - self.first_point);
         if !corners.iter().all(|v| v.is_finite()) {
             return;
         }
@@ -335,7 +351,8 @@ impl Volume {
     #[inline]
     fn shade(&self, ray: &IndexRay, t: f64, color: [f64; 3]) -> [f64; 3] {
         let Some(s) = &self.options.shading else { return color };
-        let at = DVec3::from_array(ray.at(t)).as_vec3();
+        // Exact: whole numbers from larger ones.
+        let at = DVec3::from_array(ray.at(t)).as_vec3() - self.first_point.as_vec3();
         let g = smooth_gradient(&self.grid, at).as_dvec3();
         let steepness = g.length();
         if !(steepness > 0.0 && steepness.is_finite()) {
