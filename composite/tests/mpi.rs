@@ -38,6 +38,8 @@ fn run(arguments: &[&str], variables: &[(&str, &Path)]) -> Ran {
     for launcher in ["OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK", "COMPOSITE_MPI", "COMPOSITE_MPIRUN"] {
         command.env_remove(launcher);
     }
+    // Naming the lines of a backtrace takes seconds on a busy machine, longer than the waits that are tested here.
+    command.env("RUST_BACKTRACE", "0");
     command.envs(variables.iter().copied());
     let Output { status, stdout, stderr } = command.output().expect("coreutils' timeout runs");
     let stdout = String::from_utf8_lossy(&stdout).into_owned();

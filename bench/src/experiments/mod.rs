@@ -11,6 +11,7 @@ mod fig3_5;
 mod fig3_6;
 mod fig4_10;
 mod fig4_7;
+mod fig4_8;
 mod fig4_9;
 mod fig5_11;
 mod fig5_12;
@@ -18,6 +19,7 @@ mod fig5_13;
 mod fig5_14;
 mod lineup;
 mod many_ranks;
+mod paraview;
 mod partition_view;
 mod peers;
 mod peers_schlieren;
@@ -26,6 +28,7 @@ mod shock_angles;
 mod smpi;
 mod speed_schlieren;
 mod strong_scaling;
+mod table4_1;
 mod table5_1;
 mod test_section;
 
@@ -85,6 +88,12 @@ pub const ALL: &[Experiment] = &[
     },
     Experiment { id: "fig3.10", chapter: 3, title: "Strong scaling, wavelet", run: strong_scaling::wavelet },
     Experiment {
+        id: "paraview",
+        chapter: 3,
+        title: "One node of figures 3.6 to 3.10: ParaView with llvmpipe against the same ParaView with vtk-bridge",
+        run: paraview::run,
+    },
+    Experiment {
         id: "partition-view",
         chapter: 3,
         title: "Parts of as many triangles against parts of as much work for the view",
@@ -97,10 +106,22 @@ pub const ALL: &[Experiment] = &[
         run: accuracy_composite::run,
     },
     Experiment {
+        id: "table4.1",
+        chapter: 4,
+        title: "Frames a second of unmodified OpenGL programs: llvmpipe against gluray",
+        run: table4_1::run,
+    },
+    Experiment {
         id: "fig4.7",
         chapter: 4,
         title: "Time to build the acceleration structure, by preset, against the number of triangles",
         run: fig4_7::run,
+    },
+    Experiment {
+        id: "fig4.8",
+        chapter: 4,
+        title: "Phases of ParaView’s frames when they are traced: Gantt chart and Chrome trace",
+        run: fig4_8::run,
     },
     Experiment {
         id: "fig4.9",

@@ -192,7 +192,7 @@ fn a_volume_in_bricks_has_the_bits_of_one_node() {
             assert_same(&expected, &outputs, &format!("{}, {ranks} ranks", case.name));
             assert!(outputs[0].report.warnings.iter().all(|w| !w.contains("whole")));
         }
-        // Every rank holds its brick with a layer of points around it, and not the whole.
+        // Every rank holds its brick with two layers of points around it, and not the whole.
         let whole = case.scene.volumes[0].volume.grid().values.len();
         let partition = Partition::new(&case.scene, 8, &Split::Triangles);
         let held = (0..8).map(|rank| {

@@ -13,7 +13,7 @@ use rt_core::render::RenderOptions;
 use rt_core::scene::{AmbientOcclusion, Appearance, PlacedVolume, Scene, SceneBuilder};
 use rt_core::shapes::{Cylinders, Radii, Spheres, Tubes};
 use rt_core::transfer_function::TransferFunction;
-use rt_core::volume::{Volume, VolumeOptions, VolumeShading};
+use rt_core::volume::{Interpolation, Volume, VolumeOptions, VolumeShading};
 use std::sync::Arc;
 
 /// A scene with a view of it.
@@ -131,26 +131,37 @@ pub(crate) fn volumes() -> Vec<Case> {
         let values = (0..dims.element_product()).map(value).collect();
         Grid::new(dims, DVec3::new(-2.0, -1.8, -0.7), DVec3::new(0.1, 0.1, 0.06), values).unwrap()
     };
-    let volume = |shading| {
+    let volume = |shading, interpolation| {
         let colors = ColorMap::new(vec![[0.1, 0.2, 0.9, 1.0], [1.0, 0.8, 0.1, 1.0]], [0.0, 1.0]);
         let transfer =
             TransferFunction::from_opacity(colors, &[[0.2, 0.0], [0.6, 0.3], [1.0, 0.9]], 0.4).unwrap();
-        Volume::new(grid().into(), transfer, VolumeOptions { shading }).unwrap()
+        Volume::new(grid().into(), transfer, VolumeOptions { shading, interpolation }).unwrap()
     };
-    let shading = VolumeShading { ambient: 0.3, diffuse: 0.7, light: None, half_gradient: 1.0 };
+    let shading = VolumeShading {
+        ambient: 0.3,
+        diffuse: 0.7,
+        specular: 0.4,
+        shininess: 9.0,
+        light: None,
+        half_gradient: 1.0,
+    };
     let sun = Light::directional(DVec3::new(0.4, -0.3, 1.0));
     let camera = camera(DVec3::ZERO);
     let mut out = Vec::new();
     for (name, balls, volume) in [
-        ("volume around mirrors and glass", Some(Material::dielectric(1.5)), volume(Some(shading))),
-        ("volume around layers", Some(matte().with_opacity(0.4)), volume(None)),
+        (
+            "volume around mirrors and glass",
+            Some(Material::dielectric(1.5)),
+            volume(Some(shading), Interpolation::Linear),
+        ),
+        ("volume around layers", Some(matte().with_opacity(0.4)), volume(None, Interpolation::Nearest)),
     ] {
         let mut scene = scene(DVec3::ZERO, matte(), balls, &[sun, Light::ambient(AMBIENT)], Some(0.5));
         scene.volumes.push(PlacedVolume { volume: volume.into(), world_from_object: DAffine3::IDENTITY });
         out.push(Case { name, scene, camera, options: RenderOptions { samples: 2, ..options() } });
     }
     let mut b = SceneBuilder::new();
-    b.volume(volume(Some(shading)));
+    b.volume(volume(Some(shading), Interpolation::Nearest));
     let options = RenderOptions { layers: Layers::COLOR, ..options() };
     out.push(Case { name: "volume alone", scene: b.build().unwrap(), camera, options });
     out

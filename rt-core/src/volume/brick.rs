@@ -6,10 +6,13 @@
 use super::layer::March;
 use super::{MACROCELL, Volume, VolumeQuality, VolumeReport, VolumeSample, scan};
 use crate::grid::Grid;
-use crate::grid_walk::IndexRay;
 use crate::ray::Ray;
 use glam::UVec3;
 use std::sync::Arc;
+
+/// Layers of points around a brick: a gradient takes the points on both sides of a cell's corners, and the end of a ray's way through a cell may be rounded
+/// into the next one.
+const GHOSTS: u32 = 2;
 
 /// A box of blocks of [`MACROCELL`]³ cells: from `first` to before `end`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -120,7 +123,7 @@ impl Volume {
         (z * self.blocks.y as usize + y) * self.blocks.x as usize + x
     }
 
-    /// What a holder of `brick` needs: the values of its cells with one layer of points around them, for gradients. The rest of the whole is
+    /// What a holder of `brick` needs: the values of its cells with two layers of points around them, for gradients. The rest of the whole is
     /// clear here.
     ///
     /// ```
@@ -143,15 +146,15 @@ impl Volume {
     /// assert!(near.grid().values.len() < whole.grid().values.len());
     /// ```
     pub fn part(&self, brick: Brick) -> Volume {
-        let cells = self.dims - UVec3::ONE;
+        let cells = self.cells();
         let (mut ranges, mut report) =
             (vec![[f32::INFINITY, f32::NEG_INFINITY]; self.ranges.len()], VolumeReport::default());
         let brick = Brick { first: brick.first, end: brick.end.min(self.blocks) };
         let (low, high) = if brick.is_empty() {
             (UVec3::ZERO, UVec3::ONE)
         } else {
-            let low = (brick.first * MACROCELL).saturating_sub(UVec3::ONE);
-            (low, ((brick.end * MACROCELL).min(cells) + UVec3::splat(2)).min(self.dims))
+            let low = (brick.first * MACROCELL).saturating_sub(UVec3::splat(GHOSTS));
+            (low, ((brick.end * MACROCELL).min(cells) + UVec3::splat(GHOSTS + 1)).min(self.dims))
         };
         let low = low.max(self.first_point);
         let high = high.min(self.first_point + self.grid.dims);
@@ -175,7 +178,7 @@ impl Volume {
                 for x in brick.first.x..brick.end.x {
                     let block = UVec3::new(x, y, z);
                     let (first, end) = (block * MACROCELL, ((block + UVec3::ONE) * MACROCELL).min(cells));
-                    let (range, bad) = scan(&grid, first - low, end - low);
+                    let (range, bad) = scan(&grid, first - low, end - low, self.is_nearest());
                     ranges[self.block_index(block)] = range;
                     report.cells += (end - first).as_u64vec3().element_product();
                     report.cells_non_finite += bad;
@@ -222,8 +225,11 @@ impl Volume {
         if !(ray.is_valid() && t0 < t1) {
             return;
         }
-        let index_ray = IndexRay::new(ray.origin.as_dvec3(), ray.dir.as_dvec3(), self.grid.spacing);
-        let cells = (self.dims - UVec3::ONE).to_array().map(i64::from);
+        let (index_ray, cells, t0, t1) = self.index_ray(ray, t0, t1);
+        if t0 >= t1 {
+            return;
+        }
+        let cells = cells.to_array().map(i64::from);
         index_ray.walk([0; 3], cells, cells, i64::from(MACROCELL), t0, t1, |block| {
             visit(UVec3::from_array(block.cell.map(|c| c as u32 / MACROCELL)))
         });
