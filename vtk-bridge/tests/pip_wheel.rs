@@ -1,5 +1,14 @@
 //! The package for the stock `vtk` wheel: ordinary scripts with and without it, and its own wheel built and installed without a network.
 
+#[allow(dead_code, reason = "the tests of the other programs use more of it")]
+#[path = "against_stock/capture.rs"]
+mod capture;
+#[allow(dead_code, reason = "the tests of the other programs use more of it")]
+#[path = "against_stock/compare.rs"]
+mod compare;
+
+use capture::{Capture, bright};
+use compare::{Bars, faults};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -7,27 +16,52 @@ use std::process::{Command, Output};
 /// Scripts of `tests/scripts/vtk` that a current VTK can run, with props that are traced.
 const SCRIPTS: &[&str] = &[
     "annotations",
+    "changing",
     "clipping",
+    "colors",
     "contours",
-    "data_set_mapper",
-    "light_kit",
+    "data_sets",
+    "edges",
+    "lights",
     "opacity",
-    "parallel_projection",
+    "projections",
     "selection",
     "specular",
     "streamlines",
     "textures",
-    "two_viewports",
+    "viewports",
+    "volumes",
 ];
-/// Mean difference of colours, in levels of 255.
-const COLOR_MEAN: f64 = 0.5;
-/// Share of pixels whose silhouette differs.
-const SILHOUETTE: f64 = 0.0002;
-/// VTK's depth buffer has 24 bits, and so has what crosses to it: nine of ten pixels agree within four steps.
-const DEPTH: f32 = 4.0 / 16_777_215.0;
-/// Where a surface is steep to the viewer, OpenGL's own interpolation is off by some steps more: all but a hundredth agree within these.
-const DEPTH_STEEP: f32 = 24.0 / 16_777_215.0;
 
+/// Pictures that are held to other bars, and why.
+const EXCEPTIONS: &[(&str, &str, Bars, &str)] = &[
+    (
+        "projections",
+        "sheared",
+        Bars { color_mean: 255.0, color_strays: 1.0, ..Bars::STRICT },
+        "OpenGL shades in sheared coordinates, where right angles are none: its light is wrong",
+    ),
+    (
+        "textures",
+        "transparent",
+        Bars { silhouette: 1.0, depth_ulp: u32::MAX, ..Bars::STRICT },
+        "OpenGL writes no depth for a surface with a translucent texture; we write it where the texture is opaque",
+    ),
+    (
+        "volumes",
+        "translucent_inside",
+        Bars { color_mean: 3.0, color_strays: 0.2, ..Bars::STRICT },
+        "OpenGL blends volumes over all translucent surfaces, also over those in front of them and inside",
+    ),
+    (
+        "streamlines",
+        "streamlines",
+        Bars { silhouette: 0.0005, ..Bars::STRICT },
+        "the tubes' rims: VTK 9.7 makes other tubes than 9.1, with more slivers",
+    ),
+];
+
+/// The Python with the wheel, or nothing, said aloud.
 fn python() -> Option<PathBuf> {
     let found = std::env::var_os("RTSV_PYTHON").map(PathBuf::from);
     if found.is_none() {
@@ -48,7 +82,6 @@ fn out() -> PathBuf {
     folder
 }
 
-/// Python without a display: VTK then draws with EGL or OSMesa.
 fn command(python: &Path) -> Command {
     let mut command = Command::new(python);
     let package = Path::new(env!("CARGO_MANIFEST_DIR")).join("python");
@@ -58,86 +91,73 @@ fn command(python: &Path) -> Command {
 }
 
 fn checked(what: &str, output: Output) -> String {
-    let said = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+    let said = [output.stdout, output.stderr].concat();
+    let said = String::from_utf8_lossy(&said).into_owned();
     assert!(output.status.success(), "{what}: {}\n{said}", output.status);
-    said.into_owned()
+    said
 }
 
-struct Shot {
-    rgba: Vec<u8>,
-    depth: Vec<f32>,
-    answers: serde_json::Value,
+fn scripts() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/scripts")
 }
 
-fn shot(python: &Path, script: &str, traced: bool) -> Shot {
-    let scripts = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/scripts");
-    let base = out().join(format!("{script}-{}", if traced { "rtvtk" } else { "stock" }));
+/// Runs scripts into a folder of that name, one after the other in one process.
+fn run(
+    python: &Path,
+    scripts_to_run: &[PathBuf],
+    traced: bool,
+    name: &str,
+    settings: &[(&str, &str)],
+) -> PathBuf {
+    let folder = out().join(name);
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("a folder for pictures");
     let mut c = command(python);
     if traced {
-        c.args(["-m", "rtvtk"]).env("RTV_REPORT", base.with_extension("report.json"));
+        let report = folder.join("report.json");
+        c.args(["-m", "rtvtk"]).env("RTV_REPORT", &report).env("CAPTURE_BESIDE", &report);
     }
-    c.arg(scripts.join("run.py")).arg(scripts.join(format!("vtk/{script}.py"))).arg(&base);
-    checked(script, c.output().expect("python runs"));
-    let read = |end: &str| {
-        let path = format!("{}.{end}", base.display());
-        std::fs::read(&path).unwrap_or_else(|e| panic!("{path}: {e}"))
-    };
-    let floats =
-        |b: Vec<u8>| b.chunks_exact(4).map(|c| f32::from_ne_bytes([c[0], c[1], c[2], c[3]])).collect();
-    let json: serde_json::Value = serde_json::from_slice(&read("json")).expect("JSON");
-    Shot { rgba: read("rgba"), depth: floats(read("z")), answers: json["answers"].clone() }
+    c.envs(settings.iter().copied()).arg(scripts().join("run_all.py")).arg(&folder).args(scripts_to_run);
+    checked(name, c.output().expect("python runs"));
+    folder
 }
 
 #[test]
 fn unmodified_scripts_look_the_same_in_the_stock_wheel() {
     let Some(python) = python() else { return };
+    let files: Vec<PathBuf> = SCRIPTS.iter().map(|s| scripts().join(format!("vtk/{s}.py"))).collect();
+    let stock = run(&python, &files, false, "stock", &[]);
+    let ours = run(&python, &files, true, "rtvtk", &[]);
+    let (mut found, mut compared) = (Vec::new(), 0);
     for script in SCRIPTS {
-        let (stock, traced) = (shot(&python, script, false), shot(&python, script, true));
-        let pixels = stock.depth.len();
-        assert_eq!(stock.rgba.len(), traced.rgba.len(), "{script}");
-        let colors = stock.rgba.iter().zip(&traced.rgba);
-        let mean = colors.map(|(a, b)| f64::from(a.abs_diff(*b))).sum::<f64>() / stock.rgba.len() as f64;
-        assert!(mean <= COLOR_MEAN, "{script}: colours differ by {mean}");
-        let depths = || stock.depth.iter().zip(&traced.depth);
-        let silhouette = depths().filter(|(a, b)| (**a < 1.0) != (**b < 1.0)).count();
-        assert!(
-            silhouette as f64 <= (SILHOUETTE * pixels as f64).max(1.0),
-            "{script}: {silhouette} of {pixels}"
-        );
-        let both = || depths().filter(|(a, b)| **a < 1.0 && **b < 1.0);
-        let covered = both().count();
-        let off = |limit: f32| both().filter(|(a, b)| (**a - **b).abs() > limit).count();
-        assert!(covered > 500, "{script} shows something");
-        assert!(off(DEPTH) * 10 <= covered, "{script}: depth differs at {} of {covered}", off(DEPTH));
-        assert!(
-            off(DEPTH_STEEP) * 100 <= covered,
-            "{script}: depth differs at {} of {covered}",
-            off(DEPTH_STEEP)
-        );
-        // Nodes of a selection come in the order of their actors' addresses.
-        let sorted = |v: &serde_json::Value| {
-            let mut all: Vec<_> = v.as_array().into_iter().flatten().map(ToString::to_string).collect();
-            all.sort();
-            all
-        };
-        assert_eq!(sorted(&stock.answers), sorted(&traced.answers), "{script}: picks and selections");
+        for entry in std::fs::read_dir(stock.join(script)).expect("pictures") {
+            let name = entry.expect("an entry").file_name().to_string_lossy().into_owned();
+            let Some(name) = name.strip_suffix(".png") else { continue };
+            let [a, b] = [&stock, &ours].map(|f| Capture::read(&f.join(script), name).expect("a picture"));
+            let exception = EXCEPTIONS.iter().find(|(s, n, ..)| (*s, *n) == (*script, name));
+            let bars = exception.map_or(Bars::STRICT, |(_, _, bars, _)| *bars);
+            if b.traced_elements() == 0 {
+                found.push(format!("{script}/{name}: nothing was ray traced"));
+            }
+            found.extend(faults(&a, &b, &bars).iter().map(|f| format!("{script}/{name}: {f}")));
+            compared += 1;
+        }
     }
+    assert!(found.is_empty(), "\n{}\n", found.join("\n"));
+    assert!(compared >= 30, "only {compared} pictures");
 }
 
 #[test]
 fn effects_come_by_environment_variables() {
     let Some(python) = python() else { return };
-    let plain = shot(&python, "shadow_scene", true).rgba;
-    let scripts = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/scripts");
-    let base = out().join("shadows-on");
-    let mut c = command(&python);
-    c.args(["-m", "rtvtk"]).env("RTV_SHADOWS", "1").arg(scripts.join("run.py"));
-    c.arg(scripts.join("vtk/shadow_scene.py")).arg(&base);
-    checked("shadow_scene", c.output().expect("python runs"));
-    let shadows = std::fs::read(format!("{}.rgba", base.display())).expect("a picture");
-    let darker = plain.iter().zip(&shadows).filter(|(a, b)| **a > b.saturating_add(20)).count();
-    let brighter = plain.iter().zip(&shadows).filter(|(a, b)| **b > a.saturating_add(20)).count();
-    assert!(darker > 500 && brighter < darker / 20, "{darker} darker, {brighter} brighter");
+    let room = [scripts().join("effects/room.py")];
+    let picture = |name: &str, settings: &[(&str, &str)]| {
+        Capture::read(&run(&python, &room, true, name, settings).join("room"), "room").expect("a picture")
+    };
+    let (plain, shadows) = (picture("plain", &[]), picture("shadows", &[("RTV_SHADOWS", "1")]));
+    let change = |place: &str| bright(shadows.at(place)) - bright(plain.at(place));
+    assert!(change("shadow") < -20.0, "the shadow is as bright as before: {}", change("shadow"));
+    assert!(change("lit").abs() < 1.0 && change("far_from_shadow").abs() < 1.0, "lit floor has changed");
 }
 
 #[test]
@@ -177,7 +197,7 @@ fn a_missing_library_or_script_is_a_clear_message_and_exit_code_2() {
     let here = library().display().to_string();
     let (code, said) = run(&here, &["no_such_script.py"]);
     assert_eq!((code, said.contains("no_such_script.py: no such script")), (Some(2), true), "{said}");
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/scripts/run.py").display().to_string();
+    let script = scripts().join("run_all.py").display().to_string();
     let (code, said) = run("/no/such/library.so", &[&script]);
     assert_eq!((code, said.contains("set RTVTK_LIBRARY to the file")), (Some(2), true), "{said}");
 }

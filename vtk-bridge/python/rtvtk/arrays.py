@@ -103,6 +103,9 @@ def add_colors(bridge, surface, mapper, data, keep):
     if scalars is None:
         return
     flag = int(flag)
+    if flag == 2 and mapper.GetFieldDataTupleId() < 0:
+        # An array of the field data with a value for each cell.
+        flag = 1
     key = key_of(scalars, mapper.GetLookupTable(), mapper.GetScalarRange(), mapper.GetColorMode(), mapper.GetScalarMode(),
                  mapper.GetInterpolateScalarsBeforeMapping(), mapper.GetUseLookupTableScalarRange(), flag, mapper.GetArrayComponent(),
                  mapper.GetFieldDataTupleId())

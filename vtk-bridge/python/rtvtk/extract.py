@@ -4,9 +4,9 @@ import ctypes as C
 import numpy as np
 from vtkmodules.vtkCommonDataModel import vtkMultiBlockDataSet, vtkPartitionedDataSet, vtkPartitionedDataSetCollection, vtkPolyData
 from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
-from vtkmodules.vtkRenderingCore import vtkActor
+from vtkmodules.vtkRenderingCore import vtkActor, vtkVolume
 
-from . import arrays
+from . import arrays, volumes
 from . import library as rtv
 
 ACTORS = {"vtkActor", "vtkOpenGLActor", "vtkLODActor", "vtkQuadricLODActor"}
@@ -25,6 +25,9 @@ def _property(p):
     out.ambient, out.diffuse, out.specular, out.specular_power = p.GetAmbient(), p.GetDiffuse(), p.GetSpecular(), p.GetSpecularPower()
     out.opacity, out.metallic, out.roughness, out.base_ior = p.GetOpacity(), p.GetMetallic(), p.GetRoughness(), p.GetBaseIOR()
     out.flat, out.pbr, out.lighting = p.GetInterpolation() == FLAT, p.GetInterpolation() == PBR, bool(p.GetLighting())
+    out.edge_color[:] = p.GetEdgeColor()
+    # OpenGL's are never thinner than this.
+    out.edge_width = max(1.1, p.GetLineWidth()) if p.GetEdgeVisibility() and p.GetRepresentation() == SURFACE else 0.0
     out.cull_front, out.cull_back = bool(p.GetFrontfaceCulling()), bool(p.GetBackfaceCulling())
     return out
 
@@ -40,11 +43,16 @@ class Extractor:
     def __init__(self):
         self._filters = {}
 
-    def add(self, bridge, prop, name):
+    def add(self, bridge, prop, name, renderer):
         """Gives a prop to the bridge, or raises `Untraceable`. Returns whether anything of it is traced."""
+        if isinstance(prop, vtkVolume):
+            reason = volumes.add(bridge, prop, renderer, name)
+            if reason:
+                bridge.warn(f"{name}: {reason}; OpenGL draws it")
+                raise Untraceable(reason)
+            return True
         if not isinstance(prop, vtkActor) or prop.GetMapper() is None:
-            raise Untraceable("a volume (OpenGL's ray caster sees the depth of what is traced)" if prop.IsA("vtkVolume")
-                              else "OpenGL draws props of this class")
+            raise Untraceable("OpenGL draws props of this class")
         radii = bridge.option("RTV_POINT_RADIUS"), bridge.option("RTV_LINE_RADIUS")
         mapper = prop.GetMapper()
         self._check(prop, mapper, *radii)
@@ -75,7 +83,12 @@ class Extractor:
         if p.GetRepresentation() == POINTS and point_radius <= 0:
             raise Untraceable("points (set RTV_POINT_RADIUS to trace them as spheres)")
         if p.GetRepresentation() == SURFACE and p.GetEdgeVisibility():
-            raise Untraceable("edges on the surface")
+            if p.GetRenderLinesAsTubes() or getattr(p, "GetEdgeOpacity", lambda: 1.0)() < 1.0 or getattr(p, "GetUseLineWidthForEdgeThickness", lambda: True)() is False:
+                raise Untraceable("edges as tubes, translucent edges or edges of a width of their own")
+            if actor.HasTranslucentPolygonalGeometry() or (mapper.GetClippingPlanes() and mapper.GetClippingPlanes().GetNumberOfItems()):
+                raise Untraceable("edges on a translucent or clipped surface")
+        if p.GetRepresentation() == SURFACE and p.GetVertexVisibility():
+            raise Untraceable("vertices on the surface")
         if actor.GetBackfaceProperty() is not None:
             raise Untraceable("backs with a property of their own")
         if p.GetNumberOfTextures() > 0:

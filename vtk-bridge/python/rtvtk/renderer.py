@@ -36,7 +36,7 @@ class _Tracer:
         for i, prop in enumerate(visible):
             name = f"{prop.GetClassName()} {i}"
             try:
-                self.extractor.add(self.bridge, prop, name)
+                self.extractor.add(self.bridge, prop, name, renderer)
                 traced.append(prop)
             except Untraceable as reason:
                 self.bridge.pass_on(name, str(reason))
