@@ -371,8 +371,7 @@ impl Context {
             Some(geometry) => geometry,
             None => {
                 let positions = positions(&arrays.position.pack(seen))?;
-                let triangles =
-                    elements.triangles(mode, self.state.first_vertex_provokes, self.state.flat);
+                let triangles = elements.triangles(mode, self.state.first_vertex_provokes, self.state.flat);
                 self.cache.put(key, &positions, triangles)
             }
         };

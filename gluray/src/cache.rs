@@ -156,7 +156,12 @@ impl Cache {
     }
 
     /// New geometry that the caller named.
-    pub(crate) fn put(&mut self, key: u128, positions: &[[f32; 3]], triangles: Vec<[u32; 3]>) -> Arc<Geometry> {
+    pub(crate) fn put(
+        &mut self,
+        key: u128,
+        positions: &[[f32; 3]],
+        triangles: Vec<[u32; 3]>,
+    ) -> Arc<Geometry> {
         self.insert(key, TriMesh::new(vectors(positions), triangles))
     }
 

@@ -3,8 +3,8 @@
 //! A context is owned by the thread it is current on (in [`CURRENT`]) or, while it is current nowhere, by the register. So no call needs a
 //! lock, and a context that is destroyed in flight lives on until its thread leaves it, as OpenGL says.
 
-use crate::cache::Cache;
 use crate::buffers::Writes;
+use crate::cache::Cache;
 use crate::config::Config;
 use crate::decide::{self, Verdict};
 use crate::enums::*;

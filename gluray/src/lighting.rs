@@ -335,12 +335,8 @@ mod tests {
     #[test]
     fn byte_normals_light_like_floats() {
         let l = lit(|_, a| {
-            let packed = crate::capture::Packed {
-                bytes: vec![0, 0, 127],
-                kind: BYTE,
-                size: 3,
-                normalized: true,
-            };
+            let packed =
+                crate::capture::Packed { bytes: vec![0, 0, 127], kind: BYTE, size: 3, normalized: true };
             a.normals = Values::Packed(std::sync::Arc::new(packed));
         });
         assert_eq!(l.primary[0], [1.0, 0.6, 0.35, 0.5]);

@@ -442,9 +442,7 @@ impl Context {
             Some(known) => known,
             None => {
                 let (geometry, attributes) = self.read_program_arrays(mode, &sources, elements)?;
-                self.programs
-                    .made
-                    .retain(|k, _| (&k.sources, k.elements) != (&key.sources, key.elements));
+                self.programs.made.retain(|k, _| (&k.sources, k.elements) != (&key.sources, key.elements));
                 let made = Made { geometry: geometry.clone(), attributes: attributes.clone(), used: now };
                 self.programs.made.insert(key, made);
                 (geometry, attributes)

@@ -24,7 +24,11 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let (tools, found) = (Tools::find(), paraview.find());
     let (Ok(tools), Ok(_)) = (&tools, &found) else {
         let missing: Vec<String> = tools.err().into_iter().flatten().chain(found.err()).collect();
-        return Err(UsageError(format!("fig4.8 needs programs that are not here:\n  {}", missing.join("\n  "))).into());
+        return Err(UsageError(format!(
+            "fig4.8 needs programs that are not here:\n  {}",
+            missing.join("\n  ")
+        ))
+        .into());
     };
     let (mesh, frames) = match context.quick {
         true => (crate::meshes::coarse_wavelet(51)?, 10),
@@ -51,10 +55,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let mut phases: BTreeMap<(String, String), Vec<f64>> = BTreeMap::new();
     for s in spans {
         let text = |k: &str| s[k].as_str().unwrap_or("").to_string();
-        phases
-            .entry((text("track"), text("phase")))
-            .or_default()
-            .push(s["ms"].as_f64().unwrap_or(0.0));
+        phases.entry((text("track"), text("phase"))).or_default().push(s["ms"].as_f64().unwrap_or(0.0));
     }
     for ((track, phase), times) in &phases {
         let Some(t) = Summary::of(times) else { continue };
@@ -92,7 +93,8 @@ fn middle(spans: &[Value]) -> (f64, f64) {
     let frame = |s: &Value| s["frame"].as_u64().unwrap_or(0);
     let last = spans.iter().map(frame).max().unwrap_or(0);
     let shown = |s: &&Value| (last.saturating_sub(5)..last).contains(&frame(s));
-    let from = spans.iter().filter(shown).filter_map(|s| s["start_ms"].as_f64()).fold(f64::INFINITY, f64::min);
+    let from =
+        spans.iter().filter(shown).filter_map(|s| s["start_ms"].as_f64()).fold(f64::INFINITY, f64::min);
     let to = spans
         .iter()
         .filter(shown)
@@ -112,6 +114,9 @@ fn draw(gluray: &Path, report: &Path, files: &[&Path], window: Option<(f64, f64)
     }
     let output = command.output().context("cannot start `gluray timeline`")?;
     let told = String::from_utf8_lossy(&output.stderr);
-    anyhow::ensure!(output.status.success() && files.iter().all(|f| f.is_file()), "`gluray timeline`: {told}");
+    anyhow::ensure!(
+        output.status.success() && files.iter().all(|f| f.is_file()),
+        "`gluray timeline`: {told}"
+    );
     Ok(())
 }

@@ -20,6 +20,7 @@ mod fig5_14;
 mod lineup;
 mod many_ranks;
 mod partition_view;
+mod passing;
 mod peers;
 mod peers_schlieren;
 mod pictures;
@@ -103,6 +104,12 @@ pub const ALL: &[Experiment] = &[
         chapter: 4,
         title: "Frames a second of unmodified OpenGL programs: llvmpipe against gluray",
         run: table4_1::run,
+    },
+    Experiment {
+        id: "passing",
+        chapter: 4,
+        title: "Nanoseconds per OpenGL call that gluray passes to the driver",
+        run: passing::run,
     },
     Experiment {
         id: "fig4.7",

@@ -18,7 +18,11 @@ const SIZE_PX: u32 = 1024;
 const WAYS: [Way; 3] = [Way::Llvmpipe, Way::Serial, Way::Asynchronous];
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
-    record.column("program", "", "an unmodified program; it turns the model by a few degrees from frame to frame");
+    record.column(
+        "program",
+        "",
+        "an unmodified program; it turns the model by a few degrees from frame to frame",
+    );
     record.column("triangles", "", "triangles of the wavelet surfaces in its file");
     record.column("way", "", "who draws: Mesa's llvmpipe, or gluray in mode match");
     record.column("fps", "1/s", "frames a second by the median frame");
@@ -40,7 +44,11 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let programs: Vec<Program> =
         Program::ALL.into_iter().filter(|p| p.find().map_err(|m| missing.push(m)).is_ok()).collect();
     let Some(tools) = tools.filter(|_| !programs.is_empty()) else {
-        return Err(UsageError(format!("table4.1 needs programs that are not here:\n  {}", missing.join("\n  "))).into());
+        return Err(UsageError(format!(
+            "table4.1 needs programs that are not here:\n  {}",
+            missing.join("\n  ")
+        ))
+        .into());
     };
     record.missing.extend(missing);
     let display = Display::start(&tools.xvfb)?;
@@ -100,8 +108,7 @@ fn measure(
     let start = |way: Way, measured: &mut Measured| -> anyhow::Result<Session> {
         let dir = place.dir.join(format!("{}-{way:?}-{n}", program.name().replace(' ', "-")));
         let begun = std::time::Instant::now();
-        let mut s =
-            Session::start(program, way, place.tools, place.display, &dir, &data, SIZE_PX)?;
+        let mut s = Session::start(program, way, place.tools, place.display, &dir, &data, SIZE_PX)?;
         measured.first_secs = begun.elapsed().as_secs_f64();
         s.frames(if way == Way::Llvmpipe { 1 } else { settle })?;
         if way != Way::Llvmpipe && !context_is_quick(n) {
@@ -175,8 +182,7 @@ fn check(program: Program, way: Way, report: Option<serde_json::Value>) -> anyho
 }
 
 fn ratios(native: &Measured, ours: &Measured, of: impl Fn(&Cost) -> f64) -> Option<Summary> {
-    let each: Vec<f64> =
-        native.groups.iter().zip(&ours.groups).map(|(n, o)| of(n) / of(o)).collect();
+    let each: Vec<f64> = native.groups.iter().zip(&ours.groups).map(|(n, o)| of(n) / of(o)).collect();
     Summary::of(&each)
 }
 
@@ -211,7 +217,8 @@ fn ratio(program: Program, n: usize, way: Way, native: &Measured, ours: &Measure
 }
 
 fn plot(record: &Record) -> Plot {
-    let mut plot = Plot::lines("Frames of programs", Axis::log("triangles", ""), Axis::log("frames a second", "1/s"));
+    let mut plot =
+        Plot::lines("Frames of programs", Axis::log("triangles", ""), Axis::log("frames a second", "1/s"));
     for program in Program::ALL {
         for way in WAYS {
             let of = record

@@ -46,7 +46,9 @@ impl Program {
             Program::Gmsh => ("RTSV_GMSH", "/usr/bin/gmsh", "gmsh"),
             Program::Geomview => ("RTSV_GEOMVIEW", "/usr/bin/geomview", "geomview"),
             Program::ParaView => ("RTSV_PVBATCH", "/usr/bin/pvbatch", "paraview python3-paraview"),
-            Program::Vtk => ("RTSV_PYTHON", "/usr/bin/python3", "python3-vtk9, or a Python with the package vtk"),
+            Program::Vtk => {
+                ("RTSV_PYTHON", "/usr/bin/python3", "python3-vtk9, or a Python with the package vtk")
+            }
         };
         let found = find(variable, place)
             .ok_or_else(|| format!("{}: install {package}, or name it in {variable}", self.name()))?;
@@ -101,7 +103,7 @@ impl Program {
 }
 
 /// The path that a variable names, or a well-known one, if there is a file.
-pub(super) fn find(variable: &str, place: &str) -> Option<PathBuf> {
+pub fn find(variable: &str, place: &str) -> Option<PathBuf> {
     let named = std::env::var_os(variable).map(PathBuf::from);
     named.or_else(|| Some(PathBuf::from(place))).filter(|p| p.is_file())
 }

@@ -35,6 +35,28 @@ struct Surface {
     shininess: F,
 }
 
+/// Which side each lane sees.
+struct Pick<'a> {
+    back: &'a [bool; LANES],
+    /// Backs have a material of their own.
+    two: bool,
+}
+
+impl Pick<'_> {
+    /// A property of front and back, or the colour where that stands for it.
+    #[inline(always)]
+    fn of(&self, values: [f32; 2], tracked: [bool; 2], color: &F) -> F {
+        let mut out = if tracked[0] { *color } else { [values[0]; LANES] };
+        if self.two {
+            let behind = if tracked[1] { *color } else { [values[1]; LANES] };
+            for l in 0..LANES {
+                out[l] = if self.back[l] { behind[l] } else { out[l] };
+            }
+        }
+        out
+    }
+}
+
 #[inline(always)]
 fn dot(a: &[F; 3], b: &[F; 3]) -> F {
     let mut out = ZERO;
@@ -242,38 +264,36 @@ impl Setup<'_> {
     #[inline(always)]
     fn surface(
         &self,
-        materials: &[Material; 2],
+        [front, behind]: &[Material; 2],
         color: &[F; 4],
         back: &[bool; LANES],
         two: bool,
     ) -> Surface {
-        let tracked = |side: usize, what: &[u32]| {
-            self.state.color_material.is_some_and(|(f, w)| sides(f).contains(&side) && what.contains(&w))
+        let (faces, what) = self.state.color_material.map_or((&[][..], 0), |(face, w)| (sides(face), w));
+        let faces = [faces.contains(&0), faces.contains(&1)];
+        let ambient = what == AMBIENT || what == AMBIENT_AND_DIFFUSE;
+        let diffuse = what == DIFFUSE || what == AMBIENT_AND_DIFFUSE;
+        let pick = Pick { back, two };
+        let mut out = Surface {
+            ambient: [ZERO; 3],
+            diffuse: [ZERO; 3],
+            specular: [ZERO; 3],
+            emission: [ZERO; 3],
+            alpha: ZERO,
+            shininess: pick.of([front.shininess, behind.shininess], [false; 2], &ZERO),
         };
-        // Whether the colour stands for a property on either side, then the property itself.
-        let property = |what: &[u32], of: &dyn Fn(&Material) -> [f32; 4], k: usize| -> F {
-            let value = |side: usize| -> F {
-                if tracked(side, what) { color[k] } else { [of(&materials[side])[k]; LANES] }
-            };
-            let mut out = value(0);
-            if two {
-                let behind = value(1);
-                (0..LANES).for_each(|l| out[l] = if back[l] { behind[l] } else { out[l] });
-            }
-            out
-        };
-        let three = |what: &[u32], of: &dyn Fn(&Material) -> [f32; 4]| {
-            [property(what, of, 0), property(what, of, 1), property(what, of, 2)]
-        };
-        let both: &[u32] = &[DIFFUSE, AMBIENT_AND_DIFFUSE];
-        Surface {
-            ambient: three(&[AMBIENT, AMBIENT_AND_DIFFUSE], &|m| m.ambient),
-            diffuse: three(both, &|m| m.diffuse),
-            specular: three(&[SPECULAR], &|m| m.specular),
-            emission: three(&[EMISSION], &|m| m.emission),
-            alpha: property(both, &|m| m.diffuse, 3),
-            shininess: property(&[], &|m| [m.shininess; 4], 0),
+        for k in 0..3 {
+            let by = |tracked: bool| faces.map(|f| f && tracked);
+            out.ambient[k] = pick.of([front.ambient[k], behind.ambient[k]], by(ambient), &color[k]);
+            out.diffuse[k] = pick.of([front.diffuse[k], behind.diffuse[k]], by(diffuse), &color[k]);
+            out.specular[k] =
+                pick.of([front.specular[k], behind.specular[k]], by(what == SPECULAR), &color[k]);
+            out.emission[k] =
+                pick.of([front.emission[k], behind.emission[k]], by(what == EMISSION), &color[k]);
         }
+        let tracked = faces.map(|f| f && diffuse);
+        out.alpha = pick.of([front.diffuse[3], behind.diffuse[3]], tracked, &color[3]);
+        out
     }
 
     /// Primary and secondary colours.
@@ -397,8 +417,9 @@ mod tests {
             spot_cutoff_deg: cutoff,
             attenuation: [1.0, 0.1, 0.01],
         };
-        let positions: Vec<Vec3> =
-            (0..48).map(|i| Vec3::new((i % 7) as f32 - 3.0, (i % 5) as f32 - 2.0, -4.0 - (i % 3) as f32)).collect();
+        let positions: Vec<Vec3> = (0..48)
+            .map(|i| Vec3::new((i % 7) as f32 - 3.0, (i % 5) as f32 - 2.0, -4.0 - (i % 3) as f32))
+            .collect();
         let normals =
             (0..48).map(|i| [((i * 5) % 9) as f32 - 4.0, ((i * 7) % 11) as f32 - 5.0, 1.0 + (i % 4) as f32]);
         let colors = (0..48).map(|i| [(i % 3) as f32 * 0.5, 0.25, (i % 2) as f32, 0.5]).collect();
@@ -422,7 +443,8 @@ mod tests {
             };
             let setup = Setup::new(&state);
             assert!(setup.lights_blocks(&a));
-            let triangles: [[u32; 3]; LANES] = std::array::from_fn(|l| [l as u32, l as u32 + 16, l as u32 + 32]);
+            let triangles: [[u32; 3]; LANES] =
+                std::array::from_fn(|l| [l as u32, l as u32 + 16, l as u32 + 32]);
             let weights = [[0.2; LANES], [0.3; LANES], [0.5; LANES]];
             let back = std::array::from_fn(|l| l % 3 == 0);
             let all = setup.fragments(&a, &positions, &triangles, &weights, &back, u16::MAX);
@@ -433,7 +455,8 @@ mod tests {
                     let i = triangles[l][k] as usize;
                     let lit = setup.vertex(&a, i, positions[i].to_array());
                     for c in 0..4 {
-                        wanted[c] += w * lit.primary[side][c] + if c < 3 { w * lit.secondary[side][c] } else { 0.0 };
+                        wanted[c] +=
+                            w * lit.primary[side][c] + if c < 3 { w * lit.secondary[side][c] } else { 0.0 };
                     }
                 }
                 for c in 0..4 {
