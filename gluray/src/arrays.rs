@@ -9,6 +9,7 @@ use crate::client_memory;
 use crate::context::{Context, Sink};
 use crate::decide::Verdict;
 use crate::enums::*;
+use crate::overrides::Look;
 use crate::primitives::{is_filled, triangulate};
 use crate::programs::DrawCall;
 use crate::real::gl;
@@ -126,6 +127,17 @@ fn source(
 }
 
 impl Arrays {
+    /// The array of positions alone.
+    pub(crate) fn query_position() -> Result<Source, &'static str> {
+        if !gl::is_enabled(VERTEX_ARRAY) {
+            return Err("no vertex array");
+        }
+        let size = gl::int(VERTEX_ARRAY_SIZE).max(0) as usize;
+        let (kind, stride) = (VERTEX_ARRAY_TYPE, VERTEX_ARRAY_STRIDE);
+        let buffer = VERTEX_ARRAY_BUFFER_BINDING;
+        Ok(source(size, kind, stride, VERTEX_ARRAY_POINTER, buffer, false, true))
+    }
+
     /// As the driver has them; an error in words when rays cannot stand for them.
     pub(crate) fn query(version: u32) -> Result<Arrays, &'static str> {
         let buffers = version >= 15;
@@ -186,6 +198,14 @@ impl Arrays {
         });
         Ok(Arrays { position, normal, color, tex })
     }
+}
+
+/// What became of a draw that is not left to the driver alone.
+pub(crate) enum Taken {
+    /// Rays make its pixels.
+    Traced,
+    /// The driver makes its colours, rays its shadows.
+    Shape,
 }
 
 /// Which vertices a draw takes.
@@ -255,6 +275,23 @@ impl Elements {
             Elements::Range { first, count } => (*first, *count),
             Elements::Indexed { least, count, .. } => (*least, *count),
         }
+    }
+
+    /// Up to `most` different vertices, spread over the draw.
+    pub(crate) fn some(&self, most: usize) -> Vec<u32> {
+        let n = match self {
+            Elements::Range { count, .. } => *count,
+            Elements::Indexed { indices, .. } => indices.len(),
+        };
+        let take = most.min(n);
+        let number = |i: usize| match self {
+            Elements::Range { first, .. } => (first + i) as u32,
+            Elements::Indexed { indices, .. } => indices[i],
+        };
+        let mut out: Vec<u32> = (0..take).map(|i| number(i * (n - 1) / (take - 1).max(1))).collect();
+        out.sort_unstable();
+        out.dedup();
+        out
     }
 
     /// Triangles, in vertex numbers of the span.
@@ -342,11 +379,17 @@ impl Context {
             // Recognised programs decide for themselves what blending means.
             _ if self.state.program != 0 => self.take_program_arrays(mode, call, elements),
             Verdict::Pass(why) => Err(why),
-            v => self.take_arrays(mode, elements, v),
+            v => self.take_arrays(mode, elements, v).map(|()| Taken::Traced),
         };
         self.drop_errors();
         match taken {
-            Ok(()) => true,
+            Ok(Taken::Traced) => true,
+            // The driver draws it, and rays darken it when the frame ends.
+            Ok(Taken::Shape) => {
+                self.sync();
+                self.mark_current();
+                false
+            }
             Err(why) => {
                 self.passing(why, is_filled(mode));
                 // The arrays of the driver's draw leave some current values undefined.
@@ -426,8 +469,15 @@ impl Context {
             Shading::Fixed => crate::lighting::product(&self.state.projection, &self.state.model_view),
             Shading::Program(p) => p.clip_from_object,
         };
-        let draw =
-            Draw { geometry, attributes, state: self.state.clone(), shading, clip_from_object, calls: 1 };
+        let draw = Draw {
+            geometry,
+            attributes,
+            state: self.state.clone(),
+            shading,
+            clip_from_object,
+            calls: 1,
+            look: Look::default(),
+        };
         self.add(draw, in_order);
     }
 
@@ -464,7 +514,7 @@ impl Context {
             return false;
         };
         let end = [0.0, 0.0, 0.0, 1.0];
-        self.list_begin(mode);
+        self.list_begin_arrays(mode);
         for i in elements.order() {
             if let Some(p) = &normal {
                 self.list_normal(p.at(i, [0.0; 3]));

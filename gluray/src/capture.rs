@@ -2,6 +2,7 @@
 
 use crate::cache::Geometry;
 use crate::enums::*;
+use crate::overrides::Look;
 use crate::programs::Recognised;
 use crate::state::current::{Current, Materials};
 use crate::state::snapshot::Snapshot;
@@ -133,6 +134,25 @@ pub(crate) struct Draw {
     pub(crate) clip_from_object: [f32; 16],
     /// Counts the program's draw calls in it.
     pub(crate) calls: u64,
+    /// What the user makes of it.
+    pub(crate) look: Look,
+}
+
+impl Draw {
+    /// True when no vertex of a draw of fixed function lets light through.
+    pub(crate) fn has_full_alpha(&self) -> bool {
+        let (s, a) = (&self.state, &self.attributes);
+        let tracked = s.color_material.is_some_and(|(_, what)| matches!(what, DIFFUSE | AMBIENT_AND_DIFFUSE));
+        match (&self.shading, &a.colors) {
+            (Shading::Program(_), _) => false,
+            _ if s.lighting && !tracked => a.materials.iter().flatten().all(|m| m.diffuse[3] == 1.0),
+            (_, Values::Constant(c)) => c[3] == 1.0,
+            (_, Values::PerVertex(all)) => all.iter().all(|c| c[3] == 1.0),
+            (_, Values::Packed(_)) => {
+                (0..self.geometry.mesh.positions.len()).all(|i| a.colors.at(i)[3] == 1.0)
+            }
+        }
+    }
 }
 
 /// Primitives of one kind and size that follow one another.

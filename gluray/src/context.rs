@@ -11,6 +11,7 @@ use crate::enums::*;
 use crate::frame::Frame;
 use crate::packs::Packs;
 use crate::present::Presenter;
+use crate::probe::Probes;
 use crate::programs::Programs;
 use crate::real::gl;
 use crate::recorder::Recorder;
@@ -18,6 +19,7 @@ use crate::report::Counters;
 use crate::state::current::Current;
 use crate::state::lists::{Lists, Recording};
 use crate::state::snapshot::{Abilities, Snapshot};
+use crate::studio::Studio;
 use crate::symbols::{self, class};
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -65,6 +67,8 @@ pub(crate) struct Context {
     pub(crate) packed: Packs,
     pub(crate) frame: Frame,
     pub(crate) presenter: Presenter,
+    pub(crate) studio: Studio,
+    pub(crate) probes: Probes,
     pub(crate) programs: Programs,
     pub(crate) counters: Counters,
     /// Errors that came up behind the program's back or were kept for it.
@@ -234,6 +238,8 @@ impl Context {
             packed: Packs::default(),
             frame: Frame::default(),
             presenter: Presenter::default(),
+            studio: Studio::default(),
+            probes: Probes::default(),
             programs: Programs::default(),
             counters: Counters::default(),
             errors: Vec::new(),

@@ -5,6 +5,7 @@ use crate::context::Context;
 use crate::enums::*;
 use crate::late::{self, Late, Traced};
 use crate::lighting::{product, transform};
+use crate::overrides::Look;
 use crate::present::Fate;
 use crate::texturing::Image;
 use crate::trace::{self, Prepared};
@@ -70,7 +71,15 @@ impl Context {
         );
         self.counters.spent("capture", start.elapsed());
         self.add(
-            Draw { geometry, attributes, state, shading: Shading::Fixed, clip_from_object, calls },
+            Draw {
+                geometry,
+                attributes,
+                state,
+                shading: Shading::Fixed,
+                clip_from_object,
+                calls,
+                look: Look::default(),
+            },
             in_order,
         );
     }
@@ -86,6 +95,10 @@ impl Context {
         if !trace::has_rays(&draw.clip_from_object) {
             // A model-view that flattens everything (a shadow on a floor): rays need the flattened triangles themselves.
             self.flatten(&mut draw);
+        }
+        if draw.state.blend && self.config.settings.sees_through() && draw.has_full_alpha() {
+            // Programs leave blending on; what lets no light through is opaque all the same.
+            Arc::make_mut(&mut draw.state).blend = false;
         }
         let image = match &draw.state.texture {
             Some(t) => self.presenter.images.get(t.target, t.name, t.version),
@@ -123,9 +136,18 @@ impl Context {
 
     /// Draws what is pending into the framebuffer.
     pub(crate) fn flush(&mut self, before: &str) {
+        if crate::fault::happened() {
+            return;
+        }
+        crate::fault::injected("flush");
         self.end_batch();
         let pending = std::mem::take(&mut self.frame.pending);
         let others = std::mem::take(&mut self.frame.others);
+        if !self.probes.draws.is_empty() {
+            self.counters.flushed(before);
+            self.frame.traced = true;
+            self.darken();
+        }
         if pending.is_empty() {
             return;
         }
@@ -134,6 +156,9 @@ impl Context {
         self.frame.told.traced(self.counters.report.frames + 1, pending.iter().map(|(d, _)| d));
         // What the driver drew after a traced surface wins ties with it, as LEQUAL says; what it drew before loses them.
         let func = if others { LESS } else { pending[0].0.state.depth_func };
+        if crate::picture::is_for(&self.config.settings) {
+            return self.draw_picture(&pending, func);
+        }
         if self.may_be_late(before) {
             return self.flush_late(pending, func);
         }
@@ -188,6 +213,7 @@ impl Context {
         self.frame.late.frame_done();
         (self.counters.report.cache_hits, self.counters.report.cache_misses) =
             (self.cache.hits, self.cache.misses);
+        self.studio.frame_done();
         let fast = self.config.settings.quality == crate::config::Quality::Fast;
         self.programs.frame_done();
         self.packed.frame_done();
@@ -201,7 +227,7 @@ impl Context {
         let size = [2, 3].map(|i| self.state.viewport[i].max(0).cast_unsigned());
         self.counters.report.objects = self.frame.told.frame_done(&self.counters.report, size);
         if let Some(problem) = self.frame.told.take_problem() {
-            self.counters.report.problems = vec![problem];
+            self.counters.warn(problem);
         }
         self.take_up_settings();
         self.counters.publish(false);
@@ -240,7 +266,7 @@ impl Context {
             return false;
         }
         self.end_batch();
-        if !self.frame.pending.is_empty() {
+        if !self.frame.pending.is_empty() || !self.probes.draws.is_empty() {
             const COLOR_AND_DEPTH: u32 = 0x4100;
             self.refresh();
             let whole = mask & COLOR_AND_DEPTH == COLOR_AND_DEPTH
@@ -250,6 +276,7 @@ impl Context {
                 && self.frame.pending.iter().all(|(d, _)| d.state.framebuffer == self.state.framebuffer);
             if whole {
                 self.frame.pending.clear();
+                self.probes.draws.clear();
                 self.frame.others = false;
             } else {
                 self.flush("glClear of a part");

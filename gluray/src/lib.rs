@@ -14,6 +14,7 @@
 #![deny(unsafe_code)]
 
 mod arrays;
+mod beyond;
 mod buffers;
 mod cache;
 mod capture;
@@ -36,8 +37,10 @@ mod lighting;
 mod overrides;
 mod packs;
 pub mod panel;
+mod picture;
 mod present;
 mod primitives;
+mod probe;
 mod programs;
 mod raster;
 mod real;
@@ -46,8 +49,10 @@ mod recorder;
 pub mod report;
 mod shading;
 mod state;
+mod studio;
 mod symbols;
 mod texturing;
 pub mod timeline;
 mod trace;
+mod view;
 mod worker;

@@ -4,9 +4,10 @@
 //! when every statement is one whose meaning is written down below: a shader with anything else in it (picking, edges, depth peeling,
 //! physically based materials) is left to the driver.
 
-use crate::arrays::{Elements, Source, positions};
+use crate::arrays::{Elements, Source, Taken, positions};
 use crate::cache::Geometry;
 use crate::capture::{Attributes, Shading, Values};
+use crate::config::Mode;
 use crate::context::Context;
 use crate::decide::{self, Verdict};
 use crate::effects::{Place, Visibility, vector};
@@ -159,6 +160,16 @@ impl Template {
     }
 }
 
+/// What colours a program's surface.
+pub(crate) enum ProgramSkin<'a> {
+    /// Uniforms.
+    Constant,
+    /// The vertices' colours, times this.
+    PerVertex(f32),
+    /// A colour map, times this.
+    Map(&'a Image, f32),
+}
+
 /// A program whose picture we can make, with its uniforms at one draw.
 #[derive(Debug, Clone)]
 pub(crate) struct Recognised {
@@ -250,18 +261,9 @@ impl Recognised {
             }
     }
 
-    /// The fragment's colour, as the shader computes it.
-    pub(crate) fn color(
-        &self,
-        a: &Attributes,
-        mesh: &TriMesh,
-        prim: usize,
-        w: [f32; 3],
-        front: bool,
-        reaches: &Visibility,
-    ) -> [f32; 4] {
-        let corners = mesh.indices[prim].map(|i| i as usize);
-        let (surface, alpha) = match self.template.colors {
+    /// Colour and alpha of vertices or the colour map; `None` for the uniforms' colours.
+    fn own_color(&self, a: &Attributes, corners: [usize; 3], w: [f32; 3]) -> (Option<[f32; 3]>, f32) {
+        match self.template.colors {
             _ if self.overrides => (None, 1.0),
             Colors::Uniform => (None, 1.0),
             Colors::PerVertex => {
@@ -273,7 +275,81 @@ impl Recognised {
                 let [r, g, b, alpha] = self.map.as_ref().map_or([1.0; 4], |m| m.sample(s, t));
                 (Some([r, g, b]), alpha)
             }
+        }
+    }
+
+    /// Diffuse colour with its coefficient, and opacity.
+    pub(crate) fn base(&self, a: &Attributes, mesh: &TriMesh, prim: usize, w: [f32; 3]) -> ([f32; 3], f32) {
+        let (own, alpha) = self.own_color(a, mesh.indices[prim].map(|i| i as usize), w);
+        let unlit = if self.template.lit { 0.0 } else { self.ambient_intensity };
+        let color: [f32; 3] = match own {
+            Some(c) => c.map(|v| v * (self.diffuse_intensity + unlit)),
+            None => {
+                std::array::from_fn(|k| self.diffuse[k] * self.diffuse_intensity + self.ambient[k] * unlit)
+            }
         };
+        (color, alpha * self.opacity)
+    }
+
+    /// Where colours come from, with the factor on them.
+    pub(crate) fn skin(&self) -> ProgramSkin<'_> {
+        let unlit = if self.template.lit { 0.0 } else { self.ambient_intensity };
+        let factor = self.diffuse_intensity + unlit;
+        match (self.template.colors, &self.map) {
+            (Colors::PerVertex, _) if !self.overrides => ProgramSkin::PerVertex(factor),
+            (Colors::Map, Some(map)) if !self.overrides => ProgramSkin::Map(map, factor),
+            _ => ProgramSkin::Constant,
+        }
+    }
+
+    /// True when the surface answers lights.
+    pub(crate) fn is_lit(&self) -> bool {
+        self.template.lit
+    }
+
+    /// True when a single light at the eye is all there is (VTK then makes highlights by N·L).
+    pub(crate) fn has_headlight(&self) -> bool {
+        self.template.headlight
+    }
+
+    /// The part of the light that no light has to send.
+    pub(crate) fn ambient_light(&self) -> [f32; 3] {
+        self.ambient.map(|v| v * self.ambient_intensity)
+    }
+
+    /// Eye space from the normals of vertices; `None` where triangles have none but their own.
+    pub(crate) fn eye_from_normal(&self) -> Option<&[f32; 9]> {
+        (!self.template.flat).then_some(&self.normal_matrix)
+    }
+
+    /// Shading normal in eye space.
+    pub(crate) fn smooth_normal(&self, a: &Attributes, mesh: &TriMesh, prim: usize, w: [f32; 3]) -> [f32; 3] {
+        let corners = mesh.indices[prim].map(|i| i as usize);
+        match self.eye_from_normal() {
+            Some(m) => {
+                let each = corners.map(|i| {
+                    let n = a.normals.at(i);
+                    std::array::from_fn(|r| m[r] * n[0] + m[3 + r] * n[1] + m[6 + r] * n[2])
+                });
+                normalized(mixed(each, w))
+            }
+            // The triangle's own decides.
+            None => [0.0; 3],
+        }
+    }
+
+    /// The fragment's colour, as the shader computes it.
+    pub(crate) fn color(
+        &self,
+        a: &Attributes,
+        mesh: &TriMesh,
+        prim: usize,
+        w: [f32; 3],
+        front: bool,
+        reaches: &Visibility,
+    ) -> [f32; 4] {
+        let corners = mesh.indices[prim].map(|i| i as usize);
+        let (surface, alpha) = self.own_color(a, corners, w);
         let ambient = surface.unwrap_or(self.ambient).map(|v| v * self.ambient_intensity);
         let diffuse = surface.unwrap_or(self.diffuse).map(|v| v * self.diffuse_intensity);
         let alpha = alpha * self.opacity;
@@ -369,7 +445,7 @@ impl Programs {
 }
 
 /// A generic attribute's array by name; `None` when the program has no such attribute or its array is off.
-fn attribute(program: u32, name: &str) -> Option<Source> {
+pub(crate) fn attribute(program: u32, name: &str) -> Option<Source> {
     let at = u32::try_from(gl::attrib_location(program, name)).ok()?;
     let get = |what| gl::vertex_attrib_i::<1>(at, what)[0];
     (get(VERTEX_ATTRIB_ARRAY_ENABLED) != 0).then(|| Source {
@@ -399,6 +475,10 @@ impl Context {
         self.drop_errors();
         let template =
             if other { Err("a geometry or tessellation shader") } else { Template::read(&vertex, &fragment) };
+        if template.is_err() && !other {
+            self.prepare_probe(program);
+            self.drop_errors();
+        }
         self.programs.templates.insert(program, template);
         true
     }
@@ -409,10 +489,14 @@ impl Context {
         mode: u32,
         call: DrawCall,
         elements: impl FnOnce() -> Result<Elements, &'static str>,
-    ) -> Result<(), &'static str> {
+    ) -> Result<Taken, &'static str> {
         let program = self.state.program;
         let template =
-            self.programs.templates.get(&program).copied().unwrap_or(Err("a program linked before us"))?;
+            self.programs.templates.get(&program).copied().unwrap_or(Err("a program linked before us"));
+        if template.is_err() && self.config.settings.mode == Mode::Enhance && self.config.settings.enabled {
+            return self.take_shape(mode, call, elements).map(|()| Taken::Shape);
+        }
+        let template = template?;
         let position = attribute(program, "vertexMC").ok_or("a program without positions")?;
         let sources = [
             Some(position),
@@ -463,7 +547,7 @@ impl Context {
         }
         self.end_batch();
         self.add_array_draw(geometry, attributes, Shading::Program(Arc::new(recognised)), in_order);
-        Ok(())
+        Ok(Taken::Traced)
     }
 
     fn color_map(&mut self, program: u32) -> Result<Arc<Image>, &'static str> {

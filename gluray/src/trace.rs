@@ -4,17 +4,19 @@
 //! (homogeneous edge functions after Olano and Greer 1997), so they agree with what the driver makes of neighbouring lines and text.
 
 mod fragments;
+mod in_order;
 mod rays;
 
 use crate::capture::{Draw, Shading};
 use crate::config::{Mode, Settings};
-use crate::effects::{Place, Surroundings, Visibility};
+use crate::effects::{Place, Surroundings};
 use crate::enums::*;
 use crate::lighting::{Lit, Setup, transform};
 use crate::raster::{covers, steepness};
 use crate::texturing::Image;
 use fearless_simd::{Level, dispatch};
 use fragments::{FragmentBlock, Lane};
+pub(crate) use in_order::in_order;
 use rayon::prelude::*;
 use rays::{Bundle, TileRays, slot};
 use rt_core::accel::World;
@@ -192,6 +194,11 @@ impl<'a> Prepared<'a> {
         Some(out)
     }
 
+    /// The user's clip planes, in object space.
+    pub(crate) fn clip_planes(&self) -> &[[f64; 4]] {
+        &self.clip_planes
+    }
+
     /// The ray through a point of the window, with the part of it that is not clipped; `None` when all of it is.
     fn ray(&self, x: f64, y: f64) -> Option<(Ray, f64)> {
         let [vx, vy, vw, vh] = self.draw.state.viewport.map(f64::from);
@@ -274,9 +281,19 @@ impl<'a> Prepared<'a> {
                 p[0] * v.x + p[1] * v.y + p[2] * v.z + p[3]
             };
             let terms = [0, 1, 2].map(|i| weights[i] * corner(i));
-            // Centres in the plane are kept: whatever triangle they lie on, the answer is the same.
-            if terms.iter().sum::<f64>() < -1e-6 * terms.iter().map(|v| v.abs()).sum::<f64>() {
+            let (height, slack) =
+                (terms.iter().sum::<f64>(), 1e-6 * terms.iter().map(|v| v.abs()).sum::<f64>());
+            if height < -slack {
                 return None;
+            }
+            if height <= slack {
+                // The driver cuts the triangle along the plane: a centre on the cut belongs to what is above or to the right of it.
+                let across = [h[1].cross(h[2]), h[2].cross(h[0]), h[0].cross(h[1])];
+                let slope = (0..3).map(|i| across[i] * corner(i)).sum::<DVec3>() * sum.signum();
+                let upright = slope.x.abs() > 1e-9 * slope.y.abs();
+                if (if upright { slope.x } else { slope.y }) < 0.0 {
+                    return None;
+                }
             }
         }
         let z = (0..3).map(|i| l[i] * f64::from(c[i][2])).sum::<f64>();
@@ -580,57 +597,4 @@ fn fill(
         out.fill(p, &hits[b], tile.x + x, tile.y + y);
         out.moved_back(range, &mut moved[b * LANES..(b + 1) * LANES]);
     }
-}
-
-/// Every fragment of one draw, as layers: the n-th layer has the n-th fragment of each pixel in the order of the triangles.
-pub(crate) fn in_order(p: &Prepared<'_>) -> Vec<Layer> {
-    let rect = p.rect;
-    let (w, h) = (rect.w.max(0) as usize, rect.h.max(0) as usize);
-    let fragments: Vec<Vec<(u32, [u8; 4], f32)>> = (0..w * h)
-        .into_par_iter()
-        .map(|k| {
-            let (x, y) = (rect.x + (k % w) as i32, rect.y + (k / w) as i32);
-            let mut found: Vec<(u32, [u8; 4], f32)> = Vec::new();
-            let mut keep = |prim: usize| {
-                if found.iter().all(|(o, ..)| *o != prim as u32)
-                    && let Some(f) = p.fragment(prim, x, y)
-                {
-                    found.push((
-                        prim as u32,
-                        to_bytes(p.color(prim, &f, false, &Visibility::FULL)),
-                        f.depth as f32,
-                    ));
-                }
-            };
-            const OFF: f64 = 1.0 / 200.0;
-            // The centre, and beside it for edges that go through it.
-            for (dx, dy) in [(0.0, 0.0), (-OFF, -OFF), (OFF, OFF), (OFF, -OFF), (-OFF, OFF)] {
-                let Some((mut ray, _)) = p.ray(f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy) else {
-                    continue;
-                };
-                for _ in 0..MOST_STEPS {
-                    p.rays.fetch_add(1, Relaxed);
-                    let Some(hit) = p.world.closest(&ray) else { break };
-                    keep(hit.prim as usize);
-                    ray.t_min = hit.t.next_up();
-                }
-            }
-            found.sort_unstable_by_key(|f| f.0);
-            found
-        })
-        .collect();
-    let layers = fragments.iter().map(Vec::len).max().unwrap_or(0);
-    (0..layers)
-        .map(|n| {
-            let mut layer =
-                Layer { rect, color: vec![[0; 4]; w * h], depth: vec![UNCOVERED; w * h], covered: 0 };
-            for (k, f) in fragments.iter().enumerate() {
-                if let Some((_, c, d)) = f.get(n) {
-                    (layer.color[k], layer.depth[k]) = (*c, *d);
-                    layer.covered += 1;
-                }
-            }
-            layer
-        })
-        .collect()
 }

@@ -170,6 +170,15 @@ fn vtk_in_python_draws_the_drivers_picture() {
 }
 
 #[test]
+fn vtk_by_egl_draws_the_drivers_picture() {
+    let (Some(python), Some(_)) = (program("RTSV_PYTHON"), program("RTSV_XVFB")) else { return };
+    let file = script("egl_scene.py");
+    if let Some((m, _)) = both(&python, &[file.as_str()], "out.png", |_| ()) {
+        m.assert_filled("VTK by EGL");
+    }
+}
+
+#[test]
 fn passing_everything_changes_no_pixel() {
     let Some(gmsh) = program("RTSV_GMSH") else { return };
     let Some(x) = Xvfb::start() else { return };
