@@ -70,11 +70,11 @@ impl Program {
         };
         let size = size_px.to_string();
         Ok(match self {
-            Program::Gmsh => vec![script("gmsh.py", include_str!("scripts/gmsh.py"))?, data, size],
+            Program::Gmsh => vec![script("gmsh_frames.py", include_str!("scripts/gmsh_frames.py"))?, data, size],
             Program::ParaView => {
-                vec![script("paraview.py", include_str!("scripts/paraview.py"))?, data, size]
+                vec![script("paraview_frames.py", include_str!("scripts/paraview_frames.py"))?, data, size]
             }
-            Program::Vtk => vec![script("vtk.py", include_str!("scripts/vtk.py"))?, data, size],
+            Program::Vtk => vec![script("vtk_frames.py", include_str!("scripts/vtk_frames.py"))?, data, size],
             Program::Geomview => ["-nopanels", "-c", "-"].map(String::from).to_vec(),
         })
     }
