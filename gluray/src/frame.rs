@@ -27,6 +27,8 @@ pub(crate) struct Frame {
     others: bool,
     /// Something was traced since the last frame ended.
     traced: bool,
+    /// Where: framebuffer and viewport.
+    places: Vec<(u32, [i32; 4])>,
     /// What the control panel and reports are told of it.
     told: crate::control::Told,
 }
@@ -152,6 +154,12 @@ impl Context {
             return;
         }
         self.frame.traced = true;
+        for (d, _) in &pending {
+            let place = (d.state.framebuffer, d.state.viewport);
+            if !self.frame.places.contains(&place) {
+                self.frame.places.push(place);
+            }
+        }
         self.counters.flushed(before);
         self.frame.told.traced(self.counters.report.frames + 1, pending.iter().map(|(d, _)| d));
         // What the driver drew after a traced surface wins ties with it, as LEQUAL says; what it drew before loses them.
@@ -210,6 +218,7 @@ impl Context {
     pub(crate) fn frame_done(&mut self) {
         self.counters.report.frames += 1;
         self.frame.traced = false;
+        self.frame.places.clear();
         self.frame.late.frame_done();
         (self.counters.report.cache_hits, self.counters.report.cache_misses) =
             (self.cache.hits, self.cache.misses);
@@ -253,6 +262,19 @@ impl Context {
         }
     }
 
+    /// What was traced is cleared: a frame is over that nobody swapped or read, as in programs that draw into framebuffer objects alone.
+    fn begin_again(&mut self) {
+        self.refresh();
+        let [x, y, w, h] = self.state.scissor.unwrap_or(self.state.viewport);
+        let target = self.state.framebuffer;
+        let meets = |&(f, [a, b, c, d]): &(u32, [i32; 4])| {
+            f == target && a < x + w && x < a + c && b < y + h && y < b + d
+        };
+        if self.frame.pending.is_empty() && target != 0 && self.frame.places.iter().any(meets) {
+            self.frame_done();
+        }
+    }
+
     /// `glClear`. A clear of everything makes what is pending invisible; a clear of a part comes after it.
     pub(crate) fn clear(&mut self, mask: u32) -> bool {
         if self.recording.is_some() {
@@ -266,8 +288,11 @@ impl Context {
             return false;
         }
         self.end_batch();
+        const COLOR_AND_DEPTH: u32 = 0x4100;
+        if self.frame.traced && mask & COLOR_AND_DEPTH == COLOR_AND_DEPTH {
+            self.begin_again();
+        }
         if !self.frame.pending.is_empty() || !self.probes.draws.is_empty() {
-            const COLOR_AND_DEPTH: u32 = 0x4100;
             self.refresh();
             let whole = mask & COLOR_AND_DEPTH == COLOR_AND_DEPTH
                 && self.state.scissor.is_none()

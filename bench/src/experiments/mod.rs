@@ -21,6 +21,7 @@ mod lineup;
 mod many_ranks;
 mod paraview;
 mod partition_view;
+mod passing;
 mod peers;
 mod peers_schlieren;
 mod pictures;
@@ -110,6 +111,12 @@ pub const ALL: &[Experiment] = &[
         chapter: 4,
         title: "Frames a second of unmodified OpenGL programs: llvmpipe against gluray",
         run: table4_1::run,
+    },
+    Experiment {
+        id: "passing",
+        chapter: 4,
+        title: "Nanoseconds per OpenGL call that gluray passes to the driver",
+        run: passing::run,
     },
     Experiment {
         id: "fig4.7",

@@ -7,5 +7,5 @@ mod session;
 
 pub use data::{Format, write};
 pub use display::Display;
-pub use programs::Program;
+pub use programs::{Program, find};
 pub use session::{Cost, Session, Tools, Way};

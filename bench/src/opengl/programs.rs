@@ -70,11 +70,11 @@ impl Program {
         };
         let size = size_px.to_string();
         Ok(match self {
-            Program::Gmsh => vec![script("gmsh.py", include_str!("scripts/gmsh.py"))?, data, size],
+            Program::Gmsh => vec![script("gmsh_frames.py", include_str!("scripts/gmsh_frames.py"))?, data, size],
             Program::ParaView => {
-                vec![script("paraview.py", include_str!("scripts/paraview.py"))?, data, size]
+                vec![script("paraview_frames.py", include_str!("scripts/paraview_frames.py"))?, data, size]
             }
-            Program::Vtk => vec![script("vtk.py", include_str!("scripts/vtk.py"))?, data, size],
+            Program::Vtk => vec![script("vtk_frames.py", include_str!("scripts/vtk_frames.py"))?, data, size],
             Program::Geomview => ["-nopanels", "-c", "-"].map(String::from).to_vec(),
         })
     }
@@ -103,7 +103,7 @@ impl Program {
 }
 
 /// The path that a variable names, or a well-known one, if there is a file.
-pub(super) fn find(variable: &str, place: &str) -> Option<PathBuf> {
+pub fn find(variable: &str, place: &str) -> Option<PathBuf> {
     let named = std::env::var_os(variable).map(PathBuf::from);
     named.or_else(|| Some(PathBuf::from(place))).filter(|p| p.is_file())
 }

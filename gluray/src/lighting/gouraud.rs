@@ -35,6 +35,28 @@ struct Surface {
     shininess: F,
 }
 
+/// Which side each lane sees.
+struct Pick<'a> {
+    back: &'a [bool; LANES],
+    /// Backs have a material of their own.
+    two: bool,
+}
+
+impl Pick<'_> {
+    /// A property of front and back, or the colour where that stands for it.
+    #[inline(always)]
+    fn of(&self, values: [f32; 2], tracked: [bool; 2], color: &F) -> F {
+        let mut out = if tracked[0] { *color } else { [values[0]; LANES] };
+        if self.two {
+            let behind = if tracked[1] { *color } else { [values[1]; LANES] };
+            for l in 0..LANES {
+                out[l] = if self.back[l] { behind[l] } else { out[l] };
+            }
+        }
+        out
+    }
+}
+
 #[inline(always)]
 fn dot(a: &[F; 3], b: &[F; 3]) -> F {
     let mut out = ZERO;
@@ -240,34 +262,38 @@ impl Setup<'_> {
 
     /// The material of the side that is seen, with what `glColorMaterial` takes from the colour.
     #[inline(always)]
-    fn surface(&self, materials: &[Material; 2], color: &[F; 4], back: &[bool; LANES], two: bool) -> Surface {
-        let tracked = |side: usize, what: &[u32]| {
-            self.state.color_material.is_some_and(|(f, w)| sides(f).contains(&side) && what.contains(&w))
+    fn surface(
+        &self,
+        [front, behind]: &[Material; 2],
+        color: &[F; 4],
+        back: &[bool; LANES],
+        two: bool,
+    ) -> Surface {
+        let (faces, what) = self.state.color_material.map_or((&[][..], 0), |(face, w)| (sides(face), w));
+        let faces = [faces.contains(&0), faces.contains(&1)];
+        let ambient = what == AMBIENT || what == AMBIENT_AND_DIFFUSE;
+        let diffuse = what == DIFFUSE || what == AMBIENT_AND_DIFFUSE;
+        let pick = Pick { back, two };
+        let mut out = Surface {
+            ambient: [ZERO; 3],
+            diffuse: [ZERO; 3],
+            specular: [ZERO; 3],
+            emission: [ZERO; 3],
+            alpha: ZERO,
+            shininess: pick.of([front.shininess, behind.shininess], [false; 2], &ZERO),
         };
-        // Whether the colour stands for a property on either side, then the property itself.
-        let property = |what: &[u32], of: &dyn Fn(&Material) -> [f32; 4], k: usize| -> F {
-            let value = |side: usize| -> F {
-                if tracked(side, what) { color[k] } else { [of(&materials[side])[k]; LANES] }
-            };
-            let mut out = value(0);
-            if two {
-                let behind = value(1);
-                (0..LANES).for_each(|l| out[l] = if back[l] { behind[l] } else { out[l] });
-            }
-            out
-        };
-        let three = |what: &[u32], of: &dyn Fn(&Material) -> [f32; 4]| {
-            [property(what, of, 0), property(what, of, 1), property(what, of, 2)]
-        };
-        let both: &[u32] = &[DIFFUSE, AMBIENT_AND_DIFFUSE];
-        Surface {
-            ambient: three(&[AMBIENT, AMBIENT_AND_DIFFUSE], &|m| m.ambient),
-            diffuse: three(both, &|m| m.diffuse),
-            specular: three(&[SPECULAR], &|m| m.specular),
-            emission: three(&[EMISSION], &|m| m.emission),
-            alpha: property(both, &|m| m.diffuse, 3),
-            shininess: property(&[], &|m| [m.shininess; 4], 0),
+        for k in 0..3 {
+            let by = |tracked: bool| faces.map(|f| f && tracked);
+            out.ambient[k] = pick.of([front.ambient[k], behind.ambient[k]], by(ambient), &color[k]);
+            out.diffuse[k] = pick.of([front.diffuse[k], behind.diffuse[k]], by(diffuse), &color[k]);
+            out.specular[k] =
+                pick.of([front.specular[k], behind.specular[k]], by(what == SPECULAR), &color[k]);
+            out.emission[k] =
+                pick.of([front.emission[k], behind.emission[k]], by(what == EMISSION), &color[k]);
         }
+        let tracked = faces.map(|f| f && diffuse);
+        out.alpha = pick.of([front.diffuse[3], behind.diffuse[3]], tracked, &color[3]);
+        out
     }
 
     /// Primary and secondary colours.

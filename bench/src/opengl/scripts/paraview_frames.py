@@ -1,5 +1,5 @@
 """Frames of ParaView, one for each line that comes; for pvbatch."""
-import sys
+import os, sys
 from paraview.simple import *
 
 file, size = sys.argv[1], int(sys.argv[2])
@@ -13,8 +13,9 @@ camera.Azimuth(30)
 camera.Elevation(20)
 Render(view)
 print("ready", flush=True)
-# Not `for line in sys.stdin`: pvbatch may read ahead.
-while sys.stdin.readline():
+# ParaView's own `sys.stdin` takes the ends off lines, so an empty one looks like the end.
+commands = os.fdopen(os.dup(0))
+while commands.readline():
     camera.Azimuth(5)
     Render(view)
     print("frame", flush=True)
