@@ -193,13 +193,17 @@ impl<P: Composite> Compositor<P> {
             }
             (strategy, _) => strategy,
         };
-        let plan = strategy.plan(&session.drawn, slice_px);
+        let plan = strategy.plan::<P>(&session.drawn, slice_px, places.root);
         let pieces = plan.pieces(&session.drawn);
         let spare = self.spare.take();
         let mut collector =
             Collector::new(&mut session, size_px, places.root, options.depth, &pieces, spare)?;
+        let span = session.begin_span();
         plan.run(&mut session, &frame.view(drawn), &mut collector, &mut self.scratch)?;
+        session.end_span(span, |report| &mut report.exchange_secs);
+        let span = session.begin_span();
         let (image, piece) = collector.finish(&mut session)?;
+        session.end_span(span, |report| &mut report.collect_secs);
         if options.confirm {
             session.barrier()?;
         }
@@ -217,9 +221,9 @@ pub(crate) fn give_up(comm: &mut dyn Communicator, error: &CompositeError) {
     }
 }
 
-/// A megabyte of RGBA8 with depth: long enough to be worth a message (half as much costs a tenth more processor time at eight ranks), short
-/// enough for a second-level cache, and several slices a tile at few ranks.
-pub(crate) const SLICE_PX: usize = 1 << 17;
+/// A quarter of a megabyte of RGBA8 with depth: short enough that a slice is joined and on its way to the collecting rank while the next comes,
+/// long enough to be worth a message.
+pub(crate) const SLICE_PX: usize = 1 << 15;
 
 /// Ranks in the order of compositing.
 pub(crate) struct Places {

@@ -72,7 +72,8 @@ impl<P: Composite> Compositor<P> {
                 let drawn = if bounds.is_empty() { Rect::EMPTY } else { bounds };
                 let begun = (|| {
                     session.meet(drawn, [f32::NAN; 2])?;
-                    let plan = Plan::new(&session.drawn, options.slice_px.unwrap_or(SLICE_PX));
+                    let plan =
+                        Plan::new::<P>(&session.drawn, options.slice_px.unwrap_or(SLICE_PX), places.root);
                     let pieces = plan.pieces(&session.drawn);
                     let collector =
                         Collector::new(&mut session, size_px, places.root, options.depth, &pieces, spare)?;
@@ -259,9 +260,13 @@ impl<P: Composite> Running<'_, P> {
     }
 
     fn finish(mut self) -> Result<Composited<P>, CompositeError> {
+        let span = self.session.begin_span();
         let waited = self.exchange.finish(&mut self.session, &mut self.collector, self.scratch);
         let (mut session, collector) = (self.session, self.collector);
+        session.end_span(span, |report| &mut report.exchange_secs);
+        let span = session.begin_span();
         let finished = waited.and_then(|()| collector.finish(&mut session));
+        session.end_span(span, |report| &mut report.collect_secs);
         let finished = finished.and_then(|images| {
             if self.confirm {
                 session.barrier()?;

@@ -31,6 +31,17 @@ pub enum Highlight {
     TowardsLight,
 }
 
+/// Formula of [`SurfaceModel::Pbr`] for lights.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum PbrForm {
+    /// glTF 2.0, appendix B: the matte layer gets what the coat lets through at the viewing angle.
+    #[default]
+    Gltf,
+    /// VTK 9's shader: the matte layer gets 1 - F at the half vector, F with the metal's colour in it; shadowing and masking take α =
+    /// roughness where the distribution takes α = roughness²; reflectance at grazing angles is min(1, 49.5·F₀).
+    Vtk,
+}
+
 /// How a surface answers light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SurfaceModel {
@@ -73,6 +84,8 @@ pub enum SurfaceModel {
         roughness: f32,
         /// Reflectance at normal incidence of the dielectric part; 0.04 for common plastics, 0 for none (sends no rays).
         specular: f32,
+        /// Formula for lights; rays to other surfaces follow glTF's.
+        form: PbrForm,
     },
 }
 
@@ -159,7 +172,7 @@ impl Material {
 
     /// Metallic-roughness.
     pub fn pbr(color: [f32; 3], metallic: f32, roughness: f32) -> Material {
-        Material::new(SurfaceModel::Pbr { metallic, roughness, specular: 0.04 }, color)
+        Material::new(SurfaceModel::Pbr { metallic, roughness, specular: 0.04, form: PbrForm::Gltf }, color)
     }
 
     /// The same material with another opacity.
@@ -202,7 +215,7 @@ impl Material {
         match self.model {
             SurfaceModel::Phong { mirror, .. } if mirror > 0.0 => Some(0.0),
             SurfaceModel::Metal { roughness } => Some(roughness),
-            SurfaceModel::Pbr { metallic, roughness, specular } if metallic > 0.0 || specular > 0.0 => {
+            SurfaceModel::Pbr { metallic, roughness, specular, .. } if metallic > 0.0 || specular > 0.0 => {
                 Some(roughness)
             }
             _ => None,
@@ -242,7 +255,7 @@ impl Material {
                     Err(("ior", ior.to_string(), "finite and positive"))
                 }
             }
-            SurfaceModel::Pbr { metallic, roughness, specular } => {
+            SurfaceModel::Pbr { metallic, roughness, specular, .. } => {
                 unit("metallic", metallic)?;
                 unit("roughness", roughness)?;
                 unit("specular", specular)

@@ -5,7 +5,7 @@ use rt_core::effects::Effects;
 use rt_core::environment::{Background, Environment};
 use rt_core::glam::{DVec3, Vec3};
 use rt_core::light::Light;
-use rt_core::material::{Material, Sides, SurfaceModel};
+use rt_core::material::{Material, PbrForm, Sides, SurfaceModel};
 use rt_core::mesh::Attribute;
 use rt_core::render::RenderOptions;
 use rt_core::scene::{AmbientOcclusion, SceneBuilder};
@@ -249,7 +249,7 @@ fn no_reflection_rays_at_specular_zero() {
     let c = camera(DVec3::new(4.0, 0.0, 1.0), 0.6);
     let body = || sphere(Vec3::ZERO, 1.0, 12);
     let dull = Material {
-        model: SurfaceModel::Pbr { metallic: 0.0, roughness: 0.5, specular: 0.0 },
+        model: SurfaceModel::Pbr { metallic: 0.0, roughness: 0.5, specular: 0.0, form: PbrForm::Gltf },
         ..Material::matte([0.5; 3])
     };
     for (m, reflects) in

@@ -8,8 +8,8 @@ use rt_core::grid::Grid;
 use rt_core::ray::Ray;
 use rt_core::transfer_function::TransferFunction;
 use rt_core::volume::{
-    Volume, VolumeError, VolumeOptions, VolumeQuality, VolumeSample, VolumeShading, integrate_overlapping,
-    integrate_reference,
+    Interpolation, Volume, VolumeError, VolumeOptions, VolumeQuality, VolumeSample, VolumeShading,
+    integrate_overlapping, integrate_reference,
 };
 use shapes_common::Random;
 
@@ -314,8 +314,14 @@ fn two_copies_of_a_varied_medium_equal_one_of_twice_the_extinction() {
 fn shading_follows_the_gradient() {
     let tf = || TransferFunction::new(single([1.0; 3]), vec![[0.0, 0.2]]).unwrap();
     let make = |light, g: Grid| {
-        let shading = Some(VolumeShading { ambient: 0.25, diffuse: 0.75, light, half_gradient: 1e-6 });
-        Volume::new(g.into(), tf(), VolumeOptions { shading }).unwrap()
+        let shading = Some(VolumeShading {
+            ambient: 0.25,
+            diffuse: 0.75,
+            light,
+            half_gradient: 1e-6,
+            ..VolumeShading::default()
+        });
+        Volume::new(g.into(), tf(), VolumeOptions { shading, ..VolumeOptions::default() }).unwrap()
     };
     let q = tolerance(0.1);
     let brightness = |v: &Volume, ray: &Ray| {
@@ -338,6 +344,55 @@ fn shading_follows_the_gradient() {
 }
 
 #[test]
+fn a_highlight_is_added_and_flat_places_keep_only_ambient_light_when_shading_never_fades() {
+    let make = |g: Grid| {
+        let shading = VolumeShading {
+            ambient: 0.1,
+            diffuse: 0.6,
+            specular: 0.2,
+            shininess: 10.0,
+            ..Default::default()
+        };
+        let options = VolumeOptions { shading: Some(shading), ..VolumeOptions::default() };
+        let tf = TransferFunction::new(single([0.5; 3]), vec![[0.0, 0.2]]).unwrap();
+        Volume::new(g.into(), tf, options).unwrap()
+    };
+    let brightness = |v: &Volume, dir: Vec3| {
+        let s = v.integrate(&Ray::new(Vec3::splat(4.0) - 10.0 * dir, dir), 0.0, INF, &tolerance(0.1));
+        s.rgba[0] / s.rgba[3]
+    };
+    let ramp = make(grid(9, 1.0, |p| p.x));
+    assert!((brightness(&ramp, Vec3::X) - (0.5 * 0.7 + 0.2)).abs() < 1e-4);
+    // 60°: cos = ½, and ½^10 of the highlight.
+    let slanted = Vec3::new(0.5, 0.75f32.sqrt(), 0.0);
+    assert!((brightness(&ramp, slanted) - (0.5 * (0.1 + 0.6 * 0.5) + 0.2 / 1024.0)).abs() < 1e-4);
+    assert!((brightness(&make(grid(9, 1.0, |_| 0.5)), Vec3::X) - 0.05).abs() < 1e-5);
+}
+
+#[test]
+fn nearest_values_are_boxes_around_points_cut_at_the_bounds() {
+    let tf = TransferFunction::new(single([1.0; 3]), vec![[0.0, 0.0], [1.0, 1.0]]).unwrap();
+    let options = VolumeOptions { interpolation: Interpolation::Nearest, ..VolumeOptions::default() };
+    // Values 0, 1, 0.25 along x: half a box, a box, half a box.
+    let g = Grid::new(
+        UVec3::new(3, 3, 3),
+        DVec3::ZERO,
+        DVec3::splat(2.0),
+        (0..27).map(|i| [0.0, 1.0, 0.25][i % 3]).collect(),
+    );
+    let v = Volume::new(g.unwrap().into(), tf, options).unwrap();
+    let along =
+        |y: f32| v.integrate(&Ray::new(Vec3::new(-1.0, y, 1.5), Vec3::X), 0.0, INF, &tolerance(0.1)).rgba[3];
+    for y in [0.0, 0.9, 2.3, 4.0] {
+        assert!((along(y) - (1.0 - (-(2.0f32 + 0.25)).exp())).abs() < 1e-5, "{y}: {}", along(y));
+    }
+    assert_eq!(along(4.1), 0.0, "beyond the bounds");
+    let across =
+        v.integrate(&Ray::new(Vec3::new(3.5, -9.0, 1.0), Vec3::Y), 0.0, INF, &tolerance(0.1)).rgba[3];
+    assert!((across - (1.0 - (-1.0f32).exp())).abs() < 1e-5, "{across}");
+}
+
+#[test]
 fn useless_input_is_refused_with_the_cure() {
     let tf = TransferFunction::new(single([1.0; 3]), vec![[0.0, 1.0]]).unwrap();
     let flat = Grid::new(UVec3::new(4, 1, 4), DVec3::ZERO, DVec3::ONE, vec![0.0; 16]).unwrap();
@@ -345,8 +400,10 @@ fn useless_input_is_refused_with_the_cure() {
         Volume::new(flat.into(), tf.clone(), VolumeOptions::default()),
         Err(VolumeError::NoCells { .. })
     ));
-    let shading = Some(VolumeShading { ambient: 2.0, diffuse: 0.5, light: None, half_gradient: 1.0 });
-    let e = Volume::new(grid(3, 1.0, |_| 0.0).into(), tf, VolumeOptions { shading }).unwrap_err();
+    let shading = Some(VolumeShading { ambient: 2.0, diffuse: 0.5, ..VolumeShading::default() });
+    let e =
+        Volume::new(grid(3, 1.0, |_| 0.0).into(), tf, VolumeOptions { shading, ..VolumeOptions::default() })
+            .unwrap_err();
     assert!(e.to_string().contains("ambient is 2"));
 }
 

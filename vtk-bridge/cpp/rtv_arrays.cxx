@@ -148,7 +148,7 @@ void rtvAddShape(RtvSurface& s, vtkPolyData* data, bool points, RtvKeep& keep)
   vtkDataArray* texcoords = data->GetPointData()->GetTCoords();
   s.texcoords = FloatArray(texcoords, 2, keep);
   key = Mixed(Mixed(Mixed(key, s.property.flat ? nullptr : ofPoints), ofCells), texcoords);
-  key = rtvMix(rtvMix(rtvMix(key, s.point_radius), s.line_radius), s.edges_only);
+  key = rtvMix(rtvMix(rtvMix(rtvMix(key, s.point_radius), s.line_radius), s.edges_only), s.has_back);
   s.shape_key = key;
 }
 
@@ -252,10 +252,6 @@ const char* rtvTextureReason(vtkTexture* texture)
   {
     return "a texture with a transform";
   }
-  if (texture->GetUseSRGBColorSpace())
-  {
-    return "a texture in sRGB";
-  }
   if (texture->GetCubeMap())
   {
     return "a cube map";
@@ -298,6 +294,7 @@ void rtvAddTexture(RtvSurface& s, vtkTexture* texture, RtvKeep& keep)
   }
   s.texture = RtvArray{ out, static_cast<uint64_t>(size[0]) * size[1], 4, RTV_U8 };
   s.texture_width = static_cast<uint32_t>(size[0]);
+  s.texture_srgb = texture->GetUseSRGBColorSpace() ? 1 : 0;
   s.texture_interpolate = texture->GetInterpolate() ? 1 : 0;
   s.texture_repeat = texture->GetRepeat() ? 1 : 0;
 }

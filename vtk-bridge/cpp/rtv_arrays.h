@@ -14,6 +14,7 @@ class vtkDataObject;
 class vtkGlyph3DMapper;
 class vtkPolyData;
 class vtkTexture;
+class vtkVolume;
 
 // Copies that must live until the bridge has read them: arrays of types it does not read itself.
 class RtvKeep
@@ -52,6 +53,9 @@ void rtvAddColors(RtvBridge* bridge, RtvSurface& s, vtkMapper* mapper, vtkPolyDa
 void rtvAddTexture(RtvSurface& s, vtkTexture* texture, RtvKeep& keep);
 // Why a texture cannot be traced, or null.
 const char* rtvTextureReason(vtkTexture* texture);
+// A volume. Returns why not, or null; `answer` keeps the text.
+const char* rtvAddVolume(
+  RtvBridge* bridge, vtkVolume* volume, vtkRenderer* renderer, const std::string& name, std::string& answer);
 // Copies of the sources of a glyph mapper. Returns why not, or null.
 const char* rtvAddGlyphs(RtvBridge* bridge, vtkActor* actor, vtkGlyph3DMapper* mapper, vtkDataObject* data,
   const RtvProperty& property, const std::string& name);

@@ -1,7 +1,9 @@
 // Props to surfaces: which are traced, and why the others are not.
 #include "rtv_arrays.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <string>
 #include <vtkActor.h>
 #include <vtkAssembly.h>
@@ -24,6 +26,7 @@
 #include <vtkProperty.h>
 #include <vtkShaderProperty.h>
 #include <vtkTexture.h>
+#include <vtkVolume.h>
 
 namespace
 {
@@ -78,6 +81,9 @@ RtvProperty PropertyOf(vtkProperty* p)
   out.pbr = p->GetInterpolation() == VTK_PBR;
   out.cull_front = p->GetFrontfaceCulling() ? 1 : 0;
   out.cull_back = p->GetBackfaceCulling() ? 1 : 0;
+  CopyColor(p->GetEdgeColor(), out.edge_color);
+  // OpenGL's are never thinner than this.
+  out.edge_width = p->GetEdgeVisibility() && p->GetRepresentation() == VTK_SURFACE ? std::max(1.1f, p->GetLineWidth()) : 0.0f;
   return out;
 }
 
@@ -144,6 +150,15 @@ const char* AddPolyData(Actor& a, vtkPolyData* data, const BlockState& block, co
     CopyColor(block.Color, s.property.diffuse_color);
   }
   std::copy(&a.Matrix->Element[0][0], &a.Matrix->Element[0][0] + 16, s.world_from_data);
+  if (vtkProperty* back = a.Prop->GetBackfaceProperty())
+  {
+    // The back has the shading model of the front.
+    s.has_back = 1;
+    s.back = s.property;
+    const RtvProperty own = PropertyOf(back);
+    memcpy(&s.back, &own, offsetof(RtvProperty, metallic));
+    s.back.opacity = 1.0f;
+  }
   s.point_radius = a.PointRadius;
   s.line_radius = a.LineRadius;
   s.edges_only = a.Edges ? 1 : 0;
@@ -153,8 +168,24 @@ const char* AddPolyData(Actor& a, vtkPolyData* data, const BlockState& block, co
   {
     rtvAddColors(a.Bridge, s, a.Mapper, data, a.Keep);
   }
-  if (vtkTexture* texture = a.Prop->GetTexture())
+  if (s.has_back && s.color_source != RTV_COLOR_PROPERTY)
   {
+    // Colours of points and cells show on both sides.
+    s.has_back = 0;
+  }
+  vtkTexture* texture = a.Prop->GetTexture();
+  for (const auto& own : a.Prop->GetProperty()->GetAllTextures())
+  {
+    texture = own.second;
+    // Its alpha takes the place of the opacity.
+    s.property.opacity = 1.0f;
+  }
+  if (texture)
+  {
+    if (s.has_back)
+    {
+      return "a texture on a surface whose backs have a property of their own";
+    }
     if (s.color_source != RTV_COLOR_PROPERTY)
     {
       return "it has a texture and colours";
@@ -253,16 +284,52 @@ const char* WhyNot(vtkActor* actor, vtkMapper* mapper, double pointRadius, doubl
   }
   if (property->GetRepresentation() == VTK_SURFACE && property->GetEdgeVisibility())
   {
-    return "edges on the surface";
+    if (property->GetRenderLinesAsTubes())
+    {
+      return "edges as shaded tubes on the surface";
+    }
+    if (actor->HasTranslucentPolygonalGeometry())
+    {
+      return "edges on a translucent surface";
+    }
+    if (mapper->GetClippingPlanes() && mapper->GetClippingPlanes()->GetNumberOfItems() > 0)
+    {
+      return "edges on a clipped surface";
+    }
   }
-  if (actor->GetBackfaceProperty())
+  if (property->GetRepresentation() == VTK_SURFACE && property->GetVertexVisibility())
   {
-    // Two coincident surfaces, one culled on each side, are one surface for a ray.
-    return "backs with a property of their own";
+    return "vertices on the surface";
   }
-  if (property->GetNumberOfTextures() > 0)
+  if (vtkProperty* back = actor->GetBackfaceProperty())
   {
-    return "textures of the property (albedo, material, normal)";
+    if (actor->HasTranslucentPolygonalGeometry() || back->GetOpacity() < 1.0)
+    {
+      return "translucent backs with a property of their own";
+    }
+    if (mapper->IsA("vtkGlyph3DMapper"))
+    {
+      return "glyphs whose backs have a property of their own";
+    }
+  }
+  for (const auto& texture : property->GetAllTextures())
+  {
+    if (texture.first != "albedoTex")
+    {
+      return "textures of the property other than its base colour (normal, material, emissive, coat, anisotropy)";
+    }
+    if (actor->GetTexture())
+    {
+      return "a texture and a texture of the property";
+    }
+    if (property->GetInterpolation() != VTK_PBR)
+    {
+      return "textures of the property without physically based shading";
+    }
+    if (const char* reason = rtvTextureReason(texture.second))
+    {
+      return reason;
+    }
   }
   vtkShaderProperty* shader = actor->GetShaderProperty();
   if (shader && (shader->HasFragmentShaderCode() || shader->HasVertexShaderCode() || shader->GetNumberOfShaderReplacements() > 0))
@@ -311,7 +378,7 @@ void RtvExtractor::EndFrame()
   }
 }
 
-bool RtvExtractor::Add(RtvBridge* bridge, vtkProp* prop, int number)
+bool RtvExtractor::Add(RtvBridge* bridge, vtkRenderer* renderer, vtkProp* prop, int number)
 {
   Actor a;
   a.Bridge = bridge;
@@ -326,8 +393,17 @@ bool RtvExtractor::Add(RtvBridge* bridge, vtkProp* prop, int number)
   a.Mapper = a.Prop ? a.Prop->GetMapper() : nullptr;
   if (!a.Mapper)
   {
-    return pass(prop->IsA("vtkVolume") ? "a volume (OpenGL's ray caster sees the depth of what is traced)"
-                                       : "OpenGL draws props of this class");
+    if (auto volume = vtkVolume::SafeDownCast(prop))
+    {
+      std::string answer;
+      const char* reason = rtvAddVolume(bridge, volume, renderer, a.Name, answer);
+      if (reason)
+      {
+        rtvApi->warn(bridge, (a.Name + ": " + reason + "; OpenGL draws it").c_str());
+      }
+      return reason ? pass(reason) : true;
+    }
+    return pass("OpenGL draws props of this class");
   }
   if (const char* reason = WhyNot(a.Prop, a.Mapper, a.PointRadius, a.LineRadius))
   {

@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <vtkActor.h>
+#include <vtkCompositeDataDisplayAttributes.h>
+#include <vtkCompositeDataIterator.h>
+#include <vtkCompositeDataSet.h>
 #include <vtkDataArray.h>
 #include <vtkDataSet.h>
 #include <vtkGlyph3DMapper.h>
@@ -99,34 +102,48 @@ void Scale(vtkGlyph3DMapper* mapper, vtkDataArray* array, vtkIdType i, double sc
     scale[c] = scale[c] == 0.0 ? 1.0e-10 : scale[c];
   }
 }
-}
-
-const char* rtvAddGlyphs(RtvBridge* bridge, vtkActor* actor, vtkGlyph3DMapper* mapper, vtkDataObject* input,
-  const RtvProperty& property, const std::string& name)
+// The sources by number. Why not, or null.
+const char* Sources(vtkGlyph3DMapper* mapper, std::vector<vtkPolyData*>& sources)
 {
-  vtkDataSet* data = vtkDataSet::SafeDownCast(input);
-  if (!data)
-  {
-    return "glyphs on composite data";
-  }
-  if (mapper->GetUseSourceTableTree() || mapper->GetSourceIndexing())
-  {
-    return "glyphs from several sources";
-  }
-  if (mapper->GetClippingPlanes() && mapper->GetClippingPlanes()->GetNumberOfItems() > 0)
-  {
-    return "glyphs with clipping planes";
-  }
-  if (mapper->GetNumberOfInputConnections(1) == 0)
+  const int count = mapper->GetSourceIndexing() ? mapper->GetNumberOfInputConnections(1)
+                                                : std::min(mapper->GetNumberOfInputConnections(1), 1);
+  if (count == 0)
   {
     return "glyphs without a source";
   }
-  mapper->GetInputAlgorithm(1, 0)->Update();
-  vtkPolyData* source = vtkPolyData::SafeDownCast(mapper->GetInputDataObject(1, 0));
-  if (!source || source->GetNumberOfPolys() + source->GetNumberOfStrips() == 0 || source->GetNumberOfLines() + source->GetNumberOfVerts() > 0)
+  for (int i = 0; i < count; ++i)
   {
-    return "glyphs whose source is not polygons";
+    mapper->GetInputAlgorithm(1, i)->Update();
+    vtkPolyData* source = vtkPolyData::SafeDownCast(mapper->GetInputDataObject(1, i));
+    if (!source || source->GetNumberOfPolys() + source->GetNumberOfStrips() == 0 ||
+      source->GetNumberOfLines() + source->GetNumberOfVerts() > 0)
+    {
+      return "glyphs whose source is not polygons";
+    }
+    sources.push_back(source);
   }
+  return nullptr;
+}
+
+// Which source a glyph has.
+size_t SourceOf(vtkDataArray* index, vtkIdType i, size_t count)
+{
+  if (!index)
+  {
+    return 0;
+  }
+  double sum = 0.0;
+  for (int c = 0; c < index->GetNumberOfComponents(); ++c)
+  {
+    sum += index->GetComponent(i, c) * index->GetComponent(i, c);
+  }
+  const double value = std::sqrt(sum);
+  return value >= static_cast<double>(count) ? count - 1 : static_cast<size_t>(value);
+}
+
+const char* AddGlyphsOf(RtvBridge* bridge, vtkActor* actor, vtkGlyph3DMapper* mapper, vtkDataSet* data,
+  const std::vector<vtkPolyData*>& sources, const RtvProperty& property, const std::string& name)
+{
   vtkDataArray* scales = InputArray(mapper, vtkGlyph3DMapper::SCALE, data);
   vtkDataArray* directions = mapper->GetOrient() ? InputArray(mapper, vtkGlyph3DMapper::ORIENTATION, data) : nullptr;
   vtkDataArray* mask = mapper->GetMasking() ? InputArray(mapper, vtkGlyph3DMapper::MASK, data) : nullptr;
@@ -142,8 +159,10 @@ const char* rtvAddGlyphs(RtvBridge* bridge, vtkActor* actor, vtkGlyph3DMapper* m
     }
   }
 
-  std::vector<double> matrices;
-  std::vector<unsigned char> rgba;
+  vtkDataArray* index =
+    mapper->GetSourceIndexing() ? InputArray(mapper, vtkGlyph3DMapper::SOURCE_INDEX, data) : nullptr;
+  std::vector<std::vector<double>> matricesOf(sources.size());
+  std::vector<std::vector<unsigned char>> rgbaOf(sources.size());
   auto transform = vtkSmartPointer<vtkTransform>::New();
   for (vtkIdType i = 0; i < data->GetNumberOfPoints(); ++i)
   {
@@ -162,6 +181,9 @@ const char* rtvAddGlyphs(RtvBridge* bridge, vtkActor* actor, vtkGlyph3DMapper* m
     }
     transform->Scale(scale);
     const double* m = &transform->GetMatrix()->Element[0][0];
+    const size_t which = SourceOf(index, i, sources.size());
+    std::vector<double>& matrices = matricesOf[which];
+    std::vector<unsigned char>& rgba = rgbaOf[which];
     matrices.insert(matrices.end(), m, m + 16);
     if (colors)
     {
@@ -170,15 +192,63 @@ const char* rtvAddGlyphs(RtvBridge* bridge, vtkActor* actor, vtkGlyph3DMapper* m
     }
   }
 
-  RtvKeep keep;
-  RtvSurface s = {};
-  s.name = name.c_str();
-  s.property = property;
-  const double* m = &actor->GetMatrix()->Element[0][0];
-  std::copy(m, m + 16, s.world_from_data);
-  rtvAddShape(s, source, false, keep);
-  s.glyph_matrices = RtvArray{ matrices.data(), matrices.size() / 16, 16, RTV_F64 };
-  s.glyph_colors = rgba.empty() ? RtvArray{ nullptr, 0, 0, RTV_NONE } : RtvArray{ rgba.data(), rgba.size() / 4, 4, RTV_U8 };
-  rtvApi->surface(bridge, &s);
+  for (size_t which = 0; which < sources.size(); ++which)
+  {
+    const std::vector<double>& matrices = matricesOf[which];
+    const std::vector<unsigned char>& rgba = rgbaOf[which];
+    if (matrices.empty())
+    {
+      continue;
+    }
+    RtvKeep keep;
+    RtvSurface s = {};
+    const std::string part = sources.size() > 1 ? name + ", source " + std::to_string(which) : name;
+    s.name = part.c_str();
+    s.property = property;
+    const double* m = &actor->GetMatrix()->Element[0][0];
+    std::copy(m, m + 16, s.world_from_data);
+    rtvAddShape(s, sources[which], false, keep);
+    s.glyph_matrices = RtvArray{ matrices.data(), matrices.size() / 16, 16, RTV_F64 };
+    s.glyph_colors =
+      rgba.empty() ? RtvArray{ nullptr, 0, 0, RTV_NONE } : RtvArray{ rgba.data(), rgba.size() / 4, 4, RTV_U8 };
+    rtvApi->surface(bridge, &s);
+  }
   return nullptr;
+}
+}
+
+const char* rtvAddGlyphs(RtvBridge* bridge, vtkActor* actor, vtkGlyph3DMapper* mapper, vtkDataObject* input,
+  const RtvProperty& property, const std::string& name)
+{
+  if (mapper->GetUseSourceTableTree())
+  {
+    return "glyphs from a tree of sources";
+  }
+  if (mapper->GetClippingPlanes() && mapper->GetClippingPlanes()->GetNumberOfItems() > 0)
+  {
+    return "glyphs with clipping planes";
+  }
+  std::vector<vtkPolyData*> sources;
+  if (const char* reason = Sources(mapper, sources))
+  {
+    return reason;
+  }
+  if (auto data = vtkDataSet::SafeDownCast(input))
+  {
+    return AddGlyphsOf(bridge, actor, mapper, data, sources, property, name);
+  }
+  auto composite = vtkCompositeDataSet::SafeDownCast(input);
+  vtkCompositeDataDisplayAttributes* blocks = mapper->GetBlockAttributes();
+  if (!composite || (blocks && (blocks->HasBlockVisibilities() || blocks->HasBlockColors() || blocks->HasBlockOpacities())))
+  {
+    return "glyphs on blocks with colours or visibility of their own";
+  }
+  auto it = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
+  const char* reason = nullptr;
+  for (it->InitTraversal(); !it->IsDoneWithTraversal() && !reason; it->GoToNextItem())
+  {
+    auto leaf = vtkDataSet::SafeDownCast(it->GetCurrentDataObject());
+    reason = leaf ? AddGlyphsOf(bridge, actor, mapper, leaf, sources, property, name) : "glyphs on data without points";
+  }
+  return reason;
 }

@@ -41,7 +41,7 @@ int vtkRtvRenderer::UpdateGeometry(vtkFrameBufferObjectBase* fbo)
   std::vector<vtkProp*> rest;
   for (int i = 0; i < this->PropArrayCount; ++i)
   {
-    if (!this->Extractor.Add(this->Bridge, this->PropArray[i], i))
+    if (!this->Extractor.Add(this->Bridge, this, this->PropArray[i], i))
     {
       rest.push_back(this->PropArray[i]);
     }

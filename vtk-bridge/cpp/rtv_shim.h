@@ -23,7 +23,7 @@ class RtvExtractor
 {
 public:
   // Adds `prop` to the frame. False when OpenGL has to draw it; the report knows why then.
-  bool Add(RtvBridge* bridge, vtkProp* prop, int number);
+  bool Add(RtvBridge* bridge, vtkRenderer* renderer, vtkProp* prop, int number);
   // The surface of a data set that is not polygons, made with the filter kept for `mapper`.
   vtkDataSet* SurfaceOf(vtkMapper* mapper, vtkDataSet* data);
   // Forgets the filters of mappers that were not seen this frame.

@@ -87,6 +87,10 @@ typedef struct RtvProperty {
   uint32_t cull_front;
   /* 1 to leave out sides turned away. */
   uint32_t cull_back;
+  /* Colour of the edges of polygons. */
+  float edge_color[3];
+  /* Their width in pixels; 0 for none. */
+  float edge_width;
 } RtvProperty;
 /* Something to draw. Arrays are read before rtv_surface returns and not kept. */
 typedef struct RtvSurface {
@@ -130,16 +134,20 @@ typedef struct RtvSurface {
   uint8_t texture_interpolate;
   /* 1: the texture is repeated. */
   uint8_t texture_repeat;
+  /* 1: the texture is encoded as sRGB. */
+  uint8_t texture_srgb;
   /* Not used. */
-  uint8_t reserved[2];
+  uint8_t reserved;
   /* Four RTV_U8 per texel, or none. */
   RtvArray texture;
   /* Texels per row. */
   uint32_t texture_width;
-  /* Not used. */
-  uint32_t reserved_2;
+  /* 1: backs of polygons answer light as back says. */
+  uint32_t has_back;
   /* Answer to light. */
   RtvProperty property;
+  /* Answer of backs. */
+  RtvProperty back;
   /* Row by row. */
   double world_from_data[16];
   /* Sixteen RTV_F64 per copy (row by row), or none. */
@@ -151,6 +159,43 @@ typedef struct RtvSurface {
   /* Radius of tubes for lines and edges; 0 for none. */
   double line_radius;
 } RtvSurface;
+/* A uniform grid of scalars as a medium. Arrays are read before rtv_volume returns and not kept. */
+typedef struct RtvVolume {
+  /* Name for messages, UTF-8. */
+  char const* name;
+  /* Changes whenever the scalars do; 0: not known. */
+  uint64_t scalar_key;
+  /* One number of any kind per point, x fastest; none when rtv_has_volume says that they are kept. */
+  RtvArray scalars;
+  /* Points per axis. */
+  uint32_t dims[3];
+  /* 1: the value of the nearest point; 0: linear. */
+  uint32_t nearest;
+  /* Distance of neighbouring points. */
+  double spacing[3];
+  /* Row by row; the first point is at zero of the data. */
+  double world_from_data[16];
+  /* Scalars of the first and the last entry of both tables. */
+  double range[2];
+  /* Three RTV_F32 per entry. */
+  RtvArray colors;
+  /* One RTV_F32 per entry: opacity of a slab of unit_distance. */
+  RtvArray opacities;
+  /* See opacities. */
+  double unit_distance;
+  /* 1 for shading by the gradient with a headlight. */
+  uint32_t shade;
+  /* Of the shading. */
+  float ambient;
+  /* Of the shading. */
+  float diffuse;
+  /* Of the shading. */
+  float specular;
+  /* Of the shading. */
+  float specular_power;
+  /* Not used. */
+  uint32_t reserved;
+} RtvVolume;
 /* A light that is on. */
 typedef struct RtvLight {
   /* World position. */
@@ -204,8 +249,8 @@ typedef struct RtvPicture {
   /* Window depth of the first surface, or null without blended. */
   float const* first_depth;
 } RtvPicture;
-/* Number of this interface; it changes when a structure or a call does. A shim built for another one must not go on. */
-#define RTV_ABI 1u
+/* Number of this interface, made from its structures and calls (a test says which). A shim built for another one must not go on. */
+#define RTV_ABI 220021418u
 /* All calls in one table, so that a shim needs only one symbol. */
 typedef struct RtvApi {
   /* rtv_abi. */
@@ -224,6 +269,10 @@ typedef struct RtvApi {
   int32_t (*surface)(RtvBridge*, RtvSurface const*);
   /* rtv_has_colors. */
   int32_t (*has_colors)(RtvBridge*, uint64_t, uint64_t);
+  /* rtv_volume. */
+  char const* (*volume)(RtvBridge*, RtvVolume const*);
+  /* rtv_has_volume. */
+  int32_t (*has_volume)(RtvBridge*, uint64_t);
   /* rtv_light. */
   void (*light)(RtvBridge*, RtvLight const*);
   /* rtv_pass. */
@@ -250,6 +299,10 @@ double rtv_option(char const* name);
 int32_t rtv_begin(RtvBridge* bridge);
 /* Adds something to draw: 1 when it will be traced, 0 when there is nothing to trace in it, -1 when its arrays make no sense. */
 int32_t rtv_surface(RtvBridge* bridge, RtvSurface const* surface);
+/* Adds a volume: null when it will be traced, else the reason why not, of the bridge's memory until its next call. */
+char const* rtv_volume(RtvBridge* bridge, RtvVolume const* volume);
+/* 1 when the scalars of this key are kept: rtv_volume need not be given them. */
+int32_t rtv_has_volume(RtvBridge* bridge, uint64_t scalar_key);
 /* 1 when colours of these keys are kept from the frame before: rtv_surface need not be given their arrays. */
 int32_t rtv_has_colors(RtvBridge* bridge, uint64_t shape_key, uint64_t color_key);
 /* Adds a light. */

@@ -2,6 +2,8 @@
 
 use crate::bridge::Drawn;
 use crate::colors::Resolved;
+use crate::edges::Edges;
+use crate::input::Property;
 use crate::materials::{Encoding, Setting, material, without_ambient_light};
 use crate::options::{MaterialChoice, Options};
 use rt_core::accel::{Geometry, Instance};
@@ -18,6 +20,8 @@ pub(crate) struct Assembled {
     pub(crate) appearances: Vec<Appearance>,
     pub(crate) materials: Vec<Material>,
     pub(crate) encodings: Vec<Encoding>,
+    /// One per instance; empty when there are none at all.
+    pub(crate) edges: Vec<Option<Edges>>,
 }
 
 /// Puts the lists together.
@@ -26,23 +30,36 @@ pub(crate) fn assemble(drawn: &[Drawn], options: &Options, only_headlight: bool,
     let mut out = Assembled::default();
     let mut known: HashMap<usize, usize> = HashMap::new();
     for d in drawn {
-        let mut parts: Vec<(usize, Geometry, bool)> = Vec::new();
+        let mut parts: Vec<(usize, Geometry, bool, &Property)> = Vec::new();
         if let Some(m) = &d.built.mesh {
-            parts.push((std::sync::Arc::as_ptr(&m.mesh) as usize, m.geometry(), true));
+            parts.push((std::sync::Arc::as_ptr(&m.mesh) as usize, m.geometry(), true, &d.property));
         }
         if let Some(s) = &d.built.spheres {
-            parts.push((std::sync::Arc::as_ptr(s) as usize, Geometry::Shape(s.clone()), false));
+            parts.push((std::sync::Arc::as_ptr(s) as usize, Geometry::Shape(s.clone()), false, &d.property));
         }
         if let Some(s) = &d.built.tubes {
-            parts.push((std::sync::Arc::as_ptr(s) as usize, Geometry::Shape(s.clone()), false));
+            parts.push((std::sync::Arc::as_ptr(s) as usize, Geometry::Shape(s.clone()), false, &d.property));
         }
-        for (address, geometry, is_mesh) in parts {
+        if let (Some(s), Some(back)) = (&d.built.backs, &d.back) {
+            parts.push((
+                std::sync::Arc::as_ptr(s).cast::<()>() as usize,
+                Geometry::Shape(s.clone()),
+                false,
+                back,
+            ));
+        }
+        for (address, geometry, is_mesh, property) in parts {
             let index = *known.entry(address).or_insert_with(|| {
                 out.geometries.push(geometry);
                 out.geometries.len() - 1
             });
-            out.add(d, index, is_mesh, &setting);
+            let first = out.instances.len();
+            out.add(d, property, index, is_mesh, &setting);
+            out.add_edges(d, first, is_mesh);
         }
+    }
+    if !out.edges.is_empty() {
+        out.edges.resize_with(out.instances.len(), || None);
     }
     if options.ao == 0 && !options.path_tracing {
         out.materials = std::mem::take(&mut out.materials).into_iter().map(without_ambient_light).collect();
@@ -51,9 +68,21 @@ pub(crate) fn assemble(drawn: &[Drawn], options: &Options, only_headlight: bool,
 }
 
 impl Assembled {
-    fn add(&mut self, d: &Drawn, geometry: usize, is_mesh: bool, setting: &Setting<'_>) {
+    /// Edges of the instances from `first` on.
+    fn add_edges(&mut self, d: &Drawn, first: usize, is_mesh: bool) {
+        let Some(mesh) = d.built.mesh.as_ref().filter(|m| d.property.edge_width > 0.0 && m.clipped.is_none())
+        else {
+            return;
+        };
+        self.edges.resize_with(first, || None);
+        for i in self.instances[first..].iter().filter(|_| is_mesh || d.back.is_some()) {
+            self.edges.push(Some(Edges::new(mesh, i.world_from_object, &d.property)));
+        }
+    }
+
+    fn add(&mut self, d: &Drawn, property: &Property, geometry: usize, is_mesh: bool, setting: &Setting<'_>) {
         let colors = d.color.as_ref().filter(|_| is_mesh);
-        let (base, encoding) = material(&d.property, colors.is_some(), setting);
+        let (base, encoding) = material(property, colors.is_some(), setting);
         match &d.glyphs {
             None => {
                 let m = self.dressed(base, colors, d);

@@ -36,6 +36,7 @@ pub(crate) struct Drawn {
     pub(crate) color: Option<Resolved>,
     pub(crate) texture: Option<Arc<Texture>>,
     pub(crate) property: crate::input::Property,
+    pub(crate) back: Option<crate::input::Property>,
     pub(crate) world_from_data: DAffine3,
     /// Place and colour of each copy; `None` without copies.
     pub(crate) glyphs: Option<Vec<(DAffine3, Option<[u8; 4]>)>>,
@@ -84,6 +85,7 @@ pub struct Bridge {
     geometries: HashMap<u64, Kept<Arc<Built>>>,
     colors: HashMap<(u64, u64), Kept<Option<Resolved>>>,
     textures: HashMap<u64, Kept<Option<Arc<Texture>>>>,
+    media: crate::volumes::Media,
     world: Option<(Arc<World>, Vec<rt_core::accel::Instance>, BuildOptions)>,
     renderer: Renderer,
     pool: Option<(usize, rayon::ThreadPool)>,
@@ -111,6 +113,7 @@ impl Bridge {
         }
         self.frame += 1;
         self.drawn.clear();
+        self.media.begin();
         self.lights.clear();
         self.content = DefaultHasher::new();
         self.report = FrameReport { frame: self.frame, ..FrameReport::default() };
@@ -174,6 +177,7 @@ impl Bridge {
         self.report.traced.push(Traced {
             name: surface.name.to_owned(),
             triangles: built.mesh.as_ref().map_or(0, |m| m.mesh.indices.len()) * count,
+            cells: 0,
             copies: count,
         });
         self.drawn.push(Drawn {
@@ -181,11 +185,40 @@ impl Bridge {
             color,
             texture,
             property: surface.property,
+            back: surface.back,
             world_from_data: place,
             glyphs,
         });
         self.report.ms.extract += ms(start);
         Added::Traced
+    }
+
+    /// Adds a volume. What rt-core cannot draw comes back with the reason.
+    pub fn add_volume(&mut self, volume: &crate::input::Volume<'_>) -> Result<(), String> {
+        let start = Instant::now();
+        if self.options.path_tracing {
+            return Err("a volume: RTV_MODE=path knows none".to_owned());
+        }
+        let place =
+            affine(volume.world_from_data).ok_or("a volume whose matrix is singular or not affine")?;
+        let (mut media, mut content) = (std::mem::take(&mut self.media), self.content.clone());
+        if volume.key == 0 {
+            self.frame.hash(&mut content);
+        }
+        let added = self.in_pool(|| media.add(volume, place, &mut content));
+        (self.media, self.content) = (media, content);
+        let (cells, warning) = added?;
+        if let Some(warning) = warning {
+            self.warn(format!("{}: {warning}", volume.name));
+        }
+        self.report.traced.push(Traced { name: volume.name.to_owned(), triangles: 0, cells, copies: 1 });
+        self.report.ms.extract += ms(start);
+        Ok(())
+    }
+
+    /// Whether the scalars of this key are kept, so that they need not be given again.
+    pub fn has_volume(&self, key: u64) -> bool {
+        self.media.has(key)
     }
 
     /// Whether colours of these keys are kept, so that their arrays need not be given again.
@@ -226,7 +259,7 @@ impl Bridge {
         }
         (s.shape.key, color_key, s.texture.map(|t| t.key)).hash(h);
         // The numbers' text is as unique as the numbers.
-        format!("{:?}{:?}", s.property, s.world_from_data).hash(h);
+        format!("{:?}{:?}{:?}", s.property, s.back, s.world_from_data).hash(h);
         if let Some(g) = &s.glyphs {
             g.rgba.hash(h);
             g.matrices.iter().flatten().for_each(|v| v.to_bits().hash(h));
@@ -274,6 +307,7 @@ impl Bridge {
         self.geometries.retain(|_, k| k.frame == frame);
         self.colors.retain(|_, k| k.frame == frame);
         self.textures.retain(|_, k| k.frame == frame);
+        self.media.forget_unused();
 
         // ---- Nothing changed: the picture is there, or gets better.
         format!("{view:?}").hash(&mut self.content);
@@ -299,7 +333,7 @@ impl Bridge {
         let shadows = options.shadows || view.shadows;
         let headlight_only = matches!(self.lights.as_slice(), [only] if only.headlight);
         let start = Instant::now();
-        let Assembled { geometries, instances, appearances, materials, encodings } =
+        let Assembled { geometries, instances, appearances, materials, encodings, edges } =
             assemble(&self.drawn, &options, headlight_only, self.lights.is_empty());
         let world = self.world(geometries, instances)?;
         self.report.ms.build += ms(start);
@@ -314,6 +348,13 @@ impl Bridge {
             scene.lights.push(rt_core::light::Light::ambient([1.0; 3]));
         }
         scene.materials = materials;
+        scene.volumes = self.media.placed().to_vec();
+        if !scene.volumes.is_empty() && encodings.contains(&crate::materials::Encoding::Pbr) {
+            self.warn(
+                "volumes in front of physically based surfaces: these encode their colours (power 1/2.2), and what the volume adds there is encoded with them"
+                    .to_owned(),
+            );
+        }
         if options.ao > 0 && !options.path_tracing {
             let automatic = 0.2 * world.bounds().extent().as_dvec3().length();
             let distance =
@@ -357,6 +398,7 @@ impl Bridge {
             options: render,
             averaged: options.progressive > 1,
             encodings: &encodings,
+            edges: &edges,
         };
 
         // ---- Rays, and the picture for the window.
@@ -481,6 +523,8 @@ pub(crate) struct Ready<'a> {
     pub(crate) averaged: bool,
     /// One per instance.
     pub(crate) encodings: &'a [crate::materials::Encoding],
+    /// One per instance, or none at all.
+    pub(crate) edges: &'a [Option<crate::edges::Edges>],
 }
 
 fn same(a: &Geometry, b: &Geometry) -> bool {

@@ -86,9 +86,14 @@ fn stepped(row: &[[u8; 4]], nan: [u8; 4]) -> ColorMap {
     ColorMap { nan_color: float(nan), ..ColorMap::new(colors, [half, 1.0 - half]) }
 }
 
-/// A texture, not decoded (see [`float`]).
+/// A texture; only what says that it is sRGB is decoded (see [`float`]).
 pub fn texture(image: &Image<'_>) -> Option<Texture> {
-    let texels = image.rgba.par_iter().with_min_len(CHUNK).map(|c| float(*c)).collect();
+    let decode = |v: f32| if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
+    let linear = |c: [u8; 4]| {
+        let [r, g, b, a] = float(c);
+        if image.srgb { [decode(r), decode(g), decode(b), a] } else { [r, g, b, a] }
+    };
+    let texels = image.rgba.par_iter().with_min_len(CHUNK).map(|c| linear(*c)).collect();
     let mut texture = Texture::from_linear(image.width, image.height, texels).ok()?;
     texture.wrap = [if image.repeat { Wrap::Repeat } else { Wrap::Clamp }; 2];
     texture.filter = if image.interpolate { Filter::Bilinear } else { Filter::Nearest };

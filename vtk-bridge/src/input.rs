@@ -146,6 +146,8 @@ pub struct Shape<'a> {
     pub line_radius: f64,
     /// Polygons are drawn as their edges, with tubes of `line_radius`.
     pub edges_only: bool,
+    /// The backs of polygons look different ([`Surface::back`]).
+    pub has_backs: bool,
 }
 
 impl<'a> Shape<'a> {
@@ -164,6 +166,7 @@ impl<'a> Shape<'a> {
             point_radius: 0.0,
             line_radius: 0.0,
             edges_only: false,
+            has_backs: false,
         }
     }
 }
@@ -183,6 +186,8 @@ pub struct Image<'a> {
     pub interpolate: bool,
     /// Repeated outside 0..1 instead of its edge.
     pub repeat: bool,
+    /// Encoded as sRGB: decoded before it is interpolated.
+    pub srgb: bool,
 }
 
 /// Where the colour of a surface comes from.
@@ -245,6 +250,10 @@ pub struct Property {
     pub cull_front: bool,
     /// Sides turned away from the viewer are left out.
     pub cull_back: bool,
+    /// Colour of the edges of polygons.
+    pub edge_color: [f32; 3],
+    /// Their width, pixels; 0 for none. Only on opaque surfaces that are not clipped.
+    pub edge_width: f32,
 }
 
 impl Default for Property {
@@ -267,6 +276,8 @@ impl Default for Property {
             base_ior: 1.5,
             cull_front: false,
             cull_back: false,
+            edge_color: [0.0; 3],
+            edge_width: 0.0,
         }
     }
 }
@@ -286,6 +297,8 @@ pub struct Surface<'a> {
     pub texture: Option<Image<'a>>,
     /// Its answer to light.
     pub property: Property,
+    /// Another answer on the backs of its polygons, opaque and of one colour (needs [`Shape::has_backs`]).
+    pub back: Option<Property>,
     /// Copies: each is drawn where its own matrix (data of the copy to `world_from_data`'s input) puts it.
     pub glyphs: Option<Glyphs<'a>>,
 }
@@ -297,6 +310,63 @@ pub struct Glyphs<'a> {
     pub matrices: &'a [[f64; 16]],
     /// A colour per copy; empty for the surface's own.
     pub rgba: &'a [[u8; 4]],
+}
+
+/// Values of any kind that a grid can have.
+#[derive(Debug, Clone, Copy)]
+pub enum Scalars<'a> {
+    /// Unsigned bytes.
+    U8(&'a [u8]),
+    /// 32-bit integers.
+    I32(&'a [i32]),
+    /// 64-bit integers.
+    I64(&'a [i64]),
+    /// Single precision.
+    F32(&'a [f32]),
+    /// Double precision.
+    F64(&'a [f64]),
+}
+
+/// A uniform grid of scalars as a glowing, absorbing medium: `vtkImageData` through a volume mapper, blended front to back.
+#[derive(Debug, Clone, Copy)]
+pub struct Volume<'a> {
+    /// Name for messages and the report.
+    pub name: &'a str,
+    /// Changes whenever the scalars do; 0 is never kept.
+    pub key: u64,
+    /// One per point, x fastest. Not read when [`crate::bridge::Bridge::has_volume`] says so.
+    pub scalars: Scalars<'a>,
+    /// Points per axis.
+    pub dims: [u32; 3],
+    /// Distance of neighbouring points, data units; positive.
+    pub spacing: [f64; 3],
+    /// Data coordinates (point (0,0,0) at zero) to world.
+    pub world_from_data: DMat4,
+    /// The value of the nearest point instead of linear interpolation.
+    pub nearest: bool,
+    /// Scalars of the first and the last entry of the tables.
+    pub range: [f64; 2],
+    /// Colours, evenly spaced, linear between.
+    pub colors: &'a [[f32; 3]],
+    /// Opacities of a slab of `unit_distance`, evenly spaced, linear between.
+    pub opacities: &'a [f32],
+    /// Thickness that the opacities are for, data units.
+    pub unit_distance: f64,
+    /// Answer to a headlight; `None` for none.
+    pub shading: Option<Shading>,
+}
+
+/// Answer of a volume to a headlight, by its gradient (`vtkVolumeProperty`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shading {
+    /// Part of the colour that needs no light.
+    pub ambient: f32,
+    /// Part that is lit.
+    pub diffuse: f32,
+    /// White highlight.
+    pub specular: f32,
+    /// Its exponent.
+    pub specular_power: f32,
 }
 
 /// Shape of a light.

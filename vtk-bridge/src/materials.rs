@@ -6,7 +6,7 @@
 
 use crate::input::Property;
 use crate::options::{MaterialChoice, Options};
-use rt_core::material::{ColorSource, Highlight, Material, Sides, SurfaceModel};
+use rt_core::material::{ColorSource, Highlight, Material, PbrForm, Sides, SurfaceModel};
 
 /// How radiance becomes numbers in the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -116,6 +116,7 @@ fn pbr(p: &Property, base: Material) -> (Material, Encoding) {
         metallic: sane(p.metallic).min(1.0),
         roughness: sane(p.roughness).min(1.0),
         specular: f0,
+        form: PbrForm::Vtk,
     };
     // VTK 9 takes the colour as linear here, although the result is encoded.
     (Material { model, ..base }, Encoding::Pbr)

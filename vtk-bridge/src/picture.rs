@@ -59,10 +59,11 @@ impl Picture {
         let mixed = ready.encodings.windows(2).any(|e| e[0] != e[1]);
         let effects = ready.options.effects.unwrap_or(Effects::NONE);
         let soft_edges = ready.options.samples > 1 || effects.contains(Effects::DEPTH_OF_FIELD);
-        let blend = effects.contains(Effects::TRANSPARENCY) || soft_edges || ready.averaged;
+        let see_through = Effects::TRANSPARENCY | Effects::VOLUMES;
+        let blend = effects.intersects(see_through) || soft_edges || ready.averaged;
         let layers = Layers::COLOR | Layers::DEPTH;
         let options = RenderOptions {
-            layers: if mixed { layers | Layers::IDS } else { layers },
+            layers: if mixed || !ready.edges.is_empty() { layers | Layers::IDS } else { layers },
             // Interpolated colours of opacity 1 come a rounding below it; what is 255 of 255 is opaque.
             depth_min_opacity: if effects.contains(Effects::TRANSPARENCY) { 1.0 - 1.0 / 512.0 } else { 0.0 },
             ..ready.options.clone()
@@ -70,12 +71,18 @@ impl Picture {
         let output = renderer.render(ready.scene, ready.camera, &options)?;
         let mut frame = output.frame;
         let opaque_background = !matches!(ready.scene.background, Background::Transparent);
-        let first_depth = if effects.contains(Effects::TRANSPARENCY) || opaque_background {
+        let mut first_depth = if effects.contains(Effects::TRANSPARENCY) || opaque_background {
             let depth_only = RenderOptions { layers: Layers::DEPTH, samples: 1, ..ready.options.clone() };
             renderer.render(ready.scene, ready.camera, &depth_only)?.frame.depth
         } else {
             Vec::new()
         };
+        if effects.contains(Effects::VOLUMES) {
+            if first_depth.is_empty() {
+                first_depth.clone_from(&frame.depth);
+            }
+            crate::volumes::place_in_depth(&ready.scene.volumes, view, &mut first_depth);
+        }
         let trace_ms = ms(start);
 
         let start = Instant::now();
@@ -83,6 +90,7 @@ impl Picture {
             uncover(&mut frame, &first_depth);
         }
         encode(&mut frame, ready.encodings, mixed);
+        crate::edges::draw(&mut frame, ready.edges, view);
         (self.width, self.height) = (view.width, view.height);
         std::mem::swap(&mut self.depth, &mut frame.depth);
         if blend {

@@ -13,6 +13,8 @@ pub struct Traced {
     pub name: String,
     /// Triangles, all copies together.
     pub triangles: usize,
+    /// Cells of a volume.
+    pub cells: u64,
     /// How often it is drawn.
     pub copies: usize,
 }

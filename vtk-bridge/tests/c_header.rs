@@ -70,7 +70,8 @@ fn header(sources: &[&str]) -> String {
             } else if let Some(rest) = line.strip_prefix("pub const ").filter(|r| r.contains(": u32 = ")) {
                 let (name, value) = rest.split_once(": u32 = ").expect("checked");
                 describe(&mut out, "", &comment);
-                writeln!(out, "#define {name} {}u", value.trim_end_matches(';')).expect("to a string");
+                writeln!(out, "#define {name} {}u", value.trim_end_matches(';').replace('_', ""))
+                    .expect("to a string");
                 comment.clear();
             } else if line.starts_with("#[repr(C)]") {
                 let name_line =
@@ -126,6 +127,21 @@ fn describe(out: &mut String, indent: &str, comment: &[&str]) {
     }
 }
 
+/// FNV-1a of the header without its comments and without the number itself.
+fn fingerprint(header: &str) -> u32 {
+    let counts = |line: &&str| !line.trim_start().starts_with("/*") && !line.contains(" RTV_ABI ");
+    let bytes = header.lines().filter(counts).flat_map(str::bytes);
+    bytes.fold(2_166_136_261, |h: u32, b| (h ^ u32::from(b)).wrapping_mul(16_777_619))
+}
+
+#[test]
+fn the_number_of_the_interface_follows_structures_and_calls_and_not_comments() {
+    let header = "/* One. */\ntypedef struct A {\n  /* Two. */\n  double b;\n} A;\n#define RTV_ABI 7u\n";
+    let same = header.replace("Two", "Three").replace("7u", "8u");
+    assert_eq!(fingerprint(header), fingerprint(&same));
+    assert_ne!(fingerprint(header), fingerprint(&header.replace("double", "float")));
+}
+
 #[test]
 fn the_header_says_what_the_library_does() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -136,6 +152,12 @@ fn the_header_says_what_the_library_does() {
     }
     let committed = std::fs::read_to_string(&path).expect("include/rtv.h is there");
     assert!(made == committed, "include/rtv.h is old; run this test with RTV_WRITE_HEADER=1");
+    // A shim built for one interface must not be used with another: the number is that of the interface itself.
+    let number = fingerprint(&made);
+    assert_eq!(vtk_bridge::capi::RTV_ABI, number, "the interface has changed: set RTV_ABI to {number}");
+    let python =
+        std::fs::read_to_string(folder.join("python/rtvtk/library.py")).expect("library.py is there");
+    assert!(python.contains(&format!("\nABI = {number}\n")), "python/rtvtk/library.py needs ABI = {number}");
     for expected in [
         "int32_t rtv_surface(RtvBridge* bridge, RtvSurface const* surface);",
         "  double world_from_data[16];",

@@ -25,6 +25,12 @@ cargo xtask setup
     Installs the peers: Debian packages with apt-get (as root or through sudo), Python wheels in target/peers/venv.
     Where it may not install, it says what it would have installed.
 
+cargo xtask vtk [--release] [OPTIONS OF vtk-bridge install]
+    Builds vtk-bridge from this checkout and installs it for the VTK and ParaView of this machine; then
+    `eval \"$(target/debug/vtk-bridge env --vtk)\"` (or --paraview) makes any script in this shell ray traced.
+      --release         build it optimised, into target/release
+      --prefix FOLDER, --include FOLDER, --plugin    as of `vtk-bridge install`
+
 cargo xtask ci-list
     Prints the steps and their commands without running them.
 
@@ -38,6 +44,7 @@ enum Command {
     Setup,
     CiList,
     Test(TestOptions),
+    Vtk { release: bool, install: Vec<String> },
 }
 
 /// Options of `cargo xtask test`.
@@ -99,13 +106,33 @@ fn parse(args: &[String]) -> Result<Command, String> {
             }
             Ok(Command::Test(options))
         }
-        other => Err(format!("no command `{other}`; there are test, setup, ci-list and help")),
+        "vtk" => Ok(Command::Vtk {
+            release: rest.iter().any(|a| a == "--release"),
+            install: rest.iter().filter(|a| *a != "--release").cloned().collect(),
+        }),
+        other => Err(format!("no command `{other}`; there are test, setup, vtk, ci-list and help")),
     }
 }
 
 /// The root of the workspace: the folder above xtask.
 fn workspace_root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("xtask lies inside the workspace").to_owned()
+}
+
+/// Builds vtk-bridge and lets it install itself. Its own options and messages are its business.
+fn vtk(release: bool, install: &[String]) -> Exit {
+    let mut cargo = std::process::Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.current_dir(workspace_root()).args(["run", "--quiet", "-p", "vtk-bridge", "--bin", "vtk-bridge"]);
+    cargo.args(release.then_some("--release")).args(["--", "install"]).args(install);
+    match cargo.status() {
+        Ok(status) if status.success() => Exit::Success,
+        Ok(status) if status.code() == Some(2) => Exit::Usage,
+        Ok(_) => Exit::StepFailed,
+        Err(e) => {
+            eprintln!("error: cargo could not be started: {e}");
+            Exit::StepFailed
+        }
+    }
 }
 
 fn main() -> ExitCode {
@@ -128,6 +155,7 @@ fn main() -> ExitCode {
             print!("{}", found.describe());
             if found.missing().is_empty() { Exit::Success } else { Exit::PeerMissing }
         }
+        Ok(Command::Vtk { release, install }) => vtk(release, &install),
         Ok(Command::Test(options)) => runner::run(&workspace_root(), &options),
     };
     ExitCode::from(exit as u8)
@@ -139,6 +167,13 @@ mod tests {
 
     fn parsed(line: &str) -> Result<Command, String> {
         parse(&line.split_whitespace().map(str::to_owned).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn options_of_the_bridge_are_its_own() {
+        let expected = Command::Vtk { release: true, install: vec!["--prefix".to_owned(), "/x".to_owned()] };
+        assert_eq!(parsed("vtk --release --prefix /x"), Ok(expected));
+        assert_eq!(parsed("vtk"), Ok(Command::Vtk { release: false, install: Vec::new() }));
     }
 
     #[test]

@@ -19,6 +19,7 @@ mod fig5_13;
 mod fig5_14;
 mod lineup;
 mod many_ranks;
+mod paraview;
 mod partition_view;
 mod peers;
 mod peers_schlieren;
@@ -87,6 +88,12 @@ pub const ALL: &[Experiment] = &[
     },
     Experiment { id: "fig3.10", chapter: 3, title: "Strong scaling, wavelet", run: strong_scaling::wavelet },
     Experiment {
+        id: "paraview",
+        chapter: 3,
+        title: "One node of figures 3.6 to 3.10: ParaView with llvmpipe against the same ParaView with vtk-bridge",
+        run: paraview::run,
+    },
+    Experiment {
         id: "partition-view",
         chapter: 3,
         title: "Parts of as many triangles against parts of as much work for the view",
@@ -125,7 +132,7 @@ pub const ALL: &[Experiment] = &[
     Experiment {
         id: "fig4.10",
         chapter: 4,
-        title: "Replicated data against data in parts, 1 to 64 ranks",
+        title: "Replicated data against data in parts, 1 to 128 ranks",
         run: fig4_10::run,
     },
     Experiment {

@@ -186,7 +186,8 @@ impl Look {
         if self.has(Effects::REFRACTION) && !self.glass_parts_only {
             m = glass(m.color);
         } else if self.has(Effects::GLOSSY_REFLECTION) {
-            m.model = SurfaceModel::Pbr { metallic: 0.0, roughness: 0.3, specular: 0.3 };
+            m.model =
+                SurfaceModel::Pbr { metallic: 0.0, roughness: 0.3, specular: 0.3, form: Default::default() };
         } else if self.has(Effects::REFLECTION)
             && let SurfaceModel::Phong { mirror, .. } = &mut m.model
         {

@@ -1,12 +1,13 @@
 //! The picture of many ranks is the picture of one node, bit for bit.
 mod scenes;
 
+use composite::comm::sim;
 use composite::render::{
-    DataParallel, FrameError, FrameOptions, FrameOutput, Light, Partition, Split, ray_parallel,
+    Activity, DataParallel, FrameError, FrameOptions, FrameOutput, Light, Partition, Split, ray_parallel,
 };
 use composite::{Communicator, threads};
 use rt_core::accel::BuildOptions;
-use rt_core::frame::Frame;
+use rt_core::frame::{Frame, Layers};
 use rt_core::glam::DVec3;
 use rt_core::render::render;
 use scenes::Case;
@@ -115,6 +116,54 @@ fn frames_without_secondary_rays_send_none_and_have_the_bits_of_one_node() {
                 // Later rays of the geometry pass are answered by nobody, because there are none.
                 assert_eq!((o.report.points_sent, o.report.rays_sent, o.report.answered_rays), (0, 0, 0));
                 assert_eq!(o.report.light, "no light crosses borders");
+            }
+        }
+    }
+}
+
+#[test]
+fn streamed_frames_have_the_bits_of_one_node_and_send_tiles_while_rays_are_traced() {
+    let mut case = scenes::headlight(1);
+    // Colours alone: nothing is left to do after the camera rays.
+    case.options.layers = Layers::COLOR;
+    (case.options.width, case.options.height) = (384, 320);
+    for samples in [1, 3] {
+        case.options.samples = samples;
+        let expected = one_node(&case);
+        for (ranks, split) in [
+            (1, Split::Triangles),
+            (2, Split::Triangles),
+            (5, Split::Random { seed: 3 }),
+            (27, Split::Triangles),
+            (128, Split::Triangles),
+        ] {
+            let partition = Partition::new(&case.scene, ranks, &split);
+            for stream in [true, false] {
+                let outputs = sim::run(ranks, sim::Network::FREE, sim::Compute::Measured(1.0), |mut comm| {
+                    let part = partition.part(&case.scene, comm.rank(), &BuildOptions::default())?;
+                    let options = FrameOptions { root: Some(ranks - 1), stream, ..frame_options(Light::Ask) };
+                    let mut renderer = DataParallel::new(&mut comm, part, options)?;
+                    renderer.frame(&mut comm, &case.camera, &case.options)
+                });
+                let outputs: Vec<FrameOutput> = outputs
+                    .into_iter()
+                    .map(|o: Result<Result<_, FrameError>, _>| o.unwrap().unwrap())
+                    .collect();
+                assert_same(
+                    &expected,
+                    &outputs,
+                    &format!("{samples} samples, {ranks} ranks, stream {stream}"),
+                );
+                // Some rank has finished tiles before it has traced its last ray, or none has. (With few tiles for each rank it does not pay.)
+                let overlaps = |o: &FrameOutput| {
+                    let mut spans = o.report.spans.iter().map(|s| s.activity);
+                    let last = spans.clone().rposition(|a| a == Activity::Render);
+                    let shaded = spans.position(|a| a == Activity::Shade);
+                    shaded.zip(last).is_some_and(|(shaded, last)| shaded < last)
+                };
+                if samples == 1 && (2..=5).contains(&ranks) {
+                    assert_eq!(outputs.iter().any(overlaps), stream, "{ranks} ranks");
+                }
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use super::microfacet::{ggx, schlick};
 use crate::effects::Effects;
-use crate::material::{Highlight, Material, SurfaceModel};
+use crate::material::{Highlight, Material, PbrForm, SurfaceModel};
 use glam::Vec3;
 use std::f32::consts::PI;
 
@@ -46,7 +46,11 @@ pub(crate) fn response(
         SurfaceModel::Metal { roughness } => {
             microfacets(surface_color, roughness, normal, view, l) * color * cos
         }
-        SurfaceModel::Pbr { metallic, roughness, specular } => {
+        SurfaceModel::Pbr { metallic, roughness, specular, form: PbrForm::Vtk } => {
+            let [matte, lobe] = vtk_pbr([metallic, roughness, specular], surface_color, normal, view, l);
+            (matte + lobe) * color * cos
+        }
+        SurfaceModel::Pbr { metallic, roughness, specular, form: PbrForm::Gltf } => {
             let f0 = Vec3::splat(specular).lerp(surface_color, metallic);
             let matte = surface_color * pbr_transmitted(specular, normal.dot(view)) * (1.0 - metallic);
             let lobe =
@@ -86,6 +90,28 @@ fn microfacets(f0: Vec3, roughness: f32, n: Vec3, v: Vec3, l: Vec3) -> Vec3 {
     schlick(f0, h.dot(v)) * (ggx(n, v, l, alpha) * PI)
 }
 
+/// [`PbrForm::Vtk`], times π: matte layer and highlight (`vtkOpenGLPolyDataMapper`'s shader, VTK 9.1).
+fn vtk_pbr([metallic, roughness, specular]: [f32; 3], albedo: Vec3, n: Vec3, v: Vec3, l: Vec3) -> [Vec3; 2] {
+    // As the shader has them: never 0.
+    let cosine = |a: Vec3, b: Vec3| a.dot(b).clamp(1e-5, 1.0);
+    let h = (v + l).normalize_or_zero();
+    let (nv, nl, nh, hl) = (cosine(n, v), cosine(n, l), cosine(n, h), cosine(h, l));
+    let f0 = Vec3::splat(specular).lerp(albedo, metallic);
+    let grazing = (f0.element_sum() * (50.0 * 0.33)).clamp(0.0, 1.0);
+    let f90 = Vec3::splat(grazing).lerp(Vec3::ONE, metallic);
+    let m = 1.0 - hl;
+    let m2 = m * m;
+    let f = f0 + (f90 - f0) * (m2 * m2 * m);
+    let a = roughness * roughness;
+    let a2 = a * a;
+    let d = (nh * a2 - nh) * nh + 1.0;
+    // A mirror is a point that no pixel would find; the shader divides 0 by 0 there.
+    let distribution = a2 / (PI * d * d).max(f32::MIN_POSITIVE);
+    let visibility =
+        0.5 / (nl * (a + nv * (nv - a * nv)).max(0.0).sqrt() + nv * (a + nl * (nl - a * nl)).max(0.0).sqrt());
+    [albedo * (Vec3::ONE - f) * (1.0 - metallic), f * (distribution * visibility * PI)]
+}
+
 /// Light sent to the viewer per unit of ambient radiance. Where reflection rays are left out, a reflector takes its share of
 /// ambient light instead of turning black.
 #[inline]
@@ -101,6 +127,10 @@ pub(crate) fn ambient_albedo(m: &Material, color: Vec3, effects: Effects) -> Vec
             } else {
                 color
             }
+        }
+        // VTK's physically based shader knows no ambient light; where occlusion is asked for, there must be something to occlude.
+        SurfaceModel::Pbr { form: PbrForm::Vtk, .. } if !effects.contains(Effects::AMBIENT_OCCLUSION) => {
+            Vec3::ZERO
         }
         SurfaceModel::Pbr { metallic, .. } => {
             if reflects {

@@ -106,7 +106,7 @@ fn scatter(
             }
         }
         SurfaceModel::Metal { roughness } => gloss(color, roughness, 1.0),
-        SurfaceModel::Pbr { metallic, roughness, specular } => {
+        SurfaceModel::Pbr { metallic, roughness, specular, .. } => {
             let f0 = Vec3::splat(specular).lerp(color, metallic);
             let at_view = schlick(f0, n.dot(p.view)).max_element() * (f0 != Vec3::ZERO) as u32 as f32;
             let matte = color * (1.0 - metallic);

@@ -44,7 +44,7 @@ pub(super) fn send_specular_rays(
                     reflect_lobe(stage, area, p, f0, roughness, weight, &state, &mut work.scattered, stats);
                 }
             }
-            SurfaceModel::Pbr { metallic, roughness, specular } if metallic > 0.0 || specular > 0.0 => {
+            SurfaceModel::Pbr { metallic, roughness, specular, .. } if metallic > 0.0 || specular > 0.0 => {
                 let f0 = Vec3::splat(specular).lerp(p.surface.color, metallic);
                 if if roughness <= MIRROR_ROUGHNESS { mirror } else { gloss } {
                     reflect_lobe(stage, area, p, f0, roughness, weight, &state, &mut work.scattered, stats);

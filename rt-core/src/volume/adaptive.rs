@@ -8,8 +8,8 @@
 //! 3. the curve reaches a step of the transfer function elsewhere than its chord does;
 //! 4. colours are mixed, not put one behind the other: seen as a difference too, but only when both parts have some thickness.
 
-use super::Volume;
 use super::layer::{Layer, March};
+use super::{Lit, LitStretch, Volume};
 use crate::grid_walk::{Crossing, IndexRay};
 use crate::ray_cubic;
 
@@ -49,7 +49,13 @@ impl Volume {
         m: &mut March,
     ) {
         let ends = [self.transfer.integral(b[0]), self.transfer.integral(b[3])];
-        let layer = self.layer(ray, per_t, c.t0, c.t1, b, &ends);
+        let lit = self.options.shading.is_some().then(|| {
+            let mid = 0.5 * (c.t0 + c.t1);
+            let plain = Lit { factor: 1.0, highlight: 0.0 };
+            let ends = [c.t0, mid, c.t1].map(|t| self.light_at(ray, t).unwrap_or(plain));
+            LitStretch { t0: c.t0, per_t: 1.0 / (c.t1 - c.t0), ends }
+        });
+        let layer = self.layer(lit.as_ref(), per_t, c.t0, c.t1, b, &ends);
         m.samples += 1;
         // What is wrong in one place of a cell, not all along it, may use half of the cell's share of the tolerance.
         let local_share = 0.5 * m.error_per_length * (c.t1 - c.t0) * per_t;
@@ -62,8 +68,8 @@ impl Volume {
             let mid = ta + SPLIT * (tb - ta);
             let (near, far) = ray_cubic::split(&b, SPLIT);
             let im = self.transfer.integral(far[0]);
-            let first = self.layer(ray, per_t, ta, mid, &near, &[i0, im]);
-            let second = self.layer(ray, per_t, mid, tb, &far, &[im, i1]);
+            let first = self.layer(lit.as_ref(), per_t, ta, mid, &near, &[i0, im]);
+            let second = self.layer(lit.as_ref(), per_t, mid, tb, &far, &[im, i1]);
             m.samples += 2;
             let length = (tb - ta) * per_t;
             let t = m.transmittance;
@@ -88,7 +94,7 @@ impl Volume {
     #[inline]
     fn layer(
         &self,
-        ray: &IndexRay,
+        lit: Option<&LitStretch>,
         per_t: f64,
         ta: f64,
         tb: f64,
@@ -103,7 +109,7 @@ impl Volume {
         } else {
             self.transfer.sample(0.5 * (s0 + s1))
         };
-        let color = if sigma > 0.0 { self.shade(ray, 0.5 * (ta + tb), color) } else { color };
+        let color = lit.map_or(color, |l| l.at(0.5 * (ta + tb)).on(color));
         Layer { tau: sigma.max(0.0) * (tb - ta) * per_t, color }
     }
 

@@ -52,7 +52,7 @@ pub enum VolumeError {
 }
 
 /// Lambert shading by the gradient, two-sided, with a light at the viewer or in a fixed direction. It multiplies the colour by
-/// `ambient + diffuse·|n·l|` where the gradient is steep, and by 1 where there is none.
+/// `ambient + diffuse·|n·l|` where the gradient is steep, and by 1 where there is none; `specular·|n·h|^shininess` is added.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VolumeShading {
     /// Part of the colour that needs no light, 0..=1.
@@ -61,8 +61,37 @@ pub struct VolumeShading {
     pub diffuse: f32,
     /// Direction towards the light, any length, in the volume's axes; `None` for a light at the viewer.
     pub light: Option<Vec3>,
-    /// Gradient, in value per world unit, at which the shading has half its effect.
+    /// White highlight (Blinn 1977); 0 for none.
+    pub specular: f32,
+    /// Exponent of the highlight.
+    pub shininess: f32,
+    /// Gradient, in value per world unit, at which the shading has half its effect. With 0 it has all of it everywhere, and only `ambient` where
+    /// there is no gradient (VTK).
     pub half_gradient: f32,
+}
+
+impl Default for VolumeShading {
+    /// A light at the viewer that changes nothing.
+    fn default() -> Self {
+        VolumeShading {
+            ambient: 1.0,
+            diffuse: 0.0,
+            light: None,
+            specular: 0.0,
+            shininess: 1.0,
+            half_gradient: 0.0,
+        }
+    }
+}
+
+/// What the scalar is between the points of the grid.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Interpolation {
+    /// Trilinear.
+    #[default]
+    Linear,
+    /// That of the nearest point: boxes of one value around each point, cut at the grid's bounds.
+    Nearest,
 }
 
 /// How to make a [`Volume`].
@@ -70,6 +99,8 @@ pub struct VolumeShading {
 pub struct VolumeOptions {
     /// Shading by the gradient; `None` for pure emission and absorption.
     pub shading: Option<VolumeShading>,
+    /// The scalar between points.
+    pub interpolation: Interpolation,
 }
 
 /// What accuracy to spend time on.
@@ -168,9 +199,10 @@ impl Volume {
             if let Some(&(field, value)) = fields.iter().find(|f| !(0.0..=1.0).contains(&f.1)) {
                 return Err(VolumeError::Shading { field, value, rule: "0 to 1" });
             }
-            if !(s.half_gradient > 0.0 && s.half_gradient.is_finite()) {
-                let rule = "finite and positive, in value per world unit";
-                return Err(VolumeError::Shading { field: "half_gradient", value: s.half_gradient, rule });
+            let fields =
+                [("half_gradient", s.half_gradient), ("specular", s.specular), ("shininess", s.shininess)];
+            if let Some(&(field, value)) = fields.iter().find(|f| !(f.1 >= 0.0 && f.1.is_finite())) {
+                return Err(VolumeError::Shading { field, value, rule: "finite and not negative" });
             }
             if let Some(l) = s.light
                 && l.try_normalize().is_none()
@@ -179,14 +211,15 @@ impl Volume {
                 return Err(VolumeError::Shading { field: "light", value: l.length(), rule });
             }
         }
-        let cells = grid.dims - UVec3::ONE;
+        let nearest = options.interpolation == Interpolation::Nearest;
+        let cells = if nearest { grid.dims } else { grid.dims - UVec3::ONE };
         let blocks = (cells + MACROCELL - UVec3::ONE) / MACROCELL;
         let scans: Vec<([f32; 2], u64)> = (0..blocks.as_usizevec3().element_product())
             .into_par_iter()
             .map(|n| {
                 let (x, y) = (blocks.x as usize, blocks.y as usize);
                 let lo = UVec3::new((n % x) as u32, (n / x % y) as u32, (n / x / y) as u32) * MACROCELL;
-                scan(&grid, lo, (lo + MACROCELL).min(cells))
+                scan(&grid, lo, (lo + MACROCELL).min(cells), nearest)
             })
             .collect();
         let report = VolumeReport {
@@ -258,8 +291,19 @@ impl Volume {
     fn march(&self, ray: &Ray, t0: f64, t1: f64, quality: &VolumeQuality) -> March {
         let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
         let per_t = d.length();
-        let index_ray = IndexRay::new(o, d, self.grid.spacing);
-        let cells = (self.grid.dims - UVec3::ONE).to_array().map(i64::from);
+        let nearest = self.options.interpolation == Interpolation::Nearest;
+        let (index_ray, cells, t0, t1) = if nearest {
+            // Cells are the boxes around points: half a spacing further out than the bounds, where they are cut.
+            let moved = IndexRay::new(o + 0.5 * self.grid.spacing, d, self.grid.spacing);
+            let (near, far) = within(o, d, self.grid.max_corner() - self.grid.origin);
+            (moved, self.grid.dims, t0.max(near), t1.min(far))
+        } else {
+            (IndexRay::new(o, d, self.grid.spacing), self.grid.dims - UVec3::ONE, t0, t1)
+        };
+        let cells = cells.to_array().map(i64::from);
+        if t0 >= t1 {
+            return March::new(*quality, 0.0);
+        }
         // The error budget is handed out by length of path through the grid.
         let mut inside = (0.0, 0.0);
         let whole = cells.iter().max().copied().unwrap_or(1);
@@ -292,7 +336,18 @@ impl Volume {
         if c.t1 <= c.t0 {
             return;
         }
-        let corners = self.grid.corners(UVec3::from_array(c.cell.map(|i| i as u32)));
+        let cell = UVec3::from_array(c.cell.map(|i| i as u32));
+        if self.options.interpolation == Interpolation::Nearest {
+            let value = self.grid.at(cell.x, cell.y, cell.z);
+            if value.is_finite() {
+                let (sigma, color) = self.transfer.sample(value.into());
+                m.samples += 1;
+                let tau = sigma * (c.t1 - c.t0) * per_t;
+                m.add(c.t0, c.t1, &Layer { tau, color: self.shade(ray, 0.5 * (c.t0 + c.t1), color) });
+            }
+            return;
+        }
+        let corners = self.grid.corners(cell);
         if !corners.iter().all(|v| v.is_finite()) {
             return;
         }
@@ -334,31 +389,109 @@ impl Volume {
 
     #[inline]
     fn shade(&self, ray: &IndexRay, t: f64, color: [f64; 3]) -> [f64; 3] {
-        let Some(s) = &self.options.shading else { return color };
+        match self.light_at(ray, t) {
+            Some(light) => light.on(color),
+            None => color,
+        }
+    }
+
+    /// What shading makes of colours at `t`; `None` without shading.
+    fn light_at(&self, ray: &IndexRay, t: f64) -> Option<Lit> {
+        let s = self.options.shading.as_ref()?;
         let at = DVec3::from_array(ray.at(t)).as_vec3();
+        // In indices moved by half a cell, the point around which the box lies.
+        let at = if self.options.interpolation == Interpolation::Nearest { at.floor() } else { at };
         let g = smooth_gradient(&self.grid, at).as_dvec3();
         let steepness = g.length();
         if !(steepness > 0.0 && steepness.is_finite()) {
-            return color;
+            let factor = if s.half_gradient > 0.0 { 1.0 } else { f64::from(s.ambient) };
+            return Some(Lit { factor, highlight: 0.0 });
         }
+        let dir = DVec3::from_array(ray.d) * self.grid.spacing;
         let light = match s.light {
             Some(l) => l.as_dvec3(),
-            None => DVec3::from_array(ray.d) * self.grid.spacing,
+            None => dir,
         };
         let cos = (g.dot(light) / (steepness * light.length())).abs();
         let lit = f64::from(s.ambient) + f64::from(s.diffuse) * cos;
         let weight = steepness / (steepness + f64::from(s.half_gradient));
-        color.map(|c| c * (1.0 + weight * (lit - 1.0)))
+        let highlight = if s.specular > 0.0 {
+            let towards_viewer = if s.light.is_some() { -dir } else { dir };
+            let half = light.normalize_or_zero() + towards_viewer.normalize_or_zero();
+            let base = (g.dot(half) / (steepness * half.length())).abs();
+            // Two opposite directions have no half vector.
+            if base.is_finite() {
+                weight * f64::from(s.specular) * base.powf(s.shininess.into())
+            } else {
+                0.0
+            }
+        } else {
+            0.0
+        };
+        Some(Lit { factor: 1.0 + weight * (lit - 1.0), highlight })
     }
 }
 
-/// Range of the finite values of a block's cells, and how many cells have a value that is not finite.
-fn scan(grid: &Grid, lo: UVec3, hi: UVec3) -> ([f32; 2], u64) {
+/// What shading makes of a colour.
+#[derive(Debug, Clone, Copy)]
+struct Lit {
+    factor: f64,
+    highlight: f64,
+}
+
+impl Lit {
+    #[inline]
+    fn on(&self, color: [f64; 3]) -> [f64; 3] {
+        color.map(|c| c * self.factor + self.highlight)
+    }
+}
+
+/// Shading along a ray's way through a cell: the parabola through its values at both ends and in the middle. Gradients cost as much as everything else of
+/// a sample, and between grid points they bend no more than that.
+#[derive(Debug, Clone, Copy)]
+struct LitStretch {
+    t0: f64,
+    per_t: f64,
+    ends: [Lit; 3],
+}
+
+impl LitStretch {
+    #[inline]
+    fn at(&self, t: f64) -> Lit {
+        let x = (t - self.t0) * self.per_t;
+        let [a, b, c] = self.ends;
+        let weights = [(1.0 - x) * (1.0 - 2.0 * x), 4.0 * x * (1.0 - x), x * (2.0 * x - 1.0)];
+        let mix = |v: [f64; 3]| (v[0] * weights[0] + v[1] * weights[1] + v[2] * weights[2]).max(0.0);
+        Lit {
+            factor: mix([a.factor, b.factor, c.factor]),
+            highlight: mix([a.highlight, b.highlight, c.highlight]),
+        }
+    }
+}
+
+/// Where a ray is inside the box from zero to `size`.
+fn within(o: DVec3, d: DVec3, size: DVec3) -> (f64, f64) {
+    let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
+    for a in 0..3 {
+        if d[a] == 0.0 {
+            if o[a] < 0.0 || o[a] > size[a] {
+                return (f64::INFINITY, f64::NEG_INFINITY);
+            }
+        } else {
+            let (x, y) = (-o[a] / d[a], (size[a] - o[a]) / d[a]);
+            (near, far) = (near.max(x.min(y)), far.min(x.max(y)));
+        }
+    }
+    (near, far)
+}
+
+/// Range of the finite values of a block's cells, and how many cells have a value that is not finite. `nearest`: a cell is around a point.
+fn scan(grid: &Grid, lo: UVec3, hi: UVec3, nearest: bool) -> ([f32; 2], u64) {
     let (mut range, mut bad) = ([f32::INFINITY, f32::NEG_INFINITY], 0);
     for k in lo.z..hi.z {
         for j in lo.y..hi.y {
             for i in lo.x..hi.x {
-                let v = grid.corners(UVec3::new(i, j, k));
+                let v = if nearest { [grid.at(i, j, k); 8] } else { grid.corners(UVec3::new(i, j, k)) };
                 if v.iter().all(|x| x.is_finite()) {
                     for x in v {
                         range = [range[0].min(x), range[1].max(x)];

@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 
-ABI = 1
+ABI = 220021418
 NONE, U8, F32, F64, I32, I64 = range(6)
 COLOR_PROPERTY, COLOR_POINTS, COLOR_CELLS, COLOR_MAPPED = range(4)
 LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT = range(3)
@@ -33,6 +33,7 @@ class Property(C.Structure):
     _fields_ = [(n, C.c_float * 3) for n in ("ambient_color", "diffuse_color", "specular_color")]
     _fields_ += [(n, C.c_float) for n in ("ambient", "diffuse", "specular", "specular_power", "opacity", "metallic", "roughness", "base_ior")]
     _fields_ += [(n, C.c_uint32) for n in ("flat", "lighting", "pbr", "cull_front", "cull_back")]
+    _fields_ += [("edge_color", C.c_float * 3), ("edge_width", C.c_float)]
 
 
 class Surface(C.Structure):
@@ -40,8 +41,8 @@ class Surface(C.Structure):
         ("name", C.c_char_p), ("shape_key", C.c_uint64), ("color_key", C.c_uint64), ("texture_key", C.c_uint64), ("points", Array),
         ("verts", Cells), ("lines", Cells), ("polys", Cells), ("strips", Cells), ("point_normals", Array), ("cell_normals", Array),
         ("texcoords", Array), ("clip_planes", Array), ("color_source", C.c_uint32), ("edges_only", C.c_uint32), ("colors", Array), ("map", Array),
-        ("nan_color", C.c_uint8 * 4), ("texture_interpolate", C.c_uint8), ("texture_repeat", C.c_uint8), ("reserved", C.c_uint8 * 2),
-        ("texture", Array), ("texture_width", C.c_uint32), ("reserved_2", C.c_uint32), ("property", Property),
+        ("nan_color", C.c_uint8 * 4), ("texture_interpolate", C.c_uint8), ("texture_repeat", C.c_uint8), ("texture_srgb", C.c_uint8), ("reserved", C.c_uint8),
+        ("texture", Array), ("texture_width", C.c_uint32), ("has_back", C.c_uint32), ("property", Property), ("back", Property),
         ("world_from_data", C.c_double * 16), ("glyph_matrices", Array), ("glyph_colors", Array), ("point_radius", C.c_double),
         ("line_radius", C.c_double),
     ]

@@ -7,7 +7,7 @@ use datasets::cli::{CommonArgs, CompletionsArgs, CureExt, Status, UsageError, ru
 use std::path::PathBuf;
 use std::process::ExitCode;
 use vtk_bridge::options::NAMES;
-use vtk_bridge::setup::environment::{Program, exports};
+use vtk_bridge::setup::environment::{Program, anari_exports, exports};
 use vtk_bridge::setup::headers::{Flavour, find, places};
 use vtk_bridge::setup::layout::{Layout, library};
 use vtk_bridge::setup::{SetupError, doctor, plugin};
@@ -27,6 +27,7 @@ const EXAMPLES: &str = "Examples:
   pvbatch script.py                         … any script, unchanged
   RTV_AO=16 RTV_SHADOWS=1 pvbatch script.py with ambient occlusion and shadows
   eval \"$(vtk-bridge env --vtk)\"            the same for Python scripts with VTK
+  eval \"$(vtk-bridge env --anari)\"          ANARI programs find the device `rtv`
   vtk-bridge doctor                         what is missing
   vtk-bridge options                        all variables RTV_*";
 
@@ -82,6 +83,9 @@ struct EnvArgs {
     /// For ParaView, pvpython and pvbatch.
     #[arg(long, group = "program")]
     paraview: bool,
+    /// For programs that know ANARI: the device `rtv`.
+    #[arg(long, group = "program")]
+    anari: bool,
 }
 
 fn variable(name: &str) -> Option<String> {
@@ -159,6 +163,15 @@ fn examine(common: &CommonArgs, args: &PrefixArgs) -> anyhow::Result<Status> {
 
 fn env(common: &CommonArgs, args: &EnvArgs) -> anyhow::Result<Status> {
     let layout = args.place.layout();
+    if args.anari {
+        let library = library()?;
+        if !layout.anari_is(&library) {
+            layout.install_anari(&library)?;
+        }
+        let text = anari_exports(&layout, variable("LD_LIBRARY_PATH").as_deref());
+        common.result(&text.lines().collect::<Vec<_>>(), || text.trim_end().to_owned())?;
+        return Ok(Status::Success);
+    }
     let program = if args.paraview { Program::ParaView } else { Program::Vtk };
     let (found, ..) = flavours(&[]);
     let wanted: Vec<Flavour> = found.into_iter().filter(|f| program.runs(&f.name)).collect();

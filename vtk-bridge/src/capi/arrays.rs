@@ -2,7 +2,8 @@
 
 use super::types::*;
 use crate::input::{
-    Cells, Color, Glyphs, Ids, Image, LightKind, PerItem, Points, Property, SceneLight, Shape, Surface,
+    Cells, Color, Glyphs, Ids, Image, LightKind, PerItem, Points, Property, Scalars, SceneLight, Shading,
+    Shape, Surface, Volume,
 };
 use rt_core::glam::DMat4;
 
@@ -86,6 +87,7 @@ pub(super) unsafe fn surface<'a>(s: &RtvSurface, name: &'a str) -> Result<Surfac
             point_radius: s.point_radius,
             line_radius: s.line_radius,
             edges_only: s.edges_only != 0,
+            has_backs: s.has_back != 0,
         };
         let key = s.color_key;
         let color = match s.color_source {
@@ -113,6 +115,7 @@ pub(super) unsafe fn surface<'a>(s: &RtvSurface, name: &'a str) -> Result<Surfac
             rgba: &texels[..texels.len() / width * width],
             interpolate: s.texture_interpolate != 0,
             repeat: s.texture_repeat != 0,
+            srgb: s.texture_srgb != 0,
         });
         let matrices: &[[f64; 16]] = tuples(&s.glyph_matrices, "glyphs", RTV_F64)?;
         Ok(Surface {
@@ -122,11 +125,50 @@ pub(super) unsafe fn surface<'a>(s: &RtvSurface, name: &'a str) -> Result<Surfac
             color,
             texture,
             property: property(&s.property),
+            back: (s.has_back != 0).then(|| property(&s.back)),
             glyphs: (s.glyph_matrices.kind != RTV_NONE)
                 .then(|| {
                     tuples(&s.glyph_colors, "glyph colours", RTV_U8).map(|rgba| Glyphs { matrices, rgba })
                 })
                 .transpose()?,
+        })
+    }
+}
+
+/// The volume with its arrays as slices.
+///
+/// # Safety
+/// As [`surface`].
+pub(super) unsafe fn volume<'a>(v: &RtvVolume, name: &'a str) -> Result<Volume<'a>, String> {
+    // SAFETY: the caller's promise, for every array.
+    unsafe {
+        let (array, what) = (&v.scalars, "scalars");
+        let scalars = match array.kind {
+            RTV_U8 => Scalars::U8(tuples::<u8, 1>(array, what, RTV_U8)?.as_flattened()),
+            RTV_I32 => Scalars::I32(tuples::<i32, 1>(array, what, RTV_I32)?.as_flattened()),
+            RTV_I64 => Scalars::I64(tuples::<i64, 1>(array, what, RTV_I64)?.as_flattened()),
+            RTV_F64 => Scalars::F64(tuples::<f64, 1>(array, what, RTV_F64)?.as_flattened()),
+            _ => Scalars::F32(tuples::<f32, 1>(array, what, RTV_F32)?.as_flattened()),
+        };
+        let opacities: &[[f32; 1]] = tuples(&v.opacities, "opacities", RTV_F32)?;
+        Ok(Volume {
+            name,
+            key: v.scalar_key,
+            scalars,
+            dims: v.dims,
+            spacing: v.spacing,
+            world_from_data: DMat4::from_cols_array(&v.world_from_data).transpose(),
+            nearest: v.nearest != 0,
+            range: v.range,
+            colors: tuples(&v.colors, "colours", RTV_F32)?,
+            opacities: opacities.as_flattened(),
+            unit_distance: v.unit_distance,
+            shading: (v.shade != 0).then_some(Shading {
+                ambient: v.ambient,
+                diffuse: v.diffuse,
+                specular: v.specular,
+                specular_power: v.specular_power,
+            }),
         })
     }
 }
@@ -149,6 +191,8 @@ fn property(p: &RtvProperty) -> Property {
         base_ior: p.base_ior,
         cull_front: p.cull_front != 0,
         cull_back: p.cull_back != 0,
+        edge_color: p.edge_color,
+        edge_width: p.edge_width,
     }
 }
 

@@ -24,8 +24,8 @@ pub struct RtvBridge {
     _private: [u8; 0],
 }
 
-/// Number of this interface; it changes when a structure or a call does. A shim built for another one must not go on.
-pub const RTV_ABI: u32 = 1;
+/// Number of this interface, made from its structures and calls (a test says which). A shim built for another one must not go on.
+pub const RTV_ABI: u32 = 220_021_418;
 
 /// [`RTV_ABI`] of the library.
 #[unsafe(no_mangle)]
@@ -112,6 +112,37 @@ pub unsafe extern "C" fn rtv_surface(bridge: *mut RtvBridge, surface: *const Rtv
             }
         })
     }
+}
+
+/// Adds a volume: null when it will be traced, else the reason why not, of the bridge's memory until its next call.
+///
+/// # Safety
+/// As `rtv_surface`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtv_volume(bridge: *mut RtvBridge, volume: *const RtvVolume) -> *const c_char {
+    // SAFETY: as above; a null volume is refused.
+    let Some(v) = (unsafe { volume.as_ref() }) else { return c"no volume".as_ptr() };
+    // SAFETY: as above.
+    unsafe {
+        with(bridge, c"internal error".as_ptr(), |h| {
+            let name = text(v.name);
+            let added = arrays::volume(v, &name).and_then(|volume| h.bridge.add_volume(&volume));
+            match added {
+                Ok(()) => std::ptr::null(),
+                Err(reason) => h.answer(reason),
+            }
+        })
+    }
+}
+
+/// 1 when the scalars of this key are kept: `rtv_volume` need not be given them.
+///
+/// # Safety
+/// As `rtv_begin`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtv_has_volume(bridge: *mut RtvBridge, scalar_key: u64) -> i32 {
+    // SAFETY: as above.
+    unsafe { with(bridge, 0, |h| i32::from(h.bridge.has_volume(scalar_key))) }
 }
 
 /// 1 when colours of these keys are kept from the frame before: `rtv_surface` need not be given their arrays.
@@ -220,6 +251,10 @@ pub struct RtvApi {
     pub surface: unsafe extern "C" fn(*mut RtvBridge, *const RtvSurface) -> i32,
     /// [`rtv_has_colors`].
     pub has_colors: unsafe extern "C" fn(*mut RtvBridge, u64, u64) -> i32,
+    /// [`rtv_volume`].
+    pub volume: unsafe extern "C" fn(*mut RtvBridge, *const RtvVolume) -> *const c_char,
+    /// [`rtv_has_volume`].
+    pub has_volume: unsafe extern "C" fn(*mut RtvBridge, u64) -> i32,
     /// [`rtv_light`].
     pub light: unsafe extern "C" fn(*mut RtvBridge, *const RtvLight),
     /// [`rtv_pass`].
@@ -241,6 +276,8 @@ static API: RtvApi = RtvApi {
     begin: rtv_begin,
     surface: rtv_surface,
     has_colors: rtv_has_colors,
+    volume: rtv_volume,
+    has_volume: rtv_has_volume,
     light: rtv_light,
     pass: rtv_pass,
     warn: rtv_warn,

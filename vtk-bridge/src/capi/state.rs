@@ -6,6 +6,8 @@ use crate::input::View;
 use crate::options::Options;
 use crate::report;
 use std::collections::BTreeMap;
+use std::ffi::CString;
+use std::os::raw::c_char;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -15,6 +17,8 @@ pub(super) struct Handle {
     pub(super) bridge: Bridge,
     number: u64,
     poisoned: bool,
+    /// The text that the last call gave away.
+    answer: CString,
 }
 
 /// Options set by the program, over those of the environment.
@@ -44,7 +48,18 @@ pub(super) fn set_option(name: &str, value: &str) -> bool {
 impl Handle {
     pub(super) fn new() -> Handle {
         static NUMBER: AtomicU64 = AtomicU64::new(1);
-        Handle { bridge: Bridge::new(), number: NUMBER.fetch_add(1, Ordering::Relaxed), poisoned: false }
+        Handle {
+            bridge: Bridge::new(),
+            number: NUMBER.fetch_add(1, Ordering::Relaxed),
+            poisoned: false,
+            answer: CString::default(),
+        }
+    }
+
+    /// `text` for the caller, until the next call.
+    pub(super) fn answer(&mut self, text: String) -> *const c_char {
+        self.answer = CString::new(text.replace('\0', " ")).unwrap_or_default();
+        self.answer.as_ptr()
     }
 
     pub(super) fn begin(&mut self) -> i32 {

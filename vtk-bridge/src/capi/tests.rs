@@ -35,6 +35,8 @@ fn property() -> RtvProperty {
         pbr: 0,
         cull_front: 0,
         cull_back: 0,
+        edge_color: [0.0; 3],
+        edge_width: 0.0,
     }
 }
 
@@ -61,11 +63,13 @@ fn surface(points: &[[f32; 3]], offsets: &[[i64; 1]], connectivity: &[[i64; 1]])
         nan_color: [0; 4],
         texture_interpolate: 0,
         texture_repeat: 0,
-        reserved: [0; 2],
+        texture_srgb: 0,
+        reserved: 0,
         texture: NO_ARRAY,
         texture_width: 0,
-        reserved_2: 0,
+        has_back: 0,
         property: property(),
+        back: property(),
         world_from_data: IDENTITY,
         glyph_matrices: NO_ARRAY,
         glyph_colors: NO_ARRAY,

@@ -91,6 +91,10 @@ pub struct RtvProperty {
     pub cull_front: u32,
     /// 1 to leave out sides turned away.
     pub cull_back: u32,
+    /// Colour of the edges of polygons.
+    pub edge_color: [f32; 3],
+    /// Their width in pixels; 0 for none.
+    pub edge_width: f32,
 }
 
 /// Something to draw. Arrays are read before `rtv_surface` returns and not kept.
@@ -137,16 +141,20 @@ pub struct RtvSurface {
     pub texture_interpolate: u8,
     /// 1: the texture is repeated.
     pub texture_repeat: u8,
+    /// 1: the texture is encoded as sRGB.
+    pub texture_srgb: u8,
     /// Not used.
-    pub reserved: [u8; 2],
+    pub reserved: u8,
     /// Four RTV_U8 per texel, or none.
     pub texture: RtvArray,
     /// Texels per row.
     pub texture_width: u32,
-    /// Not used.
-    pub reserved_2: u32,
+    /// 1: backs of polygons answer light as back says.
+    pub has_back: u32,
     /// Answer to light.
     pub property: RtvProperty,
+    /// Answer of backs.
+    pub back: RtvProperty,
     /// Row by row.
     pub world_from_data: [f64; 16],
     /// Sixteen RTV_F64 per copy (row by row), or none.
@@ -157,6 +165,46 @@ pub struct RtvSurface {
     pub point_radius: f64,
     /// Radius of tubes for lines and edges; 0 for none.
     pub line_radius: f64,
+}
+
+/// A uniform grid of scalars as a medium. Arrays are read before rtv_volume returns and not kept.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct RtvVolume {
+    /// Name for messages, UTF-8.
+    pub name: *const c_char,
+    /// Changes whenever the scalars do; 0: not known.
+    pub scalar_key: u64,
+    /// One number of any kind per point, x fastest; none when rtv_has_volume says that they are kept.
+    pub scalars: RtvArray,
+    /// Points per axis.
+    pub dims: [u32; 3],
+    /// 1: the value of the nearest point; 0: linear.
+    pub nearest: u32,
+    /// Distance of neighbouring points.
+    pub spacing: [f64; 3],
+    /// Row by row; the first point is at zero of the data.
+    pub world_from_data: [f64; 16],
+    /// Scalars of the first and the last entry of both tables.
+    pub range: [f64; 2],
+    /// Three RTV_F32 per entry.
+    pub colors: RtvArray,
+    /// One RTV_F32 per entry: opacity of a slab of unit_distance.
+    pub opacities: RtvArray,
+    /// See opacities.
+    pub unit_distance: f64,
+    /// 1 for shading by the gradient with a headlight.
+    pub shade: u32,
+    /// Of the shading.
+    pub ambient: f32,
+    /// Of the shading.
+    pub diffuse: f32,
+    /// Of the shading.
+    pub specular: f32,
+    /// Of the shading.
+    pub specular_power: f32,
+    /// Not used.
+    pub reserved: u32,
 }
 
 /// A light that is on.

@@ -1,5 +1,6 @@
 //! From points and cells to what rays can meet, and what is needed to put colours on it later.
 
+mod backs;
 mod clip;
 mod points_and_lines;
 mod triangulate;
@@ -23,6 +24,8 @@ pub struct Built {
     pub spheres: Option<Arc<rt_core::shapes::Spheres>>,
     /// Tubes of lines or edges.
     pub tubes: Option<Arc<rt_core::shapes::Tubes>>,
+    /// Backs of the triangles, where they look different.
+    pub backs: Option<Arc<dyn rt_core::shapes::Shape>>,
     /// Triangles that cannot be drawn (a NaN point, a point number that does not exist).
     pub skipped: usize,
 }
@@ -34,6 +37,8 @@ pub struct BuiltMesh {
     pub mesh: Arc<TriMesh>,
     /// Cell number of each triangle.
     pub cells: CellOfTriangle,
+    /// Which sides of each triangle are edges of its polygon (bit i: from corner i to the next); `None` when all are.
+    pub edges: Option<Arc<Vec<u8>>>,
     /// Set when clipping planes made new vertices and triangles.
     pub clipped: Option<Arc<Clipped>>,
 }
@@ -81,7 +86,7 @@ fn cell_numbers(shape: &Shape<'_>) -> [Range<usize>; 4] {
 /// Builds everything that `shape` asks for.
 pub fn build(shape: &Shape<'_>) -> Built {
     let [_, _, polys, strips] = cell_numbers(shape);
-    let mut built = Built { mesh: None, spheres: None, tubes: None, skipped: 0 };
+    let mut built = Built { mesh: None, spheres: None, tubes: None, backs: None, skipped: 0 };
     points_and_lines::add(shape, &mut built);
     if shape.edges_only {
         return built;
@@ -109,6 +114,12 @@ pub fn build(shape: &Shape<'_>) -> Built {
         (mesh, Some(Arc::new(clipped)))
     };
     built.skipped = (0..mesh.indices.len()).filter(|&i| !mesh.is_renderable(i)).count();
-    built.mesh = Some(BuiltMesh { mesh: Arc::new(mesh), cells, clipped });
+    let edges = match cells {
+        CellOfTriangle::Consecutive { .. } => None,
+        CellOfTriangle::List(_) => Some(Arc::new(triangulate::edges(shape))),
+    };
+    let mesh = Arc::new(mesh);
+    built.backs = shape.has_backs.then(|| Arc::new(backs::Backs::of(Arc::clone(&mesh))) as Arc<_>);
+    built.mesh = Some(BuiltMesh { mesh, cells, edges, clipped });
     built
 }

@@ -34,6 +34,20 @@ pub(super) fn triangles(
     (all().map(|t| t.0).collect(), CellOfTriangle::List(Arc::new(all().map(|t| t.1).collect())))
 }
 
+/// Which sides of the triangles of [`triangles`] are edges of their polygon: bit i for the side from corner i to the next.
+pub(super) fn edges(shape: &Shape<'_>) -> Vec<u8> {
+    let polys = expanded(&shape.polys, 0, |_, run, _, out| {
+        for k in run.start + 1..run.end.saturating_sub(1) {
+            let (first, last) = (k == run.start + 1, k + 2 == run.end);
+            out.push(([0; 3], u32::from(first) | 2 | u32::from(last) << 2));
+        }
+    });
+    let strips = expanded(&shape.strips, 0, |_, run, _, out| {
+        out.extend((run.start..run.end.saturating_sub(2)).map(|_| ([0; 3], 7)));
+    });
+    polys.iter().chain(&strips).flatten().map(|t| t.1 as u8).collect()
+}
+
 type Triangle = ([u32; 3], u32);
 
 /// Triangles by chunks of cells, in order.
@@ -96,6 +110,7 @@ mod tests {
         let (t, cells) = triangles(&shape(polys, strips), 5, 7);
         assert_eq!(t, [[0, 1, 2], [3, 4, 5], [3, 5, 6], [3, 6, 7], [10, 11, 12], [12, 11, 13]]);
         assert_eq!((0..6).map(|i| cells.at(i)).collect::<Vec<_>>(), [5, 6, 6, 6, 7, 7]);
+        assert_eq!(edges(&shape(polys, strips)), [7, 3, 2, 6, 7, 7], "diagonals of polygons are no edges");
     }
 
     #[test]

@@ -17,6 +17,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("rtv_factory.cxx", include_str!("../../cpp/rtv_factory.cxx")),
     ("rtv_glyphs.cxx", include_str!("../../cpp/rtv_glyphs.cxx")),
     ("rtv_renderer.cxx", include_str!("../../cpp/rtv_renderer.cxx")),
+    ("rtv_volumes.cxx", include_str!("../../cpp/rtv_volumes.cxx")),
     ("rtv_view.cxx", include_str!("../../cpp/rtv_view.cxx")),
 ];
 

@@ -49,6 +49,15 @@ pub fn exports(layout: &Layout, autoload_before: Option<&str>) -> String {
     )
 }
 
+/// Lines for `eval` after which ANARI programs load us when they ask for the library of the environment.
+pub fn anari_exports(layout: &Layout, libraries_before: Option<&str>) -> String {
+    let ours = layout.anari().parent().unwrap_or(layout.prefix()).display().to_string();
+    let others =
+        libraries_before.into_iter().flat_map(|v| v.split(':')).filter(|p| !p.is_empty() && *p != ours);
+    let path = std::iter::once(ours.as_str()).chain(others).collect::<Vec<_>>().join(":");
+    format!("export LD_LIBRARY_PATH={}\nexport ANARI_LIBRARY=rtv\n", quoted(&path))
+}
+
 /// `text` as one word of a POSIX shell.
 fn quoted(text: &str) -> String {
     format!("'{}'", text.replace('\'', r"'\''"))
@@ -65,6 +74,10 @@ mod tests {
         assert_eq!(
             text,
             "export VTK_AUTOLOAD_PATH='/a b/it'\\''s/autoload:/other'\nexport RTV_HOME='/a b/it'\\''s'\n"
+        );
+        assert_eq!(
+            anari_exports(&Layout::at("/a b".into()), Some("/lib:/a b/anari")),
+            "export LD_LIBRARY_PATH='/a b/anari:/lib'\nexport ANARI_LIBRARY=rtv\n"
         );
     }
 }

@@ -54,6 +54,11 @@ impl Layout {
         self.autoload().join("librtv_loader.so")
     }
 
+    /// The library as ANARI's loader looks for it: `libanari_library_rtv.so`, of the device `rtv`.
+    pub fn anari(&self) -> PathBuf {
+        self.prefix.join("anari").join("libanari_library_rtv.so")
+    }
+
     /// The shim of a VTK.
     pub fn shim(&self, flavour: &str) -> PathBuf {
         self.prefix.join("lib").join(flavour).join(SHIM)
@@ -98,11 +103,20 @@ impl Layout {
 
     /// Copies the library to where VTK finds it, unless it is there already.
     pub fn install_loader(&self, library: &Path) -> Result<(), SetupError> {
-        let (folder, loader) = (self.autoload(), self.loader());
-        fs::create_dir_all(&folder).map_err(io(&folder, "make the folder"))?;
-        let beside = self.prefix.join("librtv_loader.so.new");
+        self.put(library, &self.loader())
+    }
+
+    /// Copies the library to where ANARI's loader finds it.
+    pub fn install_anari(&self, library: &Path) -> Result<(), SetupError> {
+        self.put(library, &self.anari())
+    }
+
+    fn put(&self, library: &Path, place: &Path) -> Result<(), SetupError> {
+        let folder = place.parent().unwrap_or(&self.prefix);
+        fs::create_dir_all(folder).map_err(io(folder, "make the folder"))?;
+        let beside = place.with_extension("so.new");
         fs::copy(library, &beside).map_err(io(library, "copy"))?;
-        fs::rename(&beside, &loader).map_err(io(&loader, "put in place"))
+        fs::rename(&beside, place).map_err(io(place, "put in place"))
     }
 
     /// True when the shims were built from the sources of this program.
@@ -115,9 +129,19 @@ impl Layout {
 
     /// True when the installed loader is the library `library`, byte for byte.
     pub fn loader_is(&self, library: &Path) -> bool {
-        let read = |p: &Path| fs::read(p).ok();
-        read(&self.loader()).is_some_and(|a| read(library) == Some(a))
+        same(&self.loader(), library)
     }
+
+    /// True when the installed ANARI device is the library `library`, byte for byte.
+    pub fn anari_is(&self, library: &Path) -> bool {
+        same(&self.anari(), library)
+    }
+}
+
+/// Whether two files are there and the same.
+fn same(a: &Path, b: &Path) -> bool {
+    let read = |p: &Path| fs::read(p).ok();
+    read(a).is_some_and(|a| read(b) == Some(a))
 }
 
 /// The library that VTK loads: `RTV_LIBRARY`, or beside the program, or in `deps` beside it, or in `lib` one folder up.

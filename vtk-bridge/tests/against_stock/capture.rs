@@ -44,9 +44,9 @@ impl Capture {
     }
 
     /// Triangles that the report says were traced, all renderers together.
-    pub(crate) fn traced_triangles(&self) -> u64 {
+    pub(crate) fn traced_elements(&self) -> u64 {
         let lists = self.renderers().iter().filter_map(|r| r["traced"].as_array());
-        lists.flatten().filter_map(|t| t["triangles"].as_u64()).sum()
+        lists.flatten().flat_map(|t| [t["triangles"].as_u64(), t["cells"].as_u64()]).flatten().sum()
     }
 
     /// Names or reasons of what was left to OpenGL.

@@ -53,7 +53,7 @@ fn off_leaves_everything_to_opengl() {
     };
     for (off, stock) in off.iter().zip(&stock) {
         assert!(off.rgb == stock.rgb && off.depth == stock.depth, "RTV_OFF=1 is not stock VTK, bit for bit");
-        assert_eq!(off.traced_triangles(), 0);
+        assert_eq!(off.traced_elements(), 0);
     }
 }
 

@@ -15,10 +15,6 @@ fn both() -> Option<&'static (Run, Run)> {
     made.as_ref().map_err(|reason| skip(reason)).ok()
 }
 
-/// Pictures that are held to other bars, and why: VTK's formula for physically based surfaces is not rt-core's, and differs most (26 levels)
-/// where a surface is partly metallic.
-const PHYSICALLY_BASED: &[(&str, &str)] = &[("lights", "light_kit"), ("lights", "one_light")];
-
 fn same_as_stock(script: &str) {
     let Some((stock, ours)) = both() else { return };
     let names = stock.pictures(script).unwrap_or_else(|e| panic!("stock: {e}"));
@@ -27,12 +23,10 @@ fn same_as_stock(script: &str) {
     for name in names.iter().filter(|n| !n.contains(".tmp")) {
         let path = ours.path(script, name);
         let [stock, ours] = [stock, ours].map(|r| r.capture(script, name).unwrap());
-        if ours.traced_triangles() == 0 {
+        if ours.traced_elements() == 0 {
             found.push(format!("{}: nothing was ray traced: {:?}", path.display(), ours.report));
         }
-        let loose = Bars { color_mean: 2.5, color_strays: 0.06, ..Bars::STRICT };
-        let bars = if PHYSICALLY_BASED.contains(&(script, name.as_str())) { loose } else { Bars::STRICT };
-        found.extend(faults(&stock, &ours, &bars).iter().map(|f| format!("{}: {f}", path.display())));
+        found.extend(faults(&stock, &ours, &Bars::STRICT).iter().map(|f| format!("{}: {f}", path.display())));
     }
     assert!(found.is_empty(), "\n{}\n", found.join("\n"));
 }

@@ -57,8 +57,8 @@ fn names_are_those_of_ospray_where_there_is_one() {
 #[test]
 fn the_plugin_alone_traces_and_the_picture_is_stock() {
     let (Some(plain), Some(off)) = (picture("plain"), picture("off")) else { return };
-    assert!(plain.traced_triangles() > 0, "{:?}", plain.report);
-    assert_eq!(off.traced_triangles(), 0, "EnableRayTracing=0 must leave everything to OpenGL");
+    assert!(plain.traced_elements() > 0, "{:?}", plain.report);
+    assert_eq!(off.traced_elements(), 0, "EnableRayTracing=0 must leave everything to OpenGL");
     let mut off = off;
     off.facts = plain.facts.clone();
     assert_eq!(faults(&off, &plain, &Bars::STRICT), Vec::<String>::new());
@@ -113,7 +113,9 @@ fn options_go_back_and_views_do_not_share_them() {
 
 #[test]
 fn a_plugin_without_its_bridge_says_so_and_harms_nothing() {
-    if let Err(reason) = interpreter(Program::ParaView).and_then(|_| crate::peers::display().map(drop)) {
+    if let Err(reason) =
+        interpreter(Program::ParaView, With::Stock).and_then(|_| crate::peers::display().map(drop))
+    {
         return skip(&reason);
     }
     // The plugin alone in a folder: nothing it needs is above it.
@@ -121,7 +123,7 @@ fn a_plugin_without_its_bridge_says_so_and_harms_nothing() {
     std::fs::copy(plugin_folder().join("VtkBridge.so"), lonely.path().join("VtkBridge.so")).unwrap();
     let folder = output("plugin-alone");
     std::fs::create_dir_all(&folder).unwrap();
-    let line = format!("exec {} \"$@\"", interpreter(Program::ParaView).unwrap());
+    let line = format!("exec {} \"$@\"", interpreter(Program::ParaView, With::Stock).unwrap());
     let script = [scripts().join("run_all.py"), folder, scripts().join("paraview/views.py")];
     let launch = Launch::new(Program::ParaView, With::Stock, &line).unwrap().args(script);
     let out =

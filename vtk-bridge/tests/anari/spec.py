@@ -46,6 +46,18 @@ def spot_light_is_full_inside_dark_outside_and_linear_in_the_cosine_between(d):
     assert 0.05 < p[50, 50 + 20] < 0.45, "the rim is soft"
 
 
+def ring_light_is_a_disk_with_the_cosine_to_its_normal(d):
+    # The middle is straight ahead at distance 2; (0.6, 0, 0.8) is off the axis: cosines at both ends, and the square of the distance.
+    for light in (d.new("Light", "ring", position=[0.0, 0.0, 3.0], direction=[0.0, 0.0, -1.0], intensity=float(4 * np.pi)),
+                  d.new("Light", "ring", position=[0.0, 0.0, 3.0], direction=[0.0, 0.0, -1.0], power=float(4 * np.pi**2))):
+        p = draw(d, ball(d, light=light))
+        close(p[50, 50, :3], [0.5, 0.25, 1.0])
+        way = np.array([-0.6, 0.0, 2.2])
+        length = np.linalg.norm(way)
+        cosines = (way @ [0.6, 0.0, 0.8]) / length * (way[2] / length)
+        close(p[50, 80, 0], 0.5 * 4 * cosines / length**2, 1e-2)
+
+
 def ambient_light_makes_a_surface_its_colour(d):
     close(draw(d, ball(d, ambient=1.0))[50, 50], [0.5, 0.25, 1.0, 1.0])
 

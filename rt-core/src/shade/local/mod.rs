@@ -10,7 +10,7 @@ use super::layers::record_block;
 use super::lobes::{ambient_albedo, response};
 use super::stage::Stage;
 use super::tile::{PIXELS, TileArea, TileLayers};
-use super::{Workspace, camera_blocks, prefetch_surfaces};
+use super::{OPAQUE, Workspace, camera_blocks, prefetch_surfaces};
 use crate::effects::Effects;
 use crate::environment::Background;
 use crate::light::PlacedKind;
@@ -102,7 +102,7 @@ fn light_hits<S: Simd, const POINT: bool>(
             let placed = &stage.instances[instance as usize];
             placed.look_block::<S, POINT>(simd, lanes, rays, hits, &mut looks);
             for lane in 0..LANES {
-                let pale = looks.opacity[lane] < 1.0;
+                let pale = looks.opacity[lane] < OPAQUE;
                 stats.opacity_ignored += (pale && lanes >> lane & 1 != 0) as u64;
             }
             let material = placed.material;

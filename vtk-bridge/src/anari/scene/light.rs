@@ -55,6 +55,12 @@ pub(crate) fn light_of(light: &Object, place: &DAffine3, notes: &mut Notes) -> O
             let sized = number("radiance").filter(|_| radius > 0.0).map(|l| l * PI * radius * radius);
             (LightKind::Point { position, radius }, sized.unwrap_or(per_angle), [0.0, 0.0, 1.0])
         }
+        "ring" => {
+            let sized = number("radiance").filter(|_| radius > 0.0).map(|l| l * PI * radius * radius);
+            // Straight ahead; a disk's power is π times that.
+            let ahead = number("power").map(|p| p / PI).or(number("intensity")).unwrap_or(1.0);
+            (LightKind::Disk { position, direction, radius }, sized.unwrap_or(ahead), [0.0, 0.0, 1.0])
+        }
         _ => {
             let outer = 0.5 * number("openingAngle").unwrap_or(PI).clamp(0.0, 2.0 * PI);
             let inner = (outer - number("falloffAngle").unwrap_or(0.1).max(0.0)).max(0.0);

@@ -5,7 +5,7 @@ use super::attribute::{NAMES, Source};
 use super::paint::{AlphaMode, Input, Paint};
 use super::sampler::Sampler;
 use crate::anari::object::{Object, Value};
-use rt_core::material::{Material, SurfaceModel};
+use rt_core::material::{Material, PbrForm, SurfaceModel};
 
 /// A material without its colour: model and emission.
 pub(crate) fn model_of(material: &Object, notes: &mut Notes) -> Material {
@@ -43,7 +43,7 @@ pub(crate) fn model_of(material: &Object, notes: &mut Notes) -> Material {
     } else {
         // KHR_materials_specular, which ANARI follows: reflectance at normal incidence, scaled.
         let normal = ((ior - 1.0) / (ior + 1.0)).powi(2) * strength;
-        SurfaceModel::Pbr { metallic, roughness, specular: normal }
+        SurfaceModel::Pbr { metallic, roughness, specular: normal, form: PbrForm::Gltf }
     };
     let emission = material.vector("emissive", [0.0; 3]).map(|v| v as f32);
     if emission.iter().all(|v| v.is_finite() && *v >= 0.0) {

@@ -204,6 +204,23 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
     ),
     object(
         DataType::LIGHT,
+        "ring",
+        "KHR_LIGHT_RING",
+        "a disk that shines to one side, with the cosine to its normal",
+        &[
+            LIGHT,
+            &[
+                POSITION,
+                DIRECTION,
+                Parameter::new("radius", FLOAT, "radius of the disk").floats(&[0.0]),
+                INTENSITY,
+                POWER,
+                Parameter::new("radiance", FLOAT, "W/(sr m²); comes before the others when it has a radius"),
+            ],
+        ],
+    ),
+    object(
+        DataType::LIGHT,
         "hdri",
         "KHR_LIGHT_HDRI",
         "a picture around everything",

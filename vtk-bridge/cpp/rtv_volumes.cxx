@@ -1,0 +1,320 @@
+// Volumes of uniform grids to the bridge; which of them rt-core can draw as VTK does, and why the others stay OpenGL.
+#include "rtv_arrays.h"
+
+#include <cmath>
+#include <vtkColorTransferFunction.h>
+#include <vtkCompositeDataIterator.h>
+#include <vtkCompositeDataSet.h>
+#include <vtkDataArray.h>
+#include <vtkDataSet.h>
+#include <vtkFloatArray.h>
+#include <vtkGPUVolumeRayCastMapper.h>
+#include <vtkImageData.h>
+#include <vtkLight.h>
+#include <vtkLightCollection.h>
+#include <vtkMatrix3x3.h>
+#include <vtkMatrix4x4.h>
+#include <vtkPiecewiseFunction.h>
+#include <vtkPlaneCollection.h>
+#include <vtkSmartVolumeMapper.h>
+#include <vtkUnsignedCharArray.h>
+#include <vtkVersionMacros.h>
+#include <vtkVolume.h>
+#include <vtkVolumeMapper.h>
+#include <vtkVolumeProperty.h>
+
+namespace
+{
+// As many entries as OpenGL's tables have.
+const int Entries = 1024;
+
+const char* ClassReason(vtkVolume* volume, vtkVolumeMapper* mapper)
+{
+  if (strcmp(volume->GetClassName(), "vtkVolume") && strcmp(volume->GetClassName(), "vtkPVLODVolume"))
+  {
+    return "OpenGL draws volumes of this class";
+  }
+  static const char* const known[] = { "vtkSmartVolumeMapper", "vtkGPUVolumeRayCastMapper", "vtkOpenGLGPUVolumeRayCastMapper",
+    "vtkFixedPointVolumeRayCastMapper", "vtkMultiBlockVolumeMapper" };
+  for (const char* name : known)
+  {
+    if (mapper && !strcmp(mapper->GetClassName(), name))
+    {
+      return nullptr;
+    }
+  }
+  return "OpenGL draws volume mappers of this class";
+}
+
+const char* BlendReason(int mode)
+{
+  switch (mode)
+  {
+    case vtkVolumeMapper::COMPOSITE_BLEND:
+      return nullptr;
+    case vtkVolumeMapper::MAXIMUM_INTENSITY_BLEND:
+      return "a volume with maximum intensity blending";
+    case vtkVolumeMapper::MINIMUM_INTENSITY_BLEND:
+      return "a volume with minimum intensity blending";
+    case vtkVolumeMapper::AVERAGE_INTENSITY_BLEND:
+      return "a volume with average intensity blending";
+    case vtkVolumeMapper::ADDITIVE_BLEND:
+      return "a volume with additive blending";
+    case vtkVolumeMapper::ISOSURFACE_BLEND:
+      return "a volume with isosurface blending";
+    case vtkVolumeMapper::SLICE_BLEND:
+      return "a volume with slice blending";
+    default:
+      return "a volume with a blend mode that is not known";
+  }
+}
+
+// A shaded volume answers one white light at the eye; under others OpenGL's formula is another.
+const char* LightReason(vtkRenderer* renderer, bool& lit)
+{
+  vtkLightCollection* lights = renderer->GetLights();
+  vtkCollectionSimpleIterator it;
+  lights->InitTraversal(it);
+  int on = 0;
+  bool plain = true;
+  while (vtkLight* light = lights->GetNextLight(it))
+  {
+    if (light->GetSwitch())
+    {
+      ++on;
+      const double* color = light->GetDiffuseColor();
+      plain = plain && light->LightTypeIsHeadlight() && !light->GetPositional() && light->GetIntensity() == 1.0 &&
+        color[0] == 1.0 && color[1] == 1.0 && color[2] == 1.0;
+    }
+  }
+  lit = on > 0;
+  return on <= 1 && plain ? nullptr : "a shaded volume under other lights than one white headlight";
+}
+
+const char* MapperReason(vtkVolumeMapper* mapper)
+{
+  if (const char* reason = BlendReason(mapper->GetBlendMode()))
+  {
+    return reason;
+  }
+  if (mapper->GetCropping())
+  {
+    return "a cropped volume";
+  }
+  if (mapper->GetClippingPlanes() && mapper->GetClippingPlanes()->GetNumberOfItems() > 0)
+  {
+    return "a volume with clipping planes";
+  }
+  if (auto gpu = vtkGPUVolumeRayCastMapper::SafeDownCast(mapper))
+  {
+    if (gpu->GetMaskInput())
+    {
+      return "a volume with a mask";
+    }
+#if VTK_VERSION_NUMBER >= VTK_VERSION_CHECK(9, 2, 0)
+    if (gpu->GetGlobalIlluminationReach() > 0.0f || gpu->GetVolumetricScatteringBlending() > 0.0f)
+    {
+      return "a volume with shadows or scattering of its own";
+    }
+#endif
+  }
+  if (auto smart = vtkSmartVolumeMapper::SafeDownCast(mapper))
+  {
+    if (smart->GetVectorMode() != vtkSmartVolumeMapper::DISABLED)
+    {
+      return "a volume of vectors";
+    }
+#if VTK_VERSION_NUMBER >= VTK_VERSION_CHECK(9, 2, 0)
+    if (smart->GetGlobalIlluminationReach() > 0.0f || smart->GetVolumetricScatteringBlending() > 0.0f)
+    {
+      return "a volume with shadows or scattering of its own";
+    }
+#endif
+  }
+  return nullptr;
+}
+
+const char* PropertyReason(vtkVolumeProperty* property)
+{
+  if (property->GetTransferFunctionMode() != vtkVolumeProperty::TF_1D)
+  {
+    return "a volume with a two-dimensional transfer function";
+  }
+  if (!property->GetDisableGradientOpacity(0) && property->HasGradientOpacity(0))
+  {
+    return "a volume with gradient opacity";
+  }
+  if (property->HasLabelGradientOpacity() || property->GetLabelColor(1) || property->GetLabelScalarOpacity(1))
+  {
+    return "a volume with labels";
+  }
+  return nullptr;
+}
+
+const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volume, vtkImageData* image, bool lit,
+  const std::string& name, std::string& answer)
+{
+  vtkVolumeProperty* property = volume->GetProperty();
+  RtvVolume v = {};
+  v.name = name.c_str();
+  int extent[6], cellFlag = 0;
+  image->GetExtent(extent);
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    v.dims[axis] = static_cast<uint32_t>(extent[2 * axis + 1] - extent[2 * axis] + 1);
+    v.spacing[axis] = image->GetSpacing()[axis];
+    if (extent[2 * axis + 1] <= extent[2 * axis])
+    {
+      return "a volume one point thick";
+    }
+  }
+  if (image->HasAnyBlankPoints() || image->HasAnyBlankCells())
+  {
+    return "a volume with blanked parts";
+  }
+  vtkDataArray* scalars = vtkAbstractMapper::GetScalars(
+    image, mapper->GetScalarMode(), mapper->GetArrayAccessMode(), mapper->GetArrayId(), mapper->GetArrayName(), cellFlag);
+  if (!scalars || cellFlag != 0)
+  {
+    return scalars ? "a volume of cells' values" : "a volume without scalars";
+  }
+  if (scalars->GetNumberOfComponents() != 1)
+  {
+    return "a volume of several components";
+  }
+
+  // ---- Scalars, unless they are known.
+  RtvKeep keep;
+  v.scalar_key = rtvMix(rtvMix(rtvMix(rtvMix(1469598103934665603ull, scalars), scalars->GetMTime()), v.dims), v.spacing);
+  if (!rtvApi->has_volume(bridge, v.scalar_key))
+  {
+    uint32_t kind = RTV_NONE;
+    switch (scalars->HasStandardMemoryLayout() ? scalars->GetDataType() : VTK_VOID)
+    {
+      case VTK_UNSIGNED_CHAR:
+        kind = RTV_U8;
+        break;
+      case VTK_INT:
+        kind = RTV_I32;
+        break;
+      case VTK_FLOAT:
+        kind = RTV_F32;
+        break;
+      case VTK_DOUBLE:
+        kind = RTV_F64;
+        break;
+      default:
+      {
+        auto copy = vtkSmartPointer<vtkFloatArray>::New();
+        copy->DeepCopy(scalars);
+        keep.Object(copy);
+        v.scalars = RtvArray{ copy->GetPointer(0), static_cast<uint64_t>(copy->GetNumberOfTuples()), 1, RTV_F32 };
+      }
+    }
+    if (kind != RTV_NONE)
+    {
+      v.scalars = RtvArray{ scalars->GetVoidPointer(0), static_cast<uint64_t>(scalars->GetNumberOfTuples()), 1, kind };
+    }
+  }
+
+  // ---- Place: index times spacing, turned by the image's directions, moved to its first point, then the prop's matrix.
+  double first[3];
+  image->TransformIndexToPhysicalPoint(extent[0], extent[2], extent[4], first);
+  vtkNew<vtkMatrix4x4> local;
+  for (int row = 0; row < 3; ++row)
+  {
+    for (int column = 0; column < 3; ++column)
+    {
+      local->SetElement(row, column, image->GetDirectionMatrix()->GetElement(row, column));
+    }
+    local->SetElement(row, 3, first[row]);
+  }
+  vtkNew<vtkMatrix4x4> world;
+  vtkMatrix4x4::Multiply4x4(volume->GetMatrix(), local, world);
+  std::copy(&world->Element[0][0], &world->Element[0][0] + 16, v.world_from_data);
+
+  // ---- Tables over the range of the scalars, as OpenGL's are.
+  scalars->GetFiniteRange(v.range, 0);
+  if (!(v.range[1] > v.range[0]))
+  {
+    v.range[1] = v.range[0] + std::max(1e-6 * std::abs(v.range[0]), 1e-30);
+  }
+  std::vector<float> colors(3 * Entries), opacities(Entries);
+  if (property->GetColorChannels(0) == 1)
+  {
+    std::vector<float> gray(Entries);
+    property->GetGrayTransferFunction(0)->GetTable(v.range[0], v.range[1], Entries, gray.data());
+    for (int i = 0; i < 3 * Entries; ++i)
+    {
+      colors[i] = gray[i / 3];
+    }
+  }
+  else
+  {
+    property->GetRGBTransferFunction(0)->GetTable(v.range[0], v.range[1], Entries, colors.data());
+  }
+  property->GetScalarOpacity(0)->GetTable(v.range[0], v.range[1], Entries, opacities.data());
+  v.colors = RtvArray{ colors.data(), Entries, 3, RTV_F32 };
+  v.opacities = RtvArray{ opacities.data(), Entries, 1, RTV_F32 };
+  v.unit_distance = property->GetScalarOpacityUnitDistance(0);
+  v.nearest = property->GetInterpolationType() == VTK_NEAREST_INTERPOLATION ? 1 : 0;
+  v.shade = property->GetShade(0) && lit ? 1 : 0;
+  v.ambient = static_cast<float>(property->GetAmbient(0));
+  v.diffuse = static_cast<float>(property->GetDiffuse(0));
+  v.specular = static_cast<float>(property->GetSpecular(0));
+  v.specular_power = static_cast<float>(property->GetSpecularPower(0));
+  const char* reason = rtvApi->volume(bridge, &v);
+  answer = reason ? reason : "";
+  return reason ? answer.c_str() : nullptr;
+}
+}
+
+const char* rtvAddVolume(
+  RtvBridge* bridge, vtkVolume* volume, vtkRenderer* renderer, const std::string& name, std::string& answer)
+{
+  auto mapper = vtkVolumeMapper::SafeDownCast(volume->GetMapper());
+  if (const char* reason = ClassReason(volume, mapper))
+  {
+    return reason;
+  }
+  if (const char* reason = MapperReason(mapper))
+  {
+    return reason;
+  }
+  if (const char* reason = PropertyReason(volume->GetProperty()))
+  {
+    return reason;
+  }
+  bool lit = false;
+  if (const char* reason = volume->GetProperty()->GetShade(0) ? LightReason(renderer, lit) : nullptr)
+  {
+    return reason;
+  }
+  if (mapper->GetNumberOfInputConnections(0) > 0 && mapper->GetInputAlgorithm(0, 0))
+  {
+    mapper->GetInputAlgorithm(0, 0)->Update();
+  }
+  vtkDataObject* data = mapper->GetNumberOfInputConnections(0) > 0 ? mapper->GetInputDataObject(0, 0) : nullptr;
+  if (auto image = vtkImageData::SafeDownCast(data))
+  {
+    return AddGrid(bridge, mapper, volume, image, lit, name, answer);
+  }
+  auto composite = vtkCompositeDataSet::SafeDownCast(data);
+  vtkImageData* only = nullptr;
+  int leaves = 0;
+  if (composite)
+  {
+    auto it = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
+    for (it->InitTraversal(); !it->IsDoneWithTraversal(); it->GoToNextItem())
+    {
+      only = vtkImageData::SafeDownCast(it->GetCurrentDataObject());
+      ++leaves;
+    }
+  }
+  if (leaves == 1 && only)
+  {
+    return AddGrid(bridge, mapper, volume, only, lit, name, answer);
+  }
+  // Each block would need tables over the range of all.
+  return leaves > 1 ? "a volume of several blocks" : "a volume that is not image data";
+}

@@ -1,0 +1,115 @@
+//! Backs of triangles that look different from their fronts (`vtkActor::SetBackfaceProperty`).
+//!
+//! OpenGL asks each fragment which side it is of. rt-core's materials belong to instances, so the backs are a second shape: its triangles are met only from
+//! behind, and a hair before the surface itself.
+
+use rt_core::glam::{DVec3, Vec3};
+use rt_core::math::Aabb;
+use rt_core::mesh::TriMesh;
+use rt_core::ray::Ray;
+use rt_core::shapes::{Shape, ShapeHit, ShapeSurface};
+use std::sync::Arc;
+
+/// How much nearer than the surface, as a part of the ray's parameter: some roundings of f32.
+const BEFORE: f64 = 1.0 - 1e-6;
+
+/// See the module's text.
+pub(super) struct Backs {
+    mesh: Arc<TriMesh>,
+}
+
+impl Backs {
+    pub(super) fn of(mesh: Arc<TriMesh>) -> Backs {
+        Backs { mesh }
+    }
+
+    fn corners(&self, prim: u32) -> Option<[DVec3; 3]> {
+        let i = prim as usize;
+        self.mesh.is_renderable(i).then(|| self.mesh.triangle(i).map(|p| p.as_dvec3()))
+    }
+}
+
+impl Shape for Backs {
+    fn num_primitives(&self) -> usize {
+        self.mesh.indices.len()
+    }
+
+    fn origin(&self) -> DVec3 {
+        self.mesh.origin
+    }
+
+    fn bounds(&self, prim: u32) -> Aabb {
+        match self.corners(prim) {
+            Some(_) => {
+                let [a, b, c] = self.mesh.triangle(prim as usize);
+                // Some roundings larger: flat boxes are missed by rays that run along them.
+                let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
+                let pad = (lo.abs().max(hi.abs()) * 4.0 * f32::EPSILON).max(Vec3::splat(f32::MIN_POSITIVE));
+                Aabb { min: lo - pad, max: hi + pad }
+            }
+            None => Aabb::EMPTY,
+        }
+    }
+
+    fn closest(&self, prim: u32, ray: &Ray) -> Option<ShapeHit> {
+        let [a, b, c] = self.corners(prim)?;
+        let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
+        // Möller and Trumbore 1997, in f64.
+        let (e1, e2) = (b - a, c - a);
+        let p = d.cross(e2);
+        let det = e1.dot(p);
+        // The normal looks along the ray: from behind.
+        if det >= 0.0 {
+            return None;
+        }
+        let s = o - a;
+        let u = s.dot(p) / det;
+        let q = s.cross(e1);
+        let v = d.dot(q) / det;
+        if u < 0.0 || v < 0.0 || u + v > 1.0 {
+            return None;
+        }
+        let t = (e2.dot(q) / det * BEFORE) as f32;
+        (t >= ray.t_min && t < ray.t_max).then_some(ShapeHit { t, u: u as f32, v: v as f32 })
+    }
+
+    fn surface(&self, prim: u32, hit: &ShapeHit, _: &Ray) -> ShapeSurface {
+        let i = prim as usize;
+        let [a, b, c] = self.mesh.triangle(i).map(|p| p.as_dvec3());
+        let (u, v) = (f64::from(hit.u), f64::from(hit.v));
+        let face = (b - a).cross(c - a).as_vec3().normalize_or_zero();
+        let shading = self.mesh.normals.as_ref().and_then(|n| match n.per {
+            rt_core::mesh::PerElement::Face => n.values.get(i).copied(),
+            rt_core::mesh::PerElement::Vertex => {
+                let [x, y, z] = self.mesh.indices[i].map(|k| n.values.get(k as usize).copied());
+                Some(x? * (1.0 - hit.u - hit.v) + y? * hit.u + z? * hit.v)
+            }
+        });
+        let point = (a + (b - a) * u + (c - a) * v).as_vec3();
+        ShapeSurface {
+            point,
+            point_error: point.abs().max_element() * 4.0 * f32::EPSILON,
+            normal: shading.map_or(face, |n| n.try_normalize().unwrap_or(face)),
+            scalar: None,
+            color: None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn backs_are_met_from_behind_only_and_before_the_surface() {
+        let mesh = TriMesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
+        let backs = Backs::of(Arc::new(mesh));
+        // The normal is +z.
+        let from = |z: f32| Ray::new(Vec3::new(0.25, 0.25, z), Vec3::new(0.0, 0.0, -z.signum()));
+        assert_eq!(backs.closest(0, &from(2.0)), None);
+        let hit = backs.closest(0, &from(-2.0)).expect("the back");
+        assert!(hit.t < 2.0 && hit.t > 1.9999, "{hit:?}");
+        let s = backs.surface(0, &hit, &from(-2.0));
+        assert_eq!((s.normal, s.point.z), (Vec3::Z, 0.0));
+    }
+}

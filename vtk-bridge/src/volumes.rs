@@ -1,0 +1,241 @@
+//! Grids of scalars as rt-core's volumes, kept while their scalars stay the same; and where a volume lies in the window's depth.
+
+use crate::input::{Scalars, View, Volume as Input};
+use rayon::prelude::*;
+use rt_core::colormap::ColorMap;
+use rt_core::glam::{DAffine3, DVec3, UVec3, Vec3};
+use rt_core::grid::Grid;
+use rt_core::scene::PlacedVolume;
+use rt_core::transfer_function::TransferFunction;
+use rt_core::volume::{Interpolation, Volume, VolumeOptions, VolumeShading};
+use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::sync::Arc;
+
+/// Opacity 1 would be infinite extinction.
+const MAX_OPACITY: f32 = 0.999_999;
+/// Values a task works on.
+const CHUNK: usize = 1 << 14;
+
+/// What is kept of one grid.
+struct Medium {
+    volume: Arc<Volume>,
+    /// Of everything but the scalars.
+    look: u64,
+    used: bool,
+}
+
+/// The volumes of a renderer.
+#[derive(Default)]
+pub(crate) struct Media {
+    kept: HashMap<u64, Medium>,
+    placed: Vec<PlacedVolume>,
+}
+
+impl Media {
+    /// A new frame.
+    pub(crate) fn begin(&mut self) {
+        self.placed.clear();
+        self.kept.values_mut().for_each(|m| m.used = false);
+    }
+
+    /// See [`crate::bridge::Bridge::has_volume`].
+    pub(crate) fn has(&self, key: u64) -> bool {
+        key != 0 && self.kept.contains_key(&key)
+    }
+
+    /// The volumes of this frame.
+    pub(crate) fn placed(&self) -> &[PlacedVolume] {
+        &self.placed
+    }
+
+    /// Forgets grids that were not added this frame.
+    pub(crate) fn forget_unused(&mut self) {
+        self.kept.retain(|_, m| m.used);
+    }
+
+    /// Adds `v` at `place`, and what it looks like to `content`. Number of cells, and what the user should know.
+    pub(crate) fn add(
+        &mut self,
+        v: &Input<'_>,
+        place: DAffine3,
+        content: &mut DefaultHasher,
+    ) -> Result<(u64, Option<String>), String> {
+        let look = look_of(v);
+        (v.key, look).hash(content);
+        format!("{place:?}").hash(content);
+        let kept = self.kept.get_mut(&v.key).filter(|_| v.key != 0);
+        let volume = match kept {
+            Some(kept) if kept.look == look => {
+                kept.used = true;
+                Arc::clone(&kept.volume)
+            }
+            Some(kept) => {
+                let grid = Arc::clone(kept.volume.grid());
+                *kept = Medium { volume: Arc::new(medium(v, grid)?), look, used: true };
+                Arc::clone(&kept.volume)
+            }
+            None => {
+                let [x, y, z] = v.spacing;
+                let values = values(&v.scalars);
+                let grid = Grid::new(UVec3::from_array(v.dims), DVec3::ZERO, DVec3::new(x, y, z), values)
+                    .map_err(|e| format!("a volume: {e}"))?;
+                let volume = Arc::new(medium(v, Arc::new(grid))?);
+                self.kept.insert(v.key, Medium { volume: Arc::clone(&volume), look, used: true });
+                volume
+            }
+        };
+        let report = volume.report();
+        let bad = report.cells_non_finite;
+        let warning = (bad > 0)
+            .then(|| format!("{bad} cells have a corner that is not a number; nothing is drawn in them"));
+        self.placed.push(PlacedVolume { volume, world_from_object: place });
+        Ok((report.cells, warning))
+    }
+}
+
+/// A number for everything but the scalars and the place.
+fn look_of(v: &Input<'_>) -> u64 {
+    let mut h = DefaultHasher::new();
+    v.colors.iter().flatten().chain(v.opacities).for_each(|x| x.to_bits().hash(&mut h));
+    format!("{:?}{:?}{:?}{:?}{:?}", v.nearest, v.range, v.unit_distance, v.shading, v.spacing).hash(&mut h);
+    h.finish()
+}
+
+fn values(scalars: &Scalars<'_>) -> Vec<f32> {
+    fn convert<T: Copy + Sync>(from: &[T], to: impl Fn(T) -> f32 + Sync) -> Vec<f32> {
+        from.par_iter().with_min_len(CHUNK).map(|v| to(*v)).collect()
+    }
+    match scalars {
+        Scalars::U8(v) => convert(v, f32::from),
+        Scalars::I32(v) => convert(v, |x| x as f32),
+        Scalars::I64(v) => convert(v, |x| x as f32),
+        Scalars::F32(v) => v.to_vec(),
+        Scalars::F64(v) => convert(v, |x| x as f32),
+    }
+}
+
+fn medium(v: &Input<'_>, grid: Arc<Grid>) -> Result<Volume, String> {
+    let finite = |x: f32| if x.is_finite() { x.max(0.0) } else { 0.0 };
+    let [low, high] = v.range.map(|r| r as f32);
+    let high = if high > low { high } else { low.next_up() };
+    if v.colors.is_empty() || v.opacities.is_empty() {
+        return Err("a volume without colours or opacities".to_owned());
+    }
+    if !(v.unit_distance > 0.0 && v.unit_distance.is_finite()) {
+        return Err(format!("a volume whose opacity unit distance is {}", v.unit_distance));
+    }
+    let colors = v.colors.iter().map(|&[r, g, b]| [finite(r), finite(g), finite(b), 1.0]).collect();
+    let last = (v.opacities.len() - 1).max(1) as f32;
+    let point = |(i, a): (usize, &f32)| {
+        let sigma = -f64::from(-finite(*a).min(MAX_OPACITY)).ln_1p() / v.unit_distance;
+        [low + (high - low) * (i as f32 / last), sigma as f32]
+    };
+    let extinction = v.opacities.iter().enumerate().map(point).collect();
+    let transfer = TransferFunction::new(ColorMap::new(colors, [low, high]), straight(extinction));
+    let unit = |x: f32| finite(x).min(1.0);
+    let shading = v.shading.map(|s| VolumeShading {
+        ambient: unit(s.ambient),
+        diffuse: unit(s.diffuse),
+        specular: finite(s.specular),
+        shininess: finite(s.specular_power),
+        ..VolumeShading::default()
+    });
+    let interpolation = if v.nearest { Interpolation::Nearest } else { Interpolation::Linear };
+    let transfer = transfer.map_err(|e| format!("a volume: {e}"))?;
+    Volume::new(grid, transfer, VolumeOptions { shading, interpolation })
+        .map_err(|e| format!("a volume: {e}"))
+}
+
+/// Leaves out points that lie on the line between their neighbours: fewer bends, fewer steps of the integration.
+fn straight(points: Vec<[f32; 2]>) -> Vec<[f32; 2]> {
+    let mut out: Vec<[f32; 2]> = Vec::with_capacity(points.len());
+    for p in points {
+        if let [.., a, b] = out[..] {
+            let on_line = a[1] + (p[1] - a[1]) * ((b[0] - a[0]) / (p[0] - a[0]));
+            if (on_line - b[1]).abs() <= 1e-6 * b[1].abs() {
+                out.pop();
+            }
+        }
+        out.push(p);
+    }
+    out
+}
+
+/// Window depth for pixels that show a volume: the middle of the ray's way through it, where that is in front of `depth`. What OpenGL draws before that is in
+/// front of the volume, what it draws behind is seen through it.
+pub(crate) fn place_in_depth(volumes: &[PlacedVolume], view: &View, depth: &mut [f32]) {
+    let world_from_clip = view.clip_from_world.inverse();
+    let boxes: Vec<(DAffine3, Vec3, Vec3)> = volumes
+        .iter()
+        .map(|v| {
+            let b = v.volume.bounds();
+            let to_object = DAffine3::from_translation(-v.volume.origin()) * v.world_from_object.inverse();
+            (to_object, b.min, b.max)
+        })
+        .collect();
+    let width = view.width as usize;
+    depth.par_iter_mut().with_min_len(CHUNK).enumerate().for_each(|(i, depth)| {
+        let x = 2.0 * ((i % width) as f64 + 0.5) / f64::from(view.width) - 1.0;
+        let y = 1.0 - 2.0 * ((i / width) as f64 + 0.5) / f64::from(view.height);
+        let ends = [-1.0, 1.0].map(|z| world_from_clip.project_point3(DVec3::new(x, y, z)));
+        for (to_object, lo, hi) in &boxes {
+            let [a, b] = ends.map(|p| to_object.transform_point3(p));
+            let d = b - a;
+            let (mut near, mut far) = (0.0f64, 1.0f64);
+            for k in 0..3 {
+                let (u, v) = ((f64::from(lo[k]) - a[k]) / d[k], (f64::from(hi[k]) - a[k]) / d[k]);
+                // Parallel to the face: NaN and infinities leave both ends alone or empty the stretch, as they should.
+                (near, far) = (near.max(u.min(v)), far.min(u.max(v)));
+            }
+            if near < far {
+                let middle = ends[0] + (ends[1] - ends[0]) * (0.5 * (near + far));
+                let z = view.clip_from_world.project_point3(middle).z;
+                *depth = depth.min((0.5 * z + 0.5) as f32);
+            }
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_keeps_its_corners_only() {
+        let tent: Vec<[f32; 2]> = (0..=100).map(|i| [i as f32, (50 - i32::abs(i - 50)) as f32]).collect();
+        let corners = straight(tent);
+        assert!(corners.len() <= 5, "{corners:?}");
+        assert!(corners.contains(&[50.0, 50.0]));
+    }
+
+    #[test]
+    fn a_volume_lies_in_the_middle_of_its_box() {
+        use rt_core::glam::DMat4;
+        let clip_from_world = DMat4::from_cols_array(&[
+            0.5, 0.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, -0.2, -1.0, 0.0, 0.0, 0.0, 1.0,
+        ])
+        .transpose();
+        let grid = Grid::new(UVec3::splat(2), DVec3::ZERO, DVec3::ONE, vec![1.0; 8]).unwrap();
+        let transfer =
+            TransferFunction::new(ColorMap::new(vec![[1.0; 4]], [0.0, 1.0]), vec![[0.0, 1.0]]).unwrap();
+        let volume = Arc::new(Volume::new(Arc::new(grid), transfer, VolumeOptions::default()).unwrap());
+        let placed = PlacedVolume {
+            volume,
+            world_from_object: DAffine3::from_translation(DVec3::new(-0.5, -0.5, -5.0)),
+        };
+        let view = View {
+            clip_from_world,
+            width: 3,
+            height: 3,
+            background: [[0.0; 3]; 2],
+            interactive: false,
+            shadows: false,
+            samples: 0,
+            lens: None,
+        };
+        let mut depth = vec![1.0; 9];
+        place_in_depth(&[placed], &view, &mut depth);
+        assert!((depth[4] - 0.45).abs() < 1e-6 && depth[0] == 1.0, "{depth:?}");
+    }
+}

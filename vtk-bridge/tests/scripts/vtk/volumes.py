@@ -1,0 +1,128 @@
+# Volumes: spacing, directions, a turned prop, values of the nearest point, shading, a logarithmic table, other kinds of numbers,
+# and two that overlap.
+import vtk
+
+from capture import actor, look, save, window
+
+
+def volume(source, distance=0.1, unit=1.0, kind=vtk.vtkGPUVolumeRayCastMapper):
+    colors = vtk.vtkColorTransferFunction()
+    colors.AddRGBPoint(60, 0.1, 0.2, 0.9)
+    colors.AddRGBPoint(160, 0.9, 0.9, 0.7)
+    colors.AddRGBPoint(260, 0.9, 0.1, 0.1)
+    opacity = vtk.vtkPiecewiseFunction()
+    opacity.AddPoint(120, 0)
+    opacity.AddPoint(260, 0.25)
+    prop = vtk.vtkVolumeProperty()
+    prop.SetColor(colors)
+    prop.SetScalarOpacity(opacity)
+    prop.SetScalarOpacityUnitDistance(unit)
+    prop.SetInterpolationTypeToLinear()
+    mapper = kind()
+    if isinstance(source, vtk.vtkImageData):
+        mapper.SetInputData(source)
+    else:
+        mapper.SetInputConnection(source.GetOutputPort())
+    mapper.SetAutoAdjustSampleDistances(0)
+    mapper.SetSampleDistance(distance)
+    if kind is vtk.vtkGPUVolumeRayCastMapper:
+        mapper.UseJitteringOff()
+    made = vtk.vtkVolume()
+    made.SetMapper(mapper)
+    made.SetProperty(prop)
+    return made
+
+
+def wavelet(n=10):
+    made = vtk.vtkRTAnalyticSource()
+    made.SetWholeExtent(-n, n, -n, n, -n, n)
+    made.Update()
+    return made
+
+
+ren = vtk.vtkRenderer()
+ren.SetBackground(0.2, 0.2, 0.2)
+win = window(200, 200, ren)
+rough = wavelet()
+shown = volume(rough)
+ren.AddVolume(shown)
+
+
+def picture(name):
+    ren.ResetCameraClippingRange()
+    win.Render()
+    save(win, name, props=ren.GetNumberOfPropsRendered())
+
+
+look(ren, (20, -60, 30)).Zoom(1.3)
+picture("linear")
+shown.GetProperty().SetInterpolationTypeToNearest()
+picture("nearest")
+shown.GetProperty().SetInterpolationTypeToLinear()
+# Smooth data: VTK takes the differences that are its gradient a twentieth further apart than the points are.
+smooth = vtk.vtkRTAnalyticSource()
+smooth.SetWholeExtent(-10, 10, -10, 10, -10, 10)
+smooth.SetXFreq(5)
+smooth.SetYFreq(4)
+smooth.SetZFreq(3)
+shown.GetMapper().SetInputConnection(smooth.GetOutputPort())
+shown.GetProperty().ShadeOn()
+shown.GetProperty().SetAmbient(0.2)
+shown.GetProperty().SetDiffuse(0.7)
+shown.GetProperty().SetSpecular(0.3)
+shown.GetProperty().SetSpecularPower(12)
+picture("shaded")
+shown.GetProperty().ShadeOff()
+shown.GetMapper().SetInputConnection(rough.GetOutputPort())
+shown.GetProperty().SetScalarOpacityUnitDistance(0.3)
+shown.RotateX(30)
+shown.SetScale(1, 1.5, 0.7)
+picture("turned")
+
+# An image with a frame of its own, of whole numbers, whose extent does not begin at zero.
+image = vtk.vtkImageData()
+image.ShallowCopy(wavelet().GetOutput())
+image.SetSpacing(0.5, 1.0, 2.0)
+image.SetOrigin(3, -2, 1)
+image.SetDirectionMatrix(0.8, -0.6, 0, 0.6, 0.8, 0, 0, 0, 1)
+cast = vtk.vtkImageCast()
+cast.SetInputData(image)
+cast.SetOutputScalarTypeToShort()
+cast.Update()
+whole = vtk.vtkImageData()
+whole.ShallowCopy(cast.GetOutput())
+whole.SetDirectionMatrix(image.GetDirectionMatrix())
+ren.RemoveVolume(shown)
+shown = volume(whole)
+ren.AddVolume(shown)
+ren.ResetCamera()
+picture("directions")
+
+# A surface inside: the part in front of it dims it, the part behind is hidden. And a line that OpenGL draws in front of everything.
+ren.RemoveVolume(shown)
+shown = volume(rough, kind=vtk.vtkSmartVolumeMapper)
+ren.AddVolume(shown)
+ball = vtk.vtkSphereSource()
+ball.SetRadius(5)
+ball.SetThetaResolution(40)
+ball.SetPhiResolution(40)
+inside = actor(ball, (0.9, 0.9, 0.3))
+ren.AddActor(inside)
+box = vtk.vtkOutlineSource()
+box.SetBounds(-14, 14, -14, 14, -14, 14)
+ren.AddActor(actor(box, (1, 1, 1)))
+ren.ResetCamera()
+picture("surface_inside")
+inside.GetProperty().SetOpacity(0.5)
+picture("translucent_inside")
+inside.GetProperty().SetOpacity(1.0)
+
+# What rt-core has not stays OpenGL.
+shown.GetMapper().SetBlendModeToMaximumIntensity()
+picture("maximum")
+shown.GetMapper().SetBlendModeToComposite()
+gradient = vtk.vtkPiecewiseFunction()
+gradient.AddPoint(0, 0)
+gradient.AddPoint(90, 1)
+shown.GetProperty().SetGradientOpacity(gradient)
+picture("gradient_opacity")
