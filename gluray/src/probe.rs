@@ -314,7 +314,8 @@ mod tests {
     fn matrices_are_found_from_what_a_shader_makes_of_points() {
         // glFrustum(-1, 1, -1, 1, 1, 300) after a translation.
         let (a, b) = (-301.0 / 299.0, -600.0 / 299.0);
-        let frustum = DMat4::from_cols_array(&[1., 0., 0., 0., 0., 1., 0., 0., 0., 0., a, -1., 0., 0., b, 0.]);
+        let frustum =
+            DMat4::from_cols_array(&[1., 0., 0., 0., 0., 1., 0., 0., 0., 0., a, -1., 0., 0., b, 0.]);
         let m = frustum * DMat4::from_translation(DVec3::new(-100.0, 1.0, -9.0));
         let points = cloud();
         let (found, residual) = fit(&points, &through(&m, &points)).expect("points in space");
