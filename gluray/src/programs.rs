@@ -116,7 +116,7 @@ impl Recognised {
     }
 
     /// True when every fragment has alpha 1.
-    fn is_opaque(&self, attributes: &Attributes, vertices: usize) -> bool {
+    pub(crate) fn is_opaque(&self, attributes: &Attributes, vertices: usize) -> bool {
         self.opacity == 1.0
             && match self.template.colors {
                 Colors::Uniform => true,
