@@ -221,7 +221,7 @@ fn fail(comm: &mut RankComm, fault: Fault, timeout: Duration) -> anyhow::Result<
     if fault == Fault::Corrupt {
         // All composite the same frame.
         let frame = Frame::<DepthPixel<[u8; 4]>>::with_depth(150, 41, &[[1; 4]; 6150], &[0.5; 6150])?;
-        let options = Options { timeout, ..Options::default() };
+        let options = Options { timeout, verify: true, ..Options::default() };
         if culprit {
             composite(&mut FirstRanks::damaged(comm), &frame, &options)?;
         } else {

@@ -1,6 +1,6 @@
 //! The first ranks of a group as a group of their own, so that one launch checks several numbers of ranks; and a rank whose messages
 //! are damaged, for tests.
-use crate::comm::{Arrival, CommError, Communicator, FIRST_RESERVED_TAG, Receive};
+use crate::comm::{Arrival, CommError, Communicator, FIRST_RESERVED_TAG, Receive, collective};
 use std::time::Duration;
 
 /// The first `size` ranks of a group.
@@ -54,6 +54,26 @@ impl Communicator for FirstRanks<'_> {
 
     fn wait_any(&mut self, posted: &mut Vec<Receive>, timeout: Duration) -> Result<Arrival, CommError> {
         self.inner.wait_any(posted, timeout)
+    }
+
+    // All ranks must take part in the same way: a whole group in the way of its transport.
+    fn barrier(&mut self, timeout: Duration) -> Result<(), CommError> {
+        if self.size == self.inner.size() {
+            return self.inner.barrier(timeout);
+        }
+        collective::barrier(self, timeout)
+    }
+
+    fn all_gather(
+        &mut self,
+        mine: &[u8],
+        longest: usize,
+        timeout: Duration,
+    ) -> Result<Vec<Vec<u8>>, CommError> {
+        if self.size == self.inner.size() {
+            return self.inner.all_gather(mine, longest, timeout);
+        }
+        collective::all_gather(self, mine, longest, timeout)
     }
 
     fn abort(&mut self, reason: &str) {

@@ -1,6 +1,10 @@
 //! How ranks talk. Compositing needs no more than this trait, so any transport can be plugged in.
 pub mod collective;
 #[cfg(all(unix, target_pointer_width = "64", target_endian = "little"))]
+#[cfg_attr(
+    not(feature = "rival"),
+    allow(dead_code, reason = "functions of MPI that carry IceT's messages only")
+)]
 pub mod mpi;
 pub mod sim;
 pub mod threads;
