@@ -249,10 +249,14 @@ mod tests {
     }
 
     #[test]
-    fn the_rank_that_collects_joins_nothing_where_others_can() {
+    fn the_rank_that_collects_joins_less_or_nothing() {
         let dense = vec![Rect::of_size(1024, 1024); 8];
-        assert!(Plan::new::<P>(&dense, usize::MAX, Some(3)).slices[3].is_empty());
-        assert_eq!((owning(&dense, Some(3)), owning(&dense, None)), (7, 8));
+        let tiles = Plan::new::<P>(&dense, usize::MAX, Some(3)).slices;
+        assert!(tiles[3][0].pixels() < tiles[2][0].pixels() * 2 / 3, "{tiles:?}");
+        let corner = |i: u32| Rect { x0: 128 * i, y0: 0, x1: 128 * i + 128, y1: 1024 };
+        let apart: Vec<Rect> = (0..8).map(corner).collect();
+        assert!(Plan::new::<P>(&apart, usize::MAX, Some(3)).slices[3].is_empty());
+        assert_eq!((owning(&apart, Some(3)), owning(&apart, None)), (7, 8));
         // Two ranks share alike.
         let halves = Plan::new::<P>(&dense[..2], usize::MAX, Some(0)).slices;
         assert_eq!(halves[0][0].pixels(), halves[1][0].pixels());
