@@ -18,13 +18,18 @@ enum Kind {
 /// What a call may change; see `symbols::class`.
 fn class(name: &str) -> u32 {
     const PURE: u32 = 0;
+    if writes_buffers(name) {
+        return BUFFER;
+    }
     let starts = |list: &[&str]| list.iter().any(|p| name.starts_with(p));
     let any = |list: &[&str]| list.contains(&name);
     if name.starts_with("glX") || name.starts_with("egl") {
         return PURE;
     }
+    // What cannot write buffers, for calls that are not in any list.
+    const OTHERWISE: u32 = 0xff & !BUFFER;
     if any(&["glPopAttrib", "glPopClientAttrib"]) {
-        return 0xff;
+        return OTHERWISE;
     }
     if starts(&["glGet", "glIs", "glGen", "glAreTextures", "glFence", "glObjectLabel", "glPushAttrib"])
         || starts(&[
@@ -100,28 +105,6 @@ fn class(name: &str) -> u32 {
     ]) {
         return 8;
     }
-    if starts(&[
-        "glBufferData",
-        "glBufferSubData",
-        "glMapBuffer",
-        "glUnmapBuffer",
-        "glFlushMapped",
-        "glCopyBuffer",
-    ]) || starts(&[
-        "glNamedBuffer",
-        "glClearBufferData",
-        "glClearBufferSubData",
-        "glDeleteBuffers",
-        "glBufferStorage",
-    ]) || starts(&[
-        "glMapNamed",
-        "glUnmapNamed",
-        "glEndTransformFeedback",
-        "glDispatchCompute",
-        "glInvalidateBuffer",
-    ]) {
-        return 32;
-    }
     if starts(&["glUniform", "glProgramUniform", "glBindAttribLocation", "glBindFragDataLocation"]) {
         return 64;
     }
@@ -138,7 +121,42 @@ fn class(name: &str) -> u32 {
     {
         return 128;
     }
-    0xff
+    OTHERWISE
+}
+
+/// The class of calls that write buffers.
+const BUFFER: u32 = 32;
+
+/// Calls that write buffers: we are always told of them, because geometry in buffers is not read again as long as nobody writes.
+fn writes_buffers(name: &str) -> bool {
+    const WRITES: &[&str] = &[
+        "glBufferData",
+        "glBufferSubData",
+        "glBufferStorage",
+        "glBufferPage",
+        "glBufferAttach",
+        "glMapBuffer",
+        "glUnmap",
+        "glFlushMapped",
+        "glCopyBuffer",
+        "glCopyNamedBuffer",
+        "glNamedBuffer",
+        "glClearBufferData",
+        "glClearBufferSubData",
+        "glClearNamedBufferData",
+        "glClearNamedBufferSubData",
+        "glDeleteBuffers",
+        "glMapNamed",
+        "glMapObjectBuffer",
+        "glUpdateObjectBuffer",
+        "glEndTransformFeedback",
+        "glDispatchCompute",
+        "glInvalidateBuffer",
+        "glMemoryBarrier",
+        "glMulticastBuffer",
+        "glMulticastCopyBuffer",
+    ];
+    WRITES.iter().any(|w| name.starts_with(w))
 }
 
 /// Calls before which what was traced has to be in the framebuffer.
@@ -337,7 +355,7 @@ fn main() {
     names.iter().for_each(|x| writeln!(s, "trampolines::{x},").unwrap());
     writeln!(s, "];\nmod trampolines {{ use super::{{TABLE, ATTENTION, slow, CALLS}};").unwrap();
     for (i, x) in names.iter().enumerate() {
-        let kind = match (hooked(x), flushes(x)) {
+        let kind = match (hooked(x), flushes(x) || writes_buffers(x)) {
             (true, _) => Kind::Direct,
             (_, true) => Kind::Always,
             _ => Kind::Watched,

@@ -19,6 +19,7 @@ pub mod experiments;
 pub mod machine;
 pub mod memory;
 pub mod meshes;
+pub mod opengl;
 pub mod ours;
 pub mod peers;
 pub mod picture;

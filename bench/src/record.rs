@@ -63,6 +63,18 @@ pub struct Picture {
     pub png: Vec<u8>,
 }
 
+/// A file beside the record that other programs read, or that shows more than a table.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Attachment {
+    /// Name of the file behind the experiment's, with its ending; an SVG is shown in reports.
+    pub name: String,
+    /// What it holds.
+    pub caption: String,
+    /// The file; beside the record, not inside the JSON.
+    #[serde(skip)]
+    pub bytes: Vec<u8>,
+}
+
 /// One experiment's outcome.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Record {
@@ -94,6 +106,9 @@ pub struct Record {
     pub plots: Vec<Plot>,
     /// Pictures.
     pub pictures: Vec<Picture>,
+    /// Other files.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub attachments: Vec<Attachment>,
 }
 
 impl Record {
@@ -114,6 +129,7 @@ impl Record {
             missing: vec![],
             plots: vec![],
             pictures: vec![],
+            attachments: vec![],
         }
     }
 
@@ -168,6 +184,9 @@ impl Record {
         for p in &self.pictures {
             write(self.picture_file(p), &p.png)?;
         }
+        for a in &self.attachments {
+            write(format!("{}.{}", self.id, a.name), &a.bytes)?;
+        }
         write(format!("{}.csv", self.id), self.to_csv().as_bytes())?;
         let json = serde_json::to_string_pretty(self).context("cannot write the record as JSON")?;
         write(format!("{}.json", self.id), json.as_bytes())?;
@@ -190,6 +209,9 @@ impl Record {
         let dir = path.parent().unwrap_or(Path::new("."));
         for i in 0..r.pictures.len() {
             r.pictures[i].png = std::fs::read(dir.join(r.picture_file(&r.pictures[i]))).unwrap_or_default();
+        }
+        for a in &mut r.attachments {
+            a.bytes = std::fs::read(dir.join(format!("{}.{}", r.id, a.name))).unwrap_or_default();
         }
         Ok(r)
     }
@@ -252,6 +274,8 @@ mod tests {
             mark: Some(1.0),
         });
         r.pictures.push(Picture { name: "The view".into(), caption: "c".into(), png: vec![1, 2, 3] });
+        let bytes = b"<svg/>".to_vec();
+        r.attachments.push(Attachment { name: "chart.svg".into(), caption: "c".into(), bytes });
         r
     }
 

@@ -48,9 +48,9 @@ impl<P: Composite> Collector<P> {
             let largest = of_place.map(|piece| piece.1).max_by_key(wire::longest::<P>);
             session.post::<P>(place, Tag::Collect, &largest.unwrap_or(Rect::EMPTY))?;
         }
-        let begin = session.now();
+        let begin = session.comm.working_secs();
         collector.image = Some(blank(size_px, depths, pieces, spare));
-        session.report.collect_secs += session.now() - begin;
+        session.report.collect_secs += session.comm.working_secs() - begin;
         Ok(collector)
     }
 
@@ -66,7 +66,7 @@ impl<P: Composite> Collector<P> {
             return Ok(());
         };
         if let Some(image) = &mut self.image {
-            let begin = session.now();
+            let begin = session.comm.working_secs();
             let width = image.width_px as usize;
             let bounds = layer.bounds;
             for y in bounds.y0..bounds.y1 {
@@ -77,7 +77,7 @@ impl<P: Composite> Collector<P> {
                     image.depths[start..start + depths.len()].copy_from_slice(depths);
                 }
             }
-            session.report.collect_secs += session.now() - begin;
+            session.report.collect_secs += session.comm.working_secs() - begin;
         } else {
             session.send(root, Tag::Collect, &layer.view(), layer.bounds, self.depths)?;
         }
@@ -92,7 +92,7 @@ impl<P: Composite> Collector<P> {
         place: usize,
         bytes: Vec<u8>,
     ) -> Result<(), CompositeError> {
-        let begin = session.now();
+        let begin = session.comm.working_secs();
         // A rank finishes its pieces in any order, so the message itself says which one it is, if it is one of those expected.
         let said = wire::rect_of(&bytes);
         let mut of_place = self.outstanding.iter().enumerate().filter(|(_, piece)| piece.0 == place);
@@ -107,10 +107,15 @@ impl<P: Composite> Collector<P> {
         let part = session.codec.decode::<P>(&bytes, expected, self.depths);
         let part = part.map_err(|reason| session.unusable(place, reason))?;
         if let Some(image) = &mut self.image {
-            part.place::<P>(image.width_px as usize, &mut image.colors, &mut image.depths);
+            part.place::<P>(
+                session.codec.kernels,
+                image.width_px as usize,
+                &mut image.colors,
+                &mut image.depths,
+            );
         }
         session.comm.recycle(bytes);
-        session.report.collect_secs += session.now() - begin;
+        session.report.collect_secs += session.comm.working_secs() - begin;
         Ok(())
     }
 

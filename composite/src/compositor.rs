@@ -186,20 +186,25 @@ impl<P: Composite> Compositor<P> {
         }
 
         // The strategy, and what it hands in.
-        let slice_px = options.slice_px.unwrap_or(SLICE_PX);
+        let slice_px = options.slice_px.unwrap_or_else(|| slice_px(session.comm));
         let strategy = match (options.strategy, &self.network) {
             (Strategy::Automatic, Some(network)) => {
                 network.choose::<P>(&session.drawn, places.root.is_some())
             }
             (strategy, _) => strategy,
         };
-        let plan = strategy.plan(&session.drawn, slice_px);
+        let plan =
+            strategy.plan::<P>(&session.drawn, slice_px, places.root.filter(|_| !session.comm.is_one_node()));
         let pieces = plan.pieces(&session.drawn);
         let spare = self.spare.take();
         let mut collector =
             Collector::new(&mut session, size_px, places.root, options.depth, &pieces, spare)?;
+        let span = session.begin_span();
         plan.run(&mut session, &frame.view(drawn), &mut collector, &mut self.scratch)?;
+        session.end_span(span, |report| &mut report.exchange_secs);
+        let span = session.begin_span();
         let (image, piece) = collector.finish(&mut session)?;
+        session.end_span(span, |report| &mut report.collect_secs);
         if options.confirm {
             session.barrier()?;
         }
@@ -217,9 +222,11 @@ pub(crate) fn give_up(comm: &mut dyn Communicator, error: &CompositeError) {
     }
 }
 
-/// A megabyte of RGBA8 with depth: long enough to be worth a message (half as much costs a tenth more processor time at eight ranks), short
-/// enough for a second-level cache, and several slices a tile at few ranks.
-pub(crate) const SLICE_PX: usize = 1 << 17;
+/// Pixels of a slice that is joined and on its way to the collecting rank while the next one comes: a quarter of a megabyte of RGBA8 with depth.
+/// Where nothing travels by itself there are fewer and larger ones: half a megabyte costs a tenth more processor time at eight ranks than one.
+pub(crate) fn slice_px(comm: &dyn Communicator) -> usize {
+    if comm.is_one_node() { 1 << 17 } else { 1 << 15 }
+}
 
 /// Ranks in the order of compositing.
 pub(crate) struct Places {

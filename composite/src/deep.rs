@@ -180,6 +180,7 @@ fn composite_or_fail(
     if !own_part.is_empty() {
         parts[places.own] = Some(encode(frame, own_part, fingerprint));
     }
+    let span = session.begin_span();
     while session.is_waiting_for(Tag::Exchange) {
         match session.next(true)? {
             Some((place, true, bytes)) => collector.take(&mut session, place, bytes)?,
@@ -191,6 +192,7 @@ fn composite_or_fail(
             None => {}
         }
     }
+    session.end_span(span, |report| &mut report.exchange_secs);
     let tile = tiles[places.own];
     if !tile.is_empty() {
         let at = session.now();
@@ -201,7 +203,9 @@ fn composite_or_fail(
         session.report.blend_secs += session.now() - at;
         collector.hand_in(&mut session, layer, &mut Scratch::new(kernels))?;
     }
+    let span = session.begin_span();
     let (image, piece) = collector.finish(&mut session)?;
+    session.end_span(span, |report| &mut report.collect_secs);
     if options.confirm {
         session.barrier()?;
     }

@@ -60,7 +60,7 @@ impl<P: Composite> Scratch<P> {
             }
             Item::Message(message) => {
                 let mut layer = self.empty(bounds);
-                message.part::<P>().place_in(&mut layer);
+                message.part::<P>().place_in(self.kernels, &mut layer);
                 self.read.push(message.bytes);
                 layer
             }

@@ -21,6 +21,16 @@
 //! assert_eq!(image.depths(), [0.7, 0.5]);
 //! ```
 //!
+//! # Features
+//!
+//! | feature | what it adds | what it brings along |
+//! |---|---|---|
+//! | none | strategies, streaming, merging in shared memory, deep frames; ranks as threads, over MPI, or simulated | five small crates; no MPI, no C |
+//! | `render` | [`render`]: frames of a scene that ranks hold parts of | rt-core, datasets |
+//! | `rival` | [`rival`]: IceT over the same ranks | nothing |
+//! | `cli` (the default) | [`cli`], the program `composite` | `render`, `rival`, clap |
+//!
+//! A program that embeds the compositor wants `composite = { version = "0.1", default-features = false }`.
 #![deny(unsafe_code)]
 
 #[cfg(feature = "cli")]

@@ -104,7 +104,7 @@ impl Network {
         let folding = Folding::new(ranks);
         match strategy {
             Strategy::DirectSend | Strategy::Automatic => {
-                let plan = direct_send::Plan::new(drawn, usize::MAX);
+                let plan = direct_send::Plan::new::<P>(drawn, usize::MAX, root.then_some(0));
                 let mut worst = 0.0_f64;
                 for (place, tiles) in plan.slices.iter().enumerate() {
                     let (mut sent, mut received, mut messages) = (0.0, 0.0, 0.0);

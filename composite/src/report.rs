@@ -24,3 +24,10 @@ pub struct Report {
     /// The strategy that was used, also where it was chosen automatically.
     pub strategy: crate::Strategy,
 }
+
+impl Report {
+    /// The four columns together.
+    pub(crate) fn counted_secs(&self) -> f64 {
+        self.compress_secs + self.blend_secs + self.exchange_secs + self.collect_secs
+    }
+}

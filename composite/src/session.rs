@@ -27,6 +27,12 @@ pub(crate) struct Message {
 /// Longest string of [`Session::meet`]: fingerprint, rectangle, interval of depths.
 const GREETING_BYTES: usize = 8 + 16 + 8;
 
+/// See [`Session::begin_span`].
+pub(crate) struct Span {
+    begin: f64,
+    counted: f64,
+}
+
 /// Ranks in here are *places* in the order of compositing, not ranks of the communicator.
 pub(crate) struct Session<'a> {
     pub(crate) comm: &'a mut dyn Communicator,
@@ -113,18 +119,18 @@ impl<'a> Session<'a> {
         rect: Rect,
         depths: bool,
     ) -> Result<(), CompositeError> {
-        let begin = self.now();
+        let begin = self.comm.working_secs();
         let mut message = self.comm.buffer(wire::longest::<P>(&rect));
         let counts = self.codec.encode(view, rect, depths, &mut message);
         if self.counts_nan {
             // Joined pixels hold no NaN, so only those of the frame are counted here.
             self.report.nan_depths += counts.nan;
         }
-        let encoded = self.now();
+        let encoded = self.comm.working_secs();
         self.report.messages_sent += 1;
         self.report.bytes_sent += message.len() as u64;
         self.comm.send(self.order[place], tag as u32, message)?;
-        let sent = self.now();
+        let sent = self.comm.working_secs();
         if tag == Tag::Collect {
             self.report.collect_secs += sent - begin;
         } else {
@@ -173,11 +179,11 @@ impl<'a> Session<'a> {
         tag: Tag,
         message: Vec<u8>,
     ) -> Result<(), CompositeError> {
-        let begin = self.now();
+        let begin = self.comm.working_secs();
         self.report.messages_sent += 1;
         self.report.bytes_sent += message.len() as u64;
         self.comm.send(self.order[place], tag as u32, message)?;
-        self.report.exchange_secs += self.now() - begin;
+        self.report.exchange_secs += self.comm.working_secs() - begin;
         Ok(())
     }
 
@@ -215,9 +221,8 @@ impl<'a> Session<'a> {
     }
 
     /// The next message that comes, of those announced: its place, whether it is one of [`Tag::Collect`], its bytes. Without
-    /// `patience`, only one that has already come.
+    /// `patience`, only one that has already come. The time goes to whoever measures the [span](Self::begin_span) around it.
     pub(crate) fn next(&mut self, patience: bool) -> Result<Option<(usize, bool, Vec<u8>)>, CompositeError> {
-        let begin = self.now();
         let arrival = if patience {
             Some(self.comm.wait_any(&mut self.posted, self.timeout)?)
         } else if self.posted.is_empty() {
@@ -227,10 +232,19 @@ impl<'a> Session<'a> {
         };
         let Some(arrival) = arrival else { return Ok(None) };
         let is_collect = arrival.tag == Tag::Collect as u32;
-        let waited = self.now() - begin;
-        *(if is_collect { &mut self.report.collect_secs } else { &mut self.report.exchange_secs }) += waited;
         self.report.bytes_received += arrival.message.len() as u64;
         Ok(Some((self.place_of(arrival.source), is_collect, arrival.message)))
+    }
+
+    /// Begins a span of which [`end_span`](Self::end_span) gives what is in no other column to `column`: waits are measured
+    /// together, because where time is simulated every look at the clock costs some.
+    pub(crate) fn begin_span(&self) -> Span {
+        Span { begin: self.now(), counted: self.report.counted_secs() }
+    }
+
+    pub(crate) fn end_span(&mut self, span: Span, column: fn(&mut Report) -> &mut f64) {
+        let elsewhere = self.report.counted_secs() - span.counted;
+        *column(&mut self.report) += (self.now() - span.begin - elsewhere).max(0.0);
     }
 
     /// Checks a message of the strategy.

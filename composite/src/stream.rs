@@ -7,7 +7,7 @@
 //! are going to draw, and the image has the same bits as without streaming.
 use crate::collect::Collector;
 use crate::comm::Communicator;
-use crate::compositor::{Composited, Compositor, Places, SLICE_PX, fingerprint, give_up};
+use crate::compositor::{Composited, Compositor, Places, fingerprint, give_up, slice_px};
 use crate::error::CompositeError;
 use crate::frame::Frame;
 use crate::join::{Item, Scratch};
@@ -72,7 +72,11 @@ impl<P: Composite> Compositor<P> {
                 let drawn = if bounds.is_empty() { Rect::EMPTY } else { bounds };
                 let begun = (|| {
                     session.meet(drawn, [f32::NAN; 2])?;
-                    let plan = Plan::new(&session.drawn, options.slice_px.unwrap_or(SLICE_PX));
+                    let plan = Plan::new::<P>(
+                        &session.drawn,
+                        options.slice_px.unwrap_or_else(|| slice_px(session.comm)),
+                        places.root,
+                    );
                     let pieces = plan.pieces(&session.drawn);
                     let collector =
                         Collector::new(&mut session, size_px, places.root, options.depth, &pieces, spare)?;
@@ -259,9 +263,13 @@ impl<P: Composite> Running<'_, P> {
     }
 
     fn finish(mut self) -> Result<Composited<P>, CompositeError> {
+        let span = self.session.begin_span();
         let waited = self.exchange.finish(&mut self.session, &mut self.collector, self.scratch);
         let (mut session, collector) = (self.session, self.collector);
+        session.end_span(span, |report| &mut report.exchange_secs);
+        let span = session.begin_span();
         let finished = waited.and_then(|()| collector.finish(&mut session));
+        session.end_span(span, |report| &mut report.collect_secs);
         let finished = finished.and_then(|images| {
             if self.confirm {
                 session.barrier()?;

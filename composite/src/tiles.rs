@@ -9,89 +9,131 @@ use crate::rect::Rect;
 /// An active pixel costs a transfer and a join, a pixel of the result only its place: their ratio, about.
 const DRAWN_WEIGHT: u64 = 2;
 
+/// Cells of a region at most in which its work is added up: cuts are as fine as this part of it.
+const CELLS: usize = 128;
+
 /// One tile for every place; `drawn[place]` is the rectangle that it drew in. Tiles are disjoint and cover every `drawn`, and
 /// some may be empty.
 pub(crate) fn balanced(drawn: &[Rect]) -> Vec<Rect> {
+    let mut owners: Vec<Owner> = (0..drawn.len()).map(|place| Owner { place, share: 1 }).collect();
+    shared_out(drawn, &mut owners)
+}
+
+/// A place that gets a tile, as large as its share of all owners' shares.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Owner {
+    pub(crate) place: usize,
+    pub(crate) share: u64,
+}
+
+/// As [`balanced`], among `owners` only; other places have empty tiles.
+pub(crate) fn shared_out(drawn: &[Rect], owners: &mut [Owner]) -> Vec<Rect> {
     let whole = drawn.iter().fold(Rect::EMPTY, |all, rect| all.around(rect));
     let mut tiles = vec![Rect::EMPTY; drawn.len()];
-    let mut places: Vec<usize> = (0..drawn.len()).collect();
     let present: Vec<Rect> = drawn.iter().copied().filter(|rect| !rect.is_empty()).collect();
     if !whole.is_empty() {
-        divide(whole, &mut places, &present, drawn, &mut tiles);
+        divide(whole, owners, &present, drawn, &mut tiles);
     }
     tiles
 }
 
-/// Divides `region` among `places`; `present` are the rectangles that meet it.
-fn divide(region: Rect, places: &mut [usize], present: &[Rect], drawn: &[Rect], tiles: &mut [Rect]) {
-    if let [place] = *places {
-        tiles[place] = region;
+/// Divides `region` among `owners`; `present` are the rectangles that meet it.
+fn divide(region: Rect, owners: &mut [Owner], present: &[Rect], drawn: &[Rect], tiles: &mut [Rect]) {
+    if let [owner] = *owners {
+        tiles[owner.place] = region;
         return;
     }
-    if region.is_empty() || places.is_empty() {
+    if region.is_empty() || owners.is_empty() {
         return;
     }
-    let half = places.len() / 2;
-    let share = |columns: bool| cut(region, columns, present, half, places.len());
-    let (row, column) = (share(false), share(true));
+    let half = owners.len() / 2;
+
+    // Ranks by the centre of what they drew; those that drew nothing work in the middle, where they fill up.
+    let sort = |across_columns: bool, owners: &mut [Owner]| {
+        owners.sort_unstable_by_key(|owner| {
+            let rect = if drawn[owner.place].is_empty() { region } else { drawn[owner.place] };
+            let (from, to) = if across_columns { (rect.x0, rect.x1) } else { (rect.y0, rect.y1) };
+            (u64::from(from) + u64::from(to), owner.place)
+        });
+    };
+    let split = |across_columns: bool, owners: &mut [Owner]| {
+        sort(across_columns, owners);
+        let of = |owners: &[Owner]| owners.iter().map(|owner| owner.share).sum::<u64>();
+        cut(region, across_columns, present, of(&owners[..half]), of(owners))
+    };
 
     // A rectangle that a cut crosses is one message more. Rows lie in one piece in memory and columns do not, so the image is cut
     // across its columns only where that saves many messages: below, between or beside small objects, and across slabs.
+    let row = split(false, owners);
     let crossed_by_row = present.iter().filter(|rect| rect.y0 < row && row < rect.y1).count();
-    let crossed_by_column = present.iter().filter(|rect| rect.x0 < column && column < rect.x1).count();
     let is_flat = region.height() < 2;
-    let across_columns = region.width() > 1 && (is_flat || crossed_by_row > 2 * crossed_by_column + 1);
-    let at = if across_columns { column } else { row };
-
-    // Ranks by the centre of what they drew; those that drew nothing work in the middle, where they fill up.
-    places.sort_by_key(|&place| {
-        let rect = if drawn[place].is_empty() { region } else { drawn[place] };
-        let (from, to) = if across_columns { (rect.x0, rect.x1) } else { (rect.y0, rect.y1) };
-        (u64::from(from) + u64::from(to), place)
-    });
-    let (first, second) = places.split_at_mut(half);
-    let (mut before, mut behind) = (region, region);
-    if across_columns {
-        (before.x1, behind.x0) = (at, at);
-    } else {
-        (before.y1, behind.y0) = (at, at);
+    let mut at = (row, false);
+    if region.width() > 1 && (is_flat || crossed_by_row > 1) {
+        let column = split(true, owners);
+        let crossed_by_column = present.iter().filter(|rect| rect.x0 < column && column < rect.x1).count();
+        if is_flat || crossed_by_row > 2 * crossed_by_column + 1 {
+            at = (column, true);
+        } else {
+            sort(false, owners);
+        }
     }
-    for (part, its_places) in [(before, first), (behind, second)] {
+    let (first, second) = owners.split_at_mut(half);
+    let (mut before, mut behind) = (region, region);
+    if at.1 {
+        (before.x1, behind.x0) = (at.0, at.0);
+    } else {
+        (before.y1, behind.y0) = (at.0, at.0);
+    }
+    for (part, its_owners) in [(before, first), (behind, second)] {
+        if let [owner] = *its_owners {
+            tiles[owner.place] = part;
+            continue;
+        }
         let meeting: Vec<Rect> =
             present.iter().map(|rect| rect.intersection(&part)).filter(|rect| !rect.is_empty()).collect();
-        divide(part, its_places, &meeting, drawn, tiles);
+        divide(part, its_owners, &meeting, drawn, tiles);
     }
 }
 
 /// Where to cut `region` so that the part before has `share` of `shares` of the work.
-fn cut(region: Rect, across_columns: bool, present: &[Rect], share: usize, shares: usize) -> u32 {
+fn cut(region: Rect, across_columns: bool, present: &[Rect], share: u64, shares: u64) -> u32 {
     let (start, end) = if across_columns { (region.x0, region.x1) } else { (region.y0, region.y1) };
-    let length = (end - start) as usize;
+    let own = if across_columns { region.height() } else { region.width() } as u64;
 
-    // Work of every column (or row), from where rectangles begin and end.
-    let mut change = vec![0_i64; length + 1];
+    // The work of columns (or rows), in cells: what changes inside a cell counts as if at its nearer side.
+    let length = (end - start) as usize;
+    let cell = length.div_ceil(CELLS).max(1);
+    let cells = length.div_ceil(cell);
+    let mut changes = [0_i64; CELLS + 1];
+    let nearest = |at: u32| ((at - start) as usize + cell / 2) / cell;
     for rect in present {
         let (from, to, across) =
             if across_columns { (rect.x0, rect.x1, rect.height()) } else { (rect.y0, rect.y1, rect.width()) };
-        change[(from - start) as usize] += across as i64;
-        change[(to - start) as usize] -= across as i64;
+        let work = (DRAWN_WEIGHT * across as u64) as i64;
+        changes[nearest(from).min(CELLS)] += work;
+        changes[nearest(to).min(CELLS)] -= work;
     }
-    let own = if across_columns { region.height() } else { region.width() } as u64;
-    let mut work = Vec::with_capacity(length);
-    let (mut here, mut total) = (0_i64, 0_u64);
-    for step in &change[..length] {
-        here += step;
-        total += DRAWN_WEIGHT * here as u64 + own;
-        work.push(total);
+    let width_of = |index: usize| cell.min(length - index * cell) as u64;
+    let mut here = 0_i64;
+    let mut work = [0_u64; CELLS];
+    let mut total = 0;
+    for (index, work) in work[..cells].iter_mut().enumerate() {
+        here += changes[index];
+        *work = own + here.max(0) as u64;
+        total += *work * width_of(index);
     }
-
-    // Rounded to the nearer side, so that cuts are not always late.
-    let wanted = (u128::from(total) * share as u128 / shares as u128) as u64;
-    let before = work.partition_point(|&sum| sum < wanted);
-    let (below, above) =
-        (if before == 0 { 0 } else { work[before - 1] }, work.get(before).copied().unwrap_or(total));
-    let nearer = if above.saturating_sub(wanted) < wanted - below { before + 1 } else { before };
-    start + nearer.min(length) as u32
+    let wanted = (u128::from(total) * u128::from(share) / u128::from(shares.max(1))) as u64;
+    let mut done = 0;
+    for (index, &work) in work[..cells].iter().enumerate() {
+        let more = work * width_of(index);
+        if done + more >= wanted {
+            // Rounded to the nearer side, so that cuts are not always late.
+            let along = (wanted - done + work / 2) / work.max(1);
+            return (start + (index * cell) as u32 + along as u32).min(end);
+        }
+        done += more;
+    }
+    end
 }
 
 /// `tile` in slices of rows, of about `pixels` each.

@@ -2,10 +2,10 @@
 //!
 //! | bytes | content |
 //! |---|---|
-//! | 0..8 | `COMPOS02` |
+//! | 0..8 | `COMPOS03` |
 //! | 8..16 | checksum of the header behind it, and of everything if the flag says so |
 //! | 16..24 | fingerprint of what is composited: sizes, format, strategy, rank order |
-//! | 24..32 | flags: 1 mask present, 2 depths present, 4 checksum covers pixels |
+//! | 24..32 | flags: 1 mask present, 2 depths present, 4 checksum covers pixels, 8 colours have three bytes and full alpha |
 //! | 32..48 | `u32` each: first column, first row, end of columns, end of rows |
 //! | 48..56 | number of active pixels |
 //! | 56..64 | zero |
@@ -19,8 +19,9 @@ use crate::layer::{Layer, View};
 use crate::pixel::Composite;
 use crate::rect::Rect;
 use crate::simd::compress::{append_active, append_active_scalar};
-use crate::simd::expand::{Side, SparseRow, join_row, join_row_scalar, place_row};
+use crate::simd::expand::{Side, SparseRow, join_row, join_row_scalar, place_row, place_row_scalar};
 use crate::simd::mask::{Counts, row_words, row_words_scalar};
+use crate::simd::opaque::{drop_full_alpha, drop_full_alpha_scalar, give_full_alpha, give_full_alpha_scalar};
 use crate::simd::{Kernels, at_level};
 use fearless_simd::Simd;
 
@@ -29,12 +30,16 @@ compile_error!(
     "messages hold pixels as they lie in memory, and this has only been done for little-endian machines"
 );
 
-const MAGIC: u64 = u64::from_le_bytes(*b"COMPOS02");
+const MAGIC: u64 = u64::from_le_bytes(*b"COMPOS03");
 /// Bytes in front of the mask.
 pub(crate) const HEADER_BYTES: usize = 64;
 const HAS_MASK: u64 = 1;
 const HAS_DEPTHS: u64 = 2;
 const IS_SUMMED: u64 = 4;
+const IS_OPAQUE: u64 = 8;
+const ALL_FLAGS: u64 = 15;
+/// Bytes of a colour whose alpha is known to be full.
+const OPAQUE_BYTES: usize = 3;
 
 /// What is wrong with a message.
 #[derive(Debug, thiserror::Error, Clone, PartialEq, Eq)]
@@ -48,7 +53,7 @@ pub enum WireError {
         found: u64,
     },
     /// Not a message of this library or of this version of it.
-    #[error("it does not begin with COMPOS02")]
+    #[error("it does not begin with COMPOS03")]
     Magic,
     /// Bits changed on the way.
     #[error("its checksum is {found:#018x} instead of {expected:#018x}")]
@@ -117,6 +122,11 @@ pub(crate) fn longest<P: Composite>(rect: &Rect) -> usize {
     HEADER_BYTES + rect.height() * rect.width().div_ceil(64) * 8 + rect.pixels() * P::BYTES
 }
 
+/// Whether messages of colours without depths may leave out full alphas: opaque pictures nearly always are such.
+fn may_be_opaque<P: Composite>(depths: bool) -> bool {
+    P::HAS_DEPTH && P::Color::BYTES == 4 && !depths
+}
+
 /// The rectangle a message says it holds, not yet checked.
 pub(crate) fn rect_of(bytes: &[u8]) -> Option<Rect> {
     let corner = |at: usize| bytes.get(at..at + 4).map(bytemuck::pod_read_unaligned::<u32>);
@@ -137,12 +147,20 @@ impl Codec {
         out.resize(HEADER_BYTES, 0);
         let depths = depths && P::HAS_DEPTH;
         let mut counts = Counts::default();
-        if !rect.is_empty() {
-            counts = at_level!(
+        let mut opaque = may_be_opaque::<P>(depths);
+        while !rect.is_empty() {
+            let encoded = at_level!(
                 self.kernels,
-                simd => encode_rows(simd, view, rect, depths, out),
-                encode_rows_scalar(view, rect, depths, out)
+                simd => encode_rows(simd, view, rect, depths, opaque, out),
+                encode_rows_scalar(view, rect, depths, opaque, out)
             );
+            if let Some(encoded) = encoded {
+                counts = encoded;
+                break;
+            }
+            // One of the alphas was not full after all.
+            opaque = false;
+            out.truncate(HEADER_BYTES);
         }
 
         // Header. A rectangle with all pixels active has no mask.
@@ -154,6 +172,9 @@ impl Codec {
         }
         if self.verify {
             flags |= IS_SUMMED;
+        }
+        if opaque && counts.active > 0 {
+            flags |= IS_OPAQUE;
         }
         let corners = |a: u32, b: u32| u64::from(a) | u64::from(b) << 32;
         let (from, to) = (corners(rect.x0, rect.y0), corners(rect.x1, rect.y1));
@@ -205,16 +226,21 @@ impl Codec {
         // Flags and count fit the rectangle, and the length fits them.
         let (pixels, active) = (rect.pixels() as u64, number(6));
         let sparse = active > 0 && active < pixels;
-        if flags > 7 || number(7) != 0 || active > pixels || (flags & HAS_MASK != 0) != sparse {
+        if flags > ALL_FLAGS || number(7) != 0 || active > pixels || (flags & HAS_MASK != 0) != sparse {
             return Err(WireError::Mask);
         }
         let has_depths = flags & HAS_DEPTHS != 0;
         if has_depths != (depths && P::HAS_DEPTH) {
             return Err(WireError::Mask);
         }
+        let is_opaque = flags & IS_OPAQUE != 0;
+        if is_opaque && (active == 0 || !may_be_opaque::<P>(depths)) {
+            return Err(WireError::Mask);
+        }
         let words_per_row = rect.width().div_ceil(64) as u64;
         let mask_bytes = if sparse { 8 * words_per_row * rect.height() as u64 } else { 0 };
-        let pixel_bytes = P::Color::BYTES as u64 + if has_depths { 4 } else { 0 };
+        let color_bytes = if is_opaque { OPAQUE_BYTES } else { P::Color::BYTES };
+        let pixel_bytes = color_bytes as u64 + if has_depths { 4 } else { 0 };
         let needed = active
             .checked_mul(pixel_bytes)
             .and_then(|bytes| bytes.checked_add(mask_bytes + HEADER_BYTES as u64))
@@ -222,7 +248,7 @@ impl Codec {
         if needed != found {
             return Err(WireError::Length { expected: needed, found });
         }
-        let part = Part::open(bytes, rect, active as usize, has_depths);
+        let part = Part::open(bytes, rect, active as usize, has_depths, color_bytes);
         if sparse { part.check_mask().map(|()| part) } else { Ok(part) }
     }
 }
@@ -233,8 +259,9 @@ fn encode_rows<P: Composite, S: Simd>(
     view: &View<'_, P>,
     rect: Rect,
     depths: bool,
+    opaque: bool,
     out: &mut Vec<u8>,
-) -> Counts {
+) -> Option<Counts> {
     let mut counts = Counts::default();
     let (width, words) = (rect.width(), rect.width().div_ceil(64));
     out.reserve(rect.pixels() * P::BYTES);
@@ -248,14 +275,18 @@ fn encode_rows<P: Composite, S: Simd>(
         if counts.active != before + width {
             break;
         }
+        let begin = out.len();
         out.extend_from_slice(bytemuck::cast_slice(colors));
+        if opaque && !drop_full_alpha(simd, out, begin) {
+            return None;
+        }
         if depths {
             out.extend_from_slice(bytemuck::cast_slice(row_depths));
         }
         y += 1;
     }
     if y == rect.y1 {
-        return counts;
+        return Some(counts);
     }
 
     // With a mask, from the first row on.
@@ -272,11 +303,15 @@ fn encode_rows<P: Composite, S: Simd>(
             word_at += 8;
         });
         if counts.active > before {
+            let begin = out.len();
             let colors = bytemuck::cast_slice(colors);
             match P::Color::BYTES {
                 4 => append_active::<4, S>(simd, out, mask_at, colors),
                 8 => append_active::<8, S>(simd, out, mask_at, colors),
                 _ => append_active::<16, S>(simd, out, mask_at, colors),
+            }
+            if opaque && !drop_full_alpha(simd, out, begin) {
+                return None;
             }
             if depths {
                 append_active::<4, S>(simd, out, mask_at, bytemuck::cast_slice(row_depths));
@@ -284,7 +319,7 @@ fn encode_rows<P: Composite, S: Simd>(
         }
         mask_at = word_at;
     }
-    counts
+    Some(counts)
 }
 
 /// [`encode_rows`] one pixel after the other.
@@ -292,8 +327,9 @@ fn encode_rows_scalar<P: Composite>(
     view: &View<'_, P>,
     rect: Rect,
     depths: bool,
+    opaque: bool,
     out: &mut Vec<u8>,
-) -> Counts {
+) -> Option<Counts> {
     let mut counts = Counts::default();
     let words = rect.width().div_ceil(64);
     out.resize(HEADER_BYTES + 8 * words * rect.height(), 0);
@@ -305,11 +341,15 @@ fn encode_rows_scalar<P: Composite>(
             out[word_at..word_at + 8].copy_from_slice(&word.to_le_bytes());
             word_at += 8;
         });
+        let begin = out.len();
         let colors = bytemuck::cast_slice(colors);
         match P::Color::BYTES {
             4 => append_active_scalar::<4>(out, mask_at, colors),
             8 => append_active_scalar::<8>(out, mask_at, colors),
             _ => append_active_scalar::<16>(out, mask_at, colors),
+        }
+        if opaque && !drop_full_alpha_scalar(out, begin) {
+            return None;
         }
         if depths {
             append_active_scalar::<4>(out, mask_at, bytemuck::cast_slice(row_depths));
@@ -319,7 +359,7 @@ fn encode_rows_scalar<P: Composite>(
     if counts.active == rect.pixels() {
         out.drain(HEADER_BYTES..mask_at);
     }
-    counts
+    Some(counts)
 }
 
 /// A message whose every number has been checked.
@@ -328,6 +368,7 @@ pub(crate) struct Part<'a> {
     pub(crate) rect: Rect,
     pub(crate) active: usize,
     has_depths: bool,
+    color_bytes: usize,
     mask: &'a [u8],
     pixels: &'a [u8],
 }
@@ -336,14 +377,16 @@ impl<'a> Part<'a> {
     /// A message that [`Codec::decode`] has accepted, from its own number of active pixels.
     pub(crate) fn reopen<P: Composite>(bytes: &'a [u8], rect: Rect, depths: bool) -> Self {
         let active = bytes.get(48..56).map_or(0, bytemuck::pod_read_unaligned::<u64>);
-        Self::open(bytes, rect, active as usize, depths && P::HAS_DEPTH)
+        let flags: u64 = bytes.get(24..32).map_or(0, bytemuck::pod_read_unaligned);
+        let color_bytes = if flags & IS_OPAQUE != 0 { OPAQUE_BYTES } else { P::Color::BYTES };
+        Self::open(bytes, rect, active as usize, depths && P::HAS_DEPTH, color_bytes)
     }
 
-    fn open(bytes: &'a [u8], rect: Rect, active: usize, has_depths: bool) -> Self {
+    fn open(bytes: &'a [u8], rect: Rect, active: usize, has_depths: bool, color_bytes: usize) -> Self {
         let sparse = active > 0 && active < rect.pixels();
         let mask_bytes = if sparse { 8 * rect.width().div_ceil(64) * rect.height() } else { 0 };
         let (mask, pixels) = bytes[HEADER_BYTES..].split_at(mask_bytes);
-        Self { rect, active, has_depths, mask, pixels }
+        Self { rect, active, has_depths, color_bytes, mask, pixels }
     }
 
     /// The mask has as many ones as announced, and none behind the end of a row.
@@ -367,7 +410,7 @@ impl<'a> Part<'a> {
 
     /// Calls `visit` with every row, top to bottom, that may have active pixels.
     #[inline(always)]
-    fn for_each_row<P: Composite>(&self, mut visit: impl FnMut(u32, SparseRow<'a>)) {
+    fn for_each_row(&self, mut visit: impl FnMut(u32, SparseRow<'a>)) {
         if self.active == 0 {
             return;
         }
@@ -388,7 +431,7 @@ impl<'a> Part<'a> {
                     .map(|word| u64::from_le_bytes(*word).count_ones() as usize)
                     .sum()
             };
-            let depths_at = at + active * P::Color::BYTES;
+            let depths_at = at + active * self.color_bytes;
             let end = depths_at + if self.has_depths { 4 * active } else { 0 };
             visit(
                 y,
@@ -408,31 +451,47 @@ impl<'a> Part<'a> {
     pub(crate) fn join_to<P: Composite>(&self, kernels: Kernels, layer: &mut Layer<P>, side: Side) {
         at_level!(
             kernels,
-            simd => self.for_each_row::<P>(
+            simd => self.for_each_row(
                 #[inline(always)]
                 |y, row| {
                     let (colors, depths) = layer.row_mut(y, self.rect.x0, self.rect.x1);
                     join_row::<P, _>(simd, row, colors, depths, side);
                 }
             ),
-            self.for_each_row::<P>(|y, row| {
+            self.for_each_row(|y, row| {
                 let (colors, depths) = layer.row_mut(y, self.rect.x0, self.rect.x1);
                 join_row_scalar::<P>(row, colors, depths, side);
             })
         );
     }
 
-    /// Writes its rectangle over `layer`, whose bounds must hold it.
-    pub(crate) fn place_in<P: Composite>(&self, layer: &mut Layer<P>) {
+    /// Writes its rectangle over `layer`, whose bounds must hold it. Not for messages without depths where `layer` has some.
+    pub(crate) fn place_in<P: Composite>(&self, kernels: Kernels, layer: &mut Layer<P>) {
         let (x0, x1) = (self.rect.x0, self.rect.x1);
-        self.for_each_row::<P>(|y, row| {
-            let (colors, depths) = layer.row_mut(y, x0, x1);
-            place_row::<P>(row, colors, depths);
-        });
+        at_level!(
+            kernels,
+            simd => self.for_each_row(
+                #[inline(always)]
+                |y, row| {
+                    let (colors, depths) = layer.row_mut(y, x0, x1);
+                    place_row::<P, _>(simd, row, colors, depths);
+                }
+            ),
+            self.for_each_row(|y, row| {
+                let (colors, depths) = layer.row_mut(y, x0, x1);
+                place_row_scalar::<P>(row, colors, depths);
+            })
+        );
     }
 
     /// Writes its rectangle into planes of `width` columns; `depths` may be empty.
-    pub(crate) fn place<P: Composite>(&self, width: usize, colors: &mut [P::Color], depths: &mut [f32]) {
+    pub(crate) fn place<P: Composite>(
+        &self,
+        kernels: Kernels,
+        width: usize,
+        colors: &mut [P::Color],
+        depths: &mut [f32],
+    ) {
         let range = |y: u32| {
             let start = y as usize * width + self.rect.x0 as usize;
             start..start + self.rect.width()
@@ -445,10 +504,34 @@ impl<'a> Part<'a> {
                 }
             }
         }
-        self.for_each_row::<P>(|y, row| {
-            let to_depths = if depths.is_empty() { &mut [] } else { &mut depths[range(y)] };
-            place_row::<P>(row, &mut colors[range(y)], to_depths);
-        });
+        let is_opaque = self.color_bytes != P::Color::BYTES;
+        let mut wide = Vec::new();
+        at_level!(
+            kernels,
+            simd => self.for_each_row(
+                #[inline(always)]
+                |y, row| {
+                    let to_depths = if depths.is_empty() { &mut [] } else { &mut depths[range(y)] };
+                    let row = if is_opaque {
+                        give_full_alpha(simd, row.colors, &mut wide);
+                        SparseRow { colors: &wide, behind_colors: &wide, ..row }
+                    } else {
+                        row
+                    };
+                    place_row::<P, _>(simd, row, &mut colors[range(y)], to_depths);
+                }
+            ),
+            self.for_each_row(|y, row| {
+                let to_depths = if depths.is_empty() { &mut [] } else { &mut depths[range(y)] };
+                let row = if is_opaque {
+                    give_full_alpha_scalar(row.colors, &mut wide);
+                    SparseRow { colors: &wide, behind_colors: &wide, ..row }
+                } else {
+                    row
+                };
+                place_row_scalar::<P>(row, &mut colors[range(y)], to_depths);
+            })
+        );
     }
 }
 

@@ -211,7 +211,7 @@ where
 #[error("interrupted; what was finished is kept")]
 pub struct Interrupted;
 
-/// A flag that Ctrl-C sets. Long work looks at it at good places to stop.
+/// A flag that Ctrl-C sets, and TERM and HUP, too. Long work looks at it at good places to stop.
 #[derive(Debug, Clone, Copy)]
 pub struct Cancel(&'static Arc<AtomicBool>);
 
@@ -235,7 +235,7 @@ impl Cancel {
         Ok(Cancel(flag))
     }
 
-    /// Whether Ctrl-C came.
+    /// Whether Ctrl-C (or a TERM, as batch systems send) came.
     pub fn is_set(self) -> bool {
         self.0.load(Ordering::Relaxed)
     }

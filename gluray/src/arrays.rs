@@ -3,15 +3,18 @@
 //! The driver is asked which arrays are on when the draw comes. Client memory is copied then and there, because the program may change
 //! it as soon as the call returns.
 
-use crate::cache::Geometry;
+use crate::cache::{Geometry, hash};
 use crate::capture::{Attributes, Draw, Packed, Shading, Values, component_bytes};
 use crate::client_memory;
 use crate::context::{Context, Sink};
 use crate::decide::Verdict;
 use crate::enums::*;
+use crate::overrides::Look;
 use crate::primitives::{is_filled, triangulate};
 use crate::programs::DrawCall;
 use crate::real::gl;
+use crate::state::snapshot::Snapshot;
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// Where an array is.
@@ -31,34 +34,52 @@ impl Source {
         component_bytes(self.kind) * self.size
     }
 
-    /// Vertices `first..first + count`, tightly packed; an error in words when they cannot be read.
-    pub(crate) fn read(&self, first: usize, count: usize) -> Result<Packed, &'static str> {
+    /// Bytes from one vertex to the next.
+    fn step(&self) -> usize {
+        if self.stride == 0 { self.element() } else { self.stride }
+    }
+
+    /// Vertices `first..first + count` where they are, with gaps; an error in words when they cannot be read.
+    pub(crate) fn view(&self, first: usize, count: usize) -> Result<Cow<'static, [u8]>, &'static str> {
         let element = self.element();
         if element == 0 || self.size > 4 {
             return Err("an array of a type that is not read");
         }
-        let stride = if self.stride == 0 { element } else { self.stride };
-        let start = self.address + first * stride;
-        let length = if count == 0 { 0 } else { (count - 1) * stride + element };
-        let owned;
-        let bytes: &[u8] = if self.buffer == 0 {
-            if self.address == 0 {
-                return Err("an array without an address");
-            }
-            client_memory::view(start, length)
-        } else {
-            owned = read_buffer(self.buffer, start, length)?;
-            &owned
-        };
-        let bytes = match stride == element {
-            true => bytes.to_vec(),
+        let start = self.address + first * self.step();
+        let length = if count == 0 { 0 } else { (count - 1) * self.step() + element };
+        match self.buffer {
+            0 if self.address == 0 => Err("an array without an address"),
+            // For the time of this call: nobody keeps it.
+            0 => Ok(Cow::Borrowed(client_memory::view(start, length))),
+            buffer => read_buffer(buffer, start, length).map(Cow::Owned),
+        }
+    }
+
+    /// Bytes of [`Source::view`] tightly packed.
+    pub(crate) fn pack(&self, bytes: Cow<'_, [u8]>) -> Packed {
+        let (element, step) = (self.element(), self.step());
+        let bytes = match step == element {
+            true => bytes.into_owned(),
             false => {
-                let mut out = Vec::with_capacity(count * element);
-                (0..count).for_each(|i| out.extend_from_slice(&bytes[i * stride..i * stride + element]));
+                let mut out = Vec::with_capacity(bytes.len() / step * element + element);
+                // A stride below the element's size makes vertices overlap.
+                for at in (0..(bytes.len() + 1).saturating_sub(element)).step_by(step) {
+                    out.extend_from_slice(&bytes[at..at + element]);
+                }
                 out
             }
         };
-        Ok(Packed { bytes, kind: self.kind, size: self.size, normalized: self.normalized })
+        Packed { bytes, kind: self.kind, size: self.size, normalized: self.normalized }
+    }
+
+    /// Vertices `first..first + count`, tightly packed; an error in words when they cannot be read.
+    pub(crate) fn read(&self, first: usize, count: usize) -> Result<Packed, &'static str> {
+        Ok(self.pack(self.view(first, count)?))
+    }
+
+    /// What makes the same bytes another array.
+    pub(crate) fn layout(&self) -> (usize, u32, usize, bool) {
+        (self.step(), self.kind, self.size, self.normalized)
     }
 }
 
@@ -107,6 +128,17 @@ fn source(
 }
 
 impl Arrays {
+    /// The array of positions alone.
+    pub(crate) fn query_position() -> Result<Source, &'static str> {
+        if !gl::is_enabled(VERTEX_ARRAY) {
+            return Err("no vertex array");
+        }
+        let size = gl::int(VERTEX_ARRAY_SIZE).max(0) as usize;
+        let (kind, stride) = (VERTEX_ARRAY_TYPE, VERTEX_ARRAY_STRIDE);
+        let buffer = VERTEX_ARRAY_BUFFER_BINDING;
+        Ok(source(size, kind, stride, VERTEX_ARRAY_POINTER, buffer, false, true))
+    }
+
     /// As the driver has them; an error in words when rays cannot stand for them.
     pub(crate) fn query(version: u32) -> Result<Arrays, &'static str> {
         let buffers = version >= 15;
@@ -169,6 +201,14 @@ impl Arrays {
     }
 }
 
+/// What became of a draw that is not left to the driver alone.
+pub(crate) enum Taken {
+    /// Rays make its pixels.
+    Traced,
+    /// The driver makes its colours, rays its shadows.
+    Shape,
+}
+
 /// Which vertices a draw takes.
 pub(crate) enum Elements {
     /// Neighbours in the arrays.
@@ -215,12 +255,44 @@ impl Elements {
         Ok(Elements::Indexed { indices, least: least as usize, count })
     }
 
+    /// Names the geometry of these elements of an array of positions, whose bytes are given.
+    fn key(&self, mode: u32, bytes: &[u8], layout: (usize, u32, usize, bool), s: &Snapshot) -> u128 {
+        let (stride, kind, size, _) = layout;
+        let rules = u64::from(s.first_vertex_provokes) << 1 | u64::from(s.flat);
+        let (_, count) = self.span();
+        let tail = [stride as u64, u64::from(kind), size as u64, u64::from(mode), rules, count as u64];
+        let tail = bytemuck::cast_slice(&tail);
+        match self {
+            Elements::Range { .. } => hash(&[bytes, tail]),
+            Elements::Indexed { indices, least, .. } => {
+                hash(&[bytes, bytemuck::cast_slice(indices), &least.to_ne_bytes(), tail])
+            }
+        }
+    }
+
     /// First vertex, and how many there are from it on.
     pub(crate) fn span(&self) -> (usize, usize) {
         match self {
             Elements::Range { first, count } => (*first, *count),
             Elements::Indexed { least, count, .. } => (*least, *count),
         }
+    }
+
+    /// Up to `most` different vertices, spread over the draw.
+    pub(crate) fn some(&self, most: usize) -> Vec<u32> {
+        let n = match self {
+            Elements::Range { count, .. } => *count,
+            Elements::Indexed { indices, .. } => indices.len(),
+        };
+        let take = most.min(n);
+        let number = |i: usize| match self {
+            Elements::Range { first, .. } => (first + i) as u32,
+            Elements::Indexed { indices, .. } => indices[i],
+        };
+        let mut out: Vec<u32> = (0..take).map(|i| number(i * (n - 1) / (take - 1).max(1))).collect();
+        out.sort_unstable();
+        out.dedup();
+        out
     }
 
     /// Triangles, in vertex numbers of the span.
@@ -308,11 +380,17 @@ impl Context {
             // Recognised programs decide for themselves what blending means.
             _ if self.state.program != 0 => self.take_program_arrays(mode, call, elements),
             Verdict::Pass(why) => Err(why),
-            v => self.take_arrays(mode, elements, v),
+            v => self.take_arrays(mode, elements, v).map(|()| Taken::Traced),
         };
         self.drop_errors();
         match taken {
-            Ok(()) => true,
+            Ok(Taken::Traced) => true,
+            // The driver draws it, and rays darken it when the frame ends.
+            Ok(Taken::Shape) => {
+                self.sync();
+                self.mark_current();
+                false
+            }
             Err(why) => {
                 self.passing(why, is_filled(mode));
                 // The arrays of the driver's draw leave some current values undefined.
@@ -331,9 +409,21 @@ impl Context {
         let arrays = Arrays::query(self.can.version)?;
         let elements = elements()?;
         let (first, count) = elements.span();
-        let packed = arrays.position.read(first, count)?;
-        let positions = positions(&packed)?;
-        let read = |s: &Option<Source>| s.map(|s| s.read(first, count)).transpose();
+        let seen = arrays.position.view(first, count)?;
+        let key = elements.key(mode, &seen, arrays.position.layout(), &self.state);
+        let geometry = match self.cache.known(key) {
+            Some(geometry) => geometry,
+            None => {
+                let positions = positions(&arrays.position.pack(seen))?;
+                let triangles = elements.triangles(mode, self.state.first_vertex_provokes, self.state.flat);
+                self.cache.put(key, &positions, triangles)
+            }
+        };
+        let mut read = |s: &Option<Source>| -> Result<Option<Arc<Packed>>, &'static str> {
+            let Some(s) = s else { return Ok(None) };
+            let bytes = s.view(first, count)?;
+            Ok(Some(self.packed.get(&bytes, s.layout(), || s.pack(Cow::Borrowed(&bytes)))))
+        };
         let (normal, color, tex) = (read(&arrays.normal)?, read(&arrays.color)?, read(&arrays.tex)?);
         if let Verdict::TraceIfOpaque(why) = verdict {
             let by_color = !self.state.lighting
@@ -349,13 +439,11 @@ impl Context {
                 return Err(why);
             }
         }
-        let triangles = elements.triangles(mode, self.state.first_vertex_provokes, self.state.flat);
         self.sync();
         if verdict == Verdict::TraceInOrder {
             self.flush("a draw whose order matters");
         }
         self.end_batch();
-        let geometry = self.cache.of_indices(&positions, &triangles);
         let mut attributes = Attributes::constant(&self.current);
         if let Some(p) = normal {
             attributes.normals = Values::Packed(p);
@@ -382,8 +470,15 @@ impl Context {
             Shading::Fixed => crate::lighting::product(&self.state.projection, &self.state.model_view),
             Shading::Program(p) => p.clip_from_object,
         };
-        let draw =
-            Draw { geometry, attributes, state: self.state.clone(), shading, clip_from_object, calls: 1 };
+        let draw = Draw {
+            geometry,
+            attributes,
+            state: self.state.clone(),
+            shading,
+            clip_from_object,
+            calls: 1,
+            look: Look::default(),
+        };
         self.add(draw, in_order);
     }
 
@@ -420,7 +515,7 @@ impl Context {
             return false;
         };
         let end = [0.0, 0.0, 0.0, 1.0];
-        self.list_begin(mode);
+        self.list_begin_arrays(mode);
         for i in elements.order() {
             if let Some(p) = &normal {
                 self.list_normal(p.at(i, [0.0; 3]));

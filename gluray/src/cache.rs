@@ -139,17 +139,37 @@ impl Cache {
     }
 
     fn find(&mut self, key: u128, make: impl FnOnce() -> TriMesh) -> Arc<Geometry> {
-        let frame = self.frame;
-        if let Some(e) = self.entries.get_mut(&key) {
-            self.hits += 1;
-            e.frames += u32::from(e.last_used != frame);
-            e.last_used = frame;
-            return e.geometry.clone();
+        match self.known(key) {
+            Some(geometry) => geometry,
+            None => self.insert(key, make()),
         }
+    }
+
+    /// Geometry of a name, if it is there.
+    pub(crate) fn known(&mut self, key: u128) -> Option<Arc<Geometry>> {
+        let frame = self.frame;
+        let e = self.entries.get_mut(&key)?;
+        self.hits += 1;
+        e.frames += u32::from(e.last_used != frame);
+        e.last_used = frame;
+        Some(e.geometry.clone())
+    }
+
+    /// New geometry that the caller named.
+    pub(crate) fn put(
+        &mut self,
+        key: u128,
+        positions: &[[f32; 3]],
+        triangles: Vec<[u32; 3]>,
+    ) -> Arc<Geometry> {
+        self.insert(key, TriMesh::new(vectors(positions), triangles))
+    }
+
+    fn insert(&mut self, key: u128, mesh: TriMesh) -> Arc<Geometry> {
         self.misses += 1;
-        let geometry = Arc::new(Geometry::new(key, make()));
-        self.entries
-            .insert(key, Entry { geometry: geometry.clone(), last_used: frame, frames: 1, improving: false });
+        let geometry = Arc::new(Geometry::new(key, mesh));
+        let entry = Entry { geometry: geometry.clone(), last_used: self.frame, frames: 1, improving: false };
+        self.entries.insert(key, entry);
         geometry
     }
 
@@ -206,7 +226,11 @@ pub(crate) fn hash(arrays: &[&[u8]]) -> u128 {
             h = mix2(h, hash_chunk(a));
             continue;
         }
-        let parts: Vec<u128> = a.par_chunks(CHUNK).map(hash_chunk).collect();
+        let parts: Vec<u128> = match crate::config::current().settings.asynchronous {
+            // The pool is busy with the frame before.
+            true => a.chunks(CHUNK).map(hash_chunk).collect(),
+            false => crate::worker::on_pool(|| a.par_chunks(CHUNK).map(hash_chunk).collect()),
+        };
         h = parts.iter().fold(h, |h, p| mix2(h, *p));
     }
     h

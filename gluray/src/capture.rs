@@ -2,6 +2,7 @@
 
 use crate::cache::Geometry;
 use crate::enums::*;
+use crate::overrides::Look;
 use crate::programs::Recognised;
 use crate::state::current::{Current, Materials};
 use crate::state::snapshot::Snapshot;
@@ -15,7 +16,7 @@ pub(crate) enum Values<const N: usize> {
     /// One per vertex.
     PerVertex(Vec<[f32; N]>),
     /// One per vertex, as the program's arrays have them.
-    Packed(Packed),
+    Packed(Arc<Packed>),
 }
 
 /// A tightly packed array as the program gave it.
@@ -133,6 +134,25 @@ pub(crate) struct Draw {
     pub(crate) clip_from_object: [f32; 16],
     /// Counts the program's draw calls in it.
     pub(crate) calls: u64,
+    /// What the user makes of it.
+    pub(crate) look: Look,
+}
+
+impl Draw {
+    /// True when no part of the draw lets light through.
+    pub(crate) fn has_full_alpha(&self) -> bool {
+        let (s, a) = (&self.state, &self.attributes);
+        let tracked = s.color_material.is_some_and(|(_, what)| matches!(what, DIFFUSE | AMBIENT_AND_DIFFUSE));
+        match (&self.shading, &a.colors) {
+            (Shading::Program(program), _) => program.is_opaque(a, self.geometry.mesh.positions.len()),
+            _ if s.lighting && !tracked => a.materials.iter().flatten().all(|m| m.diffuse[3] == 1.0),
+            (_, Values::Constant(c)) => c[3] == 1.0,
+            (_, Values::PerVertex(all)) => all.iter().all(|c| c[3] == 1.0),
+            (_, Values::Packed(_)) => {
+                (0..self.geometry.mesh.positions.len()).all(|i| a.colors.at(i)[3] == 1.0)
+            }
+        }
+    }
 }
 
 /// Primitives of one kind and size that follow one another.
@@ -141,195 +161,6 @@ pub(crate) struct Run {
     pub(crate) mode: u32,
     pub(crate) count: u32,
     pub(crate) times: u32,
-}
-
-/// A stream of one attribute that costs nothing while it does not change.
-struct Stream<const N: usize> {
-    varying: bool,
-    constant: [f32; N],
-    values: Vec<[f32; N]>,
-}
-
-impl<const N: usize> Default for Stream<N> {
-    fn default() -> Self {
-        Stream { varying: false, constant: [0.0; N], values: Vec::new() }
-    }
-}
-
-impl<const N: usize> Stream<N> {
-    #[inline(always)]
-    fn set(&mut self, v: [f32; N], vertices: usize) {
-        if self.varying {
-            return;
-        }
-        if vertices == 0 {
-            self.constant = v;
-        } else if v != self.constant {
-            self.vary(vertices);
-        }
-    }
-
-    #[cold]
-    fn vary(&mut self, vertices: usize) {
-        self.values.clear();
-        self.values.resize(vertices, self.constant);
-        self.varying = true;
-    }
-
-    fn take(&mut self) -> Values<N> {
-        let varying = std::mem::take(&mut self.varying);
-        match varying {
-            true => Values::PerVertex(std::mem::take(&mut self.values)),
-            false => Values::Constant(self.constant),
-        }
-    }
-}
-
-/// Immediate mode: the vertices since the state changed last.
-#[derive(Default)]
-pub(crate) struct Recorder {
-    pub(crate) positions: Vec<[f32; 3]>,
-    normals: Stream<3>,
-    colors: Stream<4>,
-    tex: Stream<4>,
-    materials: Vec<Materials>,
-    material_of: Vec<u32>,
-    pub(crate) runs: Vec<Run>,
-    /// First vertex of the primitive between Begin and End, and its mode.
-    open: usize,
-    mode: u32,
-    /// Begin/End pairs.
-    pub(crate) calls: u64,
-}
-
-impl Recorder {
-    /// A primitive begins.
-    #[inline]
-    pub(crate) fn begin(&mut self, mode: u32, current: &Current) {
-        self.open = self.positions.len();
-        self.mode = mode;
-        if self.open == 0 {
-            self.start(current);
-        }
-    }
-
-    fn start(&mut self, current: &Current) {
-        (self.normals.constant, self.colors.constant, self.tex.constant) =
-            (current.normal, current.color, current.tex);
-        self.materials.clear();
-        self.materials.push(current.materials);
-        self.material_of.clear();
-    }
-
-    /// The primitive ends.
-    #[inline]
-    pub(crate) fn end(&mut self) {
-        let count = (self.positions.len() - self.open) as u32;
-        self.calls += 1;
-        match self.runs.last_mut() {
-            Some(r) if r.mode == self.mode && r.count == count => r.times += 1,
-            _ => self.runs.push(Run { mode: self.mode, count, times: 1 }),
-        }
-    }
-
-    #[inline(always)]
-    pub(crate) fn set_normal(&mut self, v: [f32; 3]) {
-        self.normals.set(v, self.positions.len());
-    }
-
-    #[inline(always)]
-    pub(crate) fn set_color(&mut self, v: [f32; 4]) {
-        self.colors.set(v, self.positions.len());
-    }
-
-    #[inline(always)]
-    pub(crate) fn set_tex(&mut self, v: [f32; 4]) {
-        self.tex.set(v, self.positions.len());
-    }
-
-    /// The material is another from the next vertex on.
-    pub(crate) fn set_materials(&mut self, m: &Materials) {
-        let n = self.positions.len();
-        if n == 0 {
-            self.materials.clear();
-        } else if self.materials.last() == Some(m) {
-            return;
-        } else if self.material_of.is_empty() {
-            self.material_of.resize(n, 0);
-        }
-        self.materials.push(*m);
-    }
-
-    /// A vertex with what is current.
-    #[inline(always)]
-    pub(crate) fn vertex(&mut self, v: [f32; 3], current: &Current) {
-        self.positions.push(v);
-        if self.normals.varying {
-            self.normals.values.push(current.normal);
-        }
-        if self.colors.varying {
-            self.colors.values.push(current.color);
-        }
-        if self.tex.varying {
-            self.tex.values.push(current.tex);
-        }
-        if !self.material_of.is_empty() {
-            self.material_of.push(self.materials.len() as u32 - 1);
-        }
-    }
-
-    /// The vertices of the open primitive with their attributes, taken out again: for the driver.
-    pub(crate) fn withdraw(&mut self) -> (u32, Vec<([f32; 3], Current)>) {
-        let all = self.attributes_now();
-        let out = (self.open..self.positions.len())
-            .map(|i| {
-                let current = Current {
-                    normal: all.normals.at(i),
-                    color: all.colors.at(i),
-                    tex: all.tex.at(i),
-                    materials: *all.materials_at(i),
-                };
-                (self.positions[i], current)
-            })
-            .collect();
-        self.positions.truncate(self.open);
-        for (varying, values) in [(self.normals.varying, &mut self.normals.values)] {
-            if varying {
-                values.truncate(self.open);
-            }
-        }
-        for s in [&mut self.colors, &mut self.tex] {
-            if s.varying {
-                s.values.truncate(self.open);
-            }
-        }
-        self.material_of.truncate(self.open);
-        (self.mode, out)
-    }
-
-    fn attributes_now(&self) -> Attributes {
-        fn values<const N: usize>(s: &Stream<N>) -> Values<N> {
-            if s.varying { Values::PerVertex(s.values.clone()) } else { Values::Constant(s.constant) }
-        }
-        Attributes {
-            normals: values(&self.normals),
-            colors: values(&self.colors),
-            tex: values(&self.tex),
-            materials: self.materials.clone(),
-            material_of: self.material_of.clone(),
-        }
-    }
-
-    /// Everything recorded; the recorder is empty then. Positions and runs stay for the caller to look at and clear.
-    pub(crate) fn take_attributes(&mut self) -> Attributes {
-        Attributes {
-            normals: self.normals.take(),
-            colors: self.colors.take(),
-            tex: self.tex.take(),
-            materials: std::mem::take(&mut self.materials),
-            material_of: std::mem::take(&mut self.material_of),
-        }
-    }
 }
 
 #[cfg(test)]
@@ -342,32 +173,5 @@ mod tests {
         assert_eq!(p.at::<3>(0, [0.0; 3]), [1.0, -1.0, -1.0]);
         let p = Packed { bytes: vec![255, 0, 51, 255], kind: UNSIGNED_BYTE, size: 4, normalized: true };
         assert_eq!(p.at::<4>(0, [0.0; 4]), [1.0, 0.0, 0.2, 1.0]);
-    }
-
-    #[test]
-    fn attributes_that_change_late_keep_their_first_values_and_a_primitive_can_be_withdrawn() {
-        let mut r = Recorder::default();
-        let mut c = Current { color: [1.0; 4], ..Current::default() };
-        r.begin(TRIANGLES, &c);
-        for i in 0..3 {
-            r.vertex([i as f32; 3], &c);
-        }
-        r.end();
-        r.begin(POLYGON, &c);
-        r.vertex([7.0; 3], &c);
-        c.color = [0.5; 4];
-        r.set_color(c.color);
-        c.materials[0].shininess = 9.0;
-        r.set_materials(&c.materials);
-        r.vertex([8.0; 3], &c);
-        let (mode, open) = r.withdraw();
-        assert_eq!(mode, POLYGON);
-        assert_eq!(open.len(), 2);
-        assert_eq!((open[0].1.color, open[1].1.color), ([1.0; 4], [0.5; 4]));
-        assert_eq!((open[0].1.materials[0].shininess, open[1].1.materials[0].shininess), (0.0, 9.0));
-        assert_eq!(r.positions.len(), 3);
-        let all = r.take_attributes();
-        assert_eq!(all.colors.at(2), [1.0; 4]);
-        assert_eq!(r.runs, [Run { mode: TRIANGLES, count: 3, times: 1 }]);
     }
 }

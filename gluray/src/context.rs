@@ -3,19 +3,23 @@
 //! A context is owned by the thread it is current on (in [`CURRENT`]) or, while it is current nowhere, by the register. So no call needs a
 //! lock, and a context that is destroyed in flight lives on until its thread leaves it, as OpenGL says.
 
+use crate::buffers::Writes;
 use crate::cache::Cache;
-use crate::capture::Recorder;
 use crate::config::Config;
 use crate::decide::{self, Verdict};
 use crate::enums::*;
 use crate::frame::Frame;
+use crate::packs::Packs;
 use crate::present::Presenter;
+use crate::probe::Probes;
 use crate::programs::Programs;
 use crate::real::gl;
+use crate::recorder::Recorder;
 use crate::report::Counters;
 use crate::state::current::Current;
 use crate::state::lists::{Lists, Recording};
 use crate::state::snapshot::{Abilities, Snapshot};
+use crate::studio::Studio;
 use crate::symbols::{self, class};
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -56,24 +60,34 @@ pub(crate) struct Context {
     pub(crate) stale: u8,
     pub(crate) recorder: Recorder,
     pub(crate) lists: Arc<Mutex<Lists>>,
+    pub(crate) writes: Arc<Mutex<Writes>>,
     pub(crate) recording: Option<Recording>,
     pub(crate) depth_of_lists: u32,
     pub(crate) cache: Cache,
+    pub(crate) packed: Packs,
     pub(crate) frame: Frame,
     pub(crate) presenter: Presenter,
+    pub(crate) studio: Studio,
+    pub(crate) probes: Probes,
     pub(crate) programs: Programs,
     pub(crate) counters: Counters,
     /// Errors that came up behind the program's back or were kept for it.
     pub(crate) errors: Vec<u32>,
-    /// Counts what may have changed buffers and textures.
-    pub(crate) buffer_version: u64,
+    /// Counts what may have changed textures.
     pub(crate) texture_version: u64,
     watched: u32,
 }
 
 struct Register {
     idle: HashMap<usize, Box<Context>>,
-    lists: HashMap<usize, Arc<Mutex<Lists>>>,
+    shared: HashMap<usize, Shared>,
+}
+
+/// What the contexts of a share group have in common.
+#[derive(Clone, Default)]
+struct Shared {
+    lists: Arc<Mutex<Lists>>,
+    writes: Arc<Mutex<Writes>>,
 }
 
 static REGISTER: OnceLock<Mutex<Register>> = OnceLock::new();
@@ -83,7 +97,7 @@ static THREADS: AtomicUsize = AtomicUsize::new(0);
 static BORN: AtomicU64 = AtomicU64::new(0);
 
 fn register() -> std::sync::MutexGuard<'static, Register> {
-    let new = || Mutex::new(Register { idle: HashMap::new(), lists: HashMap::new() });
+    let new = || Mutex::new(Register { idle: HashMap::new(), shared: HashMap::new() });
     REGISTER.get_or_init(new).lock().unwrap_or_else(|e| e.into_inner())
 }
 
@@ -93,8 +107,8 @@ pub(crate) fn created(handle: usize, share: usize) {
         return;
     }
     let mut r = register();
-    let lists = r.lists.get(&share).filter(|_| share != 0).cloned().unwrap_or_default();
-    r.lists.insert(handle, lists);
+    let shared = r.shared.get(&share).filter(|_| share != 0).cloned().unwrap_or_default();
+    r.shared.insert(handle, shared);
     // The address of a context that was destroyed may come again.
     r.idle.remove(&handle);
 }
@@ -110,7 +124,7 @@ pub(crate) fn destroyed(handle: usize) {
         let gone = register().idle.remove(&handle);
         drop(gone);
     }
-    register().lists.remove(&handle);
+    register().shared.remove(&handle);
 }
 
 /// Before the current context changes: what is pending is drawn.
@@ -145,8 +159,8 @@ pub(crate) fn enter(handle: usize) {
     }
     let mut context = {
         let mut r = register();
-        let lists = r.lists.entry(handle).or_default().clone();
-        r.idle.remove(&handle).unwrap_or_else(|| Box::new(Context::new(handle, lists)))
+        let shared = r.shared.entry(handle).or_default().clone();
+        r.idle.remove(&handle).unwrap_or_else(|| Box::new(Context::new(handle, shared)))
     };
     context.wake();
     let threads = THREADS.fetch_add(1, Relaxed) + 1;
@@ -200,7 +214,7 @@ impl Drop for Context {
 }
 
 impl Context {
-    fn new(handle: usize, lists: Arc<Mutex<Lists>>) -> Context {
+    fn new(handle: usize, Shared { lists, writes }: Shared) -> Context {
         if BORN.fetch_add(1, Relaxed) == 0 {
             crate::fault::silence();
         }
@@ -217,15 +231,18 @@ impl Context {
             stale: 0,
             recorder: Recorder::default(),
             lists,
+            writes,
             recording: None,
             depth_of_lists: 0,
             cache: Cache::default(),
+            packed: Packs::default(),
             frame: Frame::default(),
             presenter: Presenter::default(),
+            studio: Studio::default(),
+            probes: Probes::default(),
             programs: Programs::default(),
             counters: Counters::default(),
             errors: Vec::new(),
-            buffer_version: 1,
             texture_version: 1,
             watched: 0,
         }
@@ -275,7 +292,7 @@ impl Context {
 
     // ---- Watched calls ------------------------------------------------------------------------------------------------
 
-    fn watched_call(&mut self, index: usize, class: u8, flushes: bool, draws: bool) {
+    pub(crate) fn watched_call(&mut self, index: usize, class: u8, flushes: bool, draws: bool) {
         if self.sink == Sink::Trace {
             self.unswallow("another call between Begin and End");
         }
@@ -294,6 +311,9 @@ impl Context {
             if swaps().contains(&index) {
                 self.frame_done();
             } else if reads().contains(&index) {
+                if self.can.version >= 21 && gl::word(PIXEL_PACK_BUFFER_BINDING) != 0 {
+                    self.writes().any();
+                }
                 self.read_back();
             }
         }
@@ -303,14 +323,22 @@ impl Context {
         // A program that sets much state between draws pays for the first calls only.
         let told_enough = self.watched > 12;
         if told_enough && self.recording.is_none() && THREADS.load(Relaxed) == 1 {
-            self.mark(class::ALL);
+            // Of buffers that are written we are told all the same.
+            self.mark(class::ALL & !class::BUFFER);
             symbols::relax();
         }
     }
 
+    /// What was written to the buffers of the share group.
+    pub(crate) fn writes(&self) -> std::sync::MutexGuard<'_, Writes> {
+        self.writes.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
     fn mark(&mut self, class: u8) {
         self.dirty |= class;
-        self.buffer_version += u64::from(class & class::BUFFER != 0);
+        if class & class::BUFFER != 0 {
+            self.writes().any();
+        }
         self.texture_version += u64::from(class & class::TEXTURE != 0);
     }
 

@@ -23,6 +23,8 @@ pub(crate) enum Trace {
     /// Opaque surfaces with a depth test: see the rules below.
     #[default]
     Surfaces,
+    /// Those, and translucent ones whose order a depth test and blending over decide: rays sort them.
+    Translucent,
     /// Every filled primitive that can be.
     All,
     /// None: everything is passed.
@@ -78,6 +80,13 @@ pub(crate) fn filled(s: &Snapshot, trace: Trace) -> Verdict {
         "colour mask"
     } else if !s.depth_test {
         "no depth test"
+    } else if trace == Trace::Translucent
+        && s.blend_is_over
+        && matches!(s.depth_func, LESS | LEQUAL)
+        && s.texture.is_none()
+        && (!s.alpha_test || s.alpha_test_passes_one)
+    {
+        return Verdict::Trace;
     } else if !s.depth_mask {
         "depth is not written"
     } else if !matches!(s.depth_func, LESS | LEQUAL) {
@@ -85,7 +94,7 @@ pub(crate) fn filled(s: &Snapshot, trace: Trace) -> Verdict {
     } else if s.blend || s.alpha_test {
         let harmless = (!s.blend || s.blend_is_over) && (!s.alpha_test || s.alpha_test_passes_one);
         let why = if s.blend { "blending" } else { "alpha test" };
-        if harmless && s.texture.is_none() && trace == Trace::Surfaces {
+        if harmless && s.texture.is_none() && trace != Trace::All {
             return Verdict::TraceIfOpaque(why);
         }
         why

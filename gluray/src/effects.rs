@@ -48,15 +48,18 @@ impl Place {
 
 /// All draws of a frame, for rays that begin on one and end on any.
 pub(crate) struct Surroundings<'a> {
-    draws: &'a [Prepared<'a>],
-    object_from_eye: Vec<Option<DMat4>>,
-    diagonal: f64,
-    settings: &'a Settings,
+    pub(crate) draws: &'a [Prepared<'a>],
+    pub(crate) object_from_eye: Vec<Option<DMat4>>,
+    /// Which draws let light through: they cast no shadow.
+    pub(crate) clear: Vec<bool>,
+    pub(crate) diagonal: f64,
+    pub(crate) settings: &'a Settings,
     pub(crate) shadow_rays: AtomicU64,
     pub(crate) occlusion_rays: AtomicU64,
 }
 
-fn eye_from_object(p: &Prepared<'_>) -> DMat4 {
+/// Where a draw's vertices are in eye space.
+pub(crate) fn eye_from_object(p: &Prepared<'_>) -> DMat4 {
     let m = match &p.draw.shading {
         Shading::Fixed => &p.draw.state.model_view,
         Shading::Program(program) => &program.view_from_object,
@@ -71,6 +74,11 @@ impl<'a> Surroundings<'a> {
         if !matches!(settings.mode, Mode::Rich | Mode::Enhance | Mode::Path) || !wanted {
             return None;
         }
+        Some(Surroundings::of(draws, settings))
+    }
+
+    /// The draws, whatever is asked for.
+    pub(crate) fn of(draws: &'a [Prepared<'a>], settings: &'a Settings) -> Surroundings<'a> {
         let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for p in draws {
             let (m, b) = (eye_from_object(p), p.draw.geometry.bounds());
@@ -85,20 +93,21 @@ impl<'a> Surroundings<'a> {
             let m = eye_from_object(p);
             (m.determinant() != 0.0).then(|| m.inverse())
         };
-        Some(Surroundings {
+        Surroundings {
             object_from_eye: draws.iter().map(invert).collect(),
+            clear: vec![false; draws.len()],
             draws,
             diagonal: (hi - lo).length(),
             settings,
             shadow_rays: AtomicU64::new(0),
             occlusion_rays: AtomicU64::new(0),
-        })
+        }
     }
 
     /// Whether anything is between `from` and `from + dir * most` (eye space).
     fn hidden(&self, from: DVec3, dir: DVec3, most: f64) -> bool {
-        self.draws.iter().zip(&self.object_from_eye).any(|(p, m)| {
-            let Some(m) = m else { return false };
+        self.draws.iter().zip(&self.object_from_eye).zip(&self.clear).any(|((p, m), clear)| {
+            let Some(m) = m.filter(|_| !clear) else { return false };
             let (origin, dir) = (m.transform_point3(from), m.transform_vector3(dir));
             let (ray, moved) = p.world.ray_from_world(origin, dir);
             let t_max = (most - moved) as f32;
@@ -155,14 +164,15 @@ impl<'a> Surroundings<'a> {
 }
 
 /// Numbers that depend on the pixel alone, so that a still picture does not flicker.
-struct Random(u64);
+pub(crate) struct Random(u64);
 
 impl Random {
-    fn new((x, y): (i32, i32)) -> Random {
+    pub(crate) fn new((x, y): (i32, i32)) -> Random {
         Random((x as u64) << 32 ^ (y as u64) ^ 0x9e37_79b9_7f4a_7c15)
     }
 
-    fn next(&mut self) -> f64 {
+    /// From 0 to below 1.
+    pub(crate) fn next(&mut self) -> f64 {
         // SplitMix64 (Steele, Lea and Flood 2014).
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -171,7 +181,7 @@ impl Random {
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    fn on_disk(&mut self) -> (f64, f64) {
+    pub(crate) fn on_disk(&mut self) -> (f64, f64) {
         let (r, a) = (self.next().sqrt(), std::f64::consts::TAU * self.next());
         (r * a.cos(), r * a.sin())
     }

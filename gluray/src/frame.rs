@@ -3,7 +3,9 @@
 use crate::capture::{Draw, Shading};
 use crate::context::Context;
 use crate::enums::*;
+use crate::late::{self, Late, Traced};
 use crate::lighting::{product, transform};
+use crate::overrides::Look;
 use crate::present::Fate;
 use crate::texturing::Image;
 use crate::trace::{self, Prepared};
@@ -12,14 +14,21 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Instant;
 
+/// A draw with the image of its texture.
+pub(crate) type Pending = (Draw, Option<Arc<Image>>);
+
 /// Draws that wait for the end of the frame.
 #[derive(Default)]
 pub(crate) struct Frame {
-    pending: Vec<(Draw, Option<Arc<Image>>)>,
+    pending: Vec<Pending>,
+    /// What is shown one frame late.
+    pub(crate) late: Late,
     /// The driver drew something that commutes since the first of them.
     others: bool,
     /// Something was traced since the last frame ended.
     traced: bool,
+    /// Where: framebuffer and viewport.
+    places: Vec<(u32, [i32; 4])>,
     /// What the control panel and reports are told of it.
     told: crate::control::Told,
 }
@@ -39,14 +48,22 @@ impl Context {
         }
         let start = Instant::now();
         let kind = [self.state.first_vertex_provokes, self.state.flat];
-        let (positions, runs) =
-            (std::mem::take(&mut self.recorder.positions), std::mem::take(&mut self.recorder.runs));
-        let geometry = self.cache.of_runs(&positions, &runs, kind);
+        let geometry = match self.recorder.followed(kind) {
+            Some(geometry) => {
+                self.cache.hits += 1;
+                self.cache.touch(&geometry);
+                geometry
+            }
+            None => {
+                self.recorder.write_down();
+                let geometry = self.cache.of_runs(&self.recorder.positions, &self.recorder.runs, kind);
+                self.recorder.expect(&geometry, kind);
+                geometry
+            }
+        };
         let attributes = Arc::new(self.recorder.take_attributes());
         let clip_from_object = product(&self.state.projection, &self.state.model_view);
         let calls = std::mem::take(&mut self.recorder.calls);
-        // The memory serves the next batch.
-        (self.recorder.positions, self.recorder.runs) = (positions, runs);
         self.recorder.positions.clear();
         self.recorder.runs.clear();
         let state = self.state.clone();
@@ -56,7 +73,15 @@ impl Context {
         );
         self.counters.spent("capture", start.elapsed());
         self.add(
-            Draw { geometry, attributes, state, shading: Shading::Fixed, clip_from_object, calls },
+            Draw {
+                geometry,
+                attributes,
+                state,
+                shading: Shading::Fixed,
+                clip_from_object,
+                calls,
+                look: Look::default(),
+            },
             in_order,
         );
     }
@@ -72,6 +97,10 @@ impl Context {
         if !trace::has_rays(&draw.clip_from_object) {
             // A model-view that flattens everything (a shadow on a floor): rays need the flattened triangles themselves.
             self.flatten(&mut draw);
+        }
+        if draw.state.blend && self.config.settings.sees_through() && draw.has_full_alpha() {
+            // Programs leave blending on; what lets no light through is opaque all the same.
+            Arc::make_mut(&mut draw.state).blend = false;
         }
         let image = match &draw.state.texture {
             Some(t) => self.presenter.images.get(t.target, t.name, t.version),
@@ -109,39 +138,66 @@ impl Context {
 
     /// Draws what is pending into the framebuffer.
     pub(crate) fn flush(&mut self, before: &str) {
+        if crate::fault::happened() {
+            return;
+        }
+        crate::fault::injected("flush");
         self.end_batch();
         let pending = std::mem::take(&mut self.frame.pending);
         let others = std::mem::take(&mut self.frame.others);
+        if !self.probes.draws.is_empty() {
+            self.counters.flushed(before);
+            self.frame.traced = true;
+            self.darken();
+        }
         if pending.is_empty() {
             return;
         }
         self.frame.traced = true;
+        for (d, _) in &pending {
+            let place = (d.state.framebuffer, d.state.viewport);
+            if !self.frame.places.contains(&place) {
+                self.frame.places.push(place);
+            }
+        }
         self.counters.flushed(before);
         self.frame.told.traced(self.counters.report.frames + 1, pending.iter().map(|(d, _)| d));
-        let start = Instant::now();
-        let mut builds = 0;
+        // What the driver drew after a traced surface wins ties with it, as LEQUAL says; what it drew before loses them.
+        let func = if others { LESS } else { pending[0].0.state.depth_func };
+        if let Some(n) = pending.iter().map(|(d, _)| d.state.samples).find(|n| *n > 1) {
+            self.counters.warn(format!(
+                "the program has {n} samples a pixel: one ray stands for all of them, so silhouettes are not smoothed as the driver's are"
+            ));
+        }
+        if crate::picture::is_for(&self.config.settings) {
+            return self.draw_picture(&pending, func);
+        }
+        if self.may_be_late(before) {
+            return self.flush_late(pending, func);
+        }
         let settings = &self.config.settings;
-        let (layer, extra, rays) = worker::on_pool(|| {
-            let ready: Vec<Prepared<'_>> = pending
-                .iter()
-                .filter_map(|(d, image)| Prepared::new(d, image.clone(), &mut builds))
-                .collect();
-            let (layer, extra) = trace::nearest(&ready, settings);
-            (layer, extra, ready.iter().map(|p| p.rays.load(Relaxed)).sum::<u64>())
-        });
-        self.counters.spent("trace", start.elapsed());
-        self.counters.rays("primary", rays);
-        self.counters.rays("shadow", extra[0]);
-        self.counters.rays("ambient occlusion", extra[1]);
-        self.counters.report.builds += builds;
-        self.counters.report.pixels += layer.covered as u64;
+        let traced = worker::on_pool(|| late::trace(pending, settings));
+        self.put(traced, Fate::Surface(func));
+    }
+
+    /// Puts what was traced into the framebuffer.
+    pub(crate) fn put(&mut self, traced: Traced, fate: Fate) {
+        self.counters.spent("trace", traced.took);
+        self.counters.rays("primary", traced.primary);
+        self.counters.rays("shadow", traced.extra[0]);
+        self.counters.rays("ambient occlusion", traced.extra[1]);
+        self.counters.report.builds += traced.builds;
+        self.counters.report.pixels += traced.layer.covered as u64;
         let start = Instant::now();
-        if layer.covered > 0 {
-            // What the driver drew after a traced surface wins ties with it, as LEQUAL says; what it drew before loses them.
-            let func = if others { LESS } else { pending[0].0.state.depth_func };
-            self.present(&[layer], Fate::Surface(func));
+        if traced.layer.covered > 0 {
+            self.present(&[traced.layer], fate);
         }
         self.counters.spent("present", start.elapsed());
+        for (draw, _) in traced.draws {
+            if let Some(attributes) = Arc::into_inner(draw.attributes) {
+                self.recorder.give_back(attributes);
+            }
+        }
     }
 
     fn trace_in_order(&mut self, draw: &Draw, image: Option<Arc<Image>>) {
@@ -167,9 +223,15 @@ impl Context {
     pub(crate) fn frame_done(&mut self) {
         self.counters.report.frames += 1;
         self.frame.traced = false;
+        self.frame.places.clear();
+        self.frame.late.frame_done();
         (self.counters.report.cache_hits, self.counters.report.cache_misses) =
             (self.cache.hits, self.cache.misses);
+        self.studio.frame_done();
         let fast = self.config.settings.quality == crate::config::Quality::Fast;
+        self.programs.frame_done();
+        self.packed.frame_done();
+        self.recorder.frame_done();
         self.cache.frame_done(|g| {
             if !fast {
                 worker::in_background(move || g.improve());
@@ -179,7 +241,7 @@ impl Context {
         let size = [2, 3].map(|i| self.state.viewport[i].max(0).cast_unsigned());
         self.counters.report.objects = self.frame.told.frame_done(&self.counters.report, size);
         if let Some(problem) = self.frame.told.take_problem() {
-            self.counters.report.problems = vec![problem];
+            self.counters.warn(problem);
         }
         self.take_up_settings();
         self.counters.publish(false);
@@ -198,9 +260,23 @@ impl Context {
 
     /// The program reads what was drawn: a frame, too, when something was traced for it.
     pub(crate) fn read_back(&mut self) {
+        self.frame.late.read();
         if self.frame.traced {
             self.frame_done();
             self.counters.publish(true);
+        }
+    }
+
+    /// What was traced is cleared: a frame is over that nobody swapped or read, as in programs that draw into framebuffer objects alone.
+    fn begin_again(&mut self) {
+        self.refresh();
+        let [x, y, w, h] = self.state.scissor.unwrap_or(self.state.viewport);
+        let target = self.state.framebuffer;
+        let meets = |&(f, [a, b, c, d]): &(u32, [i32; 4])| {
+            f == target && a < x + w && x < a + c && b < y + h && y < b + d
+        };
+        if self.frame.pending.is_empty() && target != 0 && self.frame.places.iter().any(meets) {
+            self.frame_done();
         }
     }
 
@@ -217,8 +293,11 @@ impl Context {
             return false;
         }
         self.end_batch();
-        if !self.frame.pending.is_empty() {
-            const COLOR_AND_DEPTH: u32 = 0x4100;
+        const COLOR_AND_DEPTH: u32 = 0x4100;
+        if self.frame.traced && mask & COLOR_AND_DEPTH == COLOR_AND_DEPTH {
+            self.begin_again();
+        }
+        if !self.frame.pending.is_empty() || !self.probes.draws.is_empty() {
             self.refresh();
             let whole = mask & COLOR_AND_DEPTH == COLOR_AND_DEPTH
                 && self.state.scissor.is_none()
@@ -227,6 +306,7 @@ impl Context {
                 && self.frame.pending.iter().all(|(d, _)| d.state.framebuffer == self.state.framebuffer);
             if whole {
                 self.frame.pending.clear();
+                self.probes.draws.clear();
                 self.frame.others = false;
             } else {
                 self.flush("glClear of a part");

@@ -257,7 +257,11 @@ impl Context {
     }
 
     pub(crate) fn rect(&mut self, [x, y, x2, y2]: [f32; 4]) -> bool {
-        if self.sink == Sink::Trace || self.sink == Sink::Pass {
+        if self.sink == Sink::Trace {
+            // An error, which the driver is to report.
+            self.unswallow("a rectangle between Begin and End");
+        }
+        if self.sink == Sink::Pass {
             return false;
         }
         if self.sink == Sink::List {

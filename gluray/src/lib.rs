@@ -14,6 +14,8 @@
 #![deny(unsafe_code)]
 
 mod arrays;
+mod beyond;
+mod buffers;
 mod cache;
 mod capture;
 pub mod cli;
@@ -30,20 +32,27 @@ mod fault;
 pub mod folders;
 mod frame;
 mod immediate;
+mod late;
 mod lighting;
 mod overrides;
+mod packs;
 pub mod panel;
+mod picture;
 mod present;
 mod primitives;
+mod probe;
 mod programs;
 mod raster;
 mod real;
 pub mod reasons;
+mod recorder;
 pub mod report;
 mod shading;
 mod state;
+mod studio;
 mod symbols;
 mod texturing;
 pub mod timeline;
 mod trace;
+mod view;
 mod worker;

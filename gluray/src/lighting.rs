@@ -1,5 +1,7 @@
 //! OpenGL's lighting at a vertex (compatibility profile specification, section 12.2), in f32 and in the order of Mesa's vertex programs.
 
+mod gouraud;
+
 use crate::capture::Attributes;
 use crate::effects::{Place, Visibility, vector};
 use crate::enums::*;
@@ -333,12 +335,9 @@ mod tests {
     #[test]
     fn byte_normals_light_like_floats() {
         let l = lit(|_, a| {
-            a.normals = Values::Packed(crate::capture::Packed {
-                bytes: vec![0, 0, 127],
-                kind: BYTE,
-                size: 3,
-                normalized: true,
-            });
+            let packed =
+                crate::capture::Packed { bytes: vec![0, 0, 127], kind: BYTE, size: 3, normalized: true };
+            a.normals = Values::Packed(std::sync::Arc::new(packed));
         });
         assert_eq!(l.primary[0], [1.0, 0.6, 0.35, 0.5]);
     }

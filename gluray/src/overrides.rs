@@ -3,12 +3,57 @@
 //! Mode `match` shows the driver's picture, so nothing is changed there.
 
 use crate::capture::{Attributes, Draw, Shading, Values};
-use crate::config::{Lights, Material, Mode, Settings};
+use crate::config::{Lights, Material, Mode, Settings, Surface};
 use crate::control::key_of;
 use crate::effects::MOST_LIGHTS;
 use crate::programs::Recognised;
 use crate::state::snapshot::{GlLight, Snapshot};
 use std::sync::Arc;
+
+/// What the user makes of a surface beyond OpenGL's lighting.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Look {
+    pub(crate) surface: Surface,
+    /// Times the program's own.
+    pub(crate) opacity: f32,
+    /// Share of mirror reflection added.
+    pub(crate) mirror: f32,
+    pub(crate) roughness: f32,
+    pub(crate) ior: f32,
+    /// Colour of glass.
+    pub(crate) tint: [f32; 3],
+}
+
+impl Default for Look {
+    fn default() -> Self {
+        Look {
+            surface: Surface::Program,
+            opacity: 1.0,
+            mirror: 0.0,
+            roughness: 0.2,
+            ior: 1.5,
+            tint: [1.0; 3],
+        }
+    }
+}
+
+impl Look {
+    fn new(m: &Material) -> Look {
+        let usual = Look::default();
+        let surface = m.surface.unwrap_or_default();
+        // A surface that is told to have no highlight reflects nothing, and sends no rays for it.
+        let dull = surface == Surface::Matte || m.specular == Some(0.0);
+        Look {
+            surface,
+            opacity: m.opacity.map_or(usual.opacity, |v| v as f32),
+            mirror: if dull { 0.0 } else { m.mirror.map_or(usual.mirror, |v| v as f32) },
+            roughness: m.roughness.map_or(usual.roughness, |v| v as f32),
+            ior: m.ior.map_or(usual.ior, |v| v as f32),
+            // Half of the way to white: two walls of a saturated colour would swallow all light.
+            tint: m.color.map_or(usual.tint, |c| rgb(c).map(|v| 0.5 + 0.5 * v)),
+        }
+    }
+}
 
 /// Changes a draw as the settings say. Costs nothing when they say nothing.
 pub(crate) fn apply(draw: &mut Draw, settings: &Settings) {
@@ -28,6 +73,7 @@ pub(crate) fn apply(draw: &mut Draw, settings: &Settings) {
     if material.is_empty() {
         return;
     }
+    draw.look = Look::new(&material);
     match &mut draw.shading {
         Shading::Fixed => repaint(Arc::make_mut(&mut draw.attributes), &material),
         Shading::Program(program) => repaint_program(Arc::make_mut(program), &material),
@@ -51,6 +97,8 @@ fn repaint(a: &mut Attributes, m: &Material) {
         }
         if let Some(s) = m.specular {
             side.specular[..3].fill(s as f32);
+        } else if m.surface == Some(Surface::Matte) {
+            side.specular[..3].fill(0.0);
         }
         if let Some(s) = m.shininess {
             side.shininess = s as f32;
@@ -68,6 +116,8 @@ fn repaint_program(p: &mut Recognised, m: &Material) {
     }
     if let Some(s) = m.specular {
         p.specular = [s as f32; 3];
+    } else if m.surface == Some(Surface::Matte) {
+        p.specular = [0.0; 3];
     }
     if let Some(s) = m.shininess {
         p.specular_power = s as f32;

@@ -15,6 +15,12 @@ use crate::trace::{Layer, Rect};
 pub(crate) enum Fate {
     /// The depth test with this function, nothing else: the nearest surfaces of a frame.
     Surface(u32),
+    /// The same with premultiplied colours over what is there: several samples a pixel, or surfaces that let light through.
+    Over(u32),
+    /// What is there times the colours, where it has this depth or is behind: no depths are written.
+    Times,
+    /// The same again without depths: pixels whose centre sees no opaque surface.
+    Fringe(u32),
     /// Everything the program has set: a draw whose order matters.
     AsDrawn,
 }
@@ -143,12 +149,16 @@ struct Kept {
     depth_mask: i32,
     color_mask: [i32; 4],
     polygon_mode: i32,
+    /// Sources and destinations of colour and alpha, and their equations.
+    blend: [i32; 6],
     viewport: [i32; 4],
     depth_range: [f64; 2],
     core: bool,
     samplers_exist: bool,
 }
 
+const BLENDING: [u32; 6] =
+    [BLEND_SRC_RGB, BLEND_DST_RGB, BLEND_SRC_ALPHA, BLEND_DST_ALPHA, BLEND_EQUATION, BLEND_EQUATION_ALPHA];
 const UNPACK: [u32; 6] = [
     UNPACK_ALIGNMENT,
     UNPACK_ROW_LENGTH,
@@ -192,6 +202,7 @@ impl Kept {
             depth_mask: gl::int(DEPTH_WRITEMASK),
             color_mask: gl::ints(COLOR_WRITEMASK),
             polygon_mode: gl::int(POLYGON_MODE),
+            blend: if core { BLENDING.map(gl::int) } else { [0; 6] },
             viewport: gl::ints(VIEWPORT),
             depth_range: gl::doubles(DEPTH_RANGE),
             core,
@@ -221,6 +232,10 @@ impl Kept {
             let [r, g, b, a] = self.color_mask.map(|v| v as u8);
             gl::color_mask(r, g, b, a);
             gl::polygon_mode(FRONT_AND_BACK, self.polygon_mode.cast_unsigned());
+            let [src, dst, src_alpha, dst_alpha, equation, equation_alpha] =
+                self.blend.map(i32::cast_unsigned);
+            gl::blend_func_separate(src, dst, src_alpha, dst_alpha);
+            gl::blend_equation_separate(equation, equation_alpha);
             let [x, y, w, h] = self.viewport;
             gl::viewport(x, y, w, h);
             gl::depth_range(self.depth_range[0], self.depth_range[1]);
@@ -262,7 +277,7 @@ impl Context {
         }
         OFF.into_iter().filter(|c| *c != RASTERIZER_DISCARD || self.can.version >= 30).for_each(gl::disable);
         if !core {
-            (0..6).for_each(|i| gl::disable(CLIP_PLANE0 + i));
+            (0..self.can.clip_planes).for_each(|i| gl::disable(CLIP_PLANE0 + i));
             let vp = self.can.arb_programs;
             LEGACY.into_iter().filter(|c| *c != VERTEX_PROGRAM_ARB || vp).for_each(gl::disable);
             if vp {
@@ -271,8 +286,27 @@ impl Context {
         }
         gl::polygon_mode(FRONT_AND_BACK, FILL);
         gl::depth_range(0.0, 1.0);
-        if let Fate::Surface(func) = fate {
+        if fate == Fate::Times {
             OPERATIONS.into_iter().for_each(gl::disable);
+            if !core {
+                gl::disable(ALPHA_TEST);
+            }
+            gl::disable(SCISSOR_TEST);
+            gl::enable(BLEND);
+            gl::blend_equation(FUNC_ADD);
+            gl::blend_func(ZERO, SRC_COLOR);
+            gl::enable(DEPTH_TEST);
+            gl::depth_func(LEQUAL);
+            gl::depth_mask(0);
+            gl::color_mask(1, 1, 1, 0);
+        }
+        if let Fate::Surface(func) | Fate::Over(func) | Fate::Fringe(func) = fate {
+            OPERATIONS.into_iter().for_each(gl::disable);
+            if !matches!(fate, Fate::Surface(_)) {
+                gl::enable(BLEND);
+                gl::blend_equation(FUNC_ADD);
+                gl::blend_func(ONE, ONE_MINUS_SRC_ALPHA);
+            }
             if !core {
                 gl::disable(ALPHA_TEST);
             }
@@ -280,7 +314,7 @@ impl Context {
             gl::disable(SCISSOR_TEST);
             gl::enable(DEPTH_TEST);
             gl::depth_func(func);
-            gl::depth_mask(1);
+            gl::depth_mask(u8::from(!matches!(fate, Fate::Fringe(_))));
             gl::color_mask(1, 1, 1, 1);
         }
         if core {
@@ -307,7 +341,7 @@ impl Context {
         }
         if core
             && kept.caps.iter().all(|(c, _)| *c != SCISSOR_TEST)
-            && matches!(fate, Fate::Surface(_))
+            && fate != Fate::AsDrawn
             && self.state.scissor.is_some()
         {
             gl::enable(SCISSOR_TEST);

@@ -17,6 +17,18 @@ const TABLE: &[(&str, &str)] = &[
         "several colour buffers",
         "as in dual depth peeling or deferred shading; try the program's settings for translucency",
     ),
+    (
+        "a vertex shader that is no matrix",
+        "positions are bent, displaced or projected by hand; only the driver knows where they end up",
+    ),
+    ("positions that", "the vertex shader makes numbers that are no points"),
+    ("a matrix that rays", "the matrix maps the scene onto a line or a point"),
+    ("fewer vertices", "too few to tell a matrix from; --mode match does not need it"),
+    ("a texture with mipmaps", "sampled between reduced levels, which is not followed"),
+    ("a texture with two filters", "another filter near than far, which is not followed"),
+    ("a texture of", "depths and integers are compared or cast, not sampled"),
+    ("a texture whose base", "sampled from another level than the first"),
+    ("OpenGL ES", "programs for OpenGL ES are the driver's in every mode"),
     ("several texture units", "more than one texture at once is not traced"),
     ("a texture that is neither", "cube maps and volumes are not traced"),
     ("texture combiners", "GL_COMBINE is not traced"),
@@ -32,7 +44,10 @@ const TABLE: &[(&str, &str)] = &[
     ("blending", "translucent in a way that is not followed; --trace all traces it in the order drawn"),
     ("stencil", "drawn through a mask, as constructive solid geometry in image space is"),
     ("a shader", "not of a family that is recognised; --mode enhance needs no understanding"),
-    ("a program", "not of a family that is recognised; --mode enhance needs no understanding"),
+    (
+        "a program",
+        "not of a family that is recognised; --mode enhance needs no understanding, only OpenGL 3 and a program linked in that mode",
+    ),
     ("a forked process", "a child made by fork has none of our threads"),
 ];
 

@@ -139,6 +139,13 @@ impl Counters {
         self.report.driver = format!("{renderer}, {version}");
     }
 
+    /// Something that was asked for could not be done; said once.
+    pub(crate) fn warn(&mut self, text: String) {
+        if !self.report.problems.contains(&text) && self.report.problems.len() < 100 {
+            self.report.problems.push(text);
+        }
+    }
+
     /// The driver draws `n` calls.
     pub(crate) fn pass(&mut self, why: &'static str, n: u64) {
         self.report.passed_draws += n;

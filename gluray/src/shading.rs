@@ -5,9 +5,10 @@ use crate::config::Mode;
 use crate::effects::{Surroundings, Visibility, vector};
 use crate::enums::*;
 use crate::lighting::{Lit, transform};
+use crate::state::snapshot::TextureUnit;
 use crate::texturing;
 use crate::trace::{Fragment, Prepared, matrix, mixed};
-use rt_core::glam::DVec3;
+use rt_core::glam::{DVec3, Mat3};
 
 impl Prepared<'_> {
     /// Eye-space position and shading normal of a fragment.
@@ -27,6 +28,55 @@ impl Prepared<'_> {
         (mixed(eye, w), crate::lighting::normalized(normal))
     }
 
+    /// Object-space normals from those of eye space: the transposed model-view.
+    pub(crate) fn normal_from_eye(&self) -> Mat3 {
+        let m = crate::effects::eye_from_object(self);
+        rt_core::glam::DMat3::from_mat4(m).transpose().as_mat3()
+    }
+
+    /// Shading normal in eye space, as the program gave it; of any length.
+    pub(crate) fn smooth_normal(&self, prim: usize, w: [f32; 3]) -> [f32; 3] {
+        match &self.draw.shading {
+            Shading::Fixed => self.eye_point(prim, w).1,
+            Shading::Program(program) => {
+                program.smooth_normal(&self.draw.attributes, &self.draw.geometry.mesh, prim, w)
+            }
+        }
+    }
+
+    /// The colour of the surface itself, without lights: the diffuse one, with vertex colours and texture.
+    pub(crate) fn base_color(&self, prim: usize, f: &Fragment) -> [f32; 4] {
+        let mesh = &self.draw.geometry.mesh;
+        let corners = mesh.indices[prim].map(|i| i as usize);
+        let w = f.weights.map(|w| w as f32);
+        if let Shading::Program(program) = &self.draw.shading {
+            let (color, alpha) = program.base(&self.draw.attributes, mesh, prim, w);
+            return [color[0], color[1], color[2], alpha];
+        }
+        let s = &*self.draw.state;
+        let of = |i: usize| self.base_of_vertex(i);
+        let mut color = if s.flat { of(corners[2]) } else { mixed(corners.map(of), w) };
+        if let (Some(unit), Some(image)) = (&s.texture, &self.image) {
+            let coords = corners.map(|i| self.texture_coordinates(unit, i));
+            color = texturing::apply(unit, image, color, mixed(coords, w));
+        }
+        color
+    }
+
+    /// The diffuse colour of fixed function at a vertex.
+    pub(crate) fn base_of_vertex(&self, i: usize) -> [f32; 4] {
+        let (s, a) = (&*self.draw.state, &self.draw.attributes);
+        let tracked = s.color_material.is_some_and(|(_, what)| matches!(what, DIFFUSE | AMBIENT_AND_DIFFUSE));
+        let c = if s.lighting && !tracked { a.materials_at(i)[0].diffuse } else { a.colors.at(i) };
+        c.map(|v| v.clamp(0.0, 1.0))
+    }
+
+    /// Texture coordinates of a vertex of fixed function.
+    pub(crate) fn texture_coordinates(&self, unit: &TextureUnit, i: usize) -> [f32; 4] {
+        let p = self.draw.geometry.mesh.positions[i].to_array();
+        texturing::coordinates(unit, &self.draw.state, &self.draw.attributes, &self.lighting, i, p)
+    }
+
     /// The colour that the mode gives a fragment.
     pub(crate) fn shaded(
         &self,
@@ -41,6 +91,28 @@ impl Prepared<'_> {
             Shading::Fixed => self.draw.state.lighting,
             Shading::Program(_) => true,
         };
+        if around.is_none() || !lit {
+            return self.color(prim, f, per_pixel, &Visibility::FULL);
+        }
+        let (eye, _) = self.eye_point(prim, f.weights.map(|w| w as f32));
+        let clip = matrix(&self.draw.state.projection);
+        let parallel = matches!(self.draw.shading, Shading::Fixed) && clip.row(3).truncate() == DVec3::ZERO;
+        let towards = if parallel { DVec3::Z } else { -vector(eye) };
+        self.shaded_from(prim, f, mode, around, pixel, towards)
+    }
+
+    /// The same, as somebody sees it who looks along `-towards` (eye space).
+    pub(crate) fn shaded_from(
+        &self,
+        prim: usize,
+        f: &Fragment,
+        mode: Mode,
+        around: Option<&Surroundings<'_>>,
+        pixel: (i32, i32),
+        towards: DVec3,
+    ) -> [f32; 4] {
+        let per_pixel = matches!(mode, Mode::Phong | Mode::Rich | Mode::Path);
+        let lit = self.draw.state.lighting || matches!(self.draw.shading, Shading::Program(_));
         let (Some(around), true) = (around, lit) else {
             return self.color(prim, f, per_pixel, &Visibility::FULL);
         };
@@ -50,9 +122,6 @@ impl Prepared<'_> {
         let at = |w| vector(self.eye_point(prim, w).0);
         let [a, b, c] = [at([1.0, 0.0, 0.0]), at([0.0, 1.0, 0.0]), at([0.0, 0.0, 1.0])];
         let normal = (b - a).cross(c - a).normalize_or_zero();
-        let clip = matrix(&self.draw.state.projection);
-        let parallel = matches!(self.draw.shading, Shading::Fixed) && clip.row(3).truncate() == DVec3::ZERO;
-        let towards = if parallel { DVec3::Z } else { -vector(eye) };
         let normal = if normal.dot(towards) < 0.0 { -normal } else { normal };
         let reaches = around.at(vector(eye), normal, &self.places, pixel);
         if mode != Mode::Enhance {
@@ -105,16 +174,7 @@ impl Prepared<'_> {
             false => (mixed(lit.map(|l| l.primary[side]), w), mixed(lit.map(|l| l.secondary[side]), w)),
         };
         if let (Some(unit), Some(image)) = (&s.texture, &self.image) {
-            let coords = corners.map(|i| {
-                texturing::coordinates(
-                    unit,
-                    s,
-                    &self.draw.attributes,
-                    &self.lighting,
-                    i,
-                    mesh.positions[i].to_array(),
-                )
-            });
+            let coords = corners.map(|i| self.texture_coordinates(unit, i));
             color = texturing::apply(unit, image, color, mixed(coords, w));
         }
         for k in 0..3 {

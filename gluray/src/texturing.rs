@@ -6,6 +6,7 @@ use crate::enums::*;
 use crate::lighting::{Setup, normalized, transform};
 use crate::real::gl;
 use crate::state::snapshot::{Snapshot, TextureUnit};
+use rt_core::texture::{Filter, Texture, Wrap};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -76,6 +77,30 @@ pub(crate) fn followed(target: u32) -> Result<(), &'static str> {
     Ok(())
 }
 
+/// Why fixed function's sampling of the bound texture cannot be followed; `None` when it can, or when the texture is incomplete and so left out.
+pub(crate) fn unfollowed(target: u32) -> Option<&'static str> {
+    let level = |what| gl::tex_level_i::<1>(target, 0, what)[0];
+    const TEXTURE_BASE_LEVEL: u32 = 0x813c;
+    if gl::tex_parameter_i::<1>(target, TEXTURE_BASE_LEVEL)[0] != 0 {
+        return Some("a texture whose base level is not 0");
+    }
+    if level(TEXTURE_WIDTH) <= 0 || level(TEXTURE_HEIGHT) <= 0 {
+        return None;
+    }
+    match level(TEXTURE_INTERNAL_FORMAT).cast_unsigned() {
+        0x1902 | 0x84f9 | 0x81a5..=0x81a7 | 0x88f0 | 0x8cac | 0x8cad => return Some("a texture of depths"),
+        0x8d70..=0x8d8f => return Some("a texture of integers"),
+        _ => {}
+    }
+    let min = gl::tex_parameter_i::<1>(target, TEXTURE_MIN_FILTER)[0].cast_unsigned();
+    let mag = gl::tex_parameter_i::<1>(target, TEXTURE_MAG_FILTER)[0].cast_unsigned();
+    match min {
+        NEAREST | LINEAR if min == mag => None,
+        NEAREST | LINEAR => Some("a texture with two filters"),
+        _ => Some("a texture with mipmaps"),
+    }
+}
+
 fn read(target: u32) -> Option<Image> {
     let level = |what| gl::tex_level_i::<1>(target, 0, what)[0];
     let (width, height) = (level(TEXTURE_WIDTH).max(0) as usize, level(TEXTURE_HEIGHT).max(0) as usize);
@@ -103,6 +128,28 @@ impl Image {
     pub(crate) fn is_opaque(&self) -> bool {
         self.texels.iter().all(|t| t[3] == 1.0)
             && (self.wrap != [CLAMP_TO_BORDER; 2] || self.border[3] == 1.0)
+    }
+
+    /// The picture as a texture of rt-core's, with what its components stand for; `None` when it cannot be one.
+    pub(crate) fn as_texture(&self) -> Option<Texture> {
+        let rgba = |t: &[f32; 4]| match self.base {
+            Base::Alpha => [1.0, 1.0, 1.0, t[3]],
+            Base::Luminance => [t[0], t[0], t[0], 1.0],
+            Base::LuminanceAlpha => [t[0], t[0], t[0], t[3]],
+            Base::Intensity => [t[0]; 4],
+            Base::Rgb => [t[0], t[1], t[2], 1.0],
+            Base::Rgba => *t,
+        };
+        let texels = self.texels.iter().map(rgba).collect();
+        let wrap = self.wrap.map(|w| match w {
+            REPEAT => Wrap::Repeat,
+            MIRRORED_REPEAT => Wrap::Mirror,
+            _ => Wrap::Clamp,
+        });
+        let filter = if self.linear { Filter::Bilinear } else { Filter::Nearest };
+        let mut texture = Texture::from_linear(self.width, self.height, texels).ok()?;
+        (texture.wrap, texture.filter) = (wrap, filter);
+        Some(texture)
     }
 
     fn texel(&self, x: i64, y: i64) -> [f32; 4] {

@@ -3,18 +3,26 @@
 //! Rays only find the triangle. Depth and attributes are then evaluated on it at the pixel centre with the rasterizer's own arithmetic
 //! (homogeneous edge functions after Olano and Greer 1997), so they agree with what the driver makes of neighbouring lines and text.
 
+mod fragments;
+mod in_order;
+mod rays;
+
 use crate::capture::{Draw, Shading};
-use crate::config::Settings;
-use crate::effects::{Place, Surroundings, Visibility};
+use crate::config::{Mode, Settings};
+use crate::effects::{Place, Surroundings};
 use crate::enums::*;
 use crate::lighting::{Lit, Setup, transform};
 use crate::raster::{covers, steepness};
 use crate::texturing::Image;
+use fearless_simd::{Level, dispatch};
+use fragments::{FragmentBlock, Lane};
+pub(crate) use in_order::in_order;
 use rayon::prelude::*;
+use rays::{Bundle, TileRays, slot};
 use rt_core::accel::World;
 use rt_core::camera::Camera;
 use rt_core::glam::{DMat4, DVec3};
-use rt_core::ray::{HitBlock, Ray, RayBlock};
+use rt_core::ray::{LANES, Ray};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -52,6 +60,7 @@ impl Rect {
 }
 
 /// Fragments, at most one a pixel.
+#[derive(Clone, Default)]
 pub(crate) struct Layer {
     pub(crate) rect: Rect,
     pub(crate) color: Vec<[u8; 4]>,
@@ -84,6 +93,9 @@ pub(crate) struct Prepared<'a> {
     pub(crate) rect: Rect,
     pub(crate) lighting: Setup<'a>,
     pub(crate) lit: Option<Vec<Lit>>,
+    bundle: Bundle,
+    /// OpenGL's lighting at the vertices can be had for 16 fragments at a time.
+    blocks: bool,
     pub(crate) image: Option<Arc<Image>>,
     /// A mirrored projection or `glFrontFace` changes what counts as front.
     pub(crate) rays: AtomicU64,
@@ -163,6 +175,8 @@ impl<'a> Prepared<'a> {
             rect,
             lighting,
             lit: None,
+            bundle: Bundle::default(),
+            blocks: false,
             image,
             rays: AtomicU64::new(0),
         };
@@ -175,7 +189,14 @@ impl<'a> Prepared<'a> {
             };
             out.lit = Some(positions.par_iter().enumerate().map(light).collect());
         }
+        out.blocks = fixed && out.lit.is_none() && out.lighting.lights_blocks(&draw.attributes);
+        out.bundle = Bundle::new(&out);
         Some(out)
+    }
+
+    /// The user's clip planes, in object space.
+    pub(crate) fn clip_planes(&self) -> &[[f64; 4]] {
+        &self.clip_planes
     }
 
     /// The ray through a point of the window, with the part of it that is not clipped; `None` when all of it is.
@@ -260,9 +281,19 @@ impl<'a> Prepared<'a> {
                 p[0] * v.x + p[1] * v.y + p[2] * v.z + p[3]
             };
             let terms = [0, 1, 2].map(|i| weights[i] * corner(i));
-            // Centres in the plane are kept: whatever triangle they lie on, the answer is the same.
-            if terms.iter().sum::<f64>() < -1e-6 * terms.iter().map(|v| v.abs()).sum::<f64>() {
+            let (height, slack) =
+                (terms.iter().sum::<f64>(), 1e-6 * terms.iter().map(|v| v.abs()).sum::<f64>());
+            if height < -slack {
                 return None;
+            }
+            if height <= slack {
+                // The driver cuts the triangle along the plane: a centre on the cut belongs to what is above or to the right of it.
+                let across = [h[1].cross(h[2]), h[2].cross(h[0]), h[0].cross(h[1])];
+                let slope = (0..3).map(|i| across[i] * corner(i)).sum::<DVec3>() * sum.signum();
+                let upright = slope.x.abs() > 1e-9 * slope.y.abs();
+                if (if upright { slope.x } else { slope.y }) < 0.0 {
+                    return None;
+                }
             }
         }
         let z = (0..3).map(|i| l[i] * f64::from(c[i][2])).sum::<f64>();
@@ -417,41 +448,6 @@ fn screen_bounds(draw: &Draw, clip: DMat4) -> Rect {
     rect.and(Rect { x: x0, y: y0, w: x1.saturating_sub(x0), h: y1.saturating_sub(y0) })
 }
 
-/// The hits of a tile's rays: pixel (x, y) of the tile is lane `x % 4 + 4 (y % 4)` of block `x / 4 + 4 (y / 4)`.
-struct TileRays {
-    blocks: Vec<RayBlock>,
-    hits: Vec<HitBlock>,
-}
-
-impl TileRays {
-    fn new() -> TileRays {
-        TileRays { blocks: vec![RayBlock::INACTIVE; 16], hits: vec![HitBlock::MISS; 16] }
-    }
-
-    /// Sends rays through the pixels of `area`, which lies in the tile at (`x`, `y`).
-    fn send(&mut self, p: &Prepared<'_>, area: Rect) {
-        self.blocks.fill(RayBlock::INACTIVE);
-        let mut sent = 0;
-        for y in 0..area.h {
-            for x in 0..area.w {
-                let center = |a: i32, d: i32| f64::from(a + d) + 0.5;
-                if let Some((ray, _)) = p.ray(center(area.x, x), center(area.y, y)) {
-                    let (b, l) = slot(x, y);
-                    self.blocks[b].set(l, &ray);
-                    sent += 1;
-                }
-            }
-        }
-        self.hits.fill(HitBlock::MISS);
-        p.world.closest_coherent(&self.blocks, &mut self.hits);
-        p.rays.fetch_add(sent, Relaxed);
-    }
-}
-
-fn slot(x: i32, y: i32) -> (usize, usize) {
-    ((x / 4 + 4 * (y / 4)) as usize, (x % 4 + 4 * (y % 4)) as usize)
-}
-
 /// The nearest fragment of all draws at every pixel.
 pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings) -> (Layer, [u64; 2]) {
     let around = Surroundings::new(draws, settings);
@@ -473,18 +469,71 @@ pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings) -> (Layer, [u
             see(p, d as u32, area, rays, &mut seen);
         }
         let mut n = 0;
+        let mut batch = Batch::default();
         for (k, s) in seen.iter().enumerate().filter(|(_, s)| s.draw != u32::MAX) {
-            let (px, py) = (rect.x + (k % w) as i32, y + (k / w) as i32);
-            let p = &draws[s.draw as usize];
-            color[k] = to_bytes(p.shaded(s.prim as usize, &s.fragment, mode, around.as_ref(), (px, py)));
             depth[k] = s.fragment.depth as f32;
             n += 1;
+            let p = &draws[s.draw as usize];
+            if p.blocks && mode == Mode::Match {
+                if batch.count > 0 && batch.draw != s.draw {
+                    batch.shade(&draws[batch.draw as usize], color);
+                }
+                batch.add(p, s.draw, k, s, color);
+                continue;
+            }
+            let (px, py) = (rect.x + (k % w) as i32, y + (k / w) as i32);
+            color[k] = to_bytes(p.shaded(s.prim as usize, &s.fragment, mode, around.as_ref(), (px, py)));
+        }
+        if batch.count > 0 {
+            batch.shade(&draws[batch.draw as usize], color);
         }
         covered.fetch_add(n, Relaxed);
     });
     layer.covered = covered.into_inner() as usize;
     let extra = around.map_or([0; 2], |a| [a.shadow_rays.into_inner(), a.occlusion_rays.into_inner()]);
     (layer, extra)
+}
+
+/// Up to 16 fragments of one draw that are lit together.
+#[derive(Default)]
+struct Batch {
+    draw: u32,
+    count: usize,
+    pixels: [usize; LANES],
+    triangles: [[u32; 3]; LANES],
+    weights: [[f32; LANES]; 3],
+    back: [bool; LANES],
+}
+
+impl Batch {
+    fn add(&mut self, p: &Prepared<'_>, draw: u32, pixel: usize, s: &Seen, color: &mut [[u8; 4]]) {
+        // One with room left is of the same draw: others are shaded before the draw changes.
+        debug_assert!(self.count == 0 || self.draw == draw, "a batch is of one draw");
+        self.draw = draw;
+        let n = self.count;
+        self.pixels[n] = pixel;
+        self.triangles[n] = p.draw.geometry.mesh.indices[s.prim as usize];
+        for k in 0..3 {
+            self.weights[k][n] = s.fragment.weights[k] as f32;
+        }
+        self.back[n] = !s.fragment.front;
+        self.count = n + 1;
+        if self.count == LANES {
+            self.shade(p, color);
+        }
+    }
+
+    fn shade(&mut self, p: &Prepared<'_>, color: &mut [[u8; 4]]) {
+        let used = ((1_u32 << self.count) - 1) as u16;
+        let positions = &p.draw.geometry.mesh.positions;
+        let a = &p.draw.attributes;
+        let (triangles, weights, back) = (&self.triangles, &self.weights, &self.back);
+        let lit = dispatch!(Level::new(), _simd => p.lighting.fragments(a, positions, triangles, weights, back, used));
+        for l in 0..self.count {
+            color[self.pixels[l]] = to_bytes(lit.rgba.map(|c| c[l]));
+        }
+        self.count = 0;
+    }
 }
 
 /// One draw against what was seen so far.
@@ -494,17 +543,33 @@ fn see(p: &Prepared<'_>, index: u32, area: Rect, rays: &mut TileRays, seen: &mut
         return;
     }
     let later_wins_ties = p.draw.state.depth_func == LEQUAL;
+    let mut fragments: [FragmentBlock; 16] = [const { FragmentBlock::EMPTY }; 16];
     for x in (part.x..part.x + part.w).step_by(TILE as usize) {
         let tile = Rect { x, y: part.y, w: TILE.min(part.x + part.w - x), h: part.h };
-        rays.send(p, tile);
+        if !rays.send(p, tile) {
+            continue;
+        }
+        let mut moved = [f64::NAN; 256];
+        let (hits, range) = (&rays.hits, p.draw.state.depth_range);
+        let (blocks, targets) = (&mut fragments, &mut moved);
+        dispatch!(Level::new(), _simd => fill(p, hits, tile, blocks, targets, range));
+        // Polygon offset pushes steep triangles far back, at silhouettes behind others of the same draw.
+        let overtaken = p.draw.state.polygon_offset.is_some() && rays.look_behind(p, tile, &moved);
         for y in 0..tile.h {
             for x in 0..tile.w {
                 let (b, l) = slot(x, y);
-                let Some(hit) = rays.hits[b].get(l) else { continue };
+                let behind = overtaken && rays.overtakers[b].prim[l] != rt_core::ray::NO_HIT;
                 let (px, py) = (tile.x + x, tile.y + y);
-                let Some((prim, f)) = p.resolve(rays.blocks[b].get(l), Some(hit), px, py) else { continue };
+                let (prim, f) = match fragments[b].lane[l] {
+                    Lane::Empty => continue,
+                    Lane::Found if !behind => (rays.hits[b].prim[l] as usize, fragments[b].get(l)),
+                    _ => match p.resolve(rays.blocks[b].get(l), rays.hits[b].get(l), px, py) {
+                        Some(found) => found,
+                        None => continue,
+                    },
+                };
                 let at = &mut seen[((py - area.y) * area.w + px - area.x) as usize];
-                let bits = (f.depth * DEPTH_STEPS).round() as u32;
+                let bits = (f.depth * DEPTH_STEPS + 0.5) as u32;
                 if bits < at.depth_bits || (later_wins_ties && bits == at.depth_bits) {
                     *at = Seen { depth_bits: bits, draw: index, prim: prim as u32, fragment: f };
                 }
@@ -513,55 +578,23 @@ fn see(p: &Prepared<'_>, index: u32, area: Rect, rays: &mut TileRays, seen: &mut
     }
 }
 
-/// Every fragment of one draw, as layers: the n-th layer has the n-th fragment of each pixel in the order of the triangles.
-pub(crate) fn in_order(p: &Prepared<'_>) -> Vec<Layer> {
-    let rect = p.rect;
-    let (w, h) = (rect.w.max(0) as usize, rect.h.max(0) as usize);
-    let fragments: Vec<Vec<(u32, [u8; 4], f32)>> = (0..w * h)
-        .into_par_iter()
-        .map(|k| {
-            let (x, y) = (rect.x + (k % w) as i32, rect.y + (k / w) as i32);
-            let mut found: Vec<(u32, [u8; 4], f32)> = Vec::new();
-            let mut keep = |prim: usize| {
-                if found.iter().all(|(o, ..)| *o != prim as u32)
-                    && let Some(f) = p.fragment(prim, x, y)
-                {
-                    found.push((
-                        prim as u32,
-                        to_bytes(p.color(prim, &f, false, &Visibility::FULL)),
-                        f.depth as f32,
-                    ));
-                }
-            };
-            const OFF: f64 = 1.0 / 200.0;
-            // The centre, and beside it for edges that go through it.
-            for (dx, dy) in [(0.0, 0.0), (-OFF, -OFF), (OFF, OFF), (OFF, -OFF), (-OFF, OFF)] {
-                let Some((mut ray, _)) = p.ray(f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy) else {
-                    continue;
-                };
-                for _ in 0..MOST_STEPS {
-                    p.rays.fetch_add(1, Relaxed);
-                    let Some(hit) = p.world.closest(&ray) else { break };
-                    keep(hit.prim as usize);
-                    ray.t_min = hit.t.next_up();
-                }
-            }
-            found.sort_unstable_by_key(|f| f.0);
-            found
-        })
-        .collect();
-    let layers = fragments.iter().map(Vec::len).max().unwrap_or(0);
-    (0..layers)
-        .map(|n| {
-            let mut layer =
-                Layer { rect, color: vec![[0; 4]; w * h], depth: vec![UNCOVERED; w * h], covered: 0 };
-            for (k, f) in fragments.iter().enumerate() {
-                if let Some((_, c, d)) = f.get(n) {
-                    (layer.color[k], layer.depth[k]) = (*c, *d);
-                    layer.covered += 1;
-                }
-            }
-            layer
-        })
-        .collect()
+/// Fragments of a tile's hits, and where polygon offset moved them to.
+#[inline(always)]
+fn fill(
+    p: &Prepared<'_>,
+    hits: &[rt_core::ray::HitBlock],
+    tile: Rect,
+    out: &mut [FragmentBlock; 16],
+    moved: &mut [f64; 256],
+    range: [f64; 2],
+) {
+    for (b, out) in out.iter_mut().enumerate() {
+        let (x, y) = (4 * (b as i32 % 4), 4 * (b as i32 / 4));
+        if hits[b].prim.iter().all(|p| *p == rt_core::ray::NO_HIT) {
+            out.lane = [Lane::Empty; LANES];
+            continue;
+        }
+        out.fill(p, &hits[b], tile.x + x, tile.y + y);
+        out.moved_back(range, &mut moved[b * LANES..(b + 1) * LANES]);
+    }
 }

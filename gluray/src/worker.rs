@@ -15,7 +15,14 @@ pub(crate) fn forked() -> bool {
 
 /// The pool with as many threads as are set now; all that there are when nothing is set.
 fn pool() -> Option<Arc<rayon::ThreadPool>> {
-    let threads = crate::config::current().settings.threads;
+    let settings = &crate::config::current().settings;
+    // Beside the program, which has a core of its own, all the others render.
+    let threads = match settings.threads {
+        0 if settings.asynchronous => {
+            std::thread::available_parallelism().map_or(1, |n| (n.get() as u32 - 1).max(1))
+        }
+        n => n,
+    };
     let mut slot = POOL.lock().unwrap_or_else(PoisonError::into_inner);
     if slot.as_ref().is_none_or(|(n, _)| *n != threads) {
         PROCESS.store(std::process::id(), Relaxed);
@@ -31,6 +38,16 @@ pub(crate) fn on_pool<R: Send>(f: impl FnOnce() -> R + Send) -> R {
     // A child of a fork must not touch the pool: its lock and its threads are the parent's.
     match if forked() { None } else { pool() } {
         Some(pool) => pool.install(f),
+        None => f(),
+    }
+}
+
+/// Starts `f` on the pool and goes on; does it here when there is no pool.
+pub(crate) fn beside(f: impl FnOnce() + Send + 'static) {
+    match if forked() { None } else { pool() } {
+        Some(pool) => pool.spawn(move || {
+            crate::fault::guard(f);
+        }),
         None => f(),
     }
 }

@@ -225,3 +225,26 @@ fn completions_know_the_subcommands() {
         }
     }
 }
+
+/// Batch systems and `timeout` send TERM to what they started, which is us.
+#[test]
+fn a_term_ends_the_program_and_the_report_is_written() {
+    let home = tempfile::tempdir().expect("a folder");
+    let report = home.path().join("r.json");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_gluray"));
+    command.args(["run", "--report"]).arg(&report).args(["--", "sh", "-c", "echo started; exec sleep 600"]);
+    command.env("XDG_STATE_HOME", home.path()).env("XDG_CONFIG_HOME", home.path());
+    command.env("XDG_RUNTIME_DIR", home.path()).stdout(std::process::Stdio::piped());
+    let mut child = command.spawn().expect("the program starts");
+    let mut line = String::new();
+    let stdout = child.stdout.as_mut().expect("a pipe");
+    std::io::BufRead::read_line(&mut std::io::BufReader::new(stdout), &mut line).expect("a line");
+    assert_eq!(line, "started\n");
+    let pid = rustix::process::Pid::from_child(&child);
+    rustix::process::kill_process(pid, rustix::process::Signal::TERM).expect("it runs");
+    // Were the signal lost, this would wait for ten minutes.
+    let status = child.wait().expect("it ends");
+    assert_eq!(status.code(), Some(128 + 15), "the program's own end, as a shell tells it");
+    let text = std::fs::read_to_string(&report).expect("the report is there");
+    assert!(serde_json::from_str::<Report>(&text).is_ok(), "{text}");
+}

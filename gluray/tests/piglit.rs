@@ -26,6 +26,11 @@ const FILLED: &[&str] = &[
     "depth_clamp -auto -fbo",
     "pos-array -auto -fbo",
     "provoking-vertex -auto",
+    "gl-1.0-dlist-beginend -auto -fbo",
+    "array-stride -auto -fbo",
+    "gl-1.0-user-clip-all-planes -auto -fbo",
+    "texredefine -auto -fbo",
+    "copyteximage 1D -auto -fbo",
 ];
 /// Tests of errors, selection and what else must not suffer.
 const OTHERS: &[&str] = &[
@@ -42,6 +47,12 @@ const OTHERS: &[&str] = &[
     "select depth -auto -fbo",
     "vao-element-array-buffer -auto -fbo",
     "vbo-map-remap -auto -fbo",
+    "gl-1.2-texture-base-level -auto -fbo",
+    "incomplete-texture fixed -auto -fbo",
+    "levelclamp -auto -fbo",
+    "lodclamp-between -auto -fbo",
+    "mipmap-setup -auto -fbo",
+    "texsubimage-depth-formats -auto -fbo",
 ];
 
 fn verdict(x: &Xvfb, piglit: &Path, line: &str, through: Option<&[&str]>) -> (String, u64) {

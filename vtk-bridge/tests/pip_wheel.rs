@@ -1,67 +1,10 @@
-//! The package for the stock `vtk` wheel: ordinary scripts with and without it, and its own wheel built and installed without a network.
+//! The package for the stock `vtk` wheel: built and installed without a network, and what it says when something is missing.
+//! Pictures with and without it: `against_stock/wheel.rs`.
 
-#[allow(dead_code, reason = "the tests of the other programs use more of it")]
-#[path = "against_stock/capture.rs"]
-mod capture;
-#[allow(dead_code, reason = "the tests of the other programs use more of it")]
-#[path = "against_stock/compare.rs"]
-mod compare;
-
-use capture::{Capture, bright};
-use compare::{Bars, faults};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// Scripts of `tests/scripts/vtk` that a current VTK can run, with props that are traced.
-const SCRIPTS: &[&str] = &[
-    "annotations",
-    "changing",
-    "clipping",
-    "colors",
-    "contours",
-    "data_sets",
-    "edges",
-    "lights",
-    "opacity",
-    "projections",
-    "selection",
-    "specular",
-    "streamlines",
-    "textures",
-    "viewports",
-    "volumes",
-];
-
-/// Pictures that are held to other bars, and why.
-const EXCEPTIONS: &[(&str, &str, Bars, &str)] = &[
-    (
-        "projections",
-        "sheared",
-        Bars { color_mean: 255.0, color_strays: 1.0, ..Bars::STRICT },
-        "OpenGL shades in sheared coordinates, where right angles are none: its light is wrong",
-    ),
-    (
-        "textures",
-        "transparent",
-        Bars { silhouette: 1.0, depth_ulp: u32::MAX, ..Bars::STRICT },
-        "OpenGL writes no depth for a surface with a translucent texture; we write it where the texture is opaque",
-    ),
-    (
-        "volumes",
-        "translucent_inside",
-        Bars { color_mean: 3.0, color_strays: 0.2, ..Bars::STRICT },
-        "OpenGL blends volumes over all translucent surfaces, also over those in front of them and inside",
-    ),
-    (
-        "streamlines",
-        "streamlines",
-        Bars { silhouette: 0.0005, ..Bars::STRICT },
-        "the tubes' rims: VTK 9.7 makes other tubes than 9.1, with more slivers",
-    ),
-];
-
-/// The Python with the wheel, or nothing, said aloud.
 fn python() -> Option<PathBuf> {
     let found = std::env::var_os("RTSV_PYTHON").map(PathBuf::from);
     if found.is_none() {
@@ -82,6 +25,7 @@ fn out() -> PathBuf {
     folder
 }
 
+/// Python without a display: VTK then draws with EGL or OSMesa.
 fn command(python: &Path) -> Command {
     let mut command = Command::new(python);
     let package = Path::new(env!("CARGO_MANIFEST_DIR")).join("python");
@@ -91,78 +35,9 @@ fn command(python: &Path) -> Command {
 }
 
 fn checked(what: &str, output: Output) -> String {
-    let said = [output.stdout, output.stderr].concat();
-    let said = String::from_utf8_lossy(&said).into_owned();
+    let said = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{what}: {}\n{said}", output.status);
-    said
-}
-
-fn scripts() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/scripts")
-}
-
-/// Runs scripts into a folder of that name, one after the other in one process.
-fn run(
-    python: &Path,
-    scripts_to_run: &[PathBuf],
-    traced: bool,
-    name: &str,
-    settings: &[(&str, &str)],
-) -> PathBuf {
-    let folder = out().join(name);
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).expect("a folder for pictures");
-    let mut c = command(python);
-    if traced {
-        let report = folder.join("report.json");
-        c.args(["-m", "rtvtk"]).env("RTV_REPORT", &report).env("CAPTURE_BESIDE", &report);
-    }
-    c.envs(settings.iter().copied()).arg(scripts().join("run_all.py")).arg(&folder).args(scripts_to_run);
-    checked(name, c.output().expect("python runs"));
-    folder
-}
-
-#[test]
-fn unmodified_scripts_look_the_same_in_the_stock_wheel() {
-    let Some(python) = python() else { return };
-    let files: Vec<PathBuf> = SCRIPTS.iter().map(|s| scripts().join(format!("vtk/{s}.py"))).collect();
-    let stock = run(&python, &files, false, "stock", &[]);
-    let ours = run(&python, &files, true, "rtvtk", &[]);
-    let (mut found, mut compared) = (Vec::new(), 0);
-    for script in SCRIPTS {
-        for entry in std::fs::read_dir(stock.join(script)).expect("pictures") {
-            let name = entry.expect("an entry").file_name().to_string_lossy().into_owned();
-            let Some(name) = name.strip_suffix(".png") else { continue };
-            let [a, b] = [&stock, &ours].map(|f| {
-                let mut capture = Capture::read(&f.join(script), name).expect("a picture");
-                // Two rectangles with the picture are drawn in the place of the props.
-                capture.facts.as_object_mut().map(|facts| facts.remove("props"));
-                capture
-            });
-            let exception = EXCEPTIONS.iter().find(|(s, n, ..)| (*s, *n) == (*script, name));
-            let bars = exception.map_or(Bars::STRICT, |(_, _, bars, _)| *bars);
-            if b.traced_elements() == 0 {
-                found.push(format!("{script}/{name}: nothing was ray traced"));
-            }
-            found.extend(faults(&a, &b, &bars).iter().map(|f| format!("{script}/{name}: {f}")));
-            compared += 1;
-        }
-    }
-    assert!(found.is_empty(), "\n{}\n", found.join("\n"));
-    assert!(compared >= 30, "only {compared} pictures");
-}
-
-#[test]
-fn effects_come_by_environment_variables() {
-    let Some(python) = python() else { return };
-    let room = [scripts().join("effects/room.py")];
-    let picture = |name: &str, settings: &[(&str, &str)]| {
-        Capture::read(&run(&python, &room, true, name, settings).join("room"), "room").expect("a picture")
-    };
-    let (plain, shadows) = (picture("plain", &[]), picture("shadows", &[("RTV_SHADOWS", "1")]));
-    let change = |place: &str| bright(shadows.at(place)) - bright(plain.at(place));
-    assert!(change("shadow") < -20.0, "the shadow is as bright as before: {}", change("shadow"));
-    assert!(change("lit").abs() < 1.0 && change("far_from_shadow").abs() < 1.0, "lit floor has changed");
+    said.into_owned()
 }
 
 #[test]
@@ -202,7 +77,7 @@ fn a_missing_library_or_script_is_a_clear_message_and_exit_code_2() {
     let here = library().display().to_string();
     let (code, said) = run(&here, &["no_such_script.py"]);
     assert_eq!((code, said.contains("no_such_script.py: no such script")), (Some(2), true), "{said}");
-    let script = scripts().join("run_all.py").display().to_string();
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/scripts/run_all.py").display().to_string();
     let (code, said) = run("/no/such/library.so", &[&script]);
     assert_eq!((code, said.contains("set RTVTK_LIBRARY to the file")), (Some(2), true), "{said}");
 }

@@ -2,7 +2,7 @@
 
 use super::Context;
 use super::many_ranks::{CAVEAT, simulated};
-use crate::plot::{Axis, Plot, Point, Series};
+use crate::plot::{Axis, Plot, Series};
 use crate::record::{Record, Row};
 use crate::stats::Summary;
 use composite::{
@@ -44,23 +44,27 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             measure::<[f32; 4]>(record, "f32", &case)?;
         }
     }
-    let mut plot = Plot::lines(
-        "Error against time, 128 layers, direct send",
-        Axis::log("time", "ms"),
-        Axis::log("error", "1/255"),
+    // A series for each format: what it loses with how faint layers, and at what time.
+    let mut by_alpha = Plot::lines(
+        "Error of 128 layers",
+        Axis::log("opacity of a layer", ""),
+        Axis::log("largest error", "1/255"),
     );
-    for alpha in ALPHAS {
-        let of = record
-            .rows
-            .iter()
-            .filter(|r| r.number("alpha") == Some(alpha) && r.text("strategy") == Some("direct send"));
-        let mut points: Vec<Point> = of
-            .filter_map(|r| Some(Point { x: r.number("time")?, y: r.number("error")?, range: None }))
-            .collect();
-        points.sort_by(|a, b| a.x.total_cmp(&b.x));
-        plot.series.push(Series { name: format!("alpha {alpha}"), points });
+    let mut by_time = Plot::lines(
+        "Error against time, direct send, a point for each opacity",
+        Axis::log("time of a frame", "ms"),
+        Axis::log("largest error", "1/255"),
+    );
+    for format in ["u8", "u16", "f16", "f32"] {
+        let of = |r: &&Row| r.text("format") == Some(format) && r.text("strategy") == Some("direct send");
+        let points = |column: &str| -> Vec<(f64, f64)> {
+            let rows = record.rows.iter().filter(of);
+            rows.filter_map(|r| r.number(column).zip(r.number("error"))).collect()
+        };
+        by_alpha.series.push(Series::new(format, points("alpha")));
+        by_time.series.push(Series::new(format, points("time")));
     }
-    record.plots.push(plot);
+    record.plots.extend([by_alpha, by_time]);
     Ok(())
 }
 

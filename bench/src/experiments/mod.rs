@@ -11,6 +11,7 @@ mod fig3_5;
 mod fig3_6;
 mod fig4_10;
 mod fig4_7;
+mod fig4_8;
 mod fig4_9;
 mod fig5_11;
 mod fig5_12;
@@ -20,6 +21,7 @@ mod lineup;
 mod many_ranks;
 mod paraview;
 mod partition_view;
+mod passing;
 mod peers;
 mod peers_schlieren;
 mod pictures;
@@ -27,6 +29,7 @@ mod shock_angles;
 mod smpi;
 mod speed_schlieren;
 mod strong_scaling;
+mod table4_1;
 mod table5_1;
 mod test_section;
 
@@ -104,10 +107,28 @@ pub const ALL: &[Experiment] = &[
         run: accuracy_composite::run,
     },
     Experiment {
+        id: "table4.1",
+        chapter: 4,
+        title: "Frames a second of unmodified OpenGL programs: llvmpipe against gluray",
+        run: table4_1::run,
+    },
+    Experiment {
+        id: "passing",
+        chapter: 4,
+        title: "Nanoseconds per OpenGL call that gluray passes to the driver",
+        run: passing::run,
+    },
+    Experiment {
         id: "fig4.7",
         chapter: 4,
         title: "Time to build the acceleration structure, by preset, against the number of triangles",
         run: fig4_7::run,
+    },
+    Experiment {
+        id: "fig4.8",
+        chapter: 4,
+        title: "Phases of ParaView’s frames when they are traced: Gantt chart and Chrome trace",
+        run: fig4_8::run,
     },
     Experiment {
         id: "fig4.9",
@@ -118,7 +139,7 @@ pub const ALL: &[Experiment] = &[
     Experiment {
         id: "fig4.10",
         chapter: 4,
-        title: "Replicated data against data in parts, 1 to 64 ranks",
+        title: "Replicated data against data in parts, 1 to 128 ranks",
         run: fig4_10::run,
     },
     Experiment {

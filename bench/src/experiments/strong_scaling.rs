@@ -30,6 +30,35 @@ pub(super) fn wavelet(context: &mut Context<'_>, record: &mut Record) -> anyhow:
     run(context, record, "wavelet", "orbit", ["1M", "4M"])
 }
 
+const HEADLIGHT: &str = "headlight";
+const NOT_STREAMED: &str = "headlight, not streamed";
+const LAMP: &str = "lamp and occlusion";
+
+/// What streaming gains, in words.
+fn streaming(record: &Record) -> String {
+    let frame = |light: &str, ranks: f64| {
+        let row = record
+            .rows
+            .iter()
+            .find(|r| r.text("light") == Some(light) && r.number("ranks") == Some(ranks))?;
+        row.number("frame").zip(row.number("render_max"))
+    };
+    let ranks: Vec<f64> = record.rows.iter().filter_map(|r| r.number("ranks")).filter(|r| *r > 1.0).collect();
+    let gains: Vec<String> = ranks
+        .iter()
+        .enumerate()
+        .filter(|(i, r)| !ranks[..*i].contains(r))
+        .filter_map(|(_, &r)| {
+            let ((streamed, render), (one_by_one, _)) = (frame(HEADLIGHT, r)?, frame(NOT_STREAMED, r)?);
+            Some(format!("{r:.0} ranks {one_by_one:.1} to {streamed:.1} (render {render:.1})"))
+        })
+        .collect();
+    format!(
+        "Messages that travel while rays are traced, and tiles that are collected while others are not finished, take a headlight’s frame, ms: {}.",
+        gains.join(", ")
+    )
+}
+
 fn run(
     context: &mut Context<'_>,
     record: &mut Record,
@@ -38,7 +67,11 @@ fn run(
     [small, large]: [&str; 2],
 ) -> anyhow::Result<()> {
     cost_columns(record);
-    record.column("light", "", "headlight (no ray leaves a hit), or lamp with shadows and ambient occlusion");
+    record.column(
+        "light",
+        "",
+        "headlight (no ray leaves a hit; not streamed: messages only when all rays are traced), or lamp with shadows and ambient occlusion",
+    );
     record.column("speedup", "", "frame time of one rank over that of this many");
     record.column("rounds", "", "rounds of questions between ranks");
     record.column("choice", "", "how light crosses the borders of parts, on rank 0");
@@ -52,16 +85,20 @@ fn run(
         color_by_rank: false,
         ..Demo::default()
     };
-    for (light, global_light) in [("headlight", false), ("lamp and occlusion", true)] {
+    let cases = [(HEADLIGHT, false, true), (NOT_STREAMED, false, false), (LAMP, true, true)];
+    for (light, global_light, stream) in cases {
         context.say(format!("{data} {size}, {light}: data"))?;
         let demo = Demo { global_light, ..demo.clone() };
         let mut prepared = demo.prepare(1, &mut |_, _| true)?;
         let mut alone = None;
-        for ranks in powers(1, 128).filter(|r| !quick || matches!(r, 1 | 2 | 8 | 32 | 128)) {
+        // Every other number of ranks is enough to see what streaming gains.
+        let some = quick || !stream;
+        for ranks in powers(1, 128).filter(|r| !some || matches!(r, 1 | 2 | 8 | 32 | 128)) {
             context.say(format!("{data} {size}, {light}: {ranks} ranks"))?;
             prepared.partition = Partition::new(&prepared.scene, ranks, &Split::Triangles);
             let count = if global_light { 1 } else { count };
-            let measured = frames(&prepared, ranks, count, Sharing::SortLast, &FrameOptions::default())?;
+            let options = FrameOptions { stream, ..FrameOptions::default() };
+            let measured = frames(&prepared, ranks, count, Sharing::SortLast, &options)?;
             let cost = measured.median();
             let alone: f64 = *alone.get_or_insert(cost.frame_secs);
             record.rows.push(
@@ -75,12 +112,14 @@ fn run(
     }
     context.say(format!("{data} {size}: picture"))?;
     record.pictures.push(picture(&demo)?);
+    record.notes.push(streaming(record));
     let mut plot = Plot::lines("Strong scaling", Axis::log("ranks", ""), Axis::log("time of a frame", "ms"));
     for (light, column, name) in [
-        ("headlight", "frame", "frame, headlight"),
-        ("headlight", "render_max", "slowest rank’s render, headlight"),
-        ("lamp and occlusion", "frame", "frame, lamp and occlusion"),
-        ("lamp and occlusion", "render_max", "slowest rank’s render, lamp and occlusion"),
+        (HEADLIGHT, "frame", "frame, headlight"),
+        (NOT_STREAMED, "frame", "frame, headlight, not streamed"),
+        (HEADLIGHT, "render_max", "slowest rank’s render, headlight"),
+        (LAMP, "frame", "frame, lamp and occlusion"),
+        (LAMP, "render_max", "slowest rank’s render, lamp and occlusion"),
     ] {
         let of = record.rows.iter().filter(|r| r.text("light") == Some(light));
         plot.series

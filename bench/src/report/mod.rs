@@ -70,6 +70,13 @@ fn section(r: &Record) -> String {
     for p in &r.plots {
         s += &format!("<figure>{}</figure>\n", p.to_svg());
     }
+    for a in r.attachments.iter().filter(|a| a.name.ends_with(".svg") && !a.bytes.is_empty()) {
+        let (name, caption) = (escape(&a.name), escape(&a.caption));
+        let data = base64(&a.bytes);
+        s += &format!(
+            "<figure><img alt=\"{name}\" src=\"data:image/svg+xml;base64,{data}\"><figcaption>{caption}</figcaption></figure>\n"
+        );
+    }
     for p in r.pictures.iter().filter(|p| !p.png.is_empty()) {
         let (name, caption) = (escape(&p.name), escape(&p.caption));
         let data = base64(&p.png);

@@ -20,7 +20,6 @@ const ARROWS: &[(&str, May, &[&str])] = &[
     ("datasets", May::Use, &["rt-core"]),
     ("schlieren", May::Use, &["rt-core", "datasets"]),
     ("composite", May::UseBehindAFeature, &["rt-core", "datasets"]),
-    ("composite-smpi", May::Use, &["composite"]),
     ("gluray", May::Use, &["rt-core", "composite", "datasets"]),
     ("vtk-bridge", May::Use, &["rt-core"]),
     ("vtk-bridge", May::UseBehindAFeature, &["datasets"]),

@@ -11,7 +11,10 @@ const UNSAFE_ROOMS: &[(&str, &str)] = &[
     ("vtk-bridge/src/capi", "the C ABI for VTK and ParaView"),
     ("vtk-bridge/src/loader", "finds the VTK that is in the process and loads what fits it"),
     ("vtk-bridge/src/anari/abi", "the C++ vtables through which ANARI programs call a device"),
-    ("composite-smpi/src", "the function `main` of a shared library, which SimGrid's smpirun calls"),
+    (
+        "composite/examples/composite_smpi",
+        "the function `main` of a shared library, which SimGrid's smpirun calls",
+    ),
     ("composite/src/comm/mpi", "calls into an MPI library found at run time"),
     (
         "composite/src/rival",

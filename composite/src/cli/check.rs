@@ -1,13 +1,16 @@
 //! `composite check`: does this machine's transport carry every strategy to the bits of the serial reference? And, for tests, do faults
 //! end as they should?
+use super::first_ranks::FirstRanks;
+use super::hard_cases;
 use super::ranks::{RankArgs, RankComm};
+use crate::comm::Communicator;
 use crate::compositor::{Options, composite};
 use crate::frame::Frame;
 use crate::pixel::{Composite, DepthPixel, PremultipliedPixel};
 use crate::reference::composite_serial;
 use crate::scenes::{Drawn, Scene};
 use crate::strategies::Strategy;
-use datasets::cli::{CommonArgs, Status};
+use datasets::cli::{CommonArgs, Status, UsageError};
 use serde::Serialize;
 use std::ffi::OsString;
 use std::time::Duration;
@@ -16,10 +19,20 @@ use std::time::Duration;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     composite check --ranks 5 --mpi\n  \
+    composite check --ranks 9 --mpi --counts 1,2,3,5,9 --hard\n  \
     mpirun -n 64 --hostfile nodes composite check --mpi")]
 pub(super) struct CheckArgs {
     #[command(flatten)]
     ranks: RankArgs,
+    /// Groups of the first N ranks instead of all
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
+    counts: Vec<usize>,
+    /// Also the hard cases: equal and strange depths, every size from 1x1 to 67x5 (a share of them for each number of ranks), empty ranks
+    #[arg(long)]
+    hard: bool,
+    /// With --hard: how often equal depths are composited
+    #[arg(long, default_value_t = 1000, value_name = "TIMES")]
+    repeats: u64,
     /// Let the highest rank fail in this way
     #[arg(long, hide = true)]
     fault: Option<Fault>,
@@ -39,6 +52,8 @@ enum Fault {
     Order,
     /// Returns early and leaves.
     Leaves,
+    /// A message of pixels arrives with a wrong bit.
+    Corrupt,
 }
 
 /// Odd sizes, fewer pixels than ranks, and one that needs more than one word a row.
@@ -55,8 +70,13 @@ const STRATEGIES: [Strategy; 5] = [
 struct Checked {
     ranks: usize,
     transport: String,
+    /// Numbers of ranks that were checked.
+    counts: Vec<usize>,
     images: u64,
     images_differ: u64,
+    /// Of the hard cases.
+    hard_images: u64,
+    hard_images_differ: u64,
 }
 
 pub(super) fn check(common: CommonArgs, args: &CheckArgs, arguments: &[OsString]) -> anyhow::Result<Status> {
@@ -69,41 +89,66 @@ pub(super) fn check(common: CommonArgs, args: &CheckArgs, arguments: &[OsString]
                 fail(comm, fault, timeout)?;
             }
             let transport = comm.transport();
-            let (mut images, mut images_differ) = (0, 0);
-            for scene in Scene::ALL {
-                for size_px in SIZES_PX {
-                    for strategy in STRATEGIES {
-                        for same in one_frame(comm, scene, size_px, strategy, timeout)? {
-                            images += 1;
-                            images_differ += u64::from(!same);
+            let size = comm.comm().size();
+            let counts = if args.counts.is_empty() { vec![size] } else { args.counts.clone() };
+            if let Some(wrong) = counts.iter().find(|c| !(1..=size).contains(*c)) {
+                let cure = format!("--counts {wrong}: there are {size} ranks; give numbers from 1 to {size}");
+                return Err(UsageError(cure).into());
+            }
+            let (mut images, mut images_differ, mut hard) = (0, 0, [0; 2]);
+            for &count in &counts {
+                if counts.len() > 1 {
+                    comm.comm().barrier(timeout)?;
+                }
+                let Some(mut group) = FirstRanks::new(comm.comm(), count) else { continue };
+                for scene in Scene::ALL {
+                    for size_px in SIZES_PX {
+                        for strategy in STRATEGIES {
+                            for same in one_frame(&mut group, scene, size_px, strategy, timeout)? {
+                                images += 1;
+                                images_differ += u64::from(!same);
+                            }
                         }
                     }
                 }
+                big_messages(&mut group, timeout)?;
+                if args.hard {
+                    let most = counts.len().max(1);
+                    let [all, differ] =
+                        hard_cases::run(&mut group, &STRATEGIES, most, args.repeats, timeout)?;
+                    hard = [hard[0] + all, hard[1] + differ];
+                }
             }
-            big_messages(comm, timeout)?;
-            Ok(Checked { ranks: comm.comm().size(), transport, images, images_differ })
+            // Nobody leaves while others still composite.
+            comm.comm().barrier(timeout)?;
+            let [hard_images, hard_images_differ] = hard;
+            Ok(Checked { ranks: size, transport, counts, images, images_differ, hard_images, hard_images_differ })
         },
         |checked| {
             common.result(&checked, || {
-                format!(
-                    "{} ranks over {}: {} images, {} differ from the serial reference",
-                    checked.ranks, checked.transport, checked.images, checked.images_differ
-                )
+                let Checked { ranks, transport, images, images_differ, hard_images, hard_images_differ, .. } = &checked;
+                let mut text = format!(
+                    "{ranks} ranks over {transport}: {images} images, {images_differ} differ from the serial reference"
+                );
+                if args.hard {
+                    text += &format!("; hard cases: {hard_images} images, {hard_images_differ} differ");
+                }
+                text
             })?;
-            Ok(if checked.images_differ == 0 { Status::Success } else { Status::Failure })
+            Ok(if checked.images_differ + checked.hard_images_differ == 0 { Status::Success } else { Status::Failure })
         },
     )
 }
 
 /// Composites one scene with depth and blended; on rank 0, whether each image has the bits of the reference.
 fn one_frame(
-    comm: &mut RankComm,
+    comm: &mut dyn Communicator,
     scene: Scene,
     (width_px, height_px): (u32, u32),
     strategy: Strategy,
     timeout: Duration,
 ) -> anyhow::Result<Vec<bool>> {
-    let (rank, ranks) = (comm.comm().rank(), comm.comm().size());
+    let (rank, ranks) = (comm.rank(), comm.size());
     let draw = |rank: usize| {
         let mut drawn = Drawn::new(width_px, height_px);
         scene.draw(1, rank, ranks, &mut drawn);
@@ -117,7 +162,6 @@ fn one_frame(
     let everybody: Vec<_> =
         if rank == 0 { order.iter().map(|&rank| draw(rank)).collect() } else { Vec::new() };
     let options = Options { strategy, order: Some(order), timeout, ..Options::default() };
-    let comm = comm.comm();
 
     let frame = Frame::<DepthPixel<[u8; 4]>>::with_depth(width_px, height_px, &drawn.colors, &drawn.depths)?;
     let depth = composite(comm, &frame, &options)?.image;
@@ -145,8 +189,7 @@ fn bits_are_equal<P: Composite>(a: &crate::Image<P>, b: &crate::Image<P>) -> boo
 }
 
 /// Messages of many lengths around the ring, each byte checked.
-fn big_messages(comm: &mut RankComm, timeout: Duration) -> anyhow::Result<()> {
-    let comm = comm.comm();
+fn big_messages(comm: &mut dyn Communicator, timeout: Duration) -> anyhow::Result<()> {
     let (rank, size) = (comm.rank(), comm.size());
     let byte = |rank: usize, at: usize| (at.wrapping_mul(31) ^ rank ^ (at >> 8)) as u8;
     let (next, previous) = ((rank + 1) % size, (rank + size - 1) % size);
@@ -174,7 +217,19 @@ fn big_messages(comm: &mut RankComm, timeout: Duration) -> anyhow::Result<()> {
 /// What the highest rank does instead of its part.
 fn fail(comm: &mut RankComm, fault: Fault, timeout: Duration) -> anyhow::Result<()> {
     let comm = comm.comm();
-    if comm.rank() + 1 != comm.size() {
+    let culprit = comm.rank() + 1 == comm.size();
+    if fault == Fault::Corrupt {
+        // All composite the same frame.
+        let frame = Frame::<DepthPixel<[u8; 4]>>::with_depth(150, 41, &[[1; 4]; 6150], &[0.5; 6150])?;
+        let options = Options { timeout, ..Options::default() };
+        if culprit {
+            composite(&mut FirstRanks::damaged(comm), &frame, &options)?;
+        } else {
+            composite(comm, &frame, &options)?;
+        }
+        return Ok(());
+    }
+    if !culprit {
         return Ok(());
     }
     match fault {
@@ -194,6 +249,6 @@ fn fail(comm: &mut RankComm, fault: Fault, timeout: Duration) -> anyhow::Result<
             Ok(())
         }
         Fault::Order => Ok(comm.barrier(timeout)?),
-        Fault::Leaves => anyhow::bail!("this rank has had enough"),
+        Fault::Corrupt | Fault::Leaves => anyhow::bail!("this rank has had enough"),
     }
 }

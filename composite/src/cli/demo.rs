@@ -20,12 +20,13 @@ use std::time::Duration;
 #[command(after_help = "Examples:\n  \
     composite demo -n 8\n  \
     composite demo -n 5 --data mixing-layer --view RMI --headlight\n  \
+    composite demo -n 4 --mpi --data part.vtp --grey\n  \
     composite demo -n 8 --scene discs\n  \
     composite demo -n 8 --mpi --size 2048 --out frames")]
 pub(super) struct DemoArgs {
     #[command(flatten)]
     pub(super) ranks: RankArgs,
-    /// The data set, one of triangles in the catalogue of `datasets`
+    /// The data set: one of the catalogue of `datasets`, or a file with surfaces (VTK, OBJ, glTF, PLY, STL)
     #[arg(long, default_value = "wavelet", value_name = "NAME")]
     pub(super) data: String,
     /// Its size; the smallest if not given

@@ -83,7 +83,7 @@ fn hosts_text(ranks: usize) -> String {
 /// Places where cargo puts the library, given where this program is.
 fn candidates(program: &Path) -> Vec<PathBuf> {
     let folder = program.parent().unwrap_or(Path::new("."));
-    vec![folder.join(LIBRARY), folder.join("deps").join(LIBRARY)]
+    vec![folder.join(LIBRARY), folder.join("examples").join(LIBRARY)]
 }
 
 /// The program as a shared library: named, beside the program, or built now.
@@ -93,12 +93,12 @@ fn library(common: CommonArgs) -> anyhow::Result<PathBuf> {
     }
     let program = std::env::current_exe()?;
     // Built where there are sources: cargo itself knows whether it is up to date.
-    let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("../composite-smpi/Cargo.toml");
+    let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml");
     let profile = program.parent();
     let target = profile.and_then(Path::parent);
     if let (true, Some(profile), Some(target)) = (manifest.is_file(), profile, target) {
         let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-        cargo.args(["build", "--quiet"]);
+        cargo.args(["build", "--quiet", "--example", "composite_smpi"]);
         cargo.arg("--manifest-path").arg(&manifest).arg("--target-dir").arg(target);
         if profile.ends_with("release") {
             cargo.arg("--release");
@@ -114,7 +114,7 @@ fn library(common: CommonArgs) -> anyhow::Result<PathBuf> {
     candidates(&program).into_iter().find(|path| path.is_file()).ok_or_else(|| {
         UsageError(format!(
             "the simulation needs this program as {LIBRARY}: \
-             run `cargo build -p composite-smpi`, or name the file in {LIBRARY_VARIABLE}"
+             run `cargo build -p composite --example composite_smpi`, or name the file in {LIBRARY_VARIABLE}"
         ))
         .into()
     })

@@ -3,7 +3,7 @@ use super::{CommError, Communicator, FIRST_RESERVED_TAG};
 use std::time::Duration;
 
 const BARRIER_TAG: u32 = FIRST_RESERVED_TAG;
-const GATHER_TAG: u32 = FIRST_RESERVED_TAG + 1;
+pub(super) const GATHER_TAG: u32 = FIRST_RESERVED_TAG + 1;
 /// Added to the timeout of each later round. A rank that waits for the stalled one itself is then the first to give up, and the
 /// group's error names the stalled rank instead of one that waits as well.
 const ROUND_GRACE: Duration = Duration::from_millis(50);
@@ -87,7 +87,7 @@ pub fn all_gather<C: Communicator + ?Sized>(
 }
 
 /// Begin and end of the string whose length stands at `at`.
-fn block_at(bytes: &[u8], at: usize) -> Option<(usize, usize)> {
+pub(super) fn block_at(bytes: &[u8], at: usize) -> Option<(usize, usize)> {
     let length = bytes.get(at..at.checked_add(8)?)?;
     let length = usize::try_from(u64::from_le_bytes(length.try_into().ok()?)).ok()?;
     let end = (at + 8).checked_add(length)?;

@@ -60,6 +60,18 @@ pub trait Communicator {
     /// simulated network.
     fn now(&self) -> f64;
 
+    /// As [`now`](Self::now), for the lengths of spans in which this rank waits for nothing. Where time is simulated, looking at the
+    /// simulated clock may cost more than what is measured.
+    fn working_secs(&self) -> f64 {
+        self.now()
+    }
+
+    /// Whether all ranks share one memory and its processors, so that no message travels while its ranks do something else: then it is
+    /// not worth cutting pictures in slices for that. The same on all ranks.
+    fn is_one_node(&self) -> bool {
+        false
+    }
+
     /// Hands `message` over to `destination`; does not wait for it to be received.
     ///
     /// # Errors

@@ -5,6 +5,16 @@ use std::collections::BTreeMap;
 /// Most buffers kept; a rank of direct send has one message for each other rank in flight, twice.
 const MOST: usize = 512;
 
+/// How much larger than what is asked for a buffer may be.
+const MOST_WASTE: usize = 4;
+
+/// Capacities come in eight steps from one power of two to the next: frames are alike but not equal, and a buffer of the last one shall fit
+/// the next.
+fn rounded(capacity: usize) -> usize {
+    let step = (capacity.max(64).next_power_of_two() / 16).max(1);
+    capacity.max(64).checked_next_multiple_of(step).unwrap_or(capacity)
+}
+
 /// Empty buffers by capacity.
 #[derive(Debug, Default)]
 pub struct BufferPool {
@@ -15,15 +25,19 @@ pub struct BufferPool {
 impl BufferPool {
     /// The smallest free buffer that holds `capacity` bytes, or a new one.
     pub fn take(&mut self, capacity: usize) -> Vec<u8> {
-        let Some((&size, buffers)) = self.free.range_mut(capacity.max(1)..).next() else {
-            return Vec::with_capacity(capacity);
-        };
-        let buffer = buffers.pop();
+        self.fitting(capacity).unwrap_or_else(|| Vec::with_capacity(rounded(capacity)))
+    }
+
+    /// The smallest free buffer that holds `capacity` bytes and is not so large that it will be missed.
+    pub fn fitting(&mut self, capacity: usize) -> Option<Vec<u8>> {
+        let capacity = rounded(capacity);
+        let (&size, buffers) = self.free.range_mut(capacity..=capacity.saturating_mul(MOST_WASTE)).next()?;
+        let buffer = buffers.pop()?;
         if buffers.is_empty() {
             self.free.remove(&size);
         }
-        self.count -= usize::from(buffer.is_some());
-        buffer.unwrap_or_else(|| Vec::with_capacity(capacity))
+        self.count -= 1;
+        Some(buffer)
     }
 
     /// Keeps a buffer, emptied. Of too many the smallest goes: it is the cheapest to make again.
@@ -61,6 +75,17 @@ mod tests {
         let buffer = pool.take(500);
         assert!(buffer.is_empty() && (1000..4000).contains(&buffer.capacity()));
         assert!(pool.take(5000).capacity() >= 5000);
+    }
+
+    #[test]
+    fn a_long_buffer_is_kept_for_long_messages_and_serves_one_that_is_a_little_longer() {
+        let mut pool = BufferPool::default();
+        let long = pool.take(1_000_000);
+        let at = long.as_ptr();
+        pool.put(long);
+        let (short, longer) = (pool.take(100), pool.take(1_040_000));
+        assert_ne!(short.as_ptr(), at);
+        assert_eq!(longer.as_ptr(), at);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Questions to other ranks and their answers, all at once: the shape of every exchange of a frame.
 use super::words::{from_message, message_bytes, to_message};
 use super::{Activity, FrameError, RankReport};
-use crate::comm::Communicator;
+use crate::comm::{Communicator, Receive};
 use std::time::Duration;
 
 /// Which messages belong together.
@@ -12,6 +12,19 @@ pub(super) enum Tag {
     Question = 102,
     Answer = 103,
     Tiles = 104,
+}
+
+/// Messages that will come while this rank works on something else.
+#[derive(Default)]
+pub(super) struct Inbox {
+    posted: Vec<Receive>,
+}
+
+/// What came: from whom, whether under the tag asked for, and its words.
+pub(super) struct Incoming {
+    pub(super) from: usize,
+    pub(super) tag: u32,
+    pub(super) words: Vec<u32>,
 }
 
 /// One frame's conversation of one rank, with its costs counted.
@@ -75,6 +88,38 @@ impl<'a> Talk<'a> {
             take(self, arrival.source, words)?;
         }
         Ok(())
+    }
+
+    /// Announces a message of at most `words` words. Those of one rank and tag come in the order of their announcements.
+    pub(super) fn expect(
+        &mut self,
+        inbox: &mut Inbox,
+        from: usize,
+        tag: Tag,
+        words: usize,
+    ) -> Result<(), FrameError> {
+        inbox.posted.push(self.comm.post_recv(from, tag as u32, message_bytes(words))?);
+        Ok(())
+    }
+
+    /// The next of the announced messages; with `wait`, when it comes, else only if it is there.
+    pub(super) fn next(&mut self, inbox: &mut Inbox, wait: bool) -> Result<Option<Incoming>, FrameError> {
+        if inbox.posted.is_empty() {
+            return Ok(None);
+        }
+        let arrival = if wait {
+            Some(self.comm.wait_any(&mut inbox.posted, self.timeout)?)
+        } else {
+            self.comm.test_any(&mut inbox.posted)?
+        };
+        self.spent(Activity::Exchange);
+        let Some(arrival) = arrival else { return Ok(None) };
+        self.report.bytes_received += arrival.message.len() as u64;
+        let words = from_message(&arrival.message);
+        let words =
+            words.ok_or_else(|| self.wrong(arrival.source, "hits or tiles", arrival.message.len() / 4))?;
+        self.comm.recycle(arrival.message);
+        Ok(Some(Incoming { from: arrival.source, tag: arrival.tag, words }))
     }
 
     /// Gives numbers of every rank to every rank.

@@ -1,8 +1,10 @@
 //! A data set of the catalogue, partitioned and rendered by all ranks: what `composite demo` shows.
+use super::subject::{Body, Subject, middle_and_radius};
 use super::{DataParallel, FrameError, FrameOptions, FrameOutput, Partition, Split};
 use crate::comm::Communicator;
-use datasets::catalogue::{self, CatalogueError, Data};
-use datasets::isosurface::Options as SurfaceOptions;
+use datasets::catalogue::{self, CatalogueError};
+use datasets::model::ModelError;
+use datasets::read::ReadError;
 use rt_core::accel::BuildOptions;
 use rt_core::camera::{Camera, CameraError};
 use rt_core::environment::Background;
@@ -12,11 +14,12 @@ use rt_core::material::Material;
 use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::render::RenderOptions;
 use rt_core::scene::{AmbientOcclusion, Scene, SceneBuilder, SceneError};
+use rt_core::shapes::ShapeError;
 
 /// What is shown.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Demo {
-    /// Name in [`datasets::catalogue`]; a data set of triangles.
+    /// Name in [`datasets::catalogue`], or a file that [`datasets::read::open`] reads and that has surfaces. Lines are drawn as tubes.
     pub data: String,
     /// Size of the data set; `None` for its smallest.
     pub size: Option<String>,
@@ -66,6 +69,29 @@ pub enum DemoError {
         /// All its views.
         known: String,
     },
+    /// A file that cannot be read.
+    #[error(transparent)]
+    File(#[from] ReadError),
+    /// A file whose data have no surface.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// A file without a triangle.
+    #[error("{file} has no surface to show: it holds no triangle")]
+    NoSurface {
+        /// The file.
+        file: String,
+    },
+    /// A file has one size.
+    #[error("{file} is a file and has no size `{size}`: leave the size out")]
+    SizeOfFile {
+        /// The file.
+        file: String,
+        /// The size asked for.
+        size: String,
+    },
+    /// Tubes.
+    #[error(transparent)]
+    Shape(#[from] ShapeError),
     /// The camera.
     #[error(transparent)]
     Camera(#[from] CameraError),
@@ -100,8 +126,7 @@ impl Demo {
         ranks: usize,
         progress: &mut dyn FnMut(usize, usize) -> bool,
     ) -> Result<Prepared, DemoError> {
-        let mesh = self.mesh(progress)?;
-        let (scene, camera) = self.scene_of(mesh)?;
+        let (scene, camera) = self.scene(Subject::load(&self.data, self.size.as_deref(), progress)?)?;
         let split = if self.cut_by_view {
             Split::View { camera: Box::new(camera), size_px: self.size_px }
         } else {
@@ -114,23 +139,17 @@ impl Demo {
         Ok(Prepared { scene, camera, options, partition })
     }
 
-    fn mesh(&self, progress: &mut dyn FnMut(usize, usize) -> bool) -> Result<TriMesh, DemoError> {
-        let entry = catalogue::find(&self.data)?;
-        let size = self.size.as_deref().unwrap_or(entry.sizes[0].name);
-        let normals = SurfaceOptions { normals: true, ..SurfaceOptions::default() };
-        match entry.generate(size, normals, progress)? {
-            Data::Mesh(mesh) => Ok(mesh),
-            Data::Lines(_) => Err(CatalogueError::NotAMesh { name: entry.name }.into()),
-        }
-    }
-
     /// The scene and the view of a mesh of this data set.
     ///
     /// # Errors
     /// [`DemoError::View`] for a view that the data set does not have.
     pub fn scene_of(&self, mesh: impl Into<std::sync::Arc<TriMesh>>) -> Result<(Scene, Camera), DemoError> {
-        let mesh = mesh.into();
         let views = catalogue::find(&self.data)?.views();
+        self.scene(Subject { bodies: vec![Body::Mesh(mesh.into())], views })
+    }
+
+    fn scene(&self, subject: Subject) -> Result<(Scene, Camera), DemoError> {
+        let Subject { bodies, views } = subject;
         let view = match &self.view {
             None => &views[0],
             Some(name) => {
@@ -141,11 +160,11 @@ impl Demo {
                 })?
             }
         };
-        let bounds = mesh.bounds();
-        let middle = mesh.origin + bounds.center().as_dvec3();
-        let radius = f64::from(bounds.radius());
+        let (middle, radius) = middle_and_radius(&bodies);
         let mut builder = SceneBuilder::new();
-        builder.mesh(mesh, Material::matte([0.8; 3]));
+        for body in bodies {
+            body.add_to(&mut builder, Material::matte([0.8; 3]));
+        }
         if self.global_light {
             let forward = (view.target - view.eye).normalize_or_zero();
             let right = forward.cross(view.up).normalize_or_zero();
@@ -227,7 +246,8 @@ mod tests {
 
     #[test]
     fn the_demo_is_the_picture_of_one_node() {
-        for demo in [small(), Demo { cut_by_view: true, global_light: false, ..small() }] {
+        let tubes = Demo { data: "plasma-tubes".into(), ..small() };
+        for demo in [small(), Demo { cut_by_view: true, global_light: false, ..small() }, tubes] {
             let prepared = demo.prepare(5, &mut |_, _| true).unwrap();
             let outputs =
                 threads::run(5, |mut comm| prepared.run(&mut comm, &FrameOptions::default()).unwrap());
@@ -252,6 +272,5 @@ mod tests {
             error(Demo { view: Some("inside".into()), ..small() }),
             "closed-wavelet has no view `inside`; it has: whole"
         );
-        assert!(error(Demo { data: "plasma-tubes".into(), ..small() }).contains("lines"));
     }
 }

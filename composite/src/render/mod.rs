@@ -35,6 +35,7 @@
 mod ask;
 mod boxes;
 mod camera_wave;
+mod collect;
 pub mod demo;
 mod error;
 pub mod ghost;
@@ -43,6 +44,8 @@ mod partition;
 mod ray_parallel;
 mod report;
 mod sort_last;
+mod subject;
+mod volumes;
 mod waves;
 mod words;
 

@@ -24,14 +24,26 @@ impl Owners {
         Owners { tiles: cut(&work, bounds.len()), touched }
     }
 
-    /// The tiles of `owner` that rank `from` may see something in.
-    pub(super) fn shared(&self, from: usize, owner: usize) -> impl Iterator<Item = usize> + '_ {
-        self.tiles[owner].clone().filter(move |&tile| self.touched[from][tile])
+    /// Tiles of chunk `chunk` of `chunks` of `owner`'s: what travels together.
+    pub(super) fn chunk(&self, owner: usize, (chunk, chunks): (usize, usize)) -> Range<usize> {
+        let Range { start, end } = self.tiles[owner];
+        let at = |k: usize| start + (end - start) * k / chunks;
+        at(chunk)..at(chunk + 1)
     }
 
-    /// Whether `from` has anything to say to `owner`.
-    pub(super) fn talks(&self, from: usize, owner: usize) -> bool {
-        self.shared(from, owner).next().is_some()
+    /// The tiles of a chunk of `owner` that rank `from` may see something in.
+    pub(super) fn shared(
+        &self,
+        from: usize,
+        owner: usize,
+        chunk: (usize, usize),
+    ) -> impl Iterator<Item = usize> + '_ {
+        self.chunk(owner, chunk).filter(move |&tile| self.touched[from][tile])
+    }
+
+    /// Whether `from` has anything to say to `owner` about a chunk.
+    pub(super) fn talks(&self, from: usize, owner: usize, chunk: (usize, usize)) -> bool {
+        self.shared(from, owner, chunk).next().is_some()
     }
 }
 

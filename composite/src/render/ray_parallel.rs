@@ -1,4 +1,7 @@
-//! Replicated data: every rank holds the whole scene and renders some bands of the picture (thesis sections 3.2.2 and 4.2.3).
+//! Replicated data: every rank holds the whole scene and renders some pieces of the picture (thesis sections 3.2.2 and 4.2.3).
+//!
+//! Pieces are small and dealt along a lattice, so that every rank gets a little of everything: what is costly in a picture lies together. Bands of
+//! whole rows, tried first, stop scaling when there are as many ranks as bands (32 for 1024 rows).
 use super::ask::{Tag, Talk};
 use super::{Activity, FrameError, FrameOptions, FrameOutput};
 use crate::comm::Communicator;
@@ -6,13 +9,12 @@ use rt_core::camera::Camera;
 use rt_core::frame::{Frame, Layers};
 use rt_core::render::{Crop, RenderOptions, Renderer};
 use rt_core::scene::Scene;
-use std::ops::Range;
 
-/// Rows of a band: those of rt-core's tiles.
-const BAND: u32 = rt_core::waves::TILE_SIDE;
+/// Pixels along the sides of a piece: half of rt-core's tiles. A picture of 1024 rows has 4096, 32 for each of 128 ranks.
+const PIECE: u32 = rt_core::waves::TILE_SIDE / 2;
 
-/// Renders a picture of a scene that every rank has: rank r draws bands r, r + p, r + 2p, ... of 32 rows, so that a costly part of the picture
-/// is spread. Every rank must call it with the same arguments. Time limits and error limits end a frame in each band on its own.
+/// Renders a picture of a scene that every rank has, each rank some pieces of 16 x 16 pixels spread over the picture. Every rank must call it with
+/// the same arguments. Time limits and error limits end a frame in each piece on its own.
 ///
 /// # Errors
 /// Any fault on any rank ends the frame for all.
@@ -43,16 +45,16 @@ fn render(
     let area = options.area();
     let mut renderer = Renderer::new();
     let mut mine = Vec::new();
-    for band in bands(area, rank, size) {
-        let crop =
-            Crop { x: area.x, y: area.y + band.start, width: area.width, height: band.end - band.start };
+    for piece in pieces(area, rank, size) {
+        let crop = Crop { x: area.x + piece.x, y: area.y + piece.y, ..piece };
         let cropped = RenderOptions { crop: Some(crop), ..options.clone() };
         let mut draw = || renderer.render(scene, camera, &cropped);
         // One thread a rank where ranks share a machine.
         let output = if frame_options.parallel { draw()? } else { alone(&mut draw)? };
         talk.report.rays += output.report.rays;
         talk.report.effects = output.report.effects;
-        mine.extend(to_words(&output.frame));
+        to_words(&output.frame, &mut mine);
+        renderer.recycle(output.frame);
     }
     talk.report.camera_rays = talk.report.rays.primary;
     talk.report.light = "every rank holds the whole scene".into();
@@ -70,14 +72,15 @@ fn render(
     }
     let mut picture = blank(area, options.layers, camera);
     let per_pixel = words_per_pixel(options.layers);
-    put(&mut picture, bands(area, rank, size), &mine).ok_or_else(|| talk.wrong(rank, "bands", mine.len()))?;
-    let rows = |from: usize| bands(area, from, size).map(|b| b.len()).sum::<usize>();
-    let words = |from: usize| rows(from) * area.width as usize * per_pixel;
-    let sources = (0..size).filter(|&from| from != rank && rows(from) > 0).map(|from| (from, words(from)));
-    talk.receive(Tag::Tiles, "bands", sources.collect::<Vec<_>>(), |talk, from, words| {
-        let fits = put(&mut picture, bands(area, from, size), &words);
+    put(&mut picture, pieces(area, rank, size), &mine)
+        .ok_or_else(|| talk.wrong(rank, "pieces", mine.len()))?;
+    let pixels = |from: usize| pieces(area, from, size).map(|c| (c.width * c.height) as usize).sum::<usize>();
+    let sources = (0..size).filter(|&from| from != rank).map(|from| (from, pixels(from) * per_pixel));
+    let sources: Vec<_> = sources.filter(|(_, words)| *words > 0).collect();
+    talk.receive(Tag::Tiles, "pieces", sources, |talk, from, words| {
+        let fits = put(&mut picture, pieces(area, from, size), &words);
         talk.spent(Activity::Collect);
-        fits.ok_or_else(|| talk.wrong(from, "bands", words.len()))
+        fits.ok_or_else(|| talk.wrong(from, "pieces", words.len()))
     })?;
     talk.spent(Activity::Collect);
     Ok(Some(picture))
@@ -98,9 +101,29 @@ fn alone<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     })
 }
 
-fn bands(area: Crop, rank: usize, size: usize) -> impl Iterator<Item = Range<u32>> {
-    let rows = (rank as u64 * u64::from(BAND)..u64::from(area.height)).step_by(size * BAND as usize);
-    rows.map(move |first| first as u32..(first as u32 + BAND).min(area.height))
+/// The pieces of `rank`, relative to the area, row by row. Piece (i, j) goes to rank i + s j modulo the number of ranks: a lattice of rank 1, with s
+/// near the golden section of the number of ranks, so that a rank's pieces are about as far apart as they can be.
+fn pieces(area: Crop, rank: usize, size: usize) -> impl Iterator<Item = Crop> {
+    let (columns, rows) = (area.width.div_ceil(PIECE) as usize, area.height.div_ceil(PIECE) as usize);
+    let step = lattice_step(size);
+    (0..rows).flat_map(move |j| {
+        let first = (rank + size - j * step % size) % size;
+        (first..columns).step_by(size).map(move |i| {
+            let (x, y) = (i as u32 * PIECE, j as u32 * PIECE);
+            Crop { x, y, width: PIECE.min(area.width - x), height: PIECE.min(area.height - y) }
+        })
+    })
+}
+
+/// The number nearest to the golden section of `size` that has no divisor in common with it.
+fn lattice_step(size: usize) -> usize {
+    let golden = (size as f64 * 0.618_034).round() as usize;
+    let coprime = |n: &usize| (1..size).contains(n) && gcd(*n, size) == 1;
+    (0..size).flat_map(|d| [golden + d, golden.saturating_sub(d)]).find(coprime).unwrap_or(0)
+}
+
+fn gcd(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { gcd(b, a % b) }
 }
 
 fn words_per_pixel(layers: Layers) -> usize {
@@ -131,52 +154,94 @@ fn blank(area: Crop, layers: Layers, camera: &Camera) -> Frame {
     }
 }
 
-/// All layers of a band, one after the other.
-fn to_words(frame: &Frame) -> Vec<u32> {
+/// All layers of a piece, one after the other.
+fn to_words(frame: &Frame, out: &mut Vec<u32>) {
     let float = |v: &f32| v.to_bits();
-    let mut out: Vec<u32> = frame.color.as_flattened().iter().map(float).collect();
+    out.extend(frame.color.as_flattened().iter().map(float));
     out.extend(frame.depth.iter().map(float));
     out.extend(frame.distance.iter().map(float));
     out.extend(frame.normal.as_flattened().iter().map(float));
     out.extend(&frame.instance);
     out.extend(&frame.primitive);
     out.extend(frame.cost.iter().map(float));
-    out
 }
 
-/// Puts what [`to_words`] made of each of `bands` into the picture.
-fn put(picture: &mut Frame, bands: impl Iterator<Item = Range<u32>>, mut words: &[u32]) -> Option<()> {
-    let width = picture.width as usize;
-    for band in bands {
-        let pixels = band.start as usize * width..band.end as usize * width;
-        let mut take = |n: usize| {
-            let (some, rest) = words.split_at_checked(n)?;
-            words = rest;
-            Some(some)
-        };
-        let n = pixels.len();
-        fn floats(out: &mut [f32], words: &[u32]) {
-            out.iter_mut().zip(words).for_each(|(o, w)| *o = f32::from_bits(*w));
+/// Puts what [`to_words`] made of each of `pieces` into the picture.
+fn put(picture: &mut Frame, pieces: impl Iterator<Item = Crop>, words: &[u32]) -> Option<()> {
+    let stride = picture.width as usize;
+    let mut rest = words;
+    for piece in pieces {
+        let mut put = Put { piece, stride, rest };
+        put.floats(picture.color.as_flattened_mut(), 4)?;
+        put.floats(&mut picture.depth, 1)?;
+        put.floats(&mut picture.distance, 1)?;
+        put.floats(picture.normal.as_flattened_mut(), 3)?;
+        put.layer(&mut picture.instance, 1, |w| w)?;
+        put.layer(&mut picture.primitive, 1, |w| w)?;
+        put.floats(&mut picture.cost, 1)?;
+        rest = put.rest;
+    }
+    rest.is_empty().then_some(())
+}
+
+/// A piece on its way into the picture.
+struct Put<'a> {
+    piece: Crop,
+    /// Pixels of a row of the picture.
+    stride: usize,
+    rest: &'a [u32],
+}
+
+impl Put<'_> {
+    fn floats(&mut self, layer: &mut [f32], channels: usize) -> Option<()> {
+        self.layer(layer, channels, f32::from_bits)
+    }
+
+    /// The next words into a layer of `channels` words per pixel; a layer that the picture does not have takes none.
+    fn layer<T>(&mut self, layer: &mut [T], channels: usize, value: impl Fn(u32) -> T) -> Option<()> {
+        if layer.is_empty() {
+            return Some(());
         }
-        if let Some(out) = picture.color.get_mut(pixels.clone()) {
-            floats(out.as_flattened_mut(), take(4 * n)?);
+        let Crop { x, y, width, height } = self.piece;
+        for row in y..y + height {
+            let first = (row as usize * self.stride + x as usize) * channels;
+            let out = layer.get_mut(first..first + width as usize * channels)?;
+            let (words, rest) = self.rest.split_at_checked(out.len())?;
+            self.rest = rest;
+            out.iter_mut().zip(words).for_each(|(o, w)| *o = value(*w));
         }
-        for layer in [&mut picture.depth, &mut picture.distance] {
-            if let Some(out) = layer.get_mut(pixels.clone()) {
-                floats(out, take(n)?);
+        Some(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_cover_the_area_once_and_every_rank_has_as_many() {
+        for (width, height) in [(1024, 1024), (100, 37), (16, 16), (1, 1)] {
+            let area = Crop { x: 5, y: 9, width, height };
+            for size in [1, 2, 3, 7, 16, 64, 127, 128] {
+                let mut seen = vec![0; (width * height) as usize];
+                let mut counts = Vec::new();
+                for rank in 0..size {
+                    let mine: Vec<Crop> = pieces(area, rank, size).collect();
+                    counts.push(mine.len());
+                    for c in mine {
+                        for y in c.y..c.y + c.height {
+                            for x in c.x..c.x + c.width {
+                                seen[(y * width + x) as usize] += 1;
+                            }
+                        }
+                    }
+                }
+                assert!(seen.iter().all(|n| *n == 1), "{width}x{height}, {size} ranks");
+                if width == 1024 {
+                    let (least, most) = (counts.iter().min().unwrap(), counts.iter().max().unwrap());
+                    assert!(most - least <= 1 + most / 16, "{size} ranks: {least}..{most}");
+                }
             }
-        }
-        if let Some(out) = picture.normal.get_mut(pixels.clone()) {
-            floats(out.as_flattened_mut(), take(3 * n)?);
-        }
-        for layer in [&mut picture.instance, &mut picture.primitive] {
-            if let Some(out) = layer.get_mut(pixels.clone()) {
-                out.copy_from_slice(take(n)?);
-            }
-        }
-        if let Some(out) = picture.cost.get_mut(pixels) {
-            floats(out, take(n)?);
         }
     }
-    words.is_empty().then_some(())
 }

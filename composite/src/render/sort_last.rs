@@ -1,6 +1,7 @@
 //! A sort-last frame: camera rays, then wave after wave of what leaves their hits.
-use super::ask::{Tag, Talk};
+use super::ask::Talk;
 use super::boxes::Boxes;
+use super::collect::Collect;
 use super::owners::Owners;
 use super::{Activity, FrameError, Part, RankReport, camera_wave, ghost, waves};
 use crate::comm::Communicator;
@@ -40,6 +41,8 @@ pub struct FrameOptions {
     pub timeout: Duration,
     /// How light crosses borders.
     pub light: Light,
+    /// Messages travel while rays are traced, and finished tiles while others are not. Off, one thing after the other: for comparison.
+    pub stream: bool,
     /// Use rayon's threads within a rank. Off, a rank is one thread: for many ranks in one process.
     pub parallel: bool,
     /// How boxes are built where a rank needs another structure (ghost zones).
@@ -52,6 +55,7 @@ impl Default for FrameOptions {
             root: Some(0),
             timeout: Duration::from_secs(60),
             light: Light::default(),
+            stream: true,
             parallel: false,
             build: rt_core::accel::BuildOptions::default(),
         }
@@ -156,15 +160,32 @@ impl DataParallel {
         };
         talk.report.effects = frame.effects();
         talk.report.warnings = frame.warnings().to_vec();
+        if part.scene.volumes.len() > 1 {
+            let words = "several volumes are not cut: where they overlap, media mix along the whole ray, so every rank holds them whole";
+            talk.report.warnings.push(words.into());
+        }
         let owners = Owners::new(&frame, &self.boxes.bounds);
         let mine = owners.tiles[talk.rank()].clone();
         let mut tiles: Vec<TileInWork> = mine.map(|t| frame.tile(t)).collect();
         talk.spent(Activity::Render);
 
-        for pass in frame.passes() {
+        let passes = frame.passes();
+        for (number, &pass) in passes.iter().enumerate() {
             let local = frame.local_light_suffices() && pass != Pass::Geometry;
             let record = frame.records_geometry(pass);
-            let answers = camera_wave::run(talk, &side, &owners, pass, local, record || !local)?;
+            let stream = self.options.stream;
+            let wanted = camera_wave::Wanted { pass, colors: local, whole_hits: record || !local, stream };
+            // Tiles of the last pass go to the root as they are finished.
+            if stream && local && !record && number + 1 == passes.len() {
+                let mut collect = Collect::new(talk, &side, &owners, &mut tiles, self.options.root)?;
+                camera_wave::run(talk, &side, &owners, wanted, Some(&mut collect))?;
+                let picture = collect.into_picture();
+                for tile in &tiles {
+                    talk.report.rays += tile.stats();
+                }
+                return Ok(picture);
+            }
+            let answers = camera_wave::run(talk, &side, &owners, wanted, None)?;
             let rank = talk.rank();
             let fits = |source| FrameError::Answer { rank, source };
             each(side.parallel, &mut tiles, |_, tile| tile.begin(&frame, pass));
@@ -178,15 +199,16 @@ impl DataParallel {
                 talk.spent(Activity::Shade);
                 continue;
             }
-            let mut wave = waves::Wave { side: &side, boxes: &self.boxes, way, rim: rim.as_ref(), pass };
+            let bricks =
+                part.bricks.as_deref().filter(|_| pass != Pass::Geometry && frame.volume().is_some());
+            let mut wave =
+                waves::Wave { side: &side, boxes: &self.boxes, way, rim: rim.as_ref(), bricks, pass };
             wave.run(talk, &mut tiles, answers)?;
         }
         for tile in &tiles {
             talk.report.rays += tile.stats();
         }
-        let picture = collect(talk, &frame, &owners, &tiles, self.options.root)?;
-        talk.spent(Activity::Collect);
-        Ok(picture)
+        Collect::new(talk, &side, &owners, &mut tiles, self.options.root)?.all(talk, &owners)
     }
 
     /// Decides, once and on all ranks alike, how light crosses borders, and builds what that needs.
@@ -230,51 +252,4 @@ pub(super) fn each<T: Send>(parallel: bool, items: &mut [T], f: impl Fn(usize, &
     } else {
         items.iter_mut().enumerate().for_each(|(i, item)| f(i, item));
     }
-}
-
-/// Finished tiles to the root.
-fn collect(
-    talk: &mut Talk<'_>,
-    frame: &WaveFrame<'_>,
-    owners: &Owners,
-    tiles: &[TileInWork],
-    root: Option<usize>,
-) -> Result<Option<Frame>, FrameError> {
-    let Some(root) = root else { return Ok(None) };
-    let (rank, size) = (talk.rank(), talk.size());
-    if root >= size {
-        return Err(FrameError::Comm(crate::comm::CommError::NoSuchRank { peer: root, size }));
-    }
-    if rank != root {
-        if !tiles.is_empty() {
-            let words: Vec<u32> = tiles.iter().flat_map(|t| t.words(frame)).collect();
-            talk.send(root, Tag::Tiles, &words)?;
-        }
-        return Ok(None);
-    }
-    let mut picture = frame.blank();
-    let words_of = |tile: usize| {
-        let area = frame.tile_area(tile);
-        (area.width * area.height) as usize * frame.words_per_pixel()
-    };
-    let mut place = |from: usize, mut words: &[u32]| {
-        for tile in owners.tiles[from].clone() {
-            let (own, rest) = words.split_at_checked(words_of(tile))?;
-            words = rest;
-            frame.place(&mut picture, tile, own).then_some(())?;
-        }
-        words.is_empty().then_some(())
-    };
-    let own: Vec<u32> = tiles.iter().flat_map(|t| t.words(frame)).collect();
-    place(rank, &own).ok_or_else(|| talk.wrong(rank, "tiles", own.len()))?;
-    talk.spent(Activity::Collect);
-    let sources = (0..size).filter(|&from| from != rank && !owners.tiles[from].is_empty());
-    let sources: Vec<_> =
-        sources.map(|from| (from, owners.tiles[from].clone().map(words_of).sum::<usize>())).collect();
-    talk.receive(Tag::Tiles, "tiles", sources, |talk, from, words| {
-        place(from, &words).ok_or_else(|| talk.wrong(from, "tiles", words.len()))?;
-        talk.spent(Activity::Collect);
-        Ok(())
-    })?;
-    Ok(Some(picture))
 }

@@ -154,7 +154,38 @@ pub(crate) fn join_row_scalar<P: Composite>(
 /// Writes a row of a message over `colors` and, if it is not empty, `depths`: the background too. A message for rows with depths
 /// must bring depths.
 #[inline(always)]
-pub(crate) fn place_row<P: Composite>(row: SparseRow<'_>, colors: &mut [P::Color], depths: &mut [f32]) {
+pub(crate) fn place_row<P: Composite, S: Simd>(
+    simd: S,
+    row: SparseRow<'_>,
+    colors: &mut [P::Color],
+    depths: &mut [f32],
+) {
+    place_words::<P>(
+        row,
+        colors,
+        depths,
+        #[inline(always)]
+        |taken, word, held| place_by_vectors::<P, S>(simd, row, taken, word, held),
+    );
+}
+
+/// [`place_row`] run by run.
+pub(crate) fn place_row_scalar<P: Composite>(
+    row: SparseRow<'_>,
+    colors: &mut [P::Color],
+    depths: &mut [f32],
+) {
+    place_words::<P>(row, colors, depths, |_, _, _| false);
+}
+
+/// `place` may write the colours of a word of 64 pixels, of which so many were taken before, and say that it has.
+#[inline(always)]
+fn place_words<P: Composite>(
+    row: SparseRow<'_>,
+    colors: &mut [P::Color],
+    depths: &mut [f32],
+    place: impl Fn(usize, u64, &mut [P::Color]) -> bool,
+) {
     let with_depths = !depths.is_empty();
     if row.mask.is_empty() {
         bytemuck::cast_slice_mut::<_, u8>(colors).copy_from_slice(row.colors);
@@ -167,6 +198,17 @@ pub(crate) fn place_row<P: Composite>(row: SparseRow<'_>, colors: &mut [P::Color
     for (index, word) in words(row.mask).enumerate() {
         let first = 64 * index;
         let last = (first + 64).min(colors.len());
+        if word == 0 {
+            colors[first..last].fill(P::EMPTY.color());
+            if with_depths {
+                depths[first..last].fill(1.0);
+            }
+            continue;
+        }
+        if !with_depths && word != u64::MAX && place(taken, word, &mut colors[first..last]) {
+            taken += word.count_ones() as usize;
+            continue;
+        }
         if word != u64::MAX {
             colors[first..last].fill(P::EMPTY.color());
             if with_depths {
@@ -250,6 +292,37 @@ fn join_by_vectors<P: Composite, S: Simd>(
         return true;
     }
     let _ = (simd, row, taken, word, first, held_colors, held_depths, side);
+    false
+}
+
+/// Writes up to 64 pixels with colours of four bytes, background where `word` has no bit. Whether there is an instruction for it.
+#[inline(always)]
+fn place_by_vectors<P: Composite, S: Simd>(
+    simd: S,
+    row: SparseRow<'_>,
+    taken: usize,
+    word: u64,
+    held: &mut [P::Color],
+) -> bool {
+    #[cfg(target_arch = "x86_64")]
+    if P::Color::BYTES == 4
+        && held.len() == 64
+        && let Some(avx512) = simd.level().as_avx512()
+    {
+        use fearless_simd::{Bytes, SimdBase, SimdInto, u8x64, u32x16};
+        let mut taken = taken;
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(held);
+        for (quarter, held) in bytes.as_chunks_mut::<64>().0.iter_mut().enumerate() {
+            let lanes = (word >> (16 * quarter)) as u16;
+            let packed = padded_16(avx512, row.behind_colors, 4 * taken);
+            // A colour of a depth or a premultiplied format that is not there is all zeros.
+            let colors: u32x16<_> = expand_16(avx512, packed.into(), lanes).simd_into(avx512);
+            colors.bitcast::<u8x64<_>>().store_slice(held);
+            taken += lanes.count_ones() as usize;
+        }
+        return true;
+    }
+    let _ = (simd, row, taken, word, held);
     false
 }
 

@@ -6,6 +6,7 @@
 pub(crate) mod compress;
 pub(crate) mod expand;
 pub(crate) mod mask;
+pub(crate) mod opaque;
 pub(crate) mod runs;
 
 use fearless_simd::Level;

@@ -11,7 +11,7 @@ use crate::layer::View;
 use crate::pixel::Composite;
 use crate::rect::Rect;
 use crate::session::{Session, Tag};
-use crate::tiles::{balanced, slices};
+use crate::tiles::{Owner, shared_out, slices};
 use crate::wire;
 
 /// Slices of every place's tile, in the order in which they are sent.
@@ -21,9 +21,11 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    pub(crate) fn new(drawn: &[Rect], slice_pixels: usize) -> Self {
+    /// `root` is the place that collects the image over a wire of its own.
+    pub(crate) fn new<P: Composite>(drawn: &[Rect], slice_pixels: usize, root: Option<usize>) -> Self {
         let cut = |tile: Rect| if tile.is_empty() { Vec::new() } else { slices(tile, slice_pixels) };
-        Self { slices: balanced(drawn).into_iter().map(cut).collect() }
+        let mut owners = owners::<P>(drawn, root);
+        Self { slices: shared_out(drawn, &mut owners).into_iter().map(cut).collect() }
     }
 
     /// What each place holds in the end. Where nobody drew anything nothing is held.
@@ -38,6 +40,46 @@ impl Plan {
         }
         pieces
     }
+}
+
+/// Pixels of a tile at least: smaller ones make messages that cost more than what they carry.
+const OWNER_PX: usize = 32_768;
+/// The share of a place that does not collect.
+const FULL_SHARE: u64 = 256;
+
+/// Which places own tiles, and how large ones.
+///
+/// The collecting place gets the finished image besides, over the same wire. With a share `x` of the exchange `e` and of the image `g` (bytes
+/// that come in), it receives `x e + (1 - x) g` while each other one receives `(1 - x) e / (p - 1)`. They are equal for
+/// `x = (e / (p - 1) - g) / (e p / (p - 1) - g)`, which is nothing from a handful of ranks on. Two ranks share alike: there what one does not
+/// join the other must, and both work all the time. So do ranks of one memory, where every byte costs the same processors.
+fn owners<P: Composite>(drawn: &[Rect], root: Option<usize>) -> Vec<Owner> {
+    let places = drawn.len();
+    let whole = drawn.iter().fold(Rect::EMPTY, |all, rect| all.around(rect)).pixels();
+    let layers: usize = drawn.iter().map(Rect::pixels).sum();
+    // As many as there are tiles worth a message, and enough that what comes to each is no more than what comes to the root.
+    let (drawn_bytes, image_bytes) = (layers * P::BYTES, whole * size_of::<P::Color>());
+    let wanted = (whole / OWNER_PX).max(drawn_bytes.div_ceil(image_bytes.max(1))).clamp(1, places);
+
+    let share = match root {
+        Some(_) if places > 2 => {
+            let others = (places - 1) as f64;
+            let exchange = drawn_bytes as f64 * others / places as f64;
+            let image = image_bytes as f64;
+            let x = (exchange / others - image) / (exchange * places as f64 / others - image).max(1.0);
+            // Of shares that are FULL_SHARE for each of the others.
+            let x = x.clamp(0.0, 1.0 / places as f64);
+            (x / (1.0 - x) * others * FULL_SHARE as f64) as u64
+        }
+        _ => FULL_SHARE,
+    };
+    // Evenly among all, so that owners are near to what they drew.
+    let candidates: Vec<Owner> = (0..places)
+        .map(|place| Owner { place, share: if root == Some(place) { share } else { FULL_SHARE } })
+        .filter(|owner| owner.share > 0)
+        .collect();
+    let wanted = wanted.min(candidates.len());
+    (0..wanted).map(|i| candidates[i * candidates.len() / wanted]).collect()
 }
 
 pub(crate) fn run<P: Composite>(
@@ -122,14 +164,14 @@ impl<'a, P: Composite> Exchange<'a, P> {
         collector: &mut Collector<P>,
         scratch: &mut Scratch<P>,
     ) -> Result<(), CompositeError> {
-        let begin = session.now();
+        let begin = session.comm.working_secs();
         if let Some(join) = &mut self.joins[index] {
             join.put(from, item, scratch);
         }
         for read in scratch.read.drain(..) {
             session.comm.recycle(read);
         }
-        session.report.blend_secs += session.now() - begin;
+        session.report.blend_secs += session.comm.working_secs() - begin;
         let complete = self.joins[index].take_if(|join| join.is_complete());
         match complete.and_then(|join| join.finish(scratch)) {
             Some(layer) => collector.hand_in(session, layer, scratch),
@@ -184,12 +226,47 @@ impl<'a, P: Composite> Exchange<'a, P> {
         let parts = &mut self.outstanding[from];
         let position = parts.iter().position(|part| Some(part.1) == said).unwrap_or(0);
         let (index, part) = if parts.is_empty() { (0, Rect::EMPTY) } else { parts.remove(position) };
-        let begin = session.now();
+        let begin = session.comm.working_secs();
         let message = session.check::<P>(from, bytes, part, true)?;
-        session.report.blend_secs += session.now() - begin;
+        session.report.blend_secs += session.comm.working_secs() - begin;
         if index < self.own.len() {
             self.put(index, from, Item::Message(message), session, collector, scratch)?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pixel::DepthPixel;
+
+    type P = DepthPixel<[u8; 4]>;
+
+    fn owning(drawn: &[Rect], root: Option<usize>) -> usize {
+        let plan = Plan::new::<P>(drawn, usize::MAX, root);
+        plan.slices.iter().filter(|slices| !slices.is_empty()).count()
+    }
+
+    #[test]
+    fn the_rank_that_collects_joins_nothing_where_others_can() {
+        let dense = vec![Rect::of_size(1024, 1024); 8];
+        assert!(Plan::new::<P>(&dense, usize::MAX, Some(3)).slices[3].is_empty());
+        assert_eq!((owning(&dense, Some(3)), owning(&dense, None)), (7, 8));
+        // Two ranks share alike.
+        let halves = Plan::new::<P>(&dense[..2], usize::MAX, Some(0)).slices;
+        assert_eq!(halves[0][0].pixels(), halves[1][0].pixels());
+    }
+
+    #[test]
+    fn many_ranks_with_little_to_join_leave_it_to_some_and_with_much_all_work() {
+        let apart: Vec<Rect> = (0..64)
+            .map(|i| {
+                let (x0, y0) = (i % 8 * 128, i / 8 * 128);
+                Rect { x0, y0, x1: x0 + 128, y1: y0 + 128 }
+            })
+            .collect();
+        assert_eq!(owning(&apart, Some(0)), 32);
+        assert_eq!(owning(&vec![Rect::of_size(1024, 1024); 64], None), 64);
     }
 }

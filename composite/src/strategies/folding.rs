@@ -97,7 +97,7 @@ pub(crate) fn join_members<P: Composite>(
 ) -> Result<Layer<P>, CompositeError> {
     let view = held.view();
     let mut join = Join::new(bounds, members.len(), |member| !rect_of(member).is_empty());
-    let begin = session.now();
+    let begin = session.comm.working_secs();
     let mine = rect_of(own);
     if !mine.is_empty() {
         if matches!(held, Held::Frame(_)) {
@@ -105,7 +105,7 @@ pub(crate) fn join_members<P: Composite>(
         }
         join.put(own, Item::View(View { bounds: mine, ..view }), scratch);
     }
-    session.report.blend_secs += session.now() - begin;
+    session.report.blend_secs += session.comm.working_secs() - begin;
     while !join.is_complete() {
         let Some((place, is_collect, bytes)) = session.next(true)? else { continue };
         let member = members.iter().position(|&member| member == place);
@@ -113,13 +113,13 @@ pub(crate) fn join_members<P: Composite>(
             collector.take(session, place, bytes)?;
             continue;
         };
-        let begin = session.now();
+        let begin = session.comm.working_secs();
         let message = session.check::<P>(place, bytes, rect_of(member), true)?;
         join.put(member, Item::Message(message), scratch);
         for read in scratch.read.drain(..) {
             session.comm.recycle(read);
         }
-        session.report.blend_secs += session.now() - begin;
+        session.report.blend_secs += session.comm.working_secs() - begin;
     }
     Ok(join.finish(scratch).unwrap_or_else(|| Layer::empty(bounds, scratch.layers.pop())))
 }

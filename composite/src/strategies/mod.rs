@@ -61,11 +61,12 @@ impl Strategy {
     }
 
     /// What this rank, and every other, is going to do with what all have drawn.
-    pub(crate) fn plan(self, drawn: &[Rect], slice_pixels: usize) -> Plan {
+    /// `root` is the place that collects the image.
+    pub(crate) fn plan<P: Composite>(self, drawn: &[Rect], slice_pixels: usize, root: Option<usize>) -> Plan {
         match self {
             // Automatic has been replaced by what was chosen.
             Self::DirectSend | Self::Automatic => {
-                Plan::DirectSend(direct_send::Plan::new(drawn, slice_pixels))
+                Plan::DirectSend(direct_send::Plan::new::<P>(drawn, slice_pixels, root))
             }
             Self::Tree => Plan::Tree,
             Self::BinarySwap => Plan::BinarySwap,

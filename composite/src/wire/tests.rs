@@ -72,7 +72,7 @@ fn check_format<F: Composite>() {
                     // Placed, it is what was drawn.
                     let mut placed = planes::<F>(150, 5, |_, _| true);
                     let (colors, placed_depths) = (&mut placed.colors, &mut placed.depths);
-                    part.place::<F>(150, colors, if depths { placed_depths } else { &mut [] });
+                    part.place::<F>(kernels, 150, colors, if depths { placed_depths } else { &mut [] });
                     for y in rect.y0..rect.y1 {
                         let (color, depth) = placed.view().row(y, rect.x0, rect.x1);
                         assert_eq!(color, layer.view().row(y, rect.x0, rect.x1).0);
@@ -248,7 +248,7 @@ proptest! {
                 part.join_to(kernels, &mut layer, Side::Lower);
             }
             let mut image = planes::<P>(70, 5, |_, _| false);
-            part.place::<P>(70, &mut image.colors, &mut image.depths);
+            part.place::<P>(Kernels::new(None), 70, &mut image.colors, &mut image.depths);
         }
     }
 }

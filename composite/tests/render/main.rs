@@ -1,12 +1,13 @@
 //! The picture of many ranks is the picture of one node, bit for bit.
 mod scenes;
 
+use composite::comm::sim;
 use composite::render::{
-    DataParallel, FrameError, FrameOptions, FrameOutput, Light, Partition, Split, ray_parallel,
+    Activity, DataParallel, FrameError, FrameOptions, FrameOutput, Light, Partition, Split, ray_parallel,
 };
 use composite::{Communicator, threads};
 use rt_core::accel::BuildOptions;
-use rt_core::frame::Frame;
+use rt_core::frame::{Frame, Layers};
 use rt_core::glam::DVec3;
 use rt_core::render::render;
 use scenes::Case;
@@ -121,6 +122,54 @@ fn frames_without_secondary_rays_send_none_and_have_the_bits_of_one_node() {
 }
 
 #[test]
+fn streamed_frames_have_the_bits_of_one_node_and_send_tiles_while_rays_are_traced() {
+    let mut case = scenes::headlight(1);
+    // Colours alone: nothing is left to do after the camera rays.
+    case.options.layers = Layers::COLOR;
+    (case.options.width, case.options.height) = (384, 320);
+    for samples in [1, 3] {
+        case.options.samples = samples;
+        let expected = one_node(&case);
+        for (ranks, split) in [
+            (1, Split::Triangles),
+            (2, Split::Triangles),
+            (5, Split::Random { seed: 3 }),
+            (27, Split::Triangles),
+            (128, Split::Triangles),
+        ] {
+            let partition = Partition::new(&case.scene, ranks, &split);
+            for stream in [true, false] {
+                let outputs = sim::run(ranks, sim::Network::FREE, sim::Compute::Measured(1.0), |mut comm| {
+                    let part = partition.part(&case.scene, comm.rank(), &BuildOptions::default())?;
+                    let options = FrameOptions { root: Some(ranks - 1), stream, ..frame_options(Light::Ask) };
+                    let mut renderer = DataParallel::new(&mut comm, part, options)?;
+                    renderer.frame(&mut comm, &case.camera, &case.options)
+                });
+                let outputs: Vec<FrameOutput> = outputs
+                    .into_iter()
+                    .map(|o: Result<Result<_, FrameError>, _>| o.unwrap().unwrap())
+                    .collect();
+                assert_same(
+                    &expected,
+                    &outputs,
+                    &format!("{samples} samples, {ranks} ranks, stream {stream}"),
+                );
+                // Some rank has finished tiles before it has traced its last ray, or none has. (With few tiles for each rank it does not pay.)
+                let overlaps = |o: &FrameOutput| {
+                    let mut spans = o.report.spans.iter().map(|s| s.activity);
+                    let last = spans.clone().rposition(|a| a == Activity::Render);
+                    let shaded = spans.position(|a| a == Activity::Shade);
+                    shaded.zip(last).is_some_and(|(shaded, last)| shaded < last)
+                };
+                if samples == 1 && (2..=5).contains(&ranks) {
+                    assert_eq!(outputs.iter().any(overlaps), stream, "{ranks} ranks");
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn mirrors_glass_layers_and_paths_have_the_bits_of_one_node() {
     for case in scenes::several_waves() {
         let expected = one_node(&case);
@@ -130,6 +179,38 @@ fn mirrors_glass_layers_and_paths_have_the_bits_of_one_node() {
             assert_same(&expected, &outputs, &format!("{}, {ranks} ranks", case.name));
             assert!(outputs.iter().any(|o| o.report.rounds > 2), "{}", case.name);
         }
+    }
+}
+
+#[test]
+fn a_volume_in_bricks_has_the_bits_of_one_node() {
+    for case in scenes::volumes() {
+        let expected = one_node(&case);
+        for (ranks, split) in [(2, Split::Triangles), (7, Split::Random { seed: 5 }), (64, Split::Triangles)]
+        {
+            let outputs = many(&case, ranks, &split, Light::Ask);
+            assert_same(&expected, &outputs, &format!("{}, {ranks} ranks", case.name));
+            assert!(outputs[0].report.warnings.iter().all(|w| !w.contains("whole")));
+        }
+        // Every rank holds its brick with two layers of points around it, and not the whole.
+        let whole = case.scene.volumes[0].volume.grid().values.len();
+        let partition = Partition::new(&case.scene, 8, &Split::Triangles);
+        let held = (0..8).map(|rank| {
+            let part = partition.part(&case.scene, rank, &BuildOptions::default()).unwrap();
+            part.scene.volumes[0].volume.grid().values.len()
+        });
+        let held: Vec<usize> = held.collect();
+        assert!(held.iter().all(|&n| n < whole / 2) && held.iter().sum::<usize>() >= whole, "{held:?}");
+    }
+}
+
+#[test]
+fn parts_of_tubes_cylinders_and_spheres_hold_their_own_and_have_the_bits_of_one_node() {
+    let case = scenes::arrays_of_shapes();
+    let expected = one_node(&case);
+    for (ranks, split) in [(2, Split::Triangles), (7, Split::Random { seed: 5 }), (32, Split::Triangles)] {
+        let outputs = many(&case, ranks, &split, Light::Ask);
+        assert_same(&expected, &outputs, &format!("{}, {ranks} ranks", case.name));
     }
 }
 

@@ -60,7 +60,7 @@ fn execute(cli: Cli, code: &mut Option<u8>) -> anyhow::Result<Status> {
     let common = cli.common;
     match cli.command {
         Command::Run(args) => {
-            *code = Some(run::run(&args, common.quiet)?);
+            *code = Some(run::run(&args)?);
             Ok(Status::Success)
         }
         Command::Doctor(args) => doctor::doctor(&args, &common),

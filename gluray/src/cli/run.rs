@@ -6,11 +6,13 @@ use crate::config::{Assignment, ConfigFile, SettingError, Settings, assign};
 use crate::report::Report;
 use anyhow::Context as _;
 use datasets::cli::{CureExt as _, UsageError};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
 use std::ffi::OsString;
 use std::fs;
 use std::os::unix::process::ExitStatusExt as _;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Child, Command};
 
 /// How the library gets into the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -125,7 +127,7 @@ fn with_first(variable: &str, first: &Path) -> OsString {
 }
 
 /// Runs the program; the result is its exit code.
-pub(super) fn run(args: &RunArgs, quiet: bool) -> anyhow::Result<u8> {
+pub(super) fn run(args: &RunArgs) -> anyhow::Result<u8> {
     let library = library()
         .context("libgluray.so is not beside this program")
         .cure("build it with `cargo build --release -p gluray`, or name it in the variable GLURAY_LIBRARY")?;
@@ -158,14 +160,13 @@ pub(super) fn run(args: &RunArgs, quiet: bool) -> anyhow::Result<u8> {
         command.env("LD_PRELOAD", with_first("LD_PRELOAD", &library));
     }
     let name = args.program[0].to_string_lossy().into_owned();
+    // Before there is a program, so that no signal finds one of us without the other.
+    let signals = Signals::new([SIGINT, SIGTERM, SIGHUP]).context("cannot watch for signals")?;
     let mut child = command
         .spawn()
         .with_context(|| format!("cannot start {name}"))
         .cure("check the name and the PATH; everything behind `--` is the program and its arguments")?;
-    // Ctrl-C goes to the program, too, which decides what to do about it; we stay to write the report.
-    if !quiet {
-        datasets::cli::Cancel::on_ctrl_c().ok();
-    }
+    pass_to(&child, signals);
     let status = child.wait()?;
     let report = collect(&reports, &name);
     let text = serde_json::to_string_pretty(&report)?;
@@ -179,6 +180,23 @@ pub(super) fn run(args: &RunArgs, quiet: bool) -> anyhow::Result<u8> {
     }
     let code = status.code().unwrap_or_else(|| 128 + status.signal().unwrap_or(0));
     Ok(u8::try_from(code).unwrap_or(1))
+}
+
+/// From now on signals end the program and not us, who stay to write the report. Ctrl-C goes to both by the terminal; a TERM or HUP
+/// (of batch systems, `timeout`, a closed terminal) goes to us alone and is passed on.
+fn pass_to(child: &Child, mut signals: Signals) {
+    let program = rustix::process::Pid::from_child(child);
+    std::thread::spawn(move || {
+        for signal in signals.forever() {
+            let passed = match signal {
+                SIGTERM => rustix::process::Signal::TERM,
+                SIGHUP => rustix::process::Signal::HUP,
+                _ => continue,
+            };
+            // It may have ended by itself: then there is nobody to tell.
+            let _ = rustix::process::kill_process(program, passed);
+        }
+    });
 }
 
 /// All processes' accounts as one.

@@ -26,6 +26,7 @@ impl Config {
         match (self.settings.enabled, self.settings.trace) {
             (false, _) => decide::Trace::Nothing,
             (true, Trace::All) => decide::Trace::All,
+            (true, Trace::Scene) if self.settings.sees_through() => decide::Trace::Translucent,
             (true, Trace::Scene) => decide::Trace::Surfaces,
         }
     }
@@ -44,23 +45,37 @@ impl Config {
 
 /// Paths of settings that the library obeys today. The panel disables the others, and whoever sets one is told in the report.
 pub(crate) const OBEYED: &[&str] = &[
+    "asynchronous",
     "enabled",
     "mode",
     "trace",
+    "samples",
     "quality",
     "threads",
     "effects.shadows",
     "effects.light_radius_deg",
     "effects.ambient_occlusion_samples",
     "effects.ambient_occlusion_radius",
+    "effects.reflections",
+    "effects.refraction",
+    "effects.transparency",
+    "effects.max_bounces",
+    "effects.aperture_radius",
+    "effects.focus",
     "lights.program",
     "lights.ambient",
+    "lights.sky",
     "lights.added",
     "lights.added_direction",
     "lights.added_color",
+    "material.surface",
     "material.color",
+    "material.opacity",
     "material.specular",
     "material.shininess",
+    "material.mirror",
+    "material.roughness",
+    "material.ior",
     "material.emission",
 ];
 
@@ -76,9 +91,20 @@ fn not_obeyed(settings: &Settings) -> Vec<String> {
         .filter(in_vain)
         .map(|f| format!("`{}` is set, and this version of the library does not obey it yet", f.path))
         .collect();
-    if settings.mode == Mode::Path {
-        out.push("`mode` is path, which is not built yet: `rich` is drawn".into());
-    }
+    // What changes nothing in this mode is said, too, and in which it would.
+    let elsewhere = |f: &&Field| {
+        f.modes.len() < Mode::ALL.len()
+            && !f.matters_in(settings.mode.name())
+            && value(&now, f.path) != value(&usual, f.path)
+    };
+    out.extend(FIELDS.iter().filter(elsewhere).map(|f| {
+        format!(
+            "`{}` is set, but changes nothing in mode {}: it is for {}",
+            f.path,
+            settings.mode.name(),
+            f.modes.join(", ")
+        )
+    }));
     if !settings.objects.is_empty() && !OBEYED.iter().any(|p| p.starts_with("material.")) {
         out.push("`objects` are set, and this version of the library does not obey them yet".into());
     }

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 /// Variables that are no settings: (name, what for).
 pub const OTHER_VARIABLES: &[(&str, &str)] = &[
     ("GLURAY_CONFIG", "file with settings"),
+    ("GLURAY_INJECT_FAULT", "for tests: the place at which our own code breaks; `flush`"),
     ("GLURAY_DUMP", "file that the scene is written to, see `gluray export`"),
     ("GLURAY_PANEL", "address of the control panel"),
     ("GLURAY_PANEL_SECRET", "its secret"),

@@ -94,15 +94,20 @@ pub const FIELDS: &[Field] = &[
         "how pictures are made",
     ),
     field("trace", Kind::Word { words: &["scene", "all"] }, "which draws are traced"),
-    field("samples", Kind::Whole { low: 1, high: 4096 }, "rays through each pixel")
-        .only_in(&["rich", "enhance", "path"]),
+    field(
+        "samples",
+        Kind::Whole { low: 1, high: 4096 },
+        "rays through each pixel; mode path takes at least 16",
+    )
+    .only_in(&["rich", "enhance", "path"]),
     field(
         "quality",
         Kind::Word { words: &["auto", "fast", "best"] },
         "how acceleration structures are built",
     ),
     field("threads", Kind::Whole { low: 0, high: 1024 }, "threads that render; 0 for all cores"),
-    field("asynchronous", Kind::Switch, "show each frame one frame late and trace it meanwhile"),
+    field("asynchronous", Kind::Switch, "show each frame one frame late and trace it meanwhile")
+        .only_in(&["match", "phong", "enhance"]),
     field("effects.shadows", Kind::Switch, "rays to the lights").only_in(RAYS),
     field("effects.light_radius_deg", real(0.0, 45.0), "half the angle of lights; 0 for sharp shadows")
         .unit("degrees")
@@ -118,7 +123,7 @@ pub const FIELDS: &[Field] = &[
         .only_in(RAYS),
     field("effects.reflections", Kind::Switch, "mirrors").only_in(LONG),
     field("effects.refraction", Kind::Switch, "rays through glass").only_in(LONG),
-    field("effects.transparency", Kind::Switch, "light through what is not opaque").only_in(LIT),
+    field("effects.transparency", Kind::Switch, "light through what is not opaque").only_in(LONG),
     field("effects.max_bounces", Kind::Whole { low: 1, high: 64 }, "longest chain of reflections")
         .only_in(LONG),
     field("effects.aperture_radius", real(0.0, 1.0), "radius of the lens; 0 for a pinhole")
@@ -129,22 +134,27 @@ pub const FIELDS: &[Field] = &[
     field("lights.ambient", real(0.0, 100.0), "times the program's ambient light").only_in(LIT),
     field("lights.sky", real(0.0, 100.0), "even light from all around").only_in(LONG),
     field("lights.added", real(0.0, 100.0), "strength of a light of our own").only_in(LIT),
-    field("lights.added_direction", Kind::Direction, "where it comes from: right, up, towards you")
-        .only_in(LIT),
+    field(
+        "lights.added_direction",
+        Kind::Direction,
+        "where it comes from: right, up, towards you; in enhance, where shaders' shadows come from",
+    )
+    .only_in(&["phong", "rich", "enhance", "path"]),
     field("lights.added_color", Kind::Color, "its colour").only_in(LIT),
     field(
         "material.surface",
         Kind::Word { words: &["program", "matte", "metal", "glass"] },
         "what surfaces are made of",
     )
-    .optional(),
+    .optional()
+    .only_in(LONG),
     field("material.color", Kind::Color, "colour, as glColor takes it").optional(),
-    field("material.opacity", real(0.0, 1.0), "0 invisible to 1 opaque").optional(),
+    field("material.opacity", real(0.0, 1.0), "0 invisible to 1 opaque").optional().only_in(LONG),
     field("material.specular", real(0.0, 1.0), "strength of the highlight").optional(),
     field("material.shininess", real(0.0, 10_000.0), "exponent of the highlight").optional(),
-    field("material.mirror", real(0.0, 1.0), "share of mirror reflection").optional(),
-    field("material.roughness", real(0.0, 1.0), "of a metal: 0 polished to 1 dull").optional(),
-    field("material.ior", real(1.0, 4.0), "refractive index of glass").optional(),
+    field("material.mirror", real(0.0, 1.0), "share of mirror reflection").optional().only_in(LONG),
+    field("material.roughness", real(0.0, 1.0), "of a metal: 0 polished to 1 dull").optional().only_in(LONG),
+    field("material.ior", real(1.0, 4.0), "refractive index of glass").optional().only_in(LONG),
     field("material.emission", real(0.0, 1000.0), "light given off, times the colour").optional(),
 ];
 

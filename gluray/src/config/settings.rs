@@ -252,6 +252,11 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// True when translucent surfaces are sorted by rays.
+    pub fn sees_through(&self) -> bool {
+        matches!(self.mode, Mode::Rich | Mode::Path) && self.effects.transparency
+    }
+
     /// The changes to an object's material: those for all, with its own over them.
     pub fn material_of(&self, object: &str) -> Material {
         match self.objects.get(object) {

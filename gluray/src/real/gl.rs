@@ -47,6 +47,10 @@ driver! {
     pub(crate) fn depth_range = "glDepthRange"(near: f64, far: f64);
     pub(crate) fn polygon_mode = "glPolygonMode"(face: u32, mode: u32);
     pub(crate) fn color_mask = "glColorMask"(r: u8, g: u8, b: u8, a: u8);
+    pub(crate) fn blend_func = "glBlendFunc"(src: u32, dst: u32);
+    pub(crate) fn blend_equation = "glBlendEquation"(equation: u32);
+    pub(crate) fn blend_func_separate = "glBlendFuncSeparate"(src: u32, dst: u32, src_alpha: u32, dst_alpha: u32);
+    pub(crate) fn blend_equation_separate = "glBlendEquationSeparate"(color: u32, alpha: u32);
     pub(crate) fn active_texture = "glActiveTexture"(unit: u32);
     pub(crate) fn bind_texture = "glBindTexture"(target: u32, name: u32);
     pub(crate) fn tex_parameteri = "glTexParameteri"(target: u32, what: u32, value: i32);

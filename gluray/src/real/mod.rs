@@ -6,6 +6,7 @@
 //! This is a room for unsafe code.
 #![allow(unsafe_code, reason = "a room: calls into a C library that is found at run time")]
 
+pub(crate) mod feedback;
 pub(crate) mod gl;
 
 use crate::symbols::{NAMES, hooks::no_context};

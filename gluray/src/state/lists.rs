@@ -15,6 +15,8 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Op {
     Begin(u32),
+    /// The beginning of a draw of arrays, which is an error between Begin and End: then nothing of it is drawn.
+    BeginArrays(u32),
     End,
     Vertex([f32; 4]),
     Normal([f32; 3]),
@@ -76,6 +78,11 @@ const DEEPEST: u32 = 64;
 
 impl Context {
     pub(crate) fn new_list(&mut self, name: u32, mode: u32) -> bool {
+        if crate::fault::happened() {
+            // The driver's from now on.
+            self.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.remove(&name);
+            return false;
+        }
         if self.sink == Sink::Trace {
             self.unswallow("glNewList between Begin and End");
         }
@@ -150,6 +157,11 @@ impl Context {
         self.list_op(Op::Begin(mode))
     }
 
+    /// Vertices of arrays follow.
+    pub(crate) fn list_begin_arrays(&mut self, mode: u32) -> bool {
+        self.list_op(Op::BeginArrays(mode))
+    }
+
     pub(crate) fn list_end(&mut self) -> bool {
         if let Some(r) = &mut self.recording {
             r.open = false;
@@ -189,6 +201,9 @@ impl Context {
         if self.recording.is_some() {
             return self.list_op(Op::Call(name));
         }
+        if crate::fault::happened() {
+            return self.play_plainly(name);
+        }
         let known = self.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.get(&name).cloned();
         let Some(list) = known else {
             // Not compiled by calls that we saw (fonts of glXUseXFont), or not there.
@@ -202,6 +217,55 @@ impl Context {
         self.play(&list);
         self.depth_of_lists -= 1;
         true
+    }
+
+    /// After a fault of ours: a list of ours into the driver as it is.
+    fn play_plainly(&mut self, name: u32) -> bool {
+        let known = self.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.get(&name).cloned();
+        let Some(list) = known.filter(|_| self.depth_of_lists < DEEPEST) else { return false };
+        self.depth_of_lists += 1;
+        for op in &list.ops {
+            match *op {
+                Op::Begin(mode) | Op::BeginArrays(mode) => gl::begin(mode),
+                Op::End => gl::end(),
+                Op::Vertex(v) => gl::vertex4f(v[0], v[1], v[2], v[3]),
+                Op::Normal(v) => gl::normal3f(v[0], v[1], v[2]),
+                Op::Color(v) => gl::color4f(v[0], v[1], v[2], v[3]),
+                Op::Tex(v) => gl::tex_coord4f(v[0], v[1], v[2], v[3]),
+                Op::Material(at) => {
+                    let (face, what, v) = list.materials[at as usize];
+                    gl::materialfv(face, what, &v);
+                }
+                Op::Driver { list, .. } => gl::call_list(list),
+                Op::Call(name) => self.play_plainly_or_call(name),
+                Op::CallFromBase(name) => self.play_plainly_or_call(gl::word(LIST_BASE).wrapping_add(name)),
+                Op::Rect(v) => gl::rectf(v[0], v[1], v[2], v[3]),
+            }
+        }
+        self.depth_of_lists -= 1;
+        true
+    }
+
+    fn play_plainly_or_call(&mut self, name: u32) {
+        if !self.play_plainly(name) {
+            gl::call_list(name);
+        }
+    }
+
+    /// A fault of ours has ended the tracing: the driver gets to know what it was not told.
+    pub(crate) fn give_up(&mut self) {
+        if let Some(r) = self.recording.take() {
+            gl::end_list();
+            let mut list = r.list;
+            if r.used {
+                list.ops.push(Op::Driver { list: r.piece, draws: r.draws });
+            }
+            self.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.insert(r.name, Arc::new(list));
+        }
+        self.sink = Sink::Outside;
+        self.depth_of_lists = 0;
+        self.sync();
+        self.counters.publish(true);
     }
 
     fn call_driver(&mut self, list: u32, draws: bool) {
@@ -229,9 +293,18 @@ impl Context {
     }
 
     fn play(&mut self, list: &List) {
+        let mut left_out = false;
         for op in &list.ops {
+            if left_out {
+                left_out = *op != Op::End;
+                continue;
+            }
             match *op {
-                Op::Begin(mode) => {
+                Op::BeginArrays(_) if self.sink != Sink::Outside => {
+                    self.errors.push(INVALID_OPERATION);
+                    left_out = true;
+                }
+                Op::Begin(mode) | Op::BeginArrays(mode) => {
                     if !self.begin(mode) {
                         gl::begin(mode);
                     }
@@ -287,6 +360,11 @@ impl Context {
 
     pub(crate) fn call_lists(&mut self, n: i32, kind: u32, names: usize) -> bool {
         let Some(names) = decode_names(n, kind, names) else { return false };
+        if crate::fault::happened() {
+            let base = gl::word(LIST_BASE);
+            names.into_iter().for_each(|n| self.play_plainly_or_call(base.wrapping_add(n)));
+            return true;
+        }
         if self.recording.is_some() {
             for name in names {
                 self.list_op(Op::CallFromBase(name));

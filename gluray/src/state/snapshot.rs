@@ -107,6 +107,7 @@ pub(crate) struct Abilities {
     pub(crate) core: bool,
     pub(crate) es: bool,
     pub(crate) texture_units: i32,
+    pub(crate) clip_planes: u32,
     pub(crate) rectangle: bool,
     pub(crate) depth_clamp: bool,
     pub(crate) arb_programs: bool,
@@ -131,6 +132,7 @@ impl Abilities {
             core,
             es,
             texture_units: if legacy { gl::int(MAX_TEXTURE_UNITS).clamp(1, 8) } else { 0 },
+            clip_planes: if legacy { gl::word(MAX_CLIP_PLANES).clamp(6, 32) } else { 0 },
             rectangle: has("GL_ARB_texture_rectangle"),
             depth_clamp: core || has("GL_ARB_depth_clamp"),
             arb_programs: has("GL_ARB_vertex_program") && has("GL_ARB_fragment_program"),
@@ -217,7 +219,7 @@ impl Snapshot {
         self.normalize = gl::is_enabled(NORMALIZE);
         self.rescale_normal = can.version >= 12 && gl::is_enabled(RESCALE_NORMAL);
         self.color_sum = can.version >= 14 && gl::is_enabled(COLOR_SUM);
-        self.clip_planes = (0..6)
+        self.clip_planes = (0..can.clip_planes)
             .filter(|i| gl::is_enabled(CLIP_PLANE0 + i))
             .map(|i| gl::clip_plane(CLIP_PLANE0 + i))
             .collect();
@@ -278,6 +280,8 @@ impl Snapshot {
                 self.foreign_texturing = Some("several texture units");
             } else if target == TEXTURE_1D || target == TEXTURE_2D {
                 self.texture = Some(unit_0(target));
+                // The names say what is bound; where its image comes from is asked for when it is used.
+                self.foreign_texturing = self.foreign_texturing.or(crate::texturing::unfollowed(target));
             } else {
                 self.foreign_texturing = Some("a texture that is neither 1-D nor 2-D");
             }

@@ -103,6 +103,12 @@ hooks! {
     fn glDrawRangeElementsEXT(mode: u32, start: u32, end: u32, count: Int, kind: u32, at: Address) => |c| c.draw_elements(mode, count, kind, at as usize, 0);
     fn glDrawElementsBaseVertex(mode: u32, count: Int, kind: u32, at: Address, base: Int) => |c| c.draw_elements(mode, count, kind, at as usize, base);
     fn glDrawRangeElementsBaseVertex(mode: u32, start: u32, end: u32, count: Int, kind: u32, at: Address, base: Int) => |c| c.draw_elements(mode, count, kind, at as usize, base);
+    fn glBufferData(target: u32, size: isize, data: Address, usage: u32) => |c| c.buffer_written(target);
+    fn glBufferDataARB(target: u32, size: isize, data: Address, usage: u32) => |c| c.buffer_written(target);
+    fn glBufferSubData(target: u32, at: isize, size: isize, data: Address) => |c| c.buffer_written(target);
+    fn glBufferSubDataARB(target: u32, at: isize, size: isize, data: Address) => |c| c.buffer_written(target);
+    fn glDeleteBuffers(n: Int, names: Address) => |c| c.buffers_deleted(n, names as usize);
+    fn glDeleteBuffersARB(n: Int, names: Address) => |c| c.buffers_deleted(n, names as usize);
     fn glClear(mask: u32) => |c| c.clear(mask);
     fn glLinkProgram(program: u32) => |c| c.link_program(program);
 }

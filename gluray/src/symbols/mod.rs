@@ -72,7 +72,10 @@ pub(crate) fn retire() {
     for (i, slot) in TABLE.iter().enumerate() {
         // What keeps the books of contexts and what gives out addresses stays, so that threads are left in order.
         let name = NAMES[i].to_bytes();
-        let book = name.ends_with(b"ProcAddress") || name.ends_with(b"ProcAddressARB");
+        // Lists that we compiled are ours to play.
+        let lists: [&[u8]; 5] = [b"glCallList", b"glCallLists", b"glNewList", b"glEndList", b"glDeleteLists"];
+        let book =
+            name.ends_with(b"ProcAddress") || name.ends_with(b"ProcAddressARB") || lists.contains(&name);
         if !book && HOOKS[i].is_some() {
             slot.store(real::forward(i).cast_mut(), Relaxed);
         }
@@ -100,6 +103,9 @@ extern "C" fn resolve(index: usize) -> *const () {
 }
 
 extern "C" fn told(index: usize) {
+    if crate::fault::happened() {
+        return;
+    }
     let (class, flush) = (CLASSES[index], FLUSHES[index]);
     crate::fault::guard(|| crate::context::watched(index, class, flush & 1 != 0, flush & 2 != 0));
 }

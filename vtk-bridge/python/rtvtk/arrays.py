@@ -1,8 +1,7 @@
-"""VTK's arrays as the library takes them: numpy views, and keys that tell when they change."""
+"""VTK's arrays as the library takes them: numpy views, and keys that tell when they change. Colours and textures."""
 import numpy as np
 from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonCore import VTK_UNSIGNED_CHAR, reference
-from vtkmodules.vtkCommonDataModel import vtkCellArray
+from vtkmodules.vtkCommonCore import VTK_UNSIGNED_CHAR, reference, vtkLookupTable
 from vtkmodules.vtkRenderingCore import vtkAbstractMapper
 
 from . import library as rtv
@@ -29,72 +28,33 @@ def numbers(array, kinds, keep):
     return found
 
 
-def floats(array, components, keep):
-    """An array of the library with `components` floats, or none."""
+def floats(array, components, keep, rows=None):
+    """An array of the library with `components` floats, or none; of these rows."""
     if array is None or array.GetNumberOfComponents() < components or array.GetNumberOfTuples() == 0:
         return rtv.Array()
     found = numbers(array, [np.dtype(np.float32)], keep).reshape(array.GetNumberOfTuples(), -1)
-    if found.shape[1] > components:
+    if found.shape[1] > components or rows is not None:
+        found = found if rows is None else found[rows[rows < len(found)]]
         found = np.ascontiguousarray(found[:, :components])
         keep.append(found)
     return rtv.Array.of(found)
 
 
-def cells(array, keep):
-    if array is None or array.GetNumberOfCells() == 0:
-        return rtv.Cells()
-    whole = [np.dtype(np.int64), np.dtype(np.int32)]
-    try:
-        offsets, connectivity = (vtk_to_numpy(a) for a in (array.GetOffsetsArray(), array.GetConnectivityArray()))
-        if offsets.dtype not in whole or connectivity.dtype not in whole:
-            raise TypeError
-    except (TypeError, AttributeError, AssertionError, ValueError):
-        # Cells of one size have no offsets in memory (VTK 9.6 and later).
-        plain = vtkCellArray()
-        plain.DeepCopy(array)
-        plain.ConvertTo64BitStorage()
-        offsets, connectivity = (vtk_to_numpy(a) for a in (plain.GetOffsetsArray(), plain.GetConnectivityArray()))
-        keep.append(plain)
-    offsets, connectivity = np.ascontiguousarray(offsets), np.ascontiguousarray(connectivity)
-    keep += [offsets, connectivity]
-    return rtv.Cells(rtv.Array.of(offsets), rtv.Array.of(connectivity))
-
-
-def add_shape(surface, data, as_points, keep):
-    """Points, cells, normals and texture coordinates."""
-    points = data.GetPoints()
-    coordinates = points.GetData()
-    kinds = [np.dtype(np.float64), np.dtype(np.float32)]
-    surface.points = rtv.Array.of(numbers(coordinates, kinds, keep).reshape(-1, 3))
-    if as_points:
-        ids = np.arange(points.GetNumberOfPoints() + 1, dtype=np.int64)
-        keep.append(ids)
-        surface.verts = rtv.Cells(rtv.Array.of(ids), rtv.Array.of(ids[:-1]))
-        surface.shape_key = key_of(points, coordinates, "points", surface.point_radius)
-        return
-    all_cells = [data.GetVerts(), data.GetLines(), data.GetPolys(), data.GetStrips()]
-    surface.verts, surface.lines, surface.polys, surface.strips = (cells(c, keep) for c in all_cells)
-    of_points = None if surface.property.flat else data.GetPointData().GetNormals()
-    of_cells, texcoords = data.GetCellData().GetNormals(), data.GetPointData().GetTCoords()
-    surface.point_normals, surface.cell_normals = floats(of_points, 3, keep), floats(of_cells, 3, keep)
-    surface.texcoords = floats(texcoords, 2, keep)
-    surface.shape_key = key_of(points, coordinates, *all_cells, of_points, of_cells, texcoords, surface.point_radius, surface.line_radius,
-                               surface.edges_only)
-
-
 def rgba_of(colors):
     """Bytes of one to four components as RGBA."""
     colors = colors.reshape(len(colors), -1)
-    out = np.full((len(colors), 4), 255, np.uint8)
     n = colors.shape[1]
+    if n == 4:
+        return colors
+    out = np.full((len(colors), 4), 255, np.uint8)
     out[:, :3] = colors[:, :3] if n >= 3 else colors[:, :1]
-    if n in (2, 4):
-        out[:, 3] = colors[:, -1]
+    if n == 2:
+        out[:, 3] = colors[:, 1]
     return out
 
 
-def add_colors(bridge, surface, mapper, data, keep):
-    """Colours by the mapper's own lookup. True unless the mapper colours by a tuple of field data."""
+def add_colors(bridge, surface, mapper, data, cell_map, keep):
+    """Colours by the mapper's own lookup."""
     if not mapper.GetScalarVisibility():
         return
     flag = reference(0)
@@ -104,7 +64,7 @@ def add_colors(bridge, surface, mapper, data, keep):
         return
     flag = int(flag)
     if flag == 2 and mapper.GetFieldDataTupleId() < 0:
-        # An array of the field data with a value for each cell.
+        # An array of the field data with a value for each cell; with a tuple's number it would be one colour for everything.
         flag = 1
     key = key_of(scalars, mapper.GetLookupTable(), mapper.GetScalarRange(), mapper.GetColorMode(), mapper.GetScalarMode(),
                  mapper.GetInterpolateScalarsBeforeMapping(), mapper.GetUseLookupTableScalarRange(), flag, mapper.GetArrayComponent(),
@@ -132,14 +92,16 @@ def add_colors(bridge, surface, mapper, data, keep):
     if colors is None or colors.GetNumberOfTuples() == 0:
         return
     rgba = rgba_of(numbers(colors, [np.dtype(np.uint8)], keep))
-    keep.append(rgba)
     if flag == 2:
         # One colour for everything, from a tuple of field data.
-        color = [c / 255 for c in rgba[0]]
+        color = [c / 255 for c in rgba[0].tolist()]
         surface.property.ambient_color[:] = surface.property.diffuse_color[:] = color[:3]
         surface.property.opacity *= color[3]
         surface.color_key = 0
         return
+    if flag == 1 and cell_map is not None:
+        rgba = np.ascontiguousarray(rgba[cell_map[cell_map < len(rgba)]])
+    keep.append(rgba)
     surface.color_source = rtv.COLOR_CELLS if flag == 1 else rtv.COLOR_POINTS
     surface.colors = rtv.Array.of(rgba)
 
@@ -147,35 +109,46 @@ def add_colors(bridge, surface, mapper, data, keep):
 def why_not_texture(texture):
     if texture.GetTransform():
         return "a texture with a transform"
-    if texture.GetUseSRGBColorSpace():
-        return "a texture in sRGB"
     if texture.GetCubeMap():
         return "a cube map"
     return None
 
 
-def add_texture(surface, texture, keep):
-    if texture.GetInputAlgorithm():
-        texture.GetInputAlgorithm().Update()
-    image = texture.GetInput()
-    scalars = image.GetPointData().GetScalars() if image else None
-    if scalars is None or surface.texcoords.kind == rtv.NONE:
-        return
-    width, height, _ = image.GetDimensions()
+class Textures:
+    """Texels as RGBA by the key of their image; those of the last frame are kept."""
+
+    def __init__(self):
+        self._kept, self._used = {}, {}
+
+    def end_frame(self):
+        self._kept, self._used = self._used, {}
+
+    def add(self, surface, texture, texcoords):
+        if texture.GetInputAlgorithm():
+            texture.GetInputAlgorithm().Update()
+        image = texture.GetInput()
+        scalars = image.GetPointData().GetScalars() if image else None
+        if scalars is None or texcoords is None or texcoords.GetNumberOfComponents() < 2:
+            return
+        width, height, _ = image.GetDimensions()
+        if scalars.GetNumberOfTuples() < width * height:
+            return
+        key = key_of(image, scalars, texture)
+        rgba = self._kept.get(key)
+        if rgba is None:
+            rgba = _texels(texture, scalars)[: width * height]
+        self._used[key] = rgba
+        surface.texture_key, surface.texture, surface.texture_width = key, rtv.Array.of(rgba), width
+        surface.texture_srgb = int(bool(texture.GetUseSRGBColorSpace()))
+        surface.texture_interpolate, surface.texture_repeat = int(bool(texture.GetInterpolate())), int(bool(texture.GetRepeat()))
+
+
+def _texels(texture, scalars):
     if scalars.GetDataType() != VTK_UNSIGNED_CHAR or texture.GetColorMode() == 1:
         table = texture.GetLookupTable()
         if table is None:
-            from vtkmodules.vtkCommonCore import vtkLookupTable
-
             table = vtkLookupTable()
             table.SetTableRange(scalars.GetRange())
             table.Build()
         scalars = table.MapScalars(scalars, texture.GetColorMode(), -1)
-    rgba = rgba_of(numbers(scalars, [np.dtype(np.uint8)], keep).reshape(scalars.GetNumberOfTuples(), -1))
-    if len(rgba) < width * height:
-        return
-    keep.append(rgba)
-    surface.texture_key = key_of(image, image.GetPointData().GetScalars(), texture)
-    surface.texture = rtv.Array.of(rgba[: width * height])
-    surface.texture_width = width
-    surface.texture_interpolate, surface.texture_repeat = int(bool(texture.GetInterpolate())), int(bool(texture.GetRepeat()))
+    return np.ascontiguousarray(rgba_of(numbers(scalars, [np.dtype(np.uint8)], []).reshape(scalars.GetNumberOfTuples(), -1)))

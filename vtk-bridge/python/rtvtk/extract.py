@@ -4,19 +4,16 @@ import ctypes as C
 import numpy as np
 from vtkmodules.vtkCommonDataModel import vtkMultiBlockDataSet, vtkPartitionedDataSet, vtkPartitionedDataSetCollection, vtkPolyData
 from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
-from vtkmodules.vtkRenderingCore import vtkActor, vtkVolume
+from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkVolume
 
-from . import arrays, volumes
+from . import arrays
 from . import library as rtv
+from .glyphs import Glyphs, leaves_of, sources_of
+from .shape import Shapes
+from .volumes import Volumes
+from .why import POINTS, SURFACE, WIREFRAME, Untraceable, check_actor, check_cells
 
-ACTORS = {"vtkActor", "vtkOpenGLActor", "vtkLODActor", "vtkQuadricLODActor"}
-MAPPERS = {"vtkPolyDataMapper", "vtkOpenGLPolyDataMapper", "vtkCompositePolyDataMapper", "vtkDataSetMapper"}
-POINTS, WIREFRAME, SURFACE = range(3)
 FLAT, PBR = 0, 3
-
-
-class Untraceable(Exception):
-    """OpenGL has to draw a prop; the text says why."""
 
 
 def _property(p):
@@ -25,85 +22,198 @@ def _property(p):
     out.ambient, out.diffuse, out.specular, out.specular_power = p.GetAmbient(), p.GetDiffuse(), p.GetSpecular(), p.GetSpecularPower()
     out.opacity, out.metallic, out.roughness, out.base_ior = p.GetOpacity(), p.GetMetallic(), p.GetRoughness(), p.GetBaseIOR()
     out.flat, out.pbr, out.lighting = p.GetInterpolation() == FLAT, p.GetInterpolation() == PBR, bool(p.GetLighting())
-    out.edge_color[:] = p.GetEdgeColor()
-    # OpenGL's are never thinner than this.
-    out.edge_width = max(1.1, p.GetLineWidth()) if p.GetEdgeVisibility() and p.GetRepresentation() == SURFACE else 0.0
     out.cull_front, out.cull_back = bool(p.GetFrontfaceCulling()), bool(p.GetBackfaceCulling())
+    if p.GetEdgeVisibility() and p.GetRepresentation() == SURFACE:
+        by_line = not hasattr(p, "GetUseLineWidthForEdgeThickness") or p.GetUseLineWidthForEdgeThickness()
+        out.edge_color[:] = p.GetEdgeColor()
+        # OpenGL's are never thinner than this.
+        out.edge_width = max(1.1, p.GetLineWidth() if by_line else p.GetEdgeWidth())
     return out
 
 
-def matrix_of(prop):
-    m = prop.GetMatrix()
-    return np.array([[m.GetElement(i, j) for j in range(4)] for i in range(4)])
-
-
 class Extractor:
-    """Keeps the filters that turn grids into surfaces."""
+    """Gives props to the bridge, and keeps what was made for them from frame to frame."""
 
-    def __init__(self):
-        self._filters = {}
+    def __init__(self, bridge):
+        self._bridge = bridge
+        # Filters that turn grids into surfaces, by mapper; properties by theirs.
+        self._filters, self._properties = {}, {}
+        # Surfaces of plain actors, with the times of what they are made from, by actor.
+        self._plain = {}
+        self._shapes, self._textures, self._glyphs, self._volumes = Shapes(), arrays.Textures(), Glyphs(), Volumes()
+        self._radii = 0.0, 0.0
+        self._used = set()
 
-    def add(self, bridge, prop, name, renderer):
-        """Gives a prop to the bridge, or raises `Untraceable`. Returns whether anything of it is traced."""
+    def begin_frame(self):
+        self._radii = self._bridge.option("RTV_POINT_RADIUS"), self._bridge.option("RTV_LINE_RADIUS")
+        self._used = set()
+
+    def end_frame(self, rendered):
+        """Forgets what was not used. `rendered`: the bridge was asked for a picture of these props."""
+        for kept in (self._filters, self._properties, self._plain):
+            for address in kept.keys() - self._used:
+                del kept[address]
+        for kept in (self._textures, self._glyphs, self._volumes):
+            kept.end_frame()
+        if rendered:
+            self._shapes.frame_drawn()
+        else:
+            self._shapes.frame_not_drawn()
+
+    def add(self, renderer, prop, name):
+        """Gives a prop to the bridge, or raises `Untraceable`."""
         if isinstance(prop, vtkVolume):
-            reason = volumes.add(bridge, prop, renderer, name)
+            reason = self._volumes.add(self._bridge, prop, renderer, name)
             if reason:
-                bridge.warn(f"{name}: {reason}; OpenGL draws it")
+                self._bridge.warn(f"{name}: {reason}; OpenGL draws it")
                 raise Untraceable(reason)
-            return True
+            return
         if not isinstance(prop, vtkActor) or prop.GetMapper() is None:
             raise Untraceable("OpenGL draws props of this class")
-        radii = bridge.option("RTV_POINT_RADIUS"), bridge.option("RTV_LINE_RADIUS")
         mapper = prop.GetMapper()
-        self._check(prop, mapper, *radii)
-        if not mapper.GetStatic() and mapper.GetNumberOfInputConnections(0) > 0:
+        if self._add_again(prop, mapper, name):
+            return
+        check_actor(prop, mapper, *self._radii)
+        connected = mapper.GetNumberOfInputConnections(0) > 0
+        if connected and not mapper.GetStatic():
             mapper.Update()
-        data = mapper.GetInputDataObject(0, 0) if mapper.GetNumberOfInputConnections(0) > 0 else None
+        data = mapper.GetInputDataObject(0, 0) if connected else None
         if data is None:
             raise Untraceable("no data")
+        if isinstance(mapper, vtkGlyph3DMapper):
+            return self._add_glyphs(prop, mapper, data, name)
         if data.IsA("vtkDataSet") and not isinstance(data, vtkPolyData):
-            kept = self._filters.setdefault(mapper, vtkDataSetSurfaceFilter())
-            kept.SetInputData(data)
-            kept.Update()
-            data = kept.GetOutput()
+            data = self._surface_of(mapper, data)
         attributes = mapper.GetCompositeDataDisplayAttributes() if hasattr(mapper, "GetCompositeDataDisplayAttributes") else None
-        blocks = list(_leaves(data, attributes, dict(opacity=prop.GetProperty().GetOpacity(), color=None, visible=True), ""))
+        start = dict(opacity=prop.GetProperty().GetOpacity(), color=None, visible=True)
+        representation = prop.GetProperty().GetRepresentation()
+        blocks = list(_leaves(data, attributes, start, ""))
         for block, _, _ in blocks:
-            _check_cells(block, prop.GetProperty().GetRepresentation(), *radii)
-        return any([_surface(bridge, prop, mapper, *b, name, *radii) for b in blocks])
+            check_cells(block, representation, *self._radii)
+        for block, state, block_name in blocks:
+            alone = data is block and not attributes
+            if block.GetNumberOfPoints() > 0 and (block.GetNumberOfCells() > 0 or representation == POINTS):
+                self._add_block(prop, mapper, block, state, f"{name}, block {block_name}" if block_name else name, alone)
 
-    @staticmethod
-    def _check(actor, mapper, point_radius, line_radius):
+    def _add_again(self, actor, mapper, name):
+        """Gives what was given in the frame before when nothing but the actor's place may have changed. False when more did."""
+        kept = self._plain.get(actor.__this__)
+        if kept is None:
+            return False
+        if not mapper.GetStatic():
+            mapper.Update()
+        seen, s, _ = kept
+        known = s.color_key == 0 or self._bridge.has_colors(s.shape_key, s.color_key)
+        if seen != self._times(actor, mapper, mapper.GetInputDataObject(0, 0)) or not known or not self._shapes.again(s.shape_key):
+            del self._plain[actor.__this__]
+            return False
+        self._used.update((actor.__this__, actor.GetProperty().__this__))
+        s.name = name.encode()
+        s.world_from_data[:] = actor.GetMatrix().GetData()
+        self._bridge.surface(C.byref(s))
+        return True
+
+    def _times(self, actor, mapper, data):
+        """Changes when anything does that a surface is made from; `None` for actors for which that is not known."""
+        if data is None or actor.GetTexture() is not None or actor.GetBackfaceProperty() is not None:
+            return None
+        parts = mapper, data, actor.GetProperty(), actor.GetShaderProperty()
+        return self._radii, *((part.__this__, part.GetMTime()) for part in parts)
+
+    def _surface_of(self, mapper, data):
+        """The surface of a data set that is not polygons, made with the filter kept for its mapper."""
+        self._used.add(mapper.__this__)
+        kept = self._filters.setdefault(mapper.__this__, vtkDataSetSurfaceFilter())
+        # The input of a pipeline would be updated twice; the data themselves know when they changed.
+        kept.SetInputData(data)
+        kept.Update()
+        return kept.GetOutput()
+
+    def _start(self, actor, name):
+        """A surface with everything that its actor says, and its matrix."""
+        s = rtv.Surface()
+        s.name = name.encode()
         p = actor.GetProperty()
-        # Subclasses in Python have their own names; what counts is VTK's class below them.
-        if not ACTORS & {c.__name__ for c in type(actor).__mro__[:3]}:
-            raise Untraceable("OpenGL draws props of this class")
-        if p.GetRepresentation() == WIREFRAME and line_radius <= 0:
-            raise Untraceable("wireframe (set RTV_LINE_RADIUS to trace edges as tubes)")
-        if p.GetRepresentation() == POINTS and point_radius <= 0:
-            raise Untraceable("points (set RTV_POINT_RADIUS to trace them as spheres)")
-        if p.GetRepresentation() == SURFACE and p.GetEdgeVisibility():
-            if p.GetRenderLinesAsTubes() or getattr(p, "GetEdgeOpacity", lambda: 1.0)() < 1.0 or getattr(p, "GetUseLineWidthForEdgeThickness", lambda: True)() is False:
-                raise Untraceable("edges as tubes, translucent edges or edges of a width of their own")
-            if actor.HasTranslucentPolygonalGeometry() or (mapper.GetClippingPlanes() and mapper.GetClippingPlanes().GetNumberOfItems()):
-                raise Untraceable("edges on a translucent or clipped surface")
-        if p.GetRepresentation() == SURFACE and p.GetVertexVisibility():
-            raise Untraceable("vertices on the surface")
-        if actor.GetBackfaceProperty() is not None:
-            raise Untraceable("backs with a property of their own")
-        if p.GetNumberOfTextures() > 0:
-            raise Untraceable("textures of the property (albedo, material, normal)")
-        shader = actor.GetShaderProperty()
-        if shader.HasFragmentShaderCode() or shader.HasVertexShaderCode() or shader.GetNumberOfShaderReplacements() > 0:
-            raise Untraceable("shader code of its own")
-        if actor.GetTexture() is not None:
-            reason = arrays.why_not_texture(actor.GetTexture())
-            if reason:
-                raise Untraceable(reason)
-            if mapper.GetScalarVisibility() and mapper.GetInput() is not None and mapper.MapScalars(1.0) is not None:
+        self._used.add(p.__this__)
+        time, found = self._properties.get(p.__this__, (None, None))
+        if time != p.GetMTime():
+            found = _property(p)
+            self._properties[p.__this__] = p.GetMTime(), found
+        s.property = found
+        matrix = actor.GetMatrix().GetData()
+        s.world_from_data[:] = matrix
+        return s, matrix
+
+    def _add_glyphs(self, actor, mapper, data, name):
+        sources = sources_of(mapper, data)
+        leaves = leaves_of(mapper, data)
+        copies = [c for leaf in leaves for c in self._glyphs.of(mapper, leaf, len(sources))]
+        for which, matrices, rgba in copies:
+            s, _ = self._start(actor, f"{name}, source {which}" if len(sources) > 1 else name)
+            keep = []
+            self._shapes.add(s, sources[which], False, None, keep)
+            s.glyph_matrices = rtv.Array(matrices.ctypes.data, len(matrices), 16, rtv.F64)
+            if rgba is not None:
+                s.glyph_colors = rtv.Array.of(rgba)
+            self._bridge.surface(C.byref(s))
+
+    def _add_block(self, actor, mapper, data, state, name, alone):
+        representation = actor.GetProperty().GetRepresentation()
+        keep = []
+        s, matrix = self._start(actor, name)
+        s.property.opacity = state["opacity"]
+        if state["color"]:
+            s.property.ambient_color[:] = s.property.diffuse_color[:] = state["color"]
+        back = actor.GetBackfaceProperty()
+        if back is not None:
+            _add_back(s, _property(back))
+        s.point_radius, s.line_radius = self._radii
+        s.edges_only = representation == WIREFRAME
+        planes = _planes(mapper, matrix)
+        cell_map = self._shapes.add(s, data, representation == POINTS, planes, keep)
+        if not state["color"]:
+            arrays.add_colors(self._bridge, s, mapper, data, cell_map, keep)
+        if s.color_source != rtv.COLOR_PROPERTY:
+            # Colours of points and cells show on both sides.
+            s.has_back = 0
+        if cell_map is not None and s.property.edge_width > 0:
+            raise Untraceable("edges of polygons that are not convex")
+        texture = actor.GetTexture()
+        if actor.GetProperty().GetNumberOfTextures() > 0:
+            texture = actor.GetProperty().GetTexture("albedoTex")
+            # Its alpha takes the place of the opacity.
+            s.property.opacity = 1.0
+        if texture is not None:
+            if s.has_back:
+                raise Untraceable("a texture on a surface whose backs have a property of their own")
+            if s.color_source != rtv.COLOR_PROPERTY:
                 raise Untraceable("it has a texture and colours")
-        if not MAPPERS & {c.__name__ for c in type(mapper).__mro__[:2]}:
-            raise Untraceable("OpenGL draws mappers of this class")
+            self._textures.add(s, texture, data.GetPointData().GetTCoords())
+        self._bridge.surface(C.byref(s))
+        arrays_given = s.colors.kind or any(cells.offsets.kind for cells in (s.verts, s.lines, s.polys, s.strips))
+        if alone and planes is None and texture is None and back is None and not arrays_given and mapper.GetInputDataObject(0, 0) is data:
+            self._used.add(actor.__this__)
+            self._plain[actor.__this__] = self._times(actor, mapper, data), s, keep
+
+
+def _add_back(surface, own):
+    """The back has the shading model of the front."""
+    surface.has_back, surface.back = 1, surface.property
+    for name in ("ambient_color", "diffuse_color", "specular_color"):
+        getattr(surface.back, name)[:] = getattr(own, name)[:]
+    for name in ("ambient", "diffuse", "specular", "specular_power"):
+        setattr(surface.back, name, getattr(own, name))
+    surface.back.opacity = 1.0
+
+
+def _planes(mapper, matrix):
+    """Clipping planes in the coordinates of the data, or `None`."""
+    planes = mapper.GetClippingPlanes()
+    if not planes or not planes.GetNumberOfItems():
+        return None
+    # A plane with normal n through o keeps n (M x - o) >= 0.
+    world = [[*p.GetNormal(), -np.dot(p.GetNormal(), p.GetOrigin())] for p in (planes.GetItem(i) for i in range(planes.GetNumberOfItems()))]
+    return np.ascontiguousarray(np.array(world) @ np.array(matrix).reshape(4, 4))
 
 
 def _leaves(data, attributes, state, name):
@@ -135,43 +245,3 @@ def _leaves(data, attributes, state, name):
         raise Untraceable("its data are not polygons")
     for i, child in enumerate(children):
         yield from _leaves(child, attributes, state, f"{name}/{i}" if name else str(i))
-
-
-def _check_cells(data, representation, point_radius, line_radius):
-    if representation != SURFACE:
-        return
-    if data.GetNumberOfVerts() > 0 and point_radius <= 0:
-        raise Untraceable("it has vertices (set RTV_POINT_RADIUS to trace them as spheres)")
-    if data.GetNumberOfLines() > 0 and line_radius <= 0:
-        raise Untraceable("it has lines (set RTV_LINE_RADIUS to trace them as tubes)")
-
-
-def _surface(bridge, actor, mapper, data, state, block, name, point_radius, line_radius):
-    representation = actor.GetProperty().GetRepresentation()
-    cells = data.GetNumberOfCells()
-    if data.GetNumberOfPoints() == 0 or (cells == 0 and representation != POINTS):
-        return False
-    keep = []
-    s = rtv.Surface()
-    s.name = (f"{name}, block {block}" if block else name).encode()
-    s.property = _property(actor.GetProperty())
-    s.property.opacity = state["opacity"]
-    if state["color"]:
-        s.property.ambient_color[:] = s.property.diffuse_color[:] = state["color"]
-    matrix = matrix_of(actor)
-    s.world_from_data[:] = matrix.ravel().tolist()
-    s.point_radius, s.line_radius, s.edges_only = point_radius, line_radius, representation == WIREFRAME
-    arrays.add_shape(s, data, representation == POINTS, keep)
-    planes = mapper.GetClippingPlanes()
-    if planes and planes.GetNumberOfItems():
-        # A plane with normal n through o keeps n (M x - o) >= 0.
-        world = [[*p.GetNormal(), -np.dot(p.GetNormal(), p.GetOrigin())] for p in (planes.GetItem(i) for i in range(planes.GetNumberOfItems()))]
-        local = np.ascontiguousarray(np.array(world) @ matrix)
-        keep.append(local)
-        s.clip_planes = rtv.Array.of(local)
-        s.shape_key = arrays.key_of(s.shape_key, *local.ravel().tolist())
-    if not state["color"]:
-        arrays.add_colors(bridge, s, mapper, data, keep)
-    if actor.GetTexture() is not None:
-        arrays.add_texture(s, actor.GetTexture(), keep)
-    return bridge.surface(C.byref(s)) > 0

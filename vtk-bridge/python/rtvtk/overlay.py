@@ -5,26 +5,22 @@ from vtkmodules.vtkCommonCore import vtkFloatArray, vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkImageData, vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkTexture
 
-# Depth travels as 24-bit whole numbers in three bytes: VTK keeps textures of floats in half precision, which is no depth.
-_STEPS = 16777215
+
+def _depth(name, texture):
+    # VTK keeps textures of floats in half precision, which is no depth: the four bytes of each float travel as a colour, and the number is put
+    # together again. All steps are exact, and OpenGL 3.2 has them.
+    return (f"uvec4 {name}B = uvec4(texture({texture}, uv) * 255.0 + 0.5); uint {name}E = ({name}B.a & 127u) << 1 | {name}B.b >> 7; "
+            f"float {name} = {name}E < 97u ? 0.0 : float(8388608u | ({name}B.b & 127u) << 16 | {name}B.g << 8 | {name}B.r) / 8388608.0"
+            f" / float(1u << (127u - min({name}E, 127u))); ")
 
 
-def _depth(texture):
-    return f"dot(floor(texture({texture}, uv).rgb * 255.0 + 0.5), vec3(65536.0, 256.0, 1.0)) / {_STEPS}.0"
-
-
-def _packed(depth):
-    whole = np.rint(depth[..., 0].astype(np.float64).clip(0, 1) * _STEPS).astype(np.uint32)
-    return np.stack([whole >> 16, whole >> 8 & 255, whole & 255], -1).astype(np.uint8)
-
-
-# What both rectangles begin with; texel centres lie on pixel centres.
-_FETCH = "vec2 uv = tcoordVCVSOutput; vec4 c = texture(rtvColor, uv); float d = " + _depth("rtvDepth") + "; if (c.a <= 0.0) discard;"
-_OPAQUE = _FETCH + " gl_FragData[0] = c; gl_FragDepth = d;"
+# What all rectangles begin with; texel centres lie on pixel centres.
+_FETCH = "vec2 uv = tcoordVCVSOutput; vec4 c = texture(rtvColor, uv); if (c.a <= 0.0) discard; " + _depth("d", "rtvDepth")
+_OPAQUE = _FETCH + "gl_FragData[0] = c; gl_FragDepth = d;"
 # Pixels with an opaque surface somewhere: what is in front of it is in the colour.
-_COVERED = _FETCH + " if (d >= 1.0) discard; gl_FragData[0] = vec4(c.rgb, 1.0); gl_FragDepth = d;"
+_COVERED = _FETCH + "if (d >= 1.0) discard; gl_FragData[0] = vec4(c.rgb, 1.0); gl_FragDepth = d;"
 # Pixels with translucent surfaces only, blended by VTK with colours that are not premultiplied.
-_THROUGH = _FETCH + " if (d < 1.0) discard; gl_FragData[0] = vec4(c.rgb / c.a, c.a); gl_FragDepth = " + _depth("rtvFirst") + ";"
+_THROUGH = _FETCH + "if (d < 1.0) discard; " + _depth("f", "rtvFirst") + "gl_FragData[0] = vec4(c.rgb / c.a, c.a); gl_FragDepth = f;"
 
 
 def _rectangle():
@@ -33,7 +29,8 @@ def _rectangle():
     cell.InsertNextCell(4)
     for i, (x, y) in enumerate([(0, 0), (1, 0), (1, 1), (0, 1)]):
         points.InsertNextPoint(2 * x - 1, 2 * y - 1, 0)
-        coordinates.InsertNextTuple2(x, y)
+        # Rows of the picture come from the top, those of textures from the bottom.
+        coordinates.InsertNextTuple2(x, 1 - y)
         cell.InsertCellPoint(i)
     data = vtkPolyData()
     data.SetPoints(points)
@@ -74,33 +71,51 @@ class _Layer:
 
     def upload(self, **planes):
         for name, plane in planes.items():
-            height, width = plane.shape[:2]
-            # Rows of the picture come from the top, those of textures from the bottom.
-            values = np.ascontiguousarray(plane[::-1]).reshape(width * height, -1)
+            height, width, components = plane.shape
             image = self.images[name]
             image.SetDimensions(width, height, 1)
-            image.GetPointData().SetScalars(numpy_to_vtk(values, deep=True))
+            # The library's own memory, which lives until it draws again; OpenGL copies it before.
+            image.GetPointData().SetScalars(numpy_to_vtk(plane.reshape(width * height, components)))
             image.Modified()
+
+    def stand(self, place, size):
+        """Its shader does not use its place, but VTK leaves out what lies outside the view."""
+        self.actor.SetPosition(place)
+        self.actor.SetScale(size)
 
 
 class Overlay:
+    """The rectangles of a renderer; made when they are needed."""
+
     def __init__(self):
-        self._opaque = _Layer(_OPAQUE, ["rtvColor", "rtvDepth"], False)
-        self._covered = _Layer(_COVERED, ["rtvColor", "rtvDepth"], False)
-        self._through = _Layer(_THROUGH, ["rtvColor", "rtvDepth", "rtvFirst"], True)
+        self._layers = {}
 
-    def actors(self, picture):
+    def _layer(self, shader, names, translucent=False):
+        if shader not in self._layers:
+            self._layers[shader] = _Layer(shader, names, translucent)
+        return self._layers[shader]
+
+    def actors(self, picture, camera):
         """The rectangles that show a picture of the library's."""
-        shape = (picture.height, picture.width)
+        shape = (picture.height, picture.width, 4)
 
-        def plane(pointer, components=1):
-            a = np.ctypeslib.as_array(pointer, (shape[0] * shape[1] * components,))
-            return a.reshape(*shape, components)
+        def plane(pointer, bytes_per_pixel):
+            # Four bytes, or four floats.
+            flat = np.ctypeslib.as_array(pointer, (shape[0] * shape[1] * bytes_per_pixel // 4,))
+            return (flat.view(np.uint8) if bytes_per_pixel == 4 else flat).reshape(shape)
 
-        if not picture.blended:
-            self._opaque.upload(rtvColor=plane(picture.opaque, 4), rtvDepth=_packed(plane(picture.depth)))
-            return [self._opaque.actor]
-        color, depth = plane(picture.blended, 4), _packed(plane(picture.depth))
-        self._covered.upload(rtvColor=color, rtvDepth=depth)
-        self._through.upload(rtvColor=color, rtvDepth=depth, rtvFirst=_packed(plane(picture.first_depth)))
-        return [self._covered.actor, self._through.actor]
+        if picture.opaque:
+            opaque = np.ctypeslib.as_array(picture.opaque, shape)
+            shown = [self._layer(_OPAQUE, ["rtvColor", "rtvDepth"])]
+            shown[0].upload(rtvColor=opaque, rtvDepth=plane(picture.depth, 4))
+        else:
+            color, depth = plane(picture.blended, 16), plane(picture.depth, 4)
+            covered, through = self._layer(_COVERED, ["rtvColor", "rtvDepth"]), self._layer(_THROUGH, ["rtvColor", "rtvDepth", "rtvFirst"], True)
+            covered.upload(rtvColor=color, rtvDepth=depth)
+            through.upload(rtvColor=color, rtvDepth=depth, rtvFirst=plane(picture.first_depth, 4))
+            shown = [covered, through]
+        near, far = camera.GetClippingRange()
+        middle = [p + 0.5 * (near + far) * d for p, d in zip(camera.GetPosition(), camera.GetDirectionOfProjection())]
+        for layer in shown:
+            layer.stand(middle, 10 * (abs(near) + abs(far)))
+        return [layer.actor for layer in shown]

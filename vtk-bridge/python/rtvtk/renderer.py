@@ -7,36 +7,98 @@ while a selector is at work nothing is touched.
 import ctypes as C
 
 import vtkmodules.vtkRenderingOpenGL2 as gl
+from vtkmodules.vtkCommonCore import vtkWeakReference
 
 from . import library as rtv
-from .extract import Extractor, Untraceable
+from .extract import Extractor
 from .overlay import Overlay
-from .view import add_lights, view_of
+from .view import add_lights, prepare_lights, size_of, view_of
+from .why import Untraceable
+
+
+class _Watched:
+    """What was attached to VTK objects, by address: VTK makes a new Python object for a renderer whenever the last one is gone, but only one
+    renderer. Events tell when it goes, if nobody removed all observers (PyVista does): so each is asked whether it is there and still watched."""
+
+    def __init__(self):
+        self._entries = {}
+
+    @staticmethod
+    def _address(thing):
+        return thing.__this__.split("_")[1]
+
+    def get(self, thing):
+        entry = self._entries.get(self._address(thing))
+        if entry is None:
+            return None
+        weak, tag, command, value = entry
+        found = thing.GetCommand(tag) if weak.Get() is not None else None
+        return value if found is not None and found.__this__ == command.__this__ else None
+
+    def add(self, thing, observe, value):
+        for address in [a for a, entry in self._entries.items() if entry[0].Get() is None]:
+            del self._entries[address]
+        address, weak = self._address(thing), vtkWeakReference()
+        weak.Set(thing)
+        tag = thing.AddObserver("StartEvent", observe)
+        self._entries[address] = weak, tag, thing.GetCommand(tag), value
+        # Events of objects that are going come without the object.
+        thing.AddObserver("DeleteEvent", lambda *_: self._entries.pop(address, None))
+
+
+_renderers, _windows = _Watched(), _Watched()
 
 
 class _Tracer:
     def __init__(self):
         self.bridge = rtv.Bridge()
-        self.extractor = Extractor()
-        self.overlay = None
-        self.hidden, self.shown, self.peeling = [], [], None
+        self.extractor = Extractor(self.bridge)
+        self.overlay = Overlay()
+        self.hidden, self.shown, self.switched = [], [], []
+        # How many props more than OpenGL knows of were drawn.
+        self.uncounted = 0
+        self.failed = False
 
     def start(self, renderer, _event):
         self.end(renderer, None)
+        self.uncounted = 0
+        if self.failed:
+            return
+        try:
+            self._trace(renderer)
+        except Exception as error:
+            # We are a guest in somebody's program: OpenGL draws everything, as without us.
+            self.end(renderer, None)
+            self.failed = True
+            self.bridge.warn(f"internal error, OpenGL draws from now on; please report it: {type(error).__name__}: {error}")
+            self.bridge.end()
+
+    def _trace(self, renderer):
         if renderer.GetSelector() is not None or renderer.GetUseHiddenLineRemoval() or renderer.GetRenderWindow() is None:
             return
-        width, height = renderer.GetSize()
+        width, height = size_of(renderer)
         props = renderer.GetViewProps()
         visible = [p for p in (props.GetItemAsObject(i) for i in range(props.GetNumberOfItems())) if p.GetVisibility()]
         if width < 1 or height < 1 or not visible or not self.bridge.begin():
             return
+        # Passes read props, depths and normals on their own; this one only draws larger.
+        render_pass = renderer.GetPass()
+        if render_pass is not None and render_pass.GetClassName() != "vtkSSAAPass":
+            reason = f"a render pass draws this renderer ({render_pass.GetClassName()})"
+            self.bridge.warn(f"nothing is ray traced: {reason}; take it out, and ask for RTV_SHADOWS or RTV_AO instead")
+            for i, prop in enumerate(visible):
+                self.bridge.pass_on(f"{prop.GetClassName()} {i}", reason)
+            self.bridge.end()
+            return
         # Both are made on first use, from what is visible: before anything is hidden.
-        renderer.GetActiveCamera()
+        camera = renderer.GetActiveCamera()
+        prepare_lights(renderer)
+        self.extractor.begin_frame()
         traced = []
         for i, prop in enumerate(visible):
             name = f"{prop.GetClassName()} {i}"
             try:
-                self.extractor.add(self.bridge, prop, name, renderer)
+                self.extractor.add(renderer, prop, name)
                 traced.append(prop)
             except Untraceable as reason:
                 self.bridge.pass_on(name, str(reason))
@@ -44,20 +106,24 @@ class _Tracer:
         drawn = False
         if traced:
             add_lights(self.bridge, renderer)
+            if renderer.GetUseSSAO():
+                self.bridge.warn("SSAO does not see what is ray traced; use RTV_AO for ambient occlusion")
             view = view_of(renderer, width, height)
             drawn = bool(self.bridge.render(C.byref(view), C.byref(picture)))
+        self.extractor.end_frame(bool(traced))
         if drawn:
-            self.overlay = self.overlay or Overlay()
-            self.shown = self.overlay.actors(picture)
+            self.shown = self.overlay.actors(picture, camera)
             self.hidden = traced
+            self.uncounted = len(traced) - len(self.shown)
             for prop in traced:
                 prop.VisibilityOff()
             for actor in self.shown:
                 renderer.AddActor(actor)
-            if len(self.shown) > 1 and renderer.GetUseDepthPeeling():
-                # The traced picture has its layers in order already.
-                self.peeling = renderer
-                renderer.UseDepthPeelingOff()
+            # OpenGL's shadows and occlusion would see the rectangles. The traced picture has its translucent layers in order already.
+            for name in ("UseShadows", "UseSSAO", *(["UseDepthPeeling"] if len(self.shown) > 1 else [])):
+                if getattr(renderer, f"Get{name}")():
+                    self.switched.append(name)
+                    getattr(renderer, f"Set{name}")(False)
         self.bridge.end()
 
     def end(self, renderer, _event):
@@ -65,13 +131,32 @@ class _Tracer:
             prop.VisibilityOn()
         for actor in self.shown:
             renderer.RemoveActor(actor)
-        if self.peeling is not None:
-            renderer.UseDepthPeelingOn()
-        self.hidden, self.shown, self.peeling = [], [], None
+        for name in self.switched:
+            getattr(renderer, f"Set{name}")(True)
+        self.hidden, self.shown, self.switched = [], [], []
+
+
+def attach(renderer):
+    """Makes a renderer trace, unless it does already."""
+    if renderer.IsA("vtkOpenGLRenderer") and _renderers.get(renderer) is None:
+        tracer = _Tracer()
+        _renderers.add(renderer, tracer.start, tracer)
+        renderer.AddObserver("EndEvent", tracer.end)
+
+
+def _attach_all(window, _event):
+    renderers = window.GetRenderers()
+    for i in range(renderers.GetNumberOfItems()):
+        attach(renderers.GetItemAsObject(i))
+
+
+def _watch(window):
+    if _windows.get(window) is None:
+        _windows.add(window, _attach_all, window.GetClassName())
 
 
 def install():
-    """From now on every `vtkRenderer()` traces. Raises `RtvError` when the library cannot be loaded."""
+    """From now on every renderer traces. Raises `RtvError` when the library cannot be loaded."""
     if hasattr(gl, "_rtvtk_renderer"):
         return
     rtv.Bridge()
@@ -79,8 +164,18 @@ def install():
     @gl.vtkOpenGLRenderer.override
     class RtvRenderer(gl.vtkOpenGLRenderer):
         def __init__(self):
-            self._rtv = _Tracer()
-            self.AddObserver("StartEvent", self._rtv.start)
-            self.AddObserver("EndEvent", self._rtv.end)
+            attach(self)
+
+        def GetNumberOfPropsRendered(self):
+            tracer = _renderers.get(self)
+            return super().GetNumberOfPropsRendered() + (tracer.uncounted if tracer else 0)
+
+        number_of_props_rendered = property(GetNumberOfPropsRendered)
 
     gl._rtvtk_renderer = RtvRenderer
+
+    # Renderers of classes that programs derive in Python (PyVista's) are found when their window begins to draw.
+    for name in ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow", "vtkXOpenGLRenderWindow", "vtkWin32OpenGLRenderWindow", "vtkCocoaRenderWindow"):
+        plain = getattr(gl, name, None)
+        if plain is not None:
+            plain.override(type(f"Rtv{name[3:]}", (plain,), {"__init__": _watch}))

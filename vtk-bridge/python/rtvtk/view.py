@@ -1,15 +1,20 @@
 """Lights and camera."""
 import ctypes as C
 
+from vtkmodules.vtkCommonMath import vtkMatrix4x4
+
 from . import library as rtv
+
+
+def prepare_lights(renderer):
+    """What the renderer would do a moment later."""
+    if renderer.GetLights().GetNumberOfItems() == 0 and renderer.GetAutomaticLightCreation():
+        renderer.CreateLight()
+    renderer.UpdateLightsGeometryToFollowCamera()
 
 
 def add_lights(bridge, renderer):
     lights = renderer.GetLights()
-    if lights.GetNumberOfItems() == 0 and renderer.GetAutomaticLightCreation():
-        # The renderer would do it a moment later.
-        renderer.CreateLight()
-    renderer.UpdateLightsGeometryToFollowCamera()
     for i in range(lights.GetNumberOfItems()):
         light = lights.GetItemAsObject(i)
         if not light.GetSwitch():
@@ -26,16 +31,31 @@ def add_lights(bridge, renderer):
         bridge.light(C.byref(out))
 
 
+def size_of(renderer):
+    """Pixels of the viewport; of its part in this tile, when a large picture is made of tiles (the call for it needs C pointers)."""
+    window = renderer.GetRenderWindow()
+    viewport, tile = renderer.GetViewport(), window.GetTileViewport()
+
+    def pixels(i, whole):
+        low, high = max(viewport[i], tile[i]) - tile[i], min(viewport[i + 2], tile[i + 2]) - tile[i]
+        return int(high * whole + 0.5) - int(low * whole + 0.5)
+
+    return tuple(pixels(i, whole) for i, whole in enumerate(window.GetSize()))
+
+
 def view_of(renderer, width, height):
     out = rtv.View()
     camera = renderer.GetActiveCamera()
-    # Everything is in it: window centre, explicit projections, tiles. Depth from -1 to 1, as OpenGL has it.
-    m = camera.GetCompositeProjectionTransformMatrix(renderer.GetTiledAspectRatio(), -1.0, 1.0)
-    out.clip_from_world[:] = [m.GetElement(i, j) for i in range(4) for j in range(4)]
+    # Everything is in them: window centre, explicit projections, tiles, the eye of a stereo pair. Depth from -1 to 1, as OpenGL has it.
+    matrix = vtkMatrix4x4()
+    projection = camera.GetProjectionTransformMatrix(renderer.GetTiledAspectRatio(), -1.0, 1.0)
+    vtkMatrix4x4.Multiply4x4(projection, camera.GetModelViewTransformMatrix(), matrix)
+    out.clip_from_world[:] = matrix.GetData()
     out.background_bottom[:] = renderer.GetBackground()
     out.background_top[:] = renderer.GetBackground2() if renderer.GetGradientBackground() else renderer.GetBackground()
     out.focus_distance = camera.GetDistance()
     out.width, out.height = width, height
+    # While the mouse turns the scene, interactors ask for several frames a second; still pictures for far less than one.
     out.interactive = renderer.GetRenderWindow().GetDesiredUpdateRate() > 1.0
     out.shadows = bool(renderer.GetUseShadows())
     return out

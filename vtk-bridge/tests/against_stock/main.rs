@@ -1,6 +1,6 @@
 //! The bridge in real programs: stock pictures against ours, picks, ranks, effects, the plugin, memory.
 //!
-//! Needs Debian's VTK 9.1 and ParaView 5.11, Xvfb and a C++ compiler (`cargo xtask test` installs them). What is missing makes its tests
+//! Needs Debian's VTK 9.1 and ParaView 5.11, the wheel `vtk`, Xvfb and a C++ compiler (`cargo xtask test` installs them). What is missing makes its tests
 //! say so and pass, unless `RTSV_REQUIRE_PEERS` is set. The pictures stay in `target/tmp/pictures`.
 
 mod capture;
@@ -13,3 +13,4 @@ mod plugin;
 mod ranks;
 mod session;
 mod vtk;
+mod wheel;

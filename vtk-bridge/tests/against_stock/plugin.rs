@@ -113,7 +113,9 @@ fn options_go_back_and_views_do_not_share_them() {
 
 #[test]
 fn a_plugin_without_its_bridge_says_so_and_harms_nothing() {
-    if let Err(reason) = interpreter(Program::ParaView).and_then(|_| crate::peers::display().map(drop)) {
+    if let Err(reason) =
+        interpreter(Program::ParaView, With::Stock).and_then(|_| crate::peers::display().map(drop))
+    {
         return skip(&reason);
     }
     // The plugin alone in a folder: nothing it needs is above it.
@@ -121,7 +123,7 @@ fn a_plugin_without_its_bridge_says_so_and_harms_nothing() {
     std::fs::copy(plugin_folder().join("VtkBridge.so"), lonely.path().join("VtkBridge.so")).unwrap();
     let folder = output("plugin-alone");
     std::fs::create_dir_all(&folder).unwrap();
-    let line = format!("exec {} \"$@\"", interpreter(Program::ParaView).unwrap());
+    let line = format!("exec {} \"$@\"", interpreter(Program::ParaView, With::Stock).unwrap());
     let script = [scripts().join("run_all.py"), folder, scripts().join("paraview/views.py")];
     let launch = Launch::new(Program::ParaView, With::Stock, &line).unwrap().args(script);
     let out =

@@ -19,7 +19,7 @@ fn run(
     let line = format!(
         "exec '{}' --allow-run-as-root --oversubscribe -n {ranks} {} \"$@\"",
         mpirun.display(),
-        interpreter(Program::ParaView)?
+        interpreter(Program::ParaView, With::Stock)?
     );
     let mut launch = Launch::new(Program::ParaView, with, &line)?
         .args([scripts().join("ranks/surfaces.py"), folder.clone()])

@@ -14,6 +14,8 @@ pub(crate) enum Program {
     Vtk,
     /// Debian's ParaView 5.11, `pvbatch`.
     ParaView,
+    /// The `vtk` wheel of PyPI.
+    Wheel,
 }
 
 /// With us or without.
@@ -21,7 +23,7 @@ pub(crate) enum Program {
 pub(crate) enum With {
     /// As Debian ships it.
     Stock,
-    /// After `eval "$(vtk-bridge env ...)"`.
+    /// After `eval "$(vtk-bridge env ...)"`; for the wheel, started by `python -m rtvtk`.
     Bridge,
 }
 
@@ -59,7 +61,7 @@ impl Launch {
         let display = peers::display()?;
         let mut command = Command::new("timeout");
         let mut script = String::new();
-        if with == With::Bridge {
+        if with == With::Bridge && program != Program::Wheel {
             let which = if program == Program::Vtk { "--vtk" } else { "--paraview" };
             let tool = env!("CARGO_BIN_EXE_vtk-bridge");
             script = format!(
@@ -74,6 +76,13 @@ impl Launch {
             command.env_remove(name);
         }
         command.env_remove("VTK_AUTOLOAD_PATH").env_remove("PV_PLUGIN_PATH").env_remove("PYTHONPATH");
+        if program == Program::Wheel {
+            // Without a display it draws by EGL or OSMesa, as on a server.
+            let library =
+                std::env::current_exe().map_err(|e| e.to_string())?.with_file_name("libvtk_bridge.so");
+            let package = Path::new(env!("CARGO_MANIFEST_DIR")).join("python");
+            command.env_remove("DISPLAY").env("PYTHONPATH", package).env("RTVTK_LIBRARY", library);
+        }
         if program == Program::Vtk {
             let root = peers::vtk91()
                 .ok_or("Debian's VTK 9.1 was not found (set RTSV_VTK91 to where it is unpacked)")?;
@@ -122,8 +131,14 @@ impl Outcome {
 }
 
 /// The command line that runs Python scripts in `program`.
-pub(crate) fn interpreter(program: Program) -> Result<String, String> {
+pub(crate) fn interpreter(program: Program, with: With) -> Result<String, String> {
     match program {
+        Program::Wheel => {
+            let python = peers::find("RTSV_PYTHON", &[])
+                .ok_or("Python with the wheel `vtk` was not found (set RTSV_PYTHON)")?;
+            let module = if with == With::Bridge { " -m rtvtk" } else { "" };
+            Ok(format!("'{}'{module}", python.display()))
+        }
         // Debian's modules are for Debian's Python.
         Program::Vtk => Ok("/usr/bin/python3".to_owned()),
         Program::ParaView => {
@@ -154,7 +169,7 @@ impl Run {
     ) -> Result<Run, String> {
         let _ = std::fs::remove_dir_all(&folder);
         std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-        let line = format!("exec {} \"$@\"", interpreter(program)?);
+        let line = format!("exec {} \"$@\"", interpreter(program, with)?);
         let mut run = Run { folder, ..Run::default() };
         let mut left = scripts;
         while !left.is_empty() {

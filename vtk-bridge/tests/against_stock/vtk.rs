@@ -24,7 +24,7 @@ fn both() -> Option<&'static Both> {
 }
 
 /// Pictures that are held to other bars than the rest, or to none, and why.
-const EXCEPTIONS: &[(&str, &str, Option<Bars>, &str)] = &[
+pub(crate) const EXCEPTIONS: &[(&str, &str, Option<Bars>, &str)] = &[
     (
         "odd_inputs",
         "not_a_number",
@@ -82,7 +82,7 @@ const EXCEPTIONS: &[(&str, &str, Option<Bars>, &str)] = &[
 ];
 
 /// Pictures in which there is nothing to trace.
-const EMPTY: &[(&str, &str)] =
+pub(crate) const EMPTY: &[(&str, &str)] =
     &[("odd_inputs", "nothing"), ("windows", "no_renderer"), ("windows", "actor_gone")];
 
 fn same_as_stock(script: &str) {
@@ -127,6 +127,7 @@ scripts! {
     domains_of_any_size_and_place_show_the_same_picture_as_stock: "domains",
     edges_of_surfaces_are_as_in_stock_vtk: "edges",
     glyphs_are_as_in_stock_vtk: "glyphs",
+    glyphs_of_one_source_are_instances: "instances",
     lights_are_as_in_stock_vtk: "lights",
     five_hundred_actors_are_as_in_stock_vtk: "many_actors",
     blocks_have_their_own_color_opacity_and_visibility: "multiblock",

@@ -1,22 +1,22 @@
 //! What time it is for a rank.
 //!
 //! Under SMPI every look at the simulated clock hands the processor to other simulated ranks, whose work empties the caches: a
-//! program that measures itself would be slowed by that alone. There the clock is read where a call has just handed over anyway, and
-//! from then on the processor time of this rank counts, which is what SMPI itself will add.
+//! program that measures itself would be slowed by that alone. There the clock is read where a call has waited, and from then on the
+//! time that passes here counts, which is about what SMPI itself will add (it adds processor time, but to ask for that takes most of a
+//! microsecond, which would be added too). Calls that do not wait take no simulated time, but may hand over: what happened meanwhile is
+//! taken out. So right behind a wait or barrier the time is exact, and spans within a frame are as good as the machine is quiet.
 use super::abi::Abi;
 use super::library::Mpi;
-use rustix::time::{ClockId, clock_gettime};
 use std::cell::Cell;
+use std::time::Instant;
 
 pub(super) struct Clock {
-    /// Simulated seconds and the thread's processor seconds when both were read; unused outside SMPI.
+    begin: Instant,
+    /// Simulated seconds and this rank's own seconds when both were read; unused outside SMPI.
     anchor: Cell<Option<(f64, f64)>>,
+    /// Seconds that passed inside calls.
+    inside: Cell<f64>,
     simulated: bool,
-}
-
-fn processor_secs() -> f64 {
-    let time = clock_gettime(ClockId::ThreadCPUTime);
-    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
 fn library_secs(mpi: &Mpi) -> f64 {
@@ -26,22 +26,53 @@ fn library_secs(mpi: &Mpi) -> f64 {
 
 impl Clock {
     pub(super) fn new(abi: Abi) -> Self {
-        Self { anchor: Cell::new(None), simulated: abi == Abi::Smpi }
+        Self {
+            begin: Instant::now(),
+            anchor: Cell::new(None),
+            inside: Cell::new(0.0),
+            simulated: abi == Abi::Smpi,
+        }
+    }
+
+    fn here_secs(&self) -> f64 {
+        self.begin.elapsed().as_secs_f64()
     }
 
     /// Seconds since some moment in the past.
     pub(super) fn now(&self, mpi: &Mpi) -> f64 {
-        match self.anchor.get() {
-            Some((simulated, processor)) => simulated + (processor_secs() - processor),
-            None => library_secs(mpi),
+        if !self.simulated {
+            return library_secs(mpi);
         }
+        let (simulated, own) = self.anchor.get().unwrap_or_else(|| {
+            let anchor = (library_secs(mpi), self.own_secs());
+            self.anchor.set(Some(anchor));
+            anchor
+        });
+        simulated + (self.own_secs() - own)
     }
 
-    /// To be called after every call of the library that may have handed over.
-    pub(super) fn set(&self, mpi: &Mpi) {
-        if self.simulated {
-            let simulated = library_secs(mpi);
-            self.anchor.set(Some((simulated, processor_secs())));
+    /// As [`now`](Self::now), for spans in which nothing is waited for.
+    pub(super) fn working_secs(&self, mpi: &Mpi) -> f64 {
+        if self.simulated { self.own_secs() } else { library_secs(mpi) }
+    }
+
+    fn own_secs(&self) -> f64 {
+        self.here_secs() - self.inside.get()
+    }
+
+    /// Makes a call of the library that does not wait.
+    pub(super) fn around<T>(&self, call: impl FnOnce() -> T) -> T {
+        if !self.simulated {
+            return call();
         }
+        let begin = self.here_secs();
+        let result = call();
+        self.inside.set(self.inside.get() + self.here_secs() - begin);
+        result
+    }
+
+    /// To be called after every call of the library that may have waited.
+    pub(super) fn waited(&self) {
+        self.anchor.set(None);
     }
 }

@@ -60,6 +60,7 @@ functions! {
     wait: "MPI_Wait", fn(*mut Handle, *mut Status) -> c_int;
     test_any: "MPI_Testany", fn(c_int, *mut c_void, *mut c_int, *mut c_int, *mut Status) -> c_int;
     wait_any: "MPI_Waitany", fn(c_int, *mut c_void, *mut c_int, *mut Status) -> c_int;
+    test_some: "MPI_Testsome", fn(c_int, *mut c_void, *mut c_int, *mut c_int, *mut Status) -> c_int;
     iprobe: "MPI_Iprobe", fn(c_int, c_int, Handle, *mut c_int, *mut Status) -> c_int;
     get_count: "MPI_Get_count", fn(*const Status, Handle, *mut c_int) -> c_int;
     sendrecv: "MPI_Sendrecv", fn(*const c_void, c_int, Handle, c_int, c_int, *mut c_void, c_int, Handle, c_int, c_int, Handle, *mut Status) -> c_int;

@@ -21,7 +21,7 @@ pub use error::MpiError;
 pub use library::inspect;
 pub(crate) use library::{Handle, Mpi};
 
-use super::{Arrival, CommError, Communicator, Receive};
+use super::{Arrival, CommError, Communicator, Receive, collective};
 use clock::Clock;
 use notice::{Notice, Notices};
 use std::ffi::c_int;
@@ -38,8 +38,8 @@ const FUNNELED: c_int = 1;
 const LAST_MESSAGES: Duration = Duration::from_millis(200);
 /// How long a rank that leaves waits for its messages to be taken.
 const PARTING: Duration = Duration::from_secs(2);
-/// Messages on their way from which on a sender looks which of them have left.
-const REAP_AT: usize = 16;
+/// Messages on their way from which on a sender looks which of them have left, if it has not needed their buffers before.
+const REAP_AT: usize = 512;
 /// Polls before the processor is offered to others, where every rank has its own.
 const SPINS: u32 = 2000;
 /// Offers of the processor before a rank sleeps, where ranks share processors.
@@ -63,6 +63,8 @@ pub struct MpiComm {
     aborted: Option<(usize, String)>,
     /// Whether there are more ranks here than processors.
     oversubscribed: bool,
+    /// Whether all ranks are here, which all or none of them say.
+    one_node: bool,
     finalize: bool,
 }
 
@@ -148,6 +150,7 @@ impl MpiComm {
             left: vec![false; size],
             aborted: None,
             oversubscribed: here > processors,
+            one_node: here >= size && mpi.abi != Abi::Smpi,
             finalize: initialized == 0,
             mpi: Rc::new(mpi),
         })
@@ -240,24 +243,34 @@ impl Communicator for MpiComm {
         self.clock.now(&self.mpi)
     }
 
+    fn working_secs(&self) -> f64 {
+        self.clock.working_secs(&self.mpi)
+    }
+
+    fn is_one_node(&self) -> bool {
+        self.one_node
+    }
+
     fn send(&mut self, destination: usize, tag: u32, message: Vec<u8>) -> Result<(), CommError> {
         self.check_peer(destination)?;
         if self.left[destination] {
             return Err(CommError::PeerLost { rank: self.rank, peer: destination });
         }
-        self.transfers.send(&self.mpi, destination, tag, message)?;
-        // Asking costs as much as sending a small message, so not for every one.
-        if self.transfers.outgoing() >= REAP_AT {
-            self.transfers.reap(&self.mpi);
-        }
-        self.clock.set(&self.mpi);
-        Ok(())
+        let Self { transfers, mpi, clock, .. } = self;
+        clock.around(|| {
+            transfers.send(mpi, destination, tag, message)?;
+            // Asking costs as much as sending a small message, so not for every one.
+            if transfers.outgoing() >= REAP_AT {
+                transfers.reap(mpi);
+            }
+            Ok(())
+        })
     }
 
     fn post_recv(&mut self, source: usize, tag: u32, capacity: usize) -> Result<Receive, CommError> {
         self.check_peer(source)?;
-        let id = self.transfers.post(&self.mpi, source, tag, capacity)?;
-        self.clock.set(&self.mpi);
+        let Self { transfers, mpi, clock, .. } = self;
+        let id = clock.around(|| transfers.post(mpi, source, tag, capacity))?;
         Ok(Receive { id, source, tag, capacity })
     }
 
@@ -282,7 +295,7 @@ impl Communicator for MpiComm {
         }
         loop {
             let came = self.transfers.progress(&self.mpi, block)?;
-            self.clock.set(&self.mpi);
+            self.clock.waited();
             if came {
                 match self.complete(posted) {
                     Some(arrival) => return Ok(arrival),
@@ -326,8 +339,71 @@ impl Communicator for MpiComm {
         }
     }
 
+    fn barrier(&mut self, timeout: Duration) -> Result<(), CommError> {
+        if self.mpi.abi != Abi::Smpi {
+            return collective::barrier(self, timeout);
+        }
+        // SAFETY: a communicator of this object; every rank calls this.
+        let code = unsafe { (self.mpi.functions.barrier)(self.transfers.comm()) };
+        self.clock.waited();
+        if code == 0 { Ok(()) } else { Err(transfer::failed(&self.mpi, self.rank, "MPI_Barrier", code)) }
+    }
+
+    /// Simulated ranks block anyway, so there the library's own all-gather takes the place of ours, which has timeouts.
+    fn all_gather(
+        &mut self,
+        mine: &[u8],
+        longest: usize,
+        timeout: Duration,
+    ) -> Result<Vec<Vec<u8>>, CommError> {
+        let block = 8 + longest;
+        let bytes = c_int::try_from(block);
+        let (Abi::Smpi, Ok(bytes)) = (self.mpi.abi, bytes) else {
+            return collective::all_gather(self, mine, longest, timeout);
+        };
+        let too_long = |peer| CommError::TooLong {
+            rank: self.rank,
+            peer,
+            tag: collective::GATHER_TAG,
+            capacity: longest,
+        };
+        if mine.len() > longest {
+            return Err(too_long(self.rank));
+        }
+        let mut own = Vec::with_capacity(block);
+        own.extend_from_slice(&(mine.len() as u64).to_le_bytes());
+        own.extend_from_slice(mine);
+        own.resize(block, 0);
+        let mut all = vec![0_u8; block * self.size];
+        // SAFETY: every rank calls this with blocks of the same size, and `all` has room for one of each.
+        let code = unsafe {
+            (self.mpi.functions.allgather)(
+                own.as_ptr().cast(),
+                bytes,
+                self.mpi.byte,
+                all.as_mut_ptr().cast(),
+                bytes,
+                self.mpi.byte,
+                self.transfers.comm(),
+            )
+        };
+        self.clock.waited();
+        if code != 0 {
+            return Err(transfer::failed(&self.mpi, self.rank, "MPI_Allgather", code));
+        }
+        let blocks = all.chunks_exact(block).enumerate();
+        blocks
+            .map(|(peer, block)| {
+                collective::block_at(block, 0)
+                    .map(|(start, end)| block[start..end].to_vec())
+                    .ok_or_else(|| too_long(peer))
+            })
+            .collect()
+    }
+
     fn buffer(&mut self, capacity: usize) -> Vec<u8> {
-        self.transfers.pool.take(capacity)
+        let Self { transfers, mpi, clock, .. } = self;
+        clock.around(|| transfers.buffer(mpi, capacity))
     }
 
     fn recycle(&mut self, buffer: Vec<u8>) {

@@ -4,8 +4,10 @@
 //! empty. A message shorter than a chunk, which is nearly every one, is one MPI message.
 use super::library::{Handle, Mpi, Status};
 use crate::comm::{BufferPool, CommError};
-use std::collections::VecDeque;
 use std::ffi::c_int;
+
+/// Stands for a request that has been completed; no library has such a handle.
+const COMPLETE: Handle = Handle::MAX;
 
 /// A message that MPI may still be reading.
 struct Outgoing {
@@ -35,7 +37,7 @@ pub(super) struct Transfers {
     rank: usize,
     comm: Handle,
     chunk_bytes: usize,
-    outgoing: VecDeque<Outgoing>,
+    outgoing: Vec<Outgoing>,
     /// In the order of posting.
     incoming: Vec<Incoming>,
     next_id: u64,
@@ -53,7 +55,7 @@ impl Transfers {
             rank,
             comm,
             chunk_bytes,
-            outgoing: VecDeque::new(),
+            outgoing: Vec::new(),
             incoming: Vec::new(),
             next_id: 0,
             pool: BufferPool::default(),
@@ -61,6 +63,10 @@ impl Transfers {
             requests: Vec::new(),
             owners: Vec::new(),
         }
+    }
+
+    pub(super) fn comm(&self) -> Handle {
+        self.comm
     }
 
     pub(super) fn send(
@@ -99,25 +105,61 @@ impl Transfers {
                 break;
             }
         }
-        self.outgoing.push_back(Outgoing { requests, buffer: message });
+        self.outgoing.push(Outgoing { requests, buffer: message });
         result
     }
 
-    /// Takes back the buffers of messages that have left. Looks at the oldest only: they leave in about that order.
+    /// An empty buffer with room for `capacity` bytes: one given back, one of a message that has left meanwhile, or a new one.
+    pub(super) fn buffer(&mut self, mpi: &Mpi, capacity: usize) -> Vec<u8> {
+        if let Some(buffer) = self.pool.fitting(capacity) {
+            return buffer;
+        }
+        self.reap(mpi);
+        self.pool.take(capacity)
+    }
+
+    /// Takes back the buffers of messages that have left, in one call for all.
     pub(super) fn reap(&mut self, mpi: &Mpi) {
-        while let Some(oldest) = self.outgoing.front_mut() {
-            while let Some(request) = oldest.requests.last_mut() {
-                let mut flag: c_int = 0;
-                // SAFETY: a request of MPI_Isend that has not been completed.
-                let code =
-                    unsafe { (mpi.functions.test)(&raw mut *request, &raw mut flag, mpi.status_ignore()) };
-                if code != 0 || flag == 0 {
-                    return;
-                }
-                oldest.requests.pop();
+        let requests: Vec<Handle> =
+            self.outgoing.iter().flat_map(|message| message.requests.iter().copied()).collect();
+        if requests.is_empty() {
+            return;
+        }
+        let count = requests.len() as c_int;
+        let (mut wide, mut narrow) = (requests, Vec::<u32>::new());
+        let array = if mpi.constants.request_bytes == 4 {
+            narrow.extend(wide.iter().map(|&request| request as u32));
+            narrow.as_mut_ptr().cast()
+        } else {
+            wide.as_mut_ptr().cast()
+        };
+        let mut done: c_int = 0;
+        let mut indices = vec![0 as c_int; count as usize];
+        // SAFETY: `count` requests of MPI_Isend that have not been completed, in an array of the ABI's width, and room for as many
+        // indices; the value that ignores statuses is that of one status in every ABI.
+        let code = unsafe {
+            (mpi.functions.test_some)(count, array, &raw mut done, indices.as_mut_ptr(), mpi.status_ignore())
+        };
+        // Undefined, which is negative, if there was nothing to look at.
+        let done = usize::try_from(done).unwrap_or(0).min(indices.len());
+        if code != 0 || done == 0 {
+            return;
+        }
+        for &index in &indices[..done] {
+            if let Some(request) = usize::try_from(index).ok().and_then(|index| wide.get_mut(index)) {
+                *request = COMPLETE;
             }
-            if let Some(done) = self.outgoing.pop_front() {
-                self.pool.put(done.buffer);
+        }
+        let mut at = 0;
+        for mut message in std::mem::take(&mut self.outgoing) {
+            let states = &wide[at..at + message.requests.len()];
+            at += message.requests.len();
+            let mut state = states.iter();
+            message.requests.retain(|_| state.next() != Some(&COMPLETE));
+            if message.requests.is_empty() {
+                self.pool.put(message.buffer);
+            } else {
+                self.outgoing.push(message);
             }
         }
     }
@@ -134,7 +176,7 @@ impl Transfers {
         tag: u32,
         capacity: usize,
     ) -> Result<u64, CommError> {
-        let buffer = self.pool.take(capacity.saturating_add(1).min(self.chunk_bytes));
+        let buffer = self.buffer(mpi, capacity.saturating_add(1).min(self.chunk_bytes));
         let id = self.next_id;
         self.next_id += 1;
         self.incoming.push(Incoming {

@@ -1,9 +1,11 @@
 //! The program `composite` as a shared library, in which SimGrid's `smpirun` looks for `main`: it loads one private copy for each
-//! simulated rank. Made by `cargo build -p composite-smpi`; `composite compare --smpi` does that itself.
+//! simulated rank. Made by `cargo build -p composite --example composite_smpi`; `composite compare --smpi` does that itself.
+//!
+//! An example because a package has one library, which programs are linked with and which must not have a `main`.
 #![deny(unsafe_code)]
 #![allow(unsafe_code, reason = "the one function that SimGrid calls")]
 
-// A test harness has a `main` of its own; what the library exports is tested from outside (tests/exports.rs).
+// A test harness has a `main` of its own; what the library exports is tested from outside (tests/mpi.rs).
 #[cfg(not(test))]
 mod exported {
     use std::ffi::{CStr, OsString, c_char, c_int};

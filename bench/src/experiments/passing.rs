@@ -1,0 +1,114 @@
+//! What a call costs that is passed to the driver.
+
+use super::Context;
+use crate::opengl::{Display, Tools};
+use crate::record::{Record, Row};
+use crate::stats::Summary;
+use anyhow::Context as _;
+use datasets::cli::UsageError;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Command;
+
+/// The ways a program's calls can go.
+const WAYS: [(&str, &[&str]); 3] = [
+    ("native", &[]),
+    ("vendor library", &["run", "--via", "vendor", "--"]),
+    ("LD_PRELOAD", &["run", "--via", "preload", "--"]),
+];
+
+pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
+    record.column("call", "", "an OpenGL call outside of Begin and End");
+    record.column(
+        "way",
+        "",
+        "straight to Mesa, or through gluray as GLVND's vendor library or by LD_PRELOAD",
+    );
+    record.column("time", "ns", "a call: median over the runs of each run's best round of two million");
+    record.column("time_low", "ns", "fastest run");
+    record.column("time_high", "ns", "slowest run");
+    record.column("overhead", "ns", "how much more than native, median over pairs of runs");
+    record.notes.push(
+        "CPU time of the thread that calls, in a program in C that opens OpenGL with dlopen; runs take turns. Colours and normals are kept back until \
+         something needs them, so they can cost less than native."
+            .into(),
+    );
+    let compiler = crate::opengl::find("RTSV_CC", "/usr/bin/cc");
+    let tools = Tools::find();
+    let (Ok(tools), Some(compiler)) = (&tools, &compiler) else {
+        let mut missing = tools.err().unwrap_or_default();
+        if compiler.is_none() {
+            missing.push("cc: install gcc, or name a C compiler in RTSV_CC".into());
+        }
+        return Err(UsageError(format!(
+            "passing needs programs that are not here:\n  {}",
+            missing.join("\n  ")
+        ))
+        .into());
+    };
+    let dir = tempfile::tempdir()?;
+    let (source, program) = (dir.path().join("calls.c"), dir.path().join("calls"));
+    std::fs::write(&source, include_str!("../opengl/scripts/calls.c"))?;
+    let made = Command::new(compiler).arg("-O2").arg("-o").arg(&program).arg(&source).arg("-ldl").output()?;
+    anyhow::ensure!(made.status.success(), "the C compiler: {}", String::from_utf8_lossy(&made.stderr));
+    let display = Display::start(&tools.xvfb)?;
+    let runs = if context.quick { 3 } else { 11 };
+    let mut times: BTreeMap<(String, usize), Vec<f64>> = BTreeMap::new();
+    let mut order: Vec<String> = Vec::new();
+    for n in 0..runs {
+        context.say(format!("run {} of {runs}", n + 1))?;
+        for i in 0..WAYS.len() {
+            let way = (i + n) % WAYS.len();
+            for (call, ns) in measure(tools, &display, &program, WAYS[way].1)? {
+                if !order.contains(&call) {
+                    order.push(call.clone());
+                }
+                times.entry((call, way)).or_default().push(ns);
+            }
+        }
+    }
+    for call in order {
+        for (way, (name, _)) in WAYS.iter().enumerate() {
+            let (own, native) = (&times[&(call.clone(), way)], &times[&(call.clone(), 0)]);
+            let more: Vec<f64> = own.iter().zip(native).map(|(o, n)| o - n).collect();
+            let Some(t) = Summary::of(own) else { continue };
+            let row = Row::new().with("call", call.as_str()).with("way", *name).with("time", t.median);
+            let row = row.with("time_low", t.low).with("time_high", t.high);
+            record.rows.push(row.with("overhead", Summary::of(&more).map(|s| s.median)));
+        }
+    }
+    Ok(())
+}
+
+fn measure(
+    tools: &Tools,
+    display: &Display,
+    program: &Path,
+    through: &[&str],
+) -> anyhow::Result<Vec<(String, f64)>> {
+    let mut command = match through {
+        [] => Command::new(program),
+        options => {
+            let mut c = Command::new(&tools.gluray);
+            c.arg("--quiet").args(options).arg(program);
+            c
+        }
+    };
+    let place = program.parent().unwrap_or(Path::new("."));
+    let output = command
+        .env("DISPLAY", display.name())
+        .env("LIBGL_ALWAYS_SOFTWARE", "1")
+        .env("GALLIUM_DRIVER", "llvmpipe")
+        .env("XDG_STATE_HOME", place)
+        .output()
+        .context("cannot start the program of calls")?;
+    let told = String::from_utf8_lossy(&output.stderr);
+    anyhow::ensure!(output.status.success(), "the program of calls: {told}");
+    let text = String::from_utf8_lossy(&output.stdout);
+    text.lines()
+        .map(|l| {
+            let (call, ns) = l.split_once(' ').context("a line of a call and its time")?;
+            Ok((call.to_string(), ns.parse()?))
+        })
+        .collect()
+}

@@ -1,0 +1,236 @@
+//! Table 4.1: frames of unmodified OpenGL programs, by a rasteriser in software and by rays.
+
+use super::Context;
+use super::fig4_7::fits_in_memory;
+use crate::opengl::{Cost, Display, Program, Session, Tools, Way, write};
+use crate::plot::{Axis, Plot, Series};
+use crate::record::{Record, Row};
+use crate::runner::Ratio;
+use crate::stats::Summary;
+use datasets::cli::UsageError;
+use datasets::generate::nested_wavelet::Size;
+use rt_core::mesh::TriMesh;
+use std::path::Path;
+use std::sync::Arc;
+
+/// The side of the programs' windows.
+const SIZE_PX: u32 = 1024;
+const WAYS: [Way; 3] = [Way::Llvmpipe, Way::Serial, Way::Asynchronous];
+
+pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
+    record.column(
+        "program",
+        "",
+        "an unmodified program; it turns the model by a few degrees from frame to frame",
+    );
+    record.column("triangles", "", "triangles of the wavelet surfaces in its file");
+    record.column("way", "", "who draws: Mesa's llvmpipe, or gluray in mode match");
+    record.column("fps", "1/s", "frames a second by the median frame");
+    record.column("time", "ms", "median wall time of a frame");
+    record.column("time_low", "ms", "fastest frame or group of frames");
+    record.column("time_high", "ms", "slowest");
+    record.column("cpu", "ms", "CPU time of a frame, of the program's process with all its threads");
+    record.column("first", "s", "start to first frame: the file, the program's preparations, the hierarchy");
+    record.column("memory", "GiB", "the most the process held");
+    record.column("speedup", "", "wall time of llvmpipe's frames over that of these, group by group");
+    record.column("cpu_speedup", "", "the same of CPU time");
+    record.notes.push(format!(
+        "Windows of {SIZE_PX} x {SIZE_PX} pixels on an X server without a screen. The programs take turns, a group of frames each, where two of them fit \
+         into memory; of 16 million triangles they run one after the other. `one frame late` shows each frame while the next is asked for \
+         (section 4.1.2)."
+    ));
+    let mut missing = Vec::new();
+    let tools = Tools::find().map_err(|m| missing.extend(m)).ok();
+    let programs: Vec<Program> =
+        Program::ALL.into_iter().filter(|p| p.find().map_err(|m| missing.push(m)).is_ok()).collect();
+    let Some(tools) = tools.filter(|_| !programs.is_empty()) else {
+        return Err(UsageError(format!(
+            "table4.1 needs programs that are not here:\n  {}",
+            missing.join("\n  ")
+        ))
+        .into());
+    };
+    record.missing.extend(missing);
+    let display = Display::start(&tools.xvfb)?;
+    let dir = tempfile::tempdir()?;
+    let sizes = if context.quick { &[None][..] } else { &[Some(Size::M1), Some(Size::M4), Some(Size::M16)] };
+    for &size in sizes {
+        let mesh = match size {
+            None => crate::meshes::coarse_wavelet(51)?,
+            Some(size) if fits_in_memory(size, record) => context.wavelet(size)?,
+            Some(_) => continue,
+        };
+        for &program in &programs {
+            let place = Place { tools: &tools, display: &display, dir: dir.path() };
+            measure(context, record, &place, program, &mesh)?;
+        }
+    }
+    record.plots.push(plot(record));
+    Ok(())
+}
+
+struct Place<'a> {
+    tools: &'a Tools,
+    display: &'a Display,
+    dir: &'a Path,
+}
+
+/// What was measured of one way.
+#[derive(Default)]
+struct Measured {
+    first_secs: f64,
+    groups: Vec<Cost>,
+    peak_bytes: Option<u64>,
+}
+
+fn measure(
+    context: &mut Context<'_>,
+    record: &mut Record,
+    place: &Place<'_>,
+    program: Program,
+    mesh: &Arc<TriMesh>,
+) -> anyhow::Result<()> {
+    let n = mesh.num_triangles();
+    let data = place.dir.join(format!("{n}")).with_extension(program.format().extension());
+    context.say(format!("{}, {n} triangles: data", program.name()))?;
+    write(mesh, program.format(), &data)?;
+    // CPU time is told in hundredths of a second: groups of frames are long against that.
+    let (groups, frames) = match (context.quick, n) {
+        (true, _) => (3, 5),
+        (_, ..2_000_000) => (7, 8),
+        (_, ..8_000_000) => (7, 4),
+        _ => (5, 3),
+    };
+    // The best hierarchy comes in the background after some frames: what is measured is what stays.
+    let settle = if context.quick { 4 } else { 10 };
+    let together = n < 8_000_000;
+    let mut all: Vec<Measured> = WAYS.iter().map(|_| Measured::default()).collect();
+    let start = |way: Way, measured: &mut Measured| -> anyhow::Result<Session> {
+        let dir = place.dir.join(format!("{}-{way:?}-{n}", program.name().replace(' ', "-")));
+        let begun = std::time::Instant::now();
+        let mut s = Session::start(program, way, place.tools, place.display, &dir, &data, SIZE_PX)?;
+        measured.first_secs = begun.elapsed().as_secs_f64();
+        s.frames(if way == Way::Llvmpipe { 1 } else { settle })?;
+        if way != Way::Llvmpipe && !context_is_quick(n) {
+            // Builds of the best hierarchy go on beside the frames; they take about a second per million triangles and core.
+            std::thread::sleep(std::time::Duration::from_secs_f64(2.0 + n as f64 / 4e5));
+        }
+        Ok(s)
+    };
+    if together {
+        let mut sessions = Vec::new();
+        for (way, m) in WAYS.into_iter().zip(&mut all) {
+            context.say(format!("{}, {n} triangles: starting {}", program.name(), way.name()))?;
+            sessions.push(start(way, m)?);
+        }
+        for round in 0..groups {
+            context.say(format!("{}, {n} triangles: group {} of {groups}", program.name(), round + 1))?;
+            for i in 0..WAYS.len() {
+                let i = (i + round) % WAYS.len();
+                all[i].groups.push(per_frame(sessions[i].frames(frames)?, frames));
+            }
+        }
+        for ((way, s), m) in WAYS.into_iter().zip(sessions).zip(&mut all) {
+            m.peak_bytes = s.peak_bytes();
+            check(program, way, s.end()?)?;
+        }
+    } else {
+        for (way, m) in WAYS.into_iter().zip(&mut all) {
+            context.say(format!("{}, {n} triangles: {}", program.name(), way.name()))?;
+            let mut s = start(way, m)?;
+            for _ in 0..groups {
+                m.groups.push(per_frame(s.frames(frames)?, frames));
+            }
+            m.peak_bytes = s.peak_bytes();
+            check(program, way, s.end()?)?;
+        }
+    }
+    std::fs::remove_file(&data)?;
+    for (i, way) in WAYS.into_iter().enumerate() {
+        record.rows.push(row(program, n, way, &all[0], &all[i]));
+        if i > 0 {
+            record.ratios.push(ratio(program, n, way, &all[0], &all[i]));
+        }
+    }
+    Ok(())
+}
+
+/// Small meshes are not built a second time.
+fn context_is_quick(triangles: usize) -> bool {
+    triangles < 20_000
+}
+
+fn per_frame(c: Cost, frames: u32) -> Cost {
+    Cost { wall_secs: c.wall_secs / f64::from(frames), cpu_secs: c.cpu_secs / f64::from(frames) }
+}
+
+/// Frames that the driver drew would be no frames of ours.
+fn check(program: Program, way: Way, report: Option<serde_json::Value>) -> anyhow::Result<()> {
+    if way == Way::Llvmpipe {
+        return Ok(());
+    }
+    let report = report.unwrap_or_default();
+    let traced = report["traced_draws"].as_u64().unwrap_or(0);
+    let faults = report["faults"].as_array().map_or(0, Vec::len);
+    anyhow::ensure!(
+        traced > 0 && faults == 0,
+        "{}: {traced} draws traced, {faults} faults; `passed_reasons`: {}",
+        program.name(),
+        report["passed_reasons"]
+    );
+    Ok(())
+}
+
+fn ratios(native: &Measured, ours: &Measured, of: impl Fn(&Cost) -> f64) -> Option<Summary> {
+    let each: Vec<f64> = native.groups.iter().zip(&ours.groups).map(|(n, o)| of(n) / of(o)).collect();
+    Summary::of(&each)
+}
+
+fn row(program: Program, n: usize, way: Way, native: &Measured, m: &Measured) -> Row {
+    let of = |f: &dyn Fn(&Cost) -> f64| Summary::of(&m.groups.iter().map(f).collect::<Vec<_>>());
+    let row = Row::new().with("program", program.name()).with("triangles", n).with("way", way.name());
+    let (Some(wall), Some(cpu)) = (of(&|c| c.wall_secs), of(&|c| c.cpu_secs)) else { return row };
+    let (speedup, cpu_speedup) = (ratios(native, m, |c| c.wall_secs), ratios(native, m, |c| c.cpu_secs));
+    row.with("fps", 1.0 / wall.median)
+        .with("time", wall.median * 1e3)
+        .with("time_low", wall.low * 1e3)
+        .with("time_high", wall.high * 1e3)
+        .with("cpu", cpu.median * 1e3)
+        .with("first", m.first_secs)
+        .with("memory", m.peak_bytes.map(|b| b as f64 / f64::from(1 << 30)))
+        .with("speedup", speedup.map(|s| s.median))
+        .with("cpu_speedup", cpu_speedup.map(|s| s.median))
+}
+
+fn ratio(program: Program, n: usize, way: Way, native: &Measured, ours: &Measured) -> Ratio {
+    let s = ratios(native, ours, |c| c.wall_secs);
+    let name = format!("{}, {n} triangles, {}", program.name(), way.name());
+    Ratio {
+        name,
+        rival: Way::Llvmpipe.name().into(),
+        value: s.map_or(0.0, |s| s.median),
+        spread: s.map_or(0.0, |s| s.interquartile_range()),
+        low: s.map_or(0.0, |s| s.low),
+        high: s.map_or(0.0, |s| s.high),
+        rounds: native.groups.len(),
+    }
+}
+
+fn plot(record: &Record) -> Plot {
+    let mut plot =
+        Plot::lines("Frames of programs", Axis::log("triangles", ""), Axis::log("frames a second", "1/s"));
+    for program in Program::ALL {
+        for way in WAYS {
+            let of = record
+                .rows
+                .iter()
+                .filter(|r| r.text("program") == Some(program.name()) && r.text("way") == Some(way.name()));
+            let points: Vec<(f64, f64)> =
+                of.filter_map(|r| r.number("triangles").zip(r.number("fps"))).collect();
+            if !points.is_empty() {
+                plot.series.push(Series::new(format!("{}, {}", program.name(), way.name()), points));
+            }
+        }
+    }
+    plot
+}

@@ -1,0 +1,11 @@
+//! Unmodified OpenGL programs on an X server without a screen, drawn by Mesa's llvmpipe or through `gluray run`, one frame at a time.
+
+mod data;
+mod display;
+mod programs;
+mod session;
+
+pub use data::{Format, write};
+pub use display::Display;
+pub use programs::{Program, find};
+pub use session::{Cost, Session, Tools, Way};

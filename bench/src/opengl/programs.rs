@@ -1,0 +1,109 @@
+//! The programs of table 4.1 and how each is made to draw one frame at a time. The programs are the installed ones; only their own
+//! script languages are used.
+
+use super::Format;
+use std::path::{Path, PathBuf};
+
+/// A program that draws.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Program {
+    /// gmsh: vertex arrays, sent again each frame.
+    Gmsh,
+    /// geomview: immediate mode, eight calls a triangle.
+    Geomview,
+    /// ParaView's pvbatch: buffers and shaders.
+    ParaView,
+    /// VTK in Python: the same shaders, a headlight.
+    Vtk,
+}
+
+impl Program {
+    /// All of them.
+    pub const ALL: [Program; 4] = [Program::Gmsh, Program::Geomview, Program::ParaView, Program::Vtk];
+
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Program::Gmsh => "gmsh",
+            Program::Geomview => "geomview",
+            Program::ParaView => "ParaView",
+            Program::Vtk => "python vtk",
+        }
+    }
+
+    /// What it reads.
+    pub fn format(self) -> Format {
+        match self {
+            Program::Gmsh => Format::Stl,
+            Program::Geomview => Format::Off,
+            Program::ParaView | Program::Vtk => Format::Vtp,
+        }
+    }
+
+    /// The executable, from the variable that `cargo xtask test` sets or from where Debian puts it; else what is missing, with the cure.
+    pub fn find(self) -> Result<PathBuf, String> {
+        let (variable, place, package) = match self {
+            Program::Gmsh => ("RTSV_GMSH", "/usr/bin/gmsh", "gmsh"),
+            Program::Geomview => ("RTSV_GEOMVIEW", "/usr/bin/geomview", "geomview"),
+            Program::ParaView => ("RTSV_PVBATCH", "/usr/bin/pvbatch", "paraview python3-paraview"),
+            Program::Vtk => {
+                ("RTSV_PYTHON", "/usr/bin/python3", "python3-vtk9, or a Python with the package vtk")
+            }
+        };
+        let found = find(variable, place)
+            .ok_or_else(|| format!("{}: install {package}, or name it in {variable}", self.name()))?;
+        match self {
+            // Its library is driven by Python.
+            Program::Gmsh => find("RTSV_PYTHON", "/usr/bin/python3")
+                .ok_or_else(|| "gmsh: install python3, or name it in RTSV_PYTHON".to_string()),
+            _ => Ok(found),
+        }
+    }
+
+    /// The command that draws `data` in a window of `size_px` a side, as arguments of `executable`; scripts go into `dir`.
+    pub(super) fn arguments(self, dir: &Path, data: &Path, size_px: u32) -> std::io::Result<Vec<String>> {
+        let data = data.to_string_lossy().into_owned();
+        let script = |name: &str, text: &str| -> std::io::Result<String> {
+            let file = dir.join(name);
+            std::fs::write(&file, text)?;
+            Ok(file.to_string_lossy().into_owned())
+        };
+        let size = size_px.to_string();
+        Ok(match self {
+            Program::Gmsh => vec![script("gmsh_frames.py", include_str!("scripts/gmsh_frames.py"))?, data, size],
+            Program::ParaView => {
+                vec![script("paraview_frames.py", include_str!("scripts/paraview_frames.py"))?, data, size]
+            }
+            Program::Vtk => vec![script("vtk_frames.py", include_str!("scripts/vtk_frames.py"))?, data, size],
+            Program::Geomview => ["-nopanels", "-c", "-"].map(String::from).to_vec(),
+        })
+    }
+
+    /// What it is told first.
+    pub(super) fn greeting(self, data: &Path, size_px: u32) -> String {
+        match self {
+            Program::Geomview => format!(
+                "(load {})\n(window c0 {{size {size_px} {size_px}}})\n(bbox-draw g1 no)\n(normalization g1 none)\n\
+                 (merge-ap g1 {{ shading smooth -edge }})\n(look g1)\n(redraw c0)\n(echo \"ready\\n\")\n",
+                data.display()
+            ),
+            _ => String::new(),
+        }
+    }
+
+    /// What makes it draw the next frame, from another side.
+    pub(super) fn next_frame(self) -> &'static str {
+        match self {
+            Program::Geomview => {
+                "(transform-incr g1 g1 focus rotate 0 0.1 0)\n(redraw c0)\n(echo \"frame\\n\")\n"
+            }
+            _ => "\n",
+        }
+    }
+}
+
+/// The path that a variable names, or a well-known one, if there is a file.
+pub fn find(variable: &str, place: &str) -> Option<PathBuf> {
+    let named = std::env::var_os(variable).map(PathBuf::from);
+    named.or_else(|| Some(PathBuf::from(place))).filter(|p| p.is_file())
+}

@@ -1,0 +1,21 @@
+"""Frames of ParaView, one for each line that comes; for pvbatch."""
+import os, sys
+from paraview.simple import *
+
+file, size = sys.argv[1], int(sys.argv[2])
+reader = XMLPolyDataReader(FileName=[file])
+view = CreateRenderView(ViewSize=[size, size])
+shown = Show(reader, view)
+ColorBy(shown, None)
+view.ResetCamera()
+camera = view.GetActiveCamera()
+camera.Azimuth(30)
+camera.Elevation(20)
+Render(view)
+print("ready", flush=True)
+# ParaView's own `sys.stdin` takes the ends off lines, so an empty one looks like the end.
+commands = os.fdopen(os.dup(0))
+while commands.readline():
+    camera.Azimuth(5)
+    Render(view)
+    print("frame", flush=True)

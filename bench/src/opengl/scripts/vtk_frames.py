@@ -1,0 +1,34 @@
+"""Frames of a VTK program in Python, one for each line that comes."""
+import sys
+import vtk
+
+file, size = sys.argv[1], int(sys.argv[2])
+reader = vtk.vtkXMLPolyDataReader()
+reader.SetFileName(file)
+mapper = vtk.vtkPolyDataMapper()
+mapper.SetInputConnection(reader.GetOutputPort())
+mapper.ScalarVisibilityOff()
+actor = vtk.vtkActor()
+actor.SetMapper(mapper)
+actor.GetProperty().SetColor(0.9, 0.6, 0.2)
+actor.GetProperty().SetSpecular(0.4)
+actor.GetProperty().SetSpecularPower(30)
+renderer = vtk.vtkRenderer()
+renderer.AddActor(actor)
+window = vtk.vtkRenderWindow()
+window.SetSize(size, size)
+window.SetMultiSamples(0)
+window.AddRenderer(renderer)
+window.Render()
+camera = renderer.GetActiveCamera()
+camera.Azimuth(30)
+camera.Elevation(20)
+renderer.ResetCamera()
+window.Render()
+print("ready", flush=True)
+while sys.stdin.readline():
+    camera.Azimuth(5)
+    window.Render()
+    # A picture is done when somebody has it: what is on the screen is asked for, as programs that save pictures do.
+    window.WaitForCompletion()
+    print("frame", flush=True)

@@ -1,0 +1,230 @@
+//! A program that runs and draws a frame whenever it is told to.
+//!
+//! Programs say `ready` when their first frame is drawn and `frame` after each that follows, so two of them (native, and through us) can
+//! take turns, and what each costs is read from the kernel's account of its process.
+
+use super::programs::find;
+use super::{Display, Program};
+use anyhow::Context as _;
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+/// What runs everything.
+#[derive(Debug, Clone)]
+pub struct Tools {
+    /// The X server.
+    pub xvfb: PathBuf,
+    /// `gluray`, with its library beside it.
+    pub gluray: PathBuf,
+}
+
+impl Tools {
+    /// Those of this machine; else what is missing, each with its cure.
+    pub fn find() -> Result<Tools, Vec<String>> {
+        let beside = std::env::current_exe().ok().and_then(|e| Some(e.parent()?.join("gluray")));
+        let gluray = std::env::var_os("RTSV_GLURAY").map(PathBuf::from).or(beside).filter(|p| p.is_file());
+        let xvfb = find("RTSV_XVFB", "/usr/bin/Xvfb");
+        match (xvfb, gluray) {
+            (Some(xvfb), Some(gluray)) => Ok(Tools { xvfb, gluray }),
+            (xvfb, gluray) => {
+                let mut missing = Vec::new();
+                if xvfb.is_none() {
+                    missing.push("Xvfb: install xvfb, or name it in RTSV_XVFB".to_string());
+                }
+                if gluray.is_none() {
+                    missing.push(
+                        "gluray: `cargo build --release -p gluray`, or name it in RTSV_GLURAY".to_string(),
+                    );
+                }
+                Err(missing)
+            }
+        }
+    }
+}
+
+/// By what a program draws.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Way {
+    /// By Mesa's llvmpipe.
+    Llvmpipe,
+    /// Through us, each frame when it is asked for.
+    Serial,
+    /// Through us, each frame shown while the next one comes.
+    Asynchronous,
+}
+
+impl Way {
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Way::Llvmpipe => "llvmpipe",
+            Way::Serial => "gluray",
+            Way::Asynchronous => "gluray, one frame late",
+        }
+    }
+}
+
+/// What frames cost.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Cost {
+    /// Seconds until they were done.
+    pub wall_secs: f64,
+    /// Seconds of all cores, of the program's process.
+    pub cpu_secs: f64,
+}
+
+/// A program that waits for the next frame.
+pub struct Session {
+    program: Program,
+    child: Child,
+    /// The program itself: behind `gluray run` it is a child's child.
+    pid: u32,
+    input: ChildStdin,
+    lines: Receiver<String>,
+    report: Option<PathBuf>,
+    log: PathBuf,
+}
+
+/// Programs that do not answer for that long are given up.
+const PATIENCE: Duration = Duration::from_secs(600);
+
+impl Session {
+    /// Starts `program` with `data`. Scripts, logs and the report go into `dir`, which is its own.
+    pub fn start(
+        program: Program,
+        way: Way,
+        tools: &Tools,
+        display: &Display,
+        dir: &Path,
+        data: &Path,
+        size_px: u32,
+    ) -> anyhow::Result<Session> {
+        std::fs::create_dir_all(dir)?;
+        let executable = program.find().map_err(anyhow::Error::msg)?;
+        let arguments = program.arguments(dir, data, size_px)?;
+        let report = (way != Way::Llvmpipe).then(|| dir.join("report.json"));
+        let mut command = match &report {
+            None => Command::new(&executable),
+            Some(report) => {
+                let mut c = Command::new(&tools.gluray);
+                c.args(["--quiet", "run", "--mode", "match", "--report"]).arg(report);
+                let late = if way == Way::Asynchronous { "on" } else { "off" };
+                c.args(["--set", &format!("asynchronous={late}"), "--"]).arg(&executable);
+                c
+            }
+        };
+        let log = dir.join("log.txt");
+        let errors = std::fs::File::create(&log)?;
+        command
+            .args(&arguments)
+            .current_dir(dir)
+            .env("DISPLAY", display.name())
+            .env("LIBGL_ALWAYS_SOFTWARE", "1")
+            .env("GALLIUM_DRIVER", "llvmpipe")
+            .env("PATH", "/usr/bin:/bin")
+            .env("HOME", dir)
+            .env("XDG_STATE_HOME", dir)
+            .env_remove("LD_LIBRARY_PATH")
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(errors);
+        let mut child = command.spawn().with_context(|| format!("cannot start {}", program.name()))?;
+        let (Some(mut input), Some(output)) = (child.stdin.take(), child.stdout.take()) else {
+            anyhow::bail!("{} has no pipes", program.name());
+        };
+        let (sender, lines) = channel();
+        std::thread::spawn(move || {
+            for line in BufReader::new(output).lines().map_while(Result::ok) {
+                if sender.send(line).is_err() {
+                    break;
+                }
+            }
+        });
+        input.write_all(program.greeting(data, size_px).as_bytes())?;
+        input.flush()?;
+        let mut session = Session { program, pid: child.id(), child, input, lines, report, log };
+        session.wait_for("ready")?;
+        if session.report.is_some() {
+            session.pid = only_child(session.pid).unwrap_or(session.pid);
+        }
+        Ok(session)
+    }
+
+    fn wait_for(&mut self, word: &str) -> anyhow::Result<()> {
+        loop {
+            match self.lines.recv_timeout(PATIENCE) {
+                Ok(line) if line.trim().ends_with(word) => return Ok(()),
+                Ok(_) => {}
+                Err(e) => {
+                    let log = std::fs::read_to_string(&self.log).unwrap_or_default();
+                    let tail: String = log.lines().rev().take(5).collect::<Vec<_>>().join(" / ");
+                    let what = match e {
+                        RecvTimeoutError::Timeout => "does not answer",
+                        RecvTimeoutError::Disconnected => "ended",
+                    };
+                    anyhow::bail!("{} {what} before it said `{word}`: {tail}", self.program.name());
+                }
+            }
+        }
+    }
+
+    /// Has `count` frames drawn.
+    pub fn frames(&mut self, count: u32) -> anyhow::Result<Cost> {
+        let (start, cpu) = (Instant::now(), cpu_secs(self.pid)?);
+        for _ in 0..count {
+            self.input.write_all(self.program.next_frame().as_bytes())?;
+            self.input.flush()?;
+            self.wait_for("frame")?;
+        }
+        Ok(Cost { wall_secs: start.elapsed().as_secs_f64(), cpu_secs: cpu_secs(self.pid)? - cpu })
+    }
+
+    /// The most memory that the program has held, in bytes.
+    pub fn peak_bytes(&self) -> Option<u64> {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.pid)).ok()?;
+        let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+        Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
+    }
+
+    /// Ends the program; gives our report of the run when it went through us.
+    pub fn end(mut self) -> anyhow::Result<Option<serde_json::Value>> {
+        let text = if self.program == Program::Geomview { "(exit)\n" } else { "" };
+        self.input.write_all(text.as_bytes()).ok();
+        let Session { mut child, input, report, pid, .. } = self;
+        drop(input);
+        let deadline = Instant::now() + Duration::from_secs(60);
+        while child.try_wait()?.is_none() {
+            if Instant::now() > deadline {
+                // The program, not `gluray run` before it, which then writes its report.
+                rustix::process::Pid::from_raw(pid as i32)
+                    .map(|p| rustix::process::kill_process(p, rustix::process::Signal::TERM));
+                child.wait()?;
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        let Some(report) = report else { return Ok(None) };
+        let text = std::fs::read_to_string(&report)
+            .with_context(|| format!("`gluray run` left no report `{}`", report.display()))?;
+        Ok(Some(serde_json::from_str(&text)?))
+    }
+}
+
+/// CPU seconds of a process, its threads included, from the kernel's account of its threads in nanoseconds; of threads that have ended, in ticks.
+fn cpu_secs(pid: u32) -> anyhow::Result<f64> {
+    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat"))
+        .with_context(|| format!("process {pid} is gone"))?;
+    // The name in brackets may have spaces in it.
+    let fields: Vec<&str> = stat.rsplit_once(')').map_or("", |(_, rest)| rest).split_whitespace().collect();
+    let ticks = |i: usize| fields.get(i).and_then(|f| f.parse::<f64>().ok()).unwrap_or(0.0);
+    Ok((ticks(11) + ticks(12)) / 100.0)
+}
+
+/// The child of a process that has one.
+fn only_child(pid: u32) -> Option<u32> {
+    let children = std::fs::read_to_string(format!("/proc/{pid}/task/{pid}/children")).ok()?;
+    children.split_whitespace().next()?.parse().ok()
+}

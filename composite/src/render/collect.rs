@@ -1,0 +1,159 @@
+//! Finished tiles to one rank.
+use super::ask::{Inbox, Tag, Talk};
+use super::camera_wave::TileAnswer;
+use super::owners::Owners;
+use super::sort_last::{Side, each};
+use super::{Activity, FrameError};
+use crate::comm::CommError;
+use rt_core::frame::Frame;
+use rt_core::waves::{Pass, TileInWork, WaveFrame};
+use std::ops::Range;
+
+/// One rank's part in bringing the picture to the root.
+pub(super) struct Collect<'a> {
+    side: &'a Side<'a>,
+    tiles: &'a mut [TileInWork],
+    /// Number of the first of `tiles`.
+    first: usize,
+    root: Option<usize>,
+    /// On the root.
+    picture: Option<Frame>,
+    /// Of each rank, the next tile that is to come from it.
+    next: Vec<usize>,
+}
+
+impl<'a> Collect<'a> {
+    /// Nothing has come yet. `tiles` are this rank's.
+    pub(super) fn new(
+        talk: &Talk<'_>,
+        side: &'a Side<'a>,
+        owners: &Owners,
+        tiles: &'a mut [TileInWork],
+        root: Option<usize>,
+    ) -> Result<Collect<'a>, FrameError> {
+        let (rank, size) = (talk.rank(), talk.size());
+        if let Some(peer) = root.filter(|&r| r >= size) {
+            return Err(FrameError::Comm(CommError::NoSuchRank { peer, size }));
+        }
+        let picture = (root == Some(rank)).then(|| side.frame.blank());
+        let next = owners.tiles.iter().map(|t| t.start).collect();
+        Ok(Collect { side, tiles, first: owners.tiles[rank].start, root, picture, next })
+    }
+
+    /// Posts the receives of all tiles, which come in `chunks` from each rank.
+    pub(super) fn announce(
+        &self,
+        talk: &mut Talk<'_>,
+        inbox: &mut Inbox,
+        owners: &Owners,
+        chunks: usize,
+    ) -> Result<(), FrameError> {
+        let (rank, size) = (talk.rank(), talk.size());
+        if self.root != Some(rank) {
+            return Ok(());
+        }
+        for chunk in 0..chunks {
+            for from in (0..size).filter(|&from| from != rank) {
+                let tiles = owners.chunk(from, (chunk, chunks));
+                if !tiles.is_empty() {
+                    let words = tiles.map(|t| words_of(self.side.frame, t)).sum();
+                    talk.expect(inbox, from, Tag::Tiles, words)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Gives the tiles in `range` the colours of their nearest hits, and sends them on.
+    pub(super) fn finish(
+        &mut self,
+        talk: &mut Talk<'_>,
+        range: Range<usize>,
+        pass: Pass,
+        answers: &[TileAnswer],
+    ) -> Result<(), FrameError> {
+        let (rank, frame) = (talk.rank(), self.side.frame);
+        let places = range.start - self.first..range.end - self.first;
+        let mut failed = Vec::new();
+        let mut work: Vec<_> =
+            self.tiles[places.clone()].iter_mut().zip(&answers[places]).map(|w| (w, None)).collect();
+        each(self.side.parallel, &mut work, |_, ((tile, answer), error)| {
+            tile.begin(frame, pass);
+            *error = tile.choose(frame, &answer.colors()).err();
+        });
+        failed.extend(work.into_iter().filter_map(|(_, error)| error));
+        if let Some(source) = failed.into_iter().next() {
+            return Err(FrameError::Answer { rank, source });
+        }
+        talk.spent(Activity::Shade);
+        self.send(talk, range)
+    }
+
+    /// Sends finished tiles to the root; on the root, puts them in their places.
+    fn send(&mut self, talk: &mut Talk<'_>, range: Range<usize>) -> Result<(), FrameError> {
+        let (rank, frame) = (talk.rank(), self.side.frame);
+        let Some(root) = self.root.filter(|_| !range.is_empty()) else { return Ok(()) };
+        let tiles = &self.tiles[range.start - self.first..range.end - self.first];
+        let words: Vec<u32> = tiles.iter().flat_map(|t| t.words(frame)).collect();
+        if rank == root {
+            self.put(range, &words).ok_or_else(|| talk.wrong(rank, "tiles", words.len()))?;
+        } else {
+            talk.send(root, Tag::Tiles, &words)?;
+        }
+        talk.spent(Activity::Collect);
+        Ok(())
+    }
+
+    fn put(&mut self, range: Range<usize>, mut words: &[u32]) -> Option<()> {
+        let frame = self.side.frame;
+        let picture = self.picture.as_mut()?;
+        for tile in range {
+            let (own, rest) = words.split_at_checked(words_of(frame, tile))?;
+            words = rest;
+            frame.place(picture, tile, own).then_some(())?;
+        }
+        words.is_empty().then_some(())
+    }
+
+    /// The next chunk of tiles of rank `from`.
+    pub(super) fn place(
+        &mut self,
+        talk: &mut Talk<'_>,
+        owners: &Owners,
+        from: usize,
+        chunks: usize,
+        words: &[u32],
+    ) -> Result<(), FrameError> {
+        let next = self.next[from];
+        let chunk = (0..chunks).map(|c| owners.chunk(from, (c, chunks)));
+        let range = chunk.filter(|r| !r.is_empty()).find(|r| r.start >= next);
+        let placed = range.and_then(|range| {
+            self.next[from] = range.end;
+            self.put(range, words)
+        });
+        talk.spent(Activity::Collect);
+        placed.ok_or_else(|| talk.wrong(from, "tiles", words.len()))
+    }
+
+    /// All tiles at once, at the end of a frame.
+    pub(super) fn all(mut self, talk: &mut Talk<'_>, owners: &Owners) -> Result<Option<Frame>, FrameError> {
+        let mut inbox = Inbox::default();
+        self.announce(talk, &mut inbox, owners, 1)?;
+        self.send(talk, owners.tiles[talk.rank()].clone())?;
+        while let Some(incoming) = talk.next(&mut inbox, true)? {
+            self.place(talk, owners, incoming.from, 1, &incoming.words)?;
+        }
+        Ok(self.picture)
+    }
+
+    /// The picture, after a pass in which tiles were sent as they were finished.
+    pub(super) fn into_picture(self) -> Option<Frame> {
+        self.picture
+    }
+}
+
+/// Words of a tile.
+fn words_of(frame: &WaveFrame<'_>, tile: usize) -> usize {
+    let area = frame.tile_area(tile);
+    (area.width * area.height) as usize * frame.words_per_pixel()
+}

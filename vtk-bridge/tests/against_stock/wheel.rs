@@ -1,0 +1,87 @@
+//! The same unmodified scripts in the `vtk` wheel of PyPI, alone and started by `python -m rtvtk`.
+
+use crate::compare::{Bars, faults};
+use crate::peers::skip;
+use crate::session::{Program, Run, With, output, scripts_in};
+use crate::vtk::EMPTY;
+use std::path::PathBuf;
+
+/// Pictures that are held to other bars than the rest, or to none, and why. Those of Debian's VTK hold here too.
+const EXCEPTIONS: &[(&str, &str, Option<Bars>, &str)] = &[
+    (
+        "windows",
+        "first",
+        None,
+        "the stock wheel shows nothing of an actor that two windows share; we show it in both",
+    ),
+    ("windows", "second", None, "as the first window"),
+];
+
+/// All scripts of a folder.
+fn names(folder: &str) -> Vec<String> {
+    let stems = scripts_in(folder).into_iter();
+    stems.filter_map(|p| Some(p.file_stem()?.to_str()?.to_owned())).collect()
+}
+
+fn run(with: With, folder: &str, names: &[String], settings: &[(&str, &str)]) -> Option<Run> {
+    let chosen = |p: &PathBuf| names.iter().any(|n| p.file_stem().is_some_and(|stem| stem == n.as_str()));
+    let scripts: Vec<PathBuf> = scripts_in(folder).into_iter().filter(chosen).collect();
+    assert_eq!(scripts.len(), names.len(), "every script is there");
+    let folder = output(&format!("wheel-{folder}-{with:?}{}", settings.len()).to_lowercase());
+    Run::new(Program::Wheel, with, &scripts, folder, settings).map_err(|reason| skip(&reason)).ok()
+}
+
+/// Compares all pictures of all scripts of a folder; gives the runs back.
+fn same_as_stock(folder: &str) -> Option<[Run; 2]> {
+    let scripts = names(folder);
+    let (stock, ours) = (run(With::Stock, folder, &scripts, &[])?, run(With::Bridge, folder, &scripts, &[])?);
+    let mut found = Vec::new();
+    for script in &scripts {
+        let names = stock.pictures(script).unwrap_or_else(|e| panic!("stock: {e}"));
+        assert_eq!(Ok(&names), ours.pictures(script).as_ref(), "{script}: other pictures than stock's");
+        for name in names {
+            let [a, b] = [&stock, &ours].map(|r| r.capture(script, &name).unwrap());
+            let path = ours.path(script, &name);
+            let place = (script.as_str(), name.as_str());
+            let all = EXCEPTIONS.iter().chain(crate::vtk::EXCEPTIONS);
+            let exception = all.into_iter().find(|(s, p, ..)| (*s, *p) == place);
+            let by_opengl = EMPTY.contains(&place) || place == ("steady", "after_a_fault");
+            if b.traced_elements() == 0 && !by_opengl {
+                found.push(format!("{}: nothing was ray traced: {:?}", path.display(), b.report));
+            }
+            let Some(bars) = exception.map_or(Some(Bars::STRICT), |(_, _, bars, _)| *bars) else { continue };
+            found.extend(faults(&a, &b, &bars).iter().map(|f| format!("{}: {f}", path.display())));
+        }
+    }
+    assert!(found.is_empty(), "\n{}\n", found.join("\n"));
+    Some([stock, ours])
+}
+
+#[test]
+fn unmodified_scripts_look_the_same_in_the_stock_wheel() {
+    same_as_stock("vtk");
+}
+
+/// Classes that Python derives (PyVista's are such), observers that a program removes, tiles, a fault of ours.
+#[test]
+fn python_programs_of_other_kinds_look_the_same_and_steady_frames_look_at_no_array() {
+    let Some([_, ours]) = same_as_stock("wheel") else { return };
+    let turned = ours.path("steady", "turned");
+    let looks = std::fs::read_to_string(turned.with_file_name("looks.txt")).unwrap();
+    let looks: Vec<u32> = looks.split_whitespace().map(|n| n.parse().unwrap()).collect();
+    assert!(looks[0] > 0 && looks[1] == 0, "arrays looked at in the first frame and in five more: {looks:?}");
+    assert!(ours.stderr.contains("internal error, OpenGL draws from now on"), "{}", ours.stderr);
+}
+
+#[test]
+fn shadows_come_to_the_wheel_by_their_variable() {
+    let room = ["room".to_owned()];
+    let with = |settings: &[(&str, &str)]| run(With::Bridge, "effects", &room, settings);
+    let (Some(plain), Some(shadows)) = (with(&[]), with(&[("RTV_SHADOWS", "1")])) else { return };
+    let [plain, shadows] = [plain, shadows].map(|r| r.capture("room", "room").unwrap());
+    let by_20 = |a: &[[u8; 3]], b: &[[u8; 3]]| {
+        a.iter().zip(b).filter(|(a, b)| a[1] > b[1].saturating_add(20)).count()
+    };
+    let (darker, brighter) = (by_20(&plain.rgb, &shadows.rgb), by_20(&shadows.rgb, &plain.rgb));
+    assert!(darker > 500 && brighter < darker / 20, "{darker} darker, {brighter} brighter");
+}
