@@ -40,13 +40,19 @@ pub(crate) const EXCEPTIONS: &[(&str, &str, Option<Bars>, &str)] = &[
     (
         "edges",
         "edges",
-        Some(Bars { silhouette: 0.004, color_mean: 1.2, color_strays: 0.006, ..Bars::STRICT }),
-        "OpenGL draws the outer half of an outline's edge beside the surface; we draw the half on it",
+        Some(Bars {
+            silhouette: 0.004,
+            depth_ulp: u32::MAX,
+            color_mean: 1.2,
+            color_strays: 0.006,
+            ..Bars::STRICT
+        }),
+        "OpenGL draws the outer half of an outline's edge beside the surface, we the half on it; and it pushes surfaces with edges back in depth",
     ),
     (
         "representations",
         "representations",
-        Some(Bars { silhouette: 0.001, color_strays: 0.003, ..Bars::STRICT }),
+        Some(Bars { silhouette: 0.001, depth_ulp: u32::MAX, color_strays: 0.003, ..Bars::STRICT }),
         "as edges: one of its balls shows them",
     ),
     (
