@@ -228,7 +228,7 @@ fn plot(record: &Record) -> Plot {
             let points: Vec<(f64, f64)> =
                 of.filter_map(|r| r.number("triangles").zip(r.number("fps"))).collect();
             if !points.is_empty() {
-                plot.series.push(Series::new(&format!("{}, {}", program.name(), way.name()), points));
+                plot.series.push(Series::new(format!("{}, {}", program.name(), way.name()), points));
             }
         }
     }
