@@ -7,7 +7,7 @@
 //! are going to draw, and the image has the same bits as without streaming.
 use crate::collect::Collector;
 use crate::comm::Communicator;
-use crate::compositor::{Composited, Compositor, Places, SLICE_PX, fingerprint, give_up};
+use crate::compositor::{Composited, Compositor, Places, fingerprint, give_up, slice_px};
 use crate::error::CompositeError;
 use crate::frame::Frame;
 use crate::join::{Item, Scratch};
@@ -72,8 +72,11 @@ impl<P: Composite> Compositor<P> {
                 let drawn = if bounds.is_empty() { Rect::EMPTY } else { bounds };
                 let begun = (|| {
                     session.meet(drawn, [f32::NAN; 2])?;
-                    let plan =
-                        Plan::new::<P>(&session.drawn, options.slice_px.unwrap_or(SLICE_PX), places.root);
+                    let plan = Plan::new::<P>(
+                        &session.drawn,
+                        options.slice_px.unwrap_or_else(|| slice_px(session.comm)),
+                        places.root,
+                    );
                     let pieces = plan.pieces(&session.drawn);
                     let collector =
                         Collector::new(&mut session, size_px, places.root, options.depth, &pieces, spare)?;

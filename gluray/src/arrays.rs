@@ -62,8 +62,9 @@ impl Source {
             true => bytes.into_owned(),
             false => {
                 let mut out = Vec::with_capacity(bytes.len() / step * element + element);
-                for vertex in bytes.chunks(step).filter(|v| v.len() >= element) {
-                    out.extend_from_slice(&vertex[..element]);
+                // A stride below the element's size makes vertices overlap.
+                for at in (0..(bytes.len() + 1).saturating_sub(element)).step_by(step) {
+                    out.extend_from_slice(&bytes[at..at + element]);
                 }
                 out
             }

@@ -139,12 +139,12 @@ pub(crate) struct Draw {
 }
 
 impl Draw {
-    /// True when no vertex of a draw of fixed function lets light through.
+    /// True when no part of the draw lets light through.
     pub(crate) fn has_full_alpha(&self) -> bool {
         let (s, a) = (&self.state, &self.attributes);
         let tracked = s.color_material.is_some_and(|(_, what)| matches!(what, DIFFUSE | AMBIENT_AND_DIFFUSE));
         match (&self.shading, &a.colors) {
-            (Shading::Program(_), _) => false,
+            (Shading::Program(program), _) => program.is_opaque(a, self.geometry.mesh.positions.len()),
             _ if s.lighting && !tracked => a.materials.iter().flatten().all(|m| m.diffuse[3] == 1.0),
             (_, Values::Constant(c)) => c[3] == 1.0,
             (_, Values::PerVertex(all)) => all.iter().all(|c| c[3] == 1.0),

@@ -164,6 +164,11 @@ impl Context {
         self.frame.told.traced(self.counters.report.frames + 1, pending.iter().map(|(d, _)| d));
         // What the driver drew after a traced surface wins ties with it, as LEQUAL says; what it drew before loses them.
         let func = if others { LESS } else { pending[0].0.state.depth_func };
+        if let Some(n) = pending.iter().map(|(d, _)| d.state.samples).find(|n| *n > 1) {
+            self.counters.warn(format!(
+                "the program has {n} samples a pixel: one ray stands for all of them, so silhouettes are not smoothed as the driver's are"
+            ));
+        }
         if crate::picture::is_for(&self.config.settings) {
             return self.draw_picture(&pending, func);
         }

@@ -1,8 +1,10 @@
 //! Programs with shaders: VTK's family (ParaView, PyVista, Slicer, VisIt, Mayavi) is recognised, all others are the driver's.
 //!
 //! VTK assembles its shaders from pieces. Here `main` of both shaders is taken apart into statements, and a program counts as recognised only
-//! when every statement is one whose meaning is written down below: a shader with anything else in it (picking, edges, depth peeling,
+//! when every statement is one whose meaning is written down in `template`: a shader with anything else in it (picking, edges, depth peeling,
 //! physically based materials) is left to the driver.
+
+mod template;
 
 use crate::arrays::{Elements, Source, Taken, positions};
 use crate::cache::Geometry;
@@ -20,145 +22,7 @@ use crate::trace::mixed;
 use rt_core::mesh::TriMesh;
 use std::collections::HashMap;
 use std::sync::Arc;
-
-/// Where the surface's colour comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-enum Colors {
-    #[default]
-    Uniform,
-    /// Attribute `scalarColor`.
-    PerVertex,
-    /// Texture `colortexture` at attribute `tcoord`.
-    Map,
-}
-
-/// What a program's text says.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Template {
-    colors: Colors,
-    overrides: bool,
-    /// Normals from the triangle instead of an attribute.
-    flat: bool,
-    headlight: bool,
-    /// Number of directional lights.
-    directional: usize,
-    lit: bool,
-}
-
-const MOST_LIGHTS: usize = 6;
-
-/// Statements of `main`, without blanks and comments; light numbers become `#`.
-fn statements(source: &str) -> Option<Vec<String>> {
-    let mut text = String::new();
-    for line in source.lines() {
-        let line = line.split("//").next().unwrap_or("");
-        if !line.trim_start().starts_with('#') {
-            text += line;
-            text.push('\n');
-        }
-    }
-    while let Some(start) = text.find("/*") {
-        let end = text[start..].find("*/").map_or(text.len(), |e| start + e + 2);
-        text.replace_range(start..end, " ");
-    }
-    let body = &text[text.find("void main")?..];
-    let body = &body[body.find('{')? + 1..body.rfind('}')?];
-    let squeezed: String = body.chars().filter(|c| !c.is_whitespace()).collect();
-    Some(squeezed.split([';', '{', '}']).filter(|s| !s.is_empty()).map(str::to_owned).collect())
-}
-
-/// Light numbers out of a statement.
-fn without_light(s: &str) -> (String, Option<usize>) {
-    for name in ["lightDirectionVC", "lightColor"] {
-        if let Some(at) = s.find(name) {
-            let digit = s[at + name.len()..].chars().next().and_then(|c| c.to_digit(10));
-            if let Some(d) = digit {
-                let mut out = s.to_owned();
-                for n in ["lightDirectionVC", "lightColor"] {
-                    out = out.replace(&format!("{n}{d}"), n);
-                }
-                return (out, Some(d as usize));
-            }
-        }
-    }
-    (s.to_owned(), None)
-}
-
-impl Template {
-    /// Reads the shaders; the error says why the program is not recognised.
-    pub(crate) fn read(vertex: &str, fragment: &str) -> Result<Template, &'static str> {
-        const NOT_VTK: &str = "a program that is not recognised";
-        let (Some(vs), Some(fs)) = (statements(vertex), statements(fragment)) else { return Err(NOT_VTK) };
-        let mut t = Template::default();
-        for s in &vs {
-            match s.as_str() {
-                "normalVCVSOutput=normalMatrix*normalMC"
-                | "tcoordVCVSOutput=tcoord"
-                | "vertexColorVSOutput=scalarColor"
-                | "vertexVCVSOutput=MCVCMatrix*vertexMC"
-                | "gl_Position=MCDCMatrix*vertexMC" => {}
-                _ => return Err(NOT_VTK),
-            }
-        }
-        if !vs.iter().any(|s| s == "gl_Position=MCDCMatrix*vertexMC") {
-            return Err(NOT_VTK);
-        }
-        for s in &fs {
-            let (s, light) = without_light(s);
-            match s.as_str() {
-                "vec4vertexVC=vertexVCVSOutput"
-                | "vec3fdx=dFdx(vertexVC.xyz)"
-                | "vec3fdy=dFdy(vertexVC.xyz)"
-                | "vec3specularColor=specularIntensity*specularColorUniform"
-                | "floatspecularPower=specularPowerUniform"
-                | "vec3ambientColor=ambientIntensity*ambientColorUniform"
-                | "vec3diffuseColor=diffuseIntensity*diffuseColorUniform"
-                | "floatopacity=opacityUniform"
-                | "vec3normalVCVSOutput=normalize(normalVCVSOutput)"
-                | "if(gl_FrontFacing==false)"
-                | "normalVCVSOutput=-normalVCVSOutput"
-                | "if(cameraParallel==1&&normalVCVSOutput.z<0.0)"
-                | "if(cameraParallel==0&&dot(normalVCVSOutput,vertexVC.xyz)>0.0)"
-                | "normalVCVSOutput=-1.0*normalVCVSOutput"
-                | "floatdf"
-                | "floatsf"
-                | "vec3diffuse=vec3(0,0,0)"
-                | "vec3specular=vec3(0,0,0)"
-                | "if(fragOutput0.a<=0.0)"
-                | "discard"
-                | "diffuse=diffuse*diffuseColor"
-                | "specular=specular*specularColor"
-                | "diffuse+=(df*lightColor)"
-                | "specular+=(sf*lightColor)"
-                | "floatsf=pow(df,specularPower)"
-                | "vec3diffuse=df*diffuseColor*lightColor"
-                | "vec3specular=sf*specularColor*lightColor"
-                | "sf=sign(df)*pow(max(1e-5,dot(reflect(lightDirectionVC,normalVCVSOutput),normalize(-vertexVC.xyz))),specularPower)" =>
-                    {}
-                "vec4texColor=texture(colortexture,tcoordVCVSOutput.st)" => t.colors = Colors::Map,
-                "vec3ambientColor=ambientIntensity*texColor.rgb"
-                | "vec3diffuseColor=diffuseIntensity*texColor.rgb"
-                | "floatopacity=opacityUniform*texColor.a" => t.colors = Colors::Map,
-                "vec3ambientColor=ambientIntensity*vertexColorVSOutput.rgb"
-                | "vec3diffuseColor=diffuseIntensity*vertexColorVSOutput.rgb"
-                | "floatopacity=opacityUniform*vertexColorVSOutput.a" => t.colors = Colors::PerVertex,
-                "if(OverridesColor)" => t.overrides = true,
-                "ambientColor=ambientColorUniform*ambientIntensity"
-                | "diffuseColor=diffuseColorUniform*diffuseIntensity" => {}
-                "vec3normalVCVSOutput=normalize(cross(fdx,fdy))" => t.flat = true,
-                "floatdf=max(0.000001,normalVCVSOutput.z)" if light.is_none() => t.headlight = true,
-                "df=max(0.0,dot(normalVCVSOutput,-lightDirectionVC))" => {
-                    t.directional = t.directional.max(light.unwrap_or(0) + 1);
-                }
-                "fragOutput0=vec4(ambientColor+diffuse+specular,opacity)" => t.lit = true,
-                "fragOutput0=vec4(ambientColor+diffuseColor,opacity)" => t.lit = false,
-                _ => return Err(NOT_VTK),
-            }
-        }
-        let one_kind = t.headlight != (t.directional > 0);
-        if (t.lit && !one_kind) || t.directional > MOST_LIGHTS { Err(NOT_VTK) } else { Ok(t) }
-    }
-}
+use template::{Colors, Template};
 
 /// What colours a program's surface.
 pub(crate) enum ProgramSkin<'a> {
@@ -252,7 +116,7 @@ impl Recognised {
     }
 
     /// True when every fragment has alpha 1.
-    fn is_opaque(&self, attributes: &Attributes, vertices: usize) -> bool {
+    pub(crate) fn is_opaque(&self, attributes: &Attributes, vertices: usize) -> bool {
         self.opacity == 1.0
             && match self.template.colors {
                 Colors::Uniform => true,
@@ -597,35 +461,4 @@ pub(crate) struct DrawCall {
     pub(crate) count: usize,
     pub(crate) kind: u32,
     pub(crate) at: usize,
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const VERTEX: &str = "#version 150\nin vec4 vertexMC; // a comment\nvoid main()\n{\n  vertexVCVSOutput = MCVCMatrix * vertexMC;\n  gl_Position = MCDCMatrix * vertexMC;\n}\n";
-    fn fragment(extra: &str) -> String {
-        format!(
-            "#version 150\n/* text */\nvoid main()\n{{\n vec4 vertexVC = vertexVCVSOutput;\n float opacity = opacityUniform;\n\
-             vec3 normalVCVSOutput = normalize(normalVCVSOutput);\n if (gl_FrontFacing == false) {{ normalVCVSOutput = -normalVCVSOutput; }}\n\
-             {extra}\n fragOutput0 = vec4(ambientColor + diffuse + specular, opacity);\n if (fragOutput0.a <= 0.0)\n {{\n discard;\n }}\n}}\n"
-        )
-    }
-
-    #[test]
-    fn headlights_and_light_kits_are_told_apart() {
-        let head = Template::read(VERTEX, &fragment("float df = max(0.000001, normalVCVSOutput.z);"))
-            .expect("known");
-        assert!(head.headlight && head.lit && head.directional == 0);
-        let kit = "df = max(0.0, dot(normalVCVSOutput, -lightDirectionVC0)); df = max(0.0, dot(normalVCVSOutput, -lightDirectionVC4));";
-        assert_eq!(Template::read(VERTEX, &fragment(kit)).expect("known").directional, 5);
-    }
-
-    #[test]
-    fn a_statement_that_is_not_known_makes_the_program_the_drivers() {
-        let selector = "float df = max(0.000001, normalVCVSOutput.z); fragOutput0 = vec4(propID, 1.0);";
-        assert!(Template::read(VERTEX, &fragment(selector)).is_err());
-        assert!(Template::read("void main() { gl_Position = vec4(sin(t)); }", &fragment("")).is_err());
-        assert!(Template::read(VERTEX, &fragment("")).is_err(), "lit, but by nothing that is known");
-    }
 }

@@ -28,6 +28,7 @@ const TABLE: &[(&str, &str)] = &[
     ("a texture with two filters", "another filter near than far, which is not followed"),
     ("a texture of", "depths and integers are compared or cast, not sampled"),
     ("a texture whose base", "sampled from another level than the first"),
+    ("OpenGL ES", "programs for OpenGL ES are the driver's in every mode"),
     ("several texture units", "more than one texture at once is not traced"),
     ("a texture that is neither", "cube maps and volumes are not traced"),
     ("texture combiners", "GL_COMBINE is not traced"),

@@ -27,6 +27,7 @@ const FILLED: &[&str] = &[
     "pos-array -auto -fbo",
     "provoking-vertex -auto",
     "gl-1.0-dlist-beginend -auto -fbo",
+    "array-stride -auto -fbo",
     "gl-1.0-user-clip-all-planes -auto -fbo",
     "texredefine -auto -fbo",
     "copyteximage 1D -auto -fbo",

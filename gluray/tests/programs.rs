@@ -170,6 +170,18 @@ fn vtk_in_python_draws_the_drivers_picture() {
 }
 
 #[test]
+fn vtk_leaves_blending_on_and_is_opaque_all_the_same() {
+    let (Some(python), Some(_)) = (program("RTSV_SYSTEM_PYTHON"), program("RTSV_PVBATCH")) else { return };
+    let Some(x) = Xvfb::start() else { return };
+    let place = folder();
+    let home = [("HOME", place.path().to_str().expect("UTF-8"))];
+    let run = Run { x: &x, folder: place.path(), through: Some(&["--mode", "rich"]), environment: &home };
+    let (_, report) = run.program(&python, &[script("vtk_scene.py").as_str()]);
+    assert!(report.traced_draws > 0, "{report:?}");
+    assert_eq!(report.rays.get("transparency"), None, "nothing here lets light through: {:?}", report.rays);
+}
+
+#[test]
 fn vtk_by_egl_draws_the_drivers_picture() {
     let (Some(python), Some(_)) = (program("RTSV_PYTHON"), program("RTSV_XVFB")) else { return };
     let file = script("egl_scene.py");

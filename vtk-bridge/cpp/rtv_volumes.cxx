@@ -144,6 +144,13 @@ const char* PropertyReason(vtkVolumeProperty* property)
   {
     return "a volume with gradient opacity";
   }
+#if VTK_VERSION_NUMBER >= VTK_VERSION_CHECK(9, 2, 0)
+  // Its highlight follows the mirrored light; that of rt-core's volumes, and of VTK 9.1, the half vector.
+  if (property->GetShade(0) && property->GetSpecular(0) > 0.0)
+  {
+    return "a shaded volume with a highlight";
+  }
+#endif
   if (property->HasLabelGradientOpacity() || property->GetLabelColor(1) || property->GetLabelScalarOpacity(1))
   {
     return "a volume with labels";

@@ -61,7 +61,9 @@ pub fn resolve(color: &Color<'_>, built: &BuiltMesh, points: usize) -> Result<Op
             if coordinates.len() < points || row.is_empty() {
                 return Err(length("points", points, coordinates.len()));
             }
-            let of = |c: &[f32; 2]| if c[1] > 0.5 { f32::NAN } else { c[0] };
+            // A table whose range is one number makes 0/0 of that number; OpenGL takes its first colour then.
+            let place = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(-1000.0, 1000.0) };
+            let of = |c: &[f32; 2]| if c[1] > 0.5 { f32::NAN } else { place(c[0]) };
             let values: Vec<f32> = coordinates[..points].par_iter().with_min_len(CHUNK).map(of).collect();
             let values = match &built.clipped {
                 Some(c) => c.vertex_values(&values, |a, b, t| a + (b - a) * t),
@@ -114,5 +116,24 @@ mod tests {
         }
         assert_eq!(map.lookup(f32::NAN), float([1, 2, 3, 255]));
         assert_eq!(map.lookup(7.0), [1.0; 4]);
+    }
+
+    #[test]
+    fn a_range_without_extent_takes_the_first_color_and_not_that_of_nan() {
+        use crate::input::{Cells, Ids, Points, Shape};
+        let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let polys = Cells { offsets: Ids::I64(&[0, 3]), connectivity: Ids::I64(&[0, 1, 2]) };
+        let built = crate::geometry::build(&Shape::polygons(1, Points::F32(&points), polys));
+        let coordinates = [[f32::NAN, 0.0], [f32::INFINITY, 0.0], [0.5, 1.0]];
+        let color = Color::Mapped {
+            key: 1,
+            coordinates: &coordinates,
+            row: &[[9, 8, 7, 255]; 4],
+            nan: [1, 2, 3, 255],
+        };
+        let resolved = resolve(&color, &built.mesh.expect("a triangle"), 3);
+        let Ok(Some(Resolved::Mapped(values, _))) = resolved else { panic!("a map") };
+        assert_eq!(values.values[..2], [0.0, 1000.0]);
+        assert!(values.values[2].is_nan(), "the value itself is not a number");
     }
 }

@@ -43,7 +43,11 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         "ms",
         "the same under SimGrid's SMPI, of IceT its best strategy; empty where that is not installed",
     );
-    record.column("model_over_smpi", "", "time by our model over that by SMPI, of direct send");
+    record.column(
+        "model_over_smpi",
+        "",
+        "time by our model over that by SMPI, of direct send, and of IceT its best strategy in either",
+    );
     record.column("differ", "", "pixels that differ from direct send's image");
     let (size, frames, most) = if context.quick { (512, 2, 64) } else { (1024, 5, 128) };
     record.notes.push(format!(
@@ -131,15 +135,21 @@ fn measure(
 
 /// Puts SMPI's times of direct send and of the best of IceT beside ours.
 fn beside_smpi(record: &mut Record, ranks: usize, [ours_ms, icet_ms]: [f64; 2]) {
-    let of_ranks = record.rows.iter_mut().filter(|r| r.number("ranks") == Some(ranks as f64));
-    for row in of_ranks {
+    let is_of = |r: &Row| r.number("ranks") == Some(ranks as f64);
+    let icet = record.rows.iter().filter(|r| is_of(r));
+    let icet = icet.filter(|r| r.text("compositor").is_some_and(|c| c.starts_with("IceT")));
+    let icet_best = icet.filter_map(|r| r.number("time")).min_by(f64::total_cmp);
+    for row in record.rows.iter_mut().filter(|r| is_of(r)) {
         let name = row.text("compositor").unwrap_or_default().to_string();
         let time = row.number("time");
         *row = match name.as_str() {
             "direct send" => {
                 std::mem::take(row).with("smpi", ours_ms).with("model_over_smpi", time.map(|t| t / ours_ms))
             }
-            "IceT radix-kr" => std::mem::take(row).with("smpi", icet_ms),
+            "IceT radix-kr" => {
+                let ratio = icet_best.map(|t| t / icet_ms);
+                std::mem::take(row).with("smpi", icet_ms).with("model_over_smpi", ratio)
+            }
             _ => continue,
         };
     }

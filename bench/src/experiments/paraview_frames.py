@@ -36,7 +36,7 @@ view = CreateRenderView()
 view.ViewSize = [order["pixels"]] * 2
 view.OrientationAxesVisibility = 0
 shown = Show(data, view)
-ColorBy(shown, None)
+shown.ColorArrayName = ["POINTS", ""]
 shown.DiffuseColor = [0.8, 0.6, 0.4]
 shown.SetRepresentationType("Surface")
 result["data_gb"] = peak_gb()

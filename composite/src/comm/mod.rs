@@ -66,6 +66,12 @@ pub trait Communicator {
         self.now()
     }
 
+    /// Whether all ranks share one memory and its processors, so that no message travels while its ranks do something else: then it is
+    /// not worth cutting pictures in slices for that. The same on all ranks.
+    fn is_one_node(&self) -> bool {
+        false
+    }
+
     /// Hands `message` over to `destination`; does not wait for it to be received.
     ///
     /// # Errors

@@ -161,6 +161,10 @@ impl Communicator for ThreadComm {
         self.group.begin.elapsed().as_secs_f64()
     }
 
+    fn is_one_node(&self) -> bool {
+        true
+    }
+
     fn send(&mut self, destination: usize, tag: u32, message: Vec<u8>) -> Result<(), CommError> {
         self.check_rank(destination)?;
         let mut state = self.group.lock();

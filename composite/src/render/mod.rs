@@ -45,6 +45,7 @@ mod ray_parallel;
 mod report;
 mod sort_last;
 mod subject;
+mod volumes;
 mod waves;
 mod words;
 

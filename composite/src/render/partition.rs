@@ -1,11 +1,13 @@
 //! Data to ranks: bricks of space by k-d splits, with about the same number of primitives, or the same work for a view.
-use super::FrameError;
+use super::{FrameError, volumes};
 use rt_core::accel::{BuildOptions, Geometry};
 use rt_core::camera::Camera;
 use rt_core::effects::Effects;
 use rt_core::glam::swizzles::Vec4Swizzles;
 use rt_core::glam::{DAffine3, DVec3};
 use rt_core::scene::Scene;
+use rt_core::volume::Brick;
+use std::sync::Arc;
 
 /// How primitives are dealt to ranks.
 #[derive(Debug, Clone)]
@@ -32,6 +34,8 @@ pub enum Split {
 pub struct Partition {
     /// By rank and geometry, in ascending order.
     kept: Vec<Vec<Vec<u32>>>,
+    /// Of each rank its brick of the volume, in scenes with just one.
+    bricks: Option<Vec<Brick>>,
 }
 
 /// What one rank holds.
@@ -47,6 +51,8 @@ pub struct Part {
     pub(super) kept: Vec<Vec<u32>>,
     /// What the whole scene needs.
     pub(super) needed: Effects,
+    /// Of each rank its brick of the volume, in scenes with just one.
+    pub(super) bricks: Option<Vec<Brick>>,
     /// This part with a rim, see [`super::ghost`].
     pub(super) rim: Option<(f64, Scene)>,
 }
@@ -72,6 +78,10 @@ impl Partition {
         let parts = parts.max(1);
         let geometries = scene.world.geometries().len();
         let mut kept = vec![vec![Vec::new(); geometries]; parts];
+        let bricks = match &scene.volumes[..] {
+            [placed] => Some(volumes::bricks(&placed.volume, parts)),
+            _ => None,
+        };
         if let Split::Random { seed } = split {
             for (g, geometry) in scene.world.geometries().iter().enumerate() {
                 for p in 0..count(geometry) as u32 {
@@ -79,7 +89,7 @@ impl Partition {
                     kept[rank as usize][g].push(p);
                 }
             }
-            return Partition { kept };
+            return Partition { kept, bricks };
         }
         let mut items = items(scene, split);
         let mut give = |rank: usize, items: &[Item]| {
@@ -91,7 +101,7 @@ impl Partition {
         for list in kept.iter_mut().flatten() {
             list.sort_unstable();
         }
-        Partition { kept }
+        Partition { kept, bricks }
     }
 
     /// Number of parts.
@@ -116,8 +126,12 @@ impl Partition {
     pub fn part(&self, scene: &Scene, rank: usize, options: &BuildOptions) -> Result<Part, FrameError> {
         let parts = self.parts();
         let kept = self.kept.get(rank).ok_or(FrameError::Ranks { parts, ranks: rank + 1 })?.clone();
-        let part = scene.part(&kept, options)?;
-        Ok(Part { scene: part, rank, parts, kept, needed: Effects::required_by(scene), rim: None })
+        let mut part = scene.part(&kept, options)?;
+        if let (Some(bricks), [placed]) = (&self.bricks, &mut part.volumes[..]) {
+            placed.volume = Arc::new(placed.volume.part(bricks[rank]));
+        }
+        let (needed, bricks) = (Effects::required_by(scene), self.bricks.clone());
+        Ok(Part { scene: part, rank, parts, kept, needed, bricks, rim: None })
     }
 }
 

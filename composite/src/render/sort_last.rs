@@ -160,8 +160,9 @@ impl DataParallel {
         };
         talk.report.effects = frame.effects();
         talk.report.warnings = frame.warnings().to_vec();
-        if !part.scene.volumes.is_empty() {
-            talk.report.warnings.push("volumes are not cut: every rank holds them whole".into());
+        if part.scene.volumes.len() > 1 {
+            let words = "several volumes are not cut: where they overlap, media mix along the whole ray, so every rank holds them whole";
+            talk.report.warnings.push(words.into());
         }
         let owners = Owners::new(&frame, &self.boxes.bounds);
         let mine = owners.tiles[talk.rank()].clone();
@@ -198,7 +199,10 @@ impl DataParallel {
                 talk.spent(Activity::Shade);
                 continue;
             }
-            let mut wave = waves::Wave { side: &side, boxes: &self.boxes, way, rim: rim.as_ref(), pass };
+            let bricks =
+                part.bricks.as_deref().filter(|_| pass != Pass::Geometry && frame.volume().is_some());
+            let mut wave =
+                waves::Wave { side: &side, boxes: &self.boxes, way, rim: rim.as_ref(), bricks, pass };
             wave.run(talk, &mut tiles, answers)?;
         }
         for tile in &tiles {

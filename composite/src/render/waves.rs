@@ -3,9 +3,10 @@ use super::ask::Talk;
 use super::boxes::{Boxes, ranks_in};
 use super::camera_wave::TileAnswer;
 use super::sort_last::{Light, Side, each};
-use super::{Activity, FrameError, RankReport};
+use super::{Activity, FrameError, RankReport, volumes};
 use rt_core::glam::Vec3;
 use rt_core::ray::Ray;
+use rt_core::volume::Brick;
 use rt_core::waves::{LightBits, LightPoint, Met, Pass, TileInWork, WaveFrame};
 
 /// Words of a ray in a message.
@@ -21,6 +22,8 @@ pub(super) struct Wave<'a> {
     pub(super) way: Light,
     /// This rank's part with a rim, for ghost zones.
     pub(super) rim: Option<&'a WaveFrame<'a>>,
+    /// Of each rank its brick of the scene's volume, where that is cut.
+    pub(super) bricks: Option<&'a [Brick]>,
     pub(super) pass: Pass,
 }
 
@@ -36,6 +39,10 @@ impl Wave<'_> {
         let fits = |source| FrameError::Answer { rank, source };
         // Ranks that were hit by camera rays, for light that stays there.
         let mut hit_ranks: Vec<Option<Vec<u32>>> = Vec::new();
+        if let Some(bricks) = self.bricks {
+            let met: Vec<_> = camera.iter().map(|answer| answer.met.clone()).collect();
+            volumes::cross(talk, self.side, bricks, tiles, &met)?;
+        }
         for (tile, answer) in tiles.iter_mut().zip(&camera) {
             tile.meet(frame, &answer.met).map_err(fits)?;
             hit_ranks.push(Some((0..answer.met.len()).map(|slot| answer.winner(slot)).collect()));
@@ -185,12 +192,17 @@ impl Wave<'_> {
         });
         let (any, met) = self.first_hits(talk, &rays, pixels.as_deref())?;
         let rank = talk.rank();
-        for (t, tile) in tiles.iter_mut().enumerate().filter(|(t, _)| live[*t]) {
-            let mut answers = vec![None; tile.num_rays()];
+        let mut answers: Vec<Vec<Option<Met>>> = tiles.iter().map(|t| vec![None; t.num_rays()]).collect();
+        for (t, answers) in answers.iter_mut().enumerate() {
             for ((place, ..), m) in waiting[t].iter().zip(&met[t]) {
                 answers[*place] = *m;
             }
-            tile.meet(self.side.frame, &answers).map_err(|source| FrameError::Answer { rank, source })?;
+        }
+        if let Some(bricks) = self.bricks {
+            volumes::cross(talk, self.side, bricks, tiles, &answers)?;
+        }
+        for (t, tile) in tiles.iter_mut().enumerate().filter(|(t, _)| live[*t]) {
+            tile.meet(self.side.frame, &answers[t]).map_err(|source| FrameError::Answer { rank, source })?;
         }
         talk.spent(Activity::Shade);
         // A wave of which every ray waits for nothing is still a wave of its tile; tiles agree with the others only on questions.
@@ -321,14 +333,14 @@ fn blocked_in_parallel(
     pieces.into_iter().flat_map(|(bits, _)| bits).collect()
 }
 
-fn write_ray(ray: &Ray, pixel: Option<u32>, out: &mut Vec<u32>) {
+pub(super) fn write_ray(ray: &Ray, pixel: Option<u32>, out: &mut Vec<u32>) {
     out.extend(ray.origin.to_array().map(f32::to_bits));
     out.extend(ray.dir.to_array().map(f32::to_bits));
     out.extend([ray.t_min.to_bits(), ray.t_max.to_bits()]);
     out.extend(pixel);
 }
 
-fn read_ray(words: &[u32]) -> Ray {
+pub(super) fn read_ray(words: &[u32]) -> Ray {
     let f = |i: usize| f32::from_bits(words[i]);
     Ray { origin: Vec3::new(f(0), f(1), f(2)), dir: Vec3::new(f(3), f(4), f(5)), t_min: f(6), t_max: f(7) }
 }

@@ -21,7 +21,7 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    /// `root` is the place that collects the image.
+    /// `root` is the place that collects the image over a wire of its own.
     pub(crate) fn new<P: Composite>(drawn: &[Rect], slice_pixels: usize, root: Option<usize>) -> Self {
         let cut = |tile: Rect| if tile.is_empty() { Vec::new() } else { slices(tile, slice_pixels) };
         let mut owners = owners::<P>(drawn, root);
@@ -52,14 +52,14 @@ const FULL_SHARE: u64 = 256;
 /// The collecting place gets the finished image besides, over the same wire. With a share `x` of the exchange `e` and of the image `g` (bytes
 /// that come in), it receives `x e + (1 - x) g` while each other one receives `(1 - x) e / (p - 1)`. They are equal for
 /// `x = (e / (p - 1) - g) / (e p / (p - 1) - g)`, which is nothing from a handful of ranks on. Two ranks share alike: there what one does not
-/// join the other must, and both work all the time.
+/// join the other must, and both work all the time. So do ranks of one memory, where every byte costs the same processors.
 fn owners<P: Composite>(drawn: &[Rect], root: Option<usize>) -> Vec<Owner> {
     let places = drawn.len();
     let whole = drawn.iter().fold(Rect::EMPTY, |all, rect| all.around(rect)).pixels();
     let layers: usize = drawn.iter().map(Rect::pixels).sum();
-    // As many as there are tiles worth a message, and enough that what comes to each is no more than half of what comes to the root.
+    // As many as there are tiles worth a message, and enough that what comes to each is no more than what comes to the root.
     let (drawn_bytes, image_bytes) = (layers * P::BYTES, whole * size_of::<P::Color>());
-    let wanted = (whole / OWNER_PX).max(2 * drawn_bytes / image_bytes.max(1)).clamp(1, places);
+    let wanted = (whole / OWNER_PX).max(drawn_bytes.div_ceil(image_bytes.max(1))).clamp(1, places);
 
     let share = match root {
         Some(_) if places > 2 => {
@@ -233,5 +233,40 @@ impl<'a, P: Composite> Exchange<'a, P> {
             self.put(index, from, Item::Message(message), session, collector, scratch)?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pixel::DepthPixel;
+
+    type P = DepthPixel<[u8; 4]>;
+
+    fn owning(drawn: &[Rect], root: Option<usize>) -> usize {
+        let plan = Plan::new::<P>(drawn, usize::MAX, root);
+        plan.slices.iter().filter(|slices| !slices.is_empty()).count()
+    }
+
+    #[test]
+    fn the_rank_that_collects_joins_nothing_where_others_can() {
+        let dense = vec![Rect::of_size(1024, 1024); 8];
+        assert!(Plan::new::<P>(&dense, usize::MAX, Some(3)).slices[3].is_empty());
+        assert_eq!((owning(&dense, Some(3)), owning(&dense, None)), (7, 8));
+        // Two ranks share alike.
+        let halves = Plan::new::<P>(&dense[..2], usize::MAX, Some(0)).slices;
+        assert_eq!(halves[0][0].pixels(), halves[1][0].pixels());
+    }
+
+    #[test]
+    fn many_ranks_with_little_to_join_leave_it_to_some_and_with_much_all_work() {
+        let apart: Vec<Rect> = (0..64)
+            .map(|i| {
+                let (x0, y0) = (i % 8 * 128, i / 8 * 128);
+                Rect { x0, y0, x1: x0 + 128, y1: y0 + 128 }
+            })
+            .collect();
+        assert_eq!(owning(&apart, Some(0)), 32);
+        assert_eq!(owning(&vec![Rect::of_size(1024, 1024); 64], None), 64);
     }
 }

@@ -183,6 +183,38 @@ fn mirrors_glass_layers_and_paths_have_the_bits_of_one_node() {
 }
 
 #[test]
+fn a_volume_in_bricks_has_the_bits_of_one_node() {
+    for case in scenes::volumes() {
+        let expected = one_node(&case);
+        for (ranks, split) in [(2, Split::Triangles), (7, Split::Random { seed: 5 }), (64, Split::Triangles)]
+        {
+            let outputs = many(&case, ranks, &split, Light::Ask);
+            assert_same(&expected, &outputs, &format!("{}, {ranks} ranks", case.name));
+            assert!(outputs[0].report.warnings.iter().all(|w| !w.contains("whole")));
+        }
+        // Every rank holds its brick with two layers of points around it, and not the whole.
+        let whole = case.scene.volumes[0].volume.grid().values.len();
+        let partition = Partition::new(&case.scene, 8, &Split::Triangles);
+        let held = (0..8).map(|rank| {
+            let part = partition.part(&case.scene, rank, &BuildOptions::default()).unwrap();
+            part.scene.volumes[0].volume.grid().values.len()
+        });
+        let held: Vec<usize> = held.collect();
+        assert!(held.iter().all(|&n| n < whole / 2) && held.iter().sum::<usize>() >= whole, "{held:?}");
+    }
+}
+
+#[test]
+fn parts_of_tubes_cylinders_and_spheres_hold_their_own_and_have_the_bits_of_one_node() {
+    let case = scenes::arrays_of_shapes();
+    let expected = one_node(&case);
+    for (ranks, split) in [(2, Split::Triangles), (7, Split::Random { seed: 5 }), (32, Split::Triangles)] {
+        let outputs = many(&case, ranks, &split, Light::Ask);
+        assert_same(&expected, &outputs, &format!("{}, {ranks} ranks", case.name));
+    }
+}
+
+#[test]
 fn ghost_zones_have_the_bits_of_one_node_and_the_cheaper_way_is_taken() {
     let case = scenes::occlusion_alone();
     let expected = one_node(&case);

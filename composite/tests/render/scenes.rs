@@ -1,15 +1,19 @@
 //! Scenes that have light across borders of parts.
 use rt_core::accel::Geometry;
 use rt_core::camera::Camera;
+use rt_core::colormap::ColorMap;
 use rt_core::environment::Background;
 use rt_core::frame::Layers;
-use rt_core::glam::{DAffine3, DVec3, Vec3};
+use rt_core::glam::{DAffine3, DVec3, UVec3, Vec3};
+use rt_core::grid::Grid;
 use rt_core::light::Light;
-use rt_core::material::Material;
+use rt_core::material::{ColorSource, Material};
 use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::render::RenderOptions;
-use rt_core::scene::{AmbientOcclusion, Appearance, Scene, SceneBuilder};
-use rt_core::shapes::{Radii, Spheres};
+use rt_core::scene::{AmbientOcclusion, Appearance, PlacedVolume, Scene, SceneBuilder};
+use rt_core::shapes::{Cylinders, Radii, Spheres, Tubes};
+use rt_core::transfer_function::TransferFunction;
+use rt_core::volume::{Interpolation, Volume, VolumeOptions, VolumeShading};
 use std::sync::Arc;
 
 /// A scene with a view of it.
@@ -111,6 +115,89 @@ pub(crate) fn occlusion_alone() -> Case {
         camera: camera(DVec3::ZERO),
         options: options(),
     }
+}
+
+/// A shaded volume around the surfaces, seen also through glass and layers; and one alone.
+pub(crate) fn volumes() -> Vec<Case> {
+    let dims = UVec3::new(41, 37, 29);
+    let value = |k: u32| {
+        let (x, y, z) = (k % dims.x, k / dims.x % dims.y, k / dims.x / dims.y);
+        let at = Vec3::new(x as f32, y as f32, z as f32) * 0.3;
+        // Clear in one corner, and one point is missing.
+        let v = if x < 12 && y < 15 { 0.0 } else { 0.5 + 0.5 * at.x.sin() * at.y.cos() * at.z.sin() };
+        if k == 20_000 { f32::NAN } else { v }
+    };
+    let grid = || {
+        let values = (0..dims.element_product()).map(value).collect();
+        Grid::new(dims, DVec3::new(-2.0, -1.8, -0.7), DVec3::new(0.1, 0.1, 0.06), values).unwrap()
+    };
+    let volume = |shading, interpolation| {
+        let colors = ColorMap::new(vec![[0.1, 0.2, 0.9, 1.0], [1.0, 0.8, 0.1, 1.0]], [0.0, 1.0]);
+        let transfer =
+            TransferFunction::from_opacity(colors, &[[0.2, 0.0], [0.6, 0.3], [1.0, 0.9]], 0.4).unwrap();
+        Volume::new(grid().into(), transfer, VolumeOptions { shading, interpolation }).unwrap()
+    };
+    let shading = VolumeShading {
+        ambient: 0.3,
+        diffuse: 0.7,
+        specular: 0.4,
+        shininess: 9.0,
+        light: None,
+        half_gradient: 1.0,
+    };
+    let sun = Light::directional(DVec3::new(0.4, -0.3, 1.0));
+    let camera = camera(DVec3::ZERO);
+    let mut out = Vec::new();
+    for (name, balls, volume) in [
+        (
+            "volume around mirrors and glass",
+            Some(Material::dielectric(1.5)),
+            volume(Some(shading), Interpolation::Linear),
+        ),
+        ("volume around layers", Some(matte().with_opacity(0.4)), volume(None, Interpolation::Nearest)),
+    ] {
+        let mut scene = scene(DVec3::ZERO, matte(), balls, &[sun, Light::ambient(AMBIENT)], Some(0.5));
+        scene.volumes.push(PlacedVolume { volume: volume.into(), world_from_object: DAffine3::IDENTITY });
+        out.push(Case { name, scene, camera, options: RenderOptions { samples: 2, ..options() } });
+    }
+    let mut b = SceneBuilder::new();
+    b.volume(volume(Some(shading), Interpolation::Nearest));
+    let options = RenderOptions { layers: Layers::COLOR, ..options() };
+    out.push(Case { name: "volume alone", scene: b.build().unwrap(), camera, options });
+    out
+}
+
+/// Streamtubes, cylinders and spheres, of which parts hold only their own.
+pub(crate) fn arrays_of_shapes() -> Case {
+    let mut b = SceneBuilder::new();
+    let (mut points, mut offsets, mut radii) = (Vec::new(), vec![0], Vec::new());
+    for line in 0..40 {
+        // Segments much shorter than the radius, too: their neighbours hide what is inside.
+        let (n, turns) = if line % 3 == 0 { (200, 2.0) } else { (12 + line % 7, 6.0) };
+        for k in 0..n {
+            let s = k as f32 / n as f32;
+            let a = turns * s + 0.4 * line as f32;
+            points.push(Vec3::new(1.8 * a.cos() * s, 1.8 * a.sin() * s, 0.4 + 0.03 * line as f32 + 0.4 * s));
+            radii.push(0.03 + 0.02 * (9.0 * s).sin());
+        }
+        offsets.push(points.len() as u32);
+    }
+    let scalars = (0..points.len()).map(|k| (k % 19) as f32 / 19.0).collect();
+    let tubes = Tubes::new(points, &offsets, Radii::Each(radii)).unwrap().with_scalars(scalars).unwrap();
+    let colors = ColorMap::new(vec![[0.1, 0.2, 0.9, 1.0], [1.0, 0.8, 0.1, 1.0]], [0.0, 1.0]);
+    b.shape(Arc::new(tubes), Material { color_source: ColorSource::Scalars(colors.into()), ..matte() });
+    let ends: Vec<Vec3> =
+        (0..60).map(|k| Vec3::new(-2.0 + 0.06 * k as f32, -1.5, 0.3 * (k % 4) as f32)).collect();
+    b.shape(Arc::new(Cylinders::new(ends, Radii::Common(0.05), true).unwrap()), matte());
+    let centers: Vec<Vec3> = (0..90).map(|k| Vec3::new(1.5, -1.5 + 0.033 * k as f32, 0.9)).collect();
+    let shades = (0..90).map(|k| [k as f32 / 90.0, 0.5, 0.3, 1.0]).collect();
+    let spheres = Spheres::new(centers, Radii::Common(0.07)).unwrap().with_colors(shades).unwrap();
+    b.shape(Arc::new(spheres), matte());
+    b.light(Light::directional(DVec3::new(0.4, -0.3, 1.0)));
+    b.light(Light::ambient(AMBIENT));
+    let mut scene = b.build().unwrap();
+    scene.ambient_occlusion = Some(AmbientOcclusion { distance: 0.6, rays: 6 });
+    Case { name: "arrays of shapes", scene, camera: camera(DVec3::ZERO), options: options() }
 }
 
 /// No light that leaves a hit.

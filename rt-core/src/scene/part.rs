@@ -29,7 +29,11 @@ impl Scene {
                 }
                 Geometry::Shape(shape) => {
                     vertices_kept.push(Vec::new());
-                    Geometry::Shape(Arc::new(ShapePart::new(shape.clone(), kept.clone())))
+                    Geometry::Shape(
+                        shape
+                            .part(&kept)
+                            .unwrap_or_else(|| Arc::new(ShapePart::new(shape.clone(), kept.clone()))),
+                    )
                 }
             });
             triangles_kept.push(kept);

@@ -79,6 +79,8 @@ pub(crate) struct Workspace {
     points: Vec<Point>,
     light_rays: LightRays,
     occlusion: ambient_occlusion::OcclusionBuffers,
+    /// Of each ray what it collects in the volume up to its hit, where others hold the volume's bricks; empty where it is whole here.
+    crossed: Vec<crate::volume::VolumeSample>,
     /// One ray in the object spaces of all volumes.
     along: Vec<Ray>,
     /// Premultiplied RGBA of this sample.
@@ -365,15 +367,11 @@ fn meet_surfaces(
         let hit = work.hits[i / LANES].get(lane);
         if !stage.volumes.is_empty() {
             let t_end = hit.map_or(ray.t_max, |h| h.t);
-            volumes::cross(
-                stage,
-                &ray,
-                t_end,
-                &mut work.current.states[i],
-                &mut work.pixels,
-                &mut work.along,
-                stats,
-            );
+            let sample = match work.crossed.get(i) {
+                Some(collected_elsewhere) => *collected_elsewhere,
+                None => volumes::collected(stage, &ray, t_end, &mut work.along),
+            };
+            volumes::cross(&sample, &mut work.current.states[i], &mut work.pixels, stats);
         }
         let Some(hit) = hit else {
             add_miss(stage, area, &work.current.states[i], ray.dir, &mut work.pixels);

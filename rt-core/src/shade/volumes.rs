@@ -5,32 +5,39 @@ use super::wave::RayState;
 use crate::ray::Ray;
 use crate::ray_stats::RayStats;
 use crate::volume::{VolumeSample, integrate_overlapping};
+use glam::DAffine3;
 
-/// Adds what `ray` collects in the stage's volumes up to `t_end`, and dims what comes behind. `along` is a buffer.
-pub(super) fn cross(
-    stage: &Stage<'_>,
-    ray: &Ray,
-    t_end: f32,
-    state: &mut RayState,
-    pixels: &mut [[f32; 4]],
-    along: &mut Vec<Ray>,
-    stats: &mut RayStats,
-) {
-    along.clear();
+/// The ray in a volume's space. Not normalised: the parameter is the same in every space.
+pub(super) fn in_object_space(ray: &Ray, object_from_render: &DAffine3) -> Ray {
     let (origin, dir) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
-    // Not normalised: the parameter is the same in every space.
-    along.extend(stage.volumes.iter().map(|(_, object_from_render)| Ray {
+    Ray {
         origin: object_from_render.transform_point3(origin).as_vec3(),
         dir: object_from_render.transform_vector3(dir).as_vec3(),
         ..*ray
-    }));
+    }
+}
+
+/// What `ray` collects in the stage's volumes up to `t_end`. `along` is a buffer.
+pub(super) fn collected(stage: &Stage<'_>, ray: &Ray, t_end: f32, along: &mut Vec<Ray>) -> VolumeSample {
+    along.clear();
+    along
+        .extend(stage.volumes.iter().map(|(_, object_from_render)| in_object_space(ray, object_from_render)));
     let quality = &stage.options.volume_quality;
-    let sample: VolumeSample = if let [(volume, _)] = stage.volumes[..] {
+    if let [(volume, _)] = stage.volumes[..] {
         volume.integrate(&along[0], ray.t_min, t_end, quality)
     } else {
         let pairs: Vec<_> = stage.volumes.iter().zip(along.iter()).map(|((v, _), r)| (*v, *r)).collect();
         integrate_overlapping(&pairs, ray.t_min, t_end, quality)
-    };
+    }
+}
+
+/// Adds what a ray has collected, and dims what comes behind.
+pub(super) fn cross(
+    sample: &VolumeSample,
+    state: &mut RayState,
+    pixels: &mut [[f32; 4]],
+    stats: &mut RayStats,
+) {
     stats.volume += (sample.samples > 0) as u64;
     let [r, g, b, a] = sample.rgba;
     let pixel = &mut pixels[state.slot as usize];

@@ -3,12 +3,13 @@
 use super::error::{check_count, check_length};
 use super::frustum::{End, Frustum};
 use super::{
-    Radii, Shape, ShapeError, ShapeHit, ShapeReport, ShapeSurface, any_alpha, in_range, outward_box,
+    Radii, Shape, ShapeError, ShapeHit, ShapeReport, ShapeSurface, any_alpha, in_range, outward_box, picked,
     rounded_point,
 };
 use crate::math::Aabb;
 use crate::ray::Ray;
 use glam::{DVec3, Vec3};
+use std::sync::Arc;
 
 /// Cylinders between pairs of points; with two radii, truncated cones (a radius of 0 makes a full cone). Open ones show
 /// their inside. `u` of a hit is the position along the axis (0 to 1), `v` is 1 on a cap and 0 on the side.
@@ -107,6 +108,22 @@ impl Cylinder {
 }
 
 impl Shape for Cylinders {
+    fn part(&self, primitives: &[u32]) -> Option<Arc<dyn Shape>> {
+        let count = self.points.len() / 2;
+        let ends = || {
+            let numbers = primitives.iter().map(|&p| p as usize).filter(move |&p| p < count);
+            numbers.flat_map(|p| [2 * p, 2 * p + 1])
+        };
+        Some(Arc::new(Cylinders {
+            origin: self.origin,
+            points: picked(&self.points, ends()),
+            radii: self.radii.part(ends()),
+            capped: self.capped,
+            scalars: self.scalars.as_ref().map(|s| picked(s, ends())),
+            colors: self.colors.as_ref().map(|c| picked(c, ends())),
+        }))
+    }
+
     fn num_primitives(&self) -> usize {
         self.points.len() / 2
     }

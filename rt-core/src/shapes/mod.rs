@@ -80,6 +80,12 @@ pub trait Shape: Send + Sync {
         false
     }
 
+    /// A shape of these primitives alone (ascending numbers of this one's, in that order) that holds no others' data, with the same bits in all its answers.
+    /// `None` when the data cannot be cut: who holds some primitives then holds the whole.
+    fn part(&self, _primitives: &[u32]) -> Option<Arc<dyn Shape>> {
+        None
+    }
+
     /// For a shape that only gives another one's hits a new look: that other shape. Its primitives, bounds and hits must be the same; then a world made
     /// from one that has it ([`crate::accel::World::build_sharing`]) takes over its tree.
     fn tree_of(&self) -> Option<Arc<dyn Shape>> {
@@ -101,7 +107,20 @@ pub enum Radii {
     Each(Vec<f32>),
 }
 
+/// The elements with these numbers.
+fn picked<T: Copy>(all: &[T], numbers: impl Iterator<Item = usize>) -> Vec<T> {
+    numbers.map(|i| all[i]).collect()
+}
+
 impl Radii {
+    /// Those of the elements with these numbers.
+    fn part(&self, numbers: impl Iterator<Item = usize>) -> Radii {
+        match self {
+            Radii::Common(r) => Radii::Common(*r),
+            Radii::Each(r) => Radii::Each(picked(r, numbers)),
+        }
+    }
+
     #[inline]
     fn get(&self, i: usize) -> f32 {
         match self {

@@ -7,12 +7,13 @@
 
 use super::error::{check_count, check_length};
 use super::{
-    Radii, Shape, ShapeError, ShapeHit, ShapeReport, ShapeSurface, any_alpha, in_range, outward_box,
+    Radii, Shape, ShapeError, ShapeHit, ShapeReport, ShapeSurface, any_alpha, in_range, outward_box, picked,
     rounded_point,
 };
 use crate::math::Aabb;
 use crate::ray::Ray;
 use glam::{DVec3, Vec3};
+use std::sync::Arc;
 
 /// Many spheres. A ray that starts inside one hits its far side. `u` and `v` of a hit are 0.
 #[derive(Debug, Clone)]
@@ -104,6 +105,17 @@ impl Shape for Spheres {
 
     fn has_transparency(&self) -> bool {
         any_alpha(&self.colors)
+    }
+
+    fn part(&self, primitives: &[u32]) -> Option<Arc<dyn Shape>> {
+        let numbers = || primitives.iter().map(|&p| p as usize).filter(|&p| p < self.centers.len());
+        Some(Arc::new(Spheres {
+            origin: self.origin,
+            centers: picked(&self.centers, numbers()),
+            radii: self.radii.part(numbers()),
+            scalars: self.scalars.as_ref().map(|s| picked(s, numbers())),
+            colors: self.colors.as_ref().map(|c| picked(c, numbers())),
+        }))
     }
 
     fn surface(&self, prim: u32, hit: &ShapeHit, ray: &Ray) -> ShapeSurface {

@@ -9,12 +9,14 @@
 use super::error::{check_count, check_length};
 use super::rounded_cone::{Part, RoundedCone};
 use super::{
-    Radii, Shape, ShapeError, ShapeHit, ShapeReport, ShapeSurface, any_alpha, in_range, outward_box,
+    Radii, Shape, ShapeError, ShapeHit, ShapeReport, ShapeSurface, any_alpha, in_range, outward_box, picked,
     rounded_point,
 };
+use crate::accel::ShapePart;
 use crate::math::Aabb;
 use crate::ray::Ray;
 use glam::{DVec3, Vec3};
+use std::sync::Arc;
 
 /// Polylines as tubes. `u` of a hit runs from 0 at a segment's first point to 1 at its second, linearly along the cone and constant on
 /// the round ends; `v` is 0.
@@ -225,6 +227,39 @@ impl Shape for Tubes {
 
     fn has_transparency(&self) -> bool {
         any_alpha(&self.colors)
+    }
+
+    /// Holds, beside the segments asked for, those of the same line that may hide something of them.
+    fn part(&self, primitives: &[u32]) -> Option<Arc<dyn Shape>> {
+        let (mut points, mut segments, mut local) = (Vec::new(), Vec::new(), Vec::new());
+        let asked = primitives.iter().map(|&p| p as usize).filter(|&p| p < self.segments.len());
+        let mut asked = asked.peekable();
+        while let Some(first) = asked.next() {
+            // ---- A run of segments without gap, and the primitives asked for in it.
+            let start = first.saturating_sub(NEIGHBOURS);
+            let mut run = vec![first];
+            let mut end = (first + NEIGHBOURS + 1).min(self.segments.len());
+            while let Some(next) = asked.next_if(|&next| next.saturating_sub(NEIGHBOURS) <= end) {
+                run.push(next);
+                end = (next + NEIGHBOURS + 1).min(self.segments.len());
+            }
+            local.extend(run.iter().map(|p| (p - start + segments.len()) as u32));
+            let (low, high) = (self.segments[start], self.segments[end - 1] + 1);
+            let shift = points.len();
+            segments.extend(self.segments[start..end].iter().map(|s| s - low + shift as u32));
+            points.extend(low as usize..=high as usize);
+        }
+        let numbers = || points.iter().copied();
+        let tubes = Tubes {
+            origin: self.origin,
+            points: picked(&self.points, numbers()),
+            radii: self.radii.part(numbers()),
+            scalars: self.scalars.as_ref().map(|s| picked(s, numbers())),
+            colors: self.colors.as_ref().map(|c| picked(c, numbers())),
+            segments,
+            single_points: 0,
+        };
+        Some(Arc::new(ShapePart::new(Arc::new(tubes), local)))
     }
 
     fn surface(&self, prim: u32, hit: &ShapeHit, ray: &Ray) -> ShapeSurface {

@@ -8,10 +8,12 @@
 //! Empty space is skipped by blocks of cells ([`MACROCELL`]) whose range of values has no extinction, then by cells.
 
 mod adaptive;
+mod brick;
 mod layer;
 mod overlap;
 mod reference;
 
+pub use brick::{Brick, Marched};
 pub use overlap::integrate_overlapping;
 pub use reference::integrate_reference;
 
@@ -176,6 +178,12 @@ pub struct Volume {
     grid: Arc<Grid>,
     transfer: TransferFunction,
     options: VolumeOptions,
+    /// Points per axis of the whole; those of `grid` unless this is a part.
+    dims: UVec3,
+    /// The origin of the whole.
+    origin: DVec3,
+    /// Point of the whole where `grid` begins.
+    first_point: UVec3,
     /// Smallest and largest finite value of each block, x fastest.
     ranges: Vec<[f32; 2]>,
     /// Whether a block has any extinction.
@@ -229,7 +237,19 @@ impl Volume {
             macrocells_clear: 0,
         };
         let ranges = scans.into_iter().map(|s| s.0).collect();
-        let mut v = Volume { grid, transfer, options, ranges, occupied: Vec::new(), blocks, report };
+        let (dims, origin) = (grid.dims, grid.origin);
+        let mut v = Volume {
+            grid,
+            transfer,
+            options,
+            dims,
+            origin,
+            first_point: UVec3::ZERO,
+            ranges,
+            occupied: Vec::new(),
+            blocks,
+            report,
+        };
         v.find_occupied();
         Ok(v)
     }
@@ -246,17 +266,18 @@ impl Volume {
         self.report.macrocells_clear = self.occupied.iter().filter(|o| !**o).count() as u64;
     }
 
-    /// World position of object space's origin: the grid's.
+    /// World position of object space's origin: that of the grid, of the whole one for a part.
     pub fn origin(&self) -> DVec3 {
-        self.grid.origin
+        self.origin
     }
 
-    /// Bounds relative to [`Volume::origin`].
+    /// Bounds relative to [`Volume::origin`], of the whole.
     pub fn bounds(&self) -> Aabb {
-        outward_box(DVec3::ZERO, self.grid.max_corner() - self.grid.origin)
+        let max_corner = self.origin + self.grid.spacing * (self.dims - UVec3::ONE).as_dvec3();
+        outward_box(DVec3::ZERO, max_corner - self.origin)
     }
 
-    /// The grid.
+    /// The grid; of a part, what it holds.
     pub fn grid(&self) -> &Arc<Grid> {
         &self.grid
     }
@@ -278,31 +299,37 @@ impl Volume {
         if !(ray.is_valid() && t0 < t1) {
             return VolumeSample::CLEAR;
         }
-        let m = self.march(ray, t0, t1, quality);
-        let [r, g, b] = m.color.map(|c| c as f32);
-        VolumeSample {
-            rgba: [r, g, b, (1.0 - m.transmittance) as f32],
-            depth: m.depth as f32,
-            samples: m.samples,
-        }
+        Marched::from(self.march(ray, t0, t1, quality, &Marched::default())).sample()
     }
 
-    /// As [`Volume::integrate`], in f64.
-    fn march(&self, ray: &Ray, t0: f64, t1: f64, quality: &VolumeQuality) -> March {
-        let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
-        let per_t = d.length();
-        let nearest = self.options.interpolation == Interpolation::Nearest;
-        let (index_ray, cells, t0, t1) = if nearest {
-            // Cells are the boxes around points: half a spacing further out than the bounds, where they are cut.
-            let moved = IndexRay::new(o + 0.5 * self.grid.spacing, d, self.grid.spacing);
-            let (near, far) = within(o, d, self.grid.max_corner() - self.grid.origin);
-            (moved, self.grid.dims, t0.max(near), t1.min(far))
-        } else {
-            (IndexRay::new(o, d, self.grid.spacing), self.grid.dims - UVec3::ONE, t0, t1)
-        };
+    fn is_nearest(&self) -> bool {
+        self.options.interpolation == Interpolation::Nearest
+    }
+
+    /// Cells per axis of the whole: between points, or boxes around them.
+    fn cells(&self) -> UVec3 {
+        if self.is_nearest() { self.dims } else { self.dims - UVec3::ONE }
+    }
+
+    /// The ray in indices of cells, their number, and the part of `t0..t1` that is inside the bounds.
+    fn index_ray(&self, ray: &Ray, t0: f64, t1: f64) -> (IndexRay, UVec3, f64, f64) {
+        let (o, d, spacing) = (ray.origin.as_dvec3(), ray.dir.as_dvec3(), self.grid.spacing);
+        if !self.is_nearest() {
+            return (IndexRay::new(o, d, spacing), self.cells(), t0, t1);
+        }
+        // Cells are the boxes around points: half a spacing further out than the bounds, where they are cut.
+        let max_corner = self.origin + spacing * (self.dims - UVec3::ONE).as_dvec3();
+        let (near, far) = within(o, d, max_corner - self.origin);
+        (IndexRay::new(o + 0.5 * spacing, d, spacing), self.cells(), t0.max(near), t1.min(far))
+    }
+
+    /// As [`Volume::carry_on`], in f64.
+    fn march(&self, ray: &Ray, t0: f64, t1: f64, quality: &VolumeQuality, before: &Marched) -> March {
+        let per_t = ray.dir.as_dvec3().length();
+        let (index_ray, cells, t0, t1) = self.index_ray(ray, t0, t1);
         let cells = cells.to_array().map(i64::from);
         if t0 >= t1 {
-            return March::new(*quality, 0.0);
+            return before.march(*quality, 0.0);
         }
         // The error budget is handed out by length of path through the grid.
         let mut inside = (0.0, 0.0);
@@ -311,7 +338,7 @@ impl Volume {
             inside = if inside.1 > inside.0 { (inside.0, c.t1) } else { (c.t0, c.t1) };
             true
         });
-        let mut m = March::new(*quality, (inside.1 - inside.0) * per_t);
+        let mut m = before.march(*quality, (inside.1 - inside.0) * per_t);
         if inside.1 <= inside.0 {
             return m;
         }
@@ -337,8 +364,9 @@ impl Volume {
             return;
         }
         let cell = UVec3::from_array(c.cell.map(|i| i as u32));
-        if self.options.interpolation == Interpolation::Nearest {
-            let value = self.grid.at(cell.x, cell.y, cell.z);
+        let stored = cell - self.first_point;
+        if self.is_nearest() {
+            let value = self.grid.at(stored.x, stored.y, stored.z);
             if value.is_finite() {
                 let (sigma, color) = self.transfer.sample(value.into());
                 m.samples += 1;
@@ -347,7 +375,7 @@ impl Volume {
             }
             return;
         }
-        let corners = self.grid.corners(cell);
+        let corners = self.grid.corners(stored);
         if !corners.iter().all(|v| v.is_finite()) {
             return;
         }
@@ -398,9 +426,10 @@ impl Volume {
     /// What shading makes of colours at `t`; `None` without shading.
     fn light_at(&self, ray: &IndexRay, t: f64) -> Option<Lit> {
         let s = self.options.shading.as_ref()?;
-        let at = DVec3::from_array(ray.at(t)).as_vec3();
+        // Exact: whole numbers from numbers.
+        let at = DVec3::from_array(ray.at(t)).as_vec3() - self.first_point.as_vec3();
         // In indices moved by half a cell, the point around which the box lies.
-        let at = if self.options.interpolation == Interpolation::Nearest { at.floor() } else { at };
+        let at = if self.is_nearest() { at.floor() } else { at };
         let g = smooth_gradient(&self.grid, at).as_dvec3();
         let steepness = g.length();
         if !(steepness > 0.0 && steepness.is_finite()) {

@@ -2,7 +2,7 @@
 //! its extinction. Compositing one whole volume over the other would be wrong there.
 
 use super::layer::{Layer, March};
-use super::{Volume, VolumeQuality, VolumeSample};
+use super::{Marched, Volume, VolumeQuality, VolumeSample};
 use crate::ray::Ray;
 
 /// Halvings of the common stretch at most.
@@ -91,7 +91,7 @@ impl Mixer<'_> {
             if a >= b || !ray.is_valid() {
                 continue;
             }
-            let m = volume.march(ray, a, b, &quality);
+            let m = volume.march(ray, a, b, &quality, &Marched::default());
             *samples += m.samples;
             let opacity = 1.0 - m.transmittance;
             if opacity > 0.0 {

@@ -109,8 +109,6 @@ def add_colors(bridge, surface, mapper, data, cell_map, keep):
 def why_not_texture(texture):
     if texture.GetTransform():
         return "a texture with a transform"
-    if texture.GetUseSRGBColorSpace():
-        return "a texture in sRGB"
     if texture.GetCubeMap():
         return "a cube map"
     return None
@@ -141,6 +139,7 @@ class Textures:
             rgba = _texels(texture, scalars)[: width * height]
         self._used[key] = rgba
         surface.texture_key, surface.texture, surface.texture_width = key, rtv.Array.of(rgba), width
+        surface.texture_srgb = int(bool(texture.GetUseSRGBColorSpace()))
         surface.texture_interpolate, surface.texture_repeat = int(bool(texture.GetInterpolate())), int(bool(texture.GetRepeat()))
 
 

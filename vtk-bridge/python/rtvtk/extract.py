@@ -4,22 +4,16 @@ import ctypes as C
 import numpy as np
 from vtkmodules.vtkCommonDataModel import vtkMultiBlockDataSet, vtkPartitionedDataSet, vtkPartitionedDataSetCollection, vtkPolyData
 from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
-from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper
+from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkVolume
 
 from . import arrays
 from . import library as rtv
-from .glyphs import Glyphs, why_not_glyphs
+from .glyphs import Glyphs, leaves_of, sources_of
 from .shape import Shapes
+from .volumes import Volumes
+from .why import POINTS, SURFACE, WIREFRAME, Untraceable, check_actor, check_cells
 
-ACTORS = {"vtkActor", "vtkOpenGLActor", "vtkLODActor", "vtkQuadricLODActor"}
-MAPPERS = {"vtkPolyDataMapper", "vtkOpenGLPolyDataMapper", "vtkCompositePolyDataMapper", "vtkDataSetMapper", "vtkGlyph3DMapper",
-           "vtkOpenGLGlyph3DMapper"}
-POINTS, WIREFRAME, SURFACE = range(3)
 FLAT, PBR = 0, 3
-
-
-class Untraceable(Exception):
-    """OpenGL has to draw a prop; the text says why."""
 
 
 def _property(p):
@@ -29,6 +23,11 @@ def _property(p):
     out.opacity, out.metallic, out.roughness, out.base_ior = p.GetOpacity(), p.GetMetallic(), p.GetRoughness(), p.GetBaseIOR()
     out.flat, out.pbr, out.lighting = p.GetInterpolation() == FLAT, p.GetInterpolation() == PBR, bool(p.GetLighting())
     out.cull_front, out.cull_back = bool(p.GetFrontfaceCulling()), bool(p.GetBackfaceCulling())
+    if p.GetEdgeVisibility() and p.GetRepresentation() == SURFACE:
+        by_line = not hasattr(p, "GetUseLineWidthForEdgeThickness") or p.GetUseLineWidthForEdgeThickness()
+        out.edge_color[:] = p.GetEdgeColor()
+        # OpenGL's are never thinner than this.
+        out.edge_width = max(1.1, p.GetLineWidth() if by_line else p.GetEdgeWidth())
     return out
 
 
@@ -39,7 +38,9 @@ class Extractor:
         self._bridge = bridge
         # Filters that turn grids into surfaces, by mapper; properties by theirs.
         self._filters, self._properties = {}, {}
-        self._shapes, self._textures, self._glyphs = Shapes(), arrays.Textures(), Glyphs()
+        # Surfaces of plain actors, with the times of what they are made from, by actor.
+        self._plain = {}
+        self._shapes, self._textures, self._glyphs, self._volumes = Shapes(), arrays.Textures(), Glyphs(), Volumes()
         self._radii = 0.0, 0.0
         self._used = set()
 
@@ -49,23 +50,30 @@ class Extractor:
 
     def end_frame(self, rendered):
         """Forgets what was not used. `rendered`: the bridge was asked for a picture of these props."""
-        for kept in (self._filters, self._properties):
+        for kept in (self._filters, self._properties, self._plain):
             for address in kept.keys() - self._used:
                 del kept[address]
-        self._textures.end_frame()
-        self._glyphs.end_frame()
+        for kept in (self._textures, self._glyphs, self._volumes):
+            kept.end_frame()
         if rendered:
             self._shapes.frame_drawn()
         else:
             self._shapes.frame_not_drawn()
 
-    def add(self, prop, name):
+    def add(self, renderer, prop, name):
         """Gives a prop to the bridge, or raises `Untraceable`."""
+        if isinstance(prop, vtkVolume):
+            reason = self._volumes.add(self._bridge, prop, renderer, name)
+            if reason:
+                self._bridge.warn(f"{name}: {reason}; OpenGL draws it")
+                raise Untraceable(reason)
+            return
         if not isinstance(prop, vtkActor) or prop.GetMapper() is None:
-            raise Untraceable("a volume (OpenGL's ray caster sees the depth of what is traced)" if prop.IsA("vtkVolume")
-                              else "OpenGL draws props of this class")
+            raise Untraceable("OpenGL draws props of this class")
         mapper = prop.GetMapper()
-        _check(prop, mapper, *self._radii)
+        if self._add_again(prop, mapper, name):
+            return
+        check_actor(prop, mapper, *self._radii)
         connected = mapper.GetNumberOfInputConnections(0) > 0
         if connected and not mapper.GetStatic():
             mapper.Update()
@@ -81,10 +89,36 @@ class Extractor:
         representation = prop.GetProperty().GetRepresentation()
         blocks = list(_leaves(data, attributes, start, ""))
         for block, _, _ in blocks:
-            _check_cells(block, representation, *self._radii)
+            check_cells(block, representation, *self._radii)
         for block, state, block_name in blocks:
+            alone = data is block and not attributes
             if block.GetNumberOfPoints() > 0 and (block.GetNumberOfCells() > 0 or representation == POINTS):
-                self._add_block(prop, mapper, block, state, f"{name}, block {block_name}" if block_name else name)
+                self._add_block(prop, mapper, block, state, f"{name}, block {block_name}" if block_name else name, alone)
+
+    def _add_again(self, actor, mapper, name):
+        """Gives what was given in the frame before when nothing but the actor's place may have changed. False when more did."""
+        kept = self._plain.get(actor.__this__)
+        if kept is None:
+            return False
+        if not mapper.GetStatic():
+            mapper.Update()
+        seen, s, _ = kept
+        known = s.color_key == 0 or self._bridge.has_colors(s.shape_key, s.color_key)
+        if seen != self._times(actor, mapper, mapper.GetInputDataObject(0, 0)) or not known or not self._shapes.again(s.shape_key):
+            del self._plain[actor.__this__]
+            return False
+        self._used.update((actor.__this__, actor.GetProperty().__this__))
+        s.name = name.encode()
+        s.world_from_data[:] = actor.GetMatrix().GetData()
+        self._bridge.surface(C.byref(s))
+        return True
+
+    def _times(self, actor, mapper, data):
+        """Changes when anything does that a surface is made from; `None` for actors for which that is not known."""
+        if data is None or actor.GetTexture() is not None or actor.GetBackfaceProperty() is not None:
+            return None
+        parts = mapper, data, actor.GetProperty(), actor.GetShaderProperty()
+        return self._radii, *((part.__this__, part.GetMTime()) for part in parts)
 
     def _surface_of(self, mapper, data):
         """The surface of a data set that is not polygons, made with the filter kept for its mapper."""
@@ -111,35 +145,65 @@ class Extractor:
         return s, matrix
 
     def _add_glyphs(self, actor, mapper, data, name):
-        reason = why_not_glyphs(mapper, data)
-        if reason:
-            raise Untraceable(reason)
-        source = mapper.GetInputDataObject(1, 0)
-        s, _ = self._start(actor, name)
-        reason = self._glyphs.add(s, mapper, data)
-        if reason:
-            raise Untraceable(reason)
-        keep = []
-        self._shapes.add(s, source, False, None, keep)
-        self._bridge.surface(C.byref(s))
+        sources = sources_of(mapper, data)
+        leaves = leaves_of(mapper, data)
+        copies = [c for leaf in leaves for c in self._glyphs.of(mapper, leaf, len(sources))]
+        for which, matrices, rgba in copies:
+            s, _ = self._start(actor, f"{name}, source {which}" if len(sources) > 1 else name)
+            keep = []
+            self._shapes.add(s, sources[which], False, None, keep)
+            s.glyph_matrices = rtv.Array(matrices.ctypes.data, len(matrices), 16, rtv.F64)
+            if rgba is not None:
+                s.glyph_colors = rtv.Array.of(rgba)
+            self._bridge.surface(C.byref(s))
 
-    def _add_block(self, actor, mapper, data, state, name):
+    def _add_block(self, actor, mapper, data, state, name, alone):
         representation = actor.GetProperty().GetRepresentation()
         keep = []
         s, matrix = self._start(actor, name)
         s.property.opacity = state["opacity"]
         if state["color"]:
             s.property.ambient_color[:] = s.property.diffuse_color[:] = state["color"]
+        back = actor.GetBackfaceProperty()
+        if back is not None:
+            _add_back(s, _property(back))
         s.point_radius, s.line_radius = self._radii
         s.edges_only = representation == WIREFRAME
-        cell_map = self._shapes.add(s, data, representation == POINTS, _planes(mapper, matrix), keep)
+        planes = _planes(mapper, matrix)
+        cell_map = self._shapes.add(s, data, representation == POINTS, planes, keep)
         if not state["color"]:
             arrays.add_colors(self._bridge, s, mapper, data, cell_map, keep)
-        if actor.GetTexture() is not None:
+        if s.color_source != rtv.COLOR_PROPERTY:
+            # Colours of points and cells show on both sides.
+            s.has_back = 0
+        if cell_map is not None and s.property.edge_width > 0:
+            raise Untraceable("edges of polygons that are not convex")
+        texture = actor.GetTexture()
+        if actor.GetProperty().GetNumberOfTextures() > 0:
+            texture = actor.GetProperty().GetTexture("albedoTex")
+            # Its alpha takes the place of the opacity.
+            s.property.opacity = 1.0
+        if texture is not None:
+            if s.has_back:
+                raise Untraceable("a texture on a surface whose backs have a property of their own")
             if s.color_source != rtv.COLOR_PROPERTY:
                 raise Untraceable("it has a texture and colours")
-            self._textures.add(s, actor.GetTexture(), data.GetPointData().GetTCoords())
+            self._textures.add(s, texture, data.GetPointData().GetTCoords())
         self._bridge.surface(C.byref(s))
+        arrays_given = s.colors.kind or any(cells.offsets.kind for cells in (s.verts, s.lines, s.polys, s.strips))
+        if alone and planes is None and texture is None and back is None and not arrays_given and mapper.GetInputDataObject(0, 0) is data:
+            self._used.add(actor.__this__)
+            self._plain[actor.__this__] = self._times(actor, mapper, data), s, keep
+
+
+def _add_back(surface, own):
+    """The back has the shading model of the front."""
+    surface.has_back, surface.back = 1, surface.property
+    for name in ("ambient_color", "diffuse_color", "specular_color"):
+        getattr(surface.back, name)[:] = getattr(own, name)[:]
+    for name in ("ambient", "diffuse", "specular", "specular_power"):
+        setattr(surface.back, name, getattr(own, name))
+    surface.back.opacity = 1.0
 
 
 def _planes(mapper, matrix):
@@ -150,34 +214,6 @@ def _planes(mapper, matrix):
     # A plane with normal n through o keeps n (M x - o) >= 0.
     world = [[*p.GetNormal(), -np.dot(p.GetNormal(), p.GetOrigin())] for p in (planes.GetItem(i) for i in range(planes.GetNumberOfItems()))]
     return np.ascontiguousarray(np.array(world) @ np.array(matrix).reshape(4, 4))
-
-
-def _check(actor, mapper, point_radius, line_radius):
-    p = actor.GetProperty()
-    # Classes that Python derives (PyVista's) have the names of VTK's classes below them.
-    if actor.GetClassName() not in ACTORS:
-        raise Untraceable("OpenGL draws props of this class")
-    if p.GetRepresentation() == WIREFRAME and line_radius <= 0:
-        raise Untraceable("wireframe (set RTV_LINE_RADIUS to trace edges as tubes)")
-    if p.GetRepresentation() == POINTS and point_radius <= 0:
-        raise Untraceable("points (set RTV_POINT_RADIUS to trace them as spheres)")
-    if p.GetRepresentation() == SURFACE and p.GetEdgeVisibility():
-        raise Untraceable("edges on the surface")
-    if p.GetVertexVisibility():
-        raise Untraceable("vertices on the surface")
-    if actor.GetBackfaceProperty() is not None:
-        raise Untraceable("backs with a property of their own")
-    if p.GetNumberOfTextures() > 0:
-        raise Untraceable("textures of the property (albedo, material, normal)")
-    shader = actor.GetShaderProperty()
-    if shader.HasFragmentShaderCode() or shader.HasVertexShaderCode() or shader.GetNumberOfShaderReplacements() > 0:
-        raise Untraceable("shader code of its own")
-    if actor.GetTexture() is not None:
-        reason = arrays.why_not_texture(actor.GetTexture())
-        if reason:
-            raise Untraceable(reason)
-    if mapper.GetClassName() not in MAPPERS:
-        raise Untraceable("OpenGL draws mappers of this class")
 
 
 def _leaves(data, attributes, state, name):
@@ -209,12 +245,3 @@ def _leaves(data, attributes, state, name):
         raise Untraceable("its data are not polygons")
     for i, child in enumerate(children):
         yield from _leaves(child, attributes, state, f"{name}/{i}" if name else str(i))
-
-
-def _check_cells(data, representation, point_radius, line_radius):
-    if representation != SURFACE:
-        return
-    if data.GetNumberOfVerts() > 0 and point_radius <= 0:
-        raise Untraceable("it has vertices (set RTV_POINT_RADIUS to trace them as spheres)")
-    if data.GetNumberOfLines() > 0 and line_radius <= 0:
-        raise Untraceable("it has lines (set RTV_LINE_RADIUS to trace them as tubes)")

@@ -1,33 +1,54 @@
 """Glyphs as instances: the matrices vtkGlyph3DMapper makes for OpenGL, made again, because it does not give them away."""
 import numpy as np
 from vtkmodules.vtkCommonCore import vtkBitArray
-from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkDataSet, vtkPolyData
+from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet, vtkDataObject, vtkDataSet, vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkGlyph3DMapper
 
-from . import library as rtv
 from .arrays import key_of, numbers, rgba_of
+from .why import Untraceable
 
 _REAL = [np.dtype(np.float64)]
 # Numbers of the mapper's arrays.
-_SCALE, _MASK, _ORIENTATION = 0, 2, 3
+_SCALE, _INDEX, _MASK, _ORIENTATION = range(4)
 
 
-def why_not_glyphs(mapper, data):
-    """Why OpenGL has to draw them, or `None`."""
-    if not isinstance(data, vtkDataSet):
-        return "glyphs on composite data"
-    if mapper.GetUseSourceTableTree() or mapper.GetSourceIndexing():
-        return "glyphs from several sources"
+def sources_of(mapper, data):
+    """The sources by number."""
+    if mapper.GetUseSourceTableTree():
+        raise Untraceable("glyphs from a tree of sources")
     if mapper.GetNumberOfClippingPlanes() > 0:
-        return "glyphs with clipping planes"
-    if mapper.GetNumberOfInputConnections(1) == 0:
-        return "glyphs without a source"
-    mapper.GetInputAlgorithm(1, 0).Update()
-    source = mapper.GetInputDataObject(1, 0)
-    if not isinstance(source, vtkPolyData) or source.GetNumberOfPolys() + source.GetNumberOfStrips() == 0 or (
-            source.GetNumberOfLines() + source.GetNumberOfVerts() > 0):
-        return "glyphs whose source is not polygons"
-    return None
+        raise Untraceable("glyphs with clipping planes")
+    count = mapper.GetNumberOfInputConnections(1)
+    count = count if mapper.GetSourceIndexing() else min(count, 1)
+    if count == 0:
+        raise Untraceable("glyphs without a source")
+    found = []
+    for i in range(count):
+        mapper.GetInputAlgorithm(1, i).Update()
+        source = mapper.GetInputDataObject(1, i)
+        if not isinstance(source, vtkPolyData) or source.GetNumberOfPolys() + source.GetNumberOfStrips() == 0 or (
+                source.GetNumberOfLines() + source.GetNumberOfVerts() > 0):
+            raise Untraceable("glyphs whose source is not polygons")
+        found.append(source)
+    return found
+
+
+def leaves_of(mapper, data):
+    """The data sets whose points have glyphs."""
+    if isinstance(data, vtkDataSet):
+        return [data]
+    blocks = mapper.GetBlockAttributes()
+    if not isinstance(data, vtkCompositeDataSet) or (
+            blocks and (blocks.HasBlockVisibilities() or blocks.HasBlockColors() or blocks.HasBlockOpacities())):
+        raise Untraceable("glyphs on blocks with colours or visibility of their own")
+    leaves, it = [], data.NewIterator()
+    it.InitTraversal()
+    while not it.IsDoneWithTraversal():
+        leaves.append(it.GetCurrentDataObject())
+        it.GoToNextItem()
+    if not all(isinstance(leaf, vtkDataSet) for leaf in leaves):
+        raise Untraceable("glyphs on data without points")
+    return leaves
 
 
 def _array(mapper, number, data):
@@ -96,40 +117,37 @@ class Glyphs:
     def end_frame(self):
         self._kept, self._used = self._used, {}
 
-    def add(self, surface, mapper, data):
-        """Puts copies into the surface. Returns why they cannot be traced, or `None`."""
+    def of(self, mapper, data, sources):
+        """Number of the source, matrices and colours of its copies, for each source that has any."""
         scale = _array(mapper, _SCALE, data)
         turn = _array(mapper, _ORIENTATION, data) if mapper.GetOrient() else None
         mask = _array(mapper, _MASK, data) if mapper.GetMasking() else None
         # VTK takes nothing else for a mask.
         mask = mask if isinstance(mask, vtkBitArray) else None
+        index = _array(mapper, _INDEX, data) if mapper.GetSourceIndexing() else None
         settings = (mapper.GetScaleMode(), mapper.GetScaling(), mapper.GetScaleFactor(), mapper.GetClamping(), mapper.GetRange(),
                     mapper.GetOrientationMode(), mapper.GetScalarVisibility(), mapper.GetColorMode(), mapper.GetScalarMode(),
                     mapper.GetScalarRange(), mapper.GetArrayName(), mapper.GetArrayId(), mapper.GetArrayComponent(),
-                    mapper.GetUseLookupTableScalarRange())
-        key = key_of(mapper.__this__, data, data.GetPointData(), scale, turn, mask, mapper.GetLookupTable(), *settings)
+                    mapper.GetUseLookupTableScalarRange(), sources)
+        key = key_of(mapper.__this__, data, data.GetPointData(), scale, turn, mask, index, mapper.GetLookupTable(), *settings)
         found = self._kept.get(key)
         if found is None:
-            found = _copies(mapper, data, scale, turn, mask)
-        if isinstance(found, str):
-            return found
+            found = list(_copies(mapper, data, scale, turn, mask, index, sources))
         self._used[key] = found
-        matrices, rgba = found
-        surface.glyph_matrices = rtv.Array(matrices.ctypes.data, len(matrices), 16, rtv.F64)
-        if rgba is not None and len(rgba):
-            surface.glyph_colors = rtv.Array.of(rgba)
-        return None
+        return found
 
 
-def _copies(mapper, data, scale, turn, mask):
+def _copies(mapper, data, scale, turn, mask, index, sources):
     keep, n = [], data.GetNumberOfPoints()
+    if n == 0:
+        return
     rgba = None
     if mapper.GetScalarVisibility():
         mapper.ClearColorArrays()
         colors = mapper.MapScalars(data, 1.0)
         if colors is not None:
             if colors.GetNumberOfTuples() != n:
-                return "glyphs with colours that are not of points"
+                raise Untraceable("glyphs with colours that are not of points")
             rgba = rgba_of(numbers(colors, [np.dtype(np.uint8)], keep))
     points = data.GetPoints() if hasattr(data, "GetPoints") else None
     if points is not None and points.GetNumberOfPoints() == n:
@@ -141,7 +159,11 @@ def _copies(mapper, data, scale, turn, mask):
     matrices[:, :3, 3] = xyz
     turns = np.eye(3) if turn is None else _turns(mapper.GetOrientationMode(), numbers(turn, _REAL, keep).reshape(n, -1))
     matrices[:, :3, :3] = turns * _scales(mapper, scale, n, keep)[:, None, :]
-    if mask is not None:
-        shown = numbers(mask, _REAL, keep).reshape(n, -1)[:, 0] != 0
-        matrices, rgba = matrices[shown], rgba if rgba is None else rgba[shown]
-    return np.ascontiguousarray(matrices.reshape(-1, 16)), None if rgba is None else np.ascontiguousarray(rgba)
+    shown = np.ones(n, bool) if mask is None else numbers(mask, _REAL, keep).reshape(n, -1)[:, 0] != 0
+    which = np.zeros(n, np.int64)
+    if index is not None:
+        which = np.linalg.norm(numbers(index, _REAL, keep).reshape(n, -1), axis=1).clip(0, sources - 1).astype(np.int64)
+    for source in range(sources):
+        chosen = shown & (which == source)
+        if chosen.any():
+            yield source, np.ascontiguousarray(matrices[chosen].reshape(-1, 16)), None if rgba is None else np.ascontiguousarray(rgba[chosen])

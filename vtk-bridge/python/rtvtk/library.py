@@ -48,6 +48,15 @@ class Surface(C.Structure):
     ]
 
 
+class Volume(C.Structure):
+    _fields_ = [
+        ("name", C.c_char_p), ("scalar_key", C.c_uint64), ("scalars", Array), ("dims", C.c_uint32 * 3), ("nearest", C.c_uint32),
+        ("spacing", C.c_double * 3), ("world_from_data", C.c_double * 16), ("range", C.c_double * 2), ("colors", Array), ("opacities", Array),
+        ("unit_distance", C.c_double), ("shade", C.c_uint32), ("ambient", C.c_float), ("diffuse", C.c_float), ("specular", C.c_float),
+        ("specular_power", C.c_float), ("reserved", C.c_uint32),
+    ]
+
+
 class Light(C.Structure):
     _fields_ = [
         ("position", C.c_double * 3), ("focal_point", C.c_double * 3), ("cone_angle_deg", C.c_double), ("exponent", C.c_double),
@@ -109,6 +118,7 @@ def _functions(library, path):
     return dict(
         new=bind("rtv_new", p), free=bind("rtv_free", None, p), option=bind("rtv_option", C.c_double, text), begin=bind("rtv_begin", C.c_int32, p),
         surface=bind("rtv_surface", C.c_int32, p, C.POINTER(Surface)), has_colors=bind("rtv_has_colors", C.c_int32, p, C.c_uint64, C.c_uint64),
+        volume=bind("rtv_volume", text, p, C.POINTER(Volume)), has_volume=bind("rtv_has_volume", C.c_int32, p, C.c_uint64),
         light=bind("rtv_light", None, p, C.POINTER(Light)), pass_on=bind("rtv_pass", None, p, text, text), warn=bind("rtv_warn", None, p, text),
         render=bind("rtv_render", C.c_int32, p, C.POINTER(View), C.POINTER(Picture)), end=bind("rtv_end", None, p),
     )

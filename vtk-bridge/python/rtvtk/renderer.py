@@ -10,9 +10,10 @@ import vtkmodules.vtkRenderingOpenGL2 as gl
 from vtkmodules.vtkCommonCore import vtkWeakReference
 
 from . import library as rtv
-from .extract import Extractor, Untraceable
+from .extract import Extractor
 from .overlay import Overlay
-from .view import add_lights, size_of, view_of
+from .view import add_lights, prepare_lights, size_of, view_of
+from .why import Untraceable
 
 
 class _Watched:
@@ -91,12 +92,13 @@ class _Tracer:
             return
         # Both are made on first use, from what is visible: before anything is hidden.
         camera = renderer.GetActiveCamera()
+        prepare_lights(renderer)
         self.extractor.begin_frame()
         traced = []
         for i, prop in enumerate(visible):
             name = f"{prop.GetClassName()} {i}"
             try:
-                self.extractor.add(prop, name)
+                self.extractor.add(renderer, prop, name)
                 traced.append(prop)
             except Untraceable as reason:
                 self.bridge.pass_on(name, str(reason))

@@ -31,6 +31,12 @@ class Shapes:
         self._known.update(self._added)
         self._added = {}
 
+    def again(self, key):
+        """True when the library has the shape of this key, which is used once more."""
+        if key in self._known:
+            self._added[key] = self._known[key]
+        return key in self._added
+
     def add(self, surface, data, as_points, planes, keep):
         """Fills in the shape. Returns the cells that the given ones became (`None`: as they are), for colours of cells."""
         points = data.GetPoints()
@@ -39,7 +45,7 @@ class Shapes:
         all_cells = [data.GetVerts(), data.GetLines(), polys, data.GetStrips()]
         of_points = None if surface.property.flat else data.GetPointData().GetNormals()
         of_cells, texcoords = data.GetCellData().GetNormals(), data.GetPointData().GetTCoords()
-        settings = surface.point_radius, surface.line_radius, surface.edges_only, as_points
+        settings = surface.point_radius, surface.line_radius, surface.edges_only, surface.has_back, as_points
         clip = () if planes is None else tuple(planes.ravel().tolist())
         if as_points:
             key = key_of(points, coordinates, *settings, *clip)
@@ -49,11 +55,10 @@ class Shapes:
         if planes is not None:
             keep.append(planes)
             surface.clip_planes = rtv.Array.of(planes)
-        if key in self._known or key in self._added:
-            known = self._added[key] = self._known.get(key, self._added.get(key))
+        if self.again(key):
             # Only how many points there are matters now.
             surface.points = rtv.Array.of(_some_memory(points.GetNumberOfPoints(), keep))
-            return known
+            return self._added[key]
         xyz = numbers(coordinates, _REAL, keep).reshape(-1, 3)
         surface.points = rtv.Array.of(xyz)
         if as_points:
@@ -63,7 +68,8 @@ class Shapes:
             self._added[key] = None
             return None
         runs = [_runs(c, keep) for c in all_cells]
-        runs[2], became = _divided(xyz, polys, runs[2])
+        # As tubes, polygons have their own edges and no others.
+        runs[2], became = (runs[2], None) if surface.edges_only else _divided(xyz, polys, runs[2])
         cell_map = None
         if became is not None:
             verts, lines, n_polys, strips = (c.GetNumberOfCells() for c in all_cells)

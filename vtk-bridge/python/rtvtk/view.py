@@ -6,12 +6,15 @@ from vtkmodules.vtkCommonMath import vtkMatrix4x4
 from . import library as rtv
 
 
-def add_lights(bridge, renderer):
-    lights = renderer.GetLights()
-    if lights.GetNumberOfItems() == 0 and renderer.GetAutomaticLightCreation():
-        # The renderer would do it a moment later.
+def prepare_lights(renderer):
+    """What the renderer would do a moment later."""
+    if renderer.GetLights().GetNumberOfItems() == 0 and renderer.GetAutomaticLightCreation():
         renderer.CreateLight()
     renderer.UpdateLightsGeometryToFollowCamera()
+
+
+def add_lights(bridge, renderer):
+    lights = renderer.GetLights()
     for i in range(lights.GetNumberOfItems()):
         light = lights.GetItemAsObject(i)
         if not light.GetSwitch():

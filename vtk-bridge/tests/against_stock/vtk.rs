@@ -44,6 +44,12 @@ pub(crate) const EXCEPTIONS: &[(&str, &str, Option<Bars>, &str)] = &[
         "OpenGL draws the outer half of an outline's edge beside the surface; we draw the half on it",
     ),
     (
+        "representations",
+        "representations",
+        Some(Bars { silhouette: 0.001, color_strays: 0.003, ..Bars::STRICT }),
+        "as edges: one of its balls shows them",
+    ),
+    (
         "volumes",
         "shaded",
         Some(Bars { color_mean: 1.5, ..Bars::STRICT }),

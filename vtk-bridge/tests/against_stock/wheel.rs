@@ -23,22 +23,18 @@ fn names(folder: &str) -> Vec<String> {
     stems.filter_map(|p| Some(p.file_stem()?.to_str()?.to_owned())).collect()
 }
 
-fn runs(folder: &str, names: &[String], settings: &[(&str, &str)]) -> Option<[Run; 2]> {
+fn run(with: With, folder: &str, names: &[String], settings: &[(&str, &str)]) -> Option<Run> {
     let chosen = |p: &PathBuf| names.iter().any(|n| p.file_stem().is_some_and(|stem| stem == n.as_str()));
     let scripts: Vec<PathBuf> = scripts_in(folder).into_iter().filter(chosen).collect();
     assert_eq!(scripts.len(), names.len(), "every script is there");
-    let run = |with, settings: &[(&str, &str)]| {
-        let folder = output(&format!("wheel-{folder}-{with:?}{}", settings.len()).to_lowercase());
-        Run::new(Program::Wheel, with, &scripts, folder, settings)
-    };
-    let made = run(With::Stock, &[]).and_then(|stock| Ok([stock, run(With::Bridge, settings)?]));
-    made.map_err(|reason| skip(&reason)).ok()
+    let folder = output(&format!("wheel-{folder}-{with:?}{}", settings.len()).to_lowercase());
+    Run::new(Program::Wheel, with, &scripts, folder, settings).map_err(|reason| skip(&reason)).ok()
 }
 
 /// Compares all pictures of all scripts of a folder; gives the runs back.
 fn same_as_stock(folder: &str) -> Option<[Run; 2]> {
     let scripts = names(folder);
-    let [stock, ours] = runs(folder, &scripts, &[])?;
+    let (stock, ours) = (run(With::Stock, folder, &scripts, &[])?, run(With::Bridge, folder, &scripts, &[])?);
     let mut found = Vec::new();
     for script in &scripts {
         let names = stock.pictures(script).unwrap_or_else(|e| panic!("stock: {e}"));
@@ -50,7 +46,7 @@ fn same_as_stock(folder: &str) -> Option<[Run; 2]> {
             let all = EXCEPTIONS.iter().chain(crate::vtk::EXCEPTIONS);
             let exception = all.into_iter().find(|(s, p, ..)| (*s, *p) == place);
             let by_opengl = EMPTY.contains(&place) || place == ("steady", "after_a_fault");
-            if b.traced_triangles() == 0 && !by_opengl {
+            if b.traced_elements() == 0 && !by_opengl {
                 found.push(format!("{}: nothing was ray traced: {:?}", path.display(), b.report));
             }
             let Some(bars) = exception.map_or(Some(Bars::STRICT), |(_, _, bars, _)| *bars) else { continue };
@@ -80,11 +76,8 @@ fn python_programs_of_other_kinds_look_the_same_and_steady_frames_look_at_no_arr
 #[test]
 fn shadows_come_to_the_wheel_by_their_variable() {
     let room = ["room".to_owned()];
-    let (Some([_, plain]), Some([_, shadows])) =
-        (runs("effects", &room, &[]), runs("effects", &room, &[("RTV_SHADOWS", "1")]))
-    else {
-        return;
-    };
+    let with = |settings: &[(&str, &str)]| run(With::Bridge, "effects", &room, settings);
+    let (Some(plain), Some(shadows)) = (with(&[]), with(&[("RTV_SHADOWS", "1")])) else { return };
     let [plain, shadows] = [plain, shadows].map(|r| r.capture("room", "room").unwrap());
     let by_20 = |a: &[[u8; 3]], b: &[[u8; 3]]| {
         a.iter().zip(b).filter(|(a, b)| a[1] > b[1].saturating_add(20)).count()

@@ -48,8 +48,8 @@ def spot_light_is_full_inside_dark_outside_and_linear_in_the_cosine_between(d):
 
 def ring_light_is_a_disk_with_the_cosine_to_its_normal(d):
     # The middle is straight ahead at distance 2; (0.6, 0, 0.8) is off the axis: cosines at both ends, and the square of the distance.
-    for light in (d.new("Light", "ring", position=[0.0, 0.0, 3.0], direction=[0.0, 0.0, -1.0], intensity=float(4 * np.pi)),
-                  d.new("Light", "ring", position=[0.0, 0.0, 3.0], direction=[0.0, 0.0, -1.0], power=float(4 * np.pi**2))):
+    for light in (d.new("Light", "ring", position=[0.0, 0.0, 3.0], direction=[0.0, 0.0, -1.0], radius=0.01, intensity=float(4 * np.pi)),
+                  d.new("Light", "ring", position=[0.0, 0.0, 3.0], direction=[0.0, 0.0, -1.0], radius=0.01, power=float(4 * np.pi**2))):
         p = draw(d, ball(d, light=light))
         close(p[50, 50, :3], [0.5, 0.25, 1.0])
         way = np.array([-0.6, 0.0, 2.2])

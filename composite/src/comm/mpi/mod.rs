@@ -63,6 +63,8 @@ pub struct MpiComm {
     aborted: Option<(usize, String)>,
     /// Whether there are more ranks here than processors.
     oversubscribed: bool,
+    /// Whether all ranks are here, which all or none of them say.
+    one_node: bool,
     finalize: bool,
 }
 
@@ -148,6 +150,7 @@ impl MpiComm {
             left: vec![false; size],
             aborted: None,
             oversubscribed: here > processors,
+            one_node: here >= size && mpi.abi != Abi::Smpi,
             finalize: initialized == 0,
             mpi: Rc::new(mpi),
         })
@@ -242,6 +245,10 @@ impl Communicator for MpiComm {
 
     fn working_secs(&self) -> f64 {
         self.clock.working_secs(&self.mpi)
+    }
+
+    fn is_one_node(&self) -> bool {
+        self.one_node
     }
 
     fn send(&mut self, destination: usize, tag: u32, message: Vec<u8>) -> Result<(), CommError> {

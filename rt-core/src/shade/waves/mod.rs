@@ -31,6 +31,7 @@ use crate::frame::Frame;
 use crate::math::Aabb;
 use crate::render::{Crop, RenderError, RenderOptions, plan_for};
 use crate::scene::Scene;
+use crate::volume::{Volume, VolumeQuality};
 use glam::DVec3;
 
 /// Pixels along the side of a tile.
@@ -94,6 +95,19 @@ impl<'a> WaveFrame<'a> {
     /// Requests that change nothing, in words.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
+    }
+
+    /// The volume, where the scene has just one: it may be held in bricks. Where several overlap, their media mix along the whole ray.
+    pub fn volume(&self) -> Option<&Volume> {
+        match self.stage.volumes[..] {
+            [(volume, _)] => Some(volume),
+            _ => None,
+        }
+    }
+
+    /// What accuracy volumes are integrated to.
+    pub fn volume_quality(&self) -> &VolumeQuality {
+        &self.stage.options.volume_quality
     }
 
     /// Instances of the scene, the same in every part.

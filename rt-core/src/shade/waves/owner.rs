@@ -3,13 +3,14 @@
 use super::super::shadow::Following;
 use super::super::tile::{PIXELS, TileArea, TileLayers};
 use super::super::wave::{Answers, Passage, RayKind, RecordedRay};
-use super::super::{Workspace, add_light, add_up, camera_wave, local, meet_surfaces, send_rays};
+use super::super::{Workspace, add_light, add_up, camera_wave, local, meet_surfaces, send_rays, volumes};
 use super::{LightPoint, Met, Pass, WaveFrame};
 use crate::effects::Effects;
 use crate::frame::Layers;
 use crate::ray::{Hit, HitBlock, LANES, Ray};
 use crate::ray_stats::RayStats;
 use crate::surface::SurfacePoint;
+use crate::volume::VolumeSample;
 use glam::Vec3;
 
 /// A tile on its way to be finished. Its pixels have slots (0..1024) along a Morton curve.
@@ -148,6 +149,28 @@ impl TileInWork {
         }
     }
 
+    /// Where others hold the bricks of the scene's volume: of each ray that waits its place among the answers and its way through the volume's
+    /// object space, which ends where it `met` something. What it collects there goes to [`TileInWork::cross`].
+    pub fn volume_rays(&self, frame: &WaveFrame<'_>, met: &[Option<Met>]) -> Vec<(usize, Ray)> {
+        let [(_, object_from_render)] = frame.stage.volumes[..] else { return Vec::new() };
+        let end = |i: usize, ray: &Ray| met.get(i).and_then(|m| m.as_ref()).map_or(ray.t_max, |m| m.t);
+        let way = |(i, _, ray): (usize, u16, Ray)| {
+            let t_max = end(i, &ray);
+            (i, Ray { t_max, ..volumes::in_object_space(&ray, &object_from_render) })
+        };
+        if self.pass == Pass::Geometry { Vec::new() } else { self.rays().map(way).collect() }
+    }
+
+    /// Takes what each ray of the wave collects in the volume, before [`TileInWork::meet`].
+    ///
+    /// # Errors
+    /// When there are not as many answers as rays.
+    pub fn cross(&mut self, collected: Vec<VolumeSample>) -> Result<(), WrongAnswer> {
+        self.expect("number of crossings", collected.len(), self.num_rays())?;
+        self.work.crossed = collected;
+        Ok(())
+    }
+
     /// Takes what each ray of the wave met first.
     ///
     /// # Errors
@@ -178,6 +201,7 @@ impl TileInWork {
         }
         let stats = &mut self.stats;
         meet_surfaces(&frame.stage, &self.area, &mut self.layers, &mut self.work, false, stats);
+        self.work.crossed.clear();
         self.find_light_rays(frame);
         Ok(())
     }

@@ -59,7 +59,14 @@ pub(crate) fn light_of(light: &Object, place: &DAffine3, notes: &mut Notes) -> O
             let sized = number("radiance").filter(|_| radius > 0.0).map(|l| l * PI * radius * radius);
             // Straight ahead; a disk's power is π times that.
             let ahead = number("power").map(|p| p / PI).or(number("intensity")).unwrap_or(1.0);
-            (LightKind::Disk { position, direction, radius }, sized.unwrap_or(ahead), [0.0, 0.0, 1.0])
+            let kind = if radius > 0.0 {
+                LightKind::Disk { position, direction, radius }
+            } else {
+                notes.warn(light, "`radius` is 0: it shines from a point, into the half space before it");
+                let half = 0.5 * PI;
+                LightKind::Cone { position, direction, inner_rad: half, outer_rad: half }
+            };
+            (kind, sized.unwrap_or(ahead), [0.0, 0.0, 1.0])
         }
         _ => {
             let outer = 0.5 * number("openingAngle").unwrap_or(PI).clamp(0.0, 2.0 * PI);

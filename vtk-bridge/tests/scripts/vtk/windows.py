@@ -48,6 +48,15 @@ del second
 third = window(120, 120, two)
 third.Render()
 save(third, "third")
+# As large as the largest screens; only one row of it is kept, and a small picture after it.
+third.SetSize(7680, 4320)
+third.Render()
+row = vtk.vtkFloatArray()
+third.GetZbufferData(0, 2160, 7679, 2160, row)
+covered = sum(row.GetValue(i) < 1.0 for i in range(7680))
+third.SetSize(120, 120)
+third.Render()
+save(third, "after_8k", covered=round(covered / 7680, 3))
 two.RemoveActor(shared)
 del shared
 third.Render()

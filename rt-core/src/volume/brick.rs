@@ -1,0 +1,237 @@
+//! Volumes in bricks: what several holders of one volume need so that together they see what one would.
+//!
+//! A ray meets the blocks of a grid in an order that depends on the ray alone, and what a block adds depends only on what was collected in front of it. So a ray may be
+//! carried from brick to brick together with what it has collected ([`Marched`]): the result has the bits of one march through the whole.
+
+use super::layer::March;
+use super::{MACROCELL, Volume, VolumeQuality, VolumeReport, VolumeSample, scan};
+use crate::grid::Grid;
+use crate::ray::Ray;
+use glam::UVec3;
+use std::sync::Arc;
+
+/// Layers of points around a brick: a gradient takes the points on both sides of a cell's corners, and the end of a ray's way through a cell may be rounded
+/// into the next one.
+const GHOSTS: u32 = 2;
+
+/// A box of blocks of [`MACROCELL`]³ cells: from `first` to before `end`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Brick {
+    /// Lowest block.
+    pub first: UVec3,
+    /// Beyond the highest block, on each axis.
+    pub end: UVec3,
+}
+
+impl Brick {
+    /// Whether there is no block in it.
+    pub fn is_empty(&self) -> bool {
+        self.first.cmpge(self.end).any()
+    }
+
+    /// Whether a block is in it.
+    pub fn contains(&self, block: UVec3) -> bool {
+        block.cmpge(self.first).all() && block.cmplt(self.end).all()
+    }
+}
+
+/// What a ray has collected so far, on its way from brick to brick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Marched {
+    color: [f64; 3],
+    transmittance: f64,
+    depth: f64,
+    samples: u32,
+}
+
+impl Default for Marched {
+    /// Nothing yet.
+    fn default() -> Self {
+        Marched { color: [0.0; 3], transmittance: 1.0, depth: f64::INFINITY, samples: 0 }
+    }
+}
+
+impl Marched {
+    /// Words of [`Marched::to_words`].
+    pub const WORDS: usize = 11;
+
+    /// For a message.
+    pub fn to_words(&self) -> [u32; Marched::WORDS] {
+        let [r, g, b] = self.color;
+        let mut words = [0; Marched::WORDS];
+        for (pair, number) in words.chunks_exact_mut(2).zip([r, g, b, self.transmittance, self.depth]) {
+            let bits = number.to_bits();
+            pair.copy_from_slice(&[bits as u32, (bits >> 32) as u32]);
+        }
+        words[10] = self.samples;
+        words
+    }
+
+    /// What [`Marched::to_words`] has made.
+    pub fn from_words(words: &[u32; Marched::WORDS]) -> Marched {
+        let number = |i: usize| f64::from_bits(u64::from(words[2 * i]) | u64::from(words[2 * i + 1]) << 32);
+        Marched {
+            color: [0, 1, 2].map(number),
+            transmittance: number(3),
+            depth: number(4),
+            samples: words[10],
+        }
+    }
+
+    /// At the end of the way.
+    pub fn sample(&self) -> VolumeSample {
+        let [r, g, b] = self.color.map(|c| c as f32);
+        VolumeSample {
+            rgba: [r, g, b, (1.0 - self.transmittance) as f32],
+            depth: self.depth as f32,
+            samples: self.samples,
+        }
+    }
+
+    /// Whether so little light passes that nothing behind counts.
+    pub fn is_opaque(&self, quality: &VolumeQuality) -> bool {
+        self.samples > 0 && self.march(*quality, 1.0).is_opaque()
+    }
+
+    pub(super) fn march(&self, quality: VolumeQuality, path: f64) -> March {
+        let mut m = March::new(quality, path);
+        (m.color, m.transmittance) = (self.color, self.transmittance);
+        (m.depth, m.samples) = (self.depth, self.samples);
+        m
+    }
+}
+
+impl From<March> for Marched {
+    fn from(m: March) -> Marched {
+        Marched { color: m.color, transmittance: m.transmittance, depth: m.depth, samples: m.samples }
+    }
+}
+
+impl Volume {
+    /// Blocks per axis, of the whole.
+    pub fn blocks(&self) -> UVec3 {
+        self.blocks
+    }
+
+    /// Whether a block here has any extinction. False for blocks that a brick does not hold.
+    pub fn is_occupied(&self, block: UVec3) -> bool {
+        block.cmplt(self.blocks).all() && self.occupied[self.block_index(block)]
+    }
+
+    pub(super) fn block_index(&self, block: UVec3) -> usize {
+        let [x, y, z] = block.to_array().map(|b| b as usize);
+        (z * self.blocks.y as usize + y) * self.blocks.x as usize + x
+    }
+
+    /// What a holder of `brick` needs: the values of its cells with two layers of points around them, for gradients. The rest of the whole is
+    /// clear here.
+    ///
+    /// ```
+    /// use rt_core::glam::{DVec3, UVec3, Vec3};
+    /// use rt_core::{colormap::ColorMap, grid::Grid, ray::Ray, transfer_function::TransferFunction};
+    /// use rt_core::volume::{Brick, Marched, Volume, VolumeOptions, VolumeQuality};
+    /// let values = (0..33 * 9 * 9).map(|k| (k % 7) as f32 / 7.0).collect();
+    /// let grid = Grid::new(UVec3::new(33, 9, 9), DVec3::ZERO, DVec3::ONE, values).unwrap();
+    /// let white = ColorMap::new(vec![[1.0; 4]], [0.0, 1.0]);
+    /// let transfer = TransferFunction::from_opacity(white, &[[0.0, 0.0], [1.0, 0.3]], 1.0).unwrap();
+    /// let whole = Volume::new(grid.into(), transfer, VolumeOptions::default()).unwrap();
+    /// let brick = |x: u32| whole.part(Brick { first: UVec3::new(x, 0, 0), end: UVec3::new(x + 2, 1, 1) });
+    /// let (near, far) = (brick(0), brick(2));
+    ///
+    /// let ray = Ray::new(Vec3::new(-1.0, 2.3, 4.1), Vec3::new(1.0, 0.1, 0.05));
+    /// let quality = VolumeQuality::default();
+    /// let collected = near.carry_on(&ray, 0.0, f32::INFINITY, &quality, Marched::default());
+    /// let collected = far.carry_on(&ray, 0.0, f32::INFINITY, &quality, collected);
+    /// assert_eq!(collected.sample(), whole.integrate(&ray, 0.0, f32::INFINITY, &quality));
+    /// assert!(near.grid().values.len() < whole.grid().values.len());
+    /// ```
+    pub fn part(&self, brick: Brick) -> Volume {
+        let cells = self.cells();
+        let (mut ranges, mut report) =
+            (vec![[f32::INFINITY, f32::NEG_INFINITY]; self.ranges.len()], VolumeReport::default());
+        let brick = Brick { first: brick.first, end: brick.end.min(self.blocks) };
+        let (low, high) = if brick.is_empty() {
+            (UVec3::ZERO, UVec3::ONE)
+        } else {
+            let low = (brick.first * MACROCELL).saturating_sub(UVec3::splat(GHOSTS));
+            (low, ((brick.end * MACROCELL).min(cells) + UVec3::splat(GHOSTS + 1)).min(self.dims))
+        };
+        let low = low.max(self.first_point);
+        let high = high.min(self.first_point + self.grid.dims);
+        let size = high - low;
+        let mut values = Vec::with_capacity(size.as_usizevec3().element_product());
+        for k in low.z..high.z {
+            for j in low.y..high.y {
+                let row = self.grid.index(
+                    low.x - self.first_point.x,
+                    j - self.first_point.y,
+                    k - self.first_point.z,
+                );
+                values.extend_from_slice(&self.grid.values[row..row + size.x as usize]);
+            }
+        }
+        let spacing = self.grid.spacing;
+        let origin = self.origin + spacing * low.as_dvec3();
+        let grid = Grid { dims: size, origin, spacing, values };
+        for z in brick.first.z..brick.end.z {
+            for y in brick.first.y..brick.end.y {
+                for x in brick.first.x..brick.end.x {
+                    let block = UVec3::new(x, y, z);
+                    let (first, end) = (block * MACROCELL, ((block + UVec3::ONE) * MACROCELL).min(cells));
+                    let (range, bad) = scan(&grid, first - low, end - low, self.is_nearest());
+                    ranges[self.block_index(block)] = range;
+                    report.cells += (end - first).as_u64vec3().element_product();
+                    report.cells_non_finite += bad;
+                    report.macrocells += 1;
+                }
+            }
+        }
+        let mut part = Volume {
+            grid: Arc::new(grid),
+            transfer: self.transfer.clone(),
+            options: self.options,
+            dims: self.dims,
+            origin: self.origin,
+            first_point: low,
+            ranges,
+            occupied: Vec::new(),
+            blocks: self.blocks,
+            report,
+        };
+        part.find_occupied();
+        part
+    }
+
+    /// Goes on where `collected` was left, as [`Volume::integrate`] of the whole would between the same `t0` and `t1`. Bricks must be asked in
+    /// the order in which the ray comes into them ([`Volume::blocks_along`]).
+    pub fn carry_on(
+        &self,
+        ray: &Ray,
+        t0: f32,
+        t1: f32,
+        quality: &VolumeQuality,
+        collected: Marched,
+    ) -> Marched {
+        let (t0, t1) = (f64::from(t0.max(ray.t_min)), f64::from(t1.min(ray.t_max)));
+        if !(ray.is_valid() && t0 < t1) || collected.is_opaque(quality) {
+            return collected;
+        }
+        self.march(ray, t0, t1, quality, &collected).into()
+    }
+
+    /// Calls `visit` with the blocks of the whole that the ray meets between `t0` and `t1`, in order, until it returns false.
+    pub fn blocks_along(&self, ray: &Ray, t0: f32, t1: f32, mut visit: impl FnMut(UVec3) -> bool) {
+        let (t0, t1) = (f64::from(t0.max(ray.t_min)), f64::from(t1.min(ray.t_max)));
+        if !(ray.is_valid() && t0 < t1) {
+            return;
+        }
+        let (index_ray, cells, t0, t1) = self.index_ray(ray, t0, t1);
+        if t0 >= t1 {
+            return;
+        }
+        let cells = cells.to_array().map(i64::from);
+        index_ray.walk([0; 3], cells, cells, i64::from(MACROCELL), t0, t1, |block| {
+            visit(UVec3::from_array(block.cell.map(|c| c as u32 / MACROCELL)))
+        });
+    }
+}
