@@ -70,7 +70,9 @@ impl Program {
         };
         let size = size_px.to_string();
         Ok(match self {
-            Program::Gmsh => vec![script("gmsh_frames.py", include_str!("scripts/gmsh_frames.py"))?, data, size],
+            Program::Gmsh => {
+                vec![script("gmsh_frames.py", include_str!("scripts/gmsh_frames.py"))?, data, size]
+            }
             Program::ParaView => {
                 vec![script("paraview_frames.py", include_str!("scripts/paraview_frames.py"))?, data, size]
             }

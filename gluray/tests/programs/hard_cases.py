@@ -492,13 +492,14 @@ def soak():
     generate, delete, bind = F("glGenBuffers", c_int, c_void_p), F("glDeleteBuffers", c_int, c_void_p), F("glBindBuffer", c_uint, c_uint)
     fill = F("glBufferData", c_uint, c_ulong, c_void_p, c_uint)
     n = 63000
+    base = array.array("f", [(k * 7919 % 2003) / 1001.5 - 1 for k in range(3 * n)])
     started, frames, samples, shape = time.time(), 0, [], None
-    while time.time() - started < secs:
+    while time.time() - started < secs or frames < 100:
         simple()
         rotate(frames, 0, 0, 1)
         if shape is None or frames % 24 < 16:
-            seed = frames % 9973
-            shape = array.array("f", [((k * 7919 + seed * 31) % 2003) / 1001.5 - 1 for k in range(3 * n)])
+            first = frames * 31 % 2003
+            shape = base[first:] + base[:first]
         address, way = shape.buffer_info()[0], frames // 4 % 4
         if way == 0:
             enable_array(0x8074)
