@@ -96,7 +96,15 @@ pub(crate) fn eye_from_clip(clip: DMat4, reference: Option<(DMat4, DMat4)>) -> O
     let placed = reference.and_then(|(other, eye)| {
         let here = other.inverse() * clip;
         let here = here * here.row(3).w.recip();
-        (here.row(3).truncate().length() < 1e-5 && here.is_finite()).then(|| eye * here)
+        let affine = here.row(3).truncate().length() < 1e-5 && here.is_finite();
+        // What roundings leave in the last row is no perspective.
+        let exact = DMat4::from_cols(
+            here.x_axis.with_w(0.0),
+            here.y_axis.with_w(0.0),
+            here.z_axis.with_w(0.0),
+            here.w_axis.with_w(1.0),
+        );
+        affine.then(|| eye * exact)
     });
     placed.or_else(|| Camera::from_matrix(clip).ok().map(|c| eye_space(&c)))
 }
