@@ -1,6 +1,7 @@
 //! What is drawn but not in the framebuffer yet, and when it has to be there.
 
 use crate::capture::{Draw, Shading};
+use crate::config::Mode;
 use crate::context::Context;
 use crate::enums::*;
 use crate::late::{self, Late, Traced};
@@ -164,6 +165,10 @@ impl Context {
         self.frame.told.traced(self.counters.report.frames + 1, pending.iter().map(|(d, _)| d));
         // What the driver drew after a traced surface wins ties with it, as LEQUAL says; what it drew before loses them.
         let func = if others { LESS } else { pending[0].0.state.depth_func };
+        let mut pending = pending;
+        if !matches!(self.config.settings.mode, Mode::Match | Mode::Phong) {
+            crate::view::place(&mut pending);
+        }
         if let Some(n) = pending.iter().map(|(d, _)| d.state.samples).find(|n| *n > 1) {
             self.counters.warn(format!(
                 "the program has {n} samples a pixel: one ray stands for all of them, so silhouettes are not smoothed as the driver's are"

@@ -16,7 +16,6 @@ use crate::programs::DrawCall;
 use crate::real::{feedback, gl};
 use crate::state::current::{Current, Material};
 use crate::state::snapshot::{GlLight, Snapshot};
-use rt_core::camera::Camera;
 use rt_core::glam::{DMat4, DVec3, DVec4};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -91,13 +90,6 @@ fn by_uniforms(program: u32, points: &[[f32; 3]], clip: &[[f32; 4]]) -> Option<D
             (at >= 0).then(|| DMat4::from_cols_array(&gl::uniform_f::<16>(program, at).map(f64::from)))
         })
         .find(|m| residual(m, points, clip) < RESIDUAL)
-}
-
-/// Eye space of a camera: right, up, backward, with the eye (of parallel projections: a point in the middle) as origin.
-fn view_of(camera: &Camera) -> DMat4 {
-    let axes = camera.world_from_view().transpose();
-    let eye = camera.eye().unwrap_or_else(|| camera.world_ray([0.0, 0.0]).0);
-    DMat4::from_mat3(axes) * DMat4::from_translation(-eye)
 }
 
 impl Context {
@@ -187,21 +179,15 @@ impl Context {
     }
 
     fn add_shape(&mut self, geometry: Arc<Geometry>, m: DMat4) -> Result<(), &'static str> {
-        let Ok(camera) = Camera::from_matrix(m) else { return Err("a matrix that rays cannot be made for") };
-        let placed = self.probes.reference.and_then(|(reference, view)| {
-            let here = reference.inverse() * m;
-            let here = here * here.row(3).w.recip();
-            let affine = here.row(3).truncate().length() < 1e-5 && here.is_finite();
-            affine.then(|| (view * here, reference * view.inverse()))
-        });
-        let (view, projection) = match placed {
-            Some(found) => found,
-            None => {
-                let view = view_of(&camera);
-                self.probes.reference.get_or_insert((m, view));
-                (view, m * view.inverse())
-            }
+        let Some(view) = crate::view::eye_from_clip(m, self.probes.reference) else {
+            return Err("a matrix that rays cannot be made for");
         };
+        let reference = *self.probes.reference.get_or_insert((m, view));
+        // The same for all that the first one places, to the last bit.
+        let own = m * view.inverse();
+        let shared = reference.0 * reference.1.inverse();
+        let same = (own - shared).to_cols_array().iter().all(|v| v.abs() < 1e-4);
+        let projection = if same { shared } else { own };
         let f32s = |m: DMat4| m.to_cols_array().map(|v| v as f32);
         let light = &self.config.settings.lights;
         let [x, y, z] = light.added_direction.map(|v| v as f32);

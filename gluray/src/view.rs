@@ -82,3 +82,67 @@ pub(crate) fn views<'a>(draws: impl Iterator<Item = &'a Draw>) -> Vec<(View, Vec
     }
     out
 }
+
+/// Eye space of a camera: right, up, backward, with the eye (of parallel projections: a point in the middle) as origin.
+fn eye_space(camera: &Camera) -> DMat4 {
+    let axes = camera.world_from_view().transpose();
+    let eye = camera.eye().unwrap_or_else(|| camera.world_ray([0.0, 0.0]).0);
+    DMat4::from_mat3(axes) * DMat4::from_translation(-eye)
+}
+
+/// Eye from object for a draw of which only clip from object (`clip`) is known. `reference` is both matrices of another draw: when the two differ by an affine
+/// map, both are in one space. `None` for matrices that rays cannot be made for.
+pub(crate) fn eye_from_clip(clip: DMat4, reference: Option<(DMat4, DMat4)>) -> Option<DMat4> {
+    let placed = reference.and_then(|(other, eye)| {
+        let here = other.inverse() * clip;
+        let here = here * here.row(3).w.recip();
+        let affine = here.row(3).truncate().length() < 1e-5 && here.is_finite();
+        // What roundings leave in the last row is no perspective.
+        let exact = DMat4::from_cols(
+            here.x_axis.with_w(0.0),
+            here.y_axis.with_w(0.0),
+            here.z_axis.with_w(0.0),
+            here.w_axis.with_w(1.0),
+        );
+        affine.then(|| eye * exact)
+    });
+    placed.or_else(|| Camera::from_matrix(clip).ok().map(|c| eye_space(&c)))
+}
+
+/// Gives eye spaces to draws whose shaders do without: VTK's, where a light at the eye needs normals alone.
+pub(crate) fn place<T>(draws: &mut [(Draw, T)]) {
+    let matrices = |d: &Draw| match &d.shading {
+        Shading::Program(p) => Some((matrix(&p.clip_from_object), matrix(&p.view_from_object))),
+        Shading::Fixed => None,
+    };
+    let known = |(_, eye): &(DMat4, DMat4)| eye.determinant() != 0.0 && eye.is_finite();
+    let mut reference = draws.iter().filter_map(|(d, _)| matrices(d)).find(known);
+    for (d, _) in draws {
+        let Some((clip, _)) = matrices(d).filter(|m| !known(m)) else { continue };
+        let Some(eye) = eye_from_clip(clip, reference) else { continue };
+        reference.get_or_insert((clip, eye));
+        if let Shading::Program(p) = &mut d.shading {
+            std::sync::Arc::make_mut(p).view_from_object = eye.to_cols_array().map(|v| v as f32);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rt_core::glam::DVec3;
+
+    #[test]
+    fn a_matrix_alone_tells_where_the_eye_is_and_a_second_draw_is_placed_by_the_first() {
+        let (a, b) = (-301.0 / 299.0, -600.0 / 299.0);
+        let frustum =
+            DMat4::from_cols_array(&[1., 0., 0., 0., 0., 1., 0., 0., 0., 0., a, -1., 0., 0., b, 0.]);
+        let eye = DMat4::from_rotation_y(0.3) * DMat4::from_translation(DVec3::new(1.0, -2.0, -9.0));
+        let first = frustum * eye;
+        let found = eye_from_clip(first, None).expect("a camera");
+        assert!((found - eye).to_cols_array().iter().all(|v| v.abs() < 1e-9), "{found} {eye}");
+        let object = DMat4::from_scale(DVec3::new(2.0, 3.0, 0.5)) * DMat4::from_rotation_x(1.0);
+        let second = eye_from_clip(first * object, Some((first, eye))).expect("placed");
+        assert!((second - eye * object).to_cols_array().iter().all(|v| v.abs() < 1e-9));
+    }
+}

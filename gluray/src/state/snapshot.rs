@@ -224,7 +224,11 @@ impl Snapshot {
             .map(|i| gl::clip_plane(CLIP_PLANE0 + i))
             .collect();
         self.fog = gl::is_enabled(FOG).then(|| Fog {
-            mode: gl::word(FOG_MODE),
+            // Fog by coordinates is the driver's: `decide` knows it by mode 0.
+            mode: match can.version >= 14 && gl::word(FOG_COORD_SRC) == FOG_COORD {
+                true => 0,
+                false => gl::word(FOG_MODE),
+            },
             density: gl::floats::<1>(FOG_DENSITY)[0],
             start: gl::floats::<1>(FOG_START)[0],
             end: gl::floats::<1>(FOG_END)[0],

@@ -55,7 +55,7 @@ pub(super) fn part(
     warnings: &mut Vec<String>,
 ) -> Option<Part> {
     let m = eye_from_object(p);
-    if m.row(3).truncate().length() > 1e-9 || m.row(3).w == 0.0 || !m.is_finite() {
+    if m.row(3).truncate().length() > 1e-6 * m.row(3).w.abs() || m.row(3).w == 0.0 || !m.is_finite() {
         warn(warnings, "a draw whose model-view matrix is projective is left out");
         return None;
     }
