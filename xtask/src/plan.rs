@@ -81,7 +81,16 @@ pub(crate) const STEPS: &[Step] = &[
     Step {
         name: "compositor-alone",
         tells: "who embeds the compositor builds it without the renderer, the data sets and the program",
-        action: cargo(&["clippy", "-p", "composite", "--lib", "--no-default-features", "--", "-D", "warnings"]),
+        action: cargo(&[
+            "clippy",
+            "-p",
+            "composite",
+            "--lib",
+            "--no-default-features",
+            "--",
+            "-D",
+            "warnings",
+        ]),
     },
     Step {
         name: "clippy-xtask",
