@@ -37,6 +37,15 @@ impl Communicator for FirstRanks<'_> {
         self.inner.now()
     }
 
+    fn working_secs(&self) -> f64 {
+        self.inner.working_secs()
+    }
+
+    // Plans follow from it: ranks that are wrapped and ranks that are not must agree.
+    fn is_one_node(&self) -> bool {
+        self.inner.is_one_node()
+    }
+
     fn send(&mut self, destination: usize, tag: u32, mut message: Vec<u8>) -> Result<(), CommError> {
         if self.damage
             && tag < FIRST_RESERVED_TAG

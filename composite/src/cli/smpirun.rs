@@ -83,7 +83,7 @@ fn hosts_text(ranks: usize) -> String {
 /// Places where cargo puts the library, given where this program is.
 fn candidates(program: &Path) -> Vec<PathBuf> {
     let folder = program.parent().unwrap_or(Path::new("."));
-    vec![folder.join(LIBRARY), folder.join("examples").join(LIBRARY)]
+    vec![folder.join("examples").join(LIBRARY), folder.join(LIBRARY)]
 }
 
 /// The program as a shared library: named, beside the program, or built now.

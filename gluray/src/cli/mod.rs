@@ -78,11 +78,15 @@ fn last_report() -> PathBuf {
     crate::folders::state(crate::folders::variable).unwrap_or_default().join("last.json")
 }
 
-/// The shared library that belongs to this program.
+/// The shared library that belongs to this program: the one that is named, else the newest of those near it. `cargo test` leaves it in `deps`, `cargo
+/// build` beside the program, and either may be of another day.
 fn library() -> Option<PathBuf> {
+    if let Some(named) = std::env::var_os("GLURAY_LIBRARY").map(PathBuf::from).filter(|p| p.is_file()) {
+        return Some(named);
+    }
     let exe = std::env::current_exe().ok()?;
     let folder = exe.parent()?;
     let places = [folder.to_owned(), folder.join("deps"), folder.join("../lib"), folder.join("..")];
-    let named = std::env::var_os("GLURAY_LIBRARY").map(PathBuf::from);
-    named.into_iter().chain(places.map(|p| p.join("libgluray.so"))).find(|p| p.is_file())
+    let found = places.map(|p| p.join("libgluray.so")).into_iter().filter(|p| p.is_file());
+    found.max_by_key(|p| std::fs::metadata(p).and_then(|m| m.modified()).ok())
 }
