@@ -3,9 +3,16 @@
 use crate::peers::find;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::OnceLock;
 
-/// Compiles `c_abi/frames.c` against the library of this build.
-fn program() -> PathBuf {
+/// `c_abi/frames.c`, compiled once: a program that runs cannot be written.
+fn program() -> &'static Path {
+    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+    PROGRAM.get_or_init(compiled)
+}
+
+/// Compiles it against the library of this build.
+fn compiled() -> PathBuf {
     let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("frames");
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let library = vtk_bridge::setup::layout::library().expect("the library was built with this test");

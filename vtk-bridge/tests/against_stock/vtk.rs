@@ -37,18 +37,7 @@ pub(crate) const EXCEPTIONS: &[(&str, &str, Option<Bars>, &str)] = &[
         Some(Bars { color_mean: 255.0, color_strays: 1.0, ..Bars::STRICT }),
         "OpenGL shades in sheared coordinates, where right angles are none: its light is wrong",
     ),
-    (
-        "edges",
-        "edges",
-        Some(Bars {
-            silhouette: 0.004,
-            depth_ulp: u32::MAX,
-            color_mean: 1.2,
-            color_strays: 0.006,
-            ..Bars::STRICT
-        }),
-        "OpenGL draws the outer half of an outline's edge beside the surface, we the half on it; and it pushes surfaces with edges back in depth",
-    ),
+    ("edges", "edges", Some(Bars::EDGES), "as `Bars::EDGES` says"),
     (
         "representations",
         "representations",
