@@ -19,6 +19,7 @@
 //!     color: Color::Material,
 //!     texture: None,
 //!     property: Property { lighting: false, ..Property::default() },
+//!     back: None,
 //!     glyphs: None,
 //! });
 //! let view = View {
