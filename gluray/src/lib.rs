@@ -2,15 +2,15 @@
 //!
 //! The shared library stands between a program and its OpenGL driver. The life of a frame:
 //!
-//! 1. A call comes to a trampoline ([`symbols`]); most go straight on to the driver, which keeps all state.
-//! 2. A draw of filled primitives asks what the state is ([`state`]) and whether rays can stand for it ([`decide`]).
-//! 3. If so it becomes a mesh ([`capture`], [`arrays`], [`primitives`]) whose hierarchy may be there already ([`cache`]).
-//! 4. When the program is about to see the picture ([`frame`]) rays find the nearest triangle of every pixel ([`trace`]), which is lit as
-//!    OpenGL lights it ([`lighting`], [`texturing`]).
-//! 5. Colours and depths go into the program's framebuffer as one pass of fragments ([`present`]).
+//! 1. A call comes to a trampoline (`symbols`); most go straight on to the driver, which keeps all state.
+//! 2. A draw of filled primitives asks what the state is (`state`) and whether rays can stand for it (`decide`).
+//! 3. If so it becomes a mesh (`capture`, `arrays`, `primitives`) whose hierarchy may be there already (`cache`).
+//! 4. When the program is about to see the picture (`frame`) rays find the nearest triangle of every pixel (`trace`), which is lit as
+//!    OpenGL lights it (`lighting`, `texturing`).
+//! 5. Colours and depths go into the program's framebuffer as one pass of fragments (`present`).
 //!
 //! Whatever is not understood the driver draws, and depth brings both together. A fault of ours ends the tracing, not the
-//! program ([`fault`]).
+//! program (`fault`).
 #![deny(unsafe_code)]
 
 mod arrays;

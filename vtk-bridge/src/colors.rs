@@ -88,7 +88,7 @@ fn stepped(row: &[[u8; 4]], nan: [u8; 4]) -> ColorMap {
     ColorMap { nan_color: float(nan), ..ColorMap::new(colors, [half, 1.0 - half]) }
 }
 
-/// A texture; only what says that it is sRGB is decoded (see [`float`]).
+/// A texture; only what says that it is sRGB is decoded (see `float`).
 pub fn texture(image: &Image<'_>) -> Option<Texture> {
     let decode = |v: f32| if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
     let linear = |c: [u8; 4]| {

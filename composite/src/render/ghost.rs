@@ -1,6 +1,6 @@
 //! Ghost zones: every rank also holds what lies within the distance of ambient occlusion around its part, and then answers for its
 //! own hits alone. Exact, because no such ray leaves the zone. They cost memory and a build once, and nothing per frame; asking costs messages and
-//! repeated rays every frame. [`choose`] estimates both.
+//! repeated rays every frame. `choose` estimates both.
 use super::ask::{Tag, Talk};
 use super::boxes::Boxes;
 use super::sort_last::{FrameOptions, Light};

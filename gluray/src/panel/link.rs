@@ -1,10 +1,10 @@
 //! The library's end of the link. It lives in somebody else's program, so it never waits, starts no thread and says nothing.
 //!
 //! Once a frame the library calls [`Link::poll`] and [`Link::frame`]: some microseconds when there is a panel, one look at the clock when there is
-//! none. A connection on loopback is made or refused at once by the kernel; should the panel's queue be full, [`CONNECT_PATIENCE`] is lost, and the next
+//! none. A connection on loopback is made or refused at once by the kernel; should the panel's queue be full, `CONNECT_PATIENCE` is lost, and the next
 //! attempts come more and more rarely. What the panel does not read is dropped, the newest first: a slow panel costs no memory.
 //!
-//! A process that forked leaves the link to its parent. All settings that arrive go through [`crate::config::assign`]: what is
+//! A process that forked leaves the link to its parent. All settings that arrive go through [`crate::config::assign()`]: what is
 //! wrong is refused by name, and the rest is taken.
 
 use super::meeting::{Meeting, same};
