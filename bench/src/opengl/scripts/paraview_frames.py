@@ -6,7 +6,8 @@ file, size = sys.argv[1], int(sys.argv[2])
 reader = XMLPolyDataReader(FileName=[file])
 view = CreateRenderView(ViewSize=[size, size])
 shown = Show(reader, view)
-ColorBy(shown, None)
+# One colour; `ColorBy(shown, None)` fails in ParaView 5.11 where nothing was coloured before.
+shown.ColorArrayName = ["POINTS", ""]
 view.ResetCamera()
 camera = view.GetActiveCamera()
 camera.Azimuth(30)
