@@ -221,14 +221,22 @@ impl Record {
     }
 }
 
-/// All records of a directory, by name. Files that are not records are left alone; a broken record is an error.
+/// All records of a directory, by name. JSON of other kinds (a Chrome trace beside a record, what a program printed) is left alone; a broken
+/// record, or a file that is no JSON, is an error.
 pub fn read_dir(dir: &Path) -> anyhow::Result<Vec<Record>> {
     let entries =
         std::fs::read_dir(dir).with_context(|| format!("cannot read the directory `{}`", dir.display()))?;
     let mut paths: Vec<PathBuf> =
         entries.flatten().map(|e| e.path()).filter(|p| p.extension().is_some_and(|e| e == "json")).collect();
+    paths.retain(|p| !is_of_another_kind(p));
     paths.sort();
     paths.iter().map(|p| Record::read(p)).collect()
+}
+
+/// Whether it is JSON that does not say of itself that it is a record.
+fn is_of_another_kind(path: &Path) -> bool {
+    let text = std::fs::read(path).unwrap_or_default();
+    serde_json::from_slice::<serde_json::Value>(&text).is_ok_and(|json| json.get("schema").is_none())
 }
 
 fn one_line(text: &str) -> String {
@@ -311,6 +319,18 @@ mod tests {
         r.schema = "bench-record/99".into();
         let e = Record::read(&r.write(dir.path()).unwrap()).unwrap_err().to_string();
         assert!(e.contains("fig0.0.json") && e.contains("bench-record/99"), "{e}");
+    }
+
+    #[test]
+    fn json_of_other_kinds_beside_records_is_left_alone_and_a_broken_record_is_not() {
+        let dir = tempfile::tempdir().unwrap();
+        let r = sample();
+        let path = r.write(dir.path()).unwrap();
+        std::fs::write(dir.path().join("trace.json"), r#"{"traceEvents": []}"#).unwrap();
+        assert_eq!(read_dir(dir.path()).unwrap(), vec![r]);
+        let text = std::fs::read(&path).unwrap();
+        std::fs::write(&path, &text[..text.len() / 2]).unwrap();
+        assert!(read_dir(dir.path()).unwrap_err().to_string().contains("fig0.0.json"));
     }
 
     #[test]
