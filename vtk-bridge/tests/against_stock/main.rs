@@ -11,6 +11,7 @@ mod paraview;
 mod peers;
 mod plugin;
 mod ranks;
+mod scripts;
 mod session;
 mod vtk;
 mod wheel;

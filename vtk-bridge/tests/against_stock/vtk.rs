@@ -3,6 +3,7 @@
 use crate::capture::Capture;
 use crate::compare::{Bars, faults};
 use crate::peers::skip;
+use crate::scripts::{Exception, differences};
 use crate::session::{Program, Run, With, output, scripts_in};
 use std::sync::OnceLock;
 
@@ -24,7 +25,7 @@ fn both() -> Option<&'static Both> {
 }
 
 /// Pictures that are held to other bars than the rest, or to none, and why.
-pub(crate) const EXCEPTIONS: &[(&str, &str, Option<Bars>, &str)] = &[
+pub(crate) const EXCEPTIONS: &[Exception] = &[
     (
         "odd_inputs",
         "not_a_number",
@@ -76,21 +77,7 @@ pub(crate) const EMPTY: &[(&str, &str)] =
 
 fn same_as_stock(script: &str) {
     let Some(both) = both() else { return };
-    let names = both.stock.pictures(script).unwrap_or_else(|e| panic!("stock: {e}"));
-    let ours = both.ours.pictures(script).unwrap_or_else(|e| panic!("with the bridge: {e}"));
-    assert_eq!(names, ours, "other pictures than stock VTK's");
-    let mut found = Vec::new();
-    for name in names {
-        let [stock, ours] = [&both.stock, &both.ours].map(|r| r.capture(script, &name).unwrap());
-        let path = both.ours.path(script, &name);
-        if ours.traced_elements() == 0 && !EMPTY.contains(&(script, name.as_str())) {
-            found.push(format!("{}: nothing was ray traced: {:?}", path.display(), ours.report));
-        }
-        let bars = EXCEPTIONS.iter().find(|(s, p, ..)| (*s, *p) == (script, name.as_str()));
-        if let Some(bars) = bars.map_or(Some(Bars::STRICT), |(_, _, bars, _)| *bars) {
-            found.extend(faults(&stock, &ours, &bars).iter().map(|f| format!("{}: {f}", path.display())));
-        }
-    }
+    let found = differences(&both.stock, &both.ours, script, &[EXCEPTIONS], EMPTY);
     assert!(found.is_empty(), "\n{}\n", found.join("\n"));
 }
 

@@ -1,13 +1,13 @@
 //! The same unmodified scripts in the `vtk` wheel of PyPI, alone and started by `python -m rtvtk`.
 
-use crate::compare::{Bars, faults};
 use crate::peers::skip;
+use crate::scripts::{Exception, differences};
 use crate::session::{Program, Run, With, output, scripts_in};
 use crate::vtk::EMPTY;
 use std::path::PathBuf;
 
 /// Pictures that are held to other bars than the rest, or to none, and why. Those of Debian's VTK hold here too.
-const EXCEPTIONS: &[(&str, &str, Option<Bars>, &str)] = &[
+const EXCEPTIONS: &[Exception] = &[
     (
         "windows",
         "first",
@@ -35,24 +35,10 @@ fn run(with: With, folder: &str, names: &[String], settings: &[(&str, &str)]) ->
 fn same_as_stock(folder: &str) -> Option<[Run; 2]> {
     let scripts = names(folder);
     let (stock, ours) = (run(With::Stock, folder, &scripts, &[])?, run(With::Bridge, folder, &scripts, &[])?);
-    let mut found = Vec::new();
-    for script in &scripts {
-        let names = stock.pictures(script).unwrap_or_else(|e| panic!("stock: {e}"));
-        assert_eq!(Ok(&names), ours.pictures(script).as_ref(), "{script}: other pictures than stock's");
-        for name in names {
-            let [a, b] = [&stock, &ours].map(|r| r.capture(script, &name).unwrap());
-            let path = ours.path(script, &name);
-            let place = (script.as_str(), name.as_str());
-            let all = EXCEPTIONS.iter().chain(crate::vtk::EXCEPTIONS);
-            let exception = all.into_iter().find(|(s, p, ..)| (*s, *p) == place);
-            let by_opengl = EMPTY.contains(&place) || place == ("steady", "after_a_fault");
-            if b.traced_elements() == 0 && !by_opengl {
-                found.push(format!("{}: nothing was ray traced: {:?}", path.display(), b.report));
-            }
-            let Some(bars) = exception.map_or(Some(Bars::STRICT), |(_, _, bars, _)| *bars) else { continue };
-            found.extend(faults(&a, &b, &bars).iter().map(|f| format!("{}: {f}", path.display())));
-        }
-    }
+    let exceptions = [EXCEPTIONS, crate::vtk::EXCEPTIONS];
+    let untraced = [EMPTY, &[("steady", "after_a_fault")]].concat();
+    let of = |script: &String| differences(&stock, &ours, script, &exceptions, &untraced);
+    let found: Vec<String> = scripts.iter().flat_map(of).collect();
     assert!(found.is_empty(), "\n{}\n", found.join("\n"));
     Some([stock, ours])
 }

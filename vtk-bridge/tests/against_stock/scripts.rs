@@ -1,0 +1,34 @@
+//! All pictures of a script, with us against without us.
+
+use crate::compare::{Bars, faults};
+use crate::session::Run;
+
+/// A picture (script, name) that is held to other bars than the rest, or to none, and why.
+pub(crate) type Exception = (&'static str, &'static str, Option<Bars>, &'static str);
+
+/// What is wrong with our pictures of `script`, a line each. In those of `untraced` there is nothing to trace.
+pub(crate) fn differences(
+    stock: &Run,
+    ours: &Run,
+    script: &str,
+    exceptions: &[&[Exception]],
+    untraced: &[(&str, &str)],
+) -> Vec<String> {
+    let names = stock.pictures(script).unwrap_or_else(|e| panic!("stock: {e}"));
+    let same = ours.pictures(script).unwrap_or_else(|e| panic!("with the bridge: {e}"));
+    assert_eq!(names, same, "{script}: other pictures than stock's");
+    let mut found = Vec::new();
+    // ParaView's writer leaves a file with this in its name for a moment.
+    for name in names.iter().filter(|n| !n.contains(".tmp")) {
+        let place = (script, name.as_str());
+        let path = ours.path(script, name);
+        let [a, b] = [stock, ours].map(|r| r.capture(script, name).unwrap());
+        if b.traced_elements() == 0 && !untraced.contains(&place) {
+            found.push(format!("{}: nothing was ray traced: {:?}", path.display(), b.report));
+        }
+        let exception = exceptions.iter().copied().flatten().find(|(s, p, ..)| (*s, *p) == place);
+        let Some(bars) = exception.map_or(Some(Bars::STRICT), |(_, _, bars, _)| *bars) else { continue };
+        found.extend(faults(&a, &b, &bars).iter().map(|f| format!("{}: {f}", path.display())));
+    }
+    found
+}
