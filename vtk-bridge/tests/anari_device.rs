@@ -48,8 +48,18 @@ fn objects_parameters_and_frames_are_what_the_specification_says() {
 }
 
 #[test]
+fn samplers_area_lights_and_panoramas_match_closed_forms() {
+    assert_passes("surfaces.py");
+}
+
+#[test]
 fn misuse_is_named_and_harms_nothing() {
     assert_passes("robust.py");
+}
+
+#[test]
+fn a_program_of_pynari_s_users_draws_with_us() {
+    assert_passes("through_pynari.py");
 }
 
 /// PSNR that counts as the same picture: edges differ by how pixels are sampled, and barney's noise remains.

@@ -5,6 +5,7 @@ use super::shadow::{Coherence, trace_light_rays};
 use super::stage::Stage;
 use super::wave::{LightRays, RayState};
 use super::{Dimension, Point, TileArea};
+use crate::detail::Varied;
 use crate::effects::Effects;
 use crate::math::orthonormal_basis;
 use crate::ray::{LANES, Ray};
@@ -23,6 +24,7 @@ pub(crate) fn add_ambient_light(
     stage: &Stage<'_>,
     area: &TileArea,
     points: &mut [Point],
+    varied: &[Varied],
     states: &[RayState],
     rays: &mut LightRays,
     OcclusionBuffers { open, domes }: &mut OcclusionBuffers,
@@ -31,8 +33,9 @@ pub(crate) fn add_ambient_light(
 ) {
     let Some(mean) = &stage.mean_radiance else { return };
     let ambient = |p: &Point| {
-        let material = stage.instances[p.instance as usize].material;
-        ambient_albedo(material, p.surface.color, stage.effects) * mean.for_normal(p.surface.normal)
+        let albedo = ambient_albedo(p.model(stage, varied), p.surface.color, stage.effects);
+        let light = albedo * mean.for_normal(p.surface.normal);
+        p.varied(varied).map_or(light, |v| light * v.ambient)
     };
     let occlusion =
         stage.scene.ambient_occlusion.filter(|_| stage.effects.contains(Effects::AMBIENT_OCCLUSION));

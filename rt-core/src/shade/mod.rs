@@ -24,6 +24,7 @@ pub mod waves;
 pub(crate) use stage::Stage;
 pub(crate) use tile::{TILE, TileArea, TileLayers};
 
+use crate::detail::Varied;
 use crate::effects::Effects;
 use crate::frame::Layers;
 use crate::material::SurfaceModel;
@@ -65,6 +66,28 @@ pub(crate) struct Point {
     pub(crate) instance: u32,
     /// False where lights change nothing.
     pub(crate) lit: bool,
+    /// Index into [`Workspace::varied`], or [`AS_MATERIAL`].
+    varied: u32,
+}
+
+/// In the place of an index: the point's finish is its material's.
+const AS_MATERIAL: u32 = u32::MAX;
+
+impl Point {
+    /// What the material says differently here.
+    #[inline]
+    fn varied<'v>(&self, varied: &'v [Varied]) -> Option<&'v Varied> {
+        if self.varied == AS_MATERIAL { None } else { varied.get(self.varied as usize) }
+    }
+
+    /// How it answers light.
+    #[inline]
+    fn model<'v>(&self, stage: &'v Stage<'_>, varied: &'v [Varied]) -> &'v SurfaceModel {
+        match self.varied(varied) {
+            None => &stage.instances[self.instance as usize].material.model,
+            Some(v) => &v.model,
+        }
+    }
 }
 
 /// Buffers of one thread, kept from tile to tile.
@@ -77,6 +100,8 @@ pub(crate) struct Workspace {
     /// Of each ray the surface at its hit, where somebody else has looked at it; empty where this scene's world is asked.
     surfaces: Vec<SurfacePoint>,
     points: Vec<Point>,
+    /// Finishes of points whose material has detail.
+    varied: Vec<Varied>,
     light_rays: LightRays,
     occlusion: ambient_occlusion::OcclusionBuffers,
     /// Of each ray what it collects in the volume up to its hit, where others hold the volume's bricks; empty where it is whole here.
@@ -358,6 +383,7 @@ fn meet_surfaces(
     let transparent = stage.effects.contains(Effects::TRANSPARENCY);
     let refraction = stage.effects.intersects(Effects::REFRACTION | Effects::PATH_TRACING);
     work.points.clear();
+    work.varied.clear();
     for i in 0..work.current.states.len() {
         let (block, lane) = (&work.current.blocks[i / LANES], i % LANES);
         if block.t_max[lane] < block.t_min[lane] {
@@ -381,6 +407,12 @@ fn meet_surfaces(
         let mut surface = match work.surfaces.get(i) {
             Some(seen_elsewhere) => *seen_elsewhere,
             None => placed.surface(&ray, &hit),
+        };
+        // Where somebody else has looked at the hit, its finish did not travel.
+        let varied = if work.surfaces.is_empty() {
+            placed.varied(&ray, &hit, &mut surface.normal)
+        } else {
+            None
         };
         if !transparent {
             stats.opacity_ignored += (surface.opacity < OPAQUE) as u64;
@@ -406,11 +438,15 @@ fn meet_surfaces(
         work.points.push(Point {
             surface,
             view: ray.dir * (-1.0 / length),
-            radiance: radiance + Vec3::from(placed.material.emission),
+            radiance: radiance + varied.map_or(placed.material.emission.into(), |v| v.emission),
             t: hit.t,
             lane: i as u32,
             instance: hit.instance,
             lit,
+            varied: varied.map_or(AS_MATERIAL, |v| {
+                work.varied.push(v);
+                work.varied.len() as u32 - 1
+            }),
         });
     }
 }
@@ -455,16 +491,17 @@ fn add_light(
     stats: &mut RayStats,
     mut cost: Option<&mut [f32]>,
 ) {
-    let Workspace { current, points, light_rays, occlusion, .. } = work;
+    let Workspace { current, points, varied, light_rays, occlusion, .. } = work;
     if !stage.lights.is_empty() {
         let cost = cost.as_deref_mut();
-        direct::add_direct_light(stage, area, points, &current.states, light_rays, stats, cost);
+        direct::add_direct_light(stage, area, points, varied, &current.states, light_rays, stats, cost);
     }
     if stage.mean_radiance.is_some() && !stage.effects.contains(Effects::PATH_TRACING) {
         ambient_occlusion::add_ambient_light(
             stage,
             area,
             points,
+            varied,
             &current.states,
             light_rays,
             occlusion,

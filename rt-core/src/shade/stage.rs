@@ -114,10 +114,13 @@ impl<'a> Stage<'a> {
         &self.instances[hit.instance as usize]
     }
 
-    /// The surface at a hit, opaque where transparency is left out.
+    /// The surface at a hit, with the normal that it is lit with.
     #[inline]
     pub(crate) fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
-        self.placed(hit).surface(ray, hit)
+        let placed = self.placed(hit);
+        let mut surface = placed.surface(ray, hit);
+        placed.varied(ray, hit, &mut surface.normal);
+        surface
     }
 
     /// Sample points of pixel (`x`, `y`) of the whole picture.
@@ -164,11 +167,18 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// World point of the surface met by the ray through NDC `ndc`, and that ray's origin: see [`point_on_ray`].
-    pub(crate) fn exact_point(&self, ndc: [f64; 2], ray: &Ray, hit: &Hit) -> (DVec3, DVec3) {
+    /// Window depth of the surface met by the ray through NDC `ndc`, and its distance from where the ray begins: see [`point_on_ray`].
+    pub(crate) fn depth_and_distance(&self, ndc: [f64; 2], ray: &Ray, hit: &Hit) -> (f32, f32) {
         let (on_surface, n) = self.placed(hit).plane(ray, hit, self.origin);
         let ray = self.camera.world_ray(ndc);
-        (point_on_ray(ray, on_surface, n), ray.0)
+        let point = point_on_ray(ray, on_surface, n);
+        let distance = (point - ray.0).length();
+        let depth = if self.camera.is_omnidirectional() {
+            self.camera.panorama_depth(distance)
+        } else {
+            self.camera.window_depth(point)
+        };
+        (depth as f32, distance as f32)
     }
 }
 
