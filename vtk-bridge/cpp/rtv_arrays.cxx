@@ -9,6 +9,7 @@
 #include <vtkMapper.h>
 #include <vtkPointData.h>
 #include <vtkPolyData.h>
+#include <vtkProperty.h>
 #include <vtkScalarsToColors.h>
 #include <vtkTexture.h>
 #include <vtkUnsignedCharArray.h>
