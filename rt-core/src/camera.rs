@@ -48,7 +48,9 @@ pub enum CameraError {
         rule: &'static str,
     },
     /// A lens on a parallel projection or a panorama.
-    #[error("a thin lens needs a perspective camera; this one is a parallel projection or a panorama: leave the lens out")]
+    #[error(
+        "a thin lens needs a perspective camera; this one is a parallel projection or a panorama: leave the lens out"
+    )]
     LensOnParallel,
 }
 
@@ -319,7 +321,8 @@ impl Camera {
             Projection::Perspective { eye } => (eye, self.inverse * DVec3::new(x, y, 1.0)),
             Projection::Omnidirectional { eye, axes, region: [low, high] } => {
                 let at = |v: f64, i: usize| low[i] + (high[i] - low[i]) * (0.5 * v + 0.5);
-                let (longitude, latitude) = (at(x, 0) * std::f64::consts::PI, at(y, 1) * std::f64::consts::FRAC_PI_2);
+                let (longitude, latitude) =
+                    (at(x, 0) * std::f64::consts::PI, at(y, 1) * std::f64::consts::FRAC_PI_2);
                 let level = latitude.cos();
                 (eye, axes * DVec3::new(level * longitude.sin(), latitude.sin(), -level * longitude.cos()))
             }

@@ -263,15 +263,43 @@ pub(crate) struct PlacedLight {
 
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum PlacedKind {
-    Directional { to_light: Vec3 },
-    Point { position: Vec3 },
-    Spot { position: Vec3, direction: Vec3, cos_cutoff: f32, exponent: f32 },
-    Cone { position: Vec3, direction: Vec3, cos_inner: f32, cos_outer: f32 },
-    Disk { position: Vec3, direction: Vec3 },
+    Directional {
+        to_light: Vec3,
+    },
+    Point {
+        position: Vec3,
+    },
+    Spot {
+        position: Vec3,
+        direction: Vec3,
+        cos_cutoff: f32,
+        exponent: f32,
+    },
+    Cone {
+        position: Vec3,
+        direction: Vec3,
+        cos_inner: f32,
+        cos_outer: f32,
+    },
+    Disk {
+        position: Vec3,
+        direction: Vec3,
+    },
     /// `hole`: inner radius over radius.
-    Ring { position: Vec3, direction: Vec3, hole: f32, cos_inner: f32, cos_outer: f32 },
+    Ring {
+        position: Vec3,
+        direction: Vec3,
+        hole: f32,
+        cos_inner: f32,
+        cos_outer: f32,
+    },
     /// The middle, half edges and the unit normal.
-    Quad { position: Vec3, edges: [Vec3; 2], direction: Vec3, both_sides: bool },
+    Quad {
+        position: Vec3,
+        edges: [Vec3; 2],
+        direction: Vec3,
+        both_sides: bool,
+    },
 }
 
 impl PlacedLight {
@@ -320,7 +348,8 @@ impl PlacedLight {
                 }
             }
             LightKind::Quad { corner, edges: [a, b], both_sides } => {
-                let turned = |v: DVec3| if light.frame == LightFrame::Camera { world_from_view * v } else { v };
+                let turned =
+                    |v: DVec3| if light.frame == LightFrame::Camera { world_from_view * v } else { v };
                 PlacedKind::Quad {
                     position: point(corner + 0.5 * (a + b)),
                     edges: [a, b].map(|e| (0.5 * turned(e)).as_vec3()),

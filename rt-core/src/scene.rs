@@ -357,7 +357,8 @@ pub(crate) fn requirements(scene: &Scene) -> Effects {
         .with_if(lit && scene.ambient_occlusion.is_some() && scene.has_ambient(), Effects::AMBIENT_OCCLUSION)
         .with_if(
             // Where roughness varies, it may be 0 somewhere.
-            dielectric || used().any(|m| m.reflection_roughness().is_some_and(|r| r == 0.0 || m.detail.is_some())),
+            dielectric
+                || used().any(|m| m.reflection_roughness().is_some_and(|r| r == 0.0 || m.detail.is_some())),
             Effects::REFLECTION,
         )
         .with_if(
@@ -421,7 +422,7 @@ fn check_light(l: &Light) -> Result<(), (&'static str, String, &'static str)> {
         K::Ring { position, direction, inner_radius, radius, inner_rad, outer_rad } => {
             point(position)?;
             vector("direction", direction)?;
-            if !(radius > 0.0) {
+            if radius <= 0.0 {
                 return Err(("radius", radius.to_string(), "positive: a ring needs an area"));
             }
             if !(0.0..radius).contains(&inner_radius) {

@@ -141,7 +141,8 @@ fn panoramas_see_all_around() {
     assert!((covered - expected).abs() < 0.02 * expected, "{covered} sr instead of {expected}");
     // A part of it is that part, with bounces and samples too.
     let part = Camera::omnidirectional(eye, eye - DVec3::Y, DVec3::Z, [[0.5, 0.25], [1.0, 0.75]]).unwrap();
-    let crop = draw(&s, &part, RenderOptions { layers: Layers::COLOR, ..RenderOptions::new(w / 2, h / 2) }).frame;
+    let crop =
+        draw(&s, &part, RenderOptions { layers: Layers::COLOR, ..RenderOptions::new(w / 2, h / 2) }).frame;
     for y in 0..h / 2 {
         for x in 0..w / 2 {
             assert_eq!(crop.color_at(x, y), out.color_at(x + w / 2, y + h / 4), "{x}, {y}");

@@ -39,15 +39,9 @@ fn tangents(mesh: TriMesh, t: Vec4) -> TriMesh {
 
 /// The middle pixel, once by local light alone and once with a shadow pass; both must agree.
 fn middle(mesh: &TriMesh, material: &Material, lights: &[Light], from: f64) -> [f32; 4] {
-    let camera = Camera::orthographic(
-        DVec3::new(0.0, 0.0, from),
-        DVec3::ZERO,
-        DVec3::Y,
-        0.001,
-        1.0,
-        [0.0, 20.0],
-    )
-    .unwrap();
+    let camera =
+        Camera::orthographic(DVec3::new(0.0, 0.0, from), DVec3::ZERO, DVec3::Y, 0.001, 1.0, [0.0, 20.0])
+            .unwrap();
     let with = |shadows: bool| {
         let lights = lights.iter().map(|l| Light { shadows, ..*l }).collect();
         let s = scene(vec![(mesh.clone(), material.clone())], lights);
@@ -117,7 +111,8 @@ fn scale_flattens_or_steepens_a_normal_map() {
 #[test]
 fn bent_normals_turn_with_their_instance() {
     let n = Vec3::new(0.6, 0.0, 0.8);
-    let maps: Arc<dyn Detail> = Arc::new(SurfaceMaps { normal: bend(n), ..SurfaceMaps::new(MapConvention::Gltf) });
+    let maps: Arc<dyn Detail> =
+        Arc::new(SurfaceMaps { normal: bend(n), ..SurfaceMaps::new(MapConvention::Gltf) });
     let mut b = SceneBuilder::new();
     let g = b.geometry(rt_core::accel::Geometry::Mesh(Arc::new(sheet(1.0))));
     let m = b.material(Material::matte([1.0; 3]).with_detail(maps));
@@ -138,10 +133,8 @@ fn bent_normals_turn_with_their_instance() {
 #[test]
 fn roughness_and_metalness_maps_are_the_material_with_those_numbers() {
     let lights = [Light::directional(DVec3::new(0.3, 0.2, 1.0)), Light::ambient([0.4; 3])];
-    let maps = SurfaceMaps {
-        metallic_roughness: texel([0.9, 0.5, 0.25]),
-        ..SurfaceMaps::new(MapConvention::Gltf)
-    };
+    let maps =
+        SurfaceMaps { metallic_roughness: texel([0.9, 0.5, 0.25]), ..SurfaceMaps::new(MapConvention::Gltf) };
     let base = Material::pbr([0.8, 0.4, 0.2], 0.8, 0.6);
     let mapped = base.clone().with_detail(Arc::new(maps) as Arc<dyn Detail>);
     let plain = Material::pbr([0.8, 0.4, 0.2], 0.8 * 0.25, 0.6 * 0.5);
@@ -172,9 +165,8 @@ fn occlusion_dims_ambient_light_for_gltf_and_lamps_too_for_vtk() {
             emission: texel([0.5, 1.0, 1.0]),
             ..SurfaceMaps::new(convention)
         };
-        let m = Material::matte([1.0; 3])
-            .with_emission([0.2; 3])
-            .with_detail(Arc::new(maps) as Arc<dyn Detail>);
+        let m =
+            Material::matte([1.0; 3]).with_emission([0.2; 3]).with_detail(Arc::new(maps) as Arc<dyn Detail>);
         close(middle(&sheet(1.0), &m, &lights, 5.0)[0], expected + 0.1, &format!("{convention:?}"));
     }
 }
@@ -184,10 +176,8 @@ fn occlusion_dims_ambient_light_for_gltf_and_lamps_too_for_vtk() {
 fn a_map_that_makes_part_of_a_surface_a_mirror_sends_mirror_rays_there() {
     let mut texture = Texture::from_linear(2, 1, vec![[1.0, 0.0, 1.0, 1.0], [1.0; 4]]).unwrap();
     texture.filter = Filter::Nearest;
-    let maps = SurfaceMaps {
-        metallic_roughness: Some(texture.into()),
-        ..SurfaceMaps::new(MapConvention::Gltf)
-    };
+    let maps =
+        SurfaceMaps { metallic_roughness: Some(texture.into()), ..SurfaceMaps::new(MapConvention::Gltf) };
     let m = Material::pbr([1.0; 3], 1.0, 0.8).with_detail(Arc::new(maps) as Arc<dyn Detail>);
     let s = scene(vec![(sheet(1.0), m), (floor(2.0, 3.0), Material::unlit([0.25, 0.5, 1.0]))], vec![]);
     assert!(Effects::required_by(&s).contains(Effects::REFLECTION.union(Effects::GLOSSY_REFLECTION)));
@@ -215,9 +205,12 @@ impl Detail for Checked {
 #[test]
 fn detail_of_a_program_s_own_cannot_put_nan_into_a_picture() {
     let mut b = SceneBuilder::new();
-    let m = b.material(Material { model: SurfaceModel::Metal { roughness: 0.5 }, ..Material::matte([0.5; 3]) });
-    let detailed = b.material(Material::pbr([0.5; 3], 0.5, 0.5).with_detail(Arc::new(Checked) as Arc<dyn Detail>));
-    let spheres = rt_core::shapes::Spheres::new(vec![Vec3::ZERO], rt_core::shapes::Radii::Common(0.4)).unwrap();
+    let m =
+        b.material(Material { model: SurfaceModel::Metal { roughness: 0.5 }, ..Material::matte([0.5; 3]) });
+    let detailed =
+        b.material(Material::pbr([0.5; 3], 0.5, 0.5).with_detail(Arc::new(Checked) as Arc<dyn Detail>));
+    let spheres =
+        rt_core::shapes::Spheres::new(vec![Vec3::ZERO], rt_core::shapes::Radii::Common(0.4)).unwrap();
     let g = b.geometry(rt_core::accel::Geometry::Shape(Arc::new(spheres)));
     b.instance(g, DAffine3::IDENTITY, Appearance::new(detailed));
     let normals = Some(Attribute::per_face(vec![Vec3::Z; 2]));

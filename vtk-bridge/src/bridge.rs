@@ -159,7 +159,8 @@ impl Bridge {
         }
         let color = self.color(surface, &built);
         let texture = self.texture(surface.texture.as_ref());
-        let maps = surface.maps.as_ref().map(|maps| crate::materials::finishes(maps, |image| self.texture(image)));
+        let maps =
+            surface.maps.as_ref().map(|maps| crate::materials::finishes(maps, |image| self.texture(image)));
         let glyphs = surface.glyphs.as_ref().map(|g| {
             let places = g.matrices.iter().enumerate().filter_map(|(i, m)| {
                 let local = affine(DMat4::from_cols_array(m).transpose())?;

@@ -70,14 +70,19 @@ fn numbers_at_their_limits_and_random_values_harm_nothing() {
 /// `c_abi/anari.c`, which ends with "done", with a program before it.
 fn c_program(before: &[&str]) -> Option<Output> {
     let python = python()?;
-    let place = "import importlib.util, os; print(os.path.dirname(importlib.util.find_spec('pynari').origin))";
+    let place =
+        "import importlib.util, os; print(os.path.dirname(importlib.util.find_spec('pynari').origin))";
     let found = Command::new(&python).args(["-c", place]).output().expect("python runs");
     let loader = Path::new(String::from_utf8_lossy(&found.stdout).trim()).join("libanari.so.0");
     let out = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("anari-c-{}", before.len()));
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/c_abi/anari.c");
     let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".to_owned());
     let mut compile = Command::new(&compiler);
-    compile.args(["-std=c11", "-g", "-O1", "-Wall", "-Wextra", "-Werror", "-o"]).arg(&out).arg(source).arg("-ldl");
+    compile
+        .args(["-std=c11", "-g", "-O1", "-Wall", "-Wextra", "-Werror", "-o"])
+        .arg(&out)
+        .arg(source)
+        .arg("-ldl");
     let made = compile.output().unwrap_or_else(|e| panic!("{compiler}: {e}"));
     assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
     let mut words = before.iter().map(|w| (*w).to_owned()).chain([out.display().to_string()]);
@@ -103,7 +108,8 @@ fn valgrind_finds_no_fault_in_the_device() {
     let valgrind = std::env::var("RTSV_VALGRIND").unwrap_or_else(|_| "/usr/bin/valgrind".to_owned());
     if !Path::new(&valgrind).exists() {
         // Not a peer that must be there: the program itself runs without it.
-        writeln!(std::io::stderr(), "SKIPPED: {valgrind} was not found (apt-get install valgrind)").expect("stderr");
+        writeln!(std::io::stderr(), "SKIPPED: {valgrind} was not found (apt-get install valgrind)")
+            .expect("stderr");
         return;
     }
     // The loader up to 0.14 deletes the library as an object of a type that it does not know: with C++'s delete and without the destructor. It is memory

@@ -176,11 +176,6 @@ impl Finish {
         }
         let light = |v: f32| if v > 0.0 && v.is_finite() { v } else { 0.0 };
         let [r, g, b] = self.emission.to_array().map(light);
-        Varied {
-            model,
-            emission: Vec3::new(r, g, b),
-            ambient: unit(self.ambient),
-            direct: unit(self.direct),
-        }
+        Varied { model, emission: Vec3::new(r, g, b), ambient: unit(self.ambient), direct: unit(self.direct) }
     }
 }

@@ -63,7 +63,7 @@ impl CameraRays {
         let panorama = camera.is_omnidirectional();
         let far_away = !panorama
             && (o - world_origin - bounds.center().as_dvec3()).length()
-            > EYE_WITHIN_RADII * 0.5 * (bounds.max.as_dvec3() - bounds.min.as_dvec3()).length();
+                > EYE_WITHIN_RADII * 0.5 * (bounds.max.as_dvec3() - bounds.min.as_dvec3()).length();
         let move_start =
             !bounds.is_empty() && nearest.is_finite() && (parallel || (far_away && nearest - margin > 0.0));
         let start = if move_start { nearest - margin } else { 0.0 };

@@ -409,11 +409,8 @@ fn meet_surfaces(
             None => placed.surface(&ray, &hit),
         };
         // Where somebody else has looked at the hit, its finish did not travel.
-        let varied = if work.surfaces.is_empty() {
-            placed.varied(&ray, &hit, &mut surface.normal)
-        } else {
-            None
-        };
+        let varied =
+            if work.surfaces.is_empty() { placed.varied(&ray, &hit, &mut surface.normal) } else { None };
         if !transparent {
             stats.opacity_ignored += (surface.opacity < OPAQUE) as u64;
             surface.opacity = 1.0;

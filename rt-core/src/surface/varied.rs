@@ -35,8 +35,11 @@ impl Placed<'_> {
                 (Some(mesh), point, own.and_then(Vec3::try_normalize).unwrap_or(flat))
             }
             Source::Shape(shape) => {
-                let s =
-                    shape.surface(hit.prim, &ShapeHit { t: hit.t, u: hit.u, v: hit.v }, &self.object_ray(ray));
+                let s = shape.surface(
+                    hit.prim,
+                    &ShapeHit { t: hit.t, u: hit.u, v: hit.v },
+                    &self.object_ray(ray),
+                );
                 (None, shape.origin() + s.point.as_dvec3(), s.normal)
             }
         };

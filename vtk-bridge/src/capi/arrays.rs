@@ -2,7 +2,8 @@
 
 use super::types::*;
 use crate::input::{
-    Cells, Color, Glyphs, Ids, Image, LightKind, Maps, PerItem, Points, Property, Scalars, SceneLight, Shading, Shape, Surface, Volume,
+    Cells, Color, Glyphs, Ids, Image, LightKind, Maps, PerItem, Points, Property, Scalars, SceneLight,
+    Shading, Shape, Surface, Volume,
 };
 use rt_core::glam::DMat4;
 
@@ -77,9 +78,17 @@ unsafe fn image<'a>(i: &RtvImage) -> Result<Option<Image<'a>>, String> {
 /// As [`surface`].
 unsafe fn maps<'a>(m: &RtvMaps) -> Result<Maps<'a>, String> {
     // SAFETY: the caller's promise, for every picture.
-    let [material, normal, emissive] = unsafe { [image(&m.material)?, image(&m.normal)?, image(&m.emissive)?] };
+    let [material, normal, emissive] =
+        unsafe { [image(&m.material)?, image(&m.normal)?, image(&m.emissive)?] };
     let (normal_scale, occlusion_strength) = (m.normal_scale, m.occlusion_strength);
-    Ok(Maps { material, normal, emissive, normal_scale, occlusion_strength, emissive_factor: m.emissive_factor })
+    Ok(Maps {
+        material,
+        normal,
+        emissive,
+        normal_scale,
+        occlusion_strength,
+        emissive_factor: m.emissive_factor,
+    })
 }
 
 /// # Safety

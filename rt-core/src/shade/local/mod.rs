@@ -11,10 +11,10 @@ use super::lobes::{ambient_albedo, response};
 use super::stage::Stage;
 use super::tile::{PIXELS, TileArea, TileLayers};
 use super::{OPAQUE, Workspace, camera_blocks, prefetch_surfaces};
+use crate::detail::Varied;
 use crate::effects::Effects;
 use crate::environment::Background;
 use crate::light::PlacedKind;
-use crate::detail::Varied;
 use crate::material::{Material, SurfaceModel};
 use crate::ray::{HitBlock, LANES, NO_HIT, RayBlock};
 use crate::ray_stats::RayStats;
@@ -146,13 +146,7 @@ fn fill_background(stage: &Stage<'_>, area: &TileArea, b: usize, rays: &RayBlock
 }
 
 /// Radiance of one surface towards the origin of a ray with direction `dir`: what [`light::radiance_block`] does for sixteen.
-fn radiance(
-    stage: &Stage<'_>,
-    material: &Material,
-    varied: Option<&Varied>,
-    look: &Look,
-    dir: Vec3,
-) -> Vec3 {
+fn radiance(stage: &Stage<'_>, material: &Material, varied: Option<&Varied>, look: &Look, dir: Vec3) -> Vec3 {
     let (model, arriving, ambient) =
         varied.map_or((&material.model, 1.0, 1.0), |v| (&v.model, v.direct, v.ambient));
     let mut radiance = varied.map_or(material.emission.into(), |v| v.emission);

@@ -65,7 +65,9 @@ impl<'a> WaveFrame<'a> {
         options: &'a RenderOptions,
     ) -> Result<WaveFrame<'a>, RenderError> {
         let mut plan = plan_for(scene, needed, camera, options)?;
-        if scene.materials.iter().any(|m| m.detail.is_some()) && !plan.effects.without(Effects::DEPTH_OF_FIELD).is_empty() {
+        if scene.materials.iter().any(|m| m.detail.is_some())
+            && !plan.effects.without(Effects::DEPTH_OF_FIELD).is_empty()
+        {
             plan.warnings.push(
                 "maps of roughness, metalness, emission and occlusion are left out where several render a frame with shadows or reflections: only bent \
                  normals travel"

@@ -119,7 +119,9 @@ fn quad(light: &Object, color: [f64; 3], place: &DAffine3, notes: &mut Notes) ->
     if !(corner.is_finite() && area.is_finite() && area > 0.0) {
         notes.error(
             light,
-            format!("its corner {corner} is not finite, or its edges {a} and {b} span no area: it gives no light"),
+            format!(
+                "its corner {corner} is not finite, or its edges {a} and {b} span no area: it gives no light"
+            ),
         );
         return None;
     }

@@ -163,7 +163,8 @@ fn image(sampler: &Object, notes: &mut Notes) -> Option<Image> {
         notes.error(sampler, "`image` is not set or has no texels, so there is nothing to sample");
         return None;
     };
-    let names: &[&str] = if dimensions == 1 { &["wrapMode"] } else { &["wrapMode1", "wrapMode2", "wrapMode3"] };
+    let names: &[&str] =
+        if dimensions == 1 { &["wrapMode"] } else { &["wrapMode1", "wrapMode2", "wrapMode3"] };
     let (mut wrap, mut border) = ([Wrap::Clamp; 3], [false; 3]);
     for (d, name) in names.iter().enumerate().take(dimensions) {
         // The schema lets nothing else through.

@@ -246,8 +246,15 @@ impl Making<'_> {
             let model = model_of(&material, notes);
             let paint = paint_of(&material, &geometry, spot.instance, notes);
             let grain = grain_of(&material, &geometry, spot.instance, notes);
-            if grain.as_ref().is_some_and(|g| g.normal.is_some()) && !prepared.parts.iter().all(Part::is_mesh) {
-                notes.warn(&material, format!("`normal` is left out on {}: only triangles and quads have tangents", geometry.title()));
+            if grain.as_ref().is_some_and(|g| g.normal.is_some()) && !prepared.parts.iter().all(Part::is_mesh)
+            {
+                notes.warn(
+                    &material,
+                    format!(
+                        "`normal` is left out on {}: only triangles and quads have tangents",
+                        geometry.title()
+                    ),
+                );
             }
             let place = &spot.world_from_object;
             prepared.parts.iter().map(|part| dress(part, &model, &paint, grain.as_ref(), place)).collect()

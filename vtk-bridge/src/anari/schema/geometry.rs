@@ -36,7 +36,11 @@ const VERTEX: &[Parameter] = &[
 ];
 
 const POLYGON: &[Parameter] = &[
-    Parameter::array("vertex.tangent", TANGENTS, "direction in which the first coordinate of normal maps grows"),
+    Parameter::array(
+        "vertex.tangent",
+        TANGENTS,
+        "direction in which the first coordinate of normal maps grows",
+    ),
     Parameter::array("faceVarying.tangent", TANGENTS, "the same per corner of each primitive"),
     Parameter::array("vertex.normal", NORMALS, "shading normals per vertex"),
     Parameter::array("faceVarying.normal", NORMALS, "shading normals per corner of each primitive"),

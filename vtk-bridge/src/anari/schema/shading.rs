@@ -43,8 +43,12 @@ const PHYSICALLY_BASED: &[Parameter] = &[
         &[DataType::SAMPLER],
         "normals, 2 rgb - 1 in the frame of tangent, its partner and shading normal",
     ),
-    Parameter::new("emissive", COLOR_INPUT, "radiance given off: linear RGB, an attribute's name or a sampler")
-        .floats(&[0.0, 0.0, 0.0]),
+    Parameter::new(
+        "emissive",
+        COLOR_INPUT,
+        "radiance given off: linear RGB, an attribute's name or a sampler",
+    )
+    .floats(&[0.0, 0.0, 0.0]),
     Parameter::new("occlusion", &[DataType::SAMPLER], "share of ambient and reflected light that gets in"),
     Parameter::new(
         "specular",
@@ -104,8 +108,8 @@ const DIRECTION: Parameter =
 const POSITION: Parameter =
     Parameter::new("position", VEC3, "place in the space of its group or world").floats(&[0.0; 3]);
 const INTENSITY: Parameter = Parameter::new("intensity", FLOAT, "W/sr").floats(&[1.0]);
-const OPENING_ANGLE: Parameter = Parameter::new("openingAngle", FLOAT, "full angle of the cone, radians")
-    .floats(&[std::f32::consts::PI]);
+const OPENING_ANGLE: Parameter =
+    Parameter::new("openingAngle", FLOAT, "full angle of the cone, radians").floats(&[std::f32::consts::PI]);
 const FALLOFF_ANGLE: Parameter =
     Parameter::new("falloffAngle", FLOAT, "angle between the rim and full intensity, radians").floats(&[0.1]);
 const POWER: Parameter = Parameter::new("power", FLOAT, "W in all directions; comes before `intensity`");
@@ -206,17 +210,7 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
         "spot",
         "KHR_LIGHT_SPOT",
         "a cone of light",
-        &[
-            LIGHT,
-            &[
-                POSITION,
-                DIRECTION,
-                OPENING_ANGLE,
-                FALLOFF_ANGLE,
-                INTENSITY,
-                POWER,
-            ],
-        ],
+        &[LIGHT, &[POSITION, DIRECTION, OPENING_ANGLE, FALLOFF_ANGLE, INTENSITY, POWER]],
     ),
     object(
         DataType::LIGHT,
@@ -226,7 +220,8 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
         &[
             LIGHT,
             &[
-                Parameter::new("position", VEC3, "a corner, in the space of its group or world").floats(&[0.0; 3]),
+                Parameter::new("position", VEC3, "a corner, in the space of its group or world")
+                    .floats(&[0.0; 3]),
                 Parameter::new("edge1", VEC3, "from there to a neighbouring corner").floats(&[1.0, 0.0, 0.0]),
                 Parameter::new("edge2", VEC3, "from there to the other neighbouring corner")
                     .floats(&[0.0, 1.0, 0.0]),
