@@ -97,6 +97,24 @@ fn vtk_turns_the_normal_before_it_bends_it_and_needs_tangents() {
     assert!(warnings.iter().any(|w| w.contains("lacks tangents")), "{warnings:?}");
 }
 
+/// A mirror bent so far that it would reflect what is below it: it sees along itself instead, and is not black.
+#[test]
+fn steep_normal_maps_leave_no_black_points() {
+    let n = Vec3::new(0.8, 0.0, 0.6);
+    let maps = SurfaceMaps { normal: bend(n), ..SurfaceMaps::new(MapConvention::Gltf) };
+    for roughness in [0.0, 0.3] {
+        let m = Material::pbr([1.0; 3], 1.0, roughness).with_detail(Arc::new(maps.clone()) as Arc<dyn Detail>);
+        let mut b = SceneBuilder::new();
+        b.mesh(sheet(1.0), m);
+        b.environment = Some(rt_core::environment::Environment::Constant([0.5; 3]));
+        let s = b.build().unwrap();
+        let mut options = RenderOptions::new(1, 1);
+        (options.samples, options.path_tracing) = (256, true);
+        let red = draw(&s, &top_camera(5.0, 0.001), options).frame.color_at(0, 0)[0];
+        assert!(red > 0.2, "roughness {roughness}: {red}");
+    }
+}
+
 #[test]
 fn scale_flattens_or_steepens_a_normal_map() {
     let n = Vec3::new(0.6, 0.0, 0.8);

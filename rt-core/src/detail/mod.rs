@@ -47,6 +47,9 @@ pub struct DetailPlace<'a> {
     pub(crate) linear: DMat3,
     /// Unit shading normal in world axes, not turned.
     pub(crate) outer: Vec3,
+    /// Unit, in world axes: towards where the ray came from, and the face's normal on that side.
+    pub(crate) view: Vec3,
+    pub(crate) face_normal: Vec3,
 }
 
 impl DetailPlace<'_> {
@@ -57,8 +60,8 @@ impl DetailPlace<'_> {
 
     /// The same place, seen as one of `mesh`: for shapes that stand for a mesh's triangles, with the same primitives and hits.
     pub fn on<'m>(&self, mesh: &'m TriMesh) -> DetailPlace<'m> {
-        let DetailPlace { primitive, uv, point, object_normal, turned, linear, outer, .. } = *self;
-        DetailPlace { primitive, uv, point, object_normal, turned, mesh: Some(mesh), linear, outer }
+        let DetailPlace { primitive, uv, point, object_normal, turned, linear, outer, view, face_normal, .. } = *self;
+        DetailPlace { primitive, uv, point, object_normal, turned, mesh: Some(mesh), linear, outer, view, face_normal }
     }
 
     /// A direction along the surface, in the geometry's coordinates, as one in world axes (of any length).
@@ -112,15 +115,28 @@ impl DetailPlace<'_> {
     }
 
     /// The world normal for `bend`, a normal in the space of (tangent, its partner, shading normal), as glTF defines it: the whole frame belongs to the
-    /// geometry's outside and is turned over with it. `None` where there is no such frame.
+    /// geometry's outside and is turned over with it. `None` where there is no such frame. Normals in which the viewer would see a mirror reflect what is below
+    /// the face are bent less: such points would be black (Keller et al., "The Iray Light Transport Simulation and Rendering System", 2017, appendix A.3).
     pub fn bent(&self, (tangent, sense): (Vec3, f32), bend: Vec3) -> Option<Vec3> {
         let normal = self.frame(self.outer, tangent, sense, bend)?;
-        Some(if self.turned { -normal } else { normal })
+        Some(self.seeing_out(if self.turned { -normal } else { normal }))
     }
 
     /// As [`DetailPlace::bent`], as VTK's shader does it: the normal is turned to the viewer first, the tangent stays, and its partner is their cross product.
     pub fn bent_after_turning(&self, tangent: Vec3, bend: Vec3) -> Option<Vec3> {
         self.frame(if self.turned { -self.outer } else { self.outer }, tangent, 1.0, bend)
+    }
+
+    /// `n`, or the nearest normal in the plane of it and the view in which the mirrored view just leaves the face.
+    fn seeing_out(&self, n: Vec3) -> Vec3 {
+        let mirrored = n * (2.0 * n.dot(self.view)) - self.view;
+        let below = mirrored.dot(self.face_normal);
+        let along = n.dot(self.face_normal);
+        if below >= 0.0 || along <= 0.0 {
+            return n;
+        }
+        let grazing = mirrored - n * (below / along.max(1e-3));
+        (self.view + grazing.normalize_or_zero()).try_normalize().unwrap_or(n)
     }
 
     fn frame(&self, n: Vec3, tangent: Vec3, sense: f32, bend: Vec3) -> Option<Vec3> {

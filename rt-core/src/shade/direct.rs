@@ -71,6 +71,24 @@ pub(crate) fn add_direct_light(
     states: &[RayState],
     rays: &mut LightRays,
     stats: &mut RayStats,
+    cost: Option<&mut [f32]>,
+) {
+    if varied.is_empty() {
+        shine::<false>(stage, area, points, varied, states, rays, stats, cost);
+    } else {
+        shine::<true>(stage, area, points, varied, states, rays, stats, cost);
+    }
+}
+
+/// As [`add_direct_light`]. `DETAIL`: some point has a finish of its own.
+fn shine<const DETAIL: bool>(
+    stage: &Stage<'_>,
+    area: &TileArea,
+    points: &mut [Point],
+    varied: &[Varied],
+    states: &[RayState],
+    rays: &mut LightRays,
+    stats: &mut RayStats,
     mut cost: Option<&mut [f32]>,
 ) {
     for (number, light) in stage.lights.iter().enumerate() {
@@ -81,8 +99,8 @@ pub(crate) fn add_direct_light(
                 continue;
             }
             let state = &states[p.lane as usize];
-            let model = p.model(stage, varied);
-            let arriving = p.varied(varied).map_or(1.0, |v| v.direct);
+            let model = p.model::<DETAIL>(stage, varied);
+            let arriving = p.varied::<DETAIL>(varied).map_or(1.0, |v| v.direct);
             for k in 0..count {
                 let at = spread
                     .then(|| light_point(&area.sampler(stage, state.slot), state.stream, number, k, count));
@@ -93,7 +111,8 @@ pub(crate) fn add_direct_light(
                 let (normal, color) = (p.surface.normal, p.surface.color);
                 let answer =
                     response(model, normal, color, p.view, incident.dir, light.color, light.highlight);
-                let radiance = answer * (arriving * incident.strength / count as f32);
+                let strength = if DETAIL { arriving * incident.strength } else { incident.strength };
+                let radiance = answer * (strength / count as f32);
                 if radiance == Vec3::ZERO {
                     continue;
                 }

@@ -13,6 +13,7 @@ mod lobes;
 mod local;
 mod microfacet;
 mod path;
+mod point;
 mod shadow;
 mod specular;
 mod stage;
@@ -21,6 +22,7 @@ mod volumes;
 mod wave;
 pub mod waves;
 
+pub(crate) use point::Point;
 pub(crate) use stage::Stage;
 pub(crate) use tile::{TILE, TileArea, TileLayers};
 
@@ -34,6 +36,7 @@ use crate::sampler::SamplerBlock;
 use crate::surface::{Placed, SurfacePoint};
 use fearless_simd::{Simd, dispatch};
 use glam::Vec3;
+use point::AS_MATERIAL;
 use tile::{PIXELS, block_place, lane_pixel};
 use wave::{LightRays, RayKind, RayState, Wave};
 
@@ -51,43 +54,6 @@ impl Dimension {
     const AMBIENT_OCCLUSION: u32 = 4;
     /// One per light from here on.
     const LIGHTS: u32 = 8;
-}
-
-/// A surface met by a ray of the current wave.
-pub(crate) struct Point {
-    pub(crate) surface: SurfacePoint,
-    /// Unit, towards where the ray came from.
-    pub(crate) view: Vec3,
-    /// Collected towards `view`.
-    pub(crate) radiance: Vec3,
-    pub(crate) t: f32,
-    /// Ray of the wave.
-    pub(crate) lane: u32,
-    pub(crate) instance: u32,
-    /// False where lights change nothing.
-    pub(crate) lit: bool,
-    /// Index into [`Workspace::varied`], or [`AS_MATERIAL`].
-    varied: u32,
-}
-
-/// In the place of an index: the point's finish is its material's.
-const AS_MATERIAL: u32 = u32::MAX;
-
-impl Point {
-    /// What the material says differently here.
-    #[inline]
-    fn varied<'v>(&self, varied: &'v [Varied]) -> Option<&'v Varied> {
-        if self.varied == AS_MATERIAL { None } else { varied.get(self.varied as usize) }
-    }
-
-    /// How it answers light.
-    #[inline]
-    fn model<'v>(&self, stage: &'v Stage<'_>, varied: &'v [Varied]) -> &'v SurfaceModel {
-        match self.varied(varied) {
-            None => &stage.instances[self.instance as usize].material.model,
-            Some(v) => &v.model,
-        }
-    }
 }
 
 /// Buffers of one thread, kept from tile to tile.
@@ -380,6 +346,23 @@ fn meet_surfaces(
     record: bool,
     stats: &mut RayStats,
 ) {
+    // Where somebody else has looked at the hits, their finishes did not travel.
+    if stage.has_detail && work.surfaces.is_empty() {
+        meet::<true>(stage, area, out, work, record, stats);
+    } else {
+        meet::<false>(stage, area, out, work, record, stats);
+    }
+}
+
+/// As [`meet_surfaces`]. `DETAIL`: some material has detail.
+fn meet<const DETAIL: bool>(
+    stage: &Stage<'_>,
+    area: &TileArea,
+    out: &mut TileLayers,
+    work: &mut Workspace,
+    record: bool,
+    stats: &mut RayStats,
+) {
     let transparent = stage.effects.contains(Effects::TRANSPARENCY);
     let refraction = stage.effects.intersects(Effects::REFRACTION | Effects::PATH_TRACING);
     work.points.clear();
@@ -408,9 +391,7 @@ fn meet_surfaces(
             Some(seen_elsewhere) => *seen_elsewhere,
             None => placed.surface(&ray, &hit),
         };
-        // Where somebody else has looked at the hit, its finish did not travel.
-        let varied =
-            if work.surfaces.is_empty() { placed.varied(&ray, &hit, &mut surface.normal) } else { None };
+        let varied = if DETAIL { placed.varied(&ray, &hit, &mut surface.normal) } else { None };
         if !transparent {
             stats.opacity_ignored += (surface.opacity < OPAQUE) as u64;
             surface.opacity = 1.0;

@@ -41,7 +41,7 @@ pub(super) fn continue_paths(stage: &Stage<'_>, area: &TileArea, work: &mut Work
             }
             continue;
         }
-        let model = p.model(stage, &work.varied);
+        let model = p.model::<true>(stage, &work.varied);
         let Some((dir, weight, mut next)) = scatter(stage, area, p, model, &state) else { continue };
         let mut throughput = state.throughput * weight;
         if state.bounce >= ROULETTE_FROM {

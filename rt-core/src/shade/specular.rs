@@ -32,10 +32,10 @@ pub(super) fn send_specular_rays(
     for p in &work.points {
         let state = work.current.states[p.lane as usize];
         let mut weight = state.throughput * p.surface.opacity;
-        if let Some(v) = p.varied(&work.varied) {
+        if let Some(v) = p.varied::<true>(&work.varied) {
             weight *= v.ambient;
         }
-        match *p.model(stage, &work.varied) {
+        match *p.model::<true>(stage, &work.varied) {
             SurfaceModel::Phong { mirror: share, .. } if share > 0.0 && mirror => {
                 reflect_at(stage, p, facing(p), weight * share, &state, &mut work.scattered, stats);
             }

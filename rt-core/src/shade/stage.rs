@@ -36,6 +36,8 @@ pub(crate) struct Stage<'a> {
     pub(crate) camera_rays: CameraRays,
     /// Instruction set of ray generation and shading; every one gives the same bits.
     pub(crate) level: Level,
+    /// Whether a material has detail.
+    pub(crate) has_detail: bool,
     /// Volumes with the way into their object space.
     pub(crate) volumes: Vec<(&'a Volume, DAffine3)>,
     /// World position of render space's origin.
@@ -98,6 +100,7 @@ impl<'a> Stage<'a> {
             ambient,
             camera_rays: CameraRays::new(camera, origin, bounds, effects.contains(Effects::DEPTH_OF_FIELD)),
             level: Level::new(),
+            has_detail: scene.materials.iter().any(|m| m.detail.is_some()),
             volumes,
             origin,
             up: world_from_view.y_axis.as_vec3(),

@@ -18,7 +18,7 @@ impl Placed<'_> {
     #[inline(never)]
     fn finished(&self, ray: &Ray, hit: &Hit, normal: &mut Vec3) -> Option<Varied> {
         let detail = self.material.detail.as_ref()?;
-        let (mesh, point, object_normal) = match self.source {
+        let (mesh, point, object_normal, flat) = match self.source {
             Source::Mesh(mesh) => {
                 let corner = mesh.indices[hit.prim as usize].map(|k| k as usize);
                 let [a, b, c] = corner.map(|k| mesh.positions[k].as_dvec3());
@@ -32,7 +32,7 @@ impl Placed<'_> {
                     PerElement::Face => n.values[hit.prim as usize],
                 });
                 let flat = (b - a).cross(c - a).normalize_or_zero().as_vec3();
-                (Some(mesh), point, own.and_then(Vec3::try_normalize).unwrap_or(flat))
+                (Some(mesh), point, own.and_then(Vec3::try_normalize).unwrap_or(flat), flat)
             }
             Source::Shape(shape) => {
                 let s = shape.surface(
@@ -40,11 +40,12 @@ impl Placed<'_> {
                     &ShapeHit { t: hit.t, u: hit.u, v: hit.v },
                     &self.object_ray(ray),
                 );
-                (None, shape.origin() + s.point.as_dvec3(), s.normal)
+                (None, shape.origin() + s.point.as_dvec3(), s.normal, s.normal)
             }
         };
         let world = |n: Vec3| self.normal_from_object.map_or(n, |m| (m * n).normalize_or_zero());
         let turned = world(object_normal).dot(*normal) < 0.0;
+        let face_normal = world(flat);
         let place = DetailPlace {
             primitive: hit.prim,
             uv: [hit.u, hit.v],
@@ -53,6 +54,8 @@ impl Placed<'_> {
             turned,
             mesh,
             linear: self.render_from_object.matrix3,
+            view: -ray.dir.as_dvec3().normalize_or_zero().as_vec3(),
+            face_normal: if face_normal.dot(ray.dir) > 0.0 { -face_normal } else { face_normal },
             outer: if turned { -*normal } else { *normal },
         };
         let finish = detail.finish(Finish::of(self.material, *normal), &place);
