@@ -5,6 +5,7 @@
 //! physically based materials) is left to the driver.
 
 mod template;
+mod wire;
 
 use crate::arrays::{Elements, Source, Taken, positions};
 use crate::cache::Geometry;

@@ -12,6 +12,7 @@ use crate::config::{Mode, Settings};
 use crate::effects::{Place, Surroundings};
 use crate::enums::*;
 use crate::lighting::{Lit, Setup, transform};
+use crate::ranks::rows::Share;
 use crate::raster::{covers, steepness};
 use crate::texturing::Image;
 use fearless_simd::{Level, dispatch};
@@ -448,8 +449,8 @@ fn screen_bounds(draw: &Draw, clip: DMat4) -> Rect {
     rect.and(Rect { x: x0, y: y0, w: x1.saturating_sub(x0), h: y1.saturating_sub(y0) })
 }
 
-/// The nearest fragment of all draws at every pixel.
-pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings) -> (Layer, [u64; 2]) {
+/// The nearest fragment of all draws at every pixel of a share of the rows.
+pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings, share: Share) -> (Layer, [u64; 2]) {
     let around = Surroundings::new(draws, settings);
     let mode = settings.mode;
     let rect = draws.iter().fold(Rect::default(), |r, d| r.or(d.rect));
@@ -461,7 +462,7 @@ pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings) -> (Layer, [u
     let band = w * TILE as usize;
     let covered = AtomicU64::new(0);
     let bands = layer.color.par_chunks_mut(band).zip(layer.depth.par_chunks_mut(band)).enumerate();
-    bands.for_each_init(TileRays::new, |rays, (i, (color, depth))| {
+    bands.filter(|(i, _)| share.has(*i)).for_each_init(TileRays::new, |rays, (i, (color, depth))| {
         let y = rect.y + i as i32 * TILE;
         let area = Rect { x: rect.x, y, w: rect.w, h: (color.len() / w) as i32 };
         let mut seen = vec![NOTHING; color.len()];
