@@ -5,6 +5,7 @@
 
 mod fragments;
 mod in_order;
+mod peeled;
 mod rays;
 
 use crate::capture::{Draw, Shading};
@@ -18,6 +19,7 @@ use crate::texturing::Image;
 use fearless_simd::{Level, dispatch};
 use fragments::{FragmentBlock, Lane};
 pub(crate) use in_order::in_order;
+pub(crate) use peeled::{Limit, peeled};
 use rayon::prelude::*;
 use rays::{Bundle, TileRays, slot};
 use rt_core::accel::World;

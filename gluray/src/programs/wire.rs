@@ -1,12 +1,13 @@
 //! Recognised programs as messages to other ranks. The colour map goes by its name.
 
-use super::template::{Colors, Template};
+use super::template::{Colors, Peel, Template};
 use super::{Image, Recognised};
 use crate::ranks::wire::{Malformed, Reader, Wire, wire_enum, wire_struct};
 use std::sync::Arc;
 
 wire_enum!(Colors { Uniform, PerVertex, Map });
-wire_struct!(Template { colors, overrides, flat, headlight, directional, lit });
+wire_enum!(Peel { No, Depths, Layers });
+wire_struct!(Template { colors, overrides, flat, headlight, directional, lit, peel });
 
 impl Recognised {
     /// The colour map.
