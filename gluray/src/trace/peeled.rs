@@ -6,6 +6,7 @@
 use super::{Fragment, Layer, MOST_STEPS, Prepared, Rect, TILE, TileRays, UNCOVERED, slot, to_bytes};
 use crate::config::Settings;
 use crate::effects::Surroundings;
+use crate::raster::steepness;
 use rayon::prelude::*;
 use rt_core::ray::{HitBlock, LANES, NO_HIT};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -17,8 +18,10 @@ pub(crate) struct Limit {
     pub(crate) depth: Vec<f32>,
 }
 
-/// How far behind its limit a fragment still counts, as VTK has it.
+/// How far behind its limit a fragment still counts, as VTK has it: the limit is a depth that the driver computed for such a fragment.
 const EPSILON: f64 = 1e-7;
+/// Roundings of a driver that interpolates in f32 from the window's corner on, per depth that a triangle gains from one pixel to the next.
+const ROUNDINGS: f64 = 4096.0 / 16_777_216.0;
 /// What comes through behind this changes no pixel of eight bits.
 const LEAST: f32 = 1.0 / 1024.0;
 /// How far beside a centre, in pixels.
@@ -99,7 +102,7 @@ fn through(
                 match p.fragment(prim, at.0, at.1) {
                     None => edges[k] = true,
                     // Everything that follows is behind it.
-                    Some(f) if f.plain_depth > most(at.0, at.1) => {
+                    Some(f) if is_behind(p, prim, &f, most(at.0, at.1)) => {
                         rays.blocks[b].t_max[l] = -1.0;
                         continue;
                     }
@@ -125,6 +128,14 @@ fn through(
     }
 }
 
+/// Whether a fragment is behind its limit by more than roundings.
+fn is_behind(p: &Prepared<'_>, prim: usize, f: &Fragment, most: f64) -> bool {
+    let s = &*p.draw.state;
+    let scale = s.depth_range[1] - s.depth_range[0];
+    f.plain_depth > most
+        && f.plain_depth - most > EPSILON + ROUNDINGS * steepness(&p.corners(prim), s.viewport, scale)
+}
+
 /// Fragments of triangles that rays beside the centre meet.
 fn beside(p: &Prepared<'_>, draw: usize, (x, y): (i32, i32), most: f64, found: &mut Vec<Found>) {
     for (dx, dy) in [(-OFF, -OFF), (OFF, -OFF), (-OFF, OFF), (OFF, OFF)] {
@@ -135,7 +146,7 @@ fn beside(p: &Prepared<'_>, draw: usize, (x, y): (i32, i32), most: f64, found: &
             let prim = hit.prim as usize;
             ray.t_min = hit.t.next_up();
             let Some(fragment) = p.fragment(prim, x, y) else { continue };
-            if fragment.plain_depth > most {
+            if is_behind(p, prim, &fragment, most) {
                 break;
             }
             if !found.iter().any(|f| f.draw == draw && f.prim == prim) {
