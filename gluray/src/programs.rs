@@ -22,10 +22,10 @@ use crate::real::gl;
 use crate::state::current::Current;
 use crate::texturing::{self, Image};
 use crate::trace::mixed;
+use peeling::Peeling;
 use rt_core::mesh::TriMesh;
 use std::collections::HashMap;
 use std::sync::Arc;
-use peeling::Peeling;
 use template::{Colors, Peel, Template};
 
 /// What colours a program's surface.

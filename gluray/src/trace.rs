@@ -5,6 +5,7 @@
 
 mod fragments;
 mod in_order;
+mod lifted;
 mod peeled;
 mod rays;
 

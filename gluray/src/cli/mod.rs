@@ -3,9 +3,9 @@
 mod doctor;
 mod explain;
 mod export;
+mod helpers;
 #[cfg(feature = "panel")]
 mod panel;
-mod helpers;
 mod run;
 mod serve_rays;
 mod timeline;

@@ -56,7 +56,7 @@ pub(super) fn serve_rays(common: &CommonArgs, args: &ServeRaysArgs) -> anyhow::R
             over.store(true, Relaxed);
         });
     }
-    common.note(0, &format!("programs with GLURAY_RANKS={} are helped; Ctrl-C ends", args.socket.display()));
+    common.note(0, format!("programs with GLURAY_RANKS={} are helped; Ctrl-C ends", args.socket.display()));
     while !over.load(Relaxed) {
         if cancel.check().is_err() {
             over.store(true, Relaxed);

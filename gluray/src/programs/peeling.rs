@@ -8,9 +8,9 @@
 //! whole to the driver.
 
 use super::template::Peel;
+use crate::config::Mode;
 use crate::context::Context;
 use crate::decide::{self, Verdict};
-use crate::config::Mode;
 use crate::enums::*;
 use crate::frame::Pending;
 use crate::present::Fate;
@@ -123,7 +123,8 @@ impl Context {
         };
         let same = self.state.framebuffer == self.programs.peeling.framebuffer;
         let Some((target, before)) = there.filter(|_| same) else {
-            self.counters.warn("depth peeling did not go as VTK's does: translucent surfaces are lost".into());
+            self.counters
+                .warn("depth peeling did not go as VTK's does: translucent surfaces are lost".into());
             return;
         };
         let start = Instant::now();

@@ -24,7 +24,8 @@ impl Recognised {
     /// Lights that the program computes with and that are not there; also those that are more than can be.
     pub(crate) fn missing_lights(&self) -> usize {
         let most = crate::effects::MOST_LIGHTS;
-        usize::from(self.template.headlight && self.lights.is_empty()) + self.lights.len().saturating_sub(most)
+        usize::from(self.template.headlight && self.lights.is_empty())
+            + self.lights.len().saturating_sub(most)
     }
 }
 

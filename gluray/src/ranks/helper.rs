@@ -151,7 +151,11 @@ impl Known {
             Some(program) => Shading::Program(Arc::new(program.with_map(map))),
         };
         let draw = Draw {
-            geometry: self.geometries.get(&p.geometry).cloned().ok_or_else(|| lost("geometry", p.geometry))?,
+            geometry: self
+                .geometries
+                .get(&p.geometry)
+                .cloned()
+                .ok_or_else(|| lost("geometry", p.geometry))?,
             attributes: (self.attributes.get(&p.attributes).cloned())
                 .ok_or_else(|| lost("attributes", p.attributes))?,
             state: Arc::new(p.state),

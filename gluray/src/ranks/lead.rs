@@ -3,9 +3,7 @@
 //! Who does not answer, or answers what cannot be, is left alone from then on, and its share is made here: a frame is never lost.
 
 use super::account::Accounts;
-use super::orders::{
-    ANSWER, AnswerHead, ORDER, Seen, Work, numbers, put_end, put_geometry, put_head, rect,
-};
+use super::orders::{ANSWER, AnswerHead, ORDER, Seen, Work, numbers, put_end, put_geometry, put_head, rect};
 use super::parcels::{Parcel, map_of, name_of_attributes, name_of_image};
 use super::rows::{Share, get_rows, most_bytes};
 use super::wire::{Reader, Wire};

@@ -21,10 +21,13 @@ const ORDER_OF_BYTES: u32 = 0x0102_0304;
 /// The most bytes of an order: a scene of 300 million triangles.
 pub(crate) const MOST_ORDER_BYTES: usize = 1 << 34;
 
+/// Positions and triangles.
+type Shape = (Vec<Vec3>, Vec<[u32; 3]>);
+
 /// Content that a helper does not have.
 #[derive(Default)]
 pub(super) struct News {
-    pub(super) geometries: Vec<(u128, (Vec<Vec3>, Vec<[u32; 3]>))>,
+    pub(super) geometries: Vec<(u128, Shape)>,
     pub(super) attributes: Vec<(u128, Attributes)>,
     pub(super) images: Vec<(u128, Image)>,
 }
@@ -81,7 +84,9 @@ impl Seen {
         let seen = Seen::get(from)?;
         const FAR: i32 = 1 << 24;
         let fits = |r: &[i32; 4]| {
-            r.iter().all(|v| (-FAR..=FAR).contains(v)) && (1..=1 << 16).contains(&r[2]) && (1..=1 << 16).contains(&r[3])
+            r.iter().all(|v| (-FAR..=FAR).contains(v))
+                && (1..=1 << 16).contains(&r[2])
+                && (1..=1 << 16).contains(&r[3])
         };
         match fits(&seen.viewport) && fits(&seen.rect) {
             true => Ok(seen),
@@ -121,7 +126,8 @@ impl Order {
         let from = &mut Reader::new(bytes);
         let greeting = String::get(from)?;
         if greeting != GREETING {
-            return Err(from.fault(format!("`{}` is not `{GREETING}`", greeting.chars().take(80).collect::<String>())));
+            return Err(from
+                .fault(format!("`{}` is not `{GREETING}`", greeting.chars().take(80).collect::<String>())));
         }
         if u32::get(from)? != ORDER_OF_BYTES {
             return Err(from.fault("numbers of another kind of machine"));
@@ -141,8 +147,8 @@ impl Order {
         news.attributes = Wire::get(from)?;
         news.images = Wire::get(from)?;
         let settings = String::get(from)?;
-        let settings =
-            serde_json::from_str(&settings).map_err(|e| from.fault(format!("settings that are none: {e}")))?;
+        let settings = serde_json::from_str(&settings)
+            .map_err(|e| from.fault(format!("settings that are none: {e}")))?;
         let share: Share = Wire::get(from)?;
         if share.index >= share.count {
             return Err(from.fault(format!("share {} of {}", share.index, share.count)));

@@ -203,9 +203,8 @@ impl Parcel {
     pub(super) fn check(&self, from: &Reader<'_>) -> Result<(), Malformed> {
         const FAR: i32 = 1 << 24;
         let s = &self.state;
-        let small = |r: &[i32; 4]| {
-            r.iter().all(|v| (-FAR..=FAR).contains(v)) && r[2] <= 1 << 16 && r[3] <= 1 << 16
-        };
+        let small =
+            |r: &[i32; 4]| r.iter().all(|v| (-FAR..=FAR).contains(v)) && r[2] <= 1 << 16 && r[3] <= 1 << 16;
         let lights = self.program.as_ref().map_or(0, Recognised::missing_lights);
         if !small(&s.viewport) || s.viewport[2] <= 0 || s.viewport[3] <= 0 {
             Err(from.fault(format!("a viewport of {:?}", s.viewport)))

@@ -153,6 +153,9 @@ mod tests {
         put_pods(&mut zeros, &[0_u32; 64]);
         put_pods::<[u8; 4]>(&mut zeros, &[]);
         put_pods::<f32>(&mut zeros, &[]);
-        assert!(get_rows(&mut Reader::new(&zeros), share, SIZE, (&mut c, &mut d)).is_err(), "runs of nothing");
+        assert!(
+            get_rows(&mut Reader::new(&zeros), share, SIZE, (&mut c, &mut d)).is_err(),
+            "runs of nothing"
+        );
     }
 }

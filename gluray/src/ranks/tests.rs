@@ -15,6 +15,9 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
+/// Colours, and the bits of depths.
+type Seen = (Vec<[u8; 4]>, Vec<u32>);
+
 const IDENTITY: [f32; 16] = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
 
 /// A bumpy sheet with a normal and a colour at each vertex, and a triangle that cuts through it.
@@ -75,10 +78,7 @@ fn draws(turn: f32) -> Vec<Draw> {
     };
     let cut = [[-0.7, -0.8, 0.3], [0.8, 0.1, -0.3], [-0.2, 0.9, 0.1]];
     let plain = Attributes::constant(&current);
-    vec![
-        draw(&positions, &triangles, &mut cache, &attributes),
-        draw(&cut, &[[0, 1, 2]], &mut cache, &plain),
-    ]
+    vec![draw(&positions, &triangles, &mut cache, &attributes), draw(&cut, &[[0, 1, 2]], &mut cache, &plain)]
 }
 
 fn settings(mode: Mode) -> Settings {
@@ -86,12 +86,7 @@ fn settings(mode: Mode) -> Settings {
 }
 
 /// The pictures of `frames` by a first rank and what its helpers are.
-fn pictures(
-    lead: &mut Lead,
-    frames: &[f32],
-    settings: &Settings,
-    sent: &mut Vec<u64>,
-) -> Vec<(Vec<[u8; 4]>, Vec<u32>)> {
+fn pictures(lead: &mut Lead, frames: &[f32], settings: &Settings, sent: &mut Vec<u64>) -> Vec<Seen> {
     let mut out = Vec::new();
     for turn in frames {
         let draws = draws(*turn);
@@ -115,7 +110,7 @@ fn with_helpers(
     frames: &[f32],
     mode: Mode,
     help: impl Fn(usize, &mut dyn Communicator) + Sync + Send,
-) -> (Vec<(Vec<[u8; 4]>, Vec<u32>)>, Vec<u64>, Vec<Option<String>>) {
+) -> (Vec<Seen>, Vec<u64>, Vec<Option<String>>) {
     let mut group = threads::group(ranks);
     let helpers = group.split_off(1);
     let first = group.pop().expect("the first rank");
@@ -219,7 +214,6 @@ fn orders_that_are_none_are_refused_and_the_next_is_obeyed() {
                 changed[i] ^= 0xff;
                 ask(changed);
             }
-            drop(ask);
             first.send(1, ORDER, order.clone()).expect("sent");
             let good = first.recv(1, ANSWER, 1 << 30, Duration::from_secs(20)).expect("answered");
             drop(first);

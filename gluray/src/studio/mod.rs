@@ -135,9 +135,8 @@ impl Studio {
         let mut rgba = vec![[0.0; 4]; w * h];
         let mut rays: Vec<(&'static str, u64)> = Vec::new();
         // One band of rows after the other; all at once where all are ours.
-        let parts: Vec<_> =
-            if share == Share::WHOLE { vec![0..w * h] } else { share.pixels(w, h).collect() };
-        for part in parts {
+        let whole = std::iter::once(0..w * h).filter(|_| share == Share::WHOLE);
+        for part in whole.chain(share.pixels(w, h).filter(|_| share != Share::WHOLE)) {
             let (first, rows) = (part.start / w, part.len() / w);
             let options = RenderOptions {
                 crop: Some(Crop {

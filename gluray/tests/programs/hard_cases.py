@@ -243,6 +243,21 @@ def blended_over_traced():
     F("glRectf", *[c_float] * 4)(-0.8, -0.3, 0.9, 0.4)
 
 
+def layers_in_one_plane():
+    """Squares over one another in one plane and one batch, without a depth test: the last is seen."""
+    start()
+    disable(0x0B71)
+    numbers = iter(range(1, 10**6))
+    part = lambda: next(numbers) * 7919 % 1009 / 1009
+    begin(QUADS)
+    for _ in range(60):
+        x, y, s = 2.2 * part() - 1.4, 2.2 * part() - 1.4, 0.1 + 0.5 * part()
+        color(part(), part(), part(), 1)
+        for dx, dy in ((0, 0), (s, 0), (s, s), (0, s)):
+            vertex(x + dx, y + dy, 0)
+    end()
+
+
 def two_contexts(w, n=2):
     shared = context()
     current(w, shared)
