@@ -18,6 +18,9 @@ use std::time::Instant;
 /// A draw with the image of its texture.
 pub(crate) type Pending = (Draw, Option<Arc<Image>>);
 
+/// Before what the driver draws of which nobody knows what it does to what is there.
+pub(crate) const ORDER_MATTERS: &str = "a draw of the driver's whose order matters";
+
 /// Draws that wait for the end of the frame.
 #[derive(Default)]
 pub(crate) struct Frame {
@@ -38,6 +41,14 @@ impl Frame {
     /// The driver drew lines or points whose order does not matter but for ties.
     pub(crate) fn others_drew(&mut self) {
         self.others |= !self.pending.is_empty();
+    }
+}
+
+impl Frame {
+    /// Peeled surfaces are traced for this frame.
+    pub(crate) fn traced_peeled(&mut self, frame: u64, draws: &[Pending]) {
+        self.traced = true;
+        self.told.traced(frame, draws.iter().map(|(d, _)| d));
     }
 }
 
@@ -144,6 +155,9 @@ impl Context {
         }
         crate::fault::injected("flush");
         self.end_batch();
+        if self.programs.peeling.has_draws() && matches!(before, "glBeginQuery" | ORDER_MATTERS) {
+            self.gather_peeled();
+        }
         let pending = std::mem::take(&mut self.frame.pending);
         let others = std::mem::take(&mut self.frame.others);
         if !self.probes.draws.is_empty() {
@@ -298,6 +312,7 @@ impl Context {
             return false;
         }
         self.end_batch();
+        self.programs.peeling.cleared(self.counters.report.passed_draws);
         const COLOR_AND_DEPTH: u32 = 0x4100;
         if self.frame.traced && mask & COLOR_AND_DEPTH == COLOR_AND_DEPTH {
             self.begin_again();

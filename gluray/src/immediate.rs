@@ -96,7 +96,7 @@ impl Context {
         if decide::commutes(&self.state) && !filled {
             self.frame.others_drew();
         } else {
-            self.flush("a draw of the driver's whose order matters");
+            self.flush(crate::frame::ORDER_MATTERS);
         }
         self.sync();
         self.counters.pass(why, 1);

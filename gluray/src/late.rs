@@ -8,7 +8,7 @@ use crate::cache::Structures;
 use crate::context::Context;
 use crate::frame::Pending;
 use crate::present::Fate;
-use crate::trace::{self, Layer, Prepared};
+use crate::trace::{Layer, Prepared};
 use crate::worker;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::mpsc::{Receiver, channel};
@@ -34,7 +34,7 @@ pub(crate) fn trace(draws: Vec<Pending>, settings: &crate::config::Settings) -> 
     let (layer, extra, primary) = {
         let ready: Vec<Prepared<'_>> =
             draws.iter().filter_map(|(d, image)| Prepared::new(d, image.clone(), &mut structures)).collect();
-        let (layer, extra) = trace::nearest(&ready, settings);
+        let (layer, extra) = crate::ranks::nearest(&ready, settings);
         (layer, extra, ready.iter().map(|p| p.rays.load(Relaxed)).sum())
     };
     Traced { layer, extra, primary, structures, took: start.elapsed(), draws }

@@ -10,9 +10,10 @@ use crate::config::{Mode, Settings};
 use crate::context::Context;
 use crate::enums::*;
 use crate::present::Fate;
+use crate::ranks;
 use crate::real::gl;
 use crate::texturing::Image;
-use crate::trace::{self, Layer, Prepared, Rect, UNCOVERED};
+use crate::trace::{Layer, Prepared, Rect, UNCOVERED};
 use crate::view::{View, views};
 use crate::worker;
 use std::sync::Arc;
@@ -44,7 +45,7 @@ fn bytes(c: [f32; 4]) -> [u8; 4] {
 fn depths(draws: &[Prepared<'_>], settings: &Settings) -> Layer {
     // Shading is wasted here, so the cheapest.
     let cheap = Settings { mode: Mode::Match, ..settings.clone() };
-    trace::nearest(draws, &cheap).0
+    ranks::nearest(draws, &cheap).0
 }
 
 impl Context {
@@ -115,7 +116,7 @@ impl Context {
             for (_, members) in &groups {
                 let ready: Vec<Prepared<'_>> =
                     members.iter().filter_map(|i| Prepared::new(&draws[*i], None, &mut structures)).collect();
-                let (mut layer, extra) = trace::nearest(&ready, &settings);
+                let (mut layer, extra) = ranks::nearest(&ready, &settings);
                 // The driver's own depth may be some roundings nearer.
                 layer
                     .depth
@@ -154,13 +155,13 @@ fn make(
     warnings: &mut Vec<String>,
 ) -> Made {
     if settings.mode != Mode::Path && !beyond::wanted(ready, settings) {
-        let (layer, extra) = trace::nearest(ready, settings);
+        let (layer, extra) = ranks::nearest(ready, settings);
         return Made::Surfaces(layer, vec![("shadow", extra[0]), ("ambient occlusion", extra[1])]);
     }
     let all = depths(ready, settings);
     let mut colors = match settings.mode {
         Mode::Path => studio.colors(ready, view, number, all.rect, settings),
-        _ => beyond::colors(ready, view, all.rect, settings, background),
+        _ => ranks::beyond(ready, view, all.rect, settings, background),
     };
     warnings.append(&mut colors.warnings);
     let clear: Vec<bool> =

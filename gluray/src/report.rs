@@ -52,6 +52,8 @@ pub struct Report {
     pub faults: Vec<String>,
     /// Settings that made no sense and were not taken.
     pub problems: Vec<String>,
+    /// What each rank did, where helpers trace as well; 0 is the program.
+    pub ranks: Vec<crate::ranks::RankAccount>,
     /// Objects of the last frame, largest first.
     pub objects: Vec<crate::panel::ObjectInfo>,
     /// When each phase ran, in the order in which they ended: the first two hundred thousand.
@@ -88,6 +90,12 @@ impl Report {
         sum(&mut self.milliseconds, &other.milliseconds);
         self.faults.extend(other.faults.iter().cloned());
         self.problems.extend(other.problems.iter().cloned());
+        for r in &other.ranks {
+            match self.ranks.iter_mut().find(|own| own.rank == r.rank) {
+                Some(own) => own.add(r),
+                None => self.ranks.push(r.clone()),
+            }
+        }
         self.objects.extend(other.objects.iter().cloned());
         self.timeline.extend(other.timeline.iter().cloned());
     }
@@ -206,6 +214,8 @@ impl Counters {
         sum.mode = crate::config::current().settings.mode.name().to_owned();
         sum.faults = crate::fault::messages();
         sum.problems.extend(crate::config::current().problems.iter().cloned());
+        sum.ranks = crate::ranks::accounts();
+        sum.problems.extend(crate::ranks::problems());
         write_spans(&dir.join(format!("{}.spans", sum.pid)));
         let (file, fresh) = (dir.join(format!("{}.json", sum.pid)), dir.join(format!("{}.new", sum.pid)));
         // A report that cannot be written must not trouble the program.

@@ -6,6 +6,8 @@
 mod batch;
 mod fragments;
 mod in_order;
+mod lifted;
+mod peeled;
 mod rays;
 
 use crate::cache::Structures;
@@ -14,12 +16,14 @@ use crate::config::{Mode, Settings};
 use crate::effects::{Place, Surroundings};
 use crate::enums::*;
 use crate::lighting::{Lit, Setup, transform};
+use crate::ranks::rows::Share;
 use crate::raster::{covers, steepness};
 use crate::texturing::Image;
 use batch::Batch;
 use fearless_simd::{Level, dispatch};
 use fragments::{FragmentBlock, Lane};
 pub(crate) use in_order::in_order;
+pub(crate) use peeled::{Limit, peeled};
 use rayon::prelude::*;
 use rays::{Bundle, TileRays, slot};
 use rt_core::accel::World;
@@ -455,8 +459,8 @@ fn screen_bounds(draw: &Draw, clip: DMat4) -> Rect {
     rect.and(Rect { x: x0, y: y0, w: x1.saturating_sub(x0), h: y1.saturating_sub(y0) })
 }
 
-/// The nearest fragment of all draws at every pixel.
-pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings) -> (Layer, [u64; 2]) {
+/// The nearest fragment of all draws at every pixel of a share of the rows.
+pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings, share: Share) -> (Layer, [u64; 2]) {
     let around = Surroundings::new(draws, settings);
     let mode = settings.mode;
     let rect = draws.iter().fold(Rect::default(), |r, d| r.or(d.rect));
@@ -468,7 +472,7 @@ pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings) -> (Layer, [u
     let band = w * TILE as usize;
     let covered = AtomicU64::new(0);
     let bands = layer.color.par_chunks_mut(band).zip(layer.depth.par_chunks_mut(band)).enumerate();
-    bands.for_each_init(TileRays::new, |rays, (i, (color, depth))| {
+    bands.filter(|(i, _)| share.has(*i)).for_each_init(TileRays::new, |rays, (i, (color, depth))| {
         let y = rect.y + i as i32 * TILE;
         let tile_h = (color.len() / w) as i32;
         let mut n = 0;

@@ -63,6 +63,20 @@ fn in_words(r: &Report) -> String {
         }
     }
 
+    // Who traced it.
+    for rank in &r.ranks {
+        let of = if rank.rank == 0 { "the program" } else { "helper" };
+        let lost = rank.lost.as_ref().map_or(String::new(), |why| format!("; lost: {why}"));
+        line(format!(
+            "        {:>12} pictures by rank {} ({of}): {:.1} ms each, {} kB sent to it, {} kB of rows back{lost}",
+            rank.pictures,
+            rank.rank,
+            rank.trace_ms / rank.pictures.max(1) as f64,
+            rank.sent_bytes / 1000,
+            rank.received_bytes / 1000
+        ));
+    }
+
     // What was not, and why.
     line(format!("\npassed  {:>12} draws{}", r.passed_draws, per_frame(r.passed_draws)));
     for (why, n) in by_size(&r.passed_reasons) {
