@@ -1,8 +1,8 @@
 //! From the active pixels of a message back to rows: joined to what is held, or put in place.
 use crate::color::Color;
-use crate::pixel::{Composite, combine};
+use crate::pixel::Composite;
 use crate::simd::for_runs;
-use crate::simd::runs::nearest_run;
+use crate::simd::runs::{nearest_run, nearest_run_scalar, over_one_by_one};
 #[cfg(target_arch = "x86_64")]
 use crate::simd::runs::{padded_16, take_nearer};
 use fearless_simd::Simd;
@@ -46,7 +46,7 @@ pub(crate) fn join_run<P: Composite, S: Simd>(
     }
 }
 
-/// [`join_run`] one pixel after the other.
+/// [`join_run`] without vector types.
 pub(crate) fn join_run_scalar<P: Composite>(
     colors: &[u8],
     depths: &[u8],
@@ -54,22 +54,10 @@ pub(crate) fn join_run_scalar<P: Composite>(
     held_depths: &mut [f32],
     side: Side,
 ) {
-    for (index, held_color) in held_colors.iter_mut().enumerate() {
-        let color = bytemuck::pod_read_unaligned(&colors[index * P::Color::BYTES..][..P::Color::BYTES]);
-        let (depth, held_depth) = if P::HAS_DEPTH {
-            (bytemuck::pod_read_unaligned(&depths[4 * index..4 * index + 4]), held_depths[index])
-        } else {
-            (1.0, 1.0)
-        };
-        let (other, held) = (P::from_parts(color, depth), P::from_parts(*held_color, held_depth));
-        let joined = match side {
-            Side::Lower => combine(other, held),
-            Side::Higher => combine(held, other),
-        };
-        *held_color = joined.color();
-        if P::HAS_DEPTH {
-            held_depths[index] = joined.depth();
-        }
+    if P::HAS_DEPTH {
+        nearest_run_scalar(colors, depths, held_colors, held_depths, side == Side::Higher);
+    } else {
+        over_one_by_one(colors, held_colors, side == Side::Lower);
     }
 }
 
@@ -87,13 +75,19 @@ pub(crate) fn clean_run<P: Composite, S: Simd>(simd: S, colors: &mut [P::Color],
     clean_run_scalar::<P>(&mut colors[whole..], &mut depths[whole..]);
 }
 
-/// [`clean_run`] one pixel after the other.
+/// [`clean_run`] without vector types.
 #[inline(always)]
 pub(crate) fn clean_run_scalar<P: Composite>(colors: &mut [P::Color], depths: &mut [f32]) {
-    for (color, depth) in colors.iter_mut().zip(depths) {
-        let active = *depth < 1.0;
-        *color = if active { *color } else { P::EMPTY.color() };
-        *depth = if active { *depth } else { 1.0 };
+    for (colors, depths) in colors.chunks_mut(64).zip(depths.chunks_mut(64)) {
+        // Most blocks are active as a whole: to look at them all is done four at a time, to branch for each is not.
+        if depths.iter().fold(true, |all, depth| all & (*depth < 1.0)) {
+            continue;
+        }
+        for (color, depth) in colors.iter_mut().zip(depths) {
+            let active = *depth < 1.0;
+            *color = if active { *color } else { P::EMPTY.color() };
+            *depth = if active { *depth } else { 1.0 };
+        }
     }
 }
 
@@ -132,22 +126,26 @@ pub(crate) fn join_row<P: Composite, S: Simd>(
     }
 }
 
-/// [`join_row`] one pixel after the other.
+/// [`join_row`] without vector types: run by run.
 pub(crate) fn join_row_scalar<P: Composite>(
     row: SparseRow<'_>,
     held_colors: &mut [P::Color],
     held_depths: &mut [f32],
     side: Side,
 ) {
+    if row.mask.is_empty() {
+        join_run_scalar::<P>(row.colors, row.depths, held_colors, held_depths, side);
+        return;
+    }
     let mut taken = 0;
-    for at in 0..held_colors.len() {
-        if !row.mask.is_empty() && row.mask[at / 8] >> (at % 8) & 1 == 0 {
-            continue;
-        }
-        let (colors, depths) = taken_run::<P>(row, taken, 1);
-        let held_depths = if P::HAS_DEPTH { &mut held_depths[at..at + 1] } else { &mut [] };
-        join_run_scalar::<P>(colors, depths, &mut held_colors[at..at + 1], held_depths, side);
-        taken += 1;
+    for (index, word) in words(row.mask).enumerate() {
+        for_runs(word, |start, length| {
+            let (colors, depths) = taken_run::<P>(row, taken, length);
+            let at = 64 * index + start;
+            let held_depths = if P::HAS_DEPTH { &mut held_depths[at..at + length] } else { &mut [] };
+            join_run_scalar::<P>(colors, depths, &mut held_colors[at..at + length], held_depths, side);
+            taken += length;
+        });
     }
 }
 
