@@ -337,9 +337,8 @@ fn encode_rows<P: Composite>(
         if counts.active != before + width {
             break;
         }
-        let begin = out.len();
         out.extend_from_slice(bytemuck::cast_slice(colors));
-        if opaque && !kernels.drop_full_alpha(out, begin) {
+        if opaque && out.last() != Some(&255) {
             return None;
         }
         if depths {
@@ -347,8 +346,9 @@ fn encode_rows<P: Composite>(
         }
         y += 1;
     }
+    // Opaque colours come without depths, so they lie in one piece.
     if y == rect.y1 {
-        return Some(counts);
+        return (!opaque || kernels.drop_full_alpha(out, HEADER_BYTES)).then_some(counts);
     }
 
     // With a mask, from the first row on.
@@ -365,14 +365,14 @@ fn encode_rows<P: Composite>(
             word_at += 8;
         });
         if counts.active > before {
-            let begin = out.len();
             let colors = bytemuck::cast_slice(colors);
             match P::Color::BYTES {
                 4 => kernels.append_active::<4>(out, mask_at, colors),
                 8 => kernels.append_active::<8>(out, mask_at, colors),
                 _ => kernels.append_active::<16>(out, mask_at, colors),
             }
-            if opaque && !kernels.drop_full_alpha(out, begin) {
+            // All alphas are looked at in the end; most pictures that are not opaque show it in their first row.
+            if opaque && out.last() != Some(&255) {
                 return None;
             }
             if depths {
@@ -381,7 +381,7 @@ fn encode_rows<P: Composite>(
         }
         mask_at = word_at;
     }
-    Some(counts)
+    (!opaque || kernels.drop_full_alpha(out, mask_at)).then_some(counts)
 }
 
 /// A message whose every number has been checked.
@@ -506,13 +506,14 @@ impl<'a> Part<'a> {
         );
     }
 
-    /// Writes its rectangle into planes of `width` columns; `depths` may be empty.
+    /// Writes its rectangle into planes of `width` columns; `depths` may be empty. `wide` is room to work in.
     pub(crate) fn place<P: Composite>(
         &self,
         kernels: Kernels,
         width: usize,
         colors: &mut [P::Color],
         depths: &mut [f32],
+        wide: &mut Vec<u8>,
     ) {
         let range = |y: u32| {
             let start = y as usize * width + self.rect.x0 as usize;
@@ -525,32 +526,29 @@ impl<'a> Part<'a> {
                     depths[range(y)].fill(1.0);
                 }
             }
+            return;
         }
-        let is_opaque = self.color_bytes != P::Color::BYTES;
-        let mut wide = Vec::new();
+        let mut part = *self;
+        if self.color_bytes != P::Color::BYTES {
+            // All rows at once: those of slabs have a few pixels each.
+            at_level!(
+                kernels,
+                simd => give_full_alpha(simd, self.pixels, wide),
+                give_full_alpha_scalar(self.pixels, wide)
+            );
+            part = Part { pixels: wide, color_bytes: P::Color::BYTES, ..*self };
+        }
         at_level!(
             kernels,
-            simd => self.for_each_row(
+            simd => part.for_each_row(
                 #[inline(always)]
                 |y, row| {
                     let to_depths = if depths.is_empty() { &mut [] } else { &mut depths[range(y)] };
-                    let row = if is_opaque {
-                        give_full_alpha(simd, row.colors, &mut wide);
-                        SparseRow { colors: &wide, behind_colors: &wide, ..row }
-                    } else {
-                        row
-                    };
                     place_row::<P, _>(simd, row, &mut colors[range(y)], to_depths);
                 }
             ),
-            self.for_each_row(|y, row| {
+            part.for_each_row(|y, row| {
                 let to_depths = if depths.is_empty() { &mut [] } else { &mut depths[range(y)] };
-                let row = if is_opaque {
-                    give_full_alpha_scalar(row.colors, &mut wide);
-                    SparseRow { colors: &wide, behind_colors: &wide, ..row }
-                } else {
-                    row
-                };
                 place_row_scalar::<P>(row, &mut colors[range(y)], to_depths);
             })
         );

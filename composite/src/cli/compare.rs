@@ -39,6 +39,9 @@ pub(super) struct CompareArgs {
     /// Our strategy
     #[arg(long, default_value = "direct", value_name = "direct|tree|bswap|radix-k[:K]|auto", value_parser = strategy_named)]
     strategy: Strategy,
+    /// Send messages also between processes of one machine, which else merge in shared memory
+    #[arg(long)]
+    messages: bool,
     /// Our instruction set at most: scalar, sse4.2, avx2, avx512 or neon, as far as this machine has it; or several
     #[arg(long, value_name = "LEVEL", value_delimiter = ',', value_parser = simd_named)]
     simd: Vec<SimdLevel>,
@@ -111,7 +114,8 @@ fn one_job(comm: &mut RankComm, args: &CompareArgs, icet: &Path) -> anyhow::Resu
         for &pixels in &args.pixels {
             for &simd in &levels {
                 let timeout = args.ranks.timeout();
-                let setting = Setting { size_px, pixels, strategy: args.strategy, simd, frames, timeout };
+                let (strategy, in_memory) = (args.strategy, !args.messages);
+                let setting = Setting { size_px, pixels, strategy, in_memory, simd, frames, timeout };
                 let mut bench = Bench::new(comm, icet, setting)?;
                 for &scene in args.scene.iter().copied().flatten() {
                     rows.push(bench.measure(scene)?);

@@ -110,11 +110,13 @@ pub(crate) fn join_row<P: Composite, S: Simd>(
             continue;
         }
         let first = 64 * index;
-        if word != u64::MAX
-            && join_by_vectors::<P, S>(simd, row, taken, word, first, held_colors, held_depths, side)
-        {
-            taken += word.count_ones() as usize;
-            continue;
+        // Rows that end within the word, as those of slabs do, have fewer lanes for vectors.
+        let mut word = word;
+        if word != u64::MAX {
+            let lanes = join_by_vectors::<P, S>(simd, row, taken, word, first, held_colors, held_depths, side);
+            let done = if lanes == 64 { word } else { word & !(u64::MAX << lanes) };
+            taken += done.count_ones() as usize;
+            word ^= done;
         }
         for_runs(word, |start, length| {
             let (colors, depths) = taken_run::<P>(row, taken, length);
@@ -238,7 +240,8 @@ fn words(mask: &[u8]) -> impl Iterator<Item = u64> {
     mask.chunks_exact(8).map(bytemuck::pod_read_unaligned)
 }
 
-/// Whether there is an instruction for it: 64 pixels of a depth format with colours of four bytes.
+/// Joins as many of the 64 pixels of a word as there are vectors for: none, or all whole sixteens of a depth format with colours of four
+/// bytes. Says how many pixels those are.
 #[inline(always)]
 fn join_by_vectors<P: Composite, S: Simd>(
     simd: S,
@@ -249,23 +252,22 @@ fn join_by_vectors<P: Composite, S: Simd>(
     held_colors: &mut [P::Color],
     held_depths: &mut [f32],
     side: Side,
-) -> bool {
+) -> u32 {
     #[cfg(target_arch = "x86_64")]
     if P::Color::BYTES == 4
         && P::HAS_DEPTH
         && let Some(avx512) = simd.level().as_avx512()
     {
         use fearless_simd::{Bytes, SimdInto, u32x16};
-        let held_bytes: &mut [u8] = bytemuck::cast_slice_mut(held_colors);
-        let (Some(held_bytes), Some(held_depths)) =
-            (held_bytes.get_mut(4 * first..4 * first + 256), held_depths.get_mut(first..first + 64))
-        else {
-            return false;
-        };
+        let end = (first + 64).min(held_depths.len());
+        let held_bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut held_colors[first..end]);
+        let held_depths = &mut held_depths[first..end];
         let mut taken = taken;
+        let mut done = 0;
         let quarters = held_bytes.as_chunks_mut::<64>().0.iter_mut().zip(held_depths.as_chunks_mut::<16>().0);
-        for (quarter, (held_color, held_depth)) in quarters.enumerate() {
-            let lanes = (word >> (16 * quarter)) as u16;
+        for (held_color, held_depth) in quarters {
+            let lanes = (word >> done) as u16;
+            done += 16;
             if lanes == 0 {
                 continue;
             }
@@ -287,10 +289,10 @@ fn join_by_vectors<P: Composite, S: Simd>(
             );
             taken += lanes.count_ones() as usize;
         }
-        return true;
+        return done;
     }
     let _ = (simd, row, taken, word, first, held_colors, held_depths, side);
-    false
+    0
 }
 
 /// Writes up to 64 pixels with colours of four bytes, background where `word` has no bit. Whether there is an instruction for it.
@@ -304,18 +306,24 @@ fn place_by_vectors<P: Composite, S: Simd>(
 ) -> bool {
     #[cfg(target_arch = "x86_64")]
     if P::Color::BYTES == 4
-        && held.len() == 64
         && let Some(avx512) = simd.level().as_avx512()
     {
         use fearless_simd::{Bytes, SimdBase, SimdInto, u8x64, u32x16};
         let mut taken = taken;
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(held);
-        for (quarter, held) in bytes.as_chunks_mut::<64>().0.iter_mut().enumerate() {
+        for (quarter, held) in bytes.chunks_mut(64).enumerate() {
             let lanes = (word >> (16 * quarter)) as u16;
             let packed = padded_16(avx512, row.behind_colors, 4 * taken);
             // A colour of a depth or a premultiplied format that is not there is all zeros.
             let colors: u32x16<_> = expand_16(avx512, packed.into(), lanes).simd_into(avx512);
-            colors.bitcast::<u8x64<_>>().store_slice(held);
+            let colors = colors.bitcast::<u8x64<_>>();
+            if held.len() == 64 {
+                colors.store_slice(held);
+            } else {
+                let mut last = [0; 64];
+                colors.store_slice(&mut last);
+                held.copy_from_slice(&last[..held.len()]);
+            }
             taken += lanes.count_ones() as usize;
         }
         return true;

@@ -58,8 +58,8 @@ pub(crate) fn drop_full_alpha_scalar(out: &mut Vec<u8>, start: usize) -> bool {
 }
 
 fn drop_rest(out: &mut Vec<u8>, mut from: usize, mut to: usize) {
-    while from < out.len() {
-        out.copy_within(from..from + 3, to);
+    while let Some(&[red, green, blue, _]) = out[from..].first_chunk::<4>() {
+        out[to..to + 3].copy_from_slice(&[red, green, blue]);
         (from, to) = (from + 4, to + 3);
     }
     out.truncate(to);

@@ -85,7 +85,8 @@ fn check_format<F: Composite>() {
                     // Placed, it is what was drawn.
                     let mut placed = planes::<F>(150, 5, |_, _| true);
                     let (colors, placed_depths) = (&mut placed.colors, &mut placed.depths);
-                    part.place::<F>(kernels, 150, colors, if depths { placed_depths } else { &mut [] });
+                    let placed_depths: &mut [f32] = if depths { placed_depths } else { &mut [] };
+                    part.place::<F>(kernels, 150, colors, placed_depths, &mut Vec::new());
                     for y in rect.y0..rect.y1 {
                         let (color, depth) = placed.view().row(y, rect.x0, rect.x1);
                         assert_eq!(color, layer.view().row(y, rect.x0, rect.x1).0);
@@ -261,7 +262,7 @@ proptest! {
                 part.join_to(kernels, &mut layer, Side::Lower);
             }
             let mut image = planes::<P>(70, 5, |_, _| false);
-            part.place::<P>(Kernels::new(None), 70, &mut image.colors, &mut image.depths);
+            part.place::<P>(Kernels::new(None), 70, &mut image.colors, &mut image.depths, &mut Vec::new());
         }
     }
 }

@@ -25,6 +25,7 @@ pub(super) struct Setting {
     pub(super) size_px: u32,
     pub(super) pixels: Pixels,
     pub(super) strategy: Strategy,
+    pub(super) in_memory: bool,
     pub(super) simd: Option<SimdLevel>,
     pub(super) frames: u64,
     pub(super) timeout: Duration,
@@ -43,7 +44,7 @@ pub(super) struct Bench<'a> {
 
 impl<'a> Bench<'a> {
     pub(super) fn new(comm: &'a mut RankComm, path: &Path, setting: Setting) -> anyhow::Result<Self> {
-        let Setting { size_px: size, strategy, simd, timeout, .. } = setting;
+        let Setting { size_px: size, strategy, in_memory, simd, timeout, .. } = setting;
         let mode = match setting.pixels {
             Pixels::Depth => IcetMode::Depth,
             Pixels::Blend => IcetMode::BlendF32,
@@ -55,6 +56,7 @@ impl<'a> Bench<'a> {
         // IceT collects colours only. Its ranks do not wait for each other at the end either: the barrier is timed for both.
         let options = Options {
             strategy,
+            in_memory,
             simd,
             depth: false,
             confirm: false,
@@ -75,7 +77,7 @@ impl<'a> Bench<'a> {
     /// Frames of one scene.
     pub(super) fn measure(&mut self, scene: Scene) -> anyhow::Result<Row> {
         let (rank, ranks) = (self.comm.comm().rank(), self.comm.comm().size());
-        let Setting { size_px, pixels, strategy, simd, frames, timeout } = self.setting;
+        let Setting { size_px, pixels, strategy, simd, frames, timeout, .. } = self.setting;
         let mut ours_ms = Vec::new();
         let mut rivals_ms = vec![Vec::new(); IcetStrategy::ALL.len()];
         let mut pixels_differ = 0;
@@ -166,10 +168,11 @@ impl<'a> Bench<'a> {
             pixels_differ,
             ours_min_ms: smallest(&ours_ms),
             rival_min_ms: smallest(&rivals_ms[best]),
-            ours_strategy: format!(
-                "{:?}",
-                reports.last().map_or(strategy, |report| report.strategy)
-            ),
+            ours_strategy: match reports.last() {
+                Some(report) if report.in_memory => "SharedMemory".to_string(),
+                Some(report) => format!("{:?}", report.strategy),
+                None => format!("{strategy:?}"),
+            },
             simd: simd.unwrap_or_else(SimdLevel::best).name().to_string(),
             ours_mb: total(0) as f64 / 1e6,
             ours_messages: total(8),

@@ -51,7 +51,7 @@ pub(super) struct Row {
     pub(super) pixels_differ: u64,
     pub(super) ours_min_ms: f64,
     pub(super) rival_min_ms: f64,
-    /// The strategy that was used for the last frame.
+    /// The strategy that was used for the last frame; `SharedMemory` where no messages were sent.
     pub(super) ours_strategy: String,
     pub(super) simd: String,
     pub(super) ours_mb: f64,
