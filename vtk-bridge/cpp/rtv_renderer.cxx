@@ -27,7 +27,19 @@ vtkRtvRenderer::~vtkRtvRenderer()
 void vtkRtvRenderer::ReleaseGraphicsResources(vtkWindow* window)
 {
   this->Blit.Release(window);
+  RtvFloatCompositing::Release(this->Compositing, window);
   this->Superclass::ReleaseGraphicsResources(window);
+}
+
+void vtkRtvRenderer::DeviceRender()
+{
+  if (!this->Bridge || this->Selector || this->PreserveDepthBuffer || rtvApi->option("RTV_OFF") != 0.0)
+  {
+    this->Superclass::DeviceRender();
+    return;
+  }
+  RtvFloatCompositing compositing(this->Pass, this->Compositing);
+  this->Superclass::DeviceRender();
 }
 
 int vtkRtvRenderer::UpdateGeometry(vtkFrameBufferObjectBase* fbo)

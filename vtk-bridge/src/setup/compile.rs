@@ -15,6 +15,8 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("rtv_blit.cxx", include_str!("../../cpp/rtv_blit.cxx")),
     ("rtv_extract.cxx", include_str!("../../cpp/rtv_extract.cxx")),
     ("rtv_factory.cxx", include_str!("../../cpp/rtv_factory.cxx")),
+    ("rtv_icet.h", include_str!("../../cpp/rtv_icet.h")),
+    ("rtv_icet.cxx", include_str!("../../cpp/rtv_icet.cxx")),
     ("rtv_glyphs.cxx", include_str!("../../cpp/rtv_glyphs.cxx")),
     ("rtv_renderer.cxx", include_str!("../../cpp/rtv_renderer.cxx")),
     ("rtv_volumes.cxx", include_str!("../../cpp/rtv_volumes.cxx")),
@@ -34,6 +36,9 @@ pub const MODULES: &[&str] = &[
     "CommonCore",
 ];
 
+/// Those of ParaView beyond them, for compositing over ranks.
+const PARAVIEW_MODULES: &[&str] = &["RemotingViews", "RenderingParallel", "ParallelCore", "IceTCore"];
+
 /// Writes the sources into `folder`.
 pub fn write_sources(folder: &Path) -> Result<(), SetupError> {
     fs::create_dir_all(folder).map_err(io(folder, "make the folder"))?;
@@ -46,7 +51,8 @@ pub fn write_sources(folder: &Path) -> Result<(), SetupError> {
 
 /// Compiles the shim for `flavour` into `out`.
 pub fn shim(flavour: &Flavour, sources: &Path, out: &Path) -> Result<(), SetupError> {
-    library(flavour, sources, &[], &[], out, format!("the shim for VTK {}", flavour.name))
+    let more = if flavour.is_paraview() { PARAVIEW_MODULES } else { &[] };
+    library(flavour, sources, &[], more, out, format!("the shim for VTK {}", flavour.name))
 }
 
 /// Compiles the shim's sources, and `more` with `modules`, into the shared library `out`.
@@ -65,7 +71,9 @@ pub(crate) fn library(
     let compiler = std::env::var("CXX").ok().filter(|c| !c.is_empty()).unwrap_or_else(|| "g++".to_owned());
     let mut command = Command::new(&compiler);
     command.args(["-std=c++17", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-w"]);
-    command.arg("-I").arg(sources).arg("-isystem").arg(&flavour.include).arg("-o").arg(&beside);
+    command.arg("-I").arg(sources).arg("-isystem").arg(&flavour.include);
+    // ParaView's copy of IceT.
+    command.arg("-isystem").arg(flavour.include.join("vtkicet/src/include")).arg("-o").arg(&beside);
     let cxx = SOURCES.iter().filter(|(n, _)| n.ends_with(".cxx"));
     command.args(cxx.map(|(n, _)| sources.join(n))).args(more);
     // Libraries of VTK need others of it, which the process has already.
