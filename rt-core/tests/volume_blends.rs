@@ -100,7 +100,10 @@ fn surfaces_of_given_values_lie_one_behind_the_other() {
         for w in along.windows(2) {
             for s in values.iter().filter(|s| (w[0] < **s) != (w[1] < **s)) {
                 met += 1;
-                let (a, color) = (v.transfer_function().extinction((*s).into()), v.transfer_function().colors().lookup(*s));
+                let (a, color) = (
+                    v.transfer_function().extinction((*s).into()),
+                    v.transfer_function().colors().lookup(*s),
+                );
                 (0..3).for_each(|c| rgb[c] += through * a * f64::from(color[c]));
                 through *= 1.0 - a;
             }
@@ -180,7 +183,10 @@ fn projections_and_media_are_put_one_behind_the_other() {
     let medium = volume(VolumeOptions::default());
     let ray = Ray::new(Vec3::new(-3.0, 2.6, 7.3), Vec3::X);
     let behind = Ray::new(Vec3::new(-30.0, 2.6, 7.3), Vec3::X);
-    let [front, back] = [projection.integrate(&ray, 0.0, f32::INFINITY, &QUALITY), medium.integrate(&behind, 0.0, f32::INFINITY, &QUALITY)];
+    let [front, back] = [
+        projection.integrate(&ray, 0.0, f32::INFINITY, &QUALITY),
+        medium.integrate(&behind, 0.0, f32::INFINITY, &QUALITY),
+    ];
     let both = integrate_overlapping(&[(&medium, behind), (&projection, ray)], 0.0, f32::INFINITY, &QUALITY);
     let through = 1.0 - front.rgba[3];
     let expected: [f64; 4] = std::array::from_fn(|c| f64::from(front.rgba[c] + through * back.rgba[c]));
@@ -193,7 +199,9 @@ fn bad_options_are_named() {
     let lights = vec![VolumeLight { direction: Some(Vec3::ZERO), color: [1.0; 3] }];
     assert!(fault(VolumeOptions { lights, ..VolumeOptions::default() }).contains("lights"));
     let gradient_opacity = Some(GradientOpacity { factors: Vec::new().into(), steepest: 1.0 });
-    assert!(fault(VolumeOptions { gradient_opacity, ..VolumeOptions::default() }).contains("gradient opacity"));
+    assert!(
+        fault(VolumeOptions { gradient_opacity, ..VolumeOptions::default() }).contains("gradient opacity")
+    );
     let blend = Blend::Isosurfaces([f32::NAN].into());
     assert!(fault(VolumeOptions { blend, ..VolumeOptions::default() }).contains("isosurface"));
 }

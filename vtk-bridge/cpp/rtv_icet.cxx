@@ -1,12 +1,5 @@
-#include "rtv_icet.h"
-
-#if defined(__has_include)
-#if __has_include(<vtkIceTCompositePass.h>) && __has_include(<IceT.h>)
-#define RTV_HAS_ICET 1
-#endif
-#endif
-
-#ifdef RTV_HAS_ICET
+// ParaView's pass that composites ranks with IceT, with other pixels. A library of its own, opened by the shim when there are several ranks: it needs
+// ParaView's libraries, and if the shim brought those along they would register their renderer before ours.
 #include <algorithm>
 #include <vector>
 #include <vtkCamera.h>
@@ -206,52 +199,29 @@ vtkRtvIceTPass* vtkRtvIceTPass::Drawing = nullptr;
 const vtkRenderState* vtkRtvIceTPass::DrawingState = nullptr;
 vtkStandardNewMacro(vtkRtvIceTPass);
 
-RtvFloatCompositing::RtvFloatCompositing(vtkRenderPass* pass, vtkSmartPointer<vtkRtvIceTPass>& kept)
+#define RTV_EXPORT extern "C" __attribute__((visibility("default")))
+
+// Puts our pass into the place of ParaView's below `camera`, made with `kept` or anew. Null when that does not composite translucent pictures.
+RTV_EXPORT vtkRenderPass* rtv_icet_begin(vtkRenderPass* camera, vtkRenderPass* kept)
 {
-  auto camera = vtkCameraPass::SafeDownCast(pass);
-  auto icet = camera ? vtkIceTCompositePass::SafeDownCast(camera->GetDelegatePass()) : nullptr;
+  auto outer = vtkCameraPass::SafeDownCast(camera);
+  auto icet = outer ? vtkIceTCompositePass::SafeDownCast(outer->GetDelegatePass()) : nullptr;
   if (!icet || !vtkRtvIceTPass::Fits(icet))
   {
-    return;
+    return nullptr;
   }
-  if (!kept)
-  {
-    kept = vtkSmartPointer<vtkRtvIceTPass>::New();
-  }
+  vtkRtvIceTPass* own = kept ? vtkRtvIceTPass::SafeDownCast(kept) : vtkRtvIceTPass::New();
   // The camera's pass holds the only reference.
   icet->Register(nullptr);
-  kept->Borrow(icet);
-  camera->SetDelegatePass(kept);
-  this->Camera = camera;
-  this->Own = kept;
+  own->Borrow(icet);
+  outer->SetDelegatePass(own);
+  return own;
 }
 
-RtvFloatCompositing::~RtvFloatCompositing()
+// Puts ParaView's pass back, with the result.
+RTV_EXPORT void rtv_icet_end(vtkRenderPass* camera, vtkRenderPass* own)
 {
-  if (this->Own)
-  {
-    vtkIceTCompositePass* icet = this->Own->GiveBack();
-    static_cast<vtkCameraPass*>(this->Camera)->SetDelegatePass(icet);
-    icet->UnRegister(nullptr);
-  }
+  vtkIceTCompositePass* icet = vtkRtvIceTPass::SafeDownCast(own)->GiveBack();
+  vtkCameraPass::SafeDownCast(camera)->SetDelegatePass(icet);
+  icet->UnRegister(nullptr);
 }
-
-void RtvFloatCompositing::Release(vtkSmartPointer<vtkRtvIceTPass>& kept, vtkWindow* window)
-{
-  if (kept)
-  {
-    kept->ReleaseGraphicsResources(window);
-  }
-}
-
-#else
-#include <vtkObject.h>
-
-class vtkRtvIceTPass : public vtkObject
-{
-};
-
-RtvFloatCompositing::RtvFloatCompositing(vtkRenderPass*, vtkSmartPointer<vtkRtvIceTPass>&) {}
-RtvFloatCompositing::~RtvFloatCompositing() = default;
-void RtvFloatCompositing::Release(vtkSmartPointer<vtkRtvIceTPass>&, vtkWindow*) {}
-#endif

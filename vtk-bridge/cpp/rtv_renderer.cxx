@@ -6,6 +6,7 @@
 
 #include <vtkFrameBufferObjectBase.h>
 #include <vtkObjectFactory.h>
+#include <vtkRenderPass.h>
 #include <vtkRenderTimerLog.h>
 #include <vtkTimeStamp.h>
 
@@ -27,7 +28,10 @@ vtkRtvRenderer::~vtkRtvRenderer()
 void vtkRtvRenderer::ReleaseGraphicsResources(vtkWindow* window)
 {
   this->Blit.Release(window);
-  RtvFloatCompositing::Release(this->Compositing, window);
+  if (this->Compositing)
+  {
+    this->Compositing->ReleaseGraphicsResources(window);
+  }
   this->Superclass::ReleaseGraphicsResources(window);
 }
 

@@ -2,7 +2,7 @@
 // Compiled by `vtk-bridge install` for each VTK on the machine, because the layout of VTK's classes differs from version to version.
 #pragma once
 #include "rtv.h"
-#include "rtv_icet.h"
+#include "rtv_compositing.h"
 
 #include <map>
 #include <vector>
@@ -80,7 +80,7 @@ private:
   RtvBridge* Bridge = nullptr;
   RtvExtractor Extractor;
   RtvBlit Blit;
-  vtkSmartPointer<vtkRtvIceTPass> Compositing;
+  vtkSmartPointer<vtkRenderPass> Compositing;
   // Set while OpenGL draws the rest: where the picture goes.
   bool HasPicture = false;
   bool PictureIsBlended = false;

@@ -158,7 +158,8 @@ pub(crate) fn draw(frame: &mut Frame, first_depth: &[f32], edges: &[Option<Edges
         return;
     }
     // What is translucent in front of the opaque surfaces hides the part of an edge that has no surface behind it.
-    let veiled: Vec<bool> = first_depth.par_iter().zip(&frame.depth).map(|(first, own)| first < own).collect();
+    let veiled: Vec<bool> =
+        first_depth.par_iter().zip(&frame.depth).map(|(first, own)| first < own).collect();
 
     // ---- On the surface.
     let width = view.width as usize;
@@ -261,8 +262,13 @@ mod tests {
         // A corner moves by one pixel along the diagonal, that is 0.7 pixels in x and in y: the pixels whose middle is half a pixel outside.
         let (again, _) = square();
         let frame = draw(again, 1.0);
-        assert!(shown(&frame, 50, 75) && shown(&frame, 75, 50) && shown(&frame, 24, 50) && shown(&frame, 50, 24));
-        assert!(!shown(&frame, 50, 76) && !shown(&frame, 50, 74), "nor further out, nor inside: rays see that");
+        assert!(
+            shown(&frame, 50, 75) && shown(&frame, 75, 50) && shown(&frame, 24, 50) && shown(&frame, 50, 24)
+        );
+        assert!(
+            !shown(&frame, 50, 76) && !shown(&frame, 50, 74),
+            "nor further out, nor inside: rays see that"
+        );
         assert_eq!(frame.color[75 * 100 + 50], [1.0, 0.0, 0.0, 1.0]);
         assert!((frame.depth[75 * 100 + 50] - 0.5).abs() < 1e-6);
         let (again, _) = square();

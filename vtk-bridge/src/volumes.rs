@@ -122,7 +122,10 @@ fn lights(v: &Input<'_>, place: DAffine3) -> Result<Vec<VolumeLight>, String> {
     let light = |l: &[f32; 6]| {
         let towards = to_volume * DVec3::new(l[0].into(), l[1].into(), l[2].into());
         let direction = fixed(l).then(|| towards.normalize_or_zero().as_vec3());
-        VolumeLight { direction, color: [l[3], l[4], l[5]].map(|c| if c.is_finite() { c.max(0.0) } else { 0.0 }) }
+        VolumeLight {
+            direction,
+            color: [l[3], l[4], l[5]].map(|c| if c.is_finite() { c.max(0.0) } else { 0.0 }),
+        }
     };
     Ok(v.lights.iter().map(light).collect())
 }

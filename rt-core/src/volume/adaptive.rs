@@ -8,8 +8,8 @@
 //! 3. the curve reaches a step of the transfer function elsewhere than its chord does;
 //! 4. colours are mixed, not put one behind the other: seen as a difference too, but only when both parts have some thickness.
 
-use super::layer::{Layer, March};
 use super::Volume;
+use super::layer::{Layer, March};
 use super::shading::LitStretch;
 use crate::grid_walk::Crossing;
 use crate::ray_cubic;

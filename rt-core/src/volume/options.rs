@@ -174,7 +174,11 @@ impl VolumeOptions {
         }
         if let Some(g) = &self.gradient_opacity {
             if !(g.steepest > 0.0 && g.steepest.is_finite()) || g.factors.is_empty() {
-                return fault("gradient opacity's steepest", g.steepest, "finite and positive, with one factor or more");
+                return fault(
+                    "gradient opacity's steepest",
+                    g.steepest,
+                    "finite and positive, with one factor or more",
+                );
             }
             if let Some(&f) = g.factors.iter().find(|f| !(0.0..=1.0).contains(*f)) {
                 return fault("a factor of the gradient opacity", f, "0 to 1");

@@ -51,9 +51,8 @@ impl Volume {
         let size = i64::from(MACROCELL);
         let mut going = true;
         index_ray.walk([0; 3], cells, cells, size, t0, t1, |block| {
-            let [low, high] = self.ranges[self.block_index(UVec3::from_array(
-                block.cell.map(|c| (c / size) as u32),
-            ))];
+            let [low, high] =
+                self.ranges[self.block_index(UVec3::from_array(block.cell.map(|c| (c / size) as u32)))];
             if low > high || block.t1 <= block.t0 || !wanted(low.into(), high.into()) {
                 return true;
             }
@@ -120,14 +119,20 @@ impl Volume {
         };
         let path = if mean { 1.0 } else { self.bounds().extent().as_dvec3().length() };
         let error_per_length = levels / 255.0 / path;
-        self.cross(ray, t0, t1, |_, _| true, |_, s| {
-            let way = (s.crossing.t1 - s.crossing.t0) * per_t;
-            length += way;
-            let (sum, count) = self.weighted(&s.b, way, error_per_length, 0);
-            samples += count;
-            total.iter_mut().zip(sum).for_each(|(t, s)| *t += s);
-            ControlFlow::Continue(())
-        });
+        self.cross(
+            ray,
+            t0,
+            t1,
+            |_, _| true,
+            |_, s| {
+                let way = (s.crossing.t1 - s.crossing.t0) * per_t;
+                length += way;
+                let (sum, count) = self.weighted(&s.b, way, error_per_length, 0);
+                samples += count;
+                total.iter_mut().zip(sum).for_each(|(t, s)| *t += s);
+                ControlFlow::Continue(())
+            },
+        );
         if length == 0.0 {
             return VolumeSample::CLEAR;
         }
@@ -143,8 +148,8 @@ impl Volume {
         // Not in the middle: an antisymmetric cubic passes through the middle of its chord.
         let split = 0.375;
         let (near, far) = ray_cubic::split(b, split);
-        let [first, second] =
-            [(&near, split), (&far, 1.0 - split)].map(|(b, part)| self.along_chord(b[0], b[3], length * part));
+        let [first, second] = [(&near, split), (&far, 1.0 - split)]
+            .map(|(b, part)| self.along_chord(b[0], b[3], length * part));
         let two: [f64; 3] = std::array::from_fn(|c| first[c] + second[c]);
         let off = (0..3).map(|c| (one[c] - two[c]).abs()).fold(0.0, f64::max);
         if depth == MAX_DEPTH || off <= error_per_length * length {

@@ -32,8 +32,7 @@ impl LitStretch<'_> {
         let mix = |a: f64, b: f64, c: f64| (a * w[0] + b * w[1] + c * w[2]).max(0.0);
         let highlight = mix(a.highlight, b.highlight, c.highlight);
         let lit = std::array::from_fn(|k| color[k] * mix(a.factor[k], b.factor[k], c.factor[k]) + highlight);
-        let sigma =
-            self.opacity.map_or(sigma, |o| sigma * o.at(mix(a.steepness, b.steepness, c.steepness)));
+        let sigma = self.opacity.map_or(sigma, |o| sigma * o.at(mix(a.steepness, b.steepness, c.steepness)));
         (sigma, lit)
     }
 }
