@@ -20,13 +20,14 @@
 //! let secs = *ends[5].as_ref().unwrap();
 //! assert!((secs - (2.0 * 0.4e-6 + 1e-6 + 1048576.0 / 3.2e9)).abs() < 1e-9, "{secs}");
 //! ```
+mod flows;
 mod network;
 mod schedule;
 
 pub use network::Network;
 
 use super::{Arrival, CommError, Communicator, Receive};
-use schedule::{Mail, Schedule, State, Wanted};
+use schedule::{Schedule, State, Wanted};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -205,11 +206,7 @@ impl Communicator for SimComm {
         } else {
             let s = &mut *schedule;
             s.ranks[rank].clock_secs += s.network.overhead_secs;
-            let now_secs = s.ranks[rank].clock_secs;
-            let arrival_secs =
-                s.network.transfer(&mut s.interfaces, (rank, destination), now_secs, message.len());
-            s.ranks[destination].mail[rank].push_back(Mail { tag, arrival_secs, message });
-            s.look_again(destination);
+            s.send(rank, destination, tag, message);
             Ok(())
         };
         self.until_computing(schedule);
@@ -259,7 +256,7 @@ impl Communicator for SimComm {
                 }
                 let overhead_secs = if source == rank { 0.0 } else { s.network.overhead_secs };
                 s.ranks[rank].clock_secs = now_secs.max(arrival_secs) + overhead_secs;
-                let message = s.ranks[rank].mail[source].remove(at).map(|m| m.message).unwrap_or_default();
+                let message = s.take(rank, source, at);
                 if message.len() > receive.capacity {
                     let Receive { source: peer, tag, capacity, .. } = receive;
                     Err(CommError::TooLong { rank, peer, tag, capacity })
