@@ -11,7 +11,7 @@ use std::time::Duration;
 const MOST_RANKS: usize = 4096;
 
 /// The network of `--model`, which is that of `--smpi`.
-const MODEL: sim::Network = sim::Network::QDR;
+const MODEL: sim::Network = sim::Network::QDR_AS_SMPI;
 
 /// What every job takes.
 #[derive(Debug, clap::Args)]

@@ -94,11 +94,11 @@ pub(crate) fn run<P: Composite>(
 
     // Everybody's first slices, then everybody's second …; the next place first, so that no rank gets all first messages. No more than two
     // rounds are on their way: messages share the wire, and with all of them under way at once the first slices would be complete, and begin
-    // to be collected, no sooner than the last.
+    // to be collected, no sooner than the last. With a few slices only there is nothing to gain.
     let most = plan.slices.iter().map(Vec::len).max().unwrap_or(0);
     let mut last_round = 0;
     for index in 0..most {
-        if index > 1 {
+        if most > 3 && index > 1 {
             session.let_leave(last_round);
         }
         last_round = 0;

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 struct Flow {
     number: u64,
+    tag: u32,
     from: usize,
     to: usize,
     /// Seconds it would still take alone, at the time of the last change.
@@ -33,11 +34,11 @@ impl Flows {
     }
 
     /// Begins a message that would take `secs` alone; what ended before must have been [`end`](Self::end_next)ed. Returns its number.
-    pub(super) fn begin(&mut self, (from, to): (usize, usize), now_secs: f64, secs: f64) -> u64 {
+    pub(super) fn begin(&mut self, (from, to): (usize, usize), tag: u32, now_secs: f64, secs: f64) -> u64 {
         self.go_on(now_secs);
         let number = self.next;
         self.next += 1;
-        self.active.push(Flow { number, from, to, left_secs: secs, rate: 0.0 });
+        self.active.push(Flow { number, tag, from, to, left_secs: secs, rate: 0.0 });
         self.share();
         number
     }
@@ -56,6 +57,14 @@ impl Flows {
         self.through_secs.extend(through.into_iter().map(|number| (number, next_secs)));
         self.share();
         true
+    }
+
+    /// How many messages of a sender with this tag are on their way, and when, as far as is known, the first of them will be through.
+    pub(super) fn leaving(&self, from: usize, tag: u32) -> (usize, f64) {
+        let own = self.active.iter().filter(|flow| (flow.from, flow.tag) == (from, tag));
+        own.fold((0, f64::INFINITY), |(count, first), flow| {
+            (count + 1, first.min(self.since_secs + flow.left_secs / flow.rate))
+        })
     }
 
     /// When a message was or, as far as is known, will be through.
@@ -128,7 +137,7 @@ mod tests {
             .iter()
             .map(|&(from, to, now, secs)| {
                 while flows.end_next(now) {}
-                flows.begin((from, to), now, secs)
+                flows.begin((from, to), 0, now, secs)
             })
             .collect();
         while flows.end_next(f64::INFINITY) {}

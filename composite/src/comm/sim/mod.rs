@@ -276,6 +276,31 @@ impl Communicator for SimComm {
         result
     }
 
+    fn let_leave(&mut self, tag: u32, most: usize, patience: Duration) {
+        let group = Arc::clone(&self.group);
+        let mut schedule = group.lock();
+        self.book(&mut schedule);
+        let end_secs = schedule.ranks[self.rank].clock_secs + patience.as_secs_f64();
+        loop {
+            let now_secs = schedule.ranks[self.rank].clock_secs;
+            // First all that others may do before now.
+            schedule.wait(self.rank, Vec::new(), now_secs);
+            let Ok(granted) = self.until_granted(&group, schedule) else { return };
+            schedule = granted;
+            let (count, first_secs) = schedule.flows.leaving(self.rank, tag);
+            if count <= most || now_secs >= end_secs {
+                break;
+            }
+            // Others may slow it down meanwhile: then it is looked at again.
+            let until_secs = first_secs.max(now_secs).min(end_secs);
+            schedule.wait(self.rank, Vec::new(), until_secs);
+            let Ok(granted) = self.until_granted(&group, schedule) else { return };
+            schedule = granted;
+            schedule.ranks[self.rank].clock_secs = until_secs;
+        }
+        self.until_computing(schedule);
+    }
+
     fn abort(&mut self, reason: &str) {
         let mut schedule = self.group.lock();
         if schedule.aborted.is_none() {

@@ -11,8 +11,8 @@ use std::collections::VecDeque;
 pub(super) enum Travel {
     /// It is too short to be in anybody's way.
     Until(f64),
-    /// With the last byte of this flow, after the latency.
-    With(u64),
+    /// With the last byte of this flow, and the latency after it.
+    With(u64, f64),
 }
 
 /// A message under way or arrived.
@@ -84,7 +84,7 @@ impl Schedule {
         let (at, mail) = mail.filter(|(_, m)| m.tag == wanted.tag).nth(wanted.place)?;
         let arrival_secs = match mail.travel {
             Travel::Until(secs) => secs,
-            Travel::With(flow) => self.flows.end_secs(flow) + self.network.latency_secs,
+            Travel::With(flow, latency_secs) => self.flows.end_secs(flow) + latency_secs,
         };
         Some((at, arrival_secs))
     }
@@ -92,15 +92,17 @@ impl Schedule {
     /// Sends `message` when a rank's clock says so: it shares the interfaces from then on.
     pub(super) fn send(&mut self, from: usize, to: usize, tag: u32, message: Vec<u8>) {
         let now_secs = self.ranks[from].clock_secs;
-        let Network { gap_secs, byte_secs, latency_secs, .. } = self.network;
-        let busy_secs = message.len() as f64 * byte_secs;
+        let Network { gap_secs, byte_secs, .. } = self.network;
+        let (latency_factor, byte_factor) = self.network.factors(message.len());
+        let latency_secs = self.network.latency_secs * latency_factor;
+        let busy_secs = message.len() as f64 * byte_secs * byte_factor;
         let travel = if from == to {
             Travel::Until(now_secs)
         } else if busy_secs <= gap_secs {
             Travel::Until(now_secs + gap_secs + latency_secs)
         } else {
             while self.flows.end_next(now_secs) {}
-            Travel::With(self.flows.begin((from, to), now_secs, busy_secs))
+            Travel::With(self.flows.begin((from, to), tag, now_secs, busy_secs), latency_secs)
         };
         self.ranks[to].mail[from].push_back(Mail { tag, travel, message });
         // What is under way may have become slower.
@@ -110,7 +112,7 @@ impl Schedule {
     /// Takes a message out of its queue.
     pub(super) fn take(&mut self, rank: usize, source: usize, at: usize) -> Vec<u8> {
         let Some(mail) = self.ranks[rank].mail[source].remove(at) else { return Vec::new() };
-        if let Travel::With(flow) = mail.travel {
+        if let Travel::With(flow, _) = mail.travel {
             self.flows.forget(flow);
         }
         mail.message
