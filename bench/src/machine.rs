@@ -28,6 +28,11 @@ pub struct Machine {
     pub optimised: bool,
 }
 
+/// Running processes averaged over the last minute; `None` when the system does not say.
+pub fn load() -> Option<f64> {
+    leading_number(&std::fs::read_to_string("/proc/loadavg").unwrap_or_default())
+}
+
 impl Machine {
     /// Asks the system.
     pub fn describe() -> Machine {
@@ -41,7 +46,7 @@ impl Machine {
             cores: std::thread::available_parallelism().map_or(1, |n| n.get()),
             simd: simd_level().into(),
             memory_gib: (memory_kib / 1024.0 / 1024.0 * 10.0).round() / 10.0,
-            load_1_min: leading_number(&read("/proc/loadavg")),
+            load_1_min: load(),
             os: format!("{} {}", std::env::consts::OS, kernel.trim()).trim().to_string(),
             date: iso_8601(secs),
             version: env!("CARGO_PKG_VERSION").into(),

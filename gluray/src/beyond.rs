@@ -7,6 +7,7 @@
 use crate::config::{Mode, Settings, Surface};
 use crate::effects::{Random, Surroundings, eye_from_object};
 use crate::enums::*;
+use crate::ranks::rows::{BAND, Share};
 use crate::trace::{Fragment, Prepared, Rect};
 use crate::view::View;
 use rayon::prelude::*;
@@ -82,13 +83,14 @@ const LEAST_WEIGHT: f32 = 1.0 / 512.0;
 /// Layers of translucent surfaces, and culled or clipped triangles, on one ray.
 const MOST_LAYERS: usize = 256;
 
-/// Colours of every pixel of `rect`. `background` is what the program cleared to, which mirrors and glass see.
+/// Colours of every pixel of `rect` that is in the share. `background` is what the program cleared to, which mirrors and glass see.
 pub(crate) fn colors(
     draws: &[Prepared<'_>],
     view: &View,
     rect: Rect,
     settings: &Settings,
     background: [f32; 3],
+    share: Share,
 ) -> Colors {
     let mut around = Surroundings::of(draws, settings);
     around.clear = draws.iter().map(|p| is_clear(p, settings)).collect();
@@ -108,7 +110,10 @@ pub(crate) fn colors(
     let (w, h) = (rect.w.max(0) as usize, rect.h.max(0) as usize);
     let rgba = (0..w * h)
         .into_par_iter()
-        .map(|k| beyond.pixel(rect.x + (k % w) as i32, rect.y + (k / w) as i32, lens))
+        .map(|k| match share.has(k / w / BAND) {
+            true => beyond.pixel(rect.x + (k % w) as i32, rect.y + (k / w) as i32, lens),
+            false => [0.0; 4],
+        })
         .collect();
     let rays = [
         ("primary", &beyond.primary),

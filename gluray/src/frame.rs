@@ -18,6 +18,9 @@ use std::time::Instant;
 /// A draw with the image of its texture.
 pub(crate) type Pending = (Draw, Option<Arc<Image>>);
 
+/// Before what the driver draws of which nobody knows what it does to what is there.
+pub(crate) const ORDER_MATTERS: &str = "a draw of the driver's whose order matters";
+
 /// Draws that wait for the end of the frame.
 #[derive(Default)]
 pub(crate) struct Frame {
@@ -38,6 +41,14 @@ impl Frame {
     /// The driver drew lines or points whose order does not matter but for ties.
     pub(crate) fn others_drew(&mut self) {
         self.others |= !self.pending.is_empty();
+    }
+}
+
+impl Frame {
+    /// Peeled surfaces are traced for this frame.
+    pub(crate) fn traced_peeled(&mut self, frame: u64, draws: &[Pending]) {
+        self.traced = true;
+        self.told.traced(frame, draws.iter().map(|(d, _)| d));
     }
 }
 
@@ -144,6 +155,9 @@ impl Context {
         }
         crate::fault::injected("flush");
         self.end_batch();
+        if self.programs.peeling.has_draws() && matches!(before, "glBeginQuery" | ORDER_MATTERS) {
+            self.gather_peeled();
+        }
         let pending = std::mem::take(&mut self.frame.pending);
         let others = std::mem::take(&mut self.frame.others);
         if !self.probes.draws.is_empty() {
@@ -191,7 +205,7 @@ impl Context {
         self.counters.rays("primary", traced.primary);
         self.counters.rays("shadow", traced.extra[0]);
         self.counters.rays("ambient occlusion", traced.extra[1]);
-        self.counters.report.builds += traced.builds;
+        self.counters.made(traced.structures);
         self.counters.report.pixels += traced.layer.covered as u64;
         let start = Instant::now();
         if traced.layer.covered > 0 {
@@ -210,14 +224,14 @@ impl Context {
         self.counters.flushed("in order");
         self.frame.told.traced(self.counters.report.frames + 1, std::iter::once(draw));
         let start = Instant::now();
-        let mut builds = 0;
-        let (layers, rays) = worker::on_pool(|| match Prepared::new(draw, image, &mut builds) {
+        let mut structures = crate::cache::Structures::default();
+        let (layers, rays) = worker::on_pool(|| match Prepared::new(draw, image, &mut structures) {
             Some(p) => (trace::in_order(&p), p.rays.load(Relaxed)),
             None => (Vec::new(), 0),
         });
         self.counters.spent("trace", start.elapsed());
         self.counters.rays("primary", rays);
-        self.counters.report.builds += builds;
+        self.counters.made(structures);
         self.counters.report.pixels += layers.iter().map(|l| l.covered as u64).sum::<u64>();
         if !layers.is_empty() {
             self.present(&layers, Fate::AsDrawn);
@@ -298,6 +312,7 @@ impl Context {
             return false;
         }
         self.end_batch();
+        self.programs.peeling.cleared(self.counters.report.passed_draws);
         const COLOR_AND_DEPTH: u32 = 0x4100;
         if self.frame.traced && mask & COLOR_AND_DEPTH == COLOR_AND_DEPTH {
             self.begin_again();

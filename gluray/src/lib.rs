@@ -42,6 +42,7 @@ mod present;
 mod primitives;
 mod probe;
 mod programs;
+pub mod ranks;
 mod raster;
 mod real;
 pub mod reasons;

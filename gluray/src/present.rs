@@ -21,6 +21,8 @@ pub(crate) enum Fate {
     Times,
     /// The same again without depths: pixels whose centre sees no opaque surface.
     Fringe(u32),
+    /// Premultiplied colours over what is there, whatever the depths.
+    Gathered,
     /// Everything the program has set: a draw whose order matters.
     AsDrawn,
 }
@@ -186,7 +188,7 @@ impl Kept {
             samplers[unit] = if samplers_exist { gl::int(SAMPLER_BINDING) } else { 0 };
         }
         let caps = match core {
-            true => [&OFF[..], &OPERATIONS, &[DEPTH_TEST, DEPTH_CLAMP]].concat(),
+            true => [&OFF[..], &OPERATIONS, &[DEPTH_TEST, DEPTH_CLAMP, SCISSOR_TEST]].concat(),
             false => Vec::new(),
         };
         Kept {
@@ -300,6 +302,15 @@ impl Context {
             gl::depth_mask(0);
             gl::color_mask(1, 1, 1, 0);
         }
+        if fate == Fate::Gathered {
+            OPERATIONS.into_iter().for_each(gl::disable);
+            gl::disable(SCISSOR_TEST);
+            gl::disable(DEPTH_TEST);
+            gl::enable(BLEND);
+            gl::blend_equation(FUNC_ADD);
+            gl::blend_func(ONE, ONE_MINUS_SRC_ALPHA);
+            gl::color_mask(1, 1, 1, 1);
+        }
         if let Fate::Surface(func) | Fate::Over(func) | Fate::Fringe(func) = fate {
             OPERATIONS.into_iter().for_each(gl::disable);
             if !matches!(fate, Fate::Surface(_)) {
@@ -338,13 +349,6 @@ impl Context {
                 }
                 gl::end();
             }
-        }
-        if core
-            && kept.caps.iter().all(|(c, _)| *c != SCISSOR_TEST)
-            && fate != Fate::AsDrawn
-            && self.state.scissor.is_some()
-        {
-            gl::enable(SCISSOR_TEST);
         }
     }
 }

@@ -4,25 +4,29 @@
 //! when every statement is one whose meaning is written down in `template`: a shader with anything else in it (picking, edges, depth peeling,
 //! physically based materials) is left to the driver.
 
+mod peeling;
 mod template;
+mod wire;
 
 use crate::arrays::{Elements, Source, Taken, positions};
 use crate::cache::Geometry;
-use crate::capture::{Attributes, Shading, Values};
+use crate::capture::{Attributes, Draw, Shading, Values};
 use crate::config::Mode;
 use crate::context::Context;
 use crate::decide::{self, Verdict};
 use crate::effects::{Place, Visibility, vector};
 use crate::enums::*;
 use crate::lighting::{normalized, transform};
+use crate::overrides::Look;
 use crate::real::gl;
 use crate::state::current::Current;
 use crate::texturing::{self, Image};
 use crate::trace::mixed;
+use peeling::Peeling;
 use rt_core::mesh::TriMesh;
 use std::collections::HashMap;
 use std::sync::Arc;
-use template::{Colors, Template};
+use template::{Colors, Peel, Template};
 
 /// What colours a program's surface.
 pub(crate) enum ProgramSkin<'a> {
@@ -289,6 +293,7 @@ pub(crate) struct Programs {
     templates: HashMap<u32, Result<Template, &'static str>>,
     made: HashMap<Key, Made>,
     frame: u64,
+    pub(crate) peeling: Peeling,
 }
 
 /// What was made of a draw's buffers, and the frame that used it last.
@@ -361,6 +366,7 @@ impl Context {
             return self.take_shape(mode, call, elements).map(|()| Taken::Shape);
         }
         let template = template?;
+        self.peels(template.peel)?;
         let position = attribute(program, "vertexMC").ok_or("a program without positions")?;
         let sources = [
             Some(position),
@@ -399,6 +405,14 @@ impl Context {
         self.cache.touch(&geometry);
         // VTK leaves blending on; without transparency it changes nothing.
         let mut state = (*self.state).clone();
+        if template.peel == Peel::Layers {
+            self.peeled_surface(&mut state)?;
+            let clip_from_object = recognised.clip_from_object;
+            let shading = Shading::Program(Arc::new(recognised));
+            let (state, look) = (Arc::new(state), Look::default());
+            self.take_peeled(Draw { geometry, attributes, state, shading, clip_from_object, calls: 1, look });
+            return Ok(Taken::Traced);
+        }
         if state.blend_is_over && recognised.is_opaque(&attributes, geometry.mesh.positions.len()) {
             state.blend = false;
         }

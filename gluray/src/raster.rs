@@ -1,7 +1,7 @@
 //! The rasterizer's rules: which pixel centres a triangle covers, and how steep it is.
 
 /// Window coordinates of a corner in units of 1/256 pixel, as the driver's rasterizer takes them.
-fn snapped(c: &[f32; 4], viewport: [i32; 4]) -> [i64; 2] {
+pub(crate) fn snapped(c: &[f32; 4], viewport: [i32; 4]) -> [i64; 2] {
     let [vx, vy, vw, vh] = viewport.map(|v| v as f32);
     let inverse = 1.0 / c[3];
     let x = c[0] * inverse * (0.5 * vw) + (0.5 * vw + vx);

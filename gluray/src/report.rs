@@ -38,6 +38,8 @@ pub struct Report {
     pub triangles: u64,
     /// Acceleration structures built.
     pub builds: u64,
+    /// Acceleration structures taken over from where the same triangles were in an earlier frame.
+    pub refits: u64,
     /// Geometry found again, and not.
     pub cache_hits: u64,
     /// Geometry seen for the first time.
@@ -50,6 +52,8 @@ pub struct Report {
     pub faults: Vec<String>,
     /// Settings that made no sense and were not taken.
     pub problems: Vec<String>,
+    /// What each rank did, where helpers trace as well; 0 is the program.
+    pub ranks: Vec<crate::ranks::RankAccount>,
     /// Objects of the last frame, largest first.
     pub objects: Vec<crate::panel::ObjectInfo>,
     /// When each phase ran, in the order in which they ended: the first two hundred thousand.
@@ -76,6 +80,7 @@ impl Report {
         self.passed_draws += other.passed_draws;
         self.triangles += other.triangles;
         self.builds += other.builds;
+        self.refits += other.refits;
         self.cache_hits += other.cache_hits;
         self.cache_misses += other.cache_misses;
         self.pixels += other.pixels;
@@ -85,6 +90,12 @@ impl Report {
         sum(&mut self.milliseconds, &other.milliseconds);
         self.faults.extend(other.faults.iter().cloned());
         self.problems.extend(other.problems.iter().cloned());
+        for r in &other.ranks {
+            match self.ranks.iter_mut().find(|own| own.rank == r.rank) {
+                Some(own) => own.add(r),
+                None => self.ranks.push(r.clone()),
+            }
+        }
         self.objects.extend(other.objects.iter().cloned());
         self.timeline.extend(other.timeline.iter().cloned());
     }
@@ -137,6 +148,12 @@ static SLOTS: Mutex<Vec<Report>> = Mutex::new(Vec::new());
 impl Counters {
     pub(crate) fn set_driver(&mut self, renderer: &str, version: &str) {
         self.report.driver = format!("{renderer}, {version}");
+    }
+
+    /// Acceleration structures were made.
+    pub(crate) fn made(&mut self, structures: crate::cache::Structures) {
+        self.report.builds += structures.built;
+        self.report.refits += structures.refitted;
     }
 
     /// Something that was asked for could not be done; said once.
@@ -197,6 +214,8 @@ impl Counters {
         sum.mode = crate::config::current().settings.mode.name().to_owned();
         sum.faults = crate::fault::messages();
         sum.problems.extend(crate::config::current().problems.iter().cloned());
+        sum.ranks = crate::ranks::accounts();
+        sum.problems.extend(crate::ranks::problems());
         write_spans(&dir.join(format!("{}.spans", sum.pid)));
         let (file, fresh) = (dir.join(format!("{}.json", sum.pid)), dir.join(format!("{}.new", sum.pid)));
         // A report that cannot be written must not trouble the program.

@@ -4,6 +4,7 @@
 use crate::capture::Attributes;
 use crate::enums::*;
 use crate::lighting::{Setup, normalized, transform};
+use crate::ranks::wire::{Malformed, Reader, Wire, put_pods};
 use crate::real::gl;
 use crate::state::snapshot::{Snapshot, TextureUnit};
 use rt_core::texture::{Filter, Texture, Wrap};
@@ -31,6 +32,29 @@ pub(crate) struct Image {
     linear: bool,
     wrap: [u32; 2],
     border: [f32; 4],
+}
+
+crate::ranks::wire::wire_enum!(Base { Alpha, Luminance, LuminanceAlpha, Intensity, Rgb, Rgba });
+
+impl Wire for Image {
+    fn put(&self, out: &mut Vec<u8>) {
+        (self.width, self.height).put(out);
+        put_pods(out, &self.texels);
+        self.base.put(out);
+        self.linear.put(out);
+        self.wrap.put(out);
+        self.border.put(out);
+    }
+    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
+        let (width, height): (usize, usize) = Wire::get(from)?;
+        let texels = from.pods()?;
+        if width.checked_mul(height) != Some(texels.len()) || texels.is_empty() {
+            return Err(from.fault(format!("an image of {width} x {height} with {} texels", texels.len())));
+        }
+        let (base, linear) = Wire::get(from)?;
+        let (wrap, border) = Wire::get(from)?;
+        Ok(Image { width, height, texels, base, linear, wrap, border })
+    }
 }
 
 fn base_of(format: u32) -> Base {

@@ -39,9 +39,13 @@ fn same(a: &DMat4, b: &DMat4) -> bool {
 impl View {
     /// `None` where rays cannot be made for the draw's projection.
     pub(crate) fn of(draw: &Draw) -> Option<View> {
-        let projection = projection(draw);
-        let camera = Camera::from_matrix(projection).ok()?;
         let [x, y, w, h] = draw.state.viewport;
+        View::new(projection(draw), Rect { x, y, w, h })
+    }
+
+    /// `None` where rays cannot be made for `projection`, clip from eye.
+    pub(crate) fn new(projection: DMat4, viewport: Rect) -> Option<View> {
+        let camera = Camera::from_matrix(projection).ok()?;
         // A small triangle that turns left before the viewer.
         let (origin, dir) = camera.world_ray([0.0, 0.0]);
         let (u, v) = (-dir.normalize()).any_orthonormal_pair();
@@ -53,7 +57,7 @@ impl View {
             projection,
             parallel: projection.row(3).truncate() == rt_core::glam::DVec3::ZERO,
             camera,
-            viewport: Rect { x, y, w, h },
+            viewport,
             mirrored: h3[0].dot(h3[1].cross(h3[2])) < 0.0,
         })
     }

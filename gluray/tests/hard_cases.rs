@@ -108,3 +108,8 @@ fn nothing_is_traced_when_tracing_is_off() {
 fn blending_in_order_is_traced_when_all_is_asked_for() {
     check("blended_over_traced", &Expected { traced: true, exit: 0 }, &["--trace", "all"]);
 }
+
+#[test]
+fn of_layers_in_one_plane_the_last_is_seen() {
+    check("layers_in_one_plane", &Expected { traced: true, exit: 0 }, &["--trace", "all"]);
+}

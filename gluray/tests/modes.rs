@@ -196,3 +196,25 @@ fn a_fault_of_ours_leaves_the_program_the_drivers_picture_and_is_logged() {
         "lists compiled before the fault, and the colour that was set before it, are the driver's now"
     );
 }
+
+#[test]
+fn frames_are_shown_one_late_where_that_is_asked_for_and_read_as_they_are() {
+    let Some(python) = peer("RTSV_SYSTEM_PYTHON") else { return };
+    let Some(x) = Xvfb::start() else { return };
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs/frames_shown.py");
+    let shown = |through: Option<&[&str]>| {
+        let place = folder();
+        let run = Run { x: &x, folder: place.path(), through, environment: &[] };
+        let (output, report) = run.program(&python, &[script.to_str().expect("UTF-8"), "out"]);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let text = std::fs::read_to_string(place.path().join("out")).expect("what was shown");
+        (serde_json::from_str::<serde_json::Value>(&text).expect("JSON"), report)
+    };
+    let at_once = serde_json::json!({ "shown": [0, 1, 2, 3, 4, 5, 6, 7], "read": 8 });
+    assert_eq!(shown(None).0, at_once, "the driver");
+    assert_eq!(shown(Some(&["--mode", "match"])).0, at_once, "in time");
+    let (late, report) = shown(Some(&["--mode", "match", "--set", "asynchronous=true"]));
+    // There is nothing before the first frame, so it is waited for.
+    assert_eq!(late, serde_json::json!({ "shown": [0, 0, 1, 2, 3, 4, 5, 6], "read": 8 }));
+    assert_eq!(report.traced_draws, 9);
+}

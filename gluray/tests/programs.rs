@@ -181,6 +181,44 @@ fn vtk_leaves_blending_on_and_is_opaque_all_the_same() {
     assert_eq!(report.rays.get("transparency"), None, "nothing here lets light through: {:?}", report.rays);
 }
 
+/// What VTK's depth peeling became: one pass for the driver, the rest in one go.
+fn assert_peeled(report: &Report) {
+    assert!(report.flushes.get("depth peeling").is_some_and(|n| *n > 0), "{report:?}");
+    assert_eq!(report.passed_reasons.get("translucent surfaces that VTK peels"), None, "{report:?}");
+    assert_eq!(report.problems, Vec::<String>::new());
+}
+
+#[test]
+fn translucent_surfaces_that_vtk_peels_are_traced_in_one_go_and_are_the_drivers_picture() {
+    let (Some(python), Some(_)) = (program("RTSV_SYSTEM_PYTHON"), program("RTSV_PVBATCH")) else { return };
+    let file = script("vtk_translucent.py");
+    if let Some((m, report)) = both(&python, &[file.as_str()], "out.png", |_| ()) {
+        m.assert_filled("translucent surfaces in VTK");
+        assert_peeled(&report);
+    }
+}
+
+#[test]
+fn paraviews_translucent_contours_are_traced_in_one_go_and_are_the_drivers_picture() {
+    let Some(pvbatch) = program("RTSV_PVBATCH") else { return };
+    let file = script("paraview_translucent.py");
+    if let Some((m, report)) = both(&pvbatch, &[file.as_str()], "out.png", |_| ()) {
+        m.assert_filled("translucent contours in ParaView");
+        assert_peeled(&report);
+    }
+}
+
+#[test]
+fn lines_among_translucent_surfaces_leave_the_whole_peeling_to_the_driver() {
+    let (Some(python), Some(_)) = (program("RTSV_SYSTEM_PYTHON"), program("RTSV_PVBATCH")) else { return };
+    let file = script("vtk_translucent.py");
+    if let Some((m, report)) = both(&python, &[file.as_str(), "lines"], "out.png", |_| ()) {
+        m.assert_filled("lines among translucent surfaces");
+        assert_eq!(report.flushes.get("depth peeling"), None, "{report:?}");
+        assert!(report.passed_reasons.contains_key("translucent surfaces that VTK peels"), "{report:?}");
+    }
+}
+
 #[test]
 fn vtk_by_egl_draws_the_drivers_picture() {
     let (Some(python), Some(_)) = (program("RTSV_PYTHON"), program("RTSV_XVFB")) else { return };

@@ -321,6 +321,14 @@ pub fn run(experiment: &Experiment, context: &mut Context<'_>) -> anyhow::Result
     Ok(Outcome { record, interrupted })
 }
 
+/// The record of an experiment that could not be run for want of another program: without rows, and with the reason.
+pub fn left_out(experiment: &Experiment, why: &str) -> Record {
+    let Experiment { id, chapter, title, .. } = *experiment;
+    let mut record = Record::new(id, title, chapter, true, Machine::describe());
+    record.missing.push(why.into());
+    record
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -55,12 +55,26 @@ fn in_words(r: &Report) -> String {
     if r.traced_draws > 0 {
         line(format!("        {:>12} triangles, {} pixels", r.triangles, r.pixels));
         line(format!(
-            "        {:>12} geometries were there already, {} were new, {} structures built",
-            r.cache_hits, r.cache_misses, r.builds
+            "        {:>12} geometries were there already, {} were new, {} structures built, {} refitted",
+            r.cache_hits, r.cache_misses, r.builds, r.refits
         ));
         for (kind, n) in by_size(&r.rays) {
             line(format!("        {n:>12} rays: {kind}"));
         }
+    }
+
+    // Who traced it.
+    for rank in &r.ranks {
+        let of = if rank.rank == 0 { "the program" } else { "helper" };
+        let lost = rank.lost.as_ref().map_or(String::new(), |why| format!("; lost: {why}"));
+        line(format!(
+            "        {:>12} pictures by rank {} ({of}): {:.1} ms each, {} kB sent to it, {} kB of rows back{lost}",
+            rank.pictures,
+            rank.rank,
+            rank.trace_ms / rank.pictures.max(1) as f64,
+            rank.sent_bytes / 1000,
+            rank.received_bytes / 1000
+        ));
     }
 
     // What was not, and why.

@@ -3,9 +3,11 @@
 mod doctor;
 mod explain;
 mod export;
+mod helpers;
 #[cfg(feature = "panel")]
 mod panel;
 mod run;
+mod serve_rays;
 mod timeline;
 
 use clap::{Parser, Subcommand};
@@ -43,6 +45,8 @@ enum Command {
     /// Serves the control panel for running programs
     #[cfg(feature = "panel")]
     Panel(panel::PanelArgs),
+    /// Traces a share of other programs' pictures
+    ServeRays(serve_rays::ServeRaysArgs),
     /// Draws when each phase of each frame ran
     Timeline(timeline::TimelineArgs),
     /// Prints a completion script for a shell
@@ -68,6 +72,7 @@ fn execute(cli: Cli, code: &mut Option<u8>) -> anyhow::Result<Status> {
         Command::Export(args) => export::export(common, &args).map(Status::from),
         #[cfg(feature = "panel")]
         Command::Panel(args) => panel::panel(common, &args).map(Status::from),
+        Command::ServeRays(args) => serve_rays::serve_rays(&common, &args).map(Status::from),
         Command::Timeline(args) => timeline::timeline(common, &args).map(Status::from),
         Command::Completions(args) => args.print::<Cli>().map(Status::from),
     }

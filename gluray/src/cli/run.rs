@@ -1,5 +1,6 @@
 //! `gluray run`: the environment for the library, the program, and the account of what happened.
 
+use super::helpers::Helpers;
 use super::{last_report, library};
 use crate::config::environment::{OBJECTS, parse_pair, variable_of};
 use crate::config::{Assignment, ConfigFile, SettingError, Settings, assign};
@@ -31,6 +32,7 @@ pub(super) enum Via {
 
 Examples:
   gluray run -- gmsh model.stl
+  gluray run --ranks 4 -- paraview
   gluray run --mode rich --report r.json -- geomview bunny.off
   gluray run --mode rich --set effects.ambient_occlusion_samples=32 --set objects.3f2a.surface=glass -- paraview")]
 pub(super) struct RunArgs {
@@ -49,6 +51,9 @@ pub(super) struct RunArgs {
     /// A setting by name, over the file's; several times for several. `gluray doctor --variables` lists them.
     #[arg(long, value_name = "NAME=VALUE")]
     set: Vec<String>,
+    /// Processes that trace one picture: the program, and N - 1 helpers that this starts and ends.
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=256))]
+    ranks: u32,
     /// How the library gets into the program.
     #[arg(long, value_enum, default_value = "auto")]
     via: Via,
@@ -159,6 +164,7 @@ pub(super) fn run(args: &RunArgs) -> anyhow::Result<u8> {
     } else {
         command.env("LD_PRELOAD", with_first("LD_PRELOAD", &library));
     }
+    let helpers = Helpers::start(args.ranks, &folder.0, &mut command)?;
     let name = args.program[0].to_string_lossy().into_owned();
     // Before there is a program, so that no signal finds one of us without the other.
     let signals = Signals::new([SIGINT, SIGTERM, SIGHUP]).context("cannot watch for signals")?;
@@ -168,6 +174,7 @@ pub(super) fn run(args: &RunArgs) -> anyhow::Result<u8> {
         .cure("check the name and the PATH; everything behind `--` is the program and its arguments")?;
     pass_to(&child, signals);
     let status = child.wait()?;
+    drop(helpers);
     let report = collect(&reports, &name);
     let text = serde_json::to_string_pretty(&report)?;
     if let Some(file) = &args.report {

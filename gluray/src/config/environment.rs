@@ -14,6 +14,7 @@ pub const OTHER_VARIABLES: &[(&str, &str)] = &[
     ("GLURAY_PANEL", "address of the control panel"),
     ("GLURAY_PANEL_SECRET", "its secret"),
     ("GLURAY_RUN_DIR", "folder that reports are written to"),
+    ("GLURAY_RANKS", "sockets of helpers that trace as well, with `:` between them"),
     ("GLURAY_LIBRARY", "the library that `gluray run` puts into programs"),
     ("GLURAY_GLX_VENDOR", "GLVND vendor that we stand in front of"),
     ("GLURAY_EGL_VENDOR", "the same for EGL"),

@@ -11,6 +11,82 @@ pub(super) enum Colors {
     Map,
 }
 
+/// What a program does for VTK's depth peeling.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum Peel {
+    #[default]
+    No,
+    /// Finds how far surfaces reach.
+    Depths,
+    /// Takes off the nearest and the farthest layer.
+    Layers,
+}
+
+/// The statements of a peeling pass, in their order; others may come between them.
+const PASSES: [(Peel, &[&str]); 2] = [
+    (
+        Peel::Depths,
+        &[
+            "gl_FragDepth=gl_FragCoord.z",
+            "ivec2pixel=ivec2(gl_FragCoord.xy)",
+            "floatoDepth=texelFetch(opaqueDepth,pixel,0).y",
+            "if(oDepth!=-1.&&gl_FragDepth>oDepth)",
+            "fragOutput1.xy=vec2(-1.,oDepth)",
+            "return",
+            "else",
+            "fragOutput1.xy=vec2(-gl_FragDepth,gl_FragDepth)",
+            "return",
+        ],
+    ),
+    (
+        Peel::Layers,
+        &[
+            "gl_FragDepth=gl_FragCoord.z",
+            "ivec2pixelCoord=ivec2(gl_FragCoord.xy)",
+            "vec4front=texelFetch(lastFrontPeel,pixelCoord,0)",
+            "vec2minMaxDepth=texelFetch(lastDepthPeel,pixelCoord,0).xy",
+            "floatminDepth=-minMaxDepth.x",
+            "floatmaxDepth=minMaxDepth.y",
+            "floatepsilon=0.0000001",
+            "fragOutput0=vec4(0.)",
+            "fragOutput1=front",
+            "fragOutput2.xy=vec2(-1.)",
+            "if(gl_FragDepth<minDepth-epsilon||gl_FragDepth>maxDepth+epsilon)",
+            "return",
+            "if(gl_FragDepth>minDepth+epsilon&&gl_FragDepth<maxDepth-epsilon)",
+            "fragOutput2.xy=vec2(-gl_FragDepth,gl_FragDepth)",
+            "return",
+            "vec4frag=fragOutput0",
+            "if(gl_FragDepth>=minDepth-epsilon&&gl_FragDepth<=minDepth+epsilon)",
+            "fragOutput0=vec4(0.)",
+            "front.a=1.-front.a",
+            "fragOutput1.rgb=front.a*frag.a*frag.rgb+front.rgb",
+            "fragOutput1.a=1.-(front.a*(1.-frag.a))",
+            "else",
+            "frag.rgb*=frag.a",
+            "fragOutput0=frag",
+        ],
+    ),
+];
+
+/// The pass that statements are of, without those of the pass.
+fn without_peeling(statements: Vec<String>) -> (Peel, Vec<String>) {
+    for (peel, pass) in PASSES {
+        let mut left = pass.iter().peekable();
+        let rest: Vec<String> = statements
+            .iter()
+            // The tolerance has another power of ten in other versions.
+            .map(|s| if s == "floatepsilon=0.000001" { "floatepsilon=0.0000001" } else { s.as_str() })
+            .filter(|s| left.next_if(|p| *p == s).is_none())
+            .map(str::to_owned)
+            .collect();
+        if left.next().is_none() {
+            return (peel, rest);
+        }
+    }
+    (Peel::No, statements)
+}
+
 /// What a program's text says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Template {
@@ -22,6 +98,7 @@ pub(crate) struct Template {
     /// Number of directional lights.
     pub(super) directional: usize,
     pub(super) lit: bool,
+    pub(super) peel: Peel,
 }
 
 const MOST_LIGHTS: usize = 6;
@@ -68,7 +145,8 @@ impl Template {
     pub(crate) fn read(vertex: &str, fragment: &str) -> Result<Template, &'static str> {
         const NOT_VTK: &str = "a program that is not recognised";
         let (Some(vs), Some(fs)) = (statements(vertex), statements(fragment)) else { return Err(NOT_VTK) };
-        let mut t = Template::default();
+        let (peel, fs) = without_peeling(fs);
+        let mut t = Template { peel, ..Template::default() };
         for s in &vs {
             match s.as_str() {
                 "normalVCVSOutput=normalMatrix*normalMC"
@@ -159,6 +237,23 @@ mod tests {
         assert!(head.headlight && head.lit && head.directional == 0);
         let kit = "df = max(0.0, dot(normalVCVSOutput, -lightDirectionVC0)); df = max(0.0, dot(normalVCVSOutput, -lightDirectionVC4));";
         assert_eq!(Template::read(VERTEX, &fragment(kit)).expect("known").directional, 5);
+    }
+
+    #[test]
+    fn passes_of_depth_peeling_are_known_only_with_all_of_their_statements() {
+        let head = "float df = max(0.000001, normalVCVSOutput.z);";
+        for (peel, pass) in PASSES {
+            let whole = pass.join(";") + ";";
+            let read = |text: &str| Template::read(VERTEX, &fragment(&format!("{text}{head}")));
+            let known = read(&whole.replace("fragOutput0=frag;", "fragOutput0 = frag; // the back"));
+            assert_eq!(known.map(|t| (t.peel, t.headlight)), Ok((peel, true)));
+            for left_out in pass {
+                let n = pass.iter().filter(|s| *s == left_out).count();
+                assert!(n > 1 || read(&whole.replace(left_out, "")).is_err(), "{peel:?} without {left_out}");
+            }
+            assert!(read(&format!("{whole} gl_FragDepth = 0.5;")).is_err());
+        }
+        assert_eq!(Template::read(VERTEX, &fragment(head)).map(|t| t.peel), Ok(Peel::No));
     }
 
     #[test]

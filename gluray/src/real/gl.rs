@@ -56,6 +56,7 @@ driver! {
     pub(crate) fn tex_parameteri = "glTexParameteri"(target: u32, what: u32, value: i32);
     pub(crate) fn pixel_storei = "glPixelStorei"(what: u32, value: i32);
     pub(crate) fn bind_sampler = "glBindSampler"(unit: u32, name: u32);
+    fn draw_buffers_raw = "glDrawBuffers"(n: i32, buffers: *const u32);
     fn gen_textures = "glGenTextures"(n: i32, out: *mut u32);
     fn tex_image_2d = "glTexImage2D"(target: u32, level: i32, inner: i32, w: i32, h: i32, border: i32, format: u32, kind: u32, data: *const c_void);
     fn tex_sub_image_2d = "glTexSubImage2D"(target: u32, level: i32, x: i32, y: i32, w: i32, h: i32, format: u32, kind: u32, data: *const c_void);
@@ -223,6 +224,11 @@ pub(crate) fn buffer_bytes(target: u32, at: usize, bytes: usize) -> Vec<u8> {
         get_buffer_sub_data(target, at as isize, bytes as isize, out.as_mut_ptr().cast());
     }
     out
+}
+
+/// What colours are drawn into.
+pub(crate) fn draw_buffers(buffers: &[u32]) {
+    draw_buffers_raw(buffers.len() as i32, buffers.as_ptr());
 }
 
 /// Source of a shader of ours.

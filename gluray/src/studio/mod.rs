@@ -10,11 +10,12 @@ mod parts;
 use crate::beyond::{Colors, lens};
 use crate::cache::hash;
 use crate::config::Settings;
+use crate::ranks::rows::Share;
 use crate::trace::{Prepared, Rect};
 use crate::view::View;
 use parts::Part;
 use rt_core::accel::{BuildOptions, BuildQuality, Geometry, Instance, World};
-use rt_core::camera::ThinLens;
+use rt_core::camera::{Camera, ThinLens};
 use rt_core::environment::Environment;
 use rt_core::mesh::TriMesh;
 use rt_core::ray_stats::RayStats;
@@ -80,20 +81,7 @@ impl Studio {
                 return nothing(warnings);
             }
         };
-        let b = scene.world.bounds();
-        let diagonal = if b.is_empty() { 1.0 } else { f64::from((b.max - b.min).length()) };
-        let mut camera = view.camera;
-        match lens(draws, view, settings, diagonal) {
-            Ok(None) => {}
-            Ok(Some([aperture_radius, focus_distance])) => {
-                if let Ok(with) = camera.with_lens(ThinLens { aperture_radius, focus_distance }) {
-                    camera = with;
-                }
-            }
-            Err(why) => warnings.push(why),
-        }
-        let (vw, vh) = (view.viewport.w.cast_unsigned(), view.viewport.h.cast_unsigned());
-        let top = view.viewport.y + view.viewport.h;
+        let camera = camera(draws, view, settings, &scene, &mut warnings);
         let samples = settings.samples.max(LEAST_SAMPLES);
         let key = hash(&[&key.to_ne_bytes(), format!("{rect:?} {camera:?} {settings:?}").as_bytes()]);
         let before = self.stills.remove(&number).filter(|s| s.key == key);
@@ -103,44 +91,87 @@ impl Studio {
             return Colors { rect, rgba, rays: Vec::new(), warnings };
         }
         let done = before.as_ref().map_or(0, |s| s.samples);
-        let options = RenderOptions {
-            crop: Some(Crop {
-                x: (rect.x - view.viewport.x).cast_unsigned(),
-                y: (top - rect.y - rect.h).cast_unsigned(),
-                width: rect.w.cast_unsigned(),
-                height: rect.h.cast_unsigned(),
-            }),
-            path_tracing: true,
-            samples,
-            light_rays: 1,
-            max_bounces: settings.effects.max_bounces,
-            // Another seed for every picture of the same, so that their mean gets better.
-            seed: u64::from(done / samples),
-            ..RenderOptions::new(vw, vh)
-        };
-        let output = match render(&scene, &camera, &options) {
-            Ok(output) => output,
-            Err(e) => {
-                warnings.push(format!("mode path: {e}"));
-                return nothing(warnings);
-            }
-        };
-        // Every path ends some time, and colours that are mixed may have an alpha of one less a rounding: neither is news.
-        let known = |w: &String| w.contains("max_bounces") || w.contains("drawn opaque");
-        warnings.extend(
-            output.report.warnings.into_iter().filter(|w| !known(w)).map(|w| format!("mode path: {w}")),
-        );
-        let (w, h) = (rect.w as usize, rect.h as usize);
-        let fresh = |x: usize, y: usize| output.frame.color[(h - 1 - y) * w + x];
+        // Another seed for every picture of the same, so that their mean gets better.
+        let picture = u64::from(done / samples);
+        let fresh = crate::ranks::paths(self, draws, view, number, rect, settings, picture);
+        warnings.extend(fresh.warnings);
+        warnings.dedup();
+        if fresh.rgba.is_empty() {
+            return nothing(warnings);
+        }
         let share = samples as f32 / (done + samples) as f32;
-        let mean: Vec<[f32; 4]> = (0..w * h)
-            .map(|i| {
-                let (now, old) = (fresh(i % w, i / w), before.as_ref().map_or([0.0; 4], |s| s.mean[i]));
-                std::array::from_fn(|k| old[k] + (now[k] - old[k]) * share)
-            })
-            .collect();
+        let mix = |(i, now): (usize, &[f32; 4])| {
+            let old = before.as_ref().map_or([0.0; 4], |s| s.mean[i]);
+            std::array::from_fn(|k| old[k] + (now[k] - old[k]) * share)
+        };
+        let mean: Vec<[f32; 4]> = fresh.rgba.iter().enumerate().map(mix).collect();
         self.stills.insert(number, Still { key, samples: done + samples, mean: mean.clone() });
-        Colors { rect, rgba: mean, rays: stats(&output.report.rays), warnings }
+        Colors { rect, rgba: mean, rays: fresh.rays, warnings }
+    }
+
+    /// The rows of a share of the picture with number `picture` of a view that rests. `rect` is within the viewport.
+    #[expect(clippy::too_many_arguments, reason = "what helpers are told, one by one")]
+    pub(crate) fn picture(
+        &mut self,
+        draws: &[Prepared<'_>],
+        view: &View,
+        number: usize,
+        rect: Rect,
+        settings: &Settings,
+        picture: u64,
+        share: Share,
+    ) -> Colors {
+        let mut warnings = Vec::new();
+        let nothing =
+            |warnings| Colors { rect: Rect::default(), rgba: Vec::new(), rays: Vec::new(), warnings };
+        let (scene, _) = match self.scene(draws, view, number, settings, &mut warnings) {
+            Ok(made) => made,
+            Err(why) => return nothing(vec![why]),
+        };
+        let camera = camera(draws, view, settings, &scene, &mut warnings);
+        let (vw, vh) = (view.viewport.w.cast_unsigned(), view.viewport.h.cast_unsigned());
+        let top = view.viewport.y + view.viewport.h;
+        let (w, h) = (rect.w as usize, rect.h as usize);
+        let mut rgba = vec![[0.0; 4]; w * h];
+        let mut rays: Vec<(&'static str, u64)> = Vec::new();
+        // One band of rows after the other; all at once where all are ours.
+        let whole = std::iter::once(0..w * h).filter(|_| share == Share::WHOLE);
+        for part in whole.chain(share.pixels(w, h).filter(|_| share != Share::WHOLE)) {
+            let (first, rows) = (part.start / w, part.len() / w);
+            let options = RenderOptions {
+                crop: Some(Crop {
+                    x: (rect.x - view.viewport.x).cast_unsigned(),
+                    y: (top - rect.y - (first + rows) as i32).cast_unsigned(),
+                    width: rect.w.cast_unsigned(),
+                    height: rows as u32,
+                }),
+                path_tracing: true,
+                samples: settings.samples.max(LEAST_SAMPLES),
+                light_rays: 1,
+                max_bounces: settings.effects.max_bounces,
+                seed: picture,
+                ..RenderOptions::new(vw, vh)
+            };
+            let output = match render(&scene, &camera, &options) {
+                Ok(output) => output,
+                Err(e) => return nothing(vec![format!("mode path: {e}")]),
+            };
+            // Every path ends some time, and colours that are mixed may have an alpha of one less a rounding: neither is news.
+            let known = |w: &String| w.contains("max_bounces") || w.contains("drawn opaque");
+            let told = output.report.warnings.into_iter().filter(|w| !known(w));
+            warnings.extend(told.map(|w| format!("mode path: {w}")));
+            for y in 0..rows {
+                let from = &output.frame.color[(rows - 1 - y) * w..][..w];
+                rgba[(first + y) * w..][..w].copy_from_slice(from);
+            }
+            for (kind, n) in stats(&output.report.rays) {
+                match rays.iter_mut().find(|(k, _)| *k == kind) {
+                    Some((_, sum)) => *sum += n,
+                    None => rays.push((kind, n)),
+                }
+            }
+        }
+        Colors { rect, rgba, rays, warnings }
     }
 
     fn scene(
@@ -191,6 +222,29 @@ impl Studio {
     pub(crate) fn frame_done(&mut self) {
         self.meshes.retain(|_, (_, used)| std::mem::take(used));
     }
+}
+
+/// The view's camera, with the lens that is set.
+fn camera(
+    draws: &[Prepared<'_>],
+    view: &View,
+    settings: &Settings,
+    scene: &Scene,
+    warnings: &mut Vec<String>,
+) -> Camera {
+    let b = scene.world.bounds();
+    let diagonal = if b.is_empty() { 1.0 } else { f64::from((b.max - b.min).length()) };
+    let mut camera = view.camera;
+    match lens(draws, view, settings, diagonal) {
+        Ok(None) => {}
+        Ok(Some([aperture_radius, focus_distance])) => {
+            if let Ok(with) = camera.with_lens(ThinLens { aperture_radius, focus_distance }) {
+                camera = with;
+            }
+        }
+        Err(why) => warnings.push(why),
+    }
+    camera
 }
 
 fn scene_checked(scene: Scene) -> Result<Scene, String> {

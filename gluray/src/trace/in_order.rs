@@ -1,8 +1,10 @@
 //! Every fragment of one draw, for states in which the order of triangles matters.
 //!
-//! Rays go through each pixel's centre from surface to surface, 256 at a time. Where an edge comes near a centre, four more rays beside it find the
-//! triangles that the fill rule may give the pixel to; so most pixels need one ray a layer.
+//! Where all of the draw is before the eye its triangles are stacked by their order ([`Lifted`]), and one ray a layer finds them. Elsewhere rays go through
+//! each pixel's centre from surface to surface, 256 at a time; where an edge comes near a centre, four more rays beside it find the triangles that the fill
+//! rule may give the pixel to. Of layers in one plane those rays see the first alone.
 
+use super::lifted::Lifted;
 use super::{Layer, MOST_STEPS, Prepared, Rect, TILE, UNCOVERED, slot, to_bytes};
 use crate::effects::Visibility;
 use crate::enums::ALWAYS;
@@ -25,7 +27,8 @@ pub(crate) fn in_order(p: &Prepared<'_>) -> Vec<Layer> {
     if w * h == 0 {
         return Vec::new();
     }
-    let near = near_edges(p);
+    let lifted = Lifted::new(p);
+    let near = if lifted.is_none() { near_edges(p) } else { Near { rect, marks: None } };
     let step = TILE as usize;
     let tiles: Vec<Rect> = (0..h)
         .step_by(step)
@@ -37,7 +40,13 @@ pub(crate) fn in_order(p: &Prepared<'_>) -> Vec<Layer> {
             h: step.min(h - y) as i32,
         })
         .collect();
-    let made: Vec<Vec<Vec<Found>>> = tiles.par_iter().map(|tile| of_tile(p, *tile, &near)).collect();
+    let made: Vec<Vec<Vec<Found>>> = tiles
+        .par_iter()
+        .map(|tile| match &lifted {
+            Some(lifted) => of_stack(p, *tile, lifted),
+            None => of_tile(p, *tile, &near),
+        })
+        .collect();
     let layers = made.iter().flatten().map(Vec::len).max().unwrap_or(0);
     (0..layers)
         .map(|n| {
@@ -62,6 +71,26 @@ fn last_is_all(p: &Prepared<'_>) -> bool {
     let s = &*p.draw.state;
     let untested = !s.depth_test || (s.depth_func == ALWAYS && s.depth_mask);
     untested && s.color_mask && !(s.blend || s.stencil_test || s.logic_op || s.alpha_test)
+}
+
+/// The fragment of a triangle, as it is drawn.
+fn fragment(p: &Prepared<'_>, prim: usize, x: i32, y: i32) -> Option<Found> {
+    let f = p.fragment(prim, x, y)?;
+    Some((to_bytes(p.color(prim, &f, false, &Visibility::FULL)), f.depth as f32))
+}
+
+fn of_stack(p: &Prepared<'_>, tile: Rect, stack: &Lifted) -> Vec<Vec<Found>> {
+    let last = last_is_all(p);
+    let mut made: Vec<Vec<Found>> = vec![Vec::new(); (tile.w * tile.h) as usize];
+    stack.each(p, tile, |i, prim| {
+        let (x, y) = (tile.x + i as i32 % tile.w, tile.y + i as i32 / tile.w);
+        let found = fragment(p, prim, x, y);
+        let enough = last && found.is_some();
+        made[i].extend(found);
+        !enough
+    });
+    made.iter_mut().for_each(|found| found.reverse());
+    made
 }
 
 fn of_tile(p: &Prepared<'_>, tile: Rect, near: &Near) -> Vec<Vec<Found>> {
@@ -114,11 +143,7 @@ fn of_tile(p: &Prepared<'_>, tile: Rect, near: &Near) -> Vec<Vec<Found>> {
             found.sort_unstable();
             found.dedup();
             let (x, y) = (tile.x + i as i32 % tile.w, tile.y + i as i32 / tile.w);
-            let fragment = |prim: &u32| {
-                let prim = *prim as usize;
-                let f = p.fragment(prim, x, y)?;
-                Some((to_bytes(p.color(prim, &f, false, &Visibility::FULL)), f.depth as f32))
-            };
+            let fragment = |prim: &u32| fragment(p, *prim as usize, x, y);
             match last {
                 true => found.iter().rev().find_map(fragment).into_iter().collect(),
                 false => found.iter().filter_map(fragment).collect(),

@@ -1,109 +1,7 @@
 """Small OpenGL programs, one per hard case. `hard_cases.py CASE OUT` draws the case in a window and writes OUT: width, height, RGB bytes, and depth as
-floats, bottom row first. Only ctypes is used, so the library is found the way scripts and games find it: by dlopen and dlsym."""
-import array, ctypes as c, os, struct, sys, threading
-from ctypes import c_int, c_uint, c_ulong, c_void_p, c_float, c_double
-
-X = c.CDLL("libX11.so.6")
-GL = c.CDLL("libGL.so.1")
-for f in ("XOpenDisplay", "XDefaultVisual"):
-    getattr(X, f).restype = c_void_p
-for f in ("XDefaultRootWindow", "XCreateWindow", "XCreateColormap"):
-    getattr(X, f).restype = c_ulong
-for f in ("glXChooseVisual", "glXCreateContext"):
-    getattr(GL, f).restype = c_void_p
-W = H = 128
-
-
-class VisualInfo(c.Structure):
-    _fields_ = [("visual", c_void_p), ("visualid", c_ulong), ("screen", c_int), ("depth", c_int), ("cls", c_int)]
-
-
-class Attributes(c.Structure):
-    _fields_ = [("before", c_ulong * 12), ("colormap", c_ulong), ("cursor", c_ulong)]
-
-
-def F(name, *types):
-    f = getattr(GL, name)
-    f.argtypes = types
-    return f
-
-
-X.XInitThreads()
-dpy = c_void_p(X.XOpenDisplay(None))
-root = X.XDefaultRootWindow(dpy)
-vi = c_void_p(GL.glXChooseVisual(dpy, 0, (c_int * 16)(4, 5, 8, 8, 9, 8, 10, 8, 12, 24, 13, 8, 0)))
-info = c.cast(vi, c.POINTER(VisualInfo)).contents
-
-
-def window():
-    at = Attributes()
-    at.colormap = X.XCreateColormap(dpy, c_ulong(root), c_void_p(info.visual), 0)
-    w = X.XCreateWindow(dpy, c_ulong(root), 0, 0, W, H, 0, info.depth, 1, c_void_p(info.visual), c_ulong(1 << 13 | 1 << 3), c.byref(at))
-    X.XMapWindow(dpy, c_ulong(w))
-    X.XSync(dpy, 0)
-    return w
-
-
-def context(share=None):
-    return c_void_p(GL.glXCreateContext(dpy, vi, share, 1))
-
-
-def current(w, ctx):
-    assert GL.glXMakeCurrent(dpy, c_ulong(w), ctx)
-
-
-begin, end = F("glBegin", c_uint), F("glEnd")
-vertex, vertex4, normal, color = F("glVertex3f", *[c_float] * 3), F("glVertex4f", *[c_float] * 4), F("glNormal3f", *[c_float] * 3), F("glColor4f", *[c_float] * 4)
-enable, disable, clear = F("glEnable", c_uint), F("glDisable", c_uint), F("glClear", c_uint)
-mode, ortho, frustum = F("glMatrixMode", c_uint), F("glOrtho", *[c_double] * 6), F("glFrustum", *[c_double] * 6)
-translate, scale, rotate, identity = F("glTranslatef", *[c_float] * 3), F("glScalef", *[c_float] * 3), F("glRotatef", *[c_float] * 4), F("glLoadIdentity")
-enable_array, disable_array = F("glEnableClientState", c_uint), F("glDisableClientState", c_uint)
-TRIANGLES, STRIP, FAN, QUADS, QUAD_STRIP, POLYGON = 4, 5, 6, 7, 8, 9
-
-
-def lit():
-    enable(0x0B50)
-    enable(0x4000)
-    enable(0x0B57)
-    F("glColorMaterial", c_uint, c_uint)(0x0408, 0x1602)
-    F("glLightfv", c_uint, c_uint, c_void_p)(0x4000, 0x1203, (c_float * 4)(0.5, 0.7, 1, 0))
-    F("glMaterialfv", c_uint, c_uint, c_void_p)(0x0408, 0x1202, (c_float * 4)(0.5, 0.5, 0.5, 1))
-    F("glMaterialf", c_uint, c_uint, c_float)(0x0408, 0x1601, 20)
-
-
-def start(perspective=False):
-    F("glViewport", *[c_int] * 4)(0, 0, W, H)
-    F("glClearColor", *[c_float] * 4)(0.1, 0.1, 0.2, 1)
-    clear(0x4100)
-    enable(0x0B71)
-    mode(0x1701)
-    identity()
-    frustum(-1, 1, -1, 1, 1, 10) if perspective else ortho(-1.5, 1.5, -1.5, 1.5, -10, 10)
-    mode(0x1700)
-    identity()
-    if perspective:
-        translate(0, 0, -2)
-
-
-def bump(n=12):
-    """A curved sheet as quad strips, with normals and colours."""
-    z = lambda x, y: 0.4 * (x * x - y * y) + 0.1 * x
-    for i in range(n):
-        begin(QUAD_STRIP)
-        for j in range(n + 1):
-            for k in (0, 1):
-                x, y = 2 * (i + k) / n - 1, 2 * j / n - 1
-                normal(-0.8 * x - 0.1, 0.8 * y, 1)
-                color((x + 1) / 2, (y + 1) / 2, 0.5, 1)
-                vertex(x, y, z(x, y))
-        end()
-
-
-def simple(**k):
-    start(**k)
-    lit()
-    enable(0x0BA1)
-    rotate(40, 1, 0.3, 0.2)
+floats, bottom row first."""
+from gl_by_ctypes import *
+from mode_scenes import *
 
 
 def plain():
@@ -345,6 +243,21 @@ def blended_over_traced():
     F("glRectf", *[c_float] * 4)(-0.8, -0.3, 0.9, 0.4)
 
 
+def layers_in_one_plane():
+    """Squares over one another in one plane and one batch, without a depth test: the last is seen."""
+    start()
+    disable(0x0B71)
+    numbers = iter(range(1, 10**6))
+    part = lambda: next(numbers) * 7919 % 1009 / 1009
+    begin(QUADS)
+    for _ in range(60):
+        x, y, s = 2.2 * part() - 1.4, 2.2 * part() - 1.4, 0.1 + 0.5 * part()
+        color(part(), part(), part(), 1)
+        for dx, dy in ((0, 0), (s, 0), (s, s), (0, s)):
+            vertex(x + dx, y + dy, 0)
+    end()
+
+
 def two_contexts(w, n=2):
     shared = context()
     current(w, shared)
@@ -545,154 +458,7 @@ def a_program_that_ends_without_handlers():
     plain()
 
 
-def box(at, size):
-    """A box with normals, anticlockwise from outside."""
-    begin(QUADS)
-    for axis in range(3):
-        for sign in (-1, 1):
-            n = [0, 0, 0]
-            n[axis] = sign
-            normal(*n)
-            for u, v in ((-1, -1), (1, -1), (1, 1), (-1, 1))[::sign]:
-                p = [0, 0, 0]
-                p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3] = sign, u, v
-                vertex(*[a + size * b for a, b in zip(at, p)])
-    end()
-
-
-def floor():
-    begin(QUADS)
-    normal(0, 1, 0)
-    for x, z in ((-3, 1.5), (3, 1.5), (3, -4.5), (-3, -4.5)):
-        vertex(x, -0.7, z)
-    end()
-
-
-def scene(parallel):
-    start(perspective=not parallel)
-    lit()
-    rotate(20, 1, 0, 0)
-    F("glLightfv", c_uint, c_uint, c_void_p)(0x4000, 0x1203, (c_float * 4)(-0.8, 1, 0.4, 0))
-    F("glMaterialfv", c_uint, c_uint, c_void_p)(0x0408, 0x1202, (c_float * 4)(0, 0, 0, 1))
-    color(0.5, 0.5, 0.5, 1)
-    floor()
-    color(0.9, 0.1, 0.1, 1)
-    box((0, -0.25, -0.6), 0.45)
-
-
-def box_on_floor():
-    """A red box on a grey floor, seen from a little above; light from the upper left."""
-    scene(False)
-
-
-def box_on_floor_parallel():
-    scene(True)
-
-
-def sheets_blended_in_the_wrong_order():
-    """Two translucent sheets, the near one first: OpenGL's blending then loses the far one."""
-    start()
-    enable(0x0BE2)
-    F("glBlendFunc", c_uint, c_uint)(0x0302, 0x0303)
-    for z, rgba in ((0.5, (1, 0, 0, 0.5)), (-0.5, (0, 1, 0, 0.5))):
-        color(*rgba)
-        begin(QUADS)
-        for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
-            vertex(x, y, z)
-        end()
-
-
-def glsl(vertex_text, fragment_text, names):
-    program = F("glCreateProgram")()
-    for kind, text in ((0x8B31, vertex_text), (0x8B30, fragment_text)):
-        shader = F("glCreateShader", c_uint)(kind)
-        F("glShaderSource", c_uint, c_int, c_void_p, c_void_p)(shader, 1, c.byref(c.c_char_p(text.encode())), None)
-        F("glCompileShader", c_uint)(shader)
-        F("glAttachShader", c_uint, c_uint)(program, shader)
-    for i, name in enumerate(names):
-        F("glBindAttribLocation", c_uint, c_uint, c.c_char_p)(program, i, name.encode())
-    F("glLinkProgram", c_uint)(program)
-    ok = c_int()
-    F("glGetProgramiv", c_uint, c_uint, c_void_p)(program, 0x8B82, c.byref(ok))
-    assert ok.value
-    F("glUseProgram", c_uint)(program)
-    return program
-
-
-def buffer(values):
-    name = c_uint()
-    F("glGenBuffers", c_int, c_void_p)(1, c.byref(name))
-    F("glBindBuffer", c_uint, c_uint)(0x8892, name.value)
-    F("glBufferData", c_uint, c.c_ssize_t, c_void_p, c_uint)(0x8892, 4 * len(values), (c_float * len(values))(*values), 0x88E4)
-    return name.value
-
-
-def corner_by_shader(vertex_text):
-    """Three walls of a corner by a program of one's own, with a pillar in it."""
-    start(perspective=True)
-    points, normals = [], []
-
-    def quad(p, u, v, n, cells=6):
-        at = lambda i, j: [p[k] + u[k] * i / cells + v[k] * j / cells for k in range(3)]
-        for i in range(cells):
-            for j in range(cells):
-                for a, b in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j), (i + 1, j + 1), (i, j + 1)):
-                    points.extend(at(a, b))
-                    normals.extend(n)
-
-    quad((-1, -1, -0.6), (2, 0, 0), (0, 2, 0), (0, 0, 1))
-    quad((-1, -1, -0.6), (0, 0, 1.5), (2, 0, 0), (0, 1, 0))
-    quad((-1, -1, -0.6), (0, 2, 0), (0, 0, 1.5), (1, 0, 0))
-    quad((0.1, -1, 0), (0.3, 0, 0), (0, 1.2, 0), (0, 0, 1))
-    fragment = "#version 120\nvarying vec3 n;\nvoid main() { gl_FragColor = vec4(0.5 + 0.4 * normalize(n), 1.0); }\n"
-    program = glsl(vertex_text, fragment, ("place", "up"))
-    model_view, projection = (c_float * 16)(), (c_float * 16)()
-    F("glGetFloatv", c_uint, c_void_p)(0x0BA6, model_view)
-    F("glGetFloatv", c_uint, c_void_p)(0x0BA7, projection)
-    for name, m in (("view", model_view), ("lens", projection)):
-        at = F("glGetUniformLocation", c_uint, c.c_char_p)(program, name.encode())
-        F("glUniformMatrix4fv", c_int, c_int, c_int, c_void_p)(at, 1, 0, m)
-    for i, values in enumerate((points, normals)):
-        buffer(values)
-        F("glVertexAttribPointer", c_uint, c_int, c_uint, c_int, c_int, c_void_p)(i, 3, 0x1406, 0, 0, None)
-        F("glEnableVertexAttribArray", c_uint)(i)
-    F("glDrawArrays", c_uint, c_int, c_int)(TRIANGLES, 0, len(points) // 3)
-    F("glUseProgram", c_uint)(0)
-    F("glBindBuffer", c_uint, c_uint)(0x8892, 0)
-
-
-HEAD = "#version 120\nuniform mat4 view, lens;\nattribute vec3 place, up;\nvarying vec3 n;\n"
-
-
-def shader_of_ones_own():
-    corner_by_shader(HEAD + "void main() { n = up; gl_Position = lens * (view * vec4(place, 1.0)); }\n")
-
-
-def shader_that_bends():
-    corner_by_shader(HEAD + "void main() { n = up; vec3 p = place; p.y += 0.1 * sin(5.0 * p.x); gl_Position = lens * (view * vec4(p, 1.0)); }\n")
-
-
-def lists_over_several_frames():
-    """A list that is compiled once and drawn in three frames, with a colour that is set once."""
-    simple()
-    lists = F("glGenLists", c_int)(1)
-    F("glNewList", c_uint, c_uint)(lists, 0x1300)
-    bump()
-    F("glEndList")()
-    for _ in range(3):
-        clear(0x4100)
-        F("glCallList", c_uint)(lists)
-        begin(TRIANGLES)
-        for x, y in ((-1.4, -1.4), (-0.8, -1.4), (-1.4, -0.8)):
-            vertex(x, y, 0)
-        end()
-        GL.glXSwapBuffers(dpy, c_ulong(w0))
-    clear(0x4100)
-    F("glCallList", c_uint)(lists)
-
-
 case = globals()[sys.argv[1]]
-w0 = window()
 if case.__code__.co_argcount:
     current(w0, context())
     case(w0)

@@ -1,0 +1,67 @@
+//! Recognised programs as messages to other ranks. The colour map goes by its name.
+
+use super::template::{Colors, Peel, Template};
+use super::{Image, Recognised};
+use crate::ranks::wire::{Malformed, Reader, Wire, wire_enum, wire_struct};
+use std::sync::Arc;
+
+wire_enum!(Colors { Uniform, PerVertex, Map });
+wire_enum!(Peel { No, Depths, Layers });
+wire_struct!(Template { colors, overrides, flat, headlight, directional, lit, peel });
+
+impl Recognised {
+    /// The colour map.
+    pub(crate) fn map(&self) -> Option<&Arc<Image>> {
+        self.map.as_ref()
+    }
+
+    /// The same with a colour map.
+    pub(crate) fn with_map(mut self, map: Option<Arc<Image>>) -> Recognised {
+        self.map = map;
+        self
+    }
+
+    /// Lights that the program computes with and that are not there; also those that are more than can be.
+    pub(crate) fn missing_lights(&self) -> usize {
+        let most = crate::effects::MOST_LIGHTS;
+        usize::from(self.template.headlight && self.lights.is_empty())
+            + self.lights.len().saturating_sub(most)
+    }
+}
+
+impl Wire for Recognised {
+    fn put(&self, out: &mut Vec<u8>) {
+        (self.clip_from_object, self.view_from_object).put(out);
+        self.normal_matrix.put(out);
+        self.template.put(out);
+        [self.ambient, self.diffuse, self.specular].put(out);
+        [self.ambient_intensity, self.diffuse_intensity, self.specular_power, self.opacity].put(out);
+        [self.parallel, self.overrides].put(out);
+        self.lights.put(out);
+    }
+    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
+        let (clip_from_object, view_from_object) = Wire::get(from)?;
+        let (normal_matrix, template) = Wire::get(from)?;
+        let [ambient, diffuse, specular] = Wire::get(from)?;
+        let [ambient_intensity, diffuse_intensity, specular_power, opacity] = Wire::get(from)?;
+        let [parallel, overrides] = Wire::get(from)?;
+        let lights = Wire::get(from)?;
+        Ok(Recognised {
+            clip_from_object,
+            view_from_object,
+            normal_matrix,
+            template,
+            ambient,
+            diffuse,
+            specular,
+            ambient_intensity,
+            diffuse_intensity,
+            specular_power,
+            opacity,
+            parallel,
+            overrides,
+            lights,
+            map: None,
+        })
+    }
+}

@@ -1,0 +1,59 @@
+//! What each rank did, for reports.
+
+use serde::{Deserialize, Serialize};
+
+/// The account of one rank; 0 is the program itself.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct RankAccount {
+    /// Its number.
+    pub rank: usize,
+    /// Pictures that it made a share of.
+    pub pictures: u64,
+    /// Milliseconds in which it made them.
+    pub trace_ms: f64,
+    /// Rank 0 alone: milliseconds in which it waited for the others.
+    pub wait_ms: f64,
+    /// Bytes that it was sent: the scene, once.
+    pub sent_bytes: u64,
+    /// Bytes that came back: rows.
+    pub received_bytes: u64,
+    /// Why it was given up.
+    pub lost: Option<String>,
+}
+
+impl RankAccount {
+    /// Adds another process' account of the same rank.
+    pub fn add(&mut self, other: &RankAccount) {
+        self.pictures += other.pictures;
+        self.trace_ms += other.trace_ms;
+        self.wait_ms += other.wait_ms;
+        self.sent_bytes += other.sent_bytes;
+        self.received_bytes += other.received_bytes;
+        if self.lost.is_none() {
+            self.lost.clone_from(&other.lost);
+        }
+    }
+}
+
+/// The accounts of all ranks.
+pub(crate) struct Accounts(Vec<RankAccount>);
+
+impl Accounts {
+    pub(crate) fn new(size: usize) -> Accounts {
+        Accounts((0..size).map(|rank| RankAccount { rank, ..RankAccount::default() }).collect())
+    }
+
+    pub(crate) fn of(&mut self, rank: usize) -> &mut RankAccount {
+        &mut self.0[rank]
+    }
+
+    pub(crate) fn all(&self) -> &[RankAccount] {
+        &self.0
+    }
+
+    /// A rank was given up.
+    pub(crate) fn lost(&mut self, rank: usize, why: &str) {
+        self.0[rank].lost.get_or_insert_with(|| why.to_owned());
+    }
+}
