@@ -22,6 +22,8 @@ pub(crate) struct Collector<P: Composite> {
     image: Option<Image<P>>,
     /// Without a root: what this rank has finished.
     kept: Vec<Layer<P>>,
+    /// Room to work in.
+    wide: Vec<u8>,
 }
 
 impl<P: Composite> Collector<P> {
@@ -35,7 +37,7 @@ impl<P: Composite> Collector<P> {
         spare: Option<Image<P>>,
     ) -> Result<Self, CompositeError> {
         let depths = depths && P::HAS_DEPTH;
-        let mut collector = Self { root, depths, outstanding: Vec::new(), image: None, kept: Vec::new() };
+        let mut collector = Self { root, depths, outstanding: Vec::new(), image: None, kept: Vec::new(), wide: Vec::new() };
         if root != Some(session.place) {
             return Ok(collector);
         }
@@ -112,6 +114,7 @@ impl<P: Composite> Collector<P> {
                 image.width_px as usize,
                 &mut image.colors,
                 &mut image.depths,
+                &mut self.wide,
             );
         }
         session.comm.recycle(bytes);
@@ -126,6 +129,7 @@ impl<P: Composite> Collector<P> {
                 self.take(session, place, bytes)?;
             }
         }
+        session.comm.recycle(self.wide);
         if self.root.is_some() {
             return Ok((self.image, None));
         }

@@ -3,6 +3,7 @@ use crate::collect::Collector;
 use crate::comm::{CommError, Communicator};
 use crate::error::CompositeError;
 use crate::frame::{Frame, Image, Piece};
+use crate::in_memory;
 use crate::join::Scratch;
 use crate::network::Network;
 use crate::pixel::{Composite, PixelFormat};
@@ -42,6 +43,9 @@ pub struct Options {
     /// Pixels of one message at most, about: direct send cuts its tiles in slices of so many, so that one is compressed while
     /// another travels. `None` chooses.
     pub slice_px: Option<usize>,
+    /// Whether ranks that are processes of one machine merge the image in memory that they share, where [`Strategy::DirectSend`] or
+    /// [`Strategy::Automatic`] is asked for and the image goes to one rank. Without it, and where there is no such memory, they send messages.
+    pub in_memory: bool,
     /// The instruction set; `None` is the best this machine has. Changes the time, never the image.
     pub simd: Option<SimdLevel>,
     /// Longest wait for one message. Must allow for the slowest rank's rendering if ranks do not meet at a barrier first.
@@ -61,6 +65,7 @@ impl Default for Options {
             depth: true,
             verify: false,
             slice_px: None,
+            in_memory: true,
             simd: None,
             timeout: Duration::from_secs(60),
             confirm: true,
@@ -162,7 +167,11 @@ impl<P: Composite> Compositor<P> {
         let places = Places::new(comm, options)?;
         options.strategy.check()?;
         let size_px = (frame.width_px(), frame.height_px());
-        if options.strategy == Strategy::Automatic && self.network.is_none() {
+        let may_share = options.in_memory
+            && places.root.is_some()
+            && matches!(options.strategy, Strategy::DirectSend | Strategy::Automatic);
+        let shares = may_share && comm.node_memory().is_some();
+        if options.strategy == Strategy::Automatic && self.network.is_none() && !shares {
             self.network = Some(Network::measure(comm, options.timeout)?);
         }
 
@@ -183,6 +192,22 @@ impl<P: Composite> Compositor<P> {
         let ranges = session.meet(drawn, frame.depth_range().unwrap_or([f32::NAN; 2]))?;
         if !P::HAS_DEPTH {
             check_order(&session.drawn, &ranges, &places.order)?;
+        }
+
+        // Ranks of one machine.
+        if let Some(root) = places.root.filter(|_| shares && in_memory::is_possible::<P>(&mut session, size_px)) {
+            let spare = self.spare.take();
+            let view = frame.view(drawn);
+            let done = in_memory::run(&mut session, &view, size_px, root, options.depth, spare, kernels)?;
+            if let Some(image) = done {
+                let report = Report {
+                    strategy: Strategy::DirectSend,
+                    in_memory: true,
+                    total_secs: session.now() - begin,
+                    ..session.report
+                };
+                return Ok(Composited { image, piece: None, report });
+            }
         }
 
         // The strategy, and what it hands in.
@@ -299,6 +324,7 @@ pub(crate) fn fingerprint<P: PixelFormat>(
         options.strategy.code(),
         places.root.map_or(u64::MAX, |root| root as u64),
         u64::from(options.depth),
+        u64::from(options.in_memory),
         options.slice_px.map_or(u64::MAX, |pixels| pixels as u64),
         network.map_or(0, Network::code),
     ];

@@ -49,6 +49,7 @@ mod compositor;
 mod deep;
 mod error;
 mod frame;
+mod in_memory;
 mod join;
 mod layer;
 mod network;

@@ -23,6 +23,8 @@ pub struct Report {
     pub nan_depths: u64,
     /// The strategy that was used, also where it was chosen automatically.
     pub strategy: crate::Strategy,
+    /// Whether ranks of one machine merged the frame in shared memory instead of sending messages.
+    pub in_memory: bool,
 }
 
 impl Report {

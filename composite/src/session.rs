@@ -79,6 +79,10 @@ impl<'a> Session<'a> {
         self.order.len()
     }
 
+    pub(crate) fn rank_of(&self, place: usize) -> usize {
+        self.order[place]
+    }
+
     fn place_of(&self, rank: usize) -> usize {
         // The order is a permutation, so every rank is in it.
         self.order.iter().position(|&other| other == rank).unwrap_or(rank)

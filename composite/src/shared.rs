@@ -134,6 +134,7 @@ pub(crate) fn merge_band<P: Composite>(
 
 /// Rows in which one thread works.
 pub(crate) struct Rows<P: Composite> {
+    width: usize,
     depth: Vec<f32>,
     /// For blended formats: the groups of the balanced tree that wait for their other half, by the logarithm of their size.
     waiting: Vec<Group<P>>,
@@ -149,6 +150,7 @@ struct Group<P: Composite> {
 impl<P: Composite> Rows<P> {
     pub(crate) fn new(width: usize) -> Self {
         Self {
+            width,
             depth: vec![1.0; if P::HAS_DEPTH { width } else { 0 }],
             waiting: Vec::new(),
             spare: Vec::new(),
@@ -165,7 +167,10 @@ impl<P: Composite> Rows<P> {
         depths: &mut [f32],
         join: impl Fn(&[u8], &[u8], &mut [P::Color], &mut [f32], Side),
     ) {
-        let Some(width) = views.first().map(|view| view.stride).filter(|&width| width > 0) else { return };
+        let width = self.width;
+        if width == 0 {
+            return;
+        }
         for (index, row) in colors.chunks_exact_mut(width).enumerate() {
             let y = first_row + index as u32;
             if P::HAS_DEPTH {
@@ -227,7 +232,7 @@ impl<P: Composite> Rows<P> {
     }
 
     fn row_of(&mut self, view: &View<'_, P>, y: u32) -> Group<P> {
-        let mut colors = self.spare.pop().unwrap_or_else(|| vec![P::EMPTY.color(); view.stride]);
+        let mut colors = self.spare.pop().unwrap_or_else(|| vec![P::EMPTY.color(); self.width]);
         if !(view.bounds.y0..view.bounds.y1).contains(&y) {
             return Group { columns: 0..0, colors };
         }

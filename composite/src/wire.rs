@@ -151,8 +151,8 @@ impl Codec {
         while !rect.is_empty() {
             let encoded = at_level!(
                 self.kernels,
-                simd => encode_rows(simd, view, rect, depths, opaque, out),
-                encode_rows_scalar(view, rect, depths, opaque, out)
+                simd => encode_rows(Vectors(simd), view, rect, depths, opaque, out),
+                encode_rows(NoVectors, view, rect, depths, opaque, out)
             );
             if let Some(encoded) = encoded {
                 counts = encoded;
@@ -253,9 +253,71 @@ impl Codec {
     }
 }
 
+/// What [`encode_rows`] does to a row, at one instruction set.
+trait RowKernels: Copy {
+    fn row_words<P: Composite>(
+        self,
+        colors: &[P::Color],
+        depths: &[f32],
+        counts: &mut Counts,
+        put: impl FnMut(u64),
+    );
+    fn append_active<const SIZE: usize>(self, out: &mut Vec<u8>, mask_at: usize, row: &[u8]);
+    fn drop_full_alpha(self, out: &mut Vec<u8>, start: usize) -> bool;
+}
+
+#[derive(Clone, Copy)]
+struct Vectors<S>(S);
+
+impl<S: Simd> RowKernels for Vectors<S> {
+    #[inline(always)]
+    fn row_words<P: Composite>(
+        self,
+        colors: &[P::Color],
+        depths: &[f32],
+        counts: &mut Counts,
+        put: impl FnMut(u64),
+    ) {
+        row_words::<P, S>(self.0, colors, depths, counts, put);
+    }
+
+    #[inline(always)]
+    fn append_active<const SIZE: usize>(self, out: &mut Vec<u8>, mask_at: usize, row: &[u8]) {
+        append_active::<SIZE, S>(self.0, out, mask_at, row);
+    }
+
+    #[inline(always)]
+    fn drop_full_alpha(self, out: &mut Vec<u8>, start: usize) -> bool {
+        drop_full_alpha(self.0, out, start)
+    }
+}
+
+#[derive(Clone, Copy)]
+struct NoVectors;
+
+impl RowKernels for NoVectors {
+    fn row_words<P: Composite>(
+        self,
+        colors: &[P::Color],
+        depths: &[f32],
+        counts: &mut Counts,
+        put: impl FnMut(u64),
+    ) {
+        row_words_scalar::<P>(colors, depths, counts, put);
+    }
+
+    fn append_active<const SIZE: usize>(self, out: &mut Vec<u8>, mask_at: usize, row: &[u8]) {
+        append_active_scalar::<SIZE>(out, mask_at, row);
+    }
+
+    fn drop_full_alpha(self, out: &mut Vec<u8>, start: usize) -> bool {
+        drop_full_alpha_scalar(out, start)
+    }
+}
+
 #[inline(always)]
-fn encode_rows<P: Composite, S: Simd>(
-    simd: S,
+fn encode_rows<P: Composite>(
+    kernels: impl RowKernels,
     view: &View<'_, P>,
     rect: Rect,
     depths: bool,
@@ -271,13 +333,12 @@ fn encode_rows<P: Composite, S: Simd>(
     while y < rect.y1 {
         let (colors, row_depths) = view.row(y, rect.x0, rect.x1);
         let before = counts.active;
-        row_words::<P, S>(simd, colors, row_depths, &mut counts, |_| {});
+        kernels.row_words::<P>(colors, row_depths, &mut counts, |_| {});
         if counts.active != before + width {
             break;
         }
-        let begin = out.len();
         out.extend_from_slice(bytemuck::cast_slice(colors));
-        if opaque && !drop_full_alpha(simd, out, begin) {
+        if opaque && out.last() != Some(&255) {
             return None;
         }
         if depths {
@@ -285,8 +346,9 @@ fn encode_rows<P: Composite, S: Simd>(
         }
         y += 1;
     }
+    // Opaque colours come without depths, so they lie in one piece.
     if y == rect.y1 {
-        return Some(counts);
+        return (!opaque || kernels.drop_full_alpha(out, HEADER_BYTES)).then_some(counts);
     }
 
     // With a mask, from the first row on.
@@ -298,68 +360,28 @@ fn encode_rows<P: Composite, S: Simd>(
         let (colors, row_depths) = view.row(y, rect.x0, rect.x1);
         let before = counts.active;
         let mut word_at = mask_at;
-        row_words::<P, S>(simd, colors, row_depths, &mut counts, |word| {
+        kernels.row_words::<P>(colors, row_depths, &mut counts, |word| {
             out[word_at..word_at + 8].copy_from_slice(&word.to_le_bytes());
             word_at += 8;
         });
         if counts.active > before {
-            let begin = out.len();
             let colors = bytemuck::cast_slice(colors);
             match P::Color::BYTES {
-                4 => append_active::<4, S>(simd, out, mask_at, colors),
-                8 => append_active::<8, S>(simd, out, mask_at, colors),
-                _ => append_active::<16, S>(simd, out, mask_at, colors),
+                4 => kernels.append_active::<4>(out, mask_at, colors),
+                8 => kernels.append_active::<8>(out, mask_at, colors),
+                _ => kernels.append_active::<16>(out, mask_at, colors),
             }
-            if opaque && !drop_full_alpha(simd, out, begin) {
+            // All alphas are looked at in the end; most pictures that are not opaque show it in their first row.
+            if opaque && out.last() != Some(&255) {
                 return None;
             }
             if depths {
-                append_active::<4, S>(simd, out, mask_at, bytemuck::cast_slice(row_depths));
+                kernels.append_active::<4>(out, mask_at, bytemuck::cast_slice(row_depths));
             }
         }
         mask_at = word_at;
     }
-    Some(counts)
-}
-
-/// [`encode_rows`] one pixel after the other.
-fn encode_rows_scalar<P: Composite>(
-    view: &View<'_, P>,
-    rect: Rect,
-    depths: bool,
-    opaque: bool,
-    out: &mut Vec<u8>,
-) -> Option<Counts> {
-    let mut counts = Counts::default();
-    let words = rect.width().div_ceil(64);
-    out.resize(HEADER_BYTES + 8 * words * rect.height(), 0);
-    let mut mask_at = HEADER_BYTES;
-    for y in rect.y0..rect.y1 {
-        let (colors, row_depths) = view.row(y, rect.x0, rect.x1);
-        let mut word_at = mask_at;
-        row_words_scalar::<P>(colors, row_depths, &mut counts, |word| {
-            out[word_at..word_at + 8].copy_from_slice(&word.to_le_bytes());
-            word_at += 8;
-        });
-        let begin = out.len();
-        let colors = bytemuck::cast_slice(colors);
-        match P::Color::BYTES {
-            4 => append_active_scalar::<4>(out, mask_at, colors),
-            8 => append_active_scalar::<8>(out, mask_at, colors),
-            _ => append_active_scalar::<16>(out, mask_at, colors),
-        }
-        if opaque && !drop_full_alpha_scalar(out, begin) {
-            return None;
-        }
-        if depths {
-            append_active_scalar::<4>(out, mask_at, bytemuck::cast_slice(row_depths));
-        }
-        mask_at = word_at;
-    }
-    if counts.active == rect.pixels() {
-        out.drain(HEADER_BYTES..mask_at);
-    }
-    Some(counts)
+    (!opaque || kernels.drop_full_alpha(out, mask_at)).then_some(counts)
 }
 
 /// A message whose every number has been checked.
@@ -484,13 +506,14 @@ impl<'a> Part<'a> {
         );
     }
 
-    /// Writes its rectangle into planes of `width` columns; `depths` may be empty.
+    /// Writes its rectangle into planes of `width` columns; `depths` may be empty. `wide` is room to work in.
     pub(crate) fn place<P: Composite>(
         &self,
         kernels: Kernels,
         width: usize,
         colors: &mut [P::Color],
         depths: &mut [f32],
+        wide: &mut Vec<u8>,
     ) {
         let range = |y: u32| {
             let start = y as usize * width + self.rect.x0 as usize;
@@ -503,32 +526,29 @@ impl<'a> Part<'a> {
                     depths[range(y)].fill(1.0);
                 }
             }
+            return;
         }
-        let is_opaque = self.color_bytes != P::Color::BYTES;
-        let mut wide = Vec::new();
+        let mut part = *self;
+        if self.color_bytes != P::Color::BYTES {
+            // All rows at once: those of slabs have a few pixels each.
+            at_level!(
+                kernels,
+                simd => give_full_alpha(simd, self.pixels, wide),
+                give_full_alpha_scalar(self.pixels, wide)
+            );
+            part = Part { pixels: wide, color_bytes: P::Color::BYTES, ..*self };
+        }
         at_level!(
             kernels,
-            simd => self.for_each_row(
+            simd => part.for_each_row(
                 #[inline(always)]
                 |y, row| {
                     let to_depths = if depths.is_empty() { &mut [] } else { &mut depths[range(y)] };
-                    let row = if is_opaque {
-                        give_full_alpha(simd, row.colors, &mut wide);
-                        SparseRow { colors: &wide, behind_colors: &wide, ..row }
-                    } else {
-                        row
-                    };
                     place_row::<P, _>(simd, row, &mut colors[range(y)], to_depths);
                 }
             ),
-            self.for_each_row(|y, row| {
+            part.for_each_row(|y, row| {
                 let to_depths = if depths.is_empty() { &mut [] } else { &mut depths[range(y)] };
-                let row = if is_opaque {
-                    give_full_alpha_scalar(row.colors, &mut wide);
-                    SparseRow { colors: &wide, behind_colors: &wide, ..row }
-                } else {
-                    row
-                };
                 place_row_scalar::<P>(row, &mut colors[range(y)], to_depths);
             })
         );

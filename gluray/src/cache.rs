@@ -1,6 +1,8 @@
 //! Geometry that is there already: keyed by positions and connectivity alone, so that a moved camera, other colours or flipped normals
 //! (geomview turns them to the viewer each frame) rebuild nothing.
 
+mod moved;
+
 use crate::capture::Run;
 use crate::primitives::triangulate;
 use rt_core::accel::{BuildOptions, BuildQuality, World};
@@ -8,7 +10,7 @@ use rt_core::glam::Vec3;
 use rt_core::math::Aabb;
 use rt_core::mesh::TriMesh;
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, Weak};
 
 /// A mesh with the structure that rays need, made when the first ray comes.
 pub(crate) struct Geometry {
@@ -19,6 +21,17 @@ pub(crate) struct Geometry {
     world: Mutex<Option<Arc<World>>>,
     best: OnceLock<Arc<World>>,
     bounds: OnceLock<Aabb>,
+    /// The same triangles where they were before.
+    before: Weak<Geometry>,
+}
+
+/// How structures came to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Structures {
+    /// Built.
+    pub(crate) built: u64,
+    /// Taken over from where the triangles were before.
+    pub(crate) refitted: u64,
 }
 
 /// Positions as bytes, and back as vectors.
@@ -27,13 +40,14 @@ fn vectors(p: &[[f32; 3]]) -> Vec<Vec3> {
 }
 
 impl Geometry {
-    fn new(key: u128, mesh: TriMesh) -> Geometry {
+    fn new(key: u128, mesh: TriMesh, before: Weak<Geometry>) -> Geometry {
         Geometry {
             mesh: Arc::new(mesh),
             key,
             world: Mutex::new(None),
             best: OnceLock::new(),
             bounds: OnceLock::new(),
+            before,
         }
     }
 
@@ -43,21 +57,32 @@ impl Geometry {
     }
 
     /// The structure, built now if need be; `None` when the mesh cannot be built.
-    pub(crate) fn world(&self, built: &mut u64) -> Option<Arc<World>> {
+    pub(crate) fn world(&self, made: &mut Structures) -> Option<Arc<World>> {
         if let Some(best) = self.best.get() {
             return Some(best.clone());
         }
         if crate::config::current().settings.quality == crate::config::Quality::Best {
-            *built += 1;
+            made.built += 1;
             self.improve();
             return self.best.get().cloned();
         }
         let mut slot = self.world.lock().unwrap_or_else(|e| e.into_inner());
         if slot.is_none() {
-            *built += 1;
-            *slot = build(&self.mesh, BuildQuality::Fast);
+            *slot = self.before.upgrade().and_then(|before| moved::structure(&before, &self.mesh));
+            match slot.is_some() {
+                true => made.refitted += 1,
+                false => {
+                    made.built += 1;
+                    *slot = build(&self.mesh, BuildQuality::Fast);
+                }
+            }
         }
         slot.clone()
+    }
+
+    /// The structure, if there is one and nobody is making it just now.
+    fn structure_now(&self) -> Option<Arc<World>> {
+        self.best.get().cloned().or_else(|| self.world.try_lock().ok()?.clone())
     }
 
     /// Builds the best structure and keeps it: for geometry that rests, in the background.
@@ -167,10 +192,27 @@ impl Cache {
 
     fn insert(&mut self, key: u128, mesh: TriMesh) -> Arc<Geometry> {
         self.misses += 1;
-        let geometry = Arc::new(Geometry::new(key, mesh));
+        let before = self.before(&mesh);
+        let geometry = Arc::new(Geometry::new(key, mesh, before));
         let entry = Entry { geometry: geometry.clone(), last_used: self.frame, frames: 1, improving: false };
         self.entries.insert(key, entry);
         geometry
+    }
+
+    /// What new geometry was in the frames before: the same triangles, not drawn in this frame.
+    fn before(&self, mesh: &TriMesh) -> Weak<Geometry> {
+        const WORTH_REFITTING: usize = 1000;
+        if mesh.num_triangles() < WORTH_REFITTING {
+            return Weak::new();
+        }
+        let size = |m: &TriMesh| (m.positions.len(), m.indices.len());
+        let was = self.entries.iter().filter(|(_, e)| {
+            e.last_used < self.frame
+                && size(&e.geometry.mesh) == size(mesh)
+                && e.geometry.mesh.indices == mesh.indices
+        });
+        was.max_by_key(|(key, e)| (e.last_used, **key))
+            .map_or_else(Weak::new, |(_, e)| Arc::downgrade(&e.geometry))
     }
 
     /// Geometry that was found another way is in use.

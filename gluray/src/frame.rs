@@ -205,7 +205,7 @@ impl Context {
         self.counters.rays("primary", traced.primary);
         self.counters.rays("shadow", traced.extra[0]);
         self.counters.rays("ambient occlusion", traced.extra[1]);
-        self.counters.report.builds += traced.builds;
+        self.counters.made(traced.structures);
         self.counters.report.pixels += traced.layer.covered as u64;
         let start = Instant::now();
         if traced.layer.covered > 0 {
@@ -224,14 +224,14 @@ impl Context {
         self.counters.flushed("in order");
         self.frame.told.traced(self.counters.report.frames + 1, std::iter::once(draw));
         let start = Instant::now();
-        let mut builds = 0;
-        let (layers, rays) = worker::on_pool(|| match Prepared::new(draw, image, &mut builds) {
+        let mut structures = crate::cache::Structures::default();
+        let (layers, rays) = worker::on_pool(|| match Prepared::new(draw, image, &mut structures) {
             Some(p) => (trace::in_order(&p), p.rays.load(Relaxed)),
             None => (Vec::new(), 0),
         });
         self.counters.spent("trace", start.elapsed());
         self.counters.rays("primary", rays);
-        self.counters.report.builds += builds;
+        self.counters.made(structures);
         self.counters.report.pixels += layers.iter().map(|l| l.covered as u64).sum::<u64>();
         if !layers.is_empty() {
             self.present(&layers, Fate::AsDrawn);

@@ -181,7 +181,14 @@ impl Context {
                 self.current.normal = v;
                 return false;
             }
-            Sink::Trace | Sink::Outside => {}
+            // Only what vertices take counts: the next Begin looks.
+            Sink::Outside => {
+                self.current.normal = v;
+                self.recorder.behind = true;
+                self.now_stale(stale::NORMAL);
+                return true;
+            }
+            Sink::Trace => {}
         }
         self.current.normal = v;
         self.recorder.set_normal(v);
@@ -197,7 +204,14 @@ impl Context {
                 self.current.color = v;
                 return false;
             }
-            Sink::Trace | Sink::Outside => {}
+            // Only what vertices take counts: the next Begin looks.
+            Sink::Outside => {
+                self.current.color = v;
+                self.recorder.behind = true;
+                self.now_stale(stale::COLOR);
+                return true;
+            }
+            Sink::Trace => {}
         }
         self.current.color = v;
         self.recorder.set_color(v);
@@ -214,7 +228,14 @@ impl Context {
                 self.current.tex = v;
                 return false;
             }
-            Sink::Trace | Sink::Outside => {}
+            // Only what vertices take counts: the next Begin looks.
+            Sink::Outside => {
+                self.current.tex = v;
+                self.recorder.behind = true;
+                self.now_stale(stale::TEX);
+                return true;
+            }
+            Sink::Trace => {}
         }
         self.current.tex = v;
         self.recorder.set_tex(v);

@@ -4,6 +4,7 @@
 //! draws are sent by other threads until the program comes here again. Lines and text of the driver's are those of the new frame. Only windows are late:
 //! what is drawn into framebuffer objects is drawn to be used at once, and a program that reads its window is not made to read an old picture twice.
 
+use crate::cache::Structures;
 use crate::context::Context;
 use crate::frame::Pending;
 use crate::present::Fate;
@@ -20,7 +21,7 @@ pub(crate) struct Traced {
     /// Shadow rays, ambient occlusion rays.
     pub(crate) extra: [u64; 2],
     pub(crate) primary: u64,
-    pub(crate) builds: u64,
+    pub(crate) structures: Structures,
     pub(crate) took: Duration,
     /// The draws, whose memory serves again.
     pub(crate) draws: Vec<Pending>,
@@ -29,14 +30,14 @@ pub(crate) struct Traced {
 /// Traces draws on the threads of the pool, of which this is one.
 pub(crate) fn trace(draws: Vec<Pending>, settings: &crate::config::Settings) -> Traced {
     let start = Instant::now();
-    let mut builds = 0;
+    let mut structures = Structures::default();
     let (layer, extra, primary) = {
         let ready: Vec<Prepared<'_>> =
-            draws.iter().filter_map(|(d, image)| Prepared::new(d, image.clone(), &mut builds)).collect();
+            draws.iter().filter_map(|(d, image)| Prepared::new(d, image.clone(), &mut structures)).collect();
         let (layer, extra) = crate::ranks::nearest(&ready, settings);
         (layer, extra, ready.iter().map(|p| p.rays.load(Relaxed)).sum())
     };
-    Traced { layer, extra, primary, builds, took: start.elapsed(), draws }
+    Traced { layer, extra, primary, structures, took: start.elapsed(), draws }
 }
 
 /// The layers that are on their way, by their place in the frame.

@@ -4,6 +4,7 @@
 //! and are put over what is there.
 
 use crate::beyond::{self, Colors};
+use crate::cache::Structures;
 use crate::capture::Draw;
 use crate::config::{Mode, Settings};
 use crate::context::Context;
@@ -54,7 +55,7 @@ impl Context {
         self.keep_errors();
         let [r, g, b, _] = gl::floats::<4>(COLOR_CLEAR_VALUE);
         self.drop_errors();
-        let (mut builds, mut primary) = (0, 0);
+        let (mut structures, mut primary) = (Structures::default(), 0);
         let groups = views(pending.iter().map(|(d, _)| d));
         let (settings, studio) = (&self.config.settings, &mut self.studio);
         let mut made: Vec<Made> = Vec::new();
@@ -63,7 +64,7 @@ impl Context {
             for (number, (view, members)) in groups.iter().enumerate() {
                 let ready: Vec<Prepared<'_>> = members
                     .iter()
-                    .filter_map(|i| Prepared::new(&pending[*i].0, pending[*i].1.clone(), &mut builds))
+                    .filter_map(|i| Prepared::new(&pending[*i].0, pending[*i].1.clone(), &mut structures))
                     .collect();
                 if ready.is_empty() {
                     continue;
@@ -74,7 +75,7 @@ impl Context {
         });
         self.counters.spent("trace", start.elapsed());
         self.counters.rays("primary", primary);
-        self.counters.report.builds += builds;
+        self.counters.made(structures);
         warnings.into_iter().for_each(|w| self.counters.warn(w));
         for part in made {
             let start = Instant::now();
@@ -108,13 +109,13 @@ impl Context {
     pub(crate) fn shade_over(&mut self, draws: &[Draw], settings: &Settings) {
         let start = Instant::now();
         let settings = crate::probe::factor_settings(settings);
-        let (mut builds, mut rays) = (0, [0; 3]);
+        let (mut structures, mut rays) = (Structures::default(), [0; 3]);
         let groups = views(draws.iter());
         let mut layers = Vec::new();
         worker::on_pool(|| {
             for (_, members) in &groups {
                 let ready: Vec<Prepared<'_>> =
-                    members.iter().filter_map(|i| Prepared::new(&draws[*i], None, &mut builds)).collect();
+                    members.iter().filter_map(|i| Prepared::new(&draws[*i], None, &mut structures)).collect();
                 let (mut layer, extra) = ranks::nearest(&ready, &settings);
                 // The driver's own depth may be some roundings nearer.
                 layer
@@ -128,7 +129,7 @@ impl Context {
             }
         });
         self.counters.spent("trace", start.elapsed());
-        self.counters.report.builds += builds;
+        self.counters.made(structures);
         for (kind, n) in ["primary", "shadow", "ambient occlusion"].into_iter().zip(rays) {
             self.counters.rays(kind, n);
         }

@@ -86,6 +86,8 @@ pub(crate) struct Recorder {
     frame: u64,
     /// An attribute besides positions and normals is written down for each vertex.
     more: bool,
+    /// Current values were set outside of Begin and End, and the streams do not know.
+    pub(crate) behind: bool,
     normals: Stream<3>,
     colors: Stream<4>,
     tex: Stream<4>,
@@ -107,7 +109,12 @@ impl Recorder {
         self.mode = mode;
         if self.open == 0 {
             self.start(current);
+        } else if self.behind {
+            self.set_normal(current.normal);
+            self.set_color(current.color);
+            self.set_tex(current.tex);
         }
+        self.behind = false;
     }
 
     /// Vertices so far.
@@ -377,6 +384,21 @@ mod tests {
         r.runs.clear();
         r.frame_done();
         geometry
+    }
+
+    #[test]
+    fn what_is_set_between_primitives_is_seen_by_the_next() {
+        let (mut r, mut c) = (Recorder::default(), Current::default());
+        for (i, color) in [[1.0; 4], [1.0; 4], [0.5; 4]].into_iter().enumerate() {
+            c.color = color;
+            r.behind = true;
+            r.begin(TRIANGLES, &c);
+            (0..3).for_each(|_| r.vertex([i as f32; 3], &c));
+            r.end();
+            assert_eq!(r.colors.varying, i == 2);
+        }
+        let all = r.take_attributes();
+        assert_eq!([0, 5, 6, 8].map(|v| all.colors.at(v)[0]), [1.0, 1.0, 0.5, 0.5]);
     }
 
     #[test]

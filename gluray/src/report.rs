@@ -38,6 +38,8 @@ pub struct Report {
     pub triangles: u64,
     /// Acceleration structures built.
     pub builds: u64,
+    /// Acceleration structures taken over from where the same triangles were in an earlier frame.
+    pub refits: u64,
     /// Geometry found again, and not.
     pub cache_hits: u64,
     /// Geometry seen for the first time.
@@ -78,6 +80,7 @@ impl Report {
         self.passed_draws += other.passed_draws;
         self.triangles += other.triangles;
         self.builds += other.builds;
+        self.refits += other.refits;
         self.cache_hits += other.cache_hits;
         self.cache_misses += other.cache_misses;
         self.pixels += other.pixels;
@@ -145,6 +148,12 @@ static SLOTS: Mutex<Vec<Report>> = Mutex::new(Vec::new());
 impl Counters {
     pub(crate) fn set_driver(&mut self, renderer: &str, version: &str) {
         self.report.driver = format!("{renderer}, {version}");
+    }
+
+    /// Acceleration structures were made.
+    pub(crate) fn made(&mut self, structures: crate::cache::Structures) {
+        self.report.builds += structures.built;
+        self.report.refits += structures.refitted;
     }
 
     /// Something that was asked for could not be done; said once.

@@ -3,12 +3,14 @@
 //! Rays only find the triangle. Depth and attributes are then evaluated on it at the pixel centre with the rasterizer's own arithmetic
 //! (homogeneous edge functions after Olano and Greer 1997), so they agree with what the driver makes of neighbouring lines and text.
 
+mod batch;
 mod fragments;
 mod in_order;
 mod lifted;
 mod peeled;
 mod rays;
 
+use crate::cache::Structures;
 use crate::capture::{Draw, Shading};
 use crate::config::{Mode, Settings};
 use crate::effects::{Place, Surroundings};
@@ -17,6 +19,7 @@ use crate::lighting::{Lit, Setup, transform};
 use crate::ranks::rows::Share;
 use crate::raster::{covers, steepness};
 use crate::texturing::Image;
+use batch::Batch;
 use fearless_simd::{Level, dispatch};
 use fragments::{FragmentBlock, Lane};
 pub(crate) use in_order::in_order;
@@ -142,7 +145,11 @@ pub(crate) fn has_rays(clip_from_object: &[f32; 16]) -> bool {
 
 impl<'a> Prepared<'a> {
     /// `None` when nothing of it can be seen.
-    pub(crate) fn new(draw: &'a Draw, image: Option<Arc<Image>>, builds: &mut u64) -> Option<Prepared<'a>> {
+    pub(crate) fn new(
+        draw: &'a Draw,
+        image: Option<Arc<Image>>,
+        made: &mut Structures,
+    ) -> Option<Prepared<'a>> {
         let s = &*draw.state;
         let clip = matrix(&draw.clip_from_object);
         let camera = Camera::from_matrix(clip).ok()?;
@@ -150,7 +157,7 @@ impl<'a> Prepared<'a> {
         if rect.is_empty() {
             return None;
         }
-        let world = draw.geometry.world(builds)?;
+        let world = draw.geometry.world(made)?;
         let row = |i: usize| clip.row(i);
         let mut planes = Vec::new();
         if s.depth_clamp {
@@ -471,26 +478,32 @@ pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings, share: Share)
     let bands = layer.color.par_chunks_mut(band).zip(layer.depth.par_chunks_mut(band)).enumerate();
     bands.filter(|(i, _)| share.has(*i)).for_each_init(TileRays::new, |rays, (i, (color, depth))| {
         let y = rect.y + i as i32 * TILE;
-        let area = Rect { x: rect.x, y, w: rect.w, h: (color.len() / w) as i32 };
-        let mut seen = vec![NOTHING; color.len()];
-        for (d, p) in draws.iter().enumerate() {
-            see(p, d as u32, area, rays, &mut seen);
-        }
+        let tile_h = (color.len() / w) as i32;
         let mut n = 0;
         let mut batch = Batch::default();
-        for (k, s) in seen.iter().enumerate().filter(|(_, s)| s.draw != u32::MAX) {
-            depth[k] = s.fragment.depth as f32;
-            n += 1;
-            let p = &draws[s.draw as usize];
-            if p.blocks && mode == Mode::Match {
-                if batch.count > 0 && batch.draw != s.draw {
-                    batch.shade(&draws[batch.draw as usize], color);
-                }
-                batch.add(p, s.draw, k, s, color);
-                continue;
+        // Tile by tile: what was seen of one stays in the first cache until it is shaded.
+        for x in (rect.x..rect.x + rect.w).step_by(TILE as usize) {
+            let tile = Rect { x, y, w: TILE.min(rect.x + rect.w - x), h: tile_h };
+            let mut seen = [NOTHING; (TILE * TILE) as usize];
+            for (d, p) in draws.iter().enumerate() {
+                see(p, d as u32, tile, rays, &mut seen);
             }
-            let (px, py) = (rect.x + (k % w) as i32, y + (k / w) as i32);
-            color[k] = to_bytes(p.shaded(s.prim as usize, &s.fragment, mode, around.as_ref(), (px, py)));
+            for (j, s) in seen.iter().enumerate().filter(|(_, s)| s.draw != u32::MAX) {
+                let (tx, ty) = (j % TILE as usize, j / TILE as usize);
+                let k = ty * w + (x - rect.x) as usize + tx;
+                depth[k] = s.fragment.depth as f32;
+                n += 1;
+                let p = &draws[s.draw as usize];
+                if p.blocks && mode == Mode::Match {
+                    if batch.count > 0 && batch.draw != s.draw {
+                        batch.shade(&draws[batch.draw as usize], color);
+                    }
+                    batch.add(p, s.draw, k, s, color);
+                    continue;
+                }
+                let at = (x + tx as i32, y + ty as i32);
+                color[k] = to_bytes(p.shaded(s.prim as usize, &s.fragment, mode, around.as_ref(), at));
+            }
         }
         if batch.count > 0 {
             batch.shade(&draws[batch.draw as usize], color);
@@ -502,85 +515,43 @@ pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings, share: Share)
     (layer, extra)
 }
 
-/// Up to 16 fragments of one draw that are lit together.
-#[derive(Default)]
-struct Batch {
-    draw: u32,
-    count: usize,
-    pixels: [usize; LANES],
-    triangles: [[u32; 3]; LANES],
-    weights: [[f32; LANES]; 3],
-    back: [bool; LANES],
-}
-
-impl Batch {
-    fn add(&mut self, p: &Prepared<'_>, draw: u32, pixel: usize, s: &Seen, color: &mut [[u8; 4]]) {
-        // One with room left is of the same draw: others are shaded before the draw changes.
-        debug_assert!(self.count == 0 || self.draw == draw, "a batch is of one draw");
-        self.draw = draw;
-        let n = self.count;
-        self.pixels[n] = pixel;
-        self.triangles[n] = p.draw.geometry.mesh.indices[s.prim as usize];
-        for k in 0..3 {
-            self.weights[k][n] = s.fragment.weights[k] as f32;
-        }
-        self.back[n] = !s.fragment.front;
-        self.count = n + 1;
-        if self.count == LANES {
-            self.shade(p, color);
-        }
-    }
-
-    fn shade(&mut self, p: &Prepared<'_>, color: &mut [[u8; 4]]) {
-        let used = ((1_u32 << self.count) - 1) as u16;
-        let positions = &p.draw.geometry.mesh.positions;
-        let a = &p.draw.attributes;
-        let (triangles, weights, back) = (&self.triangles, &self.weights, &self.back);
-        let lit = dispatch!(Level::new(), _simd => p.lighting.fragments(a, positions, triangles, weights, back, used));
-        for l in 0..self.count {
-            color[self.pixels[l]] = to_bytes(lit.rgba.map(|c| c[l]));
-        }
-        self.count = 0;
-    }
-}
-
-/// One draw against what was seen so far.
-fn see(p: &Prepared<'_>, index: u32, area: Rect, rays: &mut TileRays, seen: &mut [Seen]) {
-    let part = area.and(p.rect);
-    if part.is_empty() {
+/// One draw against what was seen so far in a tile, row by row.
+fn see(
+    p: &Prepared<'_>,
+    index: u32,
+    area: Rect,
+    rays: &mut TileRays,
+    seen: &mut [Seen; (TILE * TILE) as usize],
+) {
+    let tile = area.and(p.rect);
+    if tile.is_empty() || !rays.send(p, tile) {
         return;
     }
     let later_wins_ties = p.draw.state.depth_func == LEQUAL;
     let mut fragments: [FragmentBlock; 16] = [const { FragmentBlock::EMPTY }; 16];
-    for x in (part.x..part.x + part.w).step_by(TILE as usize) {
-        let tile = Rect { x, y: part.y, w: TILE.min(part.x + part.w - x), h: part.h };
-        if !rays.send(p, tile) {
-            continue;
-        }
-        let mut moved = [f64::NAN; 256];
-        let (hits, range) = (&rays.hits, p.draw.state.depth_range);
-        let (blocks, targets) = (&mut fragments, &mut moved);
-        dispatch!(Level::new(), _simd => fill(p, hits, tile, blocks, targets, range));
-        // Polygon offset pushes steep triangles far back, at silhouettes behind others of the same draw.
-        let overtaken = p.draw.state.polygon_offset.is_some() && rays.look_behind(p, tile, &moved);
-        for y in 0..tile.h {
-            for x in 0..tile.w {
-                let (b, l) = slot(x, y);
-                let behind = overtaken && rays.overtakers[b].prim[l] != rt_core::ray::NO_HIT;
-                let (px, py) = (tile.x + x, tile.y + y);
-                let (prim, f) = match fragments[b].lane[l] {
-                    Lane::Empty => continue,
-                    Lane::Found if !behind => (rays.hits[b].prim[l] as usize, fragments[b].get(l)),
-                    _ => match p.resolve(rays.blocks[b].get(l), rays.hits[b].get(l), px, py) {
-                        Some(found) => found,
-                        None => continue,
-                    },
-                };
-                let at = &mut seen[((py - area.y) * area.w + px - area.x) as usize];
-                let bits = (f.depth * DEPTH_STEPS + 0.5) as u32;
-                if bits < at.depth_bits || (later_wins_ties && bits == at.depth_bits) {
-                    *at = Seen { depth_bits: bits, draw: index, prim: prim as u32, fragment: f };
-                }
+    let mut moved = [f64::NAN; 256];
+    let (hits, range) = (&rays.hits, p.draw.state.depth_range);
+    let (blocks, targets) = (&mut fragments, &mut moved);
+    dispatch!(Level::new(), _simd => fill(p, hits, tile, blocks, targets, range));
+    // Polygon offset pushes steep triangles far back, at silhouettes behind others of the same draw.
+    let overtaken = p.draw.state.polygon_offset.is_some() && rays.look_behind(p, tile, &moved);
+    for y in 0..tile.h {
+        for x in 0..tile.w {
+            let (b, l) = slot(x, y);
+            let behind = overtaken && rays.overtakers[b].prim[l] != rt_core::ray::NO_HIT;
+            let (px, py) = (tile.x + x, tile.y + y);
+            let (prim, f) = match fragments[b].lane[l] {
+                Lane::Empty => continue,
+                Lane::Found if !behind => (rays.hits[b].prim[l] as usize, fragments[b].get(l)),
+                _ => match p.resolve(rays.blocks[b].get(l), rays.hits[b].get(l), px, py) {
+                    Some(found) => found,
+                    None => continue,
+                },
+            };
+            let at = &mut seen[((py - area.y) * TILE + px - area.x) as usize];
+            let bits = (f.depth * DEPTH_STEPS + 0.5) as u32;
+            if bits < at.depth_bits || (later_wins_ties && bits == at.depth_bits) {
+                *at = Seen { depth_bits: bits, draw: index, prim: prim as u32, fragment: f };
             }
         }
     }

@@ -65,6 +65,7 @@ fn rays_through_bricks_have_the_bits_of_rays_through_the_whole() {
         shininess: 9.0,
         light: None,
         half_gradient: 1.0,
+        ..VolumeShading::default()
     };
     let mut state = 12_345u64;
     let mut random = || {
@@ -76,7 +77,7 @@ fn rays_through_bricks_have_the_bits_of_rays_through_the_whole() {
     let (mut met, mut through_three) = (0, 0);
     for interpolation in [Interpolation::Linear, Interpolation::Nearest] {
         for shading in [None, Some(shading)] {
-            let whole = volume(VolumeOptions { shading, interpolation });
+            let whole = volume(VolumeOptions { shading, interpolation, ..VolumeOptions::default() });
             let bricks = bricks(whole.blocks());
             let parts: Vec<Volume> = bricks.iter().map(|b| whole.part(*b)).collect();
             let most = parts.iter().map(|p| p.grid().values.len()).max().unwrap();

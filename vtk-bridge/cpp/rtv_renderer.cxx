@@ -6,6 +6,7 @@
 
 #include <vtkFrameBufferObjectBase.h>
 #include <vtkObjectFactory.h>
+#include <vtkRenderPass.h>
 #include <vtkRenderTimerLog.h>
 #include <vtkTimeStamp.h>
 
@@ -27,7 +28,22 @@ vtkRtvRenderer::~vtkRtvRenderer()
 void vtkRtvRenderer::ReleaseGraphicsResources(vtkWindow* window)
 {
   this->Blit.Release(window);
+  if (this->Compositing)
+  {
+    this->Compositing->ReleaseGraphicsResources(window);
+  }
   this->Superclass::ReleaseGraphicsResources(window);
+}
+
+void vtkRtvRenderer::DeviceRender()
+{
+  if (!this->Bridge || this->Selector || this->PreserveDepthBuffer || rtvApi->option("RTV_OFF") != 0.0)
+  {
+    this->Superclass::DeviceRender();
+    return;
+  }
+  RtvFloatCompositing compositing(this->Pass, this->Compositing);
+  this->Superclass::DeviceRender();
 }
 
 int vtkRtvRenderer::UpdateGeometry(vtkFrameBufferObjectBase* fbo)

@@ -2,6 +2,7 @@
 // Compiled by `vtk-bridge install` for each VTK on the machine, because the layout of VTK's classes differs from version to version.
 #pragma once
 #include "rtv.h"
+#include "rtv_compositing.h"
 
 #include <map>
 #include <vector>
@@ -64,6 +65,7 @@ class vtkRtvRenderer : public vtkOpenGLRenderer
 public:
   static vtkRtvRenderer* New();
   vtkTypeMacro(vtkRtvRenderer, vtkOpenGLRenderer);
+  void DeviceRender() override;
   void DeviceRenderOpaqueGeometry(vtkFrameBufferObjectBase* fbo = nullptr) override;
   void ReleaseGraphicsResources(vtkWindow* window) override;
 
@@ -78,6 +80,7 @@ private:
   RtvBridge* Bridge = nullptr;
   RtvExtractor Extractor;
   RtvBlit Blit;
+  vtkSmartPointer<vtkRenderPass> Compositing;
   // Set while OpenGL draws the rest: where the picture goes.
   bool HasPicture = false;
   bool PictureIsBlended = false;

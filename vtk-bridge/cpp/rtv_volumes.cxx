@@ -1,10 +1,13 @@
 // Volumes of uniform grids to the bridge; which of them rt-core can draw as VTK does, and why the others stay OpenGL.
 #include "rtv_arrays.h"
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 #include <vtkColorTransferFunction.h>
 #include <vtkCompositeDataIterator.h>
 #include <vtkCompositeDataSet.h>
+#include <vtkContourValues.h>
 #include <vtkDataArray.h>
 #include <vtkDataSet.h>
 #include <vtkFloatArray.h>
@@ -46,57 +49,125 @@ const char* ClassReason(vtkVolume* volume, vtkVolumeMapper* mapper)
   return "OpenGL draws volume mappers of this class";
 }
 
-const char* BlendReason(int mode)
+// What OpenGL's table of opacities by gradient reaches to: a quarter of the range of the scalars.
+const double GradientRange = 0.25;
+
+// RTV_BLEND_* of a mapper's blend mode, or -1.
+int BlendOf(int mode)
 {
   switch (mode)
   {
     case vtkVolumeMapper::COMPOSITE_BLEND:
-      return nullptr;
+      return RTV_BLEND_COMPOSITE;
     case vtkVolumeMapper::MAXIMUM_INTENSITY_BLEND:
-      return "a volume with maximum intensity blending";
+      return RTV_BLEND_MAXIMUM;
     case vtkVolumeMapper::MINIMUM_INTENSITY_BLEND:
-      return "a volume with minimum intensity blending";
+      return RTV_BLEND_MINIMUM;
     case vtkVolumeMapper::AVERAGE_INTENSITY_BLEND:
-      return "a volume with average intensity blending";
+      return RTV_BLEND_AVERAGE;
     case vtkVolumeMapper::ADDITIVE_BLEND:
-      return "a volume with additive blending";
+      return RTV_BLEND_ADDITIVE;
     case vtkVolumeMapper::ISOSURFACE_BLEND:
-      return "a volume with isosurface blending";
-    case vtkVolumeMapper::SLICE_BLEND:
-      return "a volume with slice blending";
+      return RTV_BLEND_ISOSURFACES;
     default:
-      return "a volume with a blend mode that is not known";
+      return -1;
   }
 }
 
-// A shaded volume answers one white light at the eye; under others OpenGL's formula is another.
-const char* LightReason(vtkRenderer* renderer, bool& lit)
+bool HasGradientOpacity(vtkVolumeProperty* property)
+{
+  return !property->GetDisableGradientOpacity(0) && property->HasGradientOpacity(0);
+}
+
+const char* BlendReason(int mode, vtkVolumeProperty* property)
+{
+  const int blend = BlendOf(mode);
+  if (blend < 0)
+  {
+    return mode == vtkVolumeMapper::SLICE_BLEND ? "a volume with slice blending" : "a volume with a blend mode that is not known";
+  }
+  if (blend != RTV_BLEND_COMPOSITE && HasGradientOpacity(property))
+  {
+    return "a volume with gradient opacity and another blending than composite";
+  }
+  // OpenGL shades the largest scalar by the gradient where the ray ends.
+  if ((blend == RTV_BLEND_MAXIMUM || blend == RTV_BLEND_MINIMUM) && property->GetShade(0))
+  {
+    return "a shaded volume with maximum or minimum intensity blending";
+  }
+  return nullptr;
+}
+
+// The lights of shaded volumes.
+struct Lights
+{
+  bool On = false;
+  // Six numbers each, as RtvVolume has them; empty for one white headlight.
+  std::vector<float> List;
+  // OpenGL's other formula, for all but one headlight: no ambient part, and highlights of its own.
+  bool Several = false;
+};
+
+const char* ReadLights(vtkRenderer* renderer, Lights& out)
 {
   vtkLightCollection* lights = renderer->GetLights();
   vtkCollectionSimpleIterator it;
   lights->InitTraversal(it);
+  bool plain = true, colored = false;
   int on = 0;
-  bool plain = true;
   while (vtkLight* light = lights->GetNextLight(it))
   {
-    if (light->GetSwitch())
+    if (!light->GetSwitch())
     {
-      ++on;
-      const double* color = light->GetDiffuseColor();
-      plain = plain && light->LightTypeIsHeadlight() && !light->GetPositional() && light->GetIntensity() == 1.0 &&
-        color[0] == 1.0 && color[1] == 1.0 && color[2] == 1.0;
+      continue;
+    }
+    ++on;
+    if (light->GetPositional())
+    {
+      return "a shaded volume under lights that have a place";
+    }
+    const double* color = light->GetDiffuseColor();
+    const double* ambient = light->GetAmbientColor();
+    const double* highlight = light->GetSpecularColor();
+    const double strength = light->GetIntensity();
+    plain = plain && light->LightTypeIsHeadlight();
+    double from[3], to[3];
+    light->GetTransformedPosition(from);
+    light->GetTransformedFocalPoint(to);
+    for (int c = 0; c < 3; ++c)
+    {
+      colored = colored || strength * color[c] != 1.0 || strength * highlight[c] != 1.0;
+      if (ambient[c] != 0.0)
+      {
+        return "a shaded volume under lights with an ambient colour";
+      }
+      out.List.push_back(static_cast<float>(from[c] - to[c]));
+    }
+    for (int c = 0; c < 3; ++c)
+    {
+      out.List.push_back(static_cast<float>(strength * color[c]));
     }
   }
-  lit = on > 0;
-  return on <= 1 && plain ? nullptr : "a shaded volume under other lights than one white headlight";
+  out.On = on > 0;
+  out.Several = on > 1 || !plain;
+  if (on > 6)
+  {
+    return "a shaded volume under more than six lights";
+  }
+  if (!out.Several && colored)
+  {
+    // At the viewer, not parallel.
+    std::fill(out.List.begin(), out.List.begin() + 3, 0.0f);
+  }
+  else if (!out.Several)
+  {
+    out.List.clear();
+  }
+  return nullptr;
 }
 
 const char* MapperReason(vtkVolumeMapper* mapper)
 {
-  if (const char* reason = BlendReason(mapper->GetBlendMode()))
-  {
-    return reason;
-  }
   if (mapper->GetCropping())
   {
     return "a cropped volume";
@@ -140,17 +211,6 @@ const char* PropertyReason(vtkVolumeProperty* property)
   {
     return "a volume with a two-dimensional transfer function";
   }
-  if (!property->GetDisableGradientOpacity(0) && property->HasGradientOpacity(0))
-  {
-    return "a volume with gradient opacity";
-  }
-#if VTK_VERSION_NUMBER >= VTK_VERSION_CHECK(9, 2, 0)
-  // Its highlight follows the mirrored light; that of rt-core's volumes, and of VTK 9.1, the half vector.
-  if (property->GetShade(0) && property->GetSpecular(0) > 0.0)
-  {
-    return "a shaded volume with a highlight";
-  }
-#endif
   if (property->HasLabelGradientOpacity() || property->GetLabelColor(1) || property->GetLabelScalarOpacity(1))
   {
     return "a volume with labels";
@@ -158,7 +218,7 @@ const char* PropertyReason(vtkVolumeProperty* property)
   return nullptr;
 }
 
-const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volume, vtkImageData* image, bool lit,
+const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volume, vtkImageData* image, const Lights& lights,
   const std::string& name, std::string& answer)
 {
   vtkVolumeProperty* property = volume->GetProperty();
@@ -246,8 +306,23 @@ const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volum
   {
     v.range[1] = v.range[0] + std::max(1e-6 * std::abs(v.range[0]), 1e-30);
   }
-  std::vector<float> colors(3 * Entries), opacities(Entries);
-  if (property->GetColorChannels(0) == 1)
+  const int blend = BlendOf(mapper->GetBlendMode());
+  std::vector<float> colors(3 * Entries), opacities(Entries), gradients;
+  std::vector<double> isovalues;
+  if (blend == RTV_BLEND_AVERAGE || blend == RTV_BLEND_ADDITIVE)
+  {
+    // Means and sums are of the scalars themselves, from black to white.
+    for (int i = 0; i < 3 * Entries; ++i)
+    {
+      colors[i] = static_cast<float>(i / 3) / (Entries - 1);
+    }
+    const double* range = mapper->GetAverageIPScalarRange();
+    if (blend == RTV_BLEND_AVERAGE && (range[0] > v.range[0] || range[1] < v.range[1]))
+    {
+      return "a volume with average intensity blending of a part of its scalars";
+    }
+  }
+  else if (property->GetColorChannels(0) == 1)
   {
     std::vector<float> gray(Entries);
     property->GetGrayTransferFunction(0)->GetTable(v.range[0], v.range[1], Entries, gray.data());
@@ -265,11 +340,37 @@ const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volum
   v.opacities = RtvArray{ opacities.data(), Entries, 1, RTV_F32 };
   v.unit_distance = property->GetScalarOpacityUnitDistance(0);
   v.nearest = property->GetInterpolationType() == VTK_NEAREST_INTERPOLATION ? 1 : 0;
-  v.shade = property->GetShade(0) && lit ? 1 : 0;
-  v.ambient = static_cast<float>(property->GetAmbient(0));
+  v.blend = static_cast<uint32_t>(blend);
+  if (blend == RTV_BLEND_ISOSURFACES)
+  {
+    vtkContourValues* values = property->GetIsoSurfaceValues();
+    isovalues.assign(values->GetValues(), values->GetValues() + values->GetNumberOfContours());
+    v.isovalues = RtvArray{ isovalues.data(), isovalues.size(), 1, RTV_F64 };
+  }
+  if (HasGradientOpacity(property))
+  {
+    // OpenGL takes differences over n / (n - 1) of the distance of points and back, and scales them by the mean of the spacings.
+    double spacing = 0.0, reach = 0.0;
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      spacing += v.spacing[axis] / 3.0;
+      reach += v.dims[axis] / (v.dims[axis] - 1.0) / 3.0;
+    }
+    const double steepest = GradientRange * (v.range[1] - v.range[0]);
+    gradients.resize(Entries);
+    property->GetGradientOpacity(0)->GetTable(0.0, steepest, Entries, gradients.data());
+    v.gradient_opacities = RtvArray{ gradients.data(), Entries, 1, RTV_F32 };
+    v.steepest = steepest / (spacing * reach);
+  }
+  v.shade = property->GetShade(0) && lights.On ? 1 : 0;
+  v.lights = RtvArray{ lights.List.data(), lights.List.size() / 6, 6, RTV_F32 };
+  v.ambient = lights.Several ? 0.0f : static_cast<float>(property->GetAmbient(0));
   v.diffuse = static_cast<float>(property->GetDiffuse(0));
   v.specular = static_cast<float>(property->GetSpecular(0));
   v.specular_power = static_cast<float>(property->GetSpecularPower(0));
+#if VTK_VERSION_NUMBER >= VTK_VERSION_CHECK(9, 2, 0)
+  v.specular_mirrored = 1;
+#endif
   const char* reason = rtvApi->volume(bridge, &v);
   answer = reason ? reason : "";
   return reason ? answer.c_str() : nullptr;
@@ -292,10 +393,22 @@ const char* rtvAddVolume(
   {
     return reason;
   }
-  bool lit = false;
-  if (const char* reason = volume->GetProperty()->GetShade(0) ? LightReason(renderer, lit) : nullptr)
+  if (const char* reason = BlendReason(mapper->GetBlendMode(), volume->GetProperty()))
   {
     return reason;
+  }
+  Lights lights;
+  if (volume->GetProperty()->GetShade(0))
+  {
+    if (const char* reason = ReadLights(renderer, lights))
+    {
+      return reason;
+    }
+    // OpenGL's highlight under several lights is that of the last one in 9.1, seen from a mirrored place.
+    if (!lights.List.empty() && volume->GetProperty()->GetSpecular(0) > 0.0)
+    {
+      return "a shaded volume with a highlight under other lights than one white headlight";
+    }
   }
   if (mapper->GetNumberOfInputConnections(0) > 0 && mapper->GetInputAlgorithm(0, 0))
   {
@@ -304,7 +417,7 @@ const char* rtvAddVolume(
   vtkDataObject* data = mapper->GetNumberOfInputConnections(0) > 0 ? mapper->GetInputDataObject(0, 0) : nullptr;
   if (auto image = vtkImageData::SafeDownCast(data))
   {
-    return AddGrid(bridge, mapper, volume, image, lit, name, answer);
+    return AddGrid(bridge, mapper, volume, image, lights, name, answer);
   }
   auto composite = vtkCompositeDataSet::SafeDownCast(data);
   vtkImageData* only = nullptr;
@@ -320,7 +433,7 @@ const char* rtvAddVolume(
   }
   if (leaves == 1 && only)
   {
-    return AddGrid(bridge, mapper, volume, only, lit, name, answer);
+    return AddGrid(bridge, mapper, volume, only, lights, name, answer);
   }
   // Each block would need tables over the range of all.
   return leaves > 1 ? "a volume of several blocks" : "a volume that is not image data";

@@ -35,6 +35,18 @@ typedef struct RtvBridge RtvBridge;
 #define RTV_LIGHT_POINT 1u
 /* Light from a point in a cone. */
 #define RTV_LIGHT_SPOT 2u
+/* Emission and absorption. */
+#define RTV_BLEND_COMPOSITE 0u
+/* The largest scalar. */
+#define RTV_BLEND_MAXIMUM 1u
+/* The smallest scalar. */
+#define RTV_BLEND_MINIMUM 2u
+/* The mean of colour times opacity. */
+#define RTV_BLEND_AVERAGE 3u
+/* The integral of colour times opacity. */
+#define RTV_BLEND_ADDITIVE 4u
+/* Surfaces of given scalars. */
+#define RTV_BLEND_ISOSURFACES 5u
 /* tuples times components numbers, one after the other. */
 typedef struct RtvArray {
   /* First number; may be null when there are none. */
@@ -183,7 +195,7 @@ typedef struct RtvVolume {
   RtvArray opacities;
   /* See opacities. */
   double unit_distance;
-  /* 1 for shading by the gradient with a headlight. */
+  /* 1 for shading by the gradient. */
   uint32_t shade;
   /* Of the shading. */
   float ambient;
@@ -193,8 +205,20 @@ typedef struct RtvVolume {
   float specular;
   /* Of the shading. */
   float specular_power;
+  /* 1 for a highlight around the mirrored light instead of the half vector. */
+  uint32_t specular_mirrored;
+  /* Lights: for each the direction towards it, in the world (zero for one at the viewer), and its colour; none for a white one at the viewer. */
+  RtvArray lights;
+  /* Opacities by gradient, evenly spaced from 0 to steepest, that those of the scalars are multiplied by; none for 1. */
+  RtvArray gradient_opacities;
+  /* Gradient of the last of them, scalar per data unit. */
+  double steepest;
+  /* One of RTV_BLEND_*. */
+  uint32_t blend;
   /* Not used. */
   uint32_t reserved;
+  /* Scalars of the surfaces of RTV_BLEND_ISOSURFACES, f64. */
+  RtvArray isovalues;
 } RtvVolume;
 /* A light that is on. */
 typedef struct RtvLight {
@@ -250,7 +274,7 @@ typedef struct RtvPicture {
   float const* first_depth;
 } RtvPicture;
 /* Number of this interface, made from its structures and calls (a test says which). A shim built for another one must not go on. */
-#define RTV_ABI 220021418u
+#define RTV_ABI 3226431084u
 /* All calls in one table, so that a shim needs only one symbol. */
 typedef struct RtvApi {
   /* rtv_abi. */

@@ -1,4 +1,5 @@
-//! Edges of polygons on a surface, as VTK 9's fragment shader draws them: by the distance of a pixel from the projected edges of its polygon.
+//! Edges of polygons on a surface, as VTK 9's shaders draw them: by the distance of a pixel from the projected edges of its polygon, and
+//! a little beyond the outline, because the geometry shader moves the corners of each triangle outwards.
 
 use crate::geometry::BuiltMesh;
 use crate::input::{Property, View};
@@ -8,8 +9,12 @@ use rt_core::glam::{DAffine3, DVec2, DVec4};
 use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 
-/// Pixels a task works on.
+/// Pixels or triangles a task works on.
 const CHUNK: usize = 1 << 14;
+/// How far a corner moves, in line widths. The shader means half a width and takes the window to be as wide as its coordinates from −1 to 1.
+const MOVED: f64 = 0.25;
+/// Beyond sides that are no edges nothing is drawn from here on, pixels.
+const BEYOND_DIAGONAL: f64 = -0.5;
 
 /// The edges of one instance.
 pub(crate) struct Edges {
@@ -19,6 +24,28 @@ pub(crate) struct Edges {
     world_from_object: DAffine3,
     color: [f32; 3],
     width_px: f64,
+    /// Triangles that turn this way in the window are not drawn: 1 or −1 (rows from the top), or both.
+    culled: [bool; 2],
+}
+
+/// A triangle in the window; x and y in pixels from the top left.
+struct InWindow {
+    corners: [DVec2; 3],
+    /// Where the geometry shader puts them.
+    moved: [DVec2; 3],
+    depths: [f64; 3],
+    /// Of each side, pointing to the inside, with length 1.
+    inward: [DVec2; 3],
+    /// As in [`BuiltMesh::edges`].
+    sides: u8,
+    /// 1 or −1.
+    turn: f64,
+}
+
+/// A pixel of an edge beside the surface.
+struct Fragment {
+    pixel: u32,
+    depth: f32,
 }
 
 impl Edges {
@@ -29,54 +56,147 @@ impl Edges {
             world_from_object,
             color: property.edge_color,
             width_px: f64::from(property.edge_width),
+            culled: [property.cull_front, property.cull_back],
         }
     }
 
-    /// How much of the edge's colour shows at pixel `p` (from the top left) of triangle `primitive`.
-    fn share(&self, primitive: usize, p: DVec2, view: &View) -> f32 {
-        let Some(corners) = self.mesh.indices.get(primitive) else { return 0.0 };
+    /// `None` for triangles with a corner behind the eye, which has no place in the window, and for those without an area.
+    fn in_window(&self, primitive: usize, view: &View) -> Option<InWindow> {
+        let indices = self.mesh.indices.get(primitive)?;
         let sides = self.sides.as_ref().map_or(7, |s| s.get(primitive).copied().unwrap_or(7));
         let size = DVec2::new(view.width.into(), view.height.into());
-        let mut window = [DVec2::ZERO; 3];
-        for (w, &i) in window.iter_mut().zip(corners) {
+        let (mut corners, mut depths) = ([DVec2::ZERO; 3], [0.0; 3]);
+        for (k, &i) in indices.iter().enumerate() {
             let object = self.mesh.origin + self.mesh.positions[i as usize].as_dvec3();
-            let clip: DVec4 =
-                view.clip_from_world * self.world_from_object.transform_point3(object).extend(1.0);
+            let world = self.world_from_object.transform_point3(object);
+            let clip: DVec4 = view.clip_from_world * world.extend(1.0);
             if clip.w <= 0.0 {
-                // A corner behind the eye has no place in the window.
-                return 0.0;
+                return None;
             }
-            *w = 0.5 * (DVec2::new(clip.x, -clip.y) / clip.w + 1.0) * size;
+            corners[k] = 0.5 * (DVec2::new(clip.x, -clip.y) / clip.w + 1.0) * size;
+            depths[k] = 0.5 * clip.z / clip.w + 0.5;
         }
-        let [a, b, c] = window;
-        let turn = (b - a).perp_dot(c - a).signum();
-        let mut nearest = f64::INFINITY;
-        for (i, (from, to)) in [(a, b), (b, c), (c, a)].into_iter().enumerate() {
-            let along = to - from;
-            if sides >> i & 1 != 0 && along != DVec2::ZERO {
-                nearest = nearest.min(turn * along.perp_dot(p - from) / along.length());
+        let [a, b, c] = corners;
+        let turn = (b - a).perp_dot(c - a);
+        let inward = [b - a, c - b, a - c].map(|side| turn.signum() * side.perp().normalize_or_zero());
+        if turn == 0.0 || !turn.is_finite() || inward.contains(&DVec2::ZERO) {
+            return None;
+        }
+        let [p, q, r] = inward;
+        let push = |n: DVec2| -MOVED * self.width_px * n.normalize_or_zero();
+        let moved = [a + push(r + p), b + push(p + q), c + push(q + r)];
+        Some(InWindow { corners, moved, depths, inward, sides, turn: turn.signum() })
+    }
+
+    /// How much of the edge's colour shows at distances `d` from the sides of a triangle.
+    fn share(&self, t: &InWindow, d: &[f64; 3]) -> f32 {
+        let of_edges = (0..3).filter(|&i| t.is_edge(i)).map(|i| d[i]).fold(f64::INFINITY, f64::min);
+        (0.5 + 0.5 * self.width_px - of_edges).clamp(0.0, 1.0) as f32
+    }
+
+    /// Pixels of the edges of triangle `primitive` that lie beside it, in front of `depth`.
+    fn beside(&self, primitive: usize, view: &View, depth: &[f32], out: &mut Vec<Fragment>) {
+        let Some(t) = self.in_window(primitive, view) else { return };
+        // OpenGL's front turns to the left with rows from the bottom: to the right with rows from the top.
+        if self.culled[usize::from(t.turn > 0.0)] {
+            return;
+        }
+        let low = t.moved.iter().fold(DVec2::INFINITY, |m, p| m.min(*p)).max(DVec2::ZERO);
+        let high = t.moved.iter().fold(DVec2::NEG_INFINITY, |m, p| m.max(*p));
+        // `as` saturates, and sends what is not a number to 0.
+        let end = [(high.x + 0.5) as usize, (high.y + 0.5) as usize];
+        let (width, height) = (view.width as usize, view.height as usize);
+        for y in (low.y - 0.5).ceil().max(0.0) as usize..end[1].min(height) {
+            for x in (low.x - 0.5).ceil().max(0.0) as usize..end[0].min(width) {
+                let p = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
+                let d = t.distances(p);
+                let outside = (0..3).any(|i| t.is_edge(i) && d[i] < 0.0);
+                let cut = (0..3).any(|i| !t.is_edge(i) && d[i] < BEYOND_DIAGONAL);
+                if outside && !cut && t.covers(p) {
+                    let (pixel, z) = (y * width + x, t.depth(p) as f32);
+                    if z >= 0.0 && z <= depth[pixel] && z < 1.0 {
+                        out.push(Fragment { pixel: pixel as u32, depth: z });
+                    }
+                }
             }
         }
-        (0.5 + 0.5 * self.width_px - nearest).clamp(0.0, 1.0) as f32
     }
 }
 
-/// Draws the edges of all instances into `frame`, which has its identity layers. `edges` is one per instance, or empty.
-pub(crate) fn draw(frame: &mut Frame, edges: &[Option<Edges>], view: &View) {
+impl InWindow {
+    fn is_edge(&self, side: usize) -> bool {
+        self.sides >> side & 1 != 0
+    }
+
+    /// From each side, positive inside.
+    fn distances(&self, p: DVec2) -> [f64; 3] {
+        std::array::from_fn(|i| self.inward[i].dot(p - self.corners[i]))
+    }
+
+    /// Barycentric coordinates in the moved triangle.
+    fn weights(&self, p: DVec2) -> [f64; 3] {
+        let [a, b, c] = self.moved;
+        let area = (b - a).perp_dot(c - a);
+        let [v, w] = [(p - a).perp_dot(c - a) / area, (b - a).perp_dot(p - a) / area];
+        [1.0 - v - w, v, w]
+    }
+
+    fn covers(&self, p: DVec2) -> bool {
+        self.weights(p).iter().all(|w| *w >= 0.0)
+    }
+
+    /// Window depth in the plane of the moved triangle.
+    fn depth(&self, p: DVec2) -> f64 {
+        self.weights(p).iter().zip(self.depths).map(|(w, z)| w * z).sum()
+    }
+}
+
+/// Draws the edges of all instances into `frame`, which has its identity layers. `edges` is one per instance, or empty. `first_depth` is that of what
+/// lies in front of the opaque surfaces, or empty.
+pub(crate) fn draw(frame: &mut Frame, first_depth: &[f32], edges: &[Option<Edges>], view: &View) {
     if edges.is_empty() {
         return;
     }
+    // What is translucent in front of the opaque surfaces hides the part of an edge that has no surface behind it.
+    let veiled: Vec<bool> =
+        first_depth.par_iter().zip(&frame.depth).map(|(first, own)| first < own).collect();
+
+    // ---- On the surface.
     let width = view.width as usize;
     let ids = frame.instance.par_iter().zip(&frame.primitive).with_min_len(CHUNK);
-    frame.color.par_iter_mut().zip(ids).enumerate().for_each(|(at, (color, (&instance, &primitive)))| {
+    let seen = frame.color.par_iter_mut().zip(&mut frame.depth).zip(ids).enumerate();
+    seen.for_each(|(at, ((color, depth), (&instance, &primitive)))| {
         let Some(Some(e)) = edges.get(instance as usize) else { return };
+        let Some(t) = e.in_window(primitive as usize, view) else { return };
         let p = DVec2::new((at % width) as f64 + 0.5, (at / width) as f64 + 0.5);
-        let share = e.share(primitive as usize, p, view);
+        let share = e.share(&t, &t.distances(p));
         let alpha = color[3];
         for (c, edge) in color.iter_mut().zip(e.color) {
             *c += (edge * alpha - *c) * share;
         }
+        if *depth < 1.0 {
+            *depth = (t.depth(p) as f32).clamp(0.0, 1.0f32.next_down());
+        }
     });
+
+    // ---- Beside it.
+    for e in edges.iter().flatten() {
+        let triangles = (0..e.mesh.indices.len()).into_par_iter().with_min_len(CHUNK);
+        let depth = &frame.depth;
+        let found = triangles.fold(Vec::new, |mut out, primitive| {
+            e.beside(primitive, view, depth, &mut out);
+            out
+        });
+        let found: Vec<Vec<Fragment>> = found.collect();
+        for f in found.iter().flatten() {
+            let at = f.pixel as usize;
+            let hidden = veiled.get(at) == Some(&true) && first_depth[at] < f.depth;
+            if f.depth <= frame.depth[at] && !hidden {
+                let [r, g, b] = e.color;
+                (frame.depth[at], frame.color[at]) = (f.depth, [r, g, b, 1.0]);
+            }
+        }
+    }
 }
 
 #[cfg(test)]
@@ -84,8 +204,8 @@ mod tests {
     use super::*;
     use rt_core::glam::{DMat4, Vec3};
 
-    #[test]
-    fn edges_are_as_wide_as_asked_and_diagonals_do_not_show() {
+    /// A square from pixel (50, 50) to (100, 0), in the middle of the depth, whose diagonal is no edge.
+    fn square() -> (Edges, View) {
         let corners = [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y];
         let mesh = TriMesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
         let edges = Edges {
@@ -93,11 +213,12 @@ mod tests {
             sides: Some(Arc::new(vec![3, 6])),
             world_from_object: DAffine3::IDENTITY,
             color: [1.0, 0.0, 0.0],
-            width_px: 2.0,
+            width_px: 4.0,
+            culled: [false; 2],
         };
         let view = View {
             clip_from_world: DMat4::from_cols_array(&[
-                2.0, 0.0, 0.0, -1.0, 0.0, 2.0, 0.0, -1.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0,
+                1.0, 0.0, 0.0, -0.5, 0.0, 1.0, 0.0, -0.5, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0,
             ])
             .transpose(),
             width: 100,
@@ -108,9 +229,51 @@ mod tests {
             samples: 0,
             lens: None,
         };
-        let at = |x, y| edges.share(0, DVec2::new(x, y), &view);
-        // Rows come from the top: the bottom edge is at y = 100.
-        assert_eq!([at(50.0, 99.5), at(60.0, 98.0), at(50.0, 50.5)], [1.0, 0.0, 0.0]);
-        assert!((at(60.0, 99.0) - 0.5).abs() < 1e-6, "the rim fades");
+        (edges, view)
+    }
+
+    #[test]
+    fn edges_are_as_wide_as_asked_and_diagonals_do_not_show() {
+        let (edges, view) = square();
+        let t = edges.in_window(0, &view).expect("a triangle");
+        let at = |x, y| edges.share(&t, &t.distances(DVec2::new(x, y)));
+        // Rows come from the top: the bottom edge is at y = 75.
+        assert_eq!([at(50.0, 74.5), at(60.0, 72.0), at(50.0, 50.5)], [1.0, 0.0, 0.0]);
+        assert!((at(60.0, 73.0) - 0.5).abs() < 1e-6, "the rim fades");
+    }
+
+    #[test]
+    fn the_outline_is_wider_than_the_surface_by_what_the_corners_move() {
+        let (mut edges, view) = square();
+        let draw = |edges: Edges, depth: f32| {
+            let mut frame = Frame {
+                width: 100,
+                height: 100,
+                color: vec![[0.0; 4]; 10_000],
+                depth: vec![depth; 10_000],
+                instance: vec![u32::MAX; 10_000],
+                primitive: vec![u32::MAX; 10_000],
+                ..Frame::default()
+            };
+            super::draw(&mut frame, &[], &[Some(edges)], &view);
+            frame
+        };
+        let shown = |f: &Frame, x: usize, y: usize| f.depth[y * 100 + x] < 1.0;
+        // A corner moves by one pixel along the diagonal, that is 0.7 pixels in x and in y: the pixels whose middle is half a pixel outside.
+        let (again, _) = square();
+        let frame = draw(again, 1.0);
+        assert!(
+            shown(&frame, 50, 75) && shown(&frame, 75, 50) && shown(&frame, 24, 50) && shown(&frame, 50, 24)
+        );
+        assert!(
+            !shown(&frame, 50, 76) && !shown(&frame, 50, 74),
+            "nor further out, nor inside: rays see that"
+        );
+        assert_eq!(frame.color[75 * 100 + 50], [1.0, 0.0, 0.0, 1.0]);
+        assert!((frame.depth[75 * 100 + 50] - 0.5).abs() < 1e-6);
+        let (again, _) = square();
+        assert!(draw(again, 0.4).depth.iter().all(|d| *d == 0.4), "something in front");
+        edges.culled = [true, false];
+        assert!(!shown(&draw(edges, 1.0), 50, 75), "fronts are culled");
     }
 }

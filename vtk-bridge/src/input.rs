@@ -352,11 +352,36 @@ pub struct Volume<'a> {
     pub opacities: &'a [f32],
     /// Thickness that the opacities are for, data units.
     pub unit_distance: f64,
-    /// Answer to a headlight; `None` for none.
+    /// Answer to light; `None` for none.
     pub shading: Option<Shading>,
+    /// Lights: for each the direction towards it, in the world (zero for one at the viewer), and its colour; none for a white one at the viewer.
+    pub lights: &'a [[f32; 6]],
+    /// Opacities by gradient, evenly spaced from 0 to `steepest`, that the others are multiplied by; empty for 1.
+    pub gradient_opacities: &'a [f32],
+    /// Gradient of the last of them, scalar per data unit.
+    pub steepest: f64,
+    /// What a ray makes of the scalars. All but [`VolumeBlend::Composite`] take the opacities as they are, whatever the thickness.
+    pub blend: VolumeBlend<'a>,
 }
 
-/// Answer of a volume to a headlight, by its gradient (`vtkVolumeProperty`).
+/// `vtkVolumeMapper`'s blend modes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum VolumeBlend<'a> {
+    /// Emission and absorption.
+    Composite,
+    /// Colour and opacity of the largest scalar.
+    Maximum,
+    /// Of the smallest.
+    Minimum,
+    /// The mean of colour times opacity, opaque.
+    Average,
+    /// The integral of colour times opacity by `unit_distance`, opaque.
+    Additive,
+    /// Surfaces of these scalars.
+    Isosurfaces(&'a [f64]),
+}
+
+/// Answer of a volume to light, by its gradient (`vtkVolumeProperty`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shading {
     /// Part of the colour that needs no light.
@@ -367,6 +392,8 @@ pub struct Shading {
     pub specular: f32,
     /// Its exponent.
     pub specular_power: f32,
+    /// It lies around the mirrored light (VTK 9.2 and later), not the half vector (9.1).
+    pub mirrored: bool,
 }
 
 /// Shape of a light.

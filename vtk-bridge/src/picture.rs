@@ -90,7 +90,7 @@ impl Picture {
             uncover(&mut frame, &first_depth);
         }
         encode(&mut frame, ready.encodings, mixed);
-        crate::edges::draw(&mut frame, ready.edges, view);
+        crate::edges::draw(&mut frame, &first_depth, ready.edges, view);
         (self.width, self.height) = (view.width, view.height);
         std::mem::swap(&mut self.depth, &mut frame.depth);
         if blend {
@@ -103,6 +103,9 @@ impl Picture {
                 self.blended.par_iter_mut().with_min_len(CHUNK).zip(&frame.color).for_each(mix);
             } else {
                 std::mem::swap(&mut self.blended, &mut frame.color);
+            }
+            if !ready.edges.is_empty() {
+                first_depth.iter_mut().zip(&self.depth).for_each(|(first, own)| *first = first.min(*own));
             }
             self.first_depth = if first_depth.is_empty() { self.depth.clone() } else { first_depth };
         } else {

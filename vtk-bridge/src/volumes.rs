@@ -1,13 +1,15 @@
 //! Grids of scalars as rt-core's volumes, kept while their scalars stay the same; and where a volume lies in the window's depth.
 
-use crate::input::{Scalars, View, Volume as Input};
+use crate::input::{Scalars, View, Volume as Input, VolumeBlend};
 use rayon::prelude::*;
 use rt_core::colormap::ColorMap;
-use rt_core::glam::{DAffine3, DVec3, UVec3, Vec3};
+use rt_core::glam::{DAffine3, DMat3, DVec3, UVec3, Vec3};
 use rt_core::grid::Grid;
 use rt_core::scene::PlacedVolume;
 use rt_core::transfer_function::TransferFunction;
-use rt_core::volume::{Interpolation, Volume, VolumeOptions, VolumeShading};
+use rt_core::volume::{
+    Blend, GradientOpacity, Highlight, Interpolation, Volume, VolumeLight, VolumeOptions, VolumeShading,
+};
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
@@ -61,7 +63,9 @@ impl Media {
         place: DAffine3,
         content: &mut DefaultHasher,
     ) -> Result<(u64, Option<String>), String> {
-        let look = look_of(v);
+        // Lights are fixed in the volume's axes, so that a turned volume looks different.
+        let lights = lights(v, place)?;
+        let look = look_of(v, &lights);
         (v.key, look).hash(content);
         format!("{place:?}").hash(content);
         let kept = self.kept.get_mut(&v.key).filter(|_| v.key != 0);
@@ -72,7 +76,7 @@ impl Media {
             }
             Some(kept) => {
                 let grid = Arc::clone(kept.volume.grid());
-                *kept = Medium { volume: Arc::new(medium(v, grid)?), look, used: true };
+                *kept = Medium { volume: Arc::new(medium(v, grid, lights)?), look, used: true };
                 Arc::clone(&kept.volume)
             }
             None => {
@@ -80,7 +84,7 @@ impl Media {
                 let values = values(&v.scalars);
                 let grid = Grid::new(UVec3::from_array(v.dims), DVec3::ZERO, DVec3::new(x, y, z), values)
                     .map_err(|e| format!("a volume: {e}"))?;
-                let volume = Arc::new(medium(v, Arc::new(grid))?);
+                let volume = Arc::new(medium(v, Arc::new(grid), lights)?);
                 self.kept.insert(v.key, Medium { volume: Arc::clone(&volume), look, used: true });
                 volume
             }
@@ -95,11 +99,35 @@ impl Media {
 }
 
 /// A number for everything but the scalars and the place.
-fn look_of(v: &Input<'_>) -> u64 {
+fn look_of(v: &Input<'_>, lights: &[VolumeLight]) -> u64 {
     let mut h = DefaultHasher::new();
-    v.colors.iter().flatten().chain(v.opacities).for_each(|x| x.to_bits().hash(&mut h));
+    let tables = v.colors.iter().flatten().chain(v.opacities).chain(v.gradient_opacities);
+    tables.for_each(|x| x.to_bits().hash(&mut h));
     format!("{:?}{:?}{:?}{:?}{:?}", v.nearest, v.range, v.unit_distance, v.shading, v.spacing).hash(&mut h);
+    format!("{:?}{:?}{lights:?}", v.steepest, v.blend).hash(&mut h);
     h.finish()
+}
+
+/// Lights in the axes of a volume at `place`.
+fn lights(v: &Input<'_>, place: DAffine3) -> Result<Vec<VolumeLight>, String> {
+    let to_volume = place.matrix3.transpose();
+    // Turned and evenly scaled only: elsewhere right angles in the volume are none in the world.
+    let square = to_volume * place.matrix3;
+    let scale = square.x_axis.x;
+    let even = square.abs_diff_eq(DMat3::from_diagonal(DVec3::splat(scale)), 1e-6 * scale.abs());
+    let fixed = |l: &[f32; 6]| l[..3] != [0.0; 3];
+    if v.shading.is_some() && !even && v.lights.iter().any(fixed) {
+        return Err("a shaded volume under several lights that is stretched".to_owned());
+    }
+    let light = |l: &[f32; 6]| {
+        let towards = to_volume * DVec3::new(l[0].into(), l[1].into(), l[2].into());
+        let direction = fixed(l).then(|| towards.normalize_or_zero().as_vec3());
+        VolumeLight {
+            direction,
+            color: [l[3], l[4], l[5]].map(|c| if c.is_finite() { c.max(0.0) } else { 0.0 }),
+        }
+    };
+    Ok(v.lights.iter().map(light).collect())
 }
 
 fn values(scalars: &Scalars<'_>) -> Vec<f32> {
@@ -115,7 +143,7 @@ fn values(scalars: &Scalars<'_>) -> Vec<f32> {
     }
 }
 
-fn medium(v: &Input<'_>, grid: Arc<Grid>) -> Result<Volume, String> {
+fn medium(v: &Input<'_>, grid: Arc<Grid>, lights: Vec<VolumeLight>) -> Result<Volume, String> {
     let finite = |x: f32| if x.is_finite() { x.max(0.0) } else { 0.0 };
     let [low, high] = v.range.map(|r| r as f32);
     let high = if high > low { high } else { low.next_up() };
@@ -128,7 +156,11 @@ fn medium(v: &Input<'_>, grid: Arc<Grid>) -> Result<Volume, String> {
     let colors = v.colors.iter().map(|&[r, g, b]| [finite(r), finite(g), finite(b), 1.0]).collect();
     let last = (v.opacities.len() - 1).max(1) as f32;
     let point = |(i, a): (usize, &f32)| {
-        let sigma = -f64::from(-finite(*a).min(MAX_OPACITY)).ln_1p() / v.unit_distance;
+        let sigma = match v.blend {
+            VolumeBlend::Composite => -f64::from(-finite(*a).min(MAX_OPACITY)).ln_1p() / v.unit_distance,
+            VolumeBlend::Additive => f64::from(finite(*a)) / v.unit_distance,
+            _ => f64::from(finite(*a)),
+        };
         [low + (high - low) * (i as f32 / last), sigma as f32]
     };
     let extinction = v.opacities.iter().enumerate().map(point).collect();
@@ -139,11 +171,24 @@ fn medium(v: &Input<'_>, grid: Arc<Grid>) -> Result<Volume, String> {
         diffuse: unit(s.diffuse),
         specular: finite(s.specular),
         shininess: finite(s.specular_power),
+        highlight: if s.mirrored { Highlight::Mirrored } else { Highlight::Halfway },
         ..VolumeShading::default()
     });
     let interpolation = if v.nearest { Interpolation::Nearest } else { Interpolation::Linear };
     let transfer = transfer.map_err(|e| format!("a volume: {e}"))?;
-    Volume::new(grid, transfer, VolumeOptions { shading, interpolation })
+    let gradient_opacity = (!v.gradient_opacities.is_empty()).then(|| GradientOpacity {
+        factors: v.gradient_opacities.iter().map(|f| unit(*f)).collect(),
+        steepest: v.steepest as f32,
+    });
+    let blend = match v.blend {
+        VolumeBlend::Composite => Blend::Composite,
+        VolumeBlend::Maximum => Blend::Maximum,
+        VolumeBlend::Minimum => Blend::Minimum,
+        VolumeBlend::Average => Blend::Average,
+        VolumeBlend::Additive => Blend::Additive,
+        VolumeBlend::Isosurfaces(values) => Blend::Isosurfaces(values.iter().map(|v| *v as f32).collect()),
+    };
+    Volume::new(grid, transfer, VolumeOptions { shading, interpolation, blend, lights, gradient_opacity })
         .map_err(|e| format!("a volume: {e}"))
 }
 

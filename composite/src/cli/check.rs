@@ -104,7 +104,13 @@ pub(super) fn check(common: CommonArgs, args: &CheckArgs, arguments: &[OsString]
                 for scene in Scene::ALL {
                     for size_px in SIZES_PX {
                         for strategy in STRATEGIES {
-                            for same in one_frame(&mut group, scene, size_px, strategy, timeout)? {
+                            for same in one_frame(&mut group, scene, size_px, strategy, true, timeout)? {
+                                images += 1;
+                                images_differ += u64::from(!same);
+                            }
+                        }
+                        if group.node_memory().is_some() {
+                            for same in one_frame(&mut group, scene, size_px, Strategy::DirectSend, false, timeout)? {
                                 images += 1;
                                 images_differ += u64::from(!same);
                             }
@@ -115,8 +121,13 @@ pub(super) fn check(common: CommonArgs, args: &CheckArgs, arguments: &[OsString]
                 if args.hard {
                     let most = counts.len().max(1);
                     let [all, differ] =
-                        hard_cases::run(&mut group, &STRATEGIES, most, args.repeats, timeout)?;
+                        hard_cases::run(&mut group, &STRATEGIES, true, most, args.repeats, timeout)?;
                     hard = [hard[0] + all, hard[1] + differ];
+                    if group.node_memory().is_some() {
+                        let direct = [Strategy::DirectSend];
+                        let [all, differ] = hard_cases::run(&mut group, &direct, false, most, 1, timeout)?;
+                        hard = [hard[0] + all, hard[1] + differ];
+                    }
                 }
             }
             // Nobody leaves while others still composite.
@@ -140,12 +151,13 @@ pub(super) fn check(common: CommonArgs, args: &CheckArgs, arguments: &[OsString]
     )
 }
 
-/// Composites one scene with depth and blended; on rank 0, whether each image has the bits of the reference.
+/// Composites one scene with depth and blended, in shared memory if wanted and possible; on rank 0, whether each image has the bits of the reference.
 fn one_frame(
     comm: &mut dyn Communicator,
     scene: Scene,
     (width_px, height_px): (u32, u32),
     strategy: Strategy,
+    in_memory: bool,
     timeout: Duration,
 ) -> anyhow::Result<Vec<bool>> {
     let (rank, ranks) = (comm.rank(), comm.size());
@@ -161,7 +173,7 @@ fn one_frame(
     // Everybody's frames, in the order of compositing, where they are compared.
     let everybody: Vec<_> =
         if rank == 0 { order.iter().map(|&rank| draw(rank)).collect() } else { Vec::new() };
-    let options = Options { strategy, order: Some(order), timeout, ..Options::default() };
+    let options = Options { strategy, in_memory, order: Some(order), timeout, ..Options::default() };
 
     let frame = Frame::<DepthPixel<[u8; 4]>>::with_depth(width_px, height_px, &drawn.colors, &drawn.depths)?;
     let depth = composite(comm, &frame, &options)?.image;
@@ -221,7 +233,7 @@ fn fail(comm: &mut RankComm, fault: Fault, timeout: Duration) -> anyhow::Result<
     if fault == Fault::Corrupt {
         // All composite the same frame.
         let frame = Frame::<DepthPixel<[u8; 4]>>::with_depth(150, 41, &[[1; 4]; 6150], &[0.5; 6150])?;
-        let options = Options { timeout, verify: true, ..Options::default() };
+        let options = Options { timeout, verify: true, in_memory: false, ..Options::default() };
         if culprit {
             composite(&mut FirstRanks::damaged(comm), &frame, &options)?;
         } else {

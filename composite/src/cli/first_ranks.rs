@@ -1,6 +1,6 @@
 //! The first ranks of a group as a group of their own, so that one launch checks several numbers of ranks; and a rank whose messages
 //! are damaged, for tests.
-use crate::comm::{Arrival, CommError, Communicator, FIRST_RESERVED_TAG, Receive, collective};
+use crate::comm::{Arrival, CommError, Communicator, FIRST_RESERVED_TAG, NodeMemory, Receive, collective};
 use std::time::Duration;
 
 /// The first `size` ranks of a group.
@@ -44,6 +44,10 @@ impl Communicator for FirstRanks<'_> {
     // Plans follow from it: ranks that are wrapped and ranks that are not must agree.
     fn is_one_node(&self) -> bool {
         self.inner.is_one_node()
+    }
+
+    fn node_memory(&mut self) -> Option<&mut dyn NodeMemory> {
+        if self.size == self.inner.size() { self.inner.node_memory() } else { None }
     }
 
     fn send(&mut self, destination: usize, tag: u32, mut message: Vec<u8>) -> Result<(), CommError> {

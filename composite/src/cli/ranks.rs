@@ -13,9 +13,9 @@ const MOST_RANKS: usize = 4096;
 /// What every job takes.
 #[derive(Debug, clap::Args)]
 pub(super) struct RankArgs {
-    /// Number of ranks; under an MPI launcher those it has started
-    #[arg(long, short = 'n', value_name = "N")]
-    ranks: Option<usize>,
+    /// Number of ranks; under an MPI launcher those it has started. `compare` takes several, as 2,4,8
+    #[arg(long, short = 'n', value_name = "N", value_delimiter = ',')]
+    ranks: Vec<usize>,
     /// Ranks are threads of this process (the default)
     #[arg(long, group = "where")]
     threads: bool,
@@ -73,12 +73,21 @@ impl RankArgs {
         self.smpi
     }
 
-    fn is_rank(&self) -> bool {
+    /// The numbers of ranks that were asked for.
+    pub(super) fn counts(&self) -> &[usize] {
+        &self.ranks
+    }
+
+    /// Whether this process is one of the ranks already.
+    pub(super) fn is_rank(&self) -> bool {
         smpirun::inside() || (self.mpi && launcher::launched(|name| std::env::var(name).ok()))
     }
 
     fn count(&self) -> Result<usize, UsageError> {
-        match self.ranks.unwrap_or(4) {
+        if self.ranks.len() > 1 {
+            return Err(UsageError(format!("--ranks {:?}: this takes one number of ranks", self.ranks)));
+        }
+        match self.ranks.first().copied().unwrap_or(4) {
             0 => Err(UsageError("0 ranks can do nothing; give at least 1".to_string())),
             many if many > MOST_RANKS => Err(UsageError(format!(
                 "{many} ranks on one machine are too many; give at most {MOST_RANKS}"
@@ -142,7 +151,7 @@ impl RankArgs {
     ) -> anyhow::Result<Status> {
         let mut comm = RankComm::Mpi(Box::new(MpiComm::with_chunks(self.chunk_bytes)?));
         let size = comm.comm().size();
-        let result = match self.ranks {
+        let result = match self.ranks.first().copied() {
             Some(wanted) if wanted != size => Err(anyhow::Error::new(UsageError(format!(
                 "--ranks {wanted}, but the launcher has started {size}: leave --ranks out, or start {wanted}"
             )))),

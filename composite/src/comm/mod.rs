@@ -45,6 +45,35 @@ pub struct Arrival {
     pub message: Vec<u8>,
 }
 
+/// Memory of one machine that the ranks of a group share: a room for each of them. See [`Communicator::node_memory`].
+///
+/// A frame: all meet ([`all_gather`](Communicator::all_gather)), each [`lay`](Self::lay)s its pixels down, all meet at a
+/// [barrier](Communicator::barrier) and [`open`](Self::open) the rooms of the others, take bands until there are none left, and meet at
+/// a barrier again. In any other order what is read may be half written.
+pub trait NodeMemory {
+    /// Makes this rank's room `bytes` long and has the first `used` of them written. If there is not enough memory, [`open`](Self::open)
+    /// says so to all.
+    fn lay(&mut self, bytes: usize, used: usize, fill: &mut dyn FnMut(&mut [u8]));
+
+    /// Opens the rooms of all; false, on all ranks, if there is one that could not be made.
+    ///
+    /// # Errors
+    /// [`CommError::Transport`] if a room that was made cannot be opened here.
+    fn open(&mut self) -> Result<bool, CommError>;
+
+    /// The first `bytes` of the room of `rank`, as it has laid them down.
+    fn room(&self, rank: usize, bytes: usize) -> &[u8];
+
+    /// The next band that nobody has taken, from 0 on.
+    fn next_band(&self) -> usize;
+
+    /// Has a band written, into `bytes` from `from` on of the room of `rank`, by the one who has taken it.
+    fn write_band(&self, rank: usize, from: usize, bytes: usize, write: &mut dyn FnMut(&mut [u8]));
+
+    /// A band that was written, behind the barrier.
+    fn band(&self, rank: usize, from: usize, bytes: usize) -> &[u8];
+}
+
 /// A group of ranks, seen from one of them.
 ///
 /// Messages from one rank to another with one tag arrive in the order they were sent, and receives of one source and tag are
@@ -74,6 +103,11 @@ pub trait Communicator {
     /// not worth cutting pictures in slices for that. The same on all ranks.
     fn is_one_node(&self) -> bool {
         false
+    }
+
+    /// Memory that all ranks share though they are processes, if there is such and all of them have it: then pictures need not travel.
+    fn node_memory(&mut self) -> Option<&mut dyn NodeMemory> {
+        None
     }
 
     /// Hands `message` over to `destination`; does not wait for it to be received.

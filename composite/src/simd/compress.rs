@@ -27,11 +27,14 @@ pub(crate) fn append_active<const SIZE: usize, S: Simd>(
     }
 }
 
-/// [`append_active`] one pixel after the other.
+/// [`append_active`] without vector types: run by run.
 pub(crate) fn append_active_scalar<const SIZE: usize>(out: &mut Vec<u8>, mask_at: usize, row: &[u8]) {
-    for (index, value) in row.chunks_exact(SIZE).enumerate() {
-        if word_at(out, mask_at + 8 * (index / 64)) >> (index % 64) & 1 == 1 {
-            out.extend_from_slice(value);
+    out.reserve(row.len() + 64);
+    for (index, block) in row.chunks(64 * SIZE).enumerate() {
+        match word_at(out, mask_at + 8 * index) {
+            0 => {}
+            u64::MAX => out.extend_from_slice(block),
+            word => append_by_runs::<SIZE>(out, word, block),
         }
     }
 }

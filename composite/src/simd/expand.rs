@@ -1,8 +1,8 @@
 //! From the active pixels of a message back to rows: joined to what is held, or put in place.
 use crate::color::Color;
-use crate::pixel::{Composite, combine};
+use crate::pixel::Composite;
 use crate::simd::for_runs;
-use crate::simd::runs::nearest_run;
+use crate::simd::runs::{nearest_run, nearest_run_scalar, over_one_by_one};
 #[cfg(target_arch = "x86_64")]
 use crate::simd::runs::{padded_16, take_nearer};
 use fearless_simd::Simd;
@@ -46,7 +46,7 @@ pub(crate) fn join_run<P: Composite, S: Simd>(
     }
 }
 
-/// [`join_run`] one pixel after the other.
+/// [`join_run`] without vector types.
 pub(crate) fn join_run_scalar<P: Composite>(
     colors: &[u8],
     depths: &[u8],
@@ -54,22 +54,10 @@ pub(crate) fn join_run_scalar<P: Composite>(
     held_depths: &mut [f32],
     side: Side,
 ) {
-    for (index, held_color) in held_colors.iter_mut().enumerate() {
-        let color = bytemuck::pod_read_unaligned(&colors[index * P::Color::BYTES..][..P::Color::BYTES]);
-        let (depth, held_depth) = if P::HAS_DEPTH {
-            (bytemuck::pod_read_unaligned(&depths[4 * index..4 * index + 4]), held_depths[index])
-        } else {
-            (1.0, 1.0)
-        };
-        let (other, held) = (P::from_parts(color, depth), P::from_parts(*held_color, held_depth));
-        let joined = match side {
-            Side::Lower => combine(other, held),
-            Side::Higher => combine(held, other),
-        };
-        *held_color = joined.color();
-        if P::HAS_DEPTH {
-            held_depths[index] = joined.depth();
-        }
+    if P::HAS_DEPTH {
+        nearest_run_scalar(colors, depths, held_colors, held_depths, side == Side::Higher);
+    } else {
+        over_one_by_one(colors, held_colors, side == Side::Lower);
     }
 }
 
@@ -87,13 +75,19 @@ pub(crate) fn clean_run<P: Composite, S: Simd>(simd: S, colors: &mut [P::Color],
     clean_run_scalar::<P>(&mut colors[whole..], &mut depths[whole..]);
 }
 
-/// [`clean_run`] one pixel after the other.
+/// [`clean_run`] without vector types.
 #[inline(always)]
 pub(crate) fn clean_run_scalar<P: Composite>(colors: &mut [P::Color], depths: &mut [f32]) {
-    for (color, depth) in colors.iter_mut().zip(depths) {
-        let active = *depth < 1.0;
-        *color = if active { *color } else { P::EMPTY.color() };
-        *depth = if active { *depth } else { 1.0 };
+    for (colors, depths) in colors.chunks_mut(64).zip(depths.chunks_mut(64)) {
+        // Most blocks are active as a whole: to look at them all is done four at a time, to branch for each is not.
+        if depths.iter().fold(true, |all, depth| all & (*depth < 1.0)) {
+            continue;
+        }
+        for (color, depth) in colors.iter_mut().zip(depths) {
+            let active = *depth < 1.0;
+            *color = if active { *color } else { P::EMPTY.color() };
+            *depth = if active { *depth } else { 1.0 };
+        }
     }
 }
 
@@ -116,11 +110,13 @@ pub(crate) fn join_row<P: Composite, S: Simd>(
             continue;
         }
         let first = 64 * index;
-        if word != u64::MAX
-            && join_by_vectors::<P, S>(simd, row, taken, word, first, held_colors, held_depths, side)
-        {
-            taken += word.count_ones() as usize;
-            continue;
+        // Rows that end within the word, as those of slabs do, have fewer lanes for vectors.
+        let mut word = word;
+        if word != u64::MAX {
+            let lanes = join_by_vectors::<P, S>(simd, row, taken, word, first, held_colors, held_depths, side);
+            let done = if lanes == 64 { word } else { word & !(u64::MAX << lanes) };
+            taken += done.count_ones() as usize;
+            word ^= done;
         }
         for_runs(word, |start, length| {
             let (colors, depths) = taken_run::<P>(row, taken, length);
@@ -132,22 +128,26 @@ pub(crate) fn join_row<P: Composite, S: Simd>(
     }
 }
 
-/// [`join_row`] one pixel after the other.
+/// [`join_row`] without vector types: run by run.
 pub(crate) fn join_row_scalar<P: Composite>(
     row: SparseRow<'_>,
     held_colors: &mut [P::Color],
     held_depths: &mut [f32],
     side: Side,
 ) {
+    if row.mask.is_empty() {
+        join_run_scalar::<P>(row.colors, row.depths, held_colors, held_depths, side);
+        return;
+    }
     let mut taken = 0;
-    for at in 0..held_colors.len() {
-        if !row.mask.is_empty() && row.mask[at / 8] >> (at % 8) & 1 == 0 {
-            continue;
-        }
-        let (colors, depths) = taken_run::<P>(row, taken, 1);
-        let held_depths = if P::HAS_DEPTH { &mut held_depths[at..at + 1] } else { &mut [] };
-        join_run_scalar::<P>(colors, depths, &mut held_colors[at..at + 1], held_depths, side);
-        taken += 1;
+    for (index, word) in words(row.mask).enumerate() {
+        for_runs(word, |start, length| {
+            let (colors, depths) = taken_run::<P>(row, taken, length);
+            let at = 64 * index + start;
+            let held_depths = if P::HAS_DEPTH { &mut held_depths[at..at + length] } else { &mut [] };
+            join_run_scalar::<P>(colors, depths, &mut held_colors[at..at + length], held_depths, side);
+            taken += length;
+        });
     }
 }
 
@@ -240,7 +240,8 @@ fn words(mask: &[u8]) -> impl Iterator<Item = u64> {
     mask.chunks_exact(8).map(bytemuck::pod_read_unaligned)
 }
 
-/// Whether there is an instruction for it: 64 pixels of a depth format with colours of four bytes.
+/// Joins as many of the 64 pixels of a word as there are vectors for: none, or all whole sixteens of a depth format with colours of four
+/// bytes. Says how many pixels those are.
 #[inline(always)]
 fn join_by_vectors<P: Composite, S: Simd>(
     simd: S,
@@ -251,23 +252,22 @@ fn join_by_vectors<P: Composite, S: Simd>(
     held_colors: &mut [P::Color],
     held_depths: &mut [f32],
     side: Side,
-) -> bool {
+) -> u32 {
     #[cfg(target_arch = "x86_64")]
     if P::Color::BYTES == 4
         && P::HAS_DEPTH
         && let Some(avx512) = simd.level().as_avx512()
     {
         use fearless_simd::{Bytes, SimdInto, u32x16};
-        let held_bytes: &mut [u8] = bytemuck::cast_slice_mut(held_colors);
-        let (Some(held_bytes), Some(held_depths)) =
-            (held_bytes.get_mut(4 * first..4 * first + 256), held_depths.get_mut(first..first + 64))
-        else {
-            return false;
-        };
+        let end = (first + 64).min(held_depths.len());
+        let held_bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut held_colors[first..end]);
+        let held_depths = &mut held_depths[first..end];
         let mut taken = taken;
+        let mut done = 0;
         let quarters = held_bytes.as_chunks_mut::<64>().0.iter_mut().zip(held_depths.as_chunks_mut::<16>().0);
-        for (quarter, (held_color, held_depth)) in quarters.enumerate() {
-            let lanes = (word >> (16 * quarter)) as u16;
+        for (held_color, held_depth) in quarters {
+            let lanes = (word >> done) as u16;
+            done += 16;
             if lanes == 0 {
                 continue;
             }
@@ -289,10 +289,10 @@ fn join_by_vectors<P: Composite, S: Simd>(
             );
             taken += lanes.count_ones() as usize;
         }
-        return true;
+        return done;
     }
     let _ = (simd, row, taken, word, first, held_colors, held_depths, side);
-    false
+    0
 }
 
 /// Writes up to 64 pixels with colours of four bytes, background where `word` has no bit. Whether there is an instruction for it.
@@ -306,18 +306,24 @@ fn place_by_vectors<P: Composite, S: Simd>(
 ) -> bool {
     #[cfg(target_arch = "x86_64")]
     if P::Color::BYTES == 4
-        && held.len() == 64
         && let Some(avx512) = simd.level().as_avx512()
     {
         use fearless_simd::{Bytes, SimdBase, SimdInto, u8x64, u32x16};
         let mut taken = taken;
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(held);
-        for (quarter, held) in bytes.as_chunks_mut::<64>().0.iter_mut().enumerate() {
+        for (quarter, held) in bytes.chunks_mut(64).enumerate() {
             let lanes = (word >> (16 * quarter)) as u16;
             let packed = padded_16(avx512, row.behind_colors, 4 * taken);
             // A colour of a depth or a premultiplied format that is not there is all zeros.
             let colors: u32x16<_> = expand_16(avx512, packed.into(), lanes).simd_into(avx512);
-            colors.bitcast::<u8x64<_>>().store_slice(held);
+            let colors = colors.bitcast::<u8x64<_>>();
+            if held.len() == 64 {
+                colors.store_slice(held);
+            } else {
+                let mut last = [0; 64];
+                colors.store_slice(&mut last);
+                held.copy_from_slice(&last[..held.len()]);
+            }
             taken += lanes.count_ones() as usize;
         }
         return true;

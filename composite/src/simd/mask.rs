@@ -35,7 +35,19 @@ pub(crate) fn row_words<P: Composite, S: Simd>(
             put(word);
         }
         if !rest.is_empty() {
-            put(tail(rest, counts, |depth| (*depth < 1.0, depth.is_nan())));
+            // Slabs and small bricks have rows of less than a word.
+            let one = f32x16::splat(simd, 1.0);
+            let (quarters, last) = rest.as_chunks::<16>();
+            let (mut word, mut not_numbers) = (0, 0);
+            for (index, quarter) in quarters.iter().enumerate() {
+                let depth = f32x16::from_slice(simd, quarter);
+                word |= depth.simd_lt(one).to_bitmask() << (16 * index);
+                not_numbers += (!depth.simd_eq(depth).to_bitmask() & 0xffff).count_ones();
+            }
+            counts.active += word.count_ones() as usize;
+            counts.nan += u64::from(not_numbers);
+            word |= tail(last, counts, |depth| (*depth < 1.0, depth.is_nan())) << (16 * quarters.len());
+            put(word);
         }
         return;
     }
@@ -62,22 +74,51 @@ pub(crate) fn row_words<P: Composite, S: Simd>(
     }
 }
 
-/// [`row_words`] one pixel after the other.
+/// [`row_words`] without vector types: loops over flags of one byte, which compilers turn into the vectors that every machine has.
 pub(crate) fn row_words_scalar<P: Composite>(
     colors: &[P::Color],
     depths: &[f32],
     counts: &mut Counts,
     mut put: impl FnMut(u64),
 ) {
+    let mut flags = [0_u8; 64];
     if P::HAS_DEPTH {
-        for block in depths.chunks(64) {
-            put(tail(block, counts, |depth| (*depth < 1.0, depth.is_nan())));
+        let (blocks, rest) = depths.as_chunks::<64>();
+        for block in blocks {
+            for (flag, depth) in flags.iter_mut().zip(block) {
+                *flag = u8::from(*depth < 1.0);
+            }
+            counts.nan += u64::from(block.iter().map(|depth| u32::from(depth.is_nan())).sum::<u32>());
+            let word = packed(&flags);
+            counts.active += word.count_ones() as usize;
+            put(word);
         }
-    } else {
-        for block in colors.chunks(64) {
-            put(tail(block, counts, |color| (!color.is_zero(), false)));
+        if !rest.is_empty() {
+            put(tail(rest, counts, |depth| (*depth < 1.0, depth.is_nan())));
         }
+        return;
     }
+    let (blocks, rest) = colors.as_chunks::<64>();
+    for block in blocks {
+        for (flag, color) in flags.iter_mut().zip(block) {
+            *flag = u8::from(!color.is_zero());
+        }
+        let word = packed(&flags);
+        counts.active += word.count_ones() as usize;
+        put(word);
+    }
+    if !rest.is_empty() {
+        put(tail(rest, counts, |color| (!color.is_zero(), false)));
+    }
+}
+
+/// 64 flags, each 0 or 1, as bits. The product moves the flag of byte i by 7 (8 - i) bits, to bit 56 + i; no two flags meet anywhere, so nothing is carried.
+fn packed(flags: &[u8; 64]) -> u64 {
+    let eights = flags.as_chunks::<8>().0.iter().enumerate();
+    eights.fold(0, |word, (index, eight)| {
+        let bits = u64::from_le_bytes(*eight).wrapping_mul(0x0102_0408_1020_4080) >> 56;
+        word | bits << (8 * index)
+    })
 }
 
 #[inline(always)]
@@ -90,4 +131,17 @@ fn tail<T>(block: &[T], counts: &mut Counts, active_and_nan: impl Fn(&T) -> (boo
     }
     counts.active += word.count_ones() as usize;
     word
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn flags_become_the_bits_of_their_places() {
+        for word in [0, 1, 1 << 63, u64::MAX, 0x8421_8421_1248_1248, 0xff00_0000_0000_00f1] {
+            let flags: [u8; 64] = std::array::from_fn(|bit| (word >> bit & 1) as u8);
+            assert_eq!(packed(&flags), word);
+        }
+    }
 }

@@ -37,18 +37,29 @@ pub(crate) fn drop_full_alpha<S: Simd>(simd: S, out: &mut Vec<u8>, start: usize)
     true
 }
 
-/// [`drop_full_alpha`] one pixel after the other.
+/// [`drop_full_alpha`] without vector types: two colours in a word of 64 bits.
 pub(crate) fn drop_full_alpha_scalar(out: &mut Vec<u8>, start: usize) -> bool {
-    if !out[start..].as_chunks::<4>().0.iter().all(|color| color[3] == 255) {
+    let all = out[start..].as_chunks::<4>().0.iter().fold(u32::MAX, |all, color| all & u32::from_le_bytes(*color));
+    if all >> 24 != 255 {
         return false;
     }
-    drop_rest(out, start, start);
+    let (mut from, mut to) = (start, start);
+    while from + 8 <= out.len() {
+        let mut two = [0; 8];
+        two.copy_from_slice(&out[from..from + 8]);
+        let two = u64::from_le_bytes(two);
+        let six = two & 0xff_ffff | two >> 8 & 0xffff_ff00_0000;
+        // The two bytes that are too many are written over by what comes next.
+        out[to..to + 8].copy_from_slice(&six.to_le_bytes());
+        (from, to) = (from + 8, to + 6);
+    }
+    drop_rest(out, from, to);
     true
 }
 
 fn drop_rest(out: &mut Vec<u8>, mut from: usize, mut to: usize) {
-    while from < out.len() {
-        out.copy_within(from..from + 3, to);
+    while let Some(&[red, green, blue, _]) = out[from..].first_chunk::<4>() {
+        out[to..to + 3].copy_from_slice(&[red, green, blue]);
         (from, to) = (from + 4, to + 3);
     }
     out.truncate(to);
@@ -78,10 +89,18 @@ pub(crate) fn give_full_alpha<S: Simd>(simd: S, narrow: &[u8], wide: &mut Vec<u8
     give_rest(narrow, wide, done);
 }
 
-/// [`give_full_alpha`] one pixel after the other.
+/// [`give_full_alpha`] without vector types: two colours in a word of 64 bits.
 pub(crate) fn give_full_alpha_scalar(narrow: &[u8], wide: &mut Vec<u8>) {
     wide.resize(narrow.len() / 3 * 4, 0);
-    give_rest(narrow, wide, 0);
+    let mut done = 0;
+    for two in wide.as_chunks_mut::<8>().0 {
+        // Eight bytes are loaded for six.
+        let Some(bytes) = narrow.get(3 * done..3 * done + 8).and_then(|bytes| bytes.first_chunk::<8>()) else { break };
+        let six = u64::from_le_bytes(*bytes);
+        *two = (six & 0xff_ffff | six << 8 & 0xff_ffff << 32 | 0xff00_0000_ff00_0000).to_le_bytes();
+        done += 2;
+    }
+    give_rest(narrow, wide, done);
 }
 
 fn give_rest(narrow: &[u8], wide: &mut [u8], done: usize) {

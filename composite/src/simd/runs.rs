@@ -44,6 +44,59 @@ pub(crate) fn nearest_run<C: Color, S: Simd>(
             done += 16;
         }
     }
+    nearest_rest(colors, depths, held_colors, held_depths, wins_ties, done);
+}
+
+/// [`nearest_run`] without vector types: sixteen depths and colours of 32 bits at a time, as masks of all ones or zeros, which compilers
+/// turn into the vectors that every machine has.
+pub(crate) fn nearest_run_scalar<C: Color>(
+    colors: &[u8],
+    depths: &[u8],
+    held_colors: &mut [C],
+    held_depths: &mut [f32],
+    wins_ties: bool,
+) {
+    if C::BYTES == 4 {
+        let held_bytes: &mut [u8] = cast_slice_mut(held_colors);
+        let ours = held_bytes.as_chunks_mut::<64>().0.iter_mut().zip(held_depths.as_chunks_mut::<16>().0);
+        let theirs = colors.as_chunks::<64>().0.iter().zip(depths.as_chunks::<64>().0);
+        for ((held_color, held_depth), (color, depth)) in ours.zip(theirs) {
+            let depth: [f32; 16] = bytemuck::cast(*depth);
+            let mut wins = [0_u32; 16];
+            let mut any = 0;
+            for ((win, depth), held) in wins.iter_mut().zip(&depth).zip(&*held_depth) {
+                let wins = if wins_ties { (depth <= held) & (*depth < 1.0) } else { depth < held };
+                *win = u32::from(wins).wrapping_neg();
+                any |= *win;
+            }
+            if any == 0 {
+                continue;
+            }
+            let color: [u32; 16] = bytemuck::cast(*color);
+            let mut joined: [u32; 16] = bytemuck::cast(*held_color);
+            for (((held, color), win), (held_depth, depth)) in
+                joined.iter_mut().zip(&color).zip(&wins).zip(held_depth.iter_mut().zip(&depth))
+            {
+                *held = color & win | *held & !win;
+                *held_depth = f32::from_bits(depth.to_bits() & win | held_depth.to_bits() & !win);
+            }
+            *held_color = bytemuck::cast(joined);
+        }
+    }
+    let done = if C::BYTES == 4 { held_depths.len() / 16 * 16 } else { 0 };
+    nearest_rest(colors, depths, held_colors, held_depths, wins_ties, done);
+}
+
+/// Pixel by pixel from `done` on.
+#[inline(always)]
+fn nearest_rest<C: Color>(
+    colors: &[u8],
+    depths: &[u8],
+    held_colors: &mut [C],
+    held_depths: &mut [f32],
+    wins_ties: bool,
+    done: usize,
+) {
     let rest = colors[done * C::BYTES..].chunks_exact(C::BYTES).zip(depths[done * 4..].chunks_exact(4));
     let held = held_colors[done..].iter_mut().zip(&mut held_depths[done..]);
     for ((color, depth), (held_color, held_depth)) in rest.zip(held) {

@@ -1,5 +1,5 @@
 use super::*;
-use crate::pixel::{DepthPixel, PixelFormat, PremultipliedPixel};
+use crate::pixel::{DepthPixel, PixelFormat, PremultipliedPixel, combine};
 use crate::simd::SimdLevel;
 use half::f16;
 use proptest::prelude::*;
@@ -45,6 +45,19 @@ fn pattern(kind: u32, x: u32, y: u32) -> bool {
     }
 }
 
+/// Joins one pixel by the operator itself.
+fn join_one<F: Composite>(held: &mut Layer<F>, layer: &Layer<F>, x: u32, y: u32, side: Side) {
+    let pixel = |view: View<'_, F>| {
+        let (color, depth) = view.row(y, x, x + 1);
+        F::from_parts(color[0], depth.first().copied().unwrap_or(1.0))
+    };
+    let (ours, theirs) = (pixel(held.view()), pixel(layer.view()));
+    let joined = if side == Side::Higher { combine(ours, theirs) } else { combine(theirs, ours) };
+    let (colors, depths) = held.row_mut(y, x, x + 1);
+    colors[0] = joined.color();
+    depths.iter_mut().for_each(|depth| *depth = joined.depth());
+}
+
 /// Encoding and every way of reading, at every level, against the scalar one.
 fn check_format<F: Composite>() {
     let rects = [
@@ -72,7 +85,8 @@ fn check_format<F: Composite>() {
                     // Placed, it is what was drawn.
                     let mut placed = planes::<F>(150, 5, |_, _| true);
                     let (colors, placed_depths) = (&mut placed.colors, &mut placed.depths);
-                    part.place::<F>(kernels, 150, colors, if depths { placed_depths } else { &mut [] });
+                    let placed_depths: &mut [f32] = if depths { placed_depths } else { &mut [] };
+                    part.place::<F>(kernels, 150, colors, placed_depths, &mut Vec::new());
                     for y in rect.y0..rect.y1 {
                         let (color, depth) = placed.view().row(y, rect.x0, rect.x1);
                         assert_eq!(color, layer.view().row(y, rect.x0, rect.x1).0);
@@ -82,21 +96,21 @@ fn check_format<F: Composite>() {
                         continue;
                     }
 
-                    // Joined, from either side and as a message or as a view, it has the bits of the scalar kernels.
+                    // Joined, from either side and as a message or as a view, it has the bits of the operator, pixel by pixel.
                     for side in [Side::Lower, Side::Higher] {
-                        let mut by_scalar = held.clone();
-                        scalar.decode::<F>(&message, rect, depths).unwrap().join_to(
-                            Kernels(None),
-                            &mut by_scalar,
-                            side,
-                        );
+                        let mut one_by_one = held.clone();
+                        for y in rect.y0..rect.y1 {
+                            for x in rect.x0..rect.x1 {
+                                join_one(&mut one_by_one, &layer, x, y, side);
+                            }
+                        }
                         let mut joined = held.clone();
                         part.join_to(kernels, &mut joined, side);
-                        assert!(joined.colors == by_scalar.colors && joined.depths == by_scalar.depths);
+                        assert!(joined.colors == one_by_one.colors && joined.depths == one_by_one.depths);
                         let mut viewed = held.clone();
                         let view = View { bounds: rect, ..layer.view() };
                         viewed.join_view(kernels, &view, side);
-                        assert!(viewed.colors == by_scalar.colors && viewed.depths == by_scalar.depths);
+                        assert!(viewed.colors == one_by_one.colors && viewed.depths == one_by_one.depths);
                     }
                 }
             }
@@ -248,7 +262,7 @@ proptest! {
                 part.join_to(kernels, &mut layer, Side::Lower);
             }
             let mut image = planes::<P>(70, 5, |_, _| false);
-            part.place::<P>(Kernels::new(None), 70, &mut image.colors, &mut image.depths);
+            part.place::<P>(Kernels::new(None), 70, &mut image.colors, &mut image.depths, &mut Vec::new());
         }
     }
 }

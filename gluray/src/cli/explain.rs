@@ -55,8 +55,8 @@ fn in_words(r: &Report) -> String {
     if r.traced_draws > 0 {
         line(format!("        {:>12} triangles, {} pixels", r.triangles, r.pixels));
         line(format!(
-            "        {:>12} geometries were there already, {} were new, {} structures built",
-            r.cache_hits, r.cache_misses, r.builds
+            "        {:>12} geometries were there already, {} were new, {} structures built, {} refitted",
+            r.cache_hits, r.cache_misses, r.builds, r.refits
         ));
         for (kind, n) in by_size(&r.rays) {
             line(format!("        {n:>12} rays: {kind}"));

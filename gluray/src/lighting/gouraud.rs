@@ -124,6 +124,11 @@ fn gather<const N: usize>(values: &Values<N>, vertices: &[usize; LANES], used: u
     let mut put = |l: usize, v: [f32; N]| (0..N).for_each(|k| out[k][l] = v[k]);
     match values {
         Values::Constant(v) => (0..LANES).for_each(|l| put(l, *v)),
+        Values::PerVertex(all) => {
+            for l in (0..LANES).filter(|l| used >> l & 1 != 0) {
+                put(l, all.get(vertices[l]).copied().unwrap_or([0.0; N]));
+            }
+        }
         Values::Packed(p) if p.kind == FLOAT && p.size == N => {
             let all: &[[f32; N]] = rows(p);
             for l in (0..LANES).filter(|l| used >> l & 1 != 0) {

@@ -8,6 +8,7 @@
 //! whole to the driver.
 
 use super::template::Peel;
+use crate::cache::Structures;
 use crate::config::Mode;
 use crate::context::Context;
 use crate::decide::{self, Verdict};
@@ -132,19 +133,19 @@ impl Context {
             crate::view::place(&mut taken);
         }
         let settings = &self.config.settings;
-        let (layer, rays, builds) = worker::on_pool(|| {
-            let mut builds = 0;
+        let (layer, rays, structures) = worker::on_pool(|| {
+            let mut structures = Structures::default();
             let ready: Vec<Prepared<'_>> =
-                taken.iter().filter_map(|(d, _)| Prepared::new(d, None, &mut builds)).collect();
+                taken.iter().filter_map(|(d, _)| Prepared::new(d, None, &mut structures)).collect();
             let (layer, extra) = peeled(&ready, &limit, settings);
             let primary = ready.iter().map(|p| p.rays.load(Relaxed)).sum::<u64>();
-            (layer, [primary, extra[0], extra[1]], builds)
+            (layer, [primary, extra[0], extra[1]], structures)
         });
         self.counters.spent("trace", start.elapsed());
         for (kind, n) in ["primary", "shadow", "ambient occlusion"].into_iter().zip(rays) {
             self.counters.rays(kind, n);
         }
-        self.counters.report.builds += builds;
+        self.counters.made(structures);
         self.counters.report.pixels += layer.covered as u64;
         let start = Instant::now();
         if layer.covered > 0 {

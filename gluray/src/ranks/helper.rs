@@ -97,12 +97,13 @@ impl Known {
         self.images.extend(order.news.images.into_iter().map(|(k, i)| (k, Arc::new(i))));
         let settings = obeyed(order.settings);
         let draws = order.draws.into_iter().map(|p| self.draw(p)).collect::<Result<Vec<_>, _>>()?;
-        let mut cost = Cost::default();
+        let (mut cost, mut structures) = (Cost::default(), crate::cache::Structures::default());
         let ready: Vec<Prepared<'_>> = draws
             .iter()
-            .map(|(d, image)| Prepared::new(d, image.clone(), &mut cost.builds))
+            .map(|(d, image)| Prepared::new(d, image.clone(), &mut structures))
             .map(|p| p.ok_or("a draw that cannot be seen"))
             .collect::<Result<_, _>>()?;
+        cost.builds = structures.built;
         let (area, rows, warnings) = match order.work {
             Work::Nearest => {
                 let (layer, extra) = trace::nearest(&ready, &settings, order.share);

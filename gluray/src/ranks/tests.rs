@@ -3,6 +3,7 @@ use super::lead::{Lead, Made};
 use super::orders::{ANSWER, ORDER, Work};
 use super::rows::Share;
 use crate::cache::Cache;
+use crate::cache::Structures;
 use crate::capture::{Attributes, Draw, Shading, Values};
 use crate::config::{Mode, Settings};
 use crate::enums::*;
@@ -91,7 +92,7 @@ fn pictures(lead: &mut Lead, frames: &[f32], settings: &Settings, sent: &mut Vec
     for turn in frames {
         let draws = draws(*turn);
         let ready: Vec<Prepared<'_>> =
-            draws.iter().map(|d| Prepared::new(d, None, &mut 0).expect("seen")).collect();
+            draws.iter().map(|d| Prepared::new(d, None, &mut Structures::default()).expect("seen")).collect();
         let made = lead.make(&ready, settings, &Work::Nearest, |share| own(&ready, settings, share));
         sent.push(lead.accounts.all().iter().map(|a| a.sent_bytes).sum());
         out.push((made.first, made.second.iter().map(|d| d.to_bits()).collect()));

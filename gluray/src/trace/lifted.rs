@@ -57,11 +57,8 @@ impl Lifted {
         let mut active = Vec::new();
         for i in 0..(tile.w * tile.h) as usize {
             let (x, y) = (i as i32 % tile.w, i as i32 / tile.w);
-            let above = DVec3::new(
-                f64::from(tile.x + x) + 0.5,
-                f64::from(tile.y + y) + 0.5,
-                self.triangles as f64,
-            );
+            let above =
+                DVec3::new(f64::from(tile.x + x) + 0.5, f64::from(tile.y + y) + 0.5, self.triangles as f64);
             let (ray, _) = self.world.ray_from_world(above, DVec3::NEG_Z);
             let (b, l) = slot(x, y);
             blocks[b].set(l, &ray);

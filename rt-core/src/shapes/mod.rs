@@ -10,7 +10,6 @@ mod tube;
 
 pub use cylinder::Cylinders;
 pub use error::{ShapeError, ShapeReport};
-pub(crate) use isosurface::smooth_gradient;
 pub use isosurface::{Isosurface, IsosurfaceNormals, IsosurfaceOptions, IsosurfaceReport};
 pub use sphere::Spheres;
 pub use tube::Tubes;

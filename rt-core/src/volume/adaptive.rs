@@ -8,9 +8,10 @@
 //! 3. the curve reaches a step of the transfer function elsewhere than its chord does;
 //! 4. colours are mixed, not put one behind the other: seen as a difference too, but only when both parts have some thickness.
 
+use super::Volume;
 use super::layer::{Layer, March};
-use super::{Lit, LitStretch, Volume};
-use crate::grid_walk::{Crossing, IndexRay};
+use super::shading::LitStretch;
+use crate::grid_walk::Crossing;
 use crate::ray_cubic;
 
 /// Where a stretch is cut. Not in the middle: an antisymmetric cubic passes through the middle of its chord, and would seem straight.
@@ -42,20 +43,14 @@ impl Volume {
     /// Adds the cell `c`, along which the scalar is the cubic `b`.
     pub(super) fn march_adaptive(
         &self,
-        ray: &IndexRay,
+        lit: Option<&LitStretch<'_>>,
         per_t: f64,
         c: &Crossing,
         b: &[f64; 4],
         m: &mut March,
     ) {
         let ends = [self.transfer.integral(b[0]), self.transfer.integral(b[3])];
-        let lit = self.options.shading.is_some().then(|| {
-            let mid = 0.5 * (c.t0 + c.t1);
-            let plain = Lit { factor: 1.0, highlight: 0.0 };
-            let ends = [c.t0, mid, c.t1].map(|t| self.light_at(ray, t).unwrap_or(plain));
-            LitStretch { t0: c.t0, per_t: 1.0 / (c.t1 - c.t0), ends }
-        });
-        let layer = self.layer(lit.as_ref(), per_t, c.t0, c.t1, b, &ends);
+        let layer = self.layer(lit, per_t, c.t0, c.t1, b, &ends);
         m.samples += 1;
         // What is wrong in one place of a cell, not all along it, may use half of the cell's share of the tolerance.
         let local_share = 0.5 * m.error_per_length * (c.t1 - c.t0) * per_t;
@@ -68,8 +63,8 @@ impl Volume {
             let mid = ta + SPLIT * (tb - ta);
             let (near, far) = ray_cubic::split(&b, SPLIT);
             let im = self.transfer.integral(far[0]);
-            let first = self.layer(lit.as_ref(), per_t, ta, mid, &near, &[i0, im]);
-            let second = self.layer(lit.as_ref(), per_t, mid, tb, &far, &[im, i1]);
+            let first = self.layer(lit, per_t, ta, mid, &near, &[i0, im]);
+            let second = self.layer(lit, per_t, mid, tb, &far, &[im, i1]);
             m.samples += 2;
             let length = (tb - ta) * per_t;
             let t = m.transmittance;
@@ -94,7 +89,7 @@ impl Volume {
     #[inline]
     fn layer(
         &self,
-        lit: Option<&LitStretch>,
+        lit: Option<&LitStretch<'_>>,
         per_t: f64,
         ta: f64,
         tb: f64,
@@ -109,7 +104,7 @@ impl Volume {
         } else {
             self.transfer.sample(0.5 * (s0 + s1))
         };
-        let color = lit.map_or(color, |l| l.at(0.5 * (ta + tb)).on(color));
+        let (sigma, color) = lit.map_or((sigma, color), |l| l.on(0.5 * (ta + tb), sigma, color));
         Layer { tau: sigma.max(0.0) * (tb - ta) * per_t, color }
     }
 

@@ -189,7 +189,7 @@ impl Volume {
         let mut part = Volume {
             grid: Arc::new(grid),
             transfer: self.transfer.clone(),
-            options: self.options,
+            options: self.options.clone(),
             dims: self.dims,
             origin: self.origin,
             first_point: low,

@@ -10,10 +10,16 @@
 mod adaptive;
 mod brick;
 mod layer;
+mod options;
 mod overlap;
+mod projection;
 mod reference;
+mod shading;
 
 pub use brick::{Brick, Marched};
+pub use options::{
+    Blend, GradientOpacity, Highlight, Interpolation, VolumeError, VolumeLight, VolumeOptions, VolumeShading,
+};
 pub use overlap::integrate_overlapping;
 pub use reference::integrate_reference;
 
@@ -22,88 +28,15 @@ use crate::grid_walk::{Crossing, IndexRay};
 use crate::math::Aabb;
 use crate::ray::Ray;
 use crate::ray_cubic;
-use crate::shapes::{outward_box, smooth_gradient};
+use crate::shapes::outward_box;
 use crate::transfer_function::TransferFunction;
-use glam::{DVec3, UVec3, Vec3};
+use glam::{DVec3, UVec3};
 use layer::{Layer, March};
 use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Cells along an edge of the blocks by which empty space is skipped.
 pub const MACROCELL: u32 = 8;
-
-/// Why a volume cannot be made.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum VolumeError {
-    /// A grid without cells.
-    #[error("volume: the grid has {dims} points; it needs at least 2 along each axis to have cells")]
-    NoCells {
-        /// Points per axis.
-        dims: UVec3,
-    },
-    /// A bad shading parameter.
-    #[error("volume shading: {field} is {value}; it must be {rule}")]
-    Shading {
-        /// Which one.
-        field: &'static str,
-        /// What was given.
-        value: f32,
-        /// What is allowed.
-        rule: &'static str,
-    },
-}
-
-/// Lambert shading by the gradient, two-sided, with a light at the viewer or in a fixed direction. It multiplies the colour by
-/// `ambient + diffuse·|n·l|` where the gradient is steep, and by 1 where there is none; `specular·|n·h|^shininess` is added.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct VolumeShading {
-    /// Part of the colour that needs no light, 0..=1.
-    pub ambient: f32,
-    /// Part that is lit, 0..=1.
-    pub diffuse: f32,
-    /// Direction towards the light, any length, in the volume's axes; `None` for a light at the viewer.
-    pub light: Option<Vec3>,
-    /// White highlight (Blinn 1977); 0 for none.
-    pub specular: f32,
-    /// Exponent of the highlight.
-    pub shininess: f32,
-    /// Gradient, in value per world unit, at which the shading has half its effect. With 0 it has all of it everywhere, and only `ambient` where
-    /// there is no gradient (VTK).
-    pub half_gradient: f32,
-}
-
-impl Default for VolumeShading {
-    /// A light at the viewer that changes nothing.
-    fn default() -> Self {
-        VolumeShading {
-            ambient: 1.0,
-            diffuse: 0.0,
-            light: None,
-            specular: 0.0,
-            shininess: 1.0,
-            half_gradient: 0.0,
-        }
-    }
-}
-
-/// What the scalar is between the points of the grid.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Interpolation {
-    /// Trilinear.
-    #[default]
-    Linear,
-    /// That of the nearest point: boxes of one value around each point, cut at the grid's bounds.
-    Nearest,
-}
-
-/// How to make a [`Volume`].
-#[derive(Debug, Clone, Copy, Default)]
-pub struct VolumeOptions {
-    /// Shading by the gradient; `None` for pure emission and absorption.
-    pub shading: Option<VolumeShading>,
-    /// The scalar between points.
-    pub interpolation: Interpolation,
-}
 
 /// What accuracy to spend time on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -202,23 +135,7 @@ impl Volume {
         if grid.dims.min_element() < 2 {
             return Err(VolumeError::NoCells { dims: grid.dims });
         }
-        if let Some(s) = &options.shading {
-            let fields = [("ambient", s.ambient), ("diffuse", s.diffuse)];
-            if let Some(&(field, value)) = fields.iter().find(|f| !(0.0..=1.0).contains(&f.1)) {
-                return Err(VolumeError::Shading { field, value, rule: "0 to 1" });
-            }
-            let fields =
-                [("half_gradient", s.half_gradient), ("specular", s.specular), ("shininess", s.shininess)];
-            if let Some(&(field, value)) = fields.iter().find(|f| !(f.1 >= 0.0 && f.1.is_finite())) {
-                return Err(VolumeError::Shading { field, value, rule: "finite and not negative" });
-            }
-            if let Some(l) = s.light
-                && l.try_normalize().is_none()
-            {
-                let rule = "a direction: finite and not zero";
-                return Err(VolumeError::Shading { field: "light", value: l.length(), rule });
-            }
-        }
+        options.check()?;
         let nearest = options.interpolation == Interpolation::Nearest;
         let cells = if nearest { grid.dims } else { grid.dims - UVec3::ONE };
         let blocks = (cells + MACROCELL - UVec3::ONE) / MACROCELL;
@@ -299,6 +216,9 @@ impl Volume {
         if !(ray.is_valid() && t0 < t1) {
             return VolumeSample::CLEAR;
         }
+        if !self.is_medium() {
+            return self.project(ray, t0, t1, quality);
+        }
         Marched::from(self.march(ray, t0, t1, quality, &Marched::default())).sample()
     }
 
@@ -368,10 +288,12 @@ impl Volume {
         if self.is_nearest() {
             let value = self.grid.at(stored.x, stored.y, stored.z);
             if value.is_finite() {
-                let (sigma, color) = self.transfer.sample(value.into());
+                let (mut sigma, mut color) = self.transfer.sample(value.into());
+                if let Some(light) = self.light_along(ray, stored, [c.t0, c.t1], &[0.0; 3], &[0.0; 3]) {
+                    (sigma, color) = light.on(c.t0, sigma, color);
+                }
                 m.samples += 1;
-                let tau = sigma * (c.t1 - c.t0) * per_t;
-                m.add(c.t0, c.t1, &Layer { tau, color: self.shade(ray, 0.5 * (c.t0 + c.t1), color) });
+                m.add(c.t0, c.t1, &Layer { tau: sigma * (c.t1 - c.t0) * per_t, color });
             }
             return;
         }
@@ -384,8 +306,9 @@ impl Volume {
         if self.is_clear(&b) {
             return;
         }
+        let light = self.light_along(ray, stored, [c.t0, c.t1], &p, &q);
         match m.quality {
-            VolumeQuality::Tolerance { .. } => self.march_adaptive(ray, per_t, c, &b, m),
+            VolumeQuality::Tolerance { .. } => self.march_adaptive(light.as_ref(), per_t, c, &b, m),
             VolumeQuality::Step { voxels } => {
                 // Steps lie at multiples of the step from where the ray enters the grid, cut at cell faces.
                 let step = f64::from(voxels).max(1e-3) * self.grid.spacing.min_element() / per_t;
@@ -396,11 +319,13 @@ impl Volume {
                     let end = (anchor + k * step).min(c.t1);
                     if end > t {
                         let mid = 0.5 * (t + end);
-                        let (sigma, color) =
+                        let (mut sigma, mut color) =
                             self.transfer.sample(ray_cubic::evaluate(&b, (mid - c.t0) / (c.t1 - c.t0)));
+                        if let Some(light) = &light {
+                            (sigma, color) = light.on(mid, sigma, color);
+                        }
                         m.samples += 1;
-                        let tau = sigma * (end - t) * per_t;
-                        m.add(t, end, &Layer { tau, color: self.shade(ray, mid, color) });
+                        m.add(t, end, &Layer { tau: sigma * (end - t) * per_t, color });
                         t = end;
                     }
                 }
@@ -413,88 +338,6 @@ impl Volume {
     fn is_clear(&self, b: &[f64; 4]) -> bool {
         let (lo, hi) = ray_cubic::hull(b);
         self.transfer.is_clear(lo, hi)
-    }
-
-    #[inline]
-    fn shade(&self, ray: &IndexRay, t: f64, color: [f64; 3]) -> [f64; 3] {
-        match self.light_at(ray, t) {
-            Some(light) => light.on(color),
-            None => color,
-        }
-    }
-
-    /// What shading makes of colours at `t`; `None` without shading.
-    fn light_at(&self, ray: &IndexRay, t: f64) -> Option<Lit> {
-        let s = self.options.shading.as_ref()?;
-        // Exact: whole numbers from numbers.
-        let at = DVec3::from_array(ray.at(t)).as_vec3() - self.first_point.as_vec3();
-        // In indices moved by half a cell, the point around which the box lies.
-        let at = if self.is_nearest() { at.floor() } else { at };
-        let g = smooth_gradient(&self.grid, at).as_dvec3();
-        let steepness = g.length();
-        if !(steepness > 0.0 && steepness.is_finite()) {
-            let factor = if s.half_gradient > 0.0 { 1.0 } else { f64::from(s.ambient) };
-            return Some(Lit { factor, highlight: 0.0 });
-        }
-        let dir = DVec3::from_array(ray.d) * self.grid.spacing;
-        let light = match s.light {
-            Some(l) => l.as_dvec3(),
-            None => dir,
-        };
-        let cos = (g.dot(light) / (steepness * light.length())).abs();
-        let lit = f64::from(s.ambient) + f64::from(s.diffuse) * cos;
-        let weight = steepness / (steepness + f64::from(s.half_gradient));
-        let highlight = if s.specular > 0.0 {
-            let towards_viewer = if s.light.is_some() { -dir } else { dir };
-            let half = light.normalize_or_zero() + towards_viewer.normalize_or_zero();
-            let base = (g.dot(half) / (steepness * half.length())).abs();
-            // Two opposite directions have no half vector.
-            if base.is_finite() {
-                weight * f64::from(s.specular) * base.powf(s.shininess.into())
-            } else {
-                0.0
-            }
-        } else {
-            0.0
-        };
-        Some(Lit { factor: 1.0 + weight * (lit - 1.0), highlight })
-    }
-}
-
-/// What shading makes of a colour.
-#[derive(Debug, Clone, Copy)]
-struct Lit {
-    factor: f64,
-    highlight: f64,
-}
-
-impl Lit {
-    #[inline]
-    fn on(&self, color: [f64; 3]) -> [f64; 3] {
-        color.map(|c| c * self.factor + self.highlight)
-    }
-}
-
-/// Shading along a ray's way through a cell: the parabola through its values at both ends and in the middle. Gradients cost as much as everything else of
-/// a sample, and between grid points they bend no more than that.
-#[derive(Debug, Clone, Copy)]
-struct LitStretch {
-    t0: f64,
-    per_t: f64,
-    ends: [Lit; 3],
-}
-
-impl LitStretch {
-    #[inline]
-    fn at(&self, t: f64) -> Lit {
-        let x = (t - self.t0) * self.per_t;
-        let [a, b, c] = self.ends;
-        let weights = [(1.0 - x) * (1.0 - 2.0 * x), 4.0 * x * (1.0 - x), x * (2.0 * x - 1.0)];
-        let mix = |v: [f64; 3]| (v[0] * weights[0] + v[1] * weights[1] + v[2] * weights[2]).max(0.0);
-        Lit {
-            factor: mix([a.factor, b.factor, c.factor]),
-            highlight: mix([a.highlight, b.highlight, c.highlight]),
-        }
     }
 }
 

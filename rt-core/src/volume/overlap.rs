@@ -20,6 +20,9 @@ pub fn integrate_overlapping(
     if let [(volume, ray)] = volumes {
         return volume.integrate(ray, t0, t1, quality);
     }
+    if volumes.iter().any(|(v, _)| !v.is_medium()) {
+        return one_behind_the_other(volumes, t0, t1, quality);
+    }
     // Begin with the stretches between the places where volumes begin and end.
     let mut stops = Vec::new();
     for (volume, ray) in volumes {
@@ -45,6 +48,32 @@ pub fn integrate_overlapping(
         depth: m.depth as f32,
         samples: m.samples,
     }
+}
+
+/// Projections have no place along the ray: they are put in the order of the middles of their boxes, and the media, mixed, in that of the first of them.
+fn one_behind_the_other(
+    volumes: &[(&Volume, Ray)],
+    t0: f32,
+    t1: f32,
+    quality: &VolumeQuality,
+) -> VolumeSample {
+    let middle = |(v, r): &(&Volume, Ray)| slab(v, r).map_or(f64::INFINITY, |(a, b)| 0.5 * (a + b));
+    let (media, others): (Vec<_>, Vec<_>) = volumes.iter().partition(|(v, _)| v.is_medium());
+    let first = media.iter().map(middle).fold(f64::INFINITY, f64::min);
+    let mut layers: Vec<(f64, VolumeSample)> =
+        others.iter().map(|v| (middle(v), v.0.integrate(&v.1, t0, t1, quality))).collect();
+    if !media.is_empty() {
+        layers.push((first, integrate_overlapping(&media, t0, t1, quality)));
+    }
+    layers.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut all = VolumeSample::CLEAR;
+    for (_, layer) in layers {
+        let through = 1.0 - all.rgba[3];
+        all.rgba = std::array::from_fn(|c| all.rgba[c] + through * layer.rgba[c]);
+        all.depth = all.depth.min(layer.depth);
+        all.samples += layer.samples;
+    }
+    all
 }
 
 struct Mixer<'a> {

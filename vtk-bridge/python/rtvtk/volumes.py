@@ -14,13 +14,28 @@ _ENTRIES = 1024
 _KINDS = [np.dtype(t) for t in (np.float32, np.float64, np.uint8, np.int32)]
 _MAPPERS = {"vtkSmartVolumeMapper", "vtkGPUVolumeRayCastMapper", "vtkOpenGLGPUVolumeRayCastMapper", "vtkFixedPointVolumeRayCastMapper",
             "vtkMultiBlockVolumeMapper"}
-_BLENDS = {1: "maximum intensity", 2: "minimum intensity", 3: "average intensity", 4: "additive", 5: "isosurface", 6: "slice"}
+# VTK's blend modes, which are also the library's numbers.
+_COMPOSITE, _MAXIMUM, _MINIMUM, _AVERAGE, _ADDITIVE, _ISOSURFACES, _SLICE = range(7)
+# What OpenGL's table of opacities by gradient reaches to, of the range of the scalars.
+_GRADIENT_RANGE = 0.25
+
+
+def _has_gradient_opacity(p):
+    return not p.GetDisableGradientOpacity(0) and p.HasGradientOpacity(0)
+
+
+def _why_not_blend(mode, p):
+    if not _COMPOSITE <= mode <= _ISOSURFACES:
+        return "a volume with slice blending" if mode == _SLICE else "a volume with a blend mode that is not known"
+    if mode != _COMPOSITE and _has_gradient_opacity(p):
+        return "a volume with gradient opacity and another blending than composite"
+    # OpenGL shades the largest scalar by the gradient where the ray ends.
+    if mode in (_MAXIMUM, _MINIMUM) and p.GetShade(0):
+        return "a shaded volume with maximum or minimum intensity blending"
+    return None
 
 
 def _why_not_mapper(mapper):
-    mode = mapper.GetBlendMode()
-    if mode != 0:
-        return f"a volume with {_BLENDS.get(mode, 'unknown')} blending"
     if mapper.GetCropping():
         return "a cropped volume"
     if mapper.GetNumberOfClippingPlanes() > 0:
@@ -38,20 +53,33 @@ def _why_not_mapper(mapper):
 def _why_not_property(p):
     if p.GetTransferFunctionMode() != 0:
         return "a volume with a two-dimensional transfer function"
-    if not p.GetDisableGradientOpacity(0) and p.HasGradientOpacity(0):
-        return "a volume with gradient opacity"
     if p.HasLabelGradientOpacity() or p.GetLabelColor(1) or p.GetLabelScalarOpacity(1):
         return "a volume with labels"
     return None
 
 
-def _lit(renderer):
-    """Whether a light shines on shaded volumes; `None` under lights with which OpenGL's formula is another than ours."""
-    lights = renderer.GetLights()
-    on = [light for light in (lights.GetItemAsObject(i) for i in range(lights.GetNumberOfItems())) if light.GetSwitch()]
-    plain = all(light.LightTypeIsHeadlight() and not light.GetPositional() and light.GetIntensity() == 1 and tuple(light.GetDiffuseColor()) == (1, 1, 1)
-                for light in on)
-    return len(on) > 0 if plain and len(on) <= 1 else None
+class _Lights:
+    """The lights of shaded volumes: six numbers each, as the library has them; none for one white headlight. `reason`: why OpenGL has to shade."""
+
+    def __init__(self, renderer):
+        lights = renderer.GetLights()
+        on = [light for light in (lights.GetItemAsObject(i) for i in range(lights.GetNumberOfItems())) if light.GetSwitch()]
+        self.on, self.rows, self.reason = bool(on), [], None
+        # OpenGL's other formula, for all but one headlight: no ambient part, and highlights of its own.
+        self.several = len(on) > 1 or not all(light.LightTypeIsHeadlight() for light in on)
+        if any(light.GetPositional() for light in on):
+            self.reason = "a shaded volume under lights that have a place"
+        elif any(tuple(light.GetAmbientColor()) != (0, 0, 0) for light in on):
+            self.reason = "a shaded volume under lights with an ambient colour"
+        elif len(on) > 6:
+            self.reason = "a shaded volume under more than six lights"
+        white = all(light.GetIntensity() == 1 and tuple(light.GetDiffuseColor()) == tuple(light.GetSpecularColor()) == (1, 1, 1) for light in on)
+        if self.several or not white:
+            for light in on:
+                # A headlight alone is at the viewer, not parallel.
+                place = zip(light.GetTransformedPosition(), light.GetTransformedFocalPoint())
+                towards = [p - f for p, f in place] if self.several else [0.0] * 3
+                self.rows.append([*towards, *(light.GetIntensity() * c for c in light.GetDiffuseColor())])
 
 
 def _image_of(mapper):
@@ -93,16 +121,18 @@ class Volumes:
         if mapper is None or mapper.GetClassName() not in _MAPPERS:
             return "OpenGL draws volume mappers of this class"
         p = volume.GetProperty()
-        reason = _why_not_mapper(mapper) or _why_not_property(p)
+        reason = _why_not_mapper(mapper) or _why_not_property(p) or _why_not_blend(mapper.GetBlendMode(), p)
         if reason:
             return reason
-        lit = _lit(renderer)
-        if p.GetShade(0) and lit is None:
-            return "a shaded volume under other lights than one white headlight"
+        lights = _Lights(renderer)
+        if p.GetShade(0) and lights.reason:
+            return lights.reason
+        if p.GetShade(0) and lights.rows and p.GetSpecular(0) > 0:
+            return "a shaded volume with a highlight under other lights than one white headlight"
         image = _image_of(mapper)
-        return image if isinstance(image, str) else self._add_grid(bridge, mapper, volume, image, bool(lit), name)
+        return image if isinstance(image, str) else self._add_grid(bridge, mapper, volume, image, lights, name)
 
-    def _add_grid(self, bridge, mapper, volume, image, lit, name):
+    def _add_grid(self, bridge, mapper, volume, image, lights, name):
         p, v, keep = volume.GetProperty(), rtv.Volume(), []
         v.name = name.encode()
         extent = image.GetExtent()
@@ -136,25 +166,47 @@ class Volumes:
         if not high > low:
             high = low + max(1e-6 * abs(low), 1e-30)
         v.range[:] = low, high
-        colors, opacities = self._tables(p, low, high)
-        v.colors, v.opacities = rtv.Array.of(colors), rtv.Array.of(opacities)
+        blend = mapper.GetBlendMode()
+        colors, opacities, gradients = self._tables(p, low, high)
+        if blend in (_AVERAGE, _ADDITIVE):
+            # Means and sums are of the scalars themselves, from black to white.
+            colors = np.repeat(np.linspace(0, 1, _ENTRIES, dtype=np.float32)[:, None], 3, 1)
+            keep.append(colors)
+            first, last = mapper.GetAverageIPScalarRange()
+            if blend == _AVERAGE and (first > low or last < high):
+                return "a volume with average intensity blending of a part of its scalars"
+        if blend == _ISOSURFACES:
+            values = p.GetIsoSurfaceValues()
+            keep.append(np.array([values.GetValue(i) for i in range(values.GetNumberOfContours())], np.float64).reshape(-1, 1))
+            v.isovalues = rtv.Array.of(keep[-1])
+        v.colors, v.opacities, v.blend = rtv.Array.of(colors), rtv.Array.of(opacities), blend
+        if gradients is not None:
+            # OpenGL takes differences over n / (n - 1) of the distance of points and back, and scales them by the mean of the spacings.
+            reach = sum(n / (n - 1) for n in dims) / 3
+            v.gradient_opacities, v.steepest = rtv.Array.of(gradients), _GRADIENT_RANGE * (high - low) / (sum(image.GetSpacing()) / 3 * reach)
         v.unit_distance = p.GetScalarOpacityUnitDistance(0)
-        v.nearest, v.shade = p.GetInterpolationType() == 0, bool(p.GetShade(0)) and lit
-        v.ambient, v.diffuse, v.specular = p.GetAmbient(0), p.GetDiffuse(0), p.GetSpecular(0)
-        # VTK's highlight goes by the mirrored ray, the library's by half the angle: cos(2x)^n is cos(x)^(4n) up to the fourth order in x.
-        v.specular_power = 4 * p.GetSpecularPower(0)
+        v.nearest, v.shade = p.GetInterpolationType() == 0, bool(p.GetShade(0)) and lights.on
+        if lights.rows:
+            keep.append(np.array(lights.rows, np.float32))
+            v.lights = rtv.Array.of(keep[-1])
+        v.ambient, v.diffuse, v.specular = 0.0 if lights.several else p.GetAmbient(0), p.GetDiffuse(0), p.GetSpecular(0)
+        v.specular_power, v.specular_mirrored = p.GetSpecularPower(0), 1
         reason = bridge.volume(C.byref(v))
         return reason.decode() if reason else None
 
     def _tables(self, p, low, high):
         gray = p.GetColorChannels(0) == 1
         color, opacity = p.GetGrayTransferFunction(0) if gray else p.GetRGBTransferFunction(0), p.GetScalarOpacity(0)
-        key = key_of(color, opacity, low, high)
+        gradient = p.GetGradientOpacity(0) if _has_gradient_opacity(p) else None
+        key = key_of(color, opacity, gradient, low, high)
         found = self._kept.get(key)
         if found is None:
             at = np.linspace(low, high, _ENTRIES).tolist()
             colors = [[color.GetValue(x)] * 3 if gray else color.GetColor(x) for x in at]
             opacities = [opacity.GetValue(x) for x in at]
-            found = np.array(colors, np.float32), np.array(opacities, np.float32).reshape(-1, 1)
+            gradients = None
+            if gradient is not None:
+                gradients = np.array([gradient.GetValue(x) for x in np.linspace(0, _GRADIENT_RANGE * (high - low), _ENTRIES).tolist()], np.float32)
+            found = np.array(colors, np.float32), np.array(opacities, np.float32).reshape(-1, 1), gradients
         self._used[key] = found
         return found

@@ -3,7 +3,7 @@
 use super::types::*;
 use crate::input::{
     Cells, Color, Glyphs, Ids, Image, LightKind, PerItem, Points, Property, Scalars, SceneLight, Shading,
-    Shape, Surface, Volume,
+    Shape, Surface, Volume, VolumeBlend,
 };
 use rt_core::glam::DMat4;
 
@@ -151,6 +151,8 @@ pub(super) unsafe fn volume<'a>(v: &RtvVolume, name: &'a str) -> Result<Volume<'
             _ => Scalars::F32(tuples::<f32, 1>(array, what, RTV_F32)?.as_flattened()),
         };
         let opacities: &[[f32; 1]] = tuples(&v.opacities, "opacities", RTV_F32)?;
+        let gradient: &[[f32; 1]] = tuples(&v.gradient_opacities, "gradient opacities", RTV_F32)?;
+        let isovalues: &[[f64; 1]] = tuples(&v.isovalues, "isovalues", RTV_F64)?;
         Ok(Volume {
             name,
             key: v.scalar_key,
@@ -168,7 +170,20 @@ pub(super) unsafe fn volume<'a>(v: &RtvVolume, name: &'a str) -> Result<Volume<'
                 diffuse: v.diffuse,
                 specular: v.specular,
                 specular_power: v.specular_power,
+                mirrored: v.specular_mirrored != 0,
             }),
+            lights: tuples(&v.lights, "lights", RTV_F32)?,
+            gradient_opacities: gradient.as_flattened(),
+            steepest: v.steepest,
+            blend: match v.blend {
+                RTV_BLEND_COMPOSITE => VolumeBlend::Composite,
+                RTV_BLEND_MAXIMUM => VolumeBlend::Maximum,
+                RTV_BLEND_MINIMUM => VolumeBlend::Minimum,
+                RTV_BLEND_AVERAGE => VolumeBlend::Average,
+                RTV_BLEND_ADDITIVE => VolumeBlend::Additive,
+                RTV_BLEND_ISOSURFACES => VolumeBlend::Isosurfaces(isovalues.as_flattened()),
+                other => return Err(format!("a volume with blending {other}, which does not exist")),
+            },
         })
     }
 }

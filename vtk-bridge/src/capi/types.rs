@@ -31,6 +31,19 @@ pub const RTV_LIGHT_POINT: u32 = 1;
 /// Light from a point in a cone.
 pub const RTV_LIGHT_SPOT: u32 = 2;
 
+/// Emission and absorption.
+pub const RTV_BLEND_COMPOSITE: u32 = 0;
+/// The largest scalar.
+pub const RTV_BLEND_MAXIMUM: u32 = 1;
+/// The smallest scalar.
+pub const RTV_BLEND_MINIMUM: u32 = 2;
+/// The mean of colour times opacity.
+pub const RTV_BLEND_AVERAGE: u32 = 3;
+/// The integral of colour times opacity.
+pub const RTV_BLEND_ADDITIVE: u32 = 4;
+/// Surfaces of given scalars.
+pub const RTV_BLEND_ISOSURFACES: u32 = 5;
+
 /// `tuples` times `components` numbers, one after the other.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
@@ -193,7 +206,7 @@ pub struct RtvVolume {
     pub opacities: RtvArray,
     /// See opacities.
     pub unit_distance: f64,
-    /// 1 for shading by the gradient with a headlight.
+    /// 1 for shading by the gradient.
     pub shade: u32,
     /// Of the shading.
     pub ambient: f32,
@@ -203,8 +216,20 @@ pub struct RtvVolume {
     pub specular: f32,
     /// Of the shading.
     pub specular_power: f32,
+    /// 1 for a highlight around the mirrored light instead of the half vector.
+    pub specular_mirrored: u32,
+    /// Lights: for each the direction towards it, in the world (zero for one at the viewer), and its colour; none for a white one at the viewer.
+    pub lights: RtvArray,
+    /// Opacities by gradient, evenly spaced from 0 to steepest, that those of the scalars are multiplied by; none for 1.
+    pub gradient_opacities: RtvArray,
+    /// Gradient of the last of them, scalar per data unit.
+    pub steepest: f64,
+    /// One of RTV_BLEND_*.
+    pub blend: u32,
     /// Not used.
     pub reserved: u32,
+    /// Scalars of the surfaces of RTV_BLEND_ISOSURFACES, f64.
+    pub isovalues: RtvArray,
 }
 
 /// A light that is on.

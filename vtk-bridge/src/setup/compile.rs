@@ -15,6 +15,8 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("rtv_blit.cxx", include_str!("../../cpp/rtv_blit.cxx")),
     ("rtv_extract.cxx", include_str!("../../cpp/rtv_extract.cxx")),
     ("rtv_factory.cxx", include_str!("../../cpp/rtv_factory.cxx")),
+    ("rtv_compositing.h", include_str!("../../cpp/rtv_compositing.h")),
+    ("rtv_compositing.cxx", include_str!("../../cpp/rtv_compositing.cxx")),
     ("rtv_glyphs.cxx", include_str!("../../cpp/rtv_glyphs.cxx")),
     ("rtv_renderer.cxx", include_str!("../../cpp/rtv_renderer.cxx")),
     ("rtv_volumes.cxx", include_str!("../../cpp/rtv_volumes.cxx")),
@@ -34,6 +36,24 @@ pub const MODULES: &[&str] = &[
     "CommonCore",
 ];
 
+/// Compositing over ranks in floating point: a library of its own, for ParaView only.
+const ICET: (&str, &str) = ("rtv_icet.cxx", include_str!("../../cpp/rtv_icet.cxx"));
+
+/// Its file, beside the shim.
+const ICET_FILE: &str = "librtv_icet.so";
+
+/// The modules that it calls.
+const ICET_MODULES: &[&str] = &[
+    "RemotingViews",
+    "RenderingParallel",
+    "ParallelCore",
+    "IceTCore",
+    "RenderingOpenGL2",
+    "RenderingCore",
+    "CommonMath",
+    "CommonCore",
+];
+
 /// Writes the sources into `folder`.
 pub fn write_sources(folder: &Path) -> Result<(), SetupError> {
     fs::create_dir_all(folder).map_err(io(folder, "make the folder"))?;
@@ -44,16 +64,26 @@ pub fn write_sources(folder: &Path) -> Result<(), SetupError> {
     Ok(())
 }
 
-/// Compiles the shim for `flavour` into `out`.
+/// Compiles the shim for `flavour` into `out`, and for ParaView what composites over ranks beside it.
 pub fn shim(flavour: &Flavour, sources: &Path, out: &Path) -> Result<(), SetupError> {
-    library(flavour, sources, &[], &[], out, format!("the shim for VTK {}", flavour.name))
+    let names = SOURCES.iter().map(|(name, _)| *name).filter(|n| n.ends_with(".cxx"));
+    let files: Vec<PathBuf> = names.map(|n| sources.join(n)).collect();
+    library(flavour, sources, &files, MODULES, out, format!("the shim for VTK {}", flavour.name))?;
+    let icet = flavour.include.join("vtkicet/src/include");
+    if !flavour.is_paraview() || !icet.is_dir() {
+        return Ok(());
+    }
+    let file = sources.join(ICET.0);
+    fs::write(&file, ICET.1).map_err(io(&file, "write"))?;
+    let what = format!("compositing over ranks for ParaView {}", flavour.name.trim_start_matches("pv"));
+    library(flavour, &icet, &[file], ICET_MODULES, &out.with_file_name(ICET_FILE), what)
 }
 
-/// Compiles the shim's sources, and `more` with `modules`, into the shared library `out`.
-pub(crate) fn library(
+/// Compiles `files`, which call `modules`, into the shared library `out`. `headers` is a folder of more headers.
+fn library(
     flavour: &Flavour,
-    sources: &Path,
-    more: &[PathBuf],
+    headers: &Path,
+    files: &[PathBuf],
     modules: &[&str],
     out: &Path,
     what: String,
@@ -65,13 +95,11 @@ pub(crate) fn library(
     let compiler = std::env::var("CXX").ok().filter(|c| !c.is_empty()).unwrap_or_else(|| "g++".to_owned());
     let mut command = Command::new(&compiler);
     command.args(["-std=c++17", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-w"]);
-    command.arg("-I").arg(sources).arg("-isystem").arg(&flavour.include).arg("-o").arg(&beside);
-    let cxx = SOURCES.iter().filter(|(n, _)| n.ends_with(".cxx"));
-    command.args(cxx.map(|(n, _)| sources.join(n))).args(more);
+    command.arg("-I").arg(headers).arg("-isystem").arg(&flavour.include).arg("-o").arg(&beside).args(files);
     // Libraries of VTK need others of it, which the process has already.
     // Never unloaded: VTK deletes our factory when the process ends, after ParaView has closed its plugins.
     command.args(["-Wl,--allow-shlib-undefined", "-Wl,-z,nodelete"]);
-    command.args(MODULES.iter().chain(modules).filter_map(|m| flavour.library(m)));
+    command.args(modules.iter().filter_map(|m| flavour.library(m)));
     command.args(["-lGL", "-ldl"]);
     run(&mut command, &compiler, what, "apt-get install g++")?;
     fs::rename(&beside, out).map_err(io(out, "put in place"))

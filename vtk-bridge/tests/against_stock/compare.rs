@@ -30,11 +30,6 @@ impl Bars {
         color_mean: 0.5,
         color_strays: 0.0005,
     };
-
-    /// Surfaces with edges: OpenGL draws the outer half of an outline's edge beside the surface, we the half on it; and it pushes surfaces
-    /// with edges back in depth.
-    pub(crate) const EDGES: Bars =
-        Bars { silhouette: 0.004, depth_ulp: u32::MAX, color_mean: 1.2, color_strays: 0.006, ..Bars::STRICT };
 }
 
 /// How far OpenGL's own depths may be from the exact ones: llvmpipe interpolates in f32, which was measured to be up to 22 units in the

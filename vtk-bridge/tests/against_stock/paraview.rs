@@ -1,8 +1,7 @@
 //! The same unmodified scripts in Debian's ParaView 5.11, without us and with us.
 
-use crate::compare::Bars;
 use crate::peers::skip;
-use crate::scripts::{Exception, differences};
+use crate::scripts::differences;
 use crate::session::{Program, Run, With, output, scripts_in};
 use std::sync::OnceLock;
 
@@ -16,12 +15,9 @@ fn both() -> Option<&'static (Run, Run)> {
     made.as_ref().map_err(|reason| skip(reason)).ok()
 }
 
-/// Pictures that are held to other bars than the rest, and why.
-const EXCEPTIONS: &[Exception] = &[("contours", "edges", Some(Bars::EDGES), "as `Bars::EDGES` says")];
-
 fn same_as_stock(script: &str) {
     let Some((stock, ours)) = both() else { return };
-    let found = differences(stock, ours, script, &[EXCEPTIONS], &[]);
+    let found = differences(stock, ours, script, &[], &[]);
     assert!(found.is_empty(), "\n{}\n", found.join("\n"));
 }
 

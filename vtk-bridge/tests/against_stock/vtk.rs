@@ -38,13 +38,6 @@ pub(crate) const EXCEPTIONS: &[Exception] = &[
         Some(Bars { color_mean: 255.0, color_strays: 1.0, ..Bars::STRICT }),
         "OpenGL shades in sheared coordinates, where right angles are none: its light is wrong",
     ),
-    ("edges", "edges", Some(Bars::EDGES), "as `Bars::EDGES` says"),
-    (
-        "representations",
-        "representations",
-        Some(Bars { silhouette: 0.001, depth_ulp: u32::MAX, color_strays: 0.003, ..Bars::STRICT }),
-        "as edges: one of its balls shows them",
-    ),
     (
         "volumes",
         "shaded",
@@ -118,6 +111,8 @@ scripts! {
     textures_are_as_in_stock_vtk: "textures",
     viewports_do_not_mix: "viewports",
     volumes_mix_with_surfaces: "volume",
+    projections_of_volumes_are_as_in_stock_vtk: "volume_blends",
+    shaded_volumes_under_any_lights_are_as_in_stock_vtk: "volume_lights",
     volumes_are_as_in_stock_vtk: "volumes",
     windows_come_and_go: "windows",
 }

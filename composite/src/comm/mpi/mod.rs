@@ -13,6 +13,8 @@ mod clock;
 mod error;
 pub mod launcher;
 mod library;
+#[cfg(target_os = "linux")]
+mod node;
 mod notice;
 mod transfer;
 
@@ -21,6 +23,8 @@ pub use error::MpiError;
 pub use library::inspect;
 pub(crate) use library::{Handle, Mpi};
 
+#[cfg(target_os = "linux")]
+use super::NodeMemory;
 use super::{Arrival, CommError, Communicator, Receive, collective};
 use clock::Clock;
 use notice::{Notice, Notices};
@@ -46,6 +50,9 @@ const SPINS: u32 = 2000;
 const YIELDS: u32 = 100;
 /// How long it sleeps then.
 const NAP: Duration = Duration::from_micros(20);
+/// Longest wait for the other ranks when the group is made.
+#[cfg(target_os = "linux")]
+const START: Duration = Duration::from_secs(300);
 /// How often a waiting rank looks for notices.
 const NOTICE_INTERVAL: Duration = Duration::from_millis(1);
 
@@ -66,6 +73,9 @@ pub struct MpiComm {
     /// Whether all ranks are here, which all or none of them say.
     one_node: bool,
     finalize: bool,
+    /// What ranks of one machine share, if all of them could open it.
+    #[cfg(target_os = "linux")]
+    node: Option<node::Node>,
 }
 
 static STARTED: AtomicBool = AtomicBool::new(false);
@@ -141,7 +151,7 @@ impl MpiComm {
         // More ranks than processors: a rank that spins takes the processor from the one it waits for.
         let processors = launcher::processors_here();
         let here = launcher::ranks_here(|name| std::env::var(name).ok()).unwrap_or(size);
-        Ok(Self {
+        let mut comm = Self {
             rank,
             size,
             clock: Clock::new(mpi.abi),
@@ -153,7 +163,80 @@ impl MpiComm {
             one_node: here >= size && mpi.abi != Abi::Smpi,
             finalize: initialized == 0,
             mpi: Rc::new(mpi),
-        })
+            #[cfg(target_os = "linux")]
+            node: None,
+        };
+        #[cfg(target_os = "linux")]
+        comm.share_memory()
+            .map_err(|error| MpiError::Call { call: "the first all-gather".to_string(), reason: error.to_string() })?;
+        Ok(comm)
+    }
+
+    /// Makes what the ranks of one machine share, if they are all of one machine and all of them can.
+    #[cfg(target_os = "linux")]
+    fn share_memory(&mut self) -> Result<(), CommError> {
+        if self.size < 2 || self.mpi.abi == Abi::Smpi {
+            return Ok(());
+        }
+        // Ranks of several machines may count differently how many of them are here, so all say what they know.
+        let made = if self.rank == 0 && self.one_node { node::Node::make(self.size).ok() } else { None };
+        let address = made.as_ref().map_or([0; 3], |made| made.1);
+        let mine: &[u8] = bytemuck::cast_slice(&address);
+        let said = collective::all_gather(self, mine, mine.len(), START)?;
+        let address: node::Address = match said[0].as_slice().try_into() {
+            Ok(bytes) => bytemuck::cast::<[u8; 12], _>(bytes),
+            Err(_) => [0; 3],
+        };
+        let node = match made {
+            Some((node, _)) => Some(node),
+            None if self.one_node && address != [0; 3] => node::Node::join(self.rank, self.size, address).ok(),
+            None => None,
+        };
+        let said = collective::all_gather(self, &[u8::from(node.is_some())], 1, START)?;
+        self.node = node.filter(|_| said.iter().all(|one| one == &[1]));
+        Ok(())
+    }
+
+    /// A barrier of ranks that share memory.
+    #[cfg(target_os = "linux")]
+    fn meet_in_memory(&mut self, node: &node::Node, timeout: Duration) -> Result<(), CommError> {
+        let rank = self.rank;
+        if let Some((by, reason)) = &self.aborted {
+            return Err(CommError::Aborted { by: *by, reason: reason.clone() });
+        }
+        node.arrive();
+        for _ in 0..if self.oversubscribed { 1 } else { SPINS } {
+            if node.passed() {
+                return Ok(());
+            }
+            std::hint::spin_loop();
+        }
+        let begin = Instant::now();
+        let mut heard = begin;
+        loop {
+            // What was sent before may need this rank's help to arrive.
+            let helps = self.transfers.outgoing() > 0;
+            node.sleep(if helps { NAP } else { NOTICE_INTERVAL });
+            if node.passed() {
+                return Ok(());
+            }
+            let now = Instant::now();
+            if helps {
+                self.transfers.reap(&self.mpi);
+            }
+            if now.duration_since(heard) >= NOTICE_INTERVAL {
+                heard = now;
+                self.hear()?;
+                if let Some(peer) = node.missing().filter(|&peer| self.left[peer]) {
+                    return Err(CommError::PeerLost { rank, peer });
+                }
+            }
+            if now.duration_since(begin) >= timeout {
+                self.hear()?;
+                let missing = node.missing().unwrap_or(rank);
+                return Err(CommError::BarrierTimeout { rank, missing, waited_ms: timeout.as_millis() as u64 });
+            }
+        }
     }
 
     /// Which binary interface the library has.
@@ -339,7 +422,18 @@ impl Communicator for MpiComm {
         }
     }
 
+    #[cfg(target_os = "linux")]
+    fn node_memory(&mut self) -> Option<&mut dyn NodeMemory> {
+        self.node.as_mut().map(|node| node as &mut dyn NodeMemory)
+    }
+
     fn barrier(&mut self, timeout: Duration) -> Result<(), CommError> {
+        #[cfg(target_os = "linux")]
+        if let Some(node) = self.node.take() {
+            let met = self.meet_in_memory(&node, timeout);
+            self.node = Some(node);
+            return met;
+        }
         if self.mpi.abi != Abi::Smpi {
             return collective::barrier(self, timeout);
         }
@@ -356,6 +450,17 @@ impl Communicator for MpiComm {
         longest: usize,
         timeout: Duration,
     ) -> Result<Vec<Vec<u8>>, CommError> {
+        #[cfg(target_os = "linux")]
+        if longest <= node::LONGEST
+            && mine.len() <= longest
+            && let Some(node) = self.node.take()
+        {
+            node.say(mine);
+            let met = self.meet_in_memory(&node, timeout);
+            let said = met.map(|()| node.said());
+            self.node = Some(node);
+            return said;
+        }
         let block = 8 + longest;
         let bytes = c_int::try_from(block);
         let (Abi::Smpi, Ok(bytes)) = (self.mpi.abi, bytes) else {

@@ -1,0 +1,222 @@
+//! Both compositors on the same ranks and frames, frame by frame in turn.
+use super::table::{Pixels, Row};
+use crate::cli::ranks::RankComm;
+use crate::compositor::{Compositor, Options};
+use crate::frame::Frame;
+use crate::pixel::{DepthPixel, PremultipliedPixel};
+use crate::rival::{Icet, IcetFrame, IcetImage, IcetMode, IcetStrategy};
+use crate::scenes::{Drawn, Scene};
+use crate::simd::SimdLevel;
+use crate::strategies::Strategy;
+use anyhow::Context as _;
+use datasets::cli::UsageError;
+use std::path::Path;
+use std::time::Duration;
+
+/// Frames before the clock counts: buffers are made and connections opened.
+const WARM_UP: u64 = 3;
+/// Largest difference of a channel that counts as equal where floating-point colours are blended: IceT groups the ranks differently
+/// for every strategy, so its own strategies differ by about as much.
+const BLEND_TOLERANCE: f32 = 1e-5;
+
+/// What is the same for all frames of a measurement.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Setting {
+    pub(super) size_px: u32,
+    pub(super) pixels: Pixels,
+    pub(super) strategy: Strategy,
+    pub(super) in_memory: bool,
+    pub(super) simd: Option<SimdLevel>,
+    pub(super) frames: u64,
+    pub(super) timeout: Duration,
+}
+
+/// Both compositors on one rank.
+pub(super) struct Bench<'a> {
+    comm: &'a mut RankComm,
+    setting: Setting,
+    icet: Icet,
+    depth: Compositor<DepthPixel<[u8; 4]>>,
+    blend: Compositor<PremultipliedPixel<[f32; 4]>>,
+    drawn: Drawn,
+    glass: Vec<[f32; 4]>,
+}
+
+impl<'a> Bench<'a> {
+    pub(super) fn new(comm: &'a mut RankComm, path: &Path, setting: Setting) -> anyhow::Result<Self> {
+        let Setting { size_px: size, strategy, in_memory, simd, timeout, .. } = setting;
+        let mode = match setting.pixels {
+            Pixels::Depth => IcetMode::Depth,
+            Pixels::Blend => IcetMode::BlendF32,
+        };
+        let icet = match comm {
+            RankComm::Mpi(comm) => Icet::over_mpi(path, comm, mode, size, size),
+            RankComm::Thread(comm) => Icet::over_comm(path, comm, mode, size, size),
+        };
+        // IceT collects colours only. Its ranks do not wait for each other at the end either: the barrier is timed for both.
+        let options = Options {
+            strategy,
+            in_memory,
+            simd,
+            depth: false,
+            confirm: false,
+            timeout,
+            ..Options::default()
+        };
+        Ok(Self {
+            comm,
+            setting,
+            icet: icet.map_err(|error| UsageError(error.to_string()))?,
+            depth: Compositor::new(options.clone()),
+            blend: Compositor::new(options),
+            drawn: Drawn::new(size, size),
+            glass: Vec::new(),
+        })
+    }
+
+    /// Frames of one scene.
+    pub(super) fn measure(&mut self, scene: Scene) -> anyhow::Result<Row> {
+        let (rank, ranks) = (self.comm.comm().rank(), self.comm.comm().size());
+        let Setting { size_px, pixels, strategy, simd, frames, timeout, .. } = self.setting;
+        let mut ours_ms = Vec::new();
+        let mut rivals_ms = vec![Vec::new(); IcetStrategy::ALL.len()];
+        let mut pixels_differ = 0;
+        let (mut sent, mut reports) = (0, Vec::new());
+        for moment in 0..WARM_UP + frames {
+            scene.draw(moment, rank, ranks, &mut self.drawn);
+            let order = scene.front_to_back(moment, ranks);
+            if pixels == Pixels::Blend {
+                self.drawn.premultiplied(&mut self.glass);
+                self.icet.set_order(&order);
+            }
+            let timed = moment >= WARM_UP;
+
+            // Ours.
+            self.comm.comm().barrier(timeout)?;
+            let begin = self.comm.comm().now();
+            let (image, report) = match pixels {
+                Pixels::Depth => {
+                    let drawn = &self.drawn;
+                    let frame =
+                        Frame::with_depth(drawn.width_px, drawn.height_px, &drawn.colors, &drawn.depths)?;
+                    let done = self.depth.composite(self.comm.comm(), &frame.bounded(drawn.bounds)?)?;
+                    (done.image.map(Ours::Depth), done.report)
+                }
+                Pixels::Blend => {
+                    // The order changes from frame to frame; buffers stay.
+                    self.blend.set_order(Some(order));
+                    let frame = Frame::premultiplied(self.drawn.width_px, self.drawn.height_px, &self.glass)?;
+                    let done = self.blend.composite(self.comm.comm(), &frame.bounded(self.drawn.bounds)?)?;
+                    (done.image.map(Ours::Blend), done.report)
+                }
+            };
+            self.comm.comm().barrier(timeout)?;
+            if timed {
+                ours_ms.push(1e3 * (self.comm.comm().now() - begin));
+                sent = sent.max(report.bytes_sent);
+                reports.push(report);
+            }
+
+            // Theirs, each strategy in turn.
+            for (times, strategy) in rivals_ms.iter_mut().zip(IcetStrategy::ALL) {
+                self.icet.set_strategy(strategy);
+                self.comm.comm().barrier(timeout)?;
+                let begin = self.comm.comm().now();
+                let frame = match pixels {
+                    Pixels::Depth => IcetFrame::Depth(&self.drawn.colors, &self.drawn.depths),
+                    Pixels::Blend => IcetFrame::BlendF32(&self.glass),
+                };
+                let theirs = self.icet.composite(self.comm.comm(), frame, self.drawn.bounds);
+                let theirs = theirs.with_context(|| format!("IceT's {}", strategy.name()))?;
+                self.comm.comm().barrier(timeout)?;
+                if timed {
+                    times.push(1e3 * (self.comm.comm().now() - begin));
+                }
+                if let (Some(ours), Some(theirs)) = (&image, theirs) {
+                    pixels_differ += differing(ours, theirs);
+                }
+            }
+            match image {
+                Some(Ours::Depth(image)) => self.depth.recycle(image),
+                Some(Ours::Blend(image)) => self.blend.recycle(image),
+                None => {}
+            }
+        }
+
+        // What all ranks sent.
+        let mine = [sent, reports.last().map_or(0, |report| report.messages_sent)];
+        let bytes: Vec<u8> = mine.iter().flat_map(|number| number.to_le_bytes()).collect();
+        let all = self.comm.comm().all_gather(&bytes, 16, timeout)?;
+        let total = |at: usize| -> u64 {
+            let number = |bytes: &Vec<u8>| bytes.get(at..at + 8).and_then(|b| b.try_into().ok());
+            all.iter().filter_map(number).map(u64::from_le_bytes).sum()
+        };
+        let medians: Vec<f64> = rivals_ms.iter().map(|times| median(times)).collect();
+        let best = (0..medians.len()).min_by(|&a, &b| medians[a].total_cmp(&medians[b])).unwrap_or(0);
+        let ours = median(&ours_ms);
+        let column =
+            |of: fn(&crate::Report) -> f64| 1e3 * median(&reports.iter().map(of).collect::<Vec<f64>>());
+        Ok(Row {
+            scene: scene.name().to_string(),
+            ranks,
+            size_px,
+            pixels,
+            rival: IcetStrategy::ALL[best].name().to_string(),
+            ours_ms: ours,
+            rival_ms: medians[best],
+            ratio: medians[best] / ours,
+            pixels_differ,
+            ours_min_ms: smallest(&ours_ms),
+            rival_min_ms: smallest(&rivals_ms[best]),
+            ours_strategy: match reports.last() {
+                Some(report) if report.in_memory => "SharedMemory".to_string(),
+                Some(report) => format!("{:?}", report.strategy),
+                None => format!("{strategy:?}"),
+            },
+            simd: simd.unwrap_or_else(SimdLevel::best).name().to_string(),
+            ours_mb: total(0) as f64 / 1e6,
+            ours_messages: total(8),
+            rivals_ms: IcetStrategy::ALL.iter().map(|s| s.name().to_string()).zip(medians).collect(),
+            columns_ms: [
+                ("compress", column(|r| r.compress_secs)),
+                ("blend", column(|r| r.blend_secs)),
+                ("send", column(|r| r.exchange_secs)),
+                ("collect", column(|r| r.collect_secs)),
+            ]
+            .map(|(name, ms)| (name.to_string(), ms))
+            .into(),
+        })
+    }
+}
+
+enum Ours {
+    Depth(crate::Image<DepthPixel<[u8; 4]>>),
+    Blend(crate::Image<PremultipliedPixel<[f32; 4]>>),
+}
+
+fn differing(ours: &Ours, theirs: IcetImage<'_>) -> u64 {
+    let count = match (ours, theirs) {
+        (Ours::Depth(ours), IcetImage::Rgba8(theirs)) => {
+            ours.colors().iter().zip(theirs).filter(|(a, b)| a != b).count()
+        }
+        (Ours::Blend(ours), IcetImage::RgbaF32(theirs)) => {
+            let differ = |(a, b): &(&[f32; 4], &[f32; 4])| {
+                // Not "any is farther", so that NaN differs.
+                !a.iter().zip(*b).all(|(a, b)| (a - b).abs() <= BLEND_TOLERANCE)
+            };
+            ours.colors().iter().zip(theirs).filter(differ).count()
+        }
+        _ => usize::MAX,
+    };
+    count as u64
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+fn smallest(values: &[f64]) -> f64 {
+    values.iter().copied().fold(f64::INFINITY, f64::min)
+}

@@ -1,0 +1,316 @@
+//! Memory that the processes of one machine share: a small table in which ranks meet without messages, and a room for each rank's pixels.
+//!
+//! Each piece is a file without a name (`memfd_create`), opened by the others through the process that made it, so nothing is left behind
+//! whatever happens to a process. Ranks wait on a word of the table (`futex`): they sleep until they are woken, which matters where ranks
+//! share processors. There, whoever polls for messages takes the processor from those it waits for, and Linux (6.18) moves a process
+//! that yields behind all others, so that it is served last when its message has come.
+use crate::comm::{CommError, NodeMemory};
+use rustix::fs::{FallocateFlags, MemfdFlags, fallocate, memfd_create};
+use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
+use rustix::thread::futex;
+use std::cell::Cell;
+use std::fs::{File, OpenOptions};
+use std::os::fd::AsRawFd as _;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::Duration;
+
+/// Words of 32 bits for a rank's entry: one line of the cache.
+const ENTRY: usize = 16;
+/// Words of a string in [`Node::gather_slot`]: which all-gather it belongs to, its length, and 248 bytes.
+const STRING: usize = 64;
+/// Longest string that the table holds.
+pub(super) const LONGEST: usize = 4 * (STRING - 2);
+
+// The head of the table.
+const EPOCH: usize = 0;
+const ARRIVED: usize = 1;
+const NEXT_BAND: usize = 2;
+const NONCE: usize = 3;
+// A rank's entry.
+const CAME: usize = 0;
+const PROCESS: usize = 1;
+const FILE: usize = 2;
+const GENERATION: usize = 3;
+const KIB: usize = 4;
+const REFUSED: usize = 5;
+
+/// Where the table is: process and file of rank 0, and what stands in it, so that the process of that number in another container is not
+/// taken for it.
+pub(super) type Address = [u32; 3];
+
+struct Mapping {
+    at: *mut u8,
+    bytes: usize,
+}
+
+impl Mapping {
+    /// All of a file, which must be that long. `fill` has its pages made at once.
+    fn of(file: &File, bytes: usize, fill: bool) -> std::io::Result<Self> {
+        if file.metadata()?.len() < bytes as u64 {
+            return Err(std::io::ErrorKind::UnexpectedEof.into());
+        }
+        let flags = if fill { MapFlags::SHARED | MapFlags::POPULATE } else { MapFlags::SHARED };
+        // SAFETY: a new mapping at an address that the system chooses.
+        let at = unsafe {
+            mmap(std::ptr::null_mut(), bytes, ProtFlags::READ | ProtFlags::WRITE, flags, file, 0)
+        }?;
+        Ok(Self { at: at.cast(), bytes })
+    }
+
+    /// # Safety
+    /// During the life of the slice nobody, here or in another process, writes these bytes.
+    unsafe fn read(&self, from: usize, bytes: usize) -> &[u8] {
+        assert!(from.checked_add(bytes).is_some_and(|end| end <= self.bytes), "beyond a rank's room");
+        // SAFETY: within the mapping, and not written, as the caller promises.
+        unsafe { std::slice::from_raw_parts(self.at.add(from), bytes) }
+    }
+
+    /// # Safety
+    /// During the life of the slice nobody else, here or in another process, reads or writes these bytes.
+    #[allow(clippy::mut_from_ref, reason = "the memory belongs to several processes, so exclusiveness is the caller's to see to")]
+    unsafe fn write(&self, from: usize, bytes: usize) -> &mut [u8] {
+        assert!(from.checked_add(bytes).is_some_and(|end| end <= self.bytes), "beyond a rank's room");
+        // SAFETY: within the mapping, and nobody else's, as the caller promises.
+        unsafe { std::slice::from_raw_parts_mut(self.at.add(from), bytes) }
+    }
+
+    fn word(&self, index: usize) -> &AtomicU32 {
+        assert!(4 * index + 4 <= self.bytes, "beyond the table");
+        // SAFETY: within the mapping, which begins at a page; words of the table are only used as atomics, by every process.
+        unsafe { &*self.at.cast::<AtomicU32>().add(index) }
+    }
+}
+
+impl Drop for Mapping {
+    fn drop(&mut self) {
+        // SAFETY: made by `mmap` with this length; nothing borrowed from it outlives it.
+        let _ = unsafe { munmap(self.at.cast(), self.bytes) };
+    }
+}
+
+fn nameless_file(bytes: usize) -> std::io::Result<File> {
+    let file = File::from(memfd_create("composite", MemfdFlags::CLOEXEC)?);
+    // Reserved, so that memory that is not there is an error here and not a fault later.
+    fallocate(&file, FallocateFlags::empty(), 0, bytes as u64)?;
+    Ok(file)
+}
+
+fn file_of(process: u32, file: u32) -> std::io::Result<File> {
+    OpenOptions::new().read(true).write(true).open(format!("/proc/{process}/fd/{file}"))
+}
+
+/// A rank's room, as it is mapped here.
+struct Room {
+    generation: u32,
+    mapping: Mapping,
+}
+
+/// See the module.
+pub(super) struct Node {
+    rank: usize,
+    size: usize,
+    table: Mapping,
+    /// Kept open, so that others can open it.
+    own_file: Option<File>,
+    _table_file: Option<File>,
+    rooms: Vec<Option<Room>>,
+    /// How often this rank has come to the barrier, and gathered.
+    came: Cell<u32>,
+    gathered: Cell<u32>,
+}
+
+fn table_bytes(size: usize) -> usize {
+    (4 * (ENTRY * (size + 1) + 2 * STRING * size)).next_multiple_of(4096)
+}
+
+impl Node {
+    /// The table that this rank makes for all, and where it is.
+    pub(super) fn make(size: usize) -> std::io::Result<(Self, Address)> {
+        let file = nameless_file(table_bytes(size))?;
+        let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+        let nonce = now.map_or(0, |since| since.subsec_nanos() ^ since.as_secs() as u32) | 1;
+        let address = [std::process::id(), file.as_raw_fd() as u32, nonce];
+        let node = Self::of(0, size, file)?;
+        node.table.word(NONCE).store(nonce, Ordering::Release);
+        Ok((node, address))
+    }
+
+    /// The table that rank 0 has made.
+    pub(super) fn join(rank: usize, size: usize, [process, file, nonce]: Address) -> std::io::Result<Self> {
+        let node = Self::of(rank, size, file_of(process, file)?)?;
+        let same = node.table.word(NONCE).load(Ordering::Acquire) == nonce;
+        if same { Ok(node) } else { Err(std::io::ErrorKind::NotFound.into()) }
+    }
+
+    fn of(rank: usize, size: usize, file: File) -> std::io::Result<Self> {
+        Ok(Self {
+            rank,
+            size,
+            table: Mapping::of(&file, table_bytes(size), true)?,
+            own_file: None,
+            _table_file: (rank == 0).then_some(file),
+            rooms: (0..size).map(|_| None).collect(),
+            came: Cell::new(0),
+            gathered: Cell::new(0),
+        })
+    }
+
+    fn entry(&self, rank: usize, word: usize) -> &AtomicU32 {
+        self.table.word(ENTRY * (rank + 1) + word)
+    }
+
+    /// Says that this rank has come to the barrier; wakes all if it is the last one.
+    pub(super) fn arrive(&self) {
+        let number = self.came.get().wrapping_add(1);
+        self.came.set(number);
+        self.entry(self.rank, CAME).store(number, Ordering::Release);
+        if self.table.word(ARRIVED).fetch_add(1, Ordering::AcqRel) + 1 == self.size as u32 {
+            self.table.word(ARRIVED).store(0, Ordering::Relaxed);
+            self.table.word(EPOCH).store(number, Ordering::Release);
+            let _ = futex::wake(self.table.word(EPOCH), futex::Flags::empty(), i32::MAX as u32);
+        }
+    }
+
+    /// Whether all have come to the barrier at which this rank is.
+    pub(super) fn passed(&self) -> bool {
+        self.table.word(EPOCH).load(Ordering::Acquire) == self.came.get()
+    }
+
+    /// Sleeps until all have come or the time has passed, or for no reason.
+    pub(super) fn sleep(&self, most: Duration) {
+        let before = self.came.get().wrapping_sub(1);
+        let most = futex::Timespec {
+            tv_sec: most.as_secs() as i64,
+            tv_nsec: i64::from(most.subsec_nanos()),
+        };
+        let _ = futex::wait(self.table.word(EPOCH), futex::Flags::empty(), before, Some(&most));
+    }
+
+    /// The first rank that has not come.
+    pub(super) fn missing(&self) -> Option<usize> {
+        let here = self.came.get();
+        (0..self.size).find(|&rank| self.entry(rank, CAME).load(Ordering::Acquire) != here)
+    }
+
+    /// Writes this rank's string of the next all-gather; the others can read it behind the barrier. There are two sets of strings, so nobody
+    /// writes one that another still reads.
+    pub(super) fn say(&self, string: &[u8]) {
+        let first = self.gather_slot(self.rank);
+        self.table.word(first).store(self.gathered.get().wrapping_add(1), Ordering::Relaxed);
+        self.table.word(first + 1).store(string.len() as u32, Ordering::Relaxed);
+        for (index, four) in string.chunks(4).enumerate() {
+            let mut word = [0; 4];
+            word[..four.len()].copy_from_slice(four);
+            self.table.word(first + 2 + index).store(u32::from_ne_bytes(word), Ordering::Relaxed);
+        }
+    }
+
+    /// What all have said, behind the barrier; nothing of a rank that came to the barrier for another reason.
+    pub(super) fn said(&self) -> Vec<Vec<u8>> {
+        let number = self.gathered.get().wrapping_add(1);
+        let strings = (0..self.size).map(|rank| {
+            let first = self.gather_slot(rank);
+            if self.table.word(first).load(Ordering::Relaxed) != number {
+                return Vec::new();
+            }
+            let length = (self.table.word(first + 1).load(Ordering::Relaxed) as usize).min(LONGEST);
+            let words = (0..length.div_ceil(4))
+                .map(|index| self.table.word(first + 2 + index).load(Ordering::Relaxed).to_ne_bytes());
+            let mut string: Vec<u8> = words.flatten().collect();
+            string.truncate(length);
+            string
+        });
+        let strings = strings.collect();
+        self.gathered.set(number);
+        strings
+    }
+
+    fn gather_slot(&self, rank: usize) -> usize {
+        let set = self.gathered.get() as usize % 2;
+        ENTRY * (self.size + 1) + STRING * (set * self.size + rank)
+    }
+
+    /// A room of at least so many bytes for this rank.
+    fn make_room(&mut self, bytes: usize) -> std::io::Result<()> {
+        if self.rooms[self.rank].as_ref().is_some_and(|room| room.mapping.bytes >= bytes) {
+            return Ok(());
+        }
+        // A little more than needed: frames are alike but not equal.
+        let bytes = (bytes + bytes / 4).next_multiple_of(1 << 16);
+        let file = nameless_file(bytes)?;
+        let mapping = Mapping::of(&file, bytes, true)?;
+        let generation = self.entry(self.rank, GENERATION).load(Ordering::Relaxed).wrapping_add(1);
+        for (word, value) in [
+            (PROCESS, std::process::id()),
+            (FILE, file.as_raw_fd() as u32),
+            (KIB, (bytes / 1024) as u32),
+            (GENERATION, generation),
+        ] {
+            self.entry(self.rank, word).store(value, Ordering::Relaxed);
+        }
+        self.rooms[self.rank] = Some(Room { generation, mapping });
+        self.own_file = Some(file);
+        Ok(())
+    }
+}
+
+impl NodeMemory for Node {
+    fn lay(&mut self, bytes: usize, used: usize, fill: &mut dyn FnMut(&mut [u8])) {
+        let made = self.make_room(bytes.max(1));
+        self.entry(self.rank, REFUSED).store(u32::from(made.is_err()), Ordering::Relaxed);
+        if self.rank == 0 {
+            // Whoever took bands of the last frame has come to a barrier since, and nobody takes one before the next.
+            self.table.word(NEXT_BAND).store(0, Ordering::Relaxed);
+        }
+        if let (Ok(()), Some(room)) = (made, &self.rooms[self.rank]) {
+            // SAFETY: between the meeting of a frame and its barrier only its owner uses a room.
+            fill(unsafe { room.mapping.write(0, used) });
+        }
+    }
+
+    fn open(&mut self) -> Result<bool, CommError> {
+        let refused = |rank| self.entry(rank, REFUSED).load(Ordering::Relaxed) != 0;
+        if (0..self.size).any(refused) {
+            return Ok(false);
+        }
+        for rank in 0..self.size {
+            let generation = self.entry(rank, GENERATION).load(Ordering::Relaxed);
+            if self.rooms[rank].as_ref().is_some_and(|room| room.generation == generation) {
+                continue;
+            }
+            let [process, file, kib] =
+                [PROCESS, FILE, KIB].map(|word| self.entry(rank, word).load(Ordering::Relaxed));
+            let mapping = file_of(process, file).and_then(|file| Mapping::of(&file, kib as usize * 1024, true));
+            let mapping = mapping.map_err(|error| CommError::Transport {
+                rank: self.rank,
+                call: format!("opening the memory of rank {rank}"),
+                reason: error.to_string(),
+            })?;
+            self.rooms[rank] = Some(Room { generation, mapping });
+        }
+        Ok(true)
+    }
+
+    fn room(&self, rank: usize, bytes: usize) -> &[u8] {
+        let Some(room) = &self.rooms[rank] else { return &[] };
+        // SAFETY: behind the barrier that follows `lay` nobody writes what was laid until all have met again.
+        unsafe { room.mapping.read(0, bytes) }
+    }
+
+    fn next_band(&self) -> usize {
+        self.table.word(NEXT_BAND).fetch_add(1, Ordering::Relaxed) as usize
+    }
+
+    fn write_band(&self, rank: usize, from: usize, bytes: usize, write: &mut dyn FnMut(&mut [u8])) {
+        if let Some(room) = &self.rooms[rank] {
+            // SAFETY: who has taken a band is the only one to write it, and it is read behind the next barrier.
+            write(unsafe { room.mapping.write(from, bytes) });
+        }
+    }
+
+    fn band(&self, rank: usize, from: usize, bytes: usize) -> &[u8] {
+        let Some(room) = &self.rooms[rank] else { return &[] };
+        // SAFETY: behind the barrier that follows the bands nobody writes them.
+        unsafe { room.mapping.read(from, bytes) }
+    }
+}

@@ -1,0 +1,215 @@
+//! Ranks that are processes of one machine: no message, but memory that all of them see.
+//!
+//! Each rank lays what it drew into a room of shared memory, all meet, and then take bands of rows of the image, as long as there are any, and
+//! merge them straight from the rooms. The bands of other ranks are read by the one that collects. A pixel is copied twice, where a message is read,
+//! packed, copied by the system, read again, joined, packed and sent once more; and whoever has a processor works, wherever pixels are.
+use crate::comm::NodeMemory;
+use crate::error::CompositeError;
+use crate::frame::Image;
+use crate::layer::View;
+use crate::pixel::Composite;
+use crate::rect::Rect;
+use crate::session::Session;
+use crate::shared::{BAND_ROWS, Rows, merge_band};
+use crate::simd::Kernels;
+use std::ops::Range;
+
+/// What rooms hold together at most: beyond it pictures travel, piece by piece.
+const MOST_BYTES: usize = 4 << 30;
+
+/// Planes of other types than bytes begin at multiples of this.
+const ALIGNMENT: usize = 64;
+
+/// Where the planes of a rectangle are in a room, colours first.
+struct Planes {
+    colors: usize,
+    depths: Range<usize>,
+}
+
+impl Planes {
+    fn of<P: Composite>(rect: &Rect) -> Self {
+        let colors = rect.pixels() * size_of::<P::Color>();
+        let begin = colors.next_multiple_of(ALIGNMENT);
+        let end = begin + if P::HAS_DEPTH { 4 * rect.pixels() } else { 0 };
+        Self { colors, depths: begin..end }
+    }
+}
+
+/// Where the bands of the image are, in the room of the rank that collects.
+struct Bands {
+    width: usize,
+    height: usize,
+    first: usize,
+    depths: bool,
+    row_bytes: usize,
+}
+
+impl Bands {
+    fn rows(&self, band: usize) -> Range<usize> {
+        band * BAND_ROWS..((band + 1) * BAND_ROWS).min(self.height)
+    }
+
+    fn count(&self) -> usize {
+        self.height.div_ceil(BAND_ROWS)
+    }
+
+    /// Begin, and bytes.
+    fn place(&self, band: usize) -> (usize, usize) {
+        let begin = self.first + band * (BAND_ROWS * self.row_bytes).next_multiple_of(ALIGNMENT);
+        (begin, self.rows(band).len() * self.row_bytes)
+    }
+
+    fn end(&self) -> usize {
+        self.place(self.count()).0
+    }
+
+    /// Colours and depths of a band.
+    fn split<'a, P: Composite>(&self, band: usize, bytes: &'a mut [u8]) -> (&'a mut [P::Color], &'a mut [f32]) {
+        let colors = self.rows(band).len() * self.width * size_of::<P::Color>();
+        let (colors, depths) = bytes.split_at_mut(colors);
+        (bytemuck::cast_slice_mut(colors), bytemuck::cast_slice_mut(depths))
+    }
+}
+
+/// Whether this frame can be merged in shared memory; the same on all ranks. They have met.
+pub(crate) fn is_possible<P: Composite>(session: &mut Session<'_>, (width_px, height_px): (u32, u32)) -> bool {
+    let laid: usize = session.drawn.iter().map(|rect| rect.pixels() * P::BYTES).sum();
+    let image = Rect::of_size(width_px, height_px).pixels() * P::BYTES;
+    laid.saturating_add(image) <= MOST_BYTES && session.comm.node_memory().is_some()
+}
+
+/// The image at the root, after which all have met; or nothing, if there was not enough memory, which all find alike.
+pub(crate) fn run<P: Composite>(
+    session: &mut Session<'_>,
+    view: &View<'_, P>,
+    (width_px, height_px): (u32, u32),
+    root: usize,
+    depths: bool,
+    spare: Option<Image<P>>,
+    kernels: Kernels,
+) -> Result<Option<Option<Image<P>>>, CompositeError> {
+    let (width, height) = (width_px as usize, height_px as usize);
+    let depths = depths && P::HAS_DEPTH;
+    let row_bytes = width * (size_of::<P::Color>() + if depths { 4 } else { 0 });
+    let of_root = Planes::of::<P>(&session.drawn[root]).depths.end.next_multiple_of(ALIGNMENT);
+    let bands = Bands { width, height, first: of_root, depths, row_bytes };
+
+    // What this rank drew.
+    let begin = session.comm.working_secs();
+    session.count_nan(view, view.bounds);
+    let own = Planes::of::<P>(&view.bounds);
+    let bytes = if session.place == root { bands.end() } else { own.depths.end };
+    if let Some(memory) = session.comm.node_memory() {
+        memory.lay(bytes, own.depths.end, &mut |room| copy_rows(view, &own, room));
+    }
+    session.report.compress_secs += session.comm.working_secs() - begin;
+    let span = session.begin_span();
+    session.barrier()?;
+    session.end_span(span, |report| &mut report.exchange_secs);
+
+    // Bands, as long as there are any.
+    let begin = session.comm.working_secs();
+    let (drawn, ranks): (Vec<Rect>, Vec<usize>) =
+        (0..session.places()).map(|place| (session.drawn[place], session.rank_of(place))).unzip();
+    let is_root = session.place == root;
+    let mut image = is_root.then(|| blank(width_px, height_px, depths, spare));
+    let mut own_bands = vec![false; if is_root { bands.count() } else { 0 }];
+    let Some(memory) = session.comm.node_memory() else { return Ok(None) };
+    if !memory.open()? {
+        return Ok(None);
+    }
+    let memory: &dyn NodeMemory = memory;
+    let views: Vec<View<'_, P>> =
+        drawn.iter().zip(&ranks).map(|(rect, rank)| laid_view(memory, *rank, rect)).collect();
+    let mut rows = Rows::<P>::new(width);
+    loop {
+        let band = memory.next_band();
+        if band >= bands.count() {
+            break;
+        }
+        let first = bands.rows(band).start;
+        if let Some(image) = &mut image {
+            let (colors, depths) = band_of(image, &bands, band);
+            merge_band(kernels, &mut rows, &views, first as u32, colors, depths);
+            own_bands[band] = true;
+        } else {
+            let (from, bytes) = bands.place(band);
+            memory.write_band(ranks[root], from, bytes, &mut |bytes| {
+                let (colors, depths) = bands.split::<P>(band, bytes);
+                merge_band(kernels, &mut rows, &views, first as u32, colors, depths);
+            });
+        }
+    }
+    session.report.blend_secs += session.comm.working_secs() - begin;
+    let span = session.begin_span();
+    session.barrier()?;
+    session.end_span(span, |report| &mut report.exchange_secs);
+
+    // The bands of the others.
+    let begin = session.comm.working_secs();
+    if let (Some(image), Some(memory)) = (&mut image, session.comm.node_memory()) {
+        for band in (0..bands.count()).filter(|&band| !own_bands[band]) {
+            let (from, bytes) = bands.place(band);
+            let bytes = memory.band(ranks[root], from, bytes);
+            let (colors, depths) = band_of(image, &bands, band);
+            let (merged_colors, merged_depths) = bytes.split_at(size_of_val(colors));
+            bytemuck::cast_slice_mut(colors).copy_from_slice(merged_colors);
+            bytemuck::cast_slice_mut(depths).copy_from_slice(merged_depths);
+        }
+    }
+    session.report.collect_secs += session.comm.working_secs() - begin;
+    Ok(Some(image))
+}
+
+fn copy_rows<P: Composite>(view: &View<'_, P>, planes: &Planes, room: &mut [u8]) {
+    let rect = view.bounds;
+    if rect.is_empty() {
+        return;
+    }
+    let (colors, rest) = room.split_at_mut(planes.colors);
+    let row_bytes = rect.width() * size_of::<P::Color>();
+    let depths = &mut rest[planes.depths.start - planes.colors..];
+    for (y, to) in (rect.y0..rect.y1).zip(colors.chunks_exact_mut(row_bytes)) {
+        to.copy_from_slice(bytemuck::cast_slice(view.row(y, rect.x0, rect.x1).0));
+    }
+    if P::HAS_DEPTH {
+        for (y, to) in (rect.y0..rect.y1).zip(depths.chunks_exact_mut(4 * rect.width())) {
+            to.copy_from_slice(bytemuck::cast_slice(view.row(y, rect.x0, rect.x1).1));
+        }
+    }
+}
+
+fn laid_view<'a, P: Composite>(memory: &'a dyn NodeMemory, rank: usize, rect: &Rect) -> View<'a, P> {
+    let planes = Planes::of::<P>(rect);
+    let room = memory.room(rank, planes.depths.end);
+    View {
+        bounds: *rect,
+        origin: (rect.x0, rect.y0),
+        stride: rect.width(),
+        colors: bytemuck::cast_slice(&room[..planes.colors]),
+        depths: bytemuck::cast_slice(&room[planes.depths]),
+    }
+}
+
+/// An image whose every pixel will be written.
+fn blank<P: Composite>(width_px: u32, height_px: u32, depths: bool, spare: Option<Image<P>>) -> Image<P> {
+    let pixels = Rect::of_size(width_px, height_px).pixels();
+    let depth_pixels = if depths { pixels } else { 0 };
+    let fitting = spare.filter(|image| image.colors.len() == pixels && image.depths.len() == depth_pixels);
+    let (colors, depths) = match fitting {
+        Some(image) => (image.colors, image.depths),
+        None => (vec![P::EMPTY.color(); pixels], vec![1.0; depth_pixels]),
+    };
+    Image { width_px, height_px, colors, depths }
+}
+
+fn band_of<'a, P: Composite>(
+    image: &'a mut Image<P>,
+    bands: &Bands,
+    band: usize,
+) -> (&'a mut [P::Color], &'a mut [f32]) {
+    let rows = bands.rows(band);
+    let pixels = rows.start * bands.width..rows.end * bands.width;
+    let depths = if bands.depths { &mut image.depths[pixels.clone()] } else { &mut [] };
+    (&mut image.colors[pixels], depths)
+}

@@ -1,0 +1,194 @@
+//! How a volume looks: shading, blending, and the checks of both.
+
+use glam::{UVec3, Vec3};
+use std::sync::Arc;
+
+/// Why a volume cannot be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum VolumeError {
+    /// A grid without cells.
+    #[error("volume: the grid has {dims} points; it needs at least 2 along each axis to have cells")]
+    NoCells {
+        /// Points per axis.
+        dims: UVec3,
+    },
+    /// A bad parameter of the shading, the lights or the gradient opacity.
+    #[error("volume shading: {field} is {value}; it must be {rule}")]
+    Shading {
+        /// Which one.
+        field: &'static str,
+        /// What was given.
+        value: f32,
+        /// What is allowed.
+        rule: &'static str,
+    },
+}
+
+/// How a highlight falls off around the mirrored light.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Highlight {
+    /// By the angle between the normal and the direction halfway between light and viewer (Blinn 1977).
+    #[default]
+    Halfway,
+    /// By the angle between the viewer and the mirrored light (Phong 1975).
+    Mirrored,
+}
+
+/// Lambert shading by the gradient, two-sided, with a light at the viewer or in a fixed direction. It multiplies the colour by
+/// `ambient + diffuse·|n·l|` where the gradient is steep, and by 1 where there is none; a highlight is added.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VolumeShading {
+    /// Part of the colour that needs no light, 0..=1.
+    pub ambient: f32,
+    /// Part that is lit, 0..=1.
+    pub diffuse: f32,
+    /// Direction towards the light, any length, in the volume's axes; `None` for a light at the viewer.
+    pub light: Option<Vec3>,
+    /// White highlight of that light; 0 for none.
+    pub specular: f32,
+    /// Exponent of the highlight.
+    pub shininess: f32,
+    /// Its form.
+    pub highlight: Highlight,
+    /// Gradient, in value per world unit, at which the shading has half its effect. With 0 it has all of it everywhere, and only `ambient` where
+    /// there is no gradient (VTK).
+    pub half_gradient: f32,
+}
+
+impl Default for VolumeShading {
+    /// A light at the viewer that changes nothing.
+    fn default() -> Self {
+        VolumeShading {
+            ambient: 1.0,
+            diffuse: 0.0,
+            light: None,
+            specular: 0.0,
+            shininess: 1.0,
+            highlight: Highlight::Halfway,
+            half_gradient: 0.0,
+        }
+    }
+}
+
+/// A parallel light on a volume.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VolumeLight {
+    /// Towards the light, any length, in the volume's axes; `None` for a light at the viewer.
+    pub direction: Option<Vec3>,
+    /// Linear colour times intensity.
+    pub color: [f32; 3],
+}
+
+/// Extinction that depends on the gradient too (Levoy 1988, "Display of Surfaces from Volume Data"): that of the transfer function times this.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GradientOpacity {
+    /// Factors for gradients from zero to `steepest`, evenly spaced, linear between; the last holds for steeper ones too.
+    pub factors: Arc<[f32]>,
+    /// Gradient of the last factor, in value per world unit.
+    pub steepest: f32,
+}
+
+impl GradientOpacity {
+    /// The factor at a gradient of this length.
+    #[inline]
+    pub fn at(&self, steepness: f64) -> f64 {
+        let last = self.factors.len() - 1;
+        let x = (steepness / f64::from(self.steepest)).clamp(0.0, 1.0) * last as f64;
+        // `clamp` leaves what is not a number, which `as` sends to the first entry.
+        let i = (x as usize).min(last.saturating_sub(1));
+        let [a, b] = [i, (i + 1).min(last)].map(|i| f64::from(self.factors[i]));
+        a + (b - a) * (x - i as f64)
+    }
+}
+
+/// What a ray makes of the scalars it meets. All but [`Blend::Composite`] take the transfer function's extinction for an opacity (of at most 1), or a weight: they
+/// know no thickness.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum Blend {
+    /// Emission and absorption.
+    #[default]
+    Composite,
+    /// Colour and opacity of the largest scalar along the ray (maximum intensity projection).
+    Maximum,
+    /// Colour and opacity of the smallest one.
+    Minimum,
+    /// The mean along the ray of colour times weight; opaque.
+    Average,
+    /// The integral along the ray of colour times weight per world unit, at most 1; opaque.
+    Additive,
+    /// The surfaces on which the scalar has one of these values, each with the value's colour and opacity.
+    Isosurfaces(Arc<[f32]>),
+}
+
+/// What the scalar is between the points of the grid.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Interpolation {
+    /// Trilinear.
+    #[default]
+    Linear,
+    /// That of the nearest point: boxes of one value around each point, cut at the grid's bounds.
+    Nearest,
+}
+
+/// How to make a [`super::Volume`].
+#[derive(Debug, Clone, Default)]
+pub struct VolumeOptions {
+    /// Shading by the gradient; `None` for pure emission and absorption. Not for the projections (maximum, minimum, average, additive).
+    pub shading: Option<VolumeShading>,
+    /// The scalar between points.
+    pub interpolation: Interpolation,
+    /// What a ray makes of it.
+    pub blend: Blend,
+    /// Lights that take the place of the shading's own, and cast no highlight; none for that one, white.
+    pub lights: Vec<VolumeLight>,
+    /// With [`Blend::Composite`] only.
+    pub gradient_opacity: Option<GradientOpacity>,
+}
+
+impl VolumeOptions {
+    /// The first thing that is wrong.
+    pub(super) fn check(&self) -> Result<(), VolumeError> {
+        let fault = |field, value, rule| Err(VolumeError::Shading { field, value, rule });
+        const DIRECTION: &str = "a direction: finite and not zero";
+        if let Some(s) = &self.shading {
+            let fields = [("ambient", s.ambient), ("diffuse", s.diffuse)];
+            if let Some(&(field, value)) = fields.iter().find(|f| !(0.0..=1.0).contains(&f.1)) {
+                return fault(field, value, "0 to 1");
+            }
+            let fields =
+                [("half_gradient", s.half_gradient), ("specular", s.specular), ("shininess", s.shininess)];
+            if let Some(&(field, value)) = fields.iter().find(|f| !(f.1 >= 0.0 && f.1.is_finite())) {
+                return fault(field, value, "finite and not negative");
+            }
+            if let Some(l) = s.light.filter(|l| l.try_normalize().is_none()) {
+                return fault("light", l.length(), DIRECTION);
+            }
+        }
+        for light in &self.lights {
+            if let Some(l) = light.direction.filter(|l| l.try_normalize().is_none()) {
+                return fault("lights", l.length(), DIRECTION);
+            }
+            if let Some(&c) = light.color.iter().find(|c| !(**c >= 0.0 && c.is_finite())) {
+                return fault("lights' colour", c, "finite and not negative");
+            }
+        }
+        if let Some(g) = &self.gradient_opacity {
+            if !(g.steepest > 0.0 && g.steepest.is_finite()) || g.factors.is_empty() {
+                return fault(
+                    "gradient opacity's steepest",
+                    g.steepest,
+                    "finite and positive, with one factor or more",
+                );
+            }
+            if let Some(&f) = g.factors.iter().find(|f| !(0.0..=1.0).contains(*f)) {
+                return fault("a factor of the gradient opacity", f, "0 to 1");
+            }
+        }
+        if let Blend::Isosurfaces(values) = &self.blend
+            && let Some(&v) = values.iter().find(|v| !v.is_finite())
+        {
+            return fault("an isosurface's value", v, "finite");
+        }
+        Ok(())
+    }
+}

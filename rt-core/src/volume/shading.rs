@@ -1,0 +1,184 @@
+//! Gradients of a cell, and what lights make of them.
+
+use super::{GradientOpacity, Highlight, Volume, VolumeShading};
+use crate::grid::Grid;
+use crate::grid_walk::IndexRay;
+use glam::{DVec3, UVec3, Vec3};
+
+/// What light makes of a colour, and how steep the scalar is there.
+#[derive(Debug, Clone, Copy)]
+struct Lit {
+    factor: [f64; 3],
+    highlight: f64,
+    steepness: f64,
+}
+
+/// Light along a ray's way through a cell: the parabola through its values at both ends and in the middle. Gradients cost as much as everything else of
+/// a sample, and between grid points they bend no more than that.
+pub(super) struct LitStretch<'a> {
+    t0: f64,
+    per_t: f64,
+    ends: [Lit; 3],
+    opacity: Option<&'a GradientOpacity>,
+}
+
+impl LitStretch<'_> {
+    /// Extinction and colour at `t`, of those that the transfer function says.
+    #[inline]
+    pub(super) fn on(&self, t: f64, sigma: f64, color: [f64; 3]) -> (f64, [f64; 3]) {
+        let x = (t - self.t0) * self.per_t;
+        let [a, b, c] = &self.ends;
+        let w = [(1.0 - x) * (1.0 - 2.0 * x), 4.0 * x * (1.0 - x), x * (2.0 * x - 1.0)];
+        let mix = |a: f64, b: f64, c: f64| (a * w[0] + b * w[1] + c * w[2]).max(0.0);
+        let highlight = mix(a.highlight, b.highlight, c.highlight);
+        let lit = std::array::from_fn(|k| color[k] * mix(a.factor[k], b.factor[k], c.factor[k]) + highlight);
+        let sigma = self.opacity.map_or(sigma, |o| sigma * o.at(mix(a.steepness, b.steepness, c.steepness)));
+        (sigma, lit)
+    }
+}
+
+impl Volume {
+    /// Whether colours or extinctions depend on gradients.
+    pub(super) fn has_light(&self) -> bool {
+        self.options.shading.is_some() || self.options.gradient_opacity.is_some()
+    }
+
+    /// Light along the way of `ray` through a cell (of the grid that is stored here) from `t0` at the place `p` in it to `t1` at `q`; `None` without
+    /// shading and gradient opacity.
+    pub(super) fn light_along(
+        &self,
+        ray: &IndexRay,
+        stored: UVec3,
+        [t0, t1]: [f64; 2],
+        p: &[f64; 3],
+        q: &[f64; 3],
+    ) -> Option<LitStretch<'_>> {
+        if !self.has_light() {
+            return None;
+        }
+        let dir = DVec3::from_array(ray.d) * self.grid.spacing;
+        let ends = if self.is_nearest() {
+            // The gradient at the point around which the box lies.
+            [self.lit(corner_gradient(&self.grid, stored).as_dvec3(), dir); 3]
+        } else {
+            let corners = corner_gradients(&self.grid, stored);
+            let (p, q) = (Vec3::from_array(p.map(|x| x as f32)), Vec3::from_array(q.map(|x| x as f32)));
+            [p, 0.5 * (p + q), q].map(|at| self.lit(between(&corners, at).as_dvec3(), dir))
+        };
+        let opacity = self.options.gradient_opacity.as_ref();
+        Some(LitStretch { t0, per_t: 1.0 / (t1 - t0), ends, opacity })
+    }
+
+    /// A colour under the lights at one place of a stored cell.
+    pub(super) fn shaded_at(&self, ray: &IndexRay, stored: UVec3, at: [f64; 3], color: [f64; 3]) -> [f64; 3] {
+        match self.light_along(ray, stored, [0.0, 1.0], &at, &at) {
+            Some(light) => light.on(0.5, 0.0, color).1,
+            None => color,
+        }
+    }
+
+    /// What lights make of the gradient `g` for a ray along `dir`.
+    fn lit(&self, g: DVec3, dir: DVec3) -> Lit {
+        let steepness = g.length();
+        let flat = !(steepness > 0.0 && steepness.is_finite());
+        let Some(s) = &self.options.shading else {
+            return Lit { factor: [1.0; 3], highlight: 0.0, steepness: if flat { 0.0 } else { steepness } };
+        };
+        if flat {
+            let factor = if s.half_gradient > 0.0 { 1.0 } else { f64::from(s.ambient) };
+            return Lit { factor: [factor; 3], highlight: 0.0, steepness: 0.0 };
+        }
+        let normal = g / steepness;
+        let cos = |l: DVec3| (normal.dot(l) / l.length()).abs();
+        let weight = steepness / (steepness + f64::from(s.half_gradient));
+        let (ambient, diffuse) = (f64::from(s.ambient), f64::from(s.diffuse));
+        if self.options.lights.is_empty() {
+            let light = s.light.map_or(dir, |l| l.as_dvec3());
+            let factor = 1.0 + weight * (ambient + diffuse * cos(light) - 1.0);
+            let highlight = weight * highlight(s, normal, light, dir);
+            return Lit { factor: [factor; 3], highlight, steepness };
+        }
+        let mut sum = [0.0; 3];
+        for light in &self.options.lights {
+            let cos = cos(light.direction.map_or(dir, |l| l.as_dvec3()));
+            sum.iter_mut().zip(light.color).for_each(|(s, c)| *s += f64::from(c) * cos);
+        }
+        Lit { factor: sum.map(|s| 1.0 + weight * (ambient + diffuse * s - 1.0)), highlight: 0.0, steepness }
+    }
+}
+
+fn highlight(s: &VolumeShading, normal: DVec3, light: DVec3, dir: DVec3) -> f64 {
+    if s.specular <= 0.0 {
+        return 0.0;
+    }
+    // A light at the viewer comes as the ray's direction; the sides of the gradient are alike.
+    let viewer = if s.light.is_some() { -dir } else { dir }.normalize_or_zero();
+    let light = light.normalize_or_zero();
+    let base = match s.highlight {
+        Highlight::Halfway => (normal.dot(light + viewer) / (light + viewer).length()).abs(),
+        Highlight::Mirrored => (2.0 * normal.dot(light) * normal.dot(viewer) - light.dot(viewer)).max(0.0),
+    };
+    // Two opposite directions have no half vector.
+    if base.is_finite() { f64::from(s.specular) * base.powf(s.shininess.into()) } else { 0.0 }
+}
+
+/// Trilinear in the gradients at the corners of a cell.
+#[inline]
+fn between(g: &[Vec3; 8], f: Vec3) -> Vec3 {
+    let x = |i: usize| g[i] + (g[i + 1] - g[i]) * f.x;
+    let [a, b, c, d] = [x(0), x(2), x(4), x(6)];
+    let (low, high) = (a + (b - a) * f.y, c + (d - c) * f.y);
+    low + (high - low) * f.z
+}
+
+/// Central differences at a point, one-sided at the bounds: per world unit.
+fn corner_gradient(grid: &Grid, c: UVec3) -> Vec3 {
+    let mut g = [0f32; 3];
+    for a in 0..3 {
+        let (mut lo, mut hi) = (c.to_array(), c.to_array());
+        lo[a] = lo[a].saturating_sub(1);
+        hi[a] = (hi[a] + 1).min(grid.dims[a] - 1);
+        let width = (hi[a] - lo[a]) as f32 * grid.spacing[a] as f32;
+        if width > 0.0 {
+            g[a] = (grid.at(hi[0], hi[1], hi[2]) - grid.at(lo[0], lo[1], lo[2])) / width;
+        }
+    }
+    Vec3::from_array(g)
+}
+
+/// [`corner_gradient`] at the corners of a cell, x fastest.
+fn corner_gradients(grid: &Grid, cell: UVec3) -> [Vec3; 8] {
+    let corner = |i: usize| cell + UVec3::new(i as u32 & 1, i as u32 >> 1 & 1, i as u32 >> 2 & 1);
+    if cell.cmpeq(UVec3::ZERO).any() || (cell + 2).cmpge(grid.dims).any() {
+        return std::array::from_fn(|i| corner_gradient(grid, corner(i)));
+    }
+    // Inside nothing needs to be checked one by one.
+    let (row, slab) = (grid.dims.x as usize, grid.dims.x as usize * grid.dims.y as usize);
+    let first = grid.index(cell.x - 1, cell.y - 1, cell.z - 1);
+    let Some(v) = grid.values.get(first..first + 3 * slab + 3 * row + 4) else { return [Vec3::ZERO; 8] };
+    let width = 2.0 * grid.spacing.as_vec3();
+    std::array::from_fn(|i| {
+        let at = slab * (1 + (i >> 2 & 1)) + row * (1 + (i >> 1 & 1)) + 1 + (i & 1);
+        let difference = |step: usize| v[at + step] - v[at - step];
+        Vec3::new(difference(1), difference(row), difference(slab)) / width
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gradients_inside_and_at_the_bounds_are_one_function() {
+        let dims = UVec3::new(6, 5, 4);
+        let values = (0..120).map(|i| ((i * 7919) % 101) as f32).collect();
+        let grid = Grid::new(dims, DVec3::ZERO, DVec3::new(0.5, 1.0, 3.0), values).unwrap();
+        for cell in [UVec3::new(1, 1, 1), UVec3::new(2, 2, 1), UVec3::new(3, 1, 1), UVec3::ZERO] {
+            let fast = corner_gradients(&grid, cell);
+            for (i, g) in fast.iter().enumerate() {
+                let at = cell + UVec3::new(i as u32 & 1, i as u32 >> 1 & 1, i as u32 >> 2 & 1);
+                assert_eq!(*g, corner_gradient(&grid, at), "{cell} {i}");
+            }
+        }
+    }
+}
