@@ -32,6 +32,12 @@ const GRAZED: Bars = Bars { color_strays: 0.005, ..SHADED };
 /// Pictures that are held to other bars than the rest, or to none, and why.
 pub(crate) const EXCEPTIONS: &[Exception] = &[
     (
+        "edges",
+        "edges",
+        Some(Bars { depth_strays: 0.003, ..Bars::STRICT }),
+        "where moved triangles overlap inside a surface, OpenGL shows the one in front, we the one that the ray meets",
+    ),
+    (
         "odd_inputs",
         "not_a_number",
         None,
