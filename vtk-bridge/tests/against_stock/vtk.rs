@@ -141,6 +141,7 @@ scripts! {
     odd_inputs_are_survived: "odd_inputs",
     opacity_is_as_with_depth_peeling: "opacity",
     physically_based_surfaces_are_as_in_stock_vtk: "pbr",
+    textures_of_physically_based_surfaces_are_as_in_stock_vtk: "pbr_maps",
     projections_of_all_kinds_are_exact: "projections",
     edges_points_and_mixed_cells_are_as_in_stock_vtk: "representations",
     picks_and_selections_are_stock: "selection",
