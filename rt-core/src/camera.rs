@@ -47,8 +47,10 @@ pub enum CameraError {
         /// What is allowed.
         rule: &'static str,
     },
-    /// A lens on a parallel projection.
-    #[error("a thin lens needs a perspective camera; this one is a parallel projection: leave the lens out")]
+    /// A lens on a parallel projection or a panorama.
+    #[error(
+        "a thin lens needs a perspective camera; this one is a parallel projection or a panorama: leave the lens out"
+    )]
     LensOnParallel,
 }
 
@@ -64,6 +66,15 @@ pub(crate) enum Projection {
     Parallel {
         /// World direction.
         dir: DVec3,
+    },
+    /// All rays start at the eye and go all around: longitude over the width, latitude over the height.
+    Omnidirectional {
+        /// World position.
+        eye: DVec3,
+        /// Right, up and backward.
+        axes: DMat3,
+        /// NDC of the picture's lower left and upper right corner in the whole panorama.
+        region: [[f64; 2]; 2],
     },
 }
 
@@ -191,9 +202,31 @@ impl Camera {
         Camera::from_matrix(projection * view(eye, target, up)?)
     }
 
+    /// A camera that sees all around: an equirectangular panorama with `target` in its middle. `region` is the part of the panorama that fills the picture,
+    /// from the lower left (`[[0, 0], [1, 1]]` for all of it). Window depth is 1 - 1 / (1 + distance), nothing is cut by near and far planes, and
+    /// [`Camera::clip_from_world`] is that of a right angle ahead.
+    pub fn omnidirectional(
+        eye: DVec3,
+        target: DVec3,
+        up: DVec3,
+        region: [[f64; 2]; 2],
+    ) -> Result<Camera, CameraError> {
+        let ahead =
+            Camera::perspective(eye, target, up, std::f64::consts::FRAC_PI_2, 1.0, [1.0, f64::INFINITY])?;
+        for (field, low, high) in
+            [("region.x", region[0][0], region[1][0]), ("region.y", region[0][1], region[1][1])]
+        {
+            in_range(field, low, low.is_finite(), "finite")?;
+            in_range(field, high, high.is_finite() && high != low, "finite, and the two ends must differ")?;
+        }
+        let region = region.map(|corner| corner.map(|v| 2.0 * v - 1.0));
+        let projection = Projection::Omnidirectional { eye, axes: ahead.world_from_view(), region };
+        Ok(Camera { projection, near_far_clipping: false, ..ahead })
+    }
+
     /// The same camera with a lens. Refused for parallel projections and lenses without a positive focus distance.
     pub fn with_lens(self, lens: ThinLens) -> Result<Camera, CameraError> {
-        if matches!(self.projection, Projection::Parallel { .. }) {
+        if !matches!(self.projection, Projection::Perspective { .. }) {
             return Err(CameraError::LensOnParallel);
         }
         let (a, f) = (lens.aperture_radius, lens.focus_distance);
@@ -225,7 +258,7 @@ impl Camera {
     /// World position of the eye; `None` for parallel projections.
     pub fn eye(&self) -> Option<DVec3> {
         match self.projection {
-            Projection::Perspective { eye } => Some(eye),
+            Projection::Perspective { eye } | Projection::Omnidirectional { eye, .. } => Some(eye),
             Projection::Parallel { .. } => None,
         }
     }
@@ -233,7 +266,9 @@ impl Camera {
     /// Unit viewing direction: normal of the picture plane, away from the viewer.
     pub fn forward(&self) -> DVec3 {
         match self.projection {
-            Projection::Perspective { .. } => self.clip_from_world.row(3).truncate().normalize(),
+            Projection::Perspective { .. } | Projection::Omnidirectional { .. } => {
+                self.clip_from_world.row(3).truncate().normalize()
+            }
             Projection::Parallel { dir } => dir.normalize(),
         }
     }
@@ -256,6 +291,17 @@ impl Camera {
         near + (far - near) * (0.5 * ndc + 0.5)
     }
 
+    /// True for panoramas ([`Camera::omnidirectional`]).
+    pub fn is_omnidirectional(&self) -> bool {
+        matches!(self.projection, Projection::Omnidirectional { .. })
+    }
+
+    /// Window depth of a point at `distance` from the eye of a panorama.
+    pub(crate) fn panorama_depth(&self, distance: f64) -> f64 {
+        let [near, far] = self.depth_range;
+        near + (far - near) * (1.0 - 1.0 / (1.0 + distance))
+    }
+
     /// Window depth where there is nothing: that of the far plane.
     pub fn background_depth(&self) -> f64 {
         self.depth_range[1]
@@ -273,6 +319,13 @@ impl Camera {
     pub fn world_ray(&self, [x, y]: [f64; 2]) -> (DVec3, DVec3) {
         match self.projection {
             Projection::Perspective { eye } => (eye, self.inverse * DVec3::new(x, y, 1.0)),
+            Projection::Omnidirectional { eye, axes, region: [low, high] } => {
+                let at = |v: f64, i: usize| low[i] + (high[i] - low[i]) * (0.5 * v + 0.5);
+                let (longitude, latitude) =
+                    (at(x, 0) * std::f64::consts::PI, at(y, 1) * std::f64::consts::FRAC_PI_2);
+                let level = latitude.cos();
+                (eye, axes * DVec3::new(level * longitude.sin(), latitude.sin(), -level * longitude.cos()))
+            }
             Projection::Parallel { dir } => {
                 let m = &self.clip_from_world;
                 let w = m.row(3).w;

@@ -4,6 +4,7 @@
 pub mod accel;
 pub mod camera;
 pub mod colormap;
+pub mod detail;
 pub mod effects;
 pub mod environment;
 pub mod frame;

@@ -69,6 +69,30 @@ pub enum LightKind {
         /// Radius, world units.
         radius: f64,
     },
+    /// A flat ring or disk that shines to one side with the cosine to its normal, within a cone with a soft rim (ANARI's ring light).
+    Ring {
+        /// Centre.
+        position: DVec3,
+        /// Normal of the shining side.
+        direction: DVec3,
+        /// Radius of the hole, world units; 0 for a disk.
+        inner_radius: f64,
+        /// Radius, world units.
+        radius: f64,
+        /// Half angle of full light, radians.
+        inner_rad: f64,
+        /// Half angle of any light, radians; not less than the inner one, at most π/2.
+        outer_rad: f64,
+    },
+    /// A flat parallelogram that shines with the cosine to its normal.
+    Quad {
+        /// A corner.
+        corner: DVec3,
+        /// From there to the neighbouring corners, world units. It shines to the side of edge 1 × edge 2.
+        edges: [DVec3; 2],
+        /// It shines to the other side as well.
+        both_sides: bool,
+    },
 }
 
 /// A light.
@@ -132,13 +156,19 @@ impl Light {
         Light { frame: LightFrame::Camera, shadows: false, ..Light::new(kind) }
     }
 
+    /// White light from the parallelogram at `corner` with these edges, to the side of edge 1 × edge 2; colour as at distance 1 straight ahead.
+    pub fn quad(corner: DVec3, edges: [DVec3; 2]) -> Light {
+        let kind = LightKind::Quad { corner, edges, both_sides: false };
+        Light { attenuation: [0.0, 0.0, 1.0], ..Light::new(kind) }
+    }
+
     /// The same light in another colour.
     #[must_use]
     pub fn with_color(self, color: [f32; 3]) -> Light {
         Light { color, ..self }
     }
 
-    /// The same light with a size: radius in world units, or for directional light the angular radius in radians.
+    /// The same light with a size: radius in world units, or for directional light the angular radius in radians. Cones and quadrangles stay as they are.
     #[must_use]
     pub fn with_size(mut self, size: f64) -> Light {
         match &mut self.kind {
@@ -146,7 +176,11 @@ impl Light {
             | LightKind::Point { radius: r, .. }
             | LightKind::Spot { radius: r, .. }
             | LightKind::Disk { radius: r, .. } => *r = size,
-            LightKind::Ambient | LightKind::Cone { .. } => {}
+            LightKind::Ring { inner_radius, radius, .. } => {
+                *inner_radius *= if *radius > 0.0 { size / *radius } else { 0.0 };
+                *radius = size;
+            }
+            LightKind::Ambient | LightKind::Cone { .. } | LightKind::Quad { .. } => {}
         }
         self
     }
@@ -163,10 +197,12 @@ impl Light {
         Light { frame: LightFrame::Camera, ..self }
     }
 
-    /// Radius or angular radius; 0 for a light without size.
+    /// Radius or angular radius, half the longer edge of a quadrangle; 0 for a light without size.
     pub fn size(&self) -> f64 {
         match self.kind {
             LightKind::Ambient | LightKind::Cone { .. } => 0.0,
+            LightKind::Quad { edges: [a, b], .. } => 0.5 * a.length().max(b.length()),
+            LightKind::Ring { radius: r, .. } => r,
             LightKind::Directional { angular_radius_rad: r, .. }
             | LightKind::Point { radius: r, .. }
             | LightKind::Spot { radius: r, .. }
@@ -187,7 +223,9 @@ impl Light {
             LightKind::Point { position, .. }
             | LightKind::Spot { position, .. }
             | LightKind::Cone { position, .. }
+            | LightKind::Ring { position, .. }
             | LightKind::Disk { position, .. } => position == DVec3::ZERO,
+            LightKind::Quad { .. } => false,
         }
     }
 
@@ -225,11 +263,43 @@ pub(crate) struct PlacedLight {
 
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum PlacedKind {
-    Directional { to_light: Vec3 },
-    Point { position: Vec3 },
-    Spot { position: Vec3, direction: Vec3, cos_cutoff: f32, exponent: f32 },
-    Cone { position: Vec3, direction: Vec3, cos_inner: f32, cos_outer: f32 },
-    Disk { position: Vec3, direction: Vec3 },
+    Directional {
+        to_light: Vec3,
+    },
+    Point {
+        position: Vec3,
+    },
+    Spot {
+        position: Vec3,
+        direction: Vec3,
+        cos_cutoff: f32,
+        exponent: f32,
+    },
+    Cone {
+        position: Vec3,
+        direction: Vec3,
+        cos_inner: f32,
+        cos_outer: f32,
+    },
+    Disk {
+        position: Vec3,
+        direction: Vec3,
+    },
+    /// `hole`: inner radius over radius.
+    Ring {
+        position: Vec3,
+        direction: Vec3,
+        hole: f32,
+        cos_inner: f32,
+        cos_outer: f32,
+    },
+    /// The middle, half edges and the unit normal.
+    Quad {
+        position: Vec3,
+        edges: [Vec3; 2],
+        direction: Vec3,
+        both_sides: bool,
+    },
 }
 
 impl PlacedLight {
@@ -267,6 +337,26 @@ impl PlacedLight {
             },
             LightKind::Disk { position, direction, .. } => {
                 PlacedKind::Disk { position: point(position), direction: vector(direction) }
+            }
+            LightKind::Ring { position, direction, inner_radius, radius, inner_rad, outer_rad } => {
+                PlacedKind::Ring {
+                    position: point(position),
+                    direction: vector(direction),
+                    hole: if radius > 0.0 { (inner_radius / radius) as f32 } else { 0.0 },
+                    cos_inner: inner_rad.cos() as f32,
+                    cos_outer: outer_rad.cos() as f32,
+                }
+            }
+            LightKind::Quad { corner, edges: [a, b], both_sides } => {
+                let turned =
+                    |v: DVec3| if light.frame == LightFrame::Camera { world_from_view * v } else { v };
+                PlacedKind::Quad {
+                    position: point(corner + 0.5 * (a + b)),
+                    edges: [a, b].map(|e| (0.5 * turned(e)).as_vec3()),
+                    // Scaled first: the product of two short edges may vanish.
+                    direction: vector(a.normalize_or_zero().cross(b.normalize_or_zero())),
+                    both_sides,
+                }
             }
         };
         let directional = matches!(kind, PlacedKind::Directional { .. });

@@ -1,6 +1,7 @@
 //! How surfaces look.
 
 use crate::colormap::ColorMap;
+use crate::detail::Detail;
 use crate::texture::Texture;
 use std::sync::Arc;
 
@@ -106,7 +107,7 @@ pub enum Sides {
 }
 
 /// A material.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Material {
     /// Reaction to light.
     pub model: SurfaceModel,
@@ -122,6 +123,20 @@ pub struct Material {
     pub sides: Sides,
     /// Use the geometric normal even where shading normals exist (GL_FLAT).
     pub flat: bool,
+    /// What varies besides the colour; `None` for nothing.
+    pub detail: Option<Arc<dyn Detail>>,
+}
+
+/// Details are equal when they are the same one.
+impl PartialEq for Material {
+    fn eq(&self, o: &Material) -> bool {
+        let same = match (&self.detail, &o.detail) {
+            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+            (a, b) => a.is_none() && b.is_none(),
+        };
+        let key = |m: &Material| (m.model, m.color, m.opacity, m.emission, m.sides, m.flat);
+        same && key(self) == key(o) && self.color_source == o.color_source
+    }
 }
 
 impl Material {
@@ -134,6 +149,7 @@ impl Material {
             emission: [0.0; 3],
             sides: Sides::Both,
             flat: false,
+            detail: None,
         }
     }
 
@@ -203,6 +219,12 @@ impl Material {
     #[must_use]
     pub fn with_sides(self, sides: Sides) -> Material {
         Material { sides, ..self }
+    }
+
+    /// The same material with detail.
+    #[must_use]
+    pub fn with_detail(self, detail: impl Into<Arc<dyn Detail>>) -> Material {
+        Material { detail: Some(detail.into()), ..self }
     }
 
     /// Whether one side is culled.

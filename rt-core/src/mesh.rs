@@ -2,7 +2,7 @@
 
 use crate::math::Aabb;
 use crate::scene::attribute_part;
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 
 /// Whether an [`Attribute`] has one value per vertex or one per triangle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,6 +51,9 @@ pub struct TriMesh {
     pub scalars: Option<Attribute<f32>>,
     /// Texture coordinates, one per vertex.
     pub texcoords: Option<Vec<Vec2>>,
+    /// Tangents, one per vertex: the direction in which the first texture coordinate grows, and 1 or -1 for a second one that makes a right-handed or
+    /// left-handed frame with it and the normal. For normal maps; without them they come from the texture coordinates.
+    pub tangents: Option<Vec<Vec4>>,
 }
 
 /// Why a mesh cannot be used at all. Repairable faults are counted in [`MeshReport`] instead.
@@ -155,6 +158,7 @@ impl TriMesh {
             colors: self.colors.as_ref().map(|c| attribute_part(c, &vertices, kept)),
             scalars: self.scalars.as_ref().map(|s| attribute_part(s, &vertices, kept)),
             texcoords: self.texcoords.as_ref().map(|t| vertices.iter().map(|i| t[of_vertices(i)]).collect()),
+            tangents: self.tangents.as_ref().map(|t| vertices.iter().map(|i| t[of_vertices(i)]).collect()),
         };
         (part, vertices)
     }
@@ -189,15 +193,14 @@ impl TriMesh {
         len("normals", &self.normals, v, f)?;
         len("colors", &self.colors, v, f)?;
         len("scalars", &self.scalars, v, f)?;
-        if let Some(t) = &self.texcoords
-            && t.len() != v
-        {
-            return Err(MeshError::AttributeLength {
-                field: "texcoords",
-                per: "vertex",
-                expected: v,
-                found: t.len(),
-            });
+        let vectors = [
+            ("texcoords", self.texcoords.as_ref().map(Vec::len)),
+            ("tangents", self.tangents.as_ref().map(Vec::len)),
+        ];
+        for (field, found) in vectors {
+            if let Some(found) = found.filter(|n| *n != v) {
+                return Err(MeshError::AttributeLength { field, per: "vertex", expected: v, found });
+            }
         }
         Ok(())
     }

@@ -272,7 +272,7 @@ impl Scene {
         if self.ambient_occlusion.is_some() && !self.has_ambient() {
             out.push("ambient occlusion changes no pixel: the scene has no ambient light and no environment to dim".into());
         }
-        let mut reported = vec![[false; 2]; self.materials.len()];
+        let mut reported = vec![[false; 3]; self.materials.len()];
         let mut first =
             |material: usize, kind: usize| !std::mem::replace(&mut reported[material][kind], true);
         for (i, a) in self.appearances.iter().enumerate() {
@@ -280,6 +280,11 @@ impl Scene {
             let Geometry::Mesh(mesh) = &self.world.geometries()[self.world.instances()[i].geometry] else {
                 continue;
             };
+            if let Some(what) = material.detail.as_ref().and_then(|d| d.lacks(mesh))
+                && first(a.material, 2)
+            {
+                out.push(format!("material {} has maps, but instance {i} lacks {what}", a.material));
+            }
             match &material.color_source {
                 ColorSource::Scalars(_)
                     if mesh.scalars.is_none() && a.scalars.is_none() && first(a.material, 0) =>
@@ -350,9 +355,14 @@ pub(crate) fn requirements(scene: &Scene) -> Effects {
         .with_if(lights().next().is_some(), Effects::SHADOWS)
         .with_if(lights().any(|l| l.size() > 0.0), Effects::SOFT_SHADOWS)
         .with_if(lit && scene.ambient_occlusion.is_some() && scene.has_ambient(), Effects::AMBIENT_OCCLUSION)
-        .with_if(dielectric || used().any(|m| m.reflection_roughness() == Some(0.0)), Effects::REFLECTION)
         .with_if(
-            used().any(|m| m.reflection_roughness().is_some_and(|r| r > 0.0)),
+            // Where roughness varies, it may be 0 somewhere.
+            dielectric
+                || used().any(|m| m.reflection_roughness().is_some_and(|r| r == 0.0 || m.detail.is_some())),
+            Effects::REFLECTION,
+        )
+        .with_if(
+            used().any(|m| m.reflection_roughness().is_some_and(|r| r > 0.0 || m.detail.is_some())),
             Effects::GLOSSY_REFLECTION,
         )
         .with_if(dielectric, Effects::REFRACTION)
@@ -408,6 +418,27 @@ fn check_light(l: &Light) -> Result<(), (&'static str, String, &'static str)> {
             }
             let ok = (0.0..=outer_rad).contains(&inner_rad);
             if ok { Ok(()) } else { Err(("inner_rad", inner_rad.to_string(), "0 to outer_rad")) }
+        }
+        K::Ring { position, direction, inner_radius, radius, inner_rad, outer_rad } => {
+            point(position)?;
+            vector("direction", direction)?;
+            if radius <= 0.0 {
+                return Err(("radius", radius.to_string(), "positive: a ring needs an area"));
+            }
+            if !(0.0..radius).contains(&inner_radius) {
+                return Err(("inner_radius", inner_radius.to_string(), "0 or positive, below the radius"));
+            }
+            if !(outer_rad > 0.0 && outer_rad <= std::f64::consts::FRAC_PI_2) {
+                return Err(("outer_rad", outer_rad.to_string(), "above 0 and at most pi/2"));
+            }
+            let ok = (0.0..=outer_rad).contains(&inner_rad);
+            if ok { Ok(()) } else { Err(("inner_rad", inner_rad.to_string(), "0 to outer_rad")) }
+        }
+        K::Quad { corner, edges: [a, b], .. } => {
+            point(corner)?;
+            vector("edge 1", a)?;
+            vector("edge 2", b)?;
+            vector("edge 1 x edge 2", a.normalize().cross(b.normalize()))
         }
         K::Disk { position, direction, radius } => {
             point(position)?;

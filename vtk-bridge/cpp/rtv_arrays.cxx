@@ -9,6 +9,7 @@
 #include <vtkMapper.h>
 #include <vtkPointData.h>
 #include <vtkPolyData.h>
+#include <vtkProperty.h>
 #include <vtkScalarsToColors.h>
 #include <vtkTexture.h>
 #include <vtkUnsignedCharArray.h>
@@ -147,7 +148,10 @@ void rtvAddShape(RtvSurface& s, vtkPolyData* data, bool points, RtvKeep& keep)
   s.cell_normals = FloatArray(ofCells, 3, keep);
   vtkDataArray* texcoords = data->GetPointData()->GetTCoords();
   s.texcoords = FloatArray(texcoords, 2, keep);
-  key = Mixed(Mixed(Mixed(key, s.property.flat ? nullptr : ofPoints), ofCells), texcoords);
+  // The shader has a frame for normal maps only where it has normals of points.
+  vtkDataArray* tangents = s.point_normals.kind == RTV_NONE ? nullptr : data->GetPointData()->GetTangents();
+  s.tangents = FloatArray(tangents, 3, keep);
+  key = Mixed(Mixed(Mixed(Mixed(key, s.property.flat ? nullptr : ofPoints), ofCells), texcoords), tangents);
   key = rtvMix(rtvMix(rtvMix(rtvMix(key, s.point_radius), s.line_radius), s.edges_only), s.has_back);
   s.shape_key = key;
 }
@@ -259,8 +263,11 @@ const char* rtvTextureReason(vtkTexture* texture)
   return nullptr;
 }
 
-void rtvAddTexture(RtvSurface& s, vtkTexture* texture, RtvKeep& keep)
+namespace
 {
+RtvImage ImageOf(const RtvSurface& s, vtkTexture* texture, RtvKeep& keep)
+{
+  RtvImage r = RtvImage{};
   if (texture->GetInputAlgorithm())
   {
     texture->GetInputAlgorithm()->Update();
@@ -269,7 +276,7 @@ void rtvAddTexture(RtvSurface& s, vtkTexture* texture, RtvKeep& keep)
   vtkDataArray* scalars = image ? image->GetPointData()->GetScalars() : nullptr;
   if (!scalars || s.texcoords.kind == RTV_NONE)
   {
-    return;
+    return r;
   }
   int size[3];
   image->GetDimensions(size);
@@ -280,9 +287,9 @@ void rtvAddTexture(RtvSurface& s, vtkTexture* texture, RtvKeep& keep)
   const vtkIdType count = scalars->GetNumberOfTuples();
   if (!in || count < static_cast<vtkIdType>(size[0]) * size[1])
   {
-    return;
+    return r;
   }
-  s.texture_key = Mixed(Mixed(Mixed(1469598103934665603ull, image), scalars), texture);
+  r.key = Mixed(Mixed(Mixed(1469598103934665603ull, image), scalars), texture);
   unsigned char* out = keep.Bytes(4 * count);
   for (vtkIdType i = 0; i < count; ++i)
   {
@@ -292,9 +299,47 @@ void rtvAddTexture(RtvSurface& s, vtkTexture* texture, RtvKeep& keep)
     }
     out[4 * i + 3] = n == 4 ? in[4 * i + 3] : n == 2 ? in[2 * i + 1] : 255;
   }
-  s.texture = RtvArray{ out, static_cast<uint64_t>(size[0]) * size[1], 4, RTV_U8 };
-  s.texture_width = static_cast<uint32_t>(size[0]);
-  s.texture_srgb = texture->GetUseSRGBColorSpace() ? 1 : 0;
-  s.texture_interpolate = texture->GetInterpolate() ? 1 : 0;
-  s.texture_repeat = texture->GetRepeat() ? 1 : 0;
+  r.texels = RtvArray{ out, static_cast<uint64_t>(size[0]) * size[1], 4, RTV_U8 };
+  r.width = static_cast<uint32_t>(size[0]);
+  r.srgb = texture->GetUseSRGBColorSpace() ? 1 : 0;
+  r.interpolate = texture->GetInterpolate() ? 1 : 0;
+  r.repeat = texture->GetRepeat() ? 1 : 0;
+  return r;
+}
+}
+
+void rtvAddTexture(RtvSurface& s, vtkTexture* texture, RtvKeep& keep)
+{
+  const RtvImage image = ImageOf(s, texture, keep);
+  s.texture = image.texels;
+  s.texture_key = image.key;
+  s.texture_width = image.width;
+  s.texture_srgb = image.srgb;
+  s.texture_interpolate = image.interpolate;
+  s.texture_repeat = image.repeat;
+}
+
+const RtvMaps* rtvMapsOf(const RtvSurface& s, vtkProperty* property, RtvMaps& maps, RtvKeep& keep)
+{
+  maps = RtvMaps{};
+  bool any = false;
+  for (const auto& texture : property->GetAllTextures())
+  {
+    RtvImage* to = texture.first == "materialTex" ? &maps.material
+      : texture.first == "normalTex"              ? &maps.normal
+      : texture.first == "emissiveTex"            ? &maps.emissive
+                                                  : nullptr;
+    if (to)
+    {
+      *to = ImageOf(s, texture.second, keep);
+      any = true;
+    }
+  }
+  maps.normal_scale = static_cast<float>(property->GetNormalScale());
+  maps.occlusion_strength = static_cast<float>(property->GetOcclusionStrength());
+  for (int c = 0; c < 3; ++c)
+  {
+    maps.emissive_factor[c] = static_cast<float>(property->GetEmissiveFactor()[c]);
+  }
+  return any ? &maps : nullptr;
 }

@@ -13,6 +13,7 @@ class vtkDataArray;
 class vtkDataObject;
 class vtkGlyph3DMapper;
 class vtkPolyData;
+class vtkProperty;
 class vtkTexture;
 class vtkVolume;
 
@@ -51,6 +52,8 @@ void rtvAddShape(RtvSurface& s, vtkPolyData* data, bool points, RtvKeep& keep);
 // Colours of points, cells or a map, as the mapper makes them; only when the bridge does not have them.
 void rtvAddColors(RtvBridge* bridge, RtvSurface& s, vtkMapper* mapper, vtkPolyData* data, RtvKeep& keep);
 void rtvAddTexture(RtvSurface& s, vtkTexture* texture, RtvKeep& keep);
+// The textures of a physically based property besides that of its colour; `maps` must live until the bridge has read it. Null without any.
+const RtvMaps* rtvMapsOf(const RtvSurface& s, vtkProperty* property, RtvMaps& maps, RtvKeep& keep);
 // Why a texture cannot be traced, or null.
 const char* rtvTextureReason(vtkTexture* texture);
 // A volume. Returns why not, or null; `answer` keeps the text.

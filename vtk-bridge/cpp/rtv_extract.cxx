@@ -174,9 +174,9 @@ const char* AddPolyData(Actor& a, vtkPolyData* data, const BlockState& block, co
     s.has_back = 0;
   }
   vtkTexture* texture = a.Prop->GetTexture();
-  for (const auto& own : a.Prop->GetProperty()->GetAllTextures())
+  if (vtkTexture* own = a.Prop->GetProperty()->GetTexture("albedoTex"))
   {
-    texture = own.second;
+    texture = own;
     // Its alpha takes the place of the opacity.
     s.property.opacity = 1.0f;
   }
@@ -191,6 +191,12 @@ const char* AddPolyData(Actor& a, vtkPolyData* data, const BlockState& block, co
       return "it has a texture and colours";
     }
     rtvAddTexture(s, texture, a.Keep);
+  }
+  RtvMaps maps;
+  s.maps = rtvMapsOf(s, a.Prop->GetProperty(), maps, a.Keep);
+  if (s.maps && s.has_back)
+  {
+    return "textures of the property on a surface whose backs have a property of their own";
   }
   a.Traced += rtvApi->surface(a.Bridge, &s) > 0 ? 1 : 0;
   a.Keep.Clear();
@@ -312,11 +318,29 @@ const char* WhyNot(vtkActor* actor, vtkMapper* mapper, double pointRadius, doubl
       return "glyphs whose backs have a property of their own";
     }
   }
+  if (property->GetInterpolation() == VTK_PBR)
+  {
+    const double* tint = property->GetEdgeTint();
+    if (property->GetCoatStrength() > 0.0 || property->GetAnisotropy() != 0.0)
+    {
+      return "a clear coat or anisotropy";
+    }
+    if (property->GetMetallic() > 0.0 && (tint[0] != 1.0 || tint[1] != 1.0 || tint[2] != 1.0))
+    {
+      return "a metal with an edge tint";
+    }
+  }
   for (const auto& texture : property->GetAllTextures())
   {
-    if (texture.first != "albedoTex")
+    static const char* const known[] = { "albedoTex", "materialTex", "normalTex", "emissiveTex" };
+    const auto same = [&](const char* name) { return texture.first == name; };
+    if (std::none_of(std::begin(known), std::end(known), same))
     {
-      return "textures of the property other than its base colour (normal, material, emissive, coat, anisotropy)";
+      return "textures of the property for coats or anisotropy, or of a program's own shader";
+    }
+    if (mapper->IsA("vtkGlyph3DMapper") && texture.first != known[0])
+    {
+      return "glyphs with textures of the property other than its base colour";
     }
     if (actor->GetTexture())
     {

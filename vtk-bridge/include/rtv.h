@@ -104,6 +104,40 @@ typedef struct RtvProperty {
   /* Their width in pixels; 0 for none. */
   float edge_width;
 } RtvProperty;
+/* A picture, and how it is read. */
+typedef struct RtvImage {
+  /* Four RTV_U8 per texel, or none. */
+  RtvArray texels;
+  /* Changes whenever the texels do. */
+  uint64_t key;
+  /* Texels per row. */
+  uint32_t width;
+  /* 1: linear between texels. */
+  uint8_t interpolate;
+  /* 1: repeated. */
+  uint8_t repeat;
+  /* 1: encoded as sRGB. */
+  uint8_t srgb;
+  /* Not used. */
+  uint8_t reserved;
+} RtvImage;
+/* Textures of a physically based property besides that of its colour. */
+typedef struct RtvMaps {
+  /* Occlusion, roughness and metalness in red, green and blue. */
+  RtvImage material;
+  /* Normals; they need tangents. */
+  RtvImage normal;
+  /* Radiance given off. */
+  RtvImage emissive;
+  /* Factor on the first two components of the normals. */
+  float normal_scale;
+  /* 0 for no occlusion, 1 for all of it. */
+  float occlusion_strength;
+  /* Factor on the radiance. */
+  float emissive_factor[3];
+  /* Not used. */
+  uint32_t reserved;
+} RtvMaps;
 /* Something to draw. Arrays are read before rtv_surface returns and not kept. */
 typedef struct RtvSurface {
   /* Name for messages, UTF-8. */
@@ -170,6 +204,10 @@ typedef struct RtvSurface {
   double point_radius;
   /* Radius of tubes for lines and edges; 0 for none. */
   double line_radius;
+  /* Three RTV_F32 per point, or none; they belong to the shape. */
+  RtvArray tangents;
+  /* Further textures, or null. */
+  RtvMaps const* maps;
 } RtvSurface;
 /* A uniform grid of scalars as a medium. Arrays are read before rtv_volume returns and not kept. */
 typedef struct RtvVolume {
@@ -274,7 +312,7 @@ typedef struct RtvPicture {
   float const* first_depth;
 } RtvPicture;
 /* Number of this interface, made from its structures and calls (a test says which). A shim built for another one must not go on. */
-#define RTV_ABI 3226431084u
+#define RTV_ABI 3622962323u
 /* All calls in one table, so that a shim needs only one symbol. */
 typedef struct RtvApi {
   /* rtv_abi. */

@@ -83,6 +83,10 @@ impl Assembled {
     fn add(&mut self, d: &Drawn, property: &Property, geometry: usize, is_mesh: bool, setting: &Setting<'_>) {
         let colors = d.color.as_ref().filter(|_| is_mesh);
         let (base, encoding) = material(property, colors.is_some(), setting);
+        let base = match &d.maps {
+            Some(maps) if is_mesh && encoding == Encoding::Pbr => maps.put_on(base),
+            _ => base,
+        };
         match &d.glyphs {
             None => {
                 let m = self.dressed(base, colors, d);

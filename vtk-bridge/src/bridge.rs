@@ -35,6 +35,7 @@ pub(crate) struct Drawn {
     pub(crate) built: Arc<Built>,
     pub(crate) color: Option<Resolved>,
     pub(crate) texture: Option<Arc<Texture>>,
+    pub(crate) maps: Option<crate::materials::Finishes>,
     pub(crate) property: crate::input::Property,
     pub(crate) back: Option<crate::input::Property>,
     pub(crate) world_from_data: DAffine3,
@@ -157,14 +158,9 @@ impl Bridge {
             return Added::Nothing("no polygons");
         }
         let color = self.color(surface, &built);
-        let texture = surface.texture.as_ref().and_then(|image| {
-            let kept = self
-                .textures
-                .entry(image.key)
-                .or_insert_with(|| Kept { value: colors::texture(image).map(Arc::new), frame });
-            kept.frame = frame;
-            kept.value.clone()
-        });
+        let texture = self.texture(surface.texture.as_ref());
+        let maps =
+            surface.maps.as_ref().map(|maps| crate::materials::finishes(maps, |image| self.texture(image)));
         let glyphs = surface.glyphs.as_ref().map(|g| {
             let places = g.matrices.iter().enumerate().filter_map(|(i, m)| {
                 let local = affine(DMat4::from_cols_array(m).transpose())?;
@@ -184,6 +180,7 @@ impl Bridge {
             built,
             color,
             texture,
+            maps,
             property: surface.property,
             back: surface.back,
             world_from_data: place,
@@ -226,6 +223,16 @@ impl Bridge {
         shape_key != 0 && color_key != 0 && self.colors.contains_key(&(shape_key, color_key))
     }
 
+    fn texture(&mut self, image: Option<&crate::input::Image<'_>>) -> Option<Arc<Texture>> {
+        let (image, frame) = (image?, self.frame);
+        let kept = self
+            .textures
+            .entry(image.key)
+            .or_insert_with(|| Kept { value: colors::texture(image).map(Arc::new), frame });
+        kept.frame = frame;
+        kept.value.clone()
+    }
+
     fn color(&mut self, surface: &Surface<'_>, built: &Built) -> Option<Resolved> {
         let mesh = built.mesh.as_ref()?;
         let key = match surface.color {
@@ -260,6 +267,10 @@ impl Bridge {
         (s.shape.key, color_key, s.texture.map(|t| t.key)).hash(h);
         // The numbers' text is as unique as the numbers.
         format!("{:?}{:?}{:?}", s.property, s.back, s.world_from_data).hash(h);
+        if let Some(m) = &s.maps {
+            [m.material, m.normal, m.emissive].map(|i| i.map(|i| i.key)).hash(h);
+            format!("{:?}{:?}{:?}", m.normal_scale, m.occlusion_strength, m.emissive_factor).hash(h);
+        }
         if let Some(g) = &s.glyphs {
             g.rgba.hash(h);
             g.matrices.iter().flatten().for_each(|v| v.to_bits().hash(h));

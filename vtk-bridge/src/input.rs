@@ -138,6 +138,8 @@ pub struct Shape<'a> {
     pub normals: Option<PerItem<'a, [f32; 3]>>,
     /// Texture coordinates, one per point.
     pub texcoords: Option<&'a [[f32; 2]]>,
+    /// Directions in which the first texture coordinate grows, one per point, for normal maps.
+    pub tangents: Option<&'a [[f32; 3]]>,
     /// Half-spaces `a x + b y + c z + d >= 0` (data coordinates) outside of which nothing is drawn.
     pub clip_planes: &'a [[f64; 4]],
     /// Radius of spheres for `verts`, data units; 0 for none.
@@ -162,6 +164,7 @@ impl<'a> Shape<'a> {
             strips: Cells::NONE,
             normals: None,
             texcoords: None,
+            tangents: None,
             clip_planes: &[],
             point_radius: 0.0,
             line_radius: 0.0,
@@ -172,7 +175,7 @@ impl<'a> Shape<'a> {
 }
 
 /// An RGBA picture.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Image<'a> {
     /// Changes whenever the pixels do; 0 is never kept.
     pub key: u64,
@@ -188,6 +191,23 @@ pub struct Image<'a> {
     pub repeat: bool,
     /// Encoded as sRGB: decoded before it is interpolated.
     pub srgb: bool,
+}
+
+/// Textures of a physically based property besides that of its colour, as VTK's shader reads them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Maps<'a> {
+    /// Occlusion, roughness (times the property's) and metalness (times the property's) in red, green and blue.
+    pub material: Option<Image<'a>>,
+    /// Normals, 2 rgb - 1; nothing without [`Shape::tangents`].
+    pub normal: Option<Image<'a>>,
+    /// Radiance given off.
+    pub emissive: Option<Image<'a>>,
+    /// Factor on the first two components of the normals.
+    pub normal_scale: f32,
+    /// 0 for no occlusion, 1 for all of it.
+    pub occlusion_strength: f32,
+    /// Factor on the radiance.
+    pub emissive_factor: [f32; 3],
 }
 
 /// Where the colour of a surface comes from.
@@ -295,6 +315,8 @@ pub struct Surface<'a> {
     pub color: Color<'a>,
     /// Its texture.
     pub texture: Option<Image<'a>>,
+    /// Further textures of its property.
+    pub maps: Option<Maps<'a>>,
     /// Its answer to light.
     pub property: Property,
     /// Another answer on the backs of its polygons, opaque and of one colour (needs [`Shape::has_backs`]).

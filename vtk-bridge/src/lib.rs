@@ -18,6 +18,7 @@
 //!     world_from_data: DMat4::IDENTITY,
 //!     color: Color::Material,
 //!     texture: None,
+//!     maps: None,
 //!     property: Property { lighting: false, ..Property::default() },
 //!     back: None,
 //!     glyphs: None,

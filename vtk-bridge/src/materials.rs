@@ -4,9 +4,13 @@
 //! times cosine; highlight (R·V)^p, and (N·L)^p where one headlight is the only light. Numbers are neither decoded nor encoded, except by the
 //! physically based shader, which ends with `pow(c, 1/2.2)` and divides diffuse light by π: [`Encoding::Pbr`] says so for the picture.
 
-use crate::input::Property;
+use crate::input::{Image, Maps, Property};
 use crate::options::{MaterialChoice, Options};
+use rt_core::detail::{Detail, MapConvention, SurfaceMaps};
 use rt_core::material::{ColorSource, Highlight, Material, PbrForm, Sides, SurfaceModel};
+use rt_core::texture::Texture;
+use std::f32::consts::PI;
+use std::sync::Arc;
 
 /// How radiance becomes numbers in the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,6 +54,7 @@ pub fn material(p: &Property, from_values: bool, setting: &Setting<'_>) -> (Mate
         emission: [0.0; 3],
         sides,
         flat: p.flat,
+        detail: None,
     };
     match options.material {
         MaterialChoice::Matte => {
@@ -120,6 +125,42 @@ fn pbr(p: &Property, base: Material) -> (Material, Encoding) {
     };
     // VTK 9 takes the colour as linear here, although the result is encoded.
     (Material { model, ..base }, Encoding::Pbr)
+}
+
+/// Further textures of a physically based property.
+#[derive(Debug, Clone)]
+pub(crate) struct Finishes {
+    detail: Arc<dyn Detail>,
+    emission: [f32; 3],
+}
+
+/// Those of `maps`, with what `texture` makes of pictures.
+pub(crate) fn finishes(
+    maps: &Maps<'_>,
+    mut texture: impl FnMut(Option<&Image<'_>>) -> Option<Arc<Texture>>,
+) -> Finishes {
+    let packed = texture(maps.material.as_ref());
+    let detail = SurfaceMaps {
+        normal: texture(maps.normal.as_ref()),
+        normal_scale: if maps.normal_scale.is_finite() { maps.normal_scale } else { 1.0 },
+        metallic_roughness: packed.clone(),
+        occlusion: packed,
+        occlusion_strength: sane(maps.occlusion_strength).min(1.0),
+        emission: texture(maps.emissive.as_ref()),
+        ..SurfaceMaps::new(MapConvention::Vtk)
+    };
+    // The shader adds emission where the picture is encoded, and there light is over π.
+    let factor = if detail.emission.is_some() { PI } else { 0.0 };
+    let emission = maps.emissive_factor.map(|f| sane(f) * factor);
+    Finishes { detail: Arc::new(detail), emission }
+}
+
+impl Finishes {
+    /// The material with them.
+    pub(crate) fn put_on(&self, base: Material) -> Material {
+        let emission = std::array::from_fn(|c| base.emission[c] + self.emission[c]);
+        Material { emission, ..base.with_detail(self.detail.clone()) }
+    }
 }
 
 /// The ambient part of a surface of one colour as light that it gives off. An ambient light in the scene would show on every surface, also

@@ -48,8 +48,78 @@ fn objects_parameters_and_frames_are_what_the_specification_says() {
 }
 
 #[test]
+fn samplers_area_lights_and_panoramas_match_closed_forms() {
+    assert_passes("surfaces.py");
+}
+
+#[test]
 fn misuse_is_named_and_harms_nothing() {
     assert_passes("robust.py");
+}
+
+#[test]
+fn a_program_of_pynari_s_users_draws_with_us() {
+    assert_passes("through_pynari.py");
+}
+
+#[test]
+fn numbers_at_their_limits_and_random_values_harm_nothing() {
+    assert_passes("limits.py");
+}
+
+/// `c_abi/anari.c`, which ends with "done", with a program before it.
+fn c_program(before: &[&str]) -> Option<Output> {
+    let python = python()?;
+    let place =
+        "import importlib.util, os; print(os.path.dirname(importlib.util.find_spec('pynari').origin))";
+    let found = Command::new(&python).args(["-c", place]).output().expect("python runs");
+    let loader = Path::new(String::from_utf8_lossy(&found.stdout).trim()).join("libanari.so.0");
+    let out = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("anari-c-{}", before.len()));
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/c_abi/anari.c");
+    let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".to_owned());
+    let mut compile = Command::new(&compiler);
+    compile
+        .args(["-std=c11", "-g", "-O1", "-Wall", "-Wextra", "-Werror", "-o"])
+        .arg(&out)
+        .arg(source)
+        .arg("-ldl");
+    let made = compile.output().unwrap_or_else(|e| panic!("{compiler}: {e}"));
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    let mut words = before.iter().map(|w| (*w).to_owned()).chain([out.display().to_string()]);
+    let mut command = Command::new(words.next().expect("a program"));
+    command.args(words).arg(loader).env("LD_LIBRARY_PATH", device_folder()).env("RAYON_NUM_THREADS", "2");
+    Some(command.output().expect("it starts"))
+}
+
+fn assert_done(output: &Output) {
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && output.stdout == b"done\n", "{:?}\n{text}", output.status);
+}
+
+#[test]
+fn a_c_program_draws_every_kind_of_object_through_the_loader() {
+    if let Some(output) = c_program(&[]) {
+        assert_done(&output);
+    }
+}
+
+#[test]
+fn valgrind_finds_no_fault_in_the_device() {
+    let valgrind = std::env::var("RTSV_VALGRIND").unwrap_or_else(|_| "/usr/bin/valgrind".to_owned());
+    if !Path::new(&valgrind).exists() {
+        // Not a peer that must be there: the program itself runs without it.
+        writeln!(std::io::stderr(), "SKIPPED: {valgrind} was not found (apt-get install valgrind)")
+            .expect("stderr");
+        return;
+    }
+    // The loader up to 0.14 deletes the library as an object of a type that it does not know: with C++'s delete and without the destructor. It is memory
+    // of malloc's, which is what that gives it back to.
+    let command = [valgrind.as_str(), "--error-exitcode=9", "--quiet", "--show-mismatched-frees=no"];
+    let leaks = ["--leak-check=full", "--show-leak-kinds=definite", "--errors-for-leak-kinds=definite"];
+    let command = [&command[..], &leaks].concat();
+    if let Some(output) = c_program(&command) {
+        assert_done(&output);
+    }
 }
 
 /// PSNR that counts as the same picture: edges differ by how pixels are sampled, and barney's noise remains.

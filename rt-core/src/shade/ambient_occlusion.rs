@@ -5,7 +5,9 @@ use super::shadow::{Coherence, trace_light_rays};
 use super::stage::Stage;
 use super::wave::{LightRays, RayState};
 use super::{Dimension, Point, TileArea};
+use crate::detail::Varied;
 use crate::effects::Effects;
+use crate::environment::MeanRadiance;
 use crate::math::orthonormal_basis;
 use crate::ray::{LANES, Ray};
 use crate::ray_stats::RayStats;
@@ -23,6 +25,7 @@ pub(crate) fn add_ambient_light(
     stage: &Stage<'_>,
     area: &TileArea,
     points: &mut [Point],
+    varied: &[Varied],
     states: &[RayState],
     rays: &mut LightRays,
     OcclusionBuffers { open, domes }: &mut OcclusionBuffers,
@@ -30,10 +33,8 @@ pub(crate) fn add_ambient_light(
     mut cost: Option<&mut [f32]>,
 ) {
     let Some(mean) = &stage.mean_radiance else { return };
-    let ambient = |p: &Point| {
-        let material = stage.instances[p.instance as usize].material;
-        ambient_albedo(material, p.surface.color, stage.effects) * mean.for_normal(p.surface.normal)
-    };
+    let ambient = if varied.is_empty() { ambient_at::<false> } else { ambient_at::<true> };
+    let ambient = |p: &Point| ambient(stage, mean, varied, p);
     let occlusion =
         stage.scene.ambient_occlusion.filter(|_| stage.effects.contains(Effects::AMBIENT_OCCLUSION));
     let Some(occlusion) = occlusion else {
@@ -92,6 +93,18 @@ pub(crate) fn add_ambient_light(
         stats.ambient_occlusion_blocked += counts.blocked;
         start = end;
     }
+}
+
+/// Ambient light that a point sends to the eye. `DETAIL`: some point has a finish of its own.
+fn ambient_at<const DETAIL: bool>(
+    stage: &Stage<'_>,
+    mean: &MeanRadiance,
+    varied: &[Varied],
+    p: &Point,
+) -> Vec3 {
+    let albedo = ambient_albedo(p.model::<DETAIL>(stage, varied), p.surface.color, stage.effects);
+    let light = albedo * mean.for_normal(p.surface.normal);
+    p.varied::<DETAIL>(varied).map_or(light, |v| light * v.ambient)
 }
 
 /// Where the rays of a point go.

@@ -33,7 +33,7 @@ pub(crate) struct CameraRays {
 enum Limits {
     /// At the same parameter everywhere: every usual matrix.
     Same([f64; 2]),
-    /// Somewhere else for each ray (oblique near planes).
+    /// Somewhere else for each ray (oblique near planes); panoramas, whose rays have nothing in common.
     PerRay(Box<(Camera, DVec3)>),
 }
 
@@ -60,8 +60,10 @@ impl CameraRays {
         let nearest = corners.iter().copied().fold(f64::INFINITY, f64::min);
         let farthest = corners.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let margin = 0.01 * (farthest - nearest);
-        let far_away = (o - world_origin - bounds.center().as_dvec3()).length()
-            > EYE_WITHIN_RADII * 0.5 * (bounds.max.as_dvec3() - bounds.min.as_dvec3()).length();
+        let panorama = camera.is_omnidirectional();
+        let far_away = !panorama
+            && (o - world_origin - bounds.center().as_dvec3()).length()
+                > EYE_WITHIN_RADII * 0.5 * (bounds.max.as_dvec3() - bounds.min.as_dvec3()).length();
         let move_start =
             !bounds.is_empty() && nearest.is_finite() && (parallel || (far_away && nearest - margin > 0.0));
         let start = if move_start { nearest - margin } else { 0.0 };
@@ -72,7 +74,7 @@ impl CameraRays {
                 camera.near_far(o, d)
             });
             let close = |p: f64, q: f64| p == q || (p - q).abs() <= 1e-7 * p.abs();
-            if [b, c, e].iter().all(|l| close(a[0], l[0]) && close(a[1], l[1])) {
+            if !panorama && [b, c, e].iter().all(|l| close(a[0], l[0]) && close(a[1], l[1])) {
                 Limits::Same(a)
             } else {
                 Limits::PerRay(Box::new((*camera, world_origin)))
@@ -102,6 +104,11 @@ impl CameraRays {
     /// ray's range.
     #[inline]
     pub(crate) fn ray(&self, x: f64, y: f64, lens: [f32; 2]) -> Ray {
+        if let Limits::PerRay(c) = &self.limits
+            && c.0.is_omnidirectional()
+        {
+            return Ray::new(self.origin.as_vec3(), c.0.world_ray([x, y]).1.as_vec3());
+        }
         let mut dir = self.dir + self.dir_x * x + self.dir_y * y;
         let mut origin = self.origin;
         if self.parallel {

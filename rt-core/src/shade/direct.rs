@@ -5,6 +5,7 @@ use super::shadow::{Coherence, trace_light_rays};
 use super::stage::Stage;
 use super::wave::{LightRays, RayState};
 use super::{Dimension, Point, TileArea};
+use crate::detail::Varied;
 use crate::effects::Effects;
 use crate::light::{PlacedKind, PlacedLight, cone_share};
 use crate::math::{max_abs, orthonormal_basis};
@@ -55,10 +56,10 @@ impl Sending {
     }
 }
 
-/// Point of the unit disk that ray `k` of `count` to light `number` goes to.
+/// Point of the unit square that ray `k` of `count` to light `number` belongs to; round lights spread it over their disk.
 #[inline]
 pub(super) fn light_point(sampler: &Sampler, stream: u32, number: usize, k: u32, count: u32) -> [f32; 2] {
-    unit_disk(sampler.square_of(stream.wrapping_add(Dimension::LIGHTS + number as u32), k, count))
+    sampler.square_of(stream.wrapping_add(Dimension::LIGHTS + number as u32), k, count)
 }
 
 /// Adds the light of every lamp to `points`.
@@ -66,6 +67,25 @@ pub(crate) fn add_direct_light(
     stage: &Stage<'_>,
     area: &TileArea,
     points: &mut [Point],
+    varied: &[Varied],
+    states: &[RayState],
+    rays: &mut LightRays,
+    stats: &mut RayStats,
+    cost: Option<&mut [f32]>,
+) {
+    if varied.is_empty() {
+        shine::<false>(stage, area, points, varied, states, rays, stats, cost);
+    } else {
+        shine::<true>(stage, area, points, varied, states, rays, stats, cost);
+    }
+}
+
+/// As [`add_direct_light`]. `DETAIL`: some point has a finish of its own.
+fn shine<const DETAIL: bool>(
+    stage: &Stage<'_>,
+    area: &TileArea,
+    points: &mut [Point],
+    varied: &[Varied],
     states: &[RayState],
     rays: &mut LightRays,
     stats: &mut RayStats,
@@ -79,7 +99,8 @@ pub(crate) fn add_direct_light(
                 continue;
             }
             let state = &states[p.lane as usize];
-            let material = stage.instances[p.instance as usize].material;
+            let model = p.model::<DETAIL>(stage, varied);
+            let arriving = p.varied::<DETAIL>(varied).map_or(1.0, |v| v.direct);
             for k in 0..count {
                 let at = spread
                     .then(|| light_point(&area.sampler(stage, state.slot), state.stream, number, k, count));
@@ -89,8 +110,9 @@ pub(crate) fn add_direct_light(
                 }
                 let (normal, color) = (p.surface.normal, p.surface.color);
                 let answer =
-                    response(material, normal, color, p.view, incident.dir, light.color, light.highlight);
-                let radiance = answer * (incident.strength / count as f32);
+                    response(model, normal, color, p.view, incident.dir, light.color, light.highlight);
+                let strength = if DETAIL { arriving * incident.strength } else { incident.strength };
+                let radiance = answer * (strength / count as f32);
                 if radiance == Vec3::ZERO {
                     continue;
                 }
@@ -118,13 +140,13 @@ pub(crate) fn add_direct_light(
     }
 }
 
-/// Direction and strength of `light` at `p`; `at` is a point of the unit disk for lights with a size.
+/// Direction and strength of `light` at `p`; `at` is a point of the unit square for lights with a size.
 #[inline]
 pub(super) fn incident_from(light: &PlacedLight, p: Vec3, at: Option<[f32; 2]>) -> Incident {
-    let [x, y] = at.unwrap_or_default();
     let (center, normal) = match light.kind {
         PlacedKind::Directional { to_light } => {
-            let dir = if at.is_some() {
+            let dir = if let Some(at) = at {
+                let [x, y] = unit_disk(at);
                 // Uniform over the disk that the light covers in the sky.
                 let (s, t) = orthonormal_basis(to_light);
                 (to_light + (s * x + t * y) * light.size.tan()).normalize()
@@ -136,13 +158,20 @@ pub(super) fn incident_from(light: &PlacedLight, p: Vec3, at: Option<[f32; 2]>) 
         PlacedKind::Point { position } => (position, (p - position).as_dvec3().normalize_or_zero().as_vec3()),
         PlacedKind::Spot { position, direction, .. }
         | PlacedKind::Cone { position, direction, .. }
+        | PlacedKind::Ring { position, direction, .. }
+        | PlacedKind::Quad { position, direction, .. }
         | PlacedKind::Disk { position, direction } => (position, direction),
     };
-    let from = if at.is_some() && normal != Vec3::ZERO {
-        let (s, t) = orthonormal_basis(normal);
-        center + (s * x + t * y) * light.size
-    } else {
-        center
+    let from = match (at, light.kind) {
+        (Some([x, y]), PlacedKind::Quad { edges: [a, b], .. }) => {
+            center + a * (2.0 * x - 1.0) + b * (2.0 * y - 1.0)
+        }
+        (Some(at), kind) if normal != Vec3::ZERO => {
+            let [x, y] = in_ring(unit_disk(at), kind);
+            let (s, t) = orthonormal_basis(normal);
+            center + (s * x + t * y) * light.size
+        }
+        _ => center,
     };
     let to_light = from - p;
     let distance = length(to_light);
@@ -169,9 +198,29 @@ pub(super) fn incident_from(light: &PlacedLight, p: Vec3, at: Option<[f32; 2]>) 
             strength *= cone_share(-dir.dot(direction), cos_inner, cos_outer);
         }
         PlacedKind::Disk { direction, .. } => strength *= (-dir.dot(direction)).max(0.0),
+        PlacedKind::Ring { direction, cos_inner, cos_outer, .. } => {
+            let cos = -dir.dot(direction);
+            strength *= cone_share(cos, cos_inner, cos_outer) * cos.max(0.0);
+        }
+        PlacedKind::Quad { direction, both_sides, .. } => {
+            let cos = -dir.dot(direction);
+            strength *= if both_sides { cos.abs() } else { cos.max(0.0) };
+        }
         PlacedKind::Directional { .. } | PlacedKind::Point { .. } => {}
     }
     Incident { dir, from: Some(from), strength }
+}
+
+/// A point of the unit disk spread over the ring that is left around a light's hole, with the same density everywhere.
+#[inline]
+fn in_ring(at: [f32; 2], kind: PlacedKind) -> [f32; 2] {
+    let PlacedKind::Ring { hole, .. } = kind else { return at };
+    let squared = at[0] * at[0] + at[1] * at[1];
+    if hole <= 0.0 || squared == 0.0 {
+        return at;
+    }
+    let factor = ((hole * hole + squared * (1.0 - hole * hole)) / squared).sqrt();
+    at.map(|v| v * factor)
 }
 
 /// The ray between a point and a light. `from_light` asks for the light as its origin: all rays of a light then share it and are

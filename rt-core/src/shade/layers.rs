@@ -32,6 +32,9 @@ pub(super) fn record_block<S: Simd>(
     if out.depth.is_empty() && out.distance.is_empty() {
         return;
     }
+    if stage.camera.is_omnidirectional() {
+        return panorama(stage, area, b, rays, hits, out);
+    }
     let mut planes = Planes::new();
     let mut left = hit;
     while left != 0 {
@@ -46,6 +49,28 @@ pub(super) fn record_block<S: Simd>(
         if let Some(layer) = layer.get_mut(slots.clone()) {
             for lane in 0..LANES {
                 layer[lane] = if hit >> lane & 1 != 0 { values[lane] } else { layer[lane] };
+            }
+        }
+    }
+}
+
+/// Depth and distance of panoramas, pixel by pixel.
+#[cold]
+fn panorama(
+    stage: &Stage<'_>,
+    area: &TileArea,
+    b: usize,
+    rays: &RayBlock,
+    hits: &HitBlock,
+    out: &mut TileLayers,
+) {
+    for lane in 0..LANES {
+        let slot = b * LANES + lane;
+        let (Some(hit), Some([x, y])) = (hits.get(lane), area.pixel(slot as u16)) else { continue };
+        let (depth, distance) = stage.depth_and_distance(stage.ndc(x, y, [0.5; 2]), &rays.get(lane), &hit);
+        for (layer, value) in [(&mut out.depth, depth), (&mut out.distance, distance)] {
+            if let Some(v) = layer.get_mut(slot) {
+                *v = value;
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use super::microfacet::{ggx, schlick};
 use crate::effects::Effects;
-use crate::material::{Highlight, Material, PbrForm, SurfaceModel};
+use crate::material::{Highlight, PbrForm, SurfaceModel};
 use glam::Vec3;
 use std::f32::consts::PI;
 
@@ -13,7 +13,7 @@ const MIN_HIGHLIGHT_ALPHA: f32 = 1e-3;
 /// `highlight` is the light's own colour for Phong highlights.
 #[inline]
 pub(crate) fn response(
-    m: &Material,
+    model: &SurfaceModel,
     normal: Vec3,
     surface_color: Vec3,
     view: Vec3,
@@ -25,7 +25,7 @@ pub(crate) fn response(
     if cos <= 0.0 {
         return Vec3::ZERO;
     }
-    match m.model {
+    match *model {
         SurfaceModel::Unlit => Vec3::ZERO,
         // A dielectric gets here only where refraction is switched off.
         SurfaceModel::Matte | SurfaceModel::Dielectric { .. } => surface_color * color * cos,
@@ -115,9 +115,9 @@ fn vtk_pbr([metallic, roughness, specular]: [f32; 3], albedo: Vec3, n: Vec3, v: 
 /// Light sent to the viewer per unit of ambient radiance. Where reflection rays are left out, a reflector takes its share of
 /// ambient light instead of turning black.
 #[inline]
-pub(crate) fn ambient_albedo(m: &Material, color: Vec3, effects: Effects) -> Vec3 {
+pub(crate) fn ambient_albedo(model: &SurfaceModel, color: Vec3, effects: Effects) -> Vec3 {
     let reflects = effects.intersects(Effects::REFLECTION.union(Effects::GLOSSY_REFLECTION));
-    match m.model {
+    match *model {
         SurfaceModel::Unlit => Vec3::ZERO,
         SurfaceModel::Matte => color,
         SurfaceModel::Phong { ambient, .. } => color * ambient,

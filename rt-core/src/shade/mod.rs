@@ -13,6 +13,7 @@ mod lobes;
 mod local;
 mod microfacet;
 mod path;
+mod point;
 mod shadow;
 mod specular;
 mod stage;
@@ -21,9 +22,11 @@ mod volumes;
 mod wave;
 pub mod waves;
 
+pub(crate) use point::Point;
 pub(crate) use stage::Stage;
 pub(crate) use tile::{TILE, TileArea, TileLayers};
 
+use crate::detail::Varied;
 use crate::effects::Effects;
 use crate::frame::Layers;
 use crate::material::SurfaceModel;
@@ -33,6 +36,7 @@ use crate::sampler::SamplerBlock;
 use crate::surface::{Placed, SurfacePoint};
 use fearless_simd::{Simd, dispatch};
 use glam::Vec3;
+use point::AS_MATERIAL;
 use tile::{PIXELS, block_place, lane_pixel};
 use wave::{LightRays, RayKind, RayState, Wave};
 
@@ -52,21 +56,6 @@ impl Dimension {
     const LIGHTS: u32 = 8;
 }
 
-/// A surface met by a ray of the current wave.
-pub(crate) struct Point {
-    pub(crate) surface: SurfacePoint,
-    /// Unit, towards where the ray came from.
-    pub(crate) view: Vec3,
-    /// Collected towards `view`.
-    pub(crate) radiance: Vec3,
-    pub(crate) t: f32,
-    /// Ray of the wave.
-    pub(crate) lane: u32,
-    pub(crate) instance: u32,
-    /// False where lights change nothing.
-    pub(crate) lit: bool,
-}
-
 /// Buffers of one thread, kept from tile to tile.
 #[derive(Default)]
 pub(crate) struct Workspace {
@@ -77,6 +66,8 @@ pub(crate) struct Workspace {
     /// Of each ray the surface at its hit, where somebody else has looked at it; empty where this scene's world is asked.
     surfaces: Vec<SurfacePoint>,
     points: Vec<Point>,
+    /// Finishes of points whose material has detail.
+    varied: Vec<Varied>,
     light_rays: LightRays,
     occlusion: ambient_occlusion::OcclusionBuffers,
     /// Of each ray what it collects in the volume up to its hit, where others hold the volume's bricks; empty where it is whole here.
@@ -355,9 +346,27 @@ fn meet_surfaces(
     record: bool,
     stats: &mut RayStats,
 ) {
+    // Where somebody else has looked at the hits, their finishes did not travel.
+    if stage.has_detail && work.surfaces.is_empty() {
+        meet::<true>(stage, area, out, work, record, stats);
+    } else {
+        meet::<false>(stage, area, out, work, record, stats);
+    }
+}
+
+/// As [`meet_surfaces`]. `DETAIL`: some material has detail.
+fn meet<const DETAIL: bool>(
+    stage: &Stage<'_>,
+    area: &TileArea,
+    out: &mut TileLayers,
+    work: &mut Workspace,
+    record: bool,
+    stats: &mut RayStats,
+) {
     let transparent = stage.effects.contains(Effects::TRANSPARENCY);
     let refraction = stage.effects.intersects(Effects::REFRACTION | Effects::PATH_TRACING);
     work.points.clear();
+    work.varied.clear();
     for i in 0..work.current.states.len() {
         let (block, lane) = (&work.current.blocks[i / LANES], i % LANES);
         if block.t_max[lane] < block.t_min[lane] {
@@ -382,6 +391,7 @@ fn meet_surfaces(
             Some(seen_elsewhere) => *seen_elsewhere,
             None => placed.surface(&ray, &hit),
         };
+        let varied = if DETAIL { placed.varied(&ray, &hit, &mut surface.normal) } else { None };
         if !transparent {
             stats.opacity_ignored += (surface.opacity < OPAQUE) as u64;
             surface.opacity = 1.0;
@@ -406,11 +416,15 @@ fn meet_surfaces(
         work.points.push(Point {
             surface,
             view: ray.dir * (-1.0 / length),
-            radiance: radiance + Vec3::from(placed.material.emission),
+            radiance: radiance + varied.map_or(placed.material.emission.into(), |v| v.emission),
             t: hit.t,
             lane: i as u32,
             instance: hit.instance,
             lit,
+            varied: varied.map_or(AS_MATERIAL, |v| {
+                work.varied.push(v);
+                work.varied.len() as u32 - 1
+            }),
         });
     }
 }
@@ -455,16 +469,17 @@ fn add_light(
     stats: &mut RayStats,
     mut cost: Option<&mut [f32]>,
 ) {
-    let Workspace { current, points, light_rays, occlusion, .. } = work;
+    let Workspace { current, points, varied, light_rays, occlusion, .. } = work;
     if !stage.lights.is_empty() {
         let cost = cost.as_deref_mut();
-        direct::add_direct_light(stage, area, points, &current.states, light_rays, stats, cost);
+        direct::add_direct_light(stage, area, points, varied, &current.states, light_rays, stats, cost);
     }
     if stage.mean_radiance.is_some() && !stage.effects.contains(Effects::PATH_TRACING) {
         ambient_occlusion::add_ambient_light(
             stage,
             area,
             points,
+            varied,
             &current.states,
             light_rays,
             occlusion,

@@ -41,7 +41,8 @@ pub(super) fn continue_paths(stage: &Stage<'_>, area: &TileArea, work: &mut Work
             }
             continue;
         }
-        let Some((dir, weight, mut next)) = scatter(stage, area, p, &state) else { continue };
+        let model = p.model::<true>(stage, &work.varied);
+        let Some((dir, weight, mut next)) = scatter(stage, area, p, model, &state) else { continue };
         let mut throughput = state.throughput * weight;
         if state.bounce >= ROULETTE_FROM {
             let survive = throughput.max_element().min(0.95);
@@ -61,6 +62,7 @@ fn scatter(
     stage: &Stage<'_>,
     area: &TileArea,
     p: &Point,
+    model: &SurfaceModel,
     state: &RayState,
 ) -> Option<(Vec3, Vec3, RayState)> {
     let sampler = area.sampler(stage, state.slot);
@@ -88,7 +90,7 @@ fn scatter(
         let (dir, share) = sample_lobe(p, n, f0, roughness, u)?;
         Some((dir, share / probability, kind(RayKind::Reflected)))
     };
-    match material.model {
+    match *model {
         SurfaceModel::Unlit => None,
         SurfaceModel::Matte => diffuse(color),
         SurfaceModel::Phong { diffuse: kd, mirror, .. } => {

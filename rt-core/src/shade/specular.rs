@@ -30,10 +30,12 @@ pub(super) fn send_specular_rays(
     let e = stage.effects;
     let (mirror, gloss) = (e.contains(Effects::REFLECTION), e.contains(Effects::GLOSSY_REFLECTION));
     for p in &work.points {
-        let material = stage.instances[p.instance as usize].material;
         let state = work.current.states[p.lane as usize];
-        let weight = state.throughput * p.surface.opacity;
-        match material.model {
+        let mut weight = state.throughput * p.surface.opacity;
+        if let Some(v) = p.varied::<true>(&work.varied) {
+            weight *= v.ambient;
+        }
+        match *p.model::<true>(stage, &work.varied) {
             SurfaceModel::Phong { mirror: share, .. } if share > 0.0 && mirror => {
                 reflect_at(stage, p, facing(p), weight * share, &state, &mut work.scattered, stats);
             }

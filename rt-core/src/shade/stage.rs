@@ -36,6 +36,8 @@ pub(crate) struct Stage<'a> {
     pub(crate) camera_rays: CameraRays,
     /// Instruction set of ray generation and shading; every one gives the same bits.
     pub(crate) level: Level,
+    /// Whether a material has detail.
+    pub(crate) has_detail: bool,
     /// Volumes with the way into their object space.
     pub(crate) volumes: Vec<(&'a Volume, DAffine3)>,
     /// World position of render space's origin.
@@ -98,6 +100,7 @@ impl<'a> Stage<'a> {
             ambient,
             camera_rays: CameraRays::new(camera, origin, bounds, effects.contains(Effects::DEPTH_OF_FIELD)),
             level: Level::new(),
+            has_detail: scene.materials.iter().any(|m| m.detail.is_some()),
             volumes,
             origin,
             up: world_from_view.y_axis.as_vec3(),
@@ -114,10 +117,13 @@ impl<'a> Stage<'a> {
         &self.instances[hit.instance as usize]
     }
 
-    /// The surface at a hit, opaque where transparency is left out.
+    /// The surface at a hit, with the normal that it is lit with.
     #[inline]
     pub(crate) fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
-        self.placed(hit).surface(ray, hit)
+        let placed = self.placed(hit);
+        let mut surface = placed.surface(ray, hit);
+        placed.varied(ray, hit, &mut surface.normal);
+        surface
     }
 
     /// Sample points of pixel (`x`, `y`) of the whole picture.
@@ -164,11 +170,18 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// World point of the surface met by the ray through NDC `ndc`, and that ray's origin: see [`point_on_ray`].
-    pub(crate) fn exact_point(&self, ndc: [f64; 2], ray: &Ray, hit: &Hit) -> (DVec3, DVec3) {
+    /// Window depth of the surface met by the ray through NDC `ndc`, and its distance from where the ray begins: see [`point_on_ray`].
+    pub(crate) fn depth_and_distance(&self, ndc: [f64; 2], ray: &Ray, hit: &Hit) -> (f32, f32) {
         let (on_surface, n) = self.placed(hit).plane(ray, hit, self.origin);
         let ray = self.camera.world_ray(ndc);
-        (point_on_ray(ray, on_surface, n), ray.0)
+        let point = point_on_ray(ray, on_surface, n);
+        let distance = (point - ray.0).length();
+        let depth = if self.camera.is_omnidirectional() {
+            self.camera.panorama_depth(distance)
+        } else {
+            self.camera.window_depth(point)
+        };
+        (depth as f32, distance as f32)
     }
 }
 

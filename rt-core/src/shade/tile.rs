@@ -153,12 +153,12 @@ impl TileLayers {
         self.recorded[i] = true;
         if !self.depth.is_empty() || !self.distance.is_empty() {
             let [x, y] = area.pixel(slot).unwrap_or_default();
-            let (point, origin) = stage.exact_point(stage.ndc(x, y, [0.5; 2]), ray, hit);
+            let (depth, distance) = stage.depth_and_distance(stage.ndc(x, y, [0.5; 2]), ray, hit);
             if let Some(d) = self.depth.get_mut(i) {
-                *d = stage.camera.window_depth(point) as f32;
+                *d = depth;
             }
             if let Some(d) = self.distance.get_mut(i) {
-                *d = (point - origin).length() as f32;
+                *d = distance;
             }
         }
         if let Some(n) = self.normal.get_mut(i) {

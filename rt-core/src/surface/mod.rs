@@ -6,6 +6,7 @@
 //! 0.1-0.4 % of false self-shadows, 2 ulp 1e-6, 4 ulp none. There is no global epsilon.
 
 mod block;
+mod varied;
 
 pub(crate) use block::{Looks, Planes};
 

@@ -114,6 +114,10 @@ def why_not_texture(texture):
     return None
 
 
+# Textures of a property by the field of the library that they go to.
+MAPS = {"material": "materialTex", "normal": "normalTex", "emissive": "emissiveTex"}
+
+
 class Textures:
     """Texels as RGBA by the key of their image; those of the last frame are kept."""
 
@@ -124,23 +128,38 @@ class Textures:
         self._kept, self._used = self._used, {}
 
     def add(self, surface, texture, texcoords):
+        image = self._image(texture, texcoords)
+        surface.texture_key, surface.texture, surface.texture_width = image.key, image.texels, image.width
+        surface.texture_srgb, surface.texture_interpolate, surface.texture_repeat = image.srgb, image.interpolate, image.repeat
+
+    def maps_of(self, p, texcoords):
+        """The textures of a physically based property besides that of its colour, or `None`."""
+        found = {field: p.GetTexture(name) for field, name in MAPS.items() if p.GetTexture(name) is not None}
+        if not found:
+            return None
+        maps = rtv.Maps(normal_scale=p.GetNormalScale(), occlusion_strength=p.GetOcclusionStrength())
+        maps.emissive_factor[:] = p.GetEmissiveFactor()
+        for field, texture in found.items():
+            setattr(maps, field, self._image(texture, texcoords))
+        return maps
+
+    def _image(self, texture, texcoords):
         if texture.GetInputAlgorithm():
             texture.GetInputAlgorithm().Update()
         image = texture.GetInput()
         scalars = image.GetPointData().GetScalars() if image else None
         if scalars is None or texcoords is None or texcoords.GetNumberOfComponents() < 2:
-            return
+            return rtv.Image()
         width, height, _ = image.GetDimensions()
         if scalars.GetNumberOfTuples() < width * height:
-            return
+            return rtv.Image()
         key = key_of(image, scalars, texture)
         rgba = self._kept.get(key)
         if rgba is None:
             rgba = _texels(texture, scalars)[: width * height]
         self._used[key] = rgba
-        surface.texture_key, surface.texture, surface.texture_width = key, rtv.Array.of(rgba), width
-        surface.texture_srgb = int(bool(texture.GetUseSRGBColorSpace()))
-        surface.texture_interpolate, surface.texture_repeat = int(bool(texture.GetInterpolate())), int(bool(texture.GetRepeat()))
+        flags = (int(bool(f)) for f in (texture.GetInterpolate(), texture.GetRepeat(), texture.GetUseSRGBColorSpace()))
+        return rtv.Image(rtv.Array.of(rgba), key, width, *flags)
 
 
 def _texels(texture, scalars):

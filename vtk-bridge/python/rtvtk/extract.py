@@ -179,7 +179,7 @@ class Extractor:
         if cell_map is not None and s.property.edge_width > 0:
             raise Untraceable("edges of polygons that are not convex")
         texture = actor.GetTexture()
-        if actor.GetProperty().GetNumberOfTextures() > 0:
+        if actor.GetProperty().GetTexture("albedoTex") is not None:
             texture = actor.GetProperty().GetTexture("albedoTex")
             # Its alpha takes the place of the opacity.
             s.property.opacity = 1.0
@@ -189,9 +189,14 @@ class Extractor:
             if s.color_source != rtv.COLOR_PROPERTY:
                 raise Untraceable("it has a texture and colours")
             self._textures.add(s, texture, data.GetPointData().GetTCoords())
+        maps = self._textures.maps_of(actor.GetProperty(), data.GetPointData().GetTCoords())
+        if maps is not None:
+            if s.has_back:
+                raise Untraceable("textures of the property on a surface whose backs have a property of their own")
+            s.maps = C.pointer(maps)
         self._bridge.surface(C.byref(s))
         arrays_given = s.colors.kind or any(cells.offsets.kind for cells in (s.verts, s.lines, s.polys, s.strips))
-        if alone and planes is None and texture is None and back is None and not arrays_given and mapper.GetInputDataObject(0, 0) is data:
+        if alone and planes is None and texture is None and maps is None and back is None and not arrays_given and mapper.GetInputDataObject(0, 0) is data:
             self._used.add(actor.__this__)
             self._plain[actor.__this__] = self._times(actor, mapper, data), s, keep
 

@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 
-ABI = 3226431084
+ABI = 3622962323
 NONE, U8, F32, F64, I32, I64 = range(6)
 COLOR_PROPERTY, COLOR_POINTS, COLOR_CELLS, COLOR_MAPPED = range(4)
 LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT = range(3)
@@ -36,6 +36,16 @@ class Property(C.Structure):
     _fields_ += [("edge_color", C.c_float * 3), ("edge_width", C.c_float)]
 
 
+class Image(C.Structure):
+    _fields_ = [("texels", Array), ("key", C.c_uint64), ("width", C.c_uint32)]
+    _fields_ += [(n, C.c_uint8) for n in ("interpolate", "repeat", "srgb", "reserved")]
+
+
+class Maps(C.Structure):
+    _fields_ = [(n, Image) for n in ("material", "normal", "emissive")]
+    _fields_ += [("normal_scale", C.c_float), ("occlusion_strength", C.c_float), ("emissive_factor", C.c_float * 3), ("reserved", C.c_uint32)]
+
+
 class Surface(C.Structure):
     _fields_ = [
         ("name", C.c_char_p), ("shape_key", C.c_uint64), ("color_key", C.c_uint64), ("texture_key", C.c_uint64), ("points", Array),
@@ -44,7 +54,7 @@ class Surface(C.Structure):
         ("nan_color", C.c_uint8 * 4), ("texture_interpolate", C.c_uint8), ("texture_repeat", C.c_uint8), ("texture_srgb", C.c_uint8), ("reserved", C.c_uint8),
         ("texture", Array), ("texture_width", C.c_uint32), ("has_back", C.c_uint32), ("property", Property), ("back", Property),
         ("world_from_data", C.c_double * 16), ("glyph_matrices", Array), ("glyph_colors", Array), ("point_radius", C.c_double),
-        ("line_radius", C.c_double),
+        ("line_radius", C.c_double), ("tangents", Array), ("maps", C.POINTER(Maps)),
     ]
 
 

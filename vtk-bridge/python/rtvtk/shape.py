@@ -45,12 +45,14 @@ class Shapes:
         all_cells = [data.GetVerts(), data.GetLines(), polys, data.GetStrips()]
         of_points = None if surface.property.flat else data.GetPointData().GetNormals()
         of_cells, texcoords = data.GetCellData().GetNormals(), data.GetPointData().GetTCoords()
+        # The shader has a frame for normal maps only where it has normals of points.
+        tangents = None if of_points is None else data.GetPointData().GetTangents()
         settings = surface.point_radius, surface.line_radius, surface.edges_only, surface.has_back, as_points
         clip = () if planes is None else tuple(planes.ravel().tolist())
         if as_points:
             key = key_of(points, coordinates, *settings, *clip)
         else:
-            key = key_of(points, coordinates, *all_cells, of_points, of_cells, texcoords, *settings, *clip)
+            key = key_of(points, coordinates, *all_cells, of_points, of_cells, texcoords, tangents, *settings, *clip)
         surface.shape_key = key
         if planes is not None:
             keep.append(planes)
@@ -78,6 +80,7 @@ class Shapes:
         surface.verts, surface.lines, surface.polys, surface.strips = (_cells(r, keep) for r in runs)
         surface.point_normals, surface.texcoords = floats(of_points, 3, keep), floats(texcoords, 2, keep)
         surface.cell_normals = floats(of_cells, 3, keep, cell_map)
+        surface.tangents = floats(tangents, 3, keep)
         self._added[key] = cell_map
         return cell_map
 

@@ -33,8 +33,13 @@ def check_actor(actor, mapper, point_radius, line_radius):
             raise Untraceable("translucent backs with a property of their own")
         if isinstance(mapper, vtkGlyph3DMapper):
             raise Untraceable("glyphs whose backs have a property of their own")
+    if p.GetInterpolation() == _PBR:
+        if p.GetCoatStrength() > 0 or p.GetAnisotropy() != 0:
+            raise Untraceable("a clear coat or anisotropy")
+        if p.GetMetallic() > 0 and p.GetEdgeTint() != (1, 1, 1):
+            raise Untraceable("a metal with an edge tint")
     if p.GetNumberOfTextures() > 0:
-        _check_textures(actor, p)
+        _check_textures(actor, mapper, p)
     shader = actor.GetShaderProperty()
     if shader.HasFragmentShaderCode() or shader.HasVertexShaderCode() or shader.GetNumberOfShaderReplacements() > 0:
         raise Untraceable("shader code of its own")
@@ -57,17 +62,20 @@ def _check_edges(actor, mapper, p):
         raise Untraceable("edges on a clipped surface")
 
 
-def _check_textures(actor, p):
-    albedo = p.GetTexture("albedoTex")
-    if p.GetNumberOfTextures() > 1 or albedo is None:
-        raise Untraceable("textures of the property other than its base colour (normal, material, emissive, coat, anisotropy)")
+def _check_textures(actor, mapper, p):
+    known = [t for t in (p.GetTexture(name) for name in ("albedoTex", *arrays.MAPS.values())) if t is not None]
+    if p.GetNumberOfTextures() > len(known):
+        raise Untraceable("textures of the property for coats or anisotropy, or of a program's own shader")
+    if isinstance(mapper, vtkGlyph3DMapper) and any(p.GetTexture(name) is not None for name in arrays.MAPS.values()):
+        raise Untraceable("glyphs with textures of the property other than its base colour")
     if actor.GetTexture() is not None:
         raise Untraceable("a texture and a texture of the property")
     if p.GetInterpolation() != _PBR:
         raise Untraceable("textures of the property without physically based shading")
-    reason = arrays.why_not_texture(albedo)
-    if reason:
-        raise Untraceable(reason)
+    for texture in known:
+        reason = arrays.why_not_texture(texture)
+        if reason:
+            raise Untraceable(reason)
 
 
 def check_cells(data, representation, point_radius, line_radius):

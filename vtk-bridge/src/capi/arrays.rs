@@ -2,8 +2,8 @@
 
 use super::types::*;
 use crate::input::{
-    Cells, Color, Glyphs, Ids, Image, LightKind, PerItem, Points, Property, Scalars, SceneLight, Shading,
-    Shape, Surface, Volume, VolumeBlend,
+    Cells, Color, Glyphs, Ids, Image, LightKind, Maps, PerItem, Points, Property, Scalars, SceneLight,
+    Shading, Shape, Surface, Volume, VolumeBlend,
 };
 use rt_core::glam::DMat4;
 
@@ -58,6 +58,40 @@ unsafe fn cells<'a>(cells: &RtvCells, what: &str) -> Result<Cells<'a>, String> {
 /// The surface with its arrays as slices.
 ///
 /// # Safety
+/// As [`surface`].
+unsafe fn image<'a>(i: &RtvImage) -> Result<Option<Image<'a>>, String> {
+    // SAFETY: the caller's promise.
+    let texels: &[[u8; 4]] = unsafe { tuples(&i.texels, "texture", RTV_U8) }?;
+    let width = i.width as usize;
+    Ok((width > 0 && texels.len() >= width).then(|| Image {
+        key: i.key,
+        width,
+        height: texels.len() / width,
+        rgba: &texels[..texels.len() / width * width],
+        interpolate: i.interpolate != 0,
+        repeat: i.repeat != 0,
+        srgb: i.srgb != 0,
+    }))
+}
+
+/// # Safety
+/// As [`surface`].
+unsafe fn maps<'a>(m: &RtvMaps) -> Result<Maps<'a>, String> {
+    // SAFETY: the caller's promise, for every picture.
+    let [material, normal, emissive] =
+        unsafe { [image(&m.material)?, image(&m.normal)?, image(&m.emissive)?] };
+    let (normal_scale, occlusion_strength) = (m.normal_scale, m.occlusion_strength);
+    Ok(Maps {
+        material,
+        normal,
+        emissive,
+        normal_scale,
+        occlusion_strength,
+        emissive_factor: m.emissive_factor,
+    })
+}
+
+/// # Safety
 /// Every array has the length it says, and nobody writes to it while the result lives.
 pub(super) unsafe fn surface<'a>(s: &RtvSurface, name: &'a str) -> Result<Surface<'a>, String> {
     // SAFETY: the caller's promise, for every array.
@@ -74,6 +108,7 @@ pub(super) unsafe fn surface<'a>(s: &RtvSurface, name: &'a str) -> Result<Surfac
             (!of_cells.is_empty()).then_some(PerItem::Cell(of_cells))
         };
         let texcoords: &[[f32; 2]] = tuples(&s.texcoords, "texture coordinates", RTV_F32)?;
+        let tangents: &[[f32; 3]] = tuples(&s.tangents, "tangents", RTV_F32)?;
         let shape = Shape {
             key: s.shape_key,
             points,
@@ -83,6 +118,7 @@ pub(super) unsafe fn surface<'a>(s: &RtvSurface, name: &'a str) -> Result<Surfac
             strips: cells(&s.strips, "strips")?,
             normals,
             texcoords: (!texcoords.is_empty()).then_some(texcoords),
+            tangents: (!tangents.is_empty()).then_some(tangents),
             clip_planes: tuples(&s.clip_planes, "clipping planes", RTV_F64)?,
             point_radius: s.point_radius,
             line_radius: s.line_radius,
@@ -106,17 +142,16 @@ pub(super) unsafe fn surface<'a>(s: &RtvSurface, name: &'a str) -> Result<Surfac
             },
             other => return Err(format!("colour source {other} does not exist")),
         };
-        let texels: &[[u8; 4]] = tuples(&s.texture, "texture", RTV_U8)?;
-        let width = s.texture_width as usize;
-        let texture = (width > 0 && texels.len() >= width).then(|| Image {
+        let texture = image(&RtvImage {
+            texels: s.texture,
             key: s.texture_key,
-            width,
-            height: texels.len() / width,
-            rgba: &texels[..texels.len() / width * width],
-            interpolate: s.texture_interpolate != 0,
-            repeat: s.texture_repeat != 0,
-            srgb: s.texture_srgb != 0,
-        });
+            width: s.texture_width,
+            interpolate: s.texture_interpolate,
+            repeat: s.texture_repeat,
+            srgb: s.texture_srgb,
+            reserved: 0,
+        })?;
+        let maps = s.maps.as_ref().map(|m| maps(m)).transpose()?;
         let matrices: &[[f64; 16]] = tuples(&s.glyph_matrices, "glyphs", RTV_F64)?;
         Ok(Surface {
             name,
@@ -124,6 +159,7 @@ pub(super) unsafe fn surface<'a>(s: &RtvSurface, name: &'a str) -> Result<Surfac
             world_from_data: DMat4::from_cols_array(&s.world_from_data).transpose(),
             color,
             texture,
+            maps,
             property: property(&s.property),
             back: (s.has_back != 0).then(|| property(&s.back)),
             glyphs: (s.glyph_matrices.kind != RTV_NONE)

@@ -75,6 +75,8 @@ fn surface(points: &[[f32; 3]], offsets: &[[i64; 1]], connectivity: &[[i64; 1]])
         glyph_colors: NO_ARRAY,
         point_radius: 0.0,
         line_radius: 0.0,
+        tangents: NO_ARRAY,
+        maps: std::ptr::null(),
     }
 }
 

@@ -110,6 +110,46 @@ pub struct RtvProperty {
     pub edge_width: f32,
 }
 
+/// A picture, and how it is read.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct RtvImage {
+    /// Four RTV_U8 per texel, or none.
+    pub texels: RtvArray,
+    /// Changes whenever the texels do.
+    pub key: u64,
+    /// Texels per row.
+    pub width: u32,
+    /// 1: linear between texels.
+    pub interpolate: u8,
+    /// 1: repeated.
+    pub repeat: u8,
+    /// 1: encoded as sRGB.
+    pub srgb: u8,
+    /// Not used.
+    pub reserved: u8,
+}
+
+/// Textures of a physically based property besides that of its colour.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct RtvMaps {
+    /// Occlusion, roughness and metalness in red, green and blue.
+    pub material: RtvImage,
+    /// Normals; they need tangents.
+    pub normal: RtvImage,
+    /// Radiance given off.
+    pub emissive: RtvImage,
+    /// Factor on the first two components of the normals.
+    pub normal_scale: f32,
+    /// 0 for no occlusion, 1 for all of it.
+    pub occlusion_strength: f32,
+    /// Factor on the radiance.
+    pub emissive_factor: [f32; 3],
+    /// Not used.
+    pub reserved: u32,
+}
+
 /// Something to draw. Arrays are read before `rtv_surface` returns and not kept.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
@@ -178,6 +218,10 @@ pub struct RtvSurface {
     pub point_radius: f64,
     /// Radius of tubes for lines and edges; 0 for none.
     pub line_radius: f64,
+    /// Three RTV_F32 per point, or none; they belong to the shape.
+    pub tangents: RtvArray,
+    /// Further textures, or null.
+    pub maps: *const RtvMaps,
 }
 
 /// A uniform grid of scalars as a medium. Arrays are read before rtv_volume returns and not kept.

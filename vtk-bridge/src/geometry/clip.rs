@@ -3,7 +3,7 @@
 //! OpenGL interpolates the distance to the plane over the triangle and drops fragments where it is negative; a cut along the plane is the
 //! same, up to rounding. New vertices remember the edge they were made on, so that colours can be carried over later without a new mesh.
 
-use rt_core::glam::{DVec3, Vec2, Vec3};
+use rt_core::glam::{DVec3, Vec2, Vec3, Vec4};
 use rt_core::mesh::{Attribute, PerElement, TriMesh};
 use std::collections::HashMap;
 
@@ -72,7 +72,9 @@ pub(super) fn clip(mesh: &TriMesh, planes: &[[f64; 4]]) -> (TriMesh, Clipped) {
         }
     });
     let texcoords = mesh.texcoords.as_ref().map(|v| clipped.vertex_values(v, |a: Vec2, b, t| a.lerp(b, t)));
-    (TriMesh { origin: mesh.origin, positions, indices, normals, texcoords, ..TriMesh::default() }, clipped)
+    let tangents = mesh.tangents.as_ref().map(|v| clipped.vertex_values(v, |a: Vec4, b, t| a.lerp(b, t)));
+    let origin = mesh.origin;
+    (TriMesh { origin, positions, indices, normals, texcoords, tangents, ..TriMesh::default() }, clipped)
 }
 
 /// One plane: origins of the vertices that remain or are new, triangles, and the triangle each comes from.

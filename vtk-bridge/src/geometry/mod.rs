@@ -107,6 +107,8 @@ pub fn build(shape: &Shape<'_>) -> Built {
     });
     mesh.texcoords =
         shape.texcoords.filter(|t| t.len() == points).map(|t| t.iter().map(|v| Vec2::from(*v)).collect());
+    let tangent = |t: &[f32; 3]| Vec3::from(*t).extend(1.0);
+    mesh.tangents = shape.tangents.filter(|t| t.len() == points).map(|t| t.iter().map(tangent).collect());
     let (mesh, clipped) = if shape.clip_planes.is_empty() {
         (mesh, None)
     } else {

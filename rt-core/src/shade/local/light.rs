@@ -155,6 +155,8 @@ fn incident<S: Simd>(simd: S, light: &PlacedLight, points: &Rows3) -> (Vec3x16<S
         PlacedKind::Point { position }
         | PlacedKind::Spot { position, .. }
         | PlacedKind::Cone { position, .. }
+        | PlacedKind::Ring { position, .. }
+        | PlacedKind::Quad { position, .. }
         | PlacedKind::Disk { position, .. } => position,
     };
     let to_light = Vec3x16::splat(simd, from).sub(Vec3x16::load(simd, points));
@@ -189,6 +191,18 @@ fn incident<S: Simd>(simd: S, light: &PlacedLight, points: &Rows3) -> (Vec3x16<S
         }
         PlacedKind::Disk { direction, .. } => {
             strength *= (-dir.dot(Vec3x16::splat(simd, direction))).max(zero);
+        }
+        PlacedKind::Ring { direction, cos_inner, cos_outer, .. } => {
+            let cos = -dir.dot(Vec3x16::splat(simd, direction));
+            let mut row: Row = [0.0; LANES];
+            for lane in 0..LANES {
+                row[lane] = cone_share(cos[lane], cos_inner, cos_outer) * cos[lane].max(0.0);
+            }
+            strength *= f32x16::from_slice(simd, &row);
+        }
+        PlacedKind::Quad { direction, both_sides, .. } => {
+            let cos = -dir.dot(Vec3x16::splat(simd, direction));
+            strength *= if both_sides { cos.abs() } else { cos.max(zero) };
         }
         PlacedKind::Directional { .. } | PlacedKind::Point { .. } => {}
     }

@@ -11,6 +11,7 @@ use super::lobes::{ambient_albedo, response};
 use super::stage::Stage;
 use super::tile::{PIXELS, TileArea, TileLayers};
 use super::{OPAQUE, Workspace, camera_blocks, prefetch_surfaces};
+use crate::detail::Varied;
 use crate::effects::Effects;
 use crate::environment::Background;
 use crate::light::PlacedKind;
@@ -106,11 +107,20 @@ fn light_hits<S: Simd, const POINT: bool>(
                 stats.opacity_ignored += (pale && lanes >> lane & 1 != 0) as u64;
             }
             let material = placed.material;
-            if light::knows(&material.model) {
+            if material.detail.is_some() {
+                for lane in (0..LANES).filter(|l| lanes >> l & 1 != 0) {
+                    let Some(hit) = hits.get(lane) else { continue };
+                    let (ray, mut look) = (rays.get(lane), looks.get(lane));
+                    let varied = placed.varied(&ray, &hit, &mut look.normal);
+                    looks.normal.set(lane, look.normal);
+                    radiance.set(lane, self::radiance(stage, material, varied.as_ref(), &look, ray.dir));
+                }
+            } else if light::knows(&material.model) {
                 light::radiance_block(simd, stage, material, &looks, rays, &mut radiance);
             } else {
                 for lane in (0..LANES).filter(|l| lanes >> l & 1 != 0) {
-                    radiance.set(lane, self::radiance(stage, material, &looks.get(lane), rays.get(lane).dir));
+                    let (look, dir) = (looks.get(lane), rays.get(lane).dir);
+                    radiance.set(lane, self::radiance(stage, material, None, &look, dir));
                 }
             }
             light::merge(simd, lanes, &radiance, &mut rows);
@@ -136,20 +146,22 @@ fn fill_background(stage: &Stage<'_>, area: &TileArea, b: usize, rays: &RayBlock
 }
 
 /// Radiance of one surface towards the origin of a ray with direction `dir`: what [`light::radiance_block`] does for sixteen.
-fn radiance(stage: &Stage<'_>, material: &Material, look: &Look, dir: Vec3) -> Vec3 {
-    let mut radiance = Vec3::from(material.emission);
-    if material.model == SurfaceModel::Unlit {
+fn radiance(stage: &Stage<'_>, material: &Material, varied: Option<&Varied>, look: &Look, dir: Vec3) -> Vec3 {
+    let (model, arriving, ambient) =
+        varied.map_or((&material.model, 1.0, 1.0), |v| (&v.model, v.direct, v.ambient));
+    let mut radiance = varied.map_or(material.emission.into(), |v| v.emission);
+    if *model == SurfaceModel::Unlit {
         return radiance + look.color;
     }
     let view = -dir.normalize_or_zero();
     let Look { normal, color, .. } = *look;
     for light in &stage.lights {
         let incident = incident_from(light, look.point, None);
-        let answer = response(material, normal, color, view, incident.dir, light.color, light.highlight);
-        radiance += answer * incident.strength;
+        let answer = response(model, normal, color, view, incident.dir, light.color, light.highlight);
+        radiance += answer * (arriving * incident.strength);
     }
     if let Some(mean) = &stage.mean_radiance {
-        radiance += ambient_albedo(material, color, stage.effects) * mean.for_normal(normal);
+        radiance += ambient_albedo(model, color, stage.effects) * mean.for_normal(normal) * ambient;
     }
     radiance
 }

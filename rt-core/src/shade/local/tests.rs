@@ -133,7 +133,7 @@ fn sixteen_at_a_time_have_the_bits_of_one_at_every_level() {
                         let placed = stage.placed(&hit);
                         let look = placed.look::<true>(&ray, &hit);
                         one.record(&stage, &area, slot as u16, &ray, &hit, || look.normal);
-                        radiance(&stage, placed.material, &look, ray.dir).extend(1.0).to_array()
+                        radiance(&stage, placed.material, None, &look, ray.dir).extend(1.0).to_array()
                     }
                     None => {
                         let [r, g, b, a] = stage.background(py, ray.dir);

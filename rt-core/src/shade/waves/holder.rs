@@ -99,8 +99,7 @@ impl WaveFrame<'_> {
 
     fn depth_and_distance(&self, area: &TileArea, slot: u16, ray: &Ray, hit: &Hit) -> (f32, f32) {
         let [x, y] = area.pixel(slot).unwrap_or_default();
-        let (point, origin) = self.stage.exact_point(self.stage.ndc(x, y, [0.5; 2]), ray, hit);
-        (self.stage.camera.window_depth(point) as f32, (point - origin).length() as f32)
+        self.stage.depth_and_distance(self.stage.ndc(x, y, [0.5; 2]), ray, hit)
     }
 
     /// What rays of any kind meet here, one answer each. Neighbouring rays should be similar. With `pixels` (tile and slot of each, for camera

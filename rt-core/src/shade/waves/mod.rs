@@ -64,12 +64,28 @@ impl<'a> WaveFrame<'a> {
         camera: &Camera,
         options: &'a RenderOptions,
     ) -> Result<WaveFrame<'a>, RenderError> {
-        let plan = plan_for(scene, needed, camera, options)?;
+        let mut plan = plan_for(scene, needed, camera, options)?;
+        if scene.materials.iter().any(|m| m.detail.is_some())
+            && !plan.effects.without(Effects::DEPTH_OF_FIELD).is_empty()
+        {
+            plan.warnings.push(
+                "maps of roughness, metalness, emission and occlusion are left out where several render a frame with shadows or reflections: only bent \
+                 normals travel"
+                    .into(),
+            );
+        }
         if options.time_limit.is_some() || options.max_error_levels.is_some() || options.cancel.is_some() {
             return Err(RenderError::Unsupported {
                 what: "stopping early (time_limit, max_error_levels, cancel)",
                 with: "in a frame that several render together",
                 cure: "leave these options out and give the number of samples",
+            });
+        }
+        if camera.is_omnidirectional() {
+            return Err(RenderError::Unsupported {
+                what: "a panorama (omnidirectional camera)",
+                with: "in a frame that several render together",
+                cure: "render it in one process, or with six perspective cameras",
             });
         }
         let Crop { x: left, y: top, width, height } = options.area();

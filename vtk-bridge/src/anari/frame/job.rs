@@ -247,6 +247,7 @@ fn draw(order: &Order, job: &Job) -> Result<(Picture, Vec<String>), String> {
                 flat.materials.iter_mut().for_each(|m| {
                     m.model = SurfaceModel::Unlit;
                     m.emission = [0.0; 3];
+                    m.detail = None;
                 });
                 flat.lights.clear();
                 flat.volumes.clear();

@@ -18,9 +18,13 @@ pub(crate) fn camera_of(
     let number = |name: &str| camera.numbers(name).map(|v| v[0]);
     let frame_aspect = f64::from(size[0]) / f64::from(size[1]);
     let [x0, y0, x1, y1] = camera.vector("imageRegion", [0.0, 0.0, 1.0, 1.0]);
+    // As far ahead as the eye is from zero, so that the direction survives the sum.
+    let target = eye + direction.normalize_or_zero() * eye.abs().max_element().max(1.0);
+    if camera.subtype == "omnidirectional" {
+        return Camera::omnidirectional(eye, target, up, [[x0, y0], [x1, y1]]);
+    }
     let aspect = number("aspect").unwrap_or(frame_aspect);
     let (near, far) = (number("near"), number("far"));
-    let target = eye + direction.normalize_or_zero();
     let orthographic = camera.subtype == "orthographic";
     // How far the scene can be; clipping planes that nobody asked for must not cut it.
     let reach = bounds.map_or(1.0, |[lo, hi]| (lo - eye).abs().max((hi - eye).abs()).length());

@@ -5,8 +5,10 @@
 
 use super::attribute::{Domain, Place, Topology};
 use super::geometry::{Body, Part};
-use super::paint::{AlphaMode, Input, Paint, Painted};
+use super::grain::{Grain, Grained};
+use super::paint::{AlphaMode, Input, Paint, Painted, Weights};
 use rt_core::accel::Geometry;
+use rt_core::detail::Detail;
 use rt_core::glam::{DAffine3, DVec3};
 use rt_core::material::{ColorSource, Material};
 use rt_core::mesh::{Attribute, TriMesh};
@@ -24,8 +26,27 @@ pub(crate) struct Dressed {
 }
 
 /// Puts the paint on a part.
-pub(crate) fn dress(part: &Part, model: &Material, paint: &Paint, world_from_object: &DAffine3) -> Dressed {
+pub(crate) fn dress(
+    part: &Part,
+    model: &Material,
+    paint: &Paint,
+    grain: Option<&Grain>,
+    world_from_object: &DAffine3,
+) -> Dressed {
     let topology = part.topology.clone();
+    let model = &match grain {
+        None => model.clone(),
+        Some(grain) => {
+            let (mesh, weights) = match &part.body {
+                Body::Mesh(mesh) => (Some(mesh.clone()), Weights::Corners),
+                Body::Shape(_, weights) => (None, *weights),
+            };
+            let world_from_object = *world_from_object;
+            let topology = topology.clone();
+            let grained = Grained { grain: grain.clone(), topology, weights, mesh, world_from_object };
+            model.clone().with_detail(Arc::new(grained) as Arc<dyn Detail>)
+        }
+    };
     let bare = |material, appearance| Dressed {
         geometry: part.geometry(),
         material,

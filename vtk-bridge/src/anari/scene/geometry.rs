@@ -3,10 +3,10 @@
 use super::Notes;
 use super::attribute::{Numbers, Topology};
 use super::paint::{TriangleShape, Weights};
-use super::volume::grid_of;
+use super::volume::{grid_of, is_nearest};
 use crate::anari::object::{Object, Value};
 use rt_core::accel::Geometry;
-use rt_core::glam::{DVec3, Vec3};
+use rt_core::glam::{DVec3, Vec3, Vec4};
 use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::ray::Ray;
 use rt_core::shapes::{Cylinders, Isosurface, Radii, Shape, ShapeHit, ShapeSurface, Spheres, Tubes};
@@ -37,6 +37,11 @@ pub(crate) struct Prepared {
 impl Part {
     fn new(body: Body, topology: Topology) -> Part {
         Part { body, topology: topology.into(), triangles: OnceLock::new() }
+    }
+
+    /// Whether it consists of triangles.
+    pub(crate) fn is_mesh(&self) -> bool {
+        matches!(self.body, Body::Mesh(_))
     }
 
     /// The same as a shape.
@@ -206,8 +211,24 @@ fn polygons<const N: usize>(geometry: &Object, notes: &mut Notes) -> Option<Part
     } else {
         TriMesh::new(points, topology.vertices.clone())
     };
+    mesh.tangents = tangents(geometry, &topology, mesh.positions.len());
     mesh.normals = values.filter(|v| v.len() == expected).map(Attribute::per_vertex);
     Some(Part::new(Body::Mesh(mesh.into()), topology))
+}
+
+/// Tangents of a mesh's vertices, per corner before per vertex; what is missing is 0, where normal maps then change nothing.
+fn tangents(geometry: &Object, topology: &Topology, vertices: usize) -> Option<Vec<Vec4>> {
+    let list = |name: &str| geometry.object(name).and_then(|a| a.with_array(|a| a.attributes()));
+    let at = |list: &[[f32; 4]], i: u32| list.get(i as usize).map_or(Vec4::ZERO, |t| Vec4::from(*t));
+    if let Some(of_corners) = list("faceVarying.tangent") {
+        return Some(topology.corners.iter().flatten().map(|&c| at(&of_corners, c)).collect());
+    }
+    let of_vertices = list("vertex.tangent")?;
+    Some(if topology.unshared {
+        topology.vertices.iter().flatten().map(|&v| at(&of_vertices, v)).collect()
+    } else {
+        (0..vertices as u32).map(|v| at(&of_vertices, v)).collect()
+    })
 }
 
 // ---- Round things ---------------------------------------------------------------------------------------------------
@@ -368,6 +389,12 @@ fn isosurfaces(geometry: &Object, notes: &mut Notes) -> Prepared {
         return out;
     };
     let Some(grid) = grid_of(&field, notes) else { return out };
+    if is_nearest(&field) {
+        notes.warn(
+            geometry,
+            "its field's `filter` is \"nearest\", which has no isosurfaces: it is interpolated linearly",
+        );
+    }
     let isovalues: Vec<f32> = match geometry.parameters().get("isovalue") {
         Some(Value::Object(a)) => a.with_array(|a| a.scalars()).unwrap_or_default(),
         Some(Value::Bytes(t, b)) => vec![t.attribute(b)[0]],

@@ -31,6 +31,9 @@ pub(crate) fn light_of(light: &Object, place: &DAffine3, notes: &mut Notes) -> O
     if light.subtype == "hdri" {
         return sky(light, color, place, notes);
     }
+    if light.subtype == "quad" {
+        return quad(light, color, place, notes);
+    }
     let position = place.transform_point3(DVec3::from_array(light.vector("position", [0.0; 3])));
     let direction = place.transform_vector3(DVec3::from_array(light.vector("direction", [0.0, 0.0, -1.0])));
     if !(position.is_finite() && direction.is_finite() && direction != DVec3::ZERO) {
@@ -42,6 +45,16 @@ pub(crate) fn light_of(light: &Object, place: &DAffine3, notes: &mut Notes) -> O
     }
     let number = |name: &str| light.numbers(name).map(|v| v[0]);
     let radius = number("radius").unwrap_or(0.0).max(0.0);
+    let mut cone = |light: &Object| {
+        let outer = 0.5 * number("openingAngle").unwrap_or(PI).clamp(0.0, 2.0 * PI);
+        let inner = (outer - number("falloffAngle").unwrap_or(0.1).max(0.0)).max(0.0);
+        // NaN fails the comparison too.
+        let any = outer > 0.0 && inner >= 0.0;
+        if !any {
+            notes.warn(light, "`openingAngle` or `falloffAngle` leaves no cone: it gives no light");
+        }
+        any.then_some((inner, outer))
+    };
     let per_angle = number("power").map(|p| p / (4.0 * PI)).or(number("intensity")).unwrap_or(1.0);
     let (kind, strength, attenuation) = match light.subtype.as_str() {
         "directional" => {
@@ -56,30 +69,33 @@ pub(crate) fn light_of(light: &Object, place: &DAffine3, notes: &mut Notes) -> O
             (LightKind::Point { position, radius }, sized.unwrap_or(per_angle), [0.0, 0.0, 1.0])
         }
         "ring" => {
-            let sized = number("radiance").filter(|_| radius > 0.0).map(|l| l * PI * radius * radius);
+            let hole = number("innerRadius").unwrap_or(0.0);
+            let area = PI * (radius * radius - hole * hole);
+            let sized = number("radiance").filter(|_| radius > 0.0).map(|l| l * area);
             // Straight ahead; a disk's power is π times that.
             let ahead = number("power").map(|p| p / PI).or(number("intensity")).unwrap_or(1.0);
+            let (inner_rad, outer_rad) = cone(light)?;
+            // Nothing of a flat light shines beyond its own plane.
+            let (inner_rad, outer_rad) = (inner_rad.min(0.5 * PI), outer_rad.min(0.5 * PI));
             let kind = if radius > 0.0 {
-                LightKind::Disk { position, direction, radius }
+                let inner_radius = number("innerRadius").unwrap_or(0.0);
+                if !(0.0..radius).contains(&inner_radius) {
+                    notes.error(
+                        light,
+                        format!("`innerRadius` is {inner_radius}; it must be from 0 to below the radius {radius}: it gives no light"),
+                    );
+                    return None;
+                }
+                LightKind::Ring { position, direction, inner_radius, radius, inner_rad, outer_rad }
             } else {
                 notes.warn(light, "`radius` is 0: it shines from a point, into the half space before it");
-                let half = 0.5 * PI;
-                LightKind::Cone { position, direction, inner_rad: half, outer_rad: half }
+                LightKind::Cone { position, direction, inner_rad, outer_rad }
             };
             (kind, sized.unwrap_or(ahead), [0.0, 0.0, 1.0])
         }
         _ => {
-            let outer = 0.5 * number("openingAngle").unwrap_or(PI).clamp(0.0, 2.0 * PI);
-            let inner = (outer - number("falloffAngle").unwrap_or(0.1).max(0.0)).max(0.0);
-            if outer == 0.0 {
-                notes.warn(light, "`openingAngle` is 0: it gives no light");
-                return None;
-            }
-            (
-                LightKind::Cone { position, direction, inner_rad: inner, outer_rad: outer },
-                per_angle,
-                [0.0, 0.0, 1.0],
-            )
+            let (inner_rad, outer_rad) = cone(light)?;
+            (LightKind::Cone { position, direction, inner_rad, outer_rad }, per_angle, [0.0, 0.0, 1.0])
         }
     };
     if !(strength.is_finite() && strength >= 0.0) {
@@ -90,6 +106,46 @@ pub(crate) fn light_of(light: &Object, place: &DAffine3, notes: &mut Notes) -> O
         return None;
     }
     let lamp = Light { kind, attenuation, ..Light::directional(DVec3::Z) };
+    Some(Made::Lamp(lamp.with_color(color.map(|c| (c * strength / PI) as f32))))
+}
+
+/// A parallelogram; its strength straight ahead is radiance times area.
+fn quad(light: &Object, color: [f64; 3], place: &DAffine3, notes: &mut Notes) -> Option<Made> {
+    let vector = |name: &str, default: [f64; 3]| DVec3::from_array(light.vector(name, default));
+    let corner = place.transform_point3(vector("position", [0.0; 3]));
+    let [a, b] = [("edge1", [1.0, 0.0, 0.0]), ("edge2", [0.0, 1.0, 0.0])]
+        .map(|(name, default)| place.transform_vector3(vector(name, default)));
+    let area = a.cross(b).length();
+    if !(corner.is_finite() && area.is_finite() && area > 0.0) {
+        notes.error(
+            light,
+            format!(
+                "its corner {corner} is not finite, or its edges {a} and {b} span no area: it gives no light"
+            ),
+        );
+        return None;
+    }
+    let number = |name: &str| light.numbers(name).map(|v| v[0]);
+    let side = light.text("side").unwrap_or_default();
+    let both_sides = side == "both";
+    let sides = if both_sides { 2.0 } else { 1.0 };
+    // Power of a side is π times what it sends straight ahead.
+    let strength = number("radiance")
+        .map(|l| l * area)
+        .or(number("power").map(|p| p / (PI * sides)))
+        .or(number("intensity"))
+        .unwrap_or(1.0);
+    if !(strength.is_finite() && strength >= 0.0) {
+        notes.error(
+            light,
+            format!("its strength is {strength}; it must be finite and not negative: it gives no light"),
+        );
+        return None;
+    }
+    // The side that shines is that of the first edge times the second.
+    let edges = if side == "back" { [b, a] } else { [a, b] };
+    let kind = LightKind::Quad { corner, edges, both_sides };
+    let lamp = Light { kind, ..Light::quad(corner, edges) };
     Some(Made::Lamp(lamp.with_color(color.map(|c| (c * strength / PI) as f32))))
 }
 

@@ -2,6 +2,7 @@
 
 use super::Notes;
 use super::attribute::{NAMES, Source};
+use super::grain::Grain;
 use super::paint::{AlphaMode, Input, Paint};
 use super::sampler::Sampler;
 use crate::anari::object::{Object, Value};
@@ -14,7 +15,9 @@ pub(crate) fn model_of(material: &Object, notes: &mut Notes) -> Material {
         return out;
     }
     let mut unit = |name: &str, default: f32| {
-        let v = material.f32(name, default);
+        // What varies is looked up at the hits; here it must only be able to reflect.
+        let varies = matches!(material.parameters().get(name), Some(Value::Text(_) | Value::Object(_)));
+        let v = if varies { 1.0 } else { material.f32(name, default) };
         if (0.0..=1.0).contains(&v) {
             return v;
         }
@@ -23,13 +26,10 @@ pub(crate) fn model_of(material: &Object, notes: &mut Notes) -> Material {
     };
     let (metallic, roughness) = (unit("metallic", 1.0), unit("roughness", 1.0));
     let (strength, transmission) = (unit("specular", 0.0), unit("transmission", 0.0));
-    let ior = material.f32("ior", 1.5);
-    let ior = if ior.is_finite() && ior >= 1.0 {
-        ior
-    } else {
+    let ior = ior_of(material).unwrap_or_else(|ior| {
         notes.warn(material, format!("`ior` is {ior}; it must be finite and at least 1: 1.5 is used"));
         1.5
-    };
+    });
     if transmission > 0.0 && transmission < 1.0 {
         notes.warn(material, format!("`transmission` is {transmission}; there is nothing between 0 (opaque) and 1 (glass): the nearer is used"));
     }
@@ -42,8 +42,12 @@ pub(crate) fn model_of(material: &Object, notes: &mut Notes) -> Material {
         SurfaceModel::Dielectric { ior, absorption }
     } else {
         // KHR_materials_specular, which ANARI follows: reflectance at normal incidence, scaled.
-        let normal = ((ior - 1.0) / (ior + 1.0)).powi(2) * strength;
-        SurfaceModel::Pbr { metallic, roughness, specular: normal, form: PbrForm::Gltf }
+        SurfaceModel::Pbr {
+            metallic,
+            roughness,
+            specular: normal_reflectance(ior) * strength,
+            form: PbrForm::Gltf,
+        }
     };
     let emission = material.vector("emissive", [0.0; 3]).map(|v| v as f32);
     if emission.iter().all(|v| v.is_finite() && *v >= 0.0) {
@@ -57,6 +61,66 @@ pub(crate) fn model_of(material: &Object, notes: &mut Notes) -> Material {
     out
 }
 
+fn ior_of(material: &Object) -> Result<f32, f32> {
+    let ior = material.f32("ior", 1.5);
+    if ior.is_finite() && ior >= 1.0 { Ok(ior) } else { Err(ior) }
+}
+
+/// Of light that falls straight onto glass.
+fn normal_reflectance(ior: f32) -> f32 {
+    ((ior - 1.0) / (ior + 1.0)).powi(2)
+}
+
+/// The attribute or sampler that a parameter names; `None` where it is a number, not set, or cannot be used.
+fn varying(
+    material: &Object,
+    name: &str,
+    geometry: &Object,
+    instance: Option<&Object>,
+    notes: &mut Notes,
+) -> Option<Input> {
+    match material.parameters().get(name)? {
+        Value::Text(attribute) => {
+            let source = Source::of(attribute, geometry, instance);
+            if source.is_none() {
+                notes.error(
+                    material,
+                    format!("`{name}` is \"{attribute}\", which is no attribute; use one of {NAMES:?}"),
+                );
+            }
+            source.map(Input::Attribute)
+        }
+        Value::Object(sampler) => Sampler::of(sampler, geometry, instance, notes).map(Input::Sampler),
+        Value::Bytes(..) | Value::Pointer(..) => None,
+    }
+}
+
+/// What varies besides colour and opacity on `geometry` in `instance`; `None` for nothing.
+pub(crate) fn grain_of(
+    material: &Object,
+    geometry: &Object,
+    instance: Option<&Object>,
+    notes: &mut Notes,
+) -> Option<Grain> {
+    if material.subtype != "physicallyBased" {
+        return None;
+    }
+    let mut input = |name: &str| varying(material, name, geometry, instance, notes);
+    let grain = Grain {
+        metallic: input("metallic"),
+        roughness: input("roughness"),
+        specular: input("specular"),
+        emissive: input("emissive"),
+        occlusion: input("occlusion"),
+        normal: match input("normal") {
+            Some(Input::Sampler(sampler)) => Some(sampler),
+            _ => None,
+        },
+        normal_reflectance: normal_reflectance(ior_of(material).unwrap_or(1.5)),
+    };
+    grain.varies().then_some(grain)
+}
+
 /// Where colour and opacity come from on `geometry` in `instance`.
 pub(crate) fn paint_of(
     material: &Object,
@@ -67,25 +131,10 @@ pub(crate) fn paint_of(
     let name = if material.subtype == "physicallyBased" { "baseColor" } else { "color" };
     let default = if material.subtype == "physicallyBased" { [1.0; 4] } else { [0.8, 0.8, 0.8, 1.0] };
     let mut input = |name: &str, default: [f32; 4]| {
-        let found = match material.parameters().get(name) {
-            None => return Input::Constant(default),
-            Some(Value::Bytes(t, b)) => return Input::Constant(t.attribute(b)),
-            Some(Value::Text(attribute)) => {
-                let source = Source::of(attribute, geometry, instance);
-                if source.is_none() {
-                    notes.error(
-                        material,
-                        format!("`{name}` is \"{attribute}\", which is no attribute; use one of {NAMES:?}"),
-                    );
-                }
-                source.map(Input::Attribute)
-            }
-            Some(Value::Object(sampler)) => {
-                Sampler::of(sampler, geometry, instance, notes).map(Input::Sampler)
-            }
-            Some(Value::Pointer(..)) => None,
-        };
-        found.unwrap_or(Input::Constant(default))
+        if let Some(Value::Bytes(t, b)) = material.parameters().get(name) {
+            return Input::Constant(t.attribute(b));
+        }
+        varying(material, name, geometry, instance, notes).unwrap_or(Input::Constant(default))
     };
     let (color, opacity) = (input(name, default), input("opacity", [1.0; 4]));
     let mode = match material.text("alphaMode").as_deref() {

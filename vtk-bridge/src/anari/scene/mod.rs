@@ -4,6 +4,7 @@ pub mod attribute;
 mod camera;
 mod dress;
 mod geometry;
+mod grain;
 mod light;
 mod material;
 mod paint;

@@ -78,6 +78,17 @@ pub(crate) enum Weights {
     Corners,
 }
 
+impl Weights {
+    /// Weights of the vertices at a hit with the numbers `u` and `v`.
+    pub(crate) fn of(self, [u, v]: [f32; 2]) -> [f32; 3] {
+        match self {
+            Weights::First => [1.0, 0.0, 0.0],
+            Weights::Along => [1.0 - u, u, 0.0],
+            Weights::Corners => [1.0 - u - v, u, v],
+        }
+    }
+}
+
 /// A shape with painted hits.
 pub(crate) struct Painted {
     pub(crate) shape: Arc<dyn Shape>,
@@ -110,11 +121,7 @@ impl Shape for Painted {
 
     fn surface(&self, prim: u32, hit: &ShapeHit, ray: &Ray) -> ShapeSurface {
         let surface = self.shape.surface(prim, hit, ray);
-        let weights = match self.weights {
-            Weights::First => [1.0, 0.0, 0.0],
-            Weights::Along => [1.0 - hit.u, hit.u, 0.0],
-            Weights::Corners => [1.0 - hit.u - hit.v, hit.u, hit.v],
-        };
+        let weights = self.weights.of([hit.u, hit.v]);
         let place = Place {
             topology: &self.topology,
             primitive: prim,

@@ -31,6 +31,9 @@ struct Image {
     dimensions: usize,
     texels: Vec<[f32; 4]>,
     wrap: [Wrap; 3],
+    /// Dimensions outside of which there is `border_color`.
+    border: [bool; 3],
+    border_color: [f32; 4],
     filter: Filter,
     in_transform: DMat4,
     in_offset: DVec4,
@@ -110,11 +113,16 @@ impl Sampler {
             Step::Nothing => self.input.domain(),
             Step::Primitive { .. } => Domain::Face,
             Step::Image(image) => match self.input.domain() {
-                Domain::Linear if image.dimensions < 3 && image.is_affine() => Domain::Texture,
+                Domain::Linear if image.fits_a_texture() => Domain::Texture,
                 Domain::Linear => Domain::Hit,
                 other => other,
             },
         }
+    }
+
+    /// The attribute that it looks at.
+    pub(crate) fn attribute(&self, p: &Place<'_>) -> [f32; 4] {
+        self.input.at(p)
     }
 
     /// The renderer's texture, with `finish` applied to every texel, for domain [`Domain::Texture`].
@@ -155,23 +163,19 @@ fn image(sampler: &Object, notes: &mut Notes) -> Option<Image> {
         notes.error(sampler, "`image` is not set or has no texels, so there is nothing to sample");
         return None;
     };
-    let mut wrap = |name: &str| match sampler.text(name).as_deref() {
-        None | Some("clampToEdge") => Wrap::Clamp,
-        Some("repeat") => Wrap::Repeat,
-        Some("mirrorRepeat") => Wrap::Mirror,
-        Some(other) => {
-            notes.warn(
-                sampler,
-                format!("`{name}` is \"{other}\", which this device does not have; \"clampToEdge\" is used"),
-            );
-            Wrap::Clamp
+    let names: &[&str] =
+        if dimensions == 1 { &["wrapMode"] } else { &["wrapMode1", "wrapMode2", "wrapMode3"] };
+    let (mut wrap, mut border) = ([Wrap::Clamp; 3], [false; 3]);
+    for (d, name) in names.iter().enumerate().take(dimensions) {
+        // The schema lets nothing else through.
+        match sampler.text(name).as_deref() {
+            Some("repeat") => wrap[d] = Wrap::Repeat,
+            Some("mirrorRepeat") => wrap[d] = Wrap::Mirror,
+            Some("clampToBorder") => border[d] = true,
+            _ => {}
         }
-    };
-    let wrap = match dimensions {
-        1 => [wrap("wrapMode"), Wrap::Clamp, Wrap::Clamp],
-        2 => [wrap("wrapMode1"), wrap("wrapMode2"), Wrap::Clamp],
-        _ => [wrap("wrapMode1"), wrap("wrapMode2"), wrap("wrapMode3")],
-    };
+    }
+    let border_color = sampler.vector("borderColor", [0.0; 4]).map(|v| v as f32);
     let filter =
         if sampler.text("filter").as_deref() == Some("nearest") { Filter::Nearest } else { Filter::Bilinear };
     let in_offset = DVec4::from_array(sampler.vector("inOffset", [0.0; 4]));
@@ -180,6 +184,8 @@ fn image(sampler: &Object, notes: &mut Notes) -> Option<Image> {
         dimensions,
         texels,
         wrap,
+        border,
+        border_color,
         filter,
         in_transform: matrix(sampler, "inTransform"),
         in_offset,
@@ -188,8 +194,9 @@ fn image(sampler: &Object, notes: &mut Notes) -> Option<Image> {
 
 impl Image {
     /// Matrices are applied to the attribute without division by its fourth component, so coordinates are linear wherever the attribute is.
-    fn is_affine(&self) -> bool {
-        self.in_transform.is_finite() && self.in_offset.is_finite()
+    fn fits_a_texture(&self) -> bool {
+        let affine = self.in_transform.is_finite() && self.in_offset.is_finite();
+        affine && self.dimensions < 3 && self.border == [false; 3]
     }
 
     fn coordinate(&self, attribute: [f32; 4]) -> DVec4 {
@@ -213,15 +220,22 @@ impl Image {
         for corner in 0..1usize << self.dimensions {
             let mut weight = 1.0;
             let mut index = [0usize; 3];
+            let mut outside = false;
             for d in 0..self.dimensions {
                 let up = corner >> d & 1;
                 weight *= if up == 1 { part[d] } else { 1.0 - part[d] };
-                index[d] = place(low[d] + up as i64, self.dims[d], self.wrap[d]);
+                let i = low[d] + up as i64;
+                outside |= self.border[d] && !(0..self.dims[d] as i64).contains(&i);
+                index[d] = place(i, self.dims[d], self.wrap[d]);
             }
             if weight == 0.0 {
                 continue;
             }
-            let texel = self.texels[(index[2] * self.dims[1] + index[1]) * self.dims[0] + index[0]];
+            let texel = if outside {
+                self.border_color
+            } else {
+                self.texels[(index[2] * self.dims[1] + index[1]) * self.dims[0] + index[0]]
+            };
             (0..4).for_each(|k| sum[k] += weight * f64::from(texel[k]));
         }
         sum.map(|v| v as f32)
@@ -249,7 +263,18 @@ mod tests {
     fn ramp(dims: [usize; 3], dimensions: usize, wrap: Wrap, filter: Filter) -> Image {
         let texels = (0..dims.iter().product()).map(|i| [i as f32, 0.0, 0.0, 1.0]).collect();
         let (in_transform, in_offset) = (DMat4::IDENTITY, DVec4::ZERO);
-        Image { dims, dimensions, texels, wrap: [wrap; 3], filter, in_transform, in_offset }
+        let (border, border_color) = ([false; 3], [0.0; 4]);
+        Image {
+            dims,
+            dimensions,
+            texels,
+            wrap: [wrap; 3],
+            border,
+            border_color,
+            filter,
+            in_transform,
+            in_offset,
+        }
     }
 
     #[test]

@@ -7,7 +7,7 @@ use rt_core::colormap::ColorMap;
 use rt_core::glam::{DVec3, UVec3};
 use rt_core::grid::Grid;
 use rt_core::transfer_function::TransferFunction;
-use rt_core::volume::{Volume, VolumeOptions};
+use rt_core::volume::{Interpolation, Volume, VolumeOptions};
 use std::sync::Arc;
 
 /// The field's grid; `None`, with a note, when it cannot be used.
@@ -20,12 +20,6 @@ pub(crate) fn grid_of(field: &Object, notes: &mut Notes) -> Option<Arc<Grid>> {
         notes.error(field, "`data` is not set; set it to a three-dimensional array and commit");
         return None;
     };
-    if field.text("filter").is_some_and(|f| f != "linear") {
-        notes.warn(
-            field,
-            "`filter` is not \"linear\", which is all this device has: it interpolates linearly",
-        );
-    }
     let origin = DVec3::from_array(field.vector("origin", [0.0; 3]));
     let spacing = DVec3::from_array(field.vector("spacing", [1.0; 3]));
     match Grid::new(UVec3::from_array(dims.map(|d| d as u32)), origin, spacing, values) {
@@ -35,6 +29,11 @@ pub(crate) fn grid_of(field: &Object, notes: &mut Notes) -> Option<Arc<Grid>> {
             None
         }
     }
+}
+
+/// Whether the field has the value of the nearest grid point everywhere.
+pub(crate) fn is_nearest(field: &Object) -> bool {
+    field.text("filter").as_deref() == Some("nearest")
 }
 
 /// The volume's medium; `None`, with a note, when it cannot be used.
@@ -83,9 +82,11 @@ pub(crate) fn volume_of(volume: &Object, notes: &mut Notes) -> Option<Arc<Volume
         .collect();
     let unit = volume.f32("unitDistance", 1.0);
     let transfer = TransferFunction::from_opacity(ColorMap::new(colors, [low, high]), &points, unit);
+    let interpolation = if is_nearest(&field) { Interpolation::Nearest } else { Interpolation::Linear };
+    let options = VolumeOptions { interpolation, ..VolumeOptions::default() };
     let made = transfer
         .map_err(|e| e.to_string())
-        .and_then(|t| Volume::new(grid, t, VolumeOptions::default()).map_err(|e| e.to_string()));
+        .and_then(|t| Volume::new(grid, t, options).map_err(|e| e.to_string()));
     match made {
         Ok(volume) => Some(Arc::new(volume)),
         Err(e) => {

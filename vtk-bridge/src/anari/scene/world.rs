@@ -6,9 +6,9 @@
 use super::Notes;
 use super::attribute::{SLOTS, Topology};
 use super::dress::{Dressed, dress};
-use super::geometry::{Prepared, is_look, prepare, union};
+use super::geometry::{Part, Prepared, is_look, prepare, union};
 use super::light::{Made, light_of};
-use super::material::{model_of, names_the_world, paint_of};
+use super::material::{grain_of, model_of, names_the_world, paint_of};
 use super::volume::volume_of;
 use crate::anari::data_type::DataType;
 use crate::anari::object::{Extra, Object, Value};
@@ -245,7 +245,19 @@ impl Making<'_> {
         let dressed = kept(&self.old.dressed, &mut self.cache.dressed, key, || {
             let model = model_of(&material, notes);
             let paint = paint_of(&material, &geometry, spot.instance, notes);
-            prepared.parts.iter().map(|part| dress(part, &model, &paint, &spot.world_from_object)).collect()
+            let grain = grain_of(&material, &geometry, spot.instance, notes);
+            if grain.as_ref().is_some_and(|g| g.normal.is_some()) && !prepared.parts.iter().all(Part::is_mesh)
+            {
+                notes.warn(
+                    &material,
+                    format!(
+                        "`normal` is left out on {}: only triangles and quads have tangents",
+                        geometry.title()
+                    ),
+                );
+            }
+            let place = &spot.world_from_object;
+            prepared.parts.iter().map(|part| dress(part, &model, &paint, grain.as_ref(), place)).collect()
         });
         let object = surface.u32("id", u32::MAX);
         for d in dressed.iter() {

@@ -4,6 +4,8 @@ use super::{COLORS, DataType, ObjectSchema, Parameter};
 
 const VEC4: &[DataType] = &[DataType::FLOAT32_VEC4];
 const NORMALS: &[DataType] = &[DataType::FLOAT32_VEC3, DataType::FIXED16_VEC3];
+const TANGENTS: &[DataType] =
+    &[DataType::FLOAT32_VEC4, DataType::FLOAT32_VEC3, DataType::FIXED16_VEC3, DataType::FIXED16_VEC4];
 const POSITIONS: &[DataType] = &[DataType::FLOAT32_VEC3];
 const RADII: &[DataType] = &[DataType::FLOAT32];
 const CAPS: &[&str] = &["none", "first", "second", "both"];
@@ -34,6 +36,12 @@ const VERTEX: &[Parameter] = &[
 ];
 
 const POLYGON: &[Parameter] = &[
+    Parameter::array(
+        "vertex.tangent",
+        TANGENTS,
+        "direction in which the first coordinate of normal maps grows",
+    ),
+    Parameter::array("faceVarying.tangent", TANGENTS, "the same per corner of each primitive"),
     Parameter::array("vertex.normal", NORMALS, "shading normals per vertex"),
     Parameter::array("faceVarying.normal", NORMALS, "shading normals per corner of each primitive"),
     Parameter::array("faceVarying.color", COLORS, "a colour per corner of each primitive"),

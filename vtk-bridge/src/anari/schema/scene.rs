@@ -1,6 +1,6 @@
 //! Worlds, groups, instances, surfaces, volumes and fields.
 
-use super::{DataType, ObjectSchema, Parameter};
+use super::{COLORS, DataType, ObjectSchema, Parameter};
 
 const VEC4: &[DataType] = &[DataType::FLOAT32_VEC4];
 
@@ -101,8 +101,8 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
             Parameter::new("origin", &[DataType::FLOAT32_VEC3], "place of the first grid point")
                 .floats(&[0.0; 3]),
             Parameter::new("spacing", &[DataType::FLOAT32_VEC3], "distance of grid points").floats(&[1.0; 3]),
-            Parameter::new("filter", &[DataType::STRING], "how scalars are combined")
-                .text("linear", &["linear"]),
+            Parameter::new("filter", &[DataType::STRING], "how scalars are combined, in volumes")
+                .text("linear", &["linear", "nearest"]),
         ]],
     ),
     object(
@@ -119,7 +119,7 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
             )
             .floats(&[0.0, 1.0]),
             Parameter {
-                elements: &[DataType::FLOAT32_VEC3, DataType::FLOAT32_VEC4],
+                elements: COLORS,
                 ..Parameter::new(
                     "color",
                     &[DataType::FLOAT32_VEC3, DataType::FLOAT32_VEC4, DataType::ARRAY1D],

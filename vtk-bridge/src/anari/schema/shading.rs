@@ -32,16 +32,31 @@ const MATTE: &[Parameter] = &[Parameter::new(
 const PHYSICALLY_BASED: &[Parameter] = &[
     Parameter::new("baseColor", COLOR_INPUT, "linear RGB, an attribute's name or a sampler")
         .floats(&[1.0, 1.0, 1.0]),
-    Parameter::new("metallic", FLOAT, "0 dielectric to 1 metal; one number for the surface")
+    Parameter::new("metallic", SCALAR_INPUT, "0 dielectric to 1 metal; a number, attribute or sampler")
         .floats(&[1.0])
         .between(0.0, 1.0),
-    Parameter::new("roughness", FLOAT, "0 mirror to 1 dull; one number for the surface")
+    Parameter::new("roughness", SCALAR_INPUT, "0 mirror to 1 dull; a number, attribute or sampler")
         .floats(&[1.0])
         .between(0.0, 1.0),
-    Parameter::new("emissive", VEC3, "radiance given off, linear RGB").floats(&[0.0, 0.0, 0.0]),
-    Parameter::new("specular", FLOAT, "strength of the dielectric reflection, times that of `ior`")
-        .floats(&[0.0])
-        .between(0.0, 1.0),
+    Parameter::new(
+        "normal",
+        &[DataType::SAMPLER],
+        "normals, 2 rgb - 1 in the frame of tangent, its partner and shading normal",
+    ),
+    Parameter::new(
+        "emissive",
+        COLOR_INPUT,
+        "radiance given off: linear RGB, an attribute's name or a sampler",
+    )
+    .floats(&[0.0, 0.0, 0.0]),
+    Parameter::new("occlusion", &[DataType::SAMPLER], "share of ambient and reflected light that gets in"),
+    Parameter::new(
+        "specular",
+        SCALAR_INPUT,
+        "strength of the dielectric reflection, times that of `ior`; a number, attribute or sampler",
+    )
+    .floats(&[0.0])
+    .between(0.0, 1.0),
     Parameter::new(
         "transmission",
         FLOAT,
@@ -66,6 +81,9 @@ const IN_OUT: &[Parameter] = &[
     Parameter::new("inOffset", &[DataType::FLOAT32_VEC4], "added to the attribute after the matrix")
         .floats(&[0.0; 4]),
     Parameter::new("filter", STRING, "how texels are combined").text("linear", &["nearest", "linear"]),
+    Parameter::new("borderColor", &[DataType::FLOAT32_VEC4], "what lies outside with clampToBorder")
+        .floats(&[0.0; 4])
+        .of("KHR_SAMPLER_IMAGExD_CLAMP_TO_BORDER"),
 ];
 const OUT: &[Parameter] = &[
     Parameter::new("inAttribute", STRING, "the attribute to look up")
@@ -74,7 +92,7 @@ const OUT: &[Parameter] = &[
     Parameter::new("outOffset", &[DataType::FLOAT32_VEC4], "added to the result after the matrix")
         .floats(&[0.0; 4]),
 ];
-const WRAP: &[&str] = &["clampToEdge", "repeat", "mirrorRepeat"];
+const WRAP: &[&str] = &["clampToEdge", "repeat", "mirrorRepeat", "clampToBorder"];
 
 const fn wrap(name: &'static str) -> Parameter {
     Parameter::new(name, STRING, "what lies outside of 0 to 1").text("clampToEdge", WRAP)
@@ -90,6 +108,10 @@ const DIRECTION: Parameter =
 const POSITION: Parameter =
     Parameter::new("position", VEC3, "place in the space of its group or world").floats(&[0.0; 3]);
 const INTENSITY: Parameter = Parameter::new("intensity", FLOAT, "W/sr").floats(&[1.0]);
+const OPENING_ANGLE: Parameter =
+    Parameter::new("openingAngle", FLOAT, "full angle of the cone, radians").floats(&[std::f32::consts::PI]);
+const FALLOFF_ANGLE: Parameter =
+    Parameter::new("falloffAngle", FLOAT, "angle between the rim and full intensity, radians").floats(&[0.1]);
 const POWER: Parameter = Parameter::new("power", FLOAT, "W in all directions; comes before `intensity`");
 
 const fn object(
@@ -188,17 +210,26 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
         "spot",
         "KHR_LIGHT_SPOT",
         "a cone of light",
+        &[LIGHT, &[POSITION, DIRECTION, OPENING_ANGLE, FALLOFF_ANGLE, INTENSITY, POWER]],
+    ),
+    object(
+        DataType::LIGHT,
+        "quad",
+        "KHR_LIGHT_QUAD",
+        "a parallelogram that shines with the cosine to its normal",
         &[
             LIGHT,
             &[
-                POSITION,
-                DIRECTION,
-                Parameter::new("openingAngle", FLOAT, "full angle of the cone, radians")
-                    .floats(&[std::f32::consts::PI]),
-                Parameter::new("falloffAngle", FLOAT, "angle between the rim and full intensity, radians")
-                    .floats(&[0.1]),
+                Parameter::new("position", VEC3, "a corner, in the space of its group or world")
+                    .floats(&[0.0; 3]),
+                Parameter::new("edge1", VEC3, "from there to a neighbouring corner").floats(&[1.0, 0.0, 0.0]),
+                Parameter::new("edge2", VEC3, "from there to the other neighbouring corner")
+                    .floats(&[0.0, 1.0, 0.0]),
+                Parameter::new("side", STRING, "which side shines; the front is where edge1 x edge2 points")
+                    .text("front", &["front", "back", "both"]),
                 INTENSITY,
                 POWER,
+                Parameter::new("radiance", FLOAT, "W/(sr m²); comes before the others"),
             ],
         ],
     ),
@@ -206,13 +237,16 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
         DataType::LIGHT,
         "ring",
         "KHR_LIGHT_RING",
-        "a disk that shines to one side, with the cosine to its normal",
+        "a ring or disk that shines to one side, with the cosine to its normal",
         &[
             LIGHT,
             &[
                 POSITION,
                 DIRECTION,
-                Parameter::new("radius", FLOAT, "radius of the disk").floats(&[0.0]),
+                OPENING_ANGLE,
+                FALLOFF_ANGLE,
+                Parameter::new("radius", FLOAT, "radius of the ring").floats(&[0.0]),
+                Parameter::new("innerRadius", FLOAT, "radius of its hole").floats(&[0.0]),
                 INTENSITY,
                 POWER,
                 Parameter::new("radiance", FLOAT, "W/(sr m²); comes before the others when it has a radius"),

@@ -7,7 +7,7 @@ const VEC3: &[DataType] = &[DataType::FLOAT32_VEC3];
 const COUNT: &[DataType] = &[DataType::INT32, DataType::UINT32];
 const FLAG: &[DataType] = &[DataType::BOOL];
 
-const CAMERA: &[Parameter] = &[
+const EYE: &[Parameter] = &[
     Parameter::new("position", VEC3, "place of the eye").floats(&[0.0; 3]),
     Parameter::new("direction", VEC3, "viewing direction").floats(&[0.0, 0.0, -1.0]),
     Parameter::new("up", VEC3, "which way the picture's top is").floats(&[0.0, 1.0, 0.0]),
@@ -17,6 +17,9 @@ const CAMERA: &[Parameter] = &[
         "part of the picture that fills the frame, from the lower left",
     )
     .floats(&[0.0, 0.0, 1.0, 1.0]),
+];
+
+const CAMERA: &[Parameter] = &[
     Parameter::new("aspect", FLOAT, "width over height; that of the frame when not set"),
     Parameter::new("near", FLOAT, "what is nearer than this is cut away; nothing when not set"),
     Parameter::new("far", FLOAT, "what is farther than this is cut away; nothing when not set"),
@@ -126,6 +129,7 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
         "KHR_CAMERA_PERSPECTIVE",
         "a pinhole or thin lens",
         &[
+            EYE,
             CAMERA,
             &[
                 Parameter::new("fovy", FLOAT, "vertical angle of view, radians")
@@ -144,7 +148,22 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
         "orthographic",
         "KHR_CAMERA_ORTHOGRAPHIC",
         "parallel projection",
-        &[CAMERA, &[Parameter::new("height", FLOAT, "height of the picture in the world").floats(&[1.0])]],
+        &[
+            EYE,
+            CAMERA,
+            &[Parameter::new("height", FLOAT, "height of the picture in the world").floats(&[1.0])],
+        ],
+    ),
+    object(
+        DataType::CAMERA,
+        "omnidirectional",
+        "KHR_CAMERA_OMNIDIRECTIONAL",
+        "a panorama: longitude by latitude",
+        &[
+            EYE,
+            &[Parameter::new("layout", &[DataType::STRING], "how the directions are spread")
+                .text("equirectangular", &["equirectangular"])],
+        ],
     ),
     object(
         DataType::RENDERER,

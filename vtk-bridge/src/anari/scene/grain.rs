@@ -1,0 +1,96 @@
+//! What varies over a surface besides colour and opacity, looked up at the hits: numbers, emission, bent normals.
+
+use super::attribute::{Place, Topology};
+use super::paint::{Input, Weights};
+use super::sampler::Sampler;
+use rt_core::detail::{Detail, DetailPlace, Finish};
+use rt_core::glam::{DAffine3, Vec2, Vec3};
+use rt_core::mesh::TriMesh;
+use std::sync::Arc;
+
+/// Inputs of a physically based material that are no numbers.
+#[derive(Clone)]
+pub(crate) struct Grain {
+    pub(crate) metallic: Option<Input>,
+    pub(crate) roughness: Option<Input>,
+    pub(crate) specular: Option<Input>,
+    pub(crate) emissive: Option<Input>,
+    pub(crate) occlusion: Option<Input>,
+    pub(crate) normal: Option<Sampler>,
+    /// What `specular` is a factor on.
+    pub(crate) normal_reflectance: f32,
+}
+
+impl Grain {
+    pub(crate) fn varies(&self) -> bool {
+        let inputs = [&self.metallic, &self.roughness, &self.specular, &self.emissive, &self.occlusion];
+        inputs.into_iter().any(Option::is_some) || self.normal.is_some()
+    }
+}
+
+/// The grain of a geometry.
+pub(crate) struct Grained {
+    pub(crate) grain: Grain,
+    pub(crate) topology: Arc<Topology>,
+    pub(crate) weights: Weights,
+    /// The triangles, also where they are drawn as a shape.
+    pub(crate) mesh: Option<Arc<TriMesh>>,
+    pub(crate) world_from_object: DAffine3,
+}
+
+impl std::fmt::Debug for Grained {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Grained").field("weights", &self.weights).finish_non_exhaustive()
+    }
+}
+
+impl Detail for Grained {
+    fn finish(&self, base: Finish, place: &DetailPlace<'_>) -> Finish {
+        let here = Place {
+            topology: &self.topology,
+            primitive: place.primitive,
+            weights: self.weights.of(place.uv),
+            point: place.point,
+            normal: place.object_normal.as_dvec3(),
+            world_from_object: &self.world_from_object,
+        };
+        let g = &self.grain;
+        let first = |input: &Option<Input>, other: f32| input.as_ref().map_or(other, |i| i.at(&here)[0]);
+        let mut out = Finish {
+            metallic: first(&g.metallic, base.metallic),
+            roughness: first(&g.roughness, base.roughness),
+            specular: g.specular.as_ref().map_or(base.specular, |i| i.at(&here)[0] * g.normal_reflectance),
+            ambient: first(&g.occlusion, base.ambient),
+            ..base
+        };
+        if let Some(emissive) = &g.emissive {
+            let [r, g, b, _] = emissive.at(&here);
+            out.emission = Vec3::new(r, g, b);
+        }
+        if let Some(normal) = g.normal.as_ref().and_then(|s| self.bent(s, &here, place)) {
+            out.normal = normal;
+        }
+        out
+    }
+}
+
+impl Grained {
+    /// The frame is that of the mesh's tangents, else that in which the sampler's attribute grows along the triangle.
+    fn bent(&self, sampler: &Sampler, here: &Place<'_>, place: &DetailPlace<'_>) -> Option<Vec3> {
+        let mesh = self.mesh.as_ref()?;
+        let place = place.on(mesh);
+        let frame = if mesh.tangents.is_some() {
+            place.tangent()?
+        } else {
+            let corner = |k: usize| {
+                let mut weights = [0.0; 3];
+                weights[k] = 1.0;
+                let [u, v, ..] = sampler.attribute(&Place { weights, ..*here });
+                Vec2::new(u, v)
+            };
+            place.tangent_of([corner(0), corner(1), corner(2)])?
+        };
+        let [r, g, b, _] = sampler.at(here);
+        place.bent(frame, (Vec3::new(r, g, b) * 2.0 - 1.0).try_normalize()?)
+    }
+}
