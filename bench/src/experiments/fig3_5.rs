@@ -104,7 +104,8 @@ fn measure(
 ) -> anyhow::Result<()> {
     let all: Vec<(&str, Who)> =
         ALL.into_iter().filter(|(_, w)| icet.is_some() || matches!(w, Who::Ours(_))).collect();
-    let results = simulated(Network::QDR_AS_SMPI, ranks, |mut comm| one_rank(&mut comm, &all, size, frames, icet))?;
+    let results =
+        simulated(Network::QDR_AS_SMPI, ranks, |mut comm| one_rank(&mut comm, &all, size, frames, icet))?;
     // By compositor and frame: the slowest rank.
     let secs = |k: usize, f: usize| results.iter().map(|r| r.secs[k][f]).fold(0.0, f64::max);
     for (k, (name, _)) in all.iter().enumerate() {

@@ -49,7 +49,12 @@ pub(crate) const EXCEPTIONS: &[Exception] = &[
         Some(SHADED),
         "at the bounds of the grid OpenGL takes its gradient from clamped texels, which is half of the difference across",
     ),
-    ("volume_blends", "isosurfaces", Some(GRAZED), "OpenGL's steps pass by where a ray only grazes a surface"),
+    (
+        "volume_blends",
+        "isosurfaces",
+        Some(GRAZED),
+        "OpenGL's steps pass by where a ray only grazes a surface",
+    ),
     ("volume_blends", "isosurfaces_shaded", Some(GRAZED), "as isosurfaces and shaded volumes"),
     ("volume_lights", "three", Some(SHADED), "as shaded volumes"),
     ("volume_lights", "one_beside", Some(SHADED), "as shaded volumes"),

@@ -45,8 +45,11 @@ impl Network {
     };
 
     /// The same with SimGrid's corrections, to compare times with those under SMPI.
-    pub const QDR_AS_SMPI: Network =
-        Network { name: "QDR InfiniBand, 3.2 GB/s, with SMPI's corrections", corrections: SMPI, ..Network::QDR };
+    pub const QDR_AS_SMPI: Network = Network {
+        name: "QDR InfiniBand, 3.2 GB/s, with SMPI's corrections",
+        corrections: SMPI,
+        ..Network::QDR
+    };
 
     /// 4X HDR InfiniBand: 24 GB/s.
     pub const HDR: Network = Network {
@@ -67,8 +70,14 @@ impl Network {
     };
 
     /// No costs: for what is left when messages are free.
-    pub const FREE: Network =
-        Network { name: "free", overhead_secs: 0.0, latency_secs: 0.0, gap_secs: 0.0, byte_secs: 0.0, corrections: &[] };
+    pub const FREE: Network = Network {
+        name: "free",
+        overhead_secs: 0.0,
+        latency_secs: 0.0,
+        gap_secs: 0.0,
+        byte_secs: 0.0,
+        corrections: &[],
+    };
 
     /// Factors of latency and of seconds per byte for a message.
     pub(super) fn factors(&self, bytes: usize) -> (f64, f64) {

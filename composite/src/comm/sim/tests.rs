@@ -1,8 +1,14 @@
 use super::*;
 
 const LONG: Duration = Duration::from_secs(1000);
-const NETWORK: Network =
-    Network { name: "test", overhead_secs: 1.0, latency_secs: 10.0, gap_secs: 0.0, byte_secs: 0.5, corrections: &[] };
+const NETWORK: Network = Network {
+    name: "test",
+    overhead_secs: 1.0,
+    latency_secs: 10.0,
+    gap_secs: 0.0,
+    byte_secs: 0.5,
+    corrections: &[],
+};
 
 fn results<T: Send>(size: usize, work: impl Fn(SimComm) -> T + Sync) -> Vec<T> {
     run(size, NETWORK, Compute::Given, work).into_iter().map(Result::unwrap).collect()
