@@ -251,8 +251,7 @@ pub(super) fn slab(draw: &Draw, z: DVec4) -> [[f64; 4]; 2] {
         let pick = |bit: i32, k: usize| f64::from(if corner & bit == 0 { b.min[k] } else { b.max[k] });
         z.dot(DVec4::new(pick(1, 0), pick(2, 1), pick(4, 2), 1.0))
     };
-    let (lo, hi) =
-        (0..8).map(at).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    let (lo, hi) = (0..8).map(at).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
     let more = 1e-3 * (hi - lo) + 1e-6 * (hi.abs() + lo.abs());
     [(z - DVec4::W * (lo - more)).to_array(), (DVec4::W * (hi + more) - z).to_array()]
 }
