@@ -112,7 +112,7 @@ fn steep_normal_maps_leave_no_black_points() {
         let mut options = RenderOptions::new(1, 1);
         (options.samples, options.path_tracing) = (256, true);
         let red = draw(&s, &top_camera(5.0, 0.001), options).frame.color_at(0, 0)[0];
-        assert!(red > 0.2, "roughness {roughness}: {red}");
+        assert!(red > 0.15, "roughness {roughness}: {red}");
     }
 }
 
