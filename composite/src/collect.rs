@@ -37,7 +37,8 @@ impl<P: Composite> Collector<P> {
         spare: Option<Image<P>>,
     ) -> Result<Self, CompositeError> {
         let depths = depths && P::HAS_DEPTH;
-        let mut collector = Self { root, depths, outstanding: Vec::new(), image: None, kept: Vec::new(), wide: Vec::new() };
+        let mut collector =
+            Self { root, depths, outstanding: Vec::new(), image: None, kept: Vec::new(), wide: Vec::new() };
         if root != Some(session.place) {
             return Ok(collector);
         }

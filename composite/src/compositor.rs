@@ -195,7 +195,9 @@ impl<P: Composite> Compositor<P> {
         }
 
         // Ranks of one machine.
-        if let Some(root) = places.root.filter(|_| shares && in_memory::is_possible::<P>(&mut session, size_px)) {
+        if let Some(root) =
+            places.root.filter(|_| shares && in_memory::is_possible::<P>(&mut session, size_px))
+        {
             let spare = self.spare.take();
             let view = frame.view(drawn);
             let done = in_memory::run(&mut session, &view, size_px, root, options.depth, spare, kernels)?;

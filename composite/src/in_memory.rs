@@ -64,7 +64,11 @@ impl Bands {
     }
 
     /// Colours and depths of a band.
-    fn split<'a, P: Composite>(&self, band: usize, bytes: &'a mut [u8]) -> (&'a mut [P::Color], &'a mut [f32]) {
+    fn split<'a, P: Composite>(
+        &self,
+        band: usize,
+        bytes: &'a mut [u8],
+    ) -> (&'a mut [P::Color], &'a mut [f32]) {
         let colors = self.rows(band).len() * self.width * size_of::<P::Color>();
         let (colors, depths) = bytes.split_at_mut(colors);
         (bytemuck::cast_slice_mut(colors), bytemuck::cast_slice_mut(depths))
@@ -72,7 +76,10 @@ impl Bands {
 }
 
 /// Whether this frame can be merged in shared memory; the same on all ranks. They have met.
-pub(crate) fn is_possible<P: Composite>(session: &mut Session<'_>, (width_px, height_px): (u32, u32)) -> bool {
+pub(crate) fn is_possible<P: Composite>(
+    session: &mut Session<'_>,
+    (width_px, height_px): (u32, u32),
+) -> bool {
     let laid: usize = session.drawn.iter().map(|rect| rect.pixels() * P::BYTES).sum();
     let image = Rect::of_size(width_px, height_px).pixels() * P::BYTES;
     laid.saturating_add(image) <= MOST_BYTES && session.comm.node_memory().is_some()

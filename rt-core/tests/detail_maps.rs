@@ -103,7 +103,8 @@ fn steep_normal_maps_leave_no_black_points() {
     let n = Vec3::new(0.8, 0.0, 0.6);
     let maps = SurfaceMaps { normal: bend(n), ..SurfaceMaps::new(MapConvention::Gltf) };
     for roughness in [0.0, 0.3] {
-        let m = Material::pbr([1.0; 3], 1.0, roughness).with_detail(Arc::new(maps.clone()) as Arc<dyn Detail>);
+        let m =
+            Material::pbr([1.0; 3], 1.0, roughness).with_detail(Arc::new(maps.clone()) as Arc<dyn Detail>);
         let mut b = SceneBuilder::new();
         b.mesh(sheet(1.0), m);
         b.environment = Some(rt_core::environment::Environment::Constant([0.5; 3]));

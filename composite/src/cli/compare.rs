@@ -195,7 +195,8 @@ mod tests {
         for given in ["--ranks 2,4", "--ranks=2,4", "-n 2,4", "-n2,4", "-n=2,4 --json"] {
             let words = format!("compare --mpi {given} --size 64,128");
             let arguments: Vec<OsString> = words.split(' ').map(OsString::from).collect();
-            let expected: Vec<OsString> = "compare --mpi --size 64,128 --json --ranks=4".split(' ').map(OsString::from).collect();
+            let expected: Vec<OsString> =
+                "compare --mpi --size 64,128 --json --ranks=4".split(' ').map(OsString::from).collect();
             assert_eq!(of_one_count(4, &arguments), expected, "{given}");
         }
     }

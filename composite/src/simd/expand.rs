@@ -113,7 +113,8 @@ pub(crate) fn join_row<P: Composite, S: Simd>(
         // Rows that end within the word, as those of slabs do, have fewer lanes for vectors.
         let mut word = word;
         if word != u64::MAX {
-            let lanes = join_by_vectors::<P, S>(simd, row, taken, word, first, held_colors, held_depths, side);
+            let lanes =
+                join_by_vectors::<P, S>(simd, row, taken, word, first, held_colors, held_depths, side);
             let done = if lanes == 64 { word } else { word & !(u64::MAX << lanes) };
             taken += done.count_ones() as usize;
             word ^= done;

@@ -39,7 +39,8 @@ pub(crate) fn drop_full_alpha<S: Simd>(simd: S, out: &mut Vec<u8>, start: usize)
 
 /// [`drop_full_alpha`] without vector types: two colours in a word of 64 bits.
 pub(crate) fn drop_full_alpha_scalar(out: &mut Vec<u8>, start: usize) -> bool {
-    let all = out[start..].as_chunks::<4>().0.iter().fold(u32::MAX, |all, color| all & u32::from_le_bytes(*color));
+    let all =
+        out[start..].as_chunks::<4>().0.iter().fold(u32::MAX, |all, color| all & u32::from_le_bytes(*color));
     if all >> 24 != 255 {
         return false;
     }
@@ -95,7 +96,10 @@ pub(crate) fn give_full_alpha_scalar(narrow: &[u8], wide: &mut Vec<u8>) {
     let mut done = 0;
     for two in wide.as_chunks_mut::<8>().0 {
         // Eight bytes are loaded for six.
-        let Some(bytes) = narrow.get(3 * done..3 * done + 8).and_then(|bytes| bytes.first_chunk::<8>()) else { break };
+        let Some(bytes) = narrow.get(3 * done..3 * done + 8).and_then(|bytes| bytes.first_chunk::<8>())
+        else {
+            break;
+        };
         let six = u64::from_le_bytes(*bytes);
         *two = (six & 0xff_ffff | six << 8 & 0xff_ffff << 32 | 0xff00_0000_ff00_0000).to_le_bytes();
         done += 2;

@@ -135,7 +135,12 @@ pub(crate) fn volumes() -> Vec<Case> {
         let colors = ColorMap::new(vec![[0.1, 0.2, 0.9, 1.0], [1.0, 0.8, 0.1, 1.0]], [0.0, 1.0]);
         let transfer =
             TransferFunction::from_opacity(colors, &[[0.2, 0.0], [0.6, 0.3], [1.0, 0.9]], 0.4).unwrap();
-        Volume::new(grid().into(), transfer, VolumeOptions { shading, interpolation, ..VolumeOptions::default() }).unwrap()
+        Volume::new(
+            grid().into(),
+            transfer,
+            VolumeOptions { shading, interpolation, ..VolumeOptions::default() },
+        )
+        .unwrap()
     };
     let shading = VolumeShading {
         ambient: 0.3,

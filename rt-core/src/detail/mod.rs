@@ -60,8 +60,21 @@ impl DetailPlace<'_> {
 
     /// The same place, seen as one of `mesh`: for shapes that stand for a mesh's triangles, with the same primitives and hits.
     pub fn on<'m>(&self, mesh: &'m TriMesh) -> DetailPlace<'m> {
-        let DetailPlace { primitive, uv, point, object_normal, turned, linear, outer, view, face_normal, .. } = *self;
-        DetailPlace { primitive, uv, point, object_normal, turned, mesh: Some(mesh), linear, outer, view, face_normal }
+        let DetailPlace {
+            primitive, uv, point, object_normal, turned, linear, outer, view, face_normal, ..
+        } = *self;
+        DetailPlace {
+            primitive,
+            uv,
+            point,
+            object_normal,
+            turned,
+            mesh: Some(mesh),
+            linear,
+            outer,
+            view,
+            face_normal,
+        }
     }
 
     /// A direction along the surface, in the geometry's coordinates, as one in world axes (of any length).

@@ -167,8 +167,10 @@ impl MpiComm {
             node: None,
         };
         #[cfg(target_os = "linux")]
-        comm.share_memory()
-            .map_err(|error| MpiError::Call { call: "the first all-gather".to_string(), reason: error.to_string() })?;
+        comm.share_memory().map_err(|error| MpiError::Call {
+            call: "the first all-gather".to_string(),
+            reason: error.to_string(),
+        })?;
         Ok(comm)
     }
 
@@ -189,7 +191,9 @@ impl MpiComm {
         };
         let node = match made {
             Some((node, _)) => Some(node),
-            None if self.one_node && address != [0; 3] => node::Node::join(self.rank, self.size, address).ok(),
+            None if self.one_node && address != [0; 3] => {
+                node::Node::join(self.rank, self.size, address).ok()
+            }
             None => None,
         };
         let said = collective::all_gather(self, &[u8::from(node.is_some())], 1, START)?;
@@ -234,7 +238,11 @@ impl MpiComm {
             if now.duration_since(begin) >= timeout {
                 self.hear()?;
                 let missing = node.missing().unwrap_or(rank);
-                return Err(CommError::BarrierTimeout { rank, missing, waited_ms: timeout.as_millis() as u64 });
+                return Err(CommError::BarrierTimeout {
+                    rank,
+                    missing,
+                    waited_ms: timeout.as_millis() as u64,
+                });
             }
         }
     }

@@ -51,9 +51,8 @@ impl Mapping {
         }
         let flags = if fill { MapFlags::SHARED | MapFlags::POPULATE } else { MapFlags::SHARED };
         // SAFETY: a new mapping at an address that the system chooses.
-        let at = unsafe {
-            mmap(std::ptr::null_mut(), bytes, ProtFlags::READ | ProtFlags::WRITE, flags, file, 0)
-        }?;
+        let at =
+            unsafe { mmap(std::ptr::null_mut(), bytes, ProtFlags::READ | ProtFlags::WRITE, flags, file, 0) }?;
         Ok(Self { at: at.cast(), bytes })
     }
 
@@ -67,7 +66,10 @@ impl Mapping {
 
     /// # Safety
     /// During the life of the slice nobody else, here or in another process, reads or writes these bytes.
-    #[allow(clippy::mut_from_ref, reason = "the memory belongs to several processes, so exclusiveness is the caller's to see to")]
+    #[allow(
+        clippy::mut_from_ref,
+        reason = "the memory belongs to several processes, so exclusiveness is the caller's to see to"
+    )]
     unsafe fn write(&self, from: usize, bytes: usize) -> &mut [u8] {
         assert!(from.checked_add(bytes).is_some_and(|end| end <= self.bytes), "beyond a rank's room");
         // SAFETY: within the mapping, and nobody else's, as the caller promises.
@@ -179,10 +181,7 @@ impl Node {
     /// Sleeps until all have come or the time has passed, or for no reason.
     pub(super) fn sleep(&self, most: Duration) {
         let before = self.came.get().wrapping_sub(1);
-        let most = futex::Timespec {
-            tv_sec: most.as_secs() as i64,
-            tv_nsec: i64::from(most.subsec_nanos()),
-        };
+        let most = futex::Timespec { tv_sec: most.as_secs() as i64, tv_nsec: i64::from(most.subsec_nanos()) };
         let _ = futex::wait(self.table.word(EPOCH), futex::Flags::empty(), before, Some(&most));
     }
 
@@ -280,7 +279,8 @@ impl NodeMemory for Node {
             }
             let [process, file, kib] =
                 [PROCESS, FILE, KIB].map(|word| self.entry(rank, word).load(Ordering::Relaxed));
-            let mapping = file_of(process, file).and_then(|file| Mapping::of(&file, kib as usize * 1024, true));
+            let mapping =
+                file_of(process, file).and_then(|file| Mapping::of(&file, kib as usize * 1024, true));
             let mapping = mapping.map_err(|error| CommError::Transport {
                 rank: self.rank,
                 call: format!("opening the memory of rank {rank}"),
