@@ -213,7 +213,7 @@ impl<P: Composite> Compositor<P> {
         }
 
         // The strategy, and what it hands in.
-        let slice_px = options.slice_px.unwrap_or_else(|| slice_px(session.comm));
+        let slice_px = options.slice_px.unwrap_or_else(|| slice_px::<P>(session.comm));
         let strategy = match (options.strategy, &self.network) {
             (Strategy::Automatic, Some(network)) => {
                 network.choose::<P>(&session.drawn, places.root.is_some())
@@ -249,10 +249,10 @@ pub(crate) fn give_up(comm: &mut dyn Communicator, error: &CompositeError) {
     }
 }
 
-/// Pixels of a slice that is joined and on its way to the collecting rank while the next one comes: a quarter of a megabyte of RGBA8 with depth.
+/// Pixels of a slice that is joined and on its way to the collecting rank while the next one comes: a quarter of a megabyte.
 /// Where nothing travels by itself there are fewer and larger ones: half a megabyte costs a tenth more processor time at eight ranks than one.
-pub(crate) fn slice_px(comm: &dyn Communicator) -> usize {
-    if comm.is_one_node() { 1 << 17 } else { 1 << 15 }
+pub(crate) fn slice_px<P: PixelFormat>(comm: &dyn Communicator) -> usize {
+    (if comm.is_one_node() { 1 << 20 } else { 1 << 18 }) / P::BYTES
 }
 
 /// Ranks in the order of compositing.

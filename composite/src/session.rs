@@ -144,6 +144,11 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
+    /// Lets messages of the exchange leave until at most `most` of them are on their way.
+    pub(crate) fn let_leave(&mut self, most: usize) {
+        self.comm.let_leave(Tag::Exchange as u32, most, self.timeout);
+    }
+
     /// Counts depths of the frame in `part` that are not numbers; those of parts sent to others are counted when they are
     /// compressed.
     pub(crate) fn count_nan<P: Composite>(&mut self, view: &View<'_, P>, part: Rect) {

@@ -149,12 +149,7 @@ struct Group<P: Composite> {
 
 impl<P: Composite> Rows<P> {
     pub(crate) fn new(width: usize) -> Self {
-        Self {
-            width,
-            depth: vec![1.0; if P::HAS_DEPTH { width } else { 0 }],
-            waiting: Vec::new(),
-            spare: Vec::new(),
-        }
+        Self { width, depth: Vec::new(), waiting: Vec::new(), spare: Vec::new() }
     }
 
     /// Rows `first_row…` of all frames into `colors` and, if it is not empty, `depths`.
@@ -171,27 +166,36 @@ impl<P: Composite> Rows<P> {
         if width == 0 {
             return;
         }
-        for (index, row) in colors.chunks_exact_mut(width).enumerate() {
-            let y = first_row + index as u32;
-            if P::HAS_DEPTH {
-                let row_depths =
-                    depths.get_mut(index * width..(index + 1) * width).unwrap_or(&mut self.depth);
-                row.fill(P::EMPTY.color());
-                row_depths.fill(1.0);
-                for view in views.iter().filter(|view| (view.bounds.y0..view.bounds.y1).contains(&y)) {
-                    let (x0, x1) = (view.bounds.x0, view.bounds.x1);
-                    let (from_colors, from_depths) = view.row(y, x0, x1);
-                    let columns = x0 as usize..x1 as usize;
-                    join(
-                        bytemuck::cast_slice(from_colors),
-                        bytemuck::cast_slice(from_depths),
-                        &mut row[columns.clone()],
-                        &mut row_depths[columns],
-                        Side::Higher,
-                    );
-                }
-            } else {
-                self.blend_row(views, y, row, &join);
+        if !P::HAS_DEPTH {
+            for (index, row) in colors.chunks_exact_mut(width).enumerate() {
+                self.blend_row(views, first_row + index as u32, row, &join);
+            }
+            return;
+        }
+        let depths = if depths.is_empty() {
+            self.depth.resize(colors.len(), 1.0);
+            &mut self.depth
+        } else {
+            depths
+        };
+        colors.fill(P::EMPTY.color());
+        depths.fill(1.0);
+        // All rows of one frame before those of the next: what is joined stays in the second cache, and each frame is read in one
+        // piece, which processors foresee. Row by row through all frames every row begins with misses.
+        let end_row = first_row + (colors.len() / width) as u32;
+        for view in views {
+            let (x0, x1) = (view.bounds.x0, view.bounds.x1);
+            for y in view.bounds.y0.max(first_row)..view.bounds.y1.min(end_row) {
+                let (from_colors, from_depths) = view.row(y, x0, x1);
+                let start = (y - first_row) as usize * width;
+                let pixels = start + x0 as usize..start + x1 as usize;
+                join(
+                    bytemuck::cast_slice(from_colors),
+                    bytemuck::cast_slice(from_depths),
+                    &mut colors[pixels.clone()],
+                    &mut depths[pixels],
+                    Side::Higher,
+                );
             }
         }
     }

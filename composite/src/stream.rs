@@ -74,7 +74,7 @@ impl<P: Composite> Compositor<P> {
                     session.meet(drawn, [f32::NAN; 2])?;
                     let plan = Plan::new::<P>(
                         &session.drawn,
-                        options.slice_px.unwrap_or_else(|| slice_px(session.comm)),
+                        options.slice_px.unwrap_or_else(|| slice_px::<P>(session.comm)),
                         places.root,
                     );
                     let pieces = plan.pieces(&session.drawn);

@@ -175,6 +175,30 @@ fn icet_over_its_own_mpi_layer_gives_the_same_pixels() {
 }
 
 #[test]
+fn open_mpi_in_shared_memory_and_by_messages_gives_the_same_pixels() {
+    let (Some(icet), Some(mpirun)) = (peer("RTSV_ICET"), peer("RTSV_MPIRUN")) else { return };
+    let variables: [(&str, &Path); 2] = [("RTSV_ICET", &icet), ("COMPOSITE_MPIRUN", &mpirun)];
+    for (more, strategy) in [(&[][..], "SharedMemory"), (&["--messages"][..], "DirectSend")] {
+        // Two numbers of ranks, sizes and formats make one table; in every row the pixels are those of IceT.
+        let lists =
+            ["compare", "--json", "--mpi", "--ranks", "2,3", "--size", "64,130", "--pixels", "depth,blend"];
+        let ran = run(&[&lists[..], &["--scene", "discs,dense", "--frames", "1"], more].concat(), &variables);
+        assert_eq!(ran.code, Some(0), "{}", ran.text);
+        let all: serde_json::Value = serde_json::from_str(ran.stdout.trim()).expect("one line of JSON");
+        let rows = all["rows"].as_array().expect("rows");
+        assert_eq!(rows.len(), 16);
+        for row in rows {
+            assert_eq!(row["pixels_differ"].as_u64(), Some(0), "{row}");
+            if cfg!(target_os = "linux") {
+                assert_eq!(row["ours_strategy"].as_str(), Some(strategy), "{row}");
+            }
+        }
+        let ranks: Vec<u64> = rows.iter().filter_map(|row| row["ranks"].as_u64()).collect();
+        assert_eq!(ranks, [[2; 8], [3; 8]].concat());
+    }
+}
+
+#[test]
 fn icet_over_mpich_gives_the_same_pixels() {
     let (Some(icet), Some(mpirun)) = (peer("RTSV_ICET"), peer("RTSV_MPIRUN_MPICH")) else { return };
     compare(&["--mpi", "-n", "2"], &[("RTSV_ICET", &icet), ("COMPOSITE_MPIRUN", &mpirun)]);

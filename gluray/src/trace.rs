@@ -162,6 +162,10 @@ impl<'a> Prepared<'a> {
         let mut planes = Vec::new();
         if s.depth_clamp {
             planes.push(row(3).to_array());
+            if row(3).truncate() == DVec3::ZERO {
+                // Parallel rays begin before everything, as nothing is cut off.
+                planes.extend(rays::slab(draw, row(2)));
+            }
         } else {
             planes.push((row(3) * (1.0 + SLACK) + row(2)).to_array());
             planes.push((row(3) * (1.0 + SLACK) - row(2)).to_array());

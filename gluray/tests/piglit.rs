@@ -24,6 +24,8 @@ const FILLED: &[&str] = &[
     "triangle-rasterization -auto -fbo",
     "draw-vertices -auto -fbo",
     "depth_clamp -auto -fbo",
+    "depth-clamp-range -auto -fbo",
+    "triangle-rasterization-overdraw -auto -fbo",
     "pos-array -auto -fbo",
     "provoking-vertex -auto",
     "gl-1.0-dlist-beginend -auto -fbo",

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <vtkActor.h>
+#include <vtkBitArray.h>
 #include <vtkCompositeDataDisplayAttributes.h>
 #include <vtkCompositeDataIterator.h>
 #include <vtkCompositeDataSet.h>
@@ -146,7 +147,9 @@ const char* AddGlyphsOf(RtvBridge* bridge, vtkActor* actor, vtkGlyph3DMapper* ma
 {
   vtkDataArray* scales = InputArray(mapper, vtkGlyph3DMapper::SCALE, data);
   vtkDataArray* directions = mapper->GetOrient() ? InputArray(mapper, vtkGlyph3DMapper::ORIENTATION, data) : nullptr;
-  vtkDataArray* mask = mapper->GetMasking() ? InputArray(mapper, vtkGlyph3DMapper::MASK, data) : nullptr;
+  // VTK takes nothing else for a mask.
+  vtkBitArray* mask =
+    mapper->GetMasking() ? vtkBitArray::SafeDownCast(InputArray(mapper, vtkGlyph3DMapper::MASK, data)) : nullptr;
   vtkUnsignedCharArray* colors = nullptr;
   int cellFlag = 0;
   if (mapper->GetScalarVisibility())

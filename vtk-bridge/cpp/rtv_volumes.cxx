@@ -101,7 +101,6 @@ const char* BlendReason(int mode, vtkVolumeProperty* property)
 // The lights of shaded volumes.
 struct Lights
 {
-  bool On = false;
   // Six numbers each, as RtvVolume has them; empty for one white headlight.
   std::vector<float> List;
   // OpenGL's other formula, for all but one headlight: no ambient part, and highlights of its own.
@@ -130,7 +129,8 @@ const char* ReadLights(vtkRenderer* renderer, Lights& out)
     const double* ambient = light->GetAmbientColor();
     const double* highlight = light->GetSpecularColor();
     const double strength = light->GetIntensity();
-    plain = plain && light->LightTypeIsHeadlight();
+    // OpenGL takes a headlight of another strength for one of several.
+    plain = plain && light->LightTypeIsHeadlight() && strength == 1.0;
     double from[3], to[3];
     light->GetTransformedPosition(from);
     light->GetTransformedFocalPoint(to);
@@ -148,7 +148,10 @@ const char* ReadLights(vtkRenderer* renderer, Lights& out)
       out.List.push_back(static_cast<float>(strength * color[c]));
     }
   }
-  out.On = on > 0;
+  if (on == 0)
+  {
+    return "a shaded volume without a light";
+  }
   out.Several = on > 1 || !plain;
   if (on > 6)
   {
@@ -362,7 +365,7 @@ const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volum
     v.gradient_opacities = RtvArray{ gradients.data(), Entries, 1, RTV_F32 };
     v.steepest = steepest / (spacing * reach);
   }
-  v.shade = property->GetShade(0) && lights.On ? 1 : 0;
+  v.shade = property->GetShade(0) ? 1 : 0;
   v.lights = RtvArray{ lights.List.data(), lights.List.size() / 6, 6, RTV_F32 };
   v.ambient = lights.Several ? 0.0f : static_cast<float>(property->GetAmbient(0));
   v.diffuse = static_cast<float>(property->GetDiffuse(0));

@@ -188,8 +188,11 @@ fn medium(v: &Input<'_>, grid: Arc<Grid>, lights: Vec<VolumeLight>) -> Result<Vo
         VolumeBlend::Additive => Blend::Additive,
         VolumeBlend::Isosurfaces(values) => Blend::Isosurfaces(values.iter().map(|v| *v as f32).collect()),
     };
-    Volume::new(grid, transfer, VolumeOptions { shading, interpolation, blend, lights, gradient_opacity })
-        .map_err(|e| format!("a volume: {e}"))
+    // As OpenGL's textures.
+    let clamped_gradients = true;
+    let options =
+        VolumeOptions { shading, interpolation, blend, lights, gradient_opacity, clamped_gradients };
+    Volume::new(grid, transfer, options).map_err(|e| format!("a volume: {e}"))
 }
 
 /// Leaves out points that lie on the line between their neighbours: fewer bends, fewer steps of the integration.

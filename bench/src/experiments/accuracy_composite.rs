@@ -1,7 +1,7 @@
 //! Error against bytes and time of blending many faint layers, by pixel format.
 
 use super::Context;
-use super::many_ranks::{CAVEAT, simulated};
+use super::many_ranks::{CAVEAT, NETWORK, simulated};
 use crate::plot::{Axis, Plot, Series};
 use crate::record::{Record, Row};
 use crate::stats::Summary;
@@ -103,7 +103,7 @@ where
 {
     let Case { alpha, size, frames, strategy, name } = *case;
     let pixels = (size * size) as usize;
-    let results = simulated(LAYERS, |mut comm| {
+    let results = simulated(NETWORK, LAYERS, |mut comm| {
         let rank = comm.rank();
         let layer: Vec<C> =
             (0..pixels).map(|k| C::from_f32(layer_color(alpha, rank, k).map(|v| v as f32))).collect();

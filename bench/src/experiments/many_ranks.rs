@@ -13,7 +13,7 @@ use std::time::Duration;
 /// What stands beside every figure of many ranks.
 pub(super) const CAVEAT: &str = "Computing is measured for real: every rank is a thread, one at a time has a core, and its clock advances by \
      the processor time of its thread. The network is simulated in this process by the LogGP model of 4X QDR InfiniBand (3.2 GB/s and 1 µs, an \
-     interface per rank that sends and receives one message after the other, nothing in the way between interfaces). Not modelled: contention inside \
+     interface per rank whose two directions are shared fairly by the messages under way, nothing in the way between interfaces). Not modelled: contention inside \
      the network, noise of the operating system, and that a node has its caches and its memory to itself. One thread a rank.";
 
 /// Longest wait for a message, on the ranks' own clocks.
@@ -185,12 +185,13 @@ pub(super) fn with_cost(row: Row, ranks: usize, frames: &Frames) -> Row {
         .with("camera_rays", c.camera_rays * 1e-6)
 }
 
-/// Runs `work` on simulated ranks of which every result must be there.
+/// Runs `work` on ranks simulated over `network`, of which every result must be there.
 pub(super) fn simulated<T: Send>(
+    network: Network,
     ranks: usize,
     work: impl Fn(SimComm) -> anyhow::Result<T> + Sync,
 ) -> anyhow::Result<Vec<T>> {
     let results: Vec<Result<anyhow::Result<T>, CommError>> =
-        run_on(ranks, NETWORK, Compute::Measured(1.0), 1, work);
+        run_on(ranks, network, Compute::Measured(1.0), 1, work);
     results.into_iter().map(|r| r?).collect()
 }

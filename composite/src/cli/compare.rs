@@ -4,7 +4,6 @@ mod measure;
 mod table;
 
 use super::ranks::{RankArgs, RankComm};
-use super::smpirun;
 use crate::rival;
 use crate::scenes::Scene;
 use crate::simd::SimdLevel;
@@ -104,7 +103,7 @@ fn one_job(comm: &mut RankComm, args: &CompareArgs, icet: &Path) -> anyhow::Resu
         processors: std::thread::available_parallelism().map_or(1, usize::from),
         transport: comm.transport(),
         icet: icet.display().to_string(),
-        note: smpirun::inside().then(|| smpirun::CAVEAT.to_string()),
+        note: args.ranks.caveat(),
     };
     let frames = args.frames.unwrap_or(if args.ranks.is_simulated() { 5 } else { 7 }).max(1);
     let levels: Vec<Option<SimdLevel>> =

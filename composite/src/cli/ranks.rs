@@ -1,7 +1,7 @@
 //! Where the ranks of a job run, and how they are started.
 use super::{mpirun, smpirun};
 use crate::comm::mpi::{MpiComm, launcher};
-use crate::comm::{CommError, Communicator, threads};
+use crate::comm::{CommError, Communicator, sim, threads};
 use crate::error::CompositeError;
 use datasets::cli::{CommonArgs, Status, UsageError};
 use std::ffi::OsString;
@@ -9,6 +9,9 @@ use std::time::Duration;
 
 /// The largest job that is started: more threads or processes on one machine measure nothing.
 const MOST_RANKS: usize = 4096;
+
+/// The network of `--model`, which is that of `--smpi`.
+const MODEL: sim::Network = sim::Network::QDR_AS_SMPI;
 
 /// What every job takes.
 #[derive(Debug, clap::Args)]
@@ -25,6 +28,9 @@ pub(super) struct RankArgs {
     /// Ranks are simulated by SimGrid on a network of 4X QDR InfiniBand
     #[arg(long, group = "where")]
     smpi: bool,
+    /// Ranks are simulated in this process, by a model (LogGP) of the same network; needs nothing installed
+    #[arg(long, group = "where")]
+    model: bool,
     /// Longest wait for one message, in seconds
     #[arg(long, default_value_t = 60.0, value_name = "SECONDS")]
     timeout: f64,
@@ -37,6 +43,7 @@ pub(super) struct RankArgs {
 pub(super) enum RankComm {
     Thread(threads::ThreadComm),
     Mpi(Box<MpiComm>),
+    Model(sim::SimComm),
 }
 
 impl RankComm {
@@ -44,6 +51,7 @@ impl RankComm {
         match self {
             Self::Thread(comm) => comm,
             Self::Mpi(comm) => &mut **comm,
+            Self::Model(comm) => comm,
         }
     }
 
@@ -52,6 +60,7 @@ impl RankComm {
         match self {
             Self::Thread(_) => "threads".to_string(),
             Self::Mpi(comm) => comm.library_version().to_string(),
+            Self::Model(_) => format!("a model (LogGP) of {}", MODEL.name),
         }
     }
 
@@ -59,6 +68,7 @@ impl RankComm {
         match self {
             Self::Thread(comm) => format!("rank {}", comm.rank()),
             Self::Mpi(comm) => format!("rank {} on {}", comm.rank(), comm.processor_name()),
+            Self::Model(comm) => format!("modelled rank {}", comm.rank()),
         }
     }
 }
@@ -68,9 +78,19 @@ impl RankArgs {
         Duration::from_secs_f64(self.timeout.clamp(0.001, 1e6))
     }
 
+    /// What is to be said of every number of simulated ranks.
+    pub(super) fn caveat(&self) -> Option<String> {
+        if smpirun::inside() {
+            return Some(smpirun::CAVEAT.to_string());
+        }
+        self.model.then(|| {
+            "network by a model (LogGP, fair shares of every adapter) of 4X QDR InfiniBand, 3.2 GB/s; computing measured on this machine's cores".to_string()
+        })
+    }
+
     /// Simulated ranks share this machine's processors, so a frame of all of them takes long.
     pub(super) fn is_simulated(&self) -> bool {
-        self.smpi
+        self.smpi || self.model
     }
 
     /// The numbers of ranks that were asked for.
@@ -115,14 +135,20 @@ impl RankArgs {
         if self.smpi {
             return smpirun::start(common, ranks, arguments);
         }
-        let results = threads::run(ranks, |comm| {
-            let mut comm = RankComm::Thread(comm);
+        let on_rank = |mut comm: RankComm| {
             let result = work(&mut comm);
             if let Err(error) = &result {
                 comm.comm().abort(&format!("{error:#}"));
             }
             result
-        });
+        };
+        let results = if self.model {
+            // One at a time computes, so that ranks do not disturb each other.
+            let measured = sim::Compute::Measured(1.0);
+            sim::run_on(ranks, MODEL, measured, 1, |comm| on_rank(RankComm::Model(comm)))
+        } else {
+            threads::run(ranks, |comm| on_rank(RankComm::Thread(comm)))
+        };
         let mut root = None;
         let mut first_error: Option<anyhow::Error> = None;
         for (rank, result) in results.into_iter().enumerate() {

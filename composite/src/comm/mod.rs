@@ -131,6 +131,10 @@ pub trait Communicator {
     /// [`CommError::TooLong`], [`CommError::NothingPosted`] for an empty list, [`CommError::Aborted`], [`CommError::Transport`].
     fn wait_any(&mut self, posted: &mut Vec<Receive>, timeout: Duration) -> Result<Arrival, CommError>;
 
+    /// Lets messages with this `tag` leave until at most `most` of them are on their way: where all share a wire, the first ones arrive no sooner
+    /// than the last. A hint, with which a transport whose messages leave at once need do nothing; after `patience` it has an end anyway.
+    fn let_leave(&mut self, _tag: u32, _most: usize, _patience: Duration) {}
+
     /// Ends the group: all waiting and later calls on every rank give [`CommError::Aborted`] with this rank and `reason`.
     /// Only the first call counts.
     fn abort(&mut self, reason: &str);

@@ -92,27 +92,34 @@ pub(crate) fn run<P: Composite>(
     let (place, places) = (session.place, session.places());
     let mut exchange = Exchange::new(plan, session)?;
 
-    // Everybody's first slices, then everybody's second …; the next place first, so that no rank gets all first messages.
+    // Everybody's first slices, then everybody's second …; the next place first, so that no rank gets all first messages. No more than two
+    // rounds are on their way: messages share the wire, and with all of them under way at once the first slices would be complete, and begin
+    // to be collected, no sooner than the last. With a few slices only there is nothing to gain.
     let most = plan.slices.iter().map(Vec::len).max().unwrap_or(0);
+    let mut last_round = 0;
     for index in 0..most {
+        if most > 3 && index > 1 {
+            session.let_leave(last_round);
+        }
+        last_round = 0;
         for step in 1..places {
             let owner = (place + step) % places;
             if let Some(slice) = plan.slices[owner].get(index) {
                 let part = view.bounds.intersection(slice);
                 if !part.is_empty() {
                     session.send(owner, Tag::Exchange, view, part, true)?;
+                    last_round += 1;
                 }
             }
         }
-    }
-
-    // Own pixels, and what has come meanwhile.
-    for (index, slice) in plan.slices[place].iter().enumerate() {
-        let part = view.bounds.intersection(slice);
-        if !part.is_empty() {
-            session.count_nan(view, part);
-            let item = Item::View(View { bounds: part, ..*view });
-            exchange.put(index, place, item, session, collector, scratch)?;
+        // Own pixels, and what has come meanwhile.
+        if let Some(slice) = plan.slices[place].get(index) {
+            let part = view.bounds.intersection(slice);
+            if !part.is_empty() {
+                session.count_nan(view, part);
+                let item = Item::View(View { bounds: part, ..*view });
+                exchange.put(index, place, item, session, collector, scratch)?;
+            }
         }
         exchange.take_what_has_come(session, collector, scratch)?;
     }

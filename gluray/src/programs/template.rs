@@ -245,7 +245,7 @@ mod tests {
         for (peel, pass) in PASSES {
             let whole = pass.join(";") + ";";
             let read = |text: &str| Template::read(VERTEX, &fragment(&format!("{text}{head}")));
-            let known = read(&whole.replace("fragOutput0=frag;", "fragOutput0 = frag; // the back"));
+            let known = read(&whole.replace("fragOutput0=frag;", "fragOutput0 = frag; // the back\n"));
             assert_eq!(known.map(|t| (t.peel, t.headlight)), Ok((peel, true)));
             for left_out in pass {
                 let n = pass.iter().filter(|s| *s == left_out).count();

@@ -41,6 +41,8 @@ pub(crate) struct Lead {
     attributes: Names<Attributes>,
     images: Names<Image>,
     pub(crate) accounts: Accounts,
+    /// How much longer than ten times our own share a helper may take.
+    pub(crate) patience: Duration,
 }
 
 /// Names that were found out already.
@@ -83,6 +85,7 @@ impl Lead {
             attributes: Names(HashMap::new()),
             images: Names(HashMap::new()),
             accounts: Accounts::new(size),
+            patience: PATIENCE,
         }
     }
 
@@ -137,7 +140,7 @@ impl Lead {
         account.trace_ms += took.as_secs_f64() * 1e3;
 
         // ---- Theirs ----
-        let patience = PATIENCE + took * 10;
+        let patience = self.patience + took * 10;
         for (rank, share) in asked {
             let start = Instant::now();
             let done = match self.helpers[rank].lost {

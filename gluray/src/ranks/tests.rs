@@ -121,6 +121,8 @@ fn with_helpers(
             scope.spawn(move || help(comm.rank(), &mut comm));
         }
         let mut lead = Lead::new(Box::new(first));
+        // However busy the machine is that tests it.
+        lead.patience = Duration::from_secs(600);
         let mut sent = Vec::new();
         let out = pictures(&mut lead, frames, &settings(mode), &mut sent);
         let lost = lead.accounts.all().iter().map(|a| a.lost.clone()).collect();

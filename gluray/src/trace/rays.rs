@@ -5,6 +5,7 @@
 //! so the last bits of both ways need not agree.
 
 use super::{Prepared, Rect, TILE};
+use crate::capture::Draw;
 use fearless_simd::{Level, dispatch};
 use rt_core::glam::{DVec3, DVec4};
 use rt_core::ray::{HitBlock, LANES, Ray, RayBlock};
@@ -241,6 +242,18 @@ fn make(bundle: &Bundle, area: Rect, blocks: &mut [RayBlock], shift: &mut [[f64;
             bundle.block(f64::from(area.x + x) + 0.5, f64::from(area.y + y) + 0.5, used, out, shift);
         }
     }
+}
+
+/// Two planes across clip z between which all of a draw is.
+pub(super) fn slab(draw: &Draw, z: DVec4) -> [[f64; 4]; 2] {
+    let b = draw.geometry.bounds();
+    let at = |corner: i32| {
+        let pick = |bit: i32, k: usize| f64::from(if corner & bit == 0 { b.min[k] } else { b.max[k] });
+        z.dot(DVec4::new(pick(1, 0), pick(2, 1), pick(4, 2), 1.0))
+    };
+    let (lo, hi) = (0..8).map(at).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    let more = 1e-3 * (hi - lo) + 1e-6 * (hi.abs() + lo.abs());
+    [(z - DVec4::W * (lo - more)).to_array(), (DVec4::W * (hi + more) - z).to_array()]
 }
 
 /// Block and lane of a pixel of a tile.

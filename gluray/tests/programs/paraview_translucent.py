@@ -5,7 +5,6 @@ w = Wavelet(WholeExtent=[-20, 20, -20, 20, -20, 20])
 c = Contour(Input=w, ContourBy=["POINTS", "RTData"], Isosurfaces=[120.0, 157.0, 200.0])
 v = CreateRenderView(ViewSize=[768, 768])
 v.MaximumNumberOfPeels = 100
-v.OcclusionRatio = 0.0
 d = Show(c, v)
 ColorBy(d, ("POINTS", "RTData"))
 d.Opacity = 0.4

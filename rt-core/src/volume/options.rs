@@ -143,6 +143,9 @@ pub struct VolumeOptions {
     pub lights: Vec<VolumeLight>,
     /// With [`Blend::Composite`] only.
     pub gradient_opacity: Option<GradientOpacity>,
+    /// Beyond the bounds the scalar goes on as it is there, so that gradients across them are half of what they are inside, as with OpenGL's clamped
+    /// textures. Else they are one-sided.
+    pub clamped_gradients: bool,
 }
 
 impl VolumeOptions {

@@ -59,9 +59,9 @@ impl Volume {
         let dir = DVec3::from_array(ray.d) * self.grid.spacing;
         let ends = if self.is_nearest() {
             // The gradient at the point around which the box lies.
-            [self.lit(corner_gradient(&self.grid, stored).as_dvec3(), dir); 3]
+            [self.lit(corner_gradient(&self.grid, stored, self.options.clamped_gradients).as_dvec3(), dir); 3]
         } else {
-            let corners = corner_gradients(&self.grid, stored);
+            let corners = corner_gradients(&self.grid, stored, self.options.clamped_gradients);
             let (p, q) = (Vec3::from_array(p.map(|x| x as f32)), Vec3::from_array(q.map(|x| x as f32)));
             [p, 0.5 * (p + q), q].map(|at| self.lit(between(&corners, at).as_dvec3(), dir))
         };
@@ -131,14 +131,15 @@ fn between(g: &[Vec3; 8], f: Vec3) -> Vec3 {
     low + (high - low) * f.z
 }
 
-/// Central differences at a point, one-sided at the bounds: per world unit.
-fn corner_gradient(grid: &Grid, c: UVec3) -> Vec3 {
+/// Central differences at a point, per world unit; at the bounds one-sided or `clamped`.
+fn corner_gradient(grid: &Grid, c: UVec3, clamped: bool) -> Vec3 {
     let mut g = [0f32; 3];
     for a in 0..3 {
         let (mut lo, mut hi) = (c.to_array(), c.to_array());
         lo[a] = lo[a].saturating_sub(1);
         hi[a] = (hi[a] + 1).min(grid.dims[a] - 1);
-        let width = (hi[a] - lo[a]) as f32 * grid.spacing[a] as f32;
+        let steps = if clamped { 2 } else { hi[a] - lo[a] };
+        let width = steps as f32 * grid.spacing[a] as f32;
         if width > 0.0 {
             g[a] = (grid.at(hi[0], hi[1], hi[2]) - grid.at(lo[0], lo[1], lo[2])) / width;
         }
@@ -147,10 +148,10 @@ fn corner_gradient(grid: &Grid, c: UVec3) -> Vec3 {
 }
 
 /// [`corner_gradient`] at the corners of a cell, x fastest.
-fn corner_gradients(grid: &Grid, cell: UVec3) -> [Vec3; 8] {
+fn corner_gradients(grid: &Grid, cell: UVec3, clamped: bool) -> [Vec3; 8] {
     let corner = |i: usize| cell + UVec3::new(i as u32 & 1, i as u32 >> 1 & 1, i as u32 >> 2 & 1);
     if cell.cmpeq(UVec3::ZERO).any() || (cell + 2).cmpge(grid.dims).any() {
-        return std::array::from_fn(|i| corner_gradient(grid, corner(i)));
+        return std::array::from_fn(|i| corner_gradient(grid, corner(i), clamped));
     }
     // Inside nothing needs to be checked one by one.
     let (row, slab) = (grid.dims.x as usize, grid.dims.x as usize * grid.dims.y as usize);
@@ -174,11 +175,13 @@ mod tests {
         let values = (0..120).map(|i| ((i * 7919) % 101) as f32).collect();
         let grid = Grid::new(dims, DVec3::ZERO, DVec3::new(0.5, 1.0, 3.0), values).unwrap();
         for cell in [UVec3::new(1, 1, 1), UVec3::new(2, 2, 1), UVec3::new(3, 1, 1), UVec3::ZERO] {
-            let fast = corner_gradients(&grid, cell);
+            let fast = corner_gradients(&grid, cell, false);
             for (i, g) in fast.iter().enumerate() {
                 let at = cell + UVec3::new(i as u32 & 1, i as u32 >> 1 & 1, i as u32 >> 2 & 1);
-                assert_eq!(*g, corner_gradient(&grid, at), "{cell} {i}");
+                assert_eq!(*g, corner_gradient(&grid, at, false), "{cell} {i}");
             }
         }
+        let [one_sided, clamped] = [false, true].map(|c| corner_gradient(&grid, UVec3::new(0, 2, 2), c));
+        assert_eq!((one_sided.x, one_sided.y), (2.0 * clamped.x, clamped.y), "half across the bounds");
     }
 }

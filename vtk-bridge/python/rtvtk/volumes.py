@@ -64,16 +64,18 @@ class _Lights:
     def __init__(self, renderer):
         lights = renderer.GetLights()
         on = [light for light in (lights.GetItemAsObject(i) for i in range(lights.GetNumberOfItems())) if light.GetSwitch()]
-        self.on, self.rows, self.reason = bool(on), [], None
-        # OpenGL's other formula, for all but one headlight: no ambient part, and highlights of its own.
-        self.several = len(on) > 1 or not all(light.LightTypeIsHeadlight() for light in on)
-        if any(light.GetPositional() for light in on):
+        self.rows, self.reason = [], None
+        # OpenGL's other formula, for all but one headlight of full strength: no ambient part, and highlights of its own.
+        self.several = len(on) > 1 or not all(light.LightTypeIsHeadlight() and light.GetIntensity() == 1 for light in on)
+        if not on:
+            self.reason = "a shaded volume without a light"
+        elif any(light.GetPositional() for light in on):
             self.reason = "a shaded volume under lights that have a place"
         elif any(tuple(light.GetAmbientColor()) != (0, 0, 0) for light in on):
             self.reason = "a shaded volume under lights with an ambient colour"
         elif len(on) > 6:
             self.reason = "a shaded volume under more than six lights"
-        white = all(light.GetIntensity() == 1 and tuple(light.GetDiffuseColor()) == tuple(light.GetSpecularColor()) == (1, 1, 1) for light in on)
+        white = all(tuple(light.GetDiffuseColor()) == tuple(light.GetSpecularColor()) == (1, 1, 1) for light in on)
         if self.several or not white:
             for light in on:
                 # A headlight alone is at the viewer, not parallel.
@@ -185,7 +187,7 @@ class Volumes:
             reach = sum(n / (n - 1) for n in dims) / 3
             v.gradient_opacities, v.steepest = rtv.Array.of(gradients), _GRADIENT_RANGE * (high - low) / (sum(image.GetSpacing()) / 3 * reach)
         v.unit_distance = p.GetScalarOpacityUnitDistance(0)
-        v.nearest, v.shade = p.GetInterpolationType() == 0, bool(p.GetShade(0)) and lights.on
+        v.nearest, v.shade = p.GetInterpolationType() == 0, bool(p.GetShade(0))
         if lights.rows:
             keep.append(np.array(lights.rows, np.float32))
             v.lights = rtv.Array.of(keep[-1])

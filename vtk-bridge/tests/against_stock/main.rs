@@ -6,6 +6,7 @@
 mod capture;
 mod compare;
 mod effects;
+mod gui;
 mod memory;
 mod paraview;
 mod peers;

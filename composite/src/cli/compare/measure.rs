@@ -52,6 +52,7 @@ impl<'a> Bench<'a> {
         let icet = match comm {
             RankComm::Mpi(comm) => Icet::over_mpi(path, comm, mode, size, size),
             RankComm::Thread(comm) => Icet::over_comm(path, comm, mode, size, size),
+            RankComm::Model(comm) => Icet::over_comm(path, comm, mode, size, size),
         };
         // IceT collects colours only. Its ranks do not wait for each other at the end either: the barrier is timed for both.
         let options = Options {

@@ -168,7 +168,6 @@ impl Mpi {
     }
 
     /// Waits for one of `requests` and says which; `None` if all are null.
-    #[cfg(feature = "rival")]
     pub(crate) fn wait_any_of(&self, requests: &[Handle]) -> Option<usize> {
         let mut index: c_int = -1;
         let count = requests.len() as c_int;

@@ -422,6 +422,30 @@ impl Communicator for MpiComm {
         }
     }
 
+    fn let_leave(&mut self, tag: u32, most: usize, patience: Duration) {
+        // Where no message travels by itself, waiting for it only holds up the others.
+        if self.one_node {
+            return;
+        }
+        let oversubscribed = self.oversubscribed;
+        let Self { transfers, mpi, clock, .. } = self;
+        if mpi.abi == Abi::Smpi {
+            // Simulated time does not pass while polling.
+            while transfers.outgoing_of(tag) > most && transfers.wait_sent(mpi, tag) {}
+            clock.waited();
+            return;
+        }
+        let begin = Instant::now();
+        while transfers.outgoing_of(tag) > most && begin.elapsed() < patience {
+            transfers.reap(mpi);
+            if oversubscribed {
+                std::thread::sleep(NAP);
+            } else {
+                std::hint::spin_loop();
+            }
+        }
+    }
+
     fn abort(&mut self, reason: &str) {
         if self.aborted.is_none() {
             self.aborted = Some((self.rank, reason.to_string()));

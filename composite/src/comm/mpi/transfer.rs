@@ -11,6 +11,7 @@ const COMPLETE: Handle = Handle::MAX;
 
 /// A message that MPI may still be reading.
 struct Outgoing {
+    tag: u32,
     requests: Vec<Handle>,
     buffer: Vec<u8>,
 }
@@ -105,7 +106,7 @@ impl Transfers {
                 break;
             }
         }
-        self.outgoing.push(Outgoing { requests, buffer: message });
+        self.outgoing.push(Outgoing { tag, requests, buffer: message });
         result
     }
 
@@ -167,6 +168,27 @@ impl Transfers {
     /// Messages that MPI may still be reading.
     pub(super) fn outgoing(&self) -> usize {
         self.outgoing.len()
+    }
+
+    /// The same, of those with this tag.
+    pub(super) fn outgoing_of(&self, tag: u32) -> usize {
+        self.outgoing.iter().filter(|message| message.tag == tag).count()
+    }
+
+    /// Waits until one more request of the messages with this tag is complete; false if there is none.
+    pub(super) fn wait_sent(&mut self, mpi: &Mpi, tag: u32) -> bool {
+        let of_tag = |message: &Outgoing| message.tag == tag;
+        let requests: Vec<Handle> =
+            self.outgoing.iter().filter(|m| of_tag(m)).flat_map(|m| m.requests.iter().copied()).collect();
+        let Some(done) = mpi.wait_any_of(&requests).map(|index| requests[index]) else { return false };
+        for message in self.outgoing.iter_mut().filter(|m| of_tag(m)) {
+            message.requests.retain(|request| *request != done);
+        }
+        if let Some(at) = self.outgoing.iter().position(|message| message.requests.is_empty()) {
+            let message = self.outgoing.remove(at);
+            self.pool.put(message.buffer);
+        }
+        true
     }
 
     pub(super) fn post(

@@ -20,13 +20,14 @@
 //! let secs = *ends[5].as_ref().unwrap();
 //! assert!((secs - (2.0 * 0.4e-6 + 1e-6 + 1048576.0 / 3.2e9)).abs() < 1e-9, "{secs}");
 //! ```
+mod flows;
 mod network;
 mod schedule;
 
 pub use network::Network;
 
 use super::{Arrival, CommError, Communicator, Receive};
-use schedule::{Mail, Schedule, State, Wanted};
+use schedule::{Schedule, State, Wanted};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -205,11 +206,7 @@ impl Communicator for SimComm {
         } else {
             let s = &mut *schedule;
             s.ranks[rank].clock_secs += s.network.overhead_secs;
-            let now_secs = s.ranks[rank].clock_secs;
-            let arrival_secs =
-                s.network.transfer(&mut s.interfaces, (rank, destination), now_secs, message.len());
-            s.ranks[destination].mail[rank].push_back(Mail { tag, arrival_secs, message });
-            s.look_again(destination);
+            s.send(rank, destination, tag, message);
             Ok(())
         };
         self.until_computing(schedule);
@@ -259,7 +256,7 @@ impl Communicator for SimComm {
                 }
                 let overhead_secs = if source == rank { 0.0 } else { s.network.overhead_secs };
                 s.ranks[rank].clock_secs = now_secs.max(arrival_secs) + overhead_secs;
-                let message = s.ranks[rank].mail[source].remove(at).map(|m| m.message).unwrap_or_default();
+                let message = s.take(rank, source, at);
                 if message.len() > receive.capacity {
                     let Receive { source: peer, tag, capacity, .. } = receive;
                     Err(CommError::TooLong { rank, peer, tag, capacity })
@@ -277,6 +274,31 @@ impl Communicator for SimComm {
         };
         self.until_computing(schedule);
         result
+    }
+
+    fn let_leave(&mut self, tag: u32, most: usize, patience: Duration) {
+        let group = Arc::clone(&self.group);
+        let mut schedule = group.lock();
+        self.book(&mut schedule);
+        let end_secs = schedule.ranks[self.rank].clock_secs + patience.as_secs_f64();
+        loop {
+            let now_secs = schedule.ranks[self.rank].clock_secs;
+            // First all that others may do before now.
+            schedule.wait(self.rank, Vec::new(), now_secs);
+            let Ok(granted) = self.until_granted(&group, schedule) else { return };
+            schedule = granted;
+            let (count, first_secs) = schedule.flows.leaving(self.rank, tag);
+            if count <= most || now_secs >= end_secs {
+                break;
+            }
+            // Others may slow it down meanwhile: then it is looked at again.
+            let until_secs = first_secs.max(now_secs).min(end_secs);
+            schedule.wait(self.rank, Vec::new(), until_secs);
+            let Ok(granted) = self.until_granted(&group, schedule) else { return };
+            schedule = granted;
+            schedule.ranks[self.rank].clock_secs = until_secs;
+        }
+        self.until_computing(schedule);
     }
 
     fn abort(&mut self, reason: &str) {

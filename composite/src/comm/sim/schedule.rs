@@ -2,13 +2,23 @@
 //!
 //! Ranks are threads. Between two calls a rank computes, and up to a few ranks do so at once: they cannot disturb each other. A call takes effect when no
 //! other rank can do anything earlier: a computing rank counts with the time at which it began.
-use super::network::{Interface, Network};
+use super::flows::Flows;
+use super::network::Network;
 use std::collections::VecDeque;
+
+/// When a message arrives.
+#[derive(Clone, Copy)]
+pub(super) enum Travel {
+    /// It is too short to be in anybody's way.
+    Until(f64),
+    /// With the last byte of this flow, and the latency after it.
+    With(u64, f64),
+}
 
 /// A message under way or arrived.
 pub(super) struct Mail {
     pub(super) tag: u32,
-    pub(super) arrival_secs: f64,
+    pub(super) travel: Travel,
     pub(super) message: Vec<u8>,
 }
 
@@ -46,7 +56,7 @@ pub(super) struct Rank {
 
 pub(super) struct Schedule {
     pub(super) ranks: Vec<Rank>,
-    pub(super) interfaces: Vec<Interface>,
+    pub(super) flows: Flows,
     pub(super) network: Network,
     pub(super) aborted: Option<(usize, String)>,
     cores: usize,
@@ -61,7 +71,7 @@ impl Schedule {
         };
         Schedule {
             ranks: (0..size).map(|_| rank()).collect(),
-            interfaces: vec![Interface::default(); size],
+            flows: Flows::new(size),
             network,
             aborted: None,
             cores: cores.max(1),
@@ -72,7 +82,44 @@ impl Schedule {
     pub(super) fn find(&self, rank: usize, wanted: &Wanted) -> Option<(usize, f64)> {
         let mail = self.ranks[rank].mail[wanted.source].iter().enumerate();
         let (at, mail) = mail.filter(|(_, m)| m.tag == wanted.tag).nth(wanted.place)?;
-        Some((at, mail.arrival_secs))
+        let arrival_secs = match mail.travel {
+            Travel::Until(secs) => secs,
+            Travel::With(flow, latency_secs) => self.flows.end_secs(flow) + latency_secs,
+        };
+        Some((at, arrival_secs))
+    }
+
+    /// Sends `message` when a rank's clock says so: it shares the interfaces from then on.
+    pub(super) fn send(&mut self, from: usize, to: usize, tag: u32, message: Vec<u8>) {
+        let now_secs = self.ranks[from].clock_secs;
+        let Network { gap_secs, byte_secs, .. } = self.network;
+        let (latency_factor, byte_factor) = self.network.factors(message.len());
+        let latency_secs = self.network.latency_secs * latency_factor;
+        let busy_secs = message.len() as f64 * byte_secs * byte_factor;
+        let travel = if from == to {
+            Travel::Until(now_secs)
+        } else if busy_secs <= gap_secs {
+            Travel::Until(now_secs + gap_secs + latency_secs)
+        } else {
+            while self.flows.end_next(now_secs) {}
+            Travel::With(self.flows.begin((from, to), tag, now_secs, busy_secs), latency_secs)
+        };
+        self.ranks[to].mail[from].push_back(Mail { tag, travel, message });
+        // What is under way may have become slower.
+        self.all_look_again();
+    }
+
+    /// Takes a message out of its queue.
+    pub(super) fn take(&mut self, rank: usize, source: usize, at: usize) -> Vec<u8> {
+        let Some(mail) = self.ranks[rank].mail[source].remove(at) else { return Vec::new() };
+        if let Travel::With(flow, _) = mail.travel {
+            self.flows.forget(flow);
+        }
+        mail.message
+    }
+
+    fn all_look_again(&mut self) {
+        (0..self.ranks.len()).for_each(|rank| self.look_again(rank));
     }
 
     /// Whether a wanted message will never come.
@@ -122,8 +169,16 @@ impl Schedule {
             wake(rank);
             free -= 1;
         }
-        let times = (0..self.ranks.len()).map(|r| (self.earliest_secs(r), r));
-        let next = times.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let next = loop {
+            let times = (0..self.ranks.len()).map(|r| (self.earliest_secs(r), r));
+            let next = times.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            // A message that is through leaves its part to others, which then arrive earlier than was known.
+            let until_secs = next.map_or(0.0, |next| next.0);
+            if !until_secs.is_finite() || !self.flows.end_next(until_secs) {
+                break next;
+            }
+            self.all_look_again();
+        };
         if let Some((_, rank)) = next
             && matches!(self.ranks[rank].state, State::Acting | State::Waiting { .. })
         {

@@ -1,8 +1,14 @@
 use super::*;
 
 const LONG: Duration = Duration::from_secs(1000);
-const NETWORK: Network =
-    Network { name: "test", overhead_secs: 1.0, latency_secs: 10.0, gap_secs: 0.0, byte_secs: 0.5 };
+const NETWORK: Network = Network {
+    name: "test",
+    overhead_secs: 1.0,
+    latency_secs: 10.0,
+    gap_secs: 0.0,
+    byte_secs: 0.5,
+    corrections: &[],
+};
 
 fn results<T: Send>(size: usize, work: impl Fn(SimComm) -> T + Sync) -> Vec<T> {
     run(size, NETWORK, Compute::Given, work).into_iter().map(Result::unwrap).collect()
@@ -21,6 +27,29 @@ fn times_are_those_of_the_model() {
     });
     // 5 computing, 1 sending; 10 latency, 4 bytes, 1 receiving.
     assert_eq!(ends, [6.0, 21.0]);
+}
+
+#[test]
+fn who_lets_messages_leave_waits_for_as_many_as_it_must() {
+    let ends = results(2, |mut comm| {
+        let mut ends = Vec::new();
+        if comm.rank() == 0 {
+            comm.send(1, 3, vec![0; 8]).unwrap();
+            comm.send(1, 3, vec![0; 8]).unwrap();
+            for (tag, most) in [(4, 0), (3, 2), (3, 1), (3, 0)] {
+                comm.let_leave(tag, most, LONG);
+                ends.push(comm.now());
+            }
+        } else {
+            for _ in 0..2 {
+                comm.recv(0, 3, 8, LONG).unwrap();
+            }
+        }
+        ends
+    });
+    // Sent at 1 and 2, four seconds of wire each: alone for a second, then shared. The first has three seconds left at 2, so it ends at 8, and
+    // the second, which then has one left, at 9.
+    assert_eq!(ends[0], [2.0, 2.0, 8.0, 9.0]);
 }
 
 #[test]

@@ -31,7 +31,6 @@ mapper.UseJitteringOff()
 volume = vtk.vtkVolume()
 volume.SetMapper(mapper)
 volume.SetProperty(prop)
-volume.RotateZ(25)
 volume.SetScale(1.5)
 ren = vtk.vtkRenderer()
 ren.SetBackground(0.2, 0.2, 0.2)
@@ -57,8 +56,9 @@ def picture(name):
 
 
 only = light((1, 0.8, 0.6), (0, 0, 1), "SetLightTypeToHeadlight")
-only.SetIntensity(0.8)
 picture("colored_headlight")
+only.SetIntensity(0.8)
+picture("weak_headlight")
 light((0.2, 0.3, 0.9), (10, -5, 3))
 light((0.1, 0.6, 0.1), (-3, -4, 9))
 picture("three")
@@ -69,9 +69,6 @@ ren.RemoveAllLights()
 kit = vtk.vtkLightKit()
 kit.AddLightsToRenderer(ren)
 picture("kit")
-# Turning the volume turns its normals.
+# Turning the volume turns its gradients.
 volume.RotateX(40)
 picture("kit_turned")
-for i in range(ren.GetLights().GetNumberOfItems()):
-    ren.GetLights().GetItemAsObject(i).SwitchOff()
-picture("dark")
