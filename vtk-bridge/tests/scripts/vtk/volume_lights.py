@@ -23,13 +23,20 @@ prop.ShadeOn()
 prop.SetAmbient(0.3)
 prop.SetDiffuse(0.7)
 prop.SetSpecular(0)
-mapper = vtk.vtkGPUVolumeRayCastMapper()
-mapper.SetInputConnection(wavelet.GetOutputPort())
-mapper.SetAutoAdjustSampleDistances(0)
-mapper.SetSampleDistance(0.1)
-mapper.UseJitteringOff()
 volume = vtk.vtkVolume()
-volume.SetMapper(mapper)
+
+
+def new_mapper():
+    # For each picture one: OpenGL keeps the shader that a mapper made for the lights of its first picture.
+    mapper = vtk.vtkGPUVolumeRayCastMapper()
+    mapper.SetInputConnection(wavelet.GetOutputPort())
+    mapper.SetAutoAdjustSampleDistances(0)
+    mapper.SetSampleDistance(0.1)
+    mapper.UseJitteringOff()
+    volume.SetMapper(mapper)
+
+
+new_mapper()
 volume.SetProperty(prop)
 volume.SetScale(1.5)
 ren = vtk.vtkRenderer()
@@ -50,6 +57,7 @@ def light(color, position, kind="SetLightTypeToSceneLight"):
 
 
 def picture(name):
+    new_mapper()
     ren.ResetCameraClippingRange()
     win.Render()
     save(win, name, props=ren.GetNumberOfPropsRendered())
