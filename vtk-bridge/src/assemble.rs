@@ -55,7 +55,7 @@ pub(crate) fn assemble(drawn: &[Drawn], options: &Options, only_headlight: bool,
             });
             let first = out.instances.len();
             out.add(d, property, index, is_mesh, &setting);
-            out.add_edges(d, first, is_mesh);
+            out.add_edges(d, first, is_mesh, options.edge_reach);
         }
     }
     if !out.edges.is_empty() {
@@ -69,14 +69,14 @@ pub(crate) fn assemble(drawn: &[Drawn], options: &Options, only_headlight: bool,
 
 impl Assembled {
     /// Edges of the instances from `first` on.
-    fn add_edges(&mut self, d: &Drawn, first: usize, is_mesh: bool) {
+    fn add_edges(&mut self, d: &Drawn, first: usize, is_mesh: bool, reach: f64) {
         let Some(mesh) = d.built.mesh.as_ref().filter(|m| d.property.edge_width > 0.0 && m.clipped.is_none())
         else {
             return;
         };
         self.edges.resize_with(first, || None);
         for i in self.instances[first..].iter().filter(|_| is_mesh || d.back.is_some()) {
-            self.edges.push(Some(Edges::new(mesh, i.world_from_object, &d.property)));
+            self.edges.push(Some(Edges::new(mesh, i.world_from_object, &d.property, reach)));
         }
     }
 

@@ -11,8 +11,6 @@ use std::sync::Arc;
 
 /// Pixels or triangles a task works on.
 const CHUNK: usize = 1 << 14;
-/// How far a corner moves, in line widths. The shader means half a width and takes the window to be as wide as its coordinates from −1 to 1.
-const MOVED: f64 = 0.25;
 /// Beyond sides that are no edges nothing is drawn from here on, pixels.
 const BEYOND_DIAGONAL: f64 = -0.5;
 
@@ -26,6 +24,9 @@ pub(crate) struct Edges {
     width_px: f64,
     /// Triangles that turn this way in the window are not drawn: 1 or −1 (rows from the top), or both.
     culled: [bool; 2],
+    /// How far a corner moves, line widths. VTK 9.1's shader means half a width and takes the window to be as wide as its coordinates from −1 to 1:
+    /// it moves corners by a quarter.
+    reach: f64,
 }
 
 /// A triangle in the window; x and y in pixels from the top left.
@@ -49,7 +50,12 @@ struct Fragment {
 }
 
 impl Edges {
-    pub(crate) fn new(mesh: &BuiltMesh, world_from_object: DAffine3, property: &Property) -> Edges {
+    pub(crate) fn new(
+        mesh: &BuiltMesh,
+        world_from_object: DAffine3,
+        property: &Property,
+        reach: f64,
+    ) -> Edges {
         Edges {
             mesh: Arc::clone(&mesh.mesh),
             sides: mesh.edges.clone(),
@@ -57,6 +63,7 @@ impl Edges {
             color: property.edge_color,
             width_px: f64::from(property.edge_width),
             culled: [property.cull_front, property.cull_back],
+            reach,
         }
     }
 
@@ -83,7 +90,7 @@ impl Edges {
             return None;
         }
         let [p, q, r] = inward;
-        let push = |n: DVec2| -MOVED * self.width_px * n.normalize_or_zero();
+        let push = |n: DVec2| -self.reach * self.width_px * n.normalize_or_zero();
         let moved = [a + push(r + p), b + push(p + q), c + push(q + r)];
         Some(InWindow { corners, moved, depths, inward, sides, turn: turn.signum() })
     }
@@ -174,13 +181,13 @@ pub(crate) fn draw(frame: &mut Frame, first_depth: &[f32], edges: &[Option<Edges
         for (c, edge) in color.iter_mut().zip(e.color) {
             *c += (edge * alpha - *c) * share;
         }
-        if *depth < 1.0 {
+        if e.reach > 0.0 && *depth < 1.0 {
             *depth = (t.depth(p) as f32).clamp(0.0, 1.0f32.next_down());
         }
     });
 
     // ---- Beside it.
-    for e in edges.iter().flatten() {
+    for e in edges.iter().flatten().filter(|e| e.reach > 0.0) {
         let triangles = (0..e.mesh.indices.len()).into_par_iter().with_min_len(CHUNK);
         let depth = &frame.depth;
         let found = triangles.fold(Vec::new, |mut out, primitive| {
@@ -215,6 +222,7 @@ mod tests {
             color: [1.0, 0.0, 0.0],
             width_px: 4.0,
             culled: [false; 2],
+            reach: 0.25,
         };
         let view = View {
             clip_from_world: DMat4::from_cols_array(&[

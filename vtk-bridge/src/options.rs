@@ -67,6 +67,9 @@ pub struct Options {
     pub point_radius: f64,
     /// Lines and edges become tubes of this radius, data units; 0: they stay OpenGL's lines.
     pub line_radius: f64,
+    /// How far corners of triangles with edges move outwards, line widths: the geometry shader of VTK 9.0 to 9.2 moves them by a quarter. 0: edges
+    /// end at the outline.
+    pub edge_reach: f64,
     /// Seed of the noise.
     pub seed: u64,
     /// Where the report is written after each frame.
@@ -100,6 +103,7 @@ impl Default for Options {
             build: BuildQuality::Balanced,
             point_radius: 0.0,
             line_radius: 0.0,
+            edge_reach: 0.25,
             seed: 0,
             report: None,
             quiet: false,
@@ -131,6 +135,11 @@ pub const NAMES: &[(&str, &str, &str)] = &[
     ("RTV_BUILD", "effort of building acceleration structures", "fastest, fast, balanced or best"),
     ("RTV_POINT_RADIUS", "vertices become spheres of this radius, data units", "0 or positive"),
     ("RTV_LINE_RADIUS", "lines and edges become tubes of this radius, data units", "0 or positive"),
+    (
+        "RTV_EDGES",
+        "how far edges of surfaces reach beyond the outline, line widths (VTK up to 9.2: 0.25)",
+        "0 to 4",
+    ),
     ("RTV_SEED", "seed of the noise", "a whole number"),
     ("RTV_REPORT", "file that tells after each frame what was traced, passed on, and what it cost", "a path"),
     ("RTV_QUIET", "no warnings on stderr", "0 or 1"),
@@ -207,6 +216,7 @@ impl Options {
             "RTV_BUILD" => self.build = *BuildQuality::ALL.iter().find(|q| q.name() == value)?,
             "RTV_POINT_RADIUS" => self.point_radius = within(value, 0.0, f64::MAX)?,
             "RTV_LINE_RADIUS" => self.line_radius = within(value, 0.0, f64::MAX)?,
+            "RTV_EDGES" => self.edge_reach = within(value, 0.0, 4.0)?,
             "RTV_SEED" => self.seed = value.parse().ok()?,
             "RTV_REPORT" => self.report = (!value.is_empty()).then(|| value.to_owned()),
             "RTV_QUIET" => self.quiet = switch(value)?,

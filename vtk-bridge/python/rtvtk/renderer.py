@@ -5,15 +5,18 @@ as it was. What is left (axes, text, lines, volumes) is drawn by OpenGL against 
 while a selector is at work nothing is touched.
 """
 import ctypes as C
+import os
 
 import vtkmodules.vtkRenderingOpenGL2 as gl
-from vtkmodules.vtkCommonCore import vtkWeakReference
+from vtkmodules.vtkCommonCore import vtkVersion, vtkWeakReference
 
 from . import library as rtv
 from .extract import Extractor
 from .overlay import Overlay
 from .view import add_lights, prepare_lights, size_of, view_of
 from .why import Untraceable
+
+_VERSION = (vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion())
 
 
 class _Watched:
@@ -159,6 +162,9 @@ def install():
     """From now on every renderer traces. Raises `RtvError` when the library cannot be loaded."""
     if hasattr(gl, "_rtvtk_renderer"):
         return
+    if _VERSION > (9, 2):
+        # Shaders of later versions draw edges on their surfaces alone.
+        os.environ.setdefault("RTV_EDGES", "0")
     rtv.Bridge()
 
     @gl.vtkOpenGLRenderer.override
