@@ -206,13 +206,15 @@ impl Cache {
             return Weak::new();
         }
         let size = |m: &TriMesh| (m.positions.len(), m.indices.len());
-        let was = self.entries.iter().filter(|(_, e)| {
-            e.last_used < self.frame
-                && size(&e.geometry.mesh) == size(mesh)
-                && e.geometry.mesh.indices == mesh.indices
-        });
-        was.max_by_key(|(key, e)| (e.last_used, **key))
-            .map_or_else(Weak::new, |(_, e)| Arc::downgrade(&e.geometry))
+        let was = self
+            .entries
+            .iter()
+            .filter(|(_, e)| e.last_used < self.frame && size(&e.geometry.mesh) == size(mesh));
+        // Indices are compared with those of one alone: a program may have a thousand shapes of one size.
+        match was.max_by_key(|(key, e)| (e.last_used, **key)) {
+            Some((_, e)) if e.geometry.mesh.indices == mesh.indices => Arc::downgrade(&e.geometry),
+            _ => Weak::new(),
+        }
     }
 
     /// Geometry that was found another way is in use.
