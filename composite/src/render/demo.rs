@@ -81,6 +81,12 @@ pub enum DemoError {
         /// The file.
         file: String,
     },
+    /// What looks like a file's name, and is none.
+    #[error("there is no file {file}, nor a data set of that name (`datasets list` names those)")]
+    NoFile {
+        /// The name.
+        file: String,
+    },
     /// A file has one size.
     #[error("{file} is a file and has no size `{size}`: leave the size out")]
     SizeOfFile {

@@ -12,6 +12,10 @@ use rt_core::scene::Scene;
 
 /// Pixels along the sides of a piece: half of rt-core's tiles. A picture of 1024 rows has 4096, 32 for each of 128 ranks.
 const PIECE: u32 = rt_core::waves::TILE_SIDE / 2;
+/// TEMPORARY
+fn piece_side() -> u32 {
+    std::env::var("DPAR_PIECE").ok().and_then(|v| v.parse().ok()).unwrap_or(PIECE)
+}
 
 /// Renders a picture of a scene that every rank has, each rank some pieces of 16 x 16 pixels spread over the picture. Every rank must call it with
 /// the same arguments. Time limits and error limits end a frame in each piece on its own.
@@ -104,13 +108,14 @@ fn alone<T: Send>(work: impl FnOnce() -> T + Send) -> T {
 /// The pieces of `rank`, relative to the area, row by row. Piece (i, j) goes to rank i + s j modulo the number of ranks: a lattice of rank 1, with s
 /// near the golden section of the number of ranks, so that a rank's pieces are about as far apart as they can be.
 fn pieces(area: Crop, rank: usize, size: usize) -> impl Iterator<Item = Crop> {
-    let (columns, rows) = (area.width.div_ceil(PIECE) as usize, area.height.div_ceil(PIECE) as usize);
+    let side = piece_side();
+    let (columns, rows) = (area.width.div_ceil(side) as usize, area.height.div_ceil(side) as usize);
     let step = lattice_step(size);
     (0..rows).flat_map(move |j| {
         let first = (rank + size - j * step % size) % size;
         (first..columns).step_by(size).map(move |i| {
-            let (x, y) = (i as u32 * PIECE, j as u32 * PIECE);
-            Crop { x, y, width: PIECE.min(area.width - x), height: PIECE.min(area.height - y) }
+            let (x, y) = (i as u32 * side, j as u32 * side);
+            Crop { x, y, width: side.min(area.width - x), height: side.min(area.height - y) }
         })
     })
 }
