@@ -82,10 +82,12 @@ pub enum DemoError {
         file: String,
     },
     /// What looks like a file's name, and is none.
-    #[error("there is no file {file}, nor a data set of that name (`datasets list` names those)")]
+    #[error("there is no file {file}, and {unknown}")]
     NoFile {
         /// The name.
         file: String,
+        /// What the catalogue says of it.
+        unknown: CatalogueError,
     },
     /// A file has one size.
     #[error("{file} is a file and has no size `{size}`: leave the size out")]

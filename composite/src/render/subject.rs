@@ -76,8 +76,8 @@ impl Subject {
                 let views = vec![whole(middle_and_radius(&bodies))];
                 Ok(Subject { bodies, views })
             }
-            Err(_) if path.extension().is_some() || path.components().count() > 1 => {
-                Err(DemoError::NoFile { file: name.into() })
+            Err(unknown) if path.extension().is_some() || path.components().count() > 1 => {
+                Err(DemoError::NoFile { file: name.into(), unknown })
             }
             Err(unknown) => Err(unknown.into()),
         }
