@@ -172,7 +172,7 @@ fn bricks_of_several_volumes_are_small_and_little_is_held_twice() {
         let case = alone(vec![place(coarse.clone(), 0.0), place(fine.clone(), turn)]);
         let whole: usize = case.scene.volumes.iter().map(|v| v.volume.grid().values.len()).sum();
         let held = values_held(&case, &Partition::new(&case.scene, 8, &Split::Triangles));
-        assert!(held.iter().all(|h| *h < whole / 5), "{held:?} of {whole}, turned by {turn}");
+        assert!(held.iter().all(|h| *h < whole * 3 / 10), "{held:?} of {whole}, turned by {turn}");
         assert!(held.iter().sum::<usize>() < whole * 3 / 2, "{held:?} of {whole}, turned by {turn}");
     }
 }
