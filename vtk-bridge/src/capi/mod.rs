@@ -25,7 +25,7 @@ pub struct RtvBridge {
 }
 
 /// Number of this interface, made from its structures and calls (a test says which). A shim built for another one must not go on.
-pub const RTV_ABI: u32 = 3_622_962_323;
+pub const RTV_ABI: u32 = 910_789_305;
 
 /// [`RTV_ABI`] of the library.
 #[unsafe(no_mangle)]
