@@ -9,10 +9,9 @@ use datasets::read::{Content, Opened, SceneModel};
 use glam::{DVec3, Vec3};
 use rt_core::accel::Geometry;
 use rt_core::grid::Grid;
-use rt_core::material::{Material, Sides};
+use rt_core::material::Material;
 use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::shapes::{Isosurface, IsosurfaceNormals, IsosurfaceOptions, Radii, Shape, Spheres, Tubes};
-use rt_core::texture::Texture;
 use std::sync::Arc;
 
 /// Where a part's colour comes from.
