@@ -74,7 +74,9 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     }
     if reports.iter().any(|r| r["traced_draws"].as_u64().unwrap_or(0) == 0) {
         let why = &reports[0]["passed_reasons"];
-        record.missing.push(format!("{}: gluray traces nothing of this version of it ({why})", PROGRAM.name()));
+        record
+            .missing
+            .push(format!("{}: gluray traces nothing of this version of it ({why})", PROGRAM.name()));
         return Ok(());
     }
     for (i, (report, &ranks)) in reports.iter().zip(counts).enumerate() {
