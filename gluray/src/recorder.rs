@@ -36,6 +36,7 @@ impl<const N: usize> Stream<N> {
     }
 
     #[cold]
+    #[inline(never)]
     fn vary(&mut self, vertices: usize) {
         self.values = self.spares.pop().unwrap_or_default();
         self.values.clear();
@@ -103,7 +104,7 @@ pub(crate) struct Recorder {
 
 impl Recorder {
     /// A primitive begins.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn begin(&mut self, mode: u32, current: &Current) {
         self.open = self.count();
         self.mode = mode;
@@ -123,6 +124,8 @@ impl Recorder {
         self.followed + self.positions.len()
     }
 
+    #[cold]
+    #[inline(never)]
     fn start(&mut self, current: &Current) {
         (self.normals.constant, self.colors.constant, self.tex.constant) =
             (current.normal, current.color, current.tex);
@@ -132,7 +135,7 @@ impl Recorder {
     }
 
     /// The primitive ends.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn end(&mut self) {
         let count = (self.count() - self.open) as u32;
         self.calls += 1;
@@ -189,7 +192,8 @@ impl Recorder {
                 self.followed += 1;
             }
             None if !self.positions.is_empty() => self.positions.push(v),
-            _ => self.unexpected(v),
+            // In parts: what lies in memory for the rare case would be put there for every vertex.
+            _ => self.unexpected(v[0], v[1], v[2]),
         }
         if self.normals.varying {
             self.normals.values.push(current.normal);
@@ -199,7 +203,7 @@ impl Recorder {
         }
     }
 
-    #[inline]
+    #[inline(never)]
     fn vertex_more(&mut self, current: &Current) {
         if self.colors.varying {
             self.colors.values.push(current.color);
@@ -214,7 +218,9 @@ impl Recorder {
 
     /// The first vertex of a batch, or one that is not what was expected.
     #[cold]
-    fn unexpected(&mut self, v: [f32; 3]) {
+    #[inline(never)]
+    fn unexpected(&mut self, x: f32, y: f32, z: f32) {
+        let v = [x, y, z];
         if self.expected.is_none()
             && self.followed == 0
             && let Some(e) = self.earlier.get(&v.map(f32::to_bits))

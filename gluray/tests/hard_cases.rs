@@ -79,6 +79,11 @@ cases! {
     clip_planes: true 0;
     fog: true 0;
     color_map_texture: true 0;
+    mipmaps: true 0;
+    levels_and_limits_of_textures: true 0;
+    generated_mipmaps: true 0;
+    textures_replaced_between_draws: true 0;
+    a_thousand_textures: true 0;
     material_per_vertex: true 0;
     blended_over_traced: true 0;
     seventeen_contexts: true 0;

@@ -2,6 +2,7 @@
 floats, bottom row first."""
 from gl_by_ctypes import *
 from mode_scenes import *
+from texture_scenes import *
 
 
 def plain():
