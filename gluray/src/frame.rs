@@ -75,7 +75,6 @@ impl Context {
         };
         let attributes = Arc::new(self.recorder.take_attributes());
         let clip_from_object = product(&self.state.projection, &self.state.model_view);
-        if std::env::var_os("DBG").is_some() { if let crate::capture::Values::PerVertex(v) = &attributes.normals { let h = crate::cache::hash(&[bytemuck::cast_slice(v)]); eprintln!("batch {} normals {h:x} clip {:?}", self.recorder.runs.len(), &clip_from_object[..4]); } else { eprintln!("batch constant normals"); } }
         let calls = std::mem::take(&mut self.recorder.calls);
         self.recorder.positions.clear();
         self.recorder.runs.clear();
@@ -124,6 +123,10 @@ impl Context {
         if in_order {
             self.trace_in_order(&draw, image);
         } else {
+            let samples = |d: &Draw| d.state.samples.max(1);
+            if self.frame.pending.first().is_some_and(|(d, _)| samples(d) != samples(&draw)) {
+                self.flush("a draw with more or fewer samples");
+            }
             self.frame.pending.push((draw, image));
         }
     }

@@ -103,7 +103,7 @@ impl Presenter {
         gl::use_program(program);
         gl::uniform1i(gl::uniform_location(program, "colors"), 0);
         gl::uniform1i(gl::uniform_location(program, "depths"), 1);
-        self.textures = [gl::gen_texture(), gl::gen_texture()];
+        self.textures = [gl::gen_texture(core), gl::gen_texture(core)];
         if core {
             self.vertex_array = gl::gen_vertex_array();
         }

@@ -24,7 +24,10 @@ const TABLE: &[(&str, &str)] = &[
     ("positions that", "the vertex shader makes numbers that are no points"),
     ("a matrix that rays", "the matrix maps the scene onto a line or a point"),
     ("fewer vertices", "too few to tell a matrix from; --mode match does not need it"),
-    ("a texture with anisotropic", "many samples along the longer side of a footprint, which is not followed"),
+    (
+        "a texture with anisotropic",
+        "many samples along the longer side of a footprint, which is not followed",
+    ),
     ("a texture with its components", "swizzled components are not followed"),
     ("masks or coverage of samples", "which samples of a pixel are written is the driver's to decide"),
     ("a sampler object", "filters of sampler objects are not followed"),

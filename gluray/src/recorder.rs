@@ -3,6 +3,7 @@
 use crate::cache::Geometry;
 use crate::capture::{Attributes, Run, Values};
 use crate::state::current::{Current, Materials};
+use rt_core::glam::Vec3;
 use rt_core::mesh::TriMesh;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -61,6 +62,13 @@ impl<const N: usize> Stream<N> {
             self.spares.push(v);
         }
     }
+}
+
+/// Bit for bit: not a number is what it is.
+#[inline(always)]
+fn is_at(p: &Vec3, v: [f32; 3]) -> bool {
+    (p.x.to_bits() ^ v[0].to_bits()) | (p.y.to_bits() ^ v[1].to_bits()) | (p.z.to_bits() ^ v[2].to_bits())
+        == 0
 }
 
 /// A batch of an earlier frame, which may come again vertex by vertex.
@@ -183,13 +191,8 @@ impl Recorder {
     #[inline(always)]
     pub(crate) fn vertex(&mut self, v: [f32; 3], current: &Current) {
         match &self.expected {
-            Some(mesh)
-                if mesh
-                    .positions
-                    .get(self.followed)
-                    .is_some_and(|p| p.to_array().map(f32::to_bits) == v.map(f32::to_bits)) =>
-            {
-                self.followed += 1;
+            Some(mesh) if mesh.positions.get(self.followed).is_some_and(|p| is_at(p, v)) => {
+                self.followed += 1
             }
             None if !self.positions.is_empty() => self.positions.push(v),
             // In parts: what lies in memory for the rare case would be put there for every vertex.

@@ -79,8 +79,14 @@ impl Prepared<'_> {
 
     /// How many texels of a texture of `size` the fragment of triangle `prim` covers at a pixel; `None` where the triangle's plane goes through the eye there.
     ///
-    /// The driver's way: the differences of two by two pixels, from the upper left one to its neighbours, the largest component.
-    fn footprint(&self, prim: usize, corners: [[f32; 4]; 3], size: [f32; 2], pixel: (i32, i32)) -> Option<f32> {
+    /// The driver's way: the differences of two by two pixels, from the upper left one to its neighbours.
+    fn footprint(
+        &self,
+        prim: usize,
+        corners: [[f32; 4]; 3],
+        size: [f32; 2],
+        pixel: (i32, i32),
+    ) -> Option<f32> {
         let s = &*self.draw.state;
         let (x, y) = (pixel.0 & !1, pixel.1);
         // The rows of a window are counted from its top.
@@ -97,8 +103,11 @@ impl Prepared<'_> {
             Some(texturing::divided(mixed(corners, w)))
         };
         let (here, right, down) = (at(x, top)?, at(x + 1, top)?, at(x, below)?);
-        let across = (0..2).map(|k| (right[k] - here[k]).abs().max((down[k] - here[k]).abs()) * size[k]);
-        Some(across.fold(0.0, f32::max))
+        let length = |to: [f32; 2]| {
+            let d: [f32; 2] = std::array::from_fn(|k| (to[k] - here[k]) * size[k]);
+            d[0].hypot(d[1])
+        };
+        Some(length(right).max(length(down)))
     }
 
     /// The colour that the mode gives a fragment.
@@ -222,7 +231,9 @@ impl Prepared<'_> {
         if let (Some(unit), Some(image)) = (&s.texture, &self.image) {
             let coords = corners.map(|i| self.texture_coordinates(unit, i));
             let rho = pixel.filter(|_| image.needs_footprint());
-            let rho = rho.and_then(|at| self.footprint(prim, coords, image.size(), at));
+            let [across, up] = image.size();
+            let size = [across, if unit.target == TEXTURE_1D { 0.0 } else { up }];
+            let rho = rho.and_then(|at| self.footprint(prim, coords, size, at));
             color = texturing::apply(unit, image, color, mixed(coords, w), rho);
         }
         for k in 0..3 {

@@ -4,7 +4,7 @@
 
 use super::driver;
 use core::ffi::{c_char, c_void};
-use std::sync::atomic::AtomicPtr;
+use std::sync::atomic::{AtomicPtr, AtomicU32, Ordering::Relaxed};
 
 driver! {
     pub(crate) fn begin = "glBegin"(mode: u32);
@@ -189,8 +189,12 @@ pub(crate) fn vertex_attrib_address(at: u32) -> usize {
     out as usize
 }
 
-/// A new texture.
-pub(crate) fn gen_texture() -> u32 {
+/// A new texture. Where programs may choose names themselves, as many do, ours is one that they do not choose: a generated one could be a program's next.
+pub(crate) fn gen_texture(core: bool) -> u32 {
+    static NAMES: AtomicU32 = AtomicU32::new(0x6c75_7261);
+    if !core {
+        return NAMES.fetch_add(1, Relaxed);
+    }
     let mut out = 0;
     gen_textures(1, &raw mut out);
     out

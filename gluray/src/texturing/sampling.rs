@@ -1,8 +1,7 @@
 //! Texels at a fragment: wrapping, filters, and the choice among mipmaps.
 //!
-//! OpenGL leaves it to the driver how the footprint of a pixel becomes a number (compatibility profile specification, section 8.14.1: `rho` need only lie
-//! between the longest and the sum of the derivatives). Here it is what llvmpipe does: the derivatives of each two by two pixels, the largest of their
-//! components, and between two levels a blend that keeps to the nearer one for half of the way.
+//! The footprint of a pixel is the longer of the two derivatives (compatibility profile specification, equation 8.7), taken as llvmpipe takes them: the
+//! differences within each two by two pixels.
 
 use super::image::{Image, Level};
 use crate::enums::*;
@@ -65,20 +64,13 @@ impl Filters {
         // As the driver adjusts it, and only where there is something to adjust.
         let lod = (rho.log2() + self.bias).max(least).min(most.max(least));
         let smaller = if plain { rho > 1.0 } else { lod > 0.0 };
-        let (level, share) = match (self.mip, plain) {
-            (Mip::None, _) => (0.0, 0.0),
-            (Mip::Nearest, true) => ((rho * std::f32::consts::SQRT_2).log2().floor(), 0.0),
-            (Mip::Nearest, false) => ((lod + 0.5).floor(), 0.0),
-            (Mip::Linear, true) => {
-                let r = rho * (3.5 / (2.0 * std::f32::consts::SQRT_2));
-                let level = r.log2().floor();
-                (level, 2.0 * (r / level.exp2()) - 3.0)
-            }
-            (Mip::Linear, false) => {
-                let level = (lod + 0.25).floor();
-                (level, 2.0 * (lod + 0.25 - level) - 1.0)
-            }
+        let level = match self.mip {
+            Mip::None => 0.0,
+            Mip::Nearest if plain => (rho * std::f32::consts::SQRT_2).log2().floor(),
+            Mip::Nearest => (lod + 0.5).floor(),
+            Mip::Linear => lod.floor(),
         };
+        let share = if self.mip == Mip::Linear { lod - level } else { 0.0 };
         // Also where the footprint is no number.
         let inside = level >= 0.0;
         match level as usize {
@@ -215,16 +207,16 @@ mod tests {
     }
 
     #[test]
-    fn two_levels_are_blended_in_the_middle_of_the_way_between_them() {
+    fn two_levels_are_blended_by_the_fraction_of_the_level_of_detail() {
         let mut f = image(true, REPEAT).filters;
         f.mip = Mip::Linear;
         assert_eq!(f.choose(2.0, 5), (true, 1, 0.0));
+        assert_eq!(f.choose(0.5, 5), (false, 0, 0.0));
         let (_, level, share) = f.choose(2.0 * std::f32::consts::SQRT_2, 5);
         assert!(level == 1 && (share - 0.5).abs() < 1e-5, "{level} {share}");
-        // The same by the way that knows a bias.
-        f.bias = 1e-6;
+        f.bias = -0.25;
         let (_, level, share) = f.choose(2.0 * std::f32::consts::SQRT_2, 5);
-        assert!(level == 1 && (share - 0.5).abs() < 1e-4, "{level} {share}");
+        assert!(level == 1 && (share - 0.25).abs() < 1e-5, "{level} {share}");
     }
 
     #[test]
