@@ -254,6 +254,17 @@ impl<'a> Prepared<'a> {
         mesh.triangle(prim).map(|p| transform(&self.draw.clip_from_object, p.to_array()))
     }
 
+    /// Weights of a triangle's corners where its plane is seen at the centre of a pixel, be it inside or not; `None` where that is nowhere.
+    pub(crate) fn weights_at(&self, prim: usize, x: i32, y: i32) -> Option<[f32; 3]> {
+        let [vx, vy, vw, vh] = self.draw.state.viewport.map(f64::from);
+        let (px, py) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
+        let at = DVec3::new(2.0 * (px - vx) / vw - 1.0, 2.0 * (py - vy) / vh - 1.0, 1.0);
+        let h = self.corners(prim).map(|v| DVec3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[3])));
+        let l = [h[1].cross(h[2]).dot(at), h[2].cross(h[0]).dot(at), h[0].cross(h[1]).dot(at)];
+        let sum = l[0] + l[1] + l[2];
+        (sum != 0.0 && sum.is_finite()).then(|| l.map(|v| (v / sum) as f32))
+    }
+
     /// The fragment of triangle `prim` at the centre of pixel (`x`, `y`), if the rasterizer makes one.
     fn fragment(&self, prim: usize, x: i32, y: i32) -> Option<Fragment> {
         let s = &*self.draw.state;

@@ -79,6 +79,14 @@ cases! {
     clip_planes: true 0;
     fog: true 0;
     color_map_texture: true 0;
+    mipmaps: true 0;
+    samples_of_surfaces: true 0;
+    resolved_samples: true 0;
+    samples_switched_off: true 0;
+    levels_and_limits_of_textures: true 0;
+    generated_mipmaps: true 0;
+    textures_replaced_between_draws: true 0;
+    a_thousand_textures: true 0;
     material_per_vertex: true 0;
     blended_over_traced: true 0;
     seventeen_contexts: true 0;
@@ -107,6 +115,11 @@ fn nothing_is_traced_when_tracing_is_off() {
 #[test]
 fn blending_in_order_is_traced_when_all_is_asked_for() {
     check("blended_over_traced", &Expected { traced: true, exit: 0 }, &["--trace", "all"]);
+}
+
+#[test]
+fn samples_of_draws_in_order_are_written_one_by_one() {
+    check("samples_in_order", &Expected { traced: true, exit: 0 }, &["--trace", "all"]);
 }
 
 #[test]

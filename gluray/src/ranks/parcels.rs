@@ -70,6 +70,7 @@ wire_struct!(Snapshot {
     draw_buffer,
     more_draw_buffers,
     samples,
+    masked_samples,
     discard,
     feedback_active,
     first_vertex_provokes,
