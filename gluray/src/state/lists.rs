@@ -135,19 +135,54 @@ impl Context {
 
     /// Puts a step of ours into the list; calls that went to the driver before it end their piece.
     fn list_op(&mut self, op: Op) -> bool {
-        let Some(r) = &mut self.recording else { return false };
-        if r.used {
-            gl::end_list();
-            r.list.ops.push(Op::Driver { list: r.piece, draws: r.draws });
-            let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
-            lists.next_piece += 1;
-            r.piece = FIRST_PIECE + lists.next_piece;
-            r.list.pieces.push(r.piece);
-            (r.used, r.draws) = (false, false);
-            gl::new_list(r.piece, COMPILE);
+        if self.recording.as_ref().is_some_and(|r| r.used) {
+            self.close_piece();
+            self.open_piece();
         }
+        let Some(r) = &mut self.recording else { return false };
         r.list.ops.push(op);
         true
+    }
+
+    /// The driver's piece of the list that is compiled ends here.
+    fn close_piece(&mut self) {
+        let Some(r) = &mut self.recording else { return };
+        gl::end_list();
+        if r.used {
+            r.list.ops.push(Op::Driver { list: r.piece, draws: r.draws });
+        }
+        (r.used, r.draws) = (false, false);
+    }
+
+    fn open_piece(&mut self) {
+        let Some(r) = &mut self.recording else { return };
+        let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
+        lists.next_piece += 1;
+        r.piece = FIRST_PIECE + lists.next_piece;
+        r.list.pieces.push(r.piece);
+        gl::new_list(r.piece, COMPILE);
+    }
+
+    /// `glGenLists`, which `generate` asks of the driver. Drivers hand out the names after the greatest that is in use, and that is one of our
+    /// pieces: later pieces must not take what the program was given. A piece that is open has no name for the driver yet, so it ends before.
+    pub(crate) fn gen_lists(&mut self, n: i32, generate: impl FnOnce() -> u32) -> u32 {
+        if self.sink == Sink::Trace {
+            self.unswallow("glGenLists between Begin and End");
+        }
+        let in_piece = self.recording.as_ref().is_some_and(|r| r.piece != r.name);
+        if in_piece {
+            self.close_piece();
+        }
+        let first = generate();
+        if first != 0 && n > 0 {
+            let last = first.saturating_add(n.cast_unsigned() - 1);
+            let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
+            lists.next_piece = lists.next_piece.max(last.saturating_sub(FIRST_PIECE));
+        }
+        if in_piece {
+            self.open_piece();
+        }
+        first
     }
 
     pub(crate) fn list_begin(&mut self, mode: u32) -> bool {

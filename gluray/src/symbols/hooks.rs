@@ -117,6 +117,13 @@ pub(in crate::symbols) unsafe extern "C" fn glGetError() -> u32 {
     context_error()
 }
 
+pub(in crate::symbols) unsafe extern "C" fn glGenLists(n: Int) -> u32 {
+    let names = || driver!(glGenLists(n): (Int) -> u32);
+    let mut given = None;
+    guard(|| with_context(|c| c.gen_lists(n, || *given.insert(names()))));
+    given.unwrap_or_else(names)
+}
+
 fn context_error() -> u32 {
     let kept = guard(|| with_context(context::Context::take_error)).flatten().flatten();
     kept.unwrap_or_else(|| driver!(glGetError(): () -> u32))
