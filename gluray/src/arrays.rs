@@ -10,7 +10,7 @@ use crate::context::{Context, Sink};
 use crate::decide::Verdict;
 use crate::enums::*;
 use crate::overrides::Look;
-use crate::primitives::{is_filled, triangulate};
+use crate::primitives::{Split, is_filled, triangulate};
 use crate::programs::DrawCall;
 use crate::real::gl;
 use crate::state::snapshot::Snapshot;
@@ -256,14 +256,14 @@ impl Elements {
     }
 
     /// Names the geometry of these elements of an array of positions, whose bytes are given.
-    fn key(&self, mode: u32, bytes: &[u8], layout: (usize, u32, usize, bool), s: &Snapshot) -> u128 {
+    fn key(&self, mode: u32, bytes: &[u8], layout: (usize, u32, usize, bool), split: &Split) -> u128 {
         let (stride, kind, size, _) = layout;
-        let rules = u64::from(s.first_vertex_provokes) << 1 | u64::from(s.flat);
+        let rules = u64::from(split.first_provokes) << 1 | u64::from(split.all_turned);
         let (_, count) = self.span();
         let tail = [stride as u64, u64::from(kind), size as u64, u64::from(mode), rules, count as u64];
         let tail = bytemuck::cast_slice(&tail);
         match self {
-            Elements::Range { .. } => hash(&[bytes, tail]),
+            Elements::Range { .. } => hash(&[bytes, tail, bytemuck::cast_slice(&split.turned)]),
             Elements::Indexed { indices, least, .. } => {
                 hash(&[bytes, bytemuck::cast_slice(indices), &least.to_ne_bytes(), tail])
             }
@@ -295,15 +295,47 @@ impl Elements {
         out
     }
 
+    /// How the driver splits quads where nobody knows what it clips.
+    pub(crate) fn plain_split(&self, first_provokes: bool) -> Split {
+        Split {
+            first_provokes,
+            all_turned: matches!(self, Elements::Indexed { .. }),
+            turned: Vec::new(),
+        }
+    }
+
+    /// How the driver would split quads: see [`Split`].
+    pub(crate) fn split(&self, mode: u32, s: &Snapshot, position: &Source, bytes: &[u8]) -> Split {
+        let mut split = self.plain_split(s.first_vertex_provokes);
+        split.all_turned |= s.flat;
+        let (_, count) = self.span();
+        if mode == QUADS && !split.all_turned {
+            let clipped = s.clips();
+            let (step, one, size) = (position.step(), component_bytes(position.kind), position.size.min(3));
+            split.look_for_clipped(0, count as u32, |from, to| {
+                (from..to).any(|i| {
+                    let at = i as usize * step;
+                    let mut p = [0.0; 3];
+                    for (k, v) in p.iter_mut().enumerate().take(size) {
+                        let b = bytes.get(at + k * one..at + (k + 1) * one);
+                        *v = b.map_or(0.0, |b| crate::capture::component(b, position.kind, false));
+                    }
+                    clipped(p)
+                })
+            });
+        }
+        split
+    }
+
     /// Triangles, in vertex numbers of the span.
-    pub(crate) fn triangles(&self, mode: u32, first_provokes: bool, flat: bool) -> Vec<[u32; 3]> {
+    pub(crate) fn triangles(&self, mode: u32, split: &Split) -> Vec<[u32; 3]> {
         let mut out = Vec::new();
         match self {
             Elements::Range { count, .. } => {
-                triangulate(mode, 0, *count as u32, first_provokes, flat, &mut out)
+                triangulate(mode, 0, *count as u32, split, &mut out)
             }
             Elements::Indexed { indices, least, .. } => {
-                triangulate(mode, 0, indices.len() as u32, first_provokes, flat, &mut out);
+                triangulate(mode, 0, indices.len() as u32, split, &mut out);
                 let vertex = |i: u32| indices[i as usize] - *least as u32;
                 out.iter_mut().for_each(|t| *t = t.map(vertex));
             }
@@ -410,12 +442,13 @@ impl Context {
         let elements = elements()?;
         let (first, count) = elements.span();
         let seen = arrays.position.view(first, count)?;
-        let key = elements.key(mode, &seen, arrays.position.layout(), &self.state);
+        let split = elements.split(mode, &self.state, &arrays.position, &seen);
+        let key = elements.key(mode, &seen, arrays.position.layout(), &split);
         let geometry = match self.cache.known(key) {
             Some(geometry) => geometry,
             None => {
                 let positions = positions(&arrays.position.pack(seen))?;
-                let triangles = elements.triangles(mode, self.state.first_vertex_provokes, self.state.flat);
+                let triangles = elements.triangles(mode, &split);
                 self.cache.put(key, &positions, triangles)
             }
         };

@@ -248,8 +248,15 @@ impl Context {
         if self.depth_of_lists >= DEEPEST {
             return true;
         }
+        // Quads in lists are split in another way than others: they are batches of their own.
+        if self.depth_of_lists == 0 && self.recorder.quads && self.sink == Sink::Outside {
+            self.end_batch();
+        }
         self.depth_of_lists += 1;
         self.play(&list);
+        if self.depth_of_lists == 1 && self.recorder.quads && self.sink == Sink::Outside {
+            self.end_batch();
+        }
         self.depth_of_lists -= 1;
         true
     }
@@ -329,7 +336,11 @@ impl Context {
 
     fn play(&mut self, list: &List) {
         let mut left_out = false;
-        for op in &list.ops {
+        let mut done = 0;
+        for (i, op) in list.ops.iter().enumerate() {
+            if i < done {
+                continue;
+            }
             if left_out {
                 left_out = *op != Op::End;
                 continue;
@@ -341,7 +352,10 @@ impl Context {
                 }
                 Op::Begin(mode) | Op::BeginArrays(mode) => {
                     if !self.begin(mode) {
-                        gl::begin(mode);
+                        match self.play_quads(mode, list, &list.ops[i + 1..]) {
+                            Some(n) => done = i + 1 + n,
+                            None => gl::begin(mode),
+                        }
                     }
                 }
                 Op::End => {
@@ -391,6 +405,47 @@ impl Context {
                 }
             }
         }
+    }
+
+    /// Quads of a list that the driver draws, as the triangles that it makes of quads in lists: it splits those of immediate mode along the
+    /// other diagonal. Gives how many steps that were; `None` where a quad is more than two filled triangles, or more than vertices come.
+    fn play_quads(&mut self, mode: u32, list: &List, ops: &[Op]) -> Option<usize> {
+        let filled = self.state.polygon_mode == [FILL; 2];
+        if mode != QUADS || !filled || self.sink != Sink::Pass || self.state.program != 0 {
+            return None;
+        }
+        let plain = |op: &Op| {
+            matches!(op, Op::Vertex(_) | Op::Normal(_) | Op::Color(_) | Op::Tex(_) | Op::Material(_))
+        };
+        let n = ops.iter().position(|op| !plain(op)).filter(|n| ops[*n] == Op::End)?;
+        gl::begin(TRIANGLES);
+        let mut corners = Vec::with_capacity(4);
+        let mut sent = self.current;
+        for op in &ops[..n] {
+            match *op {
+                Op::Normal(v) => self.current.normal = v,
+                Op::Color(v) => self.current.color = v,
+                Op::Tex(v) => self.current.tex = v,
+                Op::Material(at) => {
+                    let (face, what, v) = list.materials[at as usize];
+                    self.material(face, what, v);
+                }
+                Op::Vertex(v) => corners.push((v, self.current)),
+                _ => {}
+            }
+            if let [a, b, c, d] = corners[..] {
+                for (v, current) in [a, b, d, b, c, d] {
+                    current.send_changes(&sent);
+                    sent = current;
+                    gl::vertex4f(v[0], v[1], v[2], v[3]);
+                }
+                corners.clear();
+            }
+        }
+        self.current.send_changes(&sent);
+        gl::end();
+        self.end();
+        Some(n + 1)
     }
 
     pub(crate) fn call_lists(&mut self, n: i32, kind: u32, names: usize) -> bool {

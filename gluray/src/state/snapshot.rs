@@ -236,6 +236,22 @@ impl Snapshot {
         });
     }
 
+    /// Says of points in object space whether they are outside of what is seen, so that the driver has to clip.
+    pub(crate) fn clips(&self) -> impl Fn([f32; 3]) -> bool {
+        let m = crate::lighting::product(&self.projection, &self.model_view);
+        let (model_view, planes) = (self.model_view, self.clip_planes.clone());
+        let depth_clamp = self.depth_clamp;
+        move |p| {
+            let [x, y, z, w] = crate::lighting::transform(&m, p);
+            let beyond = |v: f32| v > w || v < -w;
+            let cut = |plane: &[f64; 4]| {
+                let eye = crate::lighting::transform(&model_view, p);
+                eye.iter().zip(plane).map(|(a, b)| f64::from(*a) * b).sum::<f64>() < 0.0
+            };
+            beyond(x) || beyond(y) || (!depth_clamp && beyond(z)) || planes.iter().any(cut)
+        }
+    }
+
     fn lighting(&mut self) {
         self.lighting = gl::is_enabled(LIGHTING);
         self.color_material = gl::is_enabled(COLOR_MATERIAL)
