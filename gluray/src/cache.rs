@@ -133,16 +133,14 @@ const WORTH_IMPROVING: usize = 20_000;
 
 impl Cache {
     /// The geometry of primitives in a row.
-    pub(crate) fn of_runs(
-        &mut self,
-        positions: &[[f32; 3]],
-        runs: &[Run],
-        split: &Split,
-    ) -> Arc<Geometry> {
+    pub(crate) fn of_runs(&mut self, positions: &[[f32; 3]], runs: &[Run], split: &Split) -> Arc<Geometry> {
         let mut key = hash(&[bytes_of(positions)]);
         for r in runs {
             key = mix(key, u64::from(r.mode) << 32 | u64::from(r.count));
-            key = mix(key, u64::from(r.times) << 2 | u64::from(split.first_provokes) << 1 | u64::from(split.all_turned));
+            key = mix(
+                key,
+                u64::from(r.times) << 2 | u64::from(split.first_provokes) << 1 | u64::from(split.all_turned),
+            );
         }
         for [from, to] in &split.turned {
             key = mix(key, u64::from(*from) << 32 | u64::from(*to));

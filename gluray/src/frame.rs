@@ -104,8 +104,7 @@ impl Context {
         let s = &self.state;
         // Lists end batches with quads before and after them.
         let all_turned = s.flat || self.depth_of_lists > 0;
-        let mut split =
-            Split { first_provokes: s.first_vertex_provokes, all_turned, turned: Vec::new() };
+        let mut split = Split { first_provokes: s.first_vertex_provokes, all_turned, turned: Vec::new() };
         if std::mem::take(&mut self.recorder.quads) && !all_turned {
             let clipped = self.state.clips();
             let outside = |from, to| self.recorder.any_position(from, to, &clipped);

@@ -47,13 +47,7 @@ impl Split {
 
 /// The triangles of a primitive whose vertices are numbered `first..first + count`; the vertex that gives the flat colour comes
 /// last. Incomplete primitives give nothing, as OpenGL has it.
-pub(crate) fn triangulate(
-    mode: u32,
-    first: u32,
-    count: u32,
-    split: &Split,
-    out: &mut Vec<[u32; 3]>,
-) {
+pub(crate) fn triangulate(mode: u32, first: u32, count: u32, split: &Split, out: &mut Vec<[u32; 3]>) {
     let v = |i: u32| first + i;
     let first_provokes = split.first_provokes;
     // Rotates so that vertex 0 (the first) comes last; the orientation stays.
@@ -72,7 +66,9 @@ pub(crate) fn triangulate(
             true => [v(i + 1), v(0), v(i)],
         })),
         // Mesa's quads do not follow the provoking vertex convention: their last vertex gives the colour.
-        QUADS => out.extend((0..count / 4).flat_map(|i| quad([0, 1, 2, 3].map(|k| v(4 * i + k)), split.turns(v(4 * i))))),
+        QUADS => out.extend(
+            (0..count / 4).flat_map(|i| quad([0, 1, 2, 3].map(|k| v(4 * i + k)), split.turns(v(4 * i)))),
+        ),
         QUAD_STRIP => out.extend((0..(count / 2).saturating_sub(1)).flat_map(|i| {
             let [a, b, c, d] = [0, 1, 2, 3].map(|k| v(2 * i + k));
             [[c, a, d], [a, b, d]]

@@ -122,6 +122,11 @@ impl Recorder {
         self.behind = false;
     }
 
+    /// The mode of the primitive that is open, or was last.
+    pub(crate) fn mode(&self) -> u32 {
+        self.mode
+    }
+
     /// Vertices so far.
     #[inline(always)]
     fn count(&self) -> usize {
@@ -270,7 +275,8 @@ impl Recorder {
         const WORTH_FOLLOWING: usize = 1000;
         if self.positions.len() >= WORTH_FOLLOWING {
             let (geometry, mesh) = (geometry.clone(), geometry.mesh.clone());
-            let e = Expected { geometry, mesh, runs: self.runs.clone(), kind: kind.clone(), frame: self.frame };
+            let e =
+                Expected { geometry, mesh, runs: self.runs.clone(), kind: kind.clone(), frame: self.frame };
             self.earlier.insert(self.positions[0].map(f32::to_bits), e);
         }
     }

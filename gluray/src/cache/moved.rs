@@ -30,8 +30,8 @@ pub(super) fn structure(before: &Geometry, mesh: &Arc<TriMesh>) -> Option<Arc<Wo
 mod tests {
     use crate::cache::{Cache, Structures};
     use crate::capture::Run;
-    use crate::primitives::Split;
     use crate::enums::TRIANGLES;
+    use crate::primitives::Split;
     use rt_core::glam::Vec3;
     use rt_core::ray::Ray;
 

@@ -7,6 +7,7 @@
 use crate::context::{Context, Sink};
 use crate::enums::*;
 use crate::real::gl;
+use crate::state::current::Current;
 use crate::symbols::{self, class};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -64,6 +65,8 @@ pub(crate) struct Recording {
     draws: bool,
     /// Between a Begin and its End.
     open: bool,
+    /// The mode of the latest Begin.
+    mode: u32,
 }
 
 impl Recording {
@@ -101,6 +104,7 @@ impl Context {
             used: false,
             draws: false,
             open: false,
+            mode: 0,
         });
         self.sink = Sink::List;
         symbols::attend();
@@ -187,9 +191,22 @@ impl Context {
 
     pub(crate) fn list_begin(&mut self, mode: u32) -> bool {
         if let Some(r) = &mut self.recording {
-            r.open = true;
+            (r.open, r.mode) = (true, mode);
         }
         self.list_op(Op::Begin(mode))
+    }
+
+    /// `glPrimitiveRestartNV`: an End, and a Begin of the same mode.
+    pub(crate) fn primitive_restart(&mut self) -> bool {
+        let mode = match self.sink {
+            Sink::Trace => self.recorder.mode(),
+            Sink::List => match &self.recording {
+                Some(r) if r.open => r.mode,
+                _ => return false,
+            },
+            Sink::Pass | Sink::Outside => return false,
+        };
+        self.end() && self.begin(mode)
     }
 
     /// Vertices of arrays follow.
@@ -311,6 +328,9 @@ impl Context {
     }
 
     fn call_driver(&mut self, list: u32, draws: bool) {
+        if draws {
+            self.counters.pass("text, lines by arrays, or evaluators of a display list", 1);
+        }
         self.before_driver(draws);
         gl::call_list(list);
     }
@@ -337,6 +357,8 @@ impl Context {
     fn play(&mut self, list: &List) {
         let mut left_out = false;
         let mut done = 0;
+        // Arrays leave current values undefined, and Mesa as they were.
+        let mut before_arrays: Option<Current> = None;
         for (i, op) in list.ops.iter().enumerate() {
             if i < done {
                 continue;
@@ -351,9 +373,13 @@ impl Context {
                     left_out = true;
                 }
                 Op::Begin(mode) | Op::BeginArrays(mode) => {
+                    before_arrays = matches!(op, Op::BeginArrays(_)).then_some(self.current);
                     if !self.begin(mode) {
                         match self.play_quads(mode, list, &list.ops[i + 1..]) {
-                            Some(n) => done = i + 1 + n,
+                            Some(n) => {
+                                done = i + 1 + n;
+                                self.go_back_to(before_arrays.take());
+                            }
                             None => gl::begin(mode),
                         }
                     }
@@ -362,6 +388,7 @@ impl Context {
                     if !self.end() {
                         gl::end();
                     }
+                    self.go_back_to(before_arrays.take());
                 }
                 Op::Vertex(v) => {
                     if !self.vertex(v) {
@@ -404,6 +431,20 @@ impl Context {
                     }
                 }
             }
+        }
+    }
+
+    /// Current values are what they were before arrays.
+    fn go_back_to(&mut self, before: Option<Current>) {
+        let Some(b) = before else { return };
+        if b.normal != self.current.normal && !self.normal(b.normal) {
+            gl::normal3f(b.normal[0], b.normal[1], b.normal[2]);
+        }
+        if b.color != self.current.color && !self.color(b.color) {
+            gl::color4f(b.color[0], b.color[1], b.color[2], b.color[3]);
+        }
+        if b.tex != self.current.tex && !self.tex_coord(b.tex) {
+            gl::tex_coord4f(b.tex[0], b.tex[1], b.tex[2], b.tex[3]);
         }
     }
 

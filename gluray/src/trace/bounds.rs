@@ -110,6 +110,9 @@ mod tests {
             assert_eq!(on_screen(&corners(lo, hi), false), None, "{lo:?} {hi:?}");
         }
         assert!(on_screen(&corners([-1.0, -1.0, -300.0], [1.0, 1.0, -200.0]), true).is_some(), "depth clamp");
-        assert_eq!(on_screen(&corners([-1.0, -1.0, -0.5], [1.0, 1.0, 0.5]), true), Some([[-1.0; 2], [1.0; 2]]));
+        assert_eq!(
+            on_screen(&corners([-1.0, -1.0, -0.5], [1.0, 1.0, 0.5]), true),
+            Some([[-1.0; 2], [1.0; 2]])
+        );
     }
 }
