@@ -373,8 +373,10 @@ impl Context {
                     left_out = true;
                 }
                 Op::Begin(mode) | Op::BeginArrays(mode) => {
+                    let swallowed = self.begin(mode);
+                    // Not earlier: Begin asks the driver what is current.
                     before_arrays = matches!(op, Op::BeginArrays(_)).then_some(self.current);
-                    if !self.begin(mode) {
+                    if !swallowed {
                         match self.play_quads(mode, list, &list.ops[i + 1..]) {
                             Some(n) => {
                                 done = i + 1 + n;

@@ -118,8 +118,6 @@ def arrays_of_a_list_leave_the_current_normal_alone():
     new(1, 0x1300)
     F("glDrawArrays", c_uint, c_int, c_int)(TRIANGLES, 0, 3)
     done()
-    normal(0, 0, 1)
-    color(0.2, 0.7, 1, 1)
     call(1)
     begin(TRIANGLES)
     vertex(-0.5, -0.5, 0)
