@@ -387,9 +387,13 @@ impl Context {
         if fresh != *self.state {
             self.end_batch();
             self.state = Arc::new(fresh);
-            self.verdict = decide::filled(&self.state, self.config.trace());
-        } else {
-            self.verdict = decide::filled(&self.state, self.config.trace());
+        }
+        self.verdict = decide::filled(&self.state, self.config.trace());
+        if let Some(t) = &self.state.texture
+            && !matches!(self.verdict, Verdict::Pass(_))
+        {
+            // Now, as it is bound now: when a batch of immediate mode ends another may be.
+            self.presenter.images.get(t.target, t.name, t.version);
         }
     }
 

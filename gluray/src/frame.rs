@@ -8,6 +8,7 @@ use crate::late::{self, Late, Traced};
 use crate::lighting::{product, transform};
 use crate::overrides::Look;
 use crate::present::Fate;
+use crate::primitives::Split;
 use crate::texturing::Image;
 use crate::trace::{self, Prepared};
 use crate::worker;
@@ -59,7 +60,7 @@ impl Context {
             return;
         }
         let start = Instant::now();
-        let kind = [self.state.first_vertex_provokes, self.state.flat];
+        let kind = &self.split_of_batch();
         let geometry = match self.recorder.followed(kind) {
             Some(geometry) => {
                 self.cache.hits += 1;
@@ -96,6 +97,30 @@ impl Context {
             },
             in_order,
         );
+    }
+
+    /// How the driver would split the quads of the batch.
+    fn split_of_batch(&mut self) -> Split {
+        let s = &self.state;
+        // Lists end batches with quads before and after them.
+        let all_turned = s.flat || self.depth_of_lists > 0;
+        let mut split = Split { first_provokes: s.first_vertex_provokes, all_turned, turned: Vec::new() };
+        if std::mem::take(&mut self.recorder.quads) && !all_turned {
+            let clipped = self.state.clips();
+            let outside = |from, to| self.recorder.any_position(from, to, &clipped);
+            // Begin and End after Begin and End of quads is one draw for the driver.
+            let (mut at, mut first) = (0, 0);
+            for (i, r) in self.recorder.runs.iter().enumerate() {
+                let next = self.recorder.runs.get(i + 1).map(|r| r.mode);
+                let end = at + r.count * r.times;
+                if r.mode == QUADS && next != Some(QUADS) {
+                    split.look_for_clipped(first, end, outside);
+                }
+                at = end;
+                first = if r.mode == QUADS && next == Some(QUADS) { first } else { at };
+            }
+        }
+        split
     }
 
     /// Takes a draw into the frame, or traces it at once when its order matters.

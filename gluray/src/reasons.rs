@@ -47,6 +47,15 @@ const TABLE: &[(&str, &str)] = &[
     ("depth test", "such draws are mostly text, legends and menus; --trace all traces them, too"),
     ("no depth test", "such draws are mostly text, legends and menus; --trace all traces them, too"),
     ("blending", "translucent in a way that is not followed; --trace all traces it in the order drawn"),
+    ("clip control", "another origin of the window or another range of depth than OpenGL had of old"),
+    (
+        "a colour buffer of floats",
+        "colours beyond black and white are kept there, and traced ones have eight bits",
+    ),
+    (
+        "a stencil of two sides",
+        "front and back faces are masked differently, and fragments of ours have no sides",
+    ),
     ("stencil", "drawn through a mask, as constructive solid geometry in image space is"),
     ("a shader", "not of a family that is recognised; --mode enhance needs no understanding"),
     (

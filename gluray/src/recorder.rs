@@ -2,6 +2,8 @@
 
 use crate::cache::Geometry;
 use crate::capture::{Attributes, Run, Values};
+use crate::enums::QUADS;
+use crate::primitives::Split;
 use crate::state::current::{Current, Materials};
 use rt_core::glam::Vec3;
 use rt_core::mesh::TriMesh;
@@ -77,7 +79,7 @@ struct Expected {
     geometry: Arc<Geometry>,
     mesh: Arc<TriMesh>,
     runs: Vec<Run>,
-    kind: [bool; 2],
+    kind: Split,
     frame: u64,
 }
 
@@ -108,6 +110,8 @@ pub(crate) struct Recorder {
     mode: u32,
     /// Begin/End pairs.
     pub(crate) calls: u64,
+    /// There are quads in the batch.
+    pub(crate) quads: bool,
 }
 
 impl Recorder {
@@ -116,6 +120,7 @@ impl Recorder {
     pub(crate) fn begin(&mut self, mode: u32, current: &Current) {
         self.open = self.count();
         self.mode = mode;
+        self.quads |= mode == QUADS;
         if self.open == 0 {
             self.start(current);
         } else if self.behind {
@@ -124,6 +129,11 @@ impl Recorder {
             self.set_tex(current.tex);
         }
         self.behind = false;
+    }
+
+    /// The mode of the primitive that is open, or was last.
+    pub(crate) fn mode(&self) -> u32 {
+        self.mode
     }
 
     /// Vertices so far.
@@ -236,6 +246,15 @@ impl Recorder {
         self.positions.push(v);
     }
 
+    /// Whether any position of a range of the batch is what `is` looks for.
+    pub(crate) fn any_position(&self, from: u32, to: u32, is: impl Fn([f32; 3]) -> bool) -> bool {
+        let range = from as usize..to as usize;
+        match &self.expected {
+            Some(mesh) => mesh.positions[range].iter().any(|p| is(p.to_array())),
+            None => self.positions[range].iter().any(|p| is(*p)),
+        }
+    }
+
     /// The vertices that were followed become our own.
     pub(crate) fn write_down(&mut self) {
         if let Some(mesh) = self.expected.take() {
@@ -246,12 +265,12 @@ impl Recorder {
     }
 
     /// The geometry of the batch, when it is all that an earlier one was.
-    pub(crate) fn followed(&mut self, kind: [bool; 2]) -> Option<Arc<Geometry>> {
+    pub(crate) fn followed(&mut self, kind: &Split) -> Option<Arc<Geometry>> {
         let mesh = self.expected.as_ref()?;
         let first = mesh.positions[0].to_array().map(f32::to_bits);
         let e = self.earlier.get_mut(&first)?;
         let whole = self.followed == mesh.positions.len() && Arc::ptr_eq(&e.mesh, mesh);
-        if !whole || e.kind != kind || e.runs != self.runs {
+        if !whole || e.kind != *kind || e.runs != self.runs {
             return None;
         }
         e.frame = self.frame;
@@ -261,11 +280,12 @@ impl Recorder {
     }
 
     /// This is what the batch was; it may come again.
-    pub(crate) fn expect(&mut self, geometry: &Arc<Geometry>, kind: [bool; 2]) {
+    pub(crate) fn expect(&mut self, geometry: &Arc<Geometry>, kind: &Split) {
         const WORTH_FOLLOWING: usize = 1000;
         if self.positions.len() >= WORTH_FOLLOWING {
             let (geometry, mesh) = (geometry.clone(), geometry.mesh.clone());
-            let e = Expected { geometry, mesh, runs: self.runs.clone(), kind, frame: self.frame };
+            let e =
+                Expected { geometry, mesh, runs: self.runs.clone(), kind: kind.clone(), frame: self.frame };
             self.earlier.insert(self.positions[0].map(f32::to_bits), e);
         }
     }
@@ -381,7 +401,7 @@ mod tests {
             p.iter().for_each(|p| r.vertex(*p, &current));
             r.end();
         }
-        let kind = [false; 2];
+        let kind = &Split::default();
         let geometry = r.followed(kind).unwrap_or_else(|| {
             r.write_down();
             let made = cache.of_runs(&r.positions, &r.runs, kind);

@@ -4,6 +4,7 @@
 //! (homogeneous edge functions after Olano and Greer 1997), so they agree with what the driver makes of neighbouring lines and text.
 
 mod batch;
+mod bounds;
 mod fragments;
 mod in_order;
 mod lifted;
@@ -20,6 +21,7 @@ use crate::ranks::rows::Share;
 use crate::raster::{covers, steepness};
 use crate::texturing::Image;
 use batch::Batch;
+use bounds::screen_bounds;
 use fearless_simd::{Level, dispatch};
 use fragments::{FragmentBlock, Lane};
 pub(crate) use in_order::in_order;
@@ -440,38 +442,6 @@ pub(crate) fn mixed<const N: usize>(v: [[f32; N]; 3], w: [f32; 3]) -> [f32; N] {
 
 fn to_bytes(c: [f32; 4]) -> [u8; 4] {
     c.map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
-}
-
-/// The pixels that a draw may cover: its box on the screen within viewport and scissor.
-fn screen_bounds(draw: &Draw, clip: DMat4) -> Rect {
-    let s = &*draw.state;
-    let [x, y, w, h] = s.viewport;
-    let mut rect = Rect { x, y, w, h };
-    if let Some([x, y, w, h]) = s.scissor {
-        rect = rect.and(Rect { x, y, w, h });
-    }
-    let b = draw.geometry.bounds();
-    if b.is_empty() {
-        return Rect::default();
-    }
-    let (mut lo, mut hi) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-    for corner in 0..8 {
-        let pick = |bit: i32, k: usize| if corner & bit == 0 { b.min[k] } else { b.max[k] };
-        let p = DVec3::new(f64::from(pick(1, 0)), f64::from(pick(2, 1)), f64::from(pick(4, 2)));
-        let c = clip * p.extend(1.0);
-        if c.w <= 0.0 || !c.is_finite() {
-            return rect;
-        }
-        for k in 0..2 {
-            lo[k] = lo[k].min(c[k] / c.w);
-            hi[k] = hi[k].max(c[k] / c.w);
-        }
-    }
-    let pixel =
-        |ndc: f64, at: i32, size: i32| (f64::from(at) + (ndc + 1.0) * 0.5 * f64::from(size)).clamp(-1e9, 1e9);
-    let (x0, y0) = (pixel(lo[0], x, w).floor() as i32 - 1, pixel(lo[1], y, h).floor() as i32 - 1);
-    let (x1, y1) = (pixel(hi[0], x, w).ceil() as i32 + 1, pixel(hi[1], y, h).ceil() as i32 + 1);
-    rect.and(Rect { x: x0, y: y0, w: x1.saturating_sub(x0), h: y1.saturating_sub(y0) })
 }
 
 /// The nearest fragment of all draws at every pixel of a share of the rows.

@@ -33,6 +33,7 @@ driver! {
     fn get_tex_level_i = "glGetTexLevelParameteriv"(target: u32, level: i32, what: u32, out: *mut i32);
     fn get_tex_parameter_i = "glGetTexParameteriv"(target: u32, what: u32, out: *mut i32);
     fn get_tex_parameter_f = "glGetTexParameterfv"(target: u32, what: u32, out: *mut f32);
+    fn get_attachment_i = "glGetFramebufferAttachmentParameteriv"(target: u32, attachment: u32, what: u32, out: *mut i32);
     fn get_tex_image = "glGetTexImage"(target: u32, level: i32, format: u32, kind: u32, out: *mut c_void);
     fn materialfv_raw = "glMaterialfv"(face: u32, what: u32, values: *const f32);
     pub(crate) fn new_list = "glNewList"(list: u32, mode: u32);
@@ -167,6 +168,7 @@ queries! {
     tex_gen_f(coord: u32, what: u32) -> f32 = get_tex_gen_f;
     clip_plane(plane: u32) -> f64 = get_clip_plane;
     tex_level_i(target: u32, level: i32, what: u32) -> i32 = get_tex_level_i;
+    attachment_i(target: u32, attachment: u32, what: u32) -> i32 = get_attachment_i;
     tex_parameter_i(target: u32, what: u32) -> i32 = get_tex_parameter_i;
     tex_parameter_f(target: u32, what: u32) -> f32 = get_tex_parameter_f;
     program_i(program: u32, what: u32) -> i32 = get_programiv;
@@ -175,6 +177,12 @@ queries! {
     buffer_i(target: u32, what: u32) -> i32 = get_buffer_parameter_i;
     uniform_f(program: u32, at: i32) -> f32 = get_uniformfv;
     uniform_i(program: u32, at: i32) -> i32 = get_uniformiv;
+}
+
+/// What kind of numbers the colour buffer of the framebuffer object in use has that `attachment` names; 0 when nobody knows.
+pub(crate) fn component_type(attachment: u32) -> u32 {
+    let (target, what) = (crate::enums::DRAW_FRAMEBUFFER, crate::enums::ATTACHMENT_COMPONENT_TYPE);
+    attachment_i::<1>(target, attachment, what)[0].cast_unsigned()
 }
 
 /// `glMaterialfv`.

@@ -116,6 +116,7 @@ hooks! {
     fn glRecti(x: Int, y: Int, x2: Int, y2: Int) => |c| c.rect([x, y, x2, y2].map(|v| v as f32));
     fn glRects(x: i16, y: i16, x2: i16, y2: i16) => |c| c.rect([x, y, x2, y2].map(f32::from));
     fn glNewList(list: u32, mode: u32) => |c| c.new_list(list, mode);
+    fn glPrimitiveRestartNV() => |c| c.primitive_restart();
     fn glEndList() => |c| c.end_list();
     fn glCallList(list: u32) => |c| c.call_list(list);
     fn glCallLists(n: Int, kind: u32, names: Address) => |c| c.call_lists(n, kind, names as usize);
@@ -139,6 +140,13 @@ hooks! {
 
 pub(in crate::symbols) unsafe extern "C" fn glGetError() -> u32 {
     context_error()
+}
+
+pub(in crate::symbols) unsafe extern "C" fn glGenLists(n: Int) -> u32 {
+    let names = || driver!(glGenLists(n): (Int) -> u32);
+    let mut given = None;
+    guard(|| with_context(|c| c.gen_lists(n, || *given.insert(names()))));
+    given.unwrap_or_else(names)
 }
 
 fn context_error() -> u32 {

@@ -108,3 +108,22 @@ def simple(**k):
 
 
 w0 = window()
+
+
+def run(cases):
+    """Draws the case that the command line names, and writes what is in the framebuffer then: width, height, RGBA bytes, depth as floats."""
+    case = cases[sys.argv[1]]
+    if case.__code__.co_argcount:
+        current(w0, context())
+        case(w0)
+    else:
+        current(w0, context())
+        case()
+    rgba, depth = (c.c_uint8 * (W * H * 4))(), (c_float * (W * H))()
+    read = F("glReadPixels", c_int, c_int, c_int, c_int, c_uint, c_uint, c_void_p)
+    read(0, 0, W, H, 0x1908, 0x1401, rgba)
+    read(0, 0, W, H, 0x1902, 0x1406, depth)
+    with open(sys.argv[2], "wb") as out:
+        out.write(struct.pack("II", W, H))
+        out.write(bytes(rgba))
+        out.write(bytes(depth))
