@@ -50,7 +50,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         context.say(format!("{}, {ranks} ranks: starting", PROGRAM.name()))?;
         let own = dir.path().join(format!("ranks{ranks}"));
         let way = Way::Ranks(ranks);
-        let mut session = Session::start(PROGRAM, way, &tools, &display, &own, &data, SIZE_PX)?;
+        let mut session = Session::start(PROGRAM, way, Some(&tools.gluray), &display, &own, &data, SIZE_PX)?;
         session.frames(3)?;
         sessions.push(session);
     }

@@ -2,10 +2,10 @@
 //!
 //! One frame after the other would read the colours of all that are nearest for a while (a third of them, of layers in any order), and read
 //! and write what it holds again and again. Here every pixel of the image is written once, and only those colours are read that are seen.
+use super::columns::{BLOCK, Columns};
 use crate::color::Color;
 use crate::layer::View;
 use crate::pixel::Composite;
-use super::columns::{BLOCK, Columns};
 use crate::simd::mask::packed;
 use crate::simd::runs::colors_16;
 use crate::simd::{Kernels, at_level, for_runs};
@@ -197,12 +197,15 @@ fn take_nearest<C: Color, S: Simd>(simd: S, blocks: &[Block<'_, C>], held: &mut 
                 joined[quarter] = if seen == u64::MAX {
                     colors
                 } else {
-                    mask32x16::from_bitmask(simd, seen >> (16 * quarter) & 0xffff).select(colors, joined[quarter])
+                    mask32x16::from_bitmask(simd, seen >> (16 * quarter) & 0xffff)
+                        .select(colors, joined[quarter])
                 };
             }
         });
         for quarter in 0..4 {
-            joined[quarter].bitcast::<u8x64<S>>().store_slice(&mut held_bytes[64 * quarter..64 * quarter + 64]);
+            joined[quarter]
+                .bitcast::<u8x64<S>>()
+                .store_slice(&mut held_bytes[64 * quarter..64 * quarter + 64]);
         }
         held.background &= !any;
     } else {
