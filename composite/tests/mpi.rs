@@ -368,7 +368,7 @@ fn demo_of(data: &str, more: &[&str], variables: &[(&str, &Path)]) -> (Vec<u8>, 
 }
 
 #[test]
-fn a_file_rendered_in_parts_by_four_mpi_ranks_is_the_picture_of_one_rank() {
+fn a_file_rendered_in_parts_by_threads_models_and_mpi_ranks_is_the_picture_of_one_rank() {
     let Some(mpirun) = peer("RTSV_MPIRUN") else { return };
     let file = std::env::temp_dir().join(format!("composite-part-{}.obj", std::process::id()));
     let mut obj = String::new();
@@ -383,6 +383,17 @@ fn a_file_rendered_in_parts_by_four_mpi_ranks_is_the_picture_of_one_rank() {
     let (alone, one) = demo_of(data, &["--threads", "-n", "1"], &[]);
     let (parts, four) = demo_of(data, &["--mpi", "-n", "4"], &[("COMPOSITE_MPIRUN", &mpirun)]);
     let (headlight, _) = demo_of(data, &["--threads", "-n", "3", "--headlight"], &[]);
+    for more in [&["--threads", "-n", "64"][..], &["--model", "-n", "8", "--cut-by-view"]] {
+        let (others, _) = demo_of(data, more, &[]);
+        assert!(alone == others, "{more:?}: the pictures differ");
+    }
+    if let Some(mpich) = peer("RTSV_MPIRUN_MPICH") {
+        let (three, shown) = demo_of(data, &["--mpi", "-n", "3"], &[("COMPOSITE_MPIRUN", &mpich)]);
+        assert!(
+            alone == three && shown["transport"].as_str().is_some_and(|t| t.contains("MPICH")),
+            "{shown}"
+        );
+    }
     std::fs::remove_file(&file).expect("the file");
     assert!(alone == parts, "the pictures differ");
     assert!(four["transport"].as_str().is_some_and(|t| t.contains("Open MPI")), "{four}");
