@@ -2,8 +2,8 @@
 //! them as it resolves its own.
 //!
 //! The samples' places are the driver's (`glGetMultisamplefv`). A scene that is moved so that a sample lies in the middle of its pixel is a scene like any
-//! other: rays, coverage by the fill rule and depths need not know. OpenGL lets a rasteriser shade once a pixel; ours shades each sample where it is,
-//! which in the mean over a pixel inside a surface is the same.
+//! other: rays, coverage by the fill rule and depths need not know. Colours are those of the middle of the pixel, as the driver shades once for all samples
+//! of a triangle.
 
 use crate::capture::{Draw, Shading};
 use crate::context::Context;
@@ -31,6 +31,7 @@ fn moved(draw: &Draw, [x, y]: [f32; 2]) -> Draw {
     shift(&mut draw.clip_from_object);
     let mut state = (*draw.state).clone();
     shift(&mut state.projection);
+    state.sample_place = [x, y];
     draw.state = Arc::new(state);
     if let Shading::Program(p) = &mut draw.shading {
         shift(&mut Arc::make_mut(p).clip_from_object);
@@ -47,7 +48,7 @@ impl Context {
     ) -> Option<Vec<[f32; 2]>> {
         let mut all = draws.into_iter().map(|d| d.state.samples);
         let n = all.next()?;
-        if n < 2 || n > MOST_SAMPLES || all.any(|m| m != n) || self.can.version < 32 || self.can.es {
+        if !(2..=MOST_SAMPLES).contains(&n) || all.any(|m| m != n) || self.can.version < 32 || self.can.es {
             return None;
         }
         self.keep_errors();

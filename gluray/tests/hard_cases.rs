@@ -37,14 +37,6 @@ cases! {
     clip_planes: true 0;
     fog: true 0;
     color_map_texture: true 0;
-    mipmaps: true 0;
-    samples_of_surfaces: true 0;
-    resolved_samples: true 0;
-    samples_switched_off: true 0;
-    levels_and_limits_of_textures: true 0;
-    generated_mipmaps: true 0;
-    textures_replaced_between_draws: true 0;
-    a_thousand_textures: true 0;
     material_per_vertex: true 0;
     blended_over_traced: true 0;
     seventeen_contexts: true 0;
@@ -73,6 +65,27 @@ fn nothing_is_traced_when_tracing_is_off() {
 #[test]
 fn blending_in_order_is_traced_when_all_is_asked_for() {
     check("blended_over_traced", &Expected { traced: true, exit: 0 }, &["--trace", "all"]);
+}
+
+fn check_all(cases: &[&str]) {
+    for case in cases {
+        check(case, &Expected { traced: true, exit: 0 }, &[]);
+    }
+}
+
+#[test]
+fn mipmaps_are_the_drivers() {
+    check_all(&["mipmaps", "levels_and_limits_of_textures", "generated_mipmaps"]);
+}
+
+#[test]
+fn what_was_drawn_keeps_its_texels_and_textures_that_are_gone_are_not_held() {
+    check_all(&["textures_replaced_between_draws", "a_thousand_textures"]);
+}
+
+#[test]
+fn samples_are_the_drivers_one_by_one_and_resolved() {
+    check_all(&["samples_of_surfaces", "resolved_samples", "samples_switched_off"]);
 }
 
 #[test]

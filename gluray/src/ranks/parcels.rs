@@ -74,6 +74,7 @@ wire_struct!(Snapshot {
     more_draw_buffers,
     samples,
     masked_samples,
+    sample_place,
     discard,
     feedback_active,
     first_vertex_provokes,

@@ -94,6 +94,8 @@ pub(crate) struct Snapshot {
     pub(crate) draw_buffer: u32,
     pub(crate) more_draw_buffers: bool,
     pub(crate) samples: i32,
+    /// Where the sample lies that is traced, from the middle of the pixel.
+    pub(crate) sample_place: [f32; 2],
     /// Masks, coverage or alpha decide which samples are written.
     pub(crate) masked_samples: bool,
     pub(crate) discard: bool,

@@ -76,6 +76,7 @@ fn last_is_all(p: &Prepared<'_>) -> bool {
 /// The fragment of a triangle, as it is drawn.
 fn fragment(p: &Prepared<'_>, prim: usize, x: i32, y: i32) -> Option<Found> {
     let f = p.fragment(prim, x, y)?;
+    let f = p.centred(prim, f, x, y);
     Some((to_bytes(p.color(prim, &f, false, &Visibility::FULL, Some((x, y)))), f.depth as f32))
 }
 
