@@ -92,11 +92,12 @@ pub struct Session {
 const PATIENCE: Duration = Duration::from_secs(600);
 
 impl Session {
-    /// Starts `program` with `data`. Scripts, logs and the report go into `dir`, which is its own.
+    /// Starts `program` with `data`. Scripts, logs and the report go into `dir`, which is its own. Ways that are not the driver's need
+    /// `gluray`.
     pub fn start(
         program: Program,
         way: Way,
-        tools: &Tools,
+        gluray: Option<&Path>,
         display: &Display,
         dir: &Path,
         data: &Path,
@@ -109,7 +110,8 @@ impl Session {
         let mut command = match &report {
             None => Command::new(&executable),
             Some(report) => {
-                let mut c = Command::new(&tools.gluray);
+                let gluray = gluray.with_context(|| format!("{} needs gluray", way.name()))?;
+                let mut c = Command::new(gluray);
                 c.args(["--quiet", "run", "--mode", "match", "--report"]).arg(report);
                 let late = if way == Way::Asynchronous { "on" } else { "off" };
                 c.args(["--set", &format!("asynchronous={late}"), "--"]).arg(&executable);
