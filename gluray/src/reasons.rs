@@ -26,6 +26,7 @@ const TABLE: &[(&str, &str)] = &[
     ("fewer vertices", "too few to tell a matrix from; --mode match does not need it"),
     ("a texture with mipmaps", "sampled between reduced levels, which is not followed"),
     ("a texture with two filters", "another filter near than far, which is not followed"),
+    ("a texture too large", "more than 67 million texels"),
     ("a texture of", "depths and integers are compared or cast, not sampled"),
     ("a texture whose base", "sampled from another level than the first"),
     ("OpenGL ES", "programs for OpenGL ES are the driver's in every mode"),

@@ -91,6 +91,9 @@ impl Images {
     }
 }
 
+/// Texels of the greatest texture that is read.
+const MOST_TEXELS: i64 = 1 << 26;
+
 /// Whether rays can follow the sampling of the bound texture; the reason if not.
 pub(crate) fn followed(target: u32) -> Result<(), &'static str> {
     let min = gl::tex_parameter_i::<1>(target, TEXTURE_MIN_FILTER)[0].cast_unsigned();
@@ -108,8 +111,12 @@ pub(crate) fn unfollowed(target: u32) -> Option<&'static str> {
     if gl::tex_parameter_i::<1>(target, TEXTURE_BASE_LEVEL)[0] != 0 {
         return Some("a texture whose base level is not 0");
     }
-    if level(TEXTURE_WIDTH) <= 0 || level(TEXTURE_HEIGHT) <= 0 {
+    let (width, height) = (i64::from(level(TEXTURE_WIDTH)), i64::from(level(TEXTURE_HEIGHT)));
+    if width <= 0 || height <= 0 {
         return None;
+    }
+    if width * height > MOST_TEXELS {
+        return Some("a texture too large to read");
     }
     match level(TEXTURE_INTERNAL_FORMAT).cast_unsigned() {
         0x1902 | 0x84f9 | 0x81a5..=0x81a7 | 0x88f0 | 0x8cac | 0x8cad => return Some("a texture of depths"),
@@ -128,7 +135,7 @@ pub(crate) fn unfollowed(target: u32) -> Option<&'static str> {
 fn read(target: u32) -> Option<Image> {
     let level = |what| gl::tex_level_i::<1>(target, 0, what)[0];
     let (width, height) = (level(TEXTURE_WIDTH).max(0) as usize, level(TEXTURE_HEIGHT).max(0) as usize);
-    if width == 0 || height == 0 || width * height > 1 << 26 {
+    if width == 0 || height == 0 || (width * height) as i64 > MOST_TEXELS {
         return None;
     }
     let base = base_of(level(TEXTURE_INTERNAL_FORMAT).cast_unsigned());
