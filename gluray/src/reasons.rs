@@ -32,6 +32,7 @@ const TABLE: &[(&str, &str)] = &[
     ("masks or coverage of samples", "which samples of a pixel are written is the driver's to decide"),
     ("a sampler object", "filters of sampler objects are not followed"),
     ("a texture with mipmaps or two filters", "in VTK's shaders, whose colour maps have one filter"),
+    ("a texture too large", "more than 67 million texels"),
     ("a texture of", "depths and integers are compared or cast, not sampled"),
     ("OpenGL ES", "programs for OpenGL ES are the driver's in every mode"),
     ("several texture units", "more than one texture at once is not traced"),

@@ -243,12 +243,7 @@ impl Prepared<'_> {
             let m = &s.model_view;
             let z = corners.map(|i| [transform(m, mesh.positions[i].to_array())[2].abs()]);
             let d = mixed(z, w)[0];
-            let factor = match fog.mode {
-                EXP => (-fog.density * d).exp(),
-                EXP2 => (-(fog.density * d) * (fog.density * d)).exp(),
-                _ => (fog.end - d) / (fog.end - fog.start),
-            };
-            let factor = if factor.is_nan() { 0.0 } else { factor.clamp(0.0, 1.0) };
+            let factor = crate::studio::fog::factor(fog, d);
             for k in 0..3 {
                 color[k] = fog.color[k].clamp(0.0, 1.0) * (1.0 - factor) + color[k] * factor;
             }

@@ -12,6 +12,9 @@ use crate::state::snapshot::{Snapshot, TextureUnit};
 use image::Base;
 pub(crate) use image::{Image, Images};
 
+/// Texels of the greatest texture that is read.
+const MOST_TEXELS: i64 = 1 << 26;
+
 /// Whether rays can follow the sampling of the bound texture; the reason if not.
 pub(crate) fn followed(target: u32) -> Result<(), &'static str> {
     let min = gl::tex_parameter_i::<1>(target, TEXTURE_MIN_FILTER)[0].cast_unsigned();
@@ -32,8 +35,12 @@ pub(crate) fn unfollowed(target: u32, version: u32) -> Option<&'static str> {
     let parameter = |what| gl::tex_parameter_i::<1>(target, what)[0];
     let base = parameter(TEXTURE_BASE_LEVEL).clamp(0, 31);
     let level = |what| gl::tex_level_i::<1>(target, base, what)[0];
-    if level(TEXTURE_WIDTH) <= 0 || level(TEXTURE_HEIGHT) <= 0 {
+    let (width, height) = (i64::from(level(TEXTURE_WIDTH)), i64::from(level(TEXTURE_HEIGHT)));
+    if width <= 0 || height <= 0 {
         return None;
+    }
+    if width * height > MOST_TEXELS {
+        return Some("a texture too large to read");
     }
     match level(TEXTURE_INTERNAL_FORMAT).cast_unsigned() {
         0x1902 | 0x84f9 | 0x81a5..=0x81a7 | 0x88f0 | 0x8cac | 0x8cad => return Some("a texture of depths"),

@@ -33,6 +33,7 @@ const FILLED: &[&str] = &[
     "gl-1.0-user-clip-all-planes -auto -fbo",
     "texredefine -auto -fbo",
     "copyteximage 1D -auto -fbo",
+    "nv_primitive_restart-dlist -auto -fbo",
 ];
 /// Tests of errors, selection and what else must not suffer.
 const OTHERS: &[&str] = &[
@@ -55,6 +56,13 @@ const OTHERS: &[&str] = &[
     "lodclamp-between -auto -fbo",
     "mipmap-setup -auto -fbo",
     "texsubimage-depth-formats -auto -fbo",
+    "gl-2.0-two-sided-stencil -auto -fbo",
+    "arb_clip_control-clip-control -auto -fbo",
+    "arb_clip_control-viewport -auto -fbo",
+    "arb_color_buffer_float-render GL_RGBA16F -auto -fbo",
+    "ati_fragment_shader-render-ops -auto -fbo",
+    "fbo-blending-snorm -auto -fbo",
+    "fbo-maxsize -auto -fbo",
 ];
 
 fn verdict(x: &Xvfb, piglit: &Path, line: &str, through: Option<&[&str]>) -> (String, u64) {

@@ -24,5 +24,5 @@ cases! {
     strips_that_restart_within_a_list: true [];
     a_second_texture_is_bound_right_after_a_draw_with_the_first: true [];
     things_around_the_viewer: true [];
-    masks_that_tell_front_from_back: false ["--trace", "all"];
+    masks_that_tell_front_from_back: true ["--trace", "all"];
 }
