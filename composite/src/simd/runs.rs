@@ -3,7 +3,8 @@ use crate::color::Color;
 use crate::simd::load_64;
 use bytemuck::{cast_slice, cast_slice_mut, pod_read_unaligned};
 use fearless_simd::{
-    Bytes, Select, Simd, SimdBase, SimdInt, SimdMask, SimdNarrow, SimdWiden, f32x16, u8x64, u16x32, u32x16, mask32x16,
+    Bytes, Select, Simd, SimdBase, SimdInt, SimdMask, SimdNarrow, SimdWiden, f32x16, mask32x16, u8x64,
+    u16x32, u32x16,
 };
 
 /// Sixteen colours of four bytes.
