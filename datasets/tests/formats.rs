@@ -4,7 +4,7 @@ mod sample_files;
 
 use datasets::model::{Dataset, ImageData, PolyData, StructuredGrid, Values};
 use datasets::read::plot3d::{self, Plot3dOptions};
-use datasets::read::{Content, Opened, SceneModel, open};
+use datasets::read::{AlphaMode, Content, Opened, SceneModel, open};
 use datasets::write::{Encoding, VtkOptions, write_obj, write_ply, write_pvd, write_vtk};
 use glam::{DVec3, Vec3};
 use rt_core::mesh::{Attribute, PerElement, TriMesh};
@@ -272,6 +272,79 @@ fn gltf_transforms_turn_mirrored_triangles_back() {
         assert!((b - a).cross(c - a).z > 0.0, "still seen from +z");
         assert_eq!(s.meshes[0].mesh.colors.as_ref().unwrap().values[1], [0.0, 1.0, 0.0, 1.0]);
     }
+}
+
+/// A triangle with every kind of picture; `alpha` is what the material says of that.
+fn gltf_with_pictures(dir: &std::path::Path, alpha: serde_json::Value) -> Opened {
+    let mut bytes: Vec<u8> = Vec::new();
+    let mut floats = |values: &[f32]| values.iter().for_each(|v| bytes.extend(v.to_le_bytes()));
+    floats(&[-1.0, -1.0, 0.0, 1.0, -1.0, 0.0, 1.0, 1.0, 0.0]);
+    floats(&[0.0, 1.0, 1.0, 1.0, 1.0, 0.0]);
+    floats(&[1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0]);
+    std::fs::write(dir.join("a.bin"), &bytes).unwrap();
+    for (name, texel) in
+        [("color", [255, 0, 0, 100]), ("rough", [10, 20, 30, 255]), ("normal", [128, 128, 255, 255])]
+    {
+        ::image::RgbaImage::from_pixel(2, 1, ::image::Rgba(texel))
+            .save(dir.join(name).with_extension("png"))
+            .unwrap();
+    }
+    let mut json = serde_json::json!({
+        "asset": {"version": "2.0"}, "extensionsUsed": ["KHR_materials_sheen"], "scenes": [{"nodes": [0]}], "scene": 0,
+        "nodes": [{"mesh": 0, "scale": [-1.0, 1.0, 1.0]}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1, "TANGENT": 2}, "material": 0}]}],
+        "buffers": [{"uri": "a.bin", "byteLength": bytes.len()}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 24}, {"buffer": 0, "byteOffset": 60, "byteLength": 48}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [-1, -1, 0], "max": [1, 1, 0]},
+            {"bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC2"},
+            {"bufferView": 2, "componentType": 5126, "count": 3, "type": "VEC4"}],
+        "images": [{"uri": "color.png"}, {"uri": "rough.png"}, {"uri": "normal.png"}, {"uri": "gone.png"}],
+        "samplers": [{"wrapS": 33071, "wrapT": 33648, "magFilter": 9728}],
+        "textures": [{"source": 0, "sampler": 0}, {"source": 1}, {"source": 2}, {"source": 3}],
+        "materials": [{
+            "name": "all",
+            "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 1}},
+            "normalTexture": {"index": 2, "scale": 0.5}, "occlusionTexture": {"index": 1, "strength": 0.25},
+            "emissiveTexture": {"index": 3}, "emissiveFactor": [1, 1, 1]}]
+    });
+    for (key, value) in alpha.as_object().unwrap() {
+        json["materials"][0][key] = value.clone();
+    }
+    let path = dir.join("a.gltf");
+    std::fs::write(&path, json.to_string()).unwrap();
+    open(&path).unwrap_or_else(|e| panic!("{e}"))
+}
+
+#[test]
+fn gltf_materials_have_all_their_pictures_and_samplers() {
+    use rt_core::texture::{Filter, Wrap};
+    let dir = tempfile::tempdir().unwrap();
+    let o = gltf_with_pictures(dir.path(), serde_json::json!({"alphaMode": "MASK", "alphaCutoff": 0.25}));
+    let warnings = o.warnings.clone();
+    let s = scene(o);
+    let m = &s.materials[0];
+    assert_eq!((m.alpha, m.normal_scale, m.occlusion_strength), (AlphaMode::Mask(0.25), 0.5, 0.25));
+    assert_eq!(m.metallic_roughness_texture, m.occlusion_texture, "read once");
+    let texture = |index: Option<usize>| &s.textures[index.unwrap()];
+    let color = texture(m.base_color_texture);
+    assert_eq!(
+        (color.wrap, color.filter, color.rgba8[1]),
+        ([Wrap::Clamp, Wrap::Mirror], Filter::Nearest, [255, 0, 0, 100])
+    );
+    let rough = texture(m.metallic_roughness_texture);
+    assert_eq!(
+        (rough.wrap, rough.filter, rough.rgba8[0]),
+        ([Wrap::Repeat; 2], Filter::Bilinear, [10, 20, 30, 255])
+    );
+    assert_eq!(texture(m.normal_texture).rgba8[0], [128, 128, 255, 255]);
+    assert_eq!(m.emissive_texture, None);
+    let told = |what: &str| warnings.iter().any(|w| w.contains(what));
+    assert!(warnings.len() == 2 && told("gone.png") && told("KHR_materials_sheen"), "{warnings:?}");
+    // The mirror turns tangents and the sense of their frame.
+    assert_eq!(s.meshes[0].mesh.tangents.as_ref().unwrap()[0], glam::Vec4::new(-1.0, 0.0, 0.0, -1.0));
+    let o = gltf_with_pictures(dir.path(), serde_json::json!({}));
+    assert_eq!(scene(o).materials[0].alpha, AlphaMode::Opaque);
 }
 
 #[test]

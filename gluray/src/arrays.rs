@@ -10,7 +10,7 @@ use crate::context::{Context, Sink};
 use crate::decide::Verdict;
 use crate::enums::*;
 use crate::overrides::Look;
-use crate::primitives::{is_filled, triangulate};
+use crate::primitives::{Split, is_filled, triangulate};
 use crate::programs::DrawCall;
 use crate::real::gl;
 use crate::state::snapshot::Snapshot;
@@ -218,8 +218,17 @@ pub(crate) enum Elements {
 }
 
 impl Elements {
-    /// From the arguments of `glDrawElements`.
-    pub(crate) fn indexed(n: i32, kind: u32, at: usize, base: i32) -> Result<Elements, &'static str> {
+    /// Stands for the index at which a primitive ends and another begins.
+    const RESTART: u32 = u32::MAX;
+
+    /// From the arguments of `glDrawElements`, and the index that restarts primitives.
+    pub(crate) fn indexed(
+        n: i32,
+        kind: u32,
+        at: usize,
+        base: i32,
+        restart: Option<u32>,
+    ) -> Result<Elements, &'static str> {
         let n = usize::try_from(n).map_err(|_| "a negative count")?;
         let width = component_bytes(kind);
         if !matches!(kind, UNSIGNED_BYTE | UNSIGNED_SHORT | UNSIGNED_INT) {
@@ -242,9 +251,13 @@ impl Elements {
             [a, b, c, d] => u32::from_ne_bytes([a, b, c, d]),
             _ => 0,
         };
-        let indices: Vec<u32> =
-            bytes.chunks_exact(width).map(|b| decode(b).wrapping_add_signed(base)).collect();
-        let (Some(&least), Some(&most)) = (indices.iter().min(), indices.iter().max()) else {
+        let place = |raw: u32| match restart {
+            Some(r) if r == raw => Elements::RESTART,
+            _ => raw.wrapping_add_signed(base),
+        };
+        let indices: Vec<u32> = bytes.chunks_exact(width).map(|b| place(decode(b))).collect();
+        let real = || indices.iter().filter(|i| restart.is_none() || **i != Elements::RESTART);
+        let (Some(&least), Some(&most)) = (real().min(), real().max()) else {
             return Ok(Elements::Indexed { indices, least: 0, count: 0 });
         };
         let count = (most - least) as usize + 1;
@@ -256,14 +269,14 @@ impl Elements {
     }
 
     /// Names the geometry of these elements of an array of positions, whose bytes are given.
-    fn key(&self, mode: u32, bytes: &[u8], layout: (usize, u32, usize, bool), s: &Snapshot) -> u128 {
+    fn key(&self, mode: u32, bytes: &[u8], layout: (usize, u32, usize, bool), split: &Split) -> u128 {
         let (stride, kind, size, _) = layout;
-        let rules = u64::from(s.first_vertex_provokes) << 1 | u64::from(s.flat);
+        let rules = u64::from(split.first_provokes) << 1 | u64::from(split.all_turned);
         let (_, count) = self.span();
         let tail = [stride as u64, u64::from(kind), size as u64, u64::from(mode), rules, count as u64];
         let tail = bytemuck::cast_slice(&tail);
         match self {
-            Elements::Range { .. } => hash(&[bytes, tail]),
+            Elements::Range { .. } => hash(&[bytes, tail, bytemuck::cast_slice(&split.turned)]),
             Elements::Indexed { indices, least, .. } => {
                 hash(&[bytes, bytemuck::cast_slice(indices), &least.to_ne_bytes(), tail])
             }
@@ -295,15 +308,41 @@ impl Elements {
         out
     }
 
+    /// How the driver splits quads where nobody knows what it clips.
+    pub(crate) fn plain_split(&self, first_provokes: bool) -> Split {
+        Split { first_provokes, all_turned: matches!(self, Elements::Indexed { .. }), turned: Vec::new() }
+    }
+
+    /// How the driver would split quads: see [`Split`].
+    pub(crate) fn split(&self, mode: u32, s: &Snapshot, position: &Source, bytes: &[u8]) -> Split {
+        let mut split = self.plain_split(s.first_vertex_provokes);
+        split.all_turned |= s.flat;
+        let (_, count) = self.span();
+        if mode == QUADS && !split.all_turned {
+            let clipped = s.clips();
+            let (step, one, size) = (position.step(), component_bytes(position.kind), position.size.min(3));
+            split.look_for_clipped(0, count as u32, |from, to| {
+                (from..to).any(|i| {
+                    let at = i as usize * step;
+                    let mut p = [0.0; 3];
+                    for (k, v) in p.iter_mut().enumerate().take(size) {
+                        let b = bytes.get(at + k * one..at + (k + 1) * one);
+                        *v = b.map_or(0.0, |b| crate::capture::component(b, position.kind, false));
+                    }
+                    clipped(p)
+                })
+            });
+        }
+        split
+    }
+
     /// Triangles, in vertex numbers of the span.
-    pub(crate) fn triangles(&self, mode: u32, first_provokes: bool, flat: bool) -> Vec<[u32; 3]> {
+    pub(crate) fn triangles(&self, mode: u32, split: &Split) -> Vec<[u32; 3]> {
         let mut out = Vec::new();
         match self {
-            Elements::Range { count, .. } => {
-                triangulate(mode, 0, *count as u32, first_provokes, flat, &mut out)
-            }
+            Elements::Range { count, .. } => triangulate(mode, 0, *count as u32, split, &mut out),
             Elements::Indexed { indices, least, .. } => {
-                triangulate(mode, 0, indices.len() as u32, first_provokes, flat, &mut out);
+                triangulate(mode, 0, indices.len() as u32, split, &mut out);
                 let vertex = |i: u32| indices[i as usize] - *least as u32;
                 out.iter_mut().for_each(|t| *t = t.map(vertex));
             }
@@ -311,12 +350,13 @@ impl Elements {
         out
     }
 
-    /// Vertex numbers of the span in the order they are drawn.
-    fn order(&self) -> Box<dyn Iterator<Item = usize> + '_> {
+    /// Vertex numbers of the span in the order they are drawn; `None` where a primitive ends and another begins.
+    fn order(&self) -> Box<dyn Iterator<Item = Option<usize>> + '_> {
         match self {
-            Elements::Range { count, .. } => Box::new(0..*count),
+            Elements::Range { count, .. } => Box::new((0..*count).map(Some)),
             Elements::Indexed { indices, least, .. } => {
-                Box::new(indices.iter().map(move |i| *i as usize - least))
+                let place = move |i: &u32| (*i as usize).checked_sub(*least);
+                Box::new(indices.iter().map(move |i| place(i).filter(|_| *i != Elements::RESTART)))
             }
         }
     }
@@ -353,7 +393,8 @@ impl Context {
         let buffer = gl::word(ELEMENT_ARRAY_BUFFER_BINDING) as usize;
         let call =
             DrawCall { first: (buffer << 32) | base as u32 as usize, count: count.max(0) as usize, kind, at };
-        self.array_draw(mode, call, || Elements::indexed(count, kind, at, base))
+        let restart = if self.sink == Sink::List { self.restart_index(kind) } else { None };
+        self.array_draw(mode, call, || Elements::indexed(count, kind, at, base, restart))
     }
 
     fn array_draw(
@@ -376,7 +417,7 @@ impl Context {
         self.keep_errors();
         let taken = match verdict {
             _ if !is_filled(mode) => Err("lines and points"),
-            _ if self.can.version >= 31 && gl::is_enabled(PRIMITIVE_RESTART) => Err("primitive restart"),
+            _ if self.restarts() => Err("primitive restart"),
             // Recognised programs decide for themselves what blending means.
             _ if self.state.program != 0 => self.take_program_arrays(mode, call, elements),
             Verdict::Pass(why) => Err(why),
@@ -400,6 +441,19 @@ impl Context {
         }
     }
 
+    fn restarts(&self) -> bool {
+        self.can.version >= 31 && gl::is_enabled(PRIMITIVE_RESTART)
+            || self.can.version >= 43 && gl::is_enabled(PRIMITIVE_RESTART_FIXED_INDEX)
+    }
+
+    /// The index that restarts primitives, if one does.
+    fn restart_index(&self, kind: u32) -> Option<u32> {
+        if self.can.version >= 43 && gl::is_enabled(PRIMITIVE_RESTART_FIXED_INDEX) {
+            return Some(u32::MAX >> (32 - 8 * component_bytes(kind).clamp(1, 4)));
+        }
+        self.restarts().then(|| gl::word(PRIMITIVE_RESTART_INDEX))
+    }
+
     fn take_arrays(
         &mut self,
         mode: u32,
@@ -410,12 +464,13 @@ impl Context {
         let elements = elements()?;
         let (first, count) = elements.span();
         let seen = arrays.position.view(first, count)?;
-        let key = elements.key(mode, &seen, arrays.position.layout(), &self.state);
+        let split = elements.split(mode, &self.state, &arrays.position, &seen);
+        let key = elements.key(mode, &seen, arrays.position.layout(), &split);
         let geometry = match self.cache.known(key) {
             Some(geometry) => geometry,
             None => {
                 let positions = positions(&arrays.position.pack(seen))?;
-                let triangles = elements.triangles(mode, self.state.first_vertex_provokes, self.state.flat);
+                let triangles = elements.triangles(mode, &split);
                 self.cache.put(key, &positions, triangles)
             }
         };
@@ -517,6 +572,11 @@ impl Context {
         let end = [0.0, 0.0, 0.0, 1.0];
         self.list_begin_arrays(mode);
         for i in elements.order() {
+            let Some(i) = i else {
+                self.list_end();
+                self.list_begin_arrays(mode);
+                continue;
+            };
             if let Some(p) = &normal {
                 self.list_normal(p.at(i, [0.0; 3]));
             }

@@ -4,7 +4,7 @@
 mod moved;
 
 use crate::capture::Run;
-use crate::primitives::triangulate;
+use crate::primitives::{Split, triangulate};
 use rt_core::accel::{BuildOptions, BuildQuality, World};
 use rt_core::glam::Vec3;
 use rt_core::math::Aabb;
@@ -133,23 +133,24 @@ const WORTH_IMPROVING: usize = 20_000;
 
 impl Cache {
     /// The geometry of primitives in a row.
-    pub(crate) fn of_runs(
-        &mut self,
-        positions: &[[f32; 3]],
-        runs: &[Run],
-        [first_provokes, flat]: [bool; 2],
-    ) -> Arc<Geometry> {
+    pub(crate) fn of_runs(&mut self, positions: &[[f32; 3]], runs: &[Run], split: &Split) -> Arc<Geometry> {
         let mut key = hash(&[bytes_of(positions)]);
         for r in runs {
             key = mix(key, u64::from(r.mode) << 32 | u64::from(r.count));
-            key = mix(key, u64::from(r.times) << 2 | u64::from(first_provokes) << 1 | u64::from(flat));
+            key = mix(
+                key,
+                u64::from(r.times) << 2 | u64::from(split.first_provokes) << 1 | u64::from(split.all_turned),
+            );
+        }
+        for [from, to] in &split.turned {
+            key = mix(key, u64::from(*from) << 32 | u64::from(*to));
         }
         self.find(key, || {
             let mut indices = Vec::new();
             let mut first = 0;
             for r in runs {
                 for _ in 0..r.times {
-                    triangulate(r.mode, first, r.count, first_provokes, flat, &mut indices);
+                    triangulate(r.mode, first, r.count, split, &mut indices);
                     first += r.count;
                 }
             }
@@ -322,13 +323,13 @@ mod tests {
         let mut cache = Cache::default();
         let p = grid(300_000);
         let runs = [Run { mode: TRIANGLES, count: 3, times: 100_000 }];
-        let a = cache.of_runs(&p, &runs, [false; 2]);
-        let b = cache.of_runs(&p, &runs, [false; 2]);
+        let a = cache.of_runs(&p, &runs, &Split::default());
+        let b = cache.of_runs(&p, &runs, &Split::default());
         assert!(Arc::ptr_eq(&a, &b));
         let mut moved = p.clone();
         moved[299_999][2] = f32::from_bits(moved[299_999][2].to_bits() ^ 1);
-        assert!(!Arc::ptr_eq(&a, &cache.of_runs(&moved, &runs, [false; 2])));
-        let c = cache.of_runs(&p, &[Run { mode: TRIANGLES, count: 300_000, times: 1 }], [false; 2]);
+        assert!(!Arc::ptr_eq(&a, &cache.of_runs(&moved, &runs, &Split::default())));
+        let c = cache.of_runs(&p, &[Run { mode: TRIANGLES, count: 300_000, times: 1 }], &Split::default());
         assert!(!Arc::ptr_eq(&a, &c));
         assert_eq!((cache.hits, cache.misses), (1, 3));
     }
@@ -338,7 +339,7 @@ mod tests {
         let mut cache = Cache::default();
         for i in 0..50 {
             let p = vec![[i as f32; 3]; 30_000];
-            cache.of_runs(&p, &[Run { mode: TRIANGLES, count: 3, times: 10_000 }], [false; 2]);
+            cache.of_runs(&p, &[Run { mode: TRIANGLES, count: 3, times: 10_000 }], &Split::default());
             cache.frame_done(|_| true);
         }
         assert!(cache.entries.len() <= KEPT_FRAMES as usize + 1, "{}", cache.entries.len());

@@ -317,11 +317,15 @@ impl Context {
                 self.read_back();
             }
         }
+        // A program that sets much state between draws pays for the first calls only.
+        let told_enough = self.watched >= 12;
+        if (class & class::TEXTURE != 0 || told_enough) && self.state.texture.is_some() {
+            // What was drawn with a texture is drawn with what it is now; of later changes nobody may tell us.
+            self.end_batch();
+        }
         self.sync();
         self.mark(class);
         self.watched += 1;
-        // A program that sets much state between draws pays for the first calls only.
-        let told_enough = self.watched > 12;
         if told_enough && self.recording.is_none() && THREADS.load(Relaxed) == 1 {
             // Of buffers that are written we are told all the same.
             self.mark(class::ALL & !class::BUFFER);
@@ -383,9 +387,13 @@ impl Context {
         if fresh != *self.state {
             self.end_batch();
             self.state = Arc::new(fresh);
-            self.verdict = decide::filled(&self.state, self.config.trace());
-        } else {
-            self.verdict = decide::filled(&self.state, self.config.trace());
+        }
+        self.verdict = decide::filled(&self.state, self.config.trace());
+        if let Some(t) = &self.state.texture
+            && !matches!(self.verdict, Verdict::Pass(_))
+        {
+            // Now, as it is bound now: when a batch of immediate mode ends another may be.
+            self.presenter.images.get(t.target, t.name, t.version);
         }
     }
 

@@ -31,6 +31,9 @@ pub(crate) enum Trace {
     Nothing,
 }
 
+/// Pixels of a viewport from which on pictures would cost gigabytes.
+const MOST_PIXELS: i32 = 1 << 26;
+
 /// The verdict over filled primitives in state `s`.
 pub(crate) fn filled(s: &Snapshot, trace: Trace) -> Verdict {
     use Verdict::Pass;
@@ -53,6 +56,9 @@ pub(crate) fn filled(s: &Snapshot, trace: Trace) -> Verdict {
     if s.stipple || s.smooth_polygons {
         return Pass("stippled or smoothed polygons");
     }
+    if s.masked_samples {
+        return Pass("masks or coverage of samples");
+    }
     if s.draw_buffer == 0 {
         return Pass("no colour buffer");
     }
@@ -68,8 +74,20 @@ pub(crate) fn filled(s: &Snapshot, trace: Trace) -> Verdict {
     if s.fog.is_some_and(|f| f.mode == 0) {
         return Pass("fog coordinates");
     }
+    if s.clip_control {
+        return Pass("clip control");
+    }
+    if s.unclamped_colors {
+        return Pass("a colour buffer of floats, integers or signed numbers");
+    }
+    if s.two_sided_stencil {
+        return Pass("a stencil of two sides");
+    }
     if s.viewport[2] <= 0 || s.viewport[3] <= 0 {
         return Pass("an empty viewport");
+    }
+    if s.viewport[2] > MOST_PIXELS / s.viewport[3] {
+        return Pass("a viewport too large to trace");
     }
     // ---- What has to happen in order ----
     let why = if s.stencil_test {
@@ -176,6 +194,12 @@ mod tests {
             Verdict::Pass("blending"),
             "the test may discard alpha 1"
         );
+    }
+
+    #[test]
+    fn a_stencil_that_tells_front_from_back_is_never_traced() {
+        let s = Snapshot { stencil_test: true, two_sided_stencil: true, ..surface() };
+        assert_eq!(filled(&s, Trace::All), Verdict::Pass("a stencil of two sides"));
     }
 
     #[test]

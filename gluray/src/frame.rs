@@ -8,6 +8,7 @@ use crate::late::{self, Late, Traced};
 use crate::lighting::{product, transform};
 use crate::overrides::Look;
 use crate::present::Fate;
+use crate::primitives::Split;
 use crate::texturing::Image;
 use crate::trace::{self, Prepared};
 use crate::worker;
@@ -59,7 +60,7 @@ impl Context {
             return;
         }
         let start = Instant::now();
-        let kind = [self.state.first_vertex_provokes, self.state.flat];
+        let kind = &self.split_of_batch();
         let geometry = match self.recorder.followed(kind) {
             Some(geometry) => {
                 self.cache.hits += 1;
@@ -98,6 +99,30 @@ impl Context {
         );
     }
 
+    /// How the driver would split the quads of the batch.
+    fn split_of_batch(&mut self) -> Split {
+        let s = &self.state;
+        // Lists end batches with quads before and after them.
+        let all_turned = s.flat || self.depth_of_lists > 0;
+        let mut split = Split { first_provokes: s.first_vertex_provokes, all_turned, turned: Vec::new() };
+        if std::mem::take(&mut self.recorder.quads) && !all_turned {
+            let clipped = self.state.clips();
+            let outside = |from, to| self.recorder.any_position(from, to, &clipped);
+            // Begin and End after Begin and End of quads is one draw for the driver.
+            let (mut at, mut first) = (0, 0);
+            for (i, r) in self.recorder.runs.iter().enumerate() {
+                let next = self.recorder.runs.get(i + 1).map(|r| r.mode);
+                let end = at + r.count * r.times;
+                if r.mode == QUADS && next != Some(QUADS) {
+                    split.look_for_clipped(first, end, outside);
+                }
+                at = end;
+                first = if r.mode == QUADS && next == Some(QUADS) { first } else { at };
+            }
+        }
+        split
+    }
+
     /// Takes a draw into the frame, or traces it at once when its order matters.
     pub(crate) fn add(&mut self, mut draw: Draw, in_order: bool) {
         self.counters.report.traced_draws += draw.calls;
@@ -114,13 +139,19 @@ impl Context {
             // Programs leave blending on; what lets no light through is opaque all the same.
             Arc::make_mut(&mut draw.state).blend = false;
         }
-        let image = match &draw.state.texture {
-            Some(t) => self.presenter.images.get(t.target, t.name, t.version),
-            None => None,
-        };
+        let image = draw.state.texture.and_then(|t| {
+            self.keep_errors();
+            let image = self.presenter.images.get(t.target, t.name, t.version);
+            self.drop_errors();
+            image
+        });
         if in_order {
             self.trace_in_order(&draw, image);
         } else {
+            let samples = |d: &Draw| d.state.samples.max(1);
+            if self.frame.pending.first().is_some_and(|(d, _)| samples(d) != samples(&draw)) {
+                self.flush("a draw with more or fewer samples");
+            }
             self.frame.pending.push((draw, image));
         }
     }
@@ -183,12 +214,16 @@ impl Context {
         if !matches!(self.config.settings.mode, Mode::Match | Mode::Phong) {
             crate::view::place(&mut pending);
         }
-        if let Some(n) = pending.iter().map(|(d, _)| d.state.samples).find(|n| *n > 1) {
-            self.counters.warn(format!(
-                "the program has {n} samples a pixel: one ray stands for all of them, so silhouettes are not smoothed as the driver's are"
-            ));
+        let picture = crate::picture::is_for(&self.config.settings);
+        let places = match picture {
+            true => None,
+            false => self.sample_places(pending.iter().map(|(d, _)| d)),
+        };
+        if let Some(places) = places {
+            return self.flush_samples(&pending, func, &places);
         }
-        if crate::picture::is_for(&self.config.settings) {
+        self.warn_of_samples(pending.iter().map(|(d, _)| d));
+        if picture {
             return self.draw_picture(&pending, func);
         }
         if self.may_be_late(before) {
@@ -196,11 +231,20 @@ impl Context {
         }
         let settings = &self.config.settings;
         let traced = worker::on_pool(|| late::trace(pending, settings));
-        self.put(traced, Fate::Surface(func));
+        self.put(traced, Fate::Surface(func), None);
     }
 
-    /// Puts what was traced into the framebuffer.
-    pub(crate) fn put(&mut self, traced: Traced, fate: Fate) {
+    /// One ray stands for all samples of a pixel.
+    fn warn_of_samples<'a>(&mut self, draws: impl Iterator<Item = &'a Draw>) {
+        if let Some(n) = draws.map(|d| d.state.samples).find(|n| *n > 1) {
+            self.counters.warn(format!(
+                "the program has {n} samples a pixel: one ray stands for all of them, so silhouettes are not smoothed as the driver's are"
+            ));
+        }
+    }
+
+    /// Puts what was traced into the framebuffer, or into one sample of each of its pixels.
+    pub(crate) fn put(&mut self, traced: Traced, fate: Fate, sample: Option<u32>) {
         self.counters.spent("trace", traced.took);
         self.counters.rays("primary", traced.primary);
         self.counters.rays("shadow", traced.extra[0]);
@@ -209,7 +253,7 @@ impl Context {
         self.counters.report.pixels += traced.layer.covered as u64;
         let start = Instant::now();
         if traced.layer.covered > 0 {
-            self.present(&[traced.layer], fate);
+            self.present_sample(&[traced.layer], fate, sample);
         }
         self.counters.spent("present", start.elapsed());
         for (draw, _) in traced.draws {
@@ -223,18 +267,28 @@ impl Context {
         self.frame.traced = true;
         self.counters.flushed("in order");
         self.frame.told.traced(self.counters.report.frames + 1, std::iter::once(draw));
-        let start = Instant::now();
-        let mut structures = crate::cache::Structures::default();
-        let (layers, rays) = worker::on_pool(|| match Prepared::new(draw, image, &mut structures) {
-            Some(p) => (trace::in_order(&p), p.rays.load(Relaxed)),
-            None => (Vec::new(), 0),
-        });
-        self.counters.spent("trace", start.elapsed());
-        self.counters.rays("primary", rays);
-        self.counters.made(structures);
-        self.counters.report.pixels += layers.iter().map(|l| l.covered as u64).sum::<u64>();
-        if !layers.is_empty() {
-            self.present(&layers, Fate::AsDrawn);
+        let samples = match self.sample_places([draw]) {
+            Some(places) => Context::each_sample(draw, &places),
+            None => {
+                self.warn_of_samples(std::iter::once(draw));
+                vec![(draw.clone(), None)]
+            }
+        };
+        for (draw, sample) in samples {
+            let start = Instant::now();
+            let mut structures = crate::cache::Structures::default();
+            let image = image.clone();
+            let (layers, rays) = worker::on_pool(|| match Prepared::new(&draw, image, &mut structures) {
+                Some(p) => (trace::in_order(&p), p.rays.load(Relaxed)),
+                None => (Vec::new(), 0),
+            });
+            self.counters.spent("trace", start.elapsed());
+            self.counters.rays("primary", rays);
+            self.counters.made(structures);
+            self.counters.report.pixels += layers.iter().map(|l| l.covered as u64).sum::<u64>();
+            if !layers.is_empty() {
+                self.present_sample(&layers, Fate::AsDrawn, sample);
+            }
         }
     }
 

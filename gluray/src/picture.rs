@@ -5,13 +5,15 @@
 
 use crate::beyond::{self, Colors};
 use crate::cache::Structures;
-use crate::capture::Draw;
+use crate::capture::{Draw, Shading};
 use crate::config::{Mode, Settings};
 use crate::context::Context;
 use crate::enums::*;
 use crate::present::Fate;
 use crate::ranks;
 use crate::real::gl;
+use crate::state::snapshot::Fog;
+use crate::studio::fog;
 use crate::texturing::Image;
 use crate::trace::{Layer, Prepared, Rect, UNCOVERED};
 use crate::view::{View, views};
@@ -164,6 +166,9 @@ fn make(
         _ => ranks::beyond(ready, view, all.rect, settings, background),
     };
     warnings.append(&mut colors.warnings);
+    if settings.mode == Mode::Path {
+        fogged(&mut colors, ready, view, &all, settings);
+    }
     let clear: Vec<bool> =
         ready.iter().map(|p| p.draw.state.blend && beyond::is_clear(p, settings)).collect();
     let opaque = match clear.contains(&true) {
@@ -179,6 +184,30 @@ fn make(
         }
     };
     Made::Over { colors, opaque, all }
+}
+
+/// Puts each draw's fog over a path-traced picture.
+fn fogged(colors: &mut Colors, ready: &[Prepared<'_>], view: &View, all: &Layer, settings: &Settings) {
+    let mut done: Vec<(Fog, [f64; 2])> = Vec::new();
+    for p in ready {
+        let s = &p.draw.state;
+        let Some(fog) = s.fog.filter(|_| matches!(p.draw.shading, Shading::Fixed)) else { continue };
+        let this = (fog, s.depth_range);
+        if done.contains(&this) {
+            continue;
+        }
+        done.push(this);
+        let has = |p: &Prepared<'_>| p.draw.state.fog == Some(fog) && p.draw.state.depth_range == this.1;
+        if ready.iter().all(has) {
+            return fog::over(colors, view, &fog, this.1, all, all);
+        }
+        let mut depth = vec![UNCOVERED; all.depth.len()];
+        for p in ready.iter().filter(|p| has(p)) {
+            merge(&mut depth, all.rect, &depths(std::slice::from_ref(p), settings));
+        }
+        let surfaces = Layer { rect: all.rect, color: Vec::new(), depth, covered: 0 };
+        fog::over(colors, view, &fog, this.1, &surfaces, all);
+    }
 }
 
 /// The nearer depth at every pixel.

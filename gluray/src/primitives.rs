@@ -8,18 +8,48 @@ pub(crate) fn is_filled(mode: u32) -> bool {
     (TRIANGLES..=POLYGON).contains(&mode)
 }
 
+/// How primitives become triangles.
+///
+/// OpenGL leaves open along which diagonal a quad is split, and Mesa does it along either: from the second vertex to the fourth when the quads
+/// are flat, indexed, or in a display list, and when it has to clip any vertex of the up to 4096 that it draws at once; else from the first to the
+/// third. Colours and bent quads show which.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
+pub(crate) struct Split {
+    /// The convention for the vertex of the flat colour.
+    pub(crate) first_provokes: bool,
+    /// All quads are split from the second vertex to the fourth.
+    pub(crate) all_turned: bool,
+    /// Ranges of vertices (first, end) of which the quads are.
+    pub(crate) turned: Vec<[u32; 2]>,
+}
+
+impl Split {
+    fn turns(&self, vertex: u32) -> bool {
+        self.all_turned || self.turned.iter().any(|[first, end]| (*first..*end).contains(&vertex))
+    }
+
+    /// Finds what is clipped: `outside` says for a range of vertices whether any of them is. `first..end` is one draw of quads to the driver.
+    pub(crate) fn look_for_clipped(&mut self, first: u32, end: u32, outside: impl Fn(u32, u32) -> bool) {
+        // Beyond, geometry would be built anew for what nobody sees: quads of that number are small.
+        const MOST: u32 = 1 << 16;
+        const AT_ONCE: u32 = 4096;
+        if self.all_turned || end - first > MOST {
+            return;
+        }
+        for from in (first..end).step_by(AT_ONCE as usize) {
+            let to = end.min(from + AT_ONCE);
+            if outside(from, to) {
+                self.turned.push([from, to]);
+            }
+        }
+    }
+}
+
 /// The triangles of a primitive whose vertices are numbered `first..first + count`; the vertex that gives the flat colour comes
-/// last. Incomplete primitives give nothing, as OpenGL has it. `flat` says that only that vertex' colour counts: Mesa splits quads along
-/// another diagonal then.
-pub(crate) fn triangulate(
-    mode: u32,
-    first: u32,
-    count: u32,
-    first_provokes: bool,
-    flat: bool,
-    out: &mut Vec<[u32; 3]>,
-) {
+/// last. Incomplete primitives give nothing, as OpenGL has it.
+pub(crate) fn triangulate(mode: u32, first: u32, count: u32, split: &Split, out: &mut Vec<[u32; 3]>) {
     let v = |i: u32| first + i;
+    let first_provokes = split.first_provokes;
     // Rotates so that vertex 0 (the first) comes last; the orientation stays.
     let provoked = |t: [u32; 3]| if first_provokes { [t[1], t[2], t[0]] } else { t };
     match mode {
@@ -36,7 +66,9 @@ pub(crate) fn triangulate(
             true => [v(i + 1), v(0), v(i)],
         })),
         // Mesa's quads do not follow the provoking vertex convention: their last vertex gives the colour.
-        QUADS => out.extend((0..count / 4).flat_map(|i| quad([0, 1, 2, 3].map(|k| v(4 * i + k)), flat))),
+        QUADS => out.extend(
+            (0..count / 4).flat_map(|i| quad([0, 1, 2, 3].map(|k| v(4 * i + k)), split.turns(v(4 * i)))),
+        ),
         QUAD_STRIP => out.extend((0..(count / 2).saturating_sub(1)).flat_map(|i| {
             let [a, b, c, d] = [0, 1, 2, 3].map(|k| v(2 * i + k));
             [[c, a, d], [a, b, d]]
@@ -47,17 +79,32 @@ pub(crate) fn triangulate(
     }
 }
 
-fn quad([a, b, c, d]: [u32; 4], flat: bool) -> [[u32; 3]; 2] {
-    if flat { [[a, b, d], [b, c, d]] } else { [[a, b, c], [a, c, d]] }
+fn quad([a, b, c, d]: [u32; 4], turned: bool) -> [[u32; 3]; 2] {
+    if turned { [[a, b, d], [b, c, d]] } else { [[a, b, c], [a, c, d]] }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn split(first_provokes: bool, all_turned: bool) -> Split {
+        Split { first_provokes, all_turned, turned: Vec::new() }
+    }
+
+    #[test]
+    fn quads_that_are_clipped_are_split_the_other_way_with_all_that_are_drawn_at_once() {
+        let mut s = Split::default();
+        s.look_for_clipped(8, 8 + 3 * 4096, |from, to| (from..to).contains(&5000));
+        assert_eq!(s.turned, [[8 + 4096, 8 + 2 * 4096]]);
+        let mut out = Vec::new();
+        triangulate(QUADS, 0, 4 * 4096, &s, &mut out);
+        assert_eq!(out[2 * 1025..2 * 1025 + 2], [[4100, 4101, 4102], [4100, 4102, 4103]]);
+        assert_eq!(out[2 * 1026..2 * 1026 + 2], [[4104, 4105, 4107], [4105, 4106, 4107]]);
+    }
+
     fn triangles(mode: u32, count: u32) -> Vec<[u32; 3]> {
         let mut out = Vec::new();
-        triangulate(mode, 10, count, false, true, &mut out);
+        triangulate(mode, 10, count, &split(false, true), &mut out);
         out
     }
 
@@ -87,7 +134,7 @@ mod tests {
         for first in [false, true] {
             for mode in [TRIANGLE_STRIP, QUAD_STRIP] {
                 let mut out = Vec::new();
-                triangulate(mode, 10, 8, first, true, &mut out);
+                triangulate(mode, 10, 8, &split(first, true), &mut out);
                 assert_eq!(out.len(), 6);
                 let place =
                     if mode == QUAD_STRIP { |i: u32| [f64::from(i / 2), -f64::from(i % 2)] } else { zigzag };
@@ -96,7 +143,7 @@ mod tests {
             }
             for mode in [TRIANGLES, TRIANGLE_FAN, QUADS, POLYGON] {
                 let mut out = Vec::new();
-                triangulate(mode, 10, 8, first, true, &mut out);
+                triangulate(mode, 10, 8, &split(first, true), &mut out);
                 assert!(out.iter().all(|t| turns_left(*t, circle)), "mode {mode}: {out:?}");
             }
         }
@@ -106,11 +153,11 @@ mod tests {
     fn the_provoking_vertex_comes_last() {
         assert_eq!(triangles(QUADS, 4).iter().map(|t| t[2]).collect::<Vec<_>>(), [13, 13]);
         let mut smooth = Vec::new();
-        triangulate(QUADS, 0, 4, false, false, &mut smooth);
+        triangulate(QUADS, 0, 4, &split(false, false), &mut smooth);
         assert_eq!(smooth, [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(triangles(POLYGON, 5).iter().map(|t| t[2]).collect::<Vec<_>>(), [10, 10, 10]);
         let mut out = Vec::new();
-        triangulate(TRIANGLE_STRIP, 0, 4, true, true, &mut out);
+        triangulate(TRIANGLE_STRIP, 0, 4, &split(true, true), &mut out);
         assert_eq!(out.iter().map(|t| t[2]).collect::<Vec<_>>(), [0, 1]);
     }
 }

@@ -157,7 +157,8 @@ impl Context {
                 _ => {
                     let Ok(packed) = source.read(first, count) else { continue };
                     let Ok(positions) = positions(&packed) else { continue };
-                    let triangles = elements.triangles(mode, self.state.first_vertex_provokes, false);
+                    let split = elements.plain_split(self.state.first_vertex_provokes);
+                    let triangles = elements.triangles(mode, &split);
                     self.cache.of_indices(&positions, &triangles)
                 }
             };

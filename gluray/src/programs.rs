@@ -452,7 +452,7 @@ impl Context {
         let read = |s: &Option<Source>| s.map(|s| s.read(first, count)).transpose();
         let [position, normal, color, tex] = sources;
         let positions = positions(&read(position)?.ok_or("a program without positions")?)?;
-        let triangles = elements.triangles(mode, self.state.first_vertex_provokes, false);
+        let triangles = elements.triangles(mode, &elements.plain_split(self.state.first_vertex_provokes));
         let geometry = self.cache.of_indices(&positions, &triangles);
         let mut attributes = Attributes::constant(&Current::default());
         if let Some(p) = read(normal)? {

@@ -2,7 +2,10 @@
 
 use crate::cache::Geometry;
 use crate::capture::{Attributes, Run, Values};
+use crate::enums::QUADS;
+use crate::primitives::Split;
 use crate::state::current::{Current, Materials};
+use rt_core::glam::Vec3;
 use rt_core::mesh::TriMesh;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -36,6 +39,7 @@ impl<const N: usize> Stream<N> {
     }
 
     #[cold]
+    #[inline(never)]
     fn vary(&mut self, vertices: usize) {
         self.values = self.spares.pop().unwrap_or_default();
         self.values.clear();
@@ -62,13 +66,20 @@ impl<const N: usize> Stream<N> {
     }
 }
 
+/// Bit for bit: not a number is what it is.
+#[inline(always)]
+fn is_at(p: &Vec3, v: [f32; 3]) -> bool {
+    (p.x.to_bits() ^ v[0].to_bits()) | (p.y.to_bits() ^ v[1].to_bits()) | (p.z.to_bits() ^ v[2].to_bits())
+        == 0
+}
+
 /// A batch of an earlier frame, which may come again vertex by vertex.
 #[derive(Clone)]
 struct Expected {
     geometry: Arc<Geometry>,
     mesh: Arc<TriMesh>,
     runs: Vec<Run>,
-    kind: [bool; 2],
+    kind: Split,
     frame: u64,
 }
 
@@ -99,14 +110,17 @@ pub(crate) struct Recorder {
     mode: u32,
     /// Begin/End pairs.
     pub(crate) calls: u64,
+    /// There are quads in the batch.
+    pub(crate) quads: bool,
 }
 
 impl Recorder {
     /// A primitive begins.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn begin(&mut self, mode: u32, current: &Current) {
         self.open = self.count();
         self.mode = mode;
+        self.quads |= mode == QUADS;
         if self.open == 0 {
             self.start(current);
         } else if self.behind {
@@ -117,12 +131,19 @@ impl Recorder {
         self.behind = false;
     }
 
+    /// The mode of the primitive that is open, or was last.
+    pub(crate) fn mode(&self) -> u32 {
+        self.mode
+    }
+
     /// Vertices so far.
     #[inline(always)]
     fn count(&self) -> usize {
         self.followed + self.positions.len()
     }
 
+    #[cold]
+    #[inline(never)]
     fn start(&mut self, current: &Current) {
         (self.normals.constant, self.colors.constant, self.tex.constant) =
             (current.normal, current.color, current.tex);
@@ -132,7 +153,7 @@ impl Recorder {
     }
 
     /// The primitive ends.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn end(&mut self) {
         let count = (self.count() - self.open) as u32;
         self.calls += 1;
@@ -180,16 +201,12 @@ impl Recorder {
     #[inline(always)]
     pub(crate) fn vertex(&mut self, v: [f32; 3], current: &Current) {
         match &self.expected {
-            Some(mesh)
-                if mesh
-                    .positions
-                    .get(self.followed)
-                    .is_some_and(|p| p.to_array().map(f32::to_bits) == v.map(f32::to_bits)) =>
-            {
-                self.followed += 1;
+            Some(mesh) if mesh.positions.get(self.followed).is_some_and(|p| is_at(p, v)) => {
+                self.followed += 1
             }
             None if !self.positions.is_empty() => self.positions.push(v),
-            _ => self.unexpected(v),
+            // In parts: what lies in memory for the rare case would be put there for every vertex.
+            _ => self.unexpected(v[0], v[1], v[2]),
         }
         if self.normals.varying {
             self.normals.values.push(current.normal);
@@ -199,7 +216,7 @@ impl Recorder {
         }
     }
 
-    #[inline]
+    #[inline(never)]
     fn vertex_more(&mut self, current: &Current) {
         if self.colors.varying {
             self.colors.values.push(current.color);
@@ -214,7 +231,9 @@ impl Recorder {
 
     /// The first vertex of a batch, or one that is not what was expected.
     #[cold]
-    fn unexpected(&mut self, v: [f32; 3]) {
+    #[inline(never)]
+    fn unexpected(&mut self, x: f32, y: f32, z: f32) {
+        let v = [x, y, z];
         if self.expected.is_none()
             && self.followed == 0
             && let Some(e) = self.earlier.get(&v.map(f32::to_bits))
@@ -227,6 +246,15 @@ impl Recorder {
         self.positions.push(v);
     }
 
+    /// Whether any position of a range of the batch is what `is` looks for.
+    pub(crate) fn any_position(&self, from: u32, to: u32, is: impl Fn([f32; 3]) -> bool) -> bool {
+        let range = from as usize..to as usize;
+        match &self.expected {
+            Some(mesh) => mesh.positions[range].iter().any(|p| is(p.to_array())),
+            None => self.positions[range].iter().any(|p| is(*p)),
+        }
+    }
+
     /// The vertices that were followed become our own.
     pub(crate) fn write_down(&mut self) {
         if let Some(mesh) = self.expected.take() {
@@ -237,12 +265,12 @@ impl Recorder {
     }
 
     /// The geometry of the batch, when it is all that an earlier one was.
-    pub(crate) fn followed(&mut self, kind: [bool; 2]) -> Option<Arc<Geometry>> {
+    pub(crate) fn followed(&mut self, kind: &Split) -> Option<Arc<Geometry>> {
         let mesh = self.expected.as_ref()?;
         let first = mesh.positions[0].to_array().map(f32::to_bits);
         let e = self.earlier.get_mut(&first)?;
         let whole = self.followed == mesh.positions.len() && Arc::ptr_eq(&e.mesh, mesh);
-        if !whole || e.kind != kind || e.runs != self.runs {
+        if !whole || e.kind != *kind || e.runs != self.runs {
             return None;
         }
         e.frame = self.frame;
@@ -252,11 +280,12 @@ impl Recorder {
     }
 
     /// This is what the batch was; it may come again.
-    pub(crate) fn expect(&mut self, geometry: &Arc<Geometry>, kind: [bool; 2]) {
+    pub(crate) fn expect(&mut self, geometry: &Arc<Geometry>, kind: &Split) {
         const WORTH_FOLLOWING: usize = 1000;
         if self.positions.len() >= WORTH_FOLLOWING {
             let (geometry, mesh) = (geometry.clone(), geometry.mesh.clone());
-            let e = Expected { geometry, mesh, runs: self.runs.clone(), kind, frame: self.frame };
+            let e =
+                Expected { geometry, mesh, runs: self.runs.clone(), kind: kind.clone(), frame: self.frame };
             self.earlier.insert(self.positions[0].map(f32::to_bits), e);
         }
     }
@@ -372,7 +401,7 @@ mod tests {
             p.iter().for_each(|p| r.vertex(*p, &current));
             r.end();
         }
-        let kind = [false; 2];
+        let kind = &Split::default();
         let geometry = r.followed(kind).unwrap_or_else(|| {
             r.write_down();
             let made = cache.of_runs(&r.positions, &r.runs, kind);

@@ -63,6 +63,31 @@ fn path_mode_has_shadows_and_light_from_wall_to_wall_and_is_deterministic() {
 }
 
 #[test]
+fn fog_takes_the_same_share_of_path_traced_colours_as_of_others() {
+    const FOG: [f64; 3] = [51.0, 102.0, 255.0];
+    let path = ["--mode", "path", "--set", "samples=24"];
+    let Some((picture, report)) = draw("box_in_fog", Some(&path)) else { return };
+    assert_eq!(report.problems, Vec::<String>::new());
+    let others = [
+        ("box_on_floor", &path[..]),
+        ("box_on_floor", &["--mode", "phong"]),
+        ("box_in_fog", &["--mode", "phong"]),
+    ];
+    let [clear, plain, fogged] =
+        others.map(|(case, options)| draw(case, Some(options)).expect("it ran before").0);
+    for part in [FRONT, AWAY, SHADOW] {
+        let (a, b) = (mean(&plain, part)[2], mean(&fogged, part)[2]);
+        let share = (b - a) / (FOG[2] - a);
+        assert!(share > 0.1, "there is fog: {share}");
+        let (with, without) = (mean(&picture, part), mean(&clear, part));
+        for k in 0..3 {
+            let expected = without[k] * (1.0 - share) + FOG[k] * share;
+            assert!((with[k] - expected).abs() < 4.0, "{part:?}: {with:?} of {without:?} by {share}");
+        }
+    }
+}
+
+#[test]
 fn mirrors_are_seen_and_cost_rays_only_where_they_are_asked_for() {
     let Some((plain, report)) = draw("box_on_floor", Some(&["--mode", "rich"])) else { return };
     assert_eq!(rays(&report, "reflection"), 0);

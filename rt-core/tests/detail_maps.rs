@@ -70,6 +70,13 @@ fn normal_maps_bend_along_the_texture_coordinates() {
     close(middle(&right_handed, &m, &light, 5.0)[0], n.dot(to_light), "u along x, v along y");
     let mirrored = Vec3::new(n.x, -n.y, n.z);
     close(middle(&left_handed, &m, &light, 5.0)[0], mirrored.dot(to_light), "v against y");
+    // Files of glTF count v downwards, and mean by green the upper edge of the picture all the same.
+    let from_top =
+        SurfaceMaps { normal: bend(n), rows_from_top: true, ..SurfaceMaps::new(MapConvention::Gltf) };
+    let down = Material::matte([1.0; 3]).with_detail(Arc::new(from_top) as Arc<dyn Detail>);
+    close(middle(&left_handed, &down, &light, 5.0)[0], n.dot(to_light), "v against y, rows from the top");
+    let own = tangents(sheet(-1.0), Vec4::new(1.0, 0.0, 0.0, 1.0));
+    close(middle(&own, &down, &light, 5.0)[0], n.dot(to_light), "tangents say it themselves");
     // From behind the whole frame is turned over.
     let below = Vec3::new(0.2, 0.1, -0.9).normalize();
     let found = middle(&right_handed, &m, &[Light::directional(below.as_dvec3())], -5.0)[0];

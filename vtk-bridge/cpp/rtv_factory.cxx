@@ -4,8 +4,6 @@
 #include <vtkObjectFactory.h>
 #include <vtkVersion.h>
 
-#include <cstdlib>
-
 const RtvApi* rtvApi = nullptr;
 
 // Gives the shim the bridge's functions. Returns the number of the interface it was compiled for.
@@ -14,11 +12,8 @@ extern "C" VTK_ABI_EXPORT uint32_t rtv_shim_init(const RtvApi* api)
   if (api && api->abi() == RTV_ABI)
   {
     rtvApi = api;
+    rtvApi->host(VTK_MAJOR_VERSION, VTK_MINOR_VERSION);
   }
-#if VTK_MAJOR_VERSION > 9 || (VTK_MAJOR_VERSION == 9 && VTK_MINOR_VERSION > 2)
-  // Shaders of these versions draw edges on their surfaces alone.
-  setenv("RTV_EDGES", "0", 0);
-#endif
   return RTV_ABI;
 }
 

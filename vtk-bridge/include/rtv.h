@@ -312,7 +312,7 @@ typedef struct RtvPicture {
   float const* first_depth;
 } RtvPicture;
 /* Number of this interface, made from its structures and calls (a test says which). A shim built for another one must not go on. */
-#define RTV_ABI 3622962323u
+#define RTV_ABI 910789305u
 /* All calls in one table, so that a shim needs only one symbol. */
 typedef struct RtvApi {
   /* rtv_abi. */
@@ -325,6 +325,8 @@ typedef struct RtvApi {
   int32_t (*set_option)(char const*, char const*);
   /* rtv_option. */
   double (*option)(char const*);
+  /* rtv_host. */
+  void (*host)(uint32_t, uint32_t);
   /* rtv_begin. */
   int32_t (*begin)(RtvBridge*);
   /* rtv_surface. */
@@ -357,6 +359,8 @@ void rtv_free(RtvBridge* bridge);
 int32_t rtv_set_option(char const* name, char const* value);
 /* An option's value as a number: RTV_POINT_RADIUS, RTV_LINE_RADIUS, RTV_OFF; -1 for others. */
 double rtv_option(char const* name);
+/* Tells which VTK the library is inside of: options whose default follows VTK's version (RTV_EDGES) take it from here, unless the environment or the program says otherwise. For all bridges of the process. */
+void rtv_host(uint32_t vtk_major, uint32_t vtk_minor);
 /* Begins a frame. 0 when everything is to be left to OpenGL (RTV_OFF). */
 int32_t rtv_begin(RtvBridge* bridge);
 /* Adds something to draw: 1 when it will be traced, 0 when there is nothing to trace in it, -1 when its arrays make no sense. */

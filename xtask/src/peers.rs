@@ -42,6 +42,7 @@ const PACKAGES: &[(&str, &str)] = &[
     ("openscad", "an OpenGL program that renders off the screen"),
     ("pymol", "an OpenGL program with fog"),
     ("piglit", "tests of OpenGL itself"),
+    ("xscreensaver-gl", "small animated OpenGL programs of all kinds"),
 ];
 
 /// Debian packages that conflict with some above, so they are unpacked in `target/peers/vtk91` instead of installed.
@@ -62,6 +63,7 @@ const PROGRAMS: &[(&str, &str, &str)] = &[
     ("OpenSCAD", "RTSV_OPENSCAD", "/usr/bin/openscad"),
     ("PyMOL", "RTSV_PYMOL", "/usr/bin/pymol"),
     ("glxgears", "RTSV_GLXGEARS", "/usr/bin/glxgears"),
+    ("xscreensaver-gl", "RTSV_XSCREENSAVER", "/usr/libexec/xscreensaver/gears"),
 ];
 
 /// Wheels, with the versions that our numbers were measured with, and what each is for.

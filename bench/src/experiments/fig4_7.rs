@@ -1,8 +1,10 @@
-//! Figure 4.7: build time against the number of triangles, for fast and for careful builds; with the peers' builds.
+//! Figure 4.7: build time against the number of triangles, for fast and for careful builds; with the peers' builds, and with a frame of
+//! Mesa's rasteriser, which needs no build.
 
 use super::Context;
 use super::lineup::Installed;
 use crate::meshes;
+use crate::opengl::{Cost, Mesa, Session};
 use crate::ours::Ours;
 use crate::peers::BuildCost;
 use crate::peers::embree::{EmbreeScene, Options, Quality};
@@ -20,8 +22,8 @@ type Builder<'a> = (String, Box<dyn Fn() -> anyhow::Result<BuildCost> + 'a>);
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     record.column("triangles", "", "triangles of the wavelet surfaces");
-    record.column("builder", "", "tracer and preset");
-    record.column("threads", "", "threads that build");
+    record.column("builder", "", "tracer and preset, or who draws a frame");
+    record.column("threads", "", "threads that build; empty for frames");
     record.column("time", "s", "median over the rounds, wall time");
     record.column("time_low", "s", "fastest round");
     record.column("time_high", "s", "slowest round");
@@ -35,26 +37,33 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     );
     let installed = Installed::find();
     record.missing.extend(installed.missing.iter().cloned());
+    let mesa = Mesa::find().map_err(|missing| record.missing.extend(missing)).ok();
     record.notes.push(
         "Wall time from triangles in memory to a structure that rays can use, on all threads. The dissertation’s \
          builds took under 1 s for 1 million triangles (approximate) to over 60 s for 256 million, on one 8-core \
          node (2012)."
             .into(),
     );
+    record.notes.push(
+        "A frame of llvmpipe is one of an unmodified program that keeps the mesh in buffers, 1024 x 1024 pixels, measured in the same rounds: \
+         what a program waits for anyway each time its picture changes, and so the yardstick for a build that is needed once."
+            .into(),
+    );
+    let with = Beside { installed: &installed, mesa: mesa.as_ref() };
     if context.quick {
         for points in [51, 101] {
             let mesh = meshes::coarse_wavelet(points)?;
-            measure(context, record, &installed, &mesh, 3, false)?;
+            measure(context, record, &with, &mesh, 3, false)?;
         }
         let mesh = context.wavelet(Size::M1)?;
-        measure(context, record, &installed, &mesh, 2, false)?;
+        measure(context, record, &with, &mesh, 2, false)?;
     } else {
         for size in Size::ALL {
             if fits_in_memory(size, record) {
                 let mesh = context.wavelet(size)?;
                 // Slow builders drop out where they would take minutes each.
                 let small = size <= Size::M4;
-                measure(context, record, &installed, &mesh, if small { 3 } else { 2 }, small)?;
+                measure(context, record, &with, &mesh, if small { 3 } else { 2 }, small)?;
             }
         }
     }
@@ -62,28 +71,66 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     Ok(())
 }
 
+/// Whom our builds are set against.
+struct Beside<'a> {
+    installed: &'a Installed,
+    mesa: Option<&'a Mesa>,
+}
+
 /// Builds one mesh with everyone, in turns.
 fn measure(
     context: &mut Context<'_>,
     record: &mut Record,
-    installed: &Installed,
+    with: &Beside<'_>,
     mesh: &Arc<TriMesh>,
     rounds: usize,
     slow_too: bool,
 ) -> anyhow::Result<()> {
-    let builders = builders(mesh, installed, slow_too);
+    let n = mesh.num_triangles();
+    let builders = builders(mesh, with.installed, slow_too);
     let mut costs: Vec<Vec<BuildCost>> = vec![vec![]; builders.len()];
+    context.say(format!("{n} triangles: a program for llvmpipe"))?;
+    let mut drawn: Option<(&str, Session)> = None;
+    if let Some(mesa) = with.mesa {
+        drawn = mesa.draw(mesh, 1024).map_err(|e| record.missing.push(format!("{n} triangles: {e:#}"))).ok();
+    }
+    let mut frames: Vec<Cost> = vec![];
     for round in 0..rounds {
-        context.say(format!("{} triangles, round {} of {rounds}", mesh.num_triangles(), round + 1))?;
+        context.say(format!("{n} triangles, round {} of {rounds}", round + 1))?;
         for i in 0..builders.len() {
             let i = (i + round) % builders.len();
             costs[i].push(builders[i].1()?);
+        }
+        if let Some((_, session)) = &mut drawn {
+            for _ in 0..FRAMES_A_ROUND {
+                frames.push(session.frames(1)?);
+            }
         }
     }
     for ((name, _), costs) in builders.iter().zip(&costs) {
         record.rows.push(row(name, mesh, costs));
     }
+    if let Some((program, session)) = drawn {
+        session.end()?;
+        record.rows.push(frame_row(program, n, &frames));
+    }
     Ok(())
+}
+
+/// A frame is short beside the builds of its round.
+const FRAMES_A_ROUND: usize = 3;
+
+/// A frame of the rasteriser as a row.
+fn frame_row(program: &str, triangles: usize, frames: &[Cost]) -> Row {
+    let of = |f: &dyn Fn(&Cost) -> f64| Summary::of(&frames.iter().map(f).collect::<Vec<_>>());
+    let row =
+        Row::new().with("triangles", triangles).with("builder", format!("a frame of llvmpipe ({program})"));
+    let (Some(wall), Some(cpu)) = (of(&|c| c.wall_secs), of(&|c| c.cpu_secs)) else { return row };
+    row.with("time", wall.median)
+        .with("time_low", wall.low)
+        .with("time_high", wall.high)
+        .with("cpu", cpu.median)
+        .with("rate", triangles as f64 / wall.median / 1e6)
 }
 
 fn builders<'a>(mesh: &'a Arc<TriMesh>, installed: &'a Installed, slow_too: bool) -> Vec<Builder<'a>> {

@@ -45,8 +45,15 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     write(&mesh, paraview.format(), &data)?;
     let display = Display::start(&tools.xvfb)?;
     context.say("ParaView starts")?;
-    let mut session =
-        Session::start(paraview, Way::Serial, tools, &display, &dir.path().join("run"), &data, 1024)?;
+    let mut session = Session::start(
+        paraview,
+        Way::Serial,
+        Some(&tools.gluray),
+        &display,
+        &dir.path().join("run"),
+        &data,
+        1024,
+    )?;
     context.say("frames")?;
     session.frames(frames)?;
     let report = session.end()?.context("gluray leaves a report")?;

@@ -1,11 +1,13 @@
-//! Figure 4.9: frame time against the number of triangles, same view, primary rays with a headlight.
+//! Figure 4.9: frame time against the number of triangles, same view, primary rays with a headlight; with frames of Mesa's rasteriser.
 
 use super::Context;
 use super::fig4_7::fits_in_memory;
+use crate::opengl::{Cost, Mesa, Session};
 use crate::picture::framing::Framing;
 use crate::plot::{Axis, Plot, Point, Series};
 use crate::record::{Record, Row};
 use crate::runner::{Schedule, Variant, interleave};
+use crate::stats::Summary;
 use datasets::catalogue;
 use datasets::generate::nested_wavelet::Size;
 use rt_core::accel::{BuildOptions, World};
@@ -15,10 +17,14 @@ use rt_core::scene::Scene;
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     record.column("triangles", "", "triangles of the wavelet surfaces");
-    record.column("view", "", "view of the data set");
+    record.column(
+        "view",
+        "",
+        "view of the data set; `llvmpipe`: the whole of it, turning, drawn by an unmodified program",
+    );
     record.column("pixels", "", "pixels of the frame, one primary ray each");
     record.column("covered", "", "pixels that show a surface");
-    record.column("threads", "", "threads that render");
+    record.column("threads", "", "threads that render; empty for llvmpipe, which takes what there is");
     record.column("time", "ms", "median over the rounds, wall time of a frame with headlight shading");
     record.column("time_low", "ms", "fastest round");
     record.column("time_high", "ms", "slowest round");
@@ -32,24 +38,39 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
          a rasteriser’s grows in proportion: that crossing is the point of the dissertation’s figure."
             .into(),
     );
+    let mesa = Mesa::find().map_err(|missing| record.missing.extend(missing)).ok();
     let sizes = if context.quick { &[Size::M1, Size::M2, Size::M4][..] } else { &Size::ALL[..] };
     let pixels = if context.quick { 512 } else { 1024 };
     for &size in sizes {
         if fits_in_memory(size, record) {
-            measure(context, record, size, pixels)?;
+            measure(context, record, mesa.as_ref(), size, pixels)?;
         }
     }
     record.plots.push(plot(record));
     Ok(())
 }
 
-fn measure(context: &mut Context<'_>, record: &mut Record, size: Size, pixels: u32) -> anyhow::Result<()> {
+fn measure(
+    context: &mut Context<'_>,
+    record: &mut Record,
+    mesa: Option<&Mesa>,
+    size: Size,
+    pixels: u32,
+) -> anyhow::Result<()> {
     let mesh = context.wavelet(size)?;
     context.say(format!("{} triangles: building", mesh.num_triangles()))?;
     let scene = Scene::new(World::from_mesh(mesh.clone(), &BuildOptions::default())?);
     let report = scene.world.report();
     let (build_secs, bytes) = (report.total.as_secs_f64(), report.bytes);
     let options = RenderOptions::new(pixels, pixels);
+    let n = mesh.num_triangles();
+    let mut drawn: Option<(&str, Session)> = None;
+    if let Some(mesa) = mesa {
+        context.say(format!("{n} triangles: a program for llvmpipe"))?;
+        drawn =
+            mesa.draw(&mesh, pixels).map_err(|e| record.missing.push(format!("{n} triangles: {e:#}"))).ok();
+    }
+    let mut frames: Vec<Cost> = vec![];
     for view in catalogue::find("wavelet")?.views() {
         context.say(format!("{} triangles: {}", mesh.num_triangles(), view.name))?;
         let camera: Camera = Framing::At(view.clone()).of(&scene.world, [pixels, pixels])?;
@@ -66,6 +87,12 @@ fn measure(context: &mut Context<'_>, record: &mut Record, size: Size, pixels: u
         )?;
         if let Some(e) = failed {
             return Err(e.into());
+        }
+        // After each view, so that both see the machine as it was in between.
+        if let Some((_, session)) = &mut drawn {
+            for _ in 0..FRAMES_A_VIEW {
+                frames.push(session.frames(1)?);
+            }
         }
         let timed = &timings.variants[0];
         let (wall, cpu) =
@@ -87,7 +114,27 @@ fn measure(context: &mut Context<'_>, record: &mut Record, size: Size, pixels: u
                 .with("bytes_per_triangle", bytes as f64 / mesh.num_triangles() as f64),
         );
     }
+    if let Some((program, session)) = drawn {
+        session.end()?;
+        record.rows.push(rasterised(program, n, pixels, &frames));
+    }
     Ok(())
+}
+
+const FRAMES_A_VIEW: usize = 5;
+
+/// Frames of the rasteriser as a row.
+fn rasterised(program: &str, triangles: usize, pixels: u32, frames: &[Cost]) -> Row {
+    let of = |f: &dyn Fn(&Cost) -> f64| Summary::of(&frames.iter().map(f).collect::<Vec<_>>());
+    let row = Row::new()
+        .with("triangles", triangles)
+        .with("view", format!("llvmpipe ({program})"))
+        .with("pixels", f64::from(pixels) * f64::from(pixels));
+    let (Some(wall), Some(cpu)) = (of(&|c| c.wall_secs), of(&|c| c.cpu_secs)) else { return row };
+    row.with("time", wall.median * 1e3)
+        .with("time_low", wall.low * 1e3)
+        .with("time_high", wall.high * 1e3)
+        .with("cpu", cpu.median * 1e3)
 }
 
 fn plot(record: &Record) -> Plot {

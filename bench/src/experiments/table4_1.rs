@@ -119,7 +119,8 @@ fn measure(
     let start = |way: Way, measured: &mut Measured| -> anyhow::Result<Session> {
         let dir = place.dir.join(format!("{}-{way:?}-{n}", program.name().replace(' ', "-")));
         let begun = std::time::Instant::now();
-        let mut s = Session::start(program, way, place.tools, place.display, &dir, &data, SIZE_PX)?;
+        let mut s =
+            Session::start(program, way, Some(&place.tools.gluray), place.display, &dir, &data, SIZE_PX)?;
         measured.first_secs = begun.elapsed().as_secs_f64();
         s.frames(if way == Way::Llvmpipe { 1 } else { settle })?;
         if way != Way::Llvmpipe && !is_built_once(n) {

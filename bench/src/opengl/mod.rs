@@ -2,10 +2,12 @@
 
 mod data;
 mod display;
+mod mesa;
 mod programs;
 mod session;
 
 pub use data::{Format, write};
 pub use display::Display;
+pub use mesa::Mesa;
 pub use programs::{Program, find};
 pub use session::{Cost, Session, Tools, Way};

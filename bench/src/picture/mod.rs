@@ -7,6 +7,7 @@
 pub mod framing;
 pub mod gallery;
 pub mod look;
+mod materials;
 pub mod save;
 pub mod subject;
 

@@ -1,17 +1,17 @@
 //! What is drawn: geometry with its own colours, out of a file or out of the catalogue.
 
 use super::framing::corners_of_box;
+use super::materials::Looks;
 use anyhow::Context as _;
 use datasets::catalogue::Data;
 use datasets::model::{ColorBy, Dataset};
-use datasets::read::{Content, Opened, SceneModel, SurfaceMaterial};
+use datasets::read::{Content, Opened, SceneModel};
 use glam::{DVec3, Vec3};
 use rt_core::accel::Geometry;
 use rt_core::grid::Grid;
-use rt_core::material::{Material, Sides};
+use rt_core::material::Material;
 use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::shapes::{Isosurface, IsosurfaceNormals, IsosurfaceOptions, Radii, Shape, Spheres, Tubes};
-use rt_core::texture::Texture;
 use std::sync::Arc;
 
 /// Where a part's colour comes from.
@@ -393,8 +393,9 @@ fn from_scene(model: &SceneModel, choices: &Choices) -> anyhow::Result<Subject> 
             .warnings
             .push(format!("`{wish}` is not used: the file holds meshes with materials and no arrays"));
     }
-    let textures: Vec<Arc<Texture>> = model.textures.iter().map(texture).collect::<anyhow::Result<_>>()?;
-    let materials: Vec<Material> = model.materials.iter().map(|m| material(m, &textures)).collect();
+    let mut looks = Looks::of(model);
+    let materials: Vec<Material> =
+        model.materials.iter().map(|m| looks.material(m)).collect::<anyhow::Result<_>>()?;
     for m in &model.meshes {
         let paint = match m.material {
             Some(i) => Paint::OfTheFile(materials[i].clone()),
@@ -404,42 +405,6 @@ fn from_scene(model: &SceneModel, choices: &Choices) -> anyhow::Result<Subject> 
     }
     subject.contents.push(format!("{} meshes, {} triangles", model.meshes.len(), model.num_triangles()));
     Ok(subject)
-}
-
-/// Rows from the bottom up, as rt-core has them.
-fn texture(t: &datasets::read::Texture) -> anyhow::Result<Arc<Texture>> {
-    let row = t.width.max(1) as usize;
-    let rows = t.rgba8.chunks(row);
-    // The reader leaves texture coordinates as the file has them: v = 0 is the upper edge unless `v_up`.
-    let pixels: Vec<u8> = if t.v_up {
-        rows.rev().flatten().flatten().copied().collect()
-    } else {
-        rows.flatten().flatten().copied().collect()
-    };
-    Ok(Arc::new(Texture::from_srgb8(t.width as usize, t.height as usize, &pixels)?))
-}
-
-fn material(m: &SurfaceMaterial, textures: &[Arc<Texture>]) -> Material {
-    let [r, g, b, opacity] = m.base_color;
-    // Reflectance of a smooth interface at normal incidence (Fresnel); rough dielectrics are drawn without mirror rays.
-    let fresnel = ((m.ior - 1.0) / (m.ior + 1.0)).powi(2);
-    let mut out = if m.metallic == 0.0 && m.roughness > 0.5 {
-        Material::matte([r, g, b])
-    } else {
-        let mut out = Material::pbr([r, g, b], m.metallic, m.roughness);
-        if let rt_core::material::SurfaceModel::Pbr { specular, .. } = &mut out.model {
-            *specular = fresnel.clamp(0.0, 1.0);
-        }
-        out
-    };
-    out = out.with_opacity(opacity.clamp(0.0, 1.0)).with_emission(m.emissive);
-    if !m.double_sided {
-        out = out.with_sides(Sides::FrontOnly);
-    }
-    match m.base_color_texture.and_then(|i| textures.get(i)) {
-        Some(t) => out.textured(t.clone()),
-        None => out,
-    }
 }
 
 /// Height as the scalar of a mesh.

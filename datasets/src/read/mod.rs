@@ -24,7 +24,7 @@ pub mod vtk_xml;
 
 pub use error::{At, ReadError};
 pub use open::{KNOWN, open};
-pub use scene::{SceneMesh, SceneModel, SurfaceMaterial, Texture};
+pub use scene::{AlphaMode, SceneMesh, SceneModel, SurfaceMaterial, Texture};
 
 use crate::model::{Dataset, ModelError, SurfaceReport};
 use rt_core::mesh::TriMesh;

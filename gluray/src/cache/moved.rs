@@ -31,6 +31,7 @@ mod tests {
     use crate::cache::{Cache, Structures};
     use crate::capture::Run;
     use crate::enums::TRIANGLES;
+    use crate::primitives::Split;
     use rt_core::glam::Vec3;
     use rt_core::ray::Ray;
 
@@ -54,7 +55,7 @@ mod tests {
         let runs = [Run { mode: TRIANGLES, count: 3, times: 7200 }];
         let mut made = Structures::default();
         let mut frame = |phase: f32, scattered: bool| {
-            let g = cache.of_runs(&sheet(phase, scattered), &runs, [false; 2]);
+            let g = cache.of_runs(&sheet(phase, scattered), &runs, &Split::default());
             let world = g.world(&mut made).expect("a mesh that can be built");
             let (origin, toward) = (Vec3::new(20.3, 30.6, 50.0), -Vec3::Z);
             let hit = world
@@ -72,7 +73,7 @@ mod tests {
         let (_, third) = frame(0.2, true);
         assert_eq!(third, Structures { built: 2, refitted: 1 });
         let mut fresh = Cache::default();
-        let g = fresh.of_runs(&sheet(0.2, false), &runs, [false; 2]);
+        let g = fresh.of_runs(&sheet(0.2, false), &runs, &Split::default());
         let world = g.world(&mut Structures::default()).expect("a mesh that can be built");
         let ray: Ray = world.ray_from_world(Vec3::new(20.3, 30.6, 50.0).as_dvec3(), -Vec3::Z.as_dvec3()).0;
         assert_eq!(world.closest(&ray), Some(moved));

@@ -101,6 +101,17 @@ impl Current {
         }
     }
 
+    /// Tells the driver, which knows `before`, what is new.
+    pub(crate) fn send_changes(&self, before: &Current) {
+        let bit = |changed: bool, bits: u8| if changed { bits } else { 0 };
+        // Materials may replace what colour material made of the colour.
+        let bits = bit(self.materials != before.materials, stale::MATERIAL | stale::COLOR)
+            | bit(self.color != before.color, stale::COLOR)
+            | bit(self.normal != before.normal, stale::NORMAL)
+            | bit(self.tex != before.tex, stale::TEX);
+        self.send(bits);
+    }
+
     fn send_materials(&self) {
         for (m, face) in self.materials.iter().zip([FRONT, BACK]) {
             gl::materialfv(face, AMBIENT, &m.ambient);

@@ -7,6 +7,7 @@
 use crate::context::{Context, Sink};
 use crate::enums::*;
 use crate::real::gl;
+use crate::state::current::Current;
 use crate::symbols::{self, class};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -64,6 +65,8 @@ pub(crate) struct Recording {
     draws: bool,
     /// Between a Begin and its End.
     open: bool,
+    /// The mode of the latest Begin.
+    mode: u32,
 }
 
 impl Recording {
@@ -101,6 +104,7 @@ impl Context {
             used: false,
             draws: false,
             open: false,
+            mode: 0,
         });
         self.sink = Sink::List;
         symbols::attend();
@@ -135,26 +139,74 @@ impl Context {
 
     /// Puts a step of ours into the list; calls that went to the driver before it end their piece.
     fn list_op(&mut self, op: Op) -> bool {
-        let Some(r) = &mut self.recording else { return false };
-        if r.used {
-            gl::end_list();
-            r.list.ops.push(Op::Driver { list: r.piece, draws: r.draws });
-            let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
-            lists.next_piece += 1;
-            r.piece = FIRST_PIECE + lists.next_piece;
-            r.list.pieces.push(r.piece);
-            (r.used, r.draws) = (false, false);
-            gl::new_list(r.piece, COMPILE);
+        if self.recording.as_ref().is_some_and(|r| r.used) {
+            self.close_piece();
+            self.open_piece();
         }
+        let Some(r) = &mut self.recording else { return false };
         r.list.ops.push(op);
         true
     }
 
+    /// The driver's piece of the list that is compiled ends here.
+    fn close_piece(&mut self) {
+        let Some(r) = &mut self.recording else { return };
+        gl::end_list();
+        if r.used {
+            r.list.ops.push(Op::Driver { list: r.piece, draws: r.draws });
+        }
+        (r.used, r.draws) = (false, false);
+    }
+
+    fn open_piece(&mut self) {
+        let Some(r) = &mut self.recording else { return };
+        let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
+        lists.next_piece += 1;
+        r.piece = FIRST_PIECE + lists.next_piece;
+        r.list.pieces.push(r.piece);
+        gl::new_list(r.piece, COMPILE);
+    }
+
+    /// `glGenLists`, which `generate` asks of the driver. Drivers hand out the names after the greatest that is in use, and that is one of our
+    /// pieces: later pieces must not take what the program was given. A piece that is open has no name for the driver yet, so it ends before.
+    pub(crate) fn gen_lists(&mut self, n: i32, generate: impl FnOnce() -> u32) -> u32 {
+        if self.sink == Sink::Trace {
+            self.unswallow("glGenLists between Begin and End");
+        }
+        let in_piece = self.recording.as_ref().is_some_and(|r| r.piece != r.name);
+        if in_piece {
+            self.close_piece();
+        }
+        let first = generate();
+        if first != 0 && n > 0 {
+            let last = first.saturating_add(n.cast_unsigned() - 1);
+            let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
+            lists.next_piece = lists.next_piece.max(last.saturating_sub(FIRST_PIECE));
+        }
+        if in_piece {
+            self.open_piece();
+        }
+        first
+    }
+
     pub(crate) fn list_begin(&mut self, mode: u32) -> bool {
         if let Some(r) = &mut self.recording {
-            r.open = true;
+            (r.open, r.mode) = (true, mode);
         }
         self.list_op(Op::Begin(mode))
+    }
+
+    /// `glPrimitiveRestartNV`: an End, and a Begin of the same mode.
+    pub(crate) fn primitive_restart(&mut self) -> bool {
+        let mode = match self.sink {
+            Sink::Trace => self.recorder.mode(),
+            Sink::List => match &self.recording {
+                Some(r) if r.open => r.mode,
+                _ => return false,
+            },
+            Sink::Pass | Sink::Outside => return false,
+        };
+        self.end() && self.begin(mode)
     }
 
     /// Vertices of arrays follow.
@@ -213,8 +265,15 @@ impl Context {
         if self.depth_of_lists >= DEEPEST {
             return true;
         }
+        // Quads in lists are split in another way than others: they are batches of their own.
+        if self.depth_of_lists == 0 && self.recorder.quads && self.sink == Sink::Outside {
+            self.end_batch();
+        }
         self.depth_of_lists += 1;
         self.play(&list);
+        if self.depth_of_lists == 1 && self.recorder.quads && self.sink == Sink::Outside {
+            self.end_batch();
+        }
         self.depth_of_lists -= 1;
         true
     }
@@ -269,6 +328,9 @@ impl Context {
     }
 
     fn call_driver(&mut self, list: u32, draws: bool) {
+        if draws {
+            self.counters.pass("text, lines by arrays, or evaluators of a display list", 1);
+        }
         self.before_driver(draws);
         gl::call_list(list);
     }
@@ -294,7 +356,13 @@ impl Context {
 
     fn play(&mut self, list: &List) {
         let mut left_out = false;
-        for op in &list.ops {
+        let mut done = 0;
+        // Arrays leave current values undefined, and Mesa as they were.
+        let mut before_arrays: Option<Current> = None;
+        for (i, op) in list.ops.iter().enumerate() {
+            if i < done {
+                continue;
+            }
             if left_out {
                 left_out = *op != Op::End;
                 continue;
@@ -305,14 +373,24 @@ impl Context {
                     left_out = true;
                 }
                 Op::Begin(mode) | Op::BeginArrays(mode) => {
-                    if !self.begin(mode) {
-                        gl::begin(mode);
+                    let swallowed = self.begin(mode);
+                    // Not earlier: Begin asks the driver what is current.
+                    before_arrays = matches!(op, Op::BeginArrays(_)).then_some(self.current);
+                    if !swallowed {
+                        match self.play_quads(mode, list, &list.ops[i + 1..]) {
+                            Some(n) => {
+                                done = i + 1 + n;
+                                self.go_back_to(before_arrays.take());
+                            }
+                            None => gl::begin(mode),
+                        }
                     }
                 }
                 Op::End => {
                     if !self.end() {
                         gl::end();
                     }
+                    self.go_back_to(before_arrays.take());
                 }
                 Op::Vertex(v) => {
                     if !self.vertex(v) {
@@ -356,6 +434,61 @@ impl Context {
                 }
             }
         }
+    }
+
+    /// Current values are what they were before arrays.
+    fn go_back_to(&mut self, before: Option<Current>) {
+        let Some(b) = before else { return };
+        if b.normal != self.current.normal && !self.normal(b.normal) {
+            gl::normal3f(b.normal[0], b.normal[1], b.normal[2]);
+        }
+        if b.color != self.current.color && !self.color(b.color) {
+            gl::color4f(b.color[0], b.color[1], b.color[2], b.color[3]);
+        }
+        if b.tex != self.current.tex && !self.tex_coord(b.tex) {
+            gl::tex_coord4f(b.tex[0], b.tex[1], b.tex[2], b.tex[3]);
+        }
+    }
+
+    /// Quads of a list that the driver draws, as the triangles that it makes of quads in lists: it splits those of immediate mode along the
+    /// other diagonal. Gives how many steps that were; `None` where a quad is more than two filled triangles, or more than vertices come.
+    fn play_quads(&mut self, mode: u32, list: &List, ops: &[Op]) -> Option<usize> {
+        let filled = self.state.polygon_mode == [FILL; 2];
+        if mode != QUADS || !filled || self.sink != Sink::Pass || self.state.program != 0 {
+            return None;
+        }
+        let plain = |op: &Op| {
+            matches!(op, Op::Vertex(_) | Op::Normal(_) | Op::Color(_) | Op::Tex(_) | Op::Material(_))
+        };
+        let n = ops.iter().position(|op| !plain(op)).filter(|n| ops[*n] == Op::End)?;
+        gl::begin(TRIANGLES);
+        let mut corners = Vec::with_capacity(4);
+        let mut sent = self.current;
+        for op in &ops[..n] {
+            match *op {
+                Op::Normal(v) => self.current.normal = v,
+                Op::Color(v) => self.current.color = v,
+                Op::Tex(v) => self.current.tex = v,
+                Op::Material(at) => {
+                    let (face, what, v) = list.materials[at as usize];
+                    self.material(face, what, v);
+                }
+                Op::Vertex(v) => corners.push((v, self.current)),
+                _ => {}
+            }
+            if let [a, b, c, d] = corners[..] {
+                for (v, current) in [a, b, d, b, c, d] {
+                    current.send_changes(&sent);
+                    sent = current;
+                    gl::vertex4f(v[0], v[1], v[2], v[3]);
+                }
+                corners.clear();
+            }
+        }
+        self.current.send_changes(&sent);
+        gl::end();
+        self.end();
+        Some(n + 1)
     }
 
     pub(crate) fn call_lists(&mut self, n: i32, kind: u32, names: usize) -> bool {

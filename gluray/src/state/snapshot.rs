@@ -75,6 +75,12 @@ pub(crate) struct Snapshot {
     /// An alpha test that a fragment of alpha 1 passes.
     pub(crate) alpha_test_passes_one: bool,
     pub(crate) stencil_test: bool,
+    /// `glClipControl` has set another origin or depth than OpenGL's old ones.
+    pub(crate) clip_control: bool,
+    /// The colour buffer keeps what is below 0 or above 1.
+    pub(crate) unclamped_colors: bool,
+    /// Front and back faces are masked differently.
+    pub(crate) two_sided_stencil: bool,
     pub(crate) logic_op: bool,
     pub(crate) color_mask: bool,
     pub(crate) polygon_mode: [u32; 2],
@@ -88,6 +94,10 @@ pub(crate) struct Snapshot {
     pub(crate) draw_buffer: u32,
     pub(crate) more_draw_buffers: bool,
     pub(crate) samples: i32,
+    /// Where the sample lies that is traced, from the middle of the pixel.
+    pub(crate) sample_place: [f32; 2],
+    /// Masks, coverage or alpha decide which samples are written.
+    pub(crate) masked_samples: bool,
     pub(crate) discard: bool,
     pub(crate) feedback_active: bool,
     pub(crate) first_vertex_provokes: bool,
@@ -111,6 +121,9 @@ pub(crate) struct Abilities {
     pub(crate) rectangle: bool,
     pub(crate) depth_clamp: bool,
     pub(crate) arb_programs: bool,
+    pub(crate) ati_shaders: bool,
+    pub(crate) clip_control: bool,
+    pub(crate) stencil_two_side: bool,
     pub(crate) double_buffered: bool,
 }
 
@@ -136,6 +149,9 @@ impl Abilities {
             rectangle: has("GL_ARB_texture_rectangle"),
             depth_clamp: core || has("GL_ARB_depth_clamp"),
             arb_programs: has("GL_ARB_vertex_program") && has("GL_ARB_fragment_program"),
+            ati_shaders: has("GL_ATI_fragment_shader"),
+            clip_control: version >= 45 || has("GL_ARB_clip_control"),
+            stencil_two_side: has("GL_EXT_stencil_two_side"),
             double_buffered: !es && gl::int(DOUBLEBUFFER) != 0,
         }
     }
@@ -176,7 +192,16 @@ impl Snapshot {
         self.blend = gl::is_enabled(BLEND);
         self.blend_is_over =
             self.blend && gl::word(BLEND_SRC_RGB) == 0x0302 && gl::word(BLEND_DST_RGB) == 0x0303;
+        if self.blend_is_over && can.version >= 14 {
+            self.blend_is_over = gl::word(BLEND_EQUATION) == FUNC_ADD;
+        }
         self.stencil_test = gl::is_enabled(STENCIL_TEST);
+        self.two_sided_stencil = self.stencil_test
+            && (can.stencil_two_side && gl::is_enabled(STENCIL_TEST_TWO_SIDE)
+                || can.version >= 20
+                    && STENCIL_FRONT_AND_BACK
+                        .iter()
+                        .any(|(front, back)| gl::word(*front) != gl::word(*back)));
         self.logic_op = gl::is_enabled(COLOR_LOGIC_OP);
         self.color_mask = gl::ints::<4>(COLOR_WRITEMASK).iter().all(|v| *v != 0);
         self.polygon_mode = match can.core {
@@ -187,11 +212,19 @@ impl Snapshot {
         self.program = if can.version >= 20 { gl::word(CURRENT_PROGRAM) } else { 0 };
         self.framebuffer = if can.version >= 30 { gl::word(FRAMEBUFFER_BINDING) } else { 0 };
         self.draw_buffer = gl::word(DRAW_BUFFER);
+        self.clip_control = can.clip_control
+            && (gl::word(CLIP_ORIGIN) != LOWER_LEFT || gl::word(CLIP_DEPTH_MODE) != NEGATIVE_ONE_TO_ONE);
+        self.unclamped_colors = self.framebuffer != 0
+            && self.draw_buffer != 0
+            && !matches!(gl::component_type(self.draw_buffer), UNSIGNED_NORMALIZED | 0);
         self.more_draw_buffers = can.version >= 20 && gl::word(DRAW_BUFFER0 + 1) != 0;
         self.samples = match gl::int(SAMPLE_BUFFERS) != 0 && gl::is_enabled(MULTISAMPLE) {
             true => gl::int(SAMPLES),
             false => 0,
         };
+        const MASKS: [u32; 4] = [0x809e, 0x809f, 0x80a0, 0x8e51];
+        self.masked_samples = self.samples > 1
+            && MASKS.iter().any(|c| (*c != 0x8e51 || can.version >= 32) && gl::is_enabled(*c));
         self.discard = can.version >= 30 && gl::is_enabled(RASTERIZER_DISCARD);
         self.feedback_active = can.version >= 40 && gl::int(TRANSFORM_FEEDBACK_ACTIVE) != 0;
         self.first_vertex_provokes =
@@ -212,8 +245,9 @@ impl Snapshot {
         };
         self.stipple = gl::is_enabled(POLYGON_STIPPLE);
         self.render_mode = gl::word(RENDER_MODE);
-        self.arb_program =
-            can.arb_programs && (gl::is_enabled(VERTEX_PROGRAM_ARB) || gl::is_enabled(FRAGMENT_PROGRAM_ARB));
+        self.arb_program = can.arb_programs
+            && (gl::is_enabled(VERTEX_PROGRAM_ARB) || gl::is_enabled(FRAGMENT_PROGRAM_ARB))
+            || can.ati_shaders && gl::is_enabled(FRAGMENT_SHADER_ATI);
         self.flat = gl::word(SHADE_MODEL) == FLAT;
         self.list_base = gl::word(LIST_BASE);
         self.normalize = gl::is_enabled(NORMALIZE);
@@ -234,6 +268,22 @@ impl Snapshot {
             end: gl::floats::<1>(FOG_END)[0],
             color: gl::floats(FOG_COLOR),
         });
+    }
+
+    /// Says of points in object space whether they are outside of what is seen, so that the driver has to clip.
+    pub(crate) fn clips(&self) -> impl Fn([f32; 3]) -> bool {
+        let m = crate::lighting::product(&self.projection, &self.model_view);
+        let (model_view, planes) = (self.model_view, self.clip_planes.clone());
+        let depth_clamp = self.depth_clamp;
+        move |p| {
+            let [x, y, z, w] = crate::lighting::transform(&m, p);
+            let beyond = |v: f32| v > w || v < -w;
+            let cut = |plane: &[f64; 4]| {
+                let eye = crate::lighting::transform(&model_view, p);
+                eye.iter().zip(plane).map(|(a, b)| f64::from(*a) * b).sum::<f64>() < 0.0
+            };
+            beyond(x) || beyond(y) || (!depth_clamp && beyond(z)) || planes.iter().any(cut)
+        }
     }
 
     fn lighting(&mut self) {
@@ -285,7 +335,8 @@ impl Snapshot {
             } else if target == TEXTURE_1D || target == TEXTURE_2D {
                 self.texture = Some(unit_0(target));
                 // The names say what is bound; where its image comes from is asked for when it is used.
-                self.foreign_texturing = self.foreign_texturing.or(crate::texturing::unfollowed(target));
+                self.foreign_texturing =
+                    self.foreign_texturing.or(crate::texturing::unfollowed(target, can.version));
             } else {
                 self.foreign_texturing = Some("a texture that is neither 1-D nor 2-D");
             }

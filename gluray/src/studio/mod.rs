@@ -4,6 +4,7 @@
 //! the mean of all pictures so far, so a window left alone becomes smoother. Equal runs give equal pictures.
 
 mod clip;
+pub(crate) mod fog;
 mod lights;
 mod parts;
 

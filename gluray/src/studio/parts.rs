@@ -66,9 +66,6 @@ pub(super) fn part(
         return None;
     }
     let s = &*p.draw.state;
-    if s.fog.is_some() {
-        warn(warnings, "fog is left out");
-    }
     let skin = match &p.draw.shading {
         Shading::Fixed => fixed(p, warnings),
         Shading::Program(_) => program(p),

@@ -8,6 +8,7 @@ use super::{hot, with_context};
 use crate::client_memory;
 use crate::context;
 use crate::fault::guard;
+use crate::immediate::Step;
 use crate::real::{Int, forward};
 use core::ffi::{c_char, c_void};
 
@@ -42,13 +43,21 @@ macro_rules! hooks {
     )* };
 }
 
-/// The same for the calls that come by the million. Their methods guard what is slow.
+/// The same for calls that come by the million: first the short way, then the long one. Their methods guard what is slow.
 macro_rules! hot_hooks {
-    ($($(#[$m:meta])* fn $name:ident($($a:ident: $t:ty),*) => |$c:ident| $body:expr;)*) => { $(
+    ($($(#[$m:meta])* fn $name:ident($($a:ident: $t:ty),*) => |$c:ident| $step:expr, $body:expr;)*) => { $(
         $(#[$m])*
         pub(in crate::symbols) unsafe extern "C" fn $name($($a: $t),*) {
-            if !hot::with(|$c| $body) {
-                driver!($name($($a),*): ($($t),*));
+            #[cold]
+            #[inline(never)]
+            unsafe extern "C" fn slowly($($a: $t),*) {
+                if !hot::with(|$c| $body) {
+                    driver!($name($($a),*): ($($t),*));
+                }
+            }
+            if hot::step(|$c| $step) != Step::Done {
+                // SAFETY: the program's own arguments.
+                unsafe { slowly($($a),*) }
             }
         }
     )* };
@@ -78,8 +87,23 @@ fn material_values(what: u32, address: Address, integers: bool) -> [f32; 4] {
 }
 
 hot_hooks! {
-    fn glBegin(mode: u32) => |c| c.begin(mode);
-    fn glEnd() => |c| c.end();
+    fn glBegin(mode: u32) => |c| c.begin_step(mode), c.begin(mode);
+    fn glEnd() => |c| c.end_step(), c.end();
+}
+
+/// The same for calls that have no short way.
+macro_rules! long_hooks {
+    ($($(#[$m:meta])* fn $name:ident($($a:ident: $t:ty),*) => |$c:ident| $body:expr;)*) => { $(
+        $(#[$m])*
+        pub(in crate::symbols) unsafe extern "C" fn $name($($a: $t),*) {
+            if !hot::with(|$c| $body) {
+                driver!($name($($a),*): ($($t),*));
+            }
+        }
+    )* };
+}
+
+long_hooks! {
     fn glMaterialfv(face: u32, what: u32, v: Address) => |c| c.material(face, what, material_values(what, v, false));
     fn glMaterialiv(face: u32, what: u32, v: Address) => |c| c.material(face, what, material_values(what, v, true));
     fn glMaterialf(face: u32, what: u32, v: f32) => |c| c.material(face, what, [v, 0.0, 0.0, 0.0]);
@@ -92,6 +116,7 @@ hooks! {
     fn glRecti(x: Int, y: Int, x2: Int, y2: Int) => |c| c.rect([x, y, x2, y2].map(|v| v as f32));
     fn glRects(x: i16, y: i16, x2: i16, y2: i16) => |c| c.rect([x, y, x2, y2].map(f32::from));
     fn glNewList(list: u32, mode: u32) => |c| c.new_list(list, mode);
+    fn glPrimitiveRestartNV() => |c| c.primitive_restart();
     fn glEndList() => |c| c.end_list();
     fn glCallList(list: u32) => |c| c.call_list(list);
     fn glCallLists(n: Int, kind: u32, names: Address) => |c| c.call_lists(n, kind, names as usize);
@@ -115,6 +140,13 @@ hooks! {
 
 pub(in crate::symbols) unsafe extern "C" fn glGetError() -> u32 {
     context_error()
+}
+
+pub(in crate::symbols) unsafe extern "C" fn glGenLists(n: Int) -> u32 {
+    let names = || driver!(glGenLists(n): (Int) -> u32);
+    let mut given = None;
+    guard(|| with_context(|c| c.gen_lists(n, || *given.insert(names()))));
+    given.unwrap_or_else(names)
 }
 
 fn context_error() -> u32 {

@@ -1,6 +1,7 @@
 //! What tests of real programs share: an X server of their own, running a program natively and through us, comparing pictures.
 #![allow(dead_code, reason = "each test file uses its part")]
 
+pub(crate) mod cases;
 pub(crate) mod metrics;
 
 use gluray::report::Report;

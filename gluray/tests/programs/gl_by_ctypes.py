@@ -30,7 +30,9 @@ def F(name, *types):
 X.XInitThreads()
 dpy = c_void_p(X.XOpenDisplay(None))
 root = X.XDefaultRootWindow(dpy)
-vi = c_void_p(GL.glXChooseVisual(dpy, 0, (c_int * 16)(4, 5, 8, 8, 9, 8, 10, 8, 12, 24, 13, 8, 0)))
+# Cases that begin with `samples` have four of them a pixel.
+several = (100000, 1, 100001, 4) if len(sys.argv) > 1 and sys.argv[1].startswith("samples") else ()
+vi = c_void_p(GL.glXChooseVisual(dpy, 0, (c_int * 20)(4, 5, 8, 8, 9, 8, 10, 8, 12, 24, 13, 8, *several, 0)))
 info = c.cast(vi, c.POINTER(VisualInfo)).contents
 
 
@@ -106,3 +108,22 @@ def simple(**k):
 
 
 w0 = window()
+
+
+def run(cases):
+    """Draws the case that the command line names, and writes what is in the framebuffer then: width, height, RGBA bytes, depth as floats."""
+    case = cases[sys.argv[1]]
+    if case.__code__.co_argcount:
+        current(w0, context())
+        case(w0)
+    else:
+        current(w0, context())
+        case()
+    rgba, depth = (c.c_uint8 * (W * H * 4))(), (c_float * (W * H))()
+    read = F("glReadPixels", c_int, c_int, c_int, c_int, c_uint, c_uint, c_void_p)
+    read(0, 0, W, H, 0x1908, 0x1401, rgba)
+    read(0, 0, W, H, 0x1902, 0x1406, depth)
+    with open(sys.argv[2], "wb") as out:
+        out.write(struct.pack("II", W, H))
+        out.write(bytes(rgba))
+        out.write(bytes(depth))

@@ -46,6 +46,16 @@ def box_on_floor_parallel():
     scene(True)
 
 
+def box_in_fog():
+    """The same in blue fog."""
+    enable(0x0B60)
+    F("glFogi", c_uint, c_int)(0x0B65, 0x2601)
+    F("glFogf", c_uint, c_float)(0x0B63, 0.5)
+    F("glFogf", c_uint, c_float)(0x0B64, 5)
+    F("glFogfv", c_uint, c_void_p)(0x0B66, (c_float * 4)(0.2, 0.4, 1, 1))
+    scene(False)
+
+
 def sheets_blended_in_the_wrong_order():
     """Two translucent sheets, the near one first: OpenGL's blending then loses the far one."""
     start()

@@ -34,6 +34,9 @@ pub struct SurfaceMaps {
     pub emission: Option<Arc<Texture>>,
     /// How they are read.
     pub convention: MapConvention,
+    /// The second texture coordinate grows from the picture's upper edge downwards, as in glTF's files. Green points up in the picture, so the partner of a
+    /// tangent that is made from such coordinates points against them. Tangents of the mesh say that themselves.
+    pub rows_from_top: bool,
 }
 
 impl SurfaceMaps {
@@ -46,7 +49,11 @@ impl SurfaceMaps {
         let scale = Vec3::new(self.normal_scale, self.normal_scale, 1.0);
         let bend = ((Vec3::new(r, g, b) * 2.0 - 1.0) * scale).try_normalize()?;
         match self.convention {
-            MapConvention::Gltf => place.bent(place.tangent()?, bend),
+            MapConvention::Gltf => {
+                let (tangent, sense) = place.tangent()?;
+                let made = place.mesh?.tangents.is_none();
+                place.bent((tangent, if made && self.rows_from_top { -sense } else { sense }), bend)
+            }
             MapConvention::Vtk => {
                 place.mesh?.tangents.as_ref()?;
                 place.bent_after_turning(place.tangent()?.0, bend)

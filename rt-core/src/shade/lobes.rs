@@ -10,8 +10,9 @@ use std::f32::consts::PI;
 const MIN_HIGHLIGHT_ALPHA: f32 = 1e-3;
 
 /// Light sent to `view` per unit of light colour from direction `l` (unit): BRDF · π · cosine, as the unit of lights wants it.
-/// `highlight` is the light's own colour for Phong highlights.
-#[inline]
+/// `highlight` is the light's own colour for Phong highlights. Matte and Phong are decided in the caller; microfacets, which cost more than
+/// a call, are not, so that loops over lights stay short.
+#[inline(always)]
 pub(crate) fn response(
     model: &SurfaceModel,
     normal: Vec3,
@@ -43,20 +44,37 @@ pub(crate) fn response(
             // 0^0 is 1 in OpenGL: shininess 0 lights the whole side.
             matte + specular * highlight * power(base.max(0.0), shininess)
         }
-        SurfaceModel::Metal { roughness } => {
-            microfacets(surface_color, roughness, normal, view, l) * color * cos
-        }
+        _ => microfacet_response(model, normal, surface_color, view, l, color) * cos,
+    }
+}
+
+/// [`response`] of the models of microfacets, without the cosine.
+#[inline(never)]
+fn microfacet_response(
+    model: &SurfaceModel,
+    normal: Vec3,
+    surface_color: Vec3,
+    view: Vec3,
+    l: Vec3,
+    color: Vec3,
+) -> Vec3 {
+    match *model {
+        SurfaceModel::Metal { roughness } => microfacets(surface_color, roughness, normal, view, l) * color,
         SurfaceModel::Pbr { metallic, roughness, specular, form: PbrForm::Vtk } => {
             let [matte, lobe] = vtk_pbr([metallic, roughness, specular], surface_color, normal, view, l);
-            (matte + lobe) * color * cos
+            (matte + lobe) * color
         }
         SurfaceModel::Pbr { metallic, roughness, specular, form: PbrForm::Gltf } => {
             let f0 = Vec3::splat(specular).lerp(surface_color, metallic);
             let matte = surface_color * pbr_transmitted(specular, normal.dot(view)) * (1.0 - metallic);
             let lobe =
                 if f0 == Vec3::ZERO { Vec3::ZERO } else { microfacets(f0, roughness, normal, view, l) };
-            (matte + lobe) * color * cos
+            (matte + lobe) * color
         }
+        SurfaceModel::Unlit
+        | SurfaceModel::Matte
+        | SurfaceModel::Dielectric { .. }
+        | SurfaceModel::Phong { .. } => Vec3::ZERO,
     }
 }
 

@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 
-ABI = 3622962323
+ABI = 910789305
 NONE, U8, F32, F64, I32, I64 = range(6)
 COLOR_PROPERTY, COLOR_POINTS, COLOR_CELLS, COLOR_MAPPED = range(4)
 LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT = range(3)
@@ -127,7 +127,8 @@ def _functions(library, path):
     if found != ABI:
         raise RtvError(f"{path} has interface {found}, this package needs {ABI}: install the package that belongs to the library")
     return dict(
-        new=bind("rtv_new", p), free=bind("rtv_free", None, p), option=bind("rtv_option", C.c_double, text), begin=bind("rtv_begin", C.c_int32, p),
+        new=bind("rtv_new", p), free=bind("rtv_free", None, p), option=bind("rtv_option", C.c_double, text),
+        host=bind("rtv_host", None, C.c_uint32, C.c_uint32), begin=bind("rtv_begin", C.c_int32, p),
         surface=bind("rtv_surface", C.c_int32, p, C.POINTER(Surface)), has_colors=bind("rtv_has_colors", C.c_int32, p, C.c_uint64, C.c_uint64),
         volume=bind("rtv_volume", text, p, C.POINTER(Volume)), has_volume=bind("rtv_has_volume", C.c_int32, p, C.c_uint64),
         light=bind("rtv_light", None, p, C.POINTER(Light)), pass_on=bind("rtv_pass", None, p, text, text), warn=bind("rtv_warn", None, p, text),
@@ -135,14 +136,24 @@ def _functions(library, path):
     )
 
 
+def set_host(major, minor):
+    """Tells the library which VTK it is in, and loads it for that. Raises `RtvError` when it cannot be loaded."""
+    Bridge.calls()["host"](major, minor)
+
+
 class Bridge:
     """A renderer's side of the library."""
 
     _calls = None
 
-    def __init__(self):
+    @classmethod
+    def calls(cls):
         if Bridge._calls is None:
             Bridge._calls = _functions(*_load())
+        return Bridge._calls
+
+    def __init__(self):
+        Bridge.calls()
         self._handle = Bridge._calls["new"]()
 
     def __del__(self):

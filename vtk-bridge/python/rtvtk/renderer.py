@@ -5,7 +5,6 @@ as it was. What is left (axes, text, lines, volumes) is drawn by OpenGL against 
 while a selector is at work nothing is touched.
 """
 import ctypes as C
-import os
 
 import vtkmodules.vtkRenderingOpenGL2 as gl
 from vtkmodules.vtkCommonCore import vtkVersion, vtkWeakReference
@@ -162,10 +161,7 @@ def install():
     """From now on every renderer traces. Raises `RtvError` when the library cannot be loaded."""
     if hasattr(gl, "_rtvtk_renderer"):
         return
-    if _VERSION > (9, 2):
-        # Shaders of later versions draw edges on their surfaces alone.
-        os.environ.setdefault("RTV_EDGES", "0")
-    rtv.Bridge()
+    rtv.set_host(*_VERSION)
 
     @gl.vtkOpenGLRenderer.override
     class RtvRenderer(gl.vtkOpenGLRenderer):

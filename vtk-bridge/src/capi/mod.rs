@@ -25,7 +25,7 @@ pub struct RtvBridge {
 }
 
 /// Number of this interface, made from its structures and calls (a test says which). A shim built for another one must not go on.
-pub const RTV_ABI: u32 = 3_622_962_323;
+pub const RTV_ABI: u32 = 910_789_305;
 
 /// [`RTV_ABI`] of the library.
 #[unsafe(no_mangle)]
@@ -76,6 +76,13 @@ pub unsafe extern "C" fn rtv_option(name: *const c_char) -> f64 {
         "RTV_LINE_RADIUS" => options.line_radius,
         _ => -1.0,
     }
+}
+
+/// Tells which VTK the library is inside of: options whose default follows VTK's version (`RTV_EDGES`) take it from here, unless the
+/// environment or the program says otherwise. For all bridges of the process.
+#[unsafe(no_mangle)]
+pub extern "C" fn rtv_host(vtk_major: u32, vtk_minor: u32) {
+    state::set_host(vtk_major, vtk_minor);
 }
 
 /// Begins a frame. 0 when everything is to be left to OpenGL (`RTV_OFF`).
@@ -245,6 +252,8 @@ pub struct RtvApi {
     pub set_option: unsafe extern "C" fn(*const c_char, *const c_char) -> i32,
     /// [`rtv_option`].
     pub option: unsafe extern "C" fn(*const c_char) -> f64,
+    /// [`rtv_host`].
+    pub host: extern "C" fn(u32, u32),
     /// [`rtv_begin`].
     pub begin: unsafe extern "C" fn(*mut RtvBridge) -> i32,
     /// [`rtv_surface`].
@@ -273,6 +282,7 @@ static API: RtvApi = RtvApi {
     free_bridge: rtv_free,
     set_option: rtv_set_option,
     option: rtv_option,
+    host: rtv_host,
     begin: rtv_begin,
     surface: rtv_surface,
     has_colors: rtv_has_colors,

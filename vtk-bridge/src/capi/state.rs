@@ -24,12 +24,24 @@ pub(super) struct Handle {
 /// Options set by the program, over those of the environment.
 static SET: Mutex<BTreeMap<String, String>> = Mutex::new(BTreeMap::new());
 
+/// VTK's version, as told by [`set_host`]: major in the upper half; 0 when nobody has said.
+static HOST: AtomicU64 = AtomicU64::new(0);
+
+pub(super) fn set_host(major: u32, minor: u32) {
+    HOST.store(u64::from(major) << 32 | u64::from(minor), Ordering::Relaxed);
+}
+
+/// Options that follow VTK's version. Shaders of versions after 9.2 draw edges on their surfaces alone.
+fn of_host(host: u64) -> Option<(String, String)> {
+    ((host >> 32, host & 0xffff_ffff) > (9, 2)).then(|| ("RTV_EDGES".to_owned(), "0".to_owned()))
+}
+
 /// The options in force, and what in them was not understood. The environment is read anew each time, because programs change it (a
 /// script's `os.environ`).
 pub(super) fn options() -> (Options, Vec<String>) {
     let environment = std::env::vars().filter(|(n, _)| n.starts_with("RTV_"));
     let set = SET.lock().map(|s| s.clone()).unwrap_or_default();
-    Options::parse(environment.chain(set))
+    Options::parse(of_host(HOST.load(Ordering::Relaxed)).into_iter().chain(environment).chain(set))
 }
 
 pub(super) fn set_option(name: &str, value: &str) -> bool {
@@ -145,5 +157,25 @@ pub(super) unsafe fn with<T>(bridge: *mut RtvBridge, otherwise: T, work: impl Fn
             to_user_once(&format!("internal error, OpenGL draws from now on; please report it: {message}"));
             otherwise
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn edges_follow_the_version_of_vtk_unless_told_otherwise() {
+        let of = |major: u64, minor: u64| {
+            of_host(major << 32 | minor).map(|(name, value)| format!("{name}={value}"))
+        };
+        for (major, minor) in [(0, 0), (9, 0), (9, 1), (9, 2)] {
+            assert_eq!(of(major, minor), None, "{major}.{minor}");
+        }
+        for (major, minor) in [(9, 3), (9, 7), (10, 0)] {
+            assert_eq!(of(major, minor).as_deref(), Some("RTV_EDGES=0"), "{major}.{minor}");
+        }
+        let said = ("RTV_EDGES".to_owned(), "0.5".to_owned());
+        assert_eq!(Options::parse(of_host(9 << 32 | 5).into_iter().chain([said])).0.edge_reach, 0.5);
     }
 }

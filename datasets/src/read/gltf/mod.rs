@@ -1,14 +1,17 @@
-//! glTF 2.0 (`.gltf` with its buffers, `.glb`): triangles, transforms, vertex colours, base colour, metallic-roughness.
+//! glTF 2.0 (`.gltf` with its buffers, `.glb`): triangles, transforms, vertex colours, metallic-roughness materials with all their pictures.
 //!
 //! The crate `gltf` checks the JSON; accessors are decoded here, because every offset and count has to be checked against
-//! the buffers. Not read: animation, skins, morph targets, cameras, lights, compressed meshes.
+//! the buffers. Not read: animation, skins, morph targets, cameras, lights, compressed meshes; extensions
+//! of materials but the index of refraction and the strength of emission.
+
+mod materials;
 
 use super::base64::Decoder;
 use super::error::{At, BROKEN, Fault, TRUNCATED, beside, fits, read_bytes};
 use super::percent::decoded;
-use super::scene::{SceneMesh, SceneModel, SurfaceMaterial, decode_texture};
+use super::scene::{SceneMesh, SceneModel};
 use super::{Content, Opened, ReadError};
-use glam::{DMat3, DMat4, DVec3, Vec2, Vec3};
+use glam::{DMat3, DMat4, DVec3, Vec2, Vec3, Vec4};
 use gltf::accessor::{DataType, Dimensions};
 use gltf::mesh::{Mode, Semantic};
 use rt_core::mesh::{Attribute, TriMesh};
@@ -18,6 +21,9 @@ pub(crate) const FORMAT: &str = "glTF";
 
 /// Magic, version and length at the beginning of a `.glb` file.
 const GLB_HEADER_BYTES: u32 = 12;
+
+/// What is read beyond glTF 2.0.
+const EXTENSIONS: [&str; 2] = ["KHR_materials_ior", "KHR_materials_emissive_strength"];
 
 /// One mesh may appear many times; scenes with more triangles than this in all are refused.
 const MAX_TRIANGLES: usize = 1 << 28;
@@ -79,6 +85,10 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
         if n > 0 {
             reader.warnings.push(format!("{n} {what} left out: the rest pose is shown"));
         }
+    }
+    let not_read: Vec<&str> = gltf.extensions_used().filter(|e| !EXTENSIONS.contains(e)).collect();
+    if !not_read.is_empty() {
+        reader.warnings.push(format!("extensions that are not read: {}", not_read.join(", ")));
     }
     let Reader { scene, warnings, .. } = reader;
     Ok(Opened { format: FORMAT, content: Content::Scene(scene), warnings, time_steps: Vec::new() })
@@ -143,84 +153,6 @@ struct Reader {
 }
 
 impl Reader {
-    fn materials(&mut self, path: &Path, gltf: &gltf::Gltf) {
-        let mut texture_of_image: Vec<Option<usize>> = vec![None; gltf.images().len()];
-        for m in gltf.materials() {
-            let pbr = m.pbr_metallic_roughness();
-            let strength = m.emissive_strength().unwrap_or(1.0);
-            let mut material = SurfaceMaterial {
-                name: m.name().unwrap_or("").into(),
-                base_color: pbr.base_color_factor(),
-                base_color_texture: None,
-                metallic: pbr.metallic_factor(),
-                roughness: pbr.roughness_factor(),
-                emissive: m.emissive_factor().map(|e| e * strength),
-                ior: m.ior().unwrap_or(1.5),
-                double_sided: m.double_sided(),
-            };
-            if m.alpha_mode() == gltf::material::AlphaMode::Opaque {
-                material.base_color[3] = 1.0;
-            }
-            if let Some(info) = pbr.base_color_texture() {
-                let image = info.texture().source();
-                if info.tex_coord() != 0 {
-                    self.warnings.push(format!(
-                        "material `{}` uses a second set of texture coordinates: picture left out",
-                        material.name
-                    ));
-                } else if let Some(t) = texture_of_image[image.index()] {
-                    material.base_color_texture = Some(t);
-                } else {
-                    let json = &gltf.as_json().images[image.index()];
-                    // The crate takes a picture without a source for granted not to be.
-                    let has_source =
-                        json.uri.is_some() || json.buffer_view.is_some() && json.mime_type.is_some();
-                    let picture =
-                        if has_source { self.picture(path, &image) } else { Err("it names no data".into()) };
-                    match picture {
-                        Ok(texture) => {
-                            let t = self.scene.textures.len();
-                            self.scene.textures.push(texture);
-                            texture_of_image[image.index()] = Some(t);
-                            material.base_color_texture = Some(t);
-                        }
-                        Err(e) => self.warnings.push(format!("picture {} left out: {e}", image.index())),
-                    }
-                }
-            }
-            let others = [
-                (pbr.metallic_roughness_texture().is_some(), "metallic-roughness"),
-                (m.normal_texture().is_some(), "normal"),
-                (m.emissive_texture().is_some(), "emissive"),
-                (m.occlusion_texture().is_some(), "occlusion"),
-            ];
-            for (_, what) in others.iter().filter(|(used, _)| *used) {
-                self.warnings.push(format!("material `{}`: {what} picture left out", material.name));
-            }
-            self.scene.materials.push(material);
-        }
-    }
-
-    fn picture(&self, path: &Path, image: &gltf::Image<'_>) -> Result<super::Texture, String> {
-        let name = image.name().unwrap_or("").to_string();
-        match image.source() {
-            gltf::image::Source::Uri { uri, .. } => {
-                let bytes = resource(path, uri).map_err(|e| match std::error::Error::source(&e) {
-                    Some(reason) => format!("{e}: {reason}"),
-                    None => e.to_string(),
-                })?;
-                decode_texture(&name, &bytes, false)
-            }
-            gltf::image::Source::View { view, .. } => {
-                let buffer = &self.buffers[view.buffer().index()];
-                let end = view.offset().checked_add(view.length());
-                let bytes =
-                    end.and_then(|end| buffer.get(view.offset()..end)).ok_or("it lies outside its buffer")?;
-                decode_texture(&name, bytes, false)
-            }
-        }
-    }
-
     fn mesh(
         &mut self,
         mesh: &gltf::Mesh<'_>,
@@ -326,6 +258,18 @@ impl Reader {
             let t = self.tuples::<2>(&a, &format!("texture coordinates of `{name}`"))?;
             one_per_vertex(t.len(), "texture coordinates")?;
             mesh.texcoords = Some(t.into_iter().map(Vec2::from).collect());
+        }
+        if let Some(a) = p.get(&Semantic::Tangents) {
+            let tangents = self.tuples::<4>(&a, &format!("tangents of `{name}`"))?;
+            one_per_vertex(tangents.len(), "tangents")?;
+            let m = DMat3::from_mat4(world_from_node);
+            // Tangents lie in the surface and go with it; a mirror turns the frame's sense.
+            let sense = if world_from_node.determinant() < 0.0 { -1.0 } else { 1.0 };
+            let turned = |&[x, y, z, w]: &[f32; 4]| {
+                let t = (m * Vec3::new(x, y, z).as_dvec3()).normalize_or_zero().as_vec3();
+                Vec4::from((t, if w < 0.0 { -sense } else { sense }))
+            };
+            mesh.tangents = Some(tangents.iter().map(turned).collect());
         }
         if let Some(a) = p.get(&Semantic::Colors(0)) {
             let place = format!("colours of `{name}`");

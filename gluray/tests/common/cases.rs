@@ -1,0 +1,50 @@
+//! One small program per case, natively and through us: colour and depth must agree.
+
+use super::{Picture, Run, Xvfb, folder, metrics, peer};
+use std::path::Path;
+
+/// Colour (top row first) and depth (bottom row first) of a case.
+fn read(file: &Path) -> (Picture, Vec<f32>) {
+    let bytes = std::fs::read(file).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
+    let word = |i: usize| u32::from_ne_bytes(bytes[i..i + 4].try_into().expect("four bytes"));
+    let (width, height) = (word(0) as usize, word(4) as usize);
+    let n = width * height;
+    let pixels: Vec<[u8; 3]> = bytes[8..8 + 4 * n].chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect();
+    let depth = (0..n).map(|i| f32::from_bits(word(8 + 4 * n + 4 * i))).collect();
+    (Picture { width, height, pixels }, depth)
+}
+
+/// What a case must do besides agreeing with the driver.
+pub(crate) struct Expected {
+    pub(crate) traced: bool,
+    pub(crate) exit: i32,
+}
+
+/// Runs `case` of `script` (in `tests/programs`) both ways and compares.
+pub(crate) fn check(script: &str, case: &str, expected: &Expected, options: &[&str]) {
+    let Some(python) = peer("RTSV_SYSTEM_PYTHON") else { return };
+    let Some(x) = Xvfb::start() else { return };
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs").join(script);
+    let place = folder();
+    let run = |through, out: &str| {
+        let run = Run { x: &x, folder: place.path(), through, environment: &[] };
+        let (output, report) = run.program(&python, &[script.to_str().expect("UTF-8"), case, out]);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(expected.exit), "{case}: {text}");
+        assert_eq!(text, "", "{case}: we must be silent");
+        (read(&place.path().join(out)), report)
+    };
+    let ((native, native_depth), _) = run(None, "native");
+    let ((ours, depth), report) = run(Some(options), "ours");
+    assert_eq!(report.traced_draws > 0, expected.traced, "{case}: {report:?}");
+    assert!(native.pixels.iter().any(|p| *p != native.pixels[0]), "{case} draws something");
+    let m = metrics::compare(&native, &ours);
+    let filled = m.raw <= 0.5 && m.interior <= 1.0 && m.interior_p99 <= 4.0 && m.overlap >= 0.995;
+    assert!(filled, "{case}: {m:?}");
+    // Where both pictures have the same surface its depth is the driver's to four steps of 24 bits. Of triangles that it had to clip
+    // llvmpipe interpolates from rounded new corners: up to seven steps off the plane were measured, where ours is on it.
+    let steps = if case == "vertices_behind_the_eye" { 8.0 } else { 4.0 };
+    let is_off = |(a, b): &(&f32, &f32)| (**a - **b).abs() > steps / 16_777_216.0;
+    let far = native_depth.iter().zip(&depth).filter(is_off).count();
+    assert!(far * 200 <= depth.len(), "{case}: {far} of {} depths are off", depth.len());
+}

@@ -1,0 +1,212 @@
+"""What programs of all kinds turned out to do, as small programs: `traps.py CASE OUT`, like hard_cases.py."""
+from math import cos, sin
+
+from gl_by_ctypes import *
+
+
+def lists():
+    return F("glNewList", c_uint, c_uint), F("glEndList"), F("glCallList", c_uint), F("glGenLists", c_int)
+
+
+def disc(r, n=24):
+    begin(FAN)
+    vertex(0, 0, 0)
+    for k in range(n + 1):
+        a = 6.2831853 * k / n
+        vertex(r * cos(a), r * sin(a), 0.1)
+    end()
+
+
+def generated_lists_with_state_between_primitives():
+    """Each list has several primitives with state between them, and names come from glGenLists after the first were compiled (xscreensaver's gears)."""
+    simple()
+    new, done, call, generate = lists()
+    names = []
+    for k in range(3):
+        names.append(generate(1))
+        new(names[-1], 0x1300)
+        F("glPushMatrix")()
+        scale(0.3, 0.3, 0.3)
+        for turn, shade in ((0, 0.9), (20, 0.6), (40, 0.3)):
+            F("glFrontFace", c_uint)(0x0901)
+            color(shade, k / 3, 1 - k / 3, 1)
+            rotate(turn, 0.3, 0.5, 0.1)
+            bump(3)
+        F("glPopMatrix")()
+        done()
+    assert len(set(names)) == 3
+    for k, name in enumerate(names):
+        F("glPushMatrix")()
+        translate(k - 1, 0.8 * (k % 2), 0.1 * k)
+        call(name)
+        F("glPopMatrix")()
+
+
+def corners(n=1, step=0.0):
+    """Quads of which the diagonal shows: two corners are bright, and the others dark."""
+    for i in range(n):
+        for k, (x, y) in enumerate(((-1, -1), (0.2, -1), (0.2, 0.6), (-1, 0.6))):
+            color(k % 2, 1 - k % 2, i / n, 1)
+            vertex(x + i * step, y + i * step, i * 0.01)
+
+
+def quads_of_immediate_mode():
+    start()
+    begin(QUADS)
+    corners(3, 0.3)
+    end()
+
+
+def quads_of_which_one_is_clipped():
+    start()
+    begin(QUADS)
+    corners(3, 0.6)
+    end()
+
+
+def quads_of_a_display_list():
+    start()
+    new, done, call, generate = lists()
+    name = generate(1)
+    new(name, 0x1300)
+    begin(QUADS)
+    corners(3, 0.3)
+    end()
+    done()
+    begin(QUADS)
+    corners()
+    end()
+    call(name)
+
+
+def quads_of_a_list_that_is_passed():
+    start()
+    disable(0x0B71)
+    new, done, call, generate = lists()
+    new(1, 0x1300)
+    begin(QUADS)
+    corners(3, 0.3)
+    end()
+    done()
+    call(1)
+
+
+def quads_by_index():
+    start()
+    p, q = (c_float * 24)(), (c_float * 32)()
+    for i in range(2):
+        for k, (x, y) in enumerate(((-1, -1), (0, -1), (0, 0.5), (-1, 0.5))):
+            p[3 * (4 * i + k)], p[3 * (4 * i + k) + 1] = x + i, y + 0.3 * i
+            q[4 * (4 * i + k)], q[4 * (4 * i + k) + 3] = k % 2, 1
+    F("glVertexPointer", c_int, c_uint, c_int, c_void_p)(3, 0x1406, 0, p)
+    F("glColorPointer", c_int, c_uint, c_int, c_void_p)(4, 0x1406, 0, q)
+    enable_array(0x8074)
+    enable_array(0x8076)
+    F("glDrawElements", c_uint, c_int, c_uint, c_void_p)(QUADS, 4, 0x1405, (c_uint * 4)(0, 1, 2, 3))
+    F("glDrawArrays", c_uint, c_int, c_int)(QUADS, 4, 4)
+
+
+def arrays_of_a_list_leave_the_current_normal_alone():
+    simple()
+    new, done, call, generate = lists()
+    p = (c_float * 9)(-1.2, -1.2, 0, -0.8, -1.2, 0, -1, -0.8, 0)
+    n = (c_float * 9)(*(-0.9, 0, 0.3) * 3)
+    F("glVertexPointer", c_int, c_uint, c_int, c_void_p)(3, 0x1406, 0, p)
+    F("glNormalPointer", c_uint, c_int, c_void_p)(0x1406, 0, n)
+    enable_array(0x8074)
+    enable_array(0x8075)
+    new(1, 0x1300)
+    F("glDrawArrays", c_uint, c_int, c_int)(TRIANGLES, 0, 3)
+    done()
+    call(1)
+    begin(TRIANGLES)
+    vertex(-0.5, -0.5, 0)
+    vertex(1, -0.5, 0)
+    vertex(0, 1, 0)
+    end()
+
+
+def strips_that_restart_within_a_list():
+    start()
+    new, done, call, generate = lists()
+    p, q = (c_float * 24)(), (c_float * 32)()
+    for k in range(8):
+        p[3 * k : 3 * k + 2] = -1.2 + 0.6 * (k % 4), -1 + 0.7 * (k // 4 + k % 2)
+        q[4 * k : 4 * k + 4] = k % 3 / 2, 0.5, k // 4, 1
+    F("glVertexPointer", c_int, c_uint, c_int, c_void_p)(3, 0x1406, 0, p)
+    F("glColorPointer", c_int, c_uint, c_int, c_void_p)(4, 0x1406, 0, q)
+    enable_array(0x8074)
+    enable_array(0x8076)
+    enable(0x8F9D)
+    F("glPrimitiveRestartIndex", c_uint)(99)
+    new(1, 0x1300)
+    F("glDrawElements", c_uint, c_int, c_uint, c_void_p)(STRIP, 9, 0x1403, (c.c_uint16 * 9)(0, 1, 2, 3, 99, 4, 5, 6, 7))
+    done()
+    disable(0x8F9D)
+    call(1)
+
+
+def picture(name, shade):
+    F("glBindTexture", c_uint, c_uint)(0x0DE1, name)
+    texels = (c.c_uint8 * 64)(*(v for i in range(16) for v in (shade, 17 * i, 255 - shade, 255)))
+    F("glTexImage2D", c_uint, c_int, c_int, c_int, c_int, c_int, c_uint, c_uint, c_void_p)(0x0DE1, 0, 0x1908, 4, 4, 0, 0x1908, 0x1401, texels)
+    for what in (0x2800, 0x2801):
+        F("glTexParameteri", c_uint, c_uint, c_int)(0x0DE1, what, 0x2600)
+
+
+def textured(x, y=-0.5):
+    begin(QUADS)
+    for u, v in ((0, 0), (1, 0), (1, 1), (0, 1)):
+        F("glTexCoord2f", c_float, c_float)(u, v)
+        normal(0, 0, 1)
+        vertex(x + u, y + v, 0)
+    end()
+
+
+def a_second_texture_is_bound_right_after_a_draw_with_the_first():
+    simple()
+    picture(1, 255)
+    picture(2, 0)
+    enable(0x0DE1)
+    color(1, 1, 1, 1)
+    F("glBindTexture", c_uint, c_uint)(0x0DE1, 1)
+    textured(-1.2)
+    for turn in (5, 0, 0):
+        rotate(turn, 1, 0, 0)
+    F("glBindTexture", c_uint, c_uint)(0x0DE1, 2)
+    textured(0.1)
+    # And what a draw has seen may be replaced.
+    picture(2, 128)
+    textured(-0.5, -1.5)
+
+
+def things_around_the_viewer():
+    """Most of what is drawn is behind the viewer or beside what he sees."""
+    start(perspective=True)
+    lit()
+    for k in range(12):
+        F("glPushMatrix")()
+        rotate(30 * k, 0, 1, 0)
+        translate(0, 0, -4)
+        bump(4)
+        F("glPopMatrix")()
+
+
+def masks_that_tell_front_from_back():
+    simple()
+    enable(0x0B90)
+    separate = F("glStencilOpSeparate", *[c_uint] * 4)
+    separate(0x0404, 0x1E00, 0x1E00, 0x1E02)
+    separate(0x0405, 0x1E00, 0x1E00, 0x1E03)
+    F("glStencilFunc", c_uint, c_int, c_uint)(0x0207, 0, 255)
+    bump()
+    F("glStencilFunc", c_uint, c_int, c_uint)(0x0202, 0, 255)
+    separate(0x0408, 0x1E00, 0x1E00, 0x1E00)
+    F("glLoadIdentity")()
+    color(1, 1, 0, 1)
+    begin(QUADS)
+    corners()
+    end()
+
+
+run(globals())
