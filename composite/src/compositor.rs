@@ -280,7 +280,7 @@ impl Places {
     }
 }
 
-fn front_to_back(order: Option<&[usize]>, size: usize) -> Result<Vec<usize>, CompositeError> {
+pub(crate) fn front_to_back(order: Option<&[usize]>, size: usize) -> Result<Vec<usize>, CompositeError> {
     let Some(order) = order else {
         return Ok((0..size).collect());
     };

@@ -1,31 +1,36 @@
 //! Ranks that are threads of one process, each with its own call: frames are published to each other instead of sent.
 //!
-//! Every rank lays its image on the table (an `Arc`: nothing is copied), all wait for each other, and then each takes bands of rows until
-//! there are none left and merges them straight from the planes of all. The communicator is only used to wait, so lost and stalled ranks are
-//! named as with messages.
+//! Every rank lays its image on the table (an `Arc`: nothing is copied), and all wait for each other. Whoever comes last merges all of them
+//! straight from their planes, on as many threads as there are processors and no more, while the others sleep: to wake eight ranks for bands of
+//! rows on two processors cost as much as merging. The communicator is only used to wait, so lost and stalled ranks are named as with messages.
 use crate::comm::Communicator;
-use crate::compositor::{Composited, Destination, Options, give_up};
+use crate::compositor::{Composited, Destination, Options, front_to_back, give_up};
 use crate::error::CompositeError;
 use crate::frame::{Frame, Image};
 use crate::pixel::Composite;
 use crate::rect::Rect;
-use crate::reference::check_sizes;
 use crate::report::Report;
-use crate::shared::{BAND_ROWS, Rows, merge_band};
+use crate::shared::merge;
 use crate::simd::Kernels;
+use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Frames that one thread reads in about a third of a millisecond.
+const WORTH_A_THREAD_BYTES: usize = 8 << 20;
 
 /// What one rank has laid down: its image and where it drew.
 type Laid<P> = (Arc<Image<P>>, Rect);
 
 struct Table<P: Composite> {
     laid: Vec<Option<Laid<P>>>,
-    /// The next band that nobody has taken.
-    next_band: usize,
-    /// Finished bands: number, colours, depths.
-    bands: Vec<(usize, Vec<P::Color>, Vec<f32>)>,
-    /// Buffers of bands that have been copied.
-    spare: Vec<(Vec<P::Color>, Vec<f32>)>,
+    /// An image to write over, of the rank that collects.
+    spare: Option<Image<P>>,
+    /// Frames that somebody has begun to merge.
+    begun: u64,
+    /// The last of them, until it is collected.
+    image: Option<Image<P>>,
+    /// Its depths that are not a number, by rank.
+    nan_depths: Vec<u64>,
 }
 
 /// The place of one rank at a table that it shares with the other ranks of its process.
@@ -33,23 +38,29 @@ pub struct Seat<P: Composite> {
     rank: usize,
     table: Arc<Mutex<Table<P>>>,
     spare: Option<Image<P>>,
+    /// Frames composited so far.
+    frames: u64,
+    processors: NonZeroUsize,
 }
 
 /// A table for `ranks` ranks; hand each seat to the thread of that rank.
 pub fn seats<P: Composite>(ranks: usize) -> Vec<Seat<P>> {
     let laid = (0..ranks).map(|_| None).collect();
-    let table = Table { laid, next_band: 0, bands: Vec::new(), spare: Vec::new() };
+    let table = Table { laid, spare: None, begun: 0, image: None, nan_depths: Vec::new() };
     let table = Arc::new(Mutex::new(table));
-    (0..ranks).map(|rank| Seat { rank, table: Arc::clone(&table), spare: None }).collect()
+    // To ask costs reading files on some systems.
+    let processors = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+    let seat = |rank| Seat { rank, table: Arc::clone(&table), spare: None, frames: 0, processors };
+    (0..ranks).map(seat).collect()
 }
 
 impl<P: Composite> Seat<P> {
     /// Composites the images of all ranks of the table, of which this rank drew `bounds` of `image`. Every rank calls this once a frame, with
-    /// a communicator of the same ranks. The bits are those of [`composite_serial`](crate::composite_serial) in rank order.
+    /// a communicator of the same ranks. The bits are those of [`composite_serial`](crate::composite_serial) in the order of `options`.
     ///
     /// # Errors
-    /// [`CompositeError::SizesDiffer`]; [`CompositeError::Options`] for an image that is to stay distributed or an order other than that of
-    /// ranks, which need messages ([`composite`](crate::composite)); errors of the communicator.
+    /// [`CompositeError::SizesDiffer`]; [`CompositeError::Options`] for an image that is to stay distributed, which needs messages
+    /// ([`composite`](crate::composite)), or an order that is none; errors of the communicator.
     pub fn composite(
         &mut self,
         comm: &mut dyn Communicator,
@@ -83,92 +94,80 @@ impl<P: Composite> Seat<P> {
         let begin = comm.now();
         let ranks = self.table().laid.len();
         let root = match options.destination {
-            Destination::Rank(root) if root < ranks && comm.size() == ranks && options.order.is_none() => {
-                root
-            }
+            Destination::Rank(root) if root < ranks && comm.size() == ranks => root,
             _ => {
                 return Err(CompositeError::Options(format!(
-                    "a table of {ranks} ranks composites in rank order to one of them, over a communicator of as many ranks: \
-                     use composite for anything else"
+                    "a table of {ranks} ranks composites to one of them, over a communicator of as many ranks: use composite for \
+                     anything else"
                 )));
             }
         };
+        let order = front_to_back(options.order.as_deref(), ranks)?;
         Rect::of_size(image.width_px, image.height_px).must_contain(&bounds)?;
 
         // Lay it down and wait for the others.
-        self.table().laid[self.rank] = Some((Arc::clone(image), bounds));
+        let spare = if self.rank == root { self.spare.take() } else { None };
+        {
+            let mut table = self.table();
+            table.laid[self.rank] = Some((Arc::clone(image), bounds));
+            if spare.is_some() {
+                table.spare = spare;
+            }
+        }
         comm.barrier(options.timeout)?;
         let published = comm.now();
-        let laid: Vec<Laid<P>> = self.table().laid.iter().flatten().cloned().collect();
-        let frames: Vec<Frame<'_, P>> = laid
-            .iter()
-            .map(|(image, bounds)| Frame::of_image(image).bounded(*bounds))
-            .collect::<Result<_, _>>()?;
-        let (width_px, height_px) = check_sizes(&frames)?;
 
-        // Bands, as long as there are any.
-        let (width, height) = (width_px as usize, height_px as usize);
-        let depth = options.depth && P::HAS_DEPTH;
-        let kernels = Kernels::new(options.simd);
-        let views: Vec<_> = frames.iter().map(|frame| frame.view(frame.bounds())).collect();
-        let mut rows = Rows::new(width);
-        let bands = if width == 0 { 0 } else { height.div_ceil(BAND_ROWS) };
-        loop {
-            let (band, (mut colors, mut depths)) = {
-                let mut table = self.table();
-                let band = table.next_band;
-                if band >= bands {
-                    break;
-                }
-                table.next_band += 1;
-                (band, table.spare.pop().unwrap_or_default())
-            };
-            let first = band * BAND_ROWS;
-            let pixels = width * BAND_ROWS.min(height - first);
-            // Every value will be written, so what a buffer held before may stay.
-            colors.resize(pixels, P::EMPTY.color());
-            depths.resize(if depth { pixels } else { 0 }, 1.0);
-            merge_band(kernels, &mut rows, &views, first as u32, &mut colors, &mut depths);
-            self.table().bands.push((band, colors, depths));
+        // The first to go on, who has come last, merges.
+        let frame = self.frames;
+        self.frames += 1;
+        let work = {
+            let mut table = self.table();
+            (table.begun == frame).then(|| {
+                table.begun += 1;
+                let laid: Vec<Laid<P>> = order.iter().filter_map(|&rank| table.laid[rank].take()).collect();
+                (laid, table.spare.take())
+            })
+        };
+        if let Some((laid, spare)) = work {
+            let frames: Vec<Frame<'_, P>> = laid
+                .iter()
+                .map(|(image, bounds)| Frame::of_image(image).bounded(*bounds))
+                .collect::<Result<_, _>>()?;
+            // Where others work too, a new thread may begin later than one would have been done.
+            let bytes: usize = frames.iter().map(|frame| frame.bounds().pixels() * P::BYTES).sum();
+            let threads = self.processors.min(NonZeroUsize::MIN.saturating_add(bytes / WORTH_A_THREAD_BYTES));
+            let merged = merge(&frames, threads, options.depth, spare, Kernels::new(options.simd))?;
+            // Images are let go before their ranks draw the next ones.
+            drop(frames);
+            drop(laid);
+            let mut table = self.table();
+            table.image = Some(merged.image);
+            table.nan_depths.resize(ranks, 0);
+            for (&rank, nan) in order.iter().zip(&merged.nan_depths) {
+                table.nan_depths[rank] = *nan;
+            }
         }
         let merged = comm.now();
 
-        // One rank puts them in their places, when all are there; then the table is cleared for the next frame.
+        // Nobody lays down the next frame before all have come here, and nobody merges it before this one has been taken.
         comm.barrier(options.timeout)?;
-        let mut whole = None;
-        if self.rank == root {
-            let depth_pixels = if depth { width * height } else { 0 };
-            let spare = self.spare.take();
-            let fitting =
-                spare.filter(|i| i.colors.len() == width * height && i.depths.len() == depth_pixels);
-            let (mut all_colors, mut all_depths) = match fitting {
-                Some(image) => (image.colors, image.depths),
-                None => (vec![P::EMPTY.color(); width * height], vec![1.0; depth_pixels]),
-            };
-            let mut table = self.table();
-            while let Some((band, colors, depths)) = table.bands.pop() {
-                let start = band * BAND_ROWS * width;
-                all_colors[start..start + colors.len()].copy_from_slice(&colors);
-                if depth {
-                    all_depths[start..start + depths.len()].copy_from_slice(&depths);
-                }
-                table.spare.push((colors, depths));
-            }
-            table.next_band = 0;
-            table.laid.fill_with(|| None);
-            drop(table);
-            whole = Some(Image { width_px, height_px, colors: all_colors, depths: all_depths });
+        let mut table = self.table();
+        let nan_depths = table.nan_depths.get(self.rank).copied().unwrap_or(0);
+        let image = if self.rank == root { table.image.take() } else { None };
+        drop(table);
+        if self.rank == root && image.is_none() {
+            let reason = "the ranks of this table have left a frame before its end: make new seats";
+            return Err(CompositeError::Options(reason.to_string()));
         }
-        // Nobody lays down the next frame before the table is clear.
-        comm.barrier(options.timeout)?;
         let report = Report {
             exchange_secs: published - begin,
             blend_secs: merged - published,
             collect_secs: comm.now() - merged,
             total_secs: comm.now() - begin,
-            nan_depths: if P::HAS_DEPTH { frames.get(self.rank).map_or(0, Frame::nan_depths) } else { 0 },
+            nan_depths,
+            in_memory: true,
             ..Report::default()
         };
-        Ok(Composited { image: whole, piece: None, report })
+        Ok(Composited { image, piece: None, report })
     }
 }

@@ -40,7 +40,7 @@ pub fn composite_shared<P: Composite>(
     depth: bool,
     spare: Option<Image<P>>,
 ) -> Result<Image<P>, CompositeError> {
-    merge(frames, threads, depth, spare, Kernels::new(None))
+    Ok(merge(frames, threads, depth, spare, Kernels::new(None))?.image)
 }
 
 impl<P: Composite> Compositor<P> {
@@ -63,11 +63,11 @@ impl<P: Composite> Compositor<P> {
         let spare = self.node_image.take();
         let merged = merge(frames, threads, true, spare, Kernels::new(self.options().simd));
         let merged = merged.inspect_err(|error| crate::compositor::give_up(comm, error))?;
+        let (merged, nan) = (merged.image, merged.nan_depths.iter().sum());
         let merge_secs = comm.now() - begin;
         let bounds = frames.iter().fold(Rect::EMPTY, |all, frame| all.around(&frame.bounds()));
         let frame = Frame::of_image(&merged).bounded(bounds)?;
         let mut composited = self.composite(comm, &frame)?;
-        let nan: u64 = if P::HAS_DEPTH { frames.iter().map(Frame::nan_depths).sum() } else { 0 };
         composited.report.nan_depths = nan;
         composited.report.blend_secs += merge_secs;
         composited.report.total_secs += merge_secs;
@@ -76,13 +76,20 @@ impl<P: Composite> Compositor<P> {
     }
 }
 
-fn merge<P: Composite>(
+/// What frames have given.
+pub(crate) struct Merged<P: Composite> {
+    pub(crate) image: Image<P>,
+    /// Of each frame, depths that are not a number.
+    pub(crate) nan_depths: Vec<u64>,
+}
+
+pub(crate) fn merge<P: Composite>(
     frames: &[Frame<'_, P>],
     threads: NonZeroUsize,
     depth: bool,
     spare: Option<Image<P>>,
     kernels: Kernels,
-) -> Result<Image<P>, CompositeError> {
+) -> Result<Merged<P>, CompositeError> {
     let (width_px, height_px) = check_sizes(frames)?;
     let (width, pixels) = (width_px as usize, frames[0].len());
     let depth = depth && P::HAS_DEPTH;
@@ -99,6 +106,7 @@ fn merge<P: Composite>(
     let depth_bands = depths.chunks_mut(band_pixels).map(Some).chain(std::iter::repeat_with(|| None));
     let bands = colors.chunks_mut(band_pixels).zip(depth_bands).enumerate();
     let bands = Mutex::new(bands);
+    let nan_depths = Mutex::new(vec![0; frames.len()]);
     let work = || {
         let mut rows = Rows::<P>::new(width);
         loop {
@@ -108,6 +116,10 @@ fn merge<P: Composite>(
             let depths = depths.unwrap_or(&mut []);
             merge_band(kernels, &mut rows, &views, first, colors, depths);
         }
+        let mut nan_depths = nan_depths.lock().unwrap_or_else(PoisonError::into_inner);
+        for (all, these) in nan_depths.iter_mut().zip(&rows.nearest.nan) {
+            *all += these;
+        }
     };
     let most = pixels.div_ceil(band_pixels).max(1);
     std::thread::scope(|scope| {
@@ -116,7 +128,8 @@ fn merge<P: Composite>(
         }
         work();
     });
-    Ok(Image { width_px, height_px, colors, depths })
+    let nan_depths = nan_depths.into_inner().unwrap_or_else(PoisonError::into_inner);
+    Ok(Merged { image: Image { width_px, height_px, colors, depths }, nan_depths })
 }
 
 /// Rows `first_row…` of all views into `colors` and, if it is not empty, `depths`.

@@ -1,7 +1,7 @@
 //! Frames of one memory, merged without messages, and nodes of several ranks: the bits of the serial reference.
 use composite::{
-    Communicator, Composite, CompositeError, Compositor, DepthPixel, Destination, Frame, Image, Options,
-    PremultipliedPixel, Rect, composite_serial, composite_shared, seats, threads,
+    Color, Communicator, Composite, CompositeError, Compositor, DepthPixel, Destination, Frame, Image,
+    Options, PremultipliedPixel, Rect, SimdLevel, composite_serial, composite_shared, f16, seats, threads,
 };
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex};
@@ -190,4 +190,96 @@ fn a_table_names_what_it_cannot_do_and_who_did_not_come() {
     let options = Options { destination: Destination::Distributed, ..Options::default() };
     let error = seat.composite(&mut comm, &image, Rect::of_size(1, 1), &options).unwrap_err();
     assert!(matches!(error, CompositeError::Options(_)));
+}
+
+/// Frames of any format: planes of random values everywhere, of which only rectangles count.
+fn random_images<P: Composite>(ranks: usize, (width, height): (u32, u32)) -> Vec<(Arc<Image<P>>, Rect)> {
+    let mut seed = 977_u64;
+    let mut random = move |below: u32| {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 33) as u32 % below
+    };
+    let pixels = (width * height) as usize;
+    (0..ranks)
+        .map(|rank| {
+            // Runs of what is drawn and what is not, so that whole blocks are either, too.
+            let mut run = (0, false);
+            let mut colors = Vec::with_capacity(pixels);
+            let mut depths = Vec::with_capacity(pixels);
+            for _ in 0..pixels {
+                if run.0 == 0 {
+                    run = (1 + random(90), random(2) == 0);
+                }
+                run.0 -= 1;
+                let alpha = random(256) as f32 / 255.0;
+                let color = if run.1 {
+                    [0.5 * alpha, 0.25 * alpha, alpha * rank as f32 / 64.0, alpha]
+                } else {
+                    [0.0; 4]
+                };
+                colors.push(P::Color::from_f32(color));
+                depths.push(match random(12) {
+                    _ if !run.1 => 1.0,
+                    0 => f32::NAN,
+                    1 => f32::NEG_INFINITY,
+                    2 => f32::INFINITY,
+                    3 => -0.0,
+                    4 => 0.0,
+                    5 => f32::from_bits(1.0_f32.to_bits() - 1),
+                    other => other as f32 / 16.0,
+                });
+            }
+            let (x0, y0) = (random(width), random(height));
+            let bounds = match rank % 4 {
+                0 => Rect::of_size(width, height),
+                3 if rank % 8 == 3 => Rect::EMPTY,
+                _ => Rect { x0, y0, x1: x0 + 1 + random(width - x0), y1: y0 + 1 + random(height - y0) },
+            };
+            let depths = if P::HAS_DEPTH { depths } else { Vec::new() };
+            (Arc::new(Image::from_planes(width, height, colors, depths).unwrap()), bounds)
+        })
+        .collect()
+}
+
+fn check_levels<P: Composite>(frame: impl for<'a> Fn(&'a Image<P>) -> Frame<'a, P> + Sync) {
+    for (ranks, size) in [(3, (64, 5)), (9, (200, 19)), (70, (331, 7)), (5, (63, 3)), (6, (1, 40))] {
+        let images = random_images::<P>(ranks, size);
+        let order: Vec<usize> = (0..ranks).map(|place| (place * 2 + 1) % ranks).collect();
+        let order = if ranks % 2 == 1 { order } else { (0..ranks).rev().collect() };
+        let in_order: Vec<Frame<'_, P>> =
+            order.iter().map(|&rank| frame(&images[rank].0).bounded(images[rank].1).unwrap()).collect();
+        let expected = composite_serial(&in_order).unwrap();
+        let places: Vec<_> = seats(ranks).into_iter().map(|seat| Mutex::new(Some(seat))).collect();
+        let results = threads::run(ranks, |mut comm| {
+            let rank = comm.rank();
+            let mut seat = places[rank].lock().unwrap().take().unwrap();
+            for level in SimdLevel::available() {
+                let options = Options { order: Some(order.clone()), simd: Some(level), ..Options::default() };
+                let done = seat.composite(&mut comm, &images[rank].0, images[rank].1, &options).unwrap();
+                let nan = frame(&images[rank].0).bounded(images[rank].1).unwrap().nan_depths();
+                assert_eq!(done.report.nan_depths, nan, "{level:?}, rank {rank} of {ranks}");
+                if let Some(image) = done.image {
+                    assert!(image.to_bytes() == expected.to_bytes(), "{}, {level:?}, {ranks} ranks", P::NAME);
+                    seat.recycle(image);
+                }
+            }
+        });
+        assert!(results.iter().all(Result::is_ok));
+    }
+}
+
+#[test]
+fn all_levels_merge_all_formats_in_one_memory_to_the_same_bits() {
+    macro_rules! depth_formats {
+        ($($color:ty),*) => {$(check_levels::<DepthPixel<$color>>(|image| {
+            Frame::with_depth(image.width_px(), image.height_px(), image.colors(), image.depths()).unwrap()
+        });)*};
+    }
+    macro_rules! blended_formats {
+        ($($color:ty),*) => {$(check_levels::<PremultipliedPixel<$color>>(|image| {
+            Frame::premultiplied(image.width_px(), image.height_px(), image.colors()).unwrap()
+        });)*};
+    }
+    depth_formats!([u8; 4], [u16; 4], [f16; 4], [f32; 4]);
+    blended_formats!([u8; 4], [u16; 4], [f16; 4], [f32; 4]);
 }

@@ -9,7 +9,7 @@ use crate::scenes::Scene;
 use crate::simd::SimdLevel;
 use crate::strategies::Strategy;
 use datasets::cli::{CommonArgs, Status, UsageError};
-use measure::{Bench, Setting};
+use measure::{Bench, Setting, Tables};
 use std::ffi::OsString;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -38,7 +38,7 @@ pub(super) struct CompareArgs {
     /// Our strategy
     #[arg(long, default_value = "direct", value_name = "direct|tree|bswap|radix-k[:K]|auto", value_parser = strategy_named)]
     strategy: Strategy,
-    /// Send messages also between processes of one machine, which else merge in shared memory
+    /// Send messages also between processes of one machine and between threads, which else merge in shared memory
     #[arg(long)]
     messages: bool,
     /// Our instruction set at most: scalar, sse4.2, avx2, avx512 or neon, as far as this machine has it; or several
@@ -64,10 +64,13 @@ pub(super) fn compare(
     let icet = rival::find().map_err(|error| UsageError(error.to_string()))?;
     let counts = args.ranks.counts();
     if args.ranks.is_rank() || counts.len() < 2 {
+        let is_table = !args.messages && matches!(args.strategy, Strategy::DirectSend | Strategy::Automatic);
+        let threads = if is_table && args.ranks.are_threads() { args.ranks.count()? } else { 0 };
+        let tables = Tables::new(threads);
         return args.ranks.run(
             common,
             arguments,
-            |comm| one_job(comm, args, &icet),
+            |comm| one_job(comm, args, &icet, &tables),
             |comparison| {
                 common.result(&comparison, || &comparison)?;
                 Ok(Status::Success)
@@ -98,7 +101,13 @@ pub(super) fn compare(
 }
 
 /// All that is asked of one group of ranks.
-fn one_job(comm: &mut RankComm, args: &CompareArgs, icet: &Path) -> anyhow::Result<Comparison> {
+fn one_job(
+    comm: &mut RankComm,
+    args: &CompareArgs,
+    icet: &Path,
+    tables: &Tables,
+) -> anyhow::Result<Comparison> {
+    let mut seats = tables.seats_of(comm.comm().rank());
     let machine = Machine {
         processors: std::thread::available_parallelism().map_or(1, usize::from),
         transport: comm.transport(),
@@ -117,7 +126,7 @@ fn one_job(comm: &mut RankComm, args: &CompareArgs, icet: &Path) -> anyhow::Resu
                 let setting = Setting { size_px, pixels, strategy, in_memory, simd, frames, timeout };
                 let mut bench = Bench::new(comm, icet, setting)?;
                 for &scene in args.scene.iter().copied().flatten() {
-                    rows.push(bench.measure(scene)?);
+                    rows.push(bench.measure(scene, seats.as_mut())?);
                 }
             }
         }

@@ -103,7 +103,12 @@ impl RankArgs {
         smpirun::inside() || (self.mpi && launcher::launched(|name| std::env::var(name).ok()))
     }
 
-    fn count(&self) -> Result<usize, UsageError> {
+    /// Whether ranks are threads, of which all that this process has work at once.
+    pub(super) fn are_threads(&self) -> bool {
+        !(self.mpi || self.smpi || self.model || smpirun::inside())
+    }
+
+    pub(super) fn count(&self) -> Result<usize, UsageError> {
         if self.ranks.len() > 1 {
             return Err(UsageError(format!("--ranks {:?}: this takes one number of ranks", self.ranks)));
         }

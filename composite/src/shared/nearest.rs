@@ -23,6 +23,8 @@ const FARTHEST: f32 = f32::from_bits(1.0_f32.to_bits() - 1);
 struct Block<'a, C> {
     colors: &'a [C; BLOCK],
     depths: &'a [f32; BLOCK],
+    /// The pixels that count.
+    lanes: u64,
 }
 
 /// A block of the image.
@@ -31,17 +33,21 @@ struct Held<'a, C> {
     depths: [f32; BLOCK],
     /// Pixels where nobody has drawn: their colours and depths are not set.
     background: u64,
+    /// Whether a depth was not a number.
+    has_nan: bool,
 }
 
 /// What a thread needs to merge rows.
 pub(super) struct Nearest<P: Composite> {
-    /// Blocks of which a frame has a part only, filled up with background.
+    /// Depths that are not a number, of each frame.
+    pub(super) nan: Vec<u64>,
+    /// Blocks that reach beyond the planes of a frame, filled up.
     edges: Vec<([P::Color; BLOCK], [f32; BLOCK])>,
 }
 
 impl<P: Composite> Nearest<P> {
     pub(super) fn new() -> Self {
-        Self { edges: Vec::new() }
+        Self { nan: Vec::new(), edges: Vec::new() }
     }
 
     /// Rows `first_row…`, for which `columns` says who has drawn where, into `colors` and, if it is not empty, `depths`.
@@ -54,6 +60,7 @@ impl<P: Composite> Nearest<P> {
         colors: &mut [P::Color],
         depths: &mut [f32],
     ) {
+        self.nan.resize(views.len(), 0);
         at_level!(
             kernels,
             simd => self.merge(columns, views, rows, colors, depths,
@@ -93,19 +100,34 @@ impl<P: Composite> Nearest<P> {
                     Ok(whole) => (whole, true),
                     Err(_) => (&mut padded, false),
                 };
-                let mut held = Held { colors: target, depths: [FARTHEST; BLOCK], background: u64::MAX };
+                let mut held =
+                    Held { colors: target, depths: [FARTHEST; BLOCK], background: u64::MAX, has_nan: false };
                 for some in drawn.chunks(TOGETHER) {
                     self.edges.clear();
                     for &index in some {
                         fill_up(&views[index], x, y, &mut self.edges);
                     }
                     let mut edges = self.edges.iter();
-                    let mut blocks = [Block { colors: &nothing.0, depths: &nothing.1 }; TOGETHER];
+                    let mut blocks = [Block { colors: &nothing.0, depths: &nothing.1, lanes: 0 }; TOGETHER];
                     for (&index, block) in some.iter().zip(&mut blocks) {
-                        let part = || edges.next().map(|(colors, depths)| Block { colors, depths });
-                        *block = whole(&views[index], x, y).or_else(part).unwrap_or(*block);
+                        let lanes = lanes(&views[index], x);
+                        *block = match within_planes(&views[index], x, y) {
+                            Some((colors, depths)) => Block { colors, depths, lanes },
+                            None => edges.next().map_or(*block, |(colors, depths)| Block {
+                                colors,
+                                depths,
+                                lanes,
+                            }),
+                        };
                     }
                     take_nearest(&blocks[..some.len()], &mut held);
+                    if std::mem::take(&mut held.has_nan) {
+                        for (&index, block) in some.iter().zip(&blocks) {
+                            let depths = block.depths.iter().enumerate();
+                            let nan = depths.filter(|(i, depth)| block.lanes >> i & 1 == 1 && depth.is_nan());
+                            self.nan[index] += nan.count() as u64;
+                        }
+                    }
                 }
                 let (nearest, background) = (held.depths, held.background);
                 if !depths.is_empty() {
@@ -122,18 +144,31 @@ impl<P: Composite> Nearest<P> {
     }
 }
 
-/// The block of row `y` that begins in column `x`, if the frame has all of it.
+/// Which pixels of the block that begins in column `x` the frame has; at least one.
 #[inline(always)]
-fn whole<'a, P: Composite>(view: &View<'a, P>, x: usize, y: u32) -> Option<Block<'a, P::Color>> {
-    if x < view.bounds.x0 as usize || x + BLOCK > view.bounds.x1 as usize {
-        return None;
-    }
-    let start = (y - view.origin.1) as usize * view.stride + x - view.origin.0 as usize;
-    let colors = view.colors.get(start..)?.first_chunk()?;
-    Some(Block { colors, depths: view.depths.get(start..)?.first_chunk()? })
+fn lanes<P: Composite>(view: &View<'_, P>, x: usize) -> u64 {
+    let (first, end) = (view.bounds.x0 as usize, view.bounds.x1 as usize);
+    let before = first.saturating_sub(x);
+    let behind = (x + BLOCK).saturating_sub(end);
+    (u64::MAX >> behind) & (u64::MAX << before)
 }
 
-/// Appends the block of row `y` that begins in column `x`, if the frame has only a part of it.
+/// The block of row `y` that begins in column `x`, whatever it holds outside the frame's bounds, if the planes reach so far.
+#[inline(always)]
+fn within_planes<'a, P: Composite>(
+    view: &View<'a, P>,
+    x: usize,
+    y: u32,
+) -> Option<(&'a [P::Color; BLOCK], &'a [f32; BLOCK])> {
+    let column = x.checked_sub(view.origin.0 as usize)?;
+    if column + BLOCK > view.stride {
+        return None;
+    }
+    let start = (y - view.origin.1) as usize * view.stride + column;
+    Some((view.colors.get(start..)?.first_chunk()?, view.depths.get(start..)?.first_chunk()?))
+}
+
+/// Appends the block of row `y` that begins in column `x`, if it is not within the planes.
 #[inline(always)]
 fn fill_up<P: Composite>(
     view: &View<'_, P>,
@@ -141,11 +176,11 @@ fn fill_up<P: Composite>(
     y: u32,
     edges: &mut Vec<([P::Color; BLOCK], [f32; BLOCK])>,
 ) {
-    let first = x.max(view.bounds.x0 as usize);
-    let last = (x + BLOCK).min(view.bounds.x1 as usize);
-    if last - first == BLOCK {
+    if within_planes(view, x, y).is_some() {
         return;
     }
+    let first = x.max(view.bounds.x0 as usize);
+    let last = (x + BLOCK).min(view.bounds.x1 as usize);
     let (from_colors, from_depths) = view.row(y, first as u32, last as u32);
     let (mut colors, mut depths) = ([P::EMPTY.color(); BLOCK], [1.0; BLOCK]);
     colors[first - x..last - x].copy_from_slice(from_colors);
@@ -165,16 +200,23 @@ fn take_nearest<C: Color, S: Simd>(simd: S, blocks: &[Block<'_, C>], held: &mut 
     for quarter in 0..4 {
         nearest[quarter] = load(quarter, &held.depths);
     }
+    let mut are_numbers = nearest[0].simd_eq(nearest[0]);
     let mut any = 0;
     for (block, wins) in blocks.iter().zip(&mut wins) {
         for quarter in 0..4 {
-            let depth = load(quarter, block.depths);
+            let mut depth = load(quarter, block.depths);
+            if block.lanes != u64::MAX {
+                let lanes = mask32x16::from_bitmask(simd, block.lanes >> (16 * quarter) & 0xffff);
+                depth = lanes.select(depth, f32x16::splat(simd, 1.0));
+            }
+            are_numbers &= depth.simd_eq(depth);
             let wins_here = depth.simd_le(nearest[quarter]);
             nearest[quarter] = wins_here.select(depth, nearest[quarter]);
             *wins |= wins_here.to_bitmask() << (16 * quarter);
         }
         any |= *wins;
     }
+    held.has_nan = !are_numbers.all_true();
     for quarter in 0..4 {
         nearest[quarter].store_slice(&mut held.depths[16 * quarter..16 * quarter + 16]);
     }
@@ -219,7 +261,14 @@ fn take_nearest_scalar<C: Color>(blocks: &[Block<'_, C>], held: &mut Held<'_, C>
     let mut any = 0;
     for (block, wins) in blocks.iter().zip(&mut wins) {
         let mut flags = [0_u8; BLOCK];
-        for ((held, depth), flag) in held.depths.iter_mut().zip(block.depths).zip(&mut flags) {
+        let mut depths = *block.depths;
+        if block.lanes != u64::MAX {
+            for (i, depth) in depths.iter_mut().enumerate() {
+                *depth = if block.lanes >> i & 1 == 1 { *depth } else { 1.0 };
+            }
+        }
+        held.has_nan |= depths.iter().fold(false, |any, depth| any | depth.is_nan());
+        for ((held, depth), flag) in held.depths.iter_mut().zip(&depths).zip(&mut flags) {
             let is_nearest = *depth <= *held;
             *flag = u8::from(is_nearest);
             *held = if is_nearest { *depth } else { *held };

@@ -2,15 +2,17 @@
 use super::table::{Pixels, Row};
 use crate::cli::ranks::RankComm;
 use crate::compositor::{Compositor, Options};
-use crate::frame::Frame;
+use crate::frame::{Frame, Image};
 use crate::pixel::{DepthPixel, PremultipliedPixel};
 use crate::rival::{Icet, IcetFrame, IcetImage, IcetMode, IcetStrategy};
 use crate::scenes::{Drawn, Scene};
+use crate::seats::{Seat, seats};
 use crate::simd::SimdLevel;
 use crate::strategies::Strategy;
 use anyhow::Context as _;
 use datasets::cli::UsageError;
 use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 /// Frames before the clock counts: buffers are made and connections opened.
@@ -40,6 +42,27 @@ pub(super) struct Bench<'a> {
     blend: Compositor<PremultipliedPixel<[f32; 4]>>,
     drawn: Drawn,
     glass: Vec<[f32; 4]>,
+}
+
+/// The places of one rank that is a thread at tables that it shares with the others.
+pub(super) struct Seats {
+    depth: Seat<DepthPixel<[u8; 4]>>,
+    blend: Seat<PremultipliedPixel<[f32; 4]>>,
+}
+
+/// Places for all ranks, until they come.
+pub(super) struct Tables(Vec<Mutex<Option<Seats>>>);
+
+impl Tables {
+    /// For ranks that are threads; 0 if they are not, or are to send messages.
+    pub(super) fn new(ranks: usize) -> Self {
+        let places = seats(ranks).into_iter().zip(seats(ranks));
+        Self(places.map(|(depth, blend)| Mutex::new(Some(Seats { depth, blend }))).collect())
+    }
+
+    pub(super) fn seats_of(&self, rank: usize) -> Option<Seats> {
+        self.0.get(rank)?.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
 }
 
 impl<'a> Bench<'a> {
@@ -75,8 +98,22 @@ impl<'a> Bench<'a> {
         })
     }
 
+    fn shared(&self) -> anyhow::Result<Shared> {
+        let Drawn { width_px, height_px, colors, depths, .. } = &self.drawn;
+        Ok(match self.setting.pixels {
+            Pixels::Depth => {
+                let image = Image::from_planes(*width_px, *height_px, colors.clone(), depths.clone())?;
+                Shared::Depth(Arc::new(image))
+            }
+            Pixels::Blend => {
+                let image = Image::from_planes(*width_px, *height_px, self.glass.clone(), Vec::new())?;
+                Shared::Blend(Arc::new(image))
+            }
+        })
+    }
+
     /// Frames of one scene.
-    pub(super) fn measure(&mut self, scene: Scene) -> anyhow::Result<Row> {
+    pub(super) fn measure(&mut self, scene: Scene, mut seats: Option<&mut Seats>) -> anyhow::Result<Row> {
         let (rank, ranks) = (self.comm.comm().rank(), self.comm.comm().size());
         let Setting { size_px, pixels, strategy, simd, frames, timeout, .. } = self.setting;
         let mut ours_ms = Vec::new();
@@ -92,18 +129,30 @@ impl<'a> Bench<'a> {
             }
             let timed = moment >= WARM_UP;
 
-            // Ours.
+            // Ours. Renderers of one process draw into images that they can share.
+            let shared = seats.is_some().then(|| self.shared()).transpose()?;
             self.comm.comm().barrier(timeout)?;
             let begin = self.comm.comm().now();
-            let (image, report) = match pixels {
-                Pixels::Depth => {
+            let (image, report) = match (&shared, &mut seats) {
+                (Some(Shared::Depth(image)), Some(seats)) => {
+                    let (comm, bounds) = (self.comm.comm(), self.drawn.bounds);
+                    let done = seats.depth.composite(comm, image, bounds, self.depth.options())?;
+                    (done.image.map(Ours::Depth), done.report)
+                }
+                (Some(Shared::Blend(image)), Some(seats)) => {
+                    self.blend.set_order(Some(order));
+                    let (comm, bounds) = (self.comm.comm(), self.drawn.bounds);
+                    let done = seats.blend.composite(comm, image, bounds, self.blend.options())?;
+                    (done.image.map(Ours::Blend), done.report)
+                }
+                _ if pixels == Pixels::Depth => {
                     let drawn = &self.drawn;
                     let frame =
                         Frame::with_depth(drawn.width_px, drawn.height_px, &drawn.colors, &drawn.depths)?;
                     let done = self.depth.composite(self.comm.comm(), &frame.bounded(drawn.bounds)?)?;
                     (done.image.map(Ours::Depth), done.report)
                 }
-                Pixels::Blend => {
+                _ => {
                     // The order changes from frame to frame; buffers stay.
                     self.blend.set_order(Some(order));
                     let frame = Frame::premultiplied(self.drawn.width_px, self.drawn.height_px, &self.glass)?;
@@ -137,10 +186,12 @@ impl<'a> Bench<'a> {
                     pixels_differ += differing(ours, theirs);
                 }
             }
-            match image {
-                Some(Ours::Depth(image)) => self.depth.recycle(image),
-                Some(Ours::Blend(image)) => self.blend.recycle(image),
-                None => {}
+            match (image, &mut seats) {
+                (Some(Ours::Depth(image)), Some(seats)) => seats.depth.recycle(image),
+                (Some(Ours::Blend(image)), Some(seats)) => seats.blend.recycle(image),
+                (Some(Ours::Depth(image)), None) => self.depth.recycle(image),
+                (Some(Ours::Blend(image)), None) => self.blend.recycle(image),
+                (None, _) => {}
             }
         }
 
@@ -190,9 +241,15 @@ impl<'a> Bench<'a> {
     }
 }
 
+/// What a rank has drawn, as an image of its own.
+enum Shared {
+    Depth(Arc<Image<DepthPixel<[u8; 4]>>>),
+    Blend(Arc<Image<PremultipliedPixel<[f32; 4]>>>),
+}
+
 enum Ours {
-    Depth(crate::Image<DepthPixel<[u8; 4]>>),
-    Blend(crate::Image<PremultipliedPixel<[f32; 4]>>),
+    Depth(Image<DepthPixel<[u8; 4]>>),
+    Blend(Image<PremultipliedPixel<[f32; 4]>>),
 }
 
 fn differing(ours: &Ours, theirs: IcetImage<'_>) -> u64 {
