@@ -373,7 +373,7 @@ fn main() {
         };
         writeln!(s, "#[unsafe(naked)] #[unsafe(no_mangle)] pub(in crate::symbols) unsafe extern \"C\" fn {x}() {{ core::arch::naked_asm!({code}) }}").unwrap();
     }
-    writeln!(s, "}}\n#[allow(clippy::unnecessary_cast, reason = \"written by a program\")] mod hot_hooks {{ use super::hot::with; use crate::real::forward;").unwrap();
+    writeln!(s, "}}\n#[allow(clippy::unnecessary_cast, reason = \"written by a program\")] mod hot_hooks {{ use super::hot; use crate::immediate::Step; use crate::real::{{forward, found}};").unwrap();
     for h in &hot {
         let (args, call, types) = if h.pointer {
             (format!("p: *const {}", h.c_type), "p".to_owned(), format!("*const {}", h.c_type))
@@ -394,10 +394,25 @@ fn main() {
         } else {
             String::new()
         };
+        let (name, body) = (&h.name, &h.body);
+        let step = body.replacen('(', "_step(", 1);
+        // SAFETY comments are those of the code that is written.
         writeln!(
             s,
-            "pub(in crate::symbols) unsafe extern \"C\" fn {}({args}) {{ {read} if !with(|c| {}) {{ \n// SAFETY: the driver's function of this name and signature.\n let f: unsafe extern \"C\" fn({types}) = unsafe {{ core::mem::transmute(forward({index})) }}; \n// SAFETY: the program's own arguments.\n unsafe {{ f({call}) }} }} }}",
-            h.name, h.body
+            "#[cold] #[inline(never)] unsafe extern \"C\" fn {name}_slowly({args}) {{ {read} if !hot::with(|c| {body}) {{
+                // SAFETY: the driver's function of this name and signature.
+                let f: unsafe extern \"C\" fn({types}) = unsafe {{ core::mem::transmute(forward({index})) }};
+                // SAFETY: the program's own arguments.
+                unsafe {{ f({call}) }} }} }}
+            pub(in crate::symbols) unsafe extern \"C\" fn {name}({args}) {{ {read} match hot::step(|c| {step}) {{
+                Step::Done => (),
+                Step::Driver if let Some(known) = found({index}) => {{
+                    // SAFETY: as above.
+                    let f: unsafe extern \"C\" fn({types}) = unsafe {{ core::mem::transmute(known) }};
+                    // SAFETY: as above.
+                    unsafe {{ f({call}) }} }}
+                // SAFETY: as above.
+                _ => unsafe {{ {name}_slowly({call}) }} }} }}"
         )
         .unwrap();
     }

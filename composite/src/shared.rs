@@ -10,14 +10,19 @@ use crate::error::CompositeError;
 use crate::frame::{Frame, Image};
 use crate::layer::View;
 use crate::pixel::Composite;
-use crate::rank_order::Folding;
 use crate::rect::Rect;
 use crate::reference::check_sizes;
-use crate::simd::expand::{Side, join_run, join_run_scalar};
-use crate::simd::{Kernels, at_level};
+use crate::simd::Kernels;
 use std::num::NonZeroUsize;
-use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
+
+mod blended;
+mod columns;
+mod nearest;
+
+use blended::Blended;
+use columns::Columns;
+use nearest::Nearest;
 
 /// Rows that a thread takes at a time.
 pub(crate) const BAND_ROWS: usize = 16;
@@ -123,150 +128,36 @@ pub(crate) fn merge_band<P: Composite>(
     colors: &mut [P::Color],
     depths: &mut [f32],
 ) {
-    at_level!(
-        kernels,
-        simd => rows.merge_band(views, first_row, colors, depths,
-            #[inline(always)]
-            |c, d, held_c, held_d, side| join_run::<P, _>(simd, c, d, held_c, held_d, side)),
-        rows.merge_band(views, first_row, colors, depths, join_run_scalar::<P>)
-    );
+    let Rows { width, columns, nearest, blended } = rows;
+    if *width == 0 {
+        return;
+    }
+    let end_row = first_row + (colors.len() / *width) as u32;
+    let mut y = first_row;
+    while y < end_row {
+        let end = columns.look_up(views, *width, y, end_row);
+        let pixels = (y - first_row) as usize * *width..(end - first_row) as usize * *width;
+        let colors = &mut colors[pixels.clone()];
+        if P::HAS_DEPTH {
+            let depths = if depths.is_empty() { &mut [] } else { &mut depths[pixels] };
+            nearest.merge_rows(kernels, columns, views, (y, *width), colors, depths);
+        } else {
+            blended.merge_rows(kernels, columns, views, (y, *width), colors);
+        }
+        y = end;
+    }
 }
 
-/// Rows in which one thread works.
+/// What one thread needs to merge rows.
 pub(crate) struct Rows<P: Composite> {
     width: usize,
-    depth: Vec<f32>,
-    /// For blended formats: the groups of the balanced tree that wait for their other half, by the logarithm of their size.
-    waiting: Vec<Group<P>>,
-    spare: Vec<Vec<P::Color>>,
-}
-
-/// A row of a group of ranks: pixels outside `columns` are unset.
-struct Group<P: Composite> {
-    columns: Range<usize>,
-    colors: Vec<P::Color>,
+    columns: Columns,
+    nearest: Nearest<P>,
+    blended: Blended<P>,
 }
 
 impl<P: Composite> Rows<P> {
     pub(crate) fn new(width: usize) -> Self {
-        Self { width, depth: Vec::new(), waiting: Vec::new(), spare: Vec::new() }
-    }
-
-    /// Rows `first_row…` of all frames into `colors` and, if it is not empty, `depths`.
-    #[inline(always)]
-    fn merge_band(
-        &mut self,
-        views: &[View<'_, P>],
-        first_row: u32,
-        colors: &mut [P::Color],
-        depths: &mut [f32],
-        join: impl Fn(&[u8], &[u8], &mut [P::Color], &mut [f32], Side),
-    ) {
-        let width = self.width;
-        if width == 0 {
-            return;
-        }
-        if !P::HAS_DEPTH {
-            for (index, row) in colors.chunks_exact_mut(width).enumerate() {
-                self.blend_row(views, first_row + index as u32, row, &join);
-            }
-            return;
-        }
-        let depths = if depths.is_empty() {
-            self.depth.resize(colors.len(), 1.0);
-            &mut self.depth
-        } else {
-            depths
-        };
-        colors.fill(P::EMPTY.color());
-        depths.fill(1.0);
-        // All rows of one frame before those of the next: what is joined stays in the second cache, and each frame is read in one
-        // piece, which processors foresee. Row by row through all frames every row begins with misses.
-        let end_row = first_row + (colors.len() / width) as u32;
-        for view in views {
-            let (x0, x1) = (view.bounds.x0, view.bounds.x1);
-            for y in view.bounds.y0.max(first_row)..view.bounds.y1.min(end_row) {
-                let (from_colors, from_depths) = view.row(y, x0, x1);
-                let start = (y - first_row) as usize * width;
-                let pixels = start + x0 as usize..start + x1 as usize;
-                join(
-                    bytemuck::cast_slice(from_colors),
-                    bytemuck::cast_slice(from_depths),
-                    &mut colors[pixels.clone()],
-                    &mut depths[pixels],
-                    Side::Higher,
-                );
-            }
-        }
-    }
-
-    /// One row in the canonical grouping: pairs first, then as a binary counter carries.
-    #[inline(always)]
-    fn blend_row(
-        &mut self,
-        views: &[View<'_, P>],
-        y: u32,
-        row: &mut [P::Color],
-        join: &impl Fn(&[u8], &[u8], &mut [P::Color], &mut [f32], Side),
-    ) {
-        let folding = Folding::new(views.len());
-        for slot in 0..folding.slots {
-            let leader = folding.leader(slot);
-            let mut group = self.row_of(&views[leader], y);
-            if let Some(partner) = folding.partner(leader) {
-                let other = self.row_of(&views[partner], y);
-                group = self.joined(group, other, join);
-            }
-            let mut carry = slot;
-            while carry & 1 == 1 {
-                if let Some(lower) = self.waiting.pop() {
-                    group = self.joined(lower, group, join);
-                }
-                carry >>= 1;
-            }
-            self.waiting.push(group);
-        }
-        if let Some(whole) = self.waiting.pop() {
-            let columns = whole.columns.clone();
-            row[..columns.start].fill(P::EMPTY.color());
-            row[columns.clone()].copy_from_slice(&whole.colors[columns.clone()]);
-            row[columns.end..].fill(P::EMPTY.color());
-            self.spare.push(whole.colors);
-        }
-    }
-
-    fn row_of(&mut self, view: &View<'_, P>, y: u32) -> Group<P> {
-        let mut colors = self.spare.pop().unwrap_or_else(|| vec![P::EMPTY.color(); self.width]);
-        if !(view.bounds.y0..view.bounds.y1).contains(&y) {
-            return Group { columns: 0..0, colors };
-        }
-        let columns = view.bounds.x0 as usize..view.bounds.x1 as usize;
-        colors[columns.clone()].copy_from_slice(view.row(y, view.bounds.x0, view.bounds.x1).0);
-        Group { columns, colors }
-    }
-
-    #[inline(always)]
-    fn joined(
-        &mut self,
-        mut lower: Group<P>,
-        higher: Group<P>,
-        join: &impl Fn(&[u8], &[u8], &mut [P::Color], &mut [f32], Side),
-    ) -> Group<P> {
-        if higher.columns.is_empty() {
-            self.spare.push(higher.colors);
-            return lower;
-        }
-        if lower.columns.is_empty() {
-            self.spare.push(lower.colors);
-            return higher;
-        }
-        // What neither has set becomes background.
-        let all = lower.columns.start.min(higher.columns.start)..lower.columns.end.max(higher.columns.end);
-        lower.colors[all.start..lower.columns.start].fill(P::EMPTY.color());
-        lower.colors[lower.columns.end..all.end].fill(P::EMPTY.color());
-        let other = bytemuck::cast_slice(&higher.colors[higher.columns.clone()]);
-        join(other, &[], &mut lower.colors[higher.columns.clone()], &mut [], Side::Higher);
-        self.spare.push(higher.colors);
-        Group { columns: all, colors: lower.colors }
+        Self { width, columns: Columns::default(), nearest: Nearest::new(), blended: Blended::new() }
     }
 }

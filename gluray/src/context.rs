@@ -317,11 +317,15 @@ impl Context {
                 self.read_back();
             }
         }
+        // A program that sets much state between draws pays for the first calls only.
+        let told_enough = self.watched >= 12;
+        if (class & class::TEXTURE != 0 || told_enough) && self.state.texture.is_some() {
+            // What was drawn with a texture is drawn with what it is now; of later changes nobody may tell us.
+            self.end_batch();
+        }
         self.sync();
         self.mark(class);
         self.watched += 1;
-        // A program that sets much state between draws pays for the first calls only.
-        let told_enough = self.watched > 12;
         if told_enough && self.recording.is_none() && THREADS.load(Relaxed) == 1 {
             // Of buffers that are written we are told all the same.
             self.mark(class::ALL & !class::BUFFER);

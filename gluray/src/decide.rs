@@ -56,6 +56,9 @@ pub(crate) fn filled(s: &Snapshot, trace: Trace) -> Verdict {
     if s.stipple || s.smooth_polygons {
         return Pass("stippled or smoothed polygons");
     }
+    if s.masked_samples {
+        return Pass("masks or coverage of samples");
+    }
     if s.draw_buffer == 0 {
         return Pass("no colour buffer");
     }

@@ -139,13 +139,19 @@ impl Context {
             // Programs leave blending on; what lets no light through is opaque all the same.
             Arc::make_mut(&mut draw.state).blend = false;
         }
-        let image = match &draw.state.texture {
-            Some(t) => self.presenter.images.get(t.target, t.name, t.version),
-            None => None,
-        };
+        let image = draw.state.texture.and_then(|t| {
+            self.keep_errors();
+            let image = self.presenter.images.get(t.target, t.name, t.version);
+            self.drop_errors();
+            image
+        });
         if in_order {
             self.trace_in_order(&draw, image);
         } else {
+            let samples = |d: &Draw| d.state.samples.max(1);
+            if self.frame.pending.first().is_some_and(|(d, _)| samples(d) != samples(&draw)) {
+                self.flush("a draw with more or fewer samples");
+            }
             self.frame.pending.push((draw, image));
         }
     }
@@ -208,12 +214,16 @@ impl Context {
         if !matches!(self.config.settings.mode, Mode::Match | Mode::Phong) {
             crate::view::place(&mut pending);
         }
-        if let Some(n) = pending.iter().map(|(d, _)| d.state.samples).find(|n| *n > 1) {
-            self.counters.warn(format!(
-                "the program has {n} samples a pixel: one ray stands for all of them, so silhouettes are not smoothed as the driver's are"
-            ));
+        let picture = crate::picture::is_for(&self.config.settings);
+        let places = match picture {
+            true => None,
+            false => self.sample_places(pending.iter().map(|(d, _)| d)),
+        };
+        if let Some(places) = places {
+            return self.flush_samples(&pending, func, &places);
         }
-        if crate::picture::is_for(&self.config.settings) {
+        self.warn_of_samples(pending.iter().map(|(d, _)| d));
+        if picture {
             return self.draw_picture(&pending, func);
         }
         if self.may_be_late(before) {
@@ -221,11 +231,20 @@ impl Context {
         }
         let settings = &self.config.settings;
         let traced = worker::on_pool(|| late::trace(pending, settings));
-        self.put(traced, Fate::Surface(func));
+        self.put(traced, Fate::Surface(func), None);
     }
 
-    /// Puts what was traced into the framebuffer.
-    pub(crate) fn put(&mut self, traced: Traced, fate: Fate) {
+    /// One ray stands for all samples of a pixel.
+    fn warn_of_samples<'a>(&mut self, draws: impl Iterator<Item = &'a Draw>) {
+        if let Some(n) = draws.map(|d| d.state.samples).find(|n| *n > 1) {
+            self.counters.warn(format!(
+                "the program has {n} samples a pixel: one ray stands for all of them, so silhouettes are not smoothed as the driver's are"
+            ));
+        }
+    }
+
+    /// Puts what was traced into the framebuffer, or into one sample of each of its pixels.
+    pub(crate) fn put(&mut self, traced: Traced, fate: Fate, sample: Option<u32>) {
         self.counters.spent("trace", traced.took);
         self.counters.rays("primary", traced.primary);
         self.counters.rays("shadow", traced.extra[0]);
@@ -234,7 +253,7 @@ impl Context {
         self.counters.report.pixels += traced.layer.covered as u64;
         let start = Instant::now();
         if traced.layer.covered > 0 {
-            self.present(&[traced.layer], fate);
+            self.present_sample(&[traced.layer], fate, sample);
         }
         self.counters.spent("present", start.elapsed());
         for (draw, _) in traced.draws {
@@ -248,18 +267,28 @@ impl Context {
         self.frame.traced = true;
         self.counters.flushed("in order");
         self.frame.told.traced(self.counters.report.frames + 1, std::iter::once(draw));
-        let start = Instant::now();
-        let mut structures = crate::cache::Structures::default();
-        let (layers, rays) = worker::on_pool(|| match Prepared::new(draw, image, &mut structures) {
-            Some(p) => (trace::in_order(&p), p.rays.load(Relaxed)),
-            None => (Vec::new(), 0),
-        });
-        self.counters.spent("trace", start.elapsed());
-        self.counters.rays("primary", rays);
-        self.counters.made(structures);
-        self.counters.report.pixels += layers.iter().map(|l| l.covered as u64).sum::<u64>();
-        if !layers.is_empty() {
-            self.present(&layers, Fate::AsDrawn);
+        let samples = match self.sample_places([draw]) {
+            Some(places) => Context::each_sample(draw, &places),
+            None => {
+                self.warn_of_samples(std::iter::once(draw));
+                vec![(draw.clone(), None)]
+            }
+        };
+        for (draw, sample) in samples {
+            let start = Instant::now();
+            let mut structures = crate::cache::Structures::default();
+            let image = image.clone();
+            let (layers, rays) = worker::on_pool(|| match Prepared::new(&draw, image, &mut structures) {
+                Some(p) => (trace::in_order(&p), p.rays.load(Relaxed)),
+                None => (Vec::new(), 0),
+            });
+            self.counters.spent("trace", start.elapsed());
+            self.counters.rays("primary", rays);
+            self.counters.made(structures);
+            self.counters.report.pixels += layers.iter().map(|l| l.covered as u64).sum::<u64>();
+            if !layers.is_empty() {
+                self.present_sample(&layers, Fate::AsDrawn, sample);
+            }
         }
     }
 

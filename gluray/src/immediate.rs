@@ -8,22 +8,41 @@ use crate::real::gl;
 use crate::state::current::{Current, set_material, stale};
 use crate::symbols::{self, class};
 
+/// What the short way of a call came to. It takes values and calls nothing, so that they stay in registers: a value that has been put into
+/// memory in parts and is read back whole costs more than all the rest of a call.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Step {
+    /// That was all.
+    Done,
+    /// The driver draws what is between Begin and End.
+    Driver,
+    /// The long way has to be taken. Nothing has happened that it may not do again.
+    Slow,
+}
+
 impl Context {
-    #[inline]
-    pub(crate) fn begin(&mut self, mode: u32) -> bool {
+    /// The short way of `glBegin`.
+    #[inline(always)]
+    pub(crate) fn begin_step(&mut self, mode: u32) -> Step {
         const DRAWS: u8 = class::MATRIX | class::LIGHT | class::RASTER | class::TEXTURE | class::CURRENT;
         let ready = self.sink == Sink::Outside && self.dirty & DRAWS == 0;
-        let traced = match self.verdict {
-            Verdict::Trace => self.state.program == 0,
-            Verdict::TraceIfOpaque(_) => self.state.program == 0 && self.is_opaque_now(),
-            _ => false,
-        };
-        if ready && traced && (TRIANGLES..=POLYGON).contains(&mode) {
+        if ready
+            && self.verdict == Verdict::Trace
+            && self.state.program == 0
+            && (TRIANGLES..=POLYGON).contains(&mode)
+        {
             self.recorder.begin(mode, &self.current);
             self.sink = Sink::Trace;
-            return true;
+            return Step::Done;
         }
-        guard(|| self.begin_slowly(mode)).unwrap_or(false)
+        Step::Slow
+    }
+
+    pub(crate) fn begin(&mut self, mode: u32) -> bool {
+        match self.begin_step(mode) {
+            Step::Slow => guard(|| self.begin_slowly(mode)).unwrap_or(false),
+            step => step == Step::Done,
+        }
     }
 
     /// True when a vertex now would have alpha 1.
@@ -102,17 +121,22 @@ impl Context {
         self.counters.pass(why, 1);
     }
 
-    #[inline]
-    pub(crate) fn end(&mut self) -> bool {
-        if self.sink == Sink::Trace {
+    /// The short way of `glEnd`.
+    #[inline(always)]
+    pub(crate) fn end_step(&mut self) -> Step {
+        if self.sink == Sink::Trace && self.verdict != Verdict::TraceInOrder {
             self.recorder.end();
             self.sink = Sink::Outside;
-            if self.verdict == Verdict::TraceInOrder {
-                guard(|| self.end_batch());
-            }
-            return true;
+            return Step::Done;
         }
-        guard(|| self.end_slowly()).unwrap_or(false)
+        Step::Slow
+    }
+
+    pub(crate) fn end(&mut self) -> bool {
+        match self.end_step() {
+            Step::Slow => guard(|| self.end_slowly()).unwrap_or(false),
+            step => step == Step::Done,
+        }
     }
 
     #[cold]
@@ -123,7 +147,13 @@ impl Context {
                 self.sink = Sink::Outside;
                 false
             }
-            _ => false,
+            Sink::Trace => {
+                self.recorder.end();
+                self.sink = Sink::Outside;
+                self.end_batch();
+                true
+            }
+            Sink::Outside => false,
         }
     }
 
@@ -148,13 +178,24 @@ impl Context {
         self.stale = 0;
     }
 
+    /// The short way of `glVertex`.
     #[inline(always)]
-    pub(crate) fn vertex(&mut self, v: [f32; 4]) -> bool {
-        if self.sink == Sink::Trace && v[3] == 1.0 {
-            self.recorder.vertex([v[0], v[1], v[2]], &self.current);
-            return true;
+    pub(crate) fn vertex_step(&mut self, v: [f32; 4]) -> Step {
+        match self.sink {
+            Sink::Trace if v[3] == 1.0 => {
+                self.recorder.vertex([v[0], v[1], v[2]], &self.current);
+                Step::Done
+            }
+            Sink::Pass => Step::Driver,
+            _ => Step::Slow,
         }
-        guard(|| self.vertex_slowly(v)).unwrap_or(false)
+    }
+
+    pub(crate) fn vertex(&mut self, v: [f32; 4]) -> bool {
+        match self.vertex_step(v) {
+            Step::Slow => guard(|| self.vertex_slowly(v)).unwrap_or(false),
+            step => step == Step::Done,
+        }
     }
 
     #[cold]
@@ -173,74 +214,104 @@ impl Context {
         }
     }
 
+    /// The short way of `glNormal`. Outside of Begin and End it is only remembered: what vertices take counts, and the next Begin looks.
     #[inline(always)]
-    pub(crate) fn normal(&mut self, v: [f32; 3]) -> bool {
+    pub(crate) fn normal_step(&mut self, v: [f32; 3]) -> Step {
         match self.sink {
-            Sink::List => return guard(|| self.list_normal(v)).unwrap_or(false),
-            Sink::Pass => {
-                self.current.normal = v;
-                return false;
-            }
-            // Only what vertices take counts: the next Begin looks.
             Sink::Outside => {
                 self.current.normal = v;
                 self.recorder.behind = true;
                 self.now_stale(stale::NORMAL);
-                return true;
+                Step::Done
             }
-            Sink::Trace => {}
+            Sink::Trace => {
+                self.current.normal = v;
+                self.recorder.set_normal(v);
+                self.now_stale(stale::NORMAL);
+                Step::Done
+            }
+            Sink::Pass => {
+                self.current.normal = v;
+                Step::Driver
+            }
+            Sink::List => Step::Slow,
         }
-        self.current.normal = v;
-        self.recorder.set_normal(v);
-        self.now_stale(stale::NORMAL);
-        true
     }
 
+    pub(crate) fn normal(&mut self, v: [f32; 3]) -> bool {
+        match self.normal_step(v) {
+            Step::Slow => guard(|| self.list_normal(v)).unwrap_or(false),
+            step => step == Step::Done,
+        }
+    }
+
+    /// The short way of `glColor`.
     #[inline(always)]
-    pub(crate) fn color(&mut self, v: [f32; 4]) -> bool {
+    pub(crate) fn color_step(&mut self, v: [f32; 4]) -> Step {
         match self.sink {
-            Sink::List => return guard(|| self.list_color(v)).unwrap_or(false),
-            Sink::Pass => {
-                self.current.color = v;
-                return false;
-            }
-            // Only what vertices take counts: the next Begin looks.
             Sink::Outside => {
                 self.current.color = v;
                 self.recorder.behind = true;
                 self.now_stale(stale::COLOR);
-                return true;
+                Step::Done
             }
-            Sink::Trace => {}
+            Sink::Trace if !matches!(self.verdict, Verdict::TraceIfOpaque(_)) => {
+                self.current.color = v;
+                self.recorder.set_color(v);
+                self.now_stale(stale::COLOR);
+                Step::Done
+            }
+            Sink::Pass => {
+                self.current.color = v;
+                Step::Driver
+            }
+            _ => Step::Slow,
         }
-        self.current.color = v;
-        self.recorder.set_color(v);
-        self.now_stale(stale::COLOR);
-        self.watch_alpha();
-        true
     }
 
-    #[inline(always)]
-    pub(crate) fn tex_coord(&mut self, v: [f32; 4]) -> bool {
-        match self.sink {
-            Sink::List => return guard(|| self.list_tex(v)).unwrap_or(false),
-            Sink::Pass => {
-                self.current.tex = v;
-                return false;
+    pub(crate) fn color(&mut self, v: [f32; 4]) -> bool {
+        match self.color_step(v) {
+            Step::Slow if self.sink == Sink::List => guard(|| self.list_color(v)).unwrap_or(false),
+            Step::Slow => {
+                self.current.color = v;
+                self.recorder.set_color(v);
+                self.now_stale(stale::COLOR);
+                self.watch_alpha();
+                true
             }
-            // Only what vertices take counts: the next Begin looks.
+            step => step == Step::Done,
+        }
+    }
+
+    /// The short way of `glTexCoord`.
+    #[inline(always)]
+    pub(crate) fn tex_coord_step(&mut self, v: [f32; 4]) -> Step {
+        match self.sink {
             Sink::Outside => {
                 self.current.tex = v;
                 self.recorder.behind = true;
                 self.now_stale(stale::TEX);
-                return true;
+                Step::Done
             }
-            Sink::Trace => {}
+            Sink::Trace => {
+                self.current.tex = v;
+                self.recorder.set_tex(v);
+                self.now_stale(stale::TEX);
+                Step::Done
+            }
+            Sink::Pass => {
+                self.current.tex = v;
+                Step::Driver
+            }
+            Sink::List => Step::Slow,
         }
-        self.current.tex = v;
-        self.recorder.set_tex(v);
-        self.now_stale(stale::TEX);
-        true
+    }
+
+    pub(crate) fn tex_coord(&mut self, v: [f32; 4]) -> bool {
+        match self.tex_coord_step(v) {
+            Step::Slow => guard(|| self.list_tex(v)).unwrap_or(false),
+            step => step == Step::Done,
+        }
     }
 
     pub(crate) fn material(&mut self, face: u32, what: u32, v: [f32; 4]) -> bool {

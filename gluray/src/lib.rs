@@ -34,6 +34,7 @@ mod frame;
 mod immediate;
 mod late;
 mod lighting;
+mod multisample;
 mod overrides;
 mod packs;
 pub mod panel;

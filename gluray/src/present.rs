@@ -103,7 +103,7 @@ impl Presenter {
         gl::use_program(program);
         gl::uniform1i(gl::uniform_location(program, "colors"), 0);
         gl::uniform1i(gl::uniform_location(program, "depths"), 1);
-        self.textures = [gl::gen_texture(), gl::gen_texture()];
+        self.textures = [gl::gen_texture(core), gl::gen_texture(core)];
         if core {
             self.vertex_array = gl::gen_vertex_array();
         }
@@ -248,7 +248,13 @@ impl Kept {
 impl Context {
     /// Draws the layers over one another.
     pub(crate) fn present(&mut self, layers: &[Layer], fate: Fate) {
+        self.present_sample(layers, fate, None);
+    }
+
+    /// The same into one sample of each pixel alone.
+    pub(crate) fn present_sample(&mut self, layers: &[Layer], fate: Fate, sample: Option<u32>) {
         self.keep_errors();
+        let mask = sample.map(gl::only_sample);
         let core = self.can.core;
         let kept = Kept::keep(core, self.can.version);
         if !core {
@@ -262,6 +268,9 @@ impl Context {
             self.pass(layers, fate, &kept);
         } else {
             self.counters.pass("the driver refuses our shader: what was traced is lost", 1);
+        }
+        if let Some(mask) = mask {
+            gl::all_samples(mask);
         }
         if !core {
             gl::pop_attrib();

@@ -5,6 +5,7 @@ use crate::capture::{Attributes, Run, Values};
 use crate::enums::QUADS;
 use crate::primitives::Split;
 use crate::state::current::{Current, Materials};
+use rt_core::glam::Vec3;
 use rt_core::mesh::TriMesh;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -38,6 +39,7 @@ impl<const N: usize> Stream<N> {
     }
 
     #[cold]
+    #[inline(never)]
     fn vary(&mut self, vertices: usize) {
         self.values = self.spares.pop().unwrap_or_default();
         self.values.clear();
@@ -62,6 +64,13 @@ impl<const N: usize> Stream<N> {
             self.spares.push(v);
         }
     }
+}
+
+/// Bit for bit: not a number is what it is.
+#[inline(always)]
+fn is_at(p: &Vec3, v: [f32; 3]) -> bool {
+    (p.x.to_bits() ^ v[0].to_bits()) | (p.y.to_bits() ^ v[1].to_bits()) | (p.z.to_bits() ^ v[2].to_bits())
+        == 0
 }
 
 /// A batch of an earlier frame, which may come again vertex by vertex.
@@ -107,7 +116,7 @@ pub(crate) struct Recorder {
 
 impl Recorder {
     /// A primitive begins.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn begin(&mut self, mode: u32, current: &Current) {
         self.open = self.count();
         self.mode = mode;
@@ -133,6 +142,8 @@ impl Recorder {
         self.followed + self.positions.len()
     }
 
+    #[cold]
+    #[inline(never)]
     fn start(&mut self, current: &Current) {
         (self.normals.constant, self.colors.constant, self.tex.constant) =
             (current.normal, current.color, current.tex);
@@ -142,7 +153,7 @@ impl Recorder {
     }
 
     /// The primitive ends.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn end(&mut self) {
         let count = (self.count() - self.open) as u32;
         self.calls += 1;
@@ -190,16 +201,12 @@ impl Recorder {
     #[inline(always)]
     pub(crate) fn vertex(&mut self, v: [f32; 3], current: &Current) {
         match &self.expected {
-            Some(mesh)
-                if mesh
-                    .positions
-                    .get(self.followed)
-                    .is_some_and(|p| p.to_array().map(f32::to_bits) == v.map(f32::to_bits)) =>
-            {
-                self.followed += 1;
+            Some(mesh) if mesh.positions.get(self.followed).is_some_and(|p| is_at(p, v)) => {
+                self.followed += 1
             }
             None if !self.positions.is_empty() => self.positions.push(v),
-            _ => self.unexpected(v),
+            // In parts: what lies in memory for the rare case would be put there for every vertex.
+            _ => self.unexpected(v[0], v[1], v[2]),
         }
         if self.normals.varying {
             self.normals.values.push(current.normal);
@@ -209,7 +216,7 @@ impl Recorder {
         }
     }
 
-    #[inline]
+    #[inline(never)]
     fn vertex_more(&mut self, current: &Current) {
         if self.colors.varying {
             self.colors.values.push(current.color);
@@ -224,7 +231,9 @@ impl Recorder {
 
     /// The first vertex of a batch, or one that is not what was expected.
     #[cold]
-    fn unexpected(&mut self, v: [f32; 3]) {
+    #[inline(never)]
+    fn unexpected(&mut self, x: f32, y: f32, z: f32) {
+        let v = [x, y, z];
         if self.expected.is_none()
             && self.followed == 0
             && let Some(e) = self.earlier.get(&v.map(f32::to_bits))

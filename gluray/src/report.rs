@@ -215,6 +215,9 @@ impl Counters {
         sum.faults = crate::fault::messages();
         sum.problems.extend(crate::config::current().problems.iter().cloned());
         sum.ranks = crate::ranks::accounts();
+        if let Some(own) = sum.ranks.first_mut() {
+            (own.builds, own.refits) = (sum.builds, sum.refits);
+        }
         sum.problems.extend(crate::ranks::problems());
         write_spans(&dir.join(format!("{}.spans", sum.pid)));
         let (file, fresh) = (dir.join(format!("{}.json", sum.pid)), dir.join(format!("{}.new", sum.pid)));

@@ -58,7 +58,7 @@ impl Prepared<'_> {
         let mut color = if s.flat { of(corners[2]) } else { mixed(corners.map(of), w) };
         if let (Some(unit), Some(image)) = (&s.texture, &self.image) {
             let coords = corners.map(|i| self.texture_coordinates(unit, i));
-            color = texturing::apply(unit, image, color, mixed(coords, w));
+            color = texturing::apply(unit, image, color, mixed(coords, w), None);
         }
         color
     }
@@ -77,6 +77,39 @@ impl Prepared<'_> {
         texturing::coordinates(unit, &self.draw.state, &self.draw.attributes, &self.lighting, i, p)
     }
 
+    /// How many texels of a texture of `size` the fragment of triangle `prim` covers at a pixel; `None` where the triangle's plane goes through the eye there.
+    ///
+    /// The driver's way: the differences of two by two pixels, from the upper left one to its neighbours.
+    fn footprint(
+        &self,
+        prim: usize,
+        corners: [[f32; 4]; 3],
+        size: [f32; 2],
+        pixel: (i32, i32),
+    ) -> Option<f32> {
+        let s = &*self.draw.state;
+        let (x, y) = (pixel.0 & !1, pixel.1);
+        // The rows of a window are counted from its top.
+        let (top, below) = match s.framebuffer {
+            0 => {
+                let height = s.viewport[1] + s.viewport[3];
+                let row = (height - 1 - y) & !1;
+                (height - 1 - row, height - 2 - row)
+            }
+            _ => (y & !1, (y & !1) + 1),
+        };
+        let at = |x: i32, y: i32| {
+            let w = self.weights_at(prim, x, y)?;
+            Some(texturing::divided(mixed(corners, w)))
+        };
+        let (here, right, down) = (at(x, top)?, at(x + 1, top)?, at(x, below)?);
+        let length = |to: [f32; 2]| {
+            let d: [f32; 2] = std::array::from_fn(|k| (to[k] - here[k]) * size[k]);
+            d[0].hypot(d[1])
+        };
+        Some(length(right).max(length(down)))
+    }
+
     /// The colour that the mode gives a fragment.
     pub(crate) fn shaded(
         &self,
@@ -92,13 +125,13 @@ impl Prepared<'_> {
             Shading::Program(_) => true,
         };
         if around.is_none() || !lit {
-            return self.color(prim, f, per_pixel, &Visibility::FULL);
+            return self.color(prim, f, per_pixel, &Visibility::FULL, Some(pixel));
         }
         let (eye, _) = self.eye_point(prim, f.weights.map(|w| w as f32));
         let clip = matrix(&self.draw.state.projection);
         let parallel = matches!(self.draw.shading, Shading::Fixed) && clip.row(3).truncate() == DVec3::ZERO;
         let towards = if parallel { DVec3::Z } else { -vector(eye) };
-        self.shaded_from(prim, f, mode, around, pixel, towards)
+        self.lit_from(prim, f, mode, around, (pixel, true), towards)
     }
 
     /// The same, as somebody sees it who looks along `-towards` (eye space).
@@ -111,10 +144,24 @@ impl Prepared<'_> {
         pixel: (i32, i32),
         towards: DVec3,
     ) -> [f32; 4] {
+        self.lit_from(prim, f, mode, around, (pixel, false), towards)
+    }
+
+    /// Of the pixel we also know whether the eye sees the fragment there.
+    fn lit_from(
+        &self,
+        prim: usize,
+        f: &Fragment,
+        mode: Mode,
+        around: Option<&Surroundings<'_>>,
+        (pixel, seen): ((i32, i32), bool),
+        towards: DVec3,
+    ) -> [f32; 4] {
+        let own = seen.then_some(pixel);
         let per_pixel = matches!(mode, Mode::Phong | Mode::Rich | Mode::Path);
         let lit = self.draw.state.lighting || matches!(self.draw.shading, Shading::Program(_));
         let (Some(around), true) = (around, lit) else {
-            return self.color(prim, f, per_pixel, &Visibility::FULL);
+            return self.color(prim, f, per_pixel, &Visibility::FULL, own);
         };
         // The plane of the triangle, turned to the viewer: what is in front of it is what the eye sees.
         let weights = f.weights.map(|w| w as f32);
@@ -128,9 +175,9 @@ impl Prepared<'_> {
             // Lights at the eye cast no shadow that it could see; corners dim them all the same.
             let mut r = reaches;
             r.lights.iter_mut().for_each(|l| *l *= 0.5 + 0.5 * reaches.ambient);
-            return self.color(prim, f, per_pixel, &r);
+            return self.color(prim, f, per_pixel, &r, own);
         }
-        let color = self.color(prim, f, per_pixel, &Visibility::FULL);
+        let color = self.color(prim, f, per_pixel, &Visibility::FULL, own);
         let n = self.places.len().clamp(1, crate::effects::MOST_LIGHTS);
         let light = reaches.lights[..n].iter().sum::<f32>() / n as f32;
         let dim = (0.4 + 0.6 * light) * (0.3 + 0.7 * reaches.ambient);
@@ -138,7 +185,15 @@ impl Prepared<'_> {
     }
 
     /// The colour of OpenGL's lighting: at the vertices, or at the fragment itself.
-    pub(crate) fn color(&self, prim: usize, f: &Fragment, per_pixel: bool, reaches: &Visibility) -> [f32; 4] {
+    /// `pixel` is the window's that sees it, where the eye does.
+    pub(crate) fn color(
+        &self,
+        prim: usize,
+        f: &Fragment,
+        per_pixel: bool,
+        reaches: &Visibility,
+        pixel: Option<(i32, i32)>,
+    ) -> [f32; 4] {
         let mesh = &self.draw.geometry.mesh;
         let corners = mesh.indices[prim].map(|i| i as usize);
         if let Shading::Program(program) = &self.draw.shading {
@@ -175,7 +230,11 @@ impl Prepared<'_> {
         };
         if let (Some(unit), Some(image)) = (&s.texture, &self.image) {
             let coords = corners.map(|i| self.texture_coordinates(unit, i));
-            color = texturing::apply(unit, image, color, mixed(coords, w));
+            let rho = pixel.filter(|_| image.needs_footprint());
+            let [across, up] = image.size();
+            let size = [across, if unit.target == TEXTURE_1D { 0.0 } else { up }];
+            let rho = rho.and_then(|at| self.footprint(prim, coords, size, at));
+            color = texturing::apply(unit, image, color, mixed(coords, w), rho);
         }
         for k in 0..3 {
             color[k] = (color[k] + secondary[k]).clamp(0.0, 1.0);

@@ -1,95 +1,16 @@
 //! Texture unit 0 of fixed function: coordinates at a vertex, texels at a fragment, and the environment that brings both together
 //! (compatibility profile specification, sections 12.1.3, 8.14 and 16.1).
 
+mod image;
+mod sampling;
+
 use crate::capture::Attributes;
 use crate::enums::*;
 use crate::lighting::{Setup, normalized, transform};
-use crate::ranks::wire::{Malformed, Reader, Wire, put_pods};
 use crate::real::gl;
 use crate::state::snapshot::{Snapshot, TextureUnit};
-use rt_core::texture::{Filter, Texture, Wrap};
-use std::collections::HashMap;
-use std::sync::Arc;
-
-/// What a texture's components stand for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Base {
-    Alpha,
-    Luminance,
-    LuminanceAlpha,
-    Intensity,
-    Rgb,
-    Rgba,
-}
-
-/// Level 0 of a texture.
-#[derive(Debug, Clone)]
-pub(crate) struct Image {
-    pub(crate) width: usize,
-    pub(crate) height: usize,
-    pub(crate) texels: Vec<[f32; 4]>,
-    base: Base,
-    linear: bool,
-    wrap: [u32; 2],
-    border: [f32; 4],
-}
-
-crate::ranks::wire::wire_enum!(Base { Alpha, Luminance, LuminanceAlpha, Intensity, Rgb, Rgba });
-
-impl Wire for Image {
-    fn put(&self, out: &mut Vec<u8>) {
-        (self.width, self.height).put(out);
-        put_pods(out, &self.texels);
-        self.base.put(out);
-        self.linear.put(out);
-        self.wrap.put(out);
-        self.border.put(out);
-    }
-    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
-        let (width, height): (usize, usize) = Wire::get(from)?;
-        let texels = from.pods()?;
-        if width.checked_mul(height) != Some(texels.len()) || texels.is_empty() {
-            return Err(from.fault(format!("an image of {width} x {height} with {} texels", texels.len())));
-        }
-        let (base, linear) = Wire::get(from)?;
-        let (wrap, border) = Wire::get(from)?;
-        Ok(Image { width, height, texels, base, linear, wrap, border })
-    }
-}
-
-fn base_of(format: u32) -> Base {
-    match format {
-        0x1906 | 0x803b..=0x803e => Base::Alpha,
-        1 | 0x1909 | 0x803f..=0x8042 => Base::Luminance,
-        2 | 0x190a | 0x8043..=0x8048 => Base::LuminanceAlpha,
-        0x8049..=0x804d => Base::Intensity,
-        3 | 0x1907 | 0x2a10 | 0x804f..=0x8054 => Base::Rgb,
-        _ => Base::Rgba,
-    }
-}
-
-/// The version at which a texture was read, and what it was.
-type Versioned = (u64, Option<Arc<Image>>);
-
-/// Images by texture name, with the version they were read at.
-#[derive(Default)]
-pub(crate) struct Images {
-    images: HashMap<(u32, u32), Versioned>,
-}
-
-impl Images {
-    /// The image of the bound texture; `None` when it is incomplete (then OpenGL leaves texturing out) or cannot be followed.
-    pub(crate) fn get(&mut self, target: u32, name: u32, version: u64) -> Option<Arc<Image>> {
-        if let Some((v, image)) = self.images.get(&(target, name))
-            && *v == version
-        {
-            return image.clone();
-        }
-        let image = read(target).map(Arc::new);
-        self.images.insert((target, name), (version, image.clone()));
-        image
-    }
-}
+use image::Base;
+pub(crate) use image::{Image, Images};
 
 /// Texels of the greatest texture that is read.
 const MOST_TEXELS: i64 = 1 << 26;
@@ -105,12 +26,15 @@ pub(crate) fn followed(target: u32) -> Result<(), &'static str> {
 }
 
 /// Why fixed function's sampling of the bound texture cannot be followed; `None` when it can, or when the texture is incomplete and so left out.
-pub(crate) fn unfollowed(target: u32) -> Option<&'static str> {
-    let level = |what| gl::tex_level_i::<1>(target, 0, what)[0];
+pub(crate) fn unfollowed(target: u32, version: u32) -> Option<&'static str> {
     const TEXTURE_BASE_LEVEL: u32 = 0x813c;
-    if gl::tex_parameter_i::<1>(target, TEXTURE_BASE_LEVEL)[0] != 0 {
-        return Some("a texture whose base level is not 0");
-    }
+    const TEXTURE_MAX_ANISOTROPY: u32 = 0x84fe;
+    const TEXTURE_SWIZZLE: [u32; 4] = [0x8e42, 0x8e43, 0x8e44, 0x8e45];
+    const SAMPLER_BINDING: u32 = 0x8919;
+    const IN_ORDER: [i32; 4] = [0x1903, 0x1904, 0x1905, 0x1906];
+    let parameter = |what| gl::tex_parameter_i::<1>(target, what)[0];
+    let base = parameter(TEXTURE_BASE_LEVEL).clamp(0, 31);
+    let level = |what| gl::tex_level_i::<1>(target, base, what)[0];
     let (width, height) = (i64::from(level(TEXTURE_WIDTH)), i64::from(level(TEXTURE_HEIGHT)));
     if width <= 0 || height <= 0 {
         return None;
@@ -123,109 +47,16 @@ pub(crate) fn unfollowed(target: u32) -> Option<&'static str> {
         0x8d70..=0x8d8f => return Some("a texture of integers"),
         _ => {}
     }
-    let min = gl::tex_parameter_i::<1>(target, TEXTURE_MIN_FILTER)[0].cast_unsigned();
-    let mag = gl::tex_parameter_i::<1>(target, TEXTURE_MAG_FILTER)[0].cast_unsigned();
-    match min {
-        NEAREST | LINEAR if min == mag => None,
-        NEAREST | LINEAR => Some("a texture with two filters"),
-        _ => Some("a texture with mipmaps"),
+    if gl::tex_parameter_f::<1>(target, TEXTURE_MAX_ANISOTROPY)[0] > 1.0 {
+        return Some("a texture with anisotropic filtering");
     }
-}
-
-fn read(target: u32) -> Option<Image> {
-    let level = |what| gl::tex_level_i::<1>(target, 0, what)[0];
-    let (width, height) = (level(TEXTURE_WIDTH).max(0) as usize, level(TEXTURE_HEIGHT).max(0) as usize);
-    if width == 0 || height == 0 || (width * height) as i64 > MOST_TEXELS {
-        return None;
+    if version >= 33 && TEXTURE_SWIZZLE.map(parameter) != IN_ORDER {
+        return Some("a texture with its components in another order");
     }
-    let base = base_of(level(TEXTURE_INTERNAL_FORMAT).cast_unsigned());
-    let parameter = |what| gl::tex_parameter_i::<1>(target, what)[0].cast_unsigned();
-    Some(Image {
-        width,
-        height,
-        texels: gl::tex_image_rgba(target, width * height),
-        base,
-        linear: parameter(TEXTURE_MAG_FILTER) == LINEAR,
-        wrap: [
-            parameter(TEXTURE_WRAP_S),
-            if target == TEXTURE_1D { CLAMP_TO_EDGE } else { parameter(TEXTURE_WRAP_T) },
-        ],
-        border: gl::tex_parameter_f(target, TEXTURE_BORDER_COLOR),
-    })
-}
-
-impl Image {
-    /// True when no texel lets anything through.
-    pub(crate) fn is_opaque(&self) -> bool {
-        self.texels.iter().all(|t| t[3] == 1.0)
-            && (self.wrap != [CLAMP_TO_BORDER; 2] || self.border[3] == 1.0)
+    if version >= 33 && gl::word(SAMPLER_BINDING) != 0 {
+        return Some("a sampler object");
     }
-
-    /// The picture as a texture of rt-core's, with what its components stand for; `None` when it cannot be one.
-    pub(crate) fn as_texture(&self) -> Option<Texture> {
-        let rgba = |t: &[f32; 4]| match self.base {
-            Base::Alpha => [1.0, 1.0, 1.0, t[3]],
-            Base::Luminance => [t[0], t[0], t[0], 1.0],
-            Base::LuminanceAlpha => [t[0], t[0], t[0], t[3]],
-            Base::Intensity => [t[0]; 4],
-            Base::Rgb => [t[0], t[1], t[2], 1.0],
-            Base::Rgba => *t,
-        };
-        let texels = self.texels.iter().map(rgba).collect();
-        let wrap = self.wrap.map(|w| match w {
-            REPEAT => Wrap::Repeat,
-            MIRRORED_REPEAT => Wrap::Mirror,
-            _ => Wrap::Clamp,
-        });
-        let filter = if self.linear { Filter::Bilinear } else { Filter::Nearest };
-        let mut texture = Texture::from_linear(self.width, self.height, texels).ok()?;
-        (texture.wrap, texture.filter) = (wrap, filter);
-        Some(texture)
-    }
-
-    fn texel(&self, x: i64, y: i64) -> [f32; 4] {
-        let (w, h) = (self.width as i64, self.height as i64);
-        let place = |i: i64, n: i64, wrap: u32| match wrap {
-            REPEAT => Some(i.rem_euclid(n)),
-            MIRRORED_REPEAT => {
-                let k = i.rem_euclid(2 * n);
-                Some(if k < n { k } else { 2 * n - 1 - k })
-            }
-            CLAMP_TO_EDGE => Some(i.clamp(0, n - 1)),
-            _ => (0..n).contains(&i).then_some(i),
-        };
-        match (place(x, w, self.wrap[0]), place(y, h, self.wrap[1])) {
-            (Some(x), Some(y)) => self.texels[(y * w + x) as usize],
-            _ => self.border,
-        }
-    }
-
-    /// The filtered texel at (s, t).
-    pub(crate) fn sample(&self, s: f32, t: f32) -> [f32; 4] {
-        let clamp = |v: f32, wrap: u32| if wrap == CLAMP { v.clamp(0.0, 1.0) } else { v };
-        let x = clamp(s, self.wrap[0]) * self.width as f32;
-        let y = clamp(t, self.wrap[1]) * self.height as f32;
-        if !(x.is_finite() && y.is_finite()) {
-            return self.border;
-        }
-        if !self.linear {
-            // GL_CLAMP at 1 is the last texel here.
-            let last = |v: f32, n: usize, wrap: u32| {
-                let i = v.floor() as i64;
-                if wrap == CLAMP { i.min(n as i64 - 1) } else { i }
-            };
-            return self.texel(last(x, self.width, self.wrap[0]), last(y, self.height, self.wrap[1]));
-        }
-        let (x, y) = (x - 0.5, y - 0.5);
-        let (i, j) = (x.floor(), y.floor());
-        let (a, b) = (x - i, y - j);
-        let (i, j) = (i as i64, j as i64);
-        let [p, q, r, u] = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| self.texel(i + dx, j + dy));
-        std::array::from_fn(|k| {
-            let (lo, hi) = (p[k] + (q[k] - p[k]) * a, r[k] + (u[k] - r[k]) * a);
-            lo + (hi - lo) * b
-        })
-    }
+    None
 }
 
 /// Texture coordinates of vertex `i`, generated and transformed.
@@ -261,10 +92,25 @@ pub(crate) fn coordinates(
     std::array::from_fn(|r| m[r] * c[0] + m[4 + r] * c[1] + m[8 + r] * c[2] + m[12 + r] * c[3])
 }
 
-/// The fragment's colour after the texture environment.
-pub(crate) fn apply(unit: &TextureUnit, image: &Image, f: [f32; 4], coords: [f32; 4]) -> [f32; 4] {
+/// Where coordinates are on the texture.
+pub(crate) fn divided(coords: [f32; 4]) -> [f32; 2] {
     let q = if coords[3] == 0.0 { 1.0 } else { coords[3] };
-    let t = image.sample(coords[0] / q, coords[1] / q);
+    [coords[0] / q, coords[1] / q]
+}
+
+/// The fragment's colour after the texture environment. `rho` is how many texels its pixel covers, where that is known.
+pub(crate) fn apply(
+    unit: &TextureUnit,
+    image: &Image,
+    f: [f32; 4],
+    coords: [f32; 4],
+    rho: Option<f32>,
+) -> [f32; 4] {
+    let [u, v] = divided(coords);
+    let t = match rho {
+        Some(rho) => image.sample_over(u, v, rho),
+        None => image.sample(u, v),
+    };
     environment(unit.env_mode, unit.env_color, image.base, f, t)
 }
 
@@ -310,29 +156,6 @@ fn environment(mode: u32, constant: [f32; 4], base: Base, f: [f32; 4], t: [f32; 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn image(linear: bool, wrap: u32) -> Image {
-        let texels = vec![[0.0; 4], [1.0; 4]];
-        Image {
-            width: 2,
-            height: 1,
-            texels,
-            base: Base::Rgba,
-            linear,
-            wrap: [wrap, CLAMP_TO_EDGE],
-            border: [0.5; 4],
-        }
-    }
-
-    #[test]
-    fn filters_and_wraps_are_opengls() {
-        assert_eq!(image(false, REPEAT).sample(1.3, 0.0)[0], 0.0);
-        assert_eq!(image(false, MIRRORED_REPEAT).sample(1.3, 0.0)[0], 1.0);
-        assert_eq!(image(false, CLAMP_TO_BORDER).sample(1.3, 0.0)[0], 0.5);
-        assert_eq!(image(true, CLAMP_TO_EDGE).sample(0.5, 0.5)[0], 0.5);
-        assert_eq!(image(true, CLAMP_TO_EDGE).sample(9.0, 0.5)[0], 1.0);
-        assert_eq!(image(true, CLAMP).sample(1.0, 0.5)[0], 0.75, "half edge, half border");
-    }
 
     #[test]
     fn environments_follow_the_table_of_the_specification() {

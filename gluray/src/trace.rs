@@ -106,7 +106,6 @@ pub(crate) struct Prepared<'a> {
     /// OpenGL's lighting at the vertices can be had for 16 fragments at a time.
     blocks: bool,
     pub(crate) image: Option<Arc<Image>>,
-    /// A mirrored projection or `glFrontFace` changes what counts as front.
     pub(crate) rays: AtomicU64,
 }
 
@@ -254,6 +253,27 @@ impl<'a> Prepared<'a> {
     fn corners(&self, prim: usize) -> [[f32; 4]; 3] {
         let mesh = &self.draw.geometry.mesh;
         mesh.triangle(prim).map(|p| transform(&self.draw.clip_from_object, p.to_array()))
+    }
+
+    /// Weights of a triangle's corners where its plane is seen at the centre of a pixel, be it inside or not; `None` where that is nowhere.
+    pub(crate) fn weights_at(&self, prim: usize, x: i32, y: i32) -> Option<[f32; 3]> {
+        let [vx, vy, vw, vh] = self.draw.state.viewport.map(f64::from);
+        let [dx, dy] = self.draw.state.sample_place.map(f64::from);
+        let (px, py) = (f64::from(x) + 0.5 - dx, f64::from(y) + 0.5 - dy);
+        let at = DVec3::new(2.0 * (px - vx) / vw - 1.0, 2.0 * (py - vy) / vh - 1.0, 1.0);
+        let h = self.corners(prim).map(|v| DVec3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[3])));
+        let l = [h[1].cross(h[2]).dot(at), h[2].cross(h[0]).dot(at), h[0].cross(h[1]).dot(at)];
+        let sum = l[0] + l[1] + l[2];
+        (sum != 0.0 && sum.is_finite()).then(|| l.map(|v| (v / sum) as f32))
+    }
+
+    /// The fragment as it is shaded: one of several samples takes the colour of the middle of its pixel.
+    pub(crate) fn centred(&self, prim: usize, f: Fragment, x: i32, y: i32) -> Fragment {
+        if self.draw.state.sample_place == [0.0; 2] {
+            return f;
+        }
+        let weights = self.weights_at(prim, x, y).map_or(f.weights, |w| w.map(f64::from));
+        Fragment { weights, ..f }
     }
 
     /// The fragment of triangle `prim` at the centre of pixel (`x`, `y`), if the rasterizer makes one.
@@ -464,6 +484,8 @@ pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings, share: Share)
                 depth[k] = s.fragment.depth as f32;
                 n += 1;
                 let p = &draws[s.draw as usize];
+                let at = (x + tx as i32, y + ty as i32);
+                let s = &Seen { fragment: p.centred(s.prim as usize, s.fragment, at.0, at.1), ..*s };
                 if p.blocks && mode == Mode::Match {
                     if batch.count > 0 && batch.draw != s.draw {
                         batch.shade(&draws[batch.draw as usize], color);
@@ -471,7 +493,6 @@ pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings, share: Share)
                     batch.add(p, s.draw, k, s, color);
                     continue;
                 }
-                let at = (x + tx as i32, y + ty as i32);
                 color[k] = to_bytes(p.shaded(s.prim as usize, &s.fragment, mode, around.as_ref(), at));
             }
         }

@@ -67,6 +67,32 @@ fn blending_in_order_is_traced_when_all_is_asked_for() {
     check("blended_over_traced", &Expected { traced: true, exit: 0 }, &["--trace", "all"]);
 }
 
+fn check_all(cases: &[&str]) {
+    for case in cases {
+        check(case, &Expected { traced: true, exit: 0 }, &[]);
+    }
+}
+
+#[test]
+fn mipmaps_are_the_drivers() {
+    check_all(&["mipmaps", "levels_and_limits_of_textures", "generated_mipmaps"]);
+}
+
+#[test]
+fn what_was_drawn_keeps_its_texels_and_textures_that_are_gone_are_not_held() {
+    check_all(&["textures_replaced_between_draws", "a_thousand_textures"]);
+}
+
+#[test]
+fn samples_are_the_drivers_one_by_one_and_resolved() {
+    check_all(&["samples_of_surfaces", "resolved_samples", "samples_switched_off"]);
+}
+
+#[test]
+fn samples_of_draws_in_order_are_written_one_by_one() {
+    check("samples_in_order", &Expected { traced: true, exit: 0 }, &["--trace", "all"]);
+}
+
 #[test]
 fn of_layers_in_one_plane_the_last_is_seen() {
     check("layers_in_one_plane", &Expected { traced: true, exit: 0 }, &["--trace", "all"]);

@@ -100,3 +100,20 @@ fn conformance_tests_of_filled_primitives_pass_and_are_traced() {
 fn conformance_tests_of_errors_lists_and_selection_pass() {
     all(OTHERS, false);
 }
+
+#[test]
+fn textures_replaced_five_thousand_times_cost_no_more_than_natively() {
+    let line = "streaming-texture-leak -auto -fbo";
+    let Some(piglit) = peer("RTSV_PIGLIT") else { return };
+    let Some(x) = Xvfb::start() else { return };
+    let timed = |through: Option<&[&str]>| {
+        let start = std::time::Instant::now();
+        (verdict(&x, &piglit, line, through), start.elapsed().as_secs_f64())
+    };
+    let ((native, _), native_secs) = timed(None);
+    let ((ours, traced), secs) = timed(Some(&["--trace", "all"]));
+    assert_eq!((native.as_str(), ours.as_str()), ("pass", "pass"));
+    assert_eq!(traced, 5000);
+    // Machines that run tests are busy.
+    assert!(secs < 2.0 * native_secs + 10.0, "{secs} s, natively {native_secs} s");
+}

@@ -48,6 +48,7 @@ fn a_program_draws_the_same_bits_on_any_number_of_ranks() {
             assert_eq!(report.ranks.len().to_string(), *ranks);
             for r in &report.ranks {
                 assert!(r.pictures > 0 && r.trace_ms > 0.0, "{mode}: {r:?}");
+                assert!(r.rays > 1000 && r.builds > 0, "{mode}: {r:?}");
                 assert!(r.rank == 0 || (r.sent_bytes > 10_000 && r.received_bytes > 10_000), "{mode}: {r:?}");
             }
         }

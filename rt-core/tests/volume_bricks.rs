@@ -5,7 +5,7 @@ use rt_core::grid::Grid;
 use rt_core::ray::Ray;
 use rt_core::transfer_function::TransferFunction;
 use rt_core::volume::{
-    Brick, Interpolation, Marched, Volume, VolumeOptions, VolumeQuality, VolumeSample, VolumeShading,
+    Brick, Course, Interpolation, Marched, Volume, VolumeOptions, VolumeQuality, VolumeSample, VolumeShading,
 };
 
 const DIMS: UVec3 = UVec3::new(41, 37, 29);
@@ -87,20 +87,23 @@ fn rays_through_bricks_have_the_bits_of_rays_through_the_whole() {
                     let ray = ray(n, &mut random);
                     let t1 = if n.is_multiple_of(3) { 0.8 } else { f32::INFINITY };
                     let expected = whole.integrate(&ray, 0.0, t1, &quality);
-                    let mut order: Vec<usize> = Vec::new();
-                    whole.blocks_along(&ray, 0.0, t1, |block| {
-                        let brick = bricks.iter().position(|b| b.contains(block)).unwrap();
-                        if order.last() != Some(&brick) {
-                            assert!(!order.contains(&brick), "a brick is convex");
-                            order.push(brick);
+                    // Which brick holds which spans.
+                    let mut order: Vec<(usize, usize)> = Vec::new();
+                    Course::new(vec![(&whole, ray)], 0.0, t1).spans(|k, here| {
+                        let brick = bricks.iter().position(|b| b.contains(here[0].1)).unwrap();
+                        if order.last().map(|o| o.0) != Some(brick) {
+                            assert!(order.iter().all(|o| o.0 != brick), "a brick is convex");
+                            order.push((brick, k));
                         }
-                        true
                     });
-                    let carried = order.iter().fold(Marched::default(), |m, &k| {
+                    let mut carried = Marched::default();
+                    for (k, (brick, first)) in order.iter().enumerate() {
+                        let end = order.get(k + 1).map_or(usize::MAX, |next| next.1);
                         // As it would come out of a message.
-                        let m = Marched::from_words(&m.to_words());
-                        parts[k].carry_on(&ray, 0.0, t1, &quality, m)
-                    });
+                        let m = Marched::from_words(&carried.to_words());
+                        let course = Course::new(vec![(&parts[*brick], ray)], 0.0, t1);
+                        carried = course.carry_on(*first..end, &quality, m);
+                    }
                     let what = format!("{interpolation:?} {quality:?}, ray {n}, bricks {order:?}");
                     assert_eq!(bits(&carried.sample()), bits(&expected), "{what}");
                     met += u32::from(expected.samples > 0);

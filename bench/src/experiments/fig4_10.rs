@@ -1,7 +1,8 @@
-//! Figure 4.10: replicated data, pieces of the picture to ranks (section 4.2.3), beside the same scene in parts.
+//! Figure 4.10: replicated data, pieces of the picture to ranks (section 4.2.3), beside the same scene in parts, and beside processes that share the pictures of an
+//! unmodified program ([`super::program_ranks`]).
 
-use super::Context;
 use super::many_ranks::{Sharing, cost_columns, frames, powers, with_cost};
+use super::{Context, program_ranks};
 use crate::plot::{Axis, Plot, Series};
 use crate::record::{Record, Row};
 use composite::render::demo::Demo;
@@ -9,8 +10,9 @@ use composite::render::{FrameOptions, Partition, Split};
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     cost_columns(record);
-    record.column("sharing", "", "replicated: every rank has the scene; parts: every rank has a share of it");
+    record.column("sharing", "", "replicated: every rank has the scene; parts: every rank has a share of it; gluray: a program and its helpers, which have the scene");
     record.column("speedup", "", "frame time of one rank over that of this many, same sharing");
+    program_ranks::columns(record);
     record.column("imbalance", "", "slowest rank’s render time over the mean");
     record.notes.push(
         "The wavelet with a lamp’s shadows and ambient occlusion. Replicated data need a whole scene’s memory on every rank, and then no ray leaves \
@@ -42,8 +44,9 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             );
         }
     }
+    program_ranks::run(context, record)?;
     let mut plot = Plot::lines("Sharing", Axis::log("ranks", ""), Axis::log("time of a frame", "ms"));
-    for name in ["replicated", "parts"] {
+    for name in ["replicated", "parts", program_ranks::SHARING] {
         for (column, of_what) in [("frame", ""), ("render_max", ", slowest rank’s render")] {
             let of = record.rows.iter().filter(|r| r.text("sharing") == Some(name));
             let points = of.filter_map(|r| r.number("ranks").zip(r.number(column))).collect();

@@ -25,6 +25,7 @@ mod passing;
 mod peers;
 mod peers_schlieren;
 mod pictures;
+mod program_ranks;
 mod shock_angles;
 mod smpi;
 mod speed_schlieren;
@@ -139,7 +140,7 @@ pub const ALL: &[Experiment] = &[
     Experiment {
         id: "fig4.10",
         chapter: 4,
-        title: "Replicated data against data in parts, 1 to 128 ranks",
+        title: "Replicated data against data in parts, 1 to 128 ranks; and processes that make a program’s picture",
         run: fig4_10::run,
     },
     Experiment {

@@ -54,6 +54,8 @@ pub enum Way {
     Serial,
     /// Through us, each frame shown while the next one comes.
     Asynchronous,
+    /// Through us, by so many processes.
+    Ranks(u32),
 }
 
 impl Way {
@@ -63,6 +65,7 @@ impl Way {
             Way::Llvmpipe => "llvmpipe",
             Way::Serial => "gluray",
             Way::Asynchronous => "gluray, one frame late",
+            Way::Ranks(_) => "gluray, several processes",
         }
     }
 }
@@ -113,6 +116,9 @@ impl Session {
                 let gluray = gluray.with_context(|| format!("{} needs gluray", way.name()))?;
                 let mut c = Command::new(gluray);
                 c.args(["--quiet", "run", "--mode", "match", "--report"]).arg(report);
+                if let Way::Ranks(ranks) = way {
+                    c.args(["--ranks", &ranks.to_string()]);
+                }
                 let late = if way == Way::Asynchronous { "on" } else { "off" };
                 c.args(["--set", &format!("asynchronous={late}"), "--"]).arg(&executable);
                 c
@@ -182,6 +188,15 @@ impl Session {
             self.wait_for("frame")?;
         }
         Ok(Cost { wall_secs: start.elapsed().as_secs_f64(), cpu_secs: cpu_secs(self.pid)? - cpu })
+    }
+
+    /// Has VTK write what is in its window, as raw RGB behind a short head.
+    pub fn save(&mut self, file: &Path) -> anyhow::Result<Vec<u8>> {
+        anyhow::ensure!(self.program == Program::Vtk, "{} is not made to save pictures", self.program.name());
+        self.input.write_all(format!("save {}\n", file.display()).as_bytes())?;
+        self.input.flush()?;
+        self.wait_for("saved")?;
+        std::fs::read(file).with_context(|| format!("no picture `{}`", file.display()))
     }
 
     /// The most memory that the program has held, in bytes.

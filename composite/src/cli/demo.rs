@@ -8,7 +8,7 @@ use crate::pixel::DepthPixel;
 use crate::report::Report;
 use crate::scenes::{Drawn, Scene};
 use anyhow::Context as _;
-use datasets::cli::{CommonArgs, Status, UsageError};
+use datasets::cli::{CommonArgs, CureExt as _, Status, UsageError};
 use datasets::image_io::{Picture, PngDepth, write_png};
 use serde::Serialize;
 use std::ffi::OsString;
@@ -48,7 +48,7 @@ pub(super) struct DemoArgs {
     #[arg(long, default_value_t = 1024, value_name = "PIXELS")]
     pub(super) size: u32,
     /// In place of a data set: frames made without a renderer
-    #[arg(long, value_name = "discs|dense|frag")]
+    #[arg(long, value_name = "discs|dense|frag", conflicts_with_all = ["data", "data_size", "view", "headlight", "grey", "cut_by_view"])]
     scene: Option<Scene>,
     /// Frames; the last is shown
     #[arg(long, default_value_t = 5, value_name = "N")]
@@ -134,6 +134,12 @@ type Finished = (String, f64, Vec<[u8; 4]>, Vec<Line>);
 pub(super) fn demo(common: CommonArgs, args: &DemoArgs, arguments: &[OsString]) -> anyhow::Result<Status> {
     if args.size == 0 || args.size > 32_768 || args.frames == 0 {
         return Err(UsageError("give a size of 1 to 32768 pixels and at least one frame".to_string()).into());
+    }
+    // Before anything is rendered: a folder that cannot be made is found out now.
+    if !args.ranks.is_rank() {
+        std::fs::create_dir_all(&args.out)
+            .with_context(|| format!("cannot make the folder {}", args.out.display()))
+            .cure("name another in --out")?;
     }
     let Some(scene) = args.scene else {
         return demo_data::demo(common, args, arguments);

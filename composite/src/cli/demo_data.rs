@@ -67,6 +67,8 @@ struct Shown {
     size_px: u32,
     frame_ms: f64,
     light: String,
+    /// Triangles and other primitives that cannot be hit: with NaN, infinite or absurd corners.
+    unusable: usize,
     picture: PathBuf,
     plot: PathBuf,
     ranks: Vec<RankLine>,
@@ -76,6 +78,7 @@ struct Shown {
 struct Finished {
     transport: String,
     light: String,
+    unusable: usize,
     colors: Vec<[f32; 4]>,
     lines: Vec<RankLine>,
 }
@@ -140,14 +143,21 @@ fn finish(common: CommonArgs, args: &DemoArgs, f: Finished) -> anyhow::Result<St
         size_px: args.size,
         frame_ms,
         light: f.light,
+        unusable: f.unusable,
         picture,
         plot,
         ranks: f.lines,
     };
     common.result(&shown, || {
         format!(
-            "{title}\nlight: {}\n{}\npicture: {}\nplot:    {}",
+            "{title}\nlight: {}\n{}{}\npicture: {}\nplot:    {}",
             shown.light,
+            match shown.unusable {
+                0 => String::new(),
+                n => format!(
+                    "left out: {n} primitives with corners that are no places (NaN, infinite, too large)\n"
+                ),
+            },
             timeline::table(&shown.ranks),
             shown.picture.display(),
             shown.plot.display()
@@ -178,5 +188,11 @@ fn frames(comm: &mut RankComm, args: &DemoArgs, prepared: &Prepared) -> anyhow::
     let longest = lengths.iter().map(length).max().unwrap_or(0);
     let all = comm.all_gather(&mine, longest, timeout)?;
     let lines = all.iter().map(|bytes| serde_json::from_slice(bytes)).collect::<Result<_, _>>()?;
-    Ok(Finished { transport, light: report.light, colors, lines })
+    Ok(Finished {
+        transport,
+        light: report.light,
+        unusable: prepared.scene.world.report().skipped,
+        colors,
+        lines,
+    })
 }

@@ -158,7 +158,10 @@ impl RankArgs {
                 // That somebody gave up is said by all; why, by that one.
                 Err(error) => {
                     if first_error.as_ref().is_none_or(is_echo) {
-                        first_error = Some(error.context(format!("rank {rank}")));
+                        // What is wrong with the command is no one rank's.
+                        let of_all = error.is::<UsageError>();
+                        first_error =
+                            Some(if of_all { error } else { error.context(format!("rank {rank}")) });
                     }
                 }
             }

@@ -81,6 +81,14 @@ pub enum DemoError {
         /// The file.
         file: String,
     },
+    /// What looks like a file's name, and is none.
+    #[error("there is no file {file}, and {unknown}")]
+    NoFile {
+        /// The name.
+        file: String,
+        /// What the catalogue says of it.
+        unknown: CatalogueError,
+    },
     /// A file has one size.
     #[error("{file} is a file and has no size `{size}`: leave the size out")]
     SizeOfFile {

@@ -46,4 +46,12 @@ pub enum FrameError {
         /// Ranks of the communicator.
         ranks: usize,
     },
+    /// A volume cannot be dealt like that.
+    #[error("volume {volume} cannot be dealt so: {reason}")]
+    Holders {
+        /// Its number in the scene.
+        volume: usize,
+        /// What is wrong.
+        reason: String,
+    },
 }

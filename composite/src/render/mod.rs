@@ -41,6 +41,7 @@ mod error;
 pub mod ghost;
 mod owners;
 mod partition;
+mod pieces;
 mod ray_parallel;
 mod report;
 mod sort_last;

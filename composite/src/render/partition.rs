@@ -1,10 +1,11 @@
 //! Data to ranks: bricks of space by k-d splits, with about the same number of primitives, or the same work for a view.
-use super::{FrameError, volumes};
+use super::FrameError;
+use super::pieces::{self, Held, Pieces};
 use rt_core::accel::{BuildOptions, Geometry};
 use rt_core::camera::Camera;
 use rt_core::effects::Effects;
 use rt_core::glam::swizzles::Vec4Swizzles;
-use rt_core::glam::{DAffine3, DVec3};
+use rt_core::glam::{DAffine3, DVec3, UVec3};
 use rt_core::scene::Scene;
 use rt_core::volume::Brick;
 use std::sync::Arc;
@@ -34,8 +35,8 @@ pub enum Split {
 pub struct Partition {
     /// By rank and geometry, in ascending order.
     kept: Vec<Vec<Vec<u32>>>,
-    /// Of each rank its brick of the volume, in scenes with just one.
-    bricks: Option<Vec<Brick>>,
+    /// Bricks of volumes.
+    pieces: Arc<Pieces>,
 }
 
 /// What one rank holds.
@@ -51,8 +52,10 @@ pub struct Part {
     pub(super) kept: Vec<Vec<u32>>,
     /// What the whole scene needs.
     pub(super) needed: Effects,
-    /// Of each rank its brick of the volume, in scenes with just one.
-    pub(super) bricks: Option<Vec<Brick>>,
+    /// Who holds which bricks of volumes.
+    pub(super) pieces: Arc<Pieces>,
+    /// What of them is here, by their numbers.
+    pub(super) held: Vec<Option<Held>>,
     /// This part with a rim, see [`super::ghost`].
     pub(super) rim: Option<(f64, Scene)>,
 }
@@ -61,6 +64,13 @@ impl Part {
     /// Primitives here.
     pub fn primitives(&self) -> usize {
         self.kept.iter().map(Vec::len).sum()
+    }
+
+    /// Values of volumes' grids here, with the layers around bricks.
+    pub fn volume_values(&self) -> usize {
+        let whole = self.scene.volumes.iter().filter(|v| !v.volume.is_medium());
+        let whole: usize = whole.map(|v| v.volume.grid().values.len()).sum();
+        whole + self.held.iter().flatten().map(Held::num_values).sum::<usize>()
     }
 }
 
@@ -78,10 +88,7 @@ impl Partition {
         let parts = parts.max(1);
         let geometries = scene.world.geometries().len();
         let mut kept = vec![vec![Vec::new(); geometries]; parts];
-        let bricks = match &scene.volumes[..] {
-            [placed] => Some(volumes::bricks(&placed.volume, parts)),
-            _ => None,
-        };
+        let pieces = Arc::new(Pieces::one_each(scene, parts));
         if let Split::Random { seed } = split {
             for (g, geometry) in scene.world.geometries().iter().enumerate() {
                 for p in 0..count(geometry) as u32 {
@@ -89,7 +96,7 @@ impl Partition {
                     kept[rank as usize][g].push(p);
                 }
             }
-            return Partition { kept, bricks };
+            return Partition { kept, pieces };
         }
         let mut items = items(scene, split);
         let mut give = |rank: usize, items: &[Item]| {
@@ -101,7 +108,23 @@ impl Partition {
         for list in kept.iter_mut().flatten() {
             list.sort_unstable();
         }
-        Partition { kept, bricks }
+        Partition { kept, pieces }
+    }
+
+    /// Deals a volume of `scene` otherwise: it is cut into as many bricks as `holders` has lists, and all ranks of a list hold its brick. One list with all ranks
+    /// is a volume that everybody has whole; without this call every rank has a brick.
+    ///
+    /// # Errors
+    /// [`FrameError::Holders`] for volumes and ranks that do not exist, bricks without a holder, and projections, which see whole volumes.
+    pub fn hold_volume(
+        mut self,
+        scene: &Scene,
+        volume: usize,
+        holders: &[Vec<usize>],
+    ) -> Result<Partition, FrameError> {
+        let holders = pieces::checked(scene, volume, holders, self.parts())?;
+        Arc::make_mut(&mut self.pieces).cut(scene, volume, &holders);
+        Ok(self)
     }
 
     /// Number of parts.
@@ -127,11 +150,14 @@ impl Partition {
         let parts = self.parts();
         let kept = self.kept.get(rank).ok_or(FrameError::Ranks { parts, ranks: rank + 1 })?.clone();
         let mut part = scene.part(&kept, options)?;
-        if let (Some(bricks), [placed]) = (&self.bricks, &mut part.volumes[..]) {
-            placed.volume = Arc::new(placed.volume.part(bricks[rank]));
+        // Of media the sizes and places remain here, and the bricks apart.
+        for placed in part.volumes.iter_mut().filter(|placed| placed.volume.is_medium()) {
+            let nothing = Brick { first: UVec3::ZERO, end: UVec3::ZERO };
+            placed.volume = Arc::new(placed.volume.part(nothing));
         }
-        let (needed, bricks) = (Effects::required_by(scene), self.bricks.clone());
-        Ok(Part { scene: part, rank, parts, kept, needed, bricks, rim: None })
+        let (needed, pieces) = (Effects::required_by(scene), self.pieces.clone());
+        let held = pieces.held(scene, rank);
+        Ok(Part { scene: part, rank, parts, kept, needed, pieces, held, rim: None })
     }
 }
 

@@ -91,7 +91,8 @@ impl RankReport {
     /// Seconds spent with `activity`.
     pub fn secs(&self, activity: Activity) -> f64 {
         let of_it = self.spans.iter().filter(|s| s.activity == activity);
-        of_it.map(|s| s.end_secs - s.begin_secs).sum()
+        // From +0: the sum of nothing is −0.
+        of_it.map(|s| s.end_secs - s.begin_secs).fold(0.0, |sum, secs| sum + secs)
     }
 
     /// Seconds from the begin of the frame to its end.

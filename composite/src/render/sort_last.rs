@@ -83,7 +83,7 @@ pub struct DataParallel {
 /// One rank's view of the frame in work.
 pub(super) struct Side<'a> {
     pub(super) frame: &'a WaveFrame<'a>,
-    part: &'a Part,
+    pub(super) part: &'a Part,
     pub(super) parallel: bool,
 }
 
@@ -160,8 +160,9 @@ impl DataParallel {
         };
         talk.report.effects = frame.effects();
         talk.report.warnings = frame.warnings().to_vec();
-        if part.scene.volumes.len() > 1 {
-            let words = "several volumes are not cut: where they overlap, media mix along the whole ray, so every rank holds them whole";
+        let media = frame.media();
+        if media.contains(&false) {
+            let words = "volumes that are no medium (maxima, minima, means, sums, isosurfaces) are not cut: every rank holds them whole";
             talk.report.warnings.push(words.into());
         }
         let owners = Owners::new(&frame, &self.boxes.bounds);
@@ -199,10 +200,9 @@ impl DataParallel {
                 talk.spent(Activity::Shade);
                 continue;
             }
-            let bricks =
-                part.bricks.as_deref().filter(|_| pass != Pass::Geometry && frame.volume().is_some());
+            let media = pass != Pass::Geometry && media.contains(&true);
             let mut wave =
-                waves::Wave { side: &side, boxes: &self.boxes, way, rim: rim.as_ref(), bricks, pass };
+                waves::Wave { side: &side, boxes: &self.boxes, way, rim: rim.as_ref(), media, pass };
             wave.run(talk, &mut tiles, answers)?;
         }
         for tile in &tiles {

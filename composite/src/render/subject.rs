@@ -76,6 +76,9 @@ impl Subject {
                 let views = vec![whole(middle_and_radius(&bodies))];
                 Ok(Subject { bodies, views })
             }
+            Err(unknown) if path.extension().is_some() || path.components().count() > 1 => {
+                Err(DemoError::NoFile { file: name.into(), unknown })
+            }
             Err(unknown) => Err(unknown.into()),
         }
     }
@@ -92,7 +95,9 @@ pub(super) fn middle_and_radius(bodies: &[Body]) -> (DVec3, f64) {
         (low, high) = (low.min(lo), high.max(hi));
     }
     if low.is_finite() && high.is_finite() {
-        (0.5 * (low + high), 0.5 * (high - low).length())
+        let radius = 0.5 * (high - low).length();
+        // A view of a single point is one of a ball about it.
+        (0.5 * (low + high), if radius > 0.0 { radius } else { 1.0 })
     } else {
         (DVec3::ZERO, 1.0)
     }

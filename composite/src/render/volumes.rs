@@ -1,100 +1,73 @@
-//! A volume in bricks, one for each rank: rays are carried through them, from near to far, with what they have collected.
+//! Volumes in bricks: rays are carried through them, from near to far, with what they have collected.
 //!
-//! The owner of a pixel knows which bricks a ray meets in which order. It asks the holder of the first one, takes back what the ray has collected there, and asks the next:
-//! one round of questions per brick along a ray. Sums are made in the order in which one node makes them, so they have the same bits.
+//! The owner of a pixel knows which bricks a ray meets in which order ([`super::pieces`]). It asks a holder of the first one, takes back what the ray has collected there, and asks
+//! the next: one round of questions per brick along a ray. Sums are made in the order in which one node makes them, so they have the same bits.
 use super::ask::Talk;
 use super::sort_last::Side;
 use super::{Activity, FrameError, RankReport};
 use rayon::prelude::*;
-use rt_core::glam::UVec3;
 use rt_core::ray::Ray;
-use rt_core::volume::{Brick, Marched, Volume, VolumeSample};
-use rt_core::waves::{Met, TileInWork};
+use rt_core::volume::{Marched, VolumeSample};
+use rt_core::waves::{Met, TileInWork, VolumeRay};
 
-/// Words of a ray and what it has collected.
-const WORDS: usize = 8 + Marched::WORDS;
+/// Words that say which piece, and which spans of a ray.
+const HEAD: usize = 3;
+/// Those, a ray and what it has collected.
+const WORDS: usize = HEAD + 8 + Marched::WORDS;
 
-/// Cuts a volume into one brick for each of `ranks` ranks with about the same number of blocks that are not clear.
-pub(super) fn bricks(volume: &Volume, ranks: usize) -> Vec<Brick> {
-    let mut out = Vec::with_capacity(ranks);
-    let all = Brick { first: UVec3::ZERO, end: volume.blocks() };
-    halve(volume, all, ranks, &mut out);
-    out
-}
-
-fn halve(volume: &Volume, brick: Brick, ranks: usize, out: &mut Vec<Brick>) {
-    if ranks == 1 {
-        out.push(brick);
-        return;
-    }
-    let size = brick.end.saturating_sub(brick.first).to_array();
-    let axis = (0..3).max_by_key(|&a| size[a]).unwrap_or(0);
-    // ---- Work of each layer of blocks across the axis.
-    let layer_work = |at: u32| {
-        let (mut first, mut end) = (brick.first, brick.end);
-        (first[axis], end[axis]) = (at, at + 1);
-        let mut work = 0.0;
-        for z in first.z..end.z {
-            for y in first.y..end.y {
-                for x in first.x..end.x {
-                    work += if volume.is_occupied(UVec3::new(x, y, z)) { 1.0 } else { 0.02 };
-                }
-            }
-        }
-        work
-    };
-    let layers: Vec<f64> = (brick.first[axis]..brick.end[axis]).map(layer_work).collect();
-    let lower = ranks / 2;
-    let share = layers.iter().sum::<f64>() * lower as f64 / ranks as f64;
-    let mut done = 0.0;
-    let below = layers.iter().take_while(|&&work| {
-        done += work;
-        done - 0.5 * work < share
-    });
-    let cut = brick.first[axis] + below.count() as u32;
-    let (mut near, mut far) = (brick, brick);
-    (near.end[axis], far.first[axis]) = (cut, cut);
-    halve(volume, near, lower, out);
-    halve(volume, far, ranks - lower, out);
+/// Spans of a ray that are in the same piece.
+struct Stretch {
+    piece: usize,
+    first: usize,
+    end: usize,
 }
 
 /// A ray on its way through the bricks.
 struct Journey {
     tile: usize,
-    /// Among the answers of its tile.
-    place: usize,
-    ray: Ray,
-    /// Ranks whose bricks are still to come, the next one last.
-    to_come: Vec<u16>,
+    ray: VolumeRay,
+    /// The next one last.
+    to_come: Vec<Stretch>,
     collected: Marched,
+}
+
+impl Journey {
+    fn new(talk: &Talk<'_>, side: &Side<'_>, tile: usize, ray: VolumeRay) -> Result<Journey, FrameError> {
+        let pieces = &side.part.pieces;
+        let course = side.frame.course(&ray.ray, ray.t_end, |_| None);
+        let (mut to_come, mut held): (Vec<Stretch>, bool) = (Vec::new(), true);
+        course.spans(|number, here| {
+            if !here.iter().any(|(v, block)| pieces.is_occupied(*v, *block)) {
+                return;
+            }
+            let last = to_come.last_mut();
+            match (pieces.find(here, last.as_ref().map(|s| s.piece)), last) {
+                (Some(piece), Some(last)) if last.piece == piece => last.end = number + 1,
+                (Some(piece), _) => to_come.push(Stretch { piece, first: number, end: number + 1 }),
+                (None, _) => held = false,
+            }
+        });
+        if !held {
+            return Err(talk.wrong(talk.rank(), "a block that nobody holds", 0));
+        }
+        to_come.reverse();
+        Ok(Journey { tile, ray, to_come, collected: Marched::default() })
+    }
 }
 
 /// Carries the rays of `tiles`, which end where they `met` something, through all ranks' bricks, and gives the tiles what they collect.
 pub(super) fn cross(
     talk: &mut Talk<'_>,
     side: &Side<'_>,
-    bricks: &[Brick],
     tiles: &mut [TileInWork],
     met: &[Vec<Option<Met>>],
 ) -> Result<(), FrameError> {
     let (rank, size, frame) = (talk.rank(), talk.size(), side.frame);
-    let Some(volume) = frame.volume() else { return Ok(()) };
     let quality = frame.volume_quality();
-    let owner = |block: UVec3| bricks.iter().position(|b| b.contains(block));
     let mut journeys = Vec::new();
     for (t, (tile, met)) in tiles.iter().zip(met).enumerate() {
-        for (place, ray) in tile.volume_rays(frame, met) {
-            let mut to_come: Vec<u16> = Vec::new();
-            volume.blocks_along(&ray, ray.t_min, ray.t_max, |block| {
-                // Blocks of the same brick follow each other: a brick is convex.
-                let same = to_come.last().is_some_and(|&r| bricks[usize::from(r)].contains(block));
-                if !same {
-                    to_come.extend(owner(block).map(|r| r as u16));
-                }
-                true
-            });
-            to_come.reverse();
-            journeys.push(Journey { tile: t, place, ray, to_come, collected: Marched::default() });
+        for ray in tile.volume_rays(met) {
+            journeys.push(Journey::new(talk, side, t, ray)?);
         }
     }
     talk.spent(Activity::Shade);
@@ -106,22 +79,20 @@ pub(super) fn cross(
             if j.collected.is_opaque(quality) {
                 j.to_come.clear();
             }
-            let Some(next) = j.to_come.pop().map(usize::from) else { continue };
-            super::waves::write_ray(&j.ray, None, &mut questions[next]);
-            questions[next].extend(j.collected.to_words());
-            asked[next].push(k);
+            let Some(next) = j.to_come.pop() else { continue };
+            let holder = side.part.pieces.holder(next.piece, rank);
+            let question = &mut questions[holder];
+            question.extend([next.piece as u32, next.first as u32, next.end as u32]);
+            super::waves::write_ray(&Ray { t_max: j.ray.t_end, ..j.ray.ray }, None, question);
+            question.extend(j.collected.to_words());
+            asked[holder].push(k);
         }
         talk.report.rays_sent += (0..size).filter(|&r| r != rank).map(|r| asked[r].len() as u64).sum::<u64>();
         talk.spent(Activity::Shade);
         let mut answer = |report: &mut RankReport, question: &[u32]| {
             let (rays, rest) = question.as_chunks::<WORDS>();
             report.answered_rays += rays.len() as u64;
-            let one = |words: &[u32; WORDS]| {
-                let (ray, collected) = words.split_last_chunk::<{ Marched::WORDS }>()?;
-                let ray = super::waves::read_ray(ray);
-                let collected = Marched::from_words(collected);
-                Some(volume.carry_on(&ray, ray.t_min, ray.t_max, quality, collected).to_words())
-            };
+            let one = |words: &[u32; WORDS]| carry_on(side, words);
             let all: Option<Vec<_>> = if side.parallel {
                 rays.par_iter().map(one).collect()
             } else {
@@ -149,11 +120,26 @@ pub(super) fn cross(
     let mut samples: Vec<Vec<VolumeSample>> =
         tiles.iter().map(|t| vec![VolumeSample::CLEAR; t.num_rays()]).collect();
     for j in &journeys {
-        samples[j.tile][j.place] = j.collected.sample();
+        let mixed = j.collected.sample();
+        samples[j.tile][j.ray.place] = frame.among_projections(&j.ray.ray, j.ray.t_end, mixed);
     }
     for (tile, samples) in tiles.iter_mut().zip(samples) {
         tile.cross(samples).map_err(|source| FrameError::Answer { rank, source })?;
     }
     talk.spent(Activity::Shade);
     Ok(())
+}
+
+/// The answer to one question; `None` for a question that is not for this rank.
+fn carry_on(side: &Side<'_>, words: &[u32; WORDS]) -> Option<[u32; Marched::WORDS]> {
+    let ([piece, first, end], words) = words.split_first_chunk::<HEAD>()?;
+    let (ray, collected) = words.split_last_chunk::<{ Marched::WORDS }>()?;
+    let held = side.part.held.get(*piece as usize)?.as_ref()?;
+    let (ray, spans) = (super::waves::read_ray(ray), *first as usize..*end as usize);
+    let course = side.frame.course(&ray, ray.t_max, |volume| held.volume(volume));
+    if !course.is_within(spans.clone(), |volume, block| held.has(volume, block)) {
+        return None;
+    }
+    let collected = Marched::from_words(collected);
+    Some(course.carry_on(spans, side.frame.volume_quality(), collected).to_words())
 }

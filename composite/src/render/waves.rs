@@ -6,7 +6,6 @@ use super::sort_last::{Light, Side, each};
 use super::{Activity, FrameError, RankReport, volumes};
 use rt_core::glam::Vec3;
 use rt_core::ray::Ray;
-use rt_core::volume::Brick;
 use rt_core::waves::{LightBits, LightPoint, Met, Pass, TileInWork, WaveFrame};
 
 /// Words of a ray in a message.
@@ -22,8 +21,8 @@ pub(super) struct Wave<'a> {
     pub(super) way: Light,
     /// This rank's part with a rim, for ghost zones.
     pub(super) rim: Option<&'a WaveFrame<'a>>,
-    /// Of each rank its brick of the scene's volume, where that is cut.
-    pub(super) bricks: Option<&'a [Brick]>,
+    /// Whether there are media, which are held in bricks.
+    pub(super) media: bool,
     pub(super) pass: Pass,
 }
 
@@ -39,9 +38,9 @@ impl Wave<'_> {
         let fits = |source| FrameError::Answer { rank, source };
         // Ranks that were hit by camera rays, for light that stays there.
         let mut hit_ranks: Vec<Option<Vec<u32>>> = Vec::new();
-        if let Some(bricks) = self.bricks {
+        if self.media {
             let met: Vec<_> = camera.iter().map(|answer| answer.met.clone()).collect();
-            volumes::cross(talk, self.side, bricks, tiles, &met)?;
+            volumes::cross(talk, self.side, tiles, &met)?;
         }
         for (tile, answer) in tiles.iter_mut().zip(&camera) {
             tile.meet(frame, &answer.met).map_err(fits)?;
@@ -198,8 +197,8 @@ impl Wave<'_> {
                 answers[*place] = *m;
             }
         }
-        if let Some(bricks) = self.bricks {
-            volumes::cross(talk, self.side, bricks, tiles, &answers)?;
+        if self.media {
+            volumes::cross(talk, self.side, tiles, &answers)?;
         }
         for (t, tile) in tiles.iter_mut().enumerate().filter(|(t, _)| live[*t]) {
             tile.meet(self.side.frame, &answers[t]).map_err(|source| FrameError::Answer { rank, source })?;

@@ -113,7 +113,7 @@ pub(crate) fn row_words_scalar<P: Composite>(
 }
 
 /// 64 flags, each 0 or 1, as bits. The product moves the flag of byte i by 7 (8 - i) bits, to bit 56 + i; no two flags meet anywhere, so nothing is carried.
-fn packed(flags: &[u8; 64]) -> u64 {
+pub(crate) fn packed(flags: &[u8; 64]) -> u64 {
     let eights = flags.as_chunks::<8>().0.iter().enumerate();
     eights.fold(0, |word, (index, eight)| {
         let bits = u64::from_le_bytes(*eight).wrapping_mul(0x0102_0408_1020_4080) >> 56;

@@ -3,7 +3,8 @@ use crate::color::Color;
 use crate::simd::load_64;
 use bytemuck::{cast_slice, cast_slice_mut, pod_read_unaligned};
 use fearless_simd::{
-    Bytes, Select, Simd, SimdBase, SimdInt, SimdMask, SimdNarrow, SimdWiden, f32x16, u8x64, u16x32, u32x16,
+    Bytes, Select, Simd, SimdBase, SimdInt, SimdMask, SimdNarrow, SimdWiden, f32x16, mask32x16, u8x64,
+    u16x32, u32x16,
 };
 
 /// Sixteen colours of four bytes.
@@ -181,38 +182,41 @@ fn divided_by_255<S: Simd>(simd: S, product: u16x32<S>) -> u16x32<S> {
     (x + u16x32::splat(simd, 1) + (x >> 8)) >> 8
 }
 
-/// Four pixels at a time; blocks with an inactive pixel go one by one.
+/// Four pixels at a time; inactive ones are the identity.
 #[inline(always)]
 pub(crate) fn over_f32<S: Simd>(simd: S, others: &[u8], held: &mut [[f32; 4]], others_in_front: bool) {
     let alpha_of: [u8; 64] = std::array::from_fn(|i| (12 + i % 4) as u8);
     let alpha_of = u8x64::from_slice(simd, &alpha_of);
+    let zero = u32x16::splat(simd, 0);
     let blocks = held.len() / 4;
     for block in 0..blocks {
-        let bytes = &others[64 * block..64 * block + 64];
         let four = &mut held[4 * block..4 * block + 4];
-        let theirs = colors_16(simd, bytes);
-        let ours = colors_16(simd, cast_slice(four));
-        let zero = u32x16::splat(simd, 0);
-        if has_empty_pixel(theirs.simd_eq(zero).to_bitmask())
-            || has_empty_pixel(ours.simd_eq(zero).to_bitmask())
-        {
-            over_one_by_one(bytes, four, others_in_front);
+        let theirs = colors_16(simd, &others[64 * block..64 * block + 64]);
+        let empty_theirs = lanes_of_empty_pixels(theirs.simd_eq(zero).to_bitmask());
+        if empty_theirs == 0xffff {
             continue;
         }
+        let ours = colors_16(simd, cast_slice(four));
+        let empty_ours = lanes_of_empty_pixels(ours.simd_eq(zero).to_bitmask());
         let (front, back) = if others_in_front { (theirs, ours) } else { (ours, theirs) };
         let alpha: f32x16<S> = front.bitcast::<u8x64<S>>().swizzle_dyn_within_blocks(alpha_of).bitcast();
         let (front, back): (f32x16<S>, f32x16<S>) = (front.bitcast(), back.bitcast());
-        let joined = front + (f32x16::splat(simd, 1.0) - alpha) * back;
-        joined.store_slice(cast_slice_mut(four));
+        let joined: f32x16<S> = front + (f32x16::splat(simd, 1.0) - alpha) * back;
+        let mut joined: u32x16<S> = joined.bitcast();
+        if empty_theirs | empty_ours != 0 {
+            joined = mask32x16::from_bitmask(simd, empty_theirs).select(ours, joined);
+            joined = mask32x16::from_bitmask(simd, empty_ours).select(theirs, joined);
+        }
+        joined.bitcast::<f32x16<S>>().store_slice(cast_slice_mut(four));
     }
     over_one_by_one(&others[64 * blocks..], &mut held[4 * blocks..], others_in_front);
 }
 
-/// Whether four lanes of one pixel are all zero; a bit is set for each lane that is.
+/// All lanes of those of four pixels whose four lanes are all zero; a bit is set for each lane that is.
 #[inline(always)]
-fn has_empty_pixel(zero_lanes: u64) -> bool {
+fn lanes_of_empty_pixels(zero_lanes: u64) -> u64 {
     let pairs = zero_lanes & (zero_lanes >> 1);
-    pairs & (pairs >> 2) & 0x1111 != 0
+    (pairs & (pairs >> 2) & 0x1111) * 0xf
 }
 
 /// Loads up to sixteen colours or depths that may reach beyond the end of a message.
@@ -234,7 +238,11 @@ mod tests {
 
     #[test]
     fn a_pixel_is_empty_only_if_its_own_four_lanes_are_zero() {
-        assert!(has_empty_pixel(0x000f) && has_empty_pixel(0x0f00) && has_empty_pixel(0xf3c1));
-        assert!(!has_empty_pixel(0x0000) && !has_empty_pixel(0x00f0 >> 2) && !has_empty_pixel(0x7777));
+        for (zero, empty) in [(0x000f, 0x000f), (0x0f00, 0x0f00), (0xf3c1, 0xf000), (0xffff, 0xffff)] {
+            assert_eq!(lanes_of_empty_pixels(zero), empty);
+        }
+        for zero in [0x0000, 0x00f0 >> 2, 0x7777] {
+            assert_eq!(lanes_of_empty_pixels(zero), 0);
+        }
     }
 }

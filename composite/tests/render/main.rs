@@ -1,5 +1,6 @@
 //! The picture of many ranks is the picture of one node, bit for bit.
 mod scenes;
+mod volumes;
 
 use composite::comm::sim;
 use composite::render::{
@@ -23,7 +24,11 @@ fn frame_options(light: Light) -> FrameOptions {
 
 /// All ranks' outputs; the picture is that of the last rank.
 fn many(case: &Case, ranks: usize, split: &Split, light: Light) -> Vec<FrameOutput> {
-    let partition = Partition::new(&case.scene, ranks, split);
+    dealt(case, &Partition::new(&case.scene, ranks, split), light)
+}
+
+fn dealt(case: &Case, partition: &Partition, light: Light) -> Vec<FrameOutput> {
+    let ranks = partition.parts();
     let outputs = threads::run(ranks, |mut comm| {
         let part = partition.part(&case.scene, comm.rank(), &BuildOptions::default())?;
         let options = FrameOptions { root: Some(ranks - 1), ..frame_options(light) };
@@ -194,14 +199,15 @@ fn a_volume_in_bricks_has_the_bits_of_one_node() {
         }
         // Every rank holds its brick with two layers of points around it, and not the whole.
         let whole = case.scene.volumes[0].volume.grid().values.len();
-        let partition = Partition::new(&case.scene, 8, &Split::Triangles);
-        let held = (0..8).map(|rank| {
-            let part = partition.part(&case.scene, rank, &BuildOptions::default()).unwrap();
-            part.scene.volumes[0].volume.grid().values.len()
-        });
-        let held: Vec<usize> = held.collect();
+        let held = values_held(&case, &Partition::new(&case.scene, 8, &Split::Triangles));
         assert!(held.iter().all(|&n| n < whole / 2) && held.iter().sum::<usize>() >= whole, "{held:?}");
     }
+}
+
+/// Of each rank the values of volumes' grids that it holds.
+fn values_held(case: &Case, partition: &Partition) -> Vec<usize> {
+    let part = |rank| partition.part(&case.scene, rank, &BuildOptions::default()).unwrap();
+    (0..partition.parts()).map(|rank| part(rank).volume_values()).collect()
 }
 
 #[test]

@@ -51,7 +51,7 @@ pub(crate) fn camera(shift: DVec3) -> Camera {
     Camera::perspective(eye, shift + DVec3::new(0.0, 0.0, 0.3), DVec3::Z, 0.8, 1.25, [0.1, 100.0]).unwrap()
 }
 
-fn scene(
+pub(crate) fn scene(
     shift: DVec3,
     ground: Material,
     balls: Option<Material>,
@@ -83,15 +83,15 @@ fn scene(
     scene
 }
 
-fn matte() -> Material {
+pub(crate) fn matte() -> Material {
     Material::matte([0.7, 0.6, 0.5])
 }
 
-fn options() -> RenderOptions {
+pub(crate) fn options() -> RenderOptions {
     RenderOptions { layers: Layers::ALL, ..RenderOptions::new(150, 121) }
 }
 
-const AMBIENT: [f32; 3] = [0.3; 3];
+pub(crate) const AMBIENT: [f32; 3] = [0.3; 3];
 
 /// Shadows, area lights and ambient occlusion, with light at a finite place: what the exchange of light bits is for.
 pub(crate) fn shadows_and_occlusion(shift: DVec3) -> Case {

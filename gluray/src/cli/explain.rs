@@ -68,10 +68,13 @@ fn in_words(r: &Report) -> String {
         let of = if rank.rank == 0 { "the program" } else { "helper" };
         let lost = rank.lost.as_ref().map_or(String::new(), |why| format!("; lost: {why}"));
         line(format!(
-            "        {:>12} pictures by rank {} ({of}): {:.1} ms each, {} kB sent to it, {} kB of rows back{lost}",
+            "        {:>12} pictures by rank {} ({of}): {:.1} ms each, {} rays, {} structures built, {} refitted, {} kB sent to it, {} kB of rows back{lost}",
             rank.pictures,
             rank.rank,
             rank.trace_ms / rank.pictures.max(1) as f64,
+            rank.rays,
+            rank.builds,
+            rank.refits,
             rank.sent_bytes / 1000,
             rank.received_bytes / 1000
         ));

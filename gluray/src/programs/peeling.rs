@@ -170,7 +170,7 @@ fn limit(program: u32) -> Option<Limit> {
     let (width, height) = (size(TEXTURE_WIDTH), size(TEXTURE_HEIGHT));
     let fits = width * height > 0 && width * height <= 1 << 26;
     let depth = fits.then(|| {
-        let texels = gl::tex_image_rgba(TEXTURE_2D, width * height);
+        let texels = gl::tex_image_rgba(TEXTURE_2D, 0, width * height);
         texels.into_iter().map(|t| t[1]).collect()
     });
     gl::active_texture(active);

@@ -18,6 +18,12 @@ pub struct RankAccount {
     pub sent_bytes: u64,
     /// Bytes that came back: rows.
     pub received_bytes: u64,
+    /// Acceleration structures that it built; rank 0's are those of the report's `builds` as well.
+    pub builds: u64,
+    /// Structures that it took over from where the triangles were before.
+    pub refits: u64,
+    /// Rays that it traced, of all kinds.
+    pub rays: u64,
     /// Why it was given up.
     pub lost: Option<String>,
 }
@@ -30,6 +36,9 @@ impl RankAccount {
         self.wait_ms += other.wait_ms;
         self.sent_bytes += other.sent_bytes;
         self.received_bytes += other.received_bytes;
+        self.builds += other.builds;
+        self.refits += other.refits;
+        self.rays += other.rays;
         if self.lost.is_none() {
             self.lost.clone_from(&other.lost);
         }

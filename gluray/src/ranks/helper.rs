@@ -23,9 +23,9 @@ use std::time::{Duration, Instant};
 /// How often somebody who waits for work looks whether it is over.
 const LOOK: Duration = Duration::from_millis(500);
 
-/// The scene as far as it was told.
+/// The scene as far as a program has told it, and what is made of it.
 #[derive(Default)]
-struct Known {
+pub(super) struct Helper {
     geometries: HashMap<u128, Arc<Geometry>>,
     attributes: HashMap<u128, Arc<Attributes>>,
     images: HashMap<u128, Arc<Image>>,
@@ -39,7 +39,7 @@ struct Known {
 /// # Errors
 /// What ended the group other than that the first rank left.
 pub(crate) fn serve(comm: &mut dyn Communicator, over: &AtomicBool) -> Result<(), CommError> {
-    let mut known = Known::default();
+    let mut helper = Helper::default();
     while !over.load(Relaxed) {
         let order = match comm.recv(0, ORDER, MOST_ORDER_BYTES, LOOK) {
             Ok(order) => order,
@@ -47,10 +47,7 @@ pub(crate) fn serve(comm: &mut dyn Communicator, over: &AtomicBool) -> Result<()
             Err(CommError::PeerLost { .. }) => return Ok(()),
             Err(e) => return Err(e),
         };
-        let answer = match Order::read(&order) {
-            Ok(order) => known.answer(order),
-            Err(malformed) => complaint(0, format!("an order that is none: {malformed}")),
-        };
+        let answer = helper.answer(&order);
         comm.recycle(order);
         match comm.send(0, ANSWER, answer) {
             Err(CommError::PeerLost { .. }) => return Ok(()),
@@ -71,8 +68,13 @@ fn complaint(number: u64, text: String) -> Vec<u8> {
     super::wire::bytes_of(&head)
 }
 
-impl Known {
-    fn answer(&mut self, order: Order) -> Vec<u8> {
+impl Helper {
+    /// The answer to an order, whatever that is.
+    pub(super) fn answer(&mut self, order: &[u8]) -> Vec<u8> {
+        let order = match Order::read(order) {
+            Ok(order) => order,
+            Err(malformed) => return complaint(0, format!("an order that is none: {malformed}")),
+        };
         let number = order.number;
         let made = catch_unwind(AssertUnwindSafe(|| worker::on_pool(|| self.make(order))));
         match made {
@@ -103,7 +105,7 @@ impl Known {
             .map(|(d, image)| Prepared::new(d, image.clone(), &mut structures))
             .map(|p| p.ok_or("a draw that cannot be seen"))
             .collect::<Result<_, _>>()?;
-        cost.builds = structures.built;
+        (cost.builds, cost.refits) = (structures.built, structures.refitted);
         let (area, rows, warnings) = match order.work {
             Work::Nearest => {
                 let (layer, extra) = trace::nearest(&ready, &settings, order.share);

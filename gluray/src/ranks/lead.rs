@@ -70,7 +70,6 @@ pub(crate) struct Made<A, B> {
     pub(crate) first: Vec<A>,
     pub(crate) second: Vec<B>,
     pub(crate) rays: Vec<(&'static str, u64)>,
-    pub(crate) builds: u64,
     pub(crate) warnings: Vec<String>,
 }
 
@@ -138,6 +137,7 @@ impl Lead {
         let account = self.accounts.of(0);
         account.pictures += 1;
         account.trace_ms += took.as_secs_f64() * 1e3;
+        account.rays += made.rays.iter().map(|(_, n)| n).sum::<u64>();
 
         // ---- Theirs ----
         let patience = self.patience + took * 10;
@@ -281,12 +281,14 @@ impl Lead {
             .map_err(|e| format!("its rows: {e}"))?;
         let kinds = super::orders::RAYS.into_iter().zip(head.cost.rays);
         made.rays.extend(kinds.filter(|(_, n)| *n > 0));
-        made.builds += head.cost.builds;
         made.warnings.extend(head.warnings);
         let account = self.accounts.of(rank);
         account.pictures += 1;
         account.trace_ms += head.cost.took_us as f64 * 1e-3;
         account.received_bytes += answer.len() as u64;
+        account.builds += head.cost.builds;
+        account.refits += head.cost.refits;
+        account.rays += head.cost.rays.iter().sum::<u64>();
         self.comm.recycle(answer);
         Ok(())
     }
@@ -301,7 +303,6 @@ fn put_in<A: Copy, B: Copy>(made: &mut Made<A, B>, part: Made<A, B>, share: Shar
         }
     }
     made.rays.extend(part.rays);
-    made.builds += part.builds;
     made.warnings.extend(part.warnings);
 }
 

@@ -1,10 +1,11 @@
 //! Ray-parallel mode with replicated data (dissertation, sections 4.1.3 and 6.2): several processes make one program's picture.
 //!
 //! The program is the first rank. Helpers (`gluray serve-rays`) have the whole scene, of which they are told what is new, and make every so many rows of each
-//! picture. They talk by composite's communicator. Every rank sends the packets of rays that one process would, so pictures are the same bit by bit
+//! picture. They talk by composite's communicator. [`group`] does the same for helpers that are an MPI job. Every rank sends the packets of rays that one process would, so pictures are the same bit by bit
 //! whatever the number of ranks.
 
 mod account;
+pub(crate) mod group;
 pub(crate) mod helper;
 mod lead;
 pub(crate) mod orders;
@@ -120,17 +121,21 @@ pub(crate) fn problems() -> Vec<String> {
 /// [`trace::nearest`], by all ranks.
 pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings) -> (Layer, [u64; 2]) {
     let rect = draws.iter().fold(Rect::default(), |r, d| r.or(d.rect));
+    let primary = || draws.iter().map(|d| d.rays.load(Relaxed)).sum::<u64>();
     let made = together(rect, |lead| {
-        lead.make(draws, settings, &Work::Nearest, |share| {
+        let before = primary();
+        let made = lead.make(draws, settings, &Work::Nearest, |share| {
             let (layer, extra) = trace::nearest(draws, settings, share);
             let rays = vec![("shadow", extra[0]), ("ambient occlusion", extra[1])];
             let (rect, first, second) = (layer.rect, layer.color, layer.depth);
-            Made { rect, first, second, rays, builds: 0, warnings: Vec::new() }
-        })
+            Made { rect, first, second, rays, warnings: Vec::new() }
+        });
+        lead.accounts.of(0).rays += primary() - before;
+        made
     });
     let Some(made) = made else { return trace::nearest(draws, settings, Share::WHOLE) };
     let sum = |kind: &str| made.rays.iter().filter(|(k, _)| *k == kind).map(|(_, n)| n).sum::<u64>();
-    // Our own are counted already, draw by draw.
+    // Our own primary rays are counted already, draw by draw.
     draws[0].rays.fetch_add(sum("primary"), Relaxed);
     let extra = [sum("shadow"), sum("ambient occlusion")];
     let covered = made.second.iter().filter(|d| **d < 1.5).count();
@@ -138,7 +143,7 @@ pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings) -> (Layer, [u
 }
 
 fn of_colors(c: Colors) -> Made<[f32; 4], u8> {
-    Made { rect: c.rect, first: c.rgba, second: Vec::new(), rays: c.rays, builds: 0, warnings: c.warnings }
+    Made { rect: c.rect, first: c.rgba, second: Vec::new(), rays: c.rays, warnings: c.warnings }
 }
 
 fn to_colors(made: Made<[f32; 4], u8>) -> Colors {

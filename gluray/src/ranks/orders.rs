@@ -14,7 +14,7 @@ pub(crate) const ORDER: u32 = 1;
 pub(crate) const ANSWER: u32 = 2;
 
 /// Both ends have to be of one build: messages are memory as it is.
-const GREETING: &str = concat!("gluray ranks 1, version ", env!("CARGO_PKG_VERSION"));
+const GREETING: &str = concat!("gluray ranks 2, version ", env!("CARGO_PKG_VERSION"));
 /// Written as a number, so that machines with the other order of bytes are found out.
 const ORDER_OF_BYTES: u32 = 0x0102_0304;
 
@@ -175,11 +175,13 @@ pub(super) fn put_end(out: &mut Vec<u8>, settings: &str, share: Share, work: &Wo
 pub(crate) struct Cost {
     /// Primary, shadow, ambient occlusion, reflection, refraction, transparency, path.
     pub(crate) rays: [u64; 7],
+    /// Structures built, and those taken over from where the triangles were before.
     pub(crate) builds: u64,
+    pub(crate) refits: u64,
     pub(crate) took_us: u64,
 }
 
-wire_struct!(Cost { rays, builds, took_us });
+wire_struct!(Cost { rays, builds, refits, took_us });
 
 /// Kinds of rays in their order in a [`Cost`].
 pub(crate) const RAYS: [&str; 7] =

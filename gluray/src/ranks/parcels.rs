@@ -73,6 +73,8 @@ wire_struct!(Snapshot {
     draw_buffer,
     more_draw_buffers,
     samples,
+    masked_samples,
+    sample_place,
     discard,
     feedback_active,
     first_vertex_provokes,

@@ -14,17 +14,26 @@ const STALLED: Duration = Duration::from_secs(20);
 /// Bytes that are made room for at once: about what a socket holds, and a peer that announces more has to send it.
 const ROOM: usize = 1 << 18;
 
+/// What goes before a message of `length` bytes.
+pub(super) fn head_of(tag: u32, length: usize) -> [u8; HEAD] {
+    let mut head = [0; HEAD];
+    head[..4].copy_from_slice(&tag.to_ne_bytes());
+    head[8..].copy_from_slice(&(length as u64).to_ne_bytes());
+    head
+}
+
 /// The other end of a socket.
-struct Peer {
-    stream: UnixStream,
+pub(super) struct Peer {
+    pub(super) stream: UnixStream,
     /// What has come of the next message.
     part: Vec<u8>,
-    mail: VecDeque<(u32, Vec<u8>)>,
-    lost: bool,
+    /// Messages that have come whole, with their tags.
+    pub(super) mail: VecDeque<(u32, Vec<u8>)>,
+    pub(super) lost: bool,
 }
 
 impl Peer {
-    fn new(stream: UnixStream) -> std::io::Result<Peer> {
+    pub(super) fn new(stream: UnixStream) -> std::io::Result<Peer> {
         stream.set_nonblocking(true)?;
         Ok(Peer { stream, part: Vec::new(), mail: VecDeque::new(), lost: false })
     }
@@ -36,7 +45,7 @@ impl Peer {
     }
 
     /// Reads what is there, up to messages of `capacity` bytes. False for a message that is longer.
-    fn read(&mut self, capacity: usize) -> bool {
+    pub(super) fn read(&mut self, capacity: usize) -> bool {
         while !self.lost {
             let want = match self.announced() {
                 None => HEAD - self.part.len(),
@@ -131,9 +140,7 @@ impl Communicator for SocketComm {
         self.check(destination)?;
         let lost = CommError::PeerLost { rank: self.rank, peer: destination };
         let Some(peer) = self.peers[destination].as_mut().filter(|p| !p.lost) else { return Err(lost) };
-        let mut head = [0; HEAD];
-        head[..4].copy_from_slice(&tag.to_ne_bytes());
-        head[8..].copy_from_slice(&(message.len() as u64).to_ne_bytes());
+        let head = head_of(tag, message.len());
         for part in [&head[..], &message] {
             let (mut at, mut moved) = (0, Instant::now());
             while at < part.len() {

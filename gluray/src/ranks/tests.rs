@@ -1,7 +1,9 @@
+use super::group::{lead_group, serve_group};
 use super::helper::serve;
 use super::lead::{Lead, Made};
 use super::orders::{ANSWER, ORDER, Work};
 use super::rows::Share;
+use super::sockets::SocketComm;
 use crate::cache::Cache;
 use crate::cache::Structures;
 use crate::capture::{Attributes, Draw, Shading, Values};
@@ -12,8 +14,9 @@ use crate::state::current::{Current, Material};
 use crate::state::snapshot::{GlLight, Snapshot};
 use crate::trace::{self, Layer, Prepared};
 use composite::comm::{CommError, Communicator, threads};
+use std::os::unix::net::{UnixListener, UnixStream};
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Duration;
 
 /// Colours, and the bits of depths.
@@ -102,7 +105,7 @@ fn pictures(lead: &mut Lead, frames: &[f32], settings: &Settings, sent: &mut Vec
 
 fn own(ready: &[Prepared<'_>], settings: &Settings, share: Share) -> Made<[u8; 4], f32> {
     let (Layer { rect, color, depth, .. }, _) = trace::nearest(ready, settings, share);
-    Made { rect, first: color, second: depth, rays: Vec::new(), builds: 0, warnings: Vec::new() }
+    Made { rect, first: color, second: depth, rays: Vec::new(), warnings: Vec::new() }
 }
 
 /// The pictures of a group whose helpers run `help`.
@@ -174,7 +177,7 @@ fn whoever_does_not_answer_or_answers_nonsense_is_replaced_and_named() {
             text.extend(9_u64.to_ne_bytes());
             text.extend(b"complains");
             // Rectangle, cost and warnings.
-            text.extend([0; 16 + 7 * 8 + 16 + 8]);
+            text.extend([0; 16 + 7 * 8 + 24 + 8]);
             c.send(0, ANSWER, text)
         }),
     ];
@@ -226,4 +229,56 @@ fn orders_that_are_none_are_refused_and_the_next_is_obeyed() {
         comm.send(0, ANSWER, answers).expect("sent");
     });
     assert!(lost.iter().all(Option::is_none), "{lost:?}");
+}
+
+#[test]
+fn a_group_behind_one_head_makes_the_bits_of_one_and_ranks_that_leave_are_named() {
+    let (one, ..) = with_helpers(1, &[0.1, 0.4, 0.2], Mode::Match, honest);
+    let folder = tempfile::tempdir().expect("a folder");
+    let places: Vec<_> = (1..4).map(|rank| folder.path().join(rank.to_string())).collect();
+    let listeners: Vec<UnixListener> = places.iter().map(|p| UnixListener::bind(p).expect("bound")).collect();
+    listeners.iter().for_each(|l| l.set_nonblocking(true).expect("a socket"));
+    let over: Vec<AtomicBool> = (0..4).map(|_| AtomicBool::new(false)).collect();
+    let group = threads::group(4);
+    std::thread::scope(|scope| {
+        let ranks: Vec<_> = group
+            .into_iter()
+            .map(|mut comm| {
+                let (over, listeners) =
+                    (&over[comm.rank()], listeners.iter().map(|l| l.try_clone()).collect());
+                scope.spawn(move || match comm.rank() {
+                    0 => lead_group(&mut comm, Result::expect(listeners, "sockets"), over),
+                    _ => serve_group(&mut comm, over),
+                })
+            })
+            .collect();
+        let connect = || {
+            let streams = places.iter().map(|p| UnixStream::connect(p).expect("a rank is there")).collect();
+            let mut lead = Lead::new(Box::new(SocketComm::first(streams).expect("sockets")));
+            lead.patience = Duration::from_secs(600);
+            lead
+        };
+        // Two programs, one of which says nonsense and costs the other nothing.
+        let (mut lead, mut other) = (connect(), UnixStream::connect(&places[0]).expect("a rank is there"));
+        std::io::Write::write_all(&mut other, &[0xee; 4096]).expect("nonsense");
+        let mut many = pictures(&mut lead, &[0.1], &settings(Mode::Match), &mut Vec::new());
+        assert!(lead.accounts.all().iter().all(|a| a.lost.is_none() && a.pictures == 1));
+        assert!(lead.accounts.all()[1..].iter().all(|a| a.builds == 2 && a.rays > 1000));
+        // The second rank goes.
+        over[2].store(true, Relaxed);
+        while !ranks[2].is_finished() {
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        many.extend(pictures(&mut lead, &[0.4, 0.2], &settings(Mode::Match), &mut Vec::new()));
+        let lost: Vec<bool> = lead.accounts.all().iter().map(|a| a.lost.is_some()).collect();
+        assert_eq!(lost, [false, false, true, false]);
+        assert!(one == many, "the pictures differ");
+        // The head's end is everybody's.
+        over[0].store(true, Relaxed);
+        for rank in ranks {
+            rank.join().expect("no panic").expect("no fault");
+        }
+        let again = pictures(&mut lead, &[0.2], &settings(Mode::Match), &mut Vec::new());
+        assert!(again[0] == one[2] && lead.accounts.all()[1..].iter().all(|a| a.lost.is_some()));
+    });
 }

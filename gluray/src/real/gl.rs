@@ -4,7 +4,7 @@
 
 use super::driver;
 use core::ffi::{c_char, c_void};
-use std::sync::atomic::AtomicPtr;
+use std::sync::atomic::{AtomicPtr, AtomicU32, Ordering::Relaxed};
 
 driver! {
     pub(crate) fn begin = "glBegin"(mode: u32);
@@ -56,6 +56,10 @@ driver! {
     pub(crate) fn bind_texture = "glBindTexture"(target: u32, name: u32);
     pub(crate) fn tex_parameteri = "glTexParameteri"(target: u32, what: u32, value: i32);
     pub(crate) fn pixel_storei = "glPixelStorei"(what: u32, value: i32);
+    fn sample_maski = "glSampleMaski"(word: u32, mask: u32);
+    fn get_multisample = "glGetMultisamplefv"(what: u32, index: u32, out: *mut f32);
+    fn get_integeri = "glGetIntegeri_v"(what: u32, index: u32, out: *mut i32);
+    fn pixel_transferf = "glPixelTransferf"(what: u32, value: f32);
     pub(crate) fn bind_sampler = "glBindSampler"(unit: u32, name: u32);
     fn draw_buffers_raw = "glDrawBuffers"(n: i32, buffers: *const u32);
     fn gen_textures = "glGenTextures"(n: i32, out: *mut u32);
@@ -193,8 +197,12 @@ pub(crate) fn vertex_attrib_address(at: u32) -> usize {
     out as usize
 }
 
-/// A new texture.
-pub(crate) fn gen_texture() -> u32 {
+/// A new texture. Where programs may choose names themselves, as many do, ours is one that they do not choose: a generated one could be a program's next.
+pub(crate) fn gen_texture(core: bool) -> u32 {
+    static NAMES: AtomicU32 = AtomicU32::new(0x6c75_7261);
+    if !core {
+        return NAMES.fetch_add(1, Relaxed);
+    }
     let mut out = 0;
     gen_textures(1, &raw mut out);
     out
@@ -218,10 +226,83 @@ pub(crate) fn tex_sub_image(w: i32, h: i32, format: u32, kind: u32, data: &[u8])
     tex_sub_image_2d(0x0de1, 0, 0, 0, w, h, format, kind, data.as_ptr().cast());
 }
 
-/// Level 0 of the bound texture as floats, RGBA. The caller asks for the size first.
-pub(crate) fn tex_image_rgba(target: u32, texels: usize) -> Vec<[f32; 4]> {
+/// A level of the bound texture as floats, RGBA. The caller asks for the size first, and reads plainly.
+pub(crate) fn tex_image_rgba(target: u32, level: i32, texels: usize) -> Vec<[f32; 4]> {
     let mut out = vec![[0.0_f32; 4]; texels];
-    get_tex_image(target, 0, 0x1908, 0x1406, out.as_mut_ptr().cast());
+    get_tex_image(target, level, 0x1908, 0x1406, out.as_mut_ptr().cast());
+    out
+}
+
+/// The same as bytes, in memory that served before.
+pub(crate) fn tex_image_bytes(
+    target: u32,
+    level: i32,
+    texels: usize,
+    mut memory: Vec<[u8; 4]>,
+) -> Vec<[u8; 4]> {
+    memory.resize(texels, [0; 4]);
+    get_tex_image(target, level, 0x1908, 0x1401, memory.as_mut_ptr().cast());
+    memory
+}
+
+/// Where sample `i` of the framebuffer's pixels lies, from the lower left corner of the pixel.
+pub(crate) fn sample_place(i: u32) -> [f32; 2] {
+    let mut out = [0.5; ROOM];
+    get_multisample(0x8e50, i, out.as_mut_ptr());
+    [out[0], out[1]]
+}
+
+const SAMPLE_MASK: u32 = 0x8e51;
+
+/// Has only sample `i` of each pixel written; gives the mask that was set.
+pub(crate) fn only_sample(i: u32) -> u32 {
+    let mut before = [-1; ROOM];
+    get_integeri(0x8e52, 0, before.as_mut_ptr());
+    enable(SAMPLE_MASK);
+    sample_maski(0, 1 << i);
+    before[0].cast_unsigned()
+}
+
+/// Has all samples written again. Masks of the program's own are not traced, so there is none to switch on.
+pub(crate) fn all_samples(mask: u32) {
+    disable(SAMPLE_MASK);
+    sample_maski(0, mask);
+}
+
+/// Runs `f` while texels are read as they are: rows that follow one another, into memory and not into a buffer, without the program's scales and biases.
+pub(crate) fn plain_reading<R>(f: impl FnOnce() -> R) -> R {
+    // Swapped bytes, row length, skipped rows and pixels, alignment; of volumes nothing is read.
+    const PACK: [(u32, i32); 5] = [(0x0d00, 0), (0x0d02, 0), (0x0d03, 0), (0x0d04, 0), (0x0d05, 4)];
+    // Colours through maps; scale and bias of red, green, blue, alpha.
+    const TRANSFER: [(u32, f32); 9] = [
+        (0x0d10, 0.0),
+        (0x0d14, 1.0),
+        (0x0d15, 0.0),
+        (0x0d18, 1.0),
+        (0x0d19, 0.0),
+        (0x0d1a, 1.0),
+        (0x0d1b, 0.0),
+        (0x0d1c, 1.0),
+        (0x0d1d, 0.0),
+    ];
+    const PIXEL_PACK_BUFFER: u32 = 0x88eb;
+    let pack = PACK.map(|(what, plain)| (what, plain, int(what)));
+    let transfer = TRANSFER.map(|(what, plain)| (what, plain, floats::<1>(what)[0]));
+    // A context without fixed function has none of these and says 0 for all.
+    let none = transfer.iter().all(|t| t.2 == 0.0);
+    let transfer = transfer.map(|(what, plain, now)| (what, if none { now } else { plain }, now));
+    let buffer = word(0x88ed);
+    pack.iter().filter(|p| p.1 != p.2).for_each(|p| pixel_storei(p.0, p.1));
+    transfer.iter().filter(|p| p.1 != p.2).for_each(|p| pixel_transferf(p.0, p.1));
+    if buffer != 0 {
+        bind_buffer(PIXEL_PACK_BUFFER, 0);
+    }
+    let out = f();
+    if buffer != 0 {
+        bind_buffer(PIXEL_PACK_BUFFER, buffer);
+    }
+    transfer.iter().filter(|p| p.1 != p.2).for_each(|p| pixel_transferf(p.0, p.2));
+    pack.iter().filter(|p| p.1 != p.2).for_each(|p| pixel_storei(p.0, p.2));
     out
 }
 

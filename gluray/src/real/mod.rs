@@ -144,6 +144,13 @@ fn find(name: &CStr) -> *const () {
     unsafe { get(name.as_ptr()) }
 }
 
+/// The driver's function of entry `index`, when it has been looked up.
+#[inline(always)]
+pub(crate) fn found(index: usize) -> Option<*const ()> {
+    let p = FOUND[index].load(Relaxed);
+    (!p.is_null()).then_some(p.cast_const())
+}
+
 /// The driver's function of entry `index`; one that does nothing when there is none.
 pub(crate) fn forward(index: usize) -> *const () {
     let p = FOUND[index].load(Relaxed);

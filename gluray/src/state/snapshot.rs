@@ -94,6 +94,10 @@ pub(crate) struct Snapshot {
     pub(crate) draw_buffer: u32,
     pub(crate) more_draw_buffers: bool,
     pub(crate) samples: i32,
+    /// Where the sample lies that is traced, from the middle of the pixel.
+    pub(crate) sample_place: [f32; 2],
+    /// Masks, coverage or alpha decide which samples are written.
+    pub(crate) masked_samples: bool,
     pub(crate) discard: bool,
     pub(crate) feedback_active: bool,
     pub(crate) first_vertex_provokes: bool,
@@ -218,6 +222,9 @@ impl Snapshot {
             true => gl::int(SAMPLES),
             false => 0,
         };
+        const MASKS: [u32; 4] = [0x809e, 0x809f, 0x80a0, 0x8e51];
+        self.masked_samples = self.samples > 1
+            && MASKS.iter().any(|c| (*c != 0x8e51 || can.version >= 32) && gl::is_enabled(*c));
         self.discard = can.version >= 30 && gl::is_enabled(RASTERIZER_DISCARD);
         self.feedback_active = can.version >= 40 && gl::int(TRANSFORM_FEEDBACK_ACTIVE) != 0;
         self.first_vertex_provokes =
@@ -328,7 +335,8 @@ impl Snapshot {
             } else if target == TEXTURE_1D || target == TEXTURE_2D {
                 self.texture = Some(unit_0(target));
                 // The names say what is bound; where its image comes from is asked for when it is used.
-                self.foreign_texturing = self.foreign_texturing.or(crate::texturing::unfollowed(target));
+                self.foreign_texturing =
+                    self.foreign_texturing.or(crate::texturing::unfollowed(target, can.version));
             } else {
                 self.foreign_texturing = Some("a texture that is neither 1-D nor 2-D");
             }

@@ -8,6 +8,7 @@ use super::{hot, with_context};
 use crate::client_memory;
 use crate::context;
 use crate::fault::guard;
+use crate::immediate::Step;
 use crate::real::{Int, forward};
 use core::ffi::{c_char, c_void};
 
@@ -42,13 +43,21 @@ macro_rules! hooks {
     )* };
 }
 
-/// The same for the calls that come by the million. Their methods guard what is slow.
+/// The same for calls that come by the million: first the short way, then the long one. Their methods guard what is slow.
 macro_rules! hot_hooks {
-    ($($(#[$m:meta])* fn $name:ident($($a:ident: $t:ty),*) => |$c:ident| $body:expr;)*) => { $(
+    ($($(#[$m:meta])* fn $name:ident($($a:ident: $t:ty),*) => |$c:ident| $step:expr, $body:expr;)*) => { $(
         $(#[$m])*
         pub(in crate::symbols) unsafe extern "C" fn $name($($a: $t),*) {
-            if !hot::with(|$c| $body) {
-                driver!($name($($a),*): ($($t),*));
+            #[cold]
+            #[inline(never)]
+            unsafe extern "C" fn slowly($($a: $t),*) {
+                if !hot::with(|$c| $body) {
+                    driver!($name($($a),*): ($($t),*));
+                }
+            }
+            if hot::step(|$c| $step) != Step::Done {
+                // SAFETY: the program's own arguments.
+                unsafe { slowly($($a),*) }
             }
         }
     )* };
@@ -78,8 +87,23 @@ fn material_values(what: u32, address: Address, integers: bool) -> [f32; 4] {
 }
 
 hot_hooks! {
-    fn glBegin(mode: u32) => |c| c.begin(mode);
-    fn glEnd() => |c| c.end();
+    fn glBegin(mode: u32) => |c| c.begin_step(mode), c.begin(mode);
+    fn glEnd() => |c| c.end_step(), c.end();
+}
+
+/// The same for calls that have no short way.
+macro_rules! long_hooks {
+    ($($(#[$m:meta])* fn $name:ident($($a:ident: $t:ty),*) => |$c:ident| $body:expr;)*) => { $(
+        $(#[$m])*
+        pub(in crate::symbols) unsafe extern "C" fn $name($($a: $t),*) {
+            if !hot::with(|$c| $body) {
+                driver!($name($($a),*): ($($t),*));
+            }
+        }
+    )* };
+}
+
+long_hooks! {
     fn glMaterialfv(face: u32, what: u32, v: Address) => |c| c.material(face, what, material_values(what, v, false));
     fn glMaterialiv(face: u32, what: u32, v: Address) => |c| c.material(face, what, material_values(what, v, true));
     fn glMaterialf(face: u32, what: u32, v: f32) => |c| c.material(face, what, [v, 0.0, 0.0, 0.0]);

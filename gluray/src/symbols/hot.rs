@@ -4,6 +4,7 @@
 //! much as the rest of a vertex.
 
 use crate::context::{CURRENT, Context};
+use crate::immediate::Step;
 use std::sync::atomic::{AtomicPtr, Ordering::Relaxed};
 
 static HOT: AtomicPtr<Context> = AtomicPtr::new(core::ptr::null_mut());
@@ -14,21 +15,28 @@ pub(crate) fn set_hot(context: Option<&mut Context>) {
     HOT.store(context.map_or(core::ptr::null_mut(), core::ptr::from_mut), Relaxed);
 }
 
-/// Calls `f` with the current context; false when there is none that we follow.
+/// The short way of a call, with the current context; [`Step::Slow`] when the context has to be looked up.
+///
+/// `f` must not be handed on to anything that is not inlined: see [`Step`].
 #[inline(always)]
-pub(super) fn with(f: impl FnOnce(&mut Context) -> bool) -> bool {
+pub(super) fn step(f: impl FnOnce(&mut Context) -> Step) -> Step {
     let hot = HOT.load(Relaxed);
     if hot.is_null() {
-        return elsewhere(f);
+        return Step::Slow;
     }
     // SAFETY: see `set_hot`; one thread alone has a context, and the vertex calls that come here do not call out.
     f(unsafe { &mut *hot })
 }
 
-#[cold]
-#[inline(never)]
-fn elsewhere(f: impl FnOnce(&mut Context) -> bool) -> bool {
-    with_context(f).unwrap_or(false)
+/// The long way: calls `f` with the current context; false when there is none that we follow.
+#[inline(always)]
+pub(super) fn with(f: impl FnOnce(&mut Context) -> bool) -> bool {
+    let hot = HOT.load(Relaxed);
+    if hot.is_null() {
+        return with_context(f).unwrap_or(false);
+    }
+    // SAFETY: as in `step`.
+    f(unsafe { &mut *hot })
 }
 
 /// As `with`, for calls that are not counted in nanoseconds. `None` without a context, and when we are called by the driver

@@ -76,7 +76,8 @@ fn last_is_all(p: &Prepared<'_>) -> bool {
 /// The fragment of a triangle, as it is drawn.
 fn fragment(p: &Prepared<'_>, prim: usize, x: i32, y: i32) -> Option<Found> {
     let f = p.fragment(prim, x, y)?;
-    Some((to_bytes(p.color(prim, &f, false, &Visibility::FULL)), f.depth as f32))
+    let f = p.centred(prim, f, x, y);
+    Some((to_bytes(p.color(prim, &f, false, &Visibility::FULL, Some((x, y)))), f.depth as f32))
 }
 
 fn of_stack(p: &Prepared<'_>, tile: Rect, stack: &Lifted) -> Vec<Vec<Found>> {

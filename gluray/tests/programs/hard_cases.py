@@ -2,6 +2,7 @@
 floats, bottom row first."""
 from gl_by_ctypes import *
 from mode_scenes import *
+from texture_scenes import *
 
 
 def plain():
@@ -219,6 +220,72 @@ def color_map_texture():
     enable(0x0C60)
     enable(0x0DE0)
     bump()
+
+
+def samples_of_surfaces():
+    """Two surfaces that cut each other, a hole in a far one, lines of the driver's before and after."""
+    simple(perspective=True)
+    begin(1)
+    vertex(-1, -1, 0.3)
+    vertex(1, 1, 0.3)
+    end()
+    bump()
+    rotate(70, 0.2, 1, 0.1)
+    bump(3)
+    disable(0x0B50)
+    begin(1)
+    color(1, 1, 1, 1)
+    vertex(-1, 1, 0.1)
+    vertex(1, -1, -0.1)
+    end()
+
+
+def resolved_samples():
+    """A framebuffer object of four samples a pixel, and what its resolution comes to."""
+    name = (c_uint * 2)(7, 8)
+    F("glGenFramebuffers", c_int, c_void_p)(1, name)
+    target = name[0]
+    bind = F("glBindFramebuffer", c_uint, c_uint)
+    bind(0x8D40, target)
+    for format, place in ((0x8058, 0x8CE0), (0x81A6, 0x8D00)):
+        F("glGenRenderbuffers", c_int, c_void_p)(1, name)
+        F("glBindRenderbuffer", c_uint, c_uint)(0x8D41, name[0])
+        F("glRenderbufferStorageMultisample", c_uint, c_int, c_uint, c_int, c_int)(0x8D41, 4, format, W, H)
+        F("glFramebufferRenderbuffer", c_uint, c_uint, c_uint, c_uint)(0x8D40, place, 0x8D41, name[0])
+    samples_of_surfaces()
+    disable(0x0B71)
+    begin(TRIANGLES)
+    for x, y in ((-1.9, -1.9), (-0.3, -1.8), (-0.9, -0.9)):
+        vertex(x, y, 0)
+    end()
+    bind(0x8CA9, 0)
+    F("glBlitFramebuffer", *[c_int] * 8, c_uint, c_uint)(0, 0, W, H, 0, 0, W, H, 0x4000, 0x2600)
+    bind(0x8D40, 0)
+
+
+def samples_in_order():
+    """Without a depth test the last one wins, sample by sample."""
+    start()
+    disable(0x0B71)
+    for i in range(5):
+        begin(TRIANGLES)
+        color(i / 4, 1 - i / 4, 0.5, 1)
+        for x, y in ((-1, -1), (1, -0.8), (0.1, 0.9)):
+            vertex(x * (1 - 0.13 * i), y + 0.11 * i, 0)
+        end()
+
+
+def samples_switched_off():
+    """A framebuffer of four samples, drawn to as if it had one; and a mask, which is the driver's."""
+    simple()
+    disable(0x809D)
+    bump(5)
+    enable(0x809D)
+    translate(0.3, 0.4, 0.5)
+    bump(4)
+    enable(0x809E)
+    translate(-0.6, -0.9, 0.1)
+    bump(4)
 
 
 def material_per_vertex():

@@ -6,7 +6,6 @@
 use super::layer::March;
 use super::{MACROCELL, Volume, VolumeQuality, VolumeReport, VolumeSample, scan};
 use crate::grid::Grid;
-use crate::ray::Ray;
 use glam::UVec3;
 use std::sync::Arc;
 
@@ -124,27 +123,7 @@ impl Volume {
     }
 
     /// What a holder of `brick` needs: the values of its cells with two layers of points around them, for gradients. The rest of the whole is
-    /// clear here.
-    ///
-    /// ```
-    /// use rt_core::glam::{DVec3, UVec3, Vec3};
-    /// use rt_core::{colormap::ColorMap, grid::Grid, ray::Ray, transfer_function::TransferFunction};
-    /// use rt_core::volume::{Brick, Marched, Volume, VolumeOptions, VolumeQuality};
-    /// let values = (0..33 * 9 * 9).map(|k| (k % 7) as f32 / 7.0).collect();
-    /// let grid = Grid::new(UVec3::new(33, 9, 9), DVec3::ZERO, DVec3::ONE, values).unwrap();
-    /// let white = ColorMap::new(vec![[1.0; 4]], [0.0, 1.0]);
-    /// let transfer = TransferFunction::from_opacity(white, &[[0.0, 0.0], [1.0, 0.3]], 1.0).unwrap();
-    /// let whole = Volume::new(grid.into(), transfer, VolumeOptions::default()).unwrap();
-    /// let brick = |x: u32| whole.part(Brick { first: UVec3::new(x, 0, 0), end: UVec3::new(x + 2, 1, 1) });
-    /// let (near, far) = (brick(0), brick(2));
-    ///
-    /// let ray = Ray::new(Vec3::new(-1.0, 2.3, 4.1), Vec3::new(1.0, 0.1, 0.05));
-    /// let quality = VolumeQuality::default();
-    /// let collected = near.carry_on(&ray, 0.0, f32::INFINITY, &quality, Marched::default());
-    /// let collected = far.carry_on(&ray, 0.0, f32::INFINITY, &quality, collected);
-    /// assert_eq!(collected.sample(), whole.integrate(&ray, 0.0, f32::INFINITY, &quality));
-    /// assert!(near.grid().values.len() < whole.grid().values.len());
-    /// ```
+    /// clear here. See [`Course`](super::Course) for an example.
     pub fn part(&self, brick: Brick) -> Volume {
         let cells = self.cells();
         let (mut ranges, mut report) =
@@ -200,38 +179,5 @@ impl Volume {
         };
         part.find_occupied();
         part
-    }
-
-    /// Goes on where `collected` was left, as [`Volume::integrate`] of the whole would between the same `t0` and `t1`. Bricks must be asked in
-    /// the order in which the ray comes into them ([`Volume::blocks_along`]).
-    pub fn carry_on(
-        &self,
-        ray: &Ray,
-        t0: f32,
-        t1: f32,
-        quality: &VolumeQuality,
-        collected: Marched,
-    ) -> Marched {
-        let (t0, t1) = (f64::from(t0.max(ray.t_min)), f64::from(t1.min(ray.t_max)));
-        if !(ray.is_valid() && t0 < t1) || collected.is_opaque(quality) {
-            return collected;
-        }
-        self.march(ray, t0, t1, quality, &collected).into()
-    }
-
-    /// Calls `visit` with the blocks of the whole that the ray meets between `t0` and `t1`, in order, until it returns false.
-    pub fn blocks_along(&self, ray: &Ray, t0: f32, t1: f32, mut visit: impl FnMut(UVec3) -> bool) {
-        let (t0, t1) = (f64::from(t0.max(ray.t_min)), f64::from(t1.min(ray.t_max)));
-        if !(ray.is_valid() && t0 < t1) {
-            return;
-        }
-        let (index_ray, cells, t0, t1) = self.index_ray(ray, t0, t1);
-        if t0 >= t1 {
-            return;
-        }
-        let cells = cells.to_array().map(i64::from);
-        index_ray.walk([0; 3], cells, cells, i64::from(MACROCELL), t0, t1, |block| {
-            visit(UVec3::from_array(block.cell.map(|c| c as u32 / MACROCELL)))
-        });
     }
 }

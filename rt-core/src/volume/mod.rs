@@ -20,7 +20,7 @@ pub use brick::{Brick, Marched};
 pub use options::{
     Blend, GradientOpacity, Highlight, Interpolation, VolumeError, VolumeLight, VolumeOptions, VolumeShading,
 };
-pub use overlap::integrate_overlapping;
+pub use overlap::{Course, among_projections, integrate_overlapping};
 pub use reference::integrate_reference;
 
 use crate::grid::Grid;
@@ -222,6 +222,11 @@ impl Volume {
         Marched::from(self.march(ray, t0, t1, quality, &Marched::default())).sample()
     }
 
+    /// Whether cells are boxes around the points of the grid, and not between them.
+    pub fn has_cells_around_points(&self) -> bool {
+        self.is_nearest()
+    }
+
     fn is_nearest(&self) -> bool {
         self.options.interpolation == Interpolation::Nearest
     }
@@ -243,7 +248,7 @@ impl Volume {
         (IndexRay::new(o + 0.5 * spacing, d, spacing), self.cells(), t0.max(near), t1.min(far))
     }
 
-    /// As [`Volume::carry_on`], in f64.
+    /// [`Volume::integrate`] of a medium, in f64, behind what was collected `before`.
     fn march(&self, ray: &Ray, t0: f64, t1: f64, quality: &VolumeQuality, before: &Marched) -> March {
         let per_t = ray.dir.as_dvec3().length();
         let (index_ray, cells, t0, t1) = self.index_ray(ray, t0, t1);
@@ -262,20 +267,35 @@ impl Volume {
         if inside.1 <= inside.0 {
             return m;
         }
-        let size = i64::from(MACROCELL);
-        index_ray.walk([0; 3], cells, cells, size, t0, t1, |block| {
-            let b = block.cell.map(|c| c as usize / MACROCELL as usize);
-            let n = (b[2] * self.blocks.y as usize + b[1]) * self.blocks.x as usize + b[0];
-            if self.occupied[n] && block.t1 > block.t0 {
-                let end = std::array::from_fn(|a| (block.cell[a] + size).min(cells[a]));
-                index_ray.walk(block.cell, end, cells, 1, block.t0, block.t1, |cell| {
-                    self.march_cell(&index_ray, per_t, inside.0, cell, &mut m);
-                    !m.is_opaque()
-                });
-            }
+        index_ray.walk([0; 3], cells, cells, i64::from(MACROCELL), t0, t1, |passed| {
+            let block = UVec3::from_array(passed.cell.map(|c| c as u32 / MACROCELL));
+            self.march_block(&index_ray, per_t, inside.0, block, [passed.t0, passed.t1], &mut m);
             !m.is_opaque()
         });
         m
+    }
+
+    /// Goes on from `ta` to `tb`, within one block. The ray comes into the grid at `anchor`.
+    fn march_block(
+        &self,
+        ray: &IndexRay,
+        per_t: f64,
+        anchor: f64,
+        block: UVec3,
+        [ta, tb]: [f64; 2],
+        m: &mut March,
+    ) {
+        if !(self.occupied[self.block_index(block)] && tb > ta) {
+            return;
+        }
+        let cells = self.cells().to_array().map(i64::from);
+        let size = i64::from(MACROCELL);
+        let first = block.to_array().map(|b| i64::from(b) * size);
+        let end = std::array::from_fn(|a| (first[a] + size).min(cells[a]));
+        ray.walk(first, end, cells, 1, ta, tb, |cell| {
+            self.march_cell(ray, per_t, anchor, cell, m);
+            !m.is_opaque()
+        });
     }
 
     #[inline]

@@ -26,7 +26,19 @@ camera.Elevation(20)
 renderer.ResetCamera()
 window.Render()
 print("ready", flush=True)
-while sys.stdin.readline():
+while line := sys.stdin.readline():
+    if line.startswith("save "):
+        # What is in the window, as raw RGB.
+        picture = vtk.vtkWindowToImageFilter()
+        picture.SetInput(window)
+        picture.ReadFrontBufferOff()
+        picture.ShouldRerenderOff()
+        writer = vtk.vtkPNMWriter()
+        writer.SetFileName(line[5:].rstrip("\n"))
+        writer.SetInputConnection(picture.GetOutputPort())
+        writer.Write()
+        print("saved", flush=True)
+        continue
     camera.Azimuth(5)
     window.Render()
     # A picture is done when somebody has it: what is on the screen is asked for, as programs that save pictures do.

@@ -20,19 +20,20 @@ mod owner;
 
 pub use holder::{CameraHits, LightBits};
 pub use met::{LightPoint, Met};
-pub use owner::{TileInWork, WrongAnswer};
+pub use owner::{TileInWork, VolumeRay, WrongAnswer};
 
 use super::stage::Stage;
 use super::tile::{TILE, TileArea};
-use super::{Layers, local};
+use super::{Layers, local, volumes};
 use crate::camera::Camera;
 use crate::effects::Effects;
 use crate::frame::Frame;
 use crate::math::Aabb;
+use crate::ray::Ray;
 use crate::render::{Crop, RenderError, RenderOptions, plan_for};
 use crate::scene::Scene;
-use crate::volume::{Volume, VolumeQuality};
-use glam::DVec3;
+use crate::volume::{Course, Volume, VolumeQuality, VolumeSample, among_projections};
+use glam::{DAffine3, DVec3};
 
 /// Pixels along the side of a tile.
 pub const TILE_SIDE: u32 = TILE;
@@ -113,11 +114,36 @@ impl<'a> WaveFrame<'a> {
         &self.warnings
     }
 
-    /// The volume, where the scene has just one: it may be held in bricks. Where several overlap, their media mix along the whole ray.
-    pub fn volume(&self) -> Option<&Volume> {
-        match self.stage.volumes[..] {
-            [(volume, _)] => Some(volume),
-            _ => None,
+    /// Of each volume of the frame whether it is a medium. Those may be held in bricks; projections see whole volumes.
+    pub fn media(&self) -> Vec<bool> {
+        self.stage.volumes.iter().map(|(volume, _)| volume.is_medium()).collect()
+    }
+
+    /// The way of a ray, in render space, through the volumes up to `t_end`. `held` may give a part in place of what the scene has as a volume.
+    pub fn course<'v>(
+        &'v self,
+        ray: &Ray,
+        t_end: f32,
+        held: impl Fn(usize) -> Option<&'v Volume>,
+    ) -> Course<'v> {
+        let place = |(i, (volume, object_from_render)): (usize, &(&'v Volume, DAffine3))| {
+            (held(i).unwrap_or(volume), volumes::in_object_space(ray, object_from_render))
+        };
+        Course::new(self.stage.volumes.iter().enumerate().map(place).collect(), ray.t_min, t_end)
+    }
+
+    /// What a ray shows that collects `mixed` in the media: the same where the scene has no projections, which must be here whole.
+    pub fn among_projections(&self, ray: &Ray, t_end: f32, mixed: VolumeSample) -> VolumeSample {
+        if self.stage.volumes.iter().all(|(volume, _)| volume.is_medium()) {
+            return mixed;
+        }
+        let place = |(volume, object_from_render): &(&'a Volume, DAffine3)| {
+            (*volume, volumes::in_object_space(ray, object_from_render))
+        };
+        let placed: Vec<_> = self.stage.volumes.iter().map(place).collect();
+        match placed[..] {
+            [(volume, ray)] => volume.integrate(&ray, ray.t_min, t_end, self.volume_quality()),
+            _ => among_projections(&placed, ray.t_min, t_end, self.volume_quality(), mixed),
         }
     }
 

@@ -3,7 +3,7 @@
 use super::super::shadow::Following;
 use super::super::tile::{PIXELS, TileArea, TileLayers};
 use super::super::wave::{Answers, Passage, RayKind, RecordedRay};
-use super::super::{Workspace, add_light, add_up, camera_wave, local, meet_surfaces, send_rays, volumes};
+use super::super::{Workspace, add_light, add_up, camera_wave, local, meet_surfaces, send_rays};
 use super::{LightPoint, Met, Pass, WaveFrame};
 use crate::effects::Effects;
 use crate::frame::Layers;
@@ -29,6 +29,17 @@ pub struct TileInWork {
     following: Vec<Following>,
     /// Whether the wave's points have their light.
     lit: bool,
+}
+
+/// A ray on its way through volumes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VolumeRay {
+    /// Its place among the answers of its wave.
+    pub place: usize,
+    /// In render space.
+    pub ray: Ray,
+    /// Where it meets a surface, or its own end.
+    pub t_end: f32,
 }
 
 /// An answer that no holder of this scene can have given.
@@ -149,19 +160,14 @@ impl TileInWork {
         }
     }
 
-    /// Where others hold the bricks of the scene's volume: of each ray that waits its place among the answers and its way through the volume's
-    /// object space, which ends where it `met` something. What it collects there goes to [`TileInWork::cross`].
-    pub fn volume_rays(&self, frame: &WaveFrame<'_>, met: &[Option<Met>]) -> Vec<(usize, Ray)> {
-        let [(_, object_from_render)] = frame.stage.volumes[..] else { return Vec::new() };
+    /// Where volumes are held in bricks: the rays that wait, which end where they `met` something. What they collect on their way goes to [`TileInWork::cross`].
+    pub fn volume_rays(&self, met: &[Option<Met>]) -> Vec<VolumeRay> {
         let end = |i: usize, ray: &Ray| met.get(i).and_then(|m| m.as_ref()).map_or(ray.t_max, |m| m.t);
-        let way = |(i, _, ray): (usize, u16, Ray)| {
-            let t_max = end(i, &ray);
-            (i, Ray { t_max, ..volumes::in_object_space(&ray, &object_from_render) })
-        };
+        let way = |(place, _, ray): (usize, u16, Ray)| VolumeRay { place, ray, t_end: end(place, &ray) };
         if self.pass == Pass::Geometry { Vec::new() } else { self.rays().map(way).collect() }
     }
 
-    /// Takes what each ray of the wave collects in the volume, before [`TileInWork::meet`].
+    /// Takes what each ray of the wave collects in the volumes, before [`TileInWork::meet`].
     ///
     /// # Errors
     /// When there are not as many answers as rays.

@@ -1,0 +1,154 @@
+//! Ranks of `gluray run --ranks N`: processes that make one picture of an unmodified OpenGL program together.
+
+use super::Context;
+use crate::opengl::{Display, Program, Session, Tools, Way, write};
+use crate::record::{Record, Row};
+use crate::stats::Summary;
+
+/// The side of the program's window.
+const SIZE_PX: u32 = 1024;
+/// VTK in Python: it can write what is in its window.
+const PROGRAM: Program = Program::Vtk;
+/// What these rows have in the column `sharing`.
+pub(super) const SHARING: &str = "gluray";
+
+pub(super) fn columns(record: &mut Record) {
+    record.column("rays_mean", "Mray", "gluray: rays of a rank in a frame, mean over the ranks");
+    record.column("rays_max", "Mray", "gluray: the same of the rank with the most");
+    record.column("builds", "", "gluray: acceleration structures that the helpers built in all frames");
+    record.column("pixels_differ", "", "gluray: pixels of the window that are not those of one process");
+}
+
+/// The rows of the program; without it or what runs it, its name among what is missing.
+pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
+    let tools = match (Tools::find(), PROGRAM.find()) {
+        (Ok(tools), Ok(_)) => tools,
+        (tools, program) => {
+            record.missing.extend(tools.err().into_iter().flatten().chain(program.err()));
+            return Ok(());
+        }
+    };
+    record.notes.push(format!(
+        "`{SHARING}`: {} in a window of {SIZE_PX} x {SIZE_PX} pixels, through `gluray run --mode match --ranks N`. Its ranks are real processes on the cores of this \
+         machine, which they share: one rank has all cores, more have their part of them, so wall time cannot fall below that of one, and says what \
+         sharing costs. `render` is wall time there, of a rank's share of a frame.",
+        PROGRAM.name()
+    ));
+    let display = Display::start(&tools.xvfb)?;
+    let dir = tempfile::tempdir()?;
+    let (mesh, counts, groups, frames): (_, &[u32], u32, u32) = if context.quick {
+        (crate::meshes::coarse_wavelet(51)?, &[1, 2, 4], 2, 3)
+    } else {
+        (context.wavelet(datasets::generate::nested_wavelet::Size::M1)?, &[1, 2, 4, 8, 16], 5, 4)
+    };
+    let data = dir.path().join("wavelet").with_extension(PROGRAM.format().extension());
+    write(&mesh, PROGRAM.format(), &data)?;
+
+    // ---- All numbers of ranks at once, taking turns ----
+    let mut sessions = Vec::new();
+    for &ranks in counts {
+        context.say(format!("{}, {ranks} ranks: starting", PROGRAM.name()))?;
+        let own = dir.path().join(format!("ranks{ranks}"));
+        let way = Way::Ranks(ranks);
+        let mut session = Session::start(PROGRAM, way, Some(&tools.gluray), &display, &own, &data, SIZE_PX)?;
+        session.frames(3)?;
+        sessions.push(session);
+    }
+    let mut times = vec![Vec::new(); counts.len()];
+    for round in 0..groups {
+        context.say(format!("{}: group {} of {groups}", PROGRAM.name(), round + 1))?;
+        for i in 0..counts.len() {
+            let i = (i + round as usize) % counts.len();
+            times[i].push(sessions[i].frames(frames)?.wall_secs / f64::from(frames));
+        }
+    }
+    let mut pictures = Vec::new();
+    for (session, ranks) in sessions.iter_mut().zip(counts) {
+        pictures.push(session.save(&dir.path().join(format!("ranks{ranks}.ppm")))?);
+    }
+    for (i, (session, &ranks)) in sessions.into_iter().zip(counts).enumerate() {
+        let report = session.end()?.unwrap_or_default();
+        record.rows.push(row(ranks, &times[i], &report, differing(&pictures[0], &pictures[i]))?);
+    }
+    Ok(())
+}
+
+fn row(ranks: u32, secs: &[f64], report: &serde_json::Value, differ: usize) -> anyhow::Result<Row> {
+    let accounts = report["ranks"].as_array().map_or(&[][..], Vec::as_slice);
+    let problems = report["problems"].as_array().map_or(0, Vec::len);
+    anyhow::ensure!(
+        problems == 0 && (ranks == 1 || accounts.len() == ranks as usize),
+        "{ranks} ranks: {} accounts, problems {}",
+        accounts.len(),
+        report["problems"]
+    );
+    let number = |account: &serde_json::Value, key: &str| account[key].as_f64().unwrap_or(0.0);
+    let per_picture = |key: &str| -> Vec<f64> {
+        accounts.iter().map(|a| number(a, key) / number(a, "pictures").max(1.0)).collect()
+    };
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let most = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
+    let time = Summary::of(secs).ok_or_else(|| anyhow::anyhow!("no frames"))?;
+    let mut row = Row::new()
+        .with("sharing", SHARING)
+        .with("ranks", ranks)
+        .with("frame", time.median * 1e3)
+        .with("frame_low", time.low * 1e3)
+        .with("frame_high", time.high * 1e3)
+        .with("pixels_differ", differ);
+    if !accounts.is_empty() {
+        let (render, rays) = (per_picture("trace_ms"), per_picture("rays"));
+        let helpers = &accounts[1..];
+        row = row
+            .with("render_mean", mean(&render))
+            .with("render_max", most(&render))
+            .with("imbalance", most(&render) / mean(&render))
+            .with("rays_mean", mean(&rays) * 1e-6)
+            .with("rays_max", most(&rays) * 1e-6)
+            .with("builds", helpers.iter().map(|a| number(a, "builds")).sum::<f64>())
+            .with("sent", accounts.iter().map(|a| number(a, "sent_bytes")).sum::<f64>() * 1e-6);
+    }
+    Ok(row)
+}
+
+/// Pixels in which two files of raw RGB end differently.
+fn differing(a: &[u8], b: &[u8]) -> usize {
+    let pixels = |f: &[u8]| f[f.len().saturating_sub(3 * (SIZE_PX * SIZE_PX) as usize)..].to_vec();
+    let (a, b) = (pixels(a), pixels(b));
+    if a.len() != b.len() {
+        return a.len().max(b.len()) / 3;
+    }
+    a.chunks_exact(3).zip(b.chunks_exact(3)).filter(|(a, b)| a != b).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_have_what_each_rank_did_and_pixels_are_counted_behind_the_head() {
+        let account = |rank: u32, rays: u64| {
+            serde_json::json!({ "rank": rank, "pictures": 4, "trace_ms": 40.0 * f64::from(rank + 1), "rays": rays, "builds": 1,
+                                "sent_bytes": 1000 })
+        };
+        let report =
+            serde_json::json!({ "ranks": [account(0, 4_000_000), account(1, 8_000_000)], "problems": [] });
+        let r = row(2, &[0.02, 0.01, 0.03], &report, 0).unwrap();
+        assert_eq!(
+            [r.number("frame"), r.number("rays_mean"), r.number("rays_max")],
+            [Some(20.0), Some(1.5), Some(2.0)]
+        );
+        assert_eq!(
+            [r.number("render_mean"), r.number("render_max"), r.number("builds")],
+            [Some(15.0), Some(20.0), Some(1.0)]
+        );
+        assert!(row(3, &[0.02], &report, 0).is_err(), "a rank without an account");
+        let picture = |head: &str| [head.as_bytes(), &vec![7; 3 * (SIZE_PX * SIZE_PX) as usize]].concat();
+        let (a, mut b) = (picture("P6 1"), picture("P6 with another head"));
+        assert_eq!(differing(&a, &b), 0);
+        let last = b.len() - 1;
+        b[last] = 8;
+        assert_eq!(differing(&a, &b), 1);
+        assert!(differing(&a, &[]) > 0);
+    }
+}

@@ -1,0 +1,287 @@
+//! Which rank holds which bricks of which volumes.
+//!
+//! Where volumes overlap, a span of a ray needs the blocks of all of them at once. So whoever holds a brick of a volume also holds what coarser volumes have there, and
+//! answers for every span in which that volume is the finest: little has to be held twice then. (The first volume of the scene, tried before, had others hold five times a fine
+//! volume that was turned against a coarse one.)
+use super::FrameError;
+use rt_core::glam::{DAffine3, DMat3, DVec3, UVec3};
+use rt_core::scene::{PlacedVolume, Scene};
+use rt_core::volume::{Brick, MACROCELL, Volume};
+use std::sync::Arc;
+
+/// Work of a block without extinction or that is not needed, of one that has some and is.
+const CLEAR_WORK: f64 = 0.02;
+
+/// A brick of a volume, and who holds it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Piece {
+    pub(super) volume: usize,
+    pub(super) brick: Brick,
+    pub(super) holders: Vec<u16>,
+}
+
+/// All bricks of all volumes that are media. Projections see whole volumes: every rank holds those.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Pieces {
+    pub(super) all: Vec<Piece>,
+    /// Of each volume whether a block has any extinction, x fastest.
+    occupied: Vec<Vec<bool>>,
+    /// Of each volume its blocks per axis.
+    blocks: Vec<UVec3>,
+    /// Of each volume how many are finer than it.
+    finer: Vec<usize>,
+}
+
+impl Pieces {
+    /// Every medium in one brick for each of `ranks` ranks.
+    pub(super) fn one_each(scene: &Scene, ranks: usize) -> Pieces {
+        let mut pieces = Pieces { finer: finer(scene), ..Pieces::default() };
+        for placed in &scene.volumes {
+            pieces.blocks.push(placed.volume.blocks());
+            let whole = Brick { first: UVec3::ZERO, end: placed.volume.blocks() };
+            pieces.occupied.push(blocks_of(whole).map(|block| placed.volume.is_occupied(block)).collect());
+        }
+        let each: Vec<Vec<u16>> = (0..ranks).map(|rank| vec![rank as u16]).collect();
+        for volume in 0..scene.volumes.len() {
+            pieces.cut(scene, volume, &each);
+        }
+        pieces
+    }
+
+    /// Cuts a volume anew: a brick for each list of ranks, which hold it.
+    pub(super) fn cut(&mut self, scene: &Scene, volume: usize, holders: &[Vec<u16>]) {
+        self.all.retain(|piece| piece.volume != volume);
+        let placed = &scene.volumes[volume];
+        if !placed.volume.is_medium() {
+            return;
+        }
+        let bricks = bricks(&placed.volume, holders.len(), &covered_by(scene, &self.finer, volume));
+        let piece = |(brick, holders): (Brick, &Vec<u16>)| Piece { volume, brick, holders: holders.clone() };
+        self.all.extend(bricks.into_iter().zip(holders).map(piece));
+    }
+
+    pub(super) fn is_occupied(&self, volume: usize, block: UVec3) -> bool {
+        let blocks = self.blocks[volume];
+        self.occupied[volume][((block.z * blocks.y + block.y) * blocks.x + block.x) as usize]
+    }
+
+    /// The piece whose holder has the blocks of all volumes that are `here`; `likely` is looked at first.
+    pub(super) fn find(&self, here: &[(usize, UVec3)], likely: Option<usize>) -> Option<usize> {
+        let (volume, block) = *here.iter().min_by_key(|(v, _)| self.finer[*v])?;
+        let has = |p: &Piece| p.volume == volume && p.brick.contains(block);
+        likely.filter(|p| has(&self.all[*p])).or_else(|| self.all.iter().position(has))
+    }
+
+    /// Whom `rank` asks about a piece: itself if it can, and else not everybody the same.
+    pub(super) fn holder(&self, piece: usize, rank: usize) -> usize {
+        let holders = &self.all[piece].holders;
+        match holders.iter().find(|h| usize::from(**h) == rank) {
+            Some(_) => rank,
+            None => usize::from(holders[rank % holders.len()]),
+        }
+    }
+
+    /// What `rank` holds, by the pieces' numbers.
+    pub(super) fn held(&self, scene: &Scene, rank: usize) -> Vec<Option<Held>> {
+        let holds = |p: &Piece| p.holders.iter().any(|h| usize::from(*h) == rank) && !p.brick.is_empty();
+        self.all.iter().map(|p| holds(p).then(|| Held::new(scene, &self.finer, p))).collect()
+    }
+}
+
+/// The ranks of `holders` as they are kept.
+///
+/// # Errors
+/// [`FrameError::Holders`] for lists that cannot be followed.
+pub(super) fn checked(
+    scene: &Scene,
+    volume: usize,
+    holders: &[Vec<usize>],
+    ranks: usize,
+) -> Result<Vec<Vec<u16>>, FrameError> {
+    let fault = |reason: String| Err(FrameError::Holders { volume, reason });
+    let Some(placed) = scene.volumes.get(volume) else {
+        return fault(format!("the scene has {} volumes", scene.volumes.len()));
+    };
+    if !placed.volume.is_medium() {
+        return fault("it is a projection, which sees the whole volume: every rank holds it".into());
+    }
+    if holders.is_empty() {
+        return fault("no brick has a holder".into());
+    }
+    for (brick, list) in holders.iter().enumerate() {
+        if list.is_empty() {
+            return fault(format!("brick {brick} has no holder"));
+        }
+        if let Some(rank) = list.iter().find(|r| **r >= ranks) {
+            return fault(format!("rank {rank} is to hold brick {brick}, but there are {ranks} ranks"));
+        }
+        if let Some(rank) = list.iter().enumerate().find(|(i, r)| list[..*i].contains(r)).map(|(_, r)| r) {
+            return fault(format!("rank {rank} is to hold brick {brick} twice"));
+        }
+    }
+    Ok(holders.iter().map(|list| list.iter().map(|r| *r as u16).collect()).collect())
+}
+
+/// What a rank holds for one piece: its brick, and what coarser volumes have there.
+#[derive(Clone)]
+pub(super) struct Held {
+    /// By volume.
+    parts: Vec<Option<(Brick, Arc<Volume>)>>,
+}
+
+impl Held {
+    fn new(scene: &Scene, finer: &[usize], piece: &Piece) -> Held {
+        let here = &scene.volumes[piece.volume];
+        let [lo, hi] = corners(&here.volume, piece.brick);
+        let mut parts = vec![None; scene.volumes.len()];
+        parts[piece.volume] = Some((piece.brick, Arc::new(here.volume.part(piece.brick))));
+        for (v, other) in scene.volumes.iter().enumerate() {
+            if !other.volume.is_medium() || finer[v] <= finer[piece.volume] {
+                continue;
+            }
+            let there = world_from_object(other).inverse() * world_from_object(here);
+            let brick = blocks_around(&other.volume, there, lo, hi);
+            if !brick.is_empty() {
+                parts[v] = Some((brick, Arc::new(other.volume.part(brick))));
+            }
+        }
+        Held { parts }
+    }
+
+    /// The part of a volume that is here.
+    pub(super) fn volume(&self, volume: usize) -> Option<&Volume> {
+        self.parts[volume].as_ref().map(|(_, part)| &**part)
+    }
+
+    pub(super) fn has(&self, volume: usize, block: UVec3) -> bool {
+        self.parts[volume].as_ref().is_some_and(|(brick, _)| brick.contains(block))
+    }
+
+    /// Values of grids here.
+    pub(super) fn num_values(&self) -> usize {
+        self.parts.iter().flatten().map(|(_, part)| part.grid().values.len()).sum()
+    }
+}
+
+/// From the space relative to the volume's origin.
+fn world_from_object(placed: &PlacedVolume) -> DAffine3 {
+    placed.world_from_object * DAffine3::from_translation(placed.volume.origin())
+}
+
+/// Where cell 0 begins: half a spacing before the first point where cells are boxes around points.
+fn first_cell(volume: &Volume) -> DVec3 {
+    if volume.has_cells_around_points() { -0.5 * volume.grid().spacing } else { DVec3::ZERO }
+}
+
+/// Corners of a brick, in the space relative to the volume's origin.
+fn corners(volume: &Volume, brick: Brick) -> [DVec3; 2] {
+    let at = |block: UVec3| first_cell(volume) + (block * MACROCELL).as_dvec3() * volume.grid().spacing;
+    [at(brick.first), at(brick.end)]
+}
+
+/// The eight corners of a box, seen from elsewhere, as a box there.
+fn moved(there: DAffine3, lo: DVec3, hi: DVec3) -> [DVec3; 2] {
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for i in 0..8 {
+        let pick = |a: usize| if i >> a & 1 == 0 { lo[a] } else { hi[a] };
+        let corner = there.transform_point3(DVec3::new(pick(0), pick(1), pick(2)));
+        (low, high) = (low.min(corner), high.max(corner));
+    }
+    [low, high]
+}
+
+/// Blocks of `volume` that a box comes near to, by a cell: rays are rounded where they come into another volume's space.
+fn blocks_around(volume: &Volume, there: DAffine3, lo: DVec3, hi: DVec3) -> Brick {
+    let [low, high] = moved(there, lo, hi);
+    let cell = |p: DVec3| (p - first_cell(volume)) / volume.grid().spacing;
+    let size = f64::from(MACROCELL);
+    let first = ((cell(low) - 1.0) / size).floor().max(DVec3::ZERO).as_uvec3();
+    let end = ((cell(high) + 1.0) / size).ceil().max(DVec3::ZERO).as_uvec3().min(volume.blocks());
+    Brick { first: first.min(end), end }
+}
+
+/// Of each volume how many have more cells to a length of the world; of those with as many, the first in the scene counts as finer.
+fn finer(scene: &Scene) -> Vec<usize> {
+    let cell = |placed: &PlacedVolume| {
+        let size = DMat3::from_diagonal(placed.volume.grid().spacing);
+        (placed.world_from_object.matrix3 * size).determinant().abs()
+    };
+    let cells: Vec<f64> = scene.volumes.iter().map(cell).collect();
+    let before = |a: usize, b: usize| cells[a].total_cmp(&cells[b]).then(a.cmp(&b)).is_lt();
+    (0..cells.len()).map(|v| (0..cells.len()).filter(|other| before(*other, v)).count()).collect()
+}
+
+/// Of a block of a volume whether a finer medium is all around it, so that it is never the finest.
+fn covered_by(scene: &Scene, finer: &[usize], volume: usize) -> impl Fn(UVec3) -> bool {
+    let here = &scene.volumes[volume];
+    let others: Vec<(&PlacedVolume, DAffine3)> = scene
+        .volumes
+        .iter()
+        .zip(finer)
+        .filter(|(placed, finer_than_it)| placed.volume.is_medium() && **finer_than_it < finer[volume])
+        .map(|(placed, _)| (placed, world_from_object(placed).inverse() * world_from_object(here)))
+        .collect();
+    move |block| {
+        let [lo, hi] = corners(&here.volume, Brick { first: block, end: block + 1 });
+        // By a cell of each at least: rays are rounded.
+        let margin = here.volume.grid().spacing;
+        others.iter().any(|(placed, there)| {
+            let [low, high] = moved(*there, lo - margin, hi + margin);
+            let (bounds, spacing) = (placed.volume.bounds(), placed.volume.grid().spacing);
+            low.cmpgt(bounds.min.as_dvec3() + spacing).all()
+                && high.cmplt(bounds.max.as_dvec3() - spacing).all()
+        })
+    }
+}
+
+/// Blocks of a brick, x fastest.
+fn blocks_of(brick: Brick) -> impl Iterator<Item = UVec3> {
+    let Brick { first, end } = brick;
+    (first.z..end.z).flat_map(move |z| {
+        (first.y..end.y).flat_map(move |y| (first.x..end.x).map(move |x| UVec3::new(x, y, z)))
+    })
+}
+
+/// Cuts a volume into `count` bricks with about the same number of blocks that have extinction and are not `covered`, and leaves covered ones at their sides away.
+fn bricks(volume: &Volume, count: usize, covered: &impl Fn(UVec3) -> bool) -> Vec<Brick> {
+    let mut out = Vec::with_capacity(count);
+    let all = Brick { first: UVec3::ZERO, end: volume.blocks() };
+    let work = |block| if volume.is_occupied(block) && !covered(block) { 1.0 } else { CLEAR_WORK };
+    halve(all, count, &work, &mut out);
+    for brick in &mut out {
+        let (mut first, mut end) = (UVec3::MAX, UVec3::ZERO);
+        for block in blocks_of(*brick).filter(|b| !covered(*b)) {
+            (first, end) = (first.min(block), end.max(block + 1));
+        }
+        *brick = Brick { first: first.min(end), end };
+    }
+    out
+}
+
+fn halve(brick: Brick, count: usize, work: &impl Fn(UVec3) -> f64, out: &mut Vec<Brick>) {
+    if count == 1 {
+        out.push(brick);
+        return;
+    }
+    let size = brick.end.saturating_sub(brick.first).to_array();
+    let axis = (0..3).max_by_key(|&a| size[a]).unwrap_or(0);
+    // ---- Work of each layer of blocks across the axis.
+    let layer_work = |at: u32| {
+        let (mut first, mut end) = (brick.first, brick.end);
+        (first[axis], end[axis]) = (at, at + 1);
+        blocks_of(Brick { first, end }).map(work).sum()
+    };
+    let layers: Vec<f64> = (brick.first[axis]..brick.end[axis]).map(layer_work).collect();
+    let lower = count / 2;
+    let share = layers.iter().sum::<f64>() * lower as f64 / count as f64;
+    let mut done = 0.0;
+    let below = layers.iter().take_while(|&&work| {
+        done += work;
+        done - 0.5 * work < share
+    });
+    let cut = brick.first[axis] + below.count() as u32;
+    let (mut near, mut far) = (brick, brick);
+    (near.end[axis], far.first[axis]) = (cut, cut);
+    halve(near, lower, work, out);
+    halve(far, count - lower, work, out);
+}

@@ -1,0 +1,157 @@
+//! Formats without depth: 64 pixels of all frames in the canonical grouping, which are joined while they are in the first cache.
+use super::columns::{BLOCK, Columns};
+use crate::layer::View;
+use crate::pixel::Composite;
+use crate::rank_order::Folding;
+use crate::simd::runs::over_one_by_one;
+use crate::simd::{Kernels, at_level};
+use std::ops::Range;
+
+/// What a thread needs to merge rows.
+pub(super) struct Blended<P: Composite> {
+    /// Groups that wait for what is behind them: the first is in the image, each other one here.
+    waiting: Vec<[P::Color; BLOCK]>,
+    /// The slot of the last frame of each group.
+    slots: Vec<usize>,
+}
+
+/// The pixels of a frame, and which of the block those are.
+type Alone<'a, C> = (&'a [C], Range<usize>);
+
+impl<P: Composite> Blended<P> {
+    pub(super) fn new() -> Self {
+        Self { waiting: Vec::new(), slots: Vec::new() }
+    }
+
+    /// Rows `first_row…`, for which `columns` says who has drawn where, into `colors`.
+    pub(super) fn merge_rows(
+        &mut self,
+        kernels: Kernels,
+        columns: &Columns,
+        views: &[View<'_, P>],
+        rows: (u32, usize),
+        colors: &mut [P::Color],
+    ) {
+        at_level!(
+            kernels,
+            simd => self.merge(columns, views, rows, colors,
+                #[inline(always)]
+                |others, held| <P::Color as crate::Color>::over_run(simd, others, held, false)),
+            self.merge(columns, views, rows, colors, |others, held| over_one_by_one(others, held, false))
+        );
+    }
+
+    /// `put_behind` lays its second argument over its first.
+    #[inline(always)]
+    fn merge(
+        &mut self,
+        columns: &Columns,
+        views: &[View<'_, P>],
+        (first_row, width): (u32, usize),
+        colors: &mut [P::Color],
+        put_behind: impl Fn(&[u8], &mut [P::Color]),
+    ) {
+        let folding = Folding::new(views.len());
+        for (row, colors) in colors.chunks_exact_mut(width).enumerate() {
+            let y = first_row + row as u32;
+            for (x, drawn) in columns.iter() {
+                let target = &mut colors[x..(x + BLOCK).min(width)];
+                if drawn.is_empty() {
+                    target.fill(P::EMPTY.color());
+                } else {
+                    self.merge_block(&folding, views, drawn, (x, y), target, &put_behind);
+                }
+            }
+        }
+    }
+
+    /// As a binary counter carries, where slots in which nobody has drawn are nothing to be joined.
+    #[inline(always)]
+    fn merge_block(
+        &mut self,
+        folding: &Folding,
+        views: &[View<'_, P>],
+        drawn: &[usize],
+        (x, y): (usize, u32),
+        target: &mut [P::Color],
+        put_behind: &impl Fn(&[u8], &mut [P::Color]),
+    ) {
+        self.slots.clear();
+        // The last group, as long as it is one frame: its pixels stay where they are.
+        let mut alone: Option<Alone<'_, P::Color>> = None;
+        for &index in drawn {
+            let slot = folding.slot(index);
+            while let [.., before, last] = self.slots[..]
+                && meet_at(before, last) <= meet_at(last, slot)
+            {
+                self.join_last(target, alone.take(), put_behind);
+            }
+            if let Some(alone) = alone.take() {
+                self.hold(target, &alone);
+            }
+            let view = &views[index];
+            let first = x.max(view.bounds.x0 as usize);
+            let end = (x + target.len()).min(view.bounds.x1 as usize);
+            alone = Some((view.row(y, first as u32, end as u32).0, first - x..end - x));
+            self.slots.push(slot);
+        }
+        while self.slots.len() > 1 {
+            self.join_last(target, alone.take(), put_behind);
+        }
+        if let Some(alone) = alone {
+            self.hold(target, &alone);
+        }
+    }
+
+    /// Copies the last group to where it waits.
+    #[inline(always)]
+    fn hold(&mut self, target: &mut [P::Color], (colors, pixels): &Alone<'_, P::Color>) {
+        let held = match self.slots.len() {
+            0 | 1 => target,
+            groups => {
+                if self.waiting.len() < groups - 1 {
+                    self.waiting.resize(groups - 1, [P::EMPTY.color(); BLOCK]);
+                }
+                &mut self.waiting[groups - 2][..target.len()]
+            }
+        };
+        held[..pixels.start].fill(P::EMPTY.color());
+        held[pixels.clone()].copy_from_slice(colors);
+        held[pixels.end..].fill(P::EMPTY.color());
+    }
+
+    /// Lays the last group behind the one before it.
+    #[inline(always)]
+    fn join_last(
+        &mut self,
+        target: &mut [P::Color],
+        alone: Option<Alone<'_, P::Color>>,
+        put_behind: &impl Fn(&[u8], &mut [P::Color]),
+    ) {
+        let groups = self.slots.len();
+        // Both are one group, whose last slot is that of the latter.
+        if let Some(last) = self.slots.pop()
+            && let Some(before) = self.slots.last_mut()
+        {
+            *before = last;
+        }
+        let pixels = target.len();
+        // The last one is here only if it is not alone.
+        let place = (groups - 2).min(self.waiting.len());
+        let (before, last) = self.waiting.split_at_mut(place);
+        let before = match before.last_mut() {
+            Some(before) => &mut before[..pixels],
+            None => target,
+        };
+        match (alone, last.first()) {
+            (Some((colors, part)), _) => put_behind(bytemuck::cast_slice(colors), &mut before[part]),
+            (None, Some(last)) => put_behind(bytemuck::cast_slice(&last[..pixels]), before),
+            (None, None) => {}
+        }
+    }
+}
+
+/// How far up in the balanced tree two slots meet.
+fn meet_at(one: usize, other: usize) -> u32 {
+    usize::BITS - (one ^ other).leading_zeros()
+}

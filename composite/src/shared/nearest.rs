@@ -1,0 +1,270 @@
+//! Formats with depth: of 64 pixels first the depths of all frames, then the colours of those that have won.
+//!
+//! One frame after the other would read the colours of all that are nearest for a while (a third of them, of layers in any order), and read
+//! and write what it holds again and again. Here every pixel of the image is written once, and only those colours are read that are seen.
+use super::columns::{BLOCK, Columns};
+use crate::color::Color;
+use crate::layer::View;
+use crate::pixel::Composite;
+use crate::simd::mask::packed;
+use crate::simd::runs::colors_16;
+use crate::simd::{Kernels, at_level, for_runs};
+use bytemuck::{cast_slice, cast_slice_mut};
+use fearless_simd::{Bytes, Select, Simd, SimdBase, SimdMask, f32x16, mask32x16, u8x64, u32x16};
+
+/// Frames whose blocks are looked at together.
+const TOGETHER: usize = 32;
+
+/// The farthest depth that is not background: where it is held at the beginning, whoever is not behind it has drawn something.
+const FARTHEST: f32 = f32::from_bits(1.0_f32.to_bits() - 1);
+
+/// A block of one frame.
+#[derive(Clone, Copy)]
+struct Block<'a, C> {
+    colors: &'a [C; BLOCK],
+    depths: &'a [f32; BLOCK],
+}
+
+/// A block of the image.
+struct Held<'a, C> {
+    colors: &'a mut [C; BLOCK],
+    depths: [f32; BLOCK],
+    /// Pixels where nobody has drawn: their colours and depths are not set.
+    background: u64,
+}
+
+/// What a thread needs to merge rows.
+pub(super) struct Nearest<P: Composite> {
+    /// Blocks of which a frame has a part only, filled up with background.
+    edges: Vec<([P::Color; BLOCK], [f32; BLOCK])>,
+}
+
+impl<P: Composite> Nearest<P> {
+    pub(super) fn new() -> Self {
+        Self { edges: Vec::new() }
+    }
+
+    /// Rows `first_row…`, for which `columns` says who has drawn where, into `colors` and, if it is not empty, `depths`.
+    pub(super) fn merge_rows(
+        &mut self,
+        kernels: Kernels,
+        columns: &Columns,
+        views: &[View<'_, P>],
+        rows: (u32, usize),
+        colors: &mut [P::Color],
+        depths: &mut [f32],
+    ) {
+        at_level!(
+            kernels,
+            simd => self.merge(columns, views, rows, colors, depths,
+                #[inline(always)]
+                |blocks, held| take_nearest(simd, blocks, held)),
+            self.merge(columns, views, rows, colors, depths, take_nearest_scalar)
+        );
+    }
+
+    #[inline(always)]
+    fn merge(
+        &mut self,
+        columns: &Columns,
+        views: &[View<'_, P>],
+        (first_row, width): (u32, usize),
+        colors: &mut [P::Color],
+        depths: &mut [f32],
+        take_nearest: impl Fn(&[Block<'_, P::Color>], &mut Held<'_, P::Color>),
+    ) {
+        let nothing = ([P::EMPTY.color(); BLOCK], [1.0; BLOCK]);
+        for (row, colors) in colors.chunks_exact_mut(width).enumerate() {
+            let y = first_row + row as u32;
+            let depths =
+                if depths.is_empty() { &mut [][..] } else { &mut depths[row * width..(row + 1) * width] };
+            for (x, drawn) in columns.iter() {
+                let end = (x + BLOCK).min(width);
+                let colors = &mut colors[x..end];
+                let depths = if depths.is_empty() { &mut [][..] } else { &mut depths[x..end] };
+                if drawn.is_empty() {
+                    colors.fill(P::EMPTY.color());
+                    depths.fill(1.0);
+                    continue;
+                }
+                // The last block of a row may have less than 64 pixels.
+                let mut padded = [P::EMPTY.color(); BLOCK];
+                let (target, is_whole) = match <&mut [_; BLOCK]>::try_from(&mut *colors) {
+                    Ok(whole) => (whole, true),
+                    Err(_) => (&mut padded, false),
+                };
+                let mut held = Held { colors: target, depths: [FARTHEST; BLOCK], background: u64::MAX };
+                for some in drawn.chunks(TOGETHER) {
+                    self.edges.clear();
+                    for &index in some {
+                        fill_up(&views[index], x, y, &mut self.edges);
+                    }
+                    let mut edges = self.edges.iter();
+                    let mut blocks = [Block { colors: &nothing.0, depths: &nothing.1 }; TOGETHER];
+                    for (&index, block) in some.iter().zip(&mut blocks) {
+                        let part = || edges.next().map(|(colors, depths)| Block { colors, depths });
+                        *block = whole(&views[index], x, y).or_else(part).unwrap_or(*block);
+                    }
+                    take_nearest(&blocks[..some.len()], &mut held);
+                }
+                let (nearest, background) = (held.depths, held.background);
+                if !depths.is_empty() {
+                    depths.copy_from_slice(&nearest[..depths.len()]);
+                    for_runs(background & (u64::MAX >> (BLOCK - depths.len())), |first, length| {
+                        depths[first..first + length].fill(1.0);
+                    });
+                }
+                if !is_whole {
+                    colors.copy_from_slice(&padded[..colors.len()]);
+                }
+            }
+        }
+    }
+}
+
+/// The block of row `y` that begins in column `x`, if the frame has all of it.
+#[inline(always)]
+fn whole<'a, P: Composite>(view: &View<'a, P>, x: usize, y: u32) -> Option<Block<'a, P::Color>> {
+    if x < view.bounds.x0 as usize || x + BLOCK > view.bounds.x1 as usize {
+        return None;
+    }
+    let start = (y - view.origin.1) as usize * view.stride + x - view.origin.0 as usize;
+    let colors = view.colors.get(start..)?.first_chunk()?;
+    Some(Block { colors, depths: view.depths.get(start..)?.first_chunk()? })
+}
+
+/// Appends the block of row `y` that begins in column `x`, if the frame has only a part of it.
+#[inline(always)]
+fn fill_up<P: Composite>(
+    view: &View<'_, P>,
+    x: usize,
+    y: u32,
+    edges: &mut Vec<([P::Color; BLOCK], [f32; BLOCK])>,
+) {
+    let first = x.max(view.bounds.x0 as usize);
+    let last = (x + BLOCK).min(view.bounds.x1 as usize);
+    if last - first == BLOCK {
+        return;
+    }
+    let (from_colors, from_depths) = view.row(y, first as u32, last as u32);
+    let (mut colors, mut depths) = ([P::EMPTY.color(); BLOCK], [1.0; BLOCK]);
+    colors[first - x..last - x].copy_from_slice(from_colors);
+    depths[first - x..last - x].copy_from_slice(from_depths);
+    edges.push((colors, depths));
+}
+
+/// Takes from each pixel of `blocks` and `held` the nearest, and of equally near ones the last.
+#[inline(always)]
+fn take_nearest<C: Color, S: Simd>(simd: S, blocks: &[Block<'_, C>], held: &mut Held<'_, C>) {
+    // Who is nearest so far, for each frame in turn.
+    let mut wins = [0_u64; TOGETHER];
+    let load = |quarter: usize, depths: &[f32; BLOCK]| {
+        f32x16::from_slice(simd, &depths[16 * quarter..16 * quarter + 16])
+    };
+    let mut nearest = [f32x16::splat(simd, 0.0); 4];
+    for quarter in 0..4 {
+        nearest[quarter] = load(quarter, &held.depths);
+    }
+    let mut any = 0;
+    for (block, wins) in blocks.iter().zip(&mut wins) {
+        for quarter in 0..4 {
+            let depth = load(quarter, block.depths);
+            let wins_here = depth.simd_le(nearest[quarter]);
+            nearest[quarter] = wins_here.select(depth, nearest[quarter]);
+            *wins |= wins_here.to_bitmask() << (16 * quarter);
+        }
+        any |= *wins;
+    }
+    for quarter in 0..4 {
+        nearest[quarter].store_slice(&mut held.depths[16 * quarter..16 * quarter + 16]);
+    }
+
+    // The last who was nearest is, so from the last frame on, until there is somebody for each pixel.
+    let winners = blocks.iter().zip(&wins).rev();
+    if C::BYTES == 4 {
+        let held_bytes: &mut [u8] = cast_slice_mut(held.colors);
+        let mut joined = [u32x16::splat(simd, 0); 4];
+        // Colours are only held if somebody before has drawn here.
+        if held.background != u64::MAX {
+            for quarter in 0..4 {
+                joined[quarter] = colors_16(simd, &held_bytes[64 * quarter..64 * quarter + 64]);
+            }
+        }
+        for_winners(winners, any, |block, seen| {
+            let bytes: &[u8] = cast_slice(block.colors);
+            for quarter in 0..4 {
+                let colors = colors_16(simd, &bytes[64 * quarter..64 * quarter + 64]);
+                joined[quarter] = if seen == u64::MAX {
+                    colors
+                } else {
+                    mask32x16::from_bitmask(simd, seen >> (16 * quarter) & 0xffff)
+                        .select(colors, joined[quarter])
+                };
+            }
+        });
+        for quarter in 0..4 {
+            joined[quarter]
+                .bitcast::<u8x64<S>>()
+                .store_slice(&mut held_bytes[64 * quarter..64 * quarter + 64]);
+        }
+        held.background &= !any;
+    } else {
+        take_runs(winners, any, held);
+    }
+}
+
+/// [`take_nearest`] without vector types: loops over flags and numbers, which compilers turn into the vectors that every machine has.
+fn take_nearest_scalar<C: Color>(blocks: &[Block<'_, C>], held: &mut Held<'_, C>) {
+    let mut wins = [0_u64; TOGETHER];
+    let mut any = 0;
+    for (block, wins) in blocks.iter().zip(&mut wins) {
+        let mut flags = [0_u8; BLOCK];
+        for ((held, depth), flag) in held.depths.iter_mut().zip(block.depths).zip(&mut flags) {
+            let is_nearest = *depth <= *held;
+            *flag = u8::from(is_nearest);
+            *held = if is_nearest { *depth } else { *held };
+        }
+        *wins = packed(&flags);
+        any |= *wins;
+    }
+    take_runs(blocks.iter().zip(&wins).rev(), any, held);
+}
+
+/// Colours of winners run by run.
+#[inline(always)]
+fn take_runs<'a, 'b: 'a, C: Color>(
+    winners: impl Iterator<Item = (&'a Block<'b, C>, &'a u64)>,
+    any: u64,
+    held: &mut Held<'_, C>,
+) {
+    if held.background == u64::MAX && any != u64::MAX {
+        held.colors.fill(C::TRANSPARENT);
+    }
+    for_winners(winners, any, |block, seen| {
+        for_runs(seen, |first, length| {
+            let pixels = first..first + length;
+            held.colors[pixels.clone()].copy_from_slice(&block.colors[pixels]);
+        });
+    });
+    held.background &= !any;
+}
+
+/// Each frame with those of the pixels `any` in which it is the first to have a flag.
+#[inline(always)]
+fn for_winners<'a, 'b: 'a, C: Color>(
+    winners: impl Iterator<Item = (&'a Block<'b, C>, &'a u64)>,
+    any: u64,
+    mut take: impl FnMut(&Block<'b, C>, u64),
+) {
+    let mut unseen = any;
+    for (block, wins) in winners {
+        let seen = wins & unseen;
+        if seen != 0 {
+            take(block, seen);
+            unseen ^= seen;
+            if unseen == 0 {
+                break;
+            }
+        }
+    }
+}
