@@ -111,7 +111,10 @@ impl Run<'_> {
         let report = match self.through {
             None => Report::default(),
             Some(_) => {
-                let text = std::fs::read_to_string(&report).expect("a report");
+                let text = std::fs::read_to_string(&report).unwrap_or_else(|e| {
+                    let said = String::from_utf8_lossy(&output.stderr);
+                    panic!("no report ({e}) of a program that ended with {}: {said}", output.status)
+                });
                 serde_json::from_str(&text).expect("a report in JSON")
             }
         };
