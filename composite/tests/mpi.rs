@@ -387,13 +387,6 @@ fn a_file_rendered_in_parts_by_threads_models_and_mpi_ranks_is_the_picture_of_on
         let (others, _) = demo_of(data, more, &[]);
         assert!(alone == others, "{more:?}: the pictures differ");
     }
-    if let Some(mpich) = peer("RTSV_MPIRUN_MPICH") {
-        let (three, shown) = demo_of(data, &["--mpi", "-n", "3"], &[("COMPOSITE_MPIRUN", &mpich)]);
-        assert!(
-            alone == three && shown["transport"].as_str().is_some_and(|t| t.contains("MPICH")),
-            "{shown}"
-        );
-    }
     std::fs::remove_file(&file).expect("the file");
     assert!(alone == parts, "the pictures differ");
     assert!(four["transport"].as_str().is_some_and(|t| t.contains("Open MPI")), "{four}");
