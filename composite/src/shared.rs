@@ -141,21 +141,24 @@ pub(crate) fn merge_band<P: Composite>(
     colors: &mut [P::Color],
     depths: &mut [f32],
 ) {
-    let Rows { width, columns, nearest, blended } = rows;
+    let Rows { width, columns, wide_columns, nearest, blended } = rows;
     if *width == 0 {
         return;
     }
     let end_row = first_row + (colors.len() / *width) as u32;
     let mut y = first_row;
     while y < end_row {
-        let end = columns.look_up(views, *width, y, end_row);
+        let end = match P::HAS_DEPTH {
+            true => columns.look_up(views, *width, y, end_row),
+            false => wide_columns.look_up(views, *width, y, end_row),
+        };
         let pixels = (y - first_row) as usize * *width..(end - first_row) as usize * *width;
         let colors = &mut colors[pixels.clone()];
         if P::HAS_DEPTH {
             let depths = if depths.is_empty() { &mut [] } else { &mut depths[pixels] };
             nearest.merge_rows(kernels, columns, views, (y, *width), colors, depths);
         } else {
-            blended.merge_rows(kernels, columns, views, (y, *width), colors);
+            blended.merge_rows(kernels, wide_columns, views, (y, *width), colors);
         }
         y = end;
     }
@@ -164,13 +167,20 @@ pub(crate) fn merge_band<P: Composite>(
 /// What one thread needs to merge rows.
 pub(crate) struct Rows<P: Composite> {
     width: usize,
-    columns: Columns,
+    columns: Columns<{ nearest::BLOCK }>,
+    wide_columns: Columns<{ blended::BLOCK }>,
     nearest: Nearest<P>,
     blended: Blended<P>,
 }
 
 impl<P: Composite> Rows<P> {
     pub(crate) fn new(width: usize) -> Self {
-        Self { width, columns: Columns::default(), nearest: Nearest::new(), blended: Blended::new() }
+        Self {
+            width,
+            columns: Columns::default(),
+            wide_columns: Columns::default(),
+            nearest: Nearest::new(),
+            blended: Blended::new(),
+        }
     }
 }

@@ -3,12 +3,9 @@ use crate::layer::View;
 use crate::pixel::Composite;
 use std::ops::Range;
 
-/// Pixels of a block: a word of flags, four vectors of 16.
-pub(super) const BLOCK: usize = 64;
-
-/// The frames that have drawn in each block of a row, in their order; only those need to be read.
+/// The frames that have drawn in each block (of `BLOCK` pixels) of a row, in their order; only those need to be read.
 #[derive(Default)]
-pub(super) struct Columns {
+pub(super) struct Columns<const BLOCK: usize> {
     /// For each block, which part of `drawn` are its frames.
     blocks: Vec<Range<usize>>,
     drawn: Vec<usize>,
@@ -16,7 +13,7 @@ pub(super) struct Columns {
     here: Vec<(usize, Range<usize>)>,
 }
 
-impl Columns {
+impl<const BLOCK: usize> Columns<BLOCK> {
     /// Looks at row `y`, and says before which row up to `end_row` others have drawn.
     pub(super) fn look_up<P: Composite>(
         &mut self,

@@ -2,7 +2,7 @@
 //!
 //! One frame after the other would read the colours of all that are nearest for a while (a third of them, of layers in any order), and read
 //! and write what it holds again and again. Here every pixel of the image is written once, and only those colours are read that are seen.
-use super::columns::{BLOCK, Columns};
+use super::columns::Columns;
 use crate::color::Color;
 use crate::layer::View;
 use crate::pixel::Composite;
@@ -11,6 +11,9 @@ use crate::simd::runs::colors_16;
 use crate::simd::{Kernels, at_level, for_runs};
 use bytemuck::{cast_slice, cast_slice_mut};
 use fearless_simd::{Bytes, Select, Simd, SimdBase, SimdMask, f32x16, mask32x16, u8x64, u32x16};
+
+/// Pixels of a block: a word of flags, four vectors of 16.
+pub(super) const BLOCK: usize = 64;
 
 /// Frames whose blocks are looked at together.
 const TOGETHER: usize = 32;
@@ -54,7 +57,7 @@ impl<P: Composite> Nearest<P> {
     pub(super) fn merge_rows(
         &mut self,
         kernels: Kernels,
-        columns: &Columns,
+        columns: &Columns<BLOCK>,
         views: &[View<'_, P>],
         rows: (u32, usize),
         colors: &mut [P::Color],
@@ -73,7 +76,7 @@ impl<P: Composite> Nearest<P> {
     #[inline(always)]
     fn merge(
         &mut self,
-        columns: &Columns,
+        columns: &Columns<BLOCK>,
         views: &[View<'_, P>],
         (first_row, width): (u32, usize),
         colors: &mut [P::Color],
