@@ -372,7 +372,8 @@ impl Context {
             Some(position),
             attribute(program, "normalMC"),
             attribute(program, "scalarColor"),
-            attribute(program, "tcoord"),
+            // VTK 9.7 names the coordinates of colour maps apart from those of pictures.
+            attribute(program, "tcoord").or_else(|| attribute(program, "colorTCoord")),
         ];
         if sources.iter().flatten().any(|s| s.buffer == 0) {
             return Err("a program with arrays in client memory");

@@ -229,6 +229,16 @@ fn vtk_by_egl_draws_the_drivers_picture() {
 }
 
 #[test]
+fn surfaces_of_todays_vtk_are_traced_without_normals_and_with_colour_maps() {
+    let (Some(python), Some(_)) = (program("RTSV_PYTHON"), program("RTSV_XVFB")) else { return };
+    let file = script("wheel_scene.py");
+    if let Some((m, report)) = both(&python, &[file.as_str()], "out.png", |_| ()) {
+        m.assert_filled("surfaces of today's VTK");
+        assert!(report.traced_draws >= 4, "each of the four: {report:?}");
+    }
+}
+
+#[test]
 fn passing_everything_changes_no_pixel() {
     let Some(gmsh) = program("RTSV_GMSH") else { return };
     let Some(x) = Xvfb::start() else { return };

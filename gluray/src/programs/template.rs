@@ -151,6 +151,7 @@ impl Template {
             match s.as_str() {
                 "normalVCVSOutput=normalMatrix*normalMC"
                 | "tcoordVCVSOutput=tcoord"
+                | "colorTCoordVCVSOutput=colorTCoord"
                 | "vertexColorVSOutput=scalarColor"
                 | "vertexVCVSOutput=MCVCMatrix*vertexMC"
                 | "gl_Position=MCDCMatrix*vertexMC" => {}
@@ -166,6 +167,10 @@ impl Template {
                 "vec4vertexVC=vertexVCVSOutput"
                 | "vec3fdx=dFdx(vertexVC.xyz)"
                 | "vec3fdy=dFdy(vertexVC.xyz)"
+                // VTK 9.7 keeps the differences away from underflow; the normal is the same.
+                | "floatscale=1.0/length(fwidth(vertexVC.xyz))"
+                | "vec3fdx=dFdx(vertexVC.xyz)*scale"
+                | "vec3fdy=dFdy(vertexVC.xyz)*scale"
                 | "vec3specularColor=specularIntensity*specularColorUniform"
                 | "floatspecularPower=specularPowerUniform"
                 | "vec3ambientColor=ambientIntensity*ambientColorUniform"
@@ -192,7 +197,8 @@ impl Template {
                 | "vec3specular=sf*specularColor*lightColor"
                 | "sf=sign(df)*pow(max(1e-5,dot(reflect(lightDirectionVC,normalVCVSOutput),normalize(-vertexVC.xyz))),specularPower)" =>
                     {}
-                "vec4texColor=texture(colortexture,tcoordVCVSOutput.st)" => t.colors = Colors::Map,
+                "vec4texColor=texture(colortexture,tcoordVCVSOutput.st)"
+                | "vec4texColor=texture(colortexture,colorTCoordVCVSOutput.st)" => t.colors = Colors::Map,
                 "vec3ambientColor=ambientIntensity*texColor.rgb"
                 | "vec3diffuseColor=diffuseIntensity*texColor.rgb"
                 | "floatopacity=opacityUniform*texColor.a" => t.colors = Colors::Map,
@@ -237,6 +243,19 @@ mod tests {
         assert!(head.headlight && head.lit && head.directional == 0);
         let kit = "df = max(0.0, dot(normalVCVSOutput, -lightDirectionVC0)); df = max(0.0, dot(normalVCVSOutput, -lightDirectionVC4));";
         assert_eq!(Template::read(VERTEX, &fragment(kit)).expect("known").directional, 5);
+    }
+
+    #[test]
+    fn normals_out_of_differences_are_known_with_and_without_a_scale() {
+        let head = "float df = max(0.000001, normalVCVSOutput.z);";
+        let normal = "vec3 normalVCVSOutput = normalize(cross(fdx,fdy));";
+        for scale in ["", "*scale"] {
+            let differences =
+                format!("vec3 fdx = dFdx(vertexVC.xyz){scale}; vec3 fdy = dFdy(vertexVC.xyz){scale};");
+            let first = if scale.is_empty() { "" } else { "float scale = 1.0/length(fwidth(vertexVC.xyz));" };
+            let text = format!("{first}{differences}{normal}{head}");
+            assert!(Template::read(VERTEX, &fragment(&text)).expect("known").flat, "{text}");
+        }
     }
 
     #[test]
