@@ -11,6 +11,7 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 use std::ffi::OsString;
 use std::fs;
+use std::os::unix::fs::DirBuilderExt as _;
 use std::os::unix::process::ExitStatusExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
@@ -105,14 +106,32 @@ fn has_glvnd() -> bool {
     crate::doctor::look_for_glvnd().is_some()
 }
 
-/// A folder that goes when the run is over.
+/// A folder that goes when the run is over; nobody else may enter it, because programs load our library from there.
 struct RunFolder(PathBuf);
+
+/// Folders of a process that was killed stay behind, and its number comes again: so many may be in the way.
+const MOST_LEFT_BEHIND: u32 = 1000;
 
 impl RunFolder {
     fn new() -> anyhow::Result<RunFolder> {
-        let path = std::env::temp_dir().join(format!("gluray-run-{}", std::process::id()));
-        fs::create_dir_all(&path).with_context(|| format!("cannot make the folder {}", path.display()))?;
-        Ok(RunFolder(path))
+        RunFolder::within(&std::env::temp_dir())
+    }
+
+    fn within(place: &Path) -> anyhow::Result<RunFolder> {
+        let pid = std::process::id();
+        for n in 0..MOST_LEFT_BEHIND {
+            let path = place.join(format!("gluray-run-{pid}-{n}"));
+            match fs::DirBuilder::new().mode(0o700).create(&path) {
+                Ok(()) => return Ok(RunFolder(path)),
+                // Not ours, whoever made it.
+                Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {}
+                Err(e) => {
+                    return Err(e).with_context(|| format!("cannot make the folder {}", path.display()));
+                }
+            }
+        }
+        Err(anyhow::anyhow!("{} is full of folders gluray-run-{pid}-*", place.display()))
+            .cure("remove those of runs that are over")
     }
 }
 
@@ -232,4 +251,22 @@ fn collect(folder: &Path, program: &str) -> Report {
         sum.timeline.extend(text.lines().filter_map(|l| serde_json::from_str(l).ok()));
     }
     sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::PermissionsExt as _;
+
+    #[test]
+    fn folders_that_killed_runs_left_behind_are_not_taken() {
+        let place = tempfile::tempdir().expect("a folder");
+        let left = place.path().join(format!("gluray-run-{}-0", std::process::id()));
+        fs::create_dir(&left).expect("a folder");
+        let [one, other] = [(); 2].map(|()| RunFolder::within(place.path()).expect("a folder"));
+        assert!(one.0 != left && other.0 != left && one.0 != other.0);
+        assert_eq!(fs::metadata(&one.0).expect("there").permissions().mode() & 0o777, 0o700);
+        drop((one, other));
+        assert_eq!(fs::read_dir(place.path()).expect("a folder").count(), 1);
+    }
 }
