@@ -1,7 +1,7 @@
 //! Ray-parallel mode with replicated data (dissertation, sections 4.1.3 and 6.2): several processes make one program's picture.
 //!
 //! The program is the first rank. Helpers (`gluray serve-rays`) have the whole scene, of which they are told what is new, and make every so many rows of each
-//! picture. They talk by composite's communicator. [`group`] does the same for helpers that are an MPI job. Every rank sends the packets of rays that one process would, so pictures are the same bit by bit
+//! picture. They talk by composite's communicator. `group` does the same for helpers that are an MPI job. Every rank sends the packets of rays that one process would, so pictures are the same bit by bit
 //! whatever the number of ranks.
 
 mod account;
