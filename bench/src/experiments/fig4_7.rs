@@ -4,7 +4,7 @@
 use super::Context;
 use super::lineup::Installed;
 use crate::meshes;
-use crate::opengl::{Cost, Mesa, Session};
+use crate::opengl::{Mesa, MesaFrames};
 use crate::ours::Ours;
 use crate::peers::BuildCost;
 use crate::peers::embree::{EmbreeScene, Options, Quality};
@@ -90,48 +90,32 @@ fn measure(
     let builders = builders(mesh, with.installed, slow_too);
     let mut costs: Vec<Vec<BuildCost>> = vec![vec![]; builders.len()];
     context.say(format!("{n} triangles: a program for llvmpipe"))?;
-    let mut drawn: Option<(&str, Session)> = None;
+    let mut drawn: Option<MesaFrames> = None;
     if let Some(mesa) = with.mesa {
         drawn = mesa.draw(mesh, 1024).map_err(|e| record.missing.push(format!("{n} triangles: {e:#}"))).ok();
     }
-    let mut frames: Vec<Cost> = vec![];
     for round in 0..rounds {
         context.say(format!("{n} triangles, round {} of {rounds}", round + 1))?;
         for i in 0..builders.len() {
             let i = (i + round) % builders.len();
             costs[i].push(builders[i].1()?);
         }
-        if let Some((_, session)) = &mut drawn {
-            for _ in 0..FRAMES_A_ROUND {
-                frames.push(session.frames(1)?);
-            }
+        if let Some(frames) = &mut drawn {
+            frames.take(FRAMES_A_ROUND)?;
         }
     }
     for ((name, _), costs) in builders.iter().zip(&costs) {
         record.rows.push(row(name, mesh, costs));
     }
-    if let Some((program, session)) = drawn {
-        session.end()?;
-        record.rows.push(frame_row(program, n, &frames));
+    if let Some(frames) = drawn {
+        let row = Row::new().with("triangles", n).with("builder", format!("a frame of {}", frames.name()));
+        record.rows.push(frames.end(row, 1.0)?);
     }
     Ok(())
 }
 
 /// A frame is short beside the builds of its round.
 const FRAMES_A_ROUND: usize = 3;
-
-/// A frame of the rasteriser as a row.
-fn frame_row(program: &str, triangles: usize, frames: &[Cost]) -> Row {
-    let of = |f: &dyn Fn(&Cost) -> f64| Summary::of(&frames.iter().map(f).collect::<Vec<_>>());
-    let row =
-        Row::new().with("triangles", triangles).with("builder", format!("a frame of llvmpipe ({program})"));
-    let (Some(wall), Some(cpu)) = (of(&|c| c.wall_secs), of(&|c| c.cpu_secs)) else { return row };
-    row.with("time", wall.median)
-        .with("time_low", wall.low)
-        .with("time_high", wall.high)
-        .with("cpu", cpu.median)
-        .with("rate", triangles as f64 / wall.median / 1e6)
-}
 
 fn builders<'a>(mesh: &'a Arc<TriMesh>, installed: &'a Installed, slow_too: bool) -> Vec<Builder<'a>> {
     let mut list: Vec<Builder<'a>> = vec![];

@@ -2,12 +2,11 @@
 
 use super::Context;
 use super::fig4_7::fits_in_memory;
-use crate::opengl::{Cost, Mesa, Session};
+use crate::opengl::{Mesa, MesaFrames};
 use crate::picture::framing::Framing;
 use crate::plot::{Axis, Plot, Point, Series};
 use crate::record::{Record, Row};
 use crate::runner::{Schedule, Variant, interleave};
-use crate::stats::Summary;
 use datasets::catalogue;
 use datasets::generate::nested_wavelet::Size;
 use rt_core::accel::{BuildOptions, World};
@@ -64,13 +63,12 @@ fn measure(
     let (build_secs, bytes) = (report.total.as_secs_f64(), report.bytes);
     let options = RenderOptions::new(pixels, pixels);
     let n = mesh.num_triangles();
-    let mut drawn: Option<(&str, Session)> = None;
+    let mut drawn: Option<MesaFrames> = None;
     if let Some(mesa) = mesa {
         context.say(format!("{n} triangles: a program for llvmpipe"))?;
         drawn =
             mesa.draw(&mesh, pixels).map_err(|e| record.missing.push(format!("{n} triangles: {e:#}"))).ok();
     }
-    let mut frames: Vec<Cost> = vec![];
     for view in catalogue::find("wavelet")?.views() {
         context.say(format!("{} triangles: {}", mesh.num_triangles(), view.name))?;
         let camera: Camera = Framing::At(view.clone()).of(&scene.world, [pixels, pixels])?;
@@ -89,10 +87,8 @@ fn measure(
             return Err(e.into());
         }
         // After each view, so that both see the machine as it was in between.
-        if let Some((_, session)) = &mut drawn {
-            for _ in 0..FRAMES_A_VIEW {
-                frames.push(session.frames(1)?);
-            }
+        if let Some(frames) = &mut drawn {
+            frames.take(FRAMES_A_VIEW)?;
         }
         let timed = &timings.variants[0];
         let (wall, cpu) =
@@ -114,28 +110,17 @@ fn measure(
                 .with("bytes_per_triangle", bytes as f64 / mesh.num_triangles() as f64),
         );
     }
-    if let Some((program, session)) = drawn {
-        session.end()?;
-        record.rows.push(rasterised(program, n, pixels, &frames));
+    if let Some(frames) = drawn {
+        let row = Row::new()
+            .with("triangles", n)
+            .with("view", frames.name())
+            .with("pixels", f64::from(pixels) * f64::from(pixels));
+        record.rows.push(frames.end(row, 1e3)?);
     }
     Ok(())
 }
 
 const FRAMES_A_VIEW: usize = 5;
-
-/// Frames of the rasteriser as a row.
-fn rasterised(program: &str, triangles: usize, pixels: u32, frames: &[Cost]) -> Row {
-    let of = |f: &dyn Fn(&Cost) -> f64| Summary::of(&frames.iter().map(f).collect::<Vec<_>>());
-    let row = Row::new()
-        .with("triangles", triangles)
-        .with("view", format!("llvmpipe ({program})"))
-        .with("pixels", f64::from(pixels) * f64::from(pixels));
-    let (Some(wall), Some(cpu)) = (of(&|c| c.wall_secs), of(&|c| c.cpu_secs)) else { return row };
-    row.with("time", wall.median * 1e3)
-        .with("time_low", wall.low * 1e3)
-        .with("time_high", wall.high * 1e3)
-        .with("cpu", cpu.median * 1e3)
-}
 
 fn plot(record: &Record) -> Plot {
     let mut plot = Plot::lines("Time of a frame", Axis::log("triangles", ""), Axis::log("time", "ms"));

@@ -5,9 +5,6 @@ use crate::opengl::{Display, Program, Session, Tools, Way, write};
 use crate::record::{Record, Row};
 use crate::stats::Summary;
 use datasets::generate::nested_wavelet::Size;
-use datasets::generate::wavelet::Wavelet;
-use datasets::isosurface;
-use rt_core::mesh::TriMesh;
 
 /// The side of the program's window.
 const SIZE_PX: u32 = 1024;
@@ -42,7 +39,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let dir = tempfile::tempdir()?;
     let (counts, groups, frames): (&[u32], u32, u32) =
         if context.quick { (&[1, 2, 4], 2, 3) } else { (&[1, 2, 4, 8, 16], 5, 4) };
-    let mesh = surfaces(context.quick)?;
+    let mesh = if context.quick { crate::meshes::coarse_wavelet(51)? } else { context.wavelet(Size::M1)? };
     let data = dir.path().join("wavelet").with_extension(PROGRAM.format().extension());
     write(&mesh, PROGRAM.format(), &data)?;
 
@@ -83,17 +80,6 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         record.rows.push(row(ranks, &times[i], report, differing(&pictures[0], &pictures[i]))?);
     }
     Ok(())
-}
-
-/// The wavelet with normals: surfaces without are drawn by a shader that is not known of every version of VTK.
-fn surfaces(quick: bool) -> anyhow::Result<TriMesh> {
-    let options = isosurface::Options { normals: true, ..isosurface::Options::default() };
-    let made = if quick {
-        isosurface::extract(&Wavelet::with_points(51).grid()?, &Size::M1.isovalues(), options)?
-    } else {
-        Size::M1.generate(options)?
-    };
-    Ok(made.mesh)
 }
 
 fn row(ranks: u32, secs: &[f64], report: &serde_json::Value, differ: usize) -> anyhow::Result<Row> {

@@ -1,7 +1,9 @@
 //! Frames of a mesh by Mesa's software rasteriser alone: what a build or a traced frame is set against (figures 4.7 and 4.9).
 
 use super::programs::find;
-use super::{Display, Program, Session, Way, write};
+use super::{Cost, Display, Program, Session, Way, write};
+use crate::record::Row;
+use crate::stats::Summary;
 use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 use tempfile::TempDir;
@@ -33,9 +35,9 @@ impl Mesa {
         Ok(Mesa { display, programs, dir })
     }
 
-    /// A program that draws `mesh`, a frame whenever it is asked, and its name. The mesh fills a window of `size_px` pixels a side,
-    /// and turns by some degrees from frame to frame. The error says what each program said that would not start.
-    pub fn draw(&self, mesh: &Arc<TriMesh>, size_px: u32) -> anyhow::Result<(&'static str, Session)> {
+    /// A program that draws `mesh`, which fills a window of `size_px` pixels a side and turns by some degrees from frame to frame. The
+    /// error says what each program said that would not start.
+    pub fn draw(&self, mesh: &Arc<TriMesh>, size_px: u32) -> anyhow::Result<MesaFrames> {
         let mut faults = Vec::new();
         for &program in &self.programs {
             let data = self.dir.path().join("mesh").with_extension(program.format().extension());
@@ -47,11 +49,46 @@ impl Mesa {
                 Ok(mut session) => {
                     // The first may still send buffers.
                     session.frames(1)?;
-                    return Ok((program.name(), session));
+                    return Ok(MesaFrames { program: program.name(), session, costs: Vec::new() });
                 }
                 Err(fault) => faults.push(format!("{fault:#}")),
             }
         }
         anyhow::bail!("no program draws by llvmpipe: {}", faults.join("; "))
+    }
+}
+
+/// A program that draws a mesh by llvmpipe, a frame whenever it is asked, and what its frames have cost.
+pub struct MesaFrames {
+    program: &'static str,
+    session: Session,
+    costs: Vec<Cost>,
+}
+
+impl MesaFrames {
+    /// Who draws, in words.
+    pub fn name(&self) -> String {
+        format!("llvmpipe ({})", self.program)
+    }
+
+    /// Has `count` more frames drawn.
+    pub fn take(&mut self, count: usize) -> anyhow::Result<()> {
+        for _ in 0..count {
+            self.costs.push(self.session.frames(1)?);
+        }
+        Ok(())
+    }
+
+    /// Ends the program. `row` with the columns `time`, `time_low`, `time_high` and `cpu` of a frame, where `per_second` of their unit
+    /// are a second.
+    pub fn end(self, row: Row, per_second: f64) -> anyhow::Result<Row> {
+        self.session.end()?;
+        let of = |f: &dyn Fn(&Cost) -> f64| Summary::of(&self.costs.iter().map(f).collect::<Vec<_>>());
+        let (Some(wall), Some(cpu)) = (of(&|c| c.wall_secs), of(&|c| c.cpu_secs)) else { return Ok(row) };
+        Ok(row
+            .with("time", wall.median * per_second)
+            .with("time_low", wall.low * per_second)
+            .with("time_high", wall.high * per_second)
+            .with("cpu", cpu.median * per_second))
     }
 }

@@ -8,6 +8,6 @@ mod session;
 
 pub use data::{Format, write};
 pub use display::Display;
-pub use mesa::Mesa;
+pub use mesa::{Mesa, MesaFrames};
 pub use programs::{Program, find};
 pub use session::{Cost, Session, Tools, Way};
