@@ -227,6 +227,13 @@ fn program(p: &Prepared<'_>) -> Skin {
             };
             (Some(Attribute::per_vertex((0..n).map(each).collect())), None, [1.0; 3])
         }
+        crate::programs::ProgramSkin::PerCell(image, scale) => {
+            let each = |i: usize| {
+                let [r, g, b, alpha] = image.numbered(i);
+                [r * scale, g * scale, b * scale, if p.draw.state.blend { alpha } else { 1.0 }]
+            };
+            (Some(Attribute::per_face((0..mesh.indices.len()).map(each).collect())), None, [1.0; 3])
+        }
         crate::programs::ProgramSkin::Map(image, scale) => {
             let each = |i: usize| Vec2::new(a.tex.at(i)[0], a.tex.at(i)[1]);
             let texture = image.as_texture().map(|t| (Arc::new(t), (0..n).map(each).collect()));
