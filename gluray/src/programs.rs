@@ -9,6 +9,7 @@ mod cells;
 mod color;
 mod peeling;
 mod recognised;
+mod shadow_maps;
 mod template;
 mod weighted;
 mod wire;
@@ -28,6 +29,7 @@ pub(crate) use color::At;
 use peeling::Peeling;
 use recognised::PerTriangle;
 pub(crate) use recognised::{ProgramLight, ProgramSkin, Recognised};
+use shadow_maps::ShadowMaps;
 use std::collections::HashMap;
 use std::sync::Arc;
 use template::{Colors, Peel, Template};
@@ -55,6 +57,7 @@ pub(crate) struct Programs {
     frame: u64,
     pub(crate) peeling: Peeling,
     pub(crate) weighted: Weighted,
+    shadow_maps: ShadowMaps,
 }
 
 /// What was made of a draw's buffers, and the frame that used it last.
@@ -130,6 +133,9 @@ impl Context {
             self.programs.templates.get(&program).copied().unwrap_or(Err("a program linked before us"));
         if template.is_err() && self.config.settings.mode == Mode::Enhance && self.config.settings.enabled {
             return self.take_shape(mode, call, elements).map(|()| Taken::Shape);
+        }
+        if !matches!(template, Ok(t) if t.peel != Peel::No) {
+            self.is_drawn_once(&template)?;
         }
         let template = template?;
         self.peels(template.peel)?;

@@ -293,7 +293,8 @@ pub(super) struct Lights {
 
 /// Takes lights out that follow one another from number 0 on.
 fn take_numbered(statements: &mut Vec<String>, block: &[&str]) -> usize {
-    let numbered = |i: usize| -> Vec<String> { block.iter().map(|s| s.replace('#', &i.to_string())).collect() };
+    let numbered =
+        |i: usize| -> Vec<String> { block.iter().map(|s| s.replace('#', &i.to_string())).collect() };
     let there = |i: &usize| take(statements, &numbered(*i).iter().map(String::as_str).collect::<Vec<_>>());
     (0..=MOST_LIGHTS).take_while(there).count()
 }

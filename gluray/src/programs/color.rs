@@ -51,7 +51,8 @@ impl ProgramLight {
         let mut share = 1.0 / (constant + linear * distance + quadratic * distance * distance);
         if lamp.cone_deg < 90.0 {
             let cosine = dot(travels, self.travels);
-            share *= if cosine >= lamp.cone_deg.to_radians().cos() { cosine.powf(lamp.exponent) } else { 0.0 };
+            share *=
+                if cosine >= lamp.cone_deg.to_radians().cos() { cosine.powf(lamp.exponent) } else { 0.0 };
         }
         (travels, share)
     }
@@ -139,9 +140,10 @@ impl Recognised {
             Some(back) if !at.front => back,
             _ => {
                 let (own, alpha) = self.own_color(a, mesh, at.prim, at.weights);
+                let plain = |v: f32| if self.template.linear { v.powf(2.2) } else { v };
                 Surface {
-                    ambient: own.unwrap_or(self.ambient).map(|v| v * self.ambient_intensity),
-                    diffuse: own.unwrap_or(self.diffuse).map(|v| v * self.diffuse_intensity),
+                    ambient: own.unwrap_or(self.ambient).map(|v| plain(v * self.ambient_intensity)),
+                    diffuse: own.unwrap_or(self.diffuse).map(|v| plain(v * self.diffuse_intensity)),
                     specular: self.specular,
                     power: self.specular_power,
                     alpha: alpha * self.opacity,
@@ -234,14 +236,7 @@ impl Recognised {
         })
     }
 
-    fn physically_lit(
-        &self,
-        p: &Physical,
-        s: &Surface,
-        point: V3,
-        normal: V3,
-        reaches: &Visibility,
-    ) -> V3 {
+    fn physically_lit(&self, p: &Physical, s: &Surface, point: V3, normal: V3, reaches: &Visibility) -> V3 {
         let cosine = |a: V3, b: V3| dot(a, b).clamp(1e-5, 1.0);
         let to_eye = normalized(point.map(|v| -v));
         let n_v = cosine(normal, to_eye);

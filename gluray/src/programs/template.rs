@@ -1,8 +1,8 @@
 //! VTK's shaders, statement by statement: what each of them means, and whether there are others.
 
 use super::blocks::{
-    BACK, CLIPPED, CLIPS, CLIPS_LATER, EDGES, EMITS, MEASURES, MOST_LIGHTS, WEIGHTED, take, take_lights, take_physical,
-    without_peeling,
+    BACK, CLIPPED, CLIPS, CLIPS_LATER, EDGES, EMITS, MEASURES, MOST_LIGHTS, WEIGHTED, take, take_lights,
+    take_physical, without_peeling,
 };
 
 /// Where the surface's colour comes from.
@@ -31,6 +31,9 @@ pub(super) enum Peel {
     Weighted,
 }
 
+/// Why a program that draws depths for VTK's shadow maps is not known.
+pub(super) const SHADOW_MAP: &str = "a shadow map";
+
 /// What a program's text says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Template {
@@ -49,8 +52,9 @@ pub(crate) struct Template {
     pub(super) clipped: bool,
     /// Edges of cells are drawn.
     pub(super) edges: bool,
-    /// The material is physically based.
+    /// The material is physically based, and its colours are made linear for it.
     pub(super) physical: bool,
+    pub(super) linear: bool,
 }
 
 /// Statements of `main`, without blanks and comments; light numbers become `#`.
@@ -85,6 +89,9 @@ impl Template {
             // What goes through has another name behind it.
             fs.iter_mut().for_each(|s| *s = s.replace("GSOutput", "VSOutput"));
             t.read_geometry(geometry, &mut vs).ok_or("a geometry or tessellation shader")?;
+        }
+        if fs.iter().any(|s| s == "fragOutput0.r=exp(depthC*ldepth)") {
+            return Err(SHADOW_MAP);
         }
         t.read_vertex(vs).ok_or(NOT_VTK)?;
         t.read_fragment(fs).ok_or(NOT_VTK)?;
@@ -183,6 +190,11 @@ impl Template {
             "vec4texColor=texelFetchBuffer(textureC,gl_PrimitiveID+PrimitiveIDOffset)" => {
                 self.colors = Colors::PerCell;
             }
+            "ambientColor=pow(ambientColor,vec3(2.2))" | "diffuseColor=pow(diffuseColor,vec3(2.2))"
+                if self.physical && self.colors != Colors::Uniform =>
+            {
+                self.linear = true;
+            }
             // Where it comes from was said before.
             "vec3ambientColor=ambientIntensity*texColor.rgb"
             | "vec3diffuseColor=diffuseIntensity*texColor.rgb"
@@ -251,7 +263,7 @@ mod tests {
         let all = read(&format!("{}{HEAD}{}{}", parts[1], parts[0], parts[2])).expect("known");
         assert!(all.back && all.clipped && all.peel == Peel::Weighted);
         assert!(read(HEAD).is_err(), "planes that only the vertex shader knows");
-        assert!(super::Template::read(VERTEX, "", &fragment(&format!("{}{HEAD}", parts[1]))).is_err());
+        assert!(Template::read(VERTEX, "", &fragment(&format!("{}{HEAD}", parts[1]))).is_err());
         for block in [BACK, CLIPPED, WEIGHTED] {
             let less = block[..block.len() - 1].join(";");
             assert!(read(&format!("{}{HEAD}{less};", parts[1])).is_err(), "{less}");
@@ -281,11 +293,18 @@ mod tests {
         for end in PHYSICAL_ENDS {
             for (lights, n) in [(PHYSICAL_HEADLIGHT, 0), (PHYSICAL_SUN, 1), (PHYSICAL_LAMP, 1)] {
                 let text = [PHYSICAL, lights, end].concat().join(";").replace('#', "0") + ";";
-                let whole = fragment(&text).replace("fragOutput0 = vec4(ambientColor + diffuse + specular, opacity);", "");
+                let whole = fragment(&text)
+                    .replace("fragOutput0 = vec4(ambientColor + diffuse + specular, opacity);", "");
                 let t = read(&whole).expect("known");
                 assert!(t.physical && t.lit && t.lights == n && t.headlight == (n == 0));
                 assert!(read(&fragment(&text)).is_err(), "two colours");
                 assert!(read(&whole.replace("floatao=1.0", "floatao=texture(ao)")).is_err());
+                let linear = "diffuseColor=pow(diffuseColor,vec3(2.2));";
+                let colored = "float opacity = opacityUniform * vertexColorVSOutput.a;".to_owned() + linear;
+                assert!(
+                    read(&whole.replace("float opacity = opacityUniform;", &colored)).expect("known").linear
+                );
+                assert!(read(&fragment(&format!("{HEAD}{linear}"))).is_err(), "not physically based");
             }
         }
     }
@@ -323,6 +342,8 @@ mod tests {
         let selector = "float df = max(0.000001, normalVCVSOutput.z); fragOutput0 = vec4(propID, 1.0);";
         assert!(read(&fragment(selector)).is_err());
         assert!(Template::read("void main() { gl_Position = vec4(sin(t)); }", "", &fragment(HEAD)).is_err());
+        let shadows = format!("{HEAD} fragOutput0.r = exp(depthC*ldepth);");
+        assert_eq!(read(&fragment(&shadows)), Err(SHADOW_MAP));
         assert!(read(&fragment("")).is_err(), "lit, but by nothing that is known");
     }
 }

@@ -22,6 +22,7 @@ wire_struct!(Template {
     clipped,
     edges,
     physical,
+    linear,
 });
 wire_struct!(Lamp { position, attenuation, cone_deg, exponent });
 wire_struct!(ProgramLight { travels, color, lamp });

@@ -44,6 +44,7 @@ driver! {
     pub(crate) fn push_attrib = "glPushAttrib"(mask: u32);
     pub(crate) fn pop_attrib = "glPopAttrib"();
     pub(crate) fn viewport = "glViewport"(x: i32, y: i32, w: i32, h: i32);
+    pub(crate) fn polygon_offset = "glPolygonOffset"(factor: f32, units: f32);
     pub(crate) fn depth_func = "glDepthFunc"(func: u32);
     pub(crate) fn depth_mask = "glDepthMask"(on: u8);
     pub(crate) fn depth_range = "glDepthRange"(near: f64, far: f64);

@@ -156,8 +156,8 @@ impl FragmentBlock {
                 let (mut height, mut size) = (0.0, 0.0);
                 for (i, corner) in corners.p.iter().enumerate() {
                     let at = |k: usize| f64::from(corner[k][l]);
-                    let term =
-                        self.weights[i][l] * (plane[0] * at(0) + plane[1] * at(1) + plane[2] * at(2) + plane[3]);
+                    let term = self.weights[i][l]
+                        * (plane[0] * at(0) + plane[1] * at(1) + plane[2] * at(2) + plane[3]);
                     (height, size) = (height + term, size + term.abs());
                 }
                 good[l] &= height > 1e-6 * size;

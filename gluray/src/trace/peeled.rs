@@ -3,7 +3,9 @@
 //! Rays go from surface to surface, 256 at a time. Where a hit is none of the rasterizer's fragments, an edge is near, and four rays beside the centre
 //! find the triangle that the fill rule gives the pixel to.
 
-use super::{DEPTH_STEPS, Fragment, Layer, MOST_STEPS, Prepared, Rect, TILE, TileRays, UNCOVERED, slot, to_bytes};
+use super::{
+    DEPTH_STEPS, Fragment, Layer, MOST_STEPS, Prepared, Rect, TILE, TileRays, UNCOVERED, slot, to_bytes,
+};
 use crate::config::Settings;
 use crate::effects::Surroundings;
 use crate::raster::steepness;
