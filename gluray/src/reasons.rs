@@ -8,6 +8,11 @@ pub fn advice(reason: &str) -> Option<&'static str> {
 /// By the beginning of the reason.
 const TABLE: &[(&str, &str)] = &[
     (
+        "a surface of VTK's",
+        "normal maps, environments, ambient occlusion and the like of VTK's own; --mode enhance needs no understanding",
+    ),
+    ("a picture on", "textures of VTK's actors are not followed in its shaders; colours of points and cells are"),
+    (
         "surfaces that VTK draws again",
         "VTK draws them twice, the second time over themselves with shadow maps; --mode rich makes shadows without these",
     ),

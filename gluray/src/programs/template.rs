@@ -81,6 +81,8 @@ impl Template {
     /// Reads the shaders; the error says why the program is not recognised.
     pub(crate) fn read(vertex: &str, geometry: &str, fragment: &str) -> Result<Template, &'static str> {
         const NOT_VTK: &str = "a program that is not recognised";
+        const UNKNOWN: &str = "a surface of VTK's with a statement that is not known";
+        const PICTURE: &str = "a picture on a surface of VTK's";
         let mut t = Template::default();
         let (Some(mut vs), Some(mut fs)) = (statements(vertex), statements(fragment)) else {
             return Err(NOT_VTK);
@@ -94,7 +96,8 @@ impl Template {
             return Err(SHADOW_MAP);
         }
         t.read_vertex(vs).ok_or(NOT_VTK)?;
-        t.read_fragment(fs).ok_or(NOT_VTK)?;
+        let why = if fs.iter().any(|s| s.contains("texture(actortexture")) { PICTURE } else { UNKNOWN };
+        t.read_fragment(fs).ok_or(why)?;
         Ok(t)
     }
 
