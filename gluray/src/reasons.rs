@@ -11,7 +11,10 @@ const TABLE: &[(&str, &str)] = &[
         "a surface of VTK's",
         "normal maps, environments, ambient occlusion and the like of VTK's own; --mode enhance needs no understanding",
     ),
-    ("a picture on", "textures of VTK's actors are not followed in its shaders; colours of points and cells are"),
+    (
+        "a picture on",
+        "textures of VTK's actors are not followed in its shaders; colours of points and cells are",
+    ),
     (
         "surfaces that VTK draws again",
         "VTK draws them twice, the second time over themselves with shadow maps; --mode rich makes shadows without these",

@@ -310,6 +310,31 @@ fn surfaces_that_are_drawn_again_with_shadow_maps_are_the_drivers_and_named() {
 }
 
 #[test]
+fn modes_beyond_match_keep_clipping_planes_and_say_what_paths_leave_out() {
+    let (Some(python), Some(_)) = (program("RTSV_PYTHON"), program("RTSV_XVFB")) else { return };
+    let Some(x) = Xvfb::start() else { return };
+    let file = script("wheel_scene.py");
+    let picture = |kind: &str, through: Option<&[&str]>| {
+        let place = folder();
+        let home = [("HOME", place.path().to_str().expect("UTF-8"))];
+        let run = Run { x: &x, folder: place.path(), through, environment: &home };
+        let (_, report) = run.program(&python, &[file.as_str(), kind]);
+        (Picture::read(&place.path().join("out.png")), report)
+    };
+    let (native, _) = picture("clipped", None);
+    for mode in ["rich", "path"] {
+        let (ours, report) = picture("clipped", Some(&["--mode", mode, "--set", "samples=4"]));
+        let overlap = compare(&native, &ours).overlap;
+        assert!(overlap > 0.95 && report.traced_draws >= 4, "{mode}: {overlap}, {report:?}");
+    }
+    for (kind, what) in [("edges", "edges of cells"), ("both_sides", "materials of back faces")] {
+        let (_, report) = picture(kind, Some(&["--mode", "path"]));
+        let said = format!("mode path: {what} are left out");
+        assert!(report.problems.contains(&said), "{report:?}");
+    }
+}
+
+#[test]
 fn passing_everything_changes_no_pixel() {
     let Some(gmsh) = program("RTSV_GMSH") else { return };
     let Some(x) = Xvfb::start() else { return };

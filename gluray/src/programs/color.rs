@@ -83,9 +83,8 @@ impl Physical {
 }
 
 impl Edges {
-    /// How much of a fragment at `pixel` is line. `corners` are the triangle's in clip space.
+    /// How much of a fragment is line. `corners` are the triangle's in clip space.
     fn share(&self, corners: [[f32; 4]; 3], at: &At) -> f32 {
-        let Some((x, y)) = at.pixel else { return 0.0 };
         let sides = self.sides.get(at.prim).copied().unwrap_or(7);
         let [vx, vy, vw, vh] = self.viewport;
         let p = corners.map(|c| {
@@ -94,7 +93,14 @@ impl Edges {
         let cross = (p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) - (p[1][1] - p[0][1]) * (p[2][0] - p[0][0]);
         let turn = if cross < 0.0 { -1.0 } else { 1.0 };
         let [mx, my] = at.moved_by.map(f64::from);
-        let (px, py) = (f64::from(x) + 0.5 - mx, f64::from(y) + 0.5 - my);
+        let (px, py) = match at.pixel {
+            Some((x, y)) => (f64::from(x) + 0.5 - mx, f64::from(y) + 0.5 - my),
+            // Anywhere in a pixel, or seen in a mirror: where the eye would see it.
+            None => {
+                let [x, y, _, w] = mixed(corners, at.weights);
+                (f64::from((x / w * 0.5 + 0.5) * vw + vx), f64::from((y / w * 0.5 + 0.5) * vh + vy))
+            }
+        };
         let mut nearest = f64::INFINITY;
         for i in 0..3 {
             let (a, b) = (p[i], p[(i + 1) % 3]);
@@ -313,6 +319,9 @@ mod tests {
         assert_eq!(edges(2).share(corners, &at(6, 0)), 0.0, "that side is none");
         assert_eq!(edges(4).share(corners, &at(0, 6)), 0.5, "the third side is the left one");
         assert_eq!(edges(7).share(corners, &at(5, 5)), 0.0, "inside");
-        assert_eq!(edges(7).share(corners, &At { pixel: None, ..at(6, 0) }), 0.0, "not seen by the eye");
+        // The same place by the corners' weights: 6.5 and 0.5 of 20.
+        let weights = [0.65, 0.325, 0.025];
+        let by_weights = edges(1).share(corners, &At { pixel: None, weights, ..at(0, 0) });
+        assert!((by_weights - 0.5).abs() < 1e-5, "{by_weights}");
     }
 }

@@ -277,6 +277,16 @@ impl Recognised {
         }
     }
 
+    /// What a scene of paths has no place for, in words.
+    pub(crate) fn left_out_of_paths(&self) -> impl Iterator<Item = &'static str> {
+        let left_out = [
+            (self.edges.is_some(), "edges of cells"),
+            (self.back.is_some(), "materials of back faces"),
+            (self.physical.is_some(), "VTK's rules for physically based materials"),
+        ];
+        left_out.into_iter().filter_map(|(there, what)| there.then_some(what))
+    }
+
     /// True when the surface answers lights.
     pub(crate) fn is_lit(&self) -> bool {
         self.template.lit

@@ -68,7 +68,12 @@ pub(super) fn part(
     let s = &*p.draw.state;
     let skin = match &p.draw.shading {
         Shading::Fixed => fixed(p, warnings),
-        Shading::Program(_) => program(p),
+        Shading::Program(known) => {
+            known
+                .left_out_of_paths()
+                .for_each(|what| warn(warnings, &format!("mode path: {what} are left out")));
+            program(p)
+        }
     };
     let mut mesh = TriMesh::new(p.draw.geometry.mesh.positions.clone(), p.draw.geometry.mesh.indices.clone());
     // The outside is what OpenGL calls front.
