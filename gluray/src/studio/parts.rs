@@ -69,9 +69,7 @@ pub(super) fn part(
     let skin = match &p.draw.shading {
         Shading::Fixed => fixed(p, warnings),
         Shading::Program(known) => {
-            known
-                .left_out_of_paths()
-                .for_each(|what| warn(warnings, &format!("mode path: {what} are left out")));
+            known.left_out_of_paths().for_each(|what| warn(warnings, &format!("{what} are left out")));
             program(p)
         }
     };
