@@ -1,17 +1,18 @@
 //! OpenGL's lighting at the corners of 16 fragments' triangles at a time: [`Setup::vertex`] for many.
 //!
-//! Every step is written as a loop over the lanes, which compilers turn into vector code; the order of sums is that of the scalar code. Only powers are
-//! another function: exact to a millionth for exponents up to OpenGL's 128.
+//! Every step is written as a plain loop over the lanes, which compilers turn into vector code (closures may become calls of code for the oldest
+//! processors); the order of sums is that of the scalar code. Only powers are another function: exact to a millionth for exponents up to OpenGL's 128.
 
 use super::Setup;
+use super::powers::{power, powers};
 use crate::capture::{Attributes, Packed, Values};
 use crate::enums::*;
 use crate::state::current::{Material, sides};
 use rt_core::ray::LANES;
 
 /// A number in each lane.
-type F = [f32; LANES];
-const ZERO: F = [0.0; LANES];
+pub(super) type F = [f32; LANES];
+pub(super) const ZERO: F = [0.0; LANES];
 
 /// Colours of fragments, not yet clamped to bytes.
 pub(crate) struct Colors {
@@ -33,6 +34,10 @@ struct Surface {
     emission: [F; 3],
     alpha: F,
     shininess: F,
+    /// The shininess of all lanes, where that is one whole number.
+    whole: Option<u32>,
+    /// There are highlights.
+    shines: bool,
 }
 
 /// Which side each lane sees.
@@ -66,6 +71,20 @@ fn dot(a: &[F; 3], b: &[F; 3]) -> F {
     out
 }
 
+/// From 0 to 1; not a number stays what it is.
+#[inline(always)]
+fn unit(v: f32) -> f32 {
+    let v = if v < 0.0 { 0.0 } else { v };
+    if v > 1.0 { 1.0 } else { v }
+}
+
+#[inline(always)]
+fn units(v: &mut F) {
+    for l in 0..LANES {
+        v[l] = unit(v[l]);
+    }
+}
+
 /// Unit length; zero stays zero.
 #[inline(always)]
 fn normalize(v: &mut [F; 3]) {
@@ -78,79 +97,63 @@ fn normalize(v: &mut [F; 3]) {
     }
 }
 
-/// The base-two logarithm of a positive normal number: exponent, and a series in (m - 1) / (m + 1) for the mantissa.
-#[inline(always)]
-fn log2(x: f32) -> f64 {
-    let bits = x.to_bits();
-    // Mantissas from sqrt(1/2) to sqrt(2).
-    let shifted = bits.wrapping_sub(0x3f35_04f3);
-    let exponent = (shifted.cast_signed() >> 23) as f64;
-    let m = f64::from(f32::from_bits((shifted & 0x007f_ffff).wrapping_add(0x3f35_04f3)));
-    let t = (m - 1.0) / (m + 1.0);
-    let s = t * t;
-    // 2 / ln 2 · (t + t³/3 + t⁵/5 + …), |t| < 0.172
-    let series = 1.0 + s * (1.0 / 3.0 + s * (0.2 + s * (1.0 / 7.0 + s * (1.0 / 9.0 + s * (1.0 / 11.0)))));
-    exponent + 2.885_390_081_777_926_8 * t * series
-}
-
-/// Two to a power; 0 below the smallest normal number.
-#[inline(always)]
-fn exp2(x: f64) -> f32 {
-    let x = x.clamp(-127.0, 127.0);
-    let whole = (x + 128.5) as i32 - 128;
-    let f = (x - f64::from(whole)) * std::f64::consts::LN_2;
-    // e^f, |f| < 0.35
-    let e = 1.0
-        + f * (1.0
-            + f * (0.5
-                + f * (1.0 / 6.0 + f * (1.0 / 24.0 + f * (1.0 / 120.0 + f * (1.0 / 720.0 + f / 5040.0))))));
-    let scale = f64::from(f32::from_bits(((whole + 127).max(0).cast_unsigned()) << 23));
-    (e * scale) as f32
-}
-
-/// `x.powf(e)` for x from 0 on, with anything to the 0 as 1.
-#[inline(always)]
-pub(crate) fn power(x: f32, e: f32) -> f32 {
-    let positive = x >= f32::MIN_POSITIVE;
-    let p = exp2(f64::from(e) * log2(if positive { x } else { 1.0 }));
-    let p = if positive { p } else { 0.0 };
-    if e == 0.0 { 1.0 } else { p }
-}
-
 /// An attribute of the vertices `corners` picks, lane by lane.
 #[inline(always)]
 fn gather<const N: usize>(values: &Values<N>, vertices: &[usize; LANES], used: u16) -> [F; N] {
     let mut out = [ZERO; N];
-    let mut put = |l: usize, v: [f32; N]| (0..N).for_each(|k| out[k][l] = v[k]);
+    let mut put = |l: usize, v: [f32; N]| {
+        for k in 0..N {
+            out[k][l] = v[k];
+        }
+    };
     match values {
-        Values::Constant(v) => (0..LANES).for_each(|l| put(l, *v)),
+        Values::Constant(v) => {
+            for l in 0..LANES {
+                put(l, *v);
+            }
+        }
         Values::PerVertex(all) => {
-            for l in (0..LANES).filter(|l| used >> l & 1 != 0) {
+            for l in 0..LANES {
+                if used >> l & 1 == 0 {
+                    continue;
+                }
                 put(l, all.get(vertices[l]).copied().unwrap_or([0.0; N]));
             }
         }
         Values::Packed(p) if p.kind == FLOAT && p.size == N => {
             let all: &[[f32; N]] = rows(p);
-            for l in (0..LANES).filter(|l| used >> l & 1 != 0) {
+            for l in 0..LANES {
+                if used >> l & 1 == 0 {
+                    continue;
+                }
                 put(l, all.get(vertices[l]).copied().unwrap_or([0.0; N]));
             }
         }
         Values::Packed(p) if p.kind == BYTE && p.size == N && p.normalized => {
-            for l in (0..LANES).filter(|l| used >> l & 1 != 0) {
+            for l in 0..LANES {
+                if used >> l & 1 == 0 {
+                    continue;
+                }
                 if let Some(b) = p.bytes.get(vertices[l] * N..vertices[l] * N + N) {
                     put(l, std::array::from_fn(|k| (f32::from(b[k].cast_signed()) / 127.0).max(-1.0)));
                 }
             }
         }
         Values::Packed(p) if p.kind == UNSIGNED_BYTE && p.size == N && p.normalized => {
-            for l in (0..LANES).filter(|l| used >> l & 1 != 0) {
+            for l in 0..LANES {
+                if used >> l & 1 == 0 {
+                    continue;
+                }
                 if let Some(b) = p.bytes.get(vertices[l] * N..vertices[l] * N + N) {
                     put(l, std::array::from_fn(|k| f32::from(b[k]) / 255.0));
                 }
             }
         }
         other => {
-            for l in (0..LANES).filter(|l| used >> l & 1 != 0) {
+            for l in 0..LANES {
+                if used >> l & 1 == 0 {
+                    continue;
+                }
                 put(l, other.at(vertices[l]));
             }
         }
@@ -202,29 +205,57 @@ impl Setup<'_> {
             for l in 0..LANES {
                 vertices[l] = triangles[l][k] as usize;
             }
-            let mut corner = Corner {
-                position: [ZERO; 3],
-                normal: gather(&a.normals, &vertices, used),
-                color: gather(&a.colors, &vertices, used),
-            };
-            for l in (0..LANES).filter(|l| used >> l & 1 != 0) {
-                let p = positions[vertices[l]];
-                (corner.position[0][l], corner.position[1][l], corner.position[2][l]) = (p.x, p.y, p.z);
+            let (p, s) = self.vertices(a, positions, &vertices, back, used);
+            for c in 0..4 {
+                for l in 0..LANES {
+                    primary[c][l] += p[c][l] * weights[k][l];
+                }
             }
-            let (p, s) = self.corner(&corner, &a.materials[0], back);
-            for (sum, v) in primary.iter_mut().zip(&p) {
-                (0..LANES).for_each(|l| sum[l] += v[l] * weights[k][l]);
-            }
-            for (sum, v) in secondary.iter_mut().zip(&s) {
-                (0..LANES).for_each(|l| sum[l] += v[l] * weights[k][l]);
+            for c in 0..3 {
+                for l in 0..LANES {
+                    secondary[c][l] += s[c][l] * weights[k][l];
+                }
             }
         }
         for k in 0..3 {
             for l in 0..LANES {
-                primary[k][l] = (primary[k][l] + secondary[k][l]).clamp(0.0, 1.0);
+                primary[k][l] = unit(primary[k][l] + secondary[k][l]);
             }
         }
         Colors { rgba: primary }
+    }
+
+    /// Primary and secondary colours of the vertices in the lanes of `used`, from the side that `back` says.
+    #[inline(always)]
+    pub(crate) fn vertices(
+        &self,
+        a: &Attributes,
+        positions: &[rt_core::glam::Vec3],
+        vertices: &[usize; LANES],
+        back: &[bool; LANES],
+        used: u16,
+    ) -> ([F; 4], [F; 3]) {
+        let mut corner = Corner {
+            position: [ZERO; 3],
+            normal: if self.state.lighting { gather(&a.normals, vertices, used) } else { [ZERO; 3] },
+            color: gather(&a.colors, vertices, used),
+        };
+        if self.needs_places() {
+            for l in 0..LANES {
+                if used >> l & 1 != 0 {
+                    let p = positions[vertices[l]];
+                    (corner.position[0][l], corner.position[1][l], corner.position[2][l]) = (p.x, p.y, p.z);
+                }
+            }
+        }
+        self.corner(&corner, &a.materials[0], back)
+    }
+
+    /// Where a vertex is counts for its light.
+    #[inline(always)]
+    fn needs_places(&self) -> bool {
+        let near = |p: &super::PreparedLight<'_>| !p.directional || p.spot.is_some();
+        self.state.lighting && (self.state.local_viewer || self.lights.iter().any(near))
     }
 
     #[inline(always)]
@@ -232,33 +263,43 @@ impl Setup<'_> {
         let s = self.state;
         if !s.lighting {
             let mut out = c.color;
-            out.iter_mut().for_each(|v| v.iter_mut().for_each(|v| *v = v.clamp(0.0, 1.0)));
+            for v in &mut out {
+                units(v);
+            }
             return (out, [ZERO; 3]);
         }
         let two = s.two_side && back.contains(&true);
         let m = &s.model_view;
         let mut eye = [ZERO; 3];
-        for l in 0..LANES {
-            let p = [c.position[0][l], c.position[1][l], c.position[2][l]];
-            let row = |r: usize| m[r] * p[0] + m[4 + r] * p[1] + m[8 + r] * p[2] + m[12 + r];
-            let w = row(3);
-            (eye[0][l], eye[1][l], eye[2][l]) = (row(0) / w, row(1) / w, row(2) / w);
+        if self.needs_places() {
+            for l in 0..LANES {
+                let p = [c.position[0][l], c.position[1][l], c.position[2][l]];
+                let row = |r: usize| m[r] * p[0] + m[4 + r] * p[1] + m[8 + r] * p[2] + m[12 + r];
+                let w = row(3);
+                (eye[0][l], eye[1][l], eye[2][l]) = (row(0) / w, row(1) / w, row(2) / w);
+            }
         }
         let n = &self.normal_matrix;
         let mut normal = [ZERO; 3];
-        for (k, out) in normal.iter_mut().enumerate() {
+        for k in 0..3 {
             for l in 0..LANES {
-                out[l] = c.normal[0][l] * n[0][k] + c.normal[1][l] * n[1][k] + c.normal[2][l] * n[2][k];
+                normal[k][l] = c.normal[0][l] * n[0][k] + c.normal[1][l] * n[1][k] + c.normal[2][l] * n[2][k];
             }
         }
         if s.normalize {
             normalize(&mut normal);
         } else {
-            normal.iter_mut().for_each(|v| v.iter_mut().for_each(|v| *v *= self.rescale));
+            for v in &mut normal {
+                for l in 0..LANES {
+                    v[l] *= self.rescale;
+                }
+            }
         }
         if two {
             for v in &mut normal {
-                (0..LANES).for_each(|l| v[l] = if back[l] { -v[l] } else { v[l] });
+                for l in 0..LANES {
+                    v[l] = if back[l] { -v[l] } else { v[l] };
+                }
             }
         }
         let surface = self.surface(materials, &c.color, back, two);
@@ -286,6 +327,13 @@ impl Setup<'_> {
             emission: [ZERO; 3],
             alpha: ZERO,
             shininess: pick.of([front.shininess, behind.shininess], [false; 2], &ZERO),
+            whole: (front.shininess == behind.shininess || !two)
+                .then_some(front.shininess)
+                .filter(|e| (0.0..=128.0).contains(e) && e.fract() == 0.0)
+                .map(|e| e as u32),
+            shines: what == SPECULAR
+                || front.specular[..3] != [0.0; 3]
+                || two && behind.specular[..3] != [0.0; 3],
         };
         for k in 0..3 {
             let by = |tracked: bool| faces.map(|f| f && tracked);
@@ -316,7 +364,9 @@ impl Setup<'_> {
             let mut to_light = [ZERO; 3];
             let mut strength = [1.0; LANES];
             if p.directional {
-                (0..3).for_each(|k| to_light[k] = [p.to_light[k]; LANES]);
+                for k in 0..3 {
+                    to_light[k] = [p.to_light[k]; LANES];
+                }
             } else {
                 let [c, lin, q] = p.light.attenuation;
                 for l in 0..LANES {
@@ -343,43 +393,56 @@ impl Setup<'_> {
                 let mut towards = *eye;
                 normalize(&mut towards);
                 for k in 0..3 {
-                    (0..LANES).for_each(|l| half[k][l] = to_light[k][l] - towards[k][l]);
+                    for l in 0..LANES {
+                        half[k][l] = to_light[k][l] - towards[k][l];
+                    }
                 }
                 normalize(&mut half);
             } else if !p.directional {
                 half = to_light;
-                half[2].iter_mut().for_each(|v| *v += 1.0);
-                normalize(&mut half);
-            }
-            let h = dot(normal, &half);
-            let shines = p.light.specular[..3].iter().any(|v| *v != 0.0);
-            let mut shine = ZERO;
-            if shines {
                 for l in 0..LANES {
-                    let faces = cosine[l] > 0.0;
-                    let v = power(h[l].max(0.0), m.shininess[l]) * strength[l];
-                    shine[l] = if faces { v } else { 0.0 };
+                    half[2][l] += 1.0;
                 }
+                normalize(&mut half);
             }
             for k in 0..3 {
                 for l in 0..LANES {
                     let faced = cosine[l].max(0.0) * strength[l];
                     let v = primary[k][l] + m.ambient[k][l] * p.light.ambient[k] * strength[l];
                     primary[k][l] = v + m.diffuse[k][l] * p.light.diffuse[k] * faced;
-                    specular[k][l] += m.specular[k][l] * p.light.specular[k] * shine[l];
+                }
+            }
+            if m.shines && p.light.specular[..3] != [0.0; 3] {
+                let mut h = dot(normal, &half);
+                for l in 0..LANES {
+                    h[l] = h[l].max(0.0);
+                }
+                let mut shine = powers(&h, &m.shininess, m.whole);
+                for l in 0..LANES {
+                    shine[l] = if cosine[l] > 0.0 { shine[l] * strength[l] } else { 0.0 };
+                }
+                for k in 0..3 {
+                    for l in 0..LANES {
+                        specular[k][l] += m.specular[k][l] * p.light.specular[k] * shine[l];
+                    }
                 }
             }
         }
         if !s.separate_specular {
             for k in 0..3 {
-                (0..LANES).for_each(|l| primary[k][l] += specular[k][l]);
+                for l in 0..LANES {
+                    primary[k][l] += specular[k][l];
+                }
             }
             specular = [ZERO; 3];
         }
         primary[3] = m.alpha;
-        let clamp = |v: &mut F| v.iter_mut().for_each(|v| *v = v.clamp(0.0, 1.0));
-        primary.iter_mut().for_each(clamp);
-        specular.iter_mut().for_each(clamp);
+        for v in &mut primary {
+            units(v);
+        }
+        for v in &mut specular {
+            units(v);
+        }
         (primary, specular)
     }
 }
@@ -390,17 +453,6 @@ mod tests {
     use crate::state::current::Current;
     use crate::state::snapshot::{GlLight, Snapshot};
     use rt_core::glam::Vec3;
-
-    #[test]
-    fn powers_are_exact_to_a_millionth() {
-        for i in 0..=1000 {
-            let x = i as f32 / 1000.0;
-            for e in [0.0, 0.5, 1.0, 2.0, 17.3, 40.0, 128.0] {
-                let (ours, libms) = (power(x, e), if e == 0.0 { 1.0 } else { x.powf(e) });
-                assert!((ours - libms).abs() <= 1e-6 * libms + 1e-37, "{x}^{e}: {ours} for {libms}");
-            }
-        }
-    }
 
     /// Every kind of light, both sides, tracked colours, local viewer: blocks have the colours of single vertices.
     #[test]
