@@ -164,3 +164,82 @@ impl Again {
         self.pictures.retain(|p| p.age < 2);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cache::Cache;
+    use crate::state::current::Current;
+    use crate::trace::Rect;
+
+    fn config(mode: Mode) -> Arc<Config> {
+        let settings = Settings { mode, ..Settings::default() };
+        Arc::new(Config { settings, ..Config::default() })
+    }
+
+    fn draw(positions: [[f32; 3]; 3]) -> Draw {
+        let mut attributes = Attributes::constant(&Current::default());
+        attributes.normals = Values::PerVertex(vec![[0.0, f32::NAN, 1.0]; 3]);
+        Draw {
+            geometry: Cache::default().of_indices(&positions, &[[0, 1, 2]]),
+            attributes: Arc::new(attributes),
+            state: Arc::default(),
+            shading: Shading::Fixed,
+            clip_from_object: [0.5; 16],
+            calls: 1,
+            look: Look::default(),
+        }
+    }
+
+    fn layer() -> Layer {
+        let rect = Rect { x: 0, y: 0, w: 1, h: 1 };
+        Layer { rect, color: vec![[9; 4]], depth: vec![0.5], covered: 1 }
+    }
+
+    #[test]
+    fn a_picture_is_shown_again_only_while_nothing_has_changed() {
+        let positions = [[0.0; 3], [1.0, 0.0, f32::NAN], [0.0, 1.0, 0.0]];
+        let config = config(Mode::Match);
+        let mut again = Again::default();
+        let first = [(draw(positions), None)];
+        assert!(again.find(&first, &config).is_none());
+        again.keep(Drawn::of(&first, &config.settings), &config, layer());
+        let mut same = |d: Draw| {
+            let found = again.find(&[(d, None)], &config);
+            let is = found.is_some();
+            found.into_iter().for_each(|l| again.put_back(l));
+            is
+        };
+        assert!(same(draw(positions)), "made anew, and the same bit by bit");
+        let one_bit = |v: f32| f32::from_bits(v.to_bits() ^ 1);
+        let changes: [fn(&mut Draw, fn(f32) -> f32); 7] = [
+            |d, bit| d.clip_from_object[7] = bit(0.5),
+            |d, bit| {
+                let mut normals = vec![[0.0, f32::NAN, 1.0]; 3];
+                normals[2][1] = bit(f32::NAN);
+                Arc::make_mut(&mut d.attributes).normals = Values::PerVertex(normals);
+            },
+            |d, _| Arc::make_mut(&mut d.attributes).colors = Values::Constant([0.25; 4]),
+            |d, _| Arc::make_mut(&mut d.attributes).materials[0][1].shininess = 1.0,
+            |d, _| Arc::make_mut(&mut d.attributes).version = 1,
+            |d, _| Arc::make_mut(&mut d.state).lighting = true,
+            |d, bit| {
+                let moved = [[0.0; 3], [1.0, 0.0, bit(f32::NAN)], [0.0, 1.0, 0.0]];
+                d.geometry = Cache::default().of_indices(&moved, &[[0, 1, 2]]);
+            },
+        ];
+        for (i, change) in changes.into_iter().enumerate() {
+            let mut d = draw(positions);
+            change(&mut d, one_bit);
+            // A version is compared with a version: here there is none, and the content is the same.
+            assert_eq!(same(d), i == 4, "change {i}");
+        }
+        assert!(same(draw(positions)), "back to what it was");
+        let other = super::tests::config(Mode::Match);
+        assert!(again.find(&first, &other).is_none(), "other settings");
+        assert!(Drawn::of(&first, &super::tests::config(Mode::Phong).settings).is_none());
+        again.frame_done();
+        again.frame_done();
+        assert!(again.find(&first, &config).is_none(), "the frame after is over");
+    }
+}

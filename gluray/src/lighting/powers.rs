@@ -1,6 +1,6 @@
 //! Powers for highlights, as loops over lanes: `powf` is a call for each.
 
-use super::gouraud::{F, ZERO};
+use fearless_simd::{Simd, SimdBase, SimdNarrow, SimdWiden, f32x16, f64x8};
 use rt_core::ray::LANES;
 
 /// The base-two logarithm of a positive normal number: exponent, and a series in (m - 1) / (m + 1) for the mantissa.
@@ -35,7 +35,7 @@ fn exp2(x: f64) -> f32 {
 
 /// `x.powf(e)` for x from 0 on, with anything to the 0 as 1.
 #[inline(always)]
-pub(crate) fn power(x: f32, e: f32) -> f32 {
+fn power(x: f32, e: f32) -> f32 {
     let positive = x >= f32::MIN_POSITIVE;
     let p = exp2(f64::from(e) * log2(if positive { x } else { 1.0 }));
     let p = if positive { p } else { 0.0 };
@@ -44,47 +44,40 @@ pub(crate) fn power(x: f32, e: f32) -> f32 {
 
 /// Powers of whole exponents by squaring, in f64.
 #[inline(always)]
-fn whole_powers(x: &F, e: u32) -> F {
-    let mut square = [0.0_f64; LANES];
-    let mut product = [1.0_f64; LANES];
-    for l in 0..LANES {
-        square[l] = f64::from(x[l]);
-    }
+fn whole_powers<S: Simd>(simd: S, x: f32x16<S>, e: u32) -> f32x16<S> {
+    let (mut low, mut high) = x.widen();
+    let one = f64x8::splat(simd, 1.0);
+    let (mut p, mut q) = (one, one);
     let mut left = e;
     while left > 0 {
         if left & 1 != 0 {
-            for l in 0..LANES {
-                product[l] *= square[l];
-            }
+            p *= low;
+            q *= high;
         }
-        for l in 0..LANES {
-            square[l] *= square[l];
-        }
+        low *= low;
+        high *= high;
         left >>= 1;
     }
-    let mut out = ZERO;
-    for l in 0..LANES {
-        out[l] = product[l] as f32;
-    }
-    out
+    p.narrow(q)
 }
 
 /// Powers from 0 on, of one whole exponent where there is such.
 #[inline(always)]
-pub(super) fn powers(x: &F, e: &F, whole: Option<u32>) -> F {
+pub(super) fn powers<S: Simd>(simd: S, x: f32x16<S>, e: f32x16<S>, whole: Option<u32>) -> f32x16<S> {
     if let Some(whole) = whole {
-        return whole_powers(x, whole);
+        return whole_powers(simd, x, whole);
     }
-    let mut out = ZERO;
+    let mut out = [0.0; LANES];
     for l in 0..LANES {
         out[l] = power(x[l], e[l]);
     }
-    out
+    f32x16::from_slice(simd, &out)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fearless_simd::{Level, dispatch};
 
     #[test]
     fn powers_are_exact_to_a_millionth() {
@@ -94,7 +87,7 @@ mod tests {
                 let (ours, libms) = (power(x, e), if e == 0.0 { 1.0 } else { x.powf(e) });
                 assert!((ours - libms).abs() <= 1e-6 * libms + 1e-37, "{x}^{e}: {ours} for {libms}");
                 if e.fract() == 0.0 {
-                    let whole = whole_powers(&[x; LANES], e as u32)[0];
+                    let whole = dispatch!(Level::new(), simd => whole_powers(simd, f32x16::splat(simd, x), e as u32)[0]);
                     assert!((whole - libms).abs() <= 1e-6 * libms + 1e-37, "{x}^{e}: {whole} for {libms}");
                 }
             }

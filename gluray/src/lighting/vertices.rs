@@ -1,8 +1,9 @@
 //! All vertices of a small mesh, lit once: [`Setup::vertex`] for 16 at a time.
 
+use super::gouraud::{self, F, ZERO};
 use super::{Lit, Setup};
 use crate::capture::Attributes;
-use fearless_simd::{Level, dispatch};
+use fearless_simd::{Level, Simd, SimdBase, dispatch};
 use rayon::prelude::*;
 use rt_core::glam::Vec3;
 use rt_core::ray::LANES;
@@ -15,7 +16,7 @@ impl Setup<'_> {
     pub(crate) fn all(&self, a: &Attributes, positions: &[Vec3]) -> Vec<Lit> {
         let mut out = vec![Lit::default(); positions.len()];
         let light = |(i, out): (usize, &mut [Lit])| {
-            dispatch!(Level::new(), _simd => self.some(a, positions, i * SHARE, out));
+            dispatch!(Level::new(), simd => self.some(simd, a, positions, i * SHARE, out));
         };
         match out.len() {
             ..=SHARE => out.chunks_mut(SHARE).enumerate().for_each(light),
@@ -25,7 +26,7 @@ impl Setup<'_> {
     }
 
     #[inline(always)]
-    fn some(&self, a: &Attributes, positions: &[Vec3], first: usize, out: &mut [Lit]) {
+    fn some<S: Simd>(&self, simd: S, a: &Attributes, positions: &[Vec3], first: usize, out: &mut [Lit]) {
         let two = self.state.lighting && self.state.two_side;
         for (block, out) in out.chunks_mut(LANES).enumerate() {
             let first = first + block * LANES;
@@ -34,8 +35,11 @@ impl Setup<'_> {
                 vertices[l] = first + l;
             }
             let used = u16::MAX >> (LANES - out.len());
-            let front = self.vertices(a, positions, &vertices, &[false; LANES], used);
-            let back = if two { self.vertices(a, positions, &vertices, &[true; LANES], used) } else { front };
+            let front = rows(self.vertices(simd, a, positions, &vertices, &[false; LANES], used));
+            let back = match two {
+                true => rows(self.vertices(simd, a, positions, &vertices, &[true; LANES], used)),
+                false => front,
+            };
             for (l, out) in out.iter_mut().enumerate() {
                 for (side, (primary, secondary)) in [&front, &back].into_iter().enumerate() {
                     out.primary[side] = primary.map(|v| v[l]);
@@ -44,6 +48,19 @@ impl Setup<'_> {
             }
         }
     }
+}
+
+/// From registers into memory.
+#[inline(always)]
+fn rows<S: Simd>((primary, secondary): gouraud::Lit<S>) -> ([F; 4], [F; 3]) {
+    let (mut p, mut s) = ([ZERO; 4], [ZERO; 3]);
+    for k in 0..4 {
+        primary[k].store_slice(&mut p[k]);
+    }
+    for k in 0..3 {
+        secondary[k].store_slice(&mut s[k]);
+    }
+    (p, s)
 }
 
 #[cfg(test)]

@@ -43,7 +43,7 @@ impl Batch {
         let positions = &p.draw.geometry.mesh.positions;
         let a = &p.draw.attributes;
         let (triangles, weights, back) = (&self.triangles, &self.weights, &self.back);
-        let lit = dispatch!(Level::new(), _simd => p.lighting.fragments(a, positions, triangles, weights, back, used));
+        let lit = dispatch!(Level::new(), simd => p.lighting.fragments(simd, a, positions, triangles, weights, back, used));
         for l in 0..self.count {
             color[self.pixels[l]] = to_bytes(lit.rgba.map(|c| c[l]));
         }
