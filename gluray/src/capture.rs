@@ -94,6 +94,8 @@ pub(crate) struct Attributes {
     /// The materials that occur, and which a vertex has (empty: all the first).
     pub(crate) materials: Vec<Materials>,
     pub(crate) material_of: Vec<u32>,
+    /// Of one geometry, attributes of the same version are the same; 0 says nothing.
+    pub(crate) version: u64,
 }
 
 impl Attributes {
@@ -105,6 +107,7 @@ impl Attributes {
             tex: Values::Constant(current.tex),
             materials: vec![current.materials],
             material_of: Vec::new(),
+            version: 0,
         }
     }
 

@@ -1,5 +1,6 @@
 //! What is drawn but not in the framebuffer yet, and when it has to be there.
 
+use crate::again::{self, Again};
 use crate::capture::{Draw, Shading};
 use crate::config::Mode;
 use crate::context::Context;
@@ -10,7 +11,7 @@ use crate::overrides::Look;
 use crate::present::Fate;
 use crate::primitives::Split;
 use crate::texturing::Image;
-use crate::trace::{self, Prepared};
+use crate::trace::{self, Layer, Prepared};
 use crate::worker;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -26,6 +27,8 @@ pub(crate) const ORDER_MATTERS: &str = "a draw of the driver's whose order matte
 #[derive(Default)]
 pub(crate) struct Frame {
     pending: Vec<Pending>,
+    /// Pictures that may be asked for again.
+    again: Again,
     /// What is shown one frame late.
     pub(crate) late: Late,
     /// The driver drew something that commutes since the first of them.
@@ -56,10 +59,11 @@ impl Frame {
 impl Context {
     /// The recorded immediate mode becomes a draw.
     pub(crate) fn end_batch(&mut self) {
+        let start = Instant::now();
+        self.recorder.settle();
         if self.recorder.runs.is_empty() {
             return;
         }
-        let start = Instant::now();
         let kind = &self.split_of_batch();
         let geometry = match self.recorder.followed(kind) {
             Some(geometry) => {
@@ -74,9 +78,9 @@ impl Context {
                 geometry
             }
         };
-        let attributes = Arc::new(self.recorder.take_attributes());
+        let attributes = Arc::new(self.recorder.take_attributes(&geometry));
         let clip_from_object = product(&self.state.projection, &self.state.model_view);
-        let calls = std::mem::take(&mut self.recorder.calls);
+        let calls = self.recorder.runs.iter().map(|r| u64::from(r.times)).sum();
         self.recorder.positions.clear();
         self.recorder.runs.clear();
         let state = self.state.clone();
@@ -232,9 +236,14 @@ impl Context {
         if self.may_be_late(before) {
             return self.flush_late(pending, func);
         }
+        if let Some(layer) = self.frame.again.find(&pending, &self.config) {
+            return self.put_again(pending, layer, func);
+        }
         let settings = &self.config.settings;
+        let drawn = again::Drawn::of(&pending, settings);
         let traced = worker::on_pool(|| late::trace(pending, settings));
-        self.put(traced, Fate::Surface(func), None);
+        let layer = self.put(traced, Fate::Surface(func), None);
+        self.frame.again.keep(drawn, &self.config, layer);
     }
 
     /// One ray stands for all samples of a pixel.
@@ -247,7 +256,7 @@ impl Context {
     }
 
     /// Puts what was traced into the framebuffer, or into one sample of each of its pixels.
-    pub(crate) fn put(&mut self, traced: Traced, fate: Fate, sample: Option<u32>) {
+    pub(crate) fn put(&mut self, traced: Traced, fate: Fate, sample: Option<u32>) -> Layer {
         self.counters.spent("trace", traced.took);
         self.counters.rays("primary", traced.primary);
         self.counters.rays("shadow", traced.extra[0]);
@@ -256,12 +265,30 @@ impl Context {
         self.counters.report.pixels += traced.layer.covered as u64;
         let start = Instant::now();
         if traced.layer.covered > 0 {
-            self.present_sample(&[traced.layer], fate, sample);
+            self.present_sample(std::slice::from_ref(&traced.layer), fate, sample);
         }
         self.counters.spent("present", start.elapsed());
-        for (draw, _) in traced.draws {
+        self.give_back(traced.draws);
+        traced.layer
+    }
+
+    /// Shows the picture that the same draws came to before.
+    fn put_again(&mut self, draws: Vec<Pending>, layer: Layer, func: u32) {
+        self.counters.report.pictures_again += 1;
+        self.counters.report.pixels += layer.covered as u64;
+        let start = Instant::now();
+        if layer.covered > 0 {
+            self.present(std::slice::from_ref(&layer), Fate::Surface(func));
+        }
+        self.counters.spent("present", start.elapsed());
+        self.frame.again.put_back(layer);
+        self.give_back(draws);
+    }
+
+    fn give_back(&mut self, draws: Vec<Pending>) {
+        for (draw, _) in draws {
             if let Some(attributes) = Arc::into_inner(draw.attributes) {
-                self.recorder.give_back(attributes);
+                self.recorder.give_back(attributes, &draw.geometry);
             }
         }
     }
@@ -308,6 +335,7 @@ impl Context {
         self.programs.frame_done();
         self.packed.frame_done();
         self.recorder.frame_done();
+        self.frame.again.frame_done();
         self.cache.frame_done(|g| {
             if !fast {
                 worker::in_background(move || g.improve());

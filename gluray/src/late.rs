@@ -113,7 +113,7 @@ impl Context {
         }
         self.frame.late.place += 1;
         if let Some(traced) = shown {
-            self.put(traced, Fate::Surface(func), None);
+            drop(self.put(traced, Fate::Surface(func), None));
         }
     }
 }

@@ -13,6 +13,7 @@
 //! program (`fault`).
 #![deny(unsafe_code)]
 
+mod again;
 mod arrays;
 mod beyond;
 mod buffers;

@@ -1,6 +1,8 @@
 //! OpenGL's lighting at a vertex (compatibility profile specification, section 12.2), in f32 and in the order of Mesa's vertex programs.
 
 mod gouraud;
+mod powers;
+mod vertices;
 
 use crate::capture::Attributes;
 use crate::effects::{Place, Visibility, vector};

@@ -1,134 +1,121 @@
 //! Immediate mode, recorded: positions, attributes that cost nothing while they do not change, and how vertices make primitives.
+//!
+//! A call only puts its values into a ring. Whenever it is full, its vertices are compared, all at once and bit for bit, with those that came at the same
+//! place of the frame before, and written down where they are others.
+
+mod earlier;
+mod stream;
 
 use crate::cache::Geometry;
 use crate::capture::{Attributes, Run, Values};
 use crate::enums::QUADS;
-use crate::primitives::Split;
 use crate::state::current::{Current, Materials};
-use rt_core::glam::Vec3;
+use earlier::Expected;
 use rt_core::mesh::TriMesh;
 use std::collections::HashMap;
 use std::sync::Arc;
+use stream::Stream;
+pub(crate) use stream::same_bits;
 
-/// A stream of one attribute that costs nothing while it does not change.
-struct Stream<const N: usize> {
-    varying: bool,
-    constant: [f32; N],
-    values: Vec<[f32; N]>,
-    /// Memory of earlier frames: fresh pages would cost as much as filling them.
-    spares: Vec<Vec<[f32; N]>>,
+/// Vertices of the ring.
+const RING: usize = 64;
+
+/// The latest vertices, which nobody has looked at.
+struct Ring {
+    positions: [[f32; 3]; RING],
+    normals: [[f32; 3]; RING],
+    /// Vertices that came with a normal of their own: bit by bit.
+    set: u64,
 }
 
-impl<const N: usize> Default for Stream<N> {
+impl Default for Ring {
     fn default() -> Self {
-        Stream { varying: false, constant: [0.0; N], values: Vec::new(), spares: Vec::new() }
+        Ring { positions: [[0.0; 3]; RING], normals: [[0.0; 3]; RING], set: 0 }
     }
 }
 
-impl<const N: usize> Stream<N> {
-    #[inline(always)]
-    fn set(&mut self, v: [f32; N], vertices: usize) {
-        if self.varying {
-            return;
-        }
-        if vertices == 0 {
-            self.constant = v;
-        } else if v != self.constant {
-            self.vary(vertices);
-        }
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn vary(&mut self, vertices: usize) {
-        self.values = self.spares.pop().unwrap_or_default();
-        self.values.clear();
-        self.values.resize(vertices, self.constant);
-        self.varying = true;
-    }
-
-    fn take(&mut self) -> Values<N> {
-        let varying = std::mem::take(&mut self.varying);
-        match varying {
-            true => Values::PerVertex(std::mem::take(&mut self.values)),
-            false => Values::Constant(self.constant),
-        }
-    }
-
-    /// Takes back what [`Stream::take`] gave out.
-    fn give_back(&mut self, values: Values<N>) {
-        const MOST: usize = 16;
-        if let Values::PerVertex(v) = values
-            && self.spares.len() < MOST
-        {
-            self.spares.push(v);
-        }
-    }
-}
-
-/// Bit for bit: not a number is what it is.
-#[inline(always)]
-fn is_at(p: &Vec3, v: [f32; 3]) -> bool {
-    (p.x.to_bits() ^ v[0].to_bits()) | (p.y.to_bits() ^ v[1].to_bits()) | (p.z.to_bits() ^ v[2].to_bits())
-        == 0
-}
-
-/// A batch of an earlier frame, which may come again vertex by vertex.
-#[derive(Clone)]
-struct Expected {
-    geometry: Arc<Geometry>,
-    mesh: Arc<TriMesh>,
-    runs: Vec<Run>,
-    kind: Split,
-    frame: u64,
-}
+const NO_RUN: Run = Run { mode: 0, count: u32::MAX, times: 0 };
 
 /// Immediate mode: the vertices since the state changed last.
-#[derive(Default)]
 pub(crate) struct Recorder {
+    /// Vertices so far. Those from `settled` on are in the ring alone.
+    count: usize,
+    /// At this count a vertex takes the long way.
+    limit: usize,
+    settled: usize,
+    ring: Ring,
+    /// First vertex of the primitive between Begin and End, and its mode.
+    open: usize,
+    mode: u32,
+    /// Primitives of one kind and size that are not in `runs` yet.
+    run: Run,
+    /// Current values were set outside of Begin and End, and the streams do not know.
+    pub(crate) behind: bool,
+    /// An attribute besides positions and normals is written down for each vertex.
+    more: bool,
     /// Positions, unless they are those of `expected` so far.
     pub(crate) positions: Vec<[f32; 3]>,
-    /// What this batch seems to be, and how many of its vertices have come. While it is right nothing is written down, and in the end nothing
-    /// has to be hashed.
+    /// What this batch seems to be. While it is right no position is written down, and in the end nothing has to be hashed.
     expected: Option<Arc<TriMesh>>,
-    followed: usize,
     /// Batches of earlier frames by their first position.
     earlier: HashMap<[u32; 3], Expected>,
     frame: u64,
-    /// An attribute besides positions and normals is written down for each vertex.
-    more: bool,
-    /// Current values were set outside of Begin and End, and the streams do not know.
-    pub(crate) behind: bool,
     normals: Stream<3>,
+    /// The values of `normals` are those of a whole earlier batch: of this version, unless one was changed.
+    kept: Option<u64>,
+    changed: bool,
+    /// The latest vertex' normal.
+    last_normal: [f32; 3],
     colors: Stream<4>,
     tex: Stream<4>,
     materials: Vec<Materials>,
     material_of: Vec<u32>,
     pub(crate) runs: Vec<Run>,
-    /// First vertex of the primitive between Begin and End, and its mode.
-    open: usize,
-    mode: u32,
-    /// Begin/End pairs.
-    pub(crate) calls: u64,
     /// There are quads in the batch.
     pub(crate) quads: bool,
+    versions: u64,
+}
+
+impl Default for Recorder {
+    fn default() -> Self {
+        Recorder {
+            count: 0,
+            limit: RING,
+            settled: 0,
+            ring: Ring::default(),
+            open: 0,
+            mode: 0,
+            run: NO_RUN,
+            behind: false,
+            more: false,
+            positions: Vec::new(),
+            expected: None,
+            earlier: HashMap::new(),
+            frame: 0,
+            normals: Stream::default(),
+            kept: None,
+            changed: false,
+            last_normal: [0.0; 3],
+            colors: Stream::default(),
+            tex: Stream::default(),
+            materials: Vec::new(),
+            material_of: Vec::new(),
+            runs: Vec::new(),
+            quads: false,
+            versions: 0,
+        }
+    }
 }
 
 impl Recorder {
     /// A primitive begins.
     #[inline(always)]
     pub(crate) fn begin(&mut self, mode: u32, current: &Current) {
-        self.open = self.count();
+        self.open = self.count;
         self.mode = mode;
-        self.quads |= mode == QUADS;
-        if self.open == 0 {
-            self.start(current);
-        } else if self.behind {
-            self.set_normal(current.normal);
-            self.set_color(current.color);
-            self.set_tex(current.tex);
+        if self.count == 0 || self.behind {
+            self.take_up(current);
         }
-        self.behind = false;
     }
 
     /// The mode of the primitive that is open, or was last.
@@ -136,63 +123,90 @@ impl Recorder {
         self.mode
     }
 
-    /// Vertices so far.
-    #[inline(always)]
-    fn count(&self) -> usize {
-        self.followed + self.positions.len()
-    }
-
+    /// A batch begins, or what was set between its primitives counts from now on.
     #[cold]
     #[inline(never)]
-    fn start(&mut self, current: &Current) {
-        (self.normals.constant, self.colors.constant, self.tex.constant) =
-            (current.normal, current.color, current.tex);
-        self.materials.clear();
-        self.materials.push(current.materials);
-        self.material_of.clear();
+    fn take_up(&mut self, current: &Current) {
+        self.behind = false;
+        self.set_normal(current.normal);
+        self.set_color(current.color);
+        self.set_tex(current.tex);
+        if self.count == 0 {
+            (self.normals.constant, self.last_normal) = (current.normal, current.normal);
+            self.materials.clear();
+            self.materials.push(current.materials);
+            self.material_of.clear();
+        }
     }
 
     /// The primitive ends.
     #[inline(always)]
     pub(crate) fn end(&mut self) {
-        let count = (self.count() - self.open) as u32;
-        self.calls += 1;
-        match self.runs.last_mut() {
-            Some(r) if r.mode == self.mode && r.count == count => r.times += 1,
-            _ => self.runs.push(Run { mode: self.mode, count, times: 1 }),
+        let count = (self.count - self.open) as u32;
+        if self.run.count == count && self.run.mode == self.mode {
+            self.run.times += 1;
+        } else {
+            self.next_run(count);
         }
     }
 
+    #[cold]
+    #[inline(never)]
+    fn next_run(&mut self, count: u32) {
+        self.put_run();
+        self.run = Run { mode: self.mode, count, times: 1 };
+        self.quads |= self.mode == QUADS;
+    }
+
+    fn put_run(&mut self) {
+        let run = std::mem::replace(&mut self.run, NO_RUN);
+        if run.times > 0 {
+            self.runs.push(run);
+        }
+    }
+
+    /// The next vertex has another normal.
     #[inline(always)]
     pub(crate) fn set_normal(&mut self, v: [f32; 3]) {
-        let n = self.count();
-        self.normals.set(v, n);
+        let at = self.count % RING;
+        self.ring.normals[at] = v;
+        self.ring.set |= 1 << at;
     }
 
     #[inline(always)]
     pub(crate) fn set_color(&mut self, v: [f32; 4]) {
-        let n = self.count();
-        self.colors.set(v, n);
-        self.more |= self.colors.varying;
+        self.colors.set(v, self.count);
+        if self.colors.varying && !self.more {
+            self.write_more();
+        }
     }
 
     #[inline(always)]
     pub(crate) fn set_tex(&mut self, v: [f32; 4]) {
-        let n = self.count();
-        self.tex.set(v, n);
-        self.more |= self.tex.varying;
+        self.tex.set(v, self.count);
+        if self.tex.varying && !self.more {
+            self.write_more();
+        }
+    }
+
+    /// From now on vertices have more than positions and normals.
+    #[cold]
+    #[inline(never)]
+    fn write_more(&mut self) {
+        self.more = true;
+        self.limit = self.count + 1;
     }
 
     /// The material is another from the next vertex on.
     pub(crate) fn set_materials(&mut self, m: &Materials) {
-        let n = self.count();
+        let n = self.count;
         if n == 0 {
             self.materials.clear();
         } else if self.materials.last() == Some(m) {
             return;
         } else if self.material_of.is_empty() {
             self.material_of.resize(n, 0);
-            self.more = true;
+            self.write_more();
         }
         self.materials.push(*m);
     }
@@ -200,18 +214,9 @@ impl Recorder {
     /// A vertex with what is current.
     #[inline(always)]
     pub(crate) fn vertex(&mut self, v: [f32; 3], current: &Current) {
-        match &self.expected {
-            Some(mesh) if mesh.positions.get(self.followed).is_some_and(|p| is_at(p, v)) => {
-                self.followed += 1
-            }
-            None if !self.positions.is_empty() => self.positions.push(v),
-            // In parts: what lies in memory for the rare case would be put there for every vertex.
-            _ => self.unexpected(v[0], v[1], v[2]),
-        }
-        if self.normals.varying {
-            self.normals.values.push(current.normal);
-        }
-        if self.more {
+        self.ring.positions[self.count % RING] = v;
+        self.count += 1;
+        if self.count == self.limit {
             self.vertex_more(current);
         }
     }
@@ -227,23 +232,91 @@ impl Recorder {
         if !self.material_of.is_empty() {
             self.material_of.push(self.materials.len() as u32 - 1);
         }
+        if self.count.is_multiple_of(RING) {
+            self.empty_ring();
+        }
+        self.set_limit();
     }
 
-    /// The first vertex of a batch, or one that is not what was expected.
-    #[cold]
-    #[inline(never)]
-    fn unexpected(&mut self, x: f32, y: f32, z: f32) {
-        let v = [x, y, z];
-        if self.expected.is_none()
-            && self.followed == 0
-            && let Some(e) = self.earlier.get(&v.map(f32::to_bits))
-        {
-            self.expected = Some(e.mesh.clone());
-            self.followed = 1;
+    fn set_limit(&mut self) {
+        self.limit = if self.more { self.count + 1 } else { (self.count / RING + 1) * RING };
+    }
+
+    /// Looks at what is in the ring.
+    fn empty_ring(&mut self) {
+        let n = self.count - self.settled;
+        if n == 0 {
             return;
         }
-        self.write_down();
-        self.positions.push(v);
+        let first = self.settled % RING;
+        self.settle_positions(first..first + n);
+        self.settle_normals(first..first + n);
+        self.settled = self.count;
+        self.ring.set = 0;
+    }
+
+    fn settle_positions(&mut self, new: std::ops::Range<usize>) {
+        if self.settled == 0 {
+            self.positions.clear();
+            let first = self.ring.positions[new.start].map(f32::to_bits);
+            self.expected = self.earlier.get(&first).map(|e| e.mesh.clone());
+        }
+        let new = &self.ring.positions[new];
+        if let Some(mesh) = &self.expected {
+            let all: &[[f32; 3]] = bytemuck::cast_slice(&mesh.positions);
+            if all.get(self.settled..self.settled + new.len()).is_some_and(|old| same_bits(old, new)) {
+                return;
+            }
+            self.write_down();
+        }
+        self.positions
+            .extend_from_slice(&self.ring.positions[self.settled % RING..][..self.count - self.settled]);
+    }
+
+    fn settle_normals(&mut self, new: std::ops::Range<usize>) {
+        let ring = &mut self.ring;
+        // Only what was set before one of these vertices counts.
+        let of_these = (u64::MAX >> (RING - new.len())) << new.start;
+        let set = ring.set & of_these;
+        if set == 0 && !self.normals.varying {
+            return;
+        }
+        if set != of_these {
+            let mut last = self.last_normal;
+            for i in new.clone() {
+                if set >> i & 1 == 0 {
+                    ring.normals[i] = last;
+                }
+                last = ring.normals[i];
+            }
+        }
+        let new = &ring.normals[new];
+        self.last_normal = new[new.len() - 1];
+        if !self.normals.varying {
+            if self.settled == 0 {
+                self.normals.constant = new[0];
+            }
+            let constant = self.normals.constant;
+            if new.iter().all(|v| same_bits(&[*v], &[constant])) {
+                return;
+            }
+            self.vary_normals();
+        }
+        let at = self.settled;
+        let new = &self.ring.normals[at % RING..][..self.count - at];
+        let values = &mut self.normals.values;
+        if self.kept.is_none() {
+            values.extend_from_slice(new);
+        } else if !same_bits(&values[at..at + new.len()], new) {
+            values[at..at + new.len()].copy_from_slice(new);
+            self.changed = true;
+        }
+    }
+
+    /// All that came is looked at, and all primitives are in `runs`.
+    pub(crate) fn settle(&mut self) {
+        self.empty_ring();
+        self.put_run();
     }
 
     /// Whether any position of a range of the batch is what `is` looks for.
@@ -258,55 +331,17 @@ impl Recorder {
     /// The vertices that were followed become our own.
     pub(crate) fn write_down(&mut self) {
         if let Some(mesh) = self.expected.take() {
-            let n = std::mem::take(&mut self.followed);
             self.positions.clear();
-            self.positions.extend(mesh.positions[..n].iter().map(|p| p.to_array()));
+            self.positions.extend(mesh.positions[..self.settled].iter().map(|p| p.to_array()));
+            if self.kept.take().is_some() {
+                self.normals.values.truncate(self.settled);
+            }
         }
-    }
-
-    /// The geometry of the batch, when it is all that an earlier one was.
-    pub(crate) fn followed(&mut self, kind: &Split) -> Option<Arc<Geometry>> {
-        let mesh = self.expected.as_ref()?;
-        let first = mesh.positions[0].to_array().map(f32::to_bits);
-        let e = self.earlier.get_mut(&first)?;
-        let whole = self.followed == mesh.positions.len() && Arc::ptr_eq(&e.mesh, mesh);
-        if !whole || e.kind != *kind || e.runs != self.runs {
-            return None;
-        }
-        e.frame = self.frame;
-        self.expected = None;
-        self.followed = 0;
-        Some(e.geometry.clone())
-    }
-
-    /// This is what the batch was; it may come again.
-    pub(crate) fn expect(&mut self, geometry: &Arc<Geometry>, kind: &Split) {
-        const WORTH_FOLLOWING: usize = 1000;
-        if self.positions.len() >= WORTH_FOLLOWING {
-            let (geometry, mesh) = (geometry.clone(), geometry.mesh.clone());
-            let e =
-                Expected { geometry, mesh, runs: self.runs.clone(), kind: kind.clone(), frame: self.frame };
-            self.earlier.insert(self.positions[0].map(f32::to_bits), e);
-        }
-    }
-
-    /// A frame is over: what did not come again is not expected any more.
-    pub(crate) fn frame_done(&mut self) {
-        const KEPT_FRAMES: u64 = 3;
-        self.frame += 1;
-        let now = self.frame;
-        self.earlier.retain(|_, e| now - e.frame <= KEPT_FRAMES);
-    }
-
-    /// Attributes that nobody needs any more: their memory serves again.
-    pub(crate) fn give_back(&mut self, a: Attributes) {
-        self.normals.give_back(a.normals);
-        self.colors.give_back(a.colors);
-        self.tex.give_back(a.tex);
     }
 
     /// The vertices of the open primitive with their attributes, taken out again: for the driver.
     pub(crate) fn withdraw(&mut self) -> (u32, Vec<([f32; 3], Current)>) {
+        self.empty_ring();
         self.write_down();
         let all = self.attributes_now();
         let out = (self.open..self.positions.len())
@@ -321,10 +356,8 @@ impl Recorder {
             })
             .collect();
         self.positions.truncate(self.open);
-        for (varying, values) in [(self.normals.varying, &mut self.normals.values)] {
-            if varying {
-                values.truncate(self.open);
-            }
+        if self.normals.varying {
+            self.normals.values.truncate(self.open);
         }
         for s in [&mut self.colors, &mut self.tex] {
             if s.varying {
@@ -332,6 +365,10 @@ impl Recorder {
             }
         }
         self.material_of.truncate(self.open);
+        (self.count, self.settled) = (self.open, self.open);
+        self.last_normal = if self.open > 0 { all.normals.at(self.open - 1) } else { self.normals.constant };
+        self.ring.set = 0;
+        self.set_limit();
         (self.mode, out)
     }
 
@@ -345,106 +382,28 @@ impl Recorder {
             tex: values(&self.tex),
             materials: self.materials.clone(),
             material_of: self.material_of.clone(),
+            version: 0,
         }
     }
 
-    /// Everything recorded; the recorder is empty then. Positions and runs stay for the caller to look at and clear.
-    pub(crate) fn take_attributes(&mut self) -> Attributes {
+    /// All attributes of the batch, which is of this geometry; the recorder is empty then but for positions and runs, which stay for the caller to look at
+    /// and clear. The batch must be settled.
+    pub(crate) fn take_attributes(&mut self, geometry: &Arc<Geometry>) -> Attributes {
+        let version = self.version(geometry);
         self.more = false;
+        (self.count, self.settled, self.limit) = (0, 0, RING);
+        self.ring.set = 0;
+        (self.kept, self.changed) = (None, false);
         Attributes {
             normals: self.normals.take(),
             colors: self.colors.take(),
             tex: self.tex.take(),
             materials: std::mem::take(&mut self.materials),
             material_of: std::mem::take(&mut self.material_of),
+            version,
         }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::cache::Cache;
-    use crate::enums::*;
-
-    #[test]
-    fn attributes_that_change_late_keep_their_first_values_and_a_primitive_can_be_withdrawn() {
-        let mut r = Recorder::default();
-        let mut c = Current { color: [1.0; 4], ..Current::default() };
-        r.begin(TRIANGLES, &c);
-        for i in 0..3 {
-            r.vertex([i as f32; 3], &c);
-        }
-        r.end();
-        r.begin(POLYGON, &c);
-        r.vertex([7.0; 3], &c);
-        c.color = [0.5; 4];
-        r.set_color(c.color);
-        c.materials[0].shininess = 9.0;
-        r.set_materials(&c.materials);
-        r.vertex([8.0; 3], &c);
-        let (mode, open) = r.withdraw();
-        assert_eq!(mode, POLYGON);
-        assert_eq!(open.len(), 2);
-        assert_eq!((open[0].1.color, open[1].1.color), ([1.0; 4], [0.5; 4]));
-        assert_eq!((open[0].1.materials[0].shininess, open[1].1.materials[0].shininess), (0.0, 9.0));
-        assert_eq!(r.positions.len(), 3);
-        let all = r.take_attributes();
-        assert_eq!(all.colors.at(2), [1.0; 4]);
-        assert_eq!(r.runs, [Run { mode: TRIANGLES, count: 3, times: 1 }]);
-    }
-
-    fn frame(r: &mut Recorder, cache: &mut Cache, points: &[[f32; 3]]) -> Arc<Geometry> {
-        let current = Current::default();
-        for p in points.chunks(3) {
-            r.begin(TRIANGLES, &current);
-            p.iter().for_each(|p| r.vertex(*p, &current));
-            r.end();
-        }
-        let kind = &Split::default();
-        let geometry = r.followed(kind).unwrap_or_else(|| {
-            r.write_down();
-            let made = cache.of_runs(&r.positions, &r.runs, kind);
-            r.expect(&made, kind);
-            made
-        });
-        r.take_attributes();
-        r.positions.clear();
-        r.runs.clear();
-        r.frame_done();
-        geometry
-    }
-
-    #[test]
-    fn what_is_set_between_primitives_is_seen_by_the_next() {
-        let (mut r, mut c) = (Recorder::default(), Current::default());
-        for (i, color) in [[1.0; 4], [1.0; 4], [0.5; 4]].into_iter().enumerate() {
-            c.color = color;
-            r.behind = true;
-            r.begin(TRIANGLES, &c);
-            (0..3).for_each(|_| r.vertex([i as f32; 3], &c));
-            r.end();
-            assert_eq!(r.colors.varying, i == 2);
-        }
-        let all = r.take_attributes();
-        assert_eq!([0, 5, 6, 8].map(|v| all.colors.at(v)[0]), [1.0, 1.0, 0.5, 0.5]);
-    }
-
-    #[test]
-    fn vertices_that_come_again_are_followed_and_others_are_written_down() {
-        let (mut r, mut cache) = (Recorder::default(), Cache::default());
-        let points: Vec<[f32; 3]> = (0..3000).map(|i| [i as f32, (i % 7) as f32, f32::NAN]).collect();
-        let first = frame(&mut r, &mut cache, &points);
-        assert!(Arc::ptr_eq(&first, &frame(&mut r, &mut cache, &points)));
-        assert_eq!((cache.hits, cache.misses), (0, 1), "the second frame was not even looked up");
-        let mut moved = points.clone();
-        moved[2999][0] += 1.0;
-        let second = frame(&mut r, &mut cache, &moved);
-        assert!(!Arc::ptr_eq(&first, &second));
-        assert_eq!(second.mesh.positions[2999].x, 3000.0);
-        assert_eq!(second.mesh.positions[2998].x, 2998.0);
-        let shorter = frame(&mut r, &mut cache, &moved[..1500]);
-        assert_eq!(shorter.mesh.positions.len(), 1500);
-        assert!(Arc::ptr_eq(&first, &frame(&mut r, &mut cache, &points)), "back to what it was");
-    }
-}
+mod tests;

@@ -44,6 +44,8 @@ pub struct Report {
     pub cache_hits: u64,
     /// Geometry seen for the first time.
     pub cache_misses: u64,
+    /// Pictures that were shown once more without a ray, because nothing had changed.
+    pub pictures_again: u64,
     /// Pixels that traced surfaces covered.
     pub pixels: u64,
     /// Milliseconds, by phase, summed.
@@ -83,6 +85,7 @@ impl Report {
         self.refits += other.refits;
         self.cache_hits += other.cache_hits;
         self.cache_misses += other.cache_misses;
+        self.pictures_again += other.pictures_again;
         self.pixels += other.pixels;
         sum(&mut self.passed_reasons, &other.passed_reasons);
         sum(&mut self.flushes, &other.flushes);

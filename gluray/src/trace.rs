@@ -8,30 +8,27 @@ mod bounds;
 mod fragments;
 mod in_order;
 mod lifted;
+mod nearest;
 mod peeled;
 mod rays;
 
 use crate::cache::Structures;
 use crate::capture::{Draw, Shading};
-use crate::config::{Mode, Settings};
-use crate::effects::{Place, Surroundings};
+use crate::effects::Place;
 use crate::enums::*;
 use crate::lighting::{Lit, Setup, transform};
-use crate::ranks::rows::Share;
 use crate::raster::{covers, steepness};
 use crate::texturing::Image;
-use batch::Batch;
 use bounds::screen_bounds;
-use fearless_simd::{Level, dispatch};
-use fragments::{FragmentBlock, Lane};
 pub(crate) use in_order::in_order;
+pub(crate) use nearest::nearest;
 pub(crate) use peeled::{Limit, Sums, peeled, summed};
 use rayon::prelude::*;
 use rays::{Bundle, TileRays, slot};
 use rt_core::accel::World;
 use rt_core::camera::Camera;
 use rt_core::glam::{DMat4, DVec3};
-use rt_core::ray::{LANES, Ray};
+use rt_core::ray::Ray;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -122,21 +119,6 @@ pub(crate) struct Fragment {
     pub(crate) front: bool,
 }
 
-#[derive(Clone, Copy)]
-struct Seen {
-    depth_bits: u32,
-    draw: u32,
-    prim: u32,
-    fragment: Fragment,
-}
-
-const NOTHING: Seen = Seen {
-    depth_bits: u32::MAX,
-    draw: u32::MAX,
-    prim: 0,
-    fragment: Fragment { weights: [0.0; 3], depth: 0.0, plain_depth: 0.0, front: true },
-};
-
 pub(crate) fn matrix(m: &[f32; 16]) -> DMat4 {
     DMat4::from_cols_array(&m.map(f64::from))
 }
@@ -208,15 +190,18 @@ impl<'a> Prepared<'a> {
             rays: AtomicU64::new(0),
         };
         let positions = &draw.geometry.mesh.positions;
-        // Fewer vertices than pixels: light them all once. Else only those that are seen.
         let fixed = matches!(draw.shading, Shading::Fixed);
+        out.blocks = fixed && out.lighting.lights_blocks(&draw.attributes);
+        // Fewer vertices than pixels: light them all once. Else only those that are seen.
         if fixed && positions.len() <= 2 * rect.w as usize * rect.h as usize {
             let light = |(i, p): (usize, &rt_core::glam::Vec3)| {
                 out.lighting.vertex(&draw.attributes, i, p.to_array())
             };
-            out.lit = Some(positions.par_iter().enumerate().map(light).collect());
+            out.lit = Some(match out.blocks {
+                true => out.lighting.all(&draw.attributes, positions),
+                false => positions.par_iter().enumerate().map(light).collect(),
+            });
         }
-        out.blocks = fixed && out.lit.is_none() && out.lighting.lights_blocks(&draw.attributes);
         out.bundle = Bundle::new(&out);
         Some(out)
     }
@@ -466,120 +451,4 @@ pub(crate) fn mixed<const N: usize>(v: [[f32; N]; 3], w: [f32; 3]) -> [f32; N] {
 
 fn to_bytes(c: [f32; 4]) -> [u8; 4] {
     c.map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
-}
-
-/// The nearest fragment of all draws at every pixel of a share of the rows.
-pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings, share: Share) -> (Layer, [u64; 2]) {
-    let around = Surroundings::new(draws, settings);
-    let mode = settings.mode;
-    let rect = draws.iter().fold(Rect::default(), |r, d| r.or(d.rect));
-    let (w, h) = (rect.w.max(0) as usize, rect.h.max(0) as usize);
-    let mut layer = Layer { rect, color: vec![[0; 4]; w * h], depth: vec![UNCOVERED; w * h], covered: 0 };
-    if w * h == 0 {
-        return (layer, [0; 2]);
-    }
-    let band = w * TILE as usize;
-    let covered = AtomicU64::new(0);
-    let bands = layer.color.par_chunks_mut(band).zip(layer.depth.par_chunks_mut(band)).enumerate();
-    bands.filter(|(i, _)| share.has(*i)).for_each_init(TileRays::new, |rays, (i, (color, depth))| {
-        let y = rect.y + i as i32 * TILE;
-        let tile_h = (color.len() / w) as i32;
-        let mut n = 0;
-        let mut batch = Batch::default();
-        // Tile by tile: what was seen of one stays in the first cache until it is shaded.
-        for x in (rect.x..rect.x + rect.w).step_by(TILE as usize) {
-            let tile = Rect { x, y, w: TILE.min(rect.x + rect.w - x), h: tile_h };
-            let mut seen = [NOTHING; (TILE * TILE) as usize];
-            for (d, p) in draws.iter().enumerate() {
-                see(p, d as u32, tile, rays, &mut seen);
-            }
-            for (j, s) in seen.iter().enumerate().filter(|(_, s)| s.draw != u32::MAX) {
-                let (tx, ty) = (j % TILE as usize, j / TILE as usize);
-                let k = ty * w + (x - rect.x) as usize + tx;
-                depth[k] = s.fragment.depth as f32;
-                n += 1;
-                let p = &draws[s.draw as usize];
-                let at = (x + tx as i32, y + ty as i32);
-                let s = &Seen { fragment: p.centred(s.prim as usize, s.fragment, at.0, at.1), ..*s };
-                if p.blocks && mode == Mode::Match {
-                    if batch.count > 0 && batch.draw != s.draw {
-                        batch.shade(&draws[batch.draw as usize], color);
-                    }
-                    batch.add(p, s.draw, k, s, color);
-                    continue;
-                }
-                color[k] = to_bytes(p.shaded(s.prim as usize, &s.fragment, mode, around.as_ref(), at));
-            }
-        }
-        if batch.count > 0 {
-            batch.shade(&draws[batch.draw as usize], color);
-        }
-        covered.fetch_add(n, Relaxed);
-    });
-    layer.covered = covered.into_inner() as usize;
-    let extra = around.map_or([0; 2], |a| [a.shadow_rays.into_inner(), a.occlusion_rays.into_inner()]);
-    (layer, extra)
-}
-
-/// One draw against what was seen so far in a tile, row by row.
-fn see(
-    p: &Prepared<'_>,
-    index: u32,
-    area: Rect,
-    rays: &mut TileRays,
-    seen: &mut [Seen; (TILE * TILE) as usize],
-) {
-    let tile = area.and(p.rect);
-    if tile.is_empty() || !rays.send(p, tile) {
-        return;
-    }
-    let later_wins_ties = p.draw.state.depth_func == LEQUAL;
-    let mut fragments: [FragmentBlock; 16] = [const { FragmentBlock::EMPTY }; 16];
-    let mut moved = [f64::NAN; 256];
-    let (hits, range) = (&rays.hits, p.draw.state.depth_range);
-    let (blocks, targets) = (&mut fragments, &mut moved);
-    dispatch!(Level::new(), _simd => fill(p, hits, tile, blocks, targets, range));
-    // Polygon offset pushes steep triangles far back, at silhouettes behind others of the same draw.
-    let overtaken = p.draw.state.polygon_offset.is_some() && rays.look_behind(p, tile, &moved);
-    for y in 0..tile.h {
-        for x in 0..tile.w {
-            let (b, l) = slot(x, y);
-            let behind = overtaken && rays.overtakers[b].prim[l] != rt_core::ray::NO_HIT;
-            let (px, py) = (tile.x + x, tile.y + y);
-            let (prim, f) = match fragments[b].lane[l] {
-                Lane::Empty => continue,
-                Lane::Found if !behind => (rays.hits[b].prim[l] as usize, fragments[b].get(l)),
-                _ => match p.resolve(rays.blocks[b].get(l), rays.hits[b].get(l), px, py) {
-                    Some(found) => found,
-                    None => continue,
-                },
-            };
-            let at = &mut seen[((py - area.y) * TILE + px - area.x) as usize];
-            let bits = (f.depth * DEPTH_STEPS + 0.5) as u32;
-            if bits < at.depth_bits || (later_wins_ties && bits == at.depth_bits) {
-                *at = Seen { depth_bits: bits, draw: index, prim: prim as u32, fragment: f };
-            }
-        }
-    }
-}
-
-/// Fragments of a tile's hits, and where polygon offset moved them to.
-#[inline(always)]
-fn fill(
-    p: &Prepared<'_>,
-    hits: &[rt_core::ray::HitBlock],
-    tile: Rect,
-    out: &mut [FragmentBlock; 16],
-    moved: &mut [f64; 256],
-    range: [f64; 2],
-) {
-    for (b, out) in out.iter_mut().enumerate() {
-        let (x, y) = (4 * (b as i32 % 4), 4 * (b as i32 / 4));
-        if hits[b].prim.iter().all(|p| *p == rt_core::ray::NO_HIT) {
-            out.lane = [Lane::Empty; LANES];
-            continue;
-        }
-        out.fill(p, &hits[b], tile.x + x, tile.y + y);
-        out.moved_back(range, &mut moved[b * LANES..(b + 1) * LANES]);
-    }
 }

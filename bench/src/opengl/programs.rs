@@ -97,7 +97,7 @@ impl Program {
     pub(super) fn next_frame(self) -> &'static str {
         match self {
             Program::Geomview => {
-                "(transform-incr g1 g1 focus rotate 0 0.1 0)\n(redraw c0)\n(echo \"frame\\n\")\n"
+                "(transform g1 g1 focus rotate 0 0.1 0)\n(redraw c0)\n(echo \"frame\\n\")\n"
             }
             _ => "\n",
         }

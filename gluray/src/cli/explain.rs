@@ -58,6 +58,9 @@ fn in_words(r: &Report) -> String {
             "        {:>12} geometries were there already, {} were new, {} structures built, {} refitted",
             r.cache_hits, r.cache_misses, r.builds, r.refits
         ));
+        if r.pictures_again > 0 {
+            line(format!("        {:>12} pictures shown again, as nothing had changed", r.pictures_again));
+        }
         for (kind, n) in by_size(&r.rays) {
             line(format!("        {n:>12} rays: {kind}"));
         }

@@ -1,156 +1,151 @@
 //! OpenGL's lighting at the corners of 16 fragments' triangles at a time: [`Setup::vertex`] for many.
 //!
-//! Every step is written as a loop over the lanes, which compilers turn into vector code; the order of sums is that of the scalar code. Only powers are
-//! another function: exact to a millionth for exponents up to OpenGL's 128.
+//! The order of sums is that of the scalar code. Vectors are written out, because compilers unroll loops over 16 lanes before they see that they are vectors.
+//! Only powers are another function: exact to a millionth for exponents up to OpenGL's 128.
 
 use super::Setup;
+use super::powers::powers;
 use crate::capture::{Attributes, Packed, Values};
 use crate::enums::*;
 use crate::state::current::{Material, sides};
+use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask, f32x16, mask32x16};
 use rt_core::ray::LANES;
 
 /// A number in each lane.
-type F = [f32; LANES];
-const ZERO: F = [0.0; LANES];
+pub(super) type F = [f32; LANES];
+pub(super) const ZERO: F = [0.0; LANES];
+/// The same in registers.
+type V<S> = f32x16<S>;
 
 /// Colours of fragments, not yet clamped to bytes.
 pub(crate) struct Colors {
     pub(crate) rgba: [F; 4],
 }
 
-/// One corner of each lane's triangle.
-struct Corner {
-    position: [F; 3],
-    normal: [F; 3],
-    color: [F; 4],
-}
-
 /// A side's material with what the colours replace.
-struct Surface {
-    ambient: [F; 3],
-    diffuse: [F; 3],
-    specular: [F; 3],
-    emission: [F; 3],
-    alpha: F,
-    shininess: F,
+struct Surface<S: Simd> {
+    ambient: [V<S>; 3],
+    diffuse: [V<S>; 3],
+    specular: [V<S>; 3],
+    emission: [V<S>; 3],
+    alpha: V<S>,
+    shininess: V<S>,
+    /// The shininess of all lanes, where that is one whole number.
+    whole: Option<u32>,
+    /// There are highlights.
+    shines: bool,
 }
 
 /// Which side each lane sees.
-struct Pick<'a> {
-    back: &'a [bool; LANES],
+#[derive(Clone, Copy)]
+struct Pick<S: Simd> {
+    back: mask32x16<S>,
     /// Backs have a material of their own.
     two: bool,
 }
 
-impl Pick<'_> {
+impl<S: Simd> Pick<S> {
     /// A property of front and back, or the colour where that stands for it.
     #[inline(always)]
-    fn of(&self, values: [f32; 2], tracked: [bool; 2], color: &F) -> F {
-        let mut out = if tracked[0] { *color } else { [values[0]; LANES] };
-        if self.two {
-            let behind = if tracked[1] { *color } else { [values[1]; LANES] };
-            for l in 0..LANES {
-                out[l] = if self.back[l] { behind[l] } else { out[l] };
-            }
+    fn of(&self, simd: S, values: [f32; 2], tracked: [bool; 2], color: V<S>) -> V<S> {
+        let front = if tracked[0] { color } else { V::splat(simd, values[0]) };
+        if !self.two {
+            return front;
         }
-        out
+        let behind = if tracked[1] { color } else { V::splat(simd, values[1]) };
+        self.back.select(behind, front)
     }
 }
 
 #[inline(always)]
-fn dot(a: &[F; 3], b: &[F; 3]) -> F {
-    let mut out = ZERO;
-    for l in 0..LANES {
-        out[l] = a[0][l] * b[0][l] + a[1][l] * b[1][l] + a[2][l] * b[2][l];
-    }
-    out
+fn dot<S: Simd>(a: [V<S>; 3], b: [V<S>; 3]) -> V<S> {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// From 0 to 1; not a number stays what it is.
+#[inline(always)]
+fn unit<S: Simd>(simd: S, v: V<S>) -> V<S> {
+    let (zero, one) = (V::splat(simd, 0.0), V::splat(simd, 1.0));
+    let v = v.simd_lt(zero).select(zero, v);
+    v.simd_gt(one).select(one, v)
+}
+
+/// From 0 on; not a number is 0.
+#[inline(always)]
+fn positive<S: Simd>(simd: S, v: V<S>) -> V<S> {
+    let zero = V::splat(simd, 0.0);
+    v.simd_gt(zero).select(v, zero)
 }
 
 /// Unit length; zero stays zero.
 #[inline(always)]
-fn normalize(v: &mut [F; 3]) {
-    for l in 0..LANES {
-        let square = v[0][l] * v[0][l] + v[1][l] * v[1][l] + v[2][l] * v[2][l];
-        let inverse = if square > 0.0 { 1.0 / square.sqrt() } else { 1.0 };
-        v[0][l] *= inverse;
-        v[1][l] *= inverse;
-        v[2][l] *= inverse;
-    }
+fn normalized<S: Simd>(simd: S, v: [V<S>; 3]) -> [V<S>; 3] {
+    let square = dot(v, v);
+    let one = V::splat(simd, 1.0);
+    let inverse = square.simd_gt(V::splat(simd, 0.0)).select(one / square.sqrt(), one);
+    [v[0] * inverse, v[1] * inverse, v[2] * inverse]
 }
 
-/// The base-two logarithm of a positive normal number: exponent, and a series in (m - 1) / (m + 1) for the mantissa.
-#[inline(always)]
-fn log2(x: f32) -> f64 {
-    let bits = x.to_bits();
-    // Mantissas from sqrt(1/2) to sqrt(2).
-    let shifted = bits.wrapping_sub(0x3f35_04f3);
-    let exponent = (shifted.cast_signed() >> 23) as f64;
-    let m = f64::from(f32::from_bits((shifted & 0x007f_ffff).wrapping_add(0x3f35_04f3)));
-    let t = (m - 1.0) / (m + 1.0);
-    let s = t * t;
-    // 2 / ln 2 · (t + t³/3 + t⁵/5 + …), |t| < 0.172
-    let series = 1.0 + s * (1.0 / 3.0 + s * (0.2 + s * (1.0 / 7.0 + s * (1.0 / 9.0 + s * (1.0 / 11.0)))));
-    exponent + 2.885_390_081_777_926_8 * t * series
-}
-
-/// Two to a power; 0 below the smallest normal number.
-#[inline(always)]
-fn exp2(x: f64) -> f32 {
-    let x = x.clamp(-127.0, 127.0);
-    let whole = (x + 128.5) as i32 - 128;
-    let f = (x - f64::from(whole)) * std::f64::consts::LN_2;
-    // e^f, |f| < 0.35
-    let e = 1.0
-        + f * (1.0
-            + f * (0.5
-                + f * (1.0 / 6.0 + f * (1.0 / 24.0 + f * (1.0 / 120.0 + f * (1.0 / 720.0 + f / 5040.0))))));
-    let scale = f64::from(f32::from_bits(((whole + 127).max(0).cast_unsigned()) << 23));
-    (e * scale) as f32
-}
-
-/// `x.powf(e)` for x from 0 on, with anything to the 0 as 1.
-#[inline(always)]
-pub(crate) fn power(x: f32, e: f32) -> f32 {
-    let positive = x >= f32::MIN_POSITIVE;
-    let p = exp2(f64::from(e) * log2(if positive { x } else { 1.0 }));
-    let p = if positive { p } else { 0.0 };
-    if e == 0.0 { 1.0 } else { p }
-}
+/// Primary and secondary colours.
+pub(super) type Lit<S> = ([V<S>; 4], [V<S>; 3]);
 
 /// An attribute of the vertices `corners` picks, lane by lane.
 #[inline(always)]
 fn gather<const N: usize>(values: &Values<N>, vertices: &[usize; LANES], used: u16) -> [F; N] {
     let mut out = [ZERO; N];
-    let mut put = |l: usize, v: [f32; N]| (0..N).for_each(|k| out[k][l] = v[k]);
+    let mut put = |l: usize, v: [f32; N]| {
+        for k in 0..N {
+            out[k][l] = v[k];
+        }
+    };
     match values {
-        Values::Constant(v) => (0..LANES).for_each(|l| put(l, *v)),
+        Values::Constant(v) => {
+            for l in 0..LANES {
+                put(l, *v);
+            }
+        }
         Values::PerVertex(all) => {
-            for l in (0..LANES).filter(|l| used >> l & 1 != 0) {
+            for l in 0..LANES {
+                if used >> l & 1 == 0 {
+                    continue;
+                }
                 put(l, all.get(vertices[l]).copied().unwrap_or([0.0; N]));
             }
         }
         Values::Packed(p) if p.kind == FLOAT && p.size == N => {
             let all: &[[f32; N]] = rows(p);
-            for l in (0..LANES).filter(|l| used >> l & 1 != 0) {
+            for l in 0..LANES {
+                if used >> l & 1 == 0 {
+                    continue;
+                }
                 put(l, all.get(vertices[l]).copied().unwrap_or([0.0; N]));
             }
         }
         Values::Packed(p) if p.kind == BYTE && p.size == N && p.normalized => {
-            for l in (0..LANES).filter(|l| used >> l & 1 != 0) {
+            for l in 0..LANES {
+                if used >> l & 1 == 0 {
+                    continue;
+                }
                 if let Some(b) = p.bytes.get(vertices[l] * N..vertices[l] * N + N) {
                     put(l, std::array::from_fn(|k| (f32::from(b[k].cast_signed()) / 127.0).max(-1.0)));
                 }
             }
         }
         Values::Packed(p) if p.kind == UNSIGNED_BYTE && p.size == N && p.normalized => {
-            for l in (0..LANES).filter(|l| used >> l & 1 != 0) {
+            for l in 0..LANES {
+                if used >> l & 1 == 0 {
+                    continue;
+                }
                 if let Some(b) = p.bytes.get(vertices[l] * N..vertices[l] * N + N) {
                     put(l, std::array::from_fn(|k| f32::from(b[k]) / 255.0));
                 }
             }
         }
         other => {
-            for l in (0..LANES).filter(|l| used >> l & 1 != 0) {
+            for l in 0..LANES {
+                if used >> l & 1 == 0 {
+                    continue;
+                }
                 put(l, other.at(vertices[l]));
             }
         }
@@ -183,8 +178,10 @@ impl Setup<'_> {
 
     /// Colours of 16 fragments: `triangles` are their vertices, `weights` those of the corners, `back` says whose back side is seen.
     #[inline(always)]
-    pub(crate) fn fragments(
+    #[allow(clippy::too_many_arguments, reason = "rows of a block")]
+    pub(crate) fn fragments<S: Simd>(
         &self,
+        simd: S,
         a: &Attributes,
         positions: &[rt_core::glam::Vec3],
         triangles: &[[u32; 3]; LANES],
@@ -192,8 +189,8 @@ impl Setup<'_> {
         back: &[bool; LANES],
         used: u16,
     ) -> Colors {
-        let mut primary = [ZERO; 4];
-        let mut secondary = [ZERO; 3];
+        let zero = V::splat(simd, 0.0);
+        let (mut primary, mut secondary) = ([zero; 4], [zero; 3]);
         let last = [ZERO, ZERO, [1.0; LANES]];
         let weights = if self.state.flat { &last } else { weights };
         let first = if self.state.flat { 2 } else { 0 };
@@ -202,186 +199,218 @@ impl Setup<'_> {
             for l in 0..LANES {
                 vertices[l] = triangles[l][k] as usize;
             }
-            let mut corner = Corner {
-                position: [ZERO; 3],
-                normal: gather(&a.normals, &vertices, used),
-                color: gather(&a.colors, &vertices, used),
-            };
-            for l in (0..LANES).filter(|l| used >> l & 1 != 0) {
-                let p = positions[vertices[l]];
-                (corner.position[0][l], corner.position[1][l], corner.position[2][l]) = (p.x, p.y, p.z);
+            let (p, s) = self.vertices(simd, a, positions, &vertices, back, used);
+            let weight = V::from_slice(simd, &weights[k]);
+            for c in 0..4 {
+                primary[c] += p[c] * weight;
             }
-            let (p, s) = self.corner(&corner, &a.materials[0], back);
-            for (sum, v) in primary.iter_mut().zip(&p) {
-                (0..LANES).for_each(|l| sum[l] += v[l] * weights[k][l]);
-            }
-            for (sum, v) in secondary.iter_mut().zip(&s) {
-                (0..LANES).for_each(|l| sum[l] += v[l] * weights[k][l]);
+            for c in 0..3 {
+                secondary[c] += s[c] * weight;
             }
         }
+        let mut rgba = [ZERO; 4];
         for k in 0..3 {
-            for l in 0..LANES {
-                primary[k][l] = (primary[k][l] + secondary[k][l]).clamp(0.0, 1.0);
-            }
+            unit(simd, primary[k] + secondary[k]).store_slice(&mut rgba[k]);
         }
-        Colors { rgba: primary }
+        primary[3].store_slice(&mut rgba[3]);
+        Colors { rgba }
     }
 
+    /// Primary and secondary colours of the vertices in the lanes of `used`, from the side that `back` says.
     #[inline(always)]
-    fn corner(&self, c: &Corner, materials: &[Material; 2], back: &[bool; LANES]) -> ([F; 4], [F; 3]) {
+    pub(super) fn vertices<S: Simd>(
+        &self,
+        simd: S,
+        a: &Attributes,
+        positions: &[rt_core::glam::Vec3],
+        vertices: &[usize; LANES],
+        back: &[bool; LANES],
+        used: u16,
+    ) -> Lit<S> {
         let s = self.state;
-        if !s.lighting {
-            let mut out = c.color;
-            out.iter_mut().for_each(|v| v.iter_mut().for_each(|v| *v = v.clamp(0.0, 1.0)));
-            return (out, [ZERO; 3]);
-        }
-        let two = s.two_side && back.contains(&true);
-        let m = &s.model_view;
-        let mut eye = [ZERO; 3];
-        for l in 0..LANES {
-            let p = [c.position[0][l], c.position[1][l], c.position[2][l]];
-            let row = |r: usize| m[r] * p[0] + m[4 + r] * p[1] + m[8 + r] * p[2] + m[12 + r];
-            let w = row(3);
-            (eye[0][l], eye[1][l], eye[2][l]) = (row(0) / w, row(1) / w, row(2) / w);
-        }
-        let n = &self.normal_matrix;
-        let mut normal = [ZERO; 3];
-        for (k, out) in normal.iter_mut().enumerate() {
-            for l in 0..LANES {
-                out[l] = c.normal[0][l] * n[0][k] + c.normal[1][l] * n[1][k] + c.normal[2][l] * n[2][k];
+        let color = match &a.colors {
+            Values::Constant(c) => {
+                [V::splat(simd, c[0]), V::splat(simd, c[1]), V::splat(simd, c[2]), V::splat(simd, c[3])]
             }
+            colors => {
+                let rows = gather(colors, vertices, used);
+                [
+                    V::from_slice(simd, &rows[0]),
+                    V::from_slice(simd, &rows[1]),
+                    V::from_slice(simd, &rows[2]),
+                    V::from_slice(simd, &rows[3]),
+                ]
+            }
+        };
+        let zero = V::splat(simd, 0.0);
+        if !s.lighting {
+            let [r, g, b, a] = color;
+            return ([unit(simd, r), unit(simd, g), unit(simd, b), unit(simd, a)], [zero; 3]);
+        }
+        let mut eye = [zero; 3];
+        if self.needs_places() {
+            let mut rows = [ZERO; 3];
+            for l in 0..LANES {
+                if used >> l & 1 != 0 {
+                    let p = positions[vertices[l]];
+                    (rows[0][l], rows[1][l], rows[2][l]) = (p.x, p.y, p.z);
+                }
+            }
+            let [x, y, z] =
+                [V::from_slice(simd, &rows[0]), V::from_slice(simd, &rows[1]), V::from_slice(simd, &rows[2])];
+            let m = &s.model_view;
+            let w = x * m[3] + y * m[7] + z * m[11] + m[15];
+            for k in 0..3 {
+                eye[k] = (x * m[k] + y * m[4 + k] + z * m[8 + k] + m[12 + k]) / w;
+            }
+        }
+        let mut normal = [zero; 3];
+        let rows = gather(&a.normals, vertices, used);
+        let [x, y, z] =
+            [V::from_slice(simd, &rows[0]), V::from_slice(simd, &rows[1]), V::from_slice(simd, &rows[2])];
+        let n = &self.normal_matrix;
+        for k in 0..3 {
+            normal[k] = x * n[0][k] + y * n[1][k] + z * n[2][k];
         }
         if s.normalize {
-            normalize(&mut normal);
+            normal = normalized(simd, normal);
         } else {
-            normal.iter_mut().for_each(|v| v.iter_mut().for_each(|v| *v *= self.rescale));
-        }
-        if two {
-            for v in &mut normal {
-                (0..LANES).for_each(|l| v[l] = if back[l] { -v[l] } else { v[l] });
+            for k in 0..3 {
+                normal[k] *= self.rescale;
             }
         }
-        let surface = self.surface(materials, &c.color, back, two);
-        self.lit(&surface, &eye, &normal)
+        let mut backs = 0;
+        for l in 0..LANES {
+            backs |= u64::from(back[l]) << l;
+        }
+        let pick = Pick { back: mask32x16::from_bitmask(simd, backs), two: s.two_side && backs != 0 };
+        if pick.two {
+            for k in 0..3 {
+                normal[k] = pick.back.select(-normal[k], normal[k]);
+            }
+        }
+        let surface = self.surface(simd, &a.materials[0], color, pick);
+        self.lit(simd, &surface, eye, normal)
+    }
+
+    /// Where a vertex is counts for its light.
+    #[inline(always)]
+    fn needs_places(&self) -> bool {
+        self.state.local_viewer || self.lights.iter().any(|p| !p.directional)
     }
 
     /// The material of the side that is seen, with what `glColorMaterial` takes from the colour.
     #[inline(always)]
-    fn surface(
+    fn surface<S: Simd>(
         &self,
+        simd: S,
         [front, behind]: &[Material; 2],
-        color: &[F; 4],
-        back: &[bool; LANES],
-        two: bool,
-    ) -> Surface {
+        color: [V<S>; 4],
+        pick: Pick<S>,
+    ) -> Surface<S> {
         let (faces, what) = self.state.color_material.map_or((&[][..], 0), |(face, w)| (sides(face), w));
         let faces = [faces.contains(&0), faces.contains(&1)];
-        let ambient = what == AMBIENT || what == AMBIENT_AND_DIFFUSE;
-        let diffuse = what == DIFFUSE || what == AMBIENT_AND_DIFFUSE;
-        let pick = Pick { back, two };
+        let by = |tracked: bool| [faces[0] && tracked, faces[1] && tracked];
+        let ambient = by(what == AMBIENT || what == AMBIENT_AND_DIFFUSE);
+        let diffuse = by(what == DIFFUSE || what == AMBIENT_AND_DIFFUSE);
+        let (specular, emission) = (by(what == SPECULAR), by(what == EMISSION));
+        let zero = V::splat(simd, 0.0);
         let mut out = Surface {
-            ambient: [ZERO; 3],
-            diffuse: [ZERO; 3],
-            specular: [ZERO; 3],
-            emission: [ZERO; 3],
-            alpha: ZERO,
-            shininess: pick.of([front.shininess, behind.shininess], [false; 2], &ZERO),
+            ambient: [zero; 3],
+            diffuse: [zero; 3],
+            specular: [zero; 3],
+            emission: [zero; 3],
+            alpha: pick.of(simd, [front.diffuse[3], behind.diffuse[3]], diffuse, color[3]),
+            shininess: pick.of(simd, [front.shininess, behind.shininess], [false; 2], zero),
+            whole: (front.shininess == behind.shininess || !pick.two)
+                .then_some(front.shininess)
+                .and_then(whole),
+            shines: what == SPECULAR
+                || front.specular[..3] != [0.0; 3]
+                || pick.two && behind.specular[..3] != [0.0; 3],
         };
         for k in 0..3 {
-            let by = |tracked: bool| faces.map(|f| f && tracked);
-            out.ambient[k] = pick.of([front.ambient[k], behind.ambient[k]], by(ambient), &color[k]);
-            out.diffuse[k] = pick.of([front.diffuse[k], behind.diffuse[k]], by(diffuse), &color[k]);
-            out.specular[k] =
-                pick.of([front.specular[k], behind.specular[k]], by(what == SPECULAR), &color[k]);
-            out.emission[k] =
-                pick.of([front.emission[k], behind.emission[k]], by(what == EMISSION), &color[k]);
+            out.ambient[k] = pick.of(simd, [front.ambient[k], behind.ambient[k]], ambient, color[k]);
+            out.diffuse[k] = pick.of(simd, [front.diffuse[k], behind.diffuse[k]], diffuse, color[k]);
+            out.specular[k] = pick.of(simd, [front.specular[k], behind.specular[k]], specular, color[k]);
+            out.emission[k] = pick.of(simd, [front.emission[k], behind.emission[k]], emission, color[k]);
         }
-        let tracked = faces.map(|f| f && diffuse);
-        out.alpha = pick.of([front.diffuse[3], behind.diffuse[3]], tracked, &color[3]);
         out
     }
 
     /// Primary and secondary colours.
     #[inline(always)]
-    fn lit(&self, m: &Surface, eye: &[F; 3], normal: &[F; 3]) -> ([F; 4], [F; 3]) {
+    fn lit<S: Simd>(&self, simd: S, m: &Surface<S>, eye: [V<S>; 3], normal: [V<S>; 3]) -> Lit<S> {
         let s = self.state;
-        let mut primary = [ZERO; 4];
-        let mut specular = [ZERO; 3];
+        let (zero, one) = (V::splat(simd, 0.0), V::splat(simd, 1.0));
+        let (mut primary, mut specular) = ([zero; 4], [zero; 3]);
         for k in 0..3 {
-            for l in 0..LANES {
-                primary[k][l] = m.emission[k][l] + m.ambient[k][l] * s.model_ambient[k];
-            }
+            primary[k] = m.emission[k] + m.ambient[k] * s.model_ambient[k];
         }
         for p in &self.lights {
-            let mut to_light = [ZERO; 3];
-            let mut strength = [1.0; LANES];
-            if p.directional {
-                (0..3).for_each(|k| to_light[k] = [p.to_light[k]; LANES]);
-            } else {
+            let at = |v: [f32; 3]| [V::splat(simd, v[0]), V::splat(simd, v[1]), V::splat(simd, v[2])];
+            let (mut to_light, mut strength) = (at(p.to_light), one);
+            if !p.directional {
                 let [c, lin, q] = p.light.attenuation;
-                for l in 0..LANES {
-                    let v = [0, 1, 2].map(|k| p.to_light[k] - eye[k][l]);
-                    let d = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
-                    let inverse = 1.0 / d;
-                    (to_light[0][l], to_light[1][l], to_light[2][l]) =
-                        (v[0] * inverse, v[1] * inverse, v[2] * inverse);
-                    strength[l] = if d.is_nan() { 0.0 } else { 1.0 / (c + lin * d + q * d * d) };
-                }
+                let v = [to_light[0] - eye[0], to_light[1] - eye[1], to_light[2] - eye[2]];
+                let d = dot(v, v).sqrt();
+                let inverse = one / d;
+                to_light = [v[0] * inverse, v[1] * inverse, v[2] * inverse];
+                let faded = one / (V::splat(simd, c) + d * lin + d * d * q);
+                strength = d.simd_eq(d).select(faded, zero);
             }
             if let Some((direction, cutoff)) = p.spot {
-                for l in 0..LANES {
-                    let cosine = -(to_light[0][l] * direction[0]
-                        + to_light[1][l] * direction[1]
-                        + to_light[2][l] * direction[2]);
-                    let inside = cosine >= cutoff;
-                    strength[l] *= if inside { power(cosine, p.light.spot_exponent) } else { 0.0 };
-                }
+                let cosine = -dot(to_light, at(direction));
+                let e = p.light.spot_exponent;
+                let share = powers(simd, positive(simd, cosine), V::splat(simd, e), whole(e));
+                let inside = cosine.simd_ge(V::splat(simd, cutoff));
+                strength *= inside.select(share, zero);
             }
-            let cosine = dot(normal, &to_light);
-            let mut half = [[p.half[0]; LANES], [p.half[1]; LANES], [p.half[2]; LANES]];
-            if s.local_viewer {
-                let mut towards = *eye;
-                normalize(&mut towards);
-                for k in 0..3 {
-                    (0..LANES).for_each(|l| half[k][l] = to_light[k][l] - towards[k][l]);
-                }
-                normalize(&mut half);
-            } else if !p.directional {
-                half = to_light;
-                half[2].iter_mut().for_each(|v| *v += 1.0);
-                normalize(&mut half);
-            }
-            let h = dot(normal, &half);
-            let shines = p.light.specular[..3].iter().any(|v| *v != 0.0);
-            let mut shine = ZERO;
-            if shines {
-                for l in 0..LANES {
-                    let faces = cosine[l] > 0.0;
-                    let v = power(h[l].max(0.0), m.shininess[l]) * strength[l];
-                    shine[l] = if faces { v } else { 0.0 };
-                }
-            }
+            let cosine = dot(normal, to_light);
+            let faced = positive(simd, cosine) * strength;
             for k in 0..3 {
-                for l in 0..LANES {
-                    let faced = cosine[l].max(0.0) * strength[l];
-                    let v = primary[k][l] + m.ambient[k][l] * p.light.ambient[k] * strength[l];
-                    primary[k][l] = v + m.diffuse[k][l] * p.light.diffuse[k] * faced;
-                    specular[k][l] += m.specular[k][l] * p.light.specular[k] * shine[l];
-                }
+                let v = primary[k] + m.ambient[k] * p.light.ambient[k] * strength;
+                primary[k] = v + m.diffuse[k] * p.light.diffuse[k] * faced;
+            }
+            if !m.shines || p.light.specular[..3] == [0.0; 3] {
+                continue;
+            }
+            let half = if s.local_viewer {
+                let towards = normalized(simd, eye);
+                let half = [to_light[0] - towards[0], to_light[1] - towards[1], to_light[2] - towards[2]];
+                normalized(simd, half)
+            } else if p.directional {
+                at(p.half)
+            } else {
+                normalized(simd, [to_light[0], to_light[1], to_light[2] + one])
+            };
+            let h = positive(simd, dot(normal, half));
+            let shine = powers(simd, h, m.shininess, m.whole) * strength;
+            let shine = cosine.simd_gt(zero).select(shine, zero);
+            for k in 0..3 {
+                specular[k] += m.specular[k] * p.light.specular[k] * shine;
             }
         }
         if !s.separate_specular {
             for k in 0..3 {
-                (0..LANES).for_each(|l| primary[k][l] += specular[k][l]);
+                primary[k] += specular[k];
             }
-            specular = [ZERO; 3];
+            specular = [zero; 3];
         }
         primary[3] = m.alpha;
-        let clamp = |v: &mut F| v.iter_mut().for_each(|v| *v = v.clamp(0.0, 1.0));
-        primary.iter_mut().for_each(clamp);
-        specular.iter_mut().for_each(clamp);
+        for v in &mut primary {
+            *v = unit(simd, *v);
+        }
+        for v in &mut specular {
+            *v = unit(simd, *v);
+        }
         (primary, specular)
     }
+}
+
+/// An exponent that is a whole number up to OpenGL's 128.
+fn whole(e: f32) -> Option<u32> {
+    ((0.0..=128.0).contains(&e) && e.fract() == 0.0).then_some(e as u32)
 }
 
 #[cfg(test)]
@@ -389,18 +418,8 @@ mod tests {
     use super::*;
     use crate::state::current::Current;
     use crate::state::snapshot::{GlLight, Snapshot};
+    use fearless_simd::{Level, dispatch};
     use rt_core::glam::Vec3;
-
-    #[test]
-    fn powers_are_exact_to_a_millionth() {
-        for i in 0..=1000 {
-            let x = i as f32 / 1000.0;
-            for e in [0.0, 0.5, 1.0, 2.0, 17.3, 40.0, 128.0] {
-                let (ours, libms) = (power(x, e), if e == 0.0 { 1.0 } else { x.powf(e) });
-                assert!((ours - libms).abs() <= 1e-6 * libms + 1e-37, "{x}^{e}: {ours} for {libms}");
-            }
-        }
-    }
 
     /// Every kind of light, both sides, tracked colours, local viewer: blocks have the colours of single vertices.
     #[test]
@@ -452,7 +471,7 @@ mod tests {
                 std::array::from_fn(|l| [l as u32, l as u32 + 16, l as u32 + 32]);
             let weights = [[0.2; LANES], [0.3; LANES], [0.5; LANES]];
             let back = std::array::from_fn(|l| l % 3 == 0);
-            let all = setup.fragments(&a, &positions, &triangles, &weights, &back, u16::MAX);
+            let all = dispatch!(Level::new(), simd => setup.fragments(simd, &a, &positions, &triangles, &weights, &back, u16::MAX));
             for l in 0..LANES {
                 let side = usize::from(back[l] && state.lighting && state.two_side);
                 let mut wanted = [0.0; 4];

@@ -146,6 +146,7 @@ impl Wire for Attributes {
             tex: Wire::get(from)?,
             materials: Wire::get(from)?,
             material_of: from.pods()?,
+            version: 0,
         };
         let most = a.materials.len();
         match a.material_of.iter().find(|m| **m as usize >= most) {

@@ -6,7 +6,9 @@
 
 use super::{Prepared, Rect, TILE};
 use crate::capture::Draw;
-use fearless_simd::{Level, dispatch};
+use fearless_simd::{
+    Level, Select, Simd, SimdBase, SimdMask, SimdNarrow, dispatch, f32x16, f64x8, mask32x16,
+};
 use rt_core::glam::{DVec3, DVec4};
 use rt_core::ray::{HitBlock, LANES, Ray, RayBlock};
 use std::sync::atomic::Ordering::Relaxed;
@@ -23,6 +25,23 @@ impl Affine {
     fn at(&self, x: f64, y: f64) -> f64 {
         self.0[0] + self.0[1] * x + self.0[2] * y
     }
+
+    #[inline(always)]
+    fn row<S: Simd>(&self, x: f64x8<S>, y: f64x8<S>) -> f64x8<S> {
+        x * self.0[1] + self.0[0] + y * self.0[2]
+    }
+}
+
+/// Two rows of a block.
+struct Half<S: Simd> {
+    origin: [f64x8<S>; 3],
+    dir: [f64x8<S>; 3],
+    /// Where rays begin, and what of them is not cut off, from there on.
+    back: f64x8<S>,
+    from: f64x8<S>,
+    to: f64x8<S>,
+    /// Lanes of which anything is left.
+    some: u64,
 }
 
 /// The rays of a draw as functions of window coordinates.
@@ -112,48 +131,62 @@ impl Bundle {
 
     /// The rays of one block, whose pixels begin at (`x`, `y`); `used` has a bit for each lane that is wanted.
     #[inline(always)]
-    fn block(&self, x: f64, y: f64, used: u16, out: &mut RayBlock, shift: &mut [f64; LANES]) {
-        let (mut px, mut py) = ([0.0; LANES], [0.0; LANES]);
-        for l in 0..LANES {
-            px[l] = x + (l % 4) as f64;
-            py[l] = y + (l / 4) as f64;
-        }
-        let (mut t0, mut t1) = ([f64::NEG_INFINITY; LANES], [f64::INFINITY; LANES]);
-        let mut none = [false; LANES];
-        for [above, along] in &self.planes {
-            for l in 0..LANES {
-                let (a, b) = (above.at(px[l], py[l]), along.at(px[l], py[l]));
-                let t = -a / b;
-                t0[l] = if b > 0.0 { t0[l].max(t) } else { t0[l] };
-                t1[l] = if b < 0.0 { t1[l].min(t) } else { t1[l] };
-                none[l] |= b == 0.0 && a < 0.0;
-            }
-        }
-        let mut back = [0.0; LANES];
-        for l in 0..LANES {
-            // Rays of a parallel projection begin where the program's near plane is; a plane before it may be the first.
-            let before = t0[l] < 0.0 && t0[l] > f64::NEG_INFINITY;
-            back[l] = if before { t0[l] } else { self.start };
-            shift[l] = back[l];
-        }
+    fn block<S: Simd>(
+        &self,
+        simd: S,
+        [x, y]: [f64; 2],
+        used: u16,
+        out: &mut RayBlock,
+        shift: &mut [f64; LANES],
+    ) {
+        let [a, b] = [self.half(simd, x, y), self.half(simd, x, y + 2.0)];
+        a.back.store_slice(&mut shift[..8]);
+        b.back.store_slice(&mut shift[8..]);
         for (k, o) in [&mut out.ox, &mut out.oy, &mut out.oz].into_iter().enumerate() {
-            for l in 0..LANES {
-                o[l] = (self.origin[k].at(px[l], py[l]) + self.dir[k].at(px[l], py[l]) * back[l]) as f32;
-            }
+            a.origin[k].narrow(b.origin[k]).store_slice(o);
         }
         for (k, d) in [&mut out.dx, &mut out.dy, &mut out.dz].into_iter().enumerate() {
-            for l in 0..LANES {
-                d[l] = self.dir[k].at(px[l], py[l]) as f32;
-            }
+            a.dir[k].narrow(b.dir[k]).store_slice(d);
         }
-        for l in 0..LANES {
-            let wanted = used >> l & 1 != 0 && !none[l] && t0[l] < t1[l];
-            let most = (t1[l] - back[l]) as f32;
-            // A little more, as `next_up` would give.
-            let most = if most < f32::MAX { most + most.abs() * 1.2e-7 } else { f32::INFINITY };
-            out.t_min[l] = ((t0[l] - back[l]) as f32).max(0.0);
-            out.t_max[l] = if wanted { most } else { -1.0 };
+        let zero = f32x16::splat(simd, 0.0);
+        let least = a.from.narrow(b.from);
+        least.simd_gt(zero).select(least, zero).store_slice(&mut out.t_min);
+        // A little more, as `next_up` would give.
+        let most = a.to.narrow(b.to);
+        let more = most + most.abs() * 1.2e-7;
+        let finite = most.simd_lt(f32x16::splat(simd, f32::MAX));
+        let most = finite.select(more, f32x16::splat(simd, f32::INFINITY));
+        let wanted = u64::from(used) & (a.some | b.some << 8);
+        mask32x16::from_bitmask(simd, wanted)
+            .select(most, f32x16::splat(simd, -1.0))
+            .store_slice(&mut out.t_max);
+    }
+
+    /// Two rows of a block.
+    #[inline(always)]
+    fn half<S: Simd>(&self, simd: S, x: f64, y: f64) -> Half<S> {
+        let splat = |v: f64| f64x8::splat(simd, v);
+        let px = splat(x) + f64x8::from_slice(simd, &[0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0]);
+        let py = splat(y) + f64x8::from_slice(simd, &[0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]);
+        let (zero, before_all) = (splat(0.0), splat(f64::NEG_INFINITY));
+        let (mut t0, mut t1) = (before_all, splat(f64::INFINITY));
+        let mut none = 0;
+        for [above, along] in &self.planes {
+            let (a, b) = (above.row(px, py), along.row(px, py));
+            let t = -a / b;
+            t0 = (b.simd_gt(zero) & t.simd_gt(t0)).select(t, t0);
+            t1 = (b.simd_lt(zero) & t.simd_lt(t1)).select(t, t1);
+            none |= (b.simd_eq(zero) & a.simd_lt(zero)).to_bitmask();
         }
+        // Rays of a parallel projection begin where the program's near plane is; a plane before it may be the first.
+        let before = t0.simd_lt(zero) & t0.simd_gt(before_all);
+        let back = before.select(t0, splat(self.start));
+        let (mut origin, mut dir) = ([zero; 3], [zero; 3]);
+        for k in 0..3 {
+            dir[k] = self.dir[k].row(px, py);
+            origin[k] = self.origin[k].row(px, py) + dir[k] * back;
+        }
+        Half { origin, dir, back, from: t0 - back, to: t1 - back, some: t0.simd_lt(t1).to_bitmask() & !none }
     }
 
     /// The parameter, from the ray's own origin on, at which the ray through (`x`, `y`) has this z by w.
@@ -190,7 +223,7 @@ impl TileRays {
     /// Sends rays through the pixels of `area`, which is no larger than a tile. False when nothing was hit.
     pub(super) fn send(&mut self, p: &Prepared<'_>, area: Rect) -> bool {
         let (level, blocks, shift) = (self.level, &mut self.blocks, &mut self.shift);
-        dispatch!(level, _simd => make(&p.bundle, area, blocks, shift));
+        dispatch!(level, simd => make(simd, &p.bundle, area, blocks, shift));
         self.hits.fill(HitBlock::MISS);
         p.world.closest_coherent(&self.blocks, &mut self.hits);
         p.rays.fetch_add(area.w as u64 * area.h as u64, Relaxed);
@@ -229,7 +262,13 @@ impl TileRays {
 }
 
 #[inline(always)]
-fn make(bundle: &Bundle, area: Rect, blocks: &mut [RayBlock], shift: &mut [[f64; LANES]; BLOCKS]) {
+fn make<S: Simd>(
+    simd: S,
+    bundle: &Bundle,
+    area: Rect,
+    blocks: &mut [RayBlock],
+    shift: &mut [[f64; LANES]; BLOCKS],
+) {
     for (b, (out, shift)) in blocks.iter_mut().zip(shift).enumerate() {
         let (x, y) = (4 * (b as i32 % 4), 4 * (b as i32 / 4));
         let mut used = 0_u16;
@@ -239,7 +278,8 @@ fn make(bundle: &Bundle, area: Rect, blocks: &mut [RayBlock], shift: &mut [[f64;
         if used == 0 {
             *out = RayBlock::INACTIVE;
         } else {
-            bundle.block(f64::from(area.x + x) + 0.5, f64::from(area.y + y) + 0.5, used, out, shift);
+            let at = [f64::from(area.x + x) + 0.5, f64::from(area.y + y) + 0.5];
+            bundle.block(simd, at, used, out, shift);
         }
     }
 }

@@ -1,0 +1,170 @@
+//! The nearest fragment of every pixel, tile by tile: rays, fragments of what they hit, colours.
+
+use super::batch::Batch;
+use super::fragments::{FragmentBlock, Lane};
+use super::rays::{BLOCKS, TileRays, slot};
+use super::{DEPTH_STEPS, Fragment, Layer, Prepared, Rect, TILE, UNCOVERED, to_bytes};
+use crate::config::{Mode, Settings};
+use crate::effects::Surroundings;
+use crate::enums::*;
+use crate::ranks::rows::Share;
+use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
+use rt_core::ray::{HitBlock, LANES, NO_HIT};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+/// Pixels of a tile.
+const PIXELS: usize = (TILE * TILE) as usize;
+
+/// What a pixel sees.
+#[derive(Clone, Copy)]
+pub(super) struct Seen {
+    depth_bits: u32,
+    draw: u32,
+    pub(super) prim: u32,
+    pub(super) fragment: Fragment,
+}
+
+const NOTHING: Seen = Seen {
+    depth_bits: u32::MAX,
+    draw: u32::MAX,
+    prim: 0,
+    fragment: Fragment { weights: [0.0; 3], depth: 0.0, plain_depth: 0.0, front: true },
+};
+
+/// What a thread needs for a tile.
+struct Desk {
+    rays: TileRays,
+    fragments: [FragmentBlock; BLOCKS],
+    moved: [f64; PIXELS],
+    seen: [Seen; PIXELS],
+}
+
+impl Desk {
+    fn new() -> Box<Desk> {
+        Box::new(Desk {
+            rays: TileRays::new(),
+            fragments: [const { FragmentBlock::EMPTY }; BLOCKS],
+            moved: [f64::NAN; PIXELS],
+            seen: [NOTHING; PIXELS],
+        })
+    }
+}
+
+/// The nearest fragment of all draws at every pixel of a share of the rows.
+pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings, share: Share) -> (Layer, [u64; 2]) {
+    let around = Surroundings::new(draws, settings);
+    let mode = settings.mode;
+    let rect = draws.iter().fold(Rect::default(), |r, d| r.or(d.rect));
+    let (w, h) = (rect.w.max(0) as usize, rect.h.max(0) as usize);
+    let mut layer = Layer { rect, color: vec![[0; 4]; w * h], depth: vec![UNCOVERED; w * h], covered: 0 };
+    if w * h == 0 {
+        return (layer, [0; 2]);
+    }
+    let band = w * TILE as usize;
+    let covered = AtomicU64::new(0);
+    let bands = layer.color.par_chunks_mut(band).zip(layer.depth.par_chunks_mut(band)).enumerate();
+    bands.filter(|(i, _)| share.has(*i)).for_each_init(Desk::new, |desk, (i, (color, depth))| {
+        let y = rect.y + i as i32 * TILE;
+        let tile_h = (color.len() / w) as i32;
+        let mut n = 0;
+        let mut batch = Batch::default();
+        // Tile by tile: what was seen of one stays in the first cache until it is shaded.
+        for x in (rect.x..rect.x + rect.w).step_by(TILE as usize) {
+            let tile = Rect { x, y, w: TILE.min(rect.x + rect.w - x), h: tile_h };
+            let mut any = false;
+            for (d, p) in draws.iter().enumerate() {
+                any |= see(p, d as u32, tile, desk, any);
+            }
+            if !any {
+                continue;
+            }
+            for (j, s) in desk.seen.iter().enumerate().filter(|(_, s)| s.draw != u32::MAX) {
+                let (tx, ty) = (j % TILE as usize, j / TILE as usize);
+                let k = ty * w + (x - rect.x) as usize + tx;
+                depth[k] = s.fragment.depth as f32;
+                n += 1;
+                let p = &draws[s.draw as usize];
+                let at = (x + tx as i32, y + ty as i32);
+                let s = &Seen { fragment: p.centred(s.prim as usize, s.fragment, at.0, at.1), ..*s };
+                if p.blocks && mode == Mode::Match {
+                    if batch.count > 0 && batch.draw != s.draw {
+                        batch.shade(&draws[batch.draw as usize], color);
+                    }
+                    batch.add(p, s.draw, k, s, color);
+                    continue;
+                }
+                color[k] = to_bytes(p.shaded(s.prim as usize, &s.fragment, mode, around.as_ref(), at));
+            }
+        }
+        if batch.count > 0 {
+            batch.shade(&draws[batch.draw as usize], color);
+        }
+        covered.fetch_add(n, Relaxed);
+    });
+    layer.covered = covered.into_inner() as usize;
+    let extra = around.map_or([0; 2], |a| [a.shadow_rays.into_inner(), a.occlusion_rays.into_inner()]);
+    (layer, extra)
+}
+
+/// One draw against what was seen so far in a tile, row by row; false when none of it is there. Unless `begun` nothing was seen so far.
+fn see(p: &Prepared<'_>, index: u32, area: Rect, desk: &mut Desk, begun: bool) -> bool {
+    let Desk { rays, fragments, moved, seen } = desk;
+    let tile = area.and(p.rect);
+    if tile.is_empty() || !rays.send(p, tile) {
+        return false;
+    }
+    if !begun {
+        seen.fill(NOTHING);
+    }
+    let later_wins_ties = p.draw.state.depth_func == LEQUAL;
+    let (hits, range) = (&rays.hits, p.draw.state.depth_range);
+    let (blocks, targets) = (&mut *fragments, &mut *moved);
+    dispatch!(Level::new(), _simd => fill(p, hits, tile, blocks, targets, range));
+    // Polygon offset pushes steep triangles far back, at silhouettes behind others of the same draw.
+    let overtaken = p.draw.state.polygon_offset.is_some() && rays.look_behind(p, tile, moved);
+    for y in 0..tile.h {
+        for x in 0..tile.w {
+            let (b, l) = slot(x, y);
+            let behind = overtaken && rays.overtakers[b].prim[l] != NO_HIT;
+            let (px, py) = (tile.x + x, tile.y + y);
+            let (prim, f) = match fragments[b].lane[l] {
+                Lane::Empty => continue,
+                Lane::Found if !behind => (rays.hits[b].prim[l] as usize, fragments[b].get(l)),
+                _ => match p.resolve(rays.blocks[b].get(l), rays.hits[b].get(l), px, py) {
+                    Some(found) => found,
+                    None => continue,
+                },
+            };
+            let at = &mut seen[((py - area.y) * TILE + px - area.x) as usize];
+            let bits = (f.depth * DEPTH_STEPS + 0.5) as u32;
+            if bits < at.depth_bits || (later_wins_ties && bits == at.depth_bits) {
+                *at = Seen { depth_bits: bits, draw: index, prim: prim as u32, fragment: f };
+            }
+        }
+    }
+    true
+}
+
+/// Fragments of a tile's hits, and where polygon offset moved them to.
+#[inline(always)]
+fn fill(
+    p: &Prepared<'_>,
+    hits: &[HitBlock],
+    tile: Rect,
+    out: &mut [FragmentBlock; BLOCKS],
+    moved: &mut [f64; PIXELS],
+    range: [f64; 2],
+) {
+    for (b, out) in out.iter_mut().enumerate() {
+        let (x, y) = (4 * (b as i32 % 4), 4 * (b as i32 / 4));
+        let moved = &mut moved[b * LANES..(b + 1) * LANES];
+        if hits[b].prim.iter().all(|p| *p == NO_HIT) {
+            out.lane = [Lane::Empty; LANES];
+            moved.fill(f64::NAN);
+            continue;
+        }
+        out.fill(p, &hits[b], tile.x + x, tile.y + y);
+        out.moved_back(range, moved);
+    }
+}
