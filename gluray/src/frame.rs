@@ -300,6 +300,7 @@ impl Context {
         self.frame.late.frame_done();
         (self.counters.report.cache_hits, self.counters.report.cache_misses) =
             (self.cache.hits, self.cache.misses);
+        self.counters.report.textures_read = self.presenter.images.read;
         self.studio.frame_done();
         let fast = self.config.settings.quality == crate::config::Quality::Fast;
         self.programs.frame_done();

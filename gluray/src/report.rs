@@ -44,6 +44,8 @@ pub struct Report {
     pub cache_hits: u64,
     /// Geometry seen for the first time.
     pub cache_misses: u64,
+    /// Images of textures read from the driver: one for each texture that is drawn with after it changed.
+    pub textures_read: u64,
     /// Pixels that traced surfaces covered.
     pub pixels: u64,
     /// Milliseconds, by phase, summed.
@@ -83,6 +85,7 @@ impl Report {
         self.refits += other.refits;
         self.cache_hits += other.cache_hits;
         self.cache_misses += other.cache_misses;
+        self.textures_read += other.textures_read;
         self.pixels += other.pixels;
         sum(&mut self.passed_reasons, &other.passed_reasons);
         sum(&mut self.flushes, &other.flushes);

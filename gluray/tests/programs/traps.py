@@ -209,4 +209,47 @@ def masks_that_tell_front_from_back():
     end()
 
 
+def textures_of_few_components():
+    """Luminance, intensity and red of several sizes: what is not stored is not one of the components that the environment takes."""
+    simple()
+    enable(0x0DE1)
+    F("glTexEnvi", c_uint, c_uint, c_int)(0x2300, 0x2200, 0x1E01)
+    upload = F("glTexImage2D", c_uint, c_int, c_int, c_int, c_int, c_int, c_uint, c_uint, c_void_p)
+    texels = (c.c_uint8 * 64)(*(v for i in range(16) for v in (250 - 8 * i, 17 * i, 90, 60 + 10 * i)))
+    for k, inner in enumerate((0x9015, 0x9016, 0x9017, 0x8229, 0x822B, 0x881E, 0x881F, 0x8C47, 0x8C3A)):
+        F("glBindTexture", c_uint, c_uint)(0x0DE1, k + 1)
+        upload(0x0DE1, 0, inner, 4, 4, 0, 0x1908, 0x1401, texels)
+        for what in (0x2800, 0x2801):
+            F("glTexParameteri", c_uint, c_uint, c_int)(0x0DE1, what, 0x2600)
+        color(0.2, 0.5, 0.9, 1)
+        F("glPushMatrix")()
+        scale(0.7, 0.7, 0.7)
+        textured(k % 3 * 1.2 - 1.8, k // 3 * 1.2 - 1.8)
+        F("glPopMatrix")()
+
+
+def fog_by_distance():
+    """`GL_NV_fog_distance`: passed by name."""
+    simple(perspective=True)
+    enable(0x0B60)
+    F("glFogi", c_uint, c_int)(0x855A, 0x855B)
+    F("glFogi", c_uint, c_int)(0x0B65, 0x2601)
+    F("glFogf", c_uint, c_float)(0x0B63, 1)
+    F("glFogf", c_uint, c_float)(0x0B64, 3)
+    bump()
+
+
+def an_alpha_test_for_equality():
+    """Eight bits may miss the reference: passed by name."""
+    start()
+    enable(0x0BC0)
+    F("glAlphaFunc", c_uint, c_float)(0x0202, 0.4)
+    for k, a in enumerate((0.4, 0.6)):
+        begin(TRIANGLES)
+        for x, y in ((-1, -1), (1, -1), (0, 1)):
+            color(1, k, 0, a)
+            vertex(x + 0.4 * k, y, 0.1 * k)
+        end()
+
+
 run(globals())
