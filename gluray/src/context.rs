@@ -255,6 +255,8 @@ impl Context {
         if self.can.version == 0 {
             self.keep_errors();
             self.can = Abilities::query();
+            // As large as the window until the program says otherwise.
+            self.frame.begins_with(gl::ints(SCISSOR_BOX));
             self.drop_errors();
             self.counters.set_driver(&gl::string(RENDERER), &gl::string(VERSION));
         }
@@ -372,6 +374,7 @@ impl Context {
         self.keep_errors();
         let mut fresh = (*self.state).clone();
         fresh.refresh(self.dirty, &self.can);
+        fresh.window_height = self.frame.window_height(&fresh);
         if let Some(t) = &mut fresh.texture {
             t.version = self.texture_version;
         }

@@ -34,6 +34,8 @@ pub(crate) struct Frame {
     traced: bool,
     /// Where: framebuffer and viewport.
     places: Vec<(u32, [i32; 4])>,
+    /// The highest row that viewports of the window reached in the frame before, and in this one.
+    tops: [i32; 2],
     /// What the control panel and reports are told of it.
     told: crate::control::Told,
 }
@@ -46,6 +48,21 @@ impl Frame {
 }
 
 impl Frame {
+    /// A new context's scissors.
+    pub(crate) fn begins_with(&mut self, [_, y, _, h]: [i32; 4]) {
+        self.tops[0] = y.saturating_add(h);
+    }
+
+    /// Rows of the window: no call asks for them, but some viewport reaches the top.
+    pub(crate) fn window_height(&mut self, s: &crate::state::snapshot::Snapshot) -> i32 {
+        let top = s.viewport[1].saturating_add(s.viewport[3]);
+        if s.framebuffer != 0 {
+            return top;
+        }
+        self.tops[1] = self.tops[1].max(top);
+        self.tops[0].max(self.tops[1])
+    }
+
     /// Peeled surfaces are traced for this frame.
     pub(crate) fn traced_peeled(&mut self, frame: u64, draws: &[Pending]) {
         self.traced = true;
@@ -297,6 +314,9 @@ impl Context {
         self.counters.report.frames += 1;
         self.frame.traced = false;
         self.frame.places.clear();
+        if self.frame.tops[1] > 0 {
+            self.frame.tops = [self.frame.tops[1], 0];
+        }
         self.frame.late.frame_done();
         (self.counters.report.cache_hits, self.counters.report.cache_misses) =
             (self.cache.hits, self.cache.misses);

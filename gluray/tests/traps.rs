@@ -77,3 +77,8 @@ fn fog_by_distance() {
 fn an_alpha_test_for_equality() {
     draws("an_alpha_test_for_equality", false, &["--trace", "all"]);
 }
+
+#[test]
+fn mipmaps_in_views_of_odd_heights() {
+    draws("mipmaps_in_views_of_odd_heights", true, &[]);
+}

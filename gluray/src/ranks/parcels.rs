@@ -32,6 +32,7 @@ wire_struct!(Snapshot {
     model_view,
     projection,
     viewport,
+    window_height,
     depth_range,
     cull,
     front_is_ccw,

@@ -47,6 +47,8 @@ pub(crate) struct Snapshot {
     pub(crate) model_view: [f32; 16],
     pub(crate) projection: [f32; 16],
     pub(crate) viewport: [i32; 4],
+    /// Rows of the window, as far as viewports tell.
+    pub(crate) window_height: i32,
     pub(crate) depth_range: [f64; 2],
     pub(crate) cull: Option<u32>,
     pub(crate) front_is_ccw: bool,

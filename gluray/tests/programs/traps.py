@@ -252,4 +252,34 @@ def an_alpha_test_for_equality():
         end()
 
 
+def mipmaps_in_views_of_odd_heights():
+    """Footprints are taken of two by two pixels of the window, whatever the view: each level has a colour of its own."""
+    start()
+    F("glTexEnvi", c_uint, c_uint, c_int)(0x2300, 0x2200, 0x1E01)
+    enable(0x0DE1)
+    upload = F("glTexImage2D", c_uint, c_int, c_int, c_int, c_int, c_int, c_uint, c_uint, c_void_p)
+    F("glBindTexture", c_uint, c_uint)(0x0DE1, 1)
+    for level in range(8):
+        n = 128 >> level
+        shade = bytes((255 * (level & 1), 255 * (level >> 1 & 1), 255 * (level >> 2), 255))
+        upload(0x0DE1, level, 0x1908, n, n, 0, 0x1908, 0x1401, c.c_char_p(shade * (n * n)))
+    F("glTexParameteri", c_uint, c_uint, c_int)(0x0DE1, 0x2801, 0x2700)
+    lit()
+    F("glTexParameteri", c_uint, c_uint, c_int)(0x0DE1, 0x2800, 0x2600)
+    for y, h in ((0, 31), (31, 30), (61, 67)):
+        F("glViewport", *[c_int] * 4)(0, y, W, h)
+        mode(0x1701)
+        identity()
+        frustum(-1, 1, -1, 1, 1, 40)
+        mode(0x1700)
+        identity()
+        translate(0, 0, -2)
+        begin(QUADS)
+        for u, x in ((0, -3), (3, 3)):
+            for v in (0, 9) if u == 0 else (9, 0):
+                F("glTexCoord2f", c_float, c_float)(u, v)
+                vertex(x, -0.9 + 0.19 * v, -2.3 * v)
+        end()
+
+
 run(globals())
