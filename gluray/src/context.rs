@@ -56,6 +56,8 @@ pub(crate) struct Context {
     pub(crate) state: Arc<Snapshot>,
     pub(crate) verdict: Verdict,
     pub(crate) current: Current,
+    /// A colour that colour material did not take over (see `Current::unfollowed`).
+    pub(crate) unfollowed: Option<[f32; 4]>,
     /// What of `current` the driver does not know yet.
     pub(crate) stale: u8,
     pub(crate) recorder: Recorder,
@@ -228,6 +230,7 @@ impl Context {
             state: Arc::default(),
             verdict: Verdict::Pass("nothing drawn yet"),
             current: Current::default(),
+            unfollowed: None,
             stale: 0,
             recorder: Recorder::default(),
             lists,
@@ -380,6 +383,7 @@ impl Context {
         }
         if self.dirty & class::CURRENT != 0 && !self.can.core {
             let now = Current::query();
+            self.unfollowed = now.unfollowed(fresh.color_material.filter(|_| fresh.lighting));
             if now != self.current {
                 self.end_batch();
                 self.current = now;

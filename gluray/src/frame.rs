@@ -147,6 +147,12 @@ impl Context {
         if draw.geometry.mesh.indices.is_empty() {
             return;
         }
+        if let Some(color) = self.unfollowed
+            && draw.state.color_material.is_some()
+            && matches!(&draw.attributes.colors, crate::capture::Values::Constant(c) if *c == color)
+        {
+            Arc::make_mut(&mut draw.state).color_material = None;
+        }
         crate::overrides::apply(&mut draw, &self.config.settings);
         if !trace::has_rays(&draw.clip_from_object) {
             // A model-view that flattens everything (a shadow on a floor): rays need the flattened triangles themselves.

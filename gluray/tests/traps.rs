@@ -82,3 +82,8 @@ fn an_alpha_test_for_equality() {
 fn mipmaps_in_views_of_odd_heights() {
     draws("mipmaps_in_views_of_odd_heights", true, &[]);
 }
+
+#[test]
+fn colour_material_with_the_same_colour_again() {
+    draws("colour_material_with_the_same_colour_again", true, &[]);
+}

@@ -275,11 +275,31 @@ def mipmaps_in_views_of_odd_heights():
         identity()
         translate(0, 0, -2)
         begin(QUADS)
-        for u, x in ((0, -3), (3, 3)):
+        for u, x in ((0, -1.9), (2, 1.9)):
             for v in (0, 9) if u == 0 else (9, 0):
                 F("glTexCoord2f", c_float, c_float)(u, v)
                 vertex(x, -0.9 + 0.19 * v, -2.3 * v)
         end()
+
+
+def colour_material_with_the_same_colour_again():
+    """As OpenSceneGraph begins its frames: a material while colour material is off, then the colour as it was."""
+    for turn in range(3):
+        start()
+        lit()
+        F("glLightModelfv", c_uint, c_void_p)(0x0B53, (c_float * 4)(0.9, 0.9, 0.9, 1))
+        color(0.4, 0.4, 0.4, 1)
+        p = (c_float * 12)(-1, -1, 0, 1, -1, 0.2, 1, 1, 0, -1, 1, 0.3)
+        normal(0, 0.3, 0.9)
+        F("glVertexPointer", c_int, c_uint, c_int, c_void_p)(3, 0x1406, 0, p)
+        enable_array(0x8074)
+        F("glDrawArrays", c_uint, c_int, c_int)(QUADS, 0, 4)
+        if turn < 2:
+            F("glFinish")()
+            F("glReadPixels", c_int, c_int, c_int, c_int, c_uint, c_uint, c_void_p)(0, 0, 1, 1, 0x1908, 0x1401, (c.c_uint8 * 4)())
+        disable(0x0B57)
+        color(0.4, 0.4, 0.4, 1)
+        F("glMaterialfv", c_uint, c_uint, c_void_p)(0x0408, 0x1200, (c_float * 4)(0.05, 0.1, 0.2, 1))
 
 
 run(globals())
