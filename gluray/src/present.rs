@@ -258,8 +258,7 @@ impl Context {
         let core = self.can.core;
         let kept = Kept::keep(core, self.can.version);
         if !core {
-            // All but textures: their bindings are kept by hand, and restoring parameters makes Mesa move a texture that is being drawn into.
-            gl::push_attrib(0x000f_ffff & !0x0004_0000);
+            gl::push_attrib(0x000f_ffff);
         }
         UNPACK.into_iter().for_each(|what| gl::pixel_storei(what, i32::from(what == UNPACK_ALIGNMENT)));
         if kept.unpack_buffer != 0 {
