@@ -56,6 +56,8 @@ pub(crate) struct Context {
     pub(crate) state: Arc<Snapshot>,
     pub(crate) verdict: Verdict,
     pub(crate) current: Current,
+    /// A colour that colour material did not take over (see `Current::unfollowed`).
+    pub(crate) unfollowed: Option<[f32; 4]>,
     /// What of `current` the driver does not know yet.
     pub(crate) stale: u8,
     pub(crate) recorder: Recorder,
@@ -228,6 +230,7 @@ impl Context {
             state: Arc::default(),
             verdict: Verdict::Pass("nothing drawn yet"),
             current: Current::default(),
+            unfollowed: None,
             stale: 0,
             recorder: Recorder::default(),
             lists,
@@ -255,6 +258,8 @@ impl Context {
         if self.can.version == 0 {
             self.keep_errors();
             self.can = Abilities::query();
+            // As large as the window until the program says otherwise.
+            self.frame.begins_with(gl::ints(SCISSOR_BOX));
             self.drop_errors();
             self.counters.set_driver(&gl::string(RENDERER), &gl::string(VERSION));
         }
@@ -374,11 +379,13 @@ impl Context {
         self.keep_errors();
         let mut fresh = (*self.state).clone();
         fresh.refresh(self.dirty, &self.can);
+        fresh.window_height = self.frame.window_height(&fresh);
         if let Some(t) = &mut fresh.texture {
             t.version = self.texture_version;
         }
         if self.dirty & class::CURRENT != 0 && !self.can.core {
             let now = Current::query();
+            self.unfollowed = now.unfollowed(fresh.color_material.filter(|_| fresh.lighting));
             if now != self.current {
                 self.end_batch();
                 self.current = now;

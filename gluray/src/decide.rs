@@ -53,6 +53,9 @@ pub(crate) fn filled(s: &Snapshot, trace: Trace) -> Verdict {
     if s.arb_program {
         return Pass("an assembly program");
     }
+    if s.pipeline {
+        return Pass("a program pipeline");
+    }
     if s.stipple || s.smooth_polygons {
         return Pass("stippled or smoothed polygons");
     }
@@ -72,13 +75,16 @@ pub(crate) fn filled(s: &Snapshot, trace: Trace) -> Verdict {
         return Pass("secondary colours");
     }
     if s.fog.is_some_and(|f| f.mode == 0) {
-        return Pass("fog coordinates");
+        return Pass("fog coordinates or distances");
     }
     if s.clip_control {
         return Pass("clip control");
     }
     if s.unclamped_colors {
         return Pass("a colour buffer of floats, integers or signed numbers");
+    }
+    if s.encoded_colors {
+        return Pass("a framebuffer in sRGB");
     }
     if s.two_sided_stencil {
         return Pass("a stencil of two sides");
@@ -122,7 +128,12 @@ pub(crate) fn filled(s: &Snapshot, trace: Trace) -> Verdict {
     } else {
         return Verdict::Trace;
     };
-    if trace == Trace::All { Verdict::TraceInOrder } else { Pass(why) }
+    match trace {
+        // The test is the driver's, of alphas in eight bits.
+        Trace::All if s.alpha_test_of_equality => Pass("an alpha test for equality"),
+        Trace::All => Verdict::TraceInOrder,
+        _ => Pass(why),
+    }
 }
 
 /// True when lines and points drawn now may come before or after traced surfaces: the depth test decides.

@@ -37,6 +37,8 @@ pub(crate) struct Frame {
     traced: bool,
     /// Where: framebuffer and viewport.
     places: Vec<(u32, [i32; 4])>,
+    /// The highest row that viewports of the window reached in the frame before, and in this one.
+    tops: [i32; 2],
     /// What the control panel and reports are told of it.
     told: crate::control::Told,
 }
@@ -49,6 +51,21 @@ impl Frame {
 }
 
 impl Frame {
+    /// A new context's scissors.
+    pub(crate) fn begins_with(&mut self, [_, y, _, h]: [i32; 4]) {
+        self.tops[0] = y.saturating_add(h);
+    }
+
+    /// Rows of the window: no call asks for them, but some viewport reaches the top.
+    pub(crate) fn window_height(&mut self, s: &crate::state::snapshot::Snapshot) -> i32 {
+        let top = s.viewport[1].saturating_add(s.viewport[3]);
+        if s.framebuffer != 0 {
+            return top;
+        }
+        self.tops[1] = self.tops[1].max(top);
+        self.tops[0].max(self.tops[1])
+    }
+
     /// Peeled surfaces are traced for this frame.
     pub(crate) fn traced_peeled(&mut self, frame: u64, draws: &[Pending]) {
         self.traced = true;
@@ -133,6 +150,12 @@ impl Context {
         self.counters.report.triangles += draw.geometry.mesh.num_triangles() as u64;
         if draw.geometry.mesh.indices.is_empty() {
             return;
+        }
+        if let Some(color) = self.unfollowed
+            && draw.state.color_material.is_some()
+            && matches!(&draw.attributes.colors, crate::capture::Values::Constant(c) if *c == color)
+        {
+            Arc::make_mut(&mut draw.state).color_material = None;
         }
         crate::overrides::apply(&mut draw, &self.config.settings);
         if !trace::has_rays(&draw.clip_from_object) {
@@ -327,9 +350,13 @@ impl Context {
         self.counters.report.frames += 1;
         self.frame.traced = false;
         self.frame.places.clear();
+        if self.frame.tops[1] > 0 {
+            self.frame.tops = [self.frame.tops[1], 0];
+        }
         self.frame.late.frame_done();
         (self.counters.report.cache_hits, self.counters.report.cache_misses) =
             (self.cache.hits, self.cache.misses);
+        self.counters.report.textures_read = self.presenter.images.read;
         self.studio.frame_done();
         let fast = self.config.settings.quality == crate::config::Quality::Fast;
         self.programs.frame_done();

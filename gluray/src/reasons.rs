@@ -64,7 +64,7 @@ const TABLE: &[(&str, &str)] = &[
         "stippled or smoothed",
         "a pattern of holes, or edges smoothed by blending, which the driver knows best",
     ),
-    ("fog coordinates", "fog by coordinate is not traced; fog by depth is"),
+    ("fog coordinates", "fog by coordinate or by distance in space is not traced; fog by depth is"),
     ("transform feedback", "the program reads vertices back; nothing is seen of that"),
     ("depth test", "such draws are mostly text, legends and menus; --trace all traces them, too"),
     ("no depth test", "such draws are mostly text, legends and menus; --trace all traces them, too"),
@@ -74,6 +74,9 @@ const TABLE: &[(&str, &str)] = &[
         "a colour buffer of floats",
         "colours beyond black and white are kept there, and traced ones have eight bits",
     ),
+    ("a framebuffer in sRGB", "colours are encoded after they were blended, and traced ones before"),
+    ("an alpha test for equality", "traced alphas have eight bits, which may miss the reference"),
+    ("a program pipeline", "shaders of separate programs are the driver's"),
     (
         "a stencil of two sides",
         "front and back faces are masked differently, and fragments of ours have no sides",

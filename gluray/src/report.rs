@@ -46,6 +46,8 @@ pub struct Report {
     pub cache_misses: u64,
     /// Pictures that were shown once more without a ray, because nothing had changed.
     pub pictures_again: u64,
+    /// Images of textures read from the driver: one for each texture that is drawn with after it changed.
+    pub textures_read: u64,
     /// Pixels that traced surfaces covered.
     pub pixels: u64,
     /// Milliseconds, by phase, summed.
@@ -86,6 +88,7 @@ impl Report {
         self.cache_hits += other.cache_hits;
         self.cache_misses += other.cache_misses;
         self.pictures_again += other.pictures_again;
+        self.textures_read += other.textures_read;
         self.pixels += other.pixels;
         sum(&mut self.passed_reasons, &other.passed_reasons);
         sum(&mut self.flushes, &other.flushes);

@@ -93,7 +93,7 @@ impl Prepared<'_> {
         // The rows of a window are counted from its top.
         let (top, below) = match s.framebuffer {
             0 => {
-                let height = s.viewport[1] + s.viewport[3];
+                let height = s.window_height;
                 let row = (height - 1 - y) & !1;
                 (height - 1 - row, height - 2 - row)
             }

@@ -62,3 +62,28 @@ fn things_around_the_viewer() {
 fn masks_that_tell_front_from_back() {
     draws("masks_that_tell_front_from_back", true, &["--trace", "all"]);
 }
+
+#[test]
+fn textures_of_few_components() {
+    draws("textures_of_few_components", true, &[]);
+}
+
+#[test]
+fn fog_by_distance() {
+    draws("fog_by_distance", false, &["--trace", "all"]);
+}
+
+#[test]
+fn an_alpha_test_for_equality() {
+    draws("an_alpha_test_for_equality", false, &["--trace", "all"]);
+}
+
+#[test]
+fn mipmaps_in_views_of_odd_heights() {
+    draws("mipmaps_in_views_of_odd_heights", true, &[]);
+}
+
+#[test]
+fn colour_material_with_the_same_colour_again() {
+    draws("colour_material_with_the_same_colour_again", true, &[]);
+}

@@ -83,6 +83,15 @@ impl Current {
         }
     }
 
+    /// The colour, where the driver's material is not what colour material makes of it. Mesa compares colours: set the same colour again after
+    /// `glMaterial`, and the material stays, which then lights what has no colours of its own.
+    pub(crate) fn unfollowed(&self, color_material: Option<(u32, u32)>) -> Option<[f32; 4]> {
+        let (face, what) = color_material?;
+        let mut followed = self.materials;
+        set_material(&mut followed, face, what, self.color);
+        (followed != self.materials).then_some(self.color)
+    }
+
     /// Tells the driver what `bits` name.
     pub(crate) fn send(&self, bits: u8) {
         let [r, g, b, a] = self.color;
@@ -126,6 +135,18 @@ impl Current {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_material_that_is_not_its_colour_is_found() {
+        let mut now = Current { color: [0.8; 4], ..Current::default() };
+        set_material(&mut now.materials, FRONT_AND_BACK, AMBIENT_AND_DIFFUSE, [0.8; 4]);
+        let follows = Some((FRONT_AND_BACK, AMBIENT_AND_DIFFUSE));
+        assert_eq!(now.unfollowed(follows), None);
+        set_material(&mut now.materials, FRONT_AND_BACK, AMBIENT, [0.2; 4]);
+        assert_eq!(now.unfollowed(follows), Some([0.8; 4]));
+        assert_eq!(now.unfollowed(Some((FRONT, DIFFUSE))), None);
+        assert_eq!(now.unfollowed(None), None);
+    }
 
     #[test]
     fn materials_refuse_what_opengl_refuses() {

@@ -47,6 +47,8 @@ pub(crate) struct Snapshot {
     pub(crate) model_view: [f32; 16],
     pub(crate) projection: [f32; 16],
     pub(crate) viewport: [i32; 4],
+    /// Rows of the window, as far as viewports tell.
+    pub(crate) window_height: i32,
     pub(crate) depth_range: [f64; 2],
     pub(crate) cull: Option<u32>,
     pub(crate) front_is_ccw: bool,
@@ -74,11 +76,15 @@ pub(crate) struct Snapshot {
     pub(crate) alpha_test: bool,
     /// An alpha test that a fragment of alpha 1 passes.
     pub(crate) alpha_test_passes_one: bool,
+    /// An alpha test for the reference itself, which eight bits may miss.
+    pub(crate) alpha_test_of_equality: bool,
     pub(crate) stencil_test: bool,
     /// `glClipControl` has set another origin or depth than OpenGL's old ones.
     pub(crate) clip_control: bool,
     /// The colour buffer keeps what is below 0 or above 1.
     pub(crate) unclamped_colors: bool,
+    /// Colours are encoded when they are written (`GL_FRAMEBUFFER_SRGB`).
+    pub(crate) encoded_colors: bool,
     /// Front and back faces are masked differently.
     pub(crate) two_sided_stencil: bool,
     pub(crate) logic_op: bool,
@@ -90,6 +96,8 @@ pub(crate) struct Snapshot {
     pub(crate) render_mode: u32,
     pub(crate) program: u32,
     pub(crate) arb_program: bool,
+    /// Shaders of a program pipeline, while no program is in use.
+    pub(crate) pipeline: bool,
     pub(crate) framebuffer: u32,
     pub(crate) draw_buffer: u32,
     pub(crate) more_draw_buffers: bool,
@@ -124,6 +132,8 @@ pub(crate) struct Abilities {
     pub(crate) ati_shaders: bool,
     pub(crate) clip_control: bool,
     pub(crate) stencil_two_side: bool,
+    pub(crate) fog_distance: bool,
+    pub(crate) pipelines: bool,
     pub(crate) double_buffered: bool,
 }
 
@@ -152,6 +162,8 @@ impl Abilities {
             ati_shaders: has("GL_ATI_fragment_shader"),
             clip_control: version >= 45 || has("GL_ARB_clip_control"),
             stencil_two_side: has("GL_EXT_stencil_two_side"),
+            fog_distance: has("GL_NV_fog_distance"),
+            pipelines: !es && (version >= 41 || has("GL_ARB_separate_shader_objects")),
             double_buffered: !es && gl::int(DOUBLEBUFFER) != 0,
         }
     }
@@ -210,6 +222,7 @@ impl Snapshot {
         };
         self.scissor = gl::is_enabled(SCISSOR_TEST).then(|| gl::ints(SCISSOR_BOX));
         self.program = if can.version >= 20 { gl::word(CURRENT_PROGRAM) } else { 0 };
+        self.pipeline = can.pipelines && self.program == 0 && gl::word(PROGRAM_PIPELINE_BINDING) != 0;
         self.framebuffer = if can.version >= 30 { gl::word(FRAMEBUFFER_BINDING) } else { 0 };
         self.draw_buffer = gl::word(DRAW_BUFFER);
         self.clip_control = can.clip_control
@@ -217,6 +230,7 @@ impl Snapshot {
         self.unclamped_colors = self.framebuffer != 0
             && self.draw_buffer != 0
             && !matches!(gl::component_type(self.draw_buffer), UNSIGNED_NORMALIZED | 0);
+        self.encoded_colors = can.version >= 30 && gl::is_enabled(FRAMEBUFFER_SRGB);
         self.more_draw_buffers = can.version >= 20 && gl::word(DRAW_BUFFER0 + 1) != 0;
         self.samples = match gl::int(SAMPLE_BUFFERS) != 0 && gl::is_enabled(MULTISAMPLE) {
             true => gl::int(SAMPLES),
@@ -243,6 +257,7 @@ impl Snapshot {
                 _ => false,
             }
         };
+        self.alpha_test_of_equality = self.alpha_test && matches!(gl::word(0x0bc1), EQUAL | NOTEQUAL);
         self.stipple = gl::is_enabled(POLYGON_STIPPLE);
         self.render_mode = gl::word(RENDER_MODE);
         self.arb_program = can.arb_programs
@@ -259,7 +274,10 @@ impl Snapshot {
             .collect();
         self.fog = gl::is_enabled(FOG).then(|| Fog {
             // Fog by coordinates is the driver's: `decide` knows it by mode 0.
-            mode: match can.version >= 14 && gl::word(FOG_COORD_SRC) == FOG_COORD {
+            // Likewise by distances in space: `GL_NV_fog_distance`, but for its plain form.
+            mode: match can.version >= 14 && gl::word(FOG_COORD_SRC) == FOG_COORD
+                || can.fog_distance && gl::word(FOG_DISTANCE_MODE) != EYE_PLANE_ABSOLUTE
+            {
                 true => 0,
                 false => gl::word(FOG_MODE),
             },

@@ -110,13 +110,14 @@ impl Wire for Image {
     }
 }
 
-fn base_of(format: u32) -> Base {
-    match format {
-        0x1906 | 0x803b..=0x803e => Base::Alpha,
-        1 | 0x1909 | 0x803f..=0x8042 => Base::Luminance,
-        2 | 0x190a | 0x8043..=0x8048 => Base::LuminanceAlpha,
-        0x8049..=0x804d => Base::Intensity,
-        3 | 0x1907 | 0x2a10 | 0x804f..=0x8054 => Base::Rgb,
+/// What components stand for, from the sizes of red, green, blue, alpha, luminance and intensity: formats are too many to know all by name.
+fn base_of([red, _, _, alpha, luminance, intensity]: [i32; 6]) -> Base {
+    match (red > 0, alpha > 0, luminance > 0, intensity > 0) {
+        (_, _, _, true) => Base::Intensity,
+        (_, true, true, _) => Base::LuminanceAlpha,
+        (_, false, true, _) => Base::Luminance,
+        (false, true, ..) => Base::Alpha,
+        (_, false, ..) => Base::Rgb,
         _ => Base::Rgba,
     }
 }
@@ -130,6 +131,8 @@ pub(crate) struct Images {
     images: HashMap<(u32, u32), Versioned>,
     /// Memory of an image that has gone: programs that replace a texture in each frame replace it by one of its size.
     spare: Vec<[u8; 4]>,
+    /// How many were read from the driver.
+    pub(crate) read: u64,
 }
 
 impl Images {
@@ -155,6 +158,7 @@ impl Images {
             }
         }
         let image = read_bound(target, name, &mut self.spare).map(Arc::new);
+        self.read += u64::from(image.is_some());
         self.images.insert((target, name), (version, image.clone()));
         image
     }
@@ -175,6 +179,8 @@ fn read_bound(target: u32, name: u32, spare: &mut Vec<[u8; 4]>) -> Option<Image>
 
 const TEXTURE_BASE_LEVEL: u32 = 0x813c;
 const TEXTURE_MAX_LEVEL: u32 = 0x813d;
+const TEXTURE_SRGB_DECODE: u32 = 0x8a48;
+const SKIP_DECODE: u32 = 0x8a4a;
 /// Sizes of red, green, blue, alpha, luminance, intensity.
 const COMPONENT_SIZES: [u32; 6] = [0x805c, 0x805d, 0x805e, 0x805f, 0x8060, 0x8061];
 
@@ -206,9 +212,10 @@ fn read(target: u32, spare: &mut Vec<[u8; 4]>) -> Option<Image> {
     }
     // Signed components have other steps.
     let signed = matches!(format, 0x8f90..=0x8f9b | 0x9010..=0x901b);
-    let whole = !signed && COMPONENT_SIZES.iter().all(|what| matches!(of_level(first, *what), 0 | 8));
+    let sizes = COMPONENT_SIZES.map(|what| of_level(first, what));
+    let whole = !signed && sizes.iter().all(|bits| matches!(bits, 0 | 8));
     // Decoded before they are filtered, as the driver does.
-    let encoded = matches!(format, 0x8c40..=0x8c4f);
+    let encoded = matches!(format, 0x8c40..=0x8c4f) && parameter(TEXTURE_SRGB_DECODE) != SKIP_DECODE;
     let levels = (first..=last).map(|n| {
         let [width, height] = halved(n);
         let texels = if whole && !encoded {
@@ -224,7 +231,7 @@ fn read(target: u32, spare: &mut Vec<[u8; 4]>) -> Option<Image> {
     });
     Some(Image {
         levels: levels.collect(),
-        base: base_of(format),
+        base: base_of(sizes),
         filters,
         wrap: [
             parameter(TEXTURE_WRAP_S),

@@ -209,4 +209,97 @@ def masks_that_tell_front_from_back():
     end()
 
 
+def textures_of_few_components():
+    """Luminance, intensity and red of several sizes: what is not stored is not one of the components that the environment takes."""
+    simple()
+    enable(0x0DE1)
+    F("glTexEnvi", c_uint, c_uint, c_int)(0x2300, 0x2200, 0x1E01)
+    upload = F("glTexImage2D", c_uint, c_int, c_int, c_int, c_int, c_int, c_uint, c_uint, c_void_p)
+    texels = (c.c_uint8 * 64)(*(v for i in range(16) for v in (250 - 8 * i, 17 * i, 90, 60 + 10 * i)))
+    for k, inner in enumerate((0x9015, 0x9016, 0x9017, 0x8229, 0x822B, 0x881E, 0x881F, 0x8C47, 0x8C3A)):
+        F("glBindTexture", c_uint, c_uint)(0x0DE1, k + 1)
+        upload(0x0DE1, 0, inner, 4, 4, 0, 0x1908, 0x1401, texels)
+        for what in (0x2800, 0x2801):
+            F("glTexParameteri", c_uint, c_uint, c_int)(0x0DE1, what, 0x2600)
+        color(0.2, 0.5, 0.9, 1)
+        F("glPushMatrix")()
+        scale(0.7, 0.7, 0.7)
+        textured(k % 3 * 1.2 - 1.8, k // 3 * 1.2 - 1.8)
+        F("glPopMatrix")()
+
+
+def fog_by_distance():
+    """`GL_NV_fog_distance`: passed by name."""
+    simple(perspective=True)
+    enable(0x0B60)
+    F("glFogi", c_uint, c_int)(0x855A, 0x855B)
+    F("glFogi", c_uint, c_int)(0x0B65, 0x2601)
+    F("glFogf", c_uint, c_float)(0x0B63, 1)
+    F("glFogf", c_uint, c_float)(0x0B64, 3)
+    bump()
+
+
+def an_alpha_test_for_equality():
+    """Eight bits may miss the reference: passed by name."""
+    start()
+    enable(0x0BC0)
+    F("glAlphaFunc", c_uint, c_float)(0x0202, 0.4)
+    for k, a in enumerate((0.4, 0.6)):
+        begin(TRIANGLES)
+        for x, y in ((-1, -1), (1, -1), (0, 1)):
+            color(1, k, 0, a)
+            vertex(x + 0.4 * k, y, 0.1 * k)
+        end()
+
+
+def mipmaps_in_views_of_odd_heights():
+    """Footprints are taken of two by two pixels of the window, whatever the view: each level has a colour of its own."""
+    start()
+    F("glTexEnvi", c_uint, c_uint, c_int)(0x2300, 0x2200, 0x1E01)
+    enable(0x0DE1)
+    upload = F("glTexImage2D", c_uint, c_int, c_int, c_int, c_int, c_int, c_uint, c_uint, c_void_p)
+    F("glBindTexture", c_uint, c_uint)(0x0DE1, 1)
+    for level in range(8):
+        n = 128 >> level
+        shade = bytes((255 * (level & 1), 255 * (level >> 1 & 1), 255 * (level >> 2), 255))
+        upload(0x0DE1, level, 0x1908, n, n, 0, 0x1908, 0x1401, c.c_char_p(shade * (n * n)))
+    F("glTexParameteri", c_uint, c_uint, c_int)(0x0DE1, 0x2801, 0x2700)
+    lit()
+    F("glTexParameteri", c_uint, c_uint, c_int)(0x0DE1, 0x2800, 0x2600)
+    for y, h in ((0, 31), (31, 30), (61, 67)):
+        F("glViewport", *[c_int] * 4)(0, y, W, h)
+        mode(0x1701)
+        identity()
+        frustum(-1, 1, -1, 1, 1, 40)
+        mode(0x1700)
+        identity()
+        translate(0, 0, -2)
+        begin(QUADS)
+        for u, x in ((0, -1.9), (2, 1.9)):
+            for v in (0, 9) if u == 0 else (9, 0):
+                F("glTexCoord2f", c_float, c_float)(u, v)
+                vertex(x, -0.9 + 0.19 * v, -2.3 * v)
+        end()
+
+
+def colour_material_with_the_same_colour_again():
+    """As OpenSceneGraph begins its frames: a material while colour material is off, then the colour as it was."""
+    for turn in range(3):
+        start()
+        lit()
+        F("glLightModelfv", c_uint, c_void_p)(0x0B53, (c_float * 4)(0.9, 0.9, 0.9, 1))
+        color(0.4, 0.4, 0.4, 1)
+        p = (c_float * 12)(-1, -1, 0, 1, -1, 0.2, 1, 1, 0, -1, 1, 0.3)
+        normal(0, 0.3, 0.9)
+        F("glVertexPointer", c_int, c_uint, c_int, c_void_p)(3, 0x1406, 0, p)
+        enable_array(0x8074)
+        F("glDrawArrays", c_uint, c_int, c_int)(QUADS, 0, 4)
+        if turn < 2:
+            F("glFinish")()
+            F("glReadPixels", c_int, c_int, c_int, c_int, c_uint, c_uint, c_void_p)(0, 0, 1, 1, 0x1908, 0x1401, (c.c_uint8 * 4)())
+        disable(0x0B57)
+        color(0.4, 0.4, 0.4, 1)
+        F("glMaterialfv", c_uint, c_uint, c_void_p)(0x0408, 0x1200, (c_float * 4)(0.05, 0.1, 0.2, 1))
+
+
 run(globals())
