@@ -400,13 +400,18 @@ impl Context {
 
     /// What was traced is cleared: a frame is over that nobody swapped or read, as in programs that draw into framebuffer objects alone.
     fn begin_again(&mut self) {
+        // Only then is the state asked for: windows have their frames when they are swapped, and to ask for materials heals what Mesa holds
+        // of them (osgbillboard, osgtessellate).
+        if !self.frame.pending.is_empty() || self.frame.places.iter().all(|(framebuffer, _)| *framebuffer == 0) {
+            return;
+        }
         self.refresh();
         let [x, y, w, h] = self.state.scissor.unwrap_or(self.state.viewport);
         let target = self.state.framebuffer;
         let meets = |&(f, [a, b, c, d]): &(u32, [i32; 4])| {
             f == target && a < x + w && x < a + c && b < y + h && y < b + d
         };
-        if self.frame.pending.is_empty() && target != 0 && self.frame.places.iter().any(meets) {
+        if target != 0 && self.frame.places.iter().any(meets) {
             self.frame_done();
         }
     }
