@@ -434,6 +434,9 @@ impl Context {
             }
             Err(why) => {
                 self.passing(why, is_filled(mode));
+                if is_filled(mode) {
+                    self.draw_over();
+                }
                 // The arrays of the driver's draw leave some current values undefined.
                 self.mark_current();
                 false

@@ -269,7 +269,9 @@ impl Beyond<'_> {
             let weights = [1.0 - u - v, u, v];
             let point = a * weights[0] + b * weights[1] + c * weights[2];
             let clipped = || {
-                s.clip_planes.iter().any(|q| q[0] * point.x + q[1] * point.y + q[2] * point.z + q[3] < 0.0)
+                let [a, b, c] = corners;
+                let at = a * weights[0] + b * weights[1] + c * weights[2];
+                p.clip_planes().iter().any(|q| q[0] * at.x + q[1] * at.y + q[2] * at.z + q[3] < 0.0)
             };
             if culled || clipped() {
                 ray.t_min = hit.t.next_up();

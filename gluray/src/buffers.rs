@@ -37,10 +37,10 @@ impl Writes {
     }
 
     /// When the buffers of arrays and indices were written last.
-    pub(crate) fn last(&self, arrays: &[Option<Source>; 4], indices: u32) -> [u64; 5] {
+    pub(crate) fn last(&self, arrays: &[Option<Source>; 6], indices: u32) -> [u64; 7] {
         let of = |buffer: u32| self.named.get(&buffer).copied().unwrap_or(self.unnamed);
         let array = |i: usize| arrays[i].map_or(0, |s| of(s.buffer));
-        [array(0), array(1), array(2), array(3), of(indices)]
+        [array(0), array(1), array(2), array(3), array(4), array(5), of(indices)]
     }
 }
 
@@ -52,6 +52,8 @@ impl Context {
             _ if self.sink == Sink::Pass => 0,
             ARRAY_BUFFER => ARRAY_BUFFER_BINDING,
             ELEMENT_ARRAY_BUFFER => ELEMENT_ARRAY_BUFFER_BINDING,
+            // The name of the target is that of its binding; OpenGL 3.1.
+            TEXTURE_BUFFER if self.can.version >= 31 => TEXTURE_BUFFER,
             _ => 0,
         };
         match if binding == 0 { 0 } else { gl::word(binding) } {
@@ -86,7 +88,7 @@ mod tests {
         let source = |buffer: u32| {
             Some(Source { size: 3, kind: FLOAT, stride: 0, address: 0, buffer, normalized: false })
         };
-        let arrays = [source(5), source(6), None, None];
+        let arrays = [source(5), source(6), None, None, None, None];
         let mut w = Writes::default();
         let before = w.last(&arrays, 7);
         w.to(8);

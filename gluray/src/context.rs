@@ -296,6 +296,7 @@ impl Context {
         if self.sink == Sink::Trace {
             self.unswallow("another call between Begin and End");
         }
+        self.drawn_over();
         if let Some(r) = &mut self.recording {
             r.note_driver_call(flushes, draws);
         }
@@ -365,6 +366,7 @@ impl Context {
         const DRAWS: u8 = class::MATRIX | class::LIGHT | class::RASTER | class::TEXTURE | class::CURRENT;
         self.watched = 0;
         symbols::attend();
+        self.drawn_over();
         if self.dirty & DRAWS == 0 {
             return;
         }

@@ -193,6 +193,9 @@ impl Context {
         if self.programs.peeling.has_draws() && matches!(before, "glBeginQuery" | ORDER_MATTERS) {
             self.gather_peeled();
         }
+        if self.programs.weighted.has_draws() {
+            self.sum_weighted();
+        }
         let pending = std::mem::take(&mut self.frame.pending);
         let others = std::mem::take(&mut self.frame.others);
         if !self.probes.draws.is_empty() {
@@ -395,6 +398,9 @@ impl Context {
         }
         self.end_batch();
         self.programs.peeling.cleared(self.counters.report.passed_draws);
+        if self.programs.weighted.has_draws() {
+            self.flush("glClear");
+        }
         const COLOR_AND_DEPTH: u32 = 0x4100;
         if self.frame.traced && mask & COLOR_AND_DEPTH == COLOR_AND_DEPTH {
             self.begin_again();

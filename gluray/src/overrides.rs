@@ -6,7 +6,7 @@ use crate::capture::{Attributes, Draw, Shading, Values};
 use crate::config::{Lights, Material, Mode, Settings, Surface};
 use crate::control::key_of;
 use crate::effects::MOST_LIGHTS;
-use crate::programs::Recognised;
+use crate::programs::{ProgramLight, Recognised};
 use crate::state::snapshot::{GlLight, Snapshot};
 use std::sync::Arc;
 
@@ -146,15 +146,16 @@ fn relight(s: &mut Snapshot, l: &Lights) {
 }
 
 fn relight_program(p: &mut Recognised, l: &Lights) {
-    for (_, color) in &mut p.lights {
-        color.iter_mut().for_each(|v| *v *= l.program as f32);
+    for light in &mut p.lights {
+        light.color.iter_mut().for_each(|v| *v *= l.program as f32);
     }
     p.ambient.iter_mut().for_each(|v| *v *= l.ambient as f32);
     if l.added > 0.0 && p.lights.len() < MOST_LIGHTS {
         let length = l.added_direction.iter().map(|v| v * v).sum::<f64>().sqrt();
         // VTK's shaders have the direction in which light travels.
         let travels = l.added_direction.map(|v| (-v / length) as f32);
-        p.lights.push((travels, rgb(l.added_color).map(|v| v * l.added as f32)));
+        let color = rgb(l.added_color).map(|v| v * l.added as f32);
+        p.lights.push(ProgramLight { travels, color, lamp: None });
     }
 }
 

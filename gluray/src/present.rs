@@ -81,6 +81,12 @@ fn compile(kind: u32, text: &str) -> u32 {
 }
 
 impl Presenter {
+    /// An empty vertex array of a core context; 0 elsewhere.
+    pub(crate) fn vertex_array(&mut self) -> u32 {
+        self.prepare(true);
+        self.vertex_array
+    }
+
     /// Makes the objects; false when the driver refuses them.
     fn prepare(&mut self, core: bool) -> bool {
         if self.program != 0 || self.failed {
@@ -253,8 +259,22 @@ impl Context {
 
     /// The same into one sample of each pixel alone.
     pub(crate) fn present_sample(&mut self, layers: &[Layer], fate: Fate, sample: Option<u32>) {
+        self.in_own_state(|c| {
+            let mask = sample.map(gl::only_sample);
+            if c.presenter.prepare(c.can.core) {
+                c.pass(layers, fate);
+            } else {
+                c.counters.pass("the driver refuses our shader: what was traced is lost", 1);
+            }
+            if let Some(mask) = mask {
+                gl::all_samples(mask);
+            }
+        });
+    }
+
+    /// Runs `f` with plain unpacking of pixels, and leaves no trace of what it does to the driver's state.
+    pub(crate) fn in_own_state(&mut self, f: impl FnOnce(&mut Context)) {
         self.keep_errors();
-        let mask = sample.map(gl::only_sample);
         let core = self.can.core;
         let kept = Kept::keep(core, self.can.version);
         if !core {
@@ -264,14 +284,10 @@ impl Context {
         if kept.unpack_buffer != 0 {
             gl::bind_buffer(PIXEL_UNPACK_BUFFER, 0);
         }
-        if self.presenter.prepare(core) {
-            self.pass(layers, fate, &kept);
-        } else {
-            self.counters.pass("the driver refuses our shader: what was traced is lost", 1);
+        if kept.samplers_exist {
+            (0..2).for_each(|unit| gl::bind_sampler(unit, 0));
         }
-        if let Some(mask) = mask {
-            gl::all_samples(mask);
-        }
+        f(self);
         if !core {
             gl::pop_attrib();
         }
@@ -279,13 +295,10 @@ impl Context {
         self.drop_errors();
     }
 
-    fn pass(&mut self, layers: &[Layer], fate: Fate, kept: &Kept) {
+    fn pass(&mut self, layers: &[Layer], fate: Fate) {
         let core = self.can.core;
         let p = &mut self.presenter;
         gl::use_program(p.program);
-        if kept.samplers_exist {
-            (0..2).for_each(|unit| gl::bind_sampler(unit, 0));
-        }
         OFF.into_iter().filter(|c| *c != RASTERIZER_DISCARD || self.can.version >= 30).for_each(gl::disable);
         if !core {
             (0..self.can.clip_planes).for_each(|i| gl::disable(CLIP_PLANE0 + i));

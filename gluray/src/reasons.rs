@@ -7,6 +7,27 @@ pub fn advice(reason: &str) -> Option<&'static str> {
 
 /// By the beginning of the reason.
 const TABLE: &[(&str, &str)] = &[
+    (
+        "a surface of VTK's",
+        "normal maps, environments, ambient occlusion and the like of VTK's own; --mode enhance needs no understanding",
+    ),
+    (
+        "a picture on",
+        "textures of VTK's actors are not followed in its shaders; colours of points and cells are",
+    ),
+    (
+        "surfaces that VTK draws again",
+        "VTK draws them twice, the second time over themselves with shadow maps; --mode rich makes shadows without these",
+    ),
+    (
+        "a shadow map",
+        "depths as a light sees them, for VTK's own shadows; --mode rich makes shadows without these",
+    ),
+    (
+        "translucent surfaces that VTK sums up",
+        "traced in modes match, phong and rich, where VTK blends their sums as it does of itself",
+    ),
+    ("a buffer texture", "what VTK has for each cell comes in colours of bytes or floats; this one does not"),
     ("lines", "lines and points are drawn by the driver and joined with the picture by depth"),
     ("points", "lines and points are drawn by the driver and joined with the picture by depth"),
     ("polygons drawn as lines", "a wireframe; show surfaces to have them traced"),
@@ -74,6 +95,9 @@ mod tests {
     fn what_is_known_is_explained_and_what_is_not_is_left_alone() {
         assert!(advice("tracing is off").unwrap().contains("--mode"));
         assert!(advice("no depth test, or no depth mask").is_some());
+        for known in ["a shadow map", "a buffer texture of a format that is not read"] {
+            assert!(advice(known).is_some(), "{known}");
+        }
         assert_eq!(advice("an empty viewport"), None);
         for (i, (a, _)) in TABLE.iter().enumerate() {
             let hidden = TABLE[..i].iter().any(|(b, _)| a.starts_with(b));

@@ -5,6 +5,7 @@ use crate::config::Mode;
 use crate::effects::{Surroundings, Visibility, vector};
 use crate::enums::*;
 use crate::lighting::{Lit, transform};
+use crate::programs::At;
 use crate::state::snapshot::TextureUnit;
 use crate::texturing;
 use crate::trace::{Fragment, Prepared, matrix, mixed};
@@ -197,14 +198,14 @@ impl Prepared<'_> {
         let mesh = &self.draw.geometry.mesh;
         let corners = mesh.indices[prim].map(|i| i as usize);
         if let Shading::Program(program) = &self.draw.shading {
-            return program.color(
-                &self.draw.attributes,
-                mesh,
+            let at = At {
                 prim,
-                f.weights.map(|w| w as f32),
-                f.front,
-                reaches,
-            );
+                weights: f.weights.map(|w| w as f32),
+                front: f.front,
+                pixel,
+                moved_by: self.draw.state.sample_place,
+            };
+            return program.color(&self.draw.attributes, mesh, &at, reaches);
         }
         let s = &*self.draw.state;
         let side = usize::from(!f.front && s.lighting && s.two_side);

@@ -22,7 +22,7 @@ use crate::texturing::Image;
 use bounds::screen_bounds;
 pub(crate) use in_order::in_order;
 pub(crate) use nearest::nearest;
-pub(crate) use peeled::{Limit, peeled};
+pub(crate) use peeled::{Limit, Sums, peeled, summed};
 use rayon::prelude::*;
 use rays::{Bundle, TileRays, slot};
 use rt_core::accel::World;
@@ -96,6 +96,8 @@ pub(crate) struct Prepared<'a> {
     planes: Vec<[f64; 4]>,
     /// The user's alone.
     clip_planes: Vec<[f64; 4]>,
+    /// A shader throws away what is below them; otherwise triangles are cut.
+    discards: bool,
     pub(crate) rect: Rect,
     pub(crate) lighting: Setup<'a>,
     pub(crate) lit: Option<Vec<Lit>>,
@@ -156,8 +158,16 @@ impl<'a> Prepared<'a> {
         let eye_from_object = matrix(&s.model_view);
         let object =
             |p: &[f64; 4]| (eye_from_object.transpose() * rt_core::glam::DVec4::from_array(*p)).to_array();
-        let clip_planes: Vec<[f64; 4]> = s.clip_planes.iter().map(object).collect();
-        planes.extend(&clip_planes);
+        let mut clip_planes: Vec<[f64; 4]> = s.clip_planes.iter().map(object).collect();
+        let mut discards = false;
+        if let Shading::Program(program) = &draw.shading {
+            // A shader throws fragments away by the middle of their pixel.
+            clip_planes = program.clip_planes().iter().map(|p| p.map(f64::from)).collect();
+            discards = !clip_planes.is_empty();
+        }
+        if !discards || s.sample_place == [0.0; 2] {
+            planes.extend(&clip_planes);
+        }
         let lighting = Setup::new(s);
         let places = match &draw.shading {
             Shading::Fixed => lighting.places(),
@@ -170,6 +180,7 @@ impl<'a> Prepared<'a> {
             camera,
             planes,
             clip_planes,
+            discards,
             rect,
             lighting,
             lit: None,
@@ -297,18 +308,22 @@ impl<'a> Prepared<'a> {
         }
         let weights = l.map(|v| v / sum);
         // Clipped at the centre, whatever ray found the triangle.
+        let middle = match self.discards && s.sample_place != [0.0; 2] {
+            true => self.weights_at(prim, x, y).map_or(weights, |w| w.map(f64::from)),
+            false => weights,
+        };
         for p in &self.clip_planes {
             let corner = |i: usize| {
                 let v = self.draw.geometry.mesh.triangle(prim)[i].as_dvec3();
                 p[0] * v.x + p[1] * v.y + p[2] * v.z + p[3]
             };
-            let terms = [0, 1, 2].map(|i| weights[i] * corner(i));
+            let terms = [0, 1, 2].map(|i| middle[i] * corner(i));
             let (height, slack) =
                 (terms.iter().sum::<f64>(), 1e-6 * terms.iter().map(|v| v.abs()).sum::<f64>());
-            if height < -slack {
+            if height < if self.discards { 0.0 } else { -slack } {
                 return None;
             }
-            if height <= slack {
+            if height <= slack && !self.discards {
                 // The driver cuts the triangle along the plane: a centre on the cut belongs to what is above or to the right of it.
                 let across = [h[1].cross(h[2]), h[2].cross(h[0]), h[0].cross(h[1])];
                 let slope = (0..3).map(|i| across[i] * corner(i)).sum::<DVec3>() * sum.signum();

@@ -228,13 +228,109 @@ fn vtk_by_egl_draws_the_drivers_picture() {
     }
 }
 
+/// Draws scenes of `wheel_scene.py` in today's VTK and, where `old` says so, in Debian's, natively and through us. Each has to be the driver's picture,
+/// and `least` of its draws of surfaces in each frame traced.
+fn scenes(kinds: &[&[&str]], old: bool, least: u64) -> Vec<Report> {
+    let (Some(python), Some(_)) = (program("RTSV_PYTHON"), program("RTSV_XVFB")) else { return Vec::new() };
+    let older = program("RTSV_SYSTEM_PYTHON").filter(|_| old && program("RTSV_PVBATCH").is_some());
+    let file = script("wheel_scene.py");
+    let mut reports = Vec::new();
+    for python in [Some(python), older].iter().flatten() {
+        for kind in kinds {
+            let arguments = [&[file.as_str()], *kind].concat();
+            let Some((m, report)) = both(python, &arguments, "out.png", |_| ()) else { continue };
+            m.assert_filled(&format!("{kind:?} in {}", python.display()));
+            assert!(report.traced_draws >= least, "{kind:?}: {report:?}");
+            assert_eq!(report.problems, Vec::<String>::new());
+            reports.push(report);
+        }
+    }
+    reports
+}
+
 #[test]
 fn surfaces_of_todays_vtk_are_traced_without_normals_and_with_colour_maps() {
+    scenes(&[&["plain"], &["flat"]], false, 4);
+}
+
+#[test]
+fn colours_of_cells_are_the_drivers() {
+    scenes(&[&["cells"], &["cells", "4"]], true, 4);
+}
+
+#[test]
+fn translucent_layers_that_vtk_sums_up_are_the_drivers() {
+    for report in scenes(&[&["translucent"]], true, 6) {
+        assert!(report.flushes.contains_key("translucent sums"), "{report:?}");
+        assert_eq!(report.passed_reasons.get("translucent surfaces that VTK sums up"), None, "{report:?}");
+    }
+}
+
+#[test]
+fn surfaces_that_todays_vtk_peels_are_traced_in_one_go() {
+    scenes(&[&["peeled"]], false, 6).iter().for_each(assert_peeled);
+}
+
+#[test]
+fn clipping_planes_of_mappers_cut_where_the_driver_cuts() {
+    scenes(&[&["clipped"]], true, 4);
+    scenes(&[&["clipped", "4"]], false, 4);
+}
+
+#[test]
+fn lamps_spots_and_light_kits_are_the_drivers() {
+    scenes(&[&["lights"], &["light_kit"]], true, 4);
+}
+
+#[test]
+fn back_faces_have_a_material_of_their_own() {
+    scenes(&[&["both_sides"]], true, 4);
+}
+
+#[test]
+fn physically_based_materials_are_the_drivers() {
+    scenes(&[&["physical"]], true, 4);
+    // Debian's has another rule for lamps.
+    scenes(&[&["physical_lights"]], false, 4);
+}
+
+#[test]
+fn lines_along_edges_of_cells_are_the_drivers() {
+    scenes(&[&["edges"], &["edges", "4"]], false, 4);
+}
+
+#[test]
+fn surfaces_that_are_drawn_again_with_shadow_maps_are_the_drivers_and_named() {
+    // The first frame is known by its shadow maps when surfaces are traced already; in the second they are the driver's.
+    for report in scenes(&[&["shadows"], &["shadows", "0", "2"]], false, 4) {
+        assert!(report.passed_reasons.contains_key("a shadow map"), "{report:?}");
+        let again = report.passed_reasons.contains_key("surfaces that VTK draws again with its shadow maps");
+        assert_eq!(again, report.frames > 1, "{report:?}");
+    }
+}
+
+#[test]
+fn modes_beyond_match_keep_clipping_planes_and_say_what_paths_leave_out() {
     let (Some(python), Some(_)) = (program("RTSV_PYTHON"), program("RTSV_XVFB")) else { return };
+    let Some(x) = Xvfb::start() else { return };
     let file = script("wheel_scene.py");
-    if let Some((m, report)) = both(&python, &[file.as_str()], "out.png", |_| ()) {
-        m.assert_filled("surfaces of today's VTK");
-        assert!(report.traced_draws >= 4, "each of the four: {report:?}");
+    let picture = |kind: &str, through: Option<&[&str]>| {
+        let place = folder();
+        let home = [("HOME", place.path().to_str().expect("UTF-8"))];
+        let run = Run { x: &x, folder: place.path(), through, environment: &home };
+        let (_, report) = run.program(&python, &[file.as_str(), kind]);
+        (Picture::read(&place.path().join("out.png")), report)
+    };
+    let (native, _) = picture("clipped", None);
+    for mode in ["rich", "path"] {
+        let (ours, report) = picture("clipped", Some(&["--mode", mode, "--set", "samples=4"]));
+        let overlap = compare(&native, &ours).overlap;
+        assert!(overlap > 0.95 && report.traced_draws >= 4, "{mode}: {overlap}, {report:?}");
+    }
+    for (kind, what) in [("edges", "edges of cells"), ("both_sides", "materials of back faces")] {
+        let (_, report) = picture(kind, Some(&["--mode", "path"]));
+        let said = format!("mode path: {what} are left out");
+        assert!(report.problems.contains(&said), "{report:?}");
     }
 }
 

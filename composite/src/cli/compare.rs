@@ -35,8 +35,8 @@ pub(super) struct CompareArgs {
     /// What is composited: RGBA8 with depth (depth), premultiplied RGBA f32 in order (blend), or both as depth,blend
     #[arg(long, default_value = "depth", value_delimiter = ',')]
     pixels: Vec<Pixels>,
-    /// Our strategy
-    #[arg(long, default_value = "direct", value_name = "direct|tree|bswap|radix-k[:K]|auto", value_parser = strategy_named)]
+    /// Our strategy; auto takes the fastest by a model of the network, which is measured first
+    #[arg(long, default_value = "auto", value_name = "direct|tree|bswap|radix-k[:K]|auto", value_parser = strategy_named)]
     strategy: Strategy,
     /// Send messages also between processes of one machine and between threads, which else merge in shared memory
     #[arg(long)]

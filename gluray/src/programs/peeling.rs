@@ -54,14 +54,17 @@ impl Peeling {
 }
 
 impl Context {
-    /// What becomes of a draw of a peeling pass; the reason when the driver draws it. `Ok`: it is to be taken.
+    /// What becomes of a draw of a pass for translucency; the reason when the driver draws it. `Ok`: it is to be taken.
     pub(super) fn peels(&mut self, pass: Peel) -> Result<(), &'static str> {
         const PEELED: &str = "translucent surfaces that VTK peels";
+        if pass == Peel::Weighted {
+            return self.weighs();
+        }
         let peeling = &mut self.programs.peeling;
         let settings = &self.config.settings;
         let traced = settings.enabled && matches!(settings.mode, Mode::Match | Mode::Phong | Mode::Rich);
         match pass {
-            Peel::No => Ok(()),
+            Peel::No | Peel::Weighted => Ok(()),
             Peel::Depths => {
                 if peeling.depths == 0 {
                     peeling.whole = false;
@@ -174,5 +177,5 @@ fn limit(program: u32) -> Option<Limit> {
         texels.into_iter().map(|t| t[1]).collect()
     });
     gl::active_texture(active);
-    Some(Limit { width, height, depth: depth? })
+    Some(Limit { width, height, depth: depth?, exact: false })
 }

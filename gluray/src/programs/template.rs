@@ -1,5 +1,10 @@
 //! VTK's shaders, statement by statement: what each of them means, and whether there are others.
 
+use super::blocks::{
+    BACK, CLIPPED, CLIPS, CLIPS_LATER, EDGES, EMITS, MEASURES, MOST_LIGHTS, WEIGHTED, take, take_lights,
+    take_physical, without_peeling,
+};
+
 /// Where the surface's colour comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Colors {
@@ -9,9 +14,11 @@ pub(super) enum Colors {
     PerVertex,
     /// Texture `colortexture` at attribute `tcoord`.
     Map,
+    /// Buffer texture `textureC` at the number of the triangle.
+    PerCell,
 }
 
-/// What a program does for VTK's depth peeling.
+/// What a program does for translucency.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Peel {
     #[default]
@@ -20,72 +27,12 @@ pub(super) enum Peel {
     Depths,
     /// Takes off the nearest and the farthest layer.
     Layers,
+    /// Sums up layers in any order.
+    Weighted,
 }
 
-/// The statements of a peeling pass, in their order; others may come between them.
-const PASSES: [(Peel, &[&str]); 2] = [
-    (
-        Peel::Depths,
-        &[
-            "gl_FragDepth=gl_FragCoord.z",
-            "ivec2pixel=ivec2(gl_FragCoord.xy)",
-            "floatoDepth=texelFetch(opaqueDepth,pixel,0).y",
-            "if(oDepth!=-1.&&gl_FragDepth>oDepth)",
-            "fragOutput1.xy=vec2(-1.,oDepth)",
-            "return",
-            "else",
-            "fragOutput1.xy=vec2(-gl_FragDepth,gl_FragDepth)",
-            "return",
-        ],
-    ),
-    (
-        Peel::Layers,
-        &[
-            "gl_FragDepth=gl_FragCoord.z",
-            "ivec2pixelCoord=ivec2(gl_FragCoord.xy)",
-            "vec4front=texelFetch(lastFrontPeel,pixelCoord,0)",
-            "vec2minMaxDepth=texelFetch(lastDepthPeel,pixelCoord,0).xy",
-            "floatminDepth=-minMaxDepth.x",
-            "floatmaxDepth=minMaxDepth.y",
-            "floatepsilon=0.0000001",
-            "fragOutput0=vec4(0.)",
-            "fragOutput1=front",
-            "fragOutput2.xy=vec2(-1.)",
-            "if(gl_FragDepth<minDepth-epsilon||gl_FragDepth>maxDepth+epsilon)",
-            "return",
-            "if(gl_FragDepth>minDepth+epsilon&&gl_FragDepth<maxDepth-epsilon)",
-            "fragOutput2.xy=vec2(-gl_FragDepth,gl_FragDepth)",
-            "return",
-            "vec4frag=fragOutput0",
-            "if(gl_FragDepth>=minDepth-epsilon&&gl_FragDepth<=minDepth+epsilon)",
-            "fragOutput0=vec4(0.)",
-            "front.a=1.-front.a",
-            "fragOutput1.rgb=front.a*frag.a*frag.rgb+front.rgb",
-            "fragOutput1.a=1.-(front.a*(1.-frag.a))",
-            "else",
-            "frag.rgb*=frag.a",
-            "fragOutput0=frag",
-        ],
-    ),
-];
-
-/// The pass that statements are of, without those of the pass.
-fn without_peeling(statements: Vec<String>) -> (Peel, Vec<String>) {
-    for (peel, pass) in PASSES {
-        let mut left = pass.iter().peekable();
-        let rest: Vec<String> = statements
-            .iter()
-            // The tolerance has another power of ten in other versions.
-            .map(|s| if s == "floatepsilon=0.000001" { "floatepsilon=0.0000001" } else { s.as_str() })
-            .filter(|s| left.next_if(|p| *p == s).is_none())
-            .map(str::to_owned)
-            .collect();
-        if left.next().is_none() {
-            return (peel, rest);
-        }
-    }
-    (Peel::No, statements)
-}
+/// Why a program that draws depths for VTK's shadow maps is not known.
+pub(super) const SHADOW_MAP: &str = "a shadow map";
 
 /// What a program's text says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -95,13 +42,20 @@ pub(crate) struct Template {
     /// Normals from the triangle instead of an attribute.
     pub(super) flat: bool,
     pub(super) headlight: bool,
-    /// Number of directional lights.
-    pub(super) directional: usize,
+    /// Number of lights elsewhere, and whether these may have places and cones.
+    pub(super) lights: usize,
+    pub(super) placed: bool,
     pub(super) lit: bool,
     pub(super) peel: Peel,
+    /// Back faces have a material of their own.
+    pub(super) back: bool,
+    pub(super) clipped: bool,
+    /// Edges of cells are drawn.
+    pub(super) edges: bool,
+    /// The material is physically based, and its colours are made linear for it.
+    pub(super) physical: bool,
+    pub(super) linear: bool,
 }
-
-const MOST_LIGHTS: usize = 6;
 
 /// Statements of `main`, without blanks and comments; light numbers become `#`.
 fn statements(source: &str) -> Option<Vec<String>> {
@@ -123,108 +77,153 @@ fn statements(source: &str) -> Option<Vec<String>> {
     Some(squeezed.split([';', '{', '}']).filter(|s| !s.is_empty()).map(str::to_owned).collect())
 }
 
-/// Light numbers out of a statement.
-fn without_light(s: &str) -> (String, Option<usize>) {
-    for name in ["lightDirectionVC", "lightColor"] {
-        if let Some(at) = s.find(name) {
-            let digit = s[at + name.len()..].chars().next().and_then(|c| c.to_digit(10));
-            if let Some(d) = digit {
-                let mut out = s.to_owned();
-                for n in ["lightDirectionVC", "lightColor"] {
-                    out = out.replace(&format!("{n}{d}"), n);
-                }
-                return (out, Some(d as usize));
-            }
-        }
-    }
-    (s.to_owned(), None)
-}
-
 impl Template {
     /// Reads the shaders; the error says why the program is not recognised.
-    pub(crate) fn read(vertex: &str, fragment: &str) -> Result<Template, &'static str> {
+    pub(crate) fn read(vertex: &str, geometry: &str, fragment: &str) -> Result<Template, &'static str> {
         const NOT_VTK: &str = "a program that is not recognised";
-        let (Some(vs), Some(fs)) = (statements(vertex), statements(fragment)) else { return Err(NOT_VTK) };
-        let (peel, fs) = without_peeling(fs);
-        let mut t = Template { peel, ..Template::default() };
-        for s in &vs {
-            match s.as_str() {
-                "normalVCVSOutput=normalMatrix*normalMC"
-                | "tcoordVCVSOutput=tcoord"
-                | "colorTCoordVCVSOutput=colorTCoord"
-                | "vertexColorVSOutput=scalarColor"
-                | "vertexVCVSOutput=MCVCMatrix*vertexMC"
-                | "gl_Position=MCDCMatrix*vertexMC" => {}
-                _ => return Err(NOT_VTK),
-            }
-        }
-        if !vs.iter().any(|s| s == "gl_Position=MCDCMatrix*vertexMC") {
+        const UNKNOWN: &str = "a surface of VTK's with a statement that is not known";
+        const PICTURE: &str = "a picture on a surface of VTK's";
+        let mut t = Template::default();
+        let (Some(mut vs), Some(mut fs)) = (statements(vertex), statements(fragment)) else {
             return Err(NOT_VTK);
+        };
+        if !geometry.is_empty() {
+            // What goes through has another name behind it.
+            fs.iter_mut().for_each(|s| *s = s.replace("GSOutput", "VSOutput"));
+            t.read_geometry(geometry, &mut vs).ok_or("a geometry or tessellation shader")?;
         }
+        if fs.iter().any(|s| s == "fragOutput0.r=exp(depthC*ldepth)") {
+            return Err(SHADOW_MAP);
+        }
+        t.read_vertex(vs).ok_or(NOT_VTK)?;
+        let why = if fs.iter().any(|s| s.contains("texture(actortexture")) { PICTURE } else { UNKNOWN };
+        t.read_fragment(fs).ok_or(why)?;
+        Ok(t)
+    }
+
+    /// The shader that measures edges, which changes nothing else. What it needs of the vertex shader's is taken out of that.
+    fn read_geometry(&mut self, text: &str, vs: &mut Vec<String>) -> Option<()> {
+        let mut gs: Vec<String> =
+            statements(text)?.into_iter().map(|s| s.replace("GSOutput", "VSOutput")).collect();
+        self.edges = take(&mut gs, MEASURES) && take(&mut gs, EMITS);
+        self.clipped = take(&mut gs, CLIPS_LATER) && take(vs, &["clipVertexMC=vertexMC"]);
+        let goes_through = |s: &String| {
+            ["normalVC", "tcoordVC", "colorTCoordVC", "vertexColor", "vertexVC"]
+                .iter()
+                .any(|name| *s == format!("{name}VSOutput={name}VSOutput[i]"))
+        };
+        (self.edges && gs.iter().all(goes_through)).then_some(())
+    }
+
+    fn read_vertex(&mut self, mut vs: Vec<String>) -> Option<()> {
+        self.clipped |= take(&mut vs, CLIPS);
+        let known = |s: &String| {
+            matches!(
+                s.as_str(),
+                "normalVCVSOutput=normalMatrix*normalMC"
+                    | "tcoordVCVSOutput=tcoord"
+                    | "colorTCoordVCVSOutput=colorTCoord"
+                    | "vertexColorVSOutput=scalarColor"
+                    | "vertexVCVSOutput=MCVCMatrix*vertexMC"
+                    | "gl_Position=MCDCMatrix*vertexMC"
+            )
+        };
+        let places = vs.iter().any(|s| s == "gl_Position=MCDCMatrix*vertexMC");
+        (places && vs.iter().all(known)).then_some(())
+    }
+
+    fn read_fragment(&mut self, fs: Vec<String>) -> Option<()> {
+        let (peel, mut fs) = without_peeling(fs);
+        self.peel = if take(&mut fs, WEIGHTED) { Peel::Weighted } else { peel };
+        if self.peel != peel && peel != Peel::No {
+            return None;
+        }
+        self.back = take(&mut fs, BACK);
+        if take(&mut fs, CLIPPED) != self.clipped || take(&mut fs, EDGES) != self.edges {
+            return None;
+        }
+        let physical = take_physical(&mut fs);
+        self.physical = physical.is_some();
+        self.lit = self.physical;
+        let lights = physical.unwrap_or_else(|| take_lights(&mut fs));
+        (self.headlight, self.lights, self.placed) = (lights.head, lights.others, lights.placed);
         for s in &fs {
-            let (s, light) = without_light(s);
-            match s.as_str() {
-                "vec4vertexVC=vertexVCVSOutput"
-                | "vec3fdx=dFdx(vertexVC.xyz)"
-                | "vec3fdy=dFdy(vertexVC.xyz)"
-                // VTK 9.7 keeps the differences away from underflow; the normal is the same.
-                | "floatscale=1.0/length(fwidth(vertexVC.xyz))"
-                | "vec3fdx=dFdx(vertexVC.xyz)*scale"
-                | "vec3fdy=dFdy(vertexVC.xyz)*scale"
-                | "vec3specularColor=specularIntensity*specularColorUniform"
-                | "floatspecularPower=specularPowerUniform"
-                | "vec3ambientColor=ambientIntensity*ambientColorUniform"
-                | "vec3diffuseColor=diffuseIntensity*diffuseColorUniform"
-                | "floatopacity=opacityUniform"
-                | "vec3normalVCVSOutput=normalize(normalVCVSOutput)"
-                | "if(gl_FrontFacing==false)"
-                | "normalVCVSOutput=-normalVCVSOutput"
-                | "if(cameraParallel==1&&normalVCVSOutput.z<0.0)"
-                | "if(cameraParallel==0&&dot(normalVCVSOutput,vertexVC.xyz)>0.0)"
-                | "normalVCVSOutput=-1.0*normalVCVSOutput"
-                | "floatdf"
-                | "floatsf"
-                | "vec3diffuse=vec3(0,0,0)"
-                | "vec3specular=vec3(0,0,0)"
-                | "if(fragOutput0.a<=0.0)"
-                | "discard"
-                | "diffuse=diffuse*diffuseColor"
-                | "specular=specular*specularColor"
-                | "diffuse+=(df*lightColor)"
-                | "specular+=(sf*lightColor)"
-                | "floatsf=pow(df,specularPower)"
-                | "vec3diffuse=df*diffuseColor*lightColor"
-                | "vec3specular=sf*specularColor*lightColor"
-                | "sf=sign(df)*pow(max(1e-5,dot(reflect(lightDirectionVC,normalVCVSOutput),normalize(-vertexVC.xyz))),specularPower)" =>
-                    {}
-                "vec4texColor=texture(colortexture,tcoordVCVSOutput.st)"
-                | "vec4texColor=texture(colortexture,colorTCoordVCVSOutput.st)" => t.colors = Colors::Map,
-                "vec3ambientColor=ambientIntensity*texColor.rgb"
-                | "vec3diffuseColor=diffuseIntensity*texColor.rgb"
-                | "floatopacity=opacityUniform*texColor.a" => t.colors = Colors::Map,
-                "vec3ambientColor=ambientIntensity*vertexColorVSOutput.rgb"
-                | "vec3diffuseColor=diffuseIntensity*vertexColorVSOutput.rgb"
-                | "floatopacity=opacityUniform*vertexColorVSOutput.a" => t.colors = Colors::PerVertex,
-                "if(OverridesColor)" => t.overrides = true,
-                "ambientColor=ambientColorUniform*ambientIntensity"
-                | "diffuseColor=diffuseColorUniform*diffuseIntensity" => {}
-                "vec3normalVCVSOutput=normalize(cross(fdx,fdy))" => t.flat = true,
-                "floatdf=max(0.000001,normalVCVSOutput.z)" if light.is_none() => t.headlight = true,
-                "df=max(0.0,dot(normalVCVSOutput,-lightDirectionVC))" => {
-                    t.directional = t.directional.max(light.unwrap_or(0) + 1);
-                }
-                "fragOutput0=vec4(ambientColor+diffuse+specular,opacity)" => t.lit = true,
-                "fragOutput0=vec4(ambientColor+diffuseColor,opacity)" => t.lit = false,
-                _ => return Err(NOT_VTK),
-            }
+            self.read_statement(s)?;
         }
-        let one_kind = t.headlight != (t.directional > 0);
-        if (t.lit && !one_kind) || t.directional > MOST_LIGHTS { Err(NOT_VTK) } else { Ok(t) }
+        let one_kind = self.headlight != (self.lights > 0);
+        ((!self.lit || one_kind) && self.lights <= MOST_LIGHTS).then_some(())
+    }
+
+    /// A statement that means something by itself.
+    fn read_statement(&mut self, s: &str) -> Option<()> {
+        match s {
+            "vec4vertexVC=vertexVCVSOutput"
+            | "vec3fdx=dFdx(vertexVC.xyz)"
+            | "vec3fdy=dFdy(vertexVC.xyz)"
+            // VTK 9.7 keeps the differences away from underflow; the normal is the same.
+            | "floatscale=1.0/length(fwidth(vertexVC.xyz))"
+            | "vec3fdx=dFdx(vertexVC.xyz)*scale"
+            | "vec3fdy=dFdy(vertexVC.xyz)*scale"
+            | "vec3specularColor=specularIntensity*specularColorUniform"
+            | "floatspecularPower=specularPowerUniform"
+            | "vec3ambientColor=ambientIntensity*ambientColorUniform"
+            | "vec3diffuseColor=diffuseIntensity*diffuseColorUniform"
+            | "floatopacity=opacityUniform"
+            | "vec3normalVCVSOutput=normalize(normalVCVSOutput)"
+            | "if(gl_FrontFacing==false)"
+            | "normalVCVSOutput=-normalVCVSOutput"
+            | "if(cameraParallel==1&&normalVCVSOutput.z<0.0)"
+            | "if(cameraParallel==0&&dot(normalVCVSOutput,vertexVC.xyz)>0.0)"
+            | "normalVCVSOutput=-1.0*normalVCVSOutput"
+            | "floatdf"
+            | "floatsf"
+            | "vec3diffuse=vec3(0,0,0)"
+            | "vec3specular=vec3(0,0,0)"
+            | "vec3vertLightDirectionVC"
+            | "floatattenuation"
+            | "if(fragOutput0.a<=0.0)"
+            | "discard"
+            | "diffuse=diffuse*diffuseColor"
+            | "specular=specular*specularColor"
+            | "floatsf=pow(df,specularPower)"
+            | "vec3diffuse=df*diffuseColor*lightColor0"
+            | "vec3specular=sf*specularColor*lightColor0" => {}
+            "vec4texColor=texture(colortexture,tcoordVCVSOutput.st)"
+            | "vec4texColor=texture(colortexture,colorTCoordVCVSOutput.st)" => self.colors = Colors::Map,
+            "vec4texColor=texelFetchBuffer(textureC,gl_PrimitiveID+PrimitiveIDOffset)" => {
+                self.colors = Colors::PerCell;
+            }
+            "ambientColor=pow(ambientColor,vec3(2.2))" | "diffuseColor=pow(diffuseColor,vec3(2.2))"
+                if self.physical && self.colors != Colors::Uniform =>
+            {
+                self.linear = true;
+            }
+            // Where it comes from was said before.
+            "vec3ambientColor=ambientIntensity*texColor.rgb"
+            | "vec3diffuseColor=diffuseIntensity*texColor.rgb"
+            | "floatopacity=opacityUniform*texColor.a"
+                if matches!(self.colors, Colors::Map | Colors::PerCell) => {}
+            "vec3ambientColor=ambientIntensity*vertexColorVSOutput.rgb"
+            | "vec3diffuseColor=diffuseIntensity*vertexColorVSOutput.rgb"
+            | "floatopacity=opacityUniform*vertexColorVSOutput.a" => self.colors = Colors::PerVertex,
+            "if(OverridesColor)" => self.overrides = true,
+            "ambientColor=ambientColorUniform*ambientIntensity"
+            | "diffuseColor=diffuseColorUniform*diffuseIntensity" => {}
+            "vec3normalVCVSOutput=normalize(cross(fdx,fdy))" => self.flat = true,
+            "floatdf=max(0.000001,normalVCVSOutput.z)" if !self.physical => self.headlight = true,
+            "fragOutput0=vec4(ambientColor+diffuse+specular,opacity)" if !self.physical => self.lit = true,
+            "fragOutput0=vec4(ambientColor+diffuseColor,opacity)" if !self.physical => self.lit = false,
+            _ => return None,
+        }
+        Some(())
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::blocks::{
+        LAMP, PASSES, PHYSICAL, PHYSICAL_ENDS, PHYSICAL_HEADLIGHT, PHYSICAL_LAMP, PHYSICAL_SUN, SUN,
+    };
     use super::*;
 
     const VERTEX: &str = "#version 150\nin vec4 vertexMC; // a comment\nvoid main()\n{\n  vertexVCVSOutput = MCVCMatrix * vertexMC;\n  gl_Position = MCDCMatrix * vertexMC;\n}\n";
@@ -236,34 +235,100 @@ mod tests {
         )
     }
 
+    fn read(fragment: &str) -> Result<Template, &'static str> {
+        Template::read(VERTEX, "", fragment)
+    }
+
+    const HEAD: &str = "float df = max(0.000001, normalVCVSOutput.z);";
+
     #[test]
     fn headlights_and_light_kits_are_told_apart() {
-        let head = Template::read(VERTEX, &fragment("float df = max(0.000001, normalVCVSOutput.z);"))
-            .expect("known");
-        assert!(head.headlight && head.lit && head.directional == 0);
-        let kit = "df = max(0.0, dot(normalVCVSOutput, -lightDirectionVC0)); df = max(0.0, dot(normalVCVSOutput, -lightDirectionVC4));";
-        assert_eq!(Template::read(VERTEX, &fragment(kit)).expect("known").directional, 5);
+        let head = read(&fragment(HEAD)).expect("known");
+        assert!(head.headlight && head.lit && head.lights == 0);
+        let kit = |block: &[&str], n: usize| -> String {
+            (0..n).map(|i| block.join(";").replace('#', &i.to_string()) + ";").collect()
+        };
+        let far = read(&fragment(&kit(SUN, 5))).expect("known");
+        assert!((far.headlight, far.lights, far.placed) == (false, 5, false));
+        let near = read(&fragment(&kit(LAMP, 3))).expect("known");
+        assert!((near.headlight, near.lights, near.placed) == (false, 3, true));
+        assert!(read(&fragment(&kit(&LAMP[1..], 1))).is_err(), "not all of it");
+        assert!(read(&fragment(&kit(SUN, MOST_LIGHTS + 1))).is_err(), "too many");
+        let twice = kit(SUN, 1).replace("sign(df)", "sign(df)*2.0");
+        assert!(read(&fragment(&twice)).is_err(), "brighter than is known");
+    }
+
+    #[test]
+    fn back_faces_clipping_planes_and_sums_are_known_as_a_whole() {
+        let parts = [BACK, CLIPPED, WEIGHTED].map(|block| block.join(";") + ";");
+        let clips = VERTEX.replace("  vertexVC", &format!("{};vertexVC", CLIPS.join(";")));
+        let read = |text: &str| Template::read(&clips, "", &fragment(text));
+        let all = read(&format!("{}{HEAD}{}{}", parts[1], parts[0], parts[2])).expect("known");
+        assert!(all.back && all.clipped && all.peel == Peel::Weighted);
+        assert!(read(HEAD).is_err(), "planes that only the vertex shader knows");
+        assert!(Template::read(VERTEX, "", &fragment(&format!("{}{HEAD}", parts[1]))).is_err());
+        for block in [BACK, CLIPPED, WEIGHTED] {
+            let less = block[..block.len() - 1].join(";");
+            assert!(read(&format!("{}{HEAD}{less};", parts[1])).is_err(), "{less}");
+        }
+    }
+
+    #[test]
+    fn edges_are_known_where_the_geometry_shader_only_measures_them() {
+        let geometry = |more: &str| {
+            format!(
+                "void main() {{ {}; vertexVCGSOutput = vertexVCVSOutput[i]; {more} {}; }}",
+                MEASURES.join(";"),
+                EMITS.join(";")
+            )
+        };
+        let edges = format!("{};{HEAD}", EDGES.join(";"));
+        let behind = fragment(&edges).replace("VSOutput", "GSOutput");
+        let known = Template::read(VERTEX, &geometry(""), &behind).expect("known");
+        assert!(known.edges && known.headlight);
+        assert!(Template::read(VERTEX, &geometry("gl_Position.xy += offsets[i];"), &behind).is_err());
+        assert!(Template::read(VERTEX, "", &fragment(&edges)).is_err(), "nobody measures");
+        assert!(Template::read(VERTEX, &geometry(""), &fragment(HEAD)).is_err(), "nobody draws them");
+    }
+
+    #[test]
+    fn physically_based_materials_are_known_in_both_versions() {
+        for end in PHYSICAL_ENDS {
+            for (lights, n) in [(PHYSICAL_HEADLIGHT, 0), (PHYSICAL_SUN, 1), (PHYSICAL_LAMP, 1)] {
+                let text = [PHYSICAL, lights, end].concat().join(";").replace('#', "0") + ";";
+                let whole = fragment(&text)
+                    .replace("fragOutput0 = vec4(ambientColor + diffuse + specular, opacity);", "");
+                let t = read(&whole).expect("known");
+                assert!(t.physical && t.lit && t.lights == n && t.headlight == (n == 0));
+                assert!(read(&fragment(&text)).is_err(), "two colours");
+                assert!(read(&whole.replace("floatao=1.0", "floatao=texture(ao)")).is_err());
+                let linear = "diffuseColor=pow(diffuseColor,vec3(2.2));";
+                let colored = "float opacity = opacityUniform * vertexColorVSOutput.a;".to_owned() + linear;
+                assert!(
+                    read(&whole.replace("float opacity = opacityUniform;", &colored)).expect("known").linear
+                );
+                assert!(read(&fragment(&format!("{HEAD}{linear}"))).is_err(), "not physically based");
+            }
+        }
     }
 
     #[test]
     fn normals_out_of_differences_are_known_with_and_without_a_scale() {
-        let head = "float df = max(0.000001, normalVCVSOutput.z);";
         let normal = "vec3 normalVCVSOutput = normalize(cross(fdx,fdy));";
         for scale in ["", "*scale"] {
             let differences =
                 format!("vec3 fdx = dFdx(vertexVC.xyz){scale}; vec3 fdy = dFdy(vertexVC.xyz){scale};");
             let first = if scale.is_empty() { "" } else { "float scale = 1.0/length(fwidth(vertexVC.xyz));" };
-            let text = format!("{first}{differences}{normal}{head}");
-            assert!(Template::read(VERTEX, &fragment(&text)).expect("known").flat, "{text}");
+            let text = format!("{first}{differences}{normal}{HEAD}");
+            assert!(read(&fragment(&text)).expect("known").flat, "{text}");
         }
     }
 
     #[test]
     fn passes_of_depth_peeling_are_known_only_with_all_of_their_statements() {
-        let head = "float df = max(0.000001, normalVCVSOutput.z);";
         for (peel, pass) in PASSES {
             let whole = pass.join(";") + ";";
-            let read = |text: &str| Template::read(VERTEX, &fragment(&format!("{text}{head}")));
+            let read = |text: &str| read(&fragment(&format!("{text}{HEAD}")));
             let known = read(&whole.replace("fragOutput0=frag;", "fragOutput0 = frag; // the back\n"));
             assert_eq!(known.map(|t| (t.peel, t.headlight)), Ok((peel, true)));
             for left_out in pass {
@@ -272,14 +337,16 @@ mod tests {
             }
             assert!(read(&format!("{whole} gl_FragDepth = 0.5;")).is_err());
         }
-        assert_eq!(Template::read(VERTEX, &fragment(head)).map(|t| t.peel), Ok(Peel::No));
+        assert_eq!(read(&fragment(HEAD)).map(|t| t.peel), Ok(Peel::No));
     }
 
     #[test]
     fn a_statement_that_is_not_known_makes_the_program_the_drivers() {
         let selector = "float df = max(0.000001, normalVCVSOutput.z); fragOutput0 = vec4(propID, 1.0);";
-        assert!(Template::read(VERTEX, &fragment(selector)).is_err());
-        assert!(Template::read("void main() { gl_Position = vec4(sin(t)); }", &fragment("")).is_err());
-        assert!(Template::read(VERTEX, &fragment("")).is_err(), "lit, but by nothing that is known");
+        assert!(read(&fragment(selector)).is_err());
+        assert!(Template::read("void main() { gl_Position = vec4(sin(t)); }", "", &fragment(HEAD)).is_err());
+        let shadows = format!("{HEAD} fragOutput0.r = exp(depthC*ldepth);");
+        assert_eq!(read(&fragment(&shadows)), Err(SHADOW_MAP));
+        assert!(read(&fragment("")).is_err(), "lit, but by nothing that is known");
     }
 }

@@ -1,13 +1,46 @@
 //! Recognised programs as messages to other ranks. The colour map goes by its name.
 
+use super::color::Surface;
+use super::recognised::{Edges, Lamp, Physical, ProgramLight};
 use super::template::{Colors, Peel, Template};
 use super::{Image, Recognised};
-use crate::ranks::wire::{Malformed, Reader, Wire, wire_enum, wire_struct};
+use crate::ranks::wire::{Malformed, Reader, Wire, put_pods, wire_enum, wire_struct};
 use std::sync::Arc;
 
-wire_enum!(Colors { Uniform, PerVertex, Map });
-wire_enum!(Peel { No, Depths, Layers });
-wire_struct!(Template { colors, overrides, flat, headlight, directional, lit, peel });
+wire_enum!(Colors { Uniform, PerVertex, Map, PerCell });
+wire_enum!(Peel { No, Depths, Layers, Weighted });
+wire_struct!(Template {
+    colors,
+    overrides,
+    flat,
+    headlight,
+    lights,
+    placed,
+    lit,
+    peel,
+    back,
+    clipped,
+    edges,
+    physical,
+    linear,
+});
+wire_struct!(Lamp { position, attenuation, cone_deg, exponent });
+wire_struct!(ProgramLight { travels, color, lamp });
+wire_struct!(Surface { ambient, diffuse, specular, power, alpha });
+wire_struct!(Physical { metallic, roughness, base, tint });
+
+impl Wire for Edges {
+    fn put(&self, out: &mut Vec<u8>) {
+        put_pods(out, &self.sides);
+        ([self.width, self.opacity], self.color).put(out);
+        self.viewport.put(out);
+    }
+    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
+        let sides = Arc::new(from.pods()?);
+        let ([width, opacity], color) = Wire::get(from)?;
+        Ok(Edges { sides, width, color, opacity, viewport: Wire::get(from)? })
+    }
+}
 
 impl Recognised {
     /// The colour map.
@@ -38,6 +71,9 @@ impl Wire for Recognised {
         [self.ambient_intensity, self.diffuse_intensity, self.specular_power, self.opacity].put(out);
         [self.parallel, self.overrides].put(out);
         self.lights.put(out);
+        (self.back, self.physical).put(out);
+        self.clip_planes.put(out);
+        self.edges.put(out);
     }
     fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
         let (clip_from_object, view_from_object) = Wire::get(from)?;
@@ -46,6 +82,9 @@ impl Wire for Recognised {
         let [ambient_intensity, diffuse_intensity, specular_power, opacity] = Wire::get(from)?;
         let [parallel, overrides] = Wire::get(from)?;
         let lights = Wire::get(from)?;
+        let (back, physical) = Wire::get(from)?;
+        let clip_planes = Wire::get(from)?;
+        let edges = Wire::get(from)?;
         Ok(Recognised {
             clip_from_object,
             view_from_object,
@@ -61,6 +100,10 @@ impl Wire for Recognised {
             parallel,
             overrides,
             lights,
+            back,
+            physical,
+            clip_planes,
+            edges,
             map: None,
         })
     }

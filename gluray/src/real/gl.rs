@@ -35,6 +35,7 @@ driver! {
     fn get_tex_parameter_f = "glGetTexParameterfv"(target: u32, what: u32, out: *mut f32);
     fn get_attachment_i = "glGetFramebufferAttachmentParameteriv"(target: u32, attachment: u32, what: u32, out: *mut i32);
     fn get_tex_image = "glGetTexImage"(target: u32, level: i32, format: u32, kind: u32, out: *mut c_void);
+    fn read_pixels = "glReadPixels"(x: i32, y: i32, w: i32, h: i32, format: u32, kind: u32, out: *mut c_void);
     fn materialfv_raw = "glMaterialfv"(face: u32, what: u32, values: *const f32);
     pub(crate) fn new_list = "glNewList"(list: u32, mode: u32);
     pub(crate) fn end_list = "glEndList"();
@@ -43,6 +44,7 @@ driver! {
     pub(crate) fn push_attrib = "glPushAttrib"(mask: u32);
     pub(crate) fn pop_attrib = "glPopAttrib"();
     pub(crate) fn viewport = "glViewport"(x: i32, y: i32, w: i32, h: i32);
+    pub(crate) fn polygon_offset = "glPolygonOffset"(factor: f32, units: f32);
     pub(crate) fn depth_func = "glDepthFunc"(func: u32);
     pub(crate) fn depth_mask = "glDepthMask"(on: u8);
     pub(crate) fn depth_range = "glDepthRange"(near: f64, far: f64);
@@ -312,6 +314,13 @@ pub(crate) fn buffer_bytes(target: u32, at: usize, bytes: usize) -> Vec<u8> {
     if bytes > 0 {
         get_buffer_sub_data(target, at as isize, bytes as isize, out.as_mut_ptr().cast());
     }
+    out
+}
+
+/// Depths of the framebuffer from its lower left corner on, row by row.
+pub(crate) fn depths(w: i32, h: i32) -> Vec<f32> {
+    let mut out = vec![1.0_f32; w.max(0) as usize * h.max(0) as usize];
+    plain_reading(|| read_pixels(0, 0, w.max(0), h.max(0), 0x1902, 0x1406, out.as_mut_ptr().cast()));
     out
 }
 

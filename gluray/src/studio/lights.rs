@@ -89,20 +89,7 @@ pub(super) fn of(
             s.lights.iter().filter_map(|l| of_opengl(l, radius_rad)).collect()
         }
         Shading::Program(program) => {
-            let one = |(travels, color): &([f32; 3], [f32; 3])| {
-                let position = [-travels[0], -travels[1], -travels[2], 0.0];
-                let [r, g, b] = *color;
-                let light = GlLight {
-                    diffuse: [r, g, b, 1.0],
-                    specular: [r, g, b, 1.0],
-                    position,
-                    spot_cutoff_deg: 180.0,
-                    attenuation: [1.0, 0.0, 0.0],
-                    ..GlLight::default()
-                };
-                of_opengl(&light, radius_rad)
-            };
-            program.lights.iter().filter_map(one).collect()
+            program.lights.iter().filter_map(|l| of_opengl(&l.as_opengl(), radius_rad)).collect()
         }
     };
     if !settings.effects.shadows {

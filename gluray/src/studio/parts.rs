@@ -68,7 +68,10 @@ pub(super) fn part(
     let s = &*p.draw.state;
     let skin = match &p.draw.shading {
         Shading::Fixed => fixed(p, warnings),
-        Shading::Program(_) => program(p),
+        Shading::Program(known) => {
+            known.left_out_of_paths().for_each(|what| warn(warnings, &format!("{what} are left out")));
+            program(p)
+        }
     };
     let mut mesh = TriMesh::new(p.draw.geometry.mesh.positions.clone(), p.draw.geometry.mesh.indices.clone());
     // The outside is what OpenGL calls front.
@@ -226,6 +229,13 @@ fn program(p: &Prepared<'_>) -> Skin {
                 [r * scale, g * scale, b * scale, if p.draw.state.blend { alpha } else { 1.0 }]
             };
             (Some(Attribute::per_vertex((0..n).map(each).collect())), None, [1.0; 3])
+        }
+        crate::programs::ProgramSkin::PerCell(image, scale) => {
+            let each = |i: usize| {
+                let [r, g, b, alpha] = image.numbered(i);
+                [r * scale, g * scale, b * scale, if p.draw.state.blend { alpha } else { 1.0 }]
+            };
+            (Some(Attribute::per_face((0..mesh.indices.len()).map(each).collect())), None, [1.0; 3])
         }
         crate::programs::ProgramSkin::Map(image, scale) => {
             let each = |i: usize| Vec2::new(a.tex.at(i)[0], a.tex.at(i)[1]);

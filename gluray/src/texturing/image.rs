@@ -240,6 +240,34 @@ fn decoded(v: f32) -> f32 {
 }
 
 impl Image {
+    /// Colours in a row, found by their numbers.
+    fn of_row(texels: Texels) -> Image {
+        let level = Level { width: texels.len(), height: 1, texels };
+        Image {
+            levels: vec![level],
+            base: Base::Rgba,
+            filters: Filters::NEAREST,
+            wrap: [CLAMP_TO_EDGE; 2],
+            border: [0.0; 4],
+        }
+    }
+
+    /// The same of eight bits a component.
+    pub(crate) fn of_bytes(texels: Vec<[u8; 4]>) -> Image {
+        Image::of_row(Texels::Bytes(texels))
+    }
+
+    /// The same of numbers of any size.
+    pub(crate) fn of_floats(texels: Vec<[f32; 4]>) -> Image {
+        Image::of_row(Texels::Floats(texels))
+    }
+
+    /// The colour of a number; white where there is none.
+    pub(crate) fn numbered(&self, i: usize) -> [f32; 4] {
+        let texels = &self.levels[0].texels;
+        if i < texels.len() { texels.at(i) } else { [1.0; 4] }
+    }
+
     /// True when no texel lets anything through.
     pub(crate) fn is_opaque(&self) -> bool {
         let opaque = |l: &Level| match &l.texels {

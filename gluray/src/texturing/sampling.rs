@@ -48,6 +48,10 @@ fn log2(rho: f32) -> f32 {
 }
 
 impl Filters {
+    /// None at all.
+    pub(super) const NEAREST: Filters =
+        Filters { mag_linear: false, min_linear: false, mip: Mip::None, bias: 0.0, lod: [0.0; 2] };
+
     /// Of the bound texture and its unit.
     pub(super) fn query(target: u32, min: u32, mag: u32) -> Filters {
         let one = |what| gl::tex_parameter_f::<1>(target, what)[0];

@@ -87,7 +87,8 @@ impl FragmentBlock {
                 }
             }
         }
-        if !p.clip_planes.is_empty() {
+        // Near a plane, and where a shader clips in the middle of pixels but rays are those of samples, the scalar code decides.
+        if p.discards && s.sample_place != [0.0; 2] {
             return;
         }
         let m = &p.draw.clip_from_object;
@@ -149,6 +150,18 @@ impl FragmentBlock {
             self.depth[l] = depth.max(lo).min(hi);
             self.front[l] = front;
             good[l] = before & sound & inside & !culled & covered[l];
+        }
+        for plane in &p.clip_planes {
+            for l in 0..LANES {
+                let (mut height, mut size) = (0.0, 0.0);
+                for (i, corner) in corners.p.iter().enumerate() {
+                    let at = |k: usize| f64::from(corner[k][l]);
+                    let term = self.weights[i][l]
+                        * (plane[0] * at(0) + plane[1] * at(1) + plane[2] * at(2) + plane[3]);
+                    (height, size) = (height + term, size + term.abs());
+                }
+                good[l] &= height > 1e-6 * size;
+            }
         }
         for l in 0..LANES {
             if good[l] && self.lane[l] == Lane::Ask {

@@ -1,5 +1,6 @@
 """Two spheres by VTK's window without a display, which uses EGL."""
 import vtk
+from egl_window import show
 
 
 def actor(source, x):
@@ -19,19 +20,4 @@ plain = actor(sphere, 0)
 plain.property.color = (0.9, 0.4, 0.2)
 renderer.AddActor(plain)
 renderer.AddActor(actor(heights, 0.8))
-renderer.SetBackground(0.1, 0.1, 0.2)
-window = vtk.vtkEGLRenderWindow()
-window.SetOffScreenRendering(1)
-window.SetMultiSamples(0)
-window.SetSize(400, 400)
-window.AddRenderer(renderer)
-renderer.ResetCamera()
-renderer.GetActiveCamera().Azimuth(30)
-window.Render()
-picture = vtk.vtkWindowToImageFilter()
-picture.SetInput(window)
-picture.ReadFrontBufferOff()
-writer = vtk.vtkPNGWriter()
-writer.SetInputConnection(picture.GetOutputPort())
-writer.SetFileName("out.png")
-writer.Write()
+show(renderer)
