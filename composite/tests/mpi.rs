@@ -180,7 +180,9 @@ fn icet_over_its_own_mpi_layer_gives_the_same_pixels() {
 fn open_mpi_in_shared_memory_and_by_messages_gives_the_same_pixels() {
     let (Some(icet), Some(mpirun)) = (peer("RTSV_ICET"), peer("RTSV_MPIRUN")) else { return };
     let variables: [(&str, &Path); 2] = [("RTSV_ICET", &icet), ("COMPOSITE_MPIRUN", &mpirun)];
-    for (more, strategy) in [(&[][..], "SharedMemory"), (&["--messages", "--strategy", "direct"][..], "DirectSend")] {
+    for (more, strategy) in
+        [(&[][..], "SharedMemory"), (&["--messages", "--strategy", "direct"][..], "DirectSend")]
+    {
         // Two numbers of ranks, sizes and formats make one table; in every row the pixels are those of IceT.
         let lists =
             ["compare", "--json", "--mpi", "--ranks", "2,3", "--size", "64,130", "--pixels", "depth,blend"];

@@ -402,7 +402,9 @@ impl Context {
     fn begin_again(&mut self) {
         // Only then is the state asked for: windows have their frames when they are swapped, and to ask for materials heals what Mesa holds
         // of them (osgbillboard, osgtessellate).
-        if !self.frame.pending.is_empty() || self.frame.places.iter().all(|(framebuffer, _)| *framebuffer == 0) {
+        if !self.frame.pending.is_empty()
+            || self.frame.places.iter().all(|(framebuffer, _)| *framebuffer == 0)
+        {
             return;
         }
         self.refresh();

@@ -96,9 +96,7 @@ impl Program {
     /// What makes it draw the next frame, from another side.
     pub(super) fn next_frame(self) -> &'static str {
         match self {
-            Program::Geomview => {
-                "(transform g1 g1 focus rotate 0 0.1 0)\n(redraw c0)\n(echo \"frame\\n\")\n"
-            }
+            Program::Geomview => "(transform g1 g1 focus rotate 0 0.1 0)\n(redraw c0)\n(echo \"frame\\n\")\n",
             _ => "\n",
         }
     }

@@ -119,7 +119,8 @@ impl<P: Composite> Nearest<P> {
                         fill_up(&views[index], x, y, &mut self.edges);
                     }
                     let mut edges = self.edges.iter();
-                    let mut blocks = [Block { colors: &nothing.0, depths: &nothing.1, lanes: [0; WORDS] }; TOGETHER];
+                    let mut blocks =
+                        [Block { colors: &nothing.0, depths: &nothing.1, lanes: [0; WORDS] }; TOGETHER];
                     for (&index, block) in some.iter().zip(&mut blocks) {
                         let lanes = lanes(&views[index], x);
                         *block = match within_planes(&views[index], x, y) {
