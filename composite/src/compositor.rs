@@ -252,8 +252,11 @@ pub(crate) fn give_up(comm: &mut dyn Communicator, error: &CompositeError) {
 /// Pixels of a slice that is joined and on its way to the collecting rank while the next one comes: a quarter of a megabyte.
 /// Where nothing travels by itself there are fewer and larger ones: half a megabyte costs a tenth more processor time at eight ranks than one.
 pub(crate) fn slice_px<P: PixelFormat>(comm: &dyn Communicator) -> usize {
-    (if comm.is_one_node() { 1 << 20 } else { 1 << 18 }) / P::BYTES
+    (if comm.is_one_node() { 4 * SLICE_BYTES } else { SLICE_BYTES }) / P::BYTES
 }
+
+/// Bytes of a slice between nodes.
+pub(crate) const SLICE_BYTES: usize = 1 << 18;
 
 /// Ranks in the order of compositing.
 pub(crate) struct Places {

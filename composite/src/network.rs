@@ -1,6 +1,7 @@
 //! What a message costs: the LogGP model of A. Alexandrov, M. Ionescu, K. Schauser, C. Scheiman (SPAA 1995), measured once over the
 //! communicator itself, and what follows from it for each strategy.
 use crate::comm::{CommError, Communicator};
+use crate::compositor::SLICE_BYTES;
 use crate::pixel::Composite;
 use crate::rank_order::Folding;
 use crate::rect::Rect;
@@ -29,8 +30,6 @@ const LOCAL_BYTE_SECS: f64 = 1.5e-10;
 /// What a rank does for each message besides its pixels (a buffer, a header, masks, asking whether it has left), about: from 16 to 128
 /// simulated ranks dense frames by direct send take 15 µs more for each rank, which is one message more to send, to receive and to collect.
 const LOCAL_MESSAGE_SECS: f64 = 5e-6;
-/// As [`slice_px`](crate::compositor::slice_px) has it between nodes.
-const SLICE_BYTES: usize = 1 << 18;
 
 impl Network {
     /// InfiniBand QDR as in the thesis' cluster: 3.2 GB/s, about a microsecond.
@@ -110,23 +109,26 @@ impl Network {
         let folding = Folding::new(ranks);
         match strategy {
             Strategy::DirectSend | Strategy::Automatic => {
-                let plan = direct_send::Plan::new::<P>(drawn, SLICE_BYTES / P::BYTES, root.then_some(0));
-                let mut worst = 0.0_f64;
-                let most_slices = plan.slices.iter().map(Vec::len).max().unwrap_or(0).max(1);
-                for (place, tiles) in plan.slices.iter().enumerate() {
-                    let (mut sent, mut received, mut messages) = (0.0, 0.0, 0.0);
-                    for (other, its_tiles) in
-                        plan.slices.iter().enumerate().filter(|(other, _)| *other != place)
-                    {
-                        let gives: f64 =
-                            its_tiles.iter().map(|tile| bytes(&drawn[place].intersection(tile))).sum();
-                        let gets: f64 =
-                            tiles.iter().map(|tile| bytes(&drawn[other].intersection(tile))).sum();
-                        messages += f64::from(gives > 0.0) + f64::from(gets > 0.0);
-                        (sent, received) = (sent + gives, received + gets);
+                let plan = direct_send::Plan::new::<P>(drawn, usize::MAX, root.then_some(0));
+                // Of each place what it sends and receives, and in how many messages: each pair is looked at once.
+                let mut traffic = vec![(0.0_f64, 0.0_f64, 0.0_f64); ranks];
+                for (owner, tiles) in plan.slices.iter().enumerate() {
+                    for (giver, its_rect) in drawn.iter().enumerate().filter(|(giver, _)| *giver != owner) {
+                        let given: f64 = tiles.iter().map(|tile| bytes(&its_rect.intersection(tile))).sum();
+                        if given > 0.0 {
+                            traffic[giver].0 += given;
+                            traffic[owner].1 += given;
+                            traffic[giver].2 += 1.0;
+                            traffic[owner].2 += 1.0;
+                        }
                     }
-                    worst = worst.max(self.sliced_secs(messages, f64::max(sent, received)));
                 }
+                let worst = traffic
+                    .iter()
+                    .map(|&(sent, received, messages)| self.sliced_secs(messages, f64::max(sent, received)))
+                    .fold(0.0, f64::max);
+                let largest = plan.slices.iter().flatten().map(Rect::pixels).max().unwrap_or(0);
+                let most_slices = (largest * P::BYTES).div_ceil(SLICE_BYTES).max(1);
                 let collect = collect(ranks - 1, whole.pixels() as f64 * (ranks - 1) as f64 / ranks as f64);
                 worst.max(collect) + worst.min(collect) / most_slices as f64
             }

@@ -42,6 +42,11 @@ fn frame(r: &mut Recorder, cache: &mut Cache, points: &[[f32; 3]]) -> Arc<Geomet
         p.iter().for_each(|p| r.vertex(*p, &current));
         r.end();
     }
+    over(r, cache).0
+}
+
+/// The frame is over, all of it one batch: what it came to.
+fn over(r: &mut Recorder, cache: &mut Cache) -> (Arc<Geometry>, Attributes) {
     let kind = &Split::default();
     r.settle();
     let geometry = r.followed(kind).unwrap_or_else(|| {
@@ -50,11 +55,11 @@ fn frame(r: &mut Recorder, cache: &mut Cache, points: &[[f32; 3]]) -> Arc<Geomet
         r.expect(&made, kind);
         made
     });
-    r.take_attributes(&geometry);
+    let attributes = r.take_attributes(&geometry);
     r.positions.clear();
     r.runs.clear();
     r.frame_done();
-    geometry
+    (geometry, attributes)
 }
 
 #[test]
@@ -102,18 +107,7 @@ fn lit_frame(r: &mut Recorder, cache: &mut Cache, points: &[[f32; 3]], normals: 
         }
         r.end();
     }
-    let kind = &Split::default();
-    r.settle();
-    let geometry = r.followed(kind).unwrap_or_else(|| {
-        r.write_down();
-        let made = cache.of_runs(&r.positions, &r.runs, kind);
-        r.expect(&made, kind);
-        made
-    });
-    let attributes = r.take_attributes(&geometry);
-    r.positions.clear();
-    r.runs.clear();
-    r.frame_done();
+    let (geometry, attributes) = over(r, cache);
     for (i, n) in normals.iter().enumerate() {
         assert_eq!(attributes.normals.at(i).map(f32::to_bits), n.map(f32::to_bits), "normal {i}");
     }
