@@ -211,8 +211,6 @@ fn flushes(name: &str) -> bool {
         "glClearBufferfi",
         "glGetTexImage",
         "glXBindTexImageEXT",
-        "glEvalMesh1",
-        "glEvalMesh2",
         "glBitmap",
         "glXMakeAssociatedContextCurrentAMD",
         "glCopyImageSubData",
@@ -227,7 +225,6 @@ fn flushes(name: &str) -> bool {
 /// Draws that we do not take apart: the driver draws them over what was traced before.
 fn is_other_draw(name: &str) -> bool {
     name.starts_with("glMultiDraw")
-        || name.starts_with("glEvalMesh")
         || name.contains("Indirect") && name.starts_with("glDraw")
         || name.starts_with("glDrawTransformFeedback")
         || name.starts_with("glDrawTex")

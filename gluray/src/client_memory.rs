@@ -21,6 +21,13 @@ pub(crate) fn floats<const N: usize>(address: usize) -> [f32; N] {
     })
 }
 
+/// `N` doubles behind a parameter pointer; zeros behind null.
+pub(crate) fn doubles<const N: usize>(address: usize) -> [f64; N] {
+    let v = view(address, 8 * N);
+    let (eight, _) = v.as_chunks::<8>();
+    std::array::from_fn(|i| eight.get(i).map_or(0.0, |b| f64::from_ne_bytes(*b)))
+}
+
 /// `N` integers behind a parameter pointer; zeros behind null.
 pub(crate) fn ints<const N: usize>(address: usize) -> [i32; N] {
     floats::<N>(address).map(|f| f.to_bits().cast_signed())

@@ -8,6 +8,7 @@ use crate::cache::Cache;
 use crate::config::Config;
 use crate::decide::{self, Verdict};
 use crate::enums::*;
+use crate::evaluators::Evaluators;
 use crate::frame::Frame;
 use crate::packs::Packs;
 use crate::present::Presenter;
@@ -61,6 +62,7 @@ pub(crate) struct Context {
     /// What of `current` the driver does not know yet.
     pub(crate) stale: u8,
     pub(crate) recorder: Recorder,
+    pub(crate) evaluators: Evaluators,
     pub(crate) lists: Arc<Mutex<Lists>>,
     pub(crate) writes: Arc<Mutex<Writes>>,
     pub(crate) recording: Option<Recording>,
@@ -233,6 +235,7 @@ impl Context {
             unfollowed: None,
             stale: 0,
             recorder: Recorder::default(),
+            evaluators: Evaluators::default(),
             lists,
             writes,
             recording: None,
@@ -374,6 +377,9 @@ impl Context {
         self.drawn_over();
         if self.dirty & DRAWS == 0 {
             return;
+        }
+        if self.dirty & class::RASTER != 0 {
+            self.evaluators.forget();
         }
         self.sync();
         self.keep_errors();

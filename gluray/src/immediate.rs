@@ -48,11 +48,17 @@ impl Context {
     /// True when a vertex now would have alpha 1.
     #[inline]
     pub(crate) fn is_opaque_now(&self) -> bool {
+        self.is_opaque_with(self.current.color)
+    }
+
+    /// The same with another colour than the current one.
+    #[inline]
+    pub(crate) fn is_opaque_with(&self, color: [f32; 4]) -> bool {
         let s = &*self.state;
         let tracked = s.color_material.is_some_and(|(_, what)| matches!(what, DIFFUSE | AMBIENT_AND_DIFFUSE));
         match s.lighting {
             true if !tracked => self.current.materials.iter().all(|m| m.diffuse[3] == 1.0),
-            _ => self.current.color[3] == 1.0,
+            _ => color[3] == 1.0,
         }
     }
 

@@ -28,6 +28,7 @@ mod decide;
 pub mod doctor;
 mod effects;
 mod enums;
+mod evaluators;
 pub mod export;
 mod fault;
 pub mod folders;

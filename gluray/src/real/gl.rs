@@ -13,6 +13,13 @@ driver! {
     pub(crate) fn normal3f = "glNormal3f"(x: f32, y: f32, z: f32);
     pub(crate) fn tex_coord4f = "glTexCoord4f"(s: f32, t: f32, r: f32, q: f32);
     pub(crate) fn vertex4f = "glVertex4f"(x: f32, y: f32, z: f32, w: f32);
+    pub(crate) fn eval_coord1f = "glEvalCoord1f"(u: f32);
+    pub(crate) fn eval_coord2f = "glEvalCoord2f"(u: f32, v: f32);
+    pub(crate) fn eval_point1 = "glEvalPoint1"(i: i32);
+    pub(crate) fn eval_point2 = "glEvalPoint2"(i: i32, j: i32);
+    pub(crate) fn eval_mesh2 = "glEvalMesh2"(mode: u32, i1: i32, i2: i32, j1: i32, j2: i32);
+    fn get_map_f = "glGetMapfv"(target: u32, what: u32, out: *mut f32);
+    fn get_map_i = "glGetMapiv"(target: u32, what: u32, out: *mut i32);
     pub(crate) fn rectf = "glRectf"(x: f32, y: f32, x2: f32, y2: f32);
     pub(crate) fn enable = "glEnable"(cap: u32);
     pub(crate) fn disable = "glDisable"(cap: u32);
@@ -169,6 +176,8 @@ queries! {
     tex_gen_i(coord: u32, what: u32) -> i32 = get_tex_gen_i;
     tex_gen_f(coord: u32, what: u32) -> f32 = get_tex_gen_f;
     clip_plane(plane: u32) -> f64 = get_clip_plane;
+    map_f(target: u32, what: u32) -> f32 = get_map_f;
+    map_i(target: u32, what: u32) -> i32 = get_map_i;
     tex_level_i(target: u32, level: i32, what: u32) -> i32 = get_tex_level_i;
     attachment_i(target: u32, attachment: u32, what: u32) -> i32 = get_attachment_i;
     tex_parameter_i(target: u32, what: u32) -> i32 = get_tex_parameter_i;
@@ -179,6 +188,19 @@ queries! {
     buffer_i(target: u32, what: u32) -> i32 = get_buffer_parameter_i;
     uniform_f(program: u32, at: i32) -> f32 = get_uniformfv;
     uniform_i(program: u32, at: i32) -> i32 = get_uniformiv;
+}
+
+/// Orders in both parameters of an evaluator's map, and the values of its control points, of which each has `size`. A curve's second order is 1.
+pub(crate) fn map_points(target: u32, size: usize, surface: bool) -> ([usize; 2], Vec<f32>) {
+    // No map has more values a point.
+    const MOST: usize = 4;
+    let [u, v] = map_i::<2>(target, crate::enums::MAP_ORDER).map(|n| n.max(1) as usize);
+    let orders = [u, if surface { v } else { 1 }];
+    let points = orders[0] * orders[1];
+    let mut out = vec![0.0; points * MOST];
+    get_map_f(target, crate::enums::MAP_POINTS, out.as_mut_ptr());
+    out.truncate(points * size);
+    (orders, out)
 }
 
 /// What kind of numbers the colour buffer of the framebuffer object in use has that `attachment` names; 0 when nobody knows.

@@ -4,8 +4,11 @@
 //! alternate, the driver's list is closed and another begun; calling the list plays both in order, through the same methods that the
 //! program calls. So state is what it is at the time of the call, nested lists work, and the driver gets a primitive only when it is to draw it.
 
+mod names;
+
 use crate::context::{Context, Sink};
 use crate::enums::*;
+use crate::evaluators::Kind;
 use crate::real::gl;
 use crate::state::current::Current;
 use crate::symbols::{self, class};
@@ -25,15 +28,21 @@ pub(crate) enum Op {
     Tex([f32; 4]),
     /// Index into the list's materials.
     Material(u32),
-    /// A list of the driver's, and whether it draws things whose order matters.
+    /// A list of the driver's, whether it draws things whose order matters, and whether it sets maps of evaluators and nothing else.
     Driver {
         list: u32,
         draws: bool,
+        only_maps: bool,
     },
     Call(u32),
     /// Names relative to the list base at the time of the call.
     CallFromBase(u32),
     Rect([f32; 4]),
+    /// `glEvalCoord` of a curve, whose second parameter is nothing, or of a surface.
+    EvalCoord(Kind, [f32; 2]),
+    EvalPoint(Kind, [i32; 2]),
+    /// A filled mesh.
+    EvalMesh([i32; 4]),
 }
 
 /// A finished list.
@@ -63,6 +72,8 @@ pub(crate) struct Recording {
     piece: u32,
     used: bool,
     draws: bool,
+    /// Something besides maps is in the driver's piece.
+    more: bool,
     /// Between a Begin and its End.
     open: bool,
     /// The mode of the latest Begin.
@@ -72,8 +83,22 @@ pub(crate) struct Recording {
 impl Recording {
     /// A call goes into the driver's piece.
     pub(crate) fn note_driver_call(&mut self, flushes: bool, draws: bool) {
-        self.used = true;
+        (self.used, self.more) = (true, true);
         self.draws |= flushes || draws;
+    }
+
+    /// A call that sets a map of an evaluator goes into the driver's piece.
+    pub(crate) fn note_map(&mut self) {
+        self.used = true;
+    }
+
+    /// The driver's piece ends, and is a step of the list when anything is in it.
+    fn end_piece(&mut self) {
+        gl::end_list();
+        if self.used {
+            self.list.ops.push(Op::Driver { list: self.piece, draws: self.draws, only_maps: !self.more });
+        }
+        (self.used, self.draws, self.more) = (false, false, false);
     }
 }
 
@@ -103,6 +128,7 @@ impl Context {
             piece: name,
             used: false,
             draws: false,
+            more: false,
             open: false,
             mode: 0,
         });
@@ -121,10 +147,7 @@ impl Context {
             return true;
         }
         let Some(mut r) = self.recording.take() else { return false };
-        gl::end_list();
-        if r.used {
-            r.list.ops.push(Op::Driver { list: r.piece, draws: r.draws });
-        }
+        r.end_piece();
         self.sink = Sink::Outside;
         let old = {
             let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
@@ -138,7 +161,7 @@ impl Context {
     }
 
     /// Puts a step of ours into the list; calls that went to the driver before it end their piece.
-    fn list_op(&mut self, op: Op) -> bool {
+    pub(crate) fn list_op(&mut self, op: Op) -> bool {
         if self.recording.as_ref().is_some_and(|r| r.used) {
             self.close_piece();
             self.open_piece();
@@ -150,12 +173,9 @@ impl Context {
 
     /// The driver's piece of the list that is compiled ends here.
     fn close_piece(&mut self) {
-        let Some(r) = &mut self.recording else { return };
-        gl::end_list();
-        if r.used {
-            r.list.ops.push(Op::Driver { list: r.piece, draws: r.draws });
+        if let Some(r) = &mut self.recording {
+            r.end_piece();
         }
-        (r.used, r.draws) = (false, false);
     }
 
     fn open_piece(&mut self) {
@@ -299,6 +319,7 @@ impl Context {
                 Op::Call(name) => self.play_plainly_or_call(name),
                 Op::CallFromBase(name) => self.play_plainly_or_call(gl::word(LIST_BASE).wrapping_add(name)),
                 Op::Rect(v) => gl::rectf(v[0], v[1], v[2], v[3]),
+                Op::EvalCoord(..) | Op::EvalPoint(..) | Op::EvalMesh(_) => evaluate_plainly(op),
             }
         }
         self.depth_of_lists -= 1;
@@ -313,13 +334,9 @@ impl Context {
 
     /// A fault of ours has ended the tracing: the driver gets to know what it was not told.
     pub(crate) fn give_up(&mut self) {
-        if let Some(r) = self.recording.take() {
-            gl::end_list();
-            let mut list = r.list;
-            if r.used {
-                list.ops.push(Op::Driver { list: r.piece, draws: r.draws });
-            }
-            self.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.insert(r.name, Arc::new(list));
+        if let Some(mut r) = self.recording.take() {
+            r.end_piece();
+            self.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.insert(r.name, Arc::new(r.list));
         }
         self.sink = Sink::Outside;
         self.depth_of_lists = 0;
@@ -329,7 +346,7 @@ impl Context {
 
     fn call_driver(&mut self, list: u32, draws: bool) {
         if draws {
-            self.counters.pass("text, lines by arrays, or evaluators of a display list", 1);
+            self.counters.pass("text, lines by arrays, or curves of a display list", 1);
         }
         self.before_driver(draws);
         gl::call_list(list);
@@ -418,7 +435,11 @@ impl Context {
                         gl::materialfv(face, what, &v);
                     }
                 }
-                Op::Driver { list, draws } => self.call_driver(list, draws),
+                Op::Driver { list, only_maps: true, .. } => {
+                    self.maps_change();
+                    gl::call_list(list);
+                }
+                Op::Driver { list, draws, .. } => self.call_driver(list, draws),
                 Op::Call(name) => {
                     self.call_list(name);
                 }
@@ -430,6 +451,21 @@ impl Context {
                 Op::Rect(v) => {
                     if !self.rect(v) {
                         gl::rectf(v[0], v[1], v[2], v[3]);
+                    }
+                }
+                Op::EvalCoord(kind, at) => {
+                    if !self.eval_coord(kind, at) {
+                        evaluate_plainly(op);
+                    }
+                }
+                Op::EvalPoint(kind, places) => {
+                    if !self.eval_point(kind, places) {
+                        evaluate_plainly(op);
+                    }
+                }
+                Op::EvalMesh(range) => {
+                    if !self.eval_mesh_2(FILL, range) {
+                        evaluate_plainly(op);
                     }
                 }
             }
@@ -492,7 +528,7 @@ impl Context {
     }
 
     pub(crate) fn call_lists(&mut self, n: i32, kind: u32, names: usize) -> bool {
-        let Some(names) = decode_names(n, kind, names) else { return false };
+        let Some(names) = names::decode(n, kind, names) else { return false };
         if crate::fault::happened() {
             let base = gl::word(LIST_BASE);
             names.into_iter().for_each(|n| self.play_plainly_or_call(base.wrapping_add(n)));
@@ -534,47 +570,20 @@ impl Context {
     }
 }
 
-fn delete_pieces(list: Option<Arc<List>>) {
-    for piece in list.iter().flat_map(|l| &l.pieces) {
-        gl::delete_lists(*piece, 1);
+/// A step by evaluators, for the driver.
+fn evaluate_plainly(op: &Op) {
+    match *op {
+        Op::EvalCoord(Kind::Curve, [u, _]) => gl::eval_coord1f(u),
+        Op::EvalCoord(Kind::Surface, [u, v]) => gl::eval_coord2f(u, v),
+        Op::EvalPoint(Kind::Curve, [i, _]) => gl::eval_point1(i),
+        Op::EvalPoint(Kind::Surface, [i, j]) => gl::eval_point2(i, j),
+        Op::EvalMesh([i1, i2, j1, j2]) => gl::eval_mesh2(FILL, i1, i2, j1, j2),
+        _ => {}
     }
 }
 
-/// The names of `glCallLists`; `None` for a type that OpenGL refuses.
-fn decode_names(n: i32, kind: u32, address: usize) -> Option<Vec<u32>> {
-    let width = match kind {
-        BYTE | UNSIGNED_BYTE => 1,
-        SHORT | UNSIGNED_SHORT | 0x1407 => 2,
-        INT | UNSIGNED_INT | FLOAT | 0x1409 => 4,
-        0x1408 => 3,
-        _ => return None,
-    };
-    let bytes = crate::client_memory::view(address, usize::try_from(n).ok()? * width);
-    let name = |b: &[u8]| match (kind, b) {
-        (BYTE, &[a]) => i32::from(a.cast_signed()).cast_unsigned(),
-        (SHORT, &[a, b]) => i32::from(i16::from_ne_bytes([a, b])).cast_unsigned(),
-        (UNSIGNED_SHORT, &[a, b]) => u32::from(u16::from_ne_bytes([a, b])),
-        (FLOAT, &[a, b, c, d]) => (f32::from_ne_bytes([a, b, c, d]) as i32).cast_unsigned(),
-        (INT | UNSIGNED_INT, &[a, b, c, d]) => u32::from_ne_bytes([a, b, c, d]),
-        // The types GL_2_BYTES and so on: the high byte first.
-        (_, b) => b.iter().fold(0, |h, x| h << 8 | u32::from(*x)),
-    };
-    Some(bytes.chunks_exact(width).map(name).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_of_lists_are_read_in_every_type() {
-        let bytes: Vec<u8> = vec![1, 2, 3, 4];
-        let at = bytes.as_ptr() as usize;
-        assert_eq!(decode_names(4, UNSIGNED_BYTE, at), Some(vec![1, 2, 3, 4]));
-        assert_eq!(decode_names(2, 0x1407, at), Some(vec![0x0102, 0x0304]));
-        assert_eq!(decode_names(1, 0x1409, at), Some(vec![0x0102_0304]));
-        assert_eq!(decode_names(1, 0x1234, at), None);
-        let minus_one = [255_u8];
-        assert_eq!(decode_names(1, BYTE, minus_one.as_ptr() as usize), Some(vec![u32::MAX]));
+fn delete_pieces(list: Option<Arc<List>>) {
+    for piece in list.iter().flat_map(|l| &l.pieces) {
+        gl::delete_lists(*piece, 1);
     }
 }

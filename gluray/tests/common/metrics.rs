@@ -85,6 +85,10 @@ pub(crate) fn compare(a: &Picture, b: &Picture) -> Metrics {
 }
 
 impl Metrics {
+    /// Of a picture and itself.
+    pub(crate) const SAME: Metrics =
+        Metrics { raw: 0.0, tolerant: 0.0, interior: 0.0, interior_p99: 0.0, overlap: 1.0 };
+
     /// The bars for filled surfaces.
     pub(crate) fn assert_filled(&self, what: &str) {
         let ok = self.tolerant <= 0.02

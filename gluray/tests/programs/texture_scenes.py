@@ -162,3 +162,26 @@ def a_thousand_textures():
         if i == 40:
             before = peak()
     assert peak() < before + 30_000, f"{peak() - before} KiB more after 300 textures"
+
+
+def environments_of_textures():
+    """What each environment makes of a texture of each kind of components, where the specification says what: colours, constant colours and lit surfaces."""
+    textured(perspective=False)
+    normal(0, 0.3, 0.9)
+    F("glLightModeli", c_uint, c_int)(0x81F8, 0x81F9)
+    values = (c.c_uint8 * 64)(*(v for i in range(16) for v in (17 * i, 255 - 11 * i, (60 * i) % 256, 80 + 11 * i)))
+    color_of = F("glTexEnvfv", c_uint, c_uint, c_void_p)
+    color_of(0x2300, 0x2201, (c_float * 4)(0.9, 0.2, 0.6, 0.7))
+    kinds = (0x1907, RGBA, 0x1906, 0x1909, 0x190A, 0x8049)
+    for k, inner in enumerate(kinds):
+        bind_texture(TEXTURE_2D, k + 1)
+        parameter(TEXTURE_2D, MIN, 0x2601)
+        parameter(TEXTURE_2D, MAG, 0x2601)
+        image(TEXTURE_2D, 0, inner, 4, 4, 0, RGBA, BYTES, values)
+        # Decals are of colours.
+        for n, env in enumerate((0x2100, 0x1E01, 0x2101, 0x0BE2, 0x0104)):
+            if env == 0x2101 and k > 1:
+                continue
+            F("glTexEnvi", c_uint, c_uint, c_int)(0x2300, 0x2200, env)
+            color(0.2 + 0.15 * n, 0.7 - 0.1 * k, 0.4, 1)
+            square(-1.4 + 0.47 * k, -1.4 + 0.56 * n, -1 + 0.47 * k, -0.9 + 0.56 * n, 0.1 * n)

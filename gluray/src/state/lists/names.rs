@@ -1,0 +1,42 @@
+//! The names that `glCallLists` gets, in any of OpenGL's types.
+
+use crate::enums::*;
+
+/// The names of `glCallLists`; `None` for a type that OpenGL refuses.
+pub(super) fn decode(n: i32, kind: u32, address: usize) -> Option<Vec<u32>> {
+    let width = match kind {
+        BYTE | UNSIGNED_BYTE => 1,
+        SHORT | UNSIGNED_SHORT | 0x1407 => 2,
+        INT | UNSIGNED_INT | FLOAT | 0x1409 => 4,
+        0x1408 => 3,
+        _ => return None,
+    };
+    let bytes = crate::client_memory::view(address, usize::try_from(n).ok()? * width);
+    let name = |b: &[u8]| match (kind, b) {
+        (BYTE, &[a]) => i32::from(a.cast_signed()).cast_unsigned(),
+        (SHORT, &[a, b]) => i32::from(i16::from_ne_bytes([a, b])).cast_unsigned(),
+        (UNSIGNED_SHORT, &[a, b]) => u32::from(u16::from_ne_bytes([a, b])),
+        (FLOAT, &[a, b, c, d]) => (f32::from_ne_bytes([a, b, c, d]) as i32).cast_unsigned(),
+        (INT | UNSIGNED_INT, &[a, b, c, d]) => u32::from_ne_bytes([a, b, c, d]),
+        // The types GL_2_BYTES and so on: the high byte first.
+        (_, b) => b.iter().fold(0, |h, x| h << 8 | u32::from(*x)),
+    };
+    Some(bytes.chunks_exact(width).map(name).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_lists_are_read_in_every_type() {
+        let bytes: Vec<u8> = vec![1, 2, 3, 4];
+        let at = bytes.as_ptr() as usize;
+        assert_eq!(decode(4, UNSIGNED_BYTE, at), Some(vec![1, 2, 3, 4]));
+        assert_eq!(decode(2, 0x1407, at), Some(vec![0x0102, 0x0304]));
+        assert_eq!(decode(1, 0x1409, at), Some(vec![0x0102_0304]));
+        assert_eq!(decode(1, 0x1234, at), None);
+        let minus_one = [255_u8];
+        assert_eq!(decode(1, BYTE, minus_one.as_ptr() as usize), Some(vec![u32::MAX]));
+    }
+}
