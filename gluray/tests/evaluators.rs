@@ -34,6 +34,8 @@ traced! {
     transparent_colours_by_map
     maps_of_attribute_stacks
     errors_of_evaluators
+    nurbs_of_glu
+    a_library_that_is_opened_late
 }
 
 #[test]

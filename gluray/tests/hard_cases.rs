@@ -37,6 +37,7 @@ cases! {
     clip_planes: true 0;
     fog: true 0;
     color_map_texture: true 0;
+    environments_of_textures: true 0;
     material_per_vertex: true 0;
     blended_over_traced: true 0;
     seventeen_contexts: true 0;

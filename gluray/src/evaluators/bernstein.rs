@@ -4,7 +4,11 @@
 //! lines over a surface, which the driver draws, lie where we put the surface.
 
 /// The point of a curve at `t`, of `N` values. There is a control point at least.
-pub(super) fn curve<const N: usize>(points: impl IntoIterator<Item = [f32; N]>, order: usize, t: f32) -> [f32; N] {
+pub(super) fn curve<const N: usize>(
+    points: impl IntoIterator<Item = [f32; N]>,
+    order: usize,
+    t: f32,
+) -> [f32; N] {
     let mut points = points.into_iter();
     let mut next = || points.next().unwrap_or([0.0; N]);
     let first = next();
@@ -46,7 +50,8 @@ mod tests {
     fn defined(points: &[f64], t: f64) -> f64 {
         let n = points.len() - 1;
         let binomial = |i: usize| (0..i).fold(1.0, |b, k| b * (n - k) as f64 / (k + 1) as f64);
-        let term = |(i, p): (usize, &f64)| binomial(i) * t.powi(i as i32) * (1.0 - t).powi((n - i) as i32) * p;
+        let term =
+            |(i, p): (usize, &f64)| binomial(i) * t.powi(i as i32) * (1.0 - t).powi((n - i) as i32) * p;
         points.iter().enumerate().map(term).sum()
     }
 
@@ -70,11 +75,14 @@ mod tests {
     #[test]
     fn surfaces_are_curves_of_points_of_curves_whatever_their_orders() {
         for (rows, columns) in [(1, 1), (1, 5), (5, 1), (2, 6), (6, 2), (4, 4)] {
-            let points: Vec<[f32; 2]> = (0..rows * columns).map(|i| [some(i) as f32, some(3 * i) as f32]).collect();
+            let points: Vec<[f32; 2]> =
+                (0..rows * columns).map(|i| [some(i) as f32, some(3 * i) as f32]).collect();
             let [u, v] = [0.3, 0.8];
             let found = surface(&points, [rows, columns], [u as f32, v as f32]);
             for k in 0..2 {
-                let row = |i: usize| points[i * columns..][..columns].iter().map(|p| f64::from(p[k])).collect::<Vec<_>>();
+                let row = |i: usize| {
+                    points[i * columns..][..columns].iter().map(|p| f64::from(p[k])).collect::<Vec<_>>()
+                };
                 let along: Vec<f64> = (0..rows).map(|i| defined(&row(i), v)).collect();
                 assert!((f64::from(found[k]) - defined(&along, u)).abs() < 1e-5, "{rows} {columns}");
             }

@@ -24,7 +24,11 @@ pub(super) fn point_and_tangents<const N: usize>(
         (rows, columns) = (rows - 1, columns - 1);
     }
     let line = |row: bool, k: usize| -> Vec<[f32; N]> {
-        if row { net[k * across..][..columns].to_vec() } else { (0..rows).map(|i| net[i * across + k]).collect() }
+        if row {
+            net[k * across..][..columns].to_vec()
+        } else {
+            (0..rows).map(|i| net[i * across + k]).collect()
+        }
     };
     if rows == columns {
         let [a, b, c, d] = [net[0], net[1], net[across], net[across + 1]];
@@ -87,16 +91,21 @@ mod tests {
     #[test]
     fn points_are_those_of_bernstein_s_sums_and_tangents_their_derivatives() {
         for orders in [[2, 2], [2, 3], [3, 2], [2, 7], [7, 2], [4, 4], [3, 6], [6, 3], [5, 4]] {
-            let points: Vec<[f32; 2]> =
-                (0..orders[0] * orders[1]).map(|i| [(i * 31 % 17) as f32 / 8.0, (i * 7 % 11) as f32 / 5.0]).collect();
+            let points: Vec<[f32; 2]> = (0..orders[0] * orders[1])
+                .map(|i| [(i * 31 % 17) as f32 / 8.0, (i * 7 % 11) as f32 / 5.0])
+                .collect();
             let at = [0.3, 0.6];
             let place = |du: f32, dv: f32| bernstein::surface(&points, orders, [at[0] + du, at[1] + dv]);
             let [point, du, dv] = point_and_tangents(&points, orders, at);
             let h = 1e-2;
             // Difference quotients, over the degrees that the tangents leave out.
-            let slope = |a: [f32; 2], b: [f32; 2], order: usize| less(a, b).map(|d| d / (2.0 * h) / (order - 1) as f32);
-            let (right_u, right_v) =
-                (slope(place(h, 0.0), place(-h, 0.0), orders[0]), slope(place(0.0, h), place(0.0, -h), orders[1]));
+            let slope = |a: [f32; 2], b: [f32; 2], order: usize| {
+                less(a, b).map(|d| d / (2.0 * h) / (order - 1) as f32)
+            };
+            let (right_u, right_v) = (
+                slope(place(h, 0.0), place(-h, 0.0), orders[0]),
+                slope(place(0.0, h), place(0.0, -h), orders[1]),
+            );
             for k in 0..2 {
                 assert!((point[k] - place(0.0, 0.0)[k]).abs() < 1e-5, "{orders:?}");
                 assert!((du[k] - right_u[k]).abs() < 5e-3, "{orders:?}: {du:?} {right_u:?}");

@@ -148,8 +148,10 @@ mod tests {
 
     #[test]
     fn domains_are_mapped_and_what_no_map_gives_stays_current() {
-        let corners = [[0.0, 0.0, 0.0, 0.0], [0.0, 4.0, 0.0, 0.0], [2.0, 0.0, 0.0, 0.0], [2.0, 4.0, 1.0, 0.0]];
-        let mut maps = Maps { vertex: map(&corners, [2, 2], 3), tex: map(&corners, [2, 2], 2), ..Maps::default() };
+        let corners =
+            [[0.0, 0.0, 0.0, 0.0], [0.0, 4.0, 0.0, 0.0], [2.0, 0.0, 0.0, 0.0], [2.0, 4.0, 1.0, 0.0]];
+        let mut maps =
+            Maps { vertex: map(&corners, [2, 2], 3), tex: map(&corners, [2, 2], 2), ..Maps::default() };
         let found = maps.at([2.0, 4.0]).unwrap();
         assert_eq!(found.position, [1.0, 2.0, 0.25, 1.0]);
         assert_eq!(found.tex, Some([1.0, 2.0, 0.0, 1.0]));

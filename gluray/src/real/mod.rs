@@ -84,6 +84,21 @@ fn open(library: &CStr) -> *mut c_void {
     unsafe { libc::dlopen(library.as_ptr(), libc::RTLD_LAZY | libc::RTLD_LOCAL) }
 }
 
+/// Puts our own functions where libraries that are opened later look for OpenGL's, as `LD_PRELOAD` does. Mesa does this with its own when a first context is
+/// made: calls of plugins, and of libraries that a script opens, would go past GLVND, and so past us.
+pub(crate) fn be_found_first() {
+    let ours = be_found_first as *const c_void;
+    // SAFETY: all zero is a value of this plain structure.
+    let mut about: libc::Dl_info = unsafe { core::mem::zeroed() };
+    // SAFETY: an address of our own code, and room for the answer.
+    if unsafe { libc::dladdr(ours, &raw mut about) } == 0 || about.dli_fname.is_null() {
+        return;
+    }
+    let how = libc::RTLD_LAZY | libc::RTLD_NOLOAD | libc::RTLD_GLOBAL;
+    // SAFETY: the C string that `dladdr` gave.
+    unsafe { libc::dlopen(about.dli_fname, how) };
+}
+
 /// `__glx_Main` or `__egl_Main` of the vendor that would have been there without us (`GLURAY_GLX_VENDOR`, else Mesa).
 pub(crate) fn vendor_main(egl: bool) -> *const () {
     let (prefix, variable, main) = match egl {
