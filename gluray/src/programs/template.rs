@@ -259,7 +259,8 @@ impl Template {
 #[cfg(test)]
 mod tests {
     use super::super::blocks::{
-        LAMP, PASSES, PHYSICAL, PHYSICAL_ENDS, PHYSICAL_HEADLIGHT, PHYSICAL_LAMP, PHYSICAL_SUN, SUN,
+        ALBEDO, ALBEDO_ALPHA, COMPONENTS, LAMP, MULTIPLIES, PASSES, PHYSICAL, PHYSICAL_ENDS,
+        PHYSICAL_HEADLIGHT, PHYSICAL_LAMP, PHYSICAL_SUN, READS, SUN,
     };
     use super::*;
 
@@ -346,6 +347,57 @@ mod tests {
                 );
                 assert!(read(&fragment(&format!("{HEAD}{linear}"))).is_err(), "not physically based");
             }
+        }
+    }
+
+    #[test]
+    fn pictures_are_known_where_they_are_the_last_that_happens_to_the_colour() {
+        let on = |picture: &str| {
+            let text = fragment(HEAD);
+            text.replace(" if (fragOutput0.a <= 0.0)", &format!("{picture} if (fragOutput0.a <= 0.0)"))
+        };
+        for (pictured, components) in COMPONENTS {
+            let numbered = |n: &str| {
+                let all = [READS].into_iter().chain(components).chain(MULTIPLIES);
+                all.map(|s| s.replace('#', n) + ";").collect::<String>()
+            };
+            assert_eq!(read(&on(&numbered("0"))).map(|t| t.pictured), Ok(pictured));
+            assert_eq!(read(&on(&numbered("1"))).map(|t| t.pictured), Ok(pictured));
+            assert!(read(&on(&(numbered("0") + &numbered("1")))).is_err(), "two of them");
+            assert!(read(&fragment(&format!("{HEAD}{}", numbered("0")))).is_err(), "too early");
+            let other = numbered("0").replace("fragOutput0*tcolor", "fragOutput0+tcolor");
+            assert_eq!(read(&on(&other)), Err("a picture on a surface of VTK's"));
+        }
+    }
+
+    #[test]
+    fn coordinates_of_pictures_may_have_a_matrix_and_be_apart_from_those_of_colour_maps() {
+        let vertex = |text: &str| {
+            let vs = VERTEX.replace("  vertexVC", &format!("{text};vertexVC"));
+            Template::read(&vs, "", &fragment(HEAD)).map(|t| (t.two_coordinates, t.turned))
+        };
+        let plain = ["colorTCoordVCVSOutput=colorTCoord", "tcoordVCVSOutput=tcoord"];
+        let turned = TURNED.map(|block| block.join(";"));
+        assert_eq!(vertex(plain[1]), Ok((false, false)));
+        assert_eq!(vertex(&plain.join(";")), Ok((true, false)));
+        assert_eq!(vertex(&turned[1]), Ok((false, true)));
+        assert_eq!(vertex(&turned.join(";")), Ok((true, true)));
+        assert!(vertex(&format!("{};{}", plain[0], turned[1])).is_err(), "a matrix for one of them");
+        assert!(vertex(&turned[1].replace("/tcoordTmp.w", "")).is_err());
+    }
+
+    #[test]
+    fn physically_based_materials_have_colours_from_pictures() {
+        for (pictured, alpha) in ALBEDO_ALPHA {
+            let albedo = [ALBEDO[0], ALBEDO[1], alpha].join(";");
+            let text = [PHYSICAL, PHYSICAL_HEADLIGHT, PHYSICAL_ENDS[0]].concat().join(";") + ";";
+            let text = text.replacen(PHYSICAL[0], &albedo, 1);
+            let whole = fragment(&text)
+                .replace("fragOutput0 = vec4(ambientColor + diffuse + specular, opacity);", "");
+            let t = read(&whole).expect("known");
+            assert!(t.physical && t.pictured == pictured);
+            let other = whole.replace("albedoSample.rgb*", "albedoSample.rgb+");
+            assert_eq!(read(&other), Err("a picture on a surface of VTK's"));
         }
     }
 
