@@ -37,10 +37,10 @@ impl Writes {
     }
 
     /// When the buffers of arrays and indices were written last.
-    pub(crate) fn last(&self, arrays: &[Option<Source>; 6], indices: u32) -> [u64; 7] {
+    pub(crate) fn last(&self, arrays: &[Option<Source>; 7], indices: u32) -> [u64; 8] {
         let of = |buffer: u32| self.named.get(&buffer).copied().unwrap_or(self.unnamed);
         let array = |i: usize| arrays[i].map_or(0, |s| of(s.buffer));
-        [array(0), array(1), array(2), array(3), array(4), array(5), of(indices)]
+        [array(0), array(1), array(2), array(3), array(4), array(5), array(6), of(indices)]
     }
 }
 
@@ -88,7 +88,7 @@ mod tests {
         let source = |buffer: u32| {
             Some(Source { size: 3, kind: FLOAT, stride: 0, address: 0, buffer, normalized: false })
         };
-        let arrays = [source(5), source(6), None, None, None, None];
+        let arrays = [source(5), source(6), None, None, None, None, None];
         let mut w = Writes::default();
         let before = w.last(&arrays, 7);
         w.to(8);

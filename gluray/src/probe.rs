@@ -149,7 +149,7 @@ impl Context {
             return Err("positions that are not finite");
         }
         for source in sources {
-            let written = self.writes().last(&[Some(source), None, None, None, None, None], indices);
+            let written = self.writes().last(&[Some(source), None, None, None, None, None, None], indices);
             let key = hash(&[format!("{source:?} {mode} {call:?} {first} {count} {written:?}").as_bytes()]);
             let geometry = match self.probes.made.get(&key) {
                 // Client memory may have other contents by now.

@@ -8,6 +8,7 @@ mod blocks;
 mod cells;
 mod color;
 mod peeling;
+mod picture;
 mod recognised;
 mod shadow_maps;
 mod template;
@@ -32,7 +33,7 @@ pub(crate) use recognised::{ProgramLight, ProgramSkin, Recognised};
 use shadow_maps::ShadowMaps;
 use std::collections::HashMap;
 use std::sync::Arc;
-use template::{Colors, Peel, Template};
+use template::{Colors, Peel, Pictured, Template};
 use weighted::Weighted;
 
 /// Which buffers a draw reads: while none was written, what was made of them serves again.
@@ -43,11 +44,11 @@ struct Key {
     /// The number of the first triangle in buffer textures.
     first: i32,
     /// When each of them was written last.
-    written: [u64; 7],
+    written: [u64; 8],
 }
 
-/// Positions, normals, colours, texture coordinates; colours and edges of cells.
-type Sources = [Option<Source>; 6];
+/// Positions, normals, colours, texture coordinates; colours and edges of cells; coordinates of pictures where they are apart.
+type Sources = [Option<Source>; 7];
 
 /// The programs of a context.
 #[derive(Default)]
@@ -148,18 +149,23 @@ impl Context {
             attribute(program, "normalMC"),
             attribute(program, "scalarColor"),
             // VTK 9.7 names the coordinates of colour maps apart from those of pictures.
-            attribute(program, "tcoord").or_else(|| attribute(program, "colorTCoord")),
+            attribute(program, "colorTCoord").or_else(|| attribute(program, "tcoord")),
             cells(template.colors == Colors::PerCell, "textureC")?,
             cells(template.edges, "edgeTexture")?,
+            attribute(program, "tcoord").filter(|_| template.two_coordinates),
         ];
         if sources.iter().flatten().any(|s| s.buffer == 0) {
             return Err("a program with arrays in client memory");
         }
         let map = match template.colors {
-            Colors::Map => Some(self.color_map(program)?),
+            Colors::Map => Some(self.image_of(program, "colortexture", texturing::followed)?),
             _ => None,
         };
-        let recognised = Recognised::query(program, template, map);
+        let picture = match template.pictured {
+            Pictured::No => None,
+            over => Some(self.picture_of(program, over)?),
+        };
+        let recognised = Recognised::query(program, template, [map, picture]);
         let first = match gl::uniform_location(program, "PrimitiveIDOffset") {
             -1 => 0,
             at => gl::uniform_i::<1>(program, at)[0],
@@ -226,13 +232,31 @@ impl Context {
         Ok(Taken::Traced)
     }
 
-    fn color_map(&mut self, program: u32) -> Result<Arc<Image>, &'static str> {
-        let at = gl::uniform_location(program, "colortexture");
+    fn picture_of(&mut self, program: u32, pictured: Pictured) -> Result<Arc<Image>, &'static str> {
+        let sampler = if pictured.is_over_all() { "actortexture" } else { "albedoTex" };
+        let version = self.can.version;
+        let image =
+            self.image_of(program, sampler, |target| match texturing::unfollowed(target, version) {
+                Some(why) => Err(why),
+                None => Ok(()),
+            })?;
+        // Only there do all samplers see what is stored.
+        if image.is_of_colors() { Ok(image) } else { Err("a picture of luminance or alpha alone") }
+    }
+
+    /// The image that a program's sampler has, if rays can follow its filters.
+    fn image_of(
+        &mut self,
+        program: u32,
+        sampler: &str,
+        followed: impl FnOnce(u32) -> Result<(), &'static str>,
+    ) -> Result<Arc<Image>, &'static str> {
+        let at = gl::uniform_location(program, sampler);
         let unit = if at < 0 { 0 } else { gl::uniform_i::<1>(program, at)[0].max(0) };
         let active = gl::word(ACTIVE_TEXTURE);
         gl::active_texture(TEXTURE0 + unit as u32);
         let name = gl::word(TEXTURE_BINDING_2D);
-        let followed = texturing::followed(TEXTURE_2D);
+        let followed = followed(TEXTURE_2D);
         let image = self.presenter.images.get(TEXTURE_2D, name, self.texture_version);
         gl::active_texture(active);
         followed?;
@@ -248,7 +272,7 @@ impl Context {
         let elements = elements()?;
         let (first, count) = elements.span();
         let read = |s: &Option<Source>| s.map(|s| s.read(first, count)).transpose();
-        let [position, normal, color, tex, ..] = sources;
+        let [position, normal, color, tex, _, _, picture] = sources;
         let positions = positions(&read(position)?.ok_or("a program without positions")?)?;
         let triangles = elements.triangles(mode, &elements.plain_split(self.state.first_vertex_provokes));
         let geometry = self.cache.of_indices(&positions, &triangles);
@@ -260,7 +284,16 @@ impl Context {
             attributes.colors = Values::Packed(Arc::new(p));
         }
         if let Some(p) = read(tex)? {
-            attributes.tex = Values::Packed(Arc::new(p));
+            attributes.tex = match read(picture)? {
+                None => Values::Packed(Arc::new(p)),
+                Some(q) => {
+                    let both = |i| {
+                        let ([s, t], [u, v]) = (p.at(i, [0.0; 2]), q.at(i, [0.0; 2]));
+                        [s, t, u, v]
+                    };
+                    Values::PerVertex((0..count).map(both).collect())
+                }
+            };
         }
         Ok((geometry, Arc::new(attributes)))
     }
@@ -269,7 +302,7 @@ impl Context {
 /// What buffer textures have for the triangles of a draw, of which the first has number `first`.
 fn read_cells(sources: &Sources, first: i32, triangles: usize) -> Result<PerTriangle, &'static str> {
     let first = usize::try_from(first).map_err(|_| "a negative number of a cell")?;
-    let [.., colors, sides] = sources;
+    let [.., colors, sides, _] = sources;
     Ok(PerTriangle {
         colors: colors.map(|s| cells::colors(&s, first, triangles)).transpose()?,
         sides: sides.map(|s| cells::sides(&s, first, triangles)).transpose()?,

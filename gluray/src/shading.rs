@@ -198,11 +198,17 @@ impl Prepared<'_> {
         let mesh = &self.draw.geometry.mesh;
         let corners = mesh.indices[prim].map(|i| i as usize);
         if let Shading::Program(program) = &self.draw.shading {
+            let picture = program.picture().filter(|image| image.needs_footprint());
+            let texels = picture.zip(pixel).and_then(|(image, at)| {
+                let coordinates = corners.map(|i| program.picture_coordinates(&self.draw.attributes, i));
+                self.footprint(prim, coordinates.map(|[s, t]| [s, t, 0.0, 1.0]), image.size(), at)
+            });
             let at = At {
                 prim,
                 weights: f.weights.map(|w| w as f32),
                 front: f.front,
                 pixel,
+                texels,
                 moved_by: self.draw.state.sample_place,
             };
             return program.color(&self.draw.attributes, mesh, &at, reaches);

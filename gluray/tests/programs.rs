@@ -299,6 +299,44 @@ fn lines_along_edges_of_cells_are_the_drivers() {
     scenes(&[&["edges"], &["edges", "4"]], false, 4);
 }
 
+/// All surfaces of scenes with pictures are traced in both VTKs.
+fn pictures(kinds: &[&[&str]], least: u64) {
+    for report in scenes(kinds, true, least) {
+        let passed: Vec<_> = report.passed_reasons.keys().filter(|why| why.contains("picture")).collect();
+        assert!(passed.is_empty(), "{report:?}");
+    }
+}
+
+#[test]
+fn pictures_on_surfaces_are_the_drivers() {
+    pictures(&[&["pictures"], &["pictures", "4"], &["pictures_under_lamps"]], 4);
+}
+
+#[test]
+fn pictures_over_colours_have_coordinates_of_their_own() {
+    pictures(&[&["pictures_over_colors"]], 4);
+}
+
+#[test]
+fn pictures_made_smaller_are_the_drivers() {
+    pictures(&[&["pictures_smaller"]], 2);
+}
+
+#[test]
+fn pictures_that_let_something_through_are_summed_up_with_other_layers() {
+    pictures(&[&["translucent_pictures"]], 5);
+}
+
+#[test]
+fn colours_of_physically_based_materials_come_from_pictures() {
+    pictures(&[&["physical_pictures"]], 4);
+}
+
+#[test]
+fn slices_of_images_are_pictures_on_planes() {
+    pictures(&[&["images"]], 4);
+}
+
 #[test]
 fn surfaces_that_are_drawn_again_with_shadow_maps_are_the_drivers_and_named() {
     // The first frame is known by its shadow maps when surfaces are traced already; in the second they are the driver's.

@@ -1,7 +1,7 @@
 //! Statements of VTK's shaders that only mean something together: what depth peeling, clipping planes, lights with a place, edges and physically based materials
 //! put into them. A block counts only when all of its statements are there, in their order.
 
-use super::template::Peel;
+use super::template::{Peel, Pictured};
 
 /// Most lights that VTK writes into a shader.
 pub(super) const MOST_LIGHTS: usize = 6;
@@ -272,6 +272,39 @@ pub(super) const PHYSICAL_ENDS: [&[&str]; 2] = [
     ],
 ];
 
+/// A matrix for texture coordinates, in the vertex shader: for those of colour maps, where they have a name of their own, and for the others.
+pub(super) const TURNED: [&[&str]; 2] = [
+    &[
+        "vec4colorTCoordTmp=tcMatrix*vec4(colorTCoord,0.0,1.0)",
+        "colorTCoordVCVSOutput=colorTCoordTmp.xy/colorTCoordTmp.w",
+    ],
+    &["vec4tcoordTmp=tcMatrix*vec4(tcoord,0.0,1.0)", "tcoordVCVSOutput=tcoordTmp.xy/tcoordTmp.w"],
+];
+
+/// The texture of an actor, whose number in the shader is `#`: read, its components, and what is done with it.
+pub(super) const READS: &str = "vec4tcolor_#=texture(actortexture,tcoordVCVSOutput)";
+pub(super) const COMPONENTS: [(Pictured, Option<&str>); 4] = [
+    (Pictured::Rgb, Some("tcolor_#=vec4(tcolor_#.r,tcolor_#.g,tcolor_#.b,1.0)")),
+    (Pictured::Grey, Some("tcolor_#=vec4(tcolor_#.r,tcolor_#.r,tcolor_#.r,1.0)")),
+    (Pictured::GreyAlpha, Some("tcolor_#=vec4(tcolor_#.r,tcolor_#.r,tcolor_#.r,tcolor_#.g)")),
+    (Pictured::Rgba, None),
+];
+pub(super) const MULTIPLIES: [&str; 3] = [
+    "vec4tcolor=tcolor_#",
+    "if(gl_FrontFacing==true||showTexturesOnBackface)",
+    "fragOutput0=fragOutput0*tcolor",
+];
+/// What comes after.
+const DISCARDS: [&str; 2] = ["if(fragOutput0.a<=0.0)", "discard"];
+
+/// A texture with the colour of a physically based material, and what becomes of its alpha.
+pub(super) const ALBEDO: [&str; 2] =
+    ["vec4albedoSample=texture(albedoTex,tcoordVCVSOutput)", "vec3albedo=albedoSample.rgb*diffuseColor"];
+pub(super) const ALBEDO_ALPHA: [(Pictured, &str); 2] = [
+    (Pictured::Albedo, "opacity=opacityUniform*albedoSample.a"),
+    (Pictured::AlbedoAlone, "opacity=albedoSample.a"),
+];
+
 /// Takes a block out of statements, where all of it is there without anything between.
 pub(super) fn take(statements: &mut Vec<String>, block: &[&str]) -> bool {
     let at = statements.windows(block.len()).position(|w| w.iter().zip(block).all(|(s, b)| s == b));
@@ -305,6 +338,37 @@ pub(super) fn take_lights(statements: &mut Vec<String>) -> Lights {
         0 => Lights { others: take_numbered(statements, SUN), ..Lights::default() },
         n => Lights { others: n, placed: true, ..Lights::default() },
     }
+}
+
+/// Takes a picture out that multiplies the lit colour: what it is, where that is done last of all.
+pub(super) fn take_picture(statements: &mut Vec<String>) -> Option<Pictured> {
+    const MOST_BEFORE: usize = 4;
+    for (pictured, components) in COMPONENTS {
+        for n in 0..MOST_BEFORE {
+            let numbered = |s: &str| s.replace('#', &n.to_string());
+            let block: Vec<String> =
+                [READS].into_iter().chain(components).chain(MULTIPLIES).map(numbered).collect();
+            let block: Vec<&str> = block.iter().map(String::as_str).collect();
+            let end = [&block[..], &DISCARDS].concat();
+            if statements.ends_with(&end.iter().map(|s| (*s).to_owned()).collect::<Vec<_>>())
+                && take(statements, &block)
+            {
+                return Some(pictured);
+            }
+        }
+    }
+    None
+}
+
+/// Puts the colour of a surface where a physically based material has that of a texture.
+pub(super) fn take_albedo(statements: &mut Vec<String>) -> Option<Pictured> {
+    let plain = PHYSICAL[0];
+    ALBEDO_ALPHA.into_iter().find_map(|(pictured, alpha)| {
+        let block = [ALBEDO[0], ALBEDO[1], alpha];
+        let at = statements.windows(block.len()).position(|w| w == block)?;
+        statements.splice(at..at + block.len(), [plain.to_owned()]);
+        Some(pictured)
+    })
 }
 
 /// Takes out a physically based material; its lights, or `None` where there is no such material.

@@ -1,7 +1,7 @@
 //! The colour of a fragment, step by step as VTK's shaders compute it: the surface's own, that of back faces, edges, lights.
 
 use super::recognised::{Edges, Physical, ProgramLight, Recognised};
-use super::template::Colors;
+use super::template::{Colors, Pictured};
 use crate::capture::Attributes;
 use crate::effects::Visibility;
 use crate::lighting::{normalized, transform};
@@ -28,6 +28,8 @@ pub(crate) struct At {
     pub(crate) front: bool,
     /// The window's pixel that sees it, where the eye does.
     pub(crate) pixel: Option<(i32, i32)>,
+    /// Texels of the picture that the pixel covers, where that is known.
+    pub(crate) texels: Option<f32>,
     /// The sample's place, from the middle of the pixel, that everything was moved by.
     pub(crate) moved_by: [f32; 2],
 }
@@ -132,7 +134,7 @@ impl Recognised {
             Colors::Uniform => return (None, 1.0),
             Colors::PerVertex => mixed(corners.map(|i| a.colors.at(i)), w),
             Colors::Map => {
-                let [s, t, ..] = mixed(corners.map(|i| a.tex.at(i)), w);
+                let [s, t] = mixed(corners.map(|i| self.map_coordinates(a, i)), w);
                 self.map.as_ref().map_or([1.0; 4], |m| m.sample(s, t))
             }
             Colors::PerCell => self.map.as_ref().map_or([1.0; 4], |m| m.numbered(prim)),
@@ -141,7 +143,7 @@ impl Recognised {
     }
 
     /// The surface of a fragment before light falls on it.
-    fn surface(&self, a: &Attributes, mesh: &TriMesh, at: &At) -> Surface {
+    fn surface(&self, a: &Attributes, mesh: &TriMesh, at: &At, picture: Option<[f32; 4]>) -> Surface {
         let mut surface = match self.back {
             Some(back) if !at.front => back,
             _ => {
@@ -161,6 +163,14 @@ impl Recognised {
             let line = edges.share(corners, at) * edges.opacity;
             surface.diffuse = mix(surface.diffuse, [0.0; 3], line);
             surface.ambient = mix(surface.ambient, edges.color, line);
+        }
+        if let (Pictured::Albedo | Pictured::AlbedoAlone, Some([r, g, b, alpha])) =
+            (self.template.pictured, picture)
+        {
+            let [x, y, z] = surface.diffuse;
+            surface.diffuse = [x * r, y * g, z * b];
+            surface.alpha =
+                if self.template.pictured == Pictured::Albedo { self.opacity * alpha } else { alpha };
         }
         surface
     }
@@ -194,7 +204,8 @@ impl Recognised {
 
     /// The fragment's colour, as the shader computes it.
     pub(crate) fn color(&self, a: &Attributes, mesh: &TriMesh, at: &At, reaches: &Visibility) -> [f32; 4] {
-        let s = self.surface(a, mesh, at);
+        let picture = self.picture_at(a, mesh, at.prim, at.weights, at.texels);
+        let s = self.surface(a, mesh, at, picture);
         let out = if !self.template.lit {
             std::array::from_fn(|k| s.ambient[k] + s.diffuse[k])
         } else {
@@ -204,7 +215,7 @@ impl Recognised {
                 None => self.lit(&s, point, normal, reaches),
             }
         };
-        [out[0], out[1], out[2], s.alpha]
+        self.under_picture([out[0], out[1], out[2], s.alpha], picture, at.front)
     }
 
     fn lit(&self, s: &Surface, point: V3, normal: V3, reaches: &Visibility) -> V3 {
@@ -312,6 +323,7 @@ mod tests {
             weights: [1.0, 0.0, 0.0],
             front: true,
             pixel: Some((x, y)),
+            texels: None,
             moved_by: [0.0; 2],
         };
         // Half a pixel from the lower side, far from the others.

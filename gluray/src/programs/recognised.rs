@@ -1,7 +1,7 @@
 //! A program that we know, with its uniforms at one draw.
 
 use super::color::Surface;
-use super::template::{Colors, Template};
+use super::template::{Colors, Pictured, Template};
 use crate::capture::Attributes;
 use crate::effects::{Place, vector};
 use crate::lighting::normalized;
@@ -20,6 +20,8 @@ pub(crate) enum ProgramSkin<'a> {
     PerVertex(f32),
     /// A colour map, times this.
     Map(&'a Image, f32),
+    /// A picture over uniforms.
+    Picture(&'a Image),
     /// A colour for each triangle, times this.
     PerCell(&'a Image, f32),
 }
@@ -125,6 +127,11 @@ pub(crate) struct Recognised {
     pub(super) edges: Option<Edges>,
     /// The colour map, or a colour for each triangle.
     pub(super) map: Option<Arc<Image>>,
+    /// The texture of the actor, and whether back faces have it.
+    pub(super) picture: Option<Arc<Image>>,
+    pub(super) picture_on_backs: bool,
+    /// The matrix for texture coordinates.
+    pub(super) turn: Option<[f32; 16]>,
 }
 
 /// Most clipping planes of VTK's.
@@ -132,7 +139,8 @@ const MOST_PLANES: i32 = 6;
 
 impl Recognised {
     /// The uniforms now.
-    pub(super) fn query(program: u32, template: Template, map: Option<Arc<Image>>) -> Recognised {
+    pub(super) fn query(program: u32, template: Template, images: [Option<Arc<Image>>; 2]) -> Recognised {
+        let [map, picture] = images;
         fn value<const N: usize>(program: u32, name: &str) -> [f32; N] {
             match gl::uniform_location(program, name) {
                 -1 => [0.0; N],
@@ -206,6 +214,9 @@ impl Recognised {
                 viewport: value(program, "vpDims"),
             }),
             map,
+            picture,
+            picture_on_backs: number("showTexturesOnBackface") != 0,
+            turn: template.turned.then(|| value(program, "tcMatrix")),
         }
     }
 
@@ -224,6 +235,8 @@ impl Recognised {
     pub(crate) fn paint(&mut self, color: [f32; 3]) {
         (self.ambient, self.diffuse) = (color, color);
         self.template.colors = Colors::Uniform;
+        self.template.pictured = Pictured::No;
+        self.picture = None;
         self.back = None;
     }
 
@@ -245,6 +258,7 @@ impl Recognised {
     pub(crate) fn is_opaque(&self, attributes: &Attributes, vertices: usize) -> bool {
         self.opacity == 1.0
             && self.back.is_none_or(|b| b.alpha == 1.0)
+            && self.picture_is_opaque()
             && match self.template.colors {
                 Colors::Uniform => true,
                 Colors::Map | Colors::PerCell => self.map.as_ref().is_some_and(|m| m.is_opaque()),
@@ -252,8 +266,17 @@ impl Recognised {
             }
     }
 
-    /// Diffuse colour with its coefficient, and opacity.
+    /// Diffuse colour with its coefficient, and opacity; with the picture on it.
     pub(crate) fn base(&self, a: &Attributes, mesh: &TriMesh, prim: usize, w: [f32; 3]) -> ([f32; 3], f32) {
+        let (color, alpha) = self.ground(a, mesh, prim, w);
+        match self.picture_at(a, mesh, prim, w, None) {
+            Some([r, g, b, share]) => ([color[0] * r, color[1] * g, color[2] * b], alpha * share),
+            None => (color, alpha),
+        }
+    }
+
+    /// The same without the picture.
+    pub(crate) fn ground(&self, a: &Attributes, mesh: &TriMesh, prim: usize, w: [f32; 3]) -> ([f32; 3], f32) {
         let (own, alpha) = self.own_color(a, mesh, prim, w);
         let unlit = if self.template.lit { 0.0 } else { self.ambient_intensity };
         let color: [f32; 3] = match own {
@@ -273,7 +296,7 @@ impl Recognised {
             (Colors::PerVertex, _) if !self.overrides => ProgramSkin::PerVertex(factor),
             (Colors::Map, Some(map)) if !self.overrides => ProgramSkin::Map(map, factor),
             (Colors::PerCell, Some(map)) if !self.overrides => ProgramSkin::PerCell(map, factor),
-            _ => ProgramSkin::Constant,
+            _ => self.picture_alone().map_or(ProgramSkin::Constant, |image| ProgramSkin::Picture(image)),
         }
     }
 
@@ -283,6 +306,7 @@ impl Recognised {
             (self.edges.is_some(), "edges of cells"),
             (self.back.is_some(), "materials of back faces"),
             (self.physical.is_some(), "VTK's rules for physically based materials"),
+            (self.picture.is_some() && self.picture_alone().is_none(), "pictures over other colours"),
         ];
         left_out.into_iter().filter_map(|(there, what)| there.then_some(what))
     }

@@ -1,8 +1,8 @@
 //! VTK's shaders, statement by statement: what each of them means, and whether there are others.
 
 use super::blocks::{
-    BACK, CLIPPED, CLIPS, CLIPS_LATER, EDGES, EMITS, MEASURES, MOST_LIGHTS, WEIGHTED, take, take_lights,
-    take_physical, without_peeling,
+    BACK, CLIPPED, CLIPS, CLIPS_LATER, EDGES, EMITS, MEASURES, MOST_LIGHTS, TURNED, WEIGHTED, take,
+    take_albedo, take_lights, take_physical, take_picture, without_peeling,
 };
 
 /// Where the surface's colour comes from.
@@ -16,6 +16,28 @@ pub(super) enum Colors {
     Map,
     /// Buffer texture `textureC` at the number of the triangle.
     PerCell,
+}
+
+/// What a texture of the actor's does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum Pictured {
+    #[default]
+    No,
+    /// It multiplies the lit colour, by all of its components or by these.
+    Rgba,
+    Rgb,
+    Grey,
+    GreyAlpha,
+    /// It is the colour of a physically based material; its alpha multiplies the opacity, or is it alone.
+    Albedo,
+    AlbedoAlone,
+}
+
+impl Pictured {
+    /// True when light and all is multiplied.
+    pub(super) fn is_over_all(self) -> bool {
+        matches!(self, Pictured::Rgba | Pictured::Rgb | Pictured::Grey | Pictured::GreyAlpha)
+    }
 }
 
 /// What a program does for translucency.
@@ -55,6 +77,10 @@ pub(crate) struct Template {
     /// The material is physically based, and its colours are made linear for it.
     pub(super) physical: bool,
     pub(super) linear: bool,
+    pub(super) pictured: Pictured,
+    /// Colour map and picture have coordinates of their own, and whether a matrix multiplies those.
+    pub(super) two_coordinates: bool,
+    pub(super) turned: bool,
 }
 
 /// Statements of `main`, without blanks and comments; light numbers become `#`.
@@ -96,7 +122,8 @@ impl Template {
             return Err(SHADOW_MAP);
         }
         t.read_vertex(vs).ok_or(NOT_VTK)?;
-        let why = if fs.iter().any(|s| s.contains("texture(actortexture")) { PICTURE } else { UNKNOWN };
+        let pictured = |s: &String| s.contains("texture(actortexture") || s.contains("texture(albedoTex");
+        let why = if fs.iter().any(pictured) { PICTURE } else { UNKNOWN };
         t.read_fragment(fs).ok_or(why)?;
         Ok(t)
     }
@@ -117,6 +144,15 @@ impl Template {
 
     fn read_vertex(&mut self, mut vs: Vec<String>) -> Option<()> {
         self.clipped |= take(&mut vs, CLIPS);
+        let [map, picture] = TURNED.map(|block| take(&mut vs, block));
+        let has = |name: &str| vs.iter().any(|s| s.starts_with(name));
+        let plain = [has("colorTCoordVCVSOutput="), has("tcoordVCVSOutput=")];
+        self.turned = map || picture;
+        self.two_coordinates = (map || plain[0]) && (picture || plain[1]);
+        // A matrix for one kind of coordinates alone.
+        if self.turned && plain != [false; 2] {
+            return None;
+        }
         let known = |s: &String| {
             matches!(
                 s.as_str(),
@@ -142,6 +178,7 @@ impl Template {
         if take(&mut fs, CLIPPED) != self.clipped || take(&mut fs, EDGES) != self.edges {
             return None;
         }
+        self.pictured = take_albedo(&mut fs).or_else(|| take_picture(&mut fs)).unwrap_or_default();
         let physical = take_physical(&mut fs);
         self.physical = physical.is_some();
         self.lit = self.physical;
@@ -222,7 +259,8 @@ impl Template {
 #[cfg(test)]
 mod tests {
     use super::super::blocks::{
-        LAMP, PASSES, PHYSICAL, PHYSICAL_ENDS, PHYSICAL_HEADLIGHT, PHYSICAL_LAMP, PHYSICAL_SUN, SUN,
+        ALBEDO, ALBEDO_ALPHA, COMPONENTS, LAMP, MULTIPLIES, PASSES, PHYSICAL, PHYSICAL_ENDS,
+        PHYSICAL_HEADLIGHT, PHYSICAL_LAMP, PHYSICAL_SUN, READS, SUN,
     };
     use super::*;
 
@@ -309,6 +347,57 @@ mod tests {
                 );
                 assert!(read(&fragment(&format!("{HEAD}{linear}"))).is_err(), "not physically based");
             }
+        }
+    }
+
+    #[test]
+    fn pictures_are_known_where_they_are_the_last_that_happens_to_the_colour() {
+        let on = |picture: &str| {
+            let text = fragment(HEAD);
+            text.replace(" if (fragOutput0.a <= 0.0)", &format!("{picture} if (fragOutput0.a <= 0.0)"))
+        };
+        for (pictured, components) in COMPONENTS {
+            let numbered = |n: &str| {
+                let all = [READS].into_iter().chain(components).chain(MULTIPLIES);
+                all.map(|s| s.replace('#', n) + ";").collect::<String>()
+            };
+            assert_eq!(read(&on(&numbered("0"))).map(|t| t.pictured), Ok(pictured));
+            assert_eq!(read(&on(&numbered("1"))).map(|t| t.pictured), Ok(pictured));
+            assert!(read(&on(&(numbered("0") + &numbered("1")))).is_err(), "two of them");
+            assert!(read(&fragment(&format!("{HEAD}{}", numbered("0")))).is_err(), "too early");
+            let other = numbered("0").replace("fragOutput0*tcolor", "fragOutput0+tcolor");
+            assert_eq!(read(&on(&other)), Err("a picture on a surface of VTK's"));
+        }
+    }
+
+    #[test]
+    fn coordinates_of_pictures_may_have_a_matrix_and_be_apart_from_those_of_colour_maps() {
+        let vertex = |text: &str| {
+            let vs = VERTEX.replace("  vertexVC", &format!("{text};vertexVC"));
+            Template::read(&vs, "", &fragment(HEAD)).map(|t| (t.two_coordinates, t.turned))
+        };
+        let plain = ["colorTCoordVCVSOutput=colorTCoord", "tcoordVCVSOutput=tcoord"];
+        let turned = TURNED.map(|block| block.join(";"));
+        assert_eq!(vertex(plain[1]), Ok((false, false)));
+        assert_eq!(vertex(&plain.join(";")), Ok((true, false)));
+        assert_eq!(vertex(&turned[1]), Ok((false, true)));
+        assert_eq!(vertex(&turned.join(";")), Ok((true, true)));
+        assert!(vertex(&format!("{};{}", plain[0], turned[1])).is_err(), "a matrix for one of them");
+        assert!(vertex(&turned[1].replace("/tcoordTmp.w", "")).is_err());
+    }
+
+    #[test]
+    fn physically_based_materials_have_colours_from_pictures() {
+        for (pictured, alpha) in ALBEDO_ALPHA {
+            let albedo = [ALBEDO[0], ALBEDO[1], alpha].join(";");
+            let text = [PHYSICAL, PHYSICAL_HEADLIGHT, PHYSICAL_ENDS[0]].concat().join(";") + ";";
+            let text = text.replacen(PHYSICAL[0], &albedo, 1);
+            let whole = fragment(&text)
+                .replace("fragOutput0 = vec4(ambientColor + diffuse + specular, opacity);", "");
+            let t = read(&whole).expect("known");
+            assert!(t.physical && t.pictured == pictured);
+            let other = whole.replace("albedoSample.rgb*", "albedoSample.rgb+");
+            assert_eq!(read(&other), Err("a picture on a surface of VTK's"));
         }
     }
 

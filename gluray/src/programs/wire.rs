@@ -1,14 +1,15 @@
-//! Recognised programs as messages to other ranks. The colour map goes by its name.
+//! Recognised programs as messages to other ranks. Colour map and picture go by their names.
 
 use super::color::Surface;
 use super::recognised::{Edges, Lamp, Physical, ProgramLight};
-use super::template::{Colors, Peel, Template};
+use super::template::{Colors, Peel, Pictured, Template};
 use super::{Image, Recognised};
 use crate::ranks::wire::{Malformed, Reader, Wire, put_pods, wire_enum, wire_struct};
 use std::sync::Arc;
 
 wire_enum!(Colors { Uniform, PerVertex, Map, PerCell });
 wire_enum!(Peel { No, Depths, Layers, Weighted });
+wire_enum!(Pictured { No, Rgba, Rgb, Grey, GreyAlpha, Albedo, AlbedoAlone });
 wire_struct!(Template {
     colors,
     overrides,
@@ -23,6 +24,9 @@ wire_struct!(Template {
     edges,
     physical,
     linear,
+    pictured,
+    two_coordinates,
+    turned,
 });
 wire_struct!(Lamp { position, attenuation, cone_deg, exponent });
 wire_struct!(ProgramLight { travels, color, lamp });
@@ -43,14 +47,14 @@ impl Wire for Edges {
 }
 
 impl Recognised {
-    /// The colour map.
-    pub(crate) fn map(&self) -> Option<&Arc<Image>> {
-        self.map.as_ref()
+    /// Colour map and picture.
+    pub(crate) fn images(&self) -> [Option<&Arc<Image>>; 2] {
+        [self.map.as_ref(), self.picture.as_ref()]
     }
 
-    /// The same with a colour map.
-    pub(crate) fn with_map(mut self, map: Option<Arc<Image>>) -> Recognised {
-        self.map = map;
+    /// The same with a colour map and a picture.
+    pub(crate) fn with_images(mut self, [map, picture]: [Option<Arc<Image>>; 2]) -> Recognised {
+        (self.map, self.picture) = (map, picture);
         self
     }
 
@@ -74,6 +78,7 @@ impl Wire for Recognised {
         (self.back, self.physical).put(out);
         self.clip_planes.put(out);
         self.edges.put(out);
+        (self.picture_on_backs, self.turn).put(out);
     }
     fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
         let (clip_from_object, view_from_object) = Wire::get(from)?;
@@ -85,6 +90,7 @@ impl Wire for Recognised {
         let (back, physical) = Wire::get(from)?;
         let clip_planes = Wire::get(from)?;
         let edges = Wire::get(from)?;
+        let (picture_on_backs, turn) = Wire::get(from)?;
         Ok(Recognised {
             clip_from_object,
             view_from_object,
@@ -105,6 +111,9 @@ impl Wire for Recognised {
             clip_planes,
             edges,
             map: None,
+            picture: None,
+            picture_on_backs,
+            turn,
         })
     }
 }

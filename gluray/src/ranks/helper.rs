@@ -148,10 +148,11 @@ impl Helper {
             None => Ok(None),
             Some(n) => self.images.get(&n).cloned().map(Some).ok_or_else(|| lost("image", n)),
         };
-        let [texture, map] = [image(p.images[0])?, image(p.images[1])?];
+        let [texture, map, picture] = p.images.map(image);
+        let texture = texture?;
         let shading = match p.program {
             None => Shading::Fixed,
-            Some(program) => Shading::Program(Arc::new(program.with_map(map))),
+            Some(program) => Shading::Program(Arc::new(program.with_images([map?, picture?]))),
         };
         let draw = Draw {
             geometry: self

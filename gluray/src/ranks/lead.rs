@@ -4,7 +4,7 @@
 
 use super::account::Accounts;
 use super::orders::{ANSWER, AnswerHead, ORDER, Seen, Work, numbers, put_end, put_geometry, put_head, rect};
-use super::parcels::{Parcel, map_of, name_of_attributes, name_of_image};
+use super::parcels::{Parcel, images_of, name_of_attributes, name_of_image};
 use super::rows::{Share, get_rows, most_bytes};
 use super::wire::{Reader, Wire};
 use crate::capture::{Attributes, Shading};
@@ -173,14 +173,15 @@ impl Lead {
             let draw = p.draw;
             let (images, attributes) = (&mut self.images, &mut self.attributes);
             let mut name = |i: &Arc<Image>| images.of(i, name_of_image);
+            let [map, picture] = images_of(draw);
             let parcel = Parcel {
                 geometry: draw.geometry.key,
                 attributes: attributes.of(&draw.attributes, name_of_attributes),
-                images: [p.image.as_ref().map(&mut name), map_of(draw).map(&mut name)],
+                images: [p.image.as_ref().map(&mut name), map.map(&mut name), picture.map(&mut name)],
                 state: (*draw.state).clone(),
                 program: match &draw.shading {
                     Shading::Fixed => None,
-                    Shading::Program(program) => Some((**program).clone().with_map(None)),
+                    Shading::Program(program) => Some((**program).clone().with_images([None, None])),
                 },
                 clip_from_object: draw.clip_from_object,
                 look: draw.look,
@@ -231,8 +232,8 @@ impl Lead {
                 p.draw.attributes.put(&mut attributes);
                 counts[1] += 1;
             }
-            let maps = [p.image.as_ref(), map_of(p.draw)];
-            for (name, image) in parcel.images.iter().zip(maps) {
+            let [map, picture] = images_of(p.draw);
+            for (name, image) in parcel.images.iter().zip([p.image.as_ref(), map, picture]) {
                 if let (Some(name), Some(image)) = (name, image)
                     && has.insert(*name)
                 {

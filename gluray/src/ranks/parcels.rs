@@ -186,11 +186,11 @@ pub(super) fn name_of_image(image: &Image) -> u128 {
     hash(&[b"image", &bytes_of(image)])
 }
 
-/// The image that a draw's program maps values to colours with.
-pub(super) fn map_of(draw: &Draw) -> Option<&Arc<Image>> {
+/// The images of a draw's program: with which it maps values to colours, and which it puts on surfaces.
+pub(super) fn images_of(draw: &Draw) -> [Option<&Arc<Image>>; 2] {
     match &draw.shading {
-        Shading::Fixed => None,
-        Shading::Program(p) => p.map(),
+        Shading::Fixed => [None; 2],
+        Shading::Program(p) => p.images(),
     }
 }
 
@@ -198,8 +198,8 @@ pub(super) fn map_of(draw: &Draw) -> Option<&Arc<Image>> {
 pub(super) struct Parcel {
     pub(super) geometry: u128,
     pub(super) attributes: u128,
-    /// Of texture unit 0, and of the program's colour map.
-    pub(super) images: [Option<u128>; 2],
+    /// Of texture unit 0, of the program's colour map, and of its picture.
+    pub(super) images: [Option<u128>; 3],
     pub(super) state: Snapshot,
     pub(super) program: Option<Recognised>,
     pub(super) clip_from_object: [f32; 16],

@@ -210,7 +210,7 @@ fn program(p: &Prepared<'_>) -> Skin {
     let (a, mesh) = (&*p.draw.attributes, &*p.draw.geometry.mesh);
     let n = mesh.positions.len();
     let (constant, opacity) =
-        if mesh.indices.is_empty() { ([1.0; 3], 1.0) } else { program.base(a, mesh, 0, [1.0, 0.0, 0.0]) };
+        if mesh.indices.is_empty() { ([1.0; 3], 1.0) } else { program.ground(a, mesh, 0, [1.0, 0.0, 0.0]) };
     // VTK's normals have a matrix of their own; the scene has one for positions and normals.
     let to_object = p.normal_from_eye();
     let normals = program.eye_from_normal().map(|m| {
@@ -238,9 +238,14 @@ fn program(p: &Prepared<'_>) -> Skin {
             (Some(Attribute::per_face((0..mesh.indices.len()).map(each).collect())), None, [1.0; 3])
         }
         crate::programs::ProgramSkin::Map(image, scale) => {
-            let each = |i: usize| Vec2::new(a.tex.at(i)[0], a.tex.at(i)[1]);
+            let each = |i: usize| Vec2::from_array(program.map_coordinates(a, i));
             let texture = image.as_texture().map(|t| (Arc::new(t), (0..n).map(each).collect()));
             (None, texture, [scale; 3])
+        }
+        crate::programs::ProgramSkin::Picture(image) => {
+            let each = |i: usize| Vec2::from_array(program.picture_coordinates(a, i));
+            let texture = image.as_texture().map(|t| (Arc::new(t), (0..n).map(each).collect()));
+            (None, texture, constant)
         }
     };
     let smooth = normals.is_some();

@@ -275,6 +275,11 @@ impl Image {
         if i < texels.len() { texels.at(i) } else { [1.0; 4] }
     }
 
+    /// True when its components are red, green, blue and alpha, or the first of these.
+    pub(crate) fn is_of_colors(&self) -> bool {
+        matches!(self.base, Base::Rgb | Base::Rgba)
+    }
+
     /// True when no texel lets anything through.
     pub(crate) fn is_opaque(&self) -> bool {
         let opaque = |l: &Level| match &l.texels {

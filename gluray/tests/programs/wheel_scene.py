@@ -164,6 +164,124 @@ def edges():
             clip(actor, i, (-1, 0.3, -0.6))
 
 
+def picture(components=3, alpha=255, **values):
+    """A texture of squares on gradients."""
+    data = vtk.vtkImageData()
+    data.SetDimensions(64, 32, 1)
+    data.AllocateScalars(vtk.VTK_UNSIGNED_CHAR, components)
+    for x in range(64):
+        for y in range(32):
+            on = (x // 8 + y // 8) % 2
+            texel = 4 * x if on else 255, 40 + 6 * y, 180 if on else 60, alpha if on else 255
+            for k in range(components):
+                data.SetScalarComponentFromDouble(x, y, 0, k, texel[k])
+    out = made("Texture", **values)
+    out.SetInputData(data)
+    return out
+
+
+def pictured(i, texture, data=None, normals=True, cells=False, points=False):
+    """The sphere at place `i`, or other data moved there, with a picture."""
+    actor = sphere(i, normals=normals, cells=cells, points=points)
+    if data is None:
+        data = made("TexturedSphereSource", ThetaResolution=32, PhiResolution=32, Radius=0.5)
+    colored = made("ElevationFilter", LowPoint=(0, 0, -0.5), HighPoint=(0, 0, 0.5))
+    colored.SetInputConnection(data.GetOutputPort())
+    colored.Update()
+    surface = vtk.vtkPolyData()
+    surface.ShallowCopy(colored.GetOutput())
+    if not normals:
+        surface.GetPointData().SetNormals(None)
+    actor.GetMapper().SetInputData(surface)
+    if cells:
+        number_cells(surface, actor.GetMapper(), lambda cell: cell * 7 % 13)
+    if texture is not None:
+        actor.SetTexture(texture)
+    actor.SetPosition(*place(i))
+    actor.GetProperty().SetColor(0.9, 0.8, 0.7)
+    return actor
+
+
+def floor(repeats):
+    """A plane that goes to the back, with the picture on it so many times."""
+    plane = made("PlaneSource", Origin=(-0.5, -0.5, 0.4), Point1=(0.5, -0.5, 0.4), Point2=(-0.5, 0.5, -2))
+    scaled = made("TransformTextureCoords", Scale=(repeats, repeats, 1))
+    scaled.SetInputConnection(plane.GetOutputPort())
+    return scaled
+
+
+def pictures():
+    """On surfaces with and without normals, with and without filters, repeated and not."""
+    pictured(0, picture(Interpolate=1))
+    pictured(1, picture(Interpolate=0), normals=False).GetProperty().SetInterpolationToFlat()
+    pictured(2, picture(Interpolate=1, Repeat=0, EdgeClamp=1), floor(2))
+    pictured(3, picture(4, Interpolate=0), floor(3)).GetProperty().LightingOff()
+
+
+def pictures_smaller():
+    """Much smaller than they are, by mipmaps in one direction and in all."""
+    for i, most in enumerate((1, 1, 4, 16)):
+        texture = picture(Interpolate=1, Mipmap=1)
+        texture.SetMaximumAnisotropicFiltering(most)
+        pictured(i, texture, floor(9) if i else None)
+
+
+def pictures_over_colors():
+    """Over colours of points and cells, and colour maps, whose coordinates are others."""
+    pictured(0, picture(Interpolate=1), points=True)
+    pictured(1, picture(Interpolate=1), normals=False, cells=True)
+    pictured(2, picture(Interpolate=1), points=True).GetMapper().InterpolateScalarsBeforeMappingOn()
+    actor = pictured(3, picture(Interpolate=1), points=True)
+    turn = vtk.vtkInformation()
+    key = getattr(vtk.vtkProp, "GENERAL_TEXTURE_TRANSFORM", None) or vtk.vtkProp.GeneralTextureTransform
+    turn.Set(key(), [2, 0.5, 0, 0.1, -0.3, 1.5, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1], 16)
+    actor.SetPropertyKeys(turn)
+
+
+def pictures_under_lamps():
+    """Lit by lamps; one of them is not on back faces."""
+    lights()
+    renderer.RemoveAllViewProps()
+    for i in range(4):
+        actor = pictured(i, picture(Interpolate=1), normals=i % 2 == 0)
+        if i > 1:
+            clip(actor, i, (-1, 0.3, -0.6))
+        if i == 3:
+            actor.GetProperty().SetShowTexturesOnBackface(False)
+
+
+def translucent_pictures():
+    """With translucent texels, and with an opacity of their own."""
+    pictured(0, picture(4, 120, Interpolate=1))
+    pictured(1, picture(Interpolate=1)).GetProperty().SetOpacity(0.5)
+    pictured(2, picture(4, 30, Interpolate=1), normals=False, points=True)
+    sphere(3, radius=0.3)
+    pictured(3, picture(4, 60, Interpolate=1)).GetProperty().SetOpacity(0.7)
+
+
+def physical_pictures():
+    """Colours of physically based materials, which are in sRGB."""
+    for i in range(4):
+        actor = pictured(i, None, points=i == 3)
+        metal(actor)
+        actor.GetProperty().SetBaseColorTexture(picture(Interpolate=i != 1, UseSRGBColorSpace=1))
+
+
+def images():
+    """Slices of an image through a body, which VTK draws as pictures on planes."""
+    source = made("RTAnalyticSource", WholeExtent=(-10, 10, -10, 10, -10, 10))
+    for i in range(3):
+        mapper = made("ImageSliceMapper", Orientation=i, SliceNumber=2 * i)
+        mapper.SetInputConnection(source.GetOutputPort())
+        image = made("ImageSlice", Mapper=mapper)
+        image.GetProperty().SetColorWindow(200)
+        image.GetProperty().SetColorLevel(160)
+        image.GetProperty().SetInterpolationType(i % 2)
+        renderer.AddViewProp(image)
+    sphere(0, radius=6)
+    renderer.GetActiveCamera().SetPosition(30, 20, 40)
+
+
 def shadows():
     """Lit by lamps, whose shadows VTK adds by drawing everything again."""
     lights()
