@@ -19,7 +19,12 @@ enum Kind {
 fn class(name: &str) -> u32 {
     const PURE: u32 = 0;
     if writes_buffers(name) {
-        return BUFFER;
+        // Shaders that write buffers write images of textures as well.
+        let shaders = name.starts_with("glDispatchCompute") || name.starts_with("glMemoryBarrier");
+        return BUFFER | if shaders { TEXTURE } else { 0 };
+    }
+    if name.starts_with("glXBindTexImage") || name.starts_with("eglBindTexImage") {
+        return TEXTURE;
     }
     let starts = |list: &[&str]| list.iter().any(|p| name.starts_with(p));
     let any = |list: &[&str]| list.contains(&name);
@@ -103,7 +108,7 @@ fn class(name: &str) -> u32 {
         "glPrioritizeTextures",
         "glClientActiveTexture",
     ]) {
-        return 8;
+        return TEXTURE;
     }
     if starts(&["glUniform", "glProgramUniform", "glBindAttribLocation", "glBindFragDataLocation"]) {
         return 64;
@@ -121,11 +126,60 @@ fn class(name: &str) -> u32 {
     {
         return 128;
     }
-    OTHERWISE
+    if leaves_textures(name) { OTHERWISE & !TEXTURE } else { OTHERWISE }
 }
 
 /// The class of calls that write buffers.
 const BUFFER: u32 = 32;
+/// The class of calls that may change textures: we are always told of them, because images are not read again as long as there was none.
+const TEXTURE: u32 = 8;
+
+/// Calls that change much, but no texel and no parameter of a texture. What is drawn into a texture counts when the framebuffer is bound or given up.
+fn leaves_textures(name: &str) -> bool {
+    const BEGINNINGS: &[&str] = &[
+        "glEnable",
+        "glDisable",
+        "glViewport",
+        "glScissor",
+        "glDepth",
+        "glBlend",
+        "glStencil",
+        "glColorMask",
+        "glClipPlane",
+        "glClipControl",
+        "glClampColor",
+        "glCullFace",
+        "glFrontFace",
+        "glPolygon",
+        "glShadeModel",
+        "glAlphaFunc",
+        "glFog",
+        "glLogicOp",
+        "glSampleCoverage",
+        "glSampleMask",
+        "glProvokingVertex",
+        "glPrimitiveRestart",
+        "glReadBuffer",
+        "glReadPixels",
+        "glReadnPixels",
+        "glListBase",
+        "glUseProgram",
+        "glCreateShader",
+        "glCreateProgram",
+        "glShaderSource",
+        "glCompileShader",
+        "glAttachShader",
+        "glDetachShader",
+        "glLinkProgram",
+        "glValidateProgram",
+        "glDeleteShader",
+        "glDeleteProgram",
+        "glBeginQuery",
+        "glEndQuery",
+    ];
+    // Draws of the driver's, too.
+    is_other_draw(name) || BEGINNINGS.iter().any(|b| name.starts_with(b))
+}
 
 /// Calls that write buffers: we are always told of them, because geometry in buffers is not read again as long as nobody writes.
 fn writes_buffers(name: &str) -> bool {
@@ -353,7 +407,7 @@ fn main() {
     names.iter().for_each(|x| writeln!(s, "trampolines::{x},").unwrap());
     writeln!(s, "];\nmod trampolines {{ use super::{{TABLE, ATTENTION, slow, CALLS}};").unwrap();
     for (i, x) in names.iter().enumerate() {
-        let kind = match (hooked(x), flushes(x) || writes_buffers(x)) {
+        let kind = match (hooked(x), flushes(x) || class(x) & (BUFFER | TEXTURE) != 0) {
             (true, _) => Kind::Direct,
             (_, true) => Kind::Always,
             _ => Kind::Watched,

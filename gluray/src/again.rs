@@ -3,21 +3,27 @@
 //!
 //! Two frames are the same when everything that rays and lighting read is: geometry by its key, attributes by their version or bit by bit, state, matrices,
 //! textures, settings. Nothing is taken for the same by samples.
+//!
+//! Draws whose order matters are kept one by one, with all their layers: programs that draw a stencil's values, shadows or user interfaces draw the same
+//! rectangle again and again, some in another colour. Where that colour is all there is to it (no light, texture or fog), the layers get the new one.
 
 use crate::capture::{Attributes, Draw, Shading, Values};
 use crate::config::{Config, Mode, Settings};
 use crate::frame::Pending;
 use crate::overrides::Look;
+use crate::picture::bytes as bytes_of;
 use crate::recorder::same_bits;
 use crate::state::snapshot::Snapshot;
 use crate::texturing::Image;
-use crate::trace::Layer;
+use crate::trace::{Layer, UNCOVERED};
 use std::sync::Arc;
 
 /// Bytes of attributes that are worth keeping for a comparison.
 const MOST_BYTES: usize = 1 << 16;
 /// Pictures that are kept: a frame may have several parts.
 const MOST_PICTURES: usize = 4;
+/// Draws whose order matters that are kept: each is looked for among these.
+const MOST_ORDERED: usize = 16;
 /// Pixels of all of them.
 const MOST_PIXELS: usize = 1 << 24;
 
@@ -34,6 +40,18 @@ pub(crate) struct Drawn {
 enum Kept {
     Version(u64),
     Content(Arc<Attributes>),
+    /// Nothing but one colour, which may be another.
+    Plain,
+}
+
+/// The colour of all fragments of a draw, where it depends on nothing else.
+fn plain_color(d: &Draw) -> Option<[u8; 4]> {
+    let s = &*d.state;
+    let plain = matches!(d.shading, Shading::Fixed) && !s.lighting && s.texture.is_none() && s.fog.is_none();
+    match d.attributes.colors {
+        Values::Constant(color) if plain => Some(bytes_of(color)),
+        _ => None,
+    }
 }
 
 impl Drawn {
@@ -77,6 +95,7 @@ impl Drawn {
             && match &self.attributes {
                 Kept::Version(version) => *version == d.attributes.version,
                 Kept::Content(a) => same(a, &d.attributes),
+                Kept::Plain => plain_color(d).is_some(),
             }
     }
 }
@@ -86,8 +105,14 @@ fn bytes(a: &Attributes) -> usize {
         match v {
             Values::Constant(_) => 0,
             Values::PerVertex(all) => 4 * N * all.len(),
-            // Shared with those who keep it by its content.
-            Values::Packed(_) => 0,
+            // Long arrays are shared with those who keep them by their content.
+            Values::Packed(p) => {
+                if crate::packs::is_shared(p) {
+                    0
+                } else {
+                    p.bytes.len()
+                }
+            }
         }
     }
     of(&a.normals) + of(&a.colors) + of(&a.tex) + size_of_val(&a.materials[..]) + 4 * a.material_of.len()
@@ -98,7 +123,9 @@ fn same(a: &Attributes, b: &Attributes) -> bool {
         match (a, b) {
             (Values::Constant(a), Values::Constant(b)) => same_bits(&[*a], &[*b]),
             (Values::PerVertex(a), Values::PerVertex(b)) => same_bits(a, b),
-            (Values::Packed(a), Values::Packed(b)) => Arc::ptr_eq(a, b),
+            (Values::Packed(a), Values::Packed(b)) => {
+                Arc::ptr_eq(a, b) || !crate::packs::is_shared(a) && a == b
+            }
             _ => false,
         }
     }
@@ -117,11 +144,22 @@ struct Picture {
     age: u32,
 }
 
+/// A draw whose order matters.
+struct Ordered {
+    drawn: Drawn,
+    config: Arc<Config>,
+    layers: Vec<Layer>,
+    /// Frames ago.
+    age: u32,
+}
+
 /// The latest pictures.
 #[derive(Default)]
 pub(crate) struct Again {
     /// The latest come last.
     pictures: Vec<Picture>,
+    /// Likewise.
+    ordered: Vec<Ordered>,
 }
 
 impl Again {
@@ -162,6 +200,49 @@ impl Again {
     pub(crate) fn frame_done(&mut self) {
         self.pictures.iter_mut().for_each(|p| p.age += 1);
         self.pictures.retain(|p| p.age < 2);
+        self.ordered.iter_mut().for_each(|o| o.age += 1);
+        self.ordered.retain(|o| o.age < 2);
+    }
+
+    /// The layers of a draw whose order matters, in its colour, lent until [`Again::keep_ordered`] has them again.
+    pub(crate) fn find_ordered(
+        &mut self,
+        draw: &Draw,
+        image: Option<&Arc<Image>>,
+        config: &Arc<Config>,
+    ) -> Option<Vec<Layer>> {
+        let is = |o: &Ordered| Arc::ptr_eq(&o.config, config) && o.drawn.is(draw, image);
+        let i = self.ordered.iter().position(is)?;
+        let mut layers = self.ordered.remove(i).layers;
+        if let Some(color) = plain_color(draw) {
+            layers.iter_mut().flat_map(|l| &mut l.color).for_each(|c| *c = color);
+        }
+        Some(layers)
+    }
+
+    /// What a draw whose order matters came to.
+    pub(crate) fn keep_ordered(
+        &mut self,
+        draw: &Draw,
+        image: Option<&Arc<Image>>,
+        config: &Arc<Config>,
+        layers: Vec<Layer>,
+    ) {
+        let color = plain_color(draw);
+        let is_plain = |color: [u8; 4]| {
+            let fragments = layers.iter().flat_map(|l| l.color.iter().zip(&l.depth));
+            fragments.filter(|(_, depth)| **depth != UNCOVERED).all(|(c, _)| *c == color)
+        };
+        let Some(mut drawn) = Drawn::one(draw, image) else { return };
+        if color.is_some_and(is_plain) {
+            drawn.attributes = Kept::Plain;
+        }
+        self.ordered.push(Ordered { drawn, config: config.clone(), layers, age: 0 });
+        let pixels =
+            |all: &[Ordered]| all.iter().flat_map(|o| &o.layers).map(|l| l.depth.len()).sum::<usize>();
+        while self.ordered.len() > MOST_ORDERED || pixels(&self.ordered) > MOST_PIXELS {
+            self.ordered.remove(0);
+        }
     }
 }
 
@@ -243,5 +324,44 @@ mod tests {
         again.frame_done();
         again.frame_done();
         assert!(again.find(&first, &config).is_none(), "the frame after is over");
+    }
+
+    #[test]
+    fn draws_in_order_come_again_in_another_colour_only_where_that_is_all_there_is_to_them() {
+        let positions = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let config = config(Mode::Match);
+        let colored = |color: [f32; 4], lit: bool| {
+            let mut d = draw(positions);
+            Arc::make_mut(&mut d.attributes).colors = Values::Constant(color);
+            Arc::make_mut(&mut d.state).lighting = lit;
+            d
+        };
+        let layers =
+            |color| vec![Layer { color: vec![color, [0; 4]], depth: vec![0.5, UNCOVERED], ..layer() }];
+        let [red, green] = [[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0]];
+        for lit in [false, true] {
+            let mut again = Again::default();
+            assert!(again.find_ordered(&colored(red, lit), None, &config).is_none());
+            again.keep_ordered(&colored(red, lit), None, &config, layers([255, 0, 0, 255]));
+            let found = again.find_ordered(&colored(green, lit), None, &config);
+            assert_eq!(found.is_some(), !lit);
+            let Some(found) = found else { continue };
+            assert_eq!((found[0].color[0], found[0].depth[1]), ([0, 255, 0, 255], UNCOVERED));
+            again.keep_ordered(&colored(green, lit), None, &config, found);
+            let mut moved = colored(green, lit);
+            moved.clip_from_object[3] = 0.25;
+            assert!(again.find_ordered(&moved, None, &config).is_none(), "another place");
+            again.frame_done();
+            again.frame_done();
+            assert!(
+                again.find_ordered(&colored(green, lit), None, &config).is_none(),
+                "the frame after is over"
+            );
+        }
+        // Fragments of more than the one colour are not what this is about.
+        let mut again = Again::default();
+        again.keep_ordered(&colored(red, false), None, &config, layers([9, 9, 9, 9]));
+        assert!(again.find_ordered(&colored(green, false), None, &config).is_none());
+        assert!(again.find_ordered(&colored(red, false), None, &config).is_some());
     }
 }

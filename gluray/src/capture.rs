@@ -20,7 +20,7 @@ pub(crate) enum Values<const N: usize> {
 }
 
 /// A tightly packed array as the program gave it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Packed {
     pub(crate) bytes: Vec<u8>,
     pub(crate) kind: u32,

@@ -257,6 +257,7 @@ impl Context {
     /// Current again: the driver may have been told anything meanwhile.
     fn wake(&mut self) {
         self.dirty = class::ALL;
+        self.texture_version += 1;
         self.stale = 0;
         if self.can.version == 0 {
             self.keep_errors();
@@ -328,16 +329,16 @@ impl Context {
         }
         // A program that sets much state between draws pays for the first calls only.
         let told_enough = self.watched >= 12;
-        if (class & class::TEXTURE != 0 || told_enough) && self.state.texture.is_some() {
-            // What was drawn with a texture is drawn with what it is now; of later changes nobody may tell us.
+        if class & class::TEXTURE != 0 && self.state.texture.is_some() {
+            // What was drawn with a texture is drawn with what it is now.
             self.end_batch();
         }
         self.sync();
         self.mark(class);
         self.watched += 1;
         if told_enough && self.recording.is_none() && THREADS.load(Relaxed) == 1 {
-            // Of buffers that are written we are told all the same.
-            self.mark(class::ALL & !class::BUFFER);
+            // Of buffers and textures that are written we are told all the same.
+            self.mark(class::ALL & !(class::BUFFER | class::TEXTURE));
             symbols::relax();
         }
     }
@@ -352,7 +353,8 @@ impl Context {
         if class & class::BUFFER != 0 {
             self.writes().any();
         }
-        self.texture_version += u64::from(class & class::TEXTURE != 0);
+        // Another thread's context may share textures with this one.
+        self.texture_version += u64::from(class & class::TEXTURE != 0 || THREADS.load(Relaxed) > 1);
     }
 
     fn draws_to_front(&self) -> bool {

@@ -54,6 +54,8 @@ pub(crate) struct Surroundings<'a> {
     pub(crate) clear: Vec<bool>,
     pub(crate) diagonal: f64,
     pub(crate) settings: &'a Settings,
+    /// Another number for each sample of a pixel: each adds rays of its own to the mean.
+    sample: i32,
     pub(crate) shadow_rays: AtomicU64,
     pub(crate) occlusion_rays: AtomicU64,
 }
@@ -93,7 +95,11 @@ impl<'a> Surroundings<'a> {
             let m = eye_from_object(p);
             (m.determinant() != 0.0).then(|| m.inverse())
         };
+        // Places are multiples of a sixteenth of a pixel in [-1/2, 1/2).
+        let [x, y] = draws.first().map_or([0.0; 2], |p| p.draw.state.sample_place);
+        let sample = ((x * 256.0) as i32) << 20 ^ ((y * 256.0) as i32) << 11;
         Surroundings {
+            sample,
             object_from_eye: draws.iter().map(invert).collect(),
             clear: vec![false; draws.len()],
             draws,
@@ -121,7 +127,7 @@ impl<'a> Surroundings<'a> {
         // Off the surface by a share of the scene that f32 positions in any of its parts cannot reach.
         let from = point + normal * (self.diagonal * 2e-5);
         let effects = &self.settings.effects;
-        let mut random = Random::new(pixel);
+        let mut random = Random::new((pixel.0 ^ self.sample, pixel.1));
         if effects.shadows {
             for (light, share) in lights.iter().zip(&mut v.lights) {
                 if light.is_at_eye() && effects.light_radius_deg == 0.0 {

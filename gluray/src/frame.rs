@@ -244,18 +244,20 @@ impl Context {
         if !matches!(self.config.settings.mode, Mode::Match | Mode::Phong) {
             crate::view::place(&mut pending);
         }
-        let picture = crate::picture::is_for(&self.config.settings);
-        let places = match picture {
+        let samples = pending[0].0.state.samples.max(1).cast_unsigned();
+        let places = match crate::picture::has_samples_for(&self.config.settings, samples) {
             true => None,
             false => self.sample_places(pending.iter().map(|(d, _)| d)),
         };
         if let Some(places) = places {
             return self.flush_samples(&pending, func, &places);
         }
-        self.warn_of_samples(pending.iter().map(|(d, _)| d));
-        if picture {
-            return self.draw_picture(&pending, func);
+        if crate::picture::is_for(&self.config.settings) {
+            let config = self.config.clone();
+            let settings = crate::picture::with_samples(&config.settings, samples);
+            return self.draw_picture(&pending, func, &settings, None);
         }
+        self.warn_of_samples(pending.iter().map(|(d, _)| d));
         if self.may_be_late(before) {
             return self.flush_late(pending, func);
         }
@@ -328,21 +330,41 @@ impl Context {
             }
         };
         for (draw, sample) in samples {
+            let before = self.frame.again.find_ordered(&draw, image.as_ref(), &self.config);
+            if let Some(layers) = before {
+                self.counters.report.pictures_again += 1;
+                self.put_ordered(&draw, image.as_ref(), layers, sample);
+                continue;
+            }
             let start = Instant::now();
             let mut structures = crate::cache::Structures::default();
-            let image = image.clone();
-            let (layers, rays) = worker::on_pool(|| match Prepared::new(&draw, image, &mut structures) {
+            let texels = image.clone();
+            let (layers, rays) = worker::on_pool(|| match Prepared::new(&draw, texels, &mut structures) {
                 Some(p) => (trace::in_order(&p), p.rays.load(Relaxed)),
                 None => (Vec::new(), 0),
             });
             self.counters.spent("trace", start.elapsed());
             self.counters.rays("primary", rays);
             self.counters.made(structures);
-            self.counters.report.pixels += layers.iter().map(|l| l.covered as u64).sum::<u64>();
-            if !layers.is_empty() {
-                self.present_sample(&layers, Fate::AsDrawn, sample);
-            }
+            self.put_ordered(&draw, image.as_ref(), layers, sample);
         }
+    }
+
+    /// Draws the layers of a draw whose order matters, and keeps them for the next like it.
+    fn put_ordered(
+        &mut self,
+        draw: &Draw,
+        image: Option<&Arc<Image>>,
+        layers: Vec<Layer>,
+        sample: Option<u32>,
+    ) {
+        let start = Instant::now();
+        self.counters.report.pixels += layers.iter().map(|l| l.covered as u64).sum::<u64>();
+        if !layers.is_empty() {
+            self.present_sample(&layers, Fate::AsDrawn, sample);
+        }
+        self.counters.spent("present", start.elapsed());
+        self.frame.again.keep_ordered(draw, image, &self.config, layers);
     }
 
     /// Whoever looks at the screen sees a picture now.

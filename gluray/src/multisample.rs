@@ -6,6 +6,7 @@
 //! of a triangle.
 
 use crate::capture::{Draw, Shading};
+use crate::config::Settings;
 use crate::context::Context;
 use crate::frame::Pending;
 use crate::late;
@@ -59,9 +60,15 @@ impl Context {
 
     /// Traces what is pending for each sample by itself.
     pub(crate) fn flush_samples(&mut self, pending: &[Pending], func: u32, places: &[[f32; 2]]) {
+        // The samples are as many rays as were asked for.
+        let settings = &Settings { samples: 1, ..self.config.settings.clone() };
         for (i, place) in places.iter().enumerate() {
-            let draws = pending.iter().map(|(d, image)| (moved(d, *place), image.clone())).collect();
-            let settings = &self.config.settings;
+            let draws: Vec<Pending> =
+                pending.iter().map(|(d, image)| (moved(d, *place), image.clone())).collect();
+            if crate::picture::is_for(settings) {
+                self.draw_picture(&draws, func, settings, Some(i as u32));
+                continue;
+            }
             let traced = worker::on_pool(|| late::trace(draws, settings));
             self.put(traced, Fate::Surface(func), Some(i as u32));
         }

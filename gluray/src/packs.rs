@@ -17,6 +17,11 @@ pub(crate) struct Packs {
 /// Bytes from which a hash is worth it.
 const WORTH_HASHING: usize = 4096;
 
+/// Whether the same content is the same memory; shorter arrays are copied for each draw.
+pub(crate) fn is_shared(packed: &Packed) -> bool {
+    packed.bytes.len() >= WORTH_HASHING
+}
+
 impl Packs {
     /// `bytes` as an array of such components; `copy` makes the same bytes tightly packed.
     pub(crate) fn get(

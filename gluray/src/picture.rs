@@ -18,6 +18,7 @@ use crate::texturing::Image;
 use crate::trace::{Layer, Prepared, Rect, UNCOVERED};
 use crate::view::{View, views};
 use crate::worker;
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Instant;
@@ -31,6 +32,19 @@ pub(crate) fn is_for(settings: &Settings) -> bool {
     }
 }
 
+/// Whether the mode's own rays smooth silhouettes as well as `samples` of a pixel do: then all samples of a pixel get one colour.
+pub(crate) fn has_samples_for(settings: &Settings, samples: u32) -> bool {
+    settings.mode == Mode::Path || is_for(settings) && settings.samples > samples
+}
+
+/// The settings with at least `samples` rays through a pixel.
+pub(crate) fn with_samples(settings: &Settings, samples: u32) -> Cow<'_, Settings> {
+    match settings.samples < samples {
+        true => Cow::Owned(Settings { samples, ..settings.clone() }),
+        false => Cow::Borrowed(settings),
+    }
+}
+
 /// One view's part of a frame.
 enum Made {
     /// The nearest surfaces are all that is needed.
@@ -39,7 +53,8 @@ enum Made {
     Over { colors: Colors, opaque: Layer, all: Layer },
 }
 
-fn bytes(c: [f32; 4]) -> [u8; 4] {
+/// A colour as the framebuffer has it.
+pub(crate) fn bytes(c: [f32; 4]) -> [u8; 4] {
     c.map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
 }
 
@@ -51,15 +66,21 @@ fn depths(draws: &[Prepared<'_>], settings: &Settings) -> Layer {
 }
 
 impl Context {
-    /// Draws what is pending as a picture.
-    pub(crate) fn draw_picture(&mut self, pending: &[(Draw, Option<Arc<Image>>)], func: u32) {
+    /// Draws what is pending as a picture, or into one sample of each pixel.
+    pub(crate) fn draw_picture(
+        &mut self,
+        pending: &[(Draw, Option<Arc<Image>>)],
+        func: u32,
+        settings: &Settings,
+        sample: Option<u32>,
+    ) {
         let start = Instant::now();
         self.keep_errors();
         let [r, g, b, _] = gl::floats::<4>(COLOR_CLEAR_VALUE);
         self.drop_errors();
         let (mut structures, mut primary) = (Structures::default(), 0);
         let groups = views(pending.iter().map(|(d, _)| d));
-        let (settings, studio) = (&self.config.settings, &mut self.studio);
+        let studio = &mut self.studio;
         let mut made: Vec<Made> = Vec::new();
         let mut warnings = Vec::new();
         worker::on_pool(|| {
@@ -86,7 +107,7 @@ impl Context {
                     rays.into_iter().for_each(|(kind, n)| self.counters.rays(kind, n));
                     self.counters.report.pixels += layer.covered as u64;
                     if layer.covered > 0 {
-                        self.present(&[layer], Fate::Surface(func));
+                        self.present_sample(&[layer], Fate::Surface(func), sample);
                     }
                 }
                 Made::Over { colors, opaque, all } => {
@@ -94,10 +115,10 @@ impl Context {
                     let [solid, fringe] = split(&colors, &opaque, &all);
                     self.counters.report.pixels += (solid.covered + fringe.covered) as u64;
                     if solid.covered > 0 {
-                        self.present(&[solid], Fate::Over(func));
+                        self.present_sample(&[solid], Fate::Over(func), sample);
                     }
                     if fringe.covered > 0 {
-                        self.present(&[fringe], Fate::Fringe(func));
+                        self.present_sample(&[fringe], Fate::Fringe(func), sample);
                     }
                 }
             }

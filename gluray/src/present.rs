@@ -32,21 +32,28 @@ pub(crate) enum Fate {
 pub(crate) struct Presenter {
     pub(crate) images: Images,
     program: u32,
-    places: Option<[i32; 2]>,
+    /// How much of the textures a layer takes up.
+    part: i32,
     textures: [u32; 2],
     size: [i32; 2],
     vertex_array: u32,
     failed: bool,
 }
 
+// Where a fragment lies in the layer comes from the corners, not from gl_FragCoord: for that Mesa keeps a constant which says whether rows are turned
+// over, and forgets to renew it when between a pass into a framebuffer object and one into the window there was only a clear.
 const VERTEX_120: &str = "#version 120
-void main() { gl_Position = gl_Vertex; }
+uniform vec4 part;
+varying vec2 at;
+void main() {
+    at = (0.5 * gl_Vertex.xy + 0.5) * part.xy;
+    gl_Position = gl_Vertex;
+}
 ";
 const FRAGMENT_120: &str = "#version 120
 uniform sampler2D colors, depths;
-uniform vec4 window;
+varying vec2 at;
 void main() {
-    vec2 at = (gl_FragCoord.xy - window.xy) * window.zw;
     float z = texture2D(depths, at).r;
     if (z > 1.5) discard;
     gl_FragDepth = z;
@@ -54,22 +61,23 @@ void main() {
 }
 ";
 const VERTEX_150: &str = "#version 150
-uniform vec4 quad;
+uniform vec4 part;
+out vec2 at;
 void main() {
     vec2 c = vec2(gl_VertexID & 1, gl_VertexID >> 1);
-    gl_Position = vec4(mix(quad.xy, quad.zw, c), 0.0, 1.0);
+    at = c * part.xy;
+    gl_Position = vec4(2.0 * c - 1.0, 0.0, 1.0);
 }
 ";
 const FRAGMENT_150: &str = "#version 150
 uniform sampler2D colors, depths;
-uniform vec4 window;
+in vec2 at;
 out vec4 color;
 void main() {
-    ivec2 at = ivec2(gl_FragCoord.xy - window.xy);
-    float z = texelFetch(depths, at, 0).r;
+    float z = texelFetch(depths, ivec2(at), 0).r;
     if (z > 1.5) discard;
     gl_FragDepth = z;
-    color = texelFetch(colors, at, 0);
+    color = texelFetch(colors, ivec2(at), 0);
 }
 ";
 
@@ -105,7 +113,7 @@ impl Presenter {
             return false;
         }
         self.program = program;
-        self.places = Some([gl::uniform_location(program, "window"), gl::uniform_location(program, "quad")]);
+        self.part = gl::uniform_location(program, "part");
         gl::use_program(program);
         gl::uniform1i(gl::uniform_location(program, "colors"), 0);
         gl::uniform1i(gl::uniform_location(program, "depths"), 1);
@@ -358,13 +366,12 @@ impl Context {
             p.upload(layer);
             // One pixel of the viewport is one texel: the viewport is the rectangle itself.
             gl::viewport(x, y, w, h);
-            let [window, quad] = p.places.unwrap_or([-1; 2]);
+            let [wide, high] = [w as f32, h as f32];
             if core {
-                gl::uniform4f(window, x as f32, y as f32, 0.0, 0.0);
-                gl::uniform4f(quad, -1.0, -1.0, 1.0, 1.0);
+                gl::uniform4f(p.part, wide, high, 0.0, 0.0);
                 gl::draw_arrays(TRIANGLE_STRIP, 0, 4);
             } else {
-                gl::uniform4f(window, x as f32, y as f32, 1.0 / p.size[0] as f32, 1.0 / p.size[1] as f32);
+                gl::uniform4f(p.part, wide / p.size[0] as f32, high / p.size[1] as f32, 0.0, 0.0);
                 gl::begin(TRIANGLE_STRIP);
                 for (x, y) in [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)] {
                     gl::vertex4f(x, y, 0.0, 1.0);

@@ -136,6 +136,43 @@ fn translucent_surfaces_are_sorted_by_rays() {
     assert!(matched.pixels == native.pixels && report.traced_draws == 0, "match is the driver's picture");
 }
 
+/// Pixels with a channel off by more than 8.
+fn off(a: &Picture, b: &Picture) -> usize {
+    let far = |(p, q): (&[u8; 3], &[u8; 3])| (0..3).any(|k| p[k].abs_diff(q[k]) > 8);
+    a.pixels.iter().zip(&b.pixels).filter(|(p, q)| far((p, q))).count()
+}
+
+#[test]
+fn silhouettes_have_the_samples_of_the_window_in_all_modes() {
+    const PLAIN: [&str; 4] =
+        ["--set", "effects.shadows=false", "--set", "effects.ambient_occlusion_samples=0"];
+    let Some((native, _)) = draw("samples_of_silhouettes", None) else { return };
+    // How much there is to be wrong: the same without samples, by pixels in the middle of edges.
+    let mixed = native.pixels.iter().filter(|p| native.pixels.iter().filter(|q| q == p).count() < 20).count();
+    assert!(mixed > 300, "{mixed} pixels on silhouettes");
+    for (mode, more) in
+        [("match", ""), ("phong", ""), ("rich", ""), ("rich", "material.mirror=0.01"), ("enhance", "samples=3")]
+    {
+        let mut options = vec!["--mode", mode];
+        options.extend(PLAIN);
+        options.extend(if more.is_empty() { vec![] } else { vec!["--set", more] });
+        let (ours, report) = draw("samples_of_silhouettes", Some(&options)).expect("it ran before");
+        let different = off(&native, &ours);
+        println!("{mode} {more}: {different} of {mixed}");
+        assert!(different * 50 <= mixed, "{mode} {more}: {different} of {mixed} pixels");
+        assert!(report.traced_draws == 14 && report.problems.is_empty(), "{mode} {more}: {report:?}");
+    }
+    // More rays than samples smooth silhouettes by themselves.
+    let options = ["--mode", "rich", PLAIN[0], PLAIN[1], PLAIN[2], PLAIN[3], "--set", "samples=64"];
+    let (ours, report) = draw("samples_of_silhouettes", Some(&options)).expect("it ran before");
+    let mean_difference = native.pixels.iter().zip(&ours.pixels).map(|(p, q)| {
+        (0..3).map(|k| f64::from(p[k].abs_diff(q[k]))).sum::<f64>()
+    });
+    let mean_difference = mean_difference.sum::<f64>() / (3 * mixed) as f64;
+    println!("rich samples=64: {mean_difference}");
+    assert!(mean_difference < 30.0 && report.problems.is_empty(), "{mean_difference}, {:?}", report.problems);
+}
+
 #[test]
 fn a_lens_blurs_what_is_out_of_focus_and_is_refused_by_name_without_perspective() {
     let options =

@@ -38,6 +38,9 @@ const FILLED: &[&str] = &[
     "fbo-alphatest-formats -auto -fbo",
     "fbo-clear-formats GL_EXT_texture_snorm -auto -fbo",
     "tex-srgb -auto",
+    "ext_framebuffer_object-mipmap -auto -fbo",
+    "fbo-srgb -auto -fbo",
+    "fbo-clear-formats GL_EXT_packed_depth_stencil stencil -auto -fbo",
 ];
 /// Tests of errors, selection and what else must not suffer.
 const OTHERS: &[&str] = &[

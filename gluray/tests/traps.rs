@@ -87,3 +87,8 @@ fn mipmaps_in_views_of_odd_heights() {
 fn colour_material_with_the_same_colour_again() {
     draws("colour_material_with_the_same_colour_again", true, &[]);
 }
+
+#[test]
+fn a_framebuffer_object_and_then_the_window() {
+    draws("a_framebuffer_object_and_then_the_window", true, &["--trace", "all"]);
+}

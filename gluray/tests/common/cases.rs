@@ -3,15 +3,24 @@
 use super::{Picture, Run, Xvfb, folder, metrics, peer};
 use std::path::Path;
 
-/// Colour (top row first) and depth (bottom row first) of a case.
-fn read(file: &Path) -> (Picture, Vec<f32>) {
+/// Colours and depths, bottom row first.
+pub(crate) type Seen = (Picture, Vec<f32>);
+
+/// The pictures that a program wrote one after the other.
+pub(crate) fn read(file: &Path) -> Vec<Seen> {
     let bytes = std::fs::read(file).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
     let word = |i: usize| u32::from_ne_bytes(bytes[i..i + 4].try_into().expect("four bytes"));
-    let (width, height) = (word(0) as usize, word(4) as usize);
-    let n = width * height;
-    let pixels: Vec<[u8; 3]> = bytes[8..8 + 4 * n].chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect();
-    let depth = (0..n).map(|i| f32::from_bits(word(8 + 4 * n + 4 * i))).collect();
-    (Picture { width, height, pixels }, depth)
+    let (mut all, mut at) = (Vec::new(), 0);
+    while at < bytes.len() {
+        let (width, height) = (word(at) as usize, word(at + 4) as usize);
+        let (n, colors) = (width * height, at + 8);
+        let pixels = bytes[colors..colors + 4 * n].chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect();
+        let depths = colors + 4 * n;
+        let depth = (0..n).map(|i| f32::from_bits(word(depths + 4 * i))).collect();
+        all.push((Picture { width, height, pixels }, depth));
+        at = depths + 4 * n;
+    }
+    all
 }
 
 /// What a case must do besides agreeing with the driver.
@@ -22,6 +31,18 @@ pub(crate) struct Expected {
 
 /// Cases whose triangles the driver has to clip.
 const CLIPPED: [&str; 2] = ["vertices_behind_the_eye", "levels_and_limits_of_textures"];
+
+/// Asserts that colours are the driver's as far as those of two rasterizers are, and depths to `steps` of 24 bits.
+pub(crate) fn assert_agrees(what: &str, (native, native_depth): &Seen, (ours, depth): &Seen, steps: f32) -> metrics::Metrics {
+    assert!(native.pixels.iter().any(|p| *p != native.pixels[0]), "{what} draws something");
+    let m = metrics::compare(native, ours);
+    let filled = m.raw <= 0.5 && m.interior <= 1.0 && m.interior_p99 <= 4.0 && m.overlap >= 0.995;
+    assert!(filled, "{what}: {m:?}");
+    let is_off = |(a, b): &(&f32, &f32)| (**a - **b).abs() > steps / 16_777_216.0;
+    let far = native_depth.iter().zip(depth).filter(is_off).count();
+    assert!(far * 200 <= depth.len(), "{what}: {far} of {} depths are off", depth.len());
+    m
+}
 
 /// Runs `case` of `script` (in `tests/programs`) both ways and compares. Without the peers it says that pictures are the same, as [`peer`] has it.
 pub(crate) fn check(script: &str, case: &str, expected: &Expected, options: &[&str]) -> metrics::Metrics {
@@ -35,20 +56,13 @@ pub(crate) fn check(script: &str, case: &str, expected: &Expected, options: &[&s
         let text = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(expected.exit), "{case}: {text}");
         assert_eq!(text, "", "{case}: we must be silent");
-        (read(&place.path().join(out)), report)
+        (read(&place.path().join(out)).pop().expect("a picture"), report)
     };
-    let ((native, native_depth), _) = run(None, "native");
-    let ((ours, depth), report) = run(Some(options), "ours");
+    let (native, _) = run(None, "native");
+    let (ours, report) = run(Some(options), "ours");
     assert_eq!(report.traced_draws > 0, expected.traced, "{case}: {report:?}");
-    assert!(native.pixels.iter().any(|p| *p != native.pixels[0]), "{case} draws something");
-    let m = metrics::compare(&native, &ours);
-    let filled = m.raw <= 0.5 && m.interior <= 1.0 && m.interior_p99 <= 4.0 && m.overlap >= 0.995;
-    assert!(filled, "{case}: {m:?}");
     // Where both pictures have the same surface its depth is the driver's to four steps of 24 bits. Of triangles that it had to clip
     // llvmpipe interpolates from rounded new corners: up to seven steps off the plane were measured, where ours is on it.
     let steps = if CLIPPED.contains(&case) { 8.0 } else { 4.0 };
-    let is_off = |(a, b): &(&f32, &f32)| (**a - **b).abs() > steps / 16_777_216.0;
-    let far = native_depth.iter().zip(&depth).filter(is_off).count();
-    assert!(far * 200 <= depth.len(), "{case}: {far} of {} depths are off", depth.len());
-    m
+    assert_agrees(case, &native, &ours, steps)
 }

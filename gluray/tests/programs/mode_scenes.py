@@ -69,6 +69,21 @@ def sheets_blended_in_the_wrong_order():
         end()
 
 
+def samples_of_silhouettes():
+    """Unlit boards of many directions in a framebuffer of four samples a pixel: nothing but silhouettes tells modes from the driver."""
+    start(perspective=True)
+    for k in range(14):
+        F("glPushMatrix")()
+        rotate(25.7 * k, 0.1, 0.2, 1)
+        translate(0.15 * (k % 3), 0.1, -0.12 * k)
+        color((k % 3) / 2, (k % 5) / 4, (k % 2), 1)
+        begin(TRIANGLES)
+        for x, y in ((0.1, -0.08), (1.4, 0.02), (0.1, 0.15)):
+            vertex(x, y, 0.02 * k)
+        end()
+        F("glPopMatrix")()
+
+
 def glsl(vertex_text, fragment_text, names):
     program = F("glCreateProgram")()
     for kind, text in ((0x8B31, vertex_text), (0x8B30, fragment_text)):

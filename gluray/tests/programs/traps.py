@@ -302,4 +302,38 @@ def colour_material_with_the_same_colour_again():
         F("glMaterialfv", c_uint, c_uint, c_void_p)(0x0408, 0x1200, (c_float * 4)(0.05, 0.1, 0.2, 1))
 
 
+def a_framebuffer_object_and_then_the_window():
+    """Rows of the window are turned over for the driver, those of a framebuffer object are not; between the two only colours are cleared."""
+    start()
+    disable(0x0B71)
+    for name in ("glGenFramebuffers", "glGenTextures"):
+        F(name, c_int, c_void_p)(1, (c_uint * 1)())
+    bind = F("glBindFramebuffer", c_uint, c_uint)
+    for turn in range(2):
+        bind(0x8D40, 1)
+        F("glBindTexture", c_uint, c_uint)(0x0DE1, 1)
+        F("glTexImage2D", c_uint, c_int, c_int, c_int, c_int, c_int, c_uint, c_uint, c_void_p)(0x0DE1, 0, 0x1908, W, H, 0, 0x1908, 0x1401, None)
+        F("glTexParameteri", c_uint, c_uint, c_int)(0x0DE1, 0x2801, 0x2600)
+        F("glFramebufferTexture2D", *[c_uint] * 4, c_int)(0x8D40, 0x8CE0, 0x0DE1, 1, 0)
+        assert F("glCheckFramebufferStatus", c_uint)(0x8D40) == 0x8CD5
+        clear(0x4000)
+        color(1, turn, 0.2, 1)
+        begin(POLYGON)
+        for x, y in ((-1.2, -1.2), (0.1, -1.2), (-0.9, 0.1)):
+            vertex(x + turn, y, 0)
+        end()
+        bind(0x8D40, 0)
+        if turn == 0:
+            clear(0x4000)
+        # The same rectangle of pixels.
+        color(0.3, turn, 1, 1)
+        begin(POLYGON)
+        for x, y in ((-1.2, -1.2), (0.1, -1.2), (-0.9, 0.1)):
+            vertex(x + turn, y, 0)
+        end()
+    enable(0x0DE1)
+    F("glTexEnvi", c_uint, c_uint, c_int)(0x2300, 0x2200, 0x1E01)
+    textured(-0.2, 0.4)
+
+
 run(globals())
