@@ -9,6 +9,7 @@ mod fragments;
 mod in_order;
 mod lifted;
 mod nearest;
+mod outlines;
 mod peeled;
 mod rays;
 
