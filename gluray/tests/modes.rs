@@ -150,9 +150,13 @@ fn silhouettes_have_the_samples_of_the_window_in_all_modes() {
     // How much there is to be wrong: the same without samples, by pixels in the middle of edges.
     let mixed = native.pixels.iter().filter(|p| native.pixels.iter().filter(|q| q == p).count() < 20).count();
     assert!(mixed > 300, "{mixed} pixels on silhouettes");
-    for (mode, more) in
-        [("match", ""), ("phong", ""), ("rich", ""), ("rich", "material.mirror=0.01"), ("enhance", "samples=3")]
-    {
+    for (mode, more) in [
+        ("match", ""),
+        ("phong", ""),
+        ("rich", ""),
+        ("rich", "material.mirror=0.01"),
+        ("enhance", "samples=3"),
+    ] {
         let mut options = vec!["--mode", mode];
         options.extend(PLAIN);
         options.extend(if more.is_empty() { vec![] } else { vec!["--set", more] });
@@ -165,9 +169,11 @@ fn silhouettes_have_the_samples_of_the_window_in_all_modes() {
     // More rays than samples smooth silhouettes by themselves.
     let options = ["--mode", "rich", PLAIN[0], PLAIN[1], PLAIN[2], PLAIN[3], "--set", "samples=64"];
     let (ours, report) = draw("samples_of_silhouettes", Some(&options)).expect("it ran before");
-    let mean_difference = native.pixels.iter().zip(&ours.pixels).map(|(p, q)| {
-        (0..3).map(|k| f64::from(p[k].abs_diff(q[k]))).sum::<f64>()
-    });
+    let mean_difference = native
+        .pixels
+        .iter()
+        .zip(&ours.pixels)
+        .map(|(p, q)| (0..3).map(|k| f64::from(p[k].abs_diff(q[k]))).sum::<f64>());
     let mean_difference = mean_difference.sum::<f64>() / (3 * mixed) as f64;
     println!("rich samples=64: {mean_difference}");
     assert!(mean_difference < 30.0 && report.problems.is_empty(), "{mean_difference}, {:?}", report.problems);

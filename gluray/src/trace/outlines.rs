@@ -150,9 +150,8 @@ mod tests {
 
     fn marked(depth: impl Fn(usize, usize) -> Option<f64>) -> Vec<(usize, usize)> {
         let d = Depths::new(&seen(depth));
-        let row = |y: usize| (0..SIDE).filter(move |x| d.outline(y) >> x & 1 == 1).map(move |x| (x, y));
-        let d = (0..SIDE).map(row.clone());
-        d.flatten().collect()
+        let all = (0..SIDE * SIDE).map(|i| (i % SIDE, i / SIDE));
+        all.filter(|(x, y)| d.outline(*y) >> x & 1 == 1).collect()
     }
 
     #[test]

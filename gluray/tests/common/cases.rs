@@ -33,7 +33,12 @@ pub(crate) struct Expected {
 const CLIPPED: [&str; 2] = ["vertices_behind_the_eye", "levels_and_limits_of_textures"];
 
 /// Asserts that colours are the driver's as far as those of two rasterizers are, and depths to `steps` of 24 bits.
-pub(crate) fn assert_agrees(what: &str, (native, native_depth): &Seen, (ours, depth): &Seen, steps: f32) -> metrics::Metrics {
+pub(crate) fn assert_agrees(
+    what: &str,
+    (native, native_depth): &Seen,
+    (ours, depth): &Seen,
+    steps: f32,
+) -> metrics::Metrics {
     assert!(native.pixels.iter().any(|p| *p != native.pixels[0]), "{what} draws something");
     let m = metrics::compare(native, ours);
     let filled = m.raw <= 0.5 && m.interior <= 1.0 && m.interior_p99 <= 4.0 && m.overlap >= 0.995;
