@@ -9,7 +9,6 @@ mod fragments;
 mod in_order;
 mod lifted;
 mod nearest;
-mod outlines;
 mod peeled;
 mod rays;
 

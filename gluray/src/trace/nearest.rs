@@ -2,7 +2,6 @@
 
 use super::batch::Batch;
 use super::fragments::{FragmentBlock, Lane};
-use super::outlines;
 use super::rays::{BLOCKS, TileRays, slot};
 use super::{DEPTH_STEPS, Fragment, Layer, Prepared, Rect, TILE, UNCOVERED, to_bytes};
 use crate::config::{Mode, Settings};
@@ -26,36 +25,12 @@ pub(super) struct Seen {
     pub(super) fragment: Fragment,
 }
 
-impl Seen {
-    pub(super) const NOTHING: Seen = Seen {
-        depth_bits: u32::MAX,
-        draw: u32::MAX,
-        prim: 0,
-        fragment: Fragment { weights: [0.0; 3], depth: 0.0, plain_depth: 0.0, front: true },
-    };
-
-    pub(super) fn new(depth_bits: u32, draw: u32, prim: u32, fragment: Fragment) -> Seen {
-        Seen { depth_bits, draw, prim, fragment }
-    }
-
-    /// Its depth; [`UNCOVERED`] where nothing was seen.
-    #[inline]
-    pub(super) fn depth(&self) -> f32 {
-        if self.draw == u32::MAX { UNCOVERED } else { self.fragment.depth as f32 }
-    }
-
-    pub(super) fn is(&self, draw: u32, prim: u32) -> bool {
-        self.draw == draw && self.prim == prim
-    }
-
-    /// The depth test, for draws that come in any order.
-    pub(super) fn take(&mut self, other: Seen, later_wins_ties: bool) {
-        let tie = other.depth_bits == self.depth_bits && later_wins_ties && other.draw >= self.draw;
-        if other.depth_bits < self.depth_bits || tie {
-            *self = other;
-        }
-    }
-}
+const NOTHING: Seen = Seen {
+    depth_bits: u32::MAX,
+    draw: u32::MAX,
+    prim: 0,
+    fragment: Fragment { weights: [0.0; 3], depth: 0.0, plain_depth: 0.0, front: true },
+};
 
 /// What a thread needs for a tile.
 struct Desk {
@@ -71,7 +46,7 @@ impl Desk {
             rays: TileRays::new(),
             fragments: [const { FragmentBlock::EMPTY }; BLOCKS],
             moved: [f64::NAN; PIXELS],
-            seen: [Seen::NOTHING; PIXELS],
+            seen: [NOTHING; PIXELS],
         })
     }
 }
@@ -104,7 +79,6 @@ pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings, share: Share)
             if !any {
                 continue;
             }
-            outlines::look_beside(draws, tile, &mut desk.rays, &mut desk.seen);
             for (j, s) in desk.seen.iter().enumerate().filter(|(_, s)| s.draw != u32::MAX) {
                 let (tx, ty) = (j % TILE as usize, j / TILE as usize);
                 let k = ty * w + (x - rect.x) as usize + tx;
@@ -141,7 +115,7 @@ fn see(p: &Prepared<'_>, index: u32, area: Rect, desk: &mut Desk, begun: bool) -
         return false;
     }
     if !begun {
-        seen.fill(Seen::NOTHING);
+        seen.fill(NOTHING);
     }
     let later_wins_ties = p.draw.state.depth_func == LEQUAL;
     let (hits, range) = (&rays.hits, p.draw.state.depth_range);

@@ -189,29 +189,6 @@ impl Bundle {
         Half { origin, dir, back, from: t0 - back, to: t1 - back, some: t0.simd_lt(t1).to_bitmask() & !none }
     }
 
-    /// The ray through one point of the window.
-    #[inline]
-    fn ray(&self, x: f64, y: f64) -> Option<Ray> {
-        let (mut t0, mut t1) = (f64::NEG_INFINITY, f64::INFINITY);
-        for [above, along] in &self.planes {
-            let (a, b) = (above.at(x, y), along.at(x, y));
-            if b > 0.0 {
-                t0 = t0.max(-a / b);
-            } else if b < 0.0 {
-                t1 = t1.min(-a / b);
-            } else if a < 0.0 {
-                return None;
-            }
-        }
-        let back = if t0 < 0.0 && t0 > f64::NEG_INFINITY { t0 } else { self.start };
-        let dir = self.dir.map(|d| d.at(x, y));
-        let origin = [0, 1, 2].map(|k| (self.origin[k].at(x, y) + dir[k] * back) as f32);
-        let (t_min, t_max) = (((t0 - back) as f32).max(0.0), (t1 - back) as f32);
-        let t_max = if t_max < f32::MAX { t_max + t_max.abs() * 1.2e-7 } else { f32::INFINITY };
-        let dir = dir.map(|d| d as f32);
-        (t0 < t1).then(|| Ray { origin: origin.into(), dir: dir.into(), t_min, t_max })
-    }
-
     /// The parameter, from the ray's own origin on, at which the ray through (`x`, `y`) has this z by w.
     #[inline]
     fn parameter(&self, x: f64, y: f64, z_by_w: f64, shift: f64) -> f32 {
@@ -229,8 +206,6 @@ pub(super) struct TileRays {
     /// A second look behind the first hits.
     behind: Vec<RayBlock>,
     pub(super) overtakers: Vec<HitBlock>,
-    /// Hits of [`TileRays::send_points`], in the order of the points.
-    pub(super) beside: Vec<HitBlock>,
 }
 
 impl TileRays {
@@ -242,29 +217,7 @@ impl TileRays {
             shift: [[0.0; LANES]; BLOCKS],
             behind: vec![RayBlock::INACTIVE; BLOCKS],
             overtakers: vec![HitBlock::MISS; BLOCKS],
-            beside: vec![HitBlock::MISS; BLOCKS],
         }
-    }
-
-    /// Points that [`TileRays::send_points`] takes at a time.
-    pub(super) fn room(&self) -> usize {
-        self.behind.len() * LANES
-    }
-
-    /// Sends rays through points of the window. False when nothing was hit.
-    pub(super) fn send_points(&mut self, p: &Prepared<'_>, points: impl Iterator<Item = [f64; 2]>) -> bool {
-        let mut n = 0;
-        for ([x, y], i) in points.zip(0..self.room()) {
-            if let Some(ray) = p.bundle.ray(x, y) {
-                self.behind[i / LANES].set(i % LANES, &ray);
-            }
-            n = i / LANES + 1;
-        }
-        let (rays, hits) = (&mut self.behind[..n], &mut self.beside[..n]);
-        hits.fill(HitBlock::MISS);
-        p.world.closest_coherent(rays, hits);
-        rays.iter_mut().for_each(|b| b.t_max = [-1.0; LANES]);
-        hits.iter().any(|h| h.prim.iter().any(|p| *p != rt_core::ray::NO_HIT))
     }
 
     /// Sends rays through the pixels of `area`, which is no larger than a tile. False when nothing was hit.
