@@ -41,7 +41,7 @@ fn clock(place: &Path) -> PathBuf {
 
 #[test]
 fn screensavers_draw_the_drivers_pictures() {
-    let Some(gears) = peer("RTSV_XSCREENSAVER") else { return };
+    let (Some(gears), Some(_)) = (peer("RTSV_XSCREENSAVER"), peer("RTSV_XSCREENSAVER_EXTRA")) else { return };
     let Some(x) = Xvfb::start() else { return };
     let place = folder();
     let clock = clock(place.path());
@@ -59,8 +59,8 @@ fn screensavers_draw_the_drivers_pictures() {
             let (_, report) = run.program(Path::new("/usr/bin/env"), &arguments);
             (Picture::read(&out), report)
         };
-        let (native, _) = run(None, "native.ppm");
-        let (ours, report) = run(Some(&[]), "ours.ppm");
+        let (native, _) = run(None, &format!("{name}-native.ppm"));
+        let (ours, report) = run(Some(&[]), &format!("{name}-ours.ppm"));
         let m = compare(&native, &ours);
         let good = m.raw <= 0.2 && m.tolerant <= 0.02 && m.interior <= 1.0 && m.interior_p99 <= 4.0;
         let same = native.pixels == ours.pixels;

@@ -43,6 +43,7 @@ const PACKAGES: &[(&str, &str)] = &[
     ("pymol", "an OpenGL program with fog"),
     ("piglit", "tests of OpenGL itself"),
     ("xscreensaver-gl", "small animated OpenGL programs of all kinds"),
+    ("xscreensaver-gl-extra", "more of them"),
 ];
 
 /// Debian packages that conflict with some above, so they are unpacked in `target/peers/vtk91` instead of installed.
@@ -64,6 +65,7 @@ const PROGRAMS: &[(&str, &str, &str)] = &[
     ("PyMOL", "RTSV_PYMOL", "/usr/bin/pymol"),
     ("glxgears", "RTSV_GLXGEARS", "/usr/bin/glxgears"),
     ("xscreensaver-gl", "RTSV_XSCREENSAVER", "/usr/libexec/xscreensaver/gears"),
+    ("xscreensaver-gl-extra", "RTSV_XSCREENSAVER_EXTRA", "/usr/libexec/xscreensaver/sballs"),
 ];
 
 /// Wheels, with the versions that our numbers were measured with, and what each is for.

@@ -84,19 +84,19 @@ fn open(library: &CStr) -> *mut c_void {
     unsafe { libc::dlopen(library.as_ptr(), libc::RTLD_LAZY | libc::RTLD_LOCAL) }
 }
 
-/// Puts our own functions where libraries that are opened later look for OpenGL's, as `LD_PRELOAD` does. Mesa does this with its own when a first context is
-/// made: calls of plugins, and of libraries that a script opens, would go past GLVND, and so past us.
-pub(crate) fn be_found_first() {
-    let ours = be_found_first as *const c_void;
-    // SAFETY: all zero is a value of this plain structure.
-    let mut about: libc::Dl_info = unsafe { core::mem::zeroed() };
-    // SAFETY: an address of our own code, and room for the answer.
-    if unsafe { libc::dladdr(ours, &raw mut about) } == 0 || about.dli_fname.is_null() {
-        return;
-    }
-    let how = libc::RTLD_LAZY | libc::RTLD_NOLOAD | libc::RTLD_GLOBAL;
-    // SAFETY: the C string that `dladdr` gave.
-    unsafe { libc::dlopen(about.dli_fname, how) };
+/// Puts GLVND's functions before Mesa's where libraries that are opened later look for OpenGL's. When a first context is made Mesa puts its own there (those of
+/// libglapi): calls of plugins, and of libraries that a script opens (libGLU), would go past GLVND, and so past us. Our own would not do in their place, because
+/// GLVND has to hear of `glXMakeCurrent`.
+pub(crate) fn put_glvnd_first() {
+    let open = |library: &CStr, how| {
+        // SAFETY: a C string.
+        !unsafe { libc::dlopen(library.as_ptr(), libc::RTLD_LAZY | libc::RTLD_GLOBAL | how) }.is_null()
+    };
+    // One that is there already, else the one without GLX.
+    let _ =
+        [(c"libGL.so.1", libc::RTLD_NOLOAD), (c"libOpenGL.so.0", libc::RTLD_NOLOAD), (c"libOpenGL.so.0", 0)]
+            .into_iter()
+            .any(|(library, how)| open(library, how));
 }
 
 /// `__glx_Main` or `__egl_Main` of the vendor that would have been there without us (`GLURAY_GLX_VENDOR`, else Mesa).

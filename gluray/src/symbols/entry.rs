@@ -74,7 +74,7 @@ unsafe extern "C" fn __glx_Main(
     vendor: *mut c_void,
     imports: *mut Imports,
 ) -> c_int {
-    real::be_found_first();
+    real::put_glvnd_first();
     let main = real::vendor_main(false);
     if main.is_null() {
         return 0;
@@ -101,7 +101,7 @@ unsafe extern "C" fn __egl_Main(
     vendor: *mut c_void,
     imports: *mut Imports,
 ) -> c_int {
-    real::be_found_first();
+    real::put_glvnd_first();
     let main = real::vendor_main(true);
     if main.is_null() {
         return 0;
