@@ -86,7 +86,7 @@ impl Context {
     }
 
     /// The draw that comes goes into the driver's piece of the list that is compiled.
-    fn into_driver_piece(&mut self) {
+    fn put_into_driver_piece(&mut self) {
         if let Some(r) = &mut self.recording {
             r.note_driver_call(true, true);
         }
@@ -172,7 +172,7 @@ impl Context {
     pub(crate) fn eval_mesh_1(&mut self, mode: u32) -> bool {
         match self.sink {
             Sink::Trace => self.unswallow("a mesh between Begin and End"),
-            Sink::List => self.into_driver_piece(),
+            Sink::List => self.put_into_driver_piece(),
             Sink::Outside => {
                 if matches!(mode, POINT | LINE) && self.has_vertices(Kind::Curve) {
                     self.passing("lines and points", false);
@@ -204,7 +204,7 @@ impl Context {
             Sink::Pass => return false,
             Sink::List if filled => return self.list_op(Op::EvalMesh(range)),
             Sink::List => {
-                self.into_driver_piece();
+                self.put_into_driver_piece();
                 return false;
             }
             Sink::Outside => {}

@@ -7,8 +7,11 @@ use common::{Run, Xvfb, folder, peer};
 use gluray::report::Report;
 use std::path::Path;
 
-/// The second and third frame of each case of a group, natively and through us; `None` without the peers.
-fn frames(group: &str) -> Option<(Vec<[Seen; 2]>, Vec<[Seen; 2]>, Report)> {
+/// The second and the third frame of each case.
+type Frames = Vec<[Seen; 2]>;
+
+/// Frames of a group, natively and through us; `None` without the peers.
+fn frames(group: &str) -> Option<(Frames, Frames, Report)> {
     let python = peer("RTSV_SYSTEM_PYTHON")?;
     let x = Xvfb::start()?;
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs/again_scenes.py");
