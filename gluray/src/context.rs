@@ -19,6 +19,7 @@ use crate::recorder::Recorder;
 use crate::report::Counters;
 use crate::state::current::Current;
 use crate::state::lists::{Lists, Recording};
+use crate::state::properties::Properties;
 use crate::state::snapshot::{Abilities, Snapshot};
 use crate::studio::Studio;
 use crate::symbols::{self, class};
@@ -61,6 +62,10 @@ pub(crate) struct Context {
     pub(crate) unfollowed: Option<[f32; 4]>,
     /// What of `current` the driver does not know yet.
     pub(crate) stale: u8,
+    /// Of its materials, these.
+    pub(crate) stale_properties: Properties,
+    /// What `glMaterial` set since the last draw.
+    pub(crate) set_since_draw: Properties,
     pub(crate) recorder: Recorder,
     pub(crate) evaluators: Evaluators,
     pub(crate) lists: Arc<Mutex<Lists>>,
@@ -234,6 +239,8 @@ impl Context {
             current: Current::default(),
             unfollowed: None,
             stale: 0,
+            stale_properties: Properties::default(),
+            set_since_draw: Properties::default(),
             recorder: Recorder::default(),
             evaluators: Evaluators::default(),
             lists,
@@ -259,6 +266,7 @@ impl Context {
         self.dirty = class::ALL;
         self.texture_version += 1;
         self.stale = 0;
+        (self.stale_properties, self.set_since_draw) = (Properties::default(), Properties::default());
         if self.can.version == 0 {
             self.keep_errors();
             self.can = Abilities::query();
@@ -365,7 +373,7 @@ impl Context {
     pub(crate) fn sync(&mut self) {
         if self.stale != 0 {
             let bits = std::mem::take(&mut self.stale);
-            self.current.send(bits);
+            self.current.send(bits, std::mem::take(&mut self.stale_properties));
         }
     }
 
@@ -417,6 +425,7 @@ impl Context {
     /// What becomes of filled primitives in the state now.
     pub(crate) fn verdict(&mut self) -> Verdict {
         self.refresh();
+        self.set_since_draw = Properties::default();
         match self.verdict {
             _ if crate::worker::forked() => Verdict::Pass("a forked process"),
             v => v,

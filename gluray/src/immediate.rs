@@ -6,6 +6,7 @@ use crate::enums::*;
 use crate::fault::guard;
 use crate::real::gl;
 use crate::state::current::{Current, set_material, stale};
+use crate::state::properties::Properties;
 use crate::symbols::{self, class};
 
 /// What the short way of a call came to. It takes values and calls nothing, so that they stay in registers: a value that has been put into
@@ -33,6 +34,7 @@ impl Context {
         {
             self.recorder.begin(mode, &self.current);
             self.sink = Sink::Trace;
+            self.set_since_draw = Properties::default();
             return Step::Done;
         }
         Step::Slow
@@ -170,18 +172,19 @@ impl Context {
         let end = self.current;
         self.passing(why, true);
         if let Some((_, first)) = vertices.first() {
-            first.send(0xf);
+            first.send(0xf, Properties::ALL);
         }
         gl::begin(mode);
         let mut before: Option<Current> = None;
         for (p, c) in vertices {
             let changed = before.is_none_or(|b| b.materials != c.materials);
-            c.send(stale::NORMAL | stale::COLOR | stale::TEX | if changed { stale::MATERIAL } else { 0 });
+            let bits = stale::NORMAL | stale::COLOR | stale::TEX;
+            c.send(bits | if changed { stale::MATERIAL } else { 0 }, Properties::ALL);
             gl::vertex4f(p[0], p[1], p[2], 1.0);
             before = Some(c);
         }
-        end.send(0xf);
-        self.stale = 0;
+        end.send(0xf, Properties::ALL);
+        (self.stale, self.stale_properties) = (0, Properties::default());
     }
 
     /// The short way of `glVertex`.
@@ -332,6 +335,10 @@ impl Context {
             }
             return false;
         }
+        let properties = Properties::of(face, what);
+        if self.sink == Sink::Outside {
+            self.set_since_draw.add(properties);
+        }
         // Ours may be behind the driver's (after PopAttrib, say): then the driver alone is told.
         if self.sink == Sink::Pass || self.dirty & class::CURRENT != 0 {
             self.current.materials = materials;
@@ -341,6 +348,7 @@ impl Context {
             self.current.materials = materials;
             self.recorder.set_materials(&materials);
             self.now_stale(stale::MATERIAL);
+            self.stale_properties.add(properties);
             self.watch_alpha();
         }
         true

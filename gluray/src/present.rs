@@ -300,6 +300,9 @@ impl Context {
             gl::pop_attrib();
         }
         kept.restore();
+        if !core && !self.set_since_draw.is_empty() {
+            self.set_since_draw.set_again();
+        }
         self.drop_errors();
     }
 

@@ -92,3 +92,8 @@ fn colour_material_with_the_same_colour_again() {
 fn a_framebuffer_object_and_then_the_window() {
     draws("a_framebuffer_object_and_then_the_window", true, &["--trace", "all"]);
 }
+
+#[test]
+fn colour_material_after_a_material_that_nobody_has_drawn_with() {
+    draws("colour_material_after_a_material_that_nobody_has_drawn_with", true, &[]);
+}

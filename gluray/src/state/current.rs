@@ -1,5 +1,6 @@
 //! Current normal, colour, texture coordinate and material: what a vertex takes with it.
 
+use super::properties::Properties;
 use crate::enums::*;
 use crate::real::gl;
 
@@ -92,11 +93,11 @@ impl Current {
         (followed != self.materials).then_some(self.color)
     }
 
-    /// Tells the driver what `bits` name.
-    pub(crate) fn send(&self, bits: u8) {
+    /// Tells the driver what `bits` name; of materials, these properties.
+    pub(crate) fn send(&self, bits: u8, of_materials: Properties) {
         let [r, g, b, a] = self.color;
         if bits & stale::MATERIAL != 0 {
-            self.send_materials();
+            of_materials.send(&self.materials);
         }
         // After the materials: with colour material the colour is one of them.
         if bits & stale::COLOR != 0 {
@@ -118,17 +119,7 @@ impl Current {
             | bit(self.color != before.color, stale::COLOR)
             | bit(self.normal != before.normal, stale::NORMAL)
             | bit(self.tex != before.tex, stale::TEX);
-        self.send(bits);
-    }
-
-    fn send_materials(&self) {
-        for (m, face) in self.materials.iter().zip([FRONT, BACK]) {
-            gl::materialfv(face, AMBIENT, &m.ambient);
-            gl::materialfv(face, DIFFUSE, &m.diffuse);
-            gl::materialfv(face, SPECULAR, &m.specular);
-            gl::materialfv(face, EMISSION, &m.emission);
-            gl::materialfv(face, SHININESS, &[m.shininess, 0.0, 0.0, 0.0]);
-        }
+        self.send(bits, Properties::changed(&self.materials, &before.materials));
     }
 }
 

@@ -5,4 +5,5 @@
 
 pub(crate) mod current;
 pub(crate) mod lists;
+pub(crate) mod properties;
 pub(crate) mod snapshot;

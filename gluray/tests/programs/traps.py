@@ -302,6 +302,38 @@ def colour_material_with_the_same_colour_again():
         F("glMaterialfv", c_uint, c_uint, c_void_p)(0x0408, 0x1200, (c_float * 4)(0.05, 0.1, 0.2, 1))
 
 
+def colour_material_after_a_material_that_nobody_has_drawn_with():
+    """As OpenSceneGraph goes from frame to frame: Mesa keeps the last material back, and writes it over what colour material sets in the next frame."""
+    start()
+    p = (c_float * 12)(-1, -1, 0, 1, -1, 0.2, 1, 1, 0, -1, 1, 0.3)
+    new, done, call, _ = lists()
+    new(1, 0x1300)
+    normal(0, 0.3, 0.9)
+    F("glVertexPointer", c_int, c_uint, c_int, c_void_p)(3, 0x1406, 0, p)
+    enable_array(0x8074)
+    F("glDrawArrays", c_uint, c_int, c_int)(QUADS, 0, 4)
+    done()
+    material = F("glMaterialfv", c_uint, c_uint, c_void_p)
+    model = F("glLightModelfv", c_uint, c_void_p)
+    for turn in range(3):
+        clear(0x4100)
+        F("glLightfv", c_uint, c_uint, c_void_p)(0x4000, 0x1203, (c_float * 4)(0, 0, 1, 0))
+        enable(0x0B50)
+        enable(0x4000)
+        F("glColorMaterial", c_uint, c_uint)(0x0408, 0x1602)
+        enable(0x0B57)
+        color(0.5, 0.5, 0.5, 1)
+        material(0x0408, 0x1600, (c_float * 4)(0.1, 0, 0, 1))
+        model(0x0B53, (c_float * 4)(0.4, 0.4, 0.4, 1))
+        call(1)
+        disable(0x0B57)
+        color(0.5, 0.5, 0.5, 1)
+        material(0x0408, 0x1200, (c_float * 4)(0.05, 0.1, 0.9, 1))
+        model(0x0B53, (c_float * 4)(0.2, 0.2, 0.2, 1))
+        if turn < 2:
+            F("glReadPixels", c_int, c_int, c_int, c_int, c_uint, c_uint, c_void_p)(0, 0, 1, 1, 0x1908, 0x1401, (c.c_uint8 * 4)())
+
+
 def a_framebuffer_object_and_then_the_window():
     """Rows of the window are turned over for the driver, those of a framebuffer object are not; between the two only colours are cleared."""
     start()
