@@ -3,7 +3,7 @@
 //! The driver is asked which arrays are on when the draw comes. Client memory is copied then and there, because the program may change
 //! it as soon as the call returns.
 
-use crate::cache::{Geometry, hash};
+use crate::cache::hash;
 use crate::capture::{Attributes, Draw, Packed, Shading, Values, component_bytes};
 use crate::client_memory;
 use crate::context::{Context, Sink};
@@ -101,6 +101,7 @@ fn read_buffer(buffer: u32, start: usize, length: usize) -> Result<Vec<u8>, &'st
 }
 
 /// The fixed-function arrays that are on.
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct Arrays {
     pub(crate) position: Source,
     pub(crate) normal: Option<Source>,
@@ -512,35 +513,16 @@ impl Context {
         if let Some(p) = tex {
             attributes.tex = Values::Packed(p);
         }
-        self.add_array_draw(geometry, Arc::new(attributes), Shading::Fixed, verdict == Verdict::TraceInOrder);
+        let state = self.state.clone();
+        let clip_from_object = crate::lighting::product(&state.projection, &state.model_view);
+        let (attributes, shading, look) = (Arc::new(attributes), Shading::Fixed, Look::default());
+        let draw = Draw { geometry, attributes, state, shading, clip_from_object, calls: 1, look };
+        self.add(draw, verdict == Verdict::TraceInOrder);
         Ok(())
     }
 
     /// Hands a finished draw to the frame.
-    pub(crate) fn add_array_draw(
-        &mut self,
-        geometry: Arc<Geometry>,
-        attributes: Arc<Attributes>,
-        shading: Shading,
-        in_order: bool,
-    ) {
-        let clip_from_object = match &shading {
-            Shading::Fixed => crate::lighting::product(&self.state.projection, &self.state.model_view),
-            Shading::Program(p) => p.clip_from_object,
-        };
-        let draw = Draw {
-            geometry,
-            attributes,
-            state: self.state.clone(),
-            shading,
-            clip_from_object,
-            calls: 1,
-            look: Look::default(),
-        };
-        self.add(draw, in_order);
-    }
-
-    fn mark_current(&mut self) {
+    pub(crate) fn mark_current(&mut self) {
         if !self.can.core {
             self.dirty |= crate::symbols::class::CURRENT;
         }
@@ -554,7 +536,7 @@ impl Context {
     ) -> bool {
         if !is_filled(mode) {
             if let Some(r) = &mut self.recording {
-                r.note_driver_call(false, true);
+                r.note_driver_call(0, false, true);
             }
             return false;
         }
@@ -568,7 +550,7 @@ impl Context {
         };
         let Ok((position, normal, color, tex, elements)) = read() else {
             if let Some(r) = &mut self.recording {
-                r.note_driver_call(false, true);
+                r.note_driver_call(0, false, true);
             }
             return false;
         };

@@ -3,6 +3,7 @@
 //! A context is owned by the thread it is current on (in [`CURRENT`]) or, while it is current nowhere, by the register. So no call needs a
 //! lock, and a context that is destroyed in flight lives on until its thread leaves it, as OpenGL says.
 
+use crate::arrays::Arrays;
 use crate::buffers::Writes;
 use crate::cache::Cache;
 use crate::config::Config;
@@ -68,6 +69,8 @@ pub(crate) struct Context {
     pub(crate) set_since_draw: Properties,
     pub(crate) recorder: Recorder,
     pub(crate) evaluators: Evaluators,
+    /// The arrays that `glArrayElement` takes the vertices of the open primitive from.
+    pub(crate) element_arrays: Option<Arrays>,
     pub(crate) lists: Arc<Mutex<Lists>>,
     pub(crate) writes: Arc<Mutex<Writes>>,
     pub(crate) recording: Option<Recording>,
@@ -243,6 +246,7 @@ impl Context {
             set_since_draw: Properties::default(),
             recorder: Recorder::default(),
             evaluators: Evaluators::default(),
+            element_arrays: None,
             lists,
             writes,
             recording: None,
@@ -315,7 +319,7 @@ impl Context {
         }
         self.drawn_over();
         if let Some(r) = &mut self.recording {
-            r.note_driver_call(flushes, draws);
+            r.note_driver_call(class, flushes, draws);
         }
         if flushes {
             let invisible =

@@ -88,7 +88,7 @@ impl Context {
     /// The draw that comes goes into the driver's piece of the list that is compiled.
     fn put_into_driver_piece(&mut self) {
         if let Some(r) = &mut self.recording {
-            r.note_driver_call(true, true);
+            r.note_driver_call(0, true, true);
         }
     }
 

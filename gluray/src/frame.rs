@@ -444,7 +444,7 @@ impl Context {
     pub(crate) fn clear(&mut self, mask: u32) -> bool {
         if self.recording.is_some() {
             if let Some(r) = &mut self.recording {
-                r.note_driver_call(true, true);
+                r.note_driver_call(0, true, true);
             }
             return false;
         }

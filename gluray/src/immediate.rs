@@ -34,7 +34,7 @@ impl Context {
         {
             self.recorder.begin(mode, &self.current);
             self.sink = Sink::Trace;
-            self.set_since_draw = Properties::default();
+            (self.set_since_draw, self.element_arrays) = (Properties::default(), None);
             return Step::Done;
         }
         Step::Slow
@@ -101,6 +101,7 @@ impl Context {
                 }
                 self.recorder.begin(mode, &self.current);
                 self.sink = Sink::Trace;
+                self.element_arrays = None;
                 symbols::attend();
                 true
             }

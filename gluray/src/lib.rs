@@ -27,6 +27,7 @@ mod control;
 mod decide;
 pub mod doctor;
 mod effects;
+mod elements;
 mod enums;
 mod evaluators;
 pub mod export;

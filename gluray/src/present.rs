@@ -287,6 +287,7 @@ impl Context {
         let kept = Kept::keep(core, self.can.version);
         if !core {
             gl::push_attrib(0x000f_ffff);
+            gl::plain_transfer();
         }
         UNPACK.into_iter().for_each(|what| gl::pixel_storei(what, i32::from(what == UNPACK_ALIGNMENT)));
         if kept.unpack_buffer != 0 {

@@ -202,6 +202,13 @@ impl Context {
         self.cache.touch(&geometry);
         // VTK leaves blending on; without transparency it changes nothing.
         let mut state = (*self.state).clone();
+        if template.moved_back {
+            if state.polygon_offset.is_some() {
+                return Err("polygon offset of OpenGL's and of VTK's");
+            }
+            state.polygon_offset = Some(moved_back_by(program));
+            state.offset_by_length = true;
+        }
         if matches!(template.peel, Peel::Layers | Peel::Weighted) {
             match template.peel {
                 Peel::Weighted => self.weighted_surface(&mut state)?,
@@ -217,6 +224,7 @@ impl Context {
             }
             return Ok(Taken::Traced);
         }
+        let offset = (state.polygon_offset, state.offset_by_length);
         if state.blend_is_over && recognised.is_opaque(&attributes, geometry.mesh.positions.len()) {
             state.blend = false;
         }
@@ -228,7 +236,14 @@ impl Context {
             self.flush("a draw whose order matters");
         }
         self.end_batch();
-        self.add_array_draw(geometry, attributes, Shading::Program(Arc::new(recognised)), in_order);
+        let (clip_from_object, shading) =
+            (recognised.clip_from_object, Shading::Program(Arc::new(recognised)));
+        let (mut state, look) = (self.state.clone(), Look::default());
+        if template.moved_back {
+            let state = Arc::make_mut(&mut state);
+            (state.polygon_offset, state.offset_by_length) = offset;
+        }
+        self.add(Draw { geometry, attributes, state, shading, clip_from_object, calls: 1, look }, in_order);
         Ok(Taken::Traced)
     }
 
@@ -297,6 +312,17 @@ impl Context {
         }
         Ok((geometry, Arc::new(attributes)))
     }
+}
+
+/// Factor and units of polygon offset that move depths as VTK's shader does.
+fn moved_back_by(program: u32) -> (f32, f32) {
+    let one = |name: &str| match gl::uniform_location(program, name) {
+        -1 => 0.0,
+        at => gl::uniform_f::<1>(program, at)[0],
+    };
+    // A unit is two steps of the depth buffer.
+    let units = f64::from(one("cOffset")) / 65_000.0 * crate::trace::DEPTH_STEPS / 2.0;
+    (one("cFactor"), units as f32)
 }
 
 /// What buffer textures have for the triangles of a draw, of which the first has number `first`.

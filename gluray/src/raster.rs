@@ -32,6 +32,12 @@ pub(crate) fn covers(c: &[[f32; 4]; 3], viewport: [i32; 4], x: i32, y: i32) -> b
 
 /// The greater of |dz/dx| and |dz/dy| in window coordinates, for polygon offset.
 pub(crate) fn steepness(c: &[[f32; 4]; 3], viewport: [i32; 4], depth_scale: f64) -> f64 {
+    let [dx, dy] = gradient(c, viewport, depth_scale);
+    dx.abs().max(dy.abs())
+}
+
+/// The change of depth per pixel in x and in y.
+pub(crate) fn gradient(c: &[[f32; 4]; 3], viewport: [i32; 4], depth_scale: f64) -> [f64; 2] {
     let w = c.map(|v| {
         let i = 1.0 / f64::from(v[3]);
         let half = |size: i32| f64::from(size) * 0.5;
@@ -44,11 +50,18 @@ pub(crate) fn steepness(c: &[[f32; 4]; 3], viewport: [i32; 4], depth_scale: f64)
     let d = |a: usize, k: usize| w[a][k] - w[0][k];
     let det = d(1, 0) * d(2, 1) - d(2, 0) * d(1, 1);
     if det == 0.0 {
-        return 0.0;
+        return [0.0; 2];
     }
     let dx = (d(1, 2) * d(2, 1) - d(2, 2) * d(1, 1)) / det;
     let dy = (d(2, 2) * d(1, 0) - d(1, 2) * d(2, 0)) / det;
-    dx.abs().max(dy.abs())
+    [dx, dy]
+}
+
+/// How VTK's shaders move depths back: by the gradient's length. The depth that they start from, and write for all samples, is that of the pixel's middle: how
+/// far that is from the depth at a sample is the second number.
+pub(crate) fn moves_back([dx, dy]: [f64; 2], sample_place: [f32; 2]) -> [f64; 2] {
+    let [x, y] = sample_place.map(f64::from);
+    [(dx * dx + dy * dy).sqrt(), -(dx * x + dy * y)]
 }
 
 #[cfg(test)]
@@ -78,5 +91,8 @@ mod tests {
         // z_window rises by 0.1 per 50 pixels in x, falls by 0.4 per 25 in y.
         let c = [[0.0, 0.0, 0.0, 1.0], [1.0, 0.0, 0.2, 1.0], [0.0, 1.0, -0.8, 1.0]];
         assert!((steepness(&c, viewport, 1.0) - 0.4 / 25.0).abs() < 1e-9);
+        let [length, shift] = moves_back(gradient(&c, viewport, 1.0), [0.25, -0.5]);
+        assert!((length - (0.1_f64 / 50.0).hypot(0.4 / 25.0)).abs() < 1e-9);
+        assert!((shift + 0.25 * 0.1 / 50.0 + 0.5 * 0.4 / 25.0).abs() < 1e-9, "{shift}");
     }
 }

@@ -17,7 +17,7 @@ use crate::capture::{Draw, Shading};
 use crate::effects::Place;
 use crate::enums::*;
 use crate::lighting::{Lit, Setup, transform};
-use crate::raster::{covers, steepness};
+use crate::raster::{covers, gradient, moves_back, steepness};
 use crate::texturing::Image;
 use bounds::screen_bounds;
 pub(crate) use in_order::in_order;
@@ -81,7 +81,7 @@ pub(crate) const UNCOVERED: f32 = 2.0;
 /// Side of the tiles that rays are sent in: a packet of 256.
 const TILE: i32 = 16;
 /// A depth buffer of 24 bits.
-const DEPTH_STEPS: f64 = 16_777_215.0;
+pub(crate) const DEPTH_STEPS: f64 = 16_777_215.0;
 
 /// Share of w by which a point may be beyond the near or far plane: the driver clips in f32, and a plane that lies in the far plane is seen.
 const SLACK: f64 = 1e-6;
@@ -340,8 +340,11 @@ impl<'a> Prepared<'a> {
         let plain_depth = depth;
         // The unit of polygon offset is two steps of the depth buffer (Mesa).
         if let Some((factor, units)) = s.polygon_offset {
-            depth +=
-                f64::from(factor) * steepness(&c, s.viewport, f - n) + 2.0 * f64::from(units) / DEPTH_STEPS;
+            let [slope, shift] = match s.offset_by_length {
+                true => moves_back(gradient(&c, s.viewport, f - n), s.sample_place),
+                false => [steepness(&c, s.viewport, f - n), 0.0],
+            };
+            depth += f64::from(factor) * slope + 2.0 * f64::from(units) / DEPTH_STEPS + shift;
         }
         if !s.depth_clamp && z.abs() > w.abs() * (1.0 + SLACK) {
             return None;

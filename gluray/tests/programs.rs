@@ -299,6 +299,13 @@ fn lines_along_edges_of_cells_are_the_drivers() {
     scenes(&[&["edges"], &["edges", "4"]], false, 4);
 }
 
+#[test]
+fn surfaces_that_are_moved_back_for_lines_are_the_drivers() {
+    for report in scenes(&[&["moved_back"], &["moved_back", "4"], &["translucent_moved_back"]], true, 8) {
+        assert_eq!(report.passed_reasons.get("polygon offset of OpenGL's and of VTK's"), None, "{report:?}");
+    }
+}
+
 /// All surfaces of scenes with pictures are traced in both VTKs.
 fn pictures(kinds: &[&[&str]], least: u64) {
     for report in scenes(kinds, true, least) {

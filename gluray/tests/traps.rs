@@ -97,3 +97,18 @@ fn a_framebuffer_object_and_then_the_window() {
 fn colour_material_after_a_material_that_nobody_has_drawn_with() {
     draws("colour_material_after_a_material_that_nobody_has_drawn_with", true, &[]);
 }
+
+#[test]
+fn pixels_that_are_scaled_while_surfaces_wait() {
+    draws("pixels_that_are_scaled_while_surfaces_wait", true, &[]);
+}
+
+#[test]
+fn names_of_lists_are_small() {
+    draws("names_of_lists_are_small", true, &[]);
+}
+
+#[test]
+fn elements_of_arrays_in_a_list() {
+    draws("elements_of_arrays_in_a_list", true, &[]);
+}

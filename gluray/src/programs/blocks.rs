@@ -85,6 +85,14 @@ pub(super) const BACK: &[&str] = &[
     "opacity=opacityUniformBF",
 ];
 
+/// The same without light.
+pub(super) const BACK_UNLIT: &[&str] = &[
+    "if(gl_FrontFacing==false)",
+    "ambientColor=ambientIntensityBF*ambientColorUniformBF",
+    "diffuseColor=diffuseIntensityBF*diffuseColorUniformBF",
+    "opacity=opacityUniformBF",
+];
+
 /// Clipping planes: of the fragment shader, of the vertex shader, and of a geometry shader with the statement that its vertex shader has for it.
 pub(super) const CLIPPED: &[&str] = &[
     "for(intplaneNum=0",

@@ -1,8 +1,8 @@
 //! VTK's shaders, statement by statement: what each of them means, and whether there are others.
 
 use super::blocks::{
-    BACK, CLIPPED, CLIPS, CLIPS_LATER, EDGES, EMITS, MEASURES, MOST_LIGHTS, TURNED, WEIGHTED, take,
-    take_albedo, take_lights, take_physical, take_picture, without_peeling,
+    BACK, BACK_UNLIT, CLIPPED, CLIPS, CLIPS_LATER, EDGES, EMITS, MEASURES, MOST_LIGHTS, TURNED, WEIGHTED,
+    take, take_albedo, take_lights, take_physical, take_picture, without_peeling,
 };
 
 /// Where the surface's colour comes from.
@@ -81,6 +81,8 @@ pub(crate) struct Template {
     /// Colour map and picture have coordinates of their own, and whether a matrix multiplies those.
     pub(super) two_coordinates: bool,
     pub(super) turned: bool,
+    /// Depths are moved back by the slope of the surface and a constant, for lines that lie on it.
+    pub(super) moved_back: bool,
 }
 
 /// Statements of `main`, without blanks and comments; light numbers become `#`.
@@ -174,7 +176,7 @@ impl Template {
         if self.peel != peel && peel != Peel::No {
             return None;
         }
-        self.back = take(&mut fs, BACK);
+        self.back = take(&mut fs, BACK) || take(&mut fs, BACK_UNLIT);
         if take(&mut fs, CLIPPED) != self.clipped || take(&mut fs, EDGES) != self.edges {
             return None;
         }
@@ -186,6 +188,9 @@ impl Template {
         (self.headlight, self.lights, self.placed) = (lights.head, lights.others, lights.placed);
         for s in &fs {
             self.read_statement(s)?;
+        }
+        if self.moved_back && matches!(self.peel, Peel::Depths | Peel::Layers) {
+            return None;
         }
         let one_kind = self.headlight != (self.lights > 0);
         ((!self.lit || one_kind) && self.lights <= MOST_LIGHTS).then_some(())
@@ -203,6 +208,7 @@ impl Template {
             | "vec3fdy=dFdy(vertexVC.xyz)*scale"
             | "vec3specularColor=specularIntensity*specularColorUniform"
             | "floatspecularPower=specularPowerUniform"
+            | "floatcscale=length(vec2(dFdx(gl_FragCoord.z),dFdy(gl_FragCoord.z)))"
             | "vec3ambientColor=ambientIntensity*ambientColorUniform"
             | "vec3diffuseColor=diffuseIntensity*diffuseColorUniform"
             | "floatopacity=opacityUniform"
@@ -243,6 +249,11 @@ impl Template {
             "vec3ambientColor=ambientIntensity*vertexColorVSOutput.rgb"
             | "vec3diffuseColor=diffuseIntensity*vertexColorVSOutput.rgb"
             | "floatopacity=opacityUniform*vertexColorVSOutput.a" => self.colors = Colors::PerVertex,
+            // VTK 9.1 to 9.2 and ParaView, and 9.7.
+            "gl_FragDepth=gl_FragCoord.z+1.0*cOffset/65000"
+            | "gl_FragDepth=gl_FragCoord.z+1.0*cOffset/65000.0"
+            | "gl_FragDepth=gl_FragCoord.z+cFactor*cscale+1.0*cOffset/65000"
+            | "gl_FragDepth=gl_FragCoord.z+cFactor*cscale+1.0*cOffset/65000.0" => self.moved_back = true,
             "if(OverridesColor)" => self.overrides = true,
             "ambientColor=ambientColorUniform*ambientIntensity"
             | "diffuseColor=diffuseColorUniform*diffuseIntensity" => {}
@@ -368,6 +379,16 @@ mod tests {
             let other = numbered("0").replace("fragOutput0*tcolor", "fragOutput0+tcolor");
             assert_eq!(read(&on(&other)), Err("a picture on a surface of VTK's"));
         }
+    }
+
+    #[test]
+    fn depths_that_are_moved_back_are_known() {
+        let moved = |how: &str| format!("{HEAD} gl_FragDepth = gl_FragCoord.z + {how};");
+        for how in ["1.0*cOffset/65000", "cFactor*cscale + 1.0*cOffset/65000.0"] {
+            assert!(read(&fragment(&moved(how))).is_ok_and(|t| t.moved_back), "{how}");
+        }
+        assert!(read(&fragment(HEAD)).is_ok_and(|t| !t.moved_back));
+        assert!(read(&fragment(&moved("cFactor*cscale + 2.0*cOffset/65000"))).is_err());
     }
 
     #[test]

@@ -27,6 +27,7 @@ wire_struct!(Template {
     pictured,
     two_coordinates,
     turned,
+    moved_back,
 });
 wire_struct!(Lamp { position, attenuation, cone_deg, exponent });
 wire_struct!(ProgramLight { travels, color, lamp });

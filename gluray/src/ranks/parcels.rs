@@ -49,6 +49,7 @@ wire_struct!(Snapshot {
     fog,
     clip_planes,
     polygon_offset,
+    offset_by_length,
     depth_test,
     depth_func,
     depth_mask,

@@ -293,22 +293,28 @@ pub(crate) fn all_samples(mask: u32) {
     sample_maski(0, mask);
 }
 
+/// Colours through maps; scale and bias of red, green, blue, alpha.
+const TRANSFER: [(u32, f32); 9] = [
+    (0x0d10, 0.0),
+    (0x0d14, 1.0),
+    (0x0d15, 0.0),
+    (0x0d18, 1.0),
+    (0x0d19, 0.0),
+    (0x0d1a, 1.0),
+    (0x0d1b, 0.0),
+    (0x0d1c, 1.0),
+    (0x0d1d, 0.0),
+];
+
+/// Pixels go as they are, without the program's scales and biases, until attributes are popped.
+pub(crate) fn plain_transfer() {
+    TRANSFER.into_iter().for_each(|(what, plain)| pixel_transferf(what, plain));
+}
+
 /// Runs `f` while texels are read as they are: rows that follow one another, into memory and not into a buffer, without the program's scales and biases.
 pub(crate) fn plain_reading<R>(f: impl FnOnce() -> R) -> R {
     // Swapped bytes, row length, skipped rows and pixels, alignment; of volumes nothing is read.
     const PACK: [(u32, i32); 5] = [(0x0d00, 0), (0x0d02, 0), (0x0d03, 0), (0x0d04, 0), (0x0d05, 4)];
-    // Colours through maps; scale and bias of red, green, blue, alpha.
-    const TRANSFER: [(u32, f32); 9] = [
-        (0x0d10, 0.0),
-        (0x0d14, 1.0),
-        (0x0d15, 0.0),
-        (0x0d18, 1.0),
-        (0x0d19, 0.0),
-        (0x0d1a, 1.0),
-        (0x0d1b, 0.0),
-        (0x0d1c, 1.0),
-        (0x0d1d, 0.0),
-    ];
     const PIXEL_PACK_BUFFER: u32 = 0x88eb;
     let pack = PACK.map(|(what, plain)| (what, plain, int(what)));
     let transfer = TRANSFER.map(|(what, plain)| (what, plain, floats::<1>(what)[0]));

@@ -33,6 +33,8 @@ pub(crate) enum Op {
         list: u32,
         draws: bool,
         only_maps: bool,
+        /// It may change textures.
+        textures: bool,
     },
     Call(u32),
     /// Names relative to the list base at the time of the call.
@@ -59,6 +61,8 @@ pub(crate) struct List {
 pub(crate) struct Lists {
     lists: HashMap<u32, Arc<List>>,
     next_piece: u32,
+    /// The greatest name that the program has used or was given.
+    greatest: u32,
 }
 
 /// Names of our pieces begin here: no program counts its lists so far.
@@ -74,6 +78,8 @@ pub(crate) struct Recording {
     draws: bool,
     /// Something besides maps is in the driver's piece.
     more: bool,
+    /// A call that may change a texture is in it.
+    textures: bool,
     /// Between a Begin and its End.
     open: bool,
     /// The mode of the latest Begin.
@@ -81,10 +87,16 @@ pub(crate) struct Recording {
 }
 
 impl Recording {
+    /// Between a Begin and its End.
+    pub(crate) fn is_open(&self) -> bool {
+        self.open
+    }
+
     /// A call goes into the driver's piece.
-    pub(crate) fn note_driver_call(&mut self, flushes: bool, draws: bool) {
+    pub(crate) fn note_driver_call(&mut self, class: u8, flushes: bool, draws: bool) {
         (self.used, self.more) = (true, true);
         self.draws |= flushes || draws;
+        self.textures |= class & class::TEXTURE != 0;
     }
 
     /// A call that sets a map of an evaluator goes into the driver's piece.
@@ -96,9 +108,10 @@ impl Recording {
     fn end_piece(&mut self) {
         gl::end_list();
         if self.used {
-            self.list.ops.push(Op::Driver { list: self.piece, draws: self.draws, only_maps: !self.more });
+            let (list, draws, only_maps, textures) = (self.piece, self.draws, !self.more, self.textures);
+            self.list.ops.push(Op::Driver { list, draws, only_maps, textures });
         }
-        (self.used, self.draws, self.more) = (false, false, false);
+        (self.used, self.draws, self.more, self.textures) = (false, false, false, false);
     }
 }
 
@@ -120,6 +133,11 @@ impl Context {
         }
         self.sync();
         gl::new_list(name, COMPILE);
+        {
+            let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
+            lists.greatest = lists.greatest.max(name);
+            lists.next_piece = lists.next_piece.max(name.saturating_sub(FIRST_PIECE));
+        }
         let execute = mode == COMPILE_AND_EXECUTE;
         self.recording = Some(Recording {
             name,
@@ -129,6 +147,7 @@ impl Context {
             used: false,
             draws: false,
             more: false,
+            textures: false,
             open: false,
             mode: 0,
         });
@@ -187,32 +206,41 @@ impl Context {
         gl::new_list(r.piece, COMPILE);
     }
 
-    /// `glGenLists`, which `generate` asks of the driver. Drivers hand out the names after the greatest that is in use, and that is one of our
-    /// pieces: later pieces must not take what the program was given. A piece that is open has no name for the driver yet, so it ends before.
-    pub(crate) fn gen_lists(&mut self, n: i32, generate: impl FnOnce() -> u32) -> u32 {
+    /// `glGenLists`. The driver would give the names after the greatest that is in use, which is one of our pieces; programs that count their lists (Survex's
+    /// aven) end there. So they get the names after the greatest of their own, as Mesa gives them, and an empty list of the driver's for each. `None` leaves
+    /// the call to the driver.
+    pub(crate) fn gen_lists(&mut self, n: i32) -> Option<u32> {
         if self.sink == Sink::Trace {
             self.unswallow("glGenLists between Begin and End");
         }
-        let in_piece = self.recording.as_ref().is_some_and(|r| r.piece != r.name);
-        if in_piece {
+        if n <= 0 || self.sink == Sink::Pass || self.can.core || crate::fault::happened() {
+            return None;
+        }
+        let first = {
+            let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
+            let last = lists.greatest.checked_add(n.cast_unsigned()).filter(|last| *last < FIRST_PIECE)?;
+            std::mem::replace(&mut lists.greatest, last) + 1
+        };
+        // Where a list is compiled its piece ends before.
+        let compiling = self.recording.is_some();
+        if compiling {
             self.close_piece();
         }
-        let first = generate();
-        if first != 0 && n > 0 {
-            let last = first.saturating_add(n.cast_unsigned() - 1);
-            let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
-            lists.next_piece = lists.next_piece.max(last.saturating_sub(FIRST_PIECE));
+        for name in first..first + n.cast_unsigned() {
+            gl::new_list(name, COMPILE);
+            gl::end_list();
         }
-        if in_piece {
+        if compiling {
             self.open_piece();
         }
-        first
+        Some(first)
     }
 
     pub(crate) fn list_begin(&mut self, mode: u32) -> bool {
         if let Some(r) = &mut self.recording {
             (r.open, r.mode) = (true, mode);
         }
+        self.element_arrays = None;
         self.list_op(Op::Begin(mode))
     }
 
@@ -279,7 +307,7 @@ impl Context {
         let known = self.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.get(&name).cloned();
         let Some(list) = known else {
             // Not compiled by calls that we saw (fonts of glXUseXFont), or not there.
-            self.call_driver(name, true);
+            self.call_driver(name, true, true);
             return true;
         };
         if self.depth_of_lists >= DEEPEST {
@@ -344,16 +372,16 @@ impl Context {
         self.counters.publish(true);
     }
 
-    fn call_driver(&mut self, list: u32, draws: bool) {
+    fn call_driver(&mut self, list: u32, draws: bool, textures: bool) {
         if draws {
             self.counters.pass("text, lines by arrays, or curves of a display list", 1);
         }
-        self.before_driver(draws);
+        self.before_driver(draws, textures);
         gl::call_list(list);
     }
 
     /// The driver is about to play lists of its own.
-    fn before_driver(&mut self, draws: bool) {
+    fn before_driver(&mut self, draws: bool, textures: bool) {
         if self.sink == Sink::Trace {
             self.unswallow("a list between Begin and End");
         }
@@ -368,7 +396,7 @@ impl Context {
         }
         self.sync();
         self.dirty = class::ALL;
-        self.texture_version += 1;
+        self.texture_version += u64::from(textures);
     }
 
     fn play(&mut self, list: &List) {
@@ -439,7 +467,7 @@ impl Context {
                     self.maps_change();
                     gl::call_list(list);
                 }
-                Op::Driver { list, draws, .. } => self.call_driver(list, draws),
+                Op::Driver { list, draws, textures, .. } => self.call_driver(list, draws, textures),
                 Op::Call(name) => {
                     self.call_list(name);
                 }
@@ -548,7 +576,7 @@ impl Context {
         };
         if !ours {
             // A line of text in a font of glXUseXFont: one call for the driver.
-            self.before_driver(true);
+            self.before_driver(true, true);
             return false;
         }
         for name in names {

@@ -66,6 +66,8 @@ pub(crate) struct Snapshot {
     /// Eye-space planes.
     pub(crate) clip_planes: Vec<[f64; 4]>,
     pub(crate) polygon_offset: Option<(f32, f32)>,
+    /// The slope that the factor multiplies is the gradient's length, as in VTK's shaders; else the greater of its components, as OpenGL has it.
+    pub(crate) offset_by_length: bool,
     pub(crate) depth_test: bool,
     pub(crate) depth_func: u32,
     pub(crate) depth_mask: bool,

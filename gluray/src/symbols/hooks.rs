@@ -133,6 +133,8 @@ hooks! {
     fn glEvalCoord2fv(v: Address) => |c| c.eval_coord(Kind::Surface, client_memory::floats(v as usize));
     fn glEvalCoord2dv(v: Address) => |c| c.eval_coord(Kind::Surface, client_memory::doubles(v as usize).map(|x| x as f32));
     fn glEvalPoint1(i: Int) => |c| c.eval_point(Kind::Curve, [i, 0]);
+    fn glArrayElement(i: Int) => |c| c.array_element(i);
+    fn glArrayElementEXT(i: Int) => |c| c.array_element(i);
     fn glEvalPoint2(i: Int, j: Int) => |c| c.eval_point(Kind::Surface, [i, j]);
     fn glEvalMesh1(mode: u32, i1: Int, i2: Int) => |c| c.eval_mesh_1(mode);
     fn glEvalMesh2(mode: u32, i1: Int, i2: Int, j1: Int, j2: Int) => |c| c.eval_mesh_2(mode, [i1, i2, j1, j2]);
@@ -164,10 +166,8 @@ pub(in crate::symbols) unsafe extern "C" fn glGetError() -> u32 {
 }
 
 pub(in crate::symbols) unsafe extern "C" fn glGenLists(n: Int) -> u32 {
-    let names = || driver!(glGenLists(n): (Int) -> u32);
-    let mut given = None;
-    guard(|| with_context(|c| c.gen_lists(n, || *given.insert(names()))));
-    given.unwrap_or_else(names)
+    let given = guard(|| with_context(|c| c.gen_lists(n))).flatten().flatten();
+    given.unwrap_or_else(|| driver!(glGenLists(n): (Int) -> u32))
 }
 
 fn context_error() -> u32 {

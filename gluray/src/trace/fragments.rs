@@ -5,6 +5,8 @@
 
 use super::{DEPTH_STEPS, Fragment, Prepared, SLACK};
 use crate::enums::*;
+use crate::raster::moves_back;
+use crate::state::snapshot::Snapshot;
 use rt_core::ray::{HitBlock, LANES, NO_HIT};
 
 /// What came of a lane.
@@ -101,9 +103,9 @@ impl FragmentBlock {
             }
         }
         let covered = covered(&c, s.viewport, x, y);
-        let steep = match s.polygon_offset {
-            Some(_) => steepness(&c, s.viewport, s.depth_range[1] - s.depth_range[0]),
-            None => [0.0; LANES],
+        let [steep, shift] = match s.polygon_offset {
+            Some(_) => slopes(&c, s),
+            None => [[0.0; LANES]; 2],
         };
         let [vx, vy, vw, vh] = s.viewport.map(f64::from);
         let [n, f] = s.depth_range;
@@ -139,7 +141,7 @@ impl FragmentBlock {
             let z = l0 * h(0, 2) + l1 * h(1, 2) + l2 * h(2, 2);
             let w = l0 * h(0, 3) + l1 * h(1, 3) + l2 * h(2, 3);
             let plain = n + (f - n) * (z / w * 0.5 + 0.5);
-            let depth = plain + (f64::from(factor) * steep[l] + constant);
+            let depth = plain + (f64::from(factor) * steep[l] + constant + shift[l]);
             let inside = s.depth_clamp | (z.abs() <= w.abs() * (1.0 + SLACK));
             let before = (c[0][3][l] > 0.0) & (c[1][3][l] > 0.0) & (c[2][3][l] > 0.0);
             let sound = (area != 0.0) & (area.abs() < f64::INFINITY) & (sum != 0.0);
@@ -217,11 +219,12 @@ fn covered(c: &[[[f32; LANES]; 4]; 3], viewport: [i32; 4], x: i32, y: i32) -> [b
     out
 }
 
-/// As [`crate::raster::steepness`].
+/// As [`crate::raster::steepness`] or [`moves_back`], whichever the state asks for: what the factor of polygon offset multiplies, and what comes to it.
 #[inline(always)]
-fn steepness(c: &[[[f32; LANES]; 4]; 3], viewport: [i32; 4], depth_scale: f64) -> [f64; LANES] {
-    let half = [f64::from(viewport[2]) * 0.5, f64::from(viewport[3]) * 0.5];
-    let mut out = [0.0; LANES];
+fn slopes(c: &[[[f32; LANES]; 4]; 3], s: &Snapshot) -> [[f64; LANES]; 2] {
+    let depth_scale = s.depth_range[1] - s.depth_range[0];
+    let half = [f64::from(s.viewport[2]) * 0.5, f64::from(s.viewport[3]) * 0.5];
+    let mut out = [[0.0; LANES]; 2];
     for l in 0..LANES {
         let w = |i: usize| {
             let inverse = 1.0 / f64::from(c[i][3][l]);
@@ -236,7 +239,11 @@ fn steepness(c: &[[[f32; LANES]; 4]; 3], viewport: [i32; 4], depth_scale: f64) -
         let (bx, by, bz) = (w2[0] - w0[0], w2[1] - w0[1], w2[2] - w0[2]);
         let det = ax * by - bx * ay;
         let (dx, dy) = ((az * by - bz * ay) / det, (bz * ax - az * bx) / det);
-        out[l] = if det == 0.0 { 0.0 } else { dx.abs().max(dy.abs()) };
+        let [slope, shift] = match s.offset_by_length {
+            true => moves_back([dx, dy], s.sample_place),
+            false => [dx.abs().max(dy.abs()), 0.0],
+        };
+        (out[0][l], out[1][l]) = if det == 0.0 { (0.0, 0.0) } else { (slope, shift) };
     }
     out
 }
@@ -275,13 +282,27 @@ mod tests {
             let c: [[[f32; LANES]; 4]; 3] =
                 std::array::from_fn(|i| std::array::from_fn(|k| [t[i][k]; LANES]));
             let all = covered(&c, viewport, 0, 0);
-            let steep = steepness(&c, viewport, 1.0);
             for l in 0..LANES {
                 let one = raster::covers(&t, viewport, l as i32 % 4, l as i32 / 4);
                 assert_eq!(all[l], one, "{t:?}, lane {l}");
                 covered_pixels += u32::from(one);
             }
-            assert_eq!(steep[0], raster::steepness(&t, viewport, 1.0), "{t:?}");
+            let place = [0.125, -0.375];
+            let state = |offset_by_length| Snapshot {
+                viewport,
+                depth_range: [0.0, 1.0],
+                sample_place: place,
+                offset_by_length,
+                ..Snapshot::default()
+            };
+            let [greater, nothing] = slopes(&c, &state(false));
+            assert_eq!([greater[0], nothing[0]], [raster::steepness(&t, viewport, 1.0), 0.0], "{t:?}");
+            let [length, shift] = slopes(&c, &state(true));
+            assert_eq!(
+                [length[0], shift[0]],
+                moves_back(raster::gradient(&t, viewport, 1.0), place),
+                "{t:?}"
+            );
         }
         assert!(covered_pixels > 1000, "the test is about nothing: {covered_pixels}");
     }

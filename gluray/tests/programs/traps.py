@@ -334,6 +334,89 @@ def colour_material_after_a_material_that_nobody_has_drawn_with():
             F("glReadPixels", c_int, c_int, c_int, c_int, c_uint, c_uint, c_void_p)(0, 0, 1, 1, 0x1908, 0x1401, (c.c_uint8 * 4)())
 
 
+def pixels_that_are_scaled_while_surfaces_wait():
+    """Pixmap fonts (FTGL) set the scales of red, green and blue to 0; then a bitmap has us show what was traced."""
+    start()
+    lit()
+    bump()
+    color(0, 0, 0, 1)
+    F("glRasterPos3f", c_float, c_float, c_float)(-1, 1.2, 0)
+    F("glPushAttrib", c_uint)(0x6028)
+    for scale_of in (0x0D14, 0x0D18, 0x0D1A):
+        F("glPixelTransferf", c_uint, c_float)(scale_of, 0)
+    F("glPixelTransferi", c_uint, c_int)(0x0D10, 0)
+    F("glDrawPixels", c_int, c_int, c_uint, c_uint, c_void_p)(8, 4, 0x190A, 0x1401, bytes([255, 200] * 32))
+    F("glPopAttrib")()
+
+
+def names_of_lists_are_small():
+    """Programs count their lists (Survex's aven has room for a thousand); state between primitives makes us need lists of our own."""
+    start()
+    new, done, call, generate = lists()
+    deleted = F("glDeleteLists", c_uint, c_int)
+    names = []
+    for k in range(4):
+        names.append(generate(1 + k))
+        new(names[-1], 0x1300)
+        for turn in range(3):
+            F("glFrontFace", c_uint)(0x0901)
+            # Given out while another is compiled.
+            color(names[-1] / 20, (generate(2) % 7) / 7, turn / 3, 1)
+            begin(TRIANGLES)
+            for x, y in ((-0.3, -0.3), (0.3, -0.3), (0, 0.4)):
+                vertex(x + 0.2 * turn, y + 0.1 * turn, 0.1 * turn)
+            end()
+        done()
+    assert max(names) < 40, names
+    deleted(names[1], 1)
+    names[1] = generate(1)
+    for k, name in enumerate(names):
+        F("glPushMatrix")()
+        translate(0.9 * (k % 2) - 0.6, 0.9 * (k // 2) - 0.6, 0.02 * name)
+        call(name)
+        F("glPopMatrix")()
+
+
+def elements_of_arrays_in_a_list():
+    """`glArrayElement` between Begin and End of a list (R's rgl): the arrays are read when the list is compiled."""
+    simple()
+    n = 24
+    points, normals, colors = [], [], []
+    for k in range(n + 1):
+        a = 6.2831853 * k / n
+        for r in (0.5, 1.1):
+            points += [r * cos(a), r * sin(a), 0.3 * r]
+            normals += [0.3 * cos(a), 0.3 * sin(a), 0.9]
+            colors += [k / n, r - 0.4, 1 - k / n, 1]
+    p, q, r = ((c_float * len(v))(*v) for v in (points, normals, colors))
+    pointer = F("glVertexPointer", c_int, c_uint, c_int, c_void_p)
+    pointer(3, 0x1406, 0, p)
+    F("glNormalPointer", c_uint, c_int, c_void_p)(0x1406, 0, q)
+    F("glColorPointer", c_int, c_uint, c_int, c_void_p)(4, 0x1406, 0, r)
+    for array in (0x8074, 0x8075, 0x8076):
+        enable_array(array)
+    new, done, call, _ = lists()
+    element = F("glArrayElement", c_int)
+    new(5, 0x1300)
+    begin(5)
+    for i in range(2 * n + 2):
+        element(i)
+    end()
+    done()
+    for i in range(len(p)):
+        p[i] = 0
+    call(5)
+    translate(0, 0, 0.5)
+    scale(0.4, 0.4, 0.4)
+    # The same at once.
+    for i in range(len(points)):
+        p[i] = points[i]
+    begin(5)
+    for i in range(2 * n + 2):
+        element(i)
+    end()
+
+
 def a_framebuffer_object_and_then_the_window():
     """Rows of the window are turned over for the driver, those of a framebuffer object are not; between the two only colours are cleared."""
     start()

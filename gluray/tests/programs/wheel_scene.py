@@ -135,6 +135,7 @@ def both_sides():
         actor = sphere(i, normals=i % 2 == 0)
         clip(actor, i, (-1, 0.3, -0.6))
         actor.SetBackfaceProperty(made("Property", Color=(0.1, 0.8, 0.3), Specular=0.2))
+        actor.GetProperty().SetLighting(i != 3)
 
 
 def metal(actor):
@@ -162,6 +163,28 @@ def edges():
         actor.GetProperty().SetLineWidth(1 + i % 2)
         if i == 3:
             clip(actor, i, (-1, 0.3, -0.6))
+
+
+def moved_back(opacity=1):
+    """Surfaces that let lines and others lie on them, by the slope and by a constant, as vedo sets it for every mesh."""
+    moves = ((3, 4), (0, 0), (10, 66000), (1, 10))
+    for i, (factor, units) in enumerate(moves):
+        a = sphere(i, cells=i == 2, resolution=16)
+        b = sphere(i, radius=0.5 + 0.0004 * i, normals=i < 2, resolution=16)
+        b.GetProperty().SetColor(0.2, 0.6, 0.9)
+        for actor, move in ((a, (factor, units)), (b, (0, 0))):
+            actor.GetProperty().SetOpacity(opacity)
+            actor.GetMapper().SetResolveCoincidentTopologyToPolygonOffset()
+            actor.GetMapper().SetRelativeCoincidentTopologyPolygonOffsetParameters(*move)
+        b.SetPosition(0.02, 0, 0)
+        wires = made("ExtractEdges", InputData=a.GetMapper().GetInput())
+        lines = made("PolyDataMapper", InputConnection=wires.GetOutputPort(), ScalarVisibility=False)
+        renderer.AddActor(made("Actor", Mapper=lines))
+
+
+def translucent_moved_back():
+    """The same, through which one sees."""
+    moved_back(0.5)
 
 
 def picture(components=3, alpha=255, **values):
