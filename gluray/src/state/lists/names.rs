@@ -1,6 +1,41 @@
-//! The names that `glCallLists` gets, in any of OpenGL's types.
+//! Names of lists: those that `glGenLists` gives, and those that `glCallLists` gets in any of OpenGL's types.
 
+use super::FIRST_PIECE;
+use crate::context::{Context, Sink};
 use crate::enums::*;
+use crate::real::gl;
+
+impl Context {
+    /// `glGenLists`. The driver would give the names after the greatest that is in use, which is one of our pieces; programs that count their lists (Survex's
+    /// aven) end there. So they get the names after the greatest of their own, as Mesa gives them, and an empty list of the driver's for each. `None` leaves
+    /// the call to the driver.
+    pub(crate) fn gen_lists(&mut self, n: i32) -> Option<u32> {
+        if self.sink == Sink::Trace {
+            self.unswallow("glGenLists between Begin and End");
+        }
+        if n <= 0 || self.sink == Sink::Pass || self.can.core || crate::fault::happened() {
+            return None;
+        }
+        let first = {
+            let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
+            let last = lists.greatest.checked_add(n.cast_unsigned()).filter(|last| *last < FIRST_PIECE)?;
+            std::mem::replace(&mut lists.greatest, last) + 1
+        };
+        // Where a list is compiled its piece ends before.
+        let compiling = self.recording.is_some();
+        if compiling {
+            self.close_piece();
+        }
+        for name in first..first + n.cast_unsigned() {
+            gl::new_list(name, COMPILE);
+            gl::end_list();
+        }
+        if compiling {
+            self.open_piece();
+        }
+        Some(first)
+    }
+}
 
 /// The names of `glCallLists`; `None` for a type that OpenGL refuses.
 pub(super) fn decode(n: i32, kind: u32, address: usize) -> Option<Vec<u32>> {
