@@ -177,8 +177,42 @@ fn leaves_textures(name: &str) -> bool {
         "glBeginQuery",
         "glEndQuery",
     ];
+    // What comes with each vertex is called most of all.
+    const OF_VERTICES: &[&str] = &[
+        "glVertex",
+        "glColor3",
+        "glColor4",
+        "glColorP",
+        "glNormal",
+        "glTexCoord",
+        "glMultiTexCoord",
+        "glSecondaryColor",
+        "glFogCoord",
+        "glIndex",
+        "glEdgeFlag",
+        "glMaterial",
+        "glTangent",
+        "glBinormal",
+        "glWeight",
+        "glVariant",
+        "glRect",
+        "glLight",
+        "glLine",
+        "glPointSize",
+        "glPointParameter",
+        "glPatchParameter",
+        "glProgramEnvParameter",
+        "glProgramLocalParameter",
+        "glProgramParameter",
+        "glProgramNamedParameter",
+        "glPassThrough",
+        "glQueryCounter",
+        "glUseProgramObject",
+        "glInsertEventMarker",
+        "glStringMarker",
+    ];
     // Draws of the driver's, too.
-    is_other_draw(name) || BEGINNINGS.iter().any(|b| name.starts_with(b))
+    is_other_draw(name) || BEGINNINGS.iter().chain(OF_VERTICES).any(|b| name.starts_with(b))
 }
 
 /// Calls that write buffers: we are always told of them, because geometry in buffers is not read again as long as nobody writes.

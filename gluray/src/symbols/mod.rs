@@ -140,3 +140,44 @@ unsafe extern "C" fn slow() {
         told = sym told, table = sym TABLE
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn calls_that_come_with_each_vertex_are_not_told_of_for_the_sake_of_textures() {
+        let starts = |name: &[u8]| {
+            let of_vertices: [&[u8]; 6] = [
+                b"glSecondaryColor",
+                b"glMultiTexCoord",
+                b"glFogCoord",
+                b"glVertexAttrib",
+                b"glEdgeFlag",
+                b"glVertexP",
+            ];
+            of_vertices.iter().any(|b| name.starts_with(b))
+        };
+        let always = class::TEXTURE | class::BUFFER;
+        let mut seen = 0;
+        for (i, name) in NAMES.iter().enumerate().filter(|(_, n)| starts(n.to_bytes())) {
+            seen += 1;
+            assert!(CLASSES[i] & always == 0 || HOOKS[i].is_some(), "{name:?} costs ten nanoseconds");
+        }
+        assert!(seen > 100, "{seen}");
+    }
+
+    #[test]
+    fn calls_that_write_texels_are_told_of_at_all_times() {
+        for name in [
+            c"glTexSubImage2D",
+            c"glTextureSubImage2D",
+            c"glCopyTexImage2D",
+            c"glPopAttrib",
+            c"glBindFramebuffer",
+        ] {
+            let i = index_of(name.to_bytes()).expect("a call of OpenGL's");
+            assert!(CLASSES[i] & class::TEXTURE != 0 || HOOKS[i].is_some(), "{name:?}");
+        }
+    }
+}
