@@ -560,10 +560,18 @@ impl Context {
         if self.sink == Sink::Trace {
             self.unswallow("glDeleteLists between Begin and End");
         }
-        for name in first..first.saturating_add(n.max(0).cast_unsigned()) {
-            let old = self.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.remove(&name);
-            delete_pieces(old);
-        }
+        let range = first..first.saturating_add(n.max(0).cast_unsigned());
+        let gone: Vec<_> = {
+            let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
+            // Few steps, whether the program names few lists or many that are not there.
+            match lists.lists.len() < range.len() {
+                true => {
+                    lists.lists.extract_if(|name, _| range.contains(name)).map(|(_, list)| list).collect()
+                }
+                false => range.filter_map(|name| lists.lists.remove(&name)).collect(),
+            }
+        };
+        gone.into_iter().for_each(|list| delete_pieces(Some(list)));
         false
     }
 }

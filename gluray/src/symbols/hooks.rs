@@ -116,6 +116,8 @@ hooks! {
     fn glRectd(x: f64, y: f64, x2: f64, y2: f64) => |c| c.rect([x, y, x2, y2].map(|v| v as f32));
     fn glRecti(x: Int, y: Int, x2: Int, y2: Int) => |c| c.rect([x, y, x2, y2].map(|v| v as f32));
     fn glRects(x: i16, y: i16, x2: i16, y2: i16) => |c| c.rect([x, y, x2, y2].map(f32::from));
+    fn glArrayElement(i: Int) => |c| c.array_element(i);
+    fn glArrayElementEXT(i: Int) => |c| c.array_element(i);
     fn glMap1f(target: u32, u1: f32, u2: f32, stride: Int, order: Int, points: Address) => |c| c.maps_change();
     fn glMap1d(target: u32, u1: f64, u2: f64, stride: Int, order: Int, points: Address) => |c| c.maps_change();
     fn glMap2f(target: u32, u1: f32, u2: f32, ustride: Int, uorder: Int, v1: f32, v2: f32, vstride: Int, vorder: Int, points: Address) => |c| c.maps_change();
@@ -133,8 +135,6 @@ hooks! {
     fn glEvalCoord2fv(v: Address) => |c| c.eval_coord(Kind::Surface, client_memory::floats(v as usize));
     fn glEvalCoord2dv(v: Address) => |c| c.eval_coord(Kind::Surface, client_memory::doubles(v as usize).map(|x| x as f32));
     fn glEvalPoint1(i: Int) => |c| c.eval_point(Kind::Curve, [i, 0]);
-    fn glArrayElement(i: Int) => |c| c.array_element(i);
-    fn glArrayElementEXT(i: Int) => |c| c.array_element(i);
     fn glEvalPoint2(i: Int, j: Int) => |c| c.eval_point(Kind::Surface, [i, j]);
     fn glEvalMesh1(mode: u32, i1: Int, i2: Int) => |c| c.eval_mesh_1(mode);
     fn glEvalMesh2(mode: u32, i1: Int, i2: Int, j1: Int, j2: Int) => |c| c.eval_mesh_2(mode, [i1, i2, j1, j2]);

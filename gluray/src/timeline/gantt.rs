@@ -152,7 +152,9 @@ pub fn gantt_svg(spans: &[Span], options: &GanttOptions) -> String {
             bottom + 38.0 + 18.0 * (i / columns) as f64,
         );
         let inside = |s: &&&Span| s.phase == **phase && s.end_ms() >= from && s.start_ms <= to;
-        let sum: f64 = sound.iter().filter(inside).map(|s| s.end_ms().min(to) - s.start_ms.max(from)).sum();
+        // Nothing adds up to -0.0, which nobody wants to read.
+        let sum =
+            sound.iter().filter(inside).map(|s| s.end_ms().min(to) - s.start_ms.max(from)).sum::<f64>() + 0.0;
         line(format_args!(
             "<rect x=\"{left:.1}\" y=\"{:.1}\" width=\"11\" height=\"11\" fill=\"{}\"/>",
             y - 10.0,

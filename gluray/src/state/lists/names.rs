@@ -5,6 +5,9 @@ use crate::context::{Context, Sink};
 use crate::enums::*;
 use crate::real::gl;
 
+/// Names in one go that programs may want; nobody waits for more.
+const MOST_NAMES: i32 = 1 << 20;
+
 impl Context {
     /// `glGenLists`. The driver would give the names after the greatest that is in use, which is one of our pieces; programs that count their lists (Survex's
     /// aven) end there. So they get the names after the greatest of their own, as Mesa gives them, and an empty list of the driver's for each. `None` leaves
@@ -13,7 +16,11 @@ impl Context {
         if self.sink == Sink::Trace {
             self.unswallow("glGenLists between Begin and End");
         }
-        if n <= 0 || self.sink == Sink::Pass || self.can.core || crate::fault::happened() {
+        if !(1..=MOST_NAMES).contains(&n)
+            || self.sink == Sink::Pass
+            || self.can.core
+            || crate::fault::happened()
+        {
             return None;
         }
         let first = {
