@@ -387,8 +387,16 @@ fn check_light(l: &Light) -> Result<(), (&'static str, String, &'static str)> {
         let ok = v.is_finite() && v != glam::DVec3::ZERO;
         if ok { Ok(()) } else { Err((field, v.to_string(), "finite and not zero")) }
     };
-    let point =
-        |v: glam::DVec3| if v.is_finite() { Ok(()) } else { Err(("position", v.to_string(), "finite")) };
+    // Beyond, distances to it are not finite in f32, and it would be dark.
+    const FARTHEST: f64 = 1e38;
+    let point = |v: glam::DVec3| {
+        if v.abs().max_element() <= FARTHEST {
+            Ok(())
+        } else {
+            let rule = "finite, at most 1e38 from zero; make light from so far directional";
+            Err(("position", v.to_string(), rule))
+        }
+    };
     match l.kind {
         K::Ambient => Ok(()),
         K::Directional { to_light, angular_radius_rad } => {

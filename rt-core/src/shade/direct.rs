@@ -21,6 +21,10 @@ pub(super) struct Incident {
     pub(super) dir: Vec3,
     /// Where the light is; `None` for directional light.
     from: Option<Vec3>,
+    /// From there to where shadow rays go: off the plane of a flat light by the error of its place,
+    /// towards the point, so that what is drawn in that plane does not hide the light however flat
+    /// it falls.
+    lift: Vec3,
     /// Share of the light's colour that falls here.
     pub(super) strength: f32,
 }
@@ -147,7 +151,9 @@ fn shine<const DETAIL: bool>(
 #[inline(always)]
 pub(super) fn incident_from(light: &PlacedLight, p: Vec3, at: Option<[f32; 2]>) -> Incident {
     match (light.kind, at) {
-        (PlacedKind::Directional { to_light }, None) => Incident { dir: to_light, from: None, strength: 1.0 },
+        (PlacedKind::Directional { to_light }, None) => {
+            Incident { dir: to_light, from: None, lift: Vec3::ZERO, strength: 1.0 }
+        }
         _ => incident_from_place(light, p, at),
     }
 }
@@ -164,7 +170,7 @@ fn incident_from_place(light: &PlacedLight, p: Vec3, at: Option<[f32; 2]>) -> In
             } else {
                 to_light
             };
-            return Incident { dir, from: None, strength: 1.0 };
+            return Incident { dir, from: None, lift: Vec3::ZERO, strength: 1.0 };
         }
         PlacedKind::Point { position } => (position, (p - position).as_dvec3().normalize_or_zero().as_vec3()),
         PlacedKind::Spot { position, direction, .. }
@@ -187,7 +193,7 @@ fn incident_from_place(light: &PlacedLight, p: Vec3, at: Option<[f32; 2]>) -> In
     let to_light = from - p;
     let distance = length(to_light);
     if distance == 0.0 || !distance.is_finite() {
-        return Incident { dir: Vec3::ZERO, from: Some(from), strength: 0.0 };
+        return Incident { dir: Vec3::ZERO, from: Some(from), lift: Vec3::ZERO, strength: 0.0 };
     }
     let dir = to_light / distance;
     let mut strength = match light.attenuation {
@@ -219,7 +225,23 @@ fn incident_from_place(light: &PlacedLight, p: Vec3, at: Option<[f32; 2]>) -> In
         }
         PlacedKind::Directional { .. } | PlacedKind::Point { .. } => {}
     }
-    Incident { dir, from: Some(from), strength }
+    let lift = match light.kind {
+        PlacedKind::Disk { direction, .. } | PlacedKind::Ring { direction, .. } => {
+            off_plane(direction, dir, max_abs(center) + light.size)
+        }
+        PlacedKind::Quad { direction, edges: [a, b], .. } => {
+            off_plane(direction, dir, max_abs(center) + max_abs(a) + max_abs(b))
+        }
+        _ => Vec3::ZERO,
+    };
+    Incident { dir, from: Some(from), lift, strength }
+}
+
+/// See [`Incident::lift`]: for a light in the plane with this normal, of coordinates up to `reach`.
+#[inline]
+fn off_plane(normal: Vec3, to_light: Vec3, reach: f32) -> Vec3 {
+    let towards_point = if to_light.dot(normal) > 0.0 { -normal } else { normal };
+    towards_point * (PLACE_ULPS * f32::EPSILON * reach)
 }
 
 /// A point of the unit disk spread over the ring that is left around a light's hole, with the same density everywhere.
@@ -234,22 +256,43 @@ fn in_ring(at: [f32; 2], kind: PlacedKind) -> [f32; 2] {
     at.map(|v| v * factor)
 }
 
+/// Ulps of its coordinates within which a light's place is known: as those of surfaces (see
+/// [`crate::surface`]).
+const PLACE_ULPS: f32 = 4.0;
+
+/// A ray may come from the light when it then ends at most this many error bounds of the surface
+/// before it.
+const MOST_ERRORS: f32 = 32.0;
+
 /// The ray between a point and a light. `from_light` asks for the light as its origin: all rays of a light then share it and are
 /// traced as one packet.
+///
+/// A ray is exact where it starts; where it ends, the arithmetic has an error of some ulp of its
+/// length. So rays start at the surface, and that error is at the light, where it is no more than
+/// what f32 coordinates tell apart anyway: what touches the surface casts its shadow however far
+/// the light is. Only from a light so near that the error is of the size of the surface's own they
+/// may come the other way.
 #[inline]
 pub(super) fn shadow_ray(p: &SurfacePoint, incident: &Incident, from_light: bool) -> Ray {
     let origin = p.ray_origin(incident.dir);
     let Some(light) = incident.from else {
         return Ray::new(origin, incident.dir);
     };
+    let light = light + incident.lift;
     let to_light = light - origin;
     if from_light {
-        // The ray's end is off the surface by its error bound; the arithmetic of a ray from this far adds some ulp of the
-        // coordinates, taken off the range. Where that is more than a hundredth (a lamp next to the wall), start at the wall.
-        let slack = 8.0 * f32::EPSILON * (max_abs(light) + max_abs(origin)) / max_abs(to_light);
-        if slack < 0.01 {
-            return Ray::new(light, -to_light).with_t_max(1.0 - slack);
+        // The surface's end is off it by its error bound; the arithmetic of a ray from this far
+        // adds some ulp of the coordinates, taken off the range, and as much at the light, which
+        // may stand on a surface. A hundredth: a lamp next to the wall.
+        let slack = 8.0 * f32::EPSILON * (max_abs(light) + max_abs(origin));
+        let share = slack / max_abs(to_light);
+        if slack <= MOST_ERRORS * p.point_error && share < 0.01 {
+            return Ray { t_min: share, ..Ray::new(light, -to_light).with_t_max(1.0 - share) };
         }
     }
-    Ray::new(origin, to_light).with_t_max(1.0)
+    // Unit length: in units of the way to a far light, what is near the surface would be lost among
+    // the smallest numbers of f32.
+    let distance = length(to_light);
+    let error = PLACE_ULPS * f32::EPSILON * (max_abs(light) + distance);
+    Ray::new(origin, to_light / distance).with_t_max(distance - error.min(0.5 * distance))
 }
