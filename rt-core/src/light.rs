@@ -4,6 +4,7 @@
 //! π times its colour. The path tracer uses the same unit, so both integrators agree on direct light. An ambient light or an
 //! environment of radiance 1 makes an unoccluded white surface 1.
 
+use crate::camera::Camera;
 use glam::{DMat3, DVec3, Vec3};
 
 /// The space a light's position and direction are given in.
@@ -109,7 +110,9 @@ pub struct Light {
     /// Divisor c + l·d + q·d² over distance d (GL's attenuation); `[1, 0, 0]` for none, `[0, 0, 1]` for physical lights, whose
     /// colour is then that at distance 1. Ignored by directional and ambient light.
     pub attenuation: [f32; 3],
-    /// Whether surfaces block it. A light at the eye never casts a shadow that the eye could see: it gets no shadow rays either way.
+    /// Whether surfaces block it. Light that goes along the camera rays (from a point at the eye of
+    /// a perspective, or parallel to a parallel projection's rays) gets no shadow rays from what
+    /// those rays meet first: the eye could not see them.
     pub shadows: bool,
 }
 
@@ -210,31 +213,44 @@ impl Light {
         }
     }
 
-    /// True when it sits at the eye (or comes along the viewing direction) and has no size: what it misses, the eye cannot see.
+    /// True when it is a point at the eye: what it misses, camera rays from that point cannot see.
+    /// Mirrors, lenses and what lies behind translucent surfaces show its shadows.
     pub fn is_at_eye(&self) -> bool {
         if self.frame == LightFrame::World || self.size() > 0.0 {
             return false;
         }
         match self.kind {
-            LightKind::Ambient => true,
-            LightKind::Directional { to_light, .. } => {
-                to_light.x == 0.0 && to_light.y == 0.0 && to_light.z > 0.0
-            }
             LightKind::Point { position, .. }
             | LightKind::Spot { position, .. }
-            | LightKind::Cone { position, .. }
-            | LightKind::Ring { position, .. }
-            | LightKind::Disk { position, .. } => position == DVec3::ZERO,
-            LightKind::Quad { .. } => false,
+            | LightKind::Cone { position, .. } => position == DVec3::ZERO,
+            // An area is no point, and parallel light has no place.
+            LightKind::Ambient
+            | LightKind::Directional { .. }
+            | LightKind::Ring { .. }
+            | LightKind::Disk { .. }
+            | LightKind::Quad { .. } => false,
         }
+    }
+
+    /// True when its light goes along the camera rays of `camera` that leave a pinhole: from the
+    /// eye of a perspective, or parallel to the rays of a parallel projection. What such a ray
+    /// meets first is lit. Parallel light along the view is no such light in perspective: there its
+    /// shadows show beside what casts them.
+    pub(crate) fn follows_rays_of(&self, camera: &Camera) -> bool {
+        if camera.eye().is_some() {
+            return self.is_at_eye();
+        }
+        let LightKind::Directional { to_light, angular_radius_rad } = self.kind else { return false };
+        if self.frame == LightFrame::World || angular_radius_rad > 0.0 {
+            return false;
+        }
+        // The viewing axis of a parallel projection is the direction of its rays.
+        to_light.x == 0.0 && to_light.y == 0.0 && to_light.z > 0.0
     }
 
     /// True when its shadow rays can change a picture.
     pub fn casts_shadows(&self) -> bool {
-        self.shadows
-            && !matches!(self.kind, LightKind::Ambient)
-            && !self.is_at_eye()
-            && self.color != [0.0; 3]
+        self.shadows && !matches!(self.kind, LightKind::Ambient) && self.color != [0.0; 3]
     }
 }
 
@@ -259,6 +275,8 @@ pub(crate) struct PlacedLight {
     pub(crate) attenuation: Option<[f32; 3]>,
     pub(crate) size: f32,
     pub(crate) shadows: bool,
+    /// Whether all that camera rays meet first is lit, see [`Light::follows_rays_of`].
+    pub(crate) follows_camera_rays: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -303,14 +321,11 @@ pub(crate) enum PlacedKind {
 }
 
 impl PlacedLight {
-    /// `light` for a camera with axes `world_from_view` and eye `eye` in a render space with origin `origin`. `None` for
-    /// ambient light, which has no place.
-    pub(crate) fn new(
-        light: &Light,
-        world_from_view: DMat3,
-        eye: DVec3,
-        origin: DVec3,
-    ) -> Option<PlacedLight> {
+    /// `light` for `camera`, whose rays go through a lens or a pinhole, in a render space with
+    /// origin `origin`. `None` for ambient light, which has no place.
+    pub(crate) fn new(light: &Light, camera: &Camera, lens: bool, origin: DVec3) -> Option<PlacedLight> {
+        let world_from_view: DMat3 = camera.world_from_view();
+        let eye = camera.eye().unwrap_or_else(|| camera.world_ray([0.0, 0.0]).0);
         let vector = |v: DVec3| {
             let w = if light.frame == LightFrame::Camera { world_from_view * v } else { v };
             w.normalize_or_zero().as_vec3()
@@ -367,6 +382,7 @@ impl PlacedLight {
             attenuation: (!directional && light.attenuation != [1.0, 0.0, 0.0]).then_some(light.attenuation),
             size: light.size() as f32,
             shadows: light.casts_shadows(),
+            follows_camera_rays: !lens && light.follows_rays_of(camera),
         })
     }
 }

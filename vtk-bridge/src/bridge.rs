@@ -392,7 +392,7 @@ impl Bridge {
         }
         if shadows && !effects.contains(Effects::SHADOWS) {
             self.warn(
-                "shadows change no pixel: the only lights are headlights, which stand where the eye is; add a light (vtkLight, vtkLightKit, \
+                "shadows change no pixel: the only lights are headlights, whose shadows are left out; add a light (vtkLight, vtkLightKit, \
                  ParaView's light kit)"
                     .to_owned(),
             );

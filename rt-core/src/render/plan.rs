@@ -41,7 +41,11 @@ pub(crate) fn plan_for(
             cure: "leave the volumes out of the scene, or path tracing out of the options",
         });
     }
-    let asked_all = asked.map(|e| e.with_if(path, Effects::PATH_TRACING)).unwrap_or(needed);
+    let ask = |needed| asked.map(|e| e.with_if(path, Effects::PATH_TRACING)).unwrap_or(needed);
+    if !shadows_show(scene, camera, ask(needed).intersection(needed)) {
+        needed = needed.without(Effects::SHADOWS | Effects::SOFT_SHADOWS);
+    }
+    let asked_all = ask(needed);
     let effects = asked_all.intersection(needed);
     for (effect, name) in Effects::ALL {
         if asked.is_some() && asked_all.contains(effect) && !needed.contains(effect) {
@@ -61,6 +65,19 @@ pub(crate) fn plan_for(
         }
     }
     Ok(Plan { effects, left_out, warnings })
+}
+
+/// Whether `effects` lead to a point that a light casting shadows may miss: not where all such
+/// light goes along the camera rays and nothing but their first hits is lit.
+fn shadows_show(scene: &Scene, camera: &Camera, effects: Effects) -> bool {
+    let beyond_first_hits = Effects::REFLECTION
+        | Effects::GLOSSY_REFLECTION
+        | Effects::REFRACTION
+        | Effects::TRANSPARENCY
+        | Effects::DEPTH_OF_FIELD
+        | Effects::PATH_TRACING;
+    effects.intersects(beyond_first_hits)
+        || scene.lights.iter().any(|l| l.casts_shadows() && !l.follows_rays_of(camera))
 }
 
 fn why_not_needed(effect: Effects, path: bool) -> &'static str {

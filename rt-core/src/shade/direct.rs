@@ -103,6 +103,8 @@ fn shine<const DETAIL: bool>(
                 continue;
             }
             let state = &states[p.lane as usize];
+            // What lies along the light's own way to this point would have hidden it from the eye.
+            let traced = traced && !(light.follows_camera_rays && state.first);
             let model = p.model::<DETAIL>(stage, varied);
             let arriving = p.varied::<DETAIL>(varied).map_or(1.0, |v| v.direct);
             for k in 0..count {

@@ -159,6 +159,7 @@ fn camera_wave(
         slot,
         bounce: 0,
         kind: RayKind::Camera,
+        first: true,
     }));
     camera_blocks(stage, area, &mut wave.blocks, sample, stats, cost);
 }
@@ -554,7 +555,7 @@ fn send_behind(stage: &Stage<'_>, work: &mut Workspace, stats: &mut RayStats) {
             continue;
         }
         let stream = crate::sampler::hash(state.stream.wrapping_add(0x51ed_270b));
-        work.behind.push(&ray, RayState { throughput, coverage: state.coverage * left, stream, ..state });
+        work.behind.push(&ray, RayState { throughput, coverage: state.coverage * left, stream, first: false, ..state });
         stats.transparency += 1;
     }
 }

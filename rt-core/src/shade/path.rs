@@ -36,7 +36,7 @@ pub(super) fn continue_paths(stage: &Stage<'_>, area: &TileArea, work: &mut Work
             let ray = Ray { t_min: p.surface.t_behind(&ray, p.t), ..ray };
             if ray.is_valid() {
                 let stream = crate::sampler::hash(state.stream.wrapping_add(0x51ed_270b));
-                work.behind.push(&ray, RayState { stream, ..state });
+                work.behind.push(&ray, RayState { stream, first: false, ..state });
                 stats.transparency += 1;
             }
             continue;

@@ -177,6 +177,6 @@ pub(super) fn send(
     }
     let ray = Ray::new(p.surface.ray_origin(dir), dir);
     let (stream, bounce) = (child_stream(&state, branch), state.bounce + 1);
-    wave.push(&ray, RayState { throughput, coverage: 0.0, stream, bounce, ..state });
+    wave.push(&ray, RayState { throughput, coverage: 0.0, stream, bounce, first: false, ..state });
     1
 }

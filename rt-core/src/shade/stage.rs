@@ -76,12 +76,12 @@ impl<'a> Stage<'a> {
             }
         }
         let world_from_view = camera.world_from_view();
-        let eye = camera.eye().unwrap_or_else(|| camera.world_ray([0.0, 0.0]).0);
+        let lens = effects.contains(Effects::DEPTH_OF_FIELD);
         let lights: Vec<PlacedLight> = scene
             .lights
             .iter()
             .filter(|l| l.color != [0.0; 3] || l.highlight_color.is_some())
-            .filter_map(|l| PlacedLight::new(l, world_from_view, eye, origin))
+            .filter_map(|l| PlacedLight::new(l, camera, lens, origin))
             .collect();
         let ambient =
             scene.lights.iter().filter(|l| l.kind == LightKind::Ambient).map(|l| Vec3::from(l.color)).sum();
@@ -98,7 +98,7 @@ impl<'a> Stage<'a> {
             sky_number,
             mean_radiance: MeanRadiance::new(scene.environment.as_ref(), ambient),
             ambient,
-            camera_rays: CameraRays::new(camera, origin, bounds, effects.contains(Effects::DEPTH_OF_FIELD)),
+            camera_rays: CameraRays::new(camera, origin, bounds, lens),
             level: Level::new(),
             has_detail: scene.materials.iter().any(|m| m.detail.is_some()),
             volumes,

@@ -32,6 +32,8 @@ pub(crate) struct RayState {
     /// Surfaces scattered at so far.
     pub(crate) bounce: u16,
     pub(crate) kind: RayKind,
+    /// A camera ray that has met nothing yet.
+    pub(crate) first: bool,
 }
 
 /// Rays in blocks, each with its state.
