@@ -28,6 +28,9 @@ pub struct RayStats {
     pub ambient_occlusion_blocked: u64,
     /// Paths cut because they reached `max_bounces`; their rest is missing from the picture.
     pub cut_at_max_bounces: u64,
+    /// Rays left out because less than `min_contribution` of what they would have met reaches the
+    /// pixel; paths never are.
+    pub cut_at_min_contribution: u64,
     /// Hits on surfaces with opacity below 1 that were drawn opaque because transparency was left out.
     pub opacity_ignored: u64,
 }
@@ -80,6 +83,7 @@ impl AddAssign for RayStats {
         self.shadow_blocked += o.shadow_blocked;
         self.ambient_occlusion_blocked += o.ambient_occlusion_blocked;
         self.cut_at_max_bounces += o.cut_at_max_bounces;
+        self.cut_at_min_contribution += o.cut_at_min_contribution;
         self.opacity_ignored += o.opacity_ignored;
     }
 }

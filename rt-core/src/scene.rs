@@ -25,6 +25,7 @@ use crate::environment::{Background, Environment};
 use crate::light::Light;
 use crate::material::{ColorSource, Material, SurfaceModel};
 use crate::mesh::{Attribute, PerElement, TriMesh};
+use crate::shade::reflection_of;
 use crate::shapes::Shape;
 use crate::volume::Volume;
 use glam::DAffine3;
@@ -351,20 +352,16 @@ pub(crate) fn requirements(scene: &Scene) -> Effects {
     let lit = used().any(|m| !matches!(m.model, SurfaceModel::Unlit | SurfaceModel::Dielectric { .. }));
     let lights = || scene.lights.iter().filter(|l| lit && l.casts_shadows());
     let dielectric = used().any(|m| matches!(m.model, SurfaceModel::Dielectric { .. }));
+    // Where roughness varies, it may be anything somewhere.
+    let reflects = |m: &Material, effect| {
+        m.reflection_roughness().is_some_and(|r| m.detail.is_some() || reflection_of(r) == effect)
+    };
     Effects::NONE
         .with_if(lights().next().is_some(), Effects::SHADOWS)
         .with_if(lights().any(|l| l.size() > 0.0), Effects::SOFT_SHADOWS)
         .with_if(lit && scene.ambient_occlusion.is_some() && scene.has_ambient(), Effects::AMBIENT_OCCLUSION)
-        .with_if(
-            // Where roughness varies, it may be 0 somewhere.
-            dielectric
-                || used().any(|m| m.reflection_roughness().is_some_and(|r| r == 0.0 || m.detail.is_some())),
-            Effects::REFLECTION,
-        )
-        .with_if(
-            used().any(|m| m.reflection_roughness().is_some_and(|r| r > 0.0 || m.detail.is_some())),
-            Effects::GLOSSY_REFLECTION,
-        )
+        .with_if(dielectric || used().any(|m| reflects(m, Effects::REFLECTION)), Effects::REFLECTION)
+        .with_if(used().any(|m| reflects(m, Effects::GLOSSY_REFLECTION)), Effects::GLOSSY_REFLECTION)
         .with_if(dielectric, Effects::REFRACTION)
         .with_if(transparent, Effects::TRANSPARENCY)
         .with_if(!scene.volumes.is_empty(), Effects::VOLUMES)

@@ -263,6 +263,28 @@ fn no_reflection_rays_at_specular_zero() {
 }
 
 #[test]
+fn rays_of_mirrors_that_are_left_out_are_counted_and_cost_at_most_their_share() {
+    // Two mirrors of share 0.1 face each other, each gives off 1: the series 1/(1 - 0.1).
+    let mut m = Material::phong([0.0; 3], 0.0, 1.0).with_emission([1.0; 3]);
+    if let SurfaceModel::Phong { mirror, .. } = &mut m.model {
+        *mirror = 0.1;
+    }
+    let s = scene(vec![(floor(0.0, 100.0), m.clone()), (floor(2.0, 100.0), m)], vec![]);
+    let c = top_camera(1.0, 0.1);
+    let at = |min_contribution| {
+        let o = draw(&s, &c, RenderOptions { min_contribution, ..options(4) });
+        (o.frame.color_at(2, 2)[0], o.report.rays)
+    };
+    let (all, rays) = at(0.0);
+    assert!((all - 1.0 / 0.9).abs() < 1e-6 && rays.cut_at_min_contribution == 0, "{all}");
+    assert_eq!(rays.cut_at_max_bounces, 16, "after eight reflections");
+    let (most, rays) = at(0.005);
+    // The third reflection is not sent: what is missing is 0.001 times what it would have met.
+    assert_eq!((rays.cut_at_min_contribution, rays.cut_at_max_bounces), (16, 0));
+    assert!(((all - most) - 0.001 * all).abs() < 1e-6, "{all} {most}");
+}
+
+#[test]
 fn refracted_ray_leaves_where_snell_says() {
     // A slab 0 <= z <= 1 of index 1.5 over a floor at z = -1e-3 striped in x: a 45° ray enters at x = 0 and arrives shifted.
     let slab_top = floor(1.0, 100.0);

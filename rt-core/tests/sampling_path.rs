@@ -15,7 +15,7 @@ fn path(n: u32, samples: u32) -> RenderOptions {
     RenderOptions {
         path_tracing: true,
         samples,
-        max_bounces: 1000,
+        max_bounces: Some(1000),
         min_contribution: 0.0,
         ..RenderOptions::new(n, n)
     }
@@ -164,8 +164,11 @@ fn russian_roulette_and_bounces_do_not_change_the_mean_of_glass() {
         vec![],
     );
     let c = top_camera(5.0, 0.01);
-    let whitted =
-        draw(&s, &c, RenderOptions { min_contribution: 0.0, max_bounces: 12, ..RenderOptions::new(8, 8) });
+    let whitted = draw(
+        &s,
+        &c,
+        RenderOptions { min_contribution: 0.0, max_bounces: Some(12), ..RenderOptions::new(8, 8) },
+    );
     let traced = draw(&s, &c, path(8, 2048));
     // Rows of reflections between the faces: T² a / (1 - R² a²) with R = 0.04, T = 0.96, a = e^-0.3; the rest is lost to the sky.
     let a = (-0.3f64).exp();

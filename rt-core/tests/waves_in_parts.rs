@@ -141,7 +141,7 @@ fn cases() -> Vec<Case> {
             name: "path tracing",
             scene: scene(zero, matte(), Material::metal([0.9; 3], 0.0), &[sun], None),
             camera: camera(zero),
-            options: RenderOptions { path_tracing: true, samples: 3, max_bounces: 5, ..options() },
+            options: RenderOptions { path_tracing: true, samples: 3, max_bounces: Some(5), ..options() },
         },
     ];
     let path = out.last_mut().unwrap();

@@ -53,8 +53,8 @@ pub struct Options {
     pub ior: f32,
     /// Light over many bounces.
     pub path_tracing: bool,
-    /// Most bounces.
-    pub max_bounces: u32,
+    /// Most bounces; `None` for 8 of mirrors and glass, and paths that chance ends.
+    pub max_bounces: Option<u32>,
     /// Radius of the lens, world units; 0 for a pinhole.
     pub aperture: f64,
     /// Distance in focus, world units; `None` for the camera's focal point.
@@ -96,7 +96,7 @@ impl Default for Options {
             roughness: 0.2,
             ior: 1.5,
             path_tracing: false,
-            max_bounces: 8,
+            max_bounces: None,
             aperture: 0.0,
             focus: None,
             robustness: Robustness::Watertight,
@@ -207,7 +207,7 @@ impl Options {
                     _ => return None,
                 }
             }
-            "RTV_MAX_BOUNCES" => self.max_bounces = within(value, 0, 1000)?,
+            "RTV_MAX_BOUNCES" => self.max_bounces = Some(within(value, 0, 1000)?),
             "RTV_APERTURE" => self.aperture = within(value, 0.0, f64::MAX)?,
             "RTV_FOCUS" => self.focus = automatic(value)?,
             "RTV_ROBUSTNESS" => {

@@ -102,14 +102,16 @@ pub fn draw(subject: Subject, wish: &Wish, watch: &mut Watch<'_>) -> anyhow::Res
     // Glass needs more bounces before what is cut off stops to matter.
     let wished = wish.look.effects;
     let glass = wished.contains(Effects::REFRACTION);
+    let path = wished.contains(Effects::PATH_TRACING);
     // What was wished is asked for by name, so that the report says what of it changes no pixel.
     let needed = Effects::required_by(&scene) | Effects::required_by_camera(&camera);
     let options = RenderOptions {
         effects: Some(needed | wished),
-        max_bounces: if glass { 16 } else { 8 },
+        // Paths are ended by chance.
+        max_bounces: (!path).then_some(if glass { 16 } else { 8 }),
         samples: wish.samples,
         layers: Layers::COLOR | wish.layers,
-        path_tracing: wished.contains(Effects::PATH_TRACING),
+        path_tracing: path,
         cancel: watch.cancel.clone(),
         ..RenderOptions::new(wish.size[0], wish.size[1])
     };

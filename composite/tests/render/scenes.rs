@@ -237,7 +237,7 @@ pub(crate) fn several_waves() -> Vec<Case> {
         case(
             "paths",
             scene(DVec3::ZERO, matte(), Some(Material::metal([0.9; 3], 0.0)), &[sun, ambient], None),
-            RenderOptions { path_tracing: true, max_bounces: 4, ..small() },
+            RenderOptions { path_tracing: true, max_bounces: Some(4), ..small() },
         ),
     ]
 }

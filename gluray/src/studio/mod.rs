@@ -149,7 +149,7 @@ impl Studio {
                 path_tracing: true,
                 samples: settings.samples.max(LEAST_SAMPLES),
                 light_rays: 1,
-                max_bounces: settings.effects.max_bounces,
+                max_bounces: Some(settings.effects.max_bounces),
                 seed: picture,
                 ..RenderOptions::new(vw, vh)
             };

@@ -46,8 +46,18 @@ pub struct RenderOptions {
     /// Another seed gives other noise.
     pub seed: u64,
     /// Most reflections, refractions and diffuse bounces in a row; transparent layers do not count.
-    pub max_bounces: u32,
-    /// Rays whose contribution to the pixel cannot exceed this (linear, 1 = white) are not sent. 0 for all.
+    /// What lies beyond is missing from the picture:
+    /// [`RayStats::cut_at_max_bounces`](crate::ray_stats::RayStats::cut_at_max_bounces) counts it,
+    /// and a warning says so. `None`: 8 for mirrors and glass; no limit for path tracing, where
+    /// chance ends paths (Russian roulette) and the mean is right.
+    pub max_bounces: Option<u32>,
+    /// Mirror, glass and transparency rays of which less than this share reaches the pixel are not
+    /// sent: at most this times the radiance they would have met is missing for each (linear, 1 =
+    /// white), and
+    /// [`RayStats::cut_at_min_contribution`](crate::ray_stats::RayStats::cut_at_min_contribution)
+    /// counts them. Of the light that comes through translucent layers, less than this share is
+    /// missing, and less than this radiance of each ray. 0 for everything. Path tracing leaves
+    /// nothing out.
     pub min_contribution: f32,
     /// Depth, distance, normal and ids belong to the first surface of at least this opacity: 0 for any surface that is not
     /// invisible, 1 for opaque surfaces only, as OpenGL's depth buffer has it.
@@ -78,7 +88,7 @@ impl RenderOptions {
             light_rays: 4,
             sampling: Sampling::Sobol,
             seed: 0,
-            max_bounces: 8,
+            max_bounces: None,
             min_contribution: 1.0 / 1024.0,
             depth_min_opacity: 0.0,
             volume_quality: VolumeQuality::default(),
@@ -117,8 +127,11 @@ impl RenderOptions {
                 return error(field, "0".into(), "at least 1");
             }
         }
-        if self.max_bounces > u16::MAX as u32 {
-            return error("max_bounces", self.max_bounces.to_string(), "at most 65535");
+        // The counter stops at 65535.
+        if let Some(most) = self.max_bounces
+            && most > u32::from(u16::MAX)
+        {
+            return error("max_bounces", most.to_string(), "at most 65535; leave it out for the default");
         }
         for (field, v) in
             [("min_contribution", self.min_contribution), ("depth_min_opacity", self.depth_min_opacity)]

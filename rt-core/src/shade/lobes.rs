@@ -1,6 +1,7 @@
 //! How a material answers light from one direction, and ambient light.
 
 use super::microfacet::{ggx, schlick};
+use super::specular::reflection_of;
 use crate::effects::Effects;
 use crate::material::{Highlight, PbrForm, SurfaceModel};
 use glam::Vec3;
@@ -130,17 +131,17 @@ fn vtk_pbr([metallic, roughness, specular]: [f32; 3], albedo: Vec3, n: Vec3, v: 
     [albedo * (Vec3::ONE - f) * (1.0 - metallic), f * (distribution * visibility * PI)]
 }
 
-/// Light sent to the viewer per unit of ambient radiance. Where reflection rays are left out, a reflector takes its share of
-/// ambient light instead of turning black.
+/// Light sent to the viewer per unit of ambient radiance. Where the reflection rays of its own
+/// roughness are left out, a reflector takes its share of ambient light instead of turning black.
 #[inline]
 pub(crate) fn ambient_albedo(model: &SurfaceModel, color: Vec3, effects: Effects) -> Vec3 {
-    let reflects = effects.intersects(Effects::REFLECTION.union(Effects::GLOSSY_REFLECTION));
+    let reflects = |roughness| effects.contains(reflection_of(roughness));
     match *model {
         SurfaceModel::Unlit => Vec3::ZERO,
         SurfaceModel::Matte => color,
         SurfaceModel::Phong { ambient, .. } => color * ambient,
-        SurfaceModel::Metal { .. } => {
-            if reflects {
+        SurfaceModel::Metal { roughness } => {
+            if reflects(roughness) {
                 Vec3::ZERO
             } else {
                 color
@@ -150,8 +151,8 @@ pub(crate) fn ambient_albedo(model: &SurfaceModel, color: Vec3, effects: Effects
         SurfaceModel::Pbr { form: PbrForm::Vtk, .. } if !effects.contains(Effects::AMBIENT_OCCLUSION) => {
             Vec3::ZERO
         }
-        SurfaceModel::Pbr { metallic, .. } => {
-            if reflects {
+        SurfaceModel::Pbr { metallic, roughness, .. } => {
+            if reflects(roughness) {
                 color * (1.0 - metallic)
             } else {
                 color

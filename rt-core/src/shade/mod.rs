@@ -23,6 +23,7 @@ mod wave;
 pub mod waves;
 
 pub(crate) use point::Point;
+pub(crate) use specular::reflection_of;
 pub(crate) use stage::Stage;
 pub(crate) use tile::{TILE, TileArea, TileLayers};
 
@@ -551,11 +552,16 @@ fn send_behind(stage: &Stage<'_>, work: &mut Workspace, stats: &mut RayStats) {
         let throughput = state.throughput * left;
         let ray = work.current.ray(p.lane as usize);
         let ray = Ray { t_min: p.surface.t_behind(&ray, p.t), ..ray };
-        if throughput.max_element() < stage.options.min_contribution || !ray.is_valid() {
+        if !ray.is_valid() {
+            continue;
+        }
+        if throughput.max_element() < stage.options.min_contribution {
+            stats.cut_at_min_contribution += 1;
             continue;
         }
         let stream = crate::sampler::hash(state.stream.wrapping_add(0x51ed_270b));
-        work.behind.push(&ray, RayState { throughput, coverage: state.coverage * left, stream, first: false, ..state });
+        let coverage = state.coverage * left;
+        work.behind.push(&ray, RayState { throughput, coverage, stream, first: false, ..state });
         stats.transparency += 1;
     }
 }

@@ -25,9 +25,6 @@ pub(crate) enum Coherence {
     Scattered,
 }
 
-/// Below this, what is left of a light ray is no longer followed through further layers: a quarter of an 8-bit step of full white.
-const DARK: f32 = 1.0 / 1024.0;
-
 /// Calls `arrived(point, radiance)` for what reaches its point of each light ray, in order.
 pub(crate) fn trace_light_rays(
     stage: &Stage<'_>,
@@ -75,7 +72,7 @@ pub(crate) fn trace_light_rays(
     }
 
     // Follow each ray through its layers; transmittance is a product, so only the set of layers matters.
-    let mut followed = vec![Following::default(); rays.targets.len()];
+    let mut followed: Vec<_> = rays.targets.iter().map(|(_, light)| Following::new(stage, *light)).collect();
     let mut open = rays.targets.len();
     while open > 0 {
         rays.hits.clear();
@@ -123,15 +120,21 @@ pub(crate) struct Following {
     depth: Vec3,
     met: bool,
     continued: u32,
-}
-
-impl Default for Following {
-    fn default() -> Self {
-        Following { left: Vec3::ONE, depth: Vec3::ZERO, met: false, continued: 0 }
-    }
+    /// What is not more than this is no longer followed.
+    least: f32,
 }
 
 impl Following {
+    /// A ray that brings `radiance` if nothing is in its way. Missing may be less than the options'
+    /// smallest contribution, both as a share of it and as radiance; paths, whose mean must be
+    /// right, are followed until nothing is left.
+    pub(crate) fn new(stage: &Stage<'_>, radiance: Vec3) -> Following {
+        let exact = stage.effects.contains(Effects::PATH_TRACING);
+        let least =
+            if exact { 0.0 } else { stage.options.min_contribution / radiance.max_element().max(1.0) };
+        Following { left: Vec3::ONE, depth: Vec3::ZERO, met: false, continued: 0, least }
+    }
+
     /// Meets a surface at `t`; returns from where `ray` goes on, if it does.
     pub(crate) fn pass(
         &mut self,
@@ -143,15 +146,16 @@ impl Following {
     ) -> Option<f32> {
         self.met = true;
         let behind = pass(stage, material, surface, ray, t, &mut self.left, &mut self.depth);
-        let goes_on = self.left.max_element() > DARK && behind < ray.t_max;
+        let goes_on = self.left.max_element() > self.least && behind < ray.t_max;
         self.continued += goes_on as u32;
         goes_on.then_some(behind)
     }
 
     /// What has become of it.
     pub(crate) fn passage(&self) -> Passage {
-        let Following { left, depth, met, continued } = *self;
-        let left = if left.max_element() > DARK { left * (-depth.max(Vec3::ZERO)).exp() } else { Vec3::ZERO };
+        let Following { left, depth, met, continued, least } = *self;
+        let followed = left.max_element() > least;
+        let left = if followed { left * (-depth.max(Vec3::ZERO)).exp() } else { Vec3::ZERO };
         Passage { left, met, continued }
     }
 }

@@ -12,8 +12,17 @@ use crate::ray_stats::RayStats;
 use crate::sampler::hash;
 use glam::Vec3;
 
-/// Below this roughness a lobe is narrower than a pixel and treated as a mirror.
-pub(super) const MIRROR_ROUGHNESS: f32 = 1e-3;
+/// Up to this roughness a lobe is narrower than a pixel and treated as a mirror.
+pub(crate) const MIRROR_ROUGHNESS: f32 = 1e-3;
+
+/// The effect whose rays a lobe of this roughness sends.
+#[inline]
+pub(crate) fn reflection_of(roughness: f32) -> Effects {
+    if roughness <= MIRROR_ROUGHNESS { Effects::REFLECTION } else { Effects::GLOSSY_REFLECTION }
+}
+
+/// Most reflections and refractions in a row where the options do not say it.
+const MIRROR_BOUNCES: u32 = 8;
 
 /// Stream of a ray that leaves a point in branch `branch`.
 #[inline]
@@ -28,7 +37,8 @@ pub(super) fn send_specular_rays(
     stats: &mut RayStats,
 ) {
     let e = stage.effects;
-    let (mirror, gloss) = (e.contains(Effects::REFLECTION), e.contains(Effects::GLOSSY_REFLECTION));
+    let mirror = e.contains(Effects::REFLECTION);
+    let sent = |roughness| e.contains(reflection_of(roughness));
     for p in &work.points {
         let state = work.current.states[p.lane as usize];
         let mut weight = state.throughput * p.surface.opacity;
@@ -40,15 +50,14 @@ pub(super) fn send_specular_rays(
                 reflect_at(stage, p, facing(p), weight * share, &state, &mut work.scattered, stats);
             }
             SurfaceModel::Metal { roughness } => {
-                let (f0, allowed) =
-                    (p.surface.color, if roughness <= MIRROR_ROUGHNESS { mirror } else { gloss });
-                if allowed {
+                let f0 = p.surface.color;
+                if sent(roughness) {
                     reflect_lobe(stage, area, p, f0, roughness, weight, &state, &mut work.scattered, stats);
                 }
             }
             SurfaceModel::Pbr { metallic, roughness, specular, .. } if metallic > 0.0 || specular > 0.0 => {
                 let f0 = Vec3::splat(specular).lerp(p.surface.color, metallic);
-                if if roughness <= MIRROR_ROUGHNESS { mirror } else { gloss } {
+                if sent(roughness) {
                     reflect_lobe(stage, area, p, f0, roughness, weight, &state, &mut work.scattered, stats);
                 }
             }
@@ -157,7 +166,8 @@ pub(super) fn sample_lobe(p: &Point, n: Vec3, f0: Vec3, roughness: f32, u: [f32;
     (share != Vec3::ZERO && dir.dot(p.surface.face_normal) > 0.0).then_some((dir, share))
 }
 
-/// Sends a ray unless it is worth too little or has bounced too often. Returns how many were sent.
+/// Sends a ray of Whitted's tree unless it is worth too little or has bounced too often: two
+/// deterministic approximations, bounded by the options and counted. Returns how many were sent.
 pub(super) fn send(
     stage: &Stage<'_>,
     p: &Point,
@@ -169,14 +179,29 @@ pub(super) fn send(
     stats: &mut RayStats,
 ) -> u64 {
     if throughput.max_element() < stage.options.min_contribution {
+        stats.cut_at_min_contribution += (throughput != Vec3::ZERO) as u64;
         return 0;
     }
-    if state.bounce as u32 >= stage.options.max_bounces {
+    if u32::from(state.bounce) >= stage.options.max_bounces.unwrap_or(MIRROR_BOUNCES) {
         stats.cut_at_max_bounces += 1;
         return 0;
     }
-    let ray = Ray::new(p.surface.ray_origin(dir), dir);
-    let (stream, bounce) = (child_stream(&state, branch), state.bounce + 1);
-    wave.push(&ray, RayState { throughput, coverage: 0.0, stream, bounce, first: false, ..state });
+    push_scattered(p, dir, throughput, state, branch, wave);
     1
+}
+
+/// Appends the ray that leaves `p` in branch `branch` of the one with `state`.
+pub(super) fn push_scattered(
+    p: &Point,
+    dir: Vec3,
+    throughput: Vec3,
+    state: RayState,
+    branch: u32,
+    wave: &mut Wave,
+) {
+    let ray = Ray::new(p.surface.ray_origin(dir), dir);
+    // Paths without a limit may be longer than the counter reaches; it is only compared with limits
+    // below that.
+    let (stream, bounce) = (child_stream(&state, branch), state.bounce.saturating_add(1));
+    wave.push(&ray, RayState { throughput, coverage: 0.0, stream, bounce, first: false, ..state });
 }

@@ -109,6 +109,8 @@ pub(crate) struct RecordedRay {
     pub(crate) point: u32,
     /// Its number among the light rays that a point could send.
     pub(crate) number: u32,
+    /// What it brings if nothing is in the way.
+    pub(crate) radiance: Vec3,
 }
 
 /// What a light ray met.
@@ -153,9 +155,9 @@ impl LightRays {
     /// Writes the batch down for somebody else to trace.
     pub(crate) fn record(&mut self) {
         let Answers::Recording(list) = &mut self.answers else { return };
-        for (i, (&(point, _), &number)) in self.targets.iter().zip(&self.numbers).enumerate() {
+        for (i, (&(point, radiance), &number)) in self.targets.iter().zip(&self.numbers).enumerate() {
             let ray = self.blocks[i / LANES].get(i % LANES);
-            list.push(RecordedRay { ray, point: self.first_point + point, number });
+            list.push(RecordedRay { ray, point: self.first_point + point, number, radiance });
         }
     }
 

@@ -258,7 +258,8 @@ impl TileInWork {
         self.following.clear();
         self.lit = false;
         if frame.light_passes_surfaces() {
-            self.following.resize(self.waiting.len(), Following::default());
+            let start = |r: &RecordedRay| Following::new(&frame.stage, r.radiance);
+            self.following.extend(self.waiting.iter().map(start));
             return;
         }
         self.place.clear();

@@ -55,7 +55,9 @@ pub(crate) fn view_of(renderer: &Object, size: [u32; 2], notes: &mut Notes) -> V
         used
     };
     options.samples = count("pixelSamples", 1, 1, 1 << 16);
-    options.max_bounces = count("maxDepth", 8, 0, 65535);
+    if renderer.numbers("maxDepth").is_some() {
+        options.max_bounces = Some(count("maxDepth", 8, 0, 65535));
+    }
     options.light_rays = count("lightSamples", 4, 1, 4096);
     let rays = count("ambientSamples", 0, 0, 4096);
     options.path_tracing = renderer.subtype == "pathtracer";
