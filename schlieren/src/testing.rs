@@ -7,6 +7,7 @@ use crate::path::{Exit, LightPaths, Start, Wanted};
 use crate::technique::Technique;
 use crate::view::{Axis, View};
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 /// A thin flow.
 #[derive(Debug, Clone, Copy)]
@@ -119,4 +120,49 @@ pub(crate) fn beams_grey(t: &Technique, p: &ClosedForm, framing: Framing, per_si
     let film = Film::<1>::new(framing, false);
     expose_beams(&exposure(t, p), &film, per_side, &AtomicBool::new(false), &|_| {}).expect("not cancelled");
     film.developed(1.0).into_iter().flatten().collect()
+}
+
+/// What `work` returns, on a thread of its own; a failed test instead of a hang when it takes
+/// longer than `limit`.
+pub(crate) fn within<T: Send + 'static>(
+    limit: Duration,
+    what: &str,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> T {
+    let (tell, told) = std::sync::mpsc::channel();
+    let worker = std::thread::spawn(move || {
+        // Nobody listens any more when the limit has passed.
+        let _ = tell.send(work());
+    });
+    match told.recv_timeout(limit) {
+        Ok(done) => done,
+        Err(std::sync::mpsc::RecvTimeoutError::Timeout) => panic!("{what}: not done within {limit:?}"),
+        Err(std::sync::mpsc::RecvTimeoutError::Disconnected) => {
+            std::panic::resume_unwind(worker.join().err().unwrap_or_else(|| Box::new("no panic")))
+        }
+    }
+}
+
+/// Does `job` 0 on a pool, and while that is under way 48 more, which come from outside as those of another picture do; with as
+/// many fresh `jobs` as there are delays between. A worker that waits inside rayon takes what comes late before it goes on.
+pub(crate) fn with_late_jobs<J: Fn(usize) + Send + Sync + 'static>(threads: usize, jobs: impl Fn() -> J) {
+    const JOBS: usize = 49;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+    for delay_us in [100, 300, 1000, 2000, 3000, 5000, 8000, 12_000, 20_000, 30_000] {
+        let job = std::sync::Arc::new(jobs());
+        let (tell, told) = std::sync::mpsc::channel();
+        for i in 0..JOBS {
+            let (job, tell) = (job.clone(), tell.clone());
+            pool.spawn(move || {
+                job(i);
+                // Nobody listens any more when the test has failed.
+                let _ = tell.send(());
+            });
+            if i == 0 {
+                std::thread::sleep(Duration::from_micros(delay_us));
+            }
+        }
+        drop(tell);
+        assert_eq!(told.iter().count(), JOBS, "a job panicked");
+    }
 }

@@ -22,34 +22,46 @@ pub struct BSpline {
 impl BSpline {
     /// Filters a field's values into coefficients, in parallel.
     pub fn new(field: &Field) -> BSpline {
+        BSpline::in_jobs_of(field, 1)
+    }
+
+    /// [`BSpline::new`] on the calling thread alone, bit for bit the same: for who holds a lock. A
+    /// worker that waits inside rayon may take any other job, one that waits for this lock as well.
+    pub(crate) fn on_this_thread(field: &Field) -> BSpline {
+        // Rayon does not divide what is shorter, and what is not divided runs where it is called.
+        BSpline::in_jobs_of(field, usize::MAX)
+    }
+
+    /// In jobs of at least so many layers or sheets.
+    fn in_jobs_of(field: &Field, least: usize) -> BSpline {
         let [nx, ny, nz] = field.dims();
         let row = padded_row(nx + 2);
         let layer = row * (ny + 2);
 
         // Along x and y, a layer at a time in f64.
         let mut layers = vec![0.0f32; layer * nz];
-        layers.par_chunks_exact_mut(layer).zip(field.eps().par_chunks_exact(nx * ny)).for_each(
-            |(out, values)| {
-                let mut plane = vec![0.0f64; (nx + 2) * (ny + 2)];
-                for (to, from) in plane.chunks_exact_mut(nx + 2).skip(1).zip(values.chunks_exact(nx)) {
-                    for (t, f) in to[1..].iter_mut().zip(from) {
-                        *t = f64::from(*f);
-                    }
-                    prefilter_line(to);
+        let filtered = layers.par_chunks_exact_mut(layer).zip(field.eps().par_chunks_exact(nx * ny));
+        filtered.with_min_len(least).for_each(|(out, values)| {
+            let mut plane = vec![0.0f64; (nx + 2) * (ny + 2)];
+            for (to, from) in plane.chunks_exact_mut(nx + 2).skip(1).zip(values.chunks_exact(nx)) {
+                for (t, f) in to[1..].iter_mut().zip(from) {
+                    *t = f64::from(*f);
                 }
-                prefilter_rows(&mut plane, nx + 2);
-                for (to, from) in out.chunks_exact_mut(row).zip(plane.chunks_exact(nx + 2)) {
-                    for (t, f) in to.iter_mut().zip(from) {
-                        *t = *f as f32;
-                    }
+                prefilter_line(to);
+            }
+            prefilter_rows(&mut plane, nx + 2);
+            for (to, from) in out.chunks_exact_mut(row).zip(plane.chunks_exact(nx + 2)) {
+                for (t, f) in to.iter_mut().zip(from) {
+                    *t = *f as f32;
                 }
-            },
-        );
+            }
+        });
 
         // Along z, a sheet of rows with the same y at a time, again in f64: two roundings to f32 in all. (Eliminating layer by layer in place saves
         // this copy, and puts a rounding into every step of the recursion: a uniform gas then had slopes of a last digit.)
         let sheets: Vec<Vec<f32>> = (0..ny + 2)
             .into_par_iter()
+            .with_min_len(least)
             .map(|j| {
                 let mut sheet = vec![0.0f64; row * (nz + 2)];
                 for (k, to) in sheet.chunks_exact_mut(row).skip(1).take(nz).enumerate() {
@@ -63,7 +75,7 @@ impl BSpline {
             .collect();
         drop(layers);
         let mut coefficients = vec![0.0f32; layer * (nz + 2)];
-        coefficients.par_chunks_exact_mut(layer).enumerate().for_each(|(k, out)| {
+        coefficients.par_chunks_exact_mut(layer).enumerate().with_min_len(least).for_each(|(k, out)| {
             for (to, sheet) in out.chunks_exact_mut(row).zip(&sheets) {
                 to.copy_from_slice(&sheet[k * row..(k + 1) * row]);
             }

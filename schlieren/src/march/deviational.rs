@@ -122,6 +122,22 @@ impl<'a> Deviational<'a> {
         Self::made(field, view, interpolant, options, Level::new(), &|| kept.spline(field))
     }
 
+    /// [`Deviational::new`] on the calling thread alone: it waits for no other.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn on_this_thread(
+        field: &'a Field,
+        view: View,
+        interpolant: Interpolant,
+        options: Options,
+    ) -> Deviational<'a> {
+        debug_assert!(
+            options.skip_rad == 0.0 && interpolant != Interpolant::TrilinearGradient,
+            "bricks and gradients are made by all threads"
+        );
+        let spline = || Arc::new(BSpline::on_this_thread(field));
+        Self::made(field, view, interpolant, options, Level::new(), &spline)
+    }
+
     fn made(
         field: &'a Field,
         view: View,

@@ -9,6 +9,10 @@ use crate::view::View;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Made at first need, for one field: whoever keeps it must give the same field to every call.
+///
+/// What is made is made by all threads, so nothing is locked meanwhile: a worker that waits inside
+/// rayon may take another job that asks for the same. Who asks at the same time as another makes it
+/// twice, and all keep the first.
 #[derive(Default)]
 pub struct Kept {
     roughness: OnceLock<Roughness>,
@@ -36,25 +40,105 @@ const PROJECTIONS: usize = 2;
 impl Kept {
     /// The field's largest derivatives.
     pub fn roughness(&self, field: &Field) -> Roughness {
-        *self.roughness.get_or_init(|| Roughness::of(field))
+        kept(&self.roughness, || Roughness::of(field))
     }
 
     /// The spline through the field.
     pub fn spline(&self, field: &Field) -> Arc<BSpline> {
-        self.spline.get_or_init(|| Arc::new(BSpline::new(field))).clone()
+        kept(&self.spline, || Arc::new(BSpline::new(field)))
     }
 
     /// The field projected along a view.
     pub fn line_of_sight(&self, field: &Field, of: Projection) -> Arc<LineOfSight> {
-        let mut kept = self.projections.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, made)) = kept.iter().find(|p| p.0 == of) {
-            return made.clone();
+        let lock = || self.projections.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = |all: &[(Projection, Arc<LineOfSight>)]| {
+            all.iter().find(|p| p.0 == of).map(|(_, made)| made.clone())
+        };
+        if let Some(made) = found(&lock()) {
+            return made;
         }
         let made = Arc::new(LineOfSight::new(field, of.view, of.interpolant, of.wanted, of.blank));
-        if kept.len() == PROJECTIONS {
-            kept.remove(0);
+        let mut all = lock();
+        if let Some(first) = found(&all) {
+            return first;
         }
-        kept.push((of, made.clone()));
+        if all.len() == PROJECTIONS {
+            all.remove(0);
+        }
+        all.push((of, made.clone()));
         made
+    }
+}
+
+/// What is in the cell; made outside of it when nothing is.
+fn kept<T: Clone>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> T {
+    if let Some(made) = cell.get() {
+        return made.clone();
+    }
+    let made = make();
+    cell.get_or_init(|| made).clone()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{with_late_jobs, within};
+    use crate::view::Axis;
+    use glam::DVec3;
+    use std::time::Duration;
+
+    /// Several pictures of one field can be rayon jobs of one pool. A worker that waits inside rayon for a
+    /// part of what it makes may take another of them, which asks for the same.
+    #[test]
+    fn jobs_of_one_pool_that_ask_for_the_same_do_not_wait_for_themselves() {
+        let eps = |p: DVec3| 1e-4 * (-p.length_squared() / 0.02).exp();
+        let field = Arc::new(Field::from_fn([96; 3], [0.01; 3], DVec3::splat(-0.5), 1.0, eps).unwrap());
+        let view = View::new(DVec3::new(0.3, 0.1, 1.0), DVec3::Y, DVec3::ZERO).unwrap();
+        let view = [view, View::along(Axis::X, DVec3::ZERO)];
+        for what in 0..4 {
+            for threads in [1, 2, 8] {
+                let field = field.clone();
+                let name = format!("preparation {what} on {threads} threads");
+                within(Duration::from_secs(120), &name, move || {
+                    with_late_jobs(threads, || {
+                        let (field, kept) = (field.clone(), Kept::default());
+                        move |_| match what {
+                            0 => drop(kept.spline(&field)),
+                            1 => assert!(kept.roughness(&field).gradient > 0.0),
+                            _ => drop(kept.line_of_sight(
+                                &field,
+                                Projection {
+                                    view: view[what - 2],
+                                    interpolant: Interpolant::Trilinear,
+                                    wanted: Wanted::default(),
+                                    blank: BlankCells::Opaque,
+                                },
+                            )),
+                        }
+                    });
+                });
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_kept_is_made_once_and_projections_are_few() {
+        let field = Field::from_fn([8; 3], [0.1; 3], DVec3::ZERO, 1.0, |p| 1e-4 * p.x * p.y).unwrap();
+        let kept = Kept::default();
+        let of = |axis| Projection {
+            view: View::along(axis, field.centre_m()),
+            interpolant: Interpolant::BSpline,
+            wanted: Wanted::default(),
+            blank: BlankCells::Opaque,
+        };
+        assert!(Arc::ptr_eq(&kept.spline(&field), &kept.spline(&field)));
+        let x = kept.line_of_sight(&field, of(Axis::X));
+        for axis in [Axis::Y, Axis::X] {
+            kept.line_of_sight(&field, of(axis));
+        }
+        assert!(Arc::ptr_eq(&x, &kept.line_of_sight(&field, of(Axis::X))));
+        kept.line_of_sight(&field, of(Axis::Z));
+        assert_eq!(kept.projections.lock().unwrap().len(), PROJECTIONS);
+        assert!(!Arc::ptr_eq(&x, &kept.line_of_sight(&field, of(Axis::X))), "the oldest goes first");
     }
 }
