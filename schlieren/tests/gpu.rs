@@ -205,17 +205,16 @@ fn masks_stop_the_rays_that_they_stop_on_the_cpu() {
         let scale = largest(&b);
         for (a, b) in a.iter().zip(&b) {
             assert_eq!(a.transmission, b.transmission);
-            match blank {
-                // What lies behind opaque cells is found by rays whose neighbours are still on their way; by the GPU's never.
-                BlankCells::Opaque => assert_eq!(a.status == Status::Free, b.status == Status::Free),
-                BlankCells::Continued => assert_eq!(a.status, b.status),
-            }
+            assert_eq!(a.status, b.status, "{blank:?}");
             if a.transmission > 0.0 {
                 for c in 0..2 {
                     let d = f64::from((a.deflection_rad[c] - b.deflection_rad[c]).abs());
                     assert!(d < TOLERANCE * scale, "{d:e} rad");
                 }
             }
+        }
+        for status in [Status::Free, Status::Blocked, Status::Masked] {
+            assert!(a.iter().any(|e| e.status == status), "no ray is {status:?}");
         }
         let dark = a.iter().filter(|e| e.transmission == 0.0).count();
         assert!((10..400).contains(&dark), "{dark} of {} rays are stopped", a.len());
@@ -263,6 +262,50 @@ fn an_interpolant_without_a_kernel_is_refused_by_name() {
     let interpolant = Interpolant::TrilinearGradient;
     let e = GpuPaths::new(gpu, &field, oblique(), interpolant, GpuOptions::default()).err().unwrap();
     assert!(e.to_string().contains("trilinear-gradient"), "{e}");
+}
+
+/// The exits of a batch do not depend on the batch: with one being prepared while the device works
+/// on the one before, buffers in use again, and a last batch that is short.
+#[test]
+fn several_batches_have_the_bits_of_one() {
+    let Some(gpu) = gpu() else { return };
+    let field = with_body(17);
+    let options = GpuOptions { wanted: Wanted { opd: true }, ..GpuOptions::default() };
+    let starts = &grid(40, 1.1)[..1597];
+    for interpolant in [Interpolant::BSpline, Interpolant::Trilinear] {
+        let paths = |batch| {
+            GpuPaths::new(gpu.clone(), &field, oblique(), interpolant, options).unwrap().with_batch(batch)
+        };
+        let one = paths(starts.len());
+        let expected = format!("{:?}", trace(&one, starts));
+        assert_eq!(one.counters().dispatches, 1);
+        for batch in [64, 256, 1000, 1596] {
+            let several = paths(batch);
+            assert_eq!(format!("{:?}", trace(&several, starts)), expected, "batches of {batch}");
+            let mut parallel = vec![Exit::UNDISTURBED; starts.len()];
+            several.trace_parallel(starts, &mut parallel);
+            assert_eq!(format!("{parallel:?}"), expected, "batches of {batch} in parallel");
+            let c = several.counters();
+            assert_eq!(c.dispatches, 2 * starts.len().div_ceil(batch) as u64);
+            assert_eq!((c.rays, c.rays_repeated, c.rays_on_cpu), (2 * starts.len() as u64, 0, 0));
+        }
+    }
+}
+
+/// As programs have it: more rays than one dispatch takes, against the CPU.
+#[test]
+fn pictures_larger_than_a_dispatch_agree_with_the_cpu() {
+    let Some(gpu) = gpu() else { return };
+    let field = cube(9, lopsided);
+    let starts = grid(515, 0.9);
+    assert!(starts.len() > 1 << 18);
+    let on_gpu = GpuPaths::new(gpu, &field, oblique(), Interpolant::BSpline, GpuOptions::default()).unwrap();
+    let (mut a, mut b) = (vec![Exit::UNDISTURBED; starts.len()], vec![Exit::UNDISTURBED; starts.len()]);
+    on_gpu.trace_parallel(&starts, &mut a);
+    assert_eq!((on_gpu.counters().dispatches, on_gpu.counters().rays_on_cpu), (2, 0));
+    cpu(&field, oblique(), Interpolant::BSpline, GpuOptions::default()).trace_parallel(&starts, &mut b);
+    let (_, max) = difference(&a, &b);
+    assert!(max < TOLERANCE, "{max:e}");
 }
 
 /// Threads that share the paths get what one gets: buffers of batches are not mixed up.

@@ -3,8 +3,14 @@
 use super::GpuError;
 use super::kernel::{FIRST_SLAB, Kernel};
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use wgpu::{DeviceType, ErrorFilter};
+
+/// How often in a row a GPU is opened again after it failed. A batch that is finished between two
+/// failures begins a new row: then the device works, and what took it away (a driver that was
+/// reset, a laptop that slept) may pass.
+pub(super) const MAX_REOPENINGS: u32 = 3;
 
 /// An open GPU. One is enough for a program; see [`Gpu::shared`].
 pub struct Gpu {
@@ -16,6 +22,18 @@ pub struct Gpu {
     /// The first error that nobody was there to catch.
     failure: Arc<OnceLock<String>>,
     pipelines: Mutex<BTreeMap<String, wgpu::ComputePipeline>>,
+    /// Whether a batch was finished here.
+    proven: AtomicBool,
+    /// How often the GPU was opened again before this, in a row.
+    reopened: u32,
+    succession: Mutex<Succession>,
+}
+
+/// What took the place of a device that failed.
+#[derive(Default)]
+struct Succession {
+    attempts: u32,
+    successor: Option<Arc<Gpu>>,
 }
 
 impl Gpu {
@@ -70,16 +88,60 @@ impl Gpu {
             storage_buffers: limits.max_storage_buffers_per_shader_stage,
             failure,
             pipelines: Mutex::default(),
+            proven: AtomicBool::new(false),
+            reopened: 0,
+            succession: Mutex::default(),
         })
     }
 
-    /// The program's GPU, opened at the first call.
+    /// The program's GPU, opened at the first call, and again after it failed.
     ///
     /// # Errors
-    /// As [`Gpu::open`], every time.
+    /// As [`Gpu::open`]; [`GpuError::GivenUp`] once it failed several times in a row. That a
+    /// machine has none is found once.
     pub fn shared() -> Result<Arc<Gpu>, GpuError> {
-        static SHARED: OnceLock<Result<Arc<Gpu>, GpuError>> = OnceLock::new();
-        SHARED.get_or_init(|| Gpu::open().map(Arc::new)).clone()
+        static SHARED: Mutex<Option<Result<Arc<Gpu>, GpuError>>> = Mutex::new(None);
+        let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
+        let gpu = match &*shared {
+            Some(Ok(gpu)) => gpu.working(),
+            Some(Err(none)) => Err(none.clone()),
+            None => Gpu::open().map(Arc::new),
+        };
+        match &gpu {
+            Ok(_) | Err(GpuError::NoAdapter(_)) => *shared = Some(gpu.clone()),
+            // The next call tries again.
+            Err(_) => {}
+        }
+        gpu
+    }
+
+    /// This GPU, or what took its place after it failed; it is opened again if nothing did.
+    ///
+    /// # Errors
+    /// If it cannot be opened again, or has failed too often.
+    pub(super) fn working(self: &Arc<Gpu>) -> Result<Arc<Gpu>, GpuError> {
+        let mut gpu = Arc::clone(self);
+        while let Some(reason) = gpu.failure() {
+            let mut s = gpu.succession.lock().unwrap_or_else(PoisonError::into_inner);
+            let successor = match &s.successor {
+                Some(successor) => Arc::clone(successor),
+                None => {
+                    let before = if gpu.proven.load(Ordering::Relaxed) { 0 } else { gpu.reopened };
+                    let times = before + s.attempts;
+                    if times >= MAX_REOPENINGS {
+                        return Err(gpu.given_up(times, reason));
+                    }
+                    s.attempts += 1;
+                    let opened = Gpu { reopened: before + s.attempts, ..Gpu::open()? };
+                    let opened = Arc::new(opened.with_binding_limit(gpu.binding_bytes));
+                    s.successor = Some(Arc::clone(&opened));
+                    opened
+                }
+            };
+            drop(s);
+            gpu = successor;
+        }
+        Ok(gpu)
     }
 
     /// The same with smaller bindings, for tests of what large fields meet.
@@ -87,6 +149,22 @@ impl Gpu {
     pub fn with_binding_limit(mut self, bytes: u64) -> Gpu {
         self.binding_bytes = self.binding_bytes.min(bytes) & !15;
         self
+    }
+
+    /// Takes the device away as a driver's reset does, for tests of what follows.
+    pub fn lose(&self) {
+        self.device.destroy();
+    }
+
+    /// No more batches for this device.
+    pub(super) fn mark_failed(&self, reason: impl Into<String>) {
+        // The first is the cause.
+        let _ = self.failure.set(reason.into());
+    }
+
+    /// A batch was finished.
+    pub(super) fn mark_working(&self) {
+        self.proven.store(true, Ordering::Relaxed);
     }
 
     /// Name of the device, and of its driver.
@@ -116,6 +194,10 @@ impl Gpu {
     /// What failed so far, if anything did.
     pub fn failure(&self) -> Option<&str> {
         self.failure.get().map(String::as_str)
+    }
+
+    pub(super) fn given_up(&self, times: u32, reason: &str) -> GpuError {
+        GpuError::GivenUp { adapter: self.info.name.clone(), times, reason: reason.into() }
     }
 
     pub(super) fn failed(&self, reason: impl Into<String>) -> GpuError {

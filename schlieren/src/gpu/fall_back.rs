@@ -1,9 +1,23 @@
-//! When the device fails on the way: what it did not finish is traced by the same march on the CPU. Pictures take longer then, and are as right.
+//! When the device fails on the way: what it lost is traced once more on the device opened again,
+//! and what that does not finish by the same march on the CPU. Pictures take longer then, and are
+//! as right.
 
 use super::GpuError;
+use crate::field::Field;
+use crate::interpolate::Interpolant;
+use crate::march::{Deviational, Options};
 use crate::path::{Exit, LightPaths, Start};
+use crate::view::View;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
+
+/// A batch that was not finished.
+pub(super) struct Failure {
+    /// Number of the device that had it: how many were there before.
+    pub(super) device: u32,
+    /// Why.
+    pub(super) error: GpuError,
+}
 
 /// Something that traces batches of rays while its caller prepares the next, and may fail.
 pub(super) trait Batches {
@@ -11,29 +25,54 @@ pub(super) trait Batches {
     type Pending;
 
     /// Sends a batch on its way.
-    fn submit(&self, starts: &[Start], parallel: bool) -> Result<Self::Pending, GpuError>;
+    fn submit(&self, starts: &[Start], parallel: bool) -> Result<Self::Pending, Failure>;
 
     /// Waits for a batch and reads it out.
-    fn finish(&self, pending: Self::Pending, exits: &mut [Exit], parallel: bool) -> Result<(), GpuError>;
+    fn finish(&self, pending: Self::Pending, exits: &mut [Exit], parallel: bool) -> Result<(), Failure>;
+
+    /// Puts another device in the place of the one that failed, unless some thread did. It must
+    /// succeed a bounded number of times, and may be called with rayon's workers waiting for it: it
+    /// must not wait for rayon.
+    ///
+    /// # Errors
+    /// If there is none, or the failure was not the device's.
+    fn replace(&self, failed: &Failure) -> Result<(), GpuError>;
 }
 
 /// The march that stands in, and why it had to.
 pub(super) struct FallBack<'a> {
     make: Box<dyn Fn() -> Box<dyn LightPaths + Send + 'a> + Send + Sync + 'a>,
     made: OnceLock<Box<dyn LightPaths + Send + 'a>>,
+    /// The first failure.
     cause: OnceLock<GpuError>,
+    /// Why no other device took its place.
+    no_other: OnceLock<GpuError>,
+    repeated: AtomicU64,
     rays: AtomicU64,
 }
 
 impl<'a> FallBack<'a> {
-    /// `make` is called once, if ever.
-    pub(super) fn new(make: impl Fn() -> Box<dyn LightPaths + Send + 'a> + Send + Sync + 'a) -> FallBack<'a> {
+    /// `make` is called once, if ever, with rayon's workers waiting for it: it must not wait for
+    /// rayon, where a worker that waits takes other jobs, whose batches fail as well.
+    fn new(make: impl Fn() -> Box<dyn LightPaths + Send + 'a> + Send + Sync + 'a) -> FallBack<'a> {
         FallBack {
             make: Box::new(make),
             made: OnceLock::new(),
             cause: OnceLock::new(),
+            no_other: OnceLock::new(),
+            repeated: AtomicU64::new(0),
             rays: AtomicU64::new(0),
         }
+    }
+
+    /// The deviational march of the CPU through the same field.
+    pub(super) fn of_march(
+        field: &'a Field,
+        view: View,
+        interpolant: Interpolant,
+        options: Options,
+    ) -> FallBack<'a> {
+        FallBack::new(move || Box::new(Deviational::on_this_thread(field, view, interpolant, options)))
     }
 
     /// Rays that it traced.
@@ -41,9 +80,30 @@ impl<'a> FallBack<'a> {
         self.rays.load(Ordering::Relaxed)
     }
 
-    /// The first failure, for who looks at the result.
+    /// Rays that a device that took another's place traced once more.
+    pub(super) fn repeated(&self) -> u64 {
+        self.repeated.load(Ordering::Relaxed)
+    }
+
+    /// The first failure and what was done, for who looks at the result.
     pub(super) fn trouble(&self) -> Option<String> {
-        self.cause.get().map(super::made_up_for)
+        let cause = self.cause.get()?;
+        let again = self.repeated() > 0;
+        let no_other = self.no_other.get().filter(|e| *e != cause);
+        Some(match (again, self.rays() > 0) {
+            (false, _) => match no_other {
+                None => super::made_up_for(cause),
+                Some(e) => format!("{} ({e})", super::made_up_for(cause)),
+            },
+            (true, false) => {
+                format!("{}; it was opened again and traced once more what it had lost", super::failed(cause))
+            }
+            (true, true) => format!(
+                "{}; it was opened again and traced once more what it had lost, until {}; what it left then was computed on the CPU",
+                super::failed(cause),
+                no_other.unwrap_or(cause)
+            ),
+        })
     }
 
     /// Traces all rays in batches, one being prepared while the device works on the one before.
@@ -64,7 +124,7 @@ impl<'a> FallBack<'a> {
             }
             match next {
                 Ok(pending) => before = Some((pending, starts, exits)),
-                Err(e) => self.stand_in(e, starts, exits, parallel),
+                Err(failure) => self.repeat(device, failure, starts, exits, parallel),
             }
         }
         if let Some((pending, starts, exits)) = before {
@@ -80,14 +140,40 @@ impl<'a> FallBack<'a> {
         exits: &mut [Exit],
         parallel: bool,
     ) {
-        if let Err(e) = device.finish(pending, exits, parallel) {
-            self.stand_in(e, starts, exits, parallel);
+        if let Err(failure) = device.finish(pending, exits, parallel) {
+            self.repeat(device, failure, starts, exits, parallel);
         }
     }
 
-    fn stand_in(&self, cause: GpuError, starts: &[Start], exits: &mut [Exit], parallel: bool) {
+    /// On the device that takes the place of the one that failed, as long as there is one; then on
+    /// the CPU.
+    fn repeat(
+        &self,
+        device: &impl Batches,
+        mut failure: Failure,
+        starts: &[Start],
+        exits: &mut [Exit],
+        parallel: bool,
+    ) {
         // The first is the cause; what follows are its consequences.
-        let _ = self.cause.set(cause);
+        let _ = self.cause.set(failure.error.clone());
+        loop {
+            if let Err(why) = device.replace(&failure) {
+                let _ = self.no_other.set(why);
+                return self.stand_in(starts, exits, parallel);
+            }
+            let pending = device.submit(starts, parallel);
+            match pending.and_then(|pending| device.finish(pending, exits, parallel)) {
+                Ok(()) => {
+                    self.repeated.fetch_add(starts.len() as u64, Ordering::Relaxed);
+                    return;
+                }
+                Err(next) => failure = next,
+            }
+        }
+    }
+
+    fn stand_in(&self, starts: &[Start], exits: &mut [Exit], parallel: bool) {
         self.rays.fetch_add(starts.len() as u64, Ordering::Relaxed);
         let cpu = self.made.get_or_init(|| (self.make)());
         if parallel {
@@ -102,8 +188,11 @@ impl<'a> FallBack<'a> {
 mod tests {
     use super::*;
     use crate::path::Wanted;
-    use crate::view::View;
+    use crate::testing::{with_late_jobs, within};
     use glam::DVec3;
+    use std::sync::Arc;
+    use std::sync::atomic::AtomicU32;
+    use std::time::Duration;
 
     /// Bends each ray by its own place. Traced twice as far where the device did it, so that it shows who did.
     struct Bends(View, f32);
@@ -129,31 +218,58 @@ mod tests {
         Bends(View::new(DVec3::Z, DVec3::Y, DVec3::ZERO).unwrap(), by)
     }
 
-    /// A device that fails at a call, and ever after.
+    fn lamp_9(reason: String) -> GpuError {
+        GpuError::Failed { adapter: "Lamp 9".into(), reason }
+    }
+
+    /// A device that fails at a call, and ever after; those that take its place too, each after as
+    /// many calls.
     struct Fails {
         at: u64,
         calls: AtomicU64,
         in_submit: bool,
+        /// How many take its place.
+        others: u32,
+        /// Number of the present one.
+        present: AtomicU32,
     }
 
     impl Fails {
-        fn call(&self, submit: bool) -> Result<(), GpuError> {
+        fn new(in_submit: bool, at: u64, others: u32) -> Fails {
+            Fails { at, calls: AtomicU64::new(0), in_submit, others, present: AtomicU32::new(0) }
+        }
+
+        fn call(&self, submit: bool) -> Result<(), Failure> {
             if submit != self.in_submit || self.calls.fetch_add(1, Ordering::Relaxed) < self.at {
                 return Ok(());
             }
             let n = self.calls.load(Ordering::Relaxed);
-            Err(GpuError::Failed { adapter: "Lamp 9".into(), reason: format!("out of memory, call {n}") })
+            let device = self.present.load(Ordering::Relaxed);
+            Err(Failure { device, error: lamp_9(format!("out of memory, call {n}")) })
         }
     }
 
     impl Batches for Fails {
         type Pending = Vec<Start>;
-        fn submit(&self, starts: &[Start], _: bool) -> Result<Vec<Start>, GpuError> {
+        fn submit(&self, starts: &[Start], _: bool) -> Result<Vec<Start>, Failure> {
             self.call(true).map(|()| starts.to_vec())
         }
-        fn finish(&self, pending: Vec<Start>, exits: &mut [Exit], _: bool) -> Result<(), GpuError> {
+        fn finish(&self, pending: Vec<Start>, exits: &mut [Exit], _: bool) -> Result<(), Failure> {
             self.call(false)?;
             bends(2.0).trace(&pending, exits);
+            Ok(())
+        }
+        fn replace(&self, failed: &Failure) -> Result<(), GpuError> {
+            let present = self.present.load(Ordering::Relaxed);
+            if failed.device < present {
+                return Ok(());
+            }
+            if present == self.others {
+                let (adapter, reason) = ("Lamp 9".into(), "out of memory".into());
+                return Err(GpuError::GivenUp { adapter, times: present, reason });
+            }
+            self.present.store(present + 1, Ordering::Relaxed);
+            self.calls.store(0, Ordering::Relaxed);
             Ok(())
         }
     }
@@ -167,7 +283,7 @@ mod tests {
             [(true, 0), (true, 4), (true, 9), (false, 0), (false, 4), (false, 9), (true, 99)]
         {
             for parallel in [false, true] {
-                let device = Fails { at, calls: AtomicU64::new(0), in_submit };
+                let device = Fails::new(in_submit, at, 0);
                 let fall_back = FallBack::new(|| Box::new(bends(1.0)));
                 let mut exits = vec![Exit { deflection_rad: [f32::NAN; 2], ..Exit::UNDISTURBED }; 95];
                 fall_back.trace(&device, 10, &starts, &mut exits, parallel);
@@ -187,6 +303,90 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    #[test]
+    fn what_a_device_lost_is_traced_once_more_by_the_one_that_takes_its_place() {
+        let starts: Vec<Start> =
+            (0..95).map(|i| Start { position_m: [i as f32, -1.0], ..Start::default() }).collect();
+        for in_submit in [true, false] {
+            for at in [1, 2, 5, 9] {
+                let device = Fails::new(in_submit, at, 100);
+                let fall_back = FallBack::new(|| Box::new(bends(1.0)));
+                let mut exits = vec![Exit { deflection_rad: [f32::NAN; 2], ..Exit::UNDISTURBED }; 95];
+                fall_back.trace(&device, 10, &starts, &mut exits, false);
+                for (i, (s, e)) in starts.iter().zip(&exits).enumerate() {
+                    assert_eq!(e.deflection_rad, s.position_m.map(|p| p * 2.0), "ray {i}, failing at {at}");
+                }
+                assert!(fall_back.rays() == 0 && fall_back.repeated() >= 5, "{}", fall_back.repeated());
+                let told = fall_back.trouble().unwrap();
+                for word in ["Lamp 9", &format!("out of memory, call {}", at + 1), "opened again"] {
+                    assert!(told.contains(word), "{word}: {told}");
+                }
+                assert!(!told.contains("CPU"), "{told}");
+            }
+        }
+    }
+
+    /// The attempts are bounded, and what they were is told.
+    #[test]
+    fn a_device_that_fails_again_and_again_is_left_to_the_cpu_by_name() {
+        let starts: Vec<Start> =
+            (0..95).map(|i| Start { position_m: [i as f32, -1.0], ..Start::default() }).collect();
+        for (in_submit, at) in [(true, 0), (true, 1), (false, 0), (false, 2)] {
+            let device = Fails::new(in_submit, at, 3);
+            let fall_back = FallBack::new(|| Box::new(bends(1.0)));
+            let mut exits = vec![Exit { deflection_rad: [f32::NAN; 2], ..Exit::UNDISTURBED }; 95];
+            fall_back.trace(&device, 10, &starts, &mut exits, false);
+            let on_cpu =
+                starts.iter().zip(&exits).filter(|(s, e)| e.deflection_rad == s.position_m).count() as u64;
+            assert!(exits.iter().all(|e| !e.deflection_rad[0].is_nan()));
+            assert_eq!(fall_back.rays(), on_cpu);
+            assert_eq!(device.present.load(Ordering::Relaxed), 3);
+            assert!(on_cpu > 0 && (at > 0) == (fall_back.repeated() > 0), "{on_cpu}");
+            let told = fall_back.trouble().unwrap();
+            for word in ["Lamp 9", "opened again 3 times", "on the CPU"] {
+                assert!(told.contains(word), "{word}: {told}");
+            }
+        }
+    }
+
+    /// A film's tiles are rayon jobs. The spline of the march that stands in is made by the first job whose
+    /// batch fails; a worker that waits inside rayon for parts of it takes another tile, whose batch fails
+    /// as well, and which must not wait for the spline that its own worker is making.
+    #[test]
+    fn a_device_that_fails_inside_rayon_jobs_hangs_no_picture() {
+        let starts: Vec<Start> = (0..49 * 64)
+            .map(|i| Start {
+                position_m: [i % 64, i / 64].map(|k| (k as f32 - 31.4) * 0.01),
+                ..Start::default()
+            })
+            .collect();
+        let blob = |p: DVec3| 1e-4 * (-p.length_squared() / 0.02).exp();
+        let field: &Field =
+            Box::leak(Box::new(Field::from_fn([96; 3], [0.01; 3], DVec3::splat(-0.5), 1.0, blob).unwrap()));
+        let view = View::new(DVec3::Z, DVec3::Y, DVec3::ZERO).unwrap();
+        let march = Deviational::new(field, view, Interpolant::BSpline, Options::default());
+        let mut expected = vec![Exit::UNDISTURBED; starts.len()];
+        march.trace_parallel(&starts, &mut expected);
+        let shared = Arc::new((starts, expected));
+        for threads in [1, 2, 8] {
+            let shared = shared.clone();
+            within(Duration::from_secs(120), &format!("{threads} threads"), move || {
+                with_late_jobs(threads, || {
+                    let device = Fails::new(true, 0, 0);
+                    let fall_back = FallBack::of_march(field, view, Interpolant::BSpline, Options::default());
+                    let shared = shared.clone();
+                    move |tile| {
+                        let of_tile = 64 * tile..64 * (tile + 1);
+                        let mut exits = vec![Exit::UNDISTURBED; 64];
+                        fall_back.trace(&device, 16, &shared.0[of_tile.clone()], &mut exits, false);
+                        // By words: optical paths that were not asked for are NaN.
+                        assert_eq!(format!("{exits:?}"), format!("{:?}", &shared.1[of_tile]));
+                    }
+                });
+            });
         }
     }
 }

@@ -10,7 +10,8 @@
 //! | kernel.rs, *.wgsl | the shader, put together from what a scene calls for |
 //! | volume.rs | the field on the device |
 //! | paths.rs | [`GpuPaths`]: starts in, exits out, in batches |
-//! | fall_back.rs | what happens to batches that the device does not finish |
+//! | fall_back.rs | what happens to batches that the device does not finish: the device is opened
+//! again, and then the CPU stands in |
 //!
 //! What has no kernel here is refused by name ([`GpuError::Unsupported`]): line of sight and full marches, and gradients that are interpolated
 //! themselves.
@@ -72,14 +73,32 @@ pub enum GpuError {
         /// What its driver says.
         reason: String,
     },
+    /// It failed again and again.
+    #[error(
+        "`{adapter}` failed ({reason}) after it was opened again {times} times, and is left alone; look into its driver's log, or compute on the CPU (--device cpu)"
+    )]
+    GivenUp {
+        /// The device.
+        adapter: String,
+        /// How often it was opened again.
+        times: u32,
+        /// What its driver said last.
+        reason: String,
+    },
 }
 
 /// A failure, told with the picture that was drawn all the same.
 pub(crate) fn made_up_for(failure: &GpuError) -> String {
     match failure {
-        GpuError::Failed { adapter, reason } => {
-            format!("the GPU `{adapter}` failed ({reason}); what it left was computed on the CPU")
-        }
+        GpuError::Failed { .. } => format!("{}; what it left was computed on the CPU", failed(failure)),
         other => format!("computed on the CPU: {other}"),
+    }
+}
+
+/// A failure, without what can be done about it.
+fn failed(failure: &GpuError) -> String {
+    match failure {
+        GpuError::Failed { adapter, reason } => format!("the GPU `{adapter}` failed ({reason})"),
+        other => other.to_string(),
     }
 }

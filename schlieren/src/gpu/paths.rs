@@ -1,12 +1,13 @@
 //! Starts in, exits out, in batches.
 
-use super::fall_back::{Batches, FallBack};
+use super::device::MAX_REOPENINGS;
+use super::fall_back::{Batches, Failure, FallBack};
 use super::kernel::{FIRST_SLAB, Kernel};
 use super::volume::Volume;
 use super::{Gpu, GpuError};
 use crate::field::Field;
-use crate::interpolate::Interpolant;
-use crate::march::{BlankCells, Deviational, Frame, Left, Options, Prepared};
+use crate::interpolate::{BSpline, Interpolant};
+use crate::march::{BlankCells, Frame, Left, Options, Prepared};
 use crate::path::{Exit, LightPaths, Start, Wanted};
 use crate::view::View;
 use bytemuck::{Pod, Zeroable};
@@ -14,6 +15,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
+use std::time::Duration;
 use wgpu::{BufferDescriptor, BufferUsages};
 
 /// Rays of one dispatch: enough to fill any device, few enough that two batches take little memory and no driver thinks that the device hangs.
@@ -47,6 +49,8 @@ pub struct GpuCounters {
     pub ray_steps: u64,
     /// Kernels started.
     pub dispatches: u64,
+    /// Rays that were traced once more on a device that was opened again after it failed.
+    pub rays_repeated: u64,
     /// Rays that the CPU had to trace because the device failed.
     pub rays_on_cpu: u64,
 }
@@ -54,23 +58,107 @@ pub struct GpuCounters {
 /// Light paths through a field of weak index, traced on a GPU. [`LightPaths::trace_parallel`] on many starts is the fast way; every call costs a round
 /// trip to the device.
 ///
-/// When the device fails on the way, the rest is traced on the CPU: [`GpuCounters::rays_on_cpu`] counts it and [`LightPaths::trouble`] names the cause.
+/// When the device fails on the way, it is opened again, a few times at most, and what it lost is
+/// traced once more ([`GpuCounters::rays_repeated`]). What is left then is traced on the CPU
+/// ([`GpuCounters::rays_on_cpu`]). [`LightPaths::trouble`] names the cause and what was done.
 ///
 /// Of a ray that is stopped, `status` tells what stopped it, and deflection and displacement are those where it was stopped.
 pub struct GpuPaths<'a> {
-    gpu: Arc<Gpu>,
     field: &'a Field,
     frame: Frame,
+    interpolant: Interpolant,
     options: GpuOptions,
-    pipeline: wgpu::ComputePipeline,
-    volume: Volume,
-    /// Buffers that no batch uses at the moment.
-    idle: Mutex<Vec<Scratch>>,
+    /// Rays of one dispatch.
+    batch: usize,
+    current: Mutex<Current>,
     /// Takes over when the device fails.
     fall_back: FallBack<'a>,
     rays: AtomicU64,
     ray_steps: AtomicU64,
     dispatches: AtomicU64,
+}
+
+/// The field and the kernel on one device.
+struct OnDevice {
+    gpu: Arc<Gpu>,
+    /// How many were there before.
+    number: u32,
+    pipeline: wgpu::ComputePipeline,
+    volume: Volume,
+    /// Buffers that no batch uses at the moment.
+    idle: Mutex<Vec<Scratch>>,
+}
+
+/// Who traces now.
+struct Current {
+    on_device: Arc<OnDevice>,
+    /// How often another was looked for.
+    attempts: u32,
+}
+
+impl OnDevice {
+    fn new(
+        gpu: Arc<Gpu>,
+        number: u32,
+        field: &Field,
+        spline: Option<&BSpline>,
+        interpolant: Interpolant,
+        options: GpuOptions,
+    ) -> Result<OnDevice, GpuError> {
+        let volume = Volume::new(&gpu, field, spline)?;
+        let pipeline = gpu.pipeline(&Kernel {
+            interpolant,
+            opd: options.wanted.opd,
+            nodes: volume.kinds.is_some(),
+            slabs: volume.slabs.len() as u32,
+        })?;
+        Ok(OnDevice { gpu, number, pipeline, volume, idle: Mutex::default() })
+    }
+
+    fn failure(&self, error: GpuError) -> Failure {
+        Failure { device: self.number, error }
+    }
+
+    /// Takes buffers for this many rays, or makes them.
+    fn scratch(&self, rays: usize) -> Result<Scratch, GpuError> {
+        let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(i) = idle.iter().position(|s| s.capacity >= rays) {
+            return Ok(idle.swap_remove(i));
+        }
+        drop(idle);
+        let capacity = rays.next_power_of_two().clamp(1024, BATCH);
+        self.gpu.checked(|| {
+            let buffer = |size: usize, usage| {
+                self.gpu.device.create_buffer(&BufferDescriptor {
+                    label: None,
+                    size: size as u64,
+                    usage,
+                    mapped_at_creation: false,
+                })
+            };
+            let params = buffer(size_of::<Params>(), BufferUsages::UNIFORM | BufferUsages::COPY_DST);
+            let rays = buffer(capacity * size_of::<Ray>(), BufferUsages::STORAGE | BufferUsages::COPY_DST);
+            let left_bytes = capacity * size_of::<RawLeft>();
+            let lefts = buffer(left_bytes, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
+            let readback = buffer(left_bytes, BufferUsages::MAP_READ | BufferUsages::COPY_DST);
+            let mut bound = vec![(0, &params), (1, &rays), (2, &lefts)];
+            bound.extend(self.volume.kinds.as_ref().map(|k| (3, k)));
+            bound.extend((FIRST_SLAB..).zip(&self.volume.slabs));
+            let entries: Vec<_> = bound
+                .iter()
+                .map(|(binding, b)| wgpu::BindGroupEntry {
+                    binding: *binding,
+                    resource: b.as_entire_binding(),
+                })
+                .collect();
+            let bindings = self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: None,
+                layout: &self.pipeline.get_bind_group_layout(0),
+                entries: &entries,
+            });
+            Scratch { capacity, params, rays, lefts, readback, bindings }
+        })
+    }
 }
 
 /// [`Ray`] of march.wgsl.
@@ -127,6 +215,7 @@ struct Scratch {
 
 /// A batch on its way.
 pub(super) struct Pending {
+    on_device: Arc<OnDevice>,
     scratch: Scratch,
     prepared: Vec<Prepared>,
     index: wgpu::SubmissionIndex,
@@ -151,24 +240,18 @@ impl<'a> GpuPaths<'a> {
                 cure: "Take one of them, or compute on the CPU (--device cpu).",
             });
         }
-        let volume = Volume::new(&gpu, field, interpolant)?;
-        let pipeline = gpu.pipeline(&Kernel {
-            interpolant,
-            opd: options.wanted.opd,
-            nodes: volume.kinds.is_some(),
-            slabs: volume.slabs.len() as u32,
-        })?;
+        let spline = (interpolant == Interpolant::BSpline).then(|| BSpline::new(field));
+        let on_device = OnDevice::new(gpu, 0, field, spline.as_ref(), interpolant, options)?;
         let GpuOptions { step_voxels, wanted, blank } = options;
         let on_cpu = Options { step_voxels, wanted, blank, ..Options::default() };
         Ok(GpuPaths {
-            gpu,
             field,
             frame: Frame::new(field, view),
+            interpolant,
             options,
-            pipeline,
-            volume,
-            idle: Mutex::default(),
-            fall_back: FallBack::new(move || Box::new(Deviational::new(field, view, interpolant, on_cpu))),
+            batch: BATCH,
+            current: Mutex::new(Current { on_device: Arc::new(on_device), attempts: 0 }),
+            fall_back: FallBack::of_march(field, view, interpolant, on_cpu),
             rays: AtomicU64::new(0),
             ray_steps: AtomicU64::new(0),
             dispatches: AtomicU64::new(0),
@@ -182,21 +265,38 @@ impl<'a> GpuPaths<'a> {
             rays: read(&self.rays),
             ray_steps: read(&self.ray_steps),
             dispatches: read(&self.dispatches),
+            rays_repeated: self.fall_back.repeated(),
             rays_on_cpu: self.fall_back.rays(),
         }
     }
 
+    /// The same in batches of so many rays, at most those of a dispatch, for tests of what several
+    /// batches meet.
+    #[must_use]
+    pub fn with_batch(self, rays: usize) -> GpuPaths<'a> {
+        GpuPaths { batch: rays.clamp(1, BATCH), ..self }
+    }
+
+    /// The device that traces now.
+    pub fn gpu(&self) -> Arc<Gpu> {
+        Arc::clone(&self.on_device().gpu)
+    }
+
+    fn on_device(&self) -> Arc<OnDevice> {
+        Arc::clone(&self.current.lock().unwrap_or_else(PoisonError::into_inner).on_device)
+    }
+
     /// Memory that the field takes on the device, without batches.
     pub fn device_bytes(&self) -> u64 {
-        self.volume.bytes
+        self.on_device().volume.bytes
     }
 
     /// Bindings over which the field is spread.
     pub fn slabs(&self) -> usize {
-        self.volume.slabs.len()
+        self.on_device().volume.slabs.len()
     }
 
-    fn params(&self, rays: usize) -> Params {
+    fn params(&self, volume: &Volume, rays: usize) -> Params {
         let h = (self.frame.spacing_m / self.frame.unit_m).to_array();
         let dims = self.field.dims();
         Params {
@@ -208,55 +308,14 @@ impl<'a> GpuPaths<'a> {
                 BlankCells::Continued => 1,
             },
             last: dims.map(|n| (n - 1) as f32),
-            row: self.volume.stride[0] as u32,
+            row: volume.stride[0] as u32,
             last_cell: dims.map(|n| (n - 2) as f32),
-            layer: self.volume.stride[1] as u32,
+            layer: volume.stride[1] as u32,
             dims: dims.map(|n| n as u32),
-            slab: self.volume.layers as u32,
+            slab: volume.layers as u32,
             zero: 0,
             unused: [0; 3],
         }
-    }
-
-    /// Takes buffers for this many rays, or makes them.
-    fn scratch(&self, rays: usize) -> Result<Scratch, GpuError> {
-        let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(i) = idle.iter().position(|s| s.capacity >= rays) {
-            return Ok(idle.swap_remove(i));
-        }
-        drop(idle);
-        let capacity = rays.next_power_of_two().clamp(1024, BATCH);
-        self.gpu.checked(|| {
-            let buffer = |size: usize, usage| {
-                self.gpu.device.create_buffer(&BufferDescriptor {
-                    label: None,
-                    size: size as u64,
-                    usage,
-                    mapped_at_creation: false,
-                })
-            };
-            let params = buffer(size_of::<Params>(), BufferUsages::UNIFORM | BufferUsages::COPY_DST);
-            let rays = buffer(capacity * size_of::<Ray>(), BufferUsages::STORAGE | BufferUsages::COPY_DST);
-            let left_bytes = capacity * size_of::<RawLeft>();
-            let lefts = buffer(left_bytes, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
-            let readback = buffer(left_bytes, BufferUsages::MAP_READ | BufferUsages::COPY_DST);
-            let mut bound = vec![(0, &params), (1, &rays), (2, &lefts)];
-            bound.extend(self.volume.kinds.as_ref().map(|k| (3, k)));
-            bound.extend((FIRST_SLAB..).zip(&self.volume.slabs));
-            let entries: Vec<_> = bound
-                .iter()
-                .map(|(binding, b)| wgpu::BindGroupEntry {
-                    binding: *binding,
-                    resource: b.as_entire_binding(),
-                })
-                .collect();
-            let bindings = self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: None,
-                layout: &self.pipeline.get_bind_group_layout(0),
-                entries: &entries,
-            });
-            Scratch { capacity, params, rays, lefts, readback, bindings }
-        })
     }
 
     /// Rays as the kernel gets them; those that miss the field stay zero.
@@ -285,9 +344,11 @@ impl<'a> GpuPaths<'a> {
 impl Batches for GpuPaths<'_> {
     type Pending = Pending;
 
-    fn submit(&self, starts: &[Start], parallel: bool) -> Result<Pending, GpuError> {
-        if let Some(e) = self.gpu.failure() {
-            return Err(self.gpu.failed(e));
+    fn submit(&self, starts: &[Start], parallel: bool) -> Result<Pending, Failure> {
+        let on_device = self.on_device();
+        let gpu = &on_device.gpu;
+        if let Some(e) = gpu.failure() {
+            return Err(on_device.failure(gpu.failed(e)));
         }
         let mut prepared = vec![Prepared::default(); starts.len()];
         let mut rays = vec![Ray::zeroed(); starts.len()];
@@ -301,14 +362,18 @@ impl Batches for GpuPaths<'_> {
         } else {
             self.prepare(starts, &mut prepared, &mut rays);
         }
-        let scratch = self.scratch(starts.len())?;
-        let queue = &self.gpu.queue;
-        queue.write_buffer(&scratch.params, 0, bytemuck::bytes_of(&self.params(starts.len())));
+        let scratch = on_device.scratch(starts.len()).map_err(|e| on_device.failure(e))?;
+        let queue = &gpu.queue;
+        queue.write_buffer(
+            &scratch.params,
+            0,
+            bytemuck::bytes_of(&self.params(&on_device.volume, starts.len())),
+        );
         queue.write_buffer(&scratch.rays, 0, bytemuck::cast_slice(&rays));
-        let mut commands = self.gpu.device.create_command_encoder(&Default::default());
+        let mut commands = gpu.device.create_command_encoder(&Default::default());
         {
             let mut pass = commands.begin_compute_pass(&Default::default());
-            pass.set_pipeline(&self.pipeline);
+            pass.set_pipeline(&on_device.pipeline);
             pass.set_bind_group(0, &scratch.bindings, &[]);
             pass.dispatch_workgroups(starts.len().div_ceil(WORKGROUP) as u32, 1, 1);
         }
@@ -323,17 +388,30 @@ impl Batches for GpuPaths<'_> {
         let steps: u64 = rays.iter().map(|r| u64::from(r.steps)).sum();
         self.ray_steps.fetch_add(steps, Ordering::Relaxed);
         self.dispatches.fetch_add(1, Ordering::Relaxed);
-        Ok(Pending { scratch, prepared, index, mapped })
+        Ok(Pending { on_device, scratch, prepared, index, mapped })
     }
 
-    fn finish(&self, pending: Pending, exits: &mut [Exit], parallel: bool) -> Result<(), GpuError> {
+    fn finish(&self, pending: Pending, exits: &mut [Exit], parallel: bool) -> Result<(), Failure> {
+        let on_device = &pending.on_device;
+        let gpu = &on_device.gpu;
+        let failed = |e: &dyn std::fmt::Display| {
+            gpu.mark_failed(e.to_string());
+            on_device.failure(gpu.failed(gpu.failure().map_or_else(|| e.to_string(), str::to_string)))
+        };
         let wait = wgpu::PollType::Wait { submission_index: Some(pending.index), timeout: None };
-        let failed = |e: &dyn std::fmt::Display| self.gpu.failed(e.to_string());
-        self.gpu.device.poll(wait).map_err(|e| failed(&e))?;
-        // Another thread's poll may have taken this batch's completion and be about to tell; so this waits as well.
-        pending.mapped.recv().map_err(|e| failed(&e))?.map_err(|e| failed(&e))?;
-        if let Some(e) = self.gpu.failure() {
-            return Err(self.gpu.failed(e));
+        gpu.device.poll(wait).map_err(|e| failed(&e))?;
+        // Another thread's poll may have taken this batch's completion and be about to tell; so
+        // this waits as well. A device that is lost may never tell.
+        const LOOK: Duration = Duration::from_millis(100);
+        let mapped = loop {
+            match pending.mapped.recv_timeout(LOOK) {
+                Err(mpsc::RecvTimeoutError::Timeout) if gpu.failure().is_none() => {}
+                told => break told,
+            }
+        };
+        mapped.map_err(|e| failed(&e))?.map_err(|e| failed(&e))?;
+        if let Some(e) = gpu.failure() {
+            return Err(on_device.failure(gpu.failed(e)));
         }
         let bytes = (exits.len() * size_of::<RawLeft>()) as u64;
         {
@@ -353,7 +431,34 @@ impl Batches for GpuPaths<'_> {
             }
         }
         pending.scratch.readback.unmap();
-        self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(pending.scratch);
+        gpu.mark_working();
+        on_device.idle.lock().unwrap_or_else(PoisonError::into_inner).push(pending.scratch);
+        Ok(())
+    }
+
+    fn replace(&self, failed: &Failure) -> Result<(), GpuError> {
+        // Who waits here for another thread takes no other job meanwhile, so nothing below may wait
+        // for a job: the spline is made by this thread alone.
+        let mut current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
+        if current.on_device.number != failed.device {
+            return Ok(());
+        }
+        let gpu = &current.on_device.gpu;
+        let Some(reason) = gpu.failure() else {
+            // This batch failed, not the device.
+            return Err(failed.error.clone());
+        };
+        if current.attempts >= MAX_REOPENINGS {
+            return Err(gpu.given_up(current.attempts, reason));
+        }
+        let gpu = Arc::clone(gpu);
+        current.attempts += 1;
+        let working = gpu.working()?;
+        let spline = (self.interpolant == Interpolant::BSpline).then(|| BSpline::on_this_thread(self.field));
+        let number = failed.device + 1;
+        let made =
+            OnDevice::new(working, number, self.field, spline.as_ref(), self.interpolant, self.options)?;
+        current.on_device = Arc::new(made);
         Ok(())
     }
 }
@@ -361,7 +466,7 @@ impl Batches for GpuPaths<'_> {
 impl LightPaths for GpuPaths<'_> {
     fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
         self.rays.fetch_add(starts.len() as u64, Ordering::Relaxed);
-        self.fall_back.trace(self, BATCH, starts, exits, false);
+        self.fall_back.trace(self, self.batch, starts, exits, false);
     }
 
     fn view(&self) -> &View {
@@ -382,6 +487,6 @@ impl LightPaths for GpuPaths<'_> {
 
     fn trace_parallel(&self, starts: &[Start], exits: &mut [Exit]) {
         self.rays.fetch_add(starts.len() as u64, Ordering::Relaxed);
-        self.fall_back.trace(self, BATCH, starts, exits, true);
+        self.fall_back.trace(self, self.batch, starts, exits, true);
     }
 }

@@ -24,16 +24,11 @@ pub(super) struct Volume {
 }
 
 impl Volume {
-    pub(super) fn new(gpu: &Gpu, field: &Field, interpolant: Interpolant) -> Result<Volume, GpuError> {
-        let spline;
+    /// The field, or the spline through it.
+    pub(super) fn new(gpu: &Gpu, field: &Field, spline: Option<&BSpline>) -> Result<Volume, GpuError> {
         let [nx, ny, nz] = field.dims();
-        let (values, stride) = if interpolant == Interpolant::BSpline {
-            spline = BSpline::new(field);
-            spline.coefficients()
-        } else {
-            (field.eps(), [nx, nx * ny])
-        };
-        let halo = Kernel::halo(interpolant);
+        let (values, stride) = spline.map_or((field.eps(), [nx, nx * ny]), BSpline::coefficients);
+        let halo = Kernel::halo(if spline.is_some() { Interpolant::BSpline } else { Interpolant::Trilinear });
         let too_large = |what, need, room| GpuError::TooLarge {
             what,
             dims: field.dims(),

@@ -44,7 +44,9 @@ fn refused(march: &MarchSpec) -> Option<crate::gpu::GpuError> {
 #[cfg(feature = "gpu")]
 fn stands_in(asked: Device, error: crate::gpu::GpuError) -> Result<String, RenderError> {
     match error {
-        crate::gpu::GpuError::Failed { .. } => Ok(crate::gpu::made_up_for(&error)),
+        crate::gpu::GpuError::Failed { .. } | crate::gpu::GpuError::GivenUp { .. } => {
+            Ok(crate::gpu::made_up_for(&error))
+        }
         e if asked == Device::Gpu => Err(RenderError::Gpu(e)),
         e => Ok(crate::gpu::made_up_for(&e)),
     }
@@ -85,7 +87,7 @@ pub(super) fn on_gpu<'a>(
                 cure: "Compute on the CPU (--device cpu), or force --march verlet.",
             });
         }
-        let gpu = Gpu::shared()?;
+        let mut gpu = Gpu::shared()?;
         if march.device == Device::Auto && gpu.is_software() {
             return Err(GpuError::NoAdapter(format!(
                 "the only Vulkan device, {}, runs on the CPU",
@@ -94,20 +96,34 @@ pub(super) fn on_gpu<'a>(
         }
         let options =
             GpuOptions { step_voxels: plan.step_voxels, wanted: request.wanted, blank: request.blank };
-        Ok((GpuPaths::new(Arc::clone(&gpu), field, view, plan.interpolant, options)?, gpu))
+        // A device that fails while the field is copied to it is opened again, which gives up after
+        // a few times.
+        let mut told = None;
+        let paths = loop {
+            match GpuPaths::new(Arc::clone(&gpu), field, view, plan.interpolant, options) {
+                Err(e @ GpuError::Failed { .. }) if gpu.failure().is_some() => {
+                    told.get_or_insert(format!("{e}; it was opened again"));
+                    gpu = Gpu::shared()?;
+                }
+                made => break made?,
+            }
+        };
+        Ok((paths, gpu, told))
     })();
     match made {
-        Ok((paths, gpu)) => {
+        Ok((paths, gpu, told)) => {
             // The CPU's march stands in: the same within roundings.
             let achieved = measured_rays.map(|rays| plan.measure_with(field, view, rays, kept));
             let described = super::paths::described("verlet", plan.interpolant, plan.step_voxels);
-            Ok(Ok(Planned::new(
+            let mut planned = Planned::new(
                 Box::new(paths),
                 format!("{described}, on {}", gpu.name()),
                 achieved,
                 march.tolerance_rad,
                 (Mode::Paraxial.into(), plan.step_voxels),
-            )))
+            );
+            planned.warnings.extend(told);
+            Ok(Ok(planned))
         }
         Err(e) => stands_in(march.device, e).map(|why| Err(Some(why))),
     }
@@ -140,10 +156,14 @@ mod tests {
     #[test]
     fn a_device_that_fails_spoils_no_picture_and_one_that_cannot_is_refused() {
         let lost = GpuError::Failed { adapter: "Lamp 9".into(), reason: "the device is lost".into() };
+        let given_up =
+            GpuError::GivenUp { adapter: "Lamp 9".into(), times: 3, reason: "the device is lost".into() };
         for asked in [Device::Gpu, Device::Auto] {
-            let told = stands_in(asked, lost.clone()).unwrap();
-            for word in ["Lamp 9", "the device is lost", "on the CPU"] {
-                assert!(told.contains(word), "{word}: {told}");
+            for e in [&lost, &given_up] {
+                let told = stands_in(asked, e.clone()).unwrap();
+                for word in ["Lamp 9", "the device is lost", "on the CPU"] {
+                    assert!(told.contains(word), "{word}: {told}");
+                }
             }
         }
         let none = GpuError::NoAdapter("Vulkan finds no device".into());

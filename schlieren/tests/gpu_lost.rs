@@ -1,0 +1,127 @@
+//! GPUs that are lost on the way, as by a driver's reset. In a process of their own: the program's
+//! GPU is lost here too, and is that of all other tests.
+#![cfg(feature = "gpu")]
+
+mod common;
+
+use common::{cube, difference, grid, lopsided, oblique, trace};
+use schlieren::field::Field;
+use schlieren::gpu::{Gpu, GpuOptions, GpuPaths};
+use schlieren::interpolate::Interpolant;
+use schlieren::march::{Deviational, Options};
+use schlieren::path::LightPaths;
+use schlieren::render::{Control, Layers, Rendered, TestSection, render};
+use schlieren::scene::Scene;
+use std::io::Write as _;
+use std::sync::Arc;
+
+/// As tests/gpu.rs has it.
+const TOLERANCE: f64 = 1e-6;
+
+/// The program's device, or why the test is skipped.
+fn gpu() -> Option<Arc<Gpu>> {
+    match Gpu::shared() {
+        Ok(gpu) => Some(gpu),
+        Err(e) => {
+            assert!(std::env::var_os("RTSV_REQUIRE_PEERS").is_none_or(|v| v != "1"), "{e}");
+            // The test harness swallows eprintln! of tests that pass.
+            let _ = writeln!(std::io::stderr(), "skipped: {e}");
+            None
+        }
+    }
+}
+
+/// A scene of `field` drawn on the GPU.
+fn drawn(field: &Field) -> Rendered {
+    let toml = "[flow]\nfile = \"\"\ndensity = \"-\"\n[film]\nsize = [40, 30]\n[march]\ndevice = \"gpu\"\nmethod = \"verlet\"";
+    let scene = Scene::from_toml(toml).unwrap();
+    let section = TestSection::of_fields(&scene, vec![field.clone()], None).unwrap();
+    render(&scene, &section, Layers::NONE, &Control::default()).unwrap()
+}
+
+/// The device is taken away as a driver's reset does: between two pictures, and under way while
+/// others trace.
+#[test]
+fn a_lost_device_is_opened_again_and_no_ray_is_left_to_the_cpu() {
+    let Some(_) = gpu() else { return };
+    let field = cube(17, lopsided);
+    let starts = grid(32, 0.9);
+    for interpolant in [Interpolant::BSpline, Interpolant::Trilinear] {
+        let own = Arc::new(Gpu::open().unwrap());
+        let paths = GpuPaths::new(own.clone(), &field, oblique(), interpolant, GpuOptions::default())
+            .unwrap()
+            .with_batch(100);
+        let expected = format!("{:?}", trace(&paths, &starts));
+        assert_eq!(paths.trouble(), None);
+        own.lose();
+        assert_eq!(format!("{:?}", trace(&paths, &starts)), expected, "{interpolant:?}");
+        let c = paths.counters();
+        assert!(c.rays_on_cpu == 0 && c.rays_repeated > 0, "{c:?}");
+        assert!(
+            !Arc::ptr_eq(&paths.gpu(), &own) && own.failure().is_some() && paths.gpu().failure().is_none()
+        );
+        let told = paths.trouble().unwrap();
+        assert!(told.contains("lost") && told.contains("opened again") && !told.contains("CPU"), "{told}");
+
+        // Under way, with the work of four threads on it.
+        let lost = paths.gpu();
+        std::thread::scope(|s| {
+            for _ in 0..4 {
+                let (paths, starts, expected) = (&paths, &starts, &expected);
+                s.spawn(move || {
+                    for _ in 0..6 {
+                        assert_eq!(&format!("{:?}", trace(paths, starts)), expected);
+                    }
+                });
+            }
+            std::thread::sleep(std::time::Duration::from_millis(20));
+            lost.lose();
+        });
+        assert_eq!(format!("{:?}", trace(&paths, &starts)), expected, "{interpolant:?}");
+        assert_eq!(paths.counters().rays_on_cpu, 0);
+        assert!(!Arc::ptr_eq(&paths.gpu(), &lost));
+    }
+}
+
+/// The program's device is lost: the next picture has another, and the page need not be started
+/// again.
+#[test]
+fn the_program_s_gpu_comes_back_after_it_was_lost() {
+    let Some(before) = gpu() else { return };
+    let field = cube(17, lopsided);
+    let expected = drawn(&field);
+    before.lose();
+    for _ in 0..2 {
+        let r = drawn(&field);
+        assert!(r.pixels == expected.pixels, "another picture");
+        assert!(r.report.march.contains(" on "), "{}", r.report.march);
+        assert!(!r.report.warnings.iter().any(|w| w.contains("on the CPU")), "{:?}", r.report.warnings);
+    }
+    let after = Gpu::shared().unwrap();
+    assert!(after.failure().is_none() && !Arc::ptr_eq(&before, &after));
+}
+
+/// A device that is lost whenever it is opened is opened a few times, then left alone, and the
+/// picture is the CPU's.
+#[test]
+fn a_device_that_is_lost_again_and_again_is_given_up_by_name() {
+    let Some(_) = gpu() else { return };
+    let field = cube(17, lopsided);
+    let starts = grid(16, 0.9);
+    let own = Arc::new(Gpu::open().unwrap());
+    let paths = GpuPaths::new(own.clone(), &field, oblique(), Interpolant::BSpline, GpuOptions::default())
+        .unwrap()
+        .with_batch(64);
+    let on_cpu = Deviational::new(&field, oblique(), Interpolant::BSpline, Options::default());
+    let expected = trace(&on_cpu, &starts);
+    for lost in 1..=5 {
+        paths.gpu().lose();
+        let exits = trace(&paths, &starts);
+        let (_, max) = difference(&exits, &expected);
+        assert!(max < TOLERANCE, "{max:e}");
+        let c = paths.counters();
+        assert_eq!(c.rays_on_cpu > 0, lost > 3, "lost {lost} times: {c:?}");
+    }
+    let told = paths.trouble().unwrap();
+    assert!(told.contains("opened again 3 times") && told.contains("on the CPU"), "{told}");
+}
