@@ -62,6 +62,7 @@ pub mod output;
 pub mod path;
 pub mod plan;
 pub mod render;
+mod roughness;
 pub mod scene;
 #[cfg(feature = "serve")]
 pub mod serve;

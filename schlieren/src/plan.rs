@@ -1,25 +1,40 @@
 //! From a tolerance in radians to a march: mode, interpolant and step, with the bound that chose them and the error that was measured.
 //!
-//! Three errors add up. What follows bounds or estimates each from the lattice alone, in one pass over it, with G the largest gradient, H the largest
-//! second derivative, F the largest fourth difference (all per metre and direction), L the longest way through the field, h the spacing:
+//! The errors add up. What follows bounds each from the lattice alone, in one pass over it
+//! ([`Roughness`]), with G the largest gradient, H the largest second derivative, T the largest
+//! third and F the largest fourth along an axis (all per metre, mixed ones too), L the longest way
+//! through the field, h the spacing, theta = G L the largest deflection:
 //!
-//! * **Bending** (line of sight leaves it out): a ray strays by at most G L^2/2, so its gradient is off by H times that: `H G L^3 / 6`.
-//! * **Step** (Verlet): one step's error is `dt^3/24` times the second derivative of the gradient along the ray, so over L it is
-//!   `L h_step^2 / 24 * T` with T the largest third derivative; Euler's is not offered.
-//! * **Interpolation**: the spline's derivative is off by about `h^3/24 * F` (fourth derivative; de Boor's bound for the derivative of the complete cubic
-//!   spline is h^3/24), trilinear gradients' by `h^2/6 * T`, trilinear eps' by `h/2 * H`; over L.
+//! * **Bending** (line of sight leaves it out): a ray strays by at most G s²/2 after a way s, so
+//!   its gradient is off by H times that: `H G L³ / 6`. The way itself is longer by theta²/2 at
+//!   most, which adds `theta³ / 2`. The optical path is off by `G² L³ / 3`.
+//! * **Step** (Verlet): a step of length k samples the gradient at its middle, which is off by
+//!   `k²/24` times the gradient's second derivative along the ray, `T + H G` (the ray bends by G),
+//!   so over L it is `L k² / 24 (T + H G)`; Euler's is not offered. Line of sight in an oblique
+//!   view has steps of one voxel.
+//! * **Interpolation**: the spline's derivative is off by about `h³/24 F` (de Boor's bound for the
+//!   derivative of the complete cubic spline), trilinear gradients' by `h²/6 T`, trilinear eps' by
+//!   `h/2` times the second derivatives along the axes and `h²/8 T`; over L.
+//! * **Edges**: seen obliquely, deflections have a kink where rays pass an edge of the field,
+//!   unless there is no gradient. Line of sight interpolates across.
+//!
+//! An error of the gradient moves the ray, and from there on its gradient is another: errors of
+//! steps and interpolants grow by at most `cosh(√H L)` (Gronwall).
 //!
 //! All are worst cases of worst points added up along the whole path: real errors are ten to a thousand times smaller. So the plan then traces a few hundred rays
-//! twice, as planned and with everything refined, and reports that difference as the achieved error.
+//! twice, as planned and with everything refined, and reports that difference as the achieved
+//! error; and once more through coarser lattices, to know what the field's own lattice leaves open.
 
 use crate::field::Field;
-use crate::interpolate::{BSpline, Interpolant};
+use crate::interpolate::{BSpline, Interpolant, Interpolate};
 use crate::march::{BlankCells, Deviational, Full, FullOptions, Kept, Options, Pefrl, Projection, Scheme};
 use crate::path::{Exit, LightPaths, Start, Status, Wanted};
 use crate::view::View;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::Arc;
+
+pub use crate::roughness::Roughness;
 
 /// How light is taken through the field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -38,13 +53,17 @@ pub struct Request {
     /// Largest error of the deflection that is fine. Zero and below: as accurate as can be. A lattice that is itself coarser than this sets the steps
     /// instead.
     pub tolerance_rad: f64,
+    /// Direction of the light, which sets the longest way through the field. `None`: any.
+    pub direction: Option<DVec3>,
     /// Forces a mode.
     pub mode: Option<Mode>,
     /// Forces an interpolant.
     pub interpolant: Option<Interpolant>,
     /// Forces a step.
     pub step_voxels: Option<f64>,
-    /// What to compute beside deflection and displacement.
+    /// What to compute beside deflection and displacement. The optical path, if wanted, may be off
+    /// by the tolerance times the longest way through the field: where its slope is a deflection,
+    /// that is the same.
     pub wanted: Wanted,
     /// What becomes of light in cells without data.
     pub blank: BlankCells,
@@ -52,21 +71,6 @@ pub struct Request {
     pub skip_rad: f64,
     /// [`Options::skip_opd_m`].
     pub skip_opd_m: f64,
-}
-
-/// Largest values in a field, per metre.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Roughness {
-    /// |grad eps|.
-    pub gradient: f64,
-    /// Second derivatives.
-    pub second: f64,
-    /// Third derivatives.
-    pub third: f64,
-    /// Fourth derivatives.
-    pub fourth: f64,
-    /// |eps|.
-    pub eps: f64,
 }
 
 /// A bound for each kind of error, in radians.
@@ -78,8 +82,19 @@ pub struct Bounds {
     pub interpolation_rad: f64,
     /// Of the step.
     pub step_rad: f64,
+    /// Of edges that are interpolated across.
+    pub edges_rad: f64,
+    /// Of the optical path, as far as leaving out that rays bend and steps make it.
+    pub path_m: f64,
     /// Largest deflection that is possible.
     pub deflection_rad: f64,
+}
+
+impl Bounds {
+    /// All errors of a deflection together.
+    pub fn total_rad(&self) -> f64 {
+        self.bending_rad + self.interpolation_rad + self.step_rad + self.edges_rad
+    }
 }
 
 /// The choice, and why.
@@ -106,65 +121,12 @@ pub struct Achieved {
     pub max_rad: f64,
     /// Its root mean square.
     pub rms_rad: f64,
-    /// How well the field itself is resolved: the largest change of deflection when every other node is left out, divided by 8 (the spline's
-    /// derivative is of third order). Infinite when the field has too few nodes to tell.
+    /// How well the field itself is resolved: the error that its lattice leaves open, estimated
+    /// from the largest changes of deflection when half the nodes along each axis are left out, and
+    /// half of those (Richardson's extrapolation). Infinite when the field has too few nodes to tell.
     pub resolution_rad: f64,
     /// Rays compared.
     pub rays: usize,
-}
-
-impl Roughness {
-    /// One pass over the lattice, in parallel.
-    pub fn of(field: &Field) -> Roughness {
-        let d = field.dims();
-        let eps = field.eps();
-        let stride = [1, d[0], d[0] * d[1]];
-        let rcp_h = field.spacing_m().map(|h| 1.0 / h);
-        // Differences of order 1 to 4 along each axis. Mixed derivatives are bounded by sums of these only in the mean; the square root of
-        // the three axes' squares is what is used.
-        let row = |r: usize| {
-            let (j, k) = (r % d[1], r / d[1]);
-            let mut worst = [0.0f64; 5];
-            for i in 0..d[0] {
-                let o = i + r * d[0];
-                let at = [i, j, k];
-                let mut squares = [0.0f64; 5];
-                worst[4] = worst[4].max(f64::from(eps[o]).abs());
-                for c in 0..3 {
-                    let v = |n: usize| f64::from(eps[o + n * stride[c]]);
-                    let left = d[c] - 1 - at[c];
-                    let h = rcp_h[c];
-                    if left >= 1 {
-                        squares[0] += ((v(1) - v(0)) * h).powi(2);
-                    }
-                    if left >= 2 {
-                        squares[1] += ((v(2) - 2.0 * v(1) + v(0)) * h * h).powi(2);
-                    }
-                    if left >= 3 {
-                        squares[2] += ((v(3) - 3.0 * (v(2) - v(1)) - v(0)) * h.powi(3)).powi(2);
-                    }
-                    if left >= 4 {
-                        squares[3] += ((v(4) - 4.0 * (v(3) + v(1)) + 6.0 * v(2) + v(0)) * h.powi(4)).powi(2);
-                    }
-                }
-                for q in 0..4 {
-                    worst[q] = worst[q].max(squares[q]);
-                }
-            }
-            worst
-        };
-        let worst = (0..d[1] * d[2])
-            .into_par_iter()
-            .map(row)
-            .reduce(|| [0.0; 5], |a, b| [0, 1, 2, 3, 4].map(|q: usize| a[q].max(b[q])));
-        Roughness {
-            gradient: worst[0].sqrt(),
-            second: worst[1].sqrt(),
-            third: worst[2].sqrt(),
-            fourth: worst[3].sqrt(),
-            eps: worst[4],
-        }
-    }
 }
 
 /// Shortest step that is chosen: below it nothing gets better on interpolated fields.
@@ -179,29 +141,50 @@ impl Plan {
 
     /// [`Plan::new`] for a field whose roughness is known.
     pub fn from_roughness(field: &Field, request: Request, roughness: Roughness) -> Plan {
-        let length_m = field.size_m().length();
-        let h_m = DVec3::from(field.spacing_m()).max_element();
+        let way = Way::new(field, request.direction);
+        let (length_m, h_m) = (way.longest_m, DVec3::from(field.spacing_m()).max_element());
         let r = roughness;
         let tolerance = request.tolerance_rad.max(0.0);
-        let bending_rad = r.second * r.gradient * length_m.powi(3) / 6.0;
         let deflection_rad = r.gradient * length_m;
+        // Beyond e^50 it is infinite for all purposes, and still a number.
+        let growth = (r.second.sqrt() * length_m).min(50.0).cosh();
+
+        let bending_rad = r.second * r.gradient * length_m.powi(3) / 6.0 + deflection_rad.powi(3) / 2.0;
+        let bending_path_m = deflection_rad.powi(2) * length_m / 3.0;
+        let edges_rad = r.gradient_on_faces * way.edges_m(h_m);
+        let steps_rad = |voxels: f64| {
+            growth * length_m * (voxels * h_m).powi(2) / 24.0 * (r.third + r.second * r.gradient)
+        };
+        let of_interpolant = |i: Interpolant| {
+            let per_m = match i {
+                Interpolant::BSpline => h_m.powi(3) / 24.0 * r.fourth,
+                Interpolant::TrilinearGradient => h_m.powi(2) / 6.0 * r.third,
+                Interpolant::Trilinear => h_m / 2.0 * r.second_along_axes + h_m.powi(2) / 8.0 * r.third,
+            };
+            growth * length_m * per_m
+        };
+        // A quarter of the tolerance while the interpolant's bound leaves it; where the lattice
+        // itself is off by more, a third of that bound, which is the same number where the two
+        // cases meet. Shorter steps would only cost time. Zero asks for all there is.
+        let share = |i| if tolerance > 0.0 { (tolerance / 4.0).max(of_interpolant(i) / 3.0) } else { 0.0 };
 
         // Strong index: deflections for which "paraxial" is a courtesy, or an index far from the reference's.
         let strong = r.eps > 0.05 || deflection_rad > 0.5 && r.eps > 0.01;
+        // What projections have instead of steps.
+        let projected_rad = if way.oblique { steps_rad(1.0) } else { 0.0 };
+        let spline = request.interpolant.unwrap_or(Interpolant::BSpline);
+        let straight_is_enough = bending_rad + edges_rad <= 0.5 * tolerance
+            && projected_rad <= share(spline)
+            && (!request.wanted.opd || bending_path_m <= 0.5 * tolerance * length_m);
         let mode = request.mode.unwrap_or(if strong {
             Mode::Full
-        } else if bending_rad <= 0.5 * tolerance {
+        } else if straight_is_enough {
             Mode::LineOfSight
         } else {
             Mode::Paraxial
         });
 
         // The cheapest interpolant that is good enough. Line of sight is as fast with the spline as without.
-        let of_interpolant = |i: Interpolant| match i {
-            Interpolant::BSpline => length_m * h_m.powi(3) / 24.0 * r.fourth,
-            Interpolant::TrilinearGradient => length_m * h_m.powi(2) / 6.0 * r.third,
-            Interpolant::Trilinear => length_m * h_m / 2.0 * r.second,
-        };
         let interpolant = request.interpolant.unwrap_or(
             if mode == Mode::Paraxial && of_interpolant(Interpolant::Trilinear) <= 0.5 * tolerance {
                 Interpolant::Trilinear
@@ -212,26 +195,44 @@ impl Plan {
 
         // The longest step that is good enough, in powers of two from one voxel.
         let of_step = |voxels: f64| match mode {
-            Mode::LineOfSight => 0.0,
-            Mode::Paraxial => length_m * (voxels * h_m).powi(2) / 24.0 * r.third,
+            Mode::LineOfSight => projected_rad,
+            Mode::Paraxial => steps_rad(voxels),
             // Fourth order: the constant of PEFRL is about 1/5000 (Omelyan 2002, table 2), times a fifth derivative that a spline does not have.
-            Mode::Full => length_m * (voxels * h_m).powi(3) / 200.0 * r.fourth,
+            Mode::Full => growth * length_m * (voxels * h_m).powi(3) / 200.0 * r.fourth,
         };
-        // A quarter of the tolerance while the interpolant's bound leaves it; where the lattice itself is off by more, a third of that bound, which is the same
-        // number where the two cases meet. Shorter steps would only cost time. Zero asks for all there is.
-        let share =
-            if tolerance > 0.0 { (tolerance / 4.0).max(of_interpolant(interpolant) / 3.0) } else { 0.0 };
+        // Paths are summed up at the same places: eps there is off by its second derivative along
+        // the ray.
+        let path_of_step_m = |voxels: f64| match mode {
+            Mode::LineOfSight => {
+                if way.oblique {
+                    length_m * h_m.powi(2) / 24.0 * r.second
+                } else {
+                    0.0
+                }
+            }
+            Mode::Paraxial => length_m * (voxels * h_m).powi(2) / 24.0 * (r.second + r.gradient.powi(2)),
+            Mode::Full => 0.0,
+        };
+        let share_rad = share(interpolant);
+        let good_enough = |voxels: f64| {
+            let path_is = !request.wanted.opd || path_of_step_m(voxels) <= 0.25 * tolerance * length_m;
+            of_step(voxels) <= share_rad && (path_is || share_rad > tolerance)
+        };
         let step_voxels = request.step_voxels.unwrap_or_else(|| {
             let mut step = 1.0;
-            while step > SHORTEST_STEP && of_step(step) > share {
+            while step > SHORTEST_STEP && !good_enough(step) {
                 step *= 0.5;
             }
             step
         });
+        let straight = mode == Mode::LineOfSight;
         let bounds = Bounds {
-            bending_rad: if mode == Mode::LineOfSight { bending_rad } else { 0.0 },
-            interpolation_rad: of_interpolant(interpolant),
+            bending_rad: if straight { bending_rad } else { 0.0 },
+            // Oblique projections are interpolated once more, as maps.
+            interpolation_rad: of_interpolant(interpolant) * if straight && way.oblique { 2.0 } else { 1.0 },
             step_rad: of_step(step_voxels),
+            edges_rad: if straight { edges_rad } else { 0.0 },
+            path_m: path_of_step_m(step_voxels) + if straight { bending_path_m } else { 0.0 },
             deflection_rad,
         };
         Plan { request, mode, interpolant, step_voxels, bounds, roughness }
@@ -290,10 +291,17 @@ impl Plan {
         };
         fine.paths_with(field, view, kept).trace_parallel(&starts, &mut refined);
         let (max_rad, rms_rad, rays) = compare(&planned, &refined);
-        let resolution_rad = coarsened(field).map_or(f64::INFINITY, |coarse| {
-            let mut other = planned.clone();
-            fine.paths(&coarse, view).trace_parallel(&starts, &mut other);
-            compare(&other, &refined).0 / 8.0
+        let through = |lattice: &Field| {
+            let mut exits = planned.clone();
+            fine.paths(lattice, view).trace_parallel(&starts, &mut exits);
+            exits
+        };
+        let resolution_rad = coarsened(field, &|| kept.spline(field)).map_or(f64::INFINITY, |coarse| {
+            let of_coarse = through(&coarse);
+            let change = compare(&of_coarse, &refined).0;
+            let coarser = coarsened(&coarse, &|| Arc::new(BSpline::new(&coarse)));
+            let before = coarser.map(|c| compare(&through(&c), &of_coarse).0);
+            left_open(change, before)
         });
         Achieved { max_rad, rms_rad, resolution_rad, rays }
     }
@@ -328,21 +336,87 @@ fn sample_starts(field: &Field, view: &View, rays: usize) -> Vec<Start> {
         .collect()
 }
 
-/// Every other node. `None` when that leaves fewer than four along an axis.
-fn coarsened(field: &Field) -> Option<Field> {
+/// The error of a lattice by Richardson's extrapolation: `change` is what leaving out half the
+/// nodes did, `before` what leaving out half of those did. Of order p the two have a ratio of 2^p.
+/// Splines' derivatives are of third order where the field is resolved; where it is not, errors do
+/// not shrink as fast.
+fn left_open(change: f64, before: Option<f64>) -> f64 {
+    const RESOLVED: f64 = 8.0;
+    // Structures at the limit: half the change of a halving is left.
+    const UNRESOLVED: f64 = 2.0;
+    let ratio = match before {
+        Some(before) if change > 0.0 => (before / change).clamp(UNRESOLVED, RESOLVED),
+        // Too few nodes to tell, or nothing changed.
+        _ => RESOLVED,
+    };
+    change / (ratio - 1.0)
+}
+
+/// The field on a lattice of half the nodes along each axis that has at least seven. `None` when
+/// there is no such axis. Where every other node does not end with the last, nodes lie between, on
+/// the spline: a lattice that ends before the last node would be another field, with less gas.
+fn coarsened(field: &Field, spline: &dyn Fn() -> Arc<BSpline>) -> Option<Field> {
     let d = field.dims();
-    let half = d.map(|n| n.div_ceil(2));
-    if half.iter().any(|n| *n < 4) {
+    let half = d.map(|n| if n < 7 { n } else { n.div_ceil(2) });
+    if half == d {
         return None;
     }
-    let o = |i: usize| {
-        let at = [i % half[0], i / half[0] % half[1], i / (half[0] * half[1])];
-        2 * at[0] + d[0] * (2 * at[1] + d[1] * 2 * at[2])
-    };
+    let ratio = [0, 1, 2].map(|c| (d[c] - 1) as f64 / (half[c] - 1) as f64);
     let count = half.iter().product();
-    let eps = (0..count).map(|i| field.eps()[o(i)]).collect();
-    let nodes = field.nodes().map(|n| (0..count).map(|i| n[o(i)]).collect());
-    Field::new(half, field.spacing_m().map(|h| 2.0 * h), field.origin_m(), eps, field.n0(), nodes).ok()
+    let place = |i: usize| [i % half[0], i / half[0] % half[1], i / (half[0] * half[1])];
+    let near = |i: usize| {
+        let at = place(i);
+        let at = [0, 1, 2].map(|c| (at[c] as f64 * ratio[c]).round() as usize);
+        at[0] + d[0] * (at[1] + d[1] * at[2])
+    };
+    let on_nodes = ratio.iter().all(|r| r.fract() == 0.0);
+    let eps = if on_nodes {
+        (0..count).map(|i| field.eps()[near(i)]).collect()
+    } else {
+        let spline = spline();
+        let at = |i: usize| {
+            let at = place(i);
+            [0, 1, 2].map(|c| at[c] as f64 * ratio[c])
+        };
+        (0..count).into_par_iter().map(|i| spline.sample(at(i)).eps as f32).collect()
+    };
+    let nodes = field.nodes().map(|n| (0..count).map(|i| n[near(i)]).collect());
+    let h = field.spacing_m();
+    let spacing_m = [0, 1, 2].map(|c| h[c] * ratio[c]);
+    Field::new(half, spacing_m, field.origin_m(), eps, field.n0(), nodes).ok()
+}
+
+/// The way of light through a field's box.
+struct Way {
+    /// The longest.
+    longest_m: f64,
+    /// Not along an axis of the lattice, or not known.
+    oblique: bool,
+    /// How fast ways get shorter towards an edge: metres per metre across the light. Infinite when
+    /// the direction is not known.
+    slope: f64,
+}
+
+impl Way {
+    fn new(field: &Field, direction: Option<DVec3>) -> Way {
+        let size = field.size_m();
+        let d = direction.map(|d| d.normalize_or_zero().abs()).filter(|d| d.max_element() > 0.0);
+        let Some(d) = d else {
+            return Way { longest_m: size.length(), oblique: true, slope: f64::INFINITY };
+        };
+        let oblique = d.max_element() < 1.0;
+        // Between faces that the light meets under the angle with cosine c, ways change by √(1 -
+        // c²)/c per metre; those along the light have no edge.
+        let slope = d.to_array().into_iter().filter(|c| *c > 0.0).map(|c| (1.0 - c * c).sqrt() / c);
+        let slope = if oblique { slope.sum() } else { 0.0 };
+        Way { longest_m: (size / d).min_element().min(size.length()), oblique, slope }
+    }
+
+    /// Metres of gas by which a cubic spline over nodes `h_m` apart is off at an edge: a quarter of
+    /// a step times the change of slope, and no more than there are.
+    fn edges_m(&self, h_m: f64) -> f64 {
+        (0.25 * h_m * self.slope).min(self.longest_m)
+    }
 }
 
 /// [`Full`] that owns its spline.

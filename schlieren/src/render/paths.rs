@@ -79,6 +79,7 @@ impl TestSection {
         let view = if against_light { Reversed::view(&self.view) } else { self.view };
         let with = |mode| Request {
             tolerance_rad: march.tolerance_rad,
+            direction: Some(view.forward),
             mode,
             interpolant,
             step_voxels: march.step_voxels,
@@ -163,6 +164,13 @@ impl<'a> Planned<'a> {
             warnings.push(format!(
                 "deflections are off by up to {:.1e} rad, above the tolerance of {tolerance_rad:.1e} rad; the flow has structures that its lattice does not resolve: smooth shocks (flow.smoothing_nodes) or take a finer lattice",
                 a.max_rad
+            ));
+        }
+        if let Some(a) = achieved.filter(|a| a.resolution_rad.is_finite() && a.resolution_rad > tolerance_rad)
+        {
+            warnings.push(format!(
+                "the flow's own lattice leaves deflections open by about {:.1e} rad, above the tolerance of {tolerance_rad:.1e} rad, whatever march is taken: take a finer lattice, smooth shocks (flow.smoothing_nodes), or ask for less (march.tolerance_rad)",
+                a.resolution_rad
             ));
         }
         Planned {
