@@ -1,6 +1,7 @@
 //! Where files of the user's lie (XDG Base Directory Specification 0.8).
 
-use std::path::PathBuf;
+use std::fs::{File, Metadata};
+use std::path::{Path, PathBuf};
 
 fn base(variable: impl Fn(&str) -> Option<String>, name: &str, below_home: &str) -> Option<PathBuf> {
     // "All paths set in these environment variables must be absolute. If ... relative ... consider the path invalid."
@@ -18,6 +19,11 @@ pub fn config(variable: impl Fn(&str) -> Option<String>) -> Option<PathBuf> {
     base(variable, "XDG_CONFIG_HOME", ".config")
 }
 
+/// What can be made again: `$XDG_CACHE_HOME/gluray`.
+pub fn cache(variable: impl Fn(&str) -> Option<String>) -> Option<PathBuf> {
+    base(variable, "XDG_CACHE_HOME", ".cache")
+}
+
 /// Reports of runs: `$XDG_STATE_HOME/gluray`.
 pub fn state(variable: impl Fn(&str) -> Option<String>) -> Option<PathBuf> {
     base(variable, "XDG_STATE_HOME", ".local/state")
@@ -29,6 +35,17 @@ pub fn runtime(variable: impl Fn(&str) -> Option<String>) -> Option<PathBuf> {
     let set = variable("XDG_RUNTIME_DIR").map(PathBuf::from).filter(|p| p.is_absolute());
     set.map(|p| p.join("gluray"))
         .or_else(|| Some(std::env::temp_dir().join(format!("gluray-{}", user_id()?))))
+}
+
+/// Opens a plain file of this user's for reading, with what is known of it; `None` for anything else. It never waits, whatever lies there: a FIFO of somebody else's in a
+/// folder that is shared, a device, a link to one.
+pub(crate) fn open_own(path: &Path) -> Option<(File, Metadata)> {
+    use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+    let flags = libc::O_NOFOLLOW | libc::O_NONBLOCK | libc::O_CLOEXEC | libc::O_NOCTTY;
+    let file = File::options().read(true).custom_flags(flags).open(path).ok()?;
+    // Of what was opened, not of what may lie there by now.
+    let about = file.metadata().ok()?;
+    (about.is_file() && Some(about.uid()) == user_id()).then_some((file, about))
 }
 
 /// The user this process runs as.

@@ -113,14 +113,8 @@ impl Meeting {
     /// Reads a file, if it is believable.
     pub fn read(path: &Path) -> Option<Meeting> {
         use std::io::Read;
-        let file = std::fs::File::open(path).ok()?;
-        // Of what was opened, not of what may lie there by now.
-        let about = file.metadata().ok()?;
-        if !about.is_file()
-            || about.mode() & 0o077 != 0
-            || Some(about.uid()) != folders::user_id()
-            || about.len() > 4096
-        {
+        let (file, about) = folders::open_own(path)?;
+        if about.mode() & 0o077 != 0 || about.len() > 4096 {
             return None;
         }
         let mut text = String::new();
@@ -230,8 +224,33 @@ mod tests {
         {
             assert_eq!(by_variables(address, secret), None, "{address}");
         }
+        // Names that lead elsewhere are not followed, not even to a file that would be believed.
+        let _here = meeting("127.0.0.1:9").publish(dir.path()).unwrap();
+        let elsewhere = dir.path().join("elsewhere.json");
+        std::fs::rename(&path, &elsewhere).unwrap();
+        assert!(Meeting::read(&elsewhere).is_some());
+        std::os::unix::fs::symlink(&elsewhere, &path).unwrap();
+        assert_eq!(Meeting::read(&path), None, "a link");
+        std::fs::remove_file(&path).unwrap();
+        std::fs::create_dir(&path).unwrap();
+        assert_eq!(Meeting::read(&path), None, "a folder");
+        std::fs::remove_dir(&path).unwrap();
         std::fs::set_permissions(dir.path(), std::fs::Permissions::from_mode(0o777)).unwrap();
         assert!(matches!(meeting("127.0.0.1:9").publish(dir.path()), Err(MeetingError::NotPrivate { .. })));
+    }
+
+    #[test]
+    fn a_fifo_in_the_place_of_the_file_holds_nobody_up() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = file_in(dir.path());
+        let made = std::process::Command::new("mkfifo").arg("-m600").arg(&path).status().unwrap();
+        assert!(made.success());
+        let (sender, receiver) = std::sync::mpsc::channel();
+        let read = path.clone();
+        std::thread::spawn(move || sender.send(Meeting::read(&read)));
+        // Whoever waits for a writer waits for ever; the time is for a busy machine.
+        let answer = receiver.recv_timeout(std::time::Duration::from_secs(60));
+        assert_eq!(answer, Ok(None), "looked at before it is waited for");
     }
 
     #[test]
