@@ -9,6 +9,7 @@ mod panel;
 mod run;
 mod serve_rays;
 mod timeline;
+mod vendor;
 
 use clap::{Parser, Subcommand};
 use datasets::cli::{CommonArgs, CompletionsArgs, Status, run_main};

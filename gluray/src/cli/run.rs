@@ -1,6 +1,7 @@
 //! `gluray run`: the environment for the library, the program, and the account of what happened.
 
 use super::helpers::Helpers;
+use super::vendor::Vendor;
 use super::{last_report, library};
 use crate::config::environment::{OBJECTS, parse_pair, variable_of};
 use crate::config::{Assignment, ConfigFile, SettingError, Settings, assign};
@@ -106,7 +107,7 @@ fn has_glvnd() -> bool {
     crate::doctor::look_for_glvnd().is_some()
 }
 
-/// A folder that goes when the run is over; nobody else may enter it, because programs load our library from there.
+/// A folder for reports and sockets that goes when the run is over; nobody else may enter it.
 struct RunFolder(PathBuf);
 
 /// Folders of a process that was killed stay behind, and its number comes again: so many may be in the way.
@@ -168,18 +169,12 @@ pub(super) fn run(args: &RunArgs) -> anyhow::Result<u8> {
     }
     let vendor = args.via == Via::Vendor || (args.via == Via::Auto && has_glvnd());
     if vendor {
-        for name in ["libGLX_gluray.so.0", "libEGL_gluray.so.0"] {
-            std::os::unix::fs::symlink(&library, folder.0.join(name))?;
-        }
-        let egl = folder.0.join("egl.json");
-        let icd = folder.0.join("libEGL_gluray.so.0");
-        let text = serde_json::json!({ "file_format_version": "1.0.0", "ICD": { "library_path": icd } });
-        fs::write(&egl, text.to_string())?;
+        let found = Vendor::of(&library)?;
         command
             .env("GLURAY_GLX_VENDOR", std::env::var_os("__GLX_VENDOR_LIBRARY_NAME").unwrap_or_default())
-            .env("LD_LIBRARY_PATH", with_first("LD_LIBRARY_PATH", &folder.0))
+            .env("LD_LIBRARY_PATH", with_first("LD_LIBRARY_PATH", &found.folder))
             .env("__GLX_VENDOR_LIBRARY_NAME", "gluray")
-            .env("__EGL_VENDOR_LIBRARY_FILENAMES", &egl);
+            .env("__EGL_VENDOR_LIBRARY_FILENAMES", &found.egl);
     } else {
         command.env("LD_PRELOAD", with_first("LD_PRELOAD", &library));
     }
