@@ -55,7 +55,7 @@ impl Map {
     /// The driver's map of `size` values a point.
     fn query(kind: Kind, target: u32, size: usize) -> Map {
         let (orders, values) = gl::map_points(target, size, kind == Kind::Surface);
-        let domain = gl::map_f::<4>(target, MAP_DOMAIN);
+        let domain = gl::map_domain(target);
         let four = |v: &[f32]| std::array::from_fn(|k| v.get(k).copied().unwrap_or(0.0));
         let points = values.chunks_exact(size).map(four).collect();
         let mut map = Map { points, size, orders, first: [0.0; 2], scale: [0.0; 2] };

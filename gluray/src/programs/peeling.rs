@@ -173,9 +173,11 @@ fn limit(program: u32) -> Option<Limit> {
     let (width, height) = (size(TEXTURE_WIDTH), size(TEXTURE_HEIGHT));
     let fits = width * height > 0 && width * height <= 1 << 26;
     let depth = fits.then(|| {
-        let texels = gl::tex_image_rgba(TEXTURE_2D, 0, width * height);
-        texels.into_iter().map(|t| t[1]).collect()
+        // However the program wants its own pixels packed.
+        let texels = gl::plain_reading(|plainly| gl::tex_image_rgba(plainly, TEXTURE_2D, 0));
+        texels.into_iter().map(|t| t[1]).collect::<Vec<f32>>()
     });
+    let depth = depth.filter(|d| d.len() == width * height);
     gl::active_texture(active);
     Some(Limit { width, height, depth: depth?, exact: false })
 }

@@ -82,6 +82,8 @@ driver! {
     pub(crate) fn link_program = "glLinkProgram"(program: u32);
     pub(crate) fn use_program = "glUseProgram"(program: u32);
     pub(crate) fn delete_shader = "glDeleteShader"(shader: u32);
+    pub(crate) fn delete_program = "glDeleteProgram"(program: u32);
+    fn get_shader_info_log = "glGetShaderInfoLog"(shader: u32, room: i32, length: *mut i32, out: *mut c_char);
     fn get_programiv = "glGetProgramiv"(program: u32, what: u32, out: *mut i32);
     fn get_shaderiv = "glGetShaderiv"(shader: u32, what: u32, out: *mut i32);
     fn get_shader_source_raw = "glGetShaderSource"(shader: u32, room: i32, length: *mut i32, out: *mut c_char);
@@ -107,27 +109,38 @@ pub(crate) fn is_enabled(cap: u32) -> bool {
     is_enabled_raw(cap) != 0
 }
 
-// More than any query returns, so that no answer can overrun.
+// More than the answer to any query has, but for those of lists that no standard limits: they are not asked for.
 const ROOM: usize = 32;
+
+/// True when the answer may be longer than [`ROOM`]: formats of compressed textures, program binaries and shader binaries.
+fn is_of_a_list(what: u32) -> bool {
+    matches!(what, 0x86a3 | 0x87ff | 0x8df8)
+}
 
 /// `N` floats of state (at most 16).
 pub(crate) fn floats<const N: usize>(what: u32) -> [f32; N] {
     let mut out = [0.0; ROOM];
-    get_floatv(what, out.as_mut_ptr());
+    if !is_of_a_list(what) {
+        get_floatv(what, out.as_mut_ptr());
+    }
     std::array::from_fn(|i| out[i])
 }
 
 /// `N` doubles of state.
 pub(crate) fn doubles<const N: usize>(what: u32) -> [f64; N] {
     let mut out = [0.0; ROOM];
-    get_doublev(what, out.as_mut_ptr());
+    if !is_of_a_list(what) {
+        get_doublev(what, out.as_mut_ptr());
+    }
     std::array::from_fn(|i| out[i])
 }
 
 /// `N` integers of state.
 pub(crate) fn ints<const N: usize>(what: u32) -> [i32; N] {
     let mut out = [0; ROOM];
-    get_integerv(what, out.as_mut_ptr());
+    if !is_of_a_list(what) {
+        get_integerv(what, out.as_mut_ptr());
+    }
     std::array::from_fn(|i| out[i])
 }
 
@@ -176,8 +189,6 @@ queries! {
     tex_gen_i(coord: u32, what: u32) -> i32 = get_tex_gen_i;
     tex_gen_f(coord: u32, what: u32) -> f32 = get_tex_gen_f;
     clip_plane(plane: u32) -> f64 = get_clip_plane;
-    map_f(target: u32, what: u32) -> f32 = get_map_f;
-    map_i(target: u32, what: u32) -> i32 = get_map_i;
     tex_level_i(target: u32, level: i32, what: u32) -> i32 = get_tex_level_i;
     attachment_i(target: u32, attachment: u32, what: u32) -> i32 = get_attachment_i;
     tex_parameter_i(target: u32, what: u32) -> i32 = get_tex_parameter_i;
@@ -190,11 +201,25 @@ queries! {
     uniform_i(program: u32, at: i32) -> i32 = get_uniformiv;
 }
 
+/// The domain of an evaluator's map: two numbers of a curve, four of a surface.
+pub(crate) fn map_domain(target: u32) -> [f32; 4] {
+    let mut out = [0.0; ROOM];
+    get_map_f(target, crate::enums::MAP_DOMAIN, out.as_mut_ptr());
+    [out[0], out[1], out[2], out[3]]
+}
+
+/// The orders of an evaluator's map: one number of a curve, two of a surface.
+fn map_orders(target: u32) -> [i32; 2] {
+    let mut out = [0; ROOM];
+    get_map_i(target, crate::enums::MAP_ORDER, out.as_mut_ptr());
+    [out[0], out[1]]
+}
+
 /// Orders in both parameters of an evaluator's map, and the values of its control points, of which each has `size`. A curve's second order is 1.
 pub(crate) fn map_points(target: u32, size: usize, surface: bool) -> ([usize; 2], Vec<f32>) {
     // No map has more values a point.
     const MOST: usize = 4;
-    let [u, v] = map_i::<2>(target, crate::enums::MAP_ORDER).map(|n| n.max(1) as usize);
+    let [u, v] = map_orders(target).map(|n| n.max(1) as usize);
     let orders = [u, if surface { v } else { 1 }];
     let points = orders[0] * orders[1];
     let mut out = vec![0.0; points * MOST];
@@ -244,14 +269,50 @@ pub(crate) fn tex_image(inner: i32, w: i32, h: i32, format: u32, kind: u32) {
     tex_image_2d(0x0de1, 0, inner, w, h, 0, format, kind, core::ptr::null());
 }
 
-/// Fills the corner of the bound 2-D texture. Panics when `data` is too short for `w` x `h` texels of four bytes.
+/// Fills the corner of the bound 2-D texture. Panics when `data` is too short for `w` x `h` texels, or of a kind that we do not know.
 pub(crate) fn tex_sub_image(w: i32, h: i32, format: u32, kind: u32, data: &[u8]) {
-    assert!(data.len() as i64 >= i64::from(w) * i64::from(h) * 4, "too few texels");
+    use crate::enums::{FLOAT, RED, RGBA, UNSIGNED_BYTE};
+    let bytes = match (format, kind) {
+        (RGBA, UNSIGNED_BYTE) | (RED, FLOAT) => 4,
+        (RGBA, FLOAT) => 16,
+        _ => panic!("texels of format {format:#x} and type {kind:#x}"),
+    };
+    let (w, h) = (w.max(0), h.max(0));
+    assert!(data.len() as i64 >= i64::from(w) * i64::from(h) * bytes, "too few texels");
+    // Whatever rows the program has: those of `data` follow one another, and lie in our memory. Alignment, row length, skipped rows and pixels.
+    const UNPACK: [(u32, i32); 4] = [(0x0cf5, 1), (0x0cf2, 0), (0x0cf3, 0), (0x0cf4, 0)];
+    const PIXEL_UNPACK_BUFFER: u32 = 0x88ec;
+    let before = UNPACK.map(|(what, _)| int(what));
+    UNPACK.into_iter().zip(before).filter(|(u, b)| u.1 != *b).for_each(|(u, _)| pixel_storei(u.0, u.1));
+    let buffer = word(0x88ef);
+    if buffer != 0 {
+        bind_buffer(PIXEL_UNPACK_BUFFER, 0);
+    }
     tex_sub_image_2d(0x0de1, 0, 0, 0, w, h, format, kind, data.as_ptr().cast());
+    if buffer != 0 {
+        bind_buffer(PIXEL_UNPACK_BUFFER, buffer);
+    }
+    UNPACK.into_iter().zip(before).filter(|(u, b)| u.1 != *b).for_each(|(u, b)| pixel_storei(u.0, b));
 }
 
-/// A level of the bound texture as floats, RGBA. The caller asks for the size first, and reads plainly.
-pub(crate) fn tex_image_rgba(target: u32, level: i32, texels: usize) -> Vec<[f32; 4]> {
+/// Proof that texels are read as they are: [`plain_reading`] alone gives it, for the time of its call.
+pub(crate) struct Plainly(());
+
+/// Texels of a level of the bound 1-D or 2-D texture: what the driver is going to write, whatever a caller thinks. `None` for other targets and from 2^26 texels on.
+fn texels_of(target: u32, level: i32) -> Option<usize> {
+    use crate::enums::{TEXTURE_1D, TEXTURE_2D, TEXTURE_HEIGHT, TEXTURE_WIDTH};
+    if !matches!(target, TEXTURE_1D | TEXTURE_2D) {
+        return None;
+    }
+    let size = |what| usize::try_from(tex_level_i::<1>(target, level, what)[0]).ok();
+    let texels = size(TEXTURE_WIDTH)?.checked_mul(size(TEXTURE_HEIGHT)?)?;
+    // A border of texels, which levels of old programs may have, counts in both.
+    (texels <= 1 << 26).then_some(texels)
+}
+
+/// A level of the bound texture as floats, RGBA; empty where it cannot be read.
+pub(crate) fn tex_image_rgba(_: &Plainly, target: u32, level: i32) -> Vec<[f32; 4]> {
+    let Some(texels) = texels_of(target, level) else { return Vec::new() };
     let mut out = vec![[0.0_f32; 4]; texels];
     get_tex_image(target, level, 0x1908, 0x1406, out.as_mut_ptr().cast());
     out
@@ -259,13 +320,15 @@ pub(crate) fn tex_image_rgba(target: u32, level: i32, texels: usize) -> Vec<[f32
 
 /// The same as bytes, in memory that served before.
 pub(crate) fn tex_image_bytes(
+    _: &Plainly,
     target: u32,
     level: i32,
-    texels: usize,
     mut memory: Vec<[u8; 4]>,
 ) -> Vec<[u8; 4]> {
-    memory.resize(texels, [0; 4]);
-    get_tex_image(target, level, 0x1908, 0x1401, memory.as_mut_ptr().cast());
+    memory.resize(texels_of(target, level).unwrap_or(0), [0; 4]);
+    if !memory.is_empty() {
+        get_tex_image(target, level, 0x1908, 0x1401, memory.as_mut_ptr().cast());
+    }
     memory
 }
 
@@ -312,7 +375,7 @@ pub(crate) fn plain_transfer() {
 }
 
 /// Runs `f` while texels are read as they are: rows that follow one another, into memory and not into a buffer, without the program's scales and biases.
-pub(crate) fn plain_reading<R>(f: impl FnOnce() -> R) -> R {
+pub(crate) fn plain_reading<R>(f: impl FnOnce(&Plainly) -> R) -> R {
     // Swapped bytes, row length, skipped rows and pixels, alignment; of volumes nothing is read.
     const PACK: [(u32, i32); 5] = [(0x0d00, 0), (0x0d02, 0), (0x0d03, 0), (0x0d04, 0), (0x0d05, 4)];
     const PIXEL_PACK_BUFFER: u32 = 0x88eb;
@@ -327,7 +390,7 @@ pub(crate) fn plain_reading<R>(f: impl FnOnce() -> R) -> R {
     if buffer != 0 {
         bind_buffer(PIXEL_PACK_BUFFER, 0);
     }
-    let out = f();
+    let out = f(&Plainly(()));
     if buffer != 0 {
         bind_buffer(PIXEL_PACK_BUFFER, buffer);
     }
@@ -348,7 +411,7 @@ pub(crate) fn buffer_bytes(target: u32, at: usize, bytes: usize) -> Vec<u8> {
 /// Depths of the framebuffer from its lower left corner on, row by row.
 pub(crate) fn depths(w: i32, h: i32) -> Vec<f32> {
     let mut out = vec![1.0_f32; w.max(0) as usize * h.max(0) as usize];
-    plain_reading(|| read_pixels(0, 0, w.max(0), h.max(0), 0x1902, 0x1406, out.as_mut_ptr().cast()));
+    plain_reading(|_| read_pixels(0, 0, w.max(0), h.max(0), 0x1902, 0x1406, out.as_mut_ptr().cast()));
     out
 }
 
@@ -361,6 +424,22 @@ pub(crate) fn draw_buffers(buffers: &[u32]) {
 pub(crate) fn shader_source(shader: u32, text: &str) {
     let (p, n) = (text.as_ptr().cast::<c_char>(), text.len() as i32);
     shader_source_raw(shader, 1, &raw const p, &raw const n);
+}
+
+/// What the driver says of a shader: its first thousand bytes.
+pub(crate) fn shader_log(shader: u32) -> String {
+    const MOST: usize = 1000;
+    let mut out = [0_u8; MOST];
+    let mut n = 0;
+    get_shader_info_log(shader, MOST as i32, &raw mut n, out.as_mut_ptr().cast());
+    String::from_utf8_lossy(&out[..n.clamp(0, MOST as i32 - 1) as usize]).into_owned()
+}
+
+/// True when the driver takes 2-D textures of this kind. Changes nothing but what is remembered of questions like this one.
+pub(crate) fn has_texture_format(inner: i32, format: u32, kind: u32) -> bool {
+    const PROXY_TEXTURE_2D: u32 = 0x8064;
+    tex_image_2d(PROXY_TEXTURE_2D, 0, inner, 16, 16, 0, format, kind, core::ptr::null());
+    tex_level_i::<1>(PROXY_TEXTURE_2D, 0, crate::enums::TEXTURE_WIDTH)[0] == 16
 }
 
 /// Source of a shader of the program.

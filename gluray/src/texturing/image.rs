@@ -170,7 +170,7 @@ fn read_bound(target: u32, name: u32, spare: &mut Vec<[u8; 4]>) -> Option<Image>
     if bound != name {
         gl::bind_texture(target, name);
     }
-    let image = gl::plain_reading(|| read(target, spare));
+    let image = gl::plain_reading(|plainly| read(plainly, target, spare));
     if bound != name {
         gl::bind_texture(target, bound);
     }
@@ -184,7 +184,7 @@ const SKIP_DECODE: u32 = 0x8a4a;
 /// Sizes of red, green, blue, alpha, luminance, intensity.
 const COMPONENT_SIZES: [u32; 6] = [0x805c, 0x805d, 0x805e, 0x805f, 0x8060, 0x8061];
 
-fn read(target: u32, spare: &mut Vec<[u8; 4]>) -> Option<Image> {
+fn read(plainly: &gl::Plainly, target: u32, spare: &mut Vec<[u8; 4]>) -> Option<Image> {
     let of_level = |n: i32, what| gl::tex_level_i::<1>(target, n, what)[0];
     let size = |n: i32| [TEXTURE_WIDTH, TEXTURE_HEIGHT].map(|what| of_level(n, what).max(0) as usize);
     let parameter = |what| gl::tex_parameter_i::<1>(target, what)[0].cast_unsigned();
@@ -219,9 +219,9 @@ fn read(target: u32, spare: &mut Vec<[u8; 4]>) -> Option<Image> {
     let levels = (first..=last).map(|n| {
         let [width, height] = halved(n);
         let texels = if whole && !encoded {
-            Texels::Bytes(gl::tex_image_bytes(target, n, width * height, std::mem::take(spare)))
+            Texels::Bytes(gl::tex_image_bytes(plainly, target, n, std::mem::take(spare)))
         } else {
-            let mut texels = gl::tex_image_rgba(target, n, width * height);
+            let mut texels = gl::tex_image_rgba(plainly, target, n);
             if encoded {
                 texels.iter_mut().for_each(|t| (0..3).for_each(|k| t[k] = decoded(t[k])));
             }
@@ -229,8 +229,13 @@ fn read(target: u32, spare: &mut Vec<[u8; 4]>) -> Option<Image> {
         };
         Level { width, height, texels }
     });
+    let levels: Vec<Level> = levels.collect();
+    if levels.iter().any(|l| l.texels.len() != l.width * l.height) {
+        // Another thread has given it another size meanwhile.
+        return None;
+    }
     Some(Image {
-        levels: levels.collect(),
+        levels,
         base: base_of(sizes),
         filters,
         wrap: [
