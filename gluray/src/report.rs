@@ -1,5 +1,5 @@
-//! What was traced, what was passed and why: a JSON file per process, rewritten as frames come, because many programs end without
-//! running any of their exit handlers.
+//! What was traced, what was passed and why: a JSON file per process, rewritten once a second while frames come, because many programs end without
+//! running any of their exit handlers, and when a context or the program ends.
 
 use crate::timeline::Recorder;
 use serde::{Deserialize, Serialize};
@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::path::Path;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
 /// The account of one process.
@@ -107,13 +107,69 @@ impl Report {
     }
 }
 
-/// Contexts that are gone, summed; and the time of the last writing.
-struct Process {
-    done: Report,
+/// When the file is to be written.
+#[derive(Debug, Default)]
+struct Schedule {
     written: Option<Instant>,
+    /// Something has changed since.
+    behind: bool,
+    /// The process that has a thread which writes when the time has come. A child that was forked has none of its parent's threads.
+    waiting: Option<u32>,
 }
 
-static PROCESS: Mutex<Option<Process>> = Mutex::new(None);
+/// What becomes of a change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Step {
+    /// The file is written.
+    Write,
+    /// After this time, by somebody who waits for it.
+    Wait(Duration),
+    /// Somebody waits already.
+    Leave,
+}
+
+impl Schedule {
+    /// Between two writings, but for those at an end.
+    const PAUSE: Duration = Duration::from_secs(1);
+
+    const fn new() -> Schedule {
+        Schedule { written: None, behind: false, waiting: None }
+    }
+
+    /// Something has changed; `at_once` when the process or a context may be at its end.
+    fn changed(&mut self, now: Instant, at_once: bool, process: u32) -> Step {
+        self.behind = true;
+        let since = self.written.map_or(Self::PAUSE, |t| now.saturating_duration_since(t));
+        if at_once || since >= Self::PAUSE {
+            return Step::Write;
+        }
+        if self.waiting == Some(process) {
+            return Step::Leave;
+        }
+        self.waiting = Some(process);
+        Step::Wait(Self::PAUSE - since)
+    }
+
+    /// Whoever waited has waited; true when there still is something to write.
+    fn waited(&mut self) -> bool {
+        self.waiting = None;
+        self.behind
+    }
+
+    fn wrote(&mut self, now: Instant) {
+        (self.written, self.behind) = (Some(now), false);
+    }
+}
+
+/// The process that drew: a child that was forked and draws nothing has its parent's numbers, and nothing to tell.
+static DRAWING: AtomicU32 = AtomicU32::new(0);
+static SCHEDULE: Mutex<Schedule> = Mutex::new(Schedule::new());
+/// One writing at a time.
+static WRITING: Mutex<()> = Mutex::new(());
+
+fn schedule() -> std::sync::MutexGuard<'static, Schedule> {
+    SCHEDULE.lock().unwrap_or_else(|e| e.into_inner())
+}
 
 /// Counters of one context.
 #[derive(Default)]
@@ -195,43 +251,129 @@ impl Counters {
         *self.report.milliseconds.entry(phase.to_owned()).or_default() += time.as_secs_f64() * 1e3;
     }
 
-    /// Brings the file up to date; unless `now`, not more often than the disk should see.
-    pub(crate) fn publish(&mut self, now: bool) {
+    /// Brings the file up to date: at once when this may be the end, else within a second.
+    pub(crate) fn publish(&mut self, at_once: bool) {
         let Some(dir) = crate::config::current().run_dir.clone() else { return };
-        let mut slots = SLOTS.lock().unwrap_or_else(|e| e.into_inner());
-        let slot = *self.slot.get_or_insert_with(|| {
-            slots.push(Report::default());
-            slots.len() - 1
-        });
-        if let Some(s) = slots.get_mut(slot) {
-            s.clone_from(&self.report);
-        }
-        let mut process = PROCESS.lock().unwrap_or_else(|e| e.into_inner());
-        let process = process.get_or_insert_with(|| Process { done: Report::default(), written: None });
-        const PAUSE: Duration = Duration::from_millis(2);
-        if !now && process.written.is_some_and(|t| t.elapsed() < PAUSE) {
-            return;
-        }
-        process.written = Some(Instant::now());
-        let mut sum = process.done.clone();
-        slots.iter().for_each(|s| sum.add(s));
-        sum.program = crate::config::program_name();
-        sum.pid = std::process::id();
-        sum.mode = crate::config::current().settings.mode.name().to_owned();
-        sum.faults = crate::fault::messages();
-        sum.problems.extend(crate::config::current().problems.iter().cloned());
-        sum.ranks = crate::ranks::accounts();
-        if let Some(own) = sum.ranks.first_mut() {
-            (own.builds, own.refits) = (sum.builds, sum.refits);
-        }
-        sum.problems.extend(crate::ranks::problems());
-        write_spans(&dir.join(format!("{}.spans", sum.pid)));
-        let (file, fresh) = (dir.join(format!("{}.json", sum.pid)), dir.join(format!("{}.new", sum.pid)));
-        // A report that cannot be written must not trouble the program.
-        if let Ok(text) = serde_json::to_vec(&sum)
-            && std::fs::write(&fresh, text).is_ok()
         {
-            std::fs::rename(fresh, file).ok();
+            let mut slots = SLOTS.lock().unwrap_or_else(|e| e.into_inner());
+            let slot = *self.slot.get_or_insert_with(|| {
+                slots.push(Report::default());
+                slots.len() - 1
+            });
+            if let Some(s) = slots.get_mut(slot) {
+                s.clone_from(&self.report);
+            }
         }
+        DRAWING.store(std::process::id(), Relaxed);
+        // Bound, so that the lock is not held while the file is written.
+        let step = schedule().changed(Instant::now(), at_once, std::process::id());
+        match step {
+            Step::Write => write(&dir),
+            Step::Leave => {}
+            Step::Wait(time) => {
+                let wait = move || {
+                    std::thread::sleep(time);
+                    let behind = schedule().waited();
+                    if behind {
+                        crate::fault::guard(|| write(&dir));
+                    }
+                };
+                let spawned = std::thread::Builder::new().name("gluray report".to_owned()).spawn(wait);
+                if spawned.is_err() {
+                    // The next frame tries again.
+                    schedule().waited();
+                }
+            }
+        }
+    }
+}
+
+/// The process ends: what has not been written yet is.
+pub(crate) fn write_the_rest() {
+    if DRAWING.load(Relaxed) != std::process::id() {
+        return;
+    }
+    let behind = schedule().behind;
+    if let Some(dir) = crate::config::current().run_dir.clone().filter(|_| behind) {
+        write(&dir);
+    }
+}
+
+/// Writes the file.
+fn write(dir: &Path) {
+    let _one = WRITING.lock().unwrap_or_else(|e| e.into_inner());
+    // Before the numbers are looked at: what changes from here on is written next time.
+    schedule().wrote(Instant::now());
+    let mut sum = Report::default();
+    SLOTS.lock().unwrap_or_else(|e| e.into_inner()).iter().for_each(|s| sum.add(s));
+    sum.program = crate::config::program_name();
+    sum.pid = std::process::id();
+    sum.mode = crate::config::current().settings.mode.name().to_owned();
+    sum.faults = crate::fault::messages();
+    sum.problems.extend(crate::config::current().problems.iter().cloned());
+    sum.ranks = crate::ranks::accounts();
+    if let Some(own) = sum.ranks.first_mut() {
+        (own.builds, own.refits) = (sum.builds, sum.refits);
+    }
+    sum.problems.extend(crate::ranks::problems());
+    write_spans(&dir.join(format!("{}.spans", sum.pid)));
+    let (file, fresh) = (dir.join(format!("{}.json", sum.pid)), dir.join(format!("{}.new", sum.pid)));
+    // A report that cannot be written must not trouble the program.
+    if let Ok(text) = serde_json::to_vec(&sum)
+        && std::fs::write(&fresh, text).is_ok()
+    {
+        std::fs::rename(fresh, file).ok();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_report_is_written_once_a_second_whatever_the_frame_rate_and_its_last_state_always() {
+        for frames_per_sec in [1_u32, 7, 60, 400, 5000] {
+            let start = Instant::now();
+            let mut schedule = Schedule::new();
+            let (mut writings, mut due) = (0, None);
+            let frames = 10 * frames_per_sec;
+            let at = |frame: u32| start + Duration::from_secs(10) * frame / frames;
+            for frame in 0..frames {
+                let now = at(frame);
+                if due.is_some_and(|d| d <= now) {
+                    due = None;
+                    if schedule.waited() {
+                        writings += 1;
+                        schedule.wrote(now);
+                    }
+                }
+                match schedule.changed(now, false, 7) {
+                    Step::Write => {
+                        writings += 1;
+                        schedule.wrote(now);
+                    }
+                    Step::Wait(time) => {
+                        assert!(due.is_none(), "one waits, and no more");
+                        due = Some(now + time);
+                    }
+                    Step::Leave => assert!(due.is_some(), "somebody waits"),
+                }
+            }
+            assert!((9..=11).contains(&writings), "{writings} in ten seconds at {frames_per_sec} a second");
+            // The program sits idle, or ends.
+            assert!(!schedule.behind || due.is_some(), "the last frame comes into the file");
+            assert_eq!(schedule.changed(at(frames), true, 7), Step::Write, "an end is not put off");
+        }
+    }
+
+    #[test]
+    fn a_forked_child_has_nobody_who_waits() {
+        let now = Instant::now();
+        let mut schedule = Schedule::new();
+        schedule.wrote(now);
+        let soon = now + Duration::from_millis(10);
+        assert!(matches!(schedule.changed(soon, false, 7), Step::Wait(_)));
+        assert_eq!(schedule.changed(soon, false, 7), Step::Leave);
+        assert!(matches!(schedule.changed(soon, false, 8), Step::Wait(_)));
     }
 }
