@@ -458,7 +458,7 @@ fn main() {
         };
         writeln!(s, "#[unsafe(naked)] #[unsafe(no_mangle)] pub(in crate::symbols) unsafe extern \"C\" fn {x}() {{ core::arch::naked_asm!({code}) }}").unwrap();
     }
-    writeln!(s, "}}\n#[allow(clippy::unnecessary_cast, reason = \"written by a program\")] mod hot_hooks {{ use super::hot; use crate::immediate::Step; use crate::real::{{forward, found}};").unwrap();
+    writeln!(s, "}}\n#[allow(clippy::unnecessary_cast, reason = \"written by a program\")] mod hot_hooks {{ use super::hot; use crate::immediate::Step; use crate::real::found; use super::forward_plainly;").unwrap();
     for h in &hot {
         let (args, call, types) = if h.pointer {
             (format!("p: *const {}", h.c_type), "p".to_owned(), format!("*const {}", h.c_type))
@@ -484,12 +484,12 @@ fn main() {
         // SAFETY comments are those of the code that is written.
         writeln!(
             s,
-            "#[cold] #[inline(never)] unsafe extern \"C\" fn {name}_slowly({args}) {{ {read} if !hot::with(|c| {body}) {{
+            "#[cold] #[inline(never)] unsafe extern \"C\" fn {name}_slowly({args}) {{ {read} if !hot::with({index}, |c| {body}) {{
                 // SAFETY: the driver's function of this name and signature.
-                let f: unsafe extern \"C\" fn({types}) = unsafe {{ core::mem::transmute(forward({index})) }};
+                let f: unsafe extern \"C\" fn({types}) = unsafe {{ core::mem::transmute(forward_plainly({index})) }};
                 // SAFETY: the program's own arguments.
                 unsafe {{ f({call}) }} }} }}
-            pub(in crate::symbols) unsafe extern \"C\" fn {name}({args}) {{ {read} match hot::step(|c| {step}) {{
+            pub(in crate::symbols) unsafe extern \"C\" fn {name}({args}) {{ {read} match hot::step({index}, |c| {step}) {{
                 Step::Done => (),
                 Step::Driver if let Some(known) = found({index}) => {{
                     // SAFETY: as above.
@@ -500,6 +500,11 @@ fn main() {
                 _ => unsafe {{ {name}_slowly({call}) }} }} }}"
         )
         .unwrap();
+    }
+    writeln!(s, "}}\n/// Indices of the entry points that have hooks by hand.\n#[allow(non_upper_case_globals, reason = \"the names of OpenGL\")] mod at {{").unwrap();
+    for name in &by_hand {
+        let index = names.binary_search(&name.as_str()).expect("checked above");
+        writeln!(s, "pub(super) const {name}: usize = {index};").unwrap();
     }
     writeln!(s, "}}").unwrap();
     let out = std::env::var("OUT_DIR").expect("cargo sets OUT_DIR");

@@ -5,7 +5,7 @@
 
 use crate::cache::hash;
 use crate::capture::{Attributes, Draw, Packed, Shading, Values, component_bytes};
-use crate::client_memory;
+use crate::client_memory::{Call, Elements, Named, Size, Source};
 use crate::context::{Context, Sink};
 use crate::decide::Verdict;
 use crate::enums::*;
@@ -17,88 +17,9 @@ use crate::state::snapshot::Snapshot;
 use std::borrow::Cow;
 use std::sync::Arc;
 
-/// Where an array is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) struct Source {
-    pub(crate) size: usize,
-    pub(crate) kind: u32,
-    pub(crate) stride: usize,
-    pub(crate) address: usize,
-    /// 0 for client memory.
-    pub(crate) buffer: u32,
-    pub(crate) normalized: bool,
-}
-
-impl Source {
-    fn element(&self) -> usize {
-        component_bytes(self.kind) * self.size
-    }
-
-    /// Bytes from one vertex to the next.
-    fn step(&self) -> usize {
-        if self.stride == 0 { self.element() } else { self.stride }
-    }
-
-    /// Vertices `first..first + count` where they are, with gaps; an error in words when they cannot be read.
-    pub(crate) fn view(&self, first: usize, count: usize) -> Result<Cow<'static, [u8]>, &'static str> {
-        let element = self.element();
-        if element == 0 || self.size > 4 {
-            return Err("an array of a type that is not read");
-        }
-        let start = self.address + first * self.step();
-        let length = if count == 0 { 0 } else { (count - 1) * self.step() + element };
-        match self.buffer {
-            0 if self.address == 0 => Err("an array without an address"),
-            // For the time of this call: nobody keeps it.
-            0 => Ok(Cow::Borrowed(client_memory::view(start, length))),
-            buffer => read_buffer(buffer, start, length).map(Cow::Owned),
-        }
-    }
-
-    /// Bytes of [`Source::view`] tightly packed.
-    pub(crate) fn pack(&self, bytes: Cow<'_, [u8]>) -> Packed {
-        let (element, step) = (self.element(), self.step());
-        let bytes = match step == element {
-            true => bytes.into_owned(),
-            false => {
-                let mut out = Vec::with_capacity(bytes.len() / step * element + element);
-                // A stride below the element's size makes vertices overlap.
-                for at in (0..(bytes.len() + 1).saturating_sub(element)).step_by(step) {
-                    out.extend_from_slice(&bytes[at..at + element]);
-                }
-                out
-            }
-        };
-        Packed { bytes, kind: self.kind, size: self.size, normalized: self.normalized }
-    }
-
-    /// Vertices `first..first + count`, tightly packed; an error in words when they cannot be read.
-    pub(crate) fn read(&self, first: usize, count: usize) -> Result<Packed, &'static str> {
-        Ok(self.pack(self.view(first, count)?))
-    }
-
-    /// What makes the same bytes another array.
-    pub(crate) fn layout(&self) -> (usize, u32, usize, bool) {
-        (self.step(), self.kind, self.size, self.normalized)
-    }
-}
-
-/// A part of a buffer object.
-fn read_buffer(buffer: u32, start: usize, length: usize) -> Result<Vec<u8>, &'static str> {
-    let bound = gl::word(ARRAY_BUFFER_BINDING);
-    gl::bind_buffer(ARRAY_BUFFER, buffer);
-    let size = gl::buffer_i::<1>(ARRAY_BUFFER, BUFFER_SIZE)[0].max(0) as usize;
-    let mapped = gl::buffer_i::<1>(ARRAY_BUFFER, BUFFER_MAPPED)[0] != 0;
-    let answer = if mapped {
-        Err("a mapped buffer")
-    } else if start.checked_add(length).is_none_or(|end| end > size) {
-        Err("arrays beyond the end of their buffer")
-    } else {
-        Ok(gl::buffer_bytes(ARRAY_BUFFER, start, length))
-    };
-    gl::bind_buffer(ARRAY_BUFFER, bound);
-    answer
-}
+/// What the driver is asked about the array of positions.
+const POSITION: [u32; 4] =
+    [VERTEX_ARRAY_TYPE, VERTEX_ARRAY_STRIDE, VERTEX_ARRAY_POINTER, VERTEX_ARRAY_BUFFER_BINDING];
 
 /// The fixed-function arrays that are on.
 #[derive(Debug, Clone, Copy)]
@@ -109,35 +30,13 @@ pub(crate) struct Arrays {
     pub(crate) tex: Option<Source>,
 }
 
-fn source(
-    size: usize,
-    kind: u32,
-    stride: u32,
-    pointer: u32,
-    buffer: u32,
-    normalized: bool,
-    buffers: bool,
-) -> Source {
-    Source {
-        size,
-        kind: gl::word(kind),
-        stride: gl::int(stride).max(0) as usize,
-        address: gl::pointer(pointer),
-        buffer: if buffers { gl::word(buffer) } else { 0 },
-        normalized,
-    }
-}
-
 impl Arrays {
     /// The array of positions alone.
     pub(crate) fn query_position() -> Result<Source, &'static str> {
         if !gl::is_enabled(VERTEX_ARRAY) {
             return Err("no vertex array");
         }
-        let size = gl::int(VERTEX_ARRAY_SIZE).max(0) as usize;
-        let (kind, stride) = (VERTEX_ARRAY_TYPE, VERTEX_ARRAY_STRIDE);
-        let buffer = VERTEX_ARRAY_BUFFER_BINDING;
-        Ok(source(size, kind, stride, VERTEX_ARRAY_POINTER, buffer, false, true))
+        Ok(Source::of_fixed(Size::Asked(VERTEX_ARRAY_SIZE), POSITION, false, true))
     }
 
     /// As the driver has them; an error in words when rays cannot stand for them.
@@ -154,37 +53,20 @@ impl Arrays {
         if version >= 20 && (0..8).any(|i| gl::vertex_attrib_i::<1>(i, VERTEX_ATTRIB_ARRAY_ENABLED)[0] != 0) {
             return Err("generic attributes without a program");
         }
-        let size = |what| gl::int(what).max(0) as usize;
-        let position = source(
-            size(VERTEX_ARRAY_SIZE),
-            VERTEX_ARRAY_TYPE,
-            VERTEX_ARRAY_STRIDE,
-            VERTEX_ARRAY_POINTER,
-            VERTEX_ARRAY_BUFFER_BINDING,
-            false,
-            buffers,
-        );
+        let position = Source::of_fixed(Size::Asked(VERTEX_ARRAY_SIZE), POSITION, false, buffers);
         let normal = gl::is_enabled(NORMAL_ARRAY).then(|| {
-            let b = NORMAL_ARRAY_BUFFER_BINDING;
-            source(3, NORMAL_ARRAY_TYPE, NORMAL_ARRAY_STRIDE, NORMAL_ARRAY_POINTER, b, true, buffers)
+            let asked =
+                [NORMAL_ARRAY_TYPE, NORMAL_ARRAY_STRIDE, NORMAL_ARRAY_POINTER, NORMAL_ARRAY_BUFFER_BINDING];
+            Source::of_fixed(Size::Three, asked, true, buffers)
         });
         let color = match gl::is_enabled(COLOR_ARRAY) {
             true => {
-                let b = COLOR_ARRAY_BUFFER_BINDING;
-                let components = gl::word(COLOR_ARRAY_SIZE);
-                if components == BGRA {
+                if gl::word(COLOR_ARRAY_SIZE) == BGRA {
                     return Err("colours in the order BGRA");
                 }
-                let s = source(
-                    components as usize,
-                    COLOR_ARRAY_TYPE,
-                    COLOR_ARRAY_STRIDE,
-                    COLOR_ARRAY_POINTER,
-                    b,
-                    true,
-                    buffers,
-                );
-                Some(s)
+                let asked =
+                    [COLOR_ARRAY_TYPE, COLOR_ARRAY_STRIDE, COLOR_ARRAY_POINTER, COLOR_ARRAY_BUFFER_BINDING];
+                Some(Source::of_fixed(Size::Asked(COLOR_ARRAY_SIZE), asked, true, buffers))
             }
             false => None,
         };
@@ -193,10 +75,13 @@ impl Arrays {
             return Err("a client texture unit other than 0 is active");
         }
         let tex = gl::is_enabled(TEXTURE_COORD_ARRAY).then(|| {
-            let (s, b) = (size(TEXTURE_COORD_ARRAY_SIZE), TEXTURE_COORD_ARRAY_BUFFER_BINDING);
-            let (k, t, p) =
-                (TEXTURE_COORD_ARRAY_TYPE, TEXTURE_COORD_ARRAY_STRIDE, TEXTURE_COORD_ARRAY_POINTER);
-            source(s, k, t, p, b, false, buffers)
+            let asked = [
+                TEXTURE_COORD_ARRAY_TYPE,
+                TEXTURE_COORD_ARRAY_STRIDE,
+                TEXTURE_COORD_ARRAY_POINTER,
+                TEXTURE_COORD_ARRAY_BUFFER_BINDING,
+            ];
+            Source::of_fixed(Size::Asked(TEXTURE_COORD_ARRAY_SIZE), asked, false, buffers)
         });
         Ok(Arrays { position, normal, color, tex })
     }
@@ -211,41 +96,24 @@ pub(crate) enum Taken {
 }
 
 /// Which vertices a draw takes.
-pub(crate) enum Elements {
+pub(crate) enum Which {
     /// Neighbours in the arrays.
     Range { first: usize, count: usize },
     /// By index; `least` is the smallest, `count` the span.
     Indexed { indices: Vec<u32>, least: usize, count: usize },
 }
 
-impl Elements {
+impl Which {
     /// Stands for the index at which a primitive ends and another begins.
     const RESTART: u32 = u32::MAX;
 
-    /// From the arguments of `glDrawElements`, and the index that restarts primitives.
+    /// From indices of `width` bytes each, and the one that restarts primitives.
     pub(crate) fn indexed(
-        n: i32,
-        kind: u32,
-        at: usize,
+        bytes: &[u8],
+        width: usize,
         base: i32,
         restart: Option<u32>,
-    ) -> Result<Elements, &'static str> {
-        let n = usize::try_from(n).map_err(|_| "a negative count")?;
-        let width = component_bytes(kind);
-        if !matches!(kind, UNSIGNED_BYTE | UNSIGNED_SHORT | UNSIGNED_INT) {
-            return Err("indices of a type that OpenGL refuses");
-        }
-        let buffer = gl::word(ELEMENT_ARRAY_BUFFER_BINDING);
-        let owned;
-        let bytes: &[u8] = if buffer == 0 {
-            if at == 0 {
-                return Err("indices without an address");
-            }
-            client_memory::view(at, n * width)
-        } else {
-            owned = read_buffer(buffer, at, n * width)?;
-            &owned
-        };
+    ) -> Result<Which, &'static str> {
         let decode = |b: &[u8]| match *b {
             [a] => u32::from(a),
             [a, b] => u32::from(u16::from_ne_bytes([a, b])),
@@ -253,20 +121,20 @@ impl Elements {
             _ => 0,
         };
         let place = |raw: u32| match restart {
-            Some(r) if r == raw => Elements::RESTART,
+            Some(r) if r == raw => Which::RESTART,
             _ => raw.wrapping_add_signed(base),
         };
         let indices: Vec<u32> = bytes.chunks_exact(width).map(|b| place(decode(b))).collect();
-        let real = || indices.iter().filter(|i| restart.is_none() || **i != Elements::RESTART);
+        let real = || indices.iter().filter(|i| restart.is_none() || **i != Which::RESTART);
         let (Some(&least), Some(&most)) = (real().min(), real().max()) else {
-            return Ok(Elements::Indexed { indices, least: 0, count: 0 });
+            return Ok(Which::Indexed { indices, least: 0, count: 0 });
         };
         let count = (most - least) as usize + 1;
         // Client arrays of unknown length: an index that is out of order must not make us read gigabytes.
         if count > 1 << 28 {
             return Err("indices that are too far apart");
         }
-        Ok(Elements::Indexed { indices, least: least as usize, count })
+        Ok(Which::Indexed { indices, least: least as usize, count })
     }
 
     /// Names the geometry of these elements of an array of positions, whose bytes are given.
@@ -277,8 +145,8 @@ impl Elements {
         let tail = [stride as u64, u64::from(kind), size as u64, u64::from(mode), rules, count as u64];
         let tail = bytemuck::cast_slice(&tail);
         match self {
-            Elements::Range { .. } => hash(&[bytes, tail, bytemuck::cast_slice(&split.turned)]),
-            Elements::Indexed { indices, least, .. } => {
+            Which::Range { .. } => hash(&[bytes, tail, bytemuck::cast_slice(&split.turned)]),
+            Which::Indexed { indices, least, .. } => {
                 hash(&[bytes, bytemuck::cast_slice(indices), &least.to_ne_bytes(), tail])
             }
         }
@@ -287,21 +155,21 @@ impl Elements {
     /// First vertex, and how many there are from it on.
     pub(crate) fn span(&self) -> (usize, usize) {
         match self {
-            Elements::Range { first, count } => (*first, *count),
-            Elements::Indexed { least, count, .. } => (*least, *count),
+            Which::Range { first, count } => (*first, *count),
+            Which::Indexed { least, count, .. } => (*least, *count),
         }
     }
 
     /// Up to `most` different vertices, spread over the draw.
     pub(crate) fn some(&self, most: usize) -> Vec<u32> {
         let n = match self {
-            Elements::Range { count, .. } => *count,
-            Elements::Indexed { indices, .. } => indices.len(),
+            Which::Range { count, .. } => *count,
+            Which::Indexed { indices, .. } => indices.len(),
         };
         let take = most.min(n);
         let number = |i: usize| match self {
-            Elements::Range { first, .. } => (first + i) as u32,
-            Elements::Indexed { indices, .. } => indices[i],
+            Which::Range { first, .. } => (first + i) as u32,
+            Which::Indexed { indices, .. } => indices[i],
         };
         let mut out: Vec<u32> = (0..take).map(|i| number(i * (n - 1) / (take - 1).max(1))).collect();
         out.sort_unstable();
@@ -311,7 +179,7 @@ impl Elements {
 
     /// How the driver splits quads where nobody knows what it clips.
     pub(crate) fn plain_split(&self, first_provokes: bool) -> Split {
-        Split { first_provokes, all_turned: matches!(self, Elements::Indexed { .. }), turned: Vec::new() }
+        Split { first_provokes, all_turned: matches!(self, Which::Indexed { .. }), turned: Vec::new() }
     }
 
     /// How the driver would split quads: see [`Split`].
@@ -341,8 +209,8 @@ impl Elements {
     pub(crate) fn triangles(&self, mode: u32, split: &Split) -> Vec<[u32; 3]> {
         let mut out = Vec::new();
         match self {
-            Elements::Range { count, .. } => triangulate(mode, 0, *count as u32, split, &mut out),
-            Elements::Indexed { indices, least, .. } => {
+            Which::Range { count, .. } => triangulate(mode, 0, *count as u32, split, &mut out),
+            Which::Indexed { indices, least, .. } => {
                 triangulate(mode, 0, indices.len() as u32, split, &mut out);
                 let vertex = |i: u32| indices[i as usize] - *least as u32;
                 out.iter_mut().for_each(|t| *t = t.map(vertex));
@@ -354,10 +222,10 @@ impl Elements {
     /// Vertex numbers of the span in the order they are drawn; `None` where a primitive ends and another begins.
     fn order(&self) -> Box<dyn Iterator<Item = Option<usize>> + '_> {
         match self {
-            Elements::Range { count, .. } => Box::new((0..*count).map(Some)),
-            Elements::Indexed { indices, least, .. } => {
+            Which::Range { count, .. } => Box::new((0..*count).map(Some)),
+            Which::Indexed { indices, least, .. } => {
                 let place = move |i: &u32| (*i as usize).checked_sub(*least);
-                Box::new(indices.iter().map(move |i| place(i).filter(|_| *i != Elements::RESTART)))
+                Box::new(indices.iter().map(move |i| place(i).filter(|_| *i != Which::RESTART)))
             }
         }
     }
@@ -382,27 +250,29 @@ pub(crate) fn positions(p: &Packed) -> Result<Vec<[f32; 3]>, &'static str> {
 }
 
 impl Context {
-    pub(crate) fn draw_arrays(&mut self, mode: u32, first: i32, count: i32) -> bool {
-        let call = DrawCall { first: first.max(0) as usize, count: count.max(0) as usize, kind: 0, at: 0 };
-        self.array_draw(mode, call, || match (usize::try_from(first), usize::try_from(count)) {
-            (Ok(first), Ok(count)) => Ok(Elements::Range { first, count }),
-            _ => Err("a negative count"),
-        })
+    /// A draw call of arrays, by their order or by indices.
+    pub(crate) fn draw(&mut self, mode: u32, call: &Call<'_>) -> bool {
+        let (key, restart) = match call.named() {
+            Named::Elements { count, kind, at, base } => {
+                let buffer = gl::word(ELEMENT_ARRAY_BUFFER_BINDING) as usize;
+                let first = (buffer << 32) | base as u32 as usize;
+                let key = DrawCall { first, count: count.max(0) as usize, kind, at };
+                (key, if self.sink == Sink::List { self.restart_index(kind) } else { None })
+            }
+            Named::Arrays { first, count } => {
+                let (first, count) = (first.max(0) as usize, count.max(0) as usize);
+                (DrawCall { first, count, kind: 0, at: 0 }, None)
+            }
+            Named::Element(_) => return false,
+        };
+        self.array_draw(mode, key, || Elements::of(call, restart))
     }
 
-    pub(crate) fn draw_elements(&mut self, mode: u32, count: i32, kind: u32, at: usize, base: i32) -> bool {
-        let buffer = gl::word(ELEMENT_ARRAY_BUFFER_BINDING) as usize;
-        let call =
-            DrawCall { first: (buffer << 32) | base as u32 as usize, count: count.max(0) as usize, kind, at };
-        let restart = if self.sink == Sink::List { self.restart_index(kind) } else { None };
-        self.array_draw(mode, call, || Elements::indexed(count, kind, at, base, restart))
-    }
-
-    fn array_draw(
+    fn array_draw<'c>(
         &mut self,
         mode: u32,
         call: DrawCall,
-        elements: impl FnOnce() -> Result<Elements, &'static str>,
+        elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
     ) -> bool {
         if self.sink == Sink::Trace {
             self.unswallow("a draw call between Begin and End");
@@ -419,6 +289,9 @@ impl Context {
         let taken = match verdict {
             _ if !is_filled(mode) => Err("lines and points"),
             _ if self.restarts() => Err("primitive restart"),
+            _ if self.state.program != 0 && self.config.settings.enabled && self.is_refused() => {
+                Err(crate::present::REFUSED)
+            }
             // Recognised programs decide for themselves what blending means.
             _ if self.state.program != 0 => self.take_program_arrays(mode, call, elements),
             Verdict::Pass(why) => Err(why),
@@ -458,16 +331,16 @@ impl Context {
         self.restarts().then(|| gl::word(PRIMITIVE_RESTART_INDEX))
     }
 
-    fn take_arrays(
+    fn take_arrays<'c>(
         &mut self,
         mode: u32,
-        elements: impl FnOnce() -> Result<Elements, &'static str>,
+        elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
         verdict: Verdict,
     ) -> Result<(), &'static str> {
         let arrays = Arrays::query(self.can.version)?;
         let elements = elements()?;
-        let (first, count) = elements.span();
-        let seen = arrays.position.view(first, count)?;
+        let (_, count) = elements.span();
+        let seen = arrays.position.view(&elements)?;
         let split = elements.split(mode, &self.state, &arrays.position, &seen);
         let key = elements.key(mode, &seen, arrays.position.layout(), &split);
         let geometry = match self.cache.known(key) {
@@ -480,7 +353,7 @@ impl Context {
         };
         let mut read = |s: &Option<Source>| -> Result<Option<Arc<Packed>>, &'static str> {
             let Some(s) = s else { return Ok(None) };
-            let bytes = s.view(first, count)?;
+            let bytes = s.view(&elements)?;
             Ok(Some(self.packed.get(&bytes, s.layout(), || s.pack(Cow::Borrowed(&bytes)))))
         };
         let (normal, color, tex) = (read(&arrays.normal)?, read(&arrays.color)?, read(&arrays.tex)?);
@@ -529,10 +402,10 @@ impl Context {
     }
 
     /// While a list is compiled the arrays are read at once, as OpenGL says, and become steps of it.
-    fn array_into_list(
+    fn array_into_list<'c>(
         &mut self,
         mode: u32,
-        elements: impl FnOnce() -> Result<Elements, &'static str>,
+        elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
     ) -> bool {
         if !is_filled(mode) {
             if let Some(r) = &mut self.recording {
@@ -543,9 +416,8 @@ impl Context {
         let read = || -> Result<_, &'static str> {
             let arrays = Arrays::query(self.can.version)?;
             let elements = elements()?;
-            let (first, count) = elements.span();
-            let read = |s: &Option<Source>| s.map(|s| s.read(first, count)).transpose();
-            let position = arrays.position.read(first, count)?;
+            let read = |s: &Option<Source>| s.map(|s| s.read(&elements)).transpose();
+            let position = arrays.position.read(&elements)?;
             Ok((position, read(&arrays.normal)?, read(&arrays.color)?, read(&arrays.tex)?, elements))
         };
         let Ok((position, normal, color, tex, elements)) = read() else {

@@ -1,7 +1,6 @@
 //! When buffer objects were written: geometry in buffers is read once, and again only after somebody wrote to them.
 
-use crate::arrays::Source;
-use crate::client_memory;
+use crate::client_memory::Source;
 use crate::context::{Context, Sink};
 use crate::enums::*;
 use crate::real::gl;
@@ -64,13 +63,11 @@ impl Context {
         false
     }
 
-    /// Names of buffers that may come again for others.
-    pub(crate) fn buffers_deleted(&mut self, n: i32, names: usize) -> bool {
+    /// Names of buffers, four bytes each, that may come again for others.
+    pub(crate) fn buffers_deleted(&mut self, names: &[u8]) -> bool {
         self.watched_call(0, class::ARRAYS, false, false);
-        let n = usize::try_from(n).unwrap_or(0);
-        let bytes = client_memory::view(names, 4 * n);
         let mut writes = self.writes();
-        for b in bytes.chunks_exact(4) {
+        for b in names.chunks_exact(4) {
             writes.to(u32::from_ne_bytes([b[0], b[1], b[2], b[3]]));
         }
         drop(writes);
@@ -82,11 +79,19 @@ impl Context {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::client_memory::Layout;
 
     #[test]
     fn a_write_is_seen_by_the_draws_that_read_the_buffer_and_by_no_others() {
         let source = |buffer: u32| {
-            Some(Source { size: 3, kind: FLOAT, stride: 0, address: 0, buffer, normalized: false })
+            Source::in_buffer(Layout {
+                size: 3,
+                kind: FLOAT,
+                stride: 0,
+                address: 0,
+                buffer,
+                normalized: false,
+            })
         };
         let arrays = [source(5), source(6), None, None, None, None, None];
         let mut w = Writes::default();

@@ -1,7 +1,10 @@
 //! The books of contexts: which is current where, and what each knows.
 //!
-//! A context is owned by the thread it is current on (in [`CURRENT`]) or, while it is current nowhere, by the register. So no call needs a
+//! A context is owned by the thread it is current on (see `symbols/hot.rs`) or, while it is current nowhere, by the register. So no call needs a
 //! lock, and a context that is destroyed in flight lives on until its thread leaves it, as OpenGL says.
+//!
+//! It goes into the register before the driver lets go of it, and out of it after the driver has taken it: in between another thread may make it
+//! current, and must find it.
 
 use crate::arrays::Arrays;
 use crate::buffers::Writes;
@@ -18,21 +21,15 @@ use crate::programs::Programs;
 use crate::real::gl;
 use crate::recorder::Recorder;
 use crate::report::Counters;
+use crate::share_group::{Shared, TextureWrites};
 use crate::state::current::Current;
 use crate::state::lists::{Lists, Recording};
 use crate::state::properties::Properties;
 use crate::state::snapshot::{Abilities, Snapshot};
 use crate::studio::Studio;
 use crate::symbols::{self, class};
-use std::cell::RefCell;
-use std::collections::HashMap;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering::Relaxed};
+use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex, OnceLock};
-
-thread_local! {
-    /// The context of this thread.
-    pub(crate) static CURRENT: RefCell<Option<Box<Context>>> = const { RefCell::new(None) };
-}
 
 /// Where the calls of immediate mode go.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -85,31 +82,27 @@ pub(crate) struct Context {
     pub(crate) counters: Counters,
     /// Errors that came up behind the program's back or were kept for it.
     pub(crate) errors: Vec<u32>,
-    /// Counts what may have changed textures.
-    pub(crate) texture_version: u64,
+    pub(crate) texture_writes: TextureWrites,
+    /// This context may have written a texture since it last let others see what it wrote.
+    pub(crate) wrote_textures: bool,
+    /// We saw it created, so we know with whom it shares.
+    pub(crate) seen_created: bool,
+    /// A fault of ours has ended the tracing, and the driver knows what it was not told before.
+    pub(crate) given_up: bool,
     watched: u32,
 }
 
 struct Register {
     idle: HashMap<usize, Box<Context>>,
     shared: HashMap<usize, Shared>,
-}
-
-/// What the contexts of a share group have in common.
-#[derive(Clone, Default)]
-struct Shared {
-    lists: Arc<Mutex<Lists>>,
-    writes: Arc<Mutex<Writes>>,
+    /// Contexts whose creation we saw.
+    seen: HashSet<usize>,
 }
 
 static REGISTER: OnceLock<Mutex<Register>> = OnceLock::new();
-/// Threads that have a context.
-static THREADS: AtomicUsize = AtomicUsize::new(0);
-/// Contexts that were ever current, and the process that counted them.
-static BORN: AtomicU64 = AtomicU64::new(0);
 
 fn register() -> std::sync::MutexGuard<'static, Register> {
-    let new = || Mutex::new(Register { idle: HashMap::new(), shared: HashMap::new() });
+    let new = || Mutex::new(Register { idle: HashMap::new(), shared: HashMap::new(), seen: HashSet::new() });
     REGISTER.get_or_init(new).lock().unwrap_or_else(|e| e.into_inner())
 }
 
@@ -119,10 +112,13 @@ pub(crate) fn created(handle: usize, share: usize) {
         return;
     }
     let mut r = register();
-    let shared = r.shared.get(&share).filter(|_| share != 0).cloned().unwrap_or_default();
+    let shared = if share == 0 { Shared::default() } else { r.shared.entry(share).or_default().clone() };
     r.shared.insert(handle, shared);
+    r.seen.insert(handle);
     // The address of a context that was destroyed may come again.
-    r.idle.remove(&handle);
+    let gone = r.idle.remove(&handle);
+    drop(r);
+    drop(gone);
 }
 
 /// A context was destroyed; when it is current it lives until it is left.
@@ -132,58 +128,102 @@ pub(crate) fn destroyed(handle: usize) {
         c.doomed |= mine;
         mine
     });
-    if here != Some(true) {
-        let gone = register().idle.remove(&handle);
-        drop(gone);
-    }
-    register().shared.remove(&handle);
+    // Programs destroy their contexts before they end, whatever way they do.
+    crate::report::write_the_rest();
+    let mut r = register();
+    let gone = if here == Some(true) { None } else { r.idle.remove(&handle) };
+    r.shared.remove(&handle);
+    r.seen.remove(&handle);
+    drop(r);
+    drop(gone);
 }
 
-/// Before the current context changes: what is pending is drawn.
-pub(crate) fn leave() {
-    symbols::with_context(|c| {
+/// What was current before another context is made current.
+pub(crate) enum Left {
+    /// None.
+    Nothing,
+    /// This one, which is in the register; and the textures of its group, when it has written any.
+    Idle(usize, Option<TextureWrites>),
+    /// One that is destroyed, and current nowhere else.
+    Doomed(Box<Context>),
+}
+
+/// Before the current context changes: what is pending is drawn, and the context is there for other threads.
+pub(crate) fn leave() -> Left {
+    crate::fault::give_up_here();
+    let wrote = symbols::with_context(|c| {
         c.flush("context switch");
         c.sync();
-        c.counters.publish(true);
+        c.counters.publish(false);
+        c.publish_textures()
     });
+    let Some(old) = symbols::take() else { return Left::Nothing };
+    symbols::thread_leaves();
+    if old.doomed {
+        return Left::Doomed(old);
+    }
+    let left = Left::Idle(old.handle, (wrote == Some(true)).then(|| old.texture_writes.clone()));
+    let before = register().idle.insert(old.handle, old);
+    drop(before);
+    left
 }
 
 /// The change was refused: all stays as it was.
-pub(crate) fn stay() {
-    symbols::with_context(|c| c.dirty = class::ALL);
+pub(crate) fn stay(left: Left) {
+    let context = match left {
+        Left::Nothing => None,
+        // It is current here still, so no other thread can have taken it.
+        Left::Idle(handle, _) => register().idle.remove(&handle),
+        Left::Doomed(context) => Some(context),
+    };
+    if let Some(mut context) = context {
+        context.dirty = class::ALL;
+        place(context);
+    }
 }
 
-/// `handle` is current on this thread now (0: none).
-pub(crate) fn enter(handle: usize) {
-    // Some programs leave their context in exit handlers, when the thread's storage is gone already.
-    let Ok(before) = CURRENT.try_with(|slot| slot.try_borrow_mut().ok().and_then(|mut s| s.take())) else {
-        return;
-    };
-    symbols::set_hot(None);
-    if let Some(old) = before {
-        THREADS.fetch_sub(1, Relaxed);
+/// `handle` is current on this thread now (0: none), and what was `left` is not.
+pub(crate) fn enter(handle: usize, left: Left) {
+    if let Left::Idle(_, Some(textures)) = &left {
+        // Changing contexts flushes, so others see now what it wrote.
+        textures.change();
+    }
+    drop(left);
+    if let Some(old) = symbols::take() {
+        // A fault kept it from being left in order.
+        symbols::thread_leaves();
         if !old.doomed {
-            register().idle.insert(old.handle, old);
+            let before = register().idle.insert(old.handle, old);
+            drop(before);
         }
     }
-    if handle == 0 || crate::fault::happened() {
+    if handle == 0 {
         return;
     }
     let mut context = {
         let mut r = register();
         let shared = r.shared.entry(handle).or_default().clone();
-        r.idle.remove(&handle).unwrap_or_else(|| Box::new(Context::new(handle, shared)))
+        let seen = r.seen.contains(&handle);
+        r.idle.remove(&handle).unwrap_or_else(|| Box::new(Context::new(handle, shared, seen)))
     };
-    context.wake();
-    let threads = THREADS.fetch_add(1, Relaxed) + 1;
-    let placed = CURRENT.try_with(|slot| {
-        let Ok(mut slot) = slot.try_borrow_mut() else { return };
-        *slot = Some(context);
-        // With a second thread the short way would lead to the wrong context.
-        symbols::set_hot(slot.as_deref_mut().filter(|_| threads == 1));
-    });
-    if placed.is_ok() {
-        symbols::attend();
+    // After a fault the books are kept all the same: lists that we compiled are ours to play.
+    if !crate::fault::happened() {
+        context.wake();
+    }
+    place(context);
+}
+
+fn place(context: Box<Context>) {
+    // Before it is there, so that its thread is told of all calls from the first on.
+    symbols::thread_enters();
+    match symbols::install(context) {
+        Ok(()) => symbols::attend(),
+        // Some programs change contexts in exit handlers, when the thread's storage is gone already.
+        Err(context) => {
+            symbols::thread_leaves();
+            let before = register().idle.insert(context.handle, context);
+            drop(before);
+        }
     }
 }
 
@@ -220,16 +260,13 @@ fn front_only() -> &'static [usize] {
 impl Drop for Context {
     /// Also when a thread or the program ends with its context current.
     fn drop(&mut self) {
-        symbols::set_hot(None);
         crate::fault::guard(|| self.counters.publish(true));
     }
 }
 
 impl Context {
-    fn new(handle: usize, Shared { lists, writes }: Shared) -> Context {
-        if BORN.fetch_add(1, Relaxed) == 0 {
-            crate::fault::silence();
-        }
+    fn new(handle: usize, shared: Shared, seen_created: bool) -> Context {
+        let Shared { lists, writes, texture_writes } = shared;
         Context {
             handle,
             doomed: false,
@@ -260,15 +297,35 @@ impl Context {
             programs: Programs::default(),
             counters: Counters::default(),
             errors: Vec::new(),
-            texture_version: 1,
+            texture_writes,
+            wrote_textures: false,
+            seen_created,
+            given_up: false,
             watched: 0,
         }
+    }
+
+    /// One that no driver knows.
+    #[cfg(test)]
+    pub(crate) fn for_tests(handle: usize) -> Context {
+        Context::new(handle, Shared::default(), true)
+    }
+
+    /// As the driver calls it.
+    #[cfg(test)]
+    pub(crate) fn handle(&self) -> usize {
+        self.handle
+    }
+
+    #[cfg(test)]
+    pub(crate) fn rename(&mut self, handle: usize) {
+        self.handle = handle;
     }
 
     /// Current again: the driver may have been told anything meanwhile.
     fn wake(&mut self) {
         self.dirty = class::ALL;
-        self.texture_version += 1;
+        self.textures_meanwhile();
         self.stale = 0;
         (self.stale_properties, self.set_since_draw) = (Properties::default(), Properties::default());
         if self.can.version == 0 {
@@ -318,6 +375,7 @@ impl Context {
             self.unswallow("another call between Begin and End");
         }
         self.drawn_over();
+        self.heed_others(index, class);
         if let Some(r) = &mut self.recording {
             r.note_driver_call(class, flushes, draws);
         }
@@ -348,7 +406,7 @@ impl Context {
         self.sync();
         self.mark(class);
         self.watched += 1;
-        if told_enough && self.recording.is_none() && THREADS.load(Relaxed) == 1 {
+        if told_enough && self.recording.is_none() && symbols::is_alone() {
             // Of buffers and textures that are written we are told all the same.
             self.mark(class::ALL & !(class::BUFFER | class::TEXTURE));
             symbols::relax();
@@ -365,8 +423,9 @@ impl Context {
         if class & class::BUFFER != 0 {
             self.writes().any();
         }
-        // Another thread's context may share textures with this one.
-        self.texture_version += u64::from(class & class::TEXTURE != 0 || THREADS.load(Relaxed) > 1);
+        if class & class::TEXTURE != 0 {
+            self.textures_change();
+        }
     }
 
     fn draws_to_front(&self) -> bool {
@@ -389,6 +448,10 @@ impl Context {
         self.watched = 0;
         symbols::attend();
         self.drawn_over();
+        if self.state.texture.as_ref().is_some_and(|t| t.version != self.texture_version()) {
+            // Another context of the share group may have written it.
+            self.dirty |= class::TEXTURE;
+        }
         if self.dirty & DRAWS == 0 {
             return;
         }
@@ -401,7 +464,7 @@ impl Context {
         fresh.refresh(self.dirty, &self.can);
         fresh.window_height = self.frame.window_height(&fresh);
         if let Some(t) = &mut fresh.texture {
-            t.version = self.texture_version;
+            t.version = self.texture_version();
         }
         if self.dirty & class::CURRENT != 0 && !self.can.core {
             let now = Current::query();
@@ -418,6 +481,9 @@ impl Context {
             self.state = Arc::new(fresh);
         }
         self.verdict = decide::filled(&self.state, self.config.trace());
+        if !matches!(self.verdict, Verdict::Pass(_)) && self.is_refused() {
+            self.verdict = Verdict::Pass(crate::present::REFUSED);
+        }
         if let Some(t) = &self.state.texture
             && !matches!(self.verdict, Verdict::Pass(_))
         {

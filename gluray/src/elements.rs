@@ -1,11 +1,12 @@
 //! `glArrayElement`: a vertex of the arrays between Begin and End.
 
-use crate::arrays::{Arrays, Source};
+use crate::arrays::Arrays;
+use crate::client_memory::{Call, Elements, Source};
 use crate::context::{Context, Sink};
 
 impl Context {
     /// Values of element `i` become current, and a vertex of the primitive that is recorded or compiled.
-    pub(crate) fn array_element(&mut self, i: i32) -> bool {
+    pub(crate) fn array_element(&mut self, call: &Call<'_>) -> bool {
         match self.sink {
             Sink::Trace => {}
             Sink::List if self.recording.as_ref().is_some_and(|r| r.is_open()) => {}
@@ -22,7 +23,7 @@ impl Context {
                 return false;
             }
         }
-        let why = match self.take_element(i) {
+        let why = match self.take_element(call) {
             Ok(taken) => return taken,
             Err(why) => why,
         };
@@ -37,16 +38,16 @@ impl Context {
         false
     }
 
-    fn take_element(&mut self, i: i32) -> Result<bool, &'static str> {
-        let i = usize::try_from(i).map_err(|_| "an element of a negative number")?;
+    fn take_element(&mut self, call: &Call<'_>) -> Result<bool, &'static str> {
+        let element = Elements::of(call, None)?;
         // Nothing about arrays can change before End.
         let arrays = match self.element_arrays {
             Some(arrays) => arrays,
             None => *self.element_arrays.insert(Arrays::query(self.can.version)?),
         };
         let [normal, color, tex] = [arrays.normal, arrays.color, arrays.tex];
-        let position = value(arrays.position, i)?;
-        let [normal, color, tex] = [of(normal, i)?, of(color, i)?, of(tex, i)?];
+        let position = value(arrays.position, &element)?;
+        let [normal, color, tex] = [of(normal, &element)?, of(color, &element)?, of(tex, &element)?];
         if let Some([x, y, z, _]) = normal {
             self.normal([x, y, z]);
         }
@@ -60,10 +61,10 @@ impl Context {
     }
 }
 
-fn of(source: Option<Source>, i: usize) -> Result<Option<[f32; 4]>, &'static str> {
+fn of(source: Option<Source>, i: &Elements<'_>) -> Result<Option<[f32; 4]>, &'static str> {
     source.map(|s| value(s, i)).transpose()
 }
 
-fn value(source: Source, i: usize) -> Result<[f32; 4], &'static str> {
-    Ok(source.read(i, 1)?.at(0, [0.0, 0.0, 0.0, 1.0]))
+fn value(source: Source, i: &Elements<'_>) -> Result<[f32; 4], &'static str> {
+    Ok(source.read(i)?.at(0, [0.0, 0.0, 0.0, 1.0]))
 }

@@ -208,9 +208,13 @@ impl Context {
 
     /// Draws what is pending into the framebuffer.
     pub(crate) fn flush(&mut self, before: &str) {
-        if crate::fault::happened() {
-            return;
+        if !crate::fault::happened() {
+            self.flush_now(before);
         }
+    }
+
+    /// The same also after a fault: what was swallowed before it.
+    pub(crate) fn flush_now(&mut self, before: &str) {
         crate::fault::injected("flush");
         self.end_batch();
         if self.programs.peeling.has_draws() && matches!(before, "glBeginQuery" | ORDER_MATTERS) {
@@ -416,7 +420,6 @@ impl Context {
         self.frame.late.read();
         if self.frame.traced {
             self.frame_done();
-            self.counters.publish(true);
         }
     }
 

@@ -3,9 +3,7 @@
 use crate::context::{Context, Sink};
 use crate::decide::{self, Verdict};
 use crate::enums::*;
-use crate::fault::guard;
-use crate::real::gl;
-use crate::state::current::{Current, set_material, stale};
+use crate::state::current::{set_material, stale};
 use crate::state::properties::Properties;
 use crate::symbols::{self, class};
 
@@ -42,7 +40,7 @@ impl Context {
 
     pub(crate) fn begin(&mut self, mode: u32) -> bool {
         match self.begin_step(mode) {
-            Step::Slow => guard(|| self.begin_slowly(mode)).unwrap_or(false),
+            Step::Slow => self.begin_slowly(mode),
             step => step == Step::Done,
         }
     }
@@ -71,7 +69,7 @@ impl Context {
             && let Verdict::TraceIfOpaque(why) = self.verdict
             && !self.is_opaque_now()
         {
-            guard(|| self.unswallow(why));
+            self.unswallow(why);
         }
     }
 
@@ -143,7 +141,7 @@ impl Context {
 
     pub(crate) fn end(&mut self) -> bool {
         match self.end_step() {
-            Step::Slow => guard(|| self.end_slowly()).unwrap_or(false),
+            Step::Slow => self.end_slowly(),
             step => step == Step::Done,
         }
     }
@@ -170,22 +168,8 @@ impl Context {
     pub(crate) fn unswallow(&mut self, why: &'static str) {
         self.sink = Sink::Pass;
         let (mode, vertices) = self.recorder.withdraw();
-        let end = self.current;
         self.passing(why, true);
-        if let Some((_, first)) = vertices.first() {
-            first.send(0xf, Properties::ALL);
-        }
-        gl::begin(mode);
-        let mut before: Option<Current> = None;
-        for (p, c) in vertices {
-            let changed = before.is_none_or(|b| b.materials != c.materials);
-            let bits = stale::NORMAL | stale::COLOR | stale::TEX;
-            c.send(bits | if changed { stale::MATERIAL } else { 0 }, Properties::ALL);
-            gl::vertex4f(p[0], p[1], p[2], 1.0);
-            before = Some(c);
-        }
-        end.send(0xf, Properties::ALL);
-        (self.stale, self.stale_properties) = (0, Properties::default());
+        self.begin_again_with(mode, vertices);
     }
 
     /// The short way of `glVertex`.
@@ -203,7 +187,7 @@ impl Context {
 
     pub(crate) fn vertex(&mut self, v: [f32; 4]) -> bool {
         match self.vertex_step(v) {
-            Step::Slow => guard(|| self.vertex_slowly(v)).unwrap_or(false),
+            Step::Slow => self.vertex_slowly(v),
             step => step == Step::Done,
         }
     }
@@ -250,7 +234,7 @@ impl Context {
 
     pub(crate) fn normal(&mut self, v: [f32; 3]) -> bool {
         match self.normal_step(v) {
-            Step::Slow => guard(|| self.list_normal(v)).unwrap_or(false),
+            Step::Slow => self.list_normal(v),
             step => step == Step::Done,
         }
     }
@@ -281,7 +265,7 @@ impl Context {
 
     pub(crate) fn color(&mut self, v: [f32; 4]) -> bool {
         match self.color_step(v) {
-            Step::Slow if self.sink == Sink::List => guard(|| self.list_color(v)).unwrap_or(false),
+            Step::Slow if self.sink == Sink::List => self.list_color(v),
             Step::Slow => {
                 self.current.color = v;
                 self.recorder.set_color(v);
@@ -319,20 +303,20 @@ impl Context {
 
     pub(crate) fn tex_coord(&mut self, v: [f32; 4]) -> bool {
         match self.tex_coord_step(v) {
-            Step::Slow => guard(|| self.list_tex(v)).unwrap_or(false),
+            Step::Slow => self.list_tex(v),
             step => step == Step::Done,
         }
     }
 
     pub(crate) fn material(&mut self, face: u32, what: u32, v: [f32; 4]) -> bool {
         if self.sink == Sink::List {
-            return guard(|| self.list_material(face, what, v)).unwrap_or(false);
+            return self.list_material(face, what, v);
         }
         let mut materials = self.current.materials;
         if !set_material(&mut materials, face, what, v) {
             // An error, which the driver is to report.
             if self.sink == Sink::Trace {
-                guard(|| self.unswallow("an invalid material"));
+                self.unswallow("an invalid material");
             }
             return false;
         }

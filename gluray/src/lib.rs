@@ -53,6 +53,7 @@ pub mod reasons;
 mod recorder;
 pub mod report;
 mod shading;
+mod share_group;
 mod state;
 mod studio;
 mod symbols;

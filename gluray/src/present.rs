@@ -37,8 +37,26 @@ pub(crate) struct Presenter {
     textures: [u32; 2],
     size: [i32; 2],
     vertex_array: u32,
-    failed: bool,
+    tried: Tried,
 }
+
+/// Of the textures of colours and depths: internal format, format and type.
+const FORMATS: [(u32, u32, u32); 2] = [(RGBA8, RGBA, UNSIGNED_BYTE), (R32F, RED, FLOAT)];
+
+/// Whether the driver takes what the pass needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Tried {
+    #[default]
+    NotYet,
+    /// The shader is there; of all else there is nothing.
+    Linked,
+    /// All objects are there.
+    Ready,
+    Refused,
+}
+
+/// Why draws are left to a driver that refuses our pass.
+pub(crate) const REFUSED: &str = "the driver refuses our shader or its textures";
 
 // Where a fragment lies in the layer comes from the corners, not from gl_FragCoord: for that Mesa keeps a constant which says whether rows are turned
 // over, and forgets to renew it when between a pass into a framebuffer object and one into the window there was only a clear.
@@ -95,32 +113,55 @@ impl Presenter {
         self.vertex_array
     }
 
-    /// Makes the objects; false when the driver refuses them.
-    fn prepare(&mut self, core: bool) -> bool {
-        if self.program != 0 || self.failed {
-            return !self.failed;
+    /// Compiles the shader and asks for the kinds of its textures, without changing what is current, bound or compiled into a list. The driver's words when it refuses.
+    fn try_out(&mut self, core: bool) -> Result<(), String> {
+        self.tried = Tried::Refused;
+        let (vertex, mut fragment) =
+            if core { (VERTEX_150, FRAGMENT_150) } else { (VERTEX_120, FRAGMENT_120) };
+        if crate::fault::is_asked_for("shader") {
+            fragment = "#error refused, as GLURAY_INJECT_FAULT asks";
         }
-        let (vertex, fragment) = if core { (VERTEX_150, FRAGMENT_150) } else { (VERTEX_120, FRAGMENT_120) };
         let program = gl::create_program();
         let shaders = [compile(VERTEX_SHADER, vertex), compile(FRAGMENT_SHADER, fragment)];
         for s in shaders {
             gl::attach_shader(program, s);
         }
         gl::link_program(program);
+        let linked = gl::program_i::<1>(program, LINK_STATUS)[0] != 0;
+        let words = if linked { String::new() } else { shaders.map(gl::shader_log).concat() };
         shaders.into_iter().for_each(gl::delete_shader);
-        if gl::program_i::<1>(program, LINK_STATUS)[0] == 0 {
-            self.failed = true;
-            return false;
+        if !linked {
+            gl::delete_program(program);
+            return Err(words.split_whitespace().collect::<Vec<_>>().join(" "));
+        }
+        for (inner, format, kind) in FORMATS {
+            if !gl::has_texture_format(inner.cast_signed(), format, kind) {
+                gl::delete_program(program);
+                return Err(format!("no textures of the internal format {inner:#06x}"));
+            }
         }
         self.program = program;
-        self.part = gl::uniform_location(program, "part");
-        gl::use_program(program);
-        gl::uniform1i(gl::uniform_location(program, "colors"), 0);
-        gl::uniform1i(gl::uniform_location(program, "depths"), 1);
+        self.tried = Tried::Linked;
+        Ok(())
+    }
+
+    /// Makes the rest of the objects; false when the driver has refused the shader.
+    fn prepare(&mut self, core: bool) -> bool {
+        if self.tried == Tried::NotYet {
+            self.try_out(core).ok();
+        }
+        if self.tried != Tried::Linked {
+            return self.tried == Tried::Ready;
+        }
+        self.part = gl::uniform_location(self.program, "part");
+        gl::use_program(self.program);
+        gl::uniform1i(gl::uniform_location(self.program, "colors"), 0);
+        gl::uniform1i(gl::uniform_location(self.program, "depths"), 1);
         self.textures = [gl::gen_texture(core), gl::gen_texture(core)];
         if core {
             self.vertex_array = gl::gen_vertex_array();
         }
+        self.tried = Tried::Ready;
         true
     }
 
@@ -130,9 +171,8 @@ impl Presenter {
         if grow {
             self.size = [layer.rect.w.max(self.size[0]), layer.rect.h.max(self.size[1])];
         }
-        let formats = [(RGBA8, RGBA, UNSIGNED_BYTE), (R32F, RED, FLOAT)];
         let data: [&[u8]; 2] = [layer.color.as_flattened(), bytemuck::cast_slice(&layer.depth)];
-        for (unit, (inner, format, kind)) in formats.into_iter().enumerate() {
+        for (unit, (inner, format, kind)) in FORMATS.into_iter().enumerate() {
             gl::active_texture(TEXTURE0 + unit as u32);
             gl::bind_texture(TEXTURE_2D, self.textures[unit]);
             if grow {
@@ -260,6 +300,19 @@ impl Kept {
 }
 
 impl Context {
+    /// True when the driver has refused the pass: then nothing may be swallowed. It is tried when it is first asked for, which is before anything of the context is
+    /// swallowed; programs of which nothing is traced pay nothing. Not to be asked between Begin and End.
+    pub(crate) fn is_refused(&mut self) -> bool {
+        if self.presenter.tried == Tried::NotYet {
+            self.keep_errors();
+            if let Err(words) = self.presenter.try_out(self.can.core) {
+                self.counters.warn(format!("{REFUSED}, so nothing is traced: {words}"));
+            }
+            self.drop_errors();
+        }
+        self.presenter.tried == Tried::Refused
+    }
+
     /// Draws the layers over one another.
     pub(crate) fn present(&mut self, layers: &[Layer], fate: Fate) {
         self.present_sample(layers, fate, None);

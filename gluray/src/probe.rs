@@ -4,9 +4,10 @@
 //! attribute of which clip coordinates are an affine function is the position, and that function is the matrix. So positions stay in object space, hierarchies
 //! are used again, and no shader has to be read. The driver draws the colours; rays find out how dark corners and shadows make them.
 
-use crate::arrays::{Elements, Source, positions};
+use crate::arrays::positions;
 use crate::cache::{Geometry, hash};
 use crate::capture::{Attributes, Draw, Shading};
+use crate::client_memory::{Elements, Source};
 use crate::config::{Mode, Settings};
 use crate::context::Context;
 use crate::decide::{self, Verdict};
@@ -113,11 +114,11 @@ impl Context {
     }
 
     /// Takes the shape of a draw that the driver is about to draw with a program that is not understood; why not, in words.
-    pub(crate) fn take_shape(
+    pub(crate) fn take_shape<'c>(
         &mut self,
         mode: u32,
         call: DrawCall,
-        elements: impl FnOnce() -> Result<Elements, &'static str>,
+        elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
     ) -> Result<(), &'static str> {
         let program = self.state.program;
         if self.can.es {
@@ -155,7 +156,7 @@ impl Context {
                 // Client memory may have other contents by now.
                 Some(made) if source.buffer != 0 => made.clone(),
                 _ => {
-                    let Ok(packed) = source.read(first, count) else { continue };
+                    let Ok(packed) = source.read(&elements) else { continue };
                     let Ok(positions) = positions(&packed) else { continue };
                     let split = elements.plain_split(self.state.first_vertex_provokes);
                     let triangles = elements.triangles(mode, &split);

@@ -15,9 +15,10 @@ mod template;
 mod weighted;
 mod wire;
 
-use crate::arrays::{Elements, Source, Taken, positions};
+use crate::arrays::{Taken, positions};
 use crate::cache::Geometry;
 use crate::capture::{Attributes, Draw, Shading, Values};
+use crate::client_memory::{Elements, Source};
 use crate::config::Mode;
 use crate::context::Context;
 use crate::decide::{self, Verdict};
@@ -82,15 +83,7 @@ impl Programs {
 /// A generic attribute's array by name; `None` when the program has no such attribute or its array is off.
 pub(crate) fn attribute(program: u32, name: &str) -> Option<Source> {
     let at = u32::try_from(gl::attrib_location(program, name)).ok()?;
-    let get = |what| gl::vertex_attrib_i::<1>(at, what)[0];
-    (get(VERTEX_ATTRIB_ARRAY_ENABLED) != 0).then(|| Source {
-        size: get(VERTEX_ATTRIB_ARRAY_SIZE).max(0) as usize,
-        kind: get(VERTEX_ATTRIB_ARRAY_TYPE).cast_unsigned(),
-        stride: get(VERTEX_ATTRIB_ARRAY_STRIDE).max(0) as usize,
-        address: gl::vertex_attrib_address(at),
-        buffer: get(VERTEX_ATTRIB_ARRAY_BUFFER_BINDING).cast_unsigned(),
-        normalized: get(VERTEX_ATTRIB_ARRAY_NORMALIZED) != 0,
-    })
+    Source::of_attribute(at)
 }
 
 impl Context {
@@ -123,11 +116,11 @@ impl Context {
     }
 
     /// A draw with a program.
-    pub(crate) fn take_program_arrays(
+    pub(crate) fn take_program_arrays<'c>(
         &mut self,
         mode: u32,
         call: DrawCall,
-        elements: impl FnOnce() -> Result<Elements, &'static str>,
+        elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
     ) -> Result<Taken, &'static str> {
         let program = self.state.program;
         let template =
@@ -272,21 +265,22 @@ impl Context {
         gl::active_texture(TEXTURE0 + unit as u32);
         let name = gl::word(TEXTURE_BINDING_2D);
         let followed = followed(TEXTURE_2D);
-        let image = self.presenter.images.get(TEXTURE_2D, name, self.texture_version);
+        let version = self.texture_version();
+        let image = self.presenter.images.get(TEXTURE_2D, name, version);
         gl::active_texture(active);
         followed?;
         image.ok_or("a texture without an image")
     }
 
-    fn read_program_arrays(
+    fn read_program_arrays<'c>(
         &mut self,
         mode: u32,
         sources: &Sources,
-        elements: impl FnOnce() -> Result<Elements, &'static str>,
+        elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
     ) -> Result<(Arc<Geometry>, Arc<Attributes>), &'static str> {
         let elements = elements()?;
-        let (first, count) = elements.span();
-        let read = |s: &Option<Source>| s.map(|s| s.read(first, count)).transpose();
+        let (_, count) = elements.span();
+        let read = |s: &Option<Source>| s.map(|s| s.read(&elements)).transpose();
         let [position, normal, color, tex, _, _, picture] = sources;
         let positions = positions(&read(position)?.ok_or("a program without positions")?)?;
         let triangles = elements.triangles(mode, &elements.plain_split(self.state.first_vertex_provokes));

@@ -1,6 +1,6 @@
 //! Buffer textures: what VTK has for each cell, by the number of the triangle.
 
-use crate::arrays::Source;
+use crate::client_memory::{Layout, Source};
 use crate::enums::*;
 use crate::real::gl;
 use crate::texturing::Image;
@@ -27,15 +27,16 @@ pub(super) fn buffer_texture(program: u32, sampler: &str) -> Result<Source, &'st
         RGBA32F => (4, FLOAT, false),
         _ => return Err("a buffer texture of a format that is not read"),
     };
-    if bound == 0 || buffer == 0 {
+    if bound == 0 {
         return Err("a buffer texture without a buffer");
     }
-    Ok(Source { size, kind, stride: 0, address: 0, buffer, normalized })
+    let layout = Layout { size, kind, stride: 0, address: 0, buffer, normalized };
+    Source::in_buffer(layout).ok_or("a buffer texture without a buffer")
 }
 
 /// Colours of `count` triangles from number `first` on.
 pub(super) fn colors(source: &Source, first: usize, count: usize) -> Result<Arc<Image>, &'static str> {
-    let packed = source.read(first, count)?;
+    let packed = source.read_range(first, count)?;
     if packed.size != 4 {
         return Err("colours of cells without four components");
     }
@@ -47,7 +48,7 @@ pub(super) fn colors(source: &Source, first: usize, count: usize) -> Result<Arc<
 
 /// Which sides of `count` triangles from number `first` on are edges of their cells.
 pub(super) fn sides(source: &Source, first: usize, count: usize) -> Result<Arc<Vec<u8>>, &'static str> {
-    let packed = source.read(first, count)?;
+    let packed = source.read_range(first, count)?;
     match (packed.kind, packed.size) {
         (UNSIGNED_BYTE, 1) => Ok(Arc::new(packed.bytes)),
         _ => Err("edges of cells that are no bytes"),

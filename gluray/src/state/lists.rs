@@ -4,7 +4,7 @@
 //! alternate, the driver's list is closed and another begun; calling the list plays both in order, through the same methods that the
 //! program calls. So state is what it is at the time of the call, nested lists work, and the driver gets a primitive only when it is to draw it.
 
-mod names;
+pub(crate) mod names;
 
 use crate::context::{Context, Sink};
 use crate::enums::*;
@@ -97,6 +97,12 @@ impl Recording {
         (self.used, self.more) = (true, true);
         self.draws |= flushes || draws;
         self.textures |= class & class::TEXTURE != 0;
+    }
+
+    /// A fault of ours has ended the tracing: the rest of the list is the driver's, to its end.
+    pub(crate) fn give_up(&mut self) {
+        self.note_driver_call(class::ALL, true, true);
+        self.open = false;
     }
 
     /// A call that sets a map of an evaluator goes into the driver's piece.
@@ -330,18 +336,6 @@ impl Context {
         }
     }
 
-    /// A fault of ours has ended the tracing: the driver gets to know what it was not told.
-    pub(crate) fn give_up(&mut self) {
-        if let Some(mut r) = self.recording.take() {
-            r.end_piece();
-            self.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.insert(r.name, Arc::new(r.list));
-        }
-        self.sink = Sink::Outside;
-        self.depth_of_lists = 0;
-        self.sync();
-        self.counters.publish(true);
-    }
-
     fn call_driver(&mut self, list: u32, draws: bool, textures: bool) {
         if draws {
             self.counters.pass("text, lines by arrays, or curves of a display list", 1);
@@ -366,7 +360,9 @@ impl Context {
         }
         self.sync();
         self.dirty = class::ALL;
-        self.texture_version += u64::from(textures);
+        if textures {
+            self.textures_change();
+        }
     }
 
     fn play(&mut self, list: &List) {
@@ -525,8 +521,8 @@ impl Context {
         Some(n + 1)
     }
 
-    pub(crate) fn call_lists(&mut self, n: i32, kind: u32, names: usize) -> bool {
-        let Some(names) = names::decode(n, kind, names) else { return false };
+    pub(crate) fn call_lists(&mut self, kind: u32, names: &[u8]) -> bool {
+        let Some(names) = names::decode(kind, names) else { return false };
         if crate::fault::happened() {
             let base = gl::word(LIST_BASE);
             names.into_iter().for_each(|n| self.play_plainly_or_call(base.wrapping_add(n)));

@@ -1,6 +1,7 @@
 //! How programs and GLVND find the trampolines: `dlsym`, `glXGetProcAddress`, `__glx_Main`, `__egl_Main`.
 
-use super::{NAMES, index_of, trampoline};
+use super::{index_of, trampoline};
+use crate::fault::caught;
 use crate::real;
 use core::ffi::{CStr, c_char, c_int, c_void};
 use std::sync::atomic::{AtomicPtr, Ordering::Relaxed};
@@ -10,7 +11,15 @@ static REAL_DLSYM: AtomicPtr<()> = AtomicPtr::new(core::ptr::null_mut());
 
 /// Our address for what a program looks up itself, or null for libc's answer.
 unsafe extern "C" fn ours(handle: *mut c_void, name: *const c_char) -> *const () {
+    // SAFETY: the program's own arguments of dlsym.
+    caught(|| unsafe { looked_up(handle, name) }).unwrap_or(core::ptr::null())
+}
+
+/// # Safety
+/// The arguments must be such as dlsym takes.
+unsafe fn looked_up(handle: *mut c_void, name: *const c_char) -> *const () {
     REAL_DLSYM.store(real::dlsym_address().cast_mut(), Relaxed);
+    crate::fault::injected("dlsym");
     if name.is_null() || real::is_vendor() {
         return core::ptr::null();
     }
@@ -56,14 +65,22 @@ unsafe extern "C" fn glx_address(name: *const c_char) -> *const () {
     // SAFETY: GLVND's own string.
     let text = unsafe { CStr::from_ptr(name) };
     let driver = real::vendor_address(text, false);
-    if text.to_bytes().starts_with(b"glXGetProcAddress") { driver } else { replaced(name, driver) }
+    let ours = || {
+        crate::fault::injected("address");
+        if text.to_bytes().starts_with(b"glXGetProcAddress") { driver } else { replaced(name, driver) }
+    };
+    caught(ours).unwrap_or(driver)
 }
 
 unsafe extern "C" fn egl_address(name: *const c_char) -> *const () {
     // SAFETY: GLVND's own string.
     let text = unsafe { CStr::from_ptr(name) };
     let driver = real::vendor_address(text, true);
-    if text.to_bytes() == b"eglGetProcAddress" { driver } else { replaced(name, driver) }
+    let ours = || {
+        crate::fault::injected("address");
+        if text.to_bytes() == b"eglGetProcAddress" { driver } else { replaced(name, driver) }
+    };
+    caught(ours).unwrap_or(driver)
 }
 
 /// GLVND's entry into a GLX vendor library: the driver's, with our addresses.
@@ -74,8 +91,14 @@ unsafe extern "C" fn __glx_Main(
     vendor: *mut c_void,
     imports: *mut Imports,
 ) -> c_int {
-    real::put_glvnd_first();
-    let main = real::vendor_main(false);
+    let find = || {
+        crate::fault::in_program();
+        crate::fault::injected("__glx_Main");
+        real::put_glvnd_first();
+    };
+    // After a fault the vendor that there would be without us is found all the same.
+    caught(find);
+    let main = caught(|| real::vendor_main(false)).unwrap_or(core::ptr::null());
     if main.is_null() {
         return 0;
     }
@@ -101,8 +124,14 @@ unsafe extern "C" fn __egl_Main(
     vendor: *mut c_void,
     imports: *mut Imports,
 ) -> c_int {
-    real::put_glvnd_first();
-    let main = real::vendor_main(true);
+    let find = || {
+        crate::fault::in_program();
+        crate::fault::injected("__egl_Main");
+        real::put_glvnd_first();
+    };
+    // After a fault the vendor that there would be without us is found all the same.
+    caught(find);
+    let main = caught(|| real::vendor_main(true)).unwrap_or(core::ptr::null());
     if main.is_null() {
         return 0;
     }
@@ -116,9 +145,4 @@ unsafe extern "C" fn __egl_Main(
         (*imports)[3] = egl_address as *const ();
     }
     1
-}
-
-/// Index of a name that is known to be in the list.
-pub(crate) fn known(name: &str) -> usize {
-    index_of(name.as_bytes()).unwrap_or(NAMES.len())
 }

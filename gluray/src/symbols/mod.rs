@@ -13,7 +13,7 @@ mod entry;
 pub(crate) mod hooks;
 mod hot;
 
-pub(crate) use hot::{set_hot, with_context};
+pub(crate) use hot::{install, take, with_context};
 
 use crate::real;
 use std::ffi::CStr;
@@ -51,36 +51,60 @@ include!(concat!(env!("OUT_DIR"), "/trampolines.rs"));
 
 /// Where each trampoline goes: `lazy` at first, then our hook or the driver's function.
 static TABLE: [AtomicPtr<()>; COUNT] = [const { AtomicPtr::new(lazy as *mut ()) }; COUNT];
-/// Not zero while watched calls are to be reported.
-static ATTENTION: AtomicU32 = AtomicU32::new(0);
+/// Zero while watched calls need not be reported: exactly one thread has a context, and nobody asked. Bit 0 says that somebody asked; above it are the threads that have
+/// a context, less one. In one word, so that none of the two changes unseen while the other is looked at.
+static ATTENTION: AtomicU32 = AtomicU32::new(0_u32.wrapping_sub(2));
 /// Watched calls that went straight to the driver.
 static CALLS: AtomicU64 = AtomicU64::new(0);
 
 /// Asks to be told of the next watched call.
 #[inline]
 pub(crate) fn attend() {
-    ATTENTION.store(1, Relaxed);
+    if ATTENTION.load(Relaxed) & 1 == 0 {
+        ATTENTION.fetch_or(1, Relaxed);
+    }
 }
 
-/// Lets watched calls pass without a word.
+/// Lets watched calls pass without a word, unless another thread has a context, too.
 pub(crate) fn relax() {
-    ATTENTION.store(0, Relaxed);
+    // Refused when a second thread has come since somebody looked.
+    ATTENTION.compare_exchange(1, 0, Relaxed, Relaxed).ok();
 }
 
-/// From now on every entry point is the driver's: after a fault of ours.
+/// One thread alone has a context.
+pub(crate) fn is_alone() -> bool {
+    ATTENTION.load(Relaxed) & !1 == 0
+}
+
+/// A thread gets a context. From now on, and until as many have left, all watched calls are reported when it is not the only one.
+pub(crate) fn thread_enters() {
+    ATTENTION.fetch_add(2, Relaxed);
+}
+
+/// A thread has no context any longer.
+pub(crate) fn thread_leaves() {
+    ATTENTION.fetch_sub(2, Relaxed);
+}
+
+/// After a fault of ours every entry point becomes the driver's, thread by thread: see [`leaving`].
 pub(crate) fn retire() {
     for (i, slot) in TABLE.iter().enumerate() {
-        // What keeps the books of contexts and what gives out addresses stays, so that threads are left in order.
+        // What keeps the books of contexts, gives out addresses or hands out errors that we kept stays. So do lists: those that we compiled are ours to play.
         let name = NAMES[i].to_bytes();
-        // Lists that we compiled are ours to play.
-        let lists: [&[u8]; 5] = [b"glCallList", b"glCallLists", b"glNewList", b"glEndList", b"glDeleteLists"];
-        let book =
-            name.ends_with(b"ProcAddress") || name.ends_with(b"ProcAddressARB") || lists.contains(&name);
+        let kept: [&[u8]; 7] = [
+            b"glCallList",
+            b"glCallLists",
+            b"glNewList",
+            b"glEndList",
+            b"glDeleteLists",
+            b"glGenLists",
+            b"glGetError",
+        ];
+        let book = name.starts_with(b"glX") || name.starts_with(b"egl") || kept.contains(&name);
         if !book && HOOKS[i].is_some() {
-            slot.store(real::forward(i).cast_mut(), Relaxed);
+            slot.store(leaving as *mut (), Relaxed);
         }
     }
-    relax();
 }
 
 /// Index of an entry point.
@@ -93,21 +117,70 @@ fn trampoline(name: &CStr) -> Option<*const ()> {
     index_of(name.to_bytes()).map(|i| TRAMPOLINES[i] as *const ())
 }
 
+/// Has the report brought up to date when the program ends in order.
+pub(crate) fn at_exit() {
+    extern "C" fn at_exit() {
+        crate::fault::guard(crate::report::write_the_rest);
+    }
+    // SAFETY: a function of ours, and the library is never unloaded (`-z nodelete`).
+    unsafe { libc::atexit(at_exit) };
+}
+
 extern "C" fn resolve(index: usize) -> *const () {
-    let target = match HOOKS[index] {
-        Some(hook) if !crate::fault::happened() => hook.0,
-        _ => real::forward(index),
-    };
+    crate::fault::in_program();
+    let hook = HOOKS[index].filter(|_| !crate::fault::happened());
+    let target = crate::fault::caught(|| match hook {
+        Some(hook) => hook.0,
+        None => {
+            crate::fault::inject_at(index);
+            real::forward(index)
+        }
+    });
+    let target = target.unwrap_or_else(|| forward_plainly(index));
     TABLE[index].store(target.cast_mut(), Relaxed);
     target
 }
 
+/// After a fault in the search for a function of the driver's: found, or nothing is called.
+fn forward_plainly(index: usize) -> *const () {
+    crate::fault::caught(|| real::forward(index)).unwrap_or(hooks::no_context as *const ())
+}
+
 extern "C" fn told(index: usize) {
     if crate::fault::happened() {
+        crate::fault::give_up_here();
         return;
     }
     let (class, flush) = (CLASSES[index], FLUSHES[index]);
-    crate::fault::guard(|| crate::context::watched(index, class, flush & 1 != 0, flush & 2 != 0));
+    crate::fault::caught(|| {
+        crate::fault::inject_at(index);
+        crate::context::watched(index, class, flush & 1 != 0, flush & 2 != 0);
+    });
+}
+
+/// Entry `index` of those that were ours before a fault: the thread's context hands over what it has swallowed, and the driver is called.
+extern "C" fn left(index: usize) -> *const () {
+    leave_at(index);
+    forward_plainly(index)
+}
+
+/// The same without the call.
+fn leave_at(index: usize) {
+    crate::fault::give_up_here();
+    let over = crate::fault::caught(|| {
+        let given_up = with_context(|c| {
+            if NAMES[index] == c"glEnd" && c.sink == crate::context::Sink::Pass {
+                // The driver's primitive ends now, and with the next call all is handed over.
+                c.sink = crate::context::Sink::Outside;
+            }
+            c.given_up
+        });
+        given_up == Some(true) && is_alone()
+    });
+    if over == Some(true) && TABLE[index].load(Relaxed) == leaving as *mut () {
+        TABLE[index].store(forward_plainly(index).cast_mut(), Relaxed);
+        relax();
+    }
 }
 
 /// Finds the target of entry r11 and goes there, with all argument registers as they were.
@@ -122,6 +195,21 @@ unsafe extern "C" fn lazy() {
         "movdqu xmm4, [rsp+64]", "movdqu xmm5, [rsp+80]", "movdqu xmm6, [rsp+96]", "movdqu xmm7, [rsp+112]",
         "add rsp, 128", "pop r11", "pop rax", "pop r9", "pop r8", "pop rcx", "pop rdx", "pop rsi", "pop rdi", "pop rbp", "jmp r10",
         resolve = sym resolve
+    )
+}
+
+/// The target of what was a hook before a fault: see [`left`].
+#[unsafe(naked)]
+unsafe extern "C" fn leaving() {
+    core::arch::naked_asm!(
+        "push rbp", "mov rbp, rsp", "push rdi", "push rsi", "push rdx", "push rcx", "push r8", "push r9", "push rax", "push r11",
+        "sub rsp, 128", "movdqu [rsp], xmm0", "movdqu [rsp+16], xmm1", "movdqu [rsp+32], xmm2", "movdqu [rsp+48], xmm3",
+        "movdqu [rsp+64], xmm4", "movdqu [rsp+80], xmm5", "movdqu [rsp+96], xmm6", "movdqu [rsp+112], xmm7",
+        "mov edi, r11d", "call {left}", "mov r10, rax",
+        "movdqu xmm0, [rsp]", "movdqu xmm1, [rsp+16]", "movdqu xmm2, [rsp+32]", "movdqu xmm3, [rsp+48]",
+        "movdqu xmm4, [rsp+64]", "movdqu xmm5, [rsp+80]", "movdqu xmm6, [rsp+96]", "movdqu xmm7, [rsp+112]",
+        "add rsp, 128", "pop r11", "pop rax", "pop r9", "pop r8", "pop rcx", "pop rdx", "pop rsi", "pop rdi", "pop rbp", "jmp r10",
+        left = sym left
     )
 }
 
@@ -165,6 +253,15 @@ mod tests {
             assert!(CLASSES[i] & always == 0 || HOOKS[i].is_some(), "{name:?} costs ten nanoseconds");
         }
         assert!(seen > 100, "{seen}");
+    }
+
+    #[test]
+    fn the_table_of_injected_faults_has_every_hook() {
+        let hooks: Vec<&str> =
+            (0..COUNT).filter(|i| HOOKS[*i].is_some()).map(|i| NAMES[i].to_str().expect("ASCII")).collect();
+        let mut listed: Vec<&str> = include_str!("../../tests/programs/hooks.txt").lines().collect();
+        listed.sort_unstable();
+        assert_eq!(listed, hooks, "tests/programs/hooks.txt is what tests/faults.rs walks through");
     }
 
     #[test]

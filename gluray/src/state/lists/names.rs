@@ -44,16 +44,20 @@ impl Context {
     }
 }
 
+/// Bytes of a name of `glCallLists`; `None` for a type that OpenGL refuses.
+pub(crate) fn width(kind: u32) -> Option<usize> {
+    match kind {
+        BYTE | UNSIGNED_BYTE => Some(1),
+        SHORT | UNSIGNED_SHORT | 0x1407 => Some(2),
+        INT | UNSIGNED_INT | FLOAT | 0x1409 => Some(4),
+        0x1408 => Some(3),
+        _ => None,
+    }
+}
+
 /// The names of `glCallLists`; `None` for a type that OpenGL refuses.
-pub(super) fn decode(n: i32, kind: u32, address: usize) -> Option<Vec<u32>> {
-    let width = match kind {
-        BYTE | UNSIGNED_BYTE => 1,
-        SHORT | UNSIGNED_SHORT | 0x1407 => 2,
-        INT | UNSIGNED_INT | FLOAT | 0x1409 => 4,
-        0x1408 => 3,
-        _ => return None,
-    };
-    let bytes = crate::client_memory::view(address, usize::try_from(n).ok()? * width);
+pub(super) fn decode(kind: u32, bytes: &[u8]) -> Option<Vec<u32>> {
+    let width = width(kind)?;
     let name = |b: &[u8]| match (kind, b) {
         (BYTE, &[a]) => i32::from(a.cast_signed()).cast_unsigned(),
         (SHORT, &[a, b]) => i32::from(i16::from_ne_bytes([a, b])).cast_unsigned(),
@@ -72,13 +76,11 @@ mod tests {
 
     #[test]
     fn names_of_lists_are_read_in_every_type() {
-        let bytes: Vec<u8> = vec![1, 2, 3, 4];
-        let at = bytes.as_ptr() as usize;
-        assert_eq!(decode(4, UNSIGNED_BYTE, at), Some(vec![1, 2, 3, 4]));
-        assert_eq!(decode(2, 0x1407, at), Some(vec![0x0102, 0x0304]));
-        assert_eq!(decode(1, 0x1409, at), Some(vec![0x0102_0304]));
-        assert_eq!(decode(1, 0x1234, at), None);
-        let minus_one = [255_u8];
-        assert_eq!(decode(1, BYTE, minus_one.as_ptr() as usize), Some(vec![u32::MAX]));
+        let bytes = [1, 2, 3, 4];
+        assert_eq!(decode(UNSIGNED_BYTE, &bytes), Some(vec![1, 2, 3, 4]));
+        assert_eq!(decode(0x1407, &bytes), Some(vec![0x0102, 0x0304]));
+        assert_eq!(decode(0x1409, &bytes), Some(vec![0x0102_0304]));
+        assert_eq!(decode(0x1234, &bytes), None);
+        assert_eq!(decode(BYTE, &[255]), Some(vec![u32::MAX]));
     }
 }
