@@ -37,6 +37,17 @@ pub fn runtime(variable: impl Fn(&str) -> Option<String>) -> Option<PathBuf> {
         .or_else(|| Some(std::env::temp_dir().join(format!("gluray-{}", user_id()?))))
 }
 
+/// Reads a plain text file that somebody named. It never waits: a FIFO or a device in its place is an error.
+pub(crate) fn read_plain(path: &Path) -> std::io::Result<String> {
+    use std::os::unix::fs::OpenOptionsExt;
+    let flags = libc::O_NONBLOCK | libc::O_CLOEXEC | libc::O_NOCTTY;
+    let file = File::options().read(true).custom_flags(flags).open(path)?;
+    match file.metadata()?.is_file() {
+        true => std::io::read_to_string(file),
+        false => Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, "is no plain file")),
+    }
+}
+
 /// Opens a plain file of this user's for reading, with what is known of it; `None` for anything else. It never waits, whatever lies there: a FIFO of somebody else's in a
 /// folder that is shared, a device, a link to one.
 pub(crate) fn open_own(path: &Path) -> Option<(File, Metadata)> {

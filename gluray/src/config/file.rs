@@ -46,8 +46,8 @@ pub struct ConfigFile {
 impl ConfigFile {
     /// Reads a file.
     pub fn read(path: &Path) -> Result<ConfigFile, FileError> {
-        let text =
-            std::fs::read_to_string(path).map_err(|source| FileError::Read { path: path.into(), source })?;
+        let text = crate::folders::read_plain(path)
+            .map_err(|source| FileError::Read { path: path.into(), source })?;
         ConfigFile::parse(path, &text)
     }
 
@@ -185,6 +185,18 @@ mod tests {
             assert!(errors.len() == 1 && errors[0].starts_with(expected), "{text}: {errors:?}");
             assert_eq!(s, Settings::default());
         }
+    }
+
+    #[test]
+    fn a_fifo_in_the_place_of_the_file_holds_nobody_up() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("gluray.toml");
+        assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+        let (sender, receiver) = std::sync::mpsc::channel();
+        std::thread::spawn(move || sender.send(ConfigFile::read(&path).map_err(|e| e.to_string())));
+        // Whoever waits for a writer waits for ever; the time is for a busy machine.
+        let answer = receiver.recv_timeout(std::time::Duration::from_secs(60)).expect("nobody is waited for");
+        assert!(answer.is_err_and(|e| e.contains("gluray.toml")));
     }
 
     #[test]
