@@ -19,7 +19,6 @@ unsafe extern "C" fn ours(handle: *mut c_void, name: *const c_char) -> *const ()
 /// The arguments must be such as dlsym takes.
 unsafe fn looked_up(handle: *mut c_void, name: *const c_char) -> *const () {
     REAL_DLSYM.store(real::dlsym_address().cast_mut(), Relaxed);
-    crate::fault::injected("dlsym");
     if name.is_null() || real::is_vendor() {
         return core::ptr::null();
     }
@@ -29,6 +28,8 @@ unsafe fn looked_up(handle: *mut c_void, name: *const c_char) -> *const () {
     if !(bytes.starts_with(b"gl") || bytes.starts_with(b"egl")) || index_of(bytes).is_none() {
         return core::ptr::null();
     }
+    // Not earlier: other names are looked up by allocators before anything can be allocated.
+    crate::fault::injected("dlsym");
     // What the program's library lacks stays lacking.
     // SAFETY: the program's own arguments.
     let there = unsafe { real::call_dlsym(handle, name) };
