@@ -73,7 +73,7 @@ pub fn look(library: Option<PathBuf>) -> Machine {
     let mut variables: Vec<(String, String)> =
         MATTER.iter().filter_map(|n| Some(((*n).to_owned(), get(n)?))).collect();
     variables.extend(
-        std::env::vars().filter(|(n, v)| n.starts_with("GLURAY_") && !n.ends_with("SECRET") && !v.is_empty()),
+        texts().filter(|(n, v)| n.starts_with("GLURAY_") && !n.ends_with("SECRET") && !v.is_empty()),
     );
     Machine {
         library,
@@ -193,9 +193,15 @@ pub(super) fn parse_glxinfo(text: &str) -> OpenGl {
     }
 }
 
+/// The environment; bytes that are not UTF-8 are shown as U+FFFD.
+fn texts() -> impl Iterator<Item = (String, String)> {
+    let text = |t: std::ffi::OsString| t.to_string_lossy().into_owned();
+    std::env::vars_os().map(move |(name, value)| (text(name), text(value)))
+}
+
 fn settings() -> Option<(PathBuf, Vec<String>)> {
     use crate::config::{ConfigFile, Settings, Sources, assign};
-    let sources = Sources::new(std::env::vars().collect(), Vec::new());
+    let sources = Sources::new(texts().collect(), Vec::new());
     let path = sources.file.clone().filter(|p| sources.file_is_required || p.exists())?;
     let problems = match ConfigFile::read(&path) {
         Ok(file) => {
