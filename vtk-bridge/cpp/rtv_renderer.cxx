@@ -35,9 +35,16 @@ void vtkRtvRenderer::ReleaseGraphicsResources(vtkWindow* window)
   this->Superclass::ReleaseGraphicsResources(window);
 }
 
+// The bridge of a renderer, for the plugin, whose options belong to one; null for other renderers.
+extern "C" VTK_ABI_EXPORT RtvBridge* rtv_shim_bridge(vtkObjectBase* renderer)
+{
+  vtkRtvRenderer* own = vtkRtvRenderer::SafeDownCast(renderer);
+  return own ? own->GetBridge() : nullptr;
+}
+
 void vtkRtvRenderer::DeviceRender()
 {
-  if (!this->Bridge || this->Selector || this->PreserveDepthBuffer || rtvApi->option("RTV_OFF") != 0.0)
+  if (!this->Bridge || this->Selector || this->PreserveDepthBuffer || rtvApi->bridge_option(this->Bridge, "RTV_OFF") != 0.0)
   {
     this->Superclass::DeviceRender();
     return;

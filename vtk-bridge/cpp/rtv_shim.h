@@ -68,6 +68,7 @@ public:
   void DeviceRender() override;
   void DeviceRenderOpaqueGeometry(vtkFrameBufferObjectBase* fbo = nullptr) override;
   void ReleaseGraphicsResources(vtkWindow* window) override;
+  RtvBridge* GetBridge() { return this->Bridge; }
 
 protected:
   vtkRtvRenderer();

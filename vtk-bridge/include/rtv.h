@@ -312,7 +312,7 @@ typedef struct RtvPicture {
   float const* first_depth;
 } RtvPicture;
 /* Number of this interface, made from its structures and calls (a test says which). A shim built for another one must not go on. */
-#define RTV_ABI 910789305u
+#define RTV_ABI 4135612408u
 /* All calls in one table, so that a shim needs only one symbol. */
 typedef struct RtvApi {
   /* rtv_abi. */
@@ -347,6 +347,12 @@ typedef struct RtvApi {
   int32_t (*render)(RtvBridge*, RtvView const*, RtvPicture*);
   /* rtv_end. */
   void (*end)(RtvBridge*);
+  /* rtv_set_bridge_option. */
+  int32_t (*set_bridge_option)(RtvBridge*, char const*, char const*);
+  /* rtv_bridge_option. */
+  double (*bridge_option)(RtvBridge*, char const*);
+  /* rtv_surfaces. */
+  int32_t (*surfaces)(RtvBridge*, RtvSurface const*, uint64_t);
 } RtvApi;
 
 /* RTV_ABI of the library. */
@@ -357,14 +363,20 @@ RtvBridge* rtv_new(void);
 void rtv_free(RtvBridge* bridge);
 /* Sets an option for all bridges of the process (RTV_AO, "16"); an empty value takes it back. 1 when it was understood. */
 int32_t rtv_set_option(char const* name, char const* value);
+/* Sets an option for one bridge, over those of the process; as rtv_set_option. Two bridges that draw in two threads do not see each other's. */
+int32_t rtv_set_bridge_option(RtvBridge* bridge, char const* name, char const* value);
 /* An option's value as a number: RTV_POINT_RADIUS, RTV_LINE_RADIUS, RTV_OFF; -1 for others. */
 double rtv_option(char const* name);
+/* As rtv_option, with the bridge's own options over those of the process: in a frame those that it began with, else those that one begun now would have; -1 also without a bridge. */
+double rtv_bridge_option(RtvBridge* bridge, char const* name);
 /* Tells which VTK the library is inside of: options whose default follows VTK's version (RTV_EDGES) take it from here, unless the environment or the program says otherwise. For all bridges of the process. */
 void rtv_host(uint32_t vtk_major, uint32_t vtk_minor);
 /* Begins a frame. 0 when everything is to be left to OpenGL (RTV_OFF). */
 int32_t rtv_begin(RtvBridge* bridge);
 /* Adds something to draw: 1 when it will be traced, 0 when there is nothing to trace in it, -1 when its arrays make no sense. */
 int32_t rtv_surface(RtvBridge* bridge, RtvSurface const* surface);
+/* Adds all surfaces of something to draw, or none of them: how many will be traced, or -1 when the arrays of one make no sense (a warning names it), so that nothing is drawn twice. */
+int32_t rtv_surfaces(RtvBridge* bridge, RtvSurface const* surfaces, uint64_t count);
 /* Adds a volume: null when it will be traced, else the reason why not, of the bridge's memory until its next call. */
 char const* rtv_volume(RtvBridge* bridge, RtvVolume const* volume);
 /* 1 when the scalars of this key are kept: rtv_volume need not be given them. */

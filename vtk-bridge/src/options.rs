@@ -3,6 +3,7 @@
 //! What is not understood is not silently dropped: [`Options::parse`] names the variable, the value and the rule.
 
 use rt_core::accel::{BuildQuality, Robustness};
+use std::ffi::OsString;
 
 /// What all surfaces are made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -151,6 +152,28 @@ pub const NAMES: &[(&str, &str, &str)] = &[
     ),
     ("RTV_LIBRARY", "the library that `vtk-bridge install` copies", "a file"),
 ];
+
+/// Variables that the library does not read, or reads as folders and files of any name.
+const PATHS: &[&str] = &["RTV_HOME", "RTV_VTK_INCLUDE", "RTV_LIBRARY"];
+
+/// Variables as texts. The second value names those that are none because they are not UTF-8.
+pub fn readable(variables: &[(OsString, OsString)]) -> (Vec<(String, String)>, Vec<String>) {
+    let (mut texts, mut faults) = (Vec::new(), Vec::new());
+    for (name, value) in variables {
+        match (name.to_str(), value.to_str()) {
+            (Some(name), Some(value)) => texts.push((name.to_owned(), value.to_owned())),
+            (Some(name), None) if PATHS.contains(&name) => {}
+            _ => {
+                // As `Debug` writes them: with the bytes that are no text.
+                let [name, value] = [name, value].map(|t| format!("{t:?}").trim_matches('"').to_owned());
+                faults.push(format!(
+                    "{name}={value} is not UTF-8 text: it is left out; set it anew, or unset it"
+                ));
+            }
+        }
+    }
+    (texts, faults)
+}
 
 impl Options {
     /// Options from pairs of name and value; the second value says what was not understood.

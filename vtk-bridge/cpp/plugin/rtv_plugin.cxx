@@ -89,8 +89,9 @@ std::string start()
   auto table = reinterpret_cast<const RtvApi* (*)()>(dlsym(bridge, "rtv_api"));
   auto init = reinterpret_cast<uint32_t (*)(const RtvApi*)>(dlsym(shim, "rtv_shim_init"));
   auto enroll = reinterpret_cast<void (*)()>(dlsym(shim, "rtv_shim_register"));
+  auto bridgeOf = reinterpret_cast<RtvBridge* (*)(vtkObjectBase*)>(dlsym(shim, "rtv_shim_bridge"));
   const RtvApi* api = table ? table() : nullptr;
-  if (!api || !init || !enroll || api->abi() != RTV_ABI || init(api) != RTV_ABI)
+  if (!api || !init || !enroll || !bridgeOf || api->abi() != RTV_ABI || init(api) != RTV_ABI)
   {
     return "the bridge in " + at + " is of another version; run `vtk-bridge install --plugin` again";
   }
@@ -99,7 +100,7 @@ std::string start()
   {
     enroll();
   }
-  return vtkRtvViewOptions::Enroll(api) ? "" : "this ParaView has no render views";
+  return vtkRtvViewOptions::Enroll(api, bridgeOf) ? "" : "this ParaView has no render views";
 }
 
 }

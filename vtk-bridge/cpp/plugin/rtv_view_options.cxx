@@ -16,6 +16,7 @@ vtkStandardNewMacro(vtkRtvViewOptions);
 namespace
 {
 const RtvApi* theApi = nullptr;
+RtvBridge* (*theBridgeOf)(vtkObjectBase* renderer) = nullptr;
 
 // A property's command, the option it sets, its default, and the names of an enumeration. A property with its default value leaves the
 // option what the environment says, so that RTV_* variables work with the plugin too.
@@ -100,9 +101,10 @@ void enroll(vtkClientServerInterpreter* interpreter)
 }
 }
 
-bool vtkRtvViewOptions::Enroll(const RtvApi* api)
+bool vtkRtvViewOptions::Enroll(const RtvApi* api, RtvBridge* (*bridgeOf)(vtkObjectBase*))
 {
   theApi = api;
+  theBridgeOf = bridgeOf;
   // Interpreters that there are, and those to come.
   vtkClientServerInterpreterInitializer::GetInitializer()->RegisterCallback(enroll);
   return vtkClientServerInterpreterInitializer::GetGlobalInterpreter()->HasCommandFunction("vtkPVRenderView");
@@ -148,11 +150,15 @@ bool vtkRtvViewOptions::Set(const std::string& command, const std::string& value
   return false;
 }
 
-void vtkRtvViewOptions::Apply(bool on)
+void vtkRtvViewOptions::Apply(vtkObject* renderer, bool on)
 {
-  for (const auto& option : this->Values)
+  // Null for renderers that do not trace.
+  RtvBridge* bridge = theBridgeOf(renderer);
+  for (const Row& row : Table)
   {
-    theApi->set_option(option.first.c_str(), on ? option.second.c_str() : "");
+    const auto found = this->Values.find(row.Option);
+    const bool has = on && found != this->Values.end();
+    theApi->set_bridge_option(bridge, row.Option, has ? found->second.c_str() : "");
   }
 }
 
@@ -164,7 +170,7 @@ void vtkRtvViewOptions::OnRender(vtkObject* renderer, unsigned long event, void*
   }
   else if (this->IsConsumer(renderer))
   {
-    this->Apply(event == vtkCommand::StartEvent);
+    this->Apply(renderer, event == vtkCommand::StartEvent);
   }
 }
 
@@ -181,7 +187,7 @@ vtkTypeBool vtkRtvViewOptions::GetVisibility()
         renderer->AddObserver(event, this, &vtkRtvViewOptions::OnRender);
       }
       // Its first frame may have begun.
-      this->Apply(true);
+      this->Apply(renderer, true);
     }
   }
   return 0;

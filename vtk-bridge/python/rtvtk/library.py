@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 
-ABI = 910789305
+ABI = 4135612408
 NONE, U8, F32, F64, I32, I64 = range(6)
 COLOR_PROPERTY, COLOR_POINTS, COLOR_CELLS, COLOR_MAPPED = range(4)
 LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT = range(3)
@@ -127,9 +127,10 @@ def _functions(library, path):
     if found != ABI:
         raise RtvError(f"{path} has interface {found}, this package needs {ABI}: install the package that belongs to the library")
     return dict(
-        new=bind("rtv_new", p), free=bind("rtv_free", None, p), option=bind("rtv_option", C.c_double, text),
+        new=bind("rtv_new", p), free=bind("rtv_free", None, p), option=bind("rtv_bridge_option", C.c_double, p, text),
         host=bind("rtv_host", None, C.c_uint32, C.c_uint32), begin=bind("rtv_begin", C.c_int32, p),
-        surface=bind("rtv_surface", C.c_int32, p, C.POINTER(Surface)), has_colors=bind("rtv_has_colors", C.c_int32, p, C.c_uint64, C.c_uint64),
+        surfaces=bind("rtv_surfaces", C.c_int32, p, C.POINTER(Surface), C.c_uint64),
+        has_colors=bind("rtv_has_colors", C.c_int32, p, C.c_uint64, C.c_uint64),
         volume=bind("rtv_volume", text, p, C.POINTER(Volume)), has_volume=bind("rtv_has_volume", C.c_int32, p, C.c_uint64),
         light=bind("rtv_light", None, p, C.POINTER(Light)), pass_on=bind("rtv_pass", None, p, text, text), warn=bind("rtv_warn", None, p, text),
         render=bind("rtv_render", C.c_int32, p, C.POINTER(View), C.POINTER(Picture)), end=bind("rtv_end", None, p),
@@ -164,8 +165,6 @@ class Bridge:
         if name.startswith("_"):
             raise AttributeError(name)
         function = Bridge._calls[name]
-        if name == "option":
-            return lambda key: function(key.encode())
-        if name in ("warn", "pass_on"):
+        if name in ("warn", "pass_on", "option"):
             return lambda *texts: function(self._handle, *(t.encode() for t in texts))
         return lambda *arguments: function(self._handle, *arguments)

@@ -34,6 +34,19 @@ unsafe fn tuples<'a, T, const N: usize>(
     Ok(unsafe { std::slice::from_raw_parts(data, array.tuples as usize) })
 }
 
+/// `count` structures at `first`; none for null, misaligned or impossibly many.
+///
+/// # Safety
+/// They are there, and nobody writes to them while the result lives.
+pub(super) unsafe fn slice<'a, T>(first: *const T, count: u64) -> Option<&'a [T]> {
+    let bytes = usize::try_from(count).ok()?.checked_mul(size_of::<T>())?;
+    if first.is_null() || !first.is_aligned() || bytes > isize::MAX as usize {
+        return None;
+    }
+    // SAFETY: not null, aligned, of a size that fits; the rest is the caller's promise.
+    Some(unsafe { std::slice::from_raw_parts(first, count as usize) })
+}
+
 /// # Safety
 /// As [`tuples`].
 unsafe fn ids<'a>(array: &RtvArray, what: &str) -> Result<Ids<'a>, String> {

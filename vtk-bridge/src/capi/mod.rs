@@ -2,7 +2,7 @@
 //!
 //! A frame is `rtv_begin`, `rtv_surface` and `rtv_light` for everything there is, `rtv_render`. Arrays belong to the caller and are read
 //! before the call returns. Pictures and texts belong to the bridge. A panic never crosses the border: it becomes a warning, and the
-//! call fails. A bridge is used by one thread at a time; different bridges may be used at once.
+//! call fails. A bridge is used by one thread at a time; different bridges may be used at once, each with options of its own.
 #![allow(unsafe_code, reason = "this is where foreign code calls us")]
 
 mod arrays;
@@ -15,6 +15,7 @@ use crate::bridge::Added;
 use crate::input::View;
 use crate::options::Options;
 use rt_core::glam::DMat4;
+pub(crate) use state::guarded;
 use state::{Handle, set_option, with};
 use std::ffi::CStr;
 use std::os::raw::c_char;
@@ -25,7 +26,7 @@ pub struct RtvBridge {
 }
 
 /// Number of this interface, made from its structures and calls (a test says which). A shim built for another one must not go on.
-pub const RTV_ABI: u32 = 910_789_305;
+pub const RTV_ABI: u32 = 4_135_612_408;
 
 /// [`RTV_ABI`] of the library.
 #[unsafe(no_mangle)]
@@ -36,7 +37,7 @@ pub extern "C" fn rtv_abi() -> u32 {
 /// A new bridge; free it with `rtv_free`. Null only when that is impossible.
 #[unsafe(no_mangle)]
 pub extern "C" fn rtv_new() -> *mut RtvBridge {
-    Box::into_raw(Box::new(Handle::new())).cast()
+    guarded(std::ptr::null_mut(), || Box::into_raw(Box::new(Handle::new())).cast())
 }
 
 /// Frees a bridge; null is allowed.
@@ -47,7 +48,7 @@ pub extern "C" fn rtv_new() -> *mut RtvBridge {
 pub unsafe extern "C" fn rtv_free(bridge: *mut RtvBridge) {
     if !bridge.is_null() {
         // SAFETY: made by `rtv_new` from a box of this type, and given back once (the caller's promise).
-        drop(unsafe { Box::from_raw(bridge.cast::<Handle>()) });
+        guarded((), || drop(unsafe { Box::from_raw(bridge.cast::<Handle>()) }));
     }
 }
 
@@ -58,8 +59,22 @@ pub unsafe extern "C" fn rtv_free(bridge: *mut RtvBridge) {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rtv_set_option(name: *const c_char, value: *const c_char) -> i32 {
     // SAFETY: the caller's promise.
-    let (name, value) = unsafe { (text(name), text(value)) };
-    i32::from(set_option(&name, &value))
+    guarded(0, || i32::from(unsafe { set_option(&text(name), &text(value)) }))
+}
+
+/// Sets an option for one bridge, over those of the process; as `rtv_set_option`. Two bridges that
+/// draw in two threads do not see each other's.
+///
+/// # Safety
+/// `bridge` is null or came from `rtv_new`; the texts are null or end with a zero byte.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtv_set_bridge_option(
+    bridge: *mut RtvBridge,
+    name: *const c_char,
+    value: *const c_char,
+) -> i32 {
+    // SAFETY: the caller's promise.
+    unsafe { with(bridge, 0, |h| i32::from(h.set_option(&text(name), &text(value)))) }
 }
 
 /// An option's value as a number: `RTV_POINT_RADIUS`, `RTV_LINE_RADIUS`, `RTV_OFF`; -1 for others.
@@ -68,21 +83,26 @@ pub unsafe extern "C" fn rtv_set_option(name: *const c_char, value: *const c_cha
 /// As `rtv_set_option`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rtv_option(name: *const c_char) -> f64 {
-    let options = state::options().0;
     // SAFETY: the caller's promise.
-    match unsafe { text(name) }.as_str() {
-        "RTV_OFF" => f64::from(u8::from(options.off)),
-        "RTV_POINT_RADIUS" => options.point_radius,
-        "RTV_LINE_RADIUS" => options.line_radius,
-        _ => -1.0,
-    }
+    guarded(-1.0, || state::number(&state::options(), &unsafe { text(name) }))
+}
+
+/// As `rtv_option`, with the bridge's own options over those of the process: in a frame those that
+/// it began with, else those that one begun now would have; -1 also without a bridge.
+///
+/// # Safety
+/// As `rtv_set_bridge_option`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtv_bridge_option(bridge: *mut RtvBridge, name: *const c_char) -> f64 {
+    // SAFETY: the caller's promise.
+    unsafe { with(bridge, -1.0, |h| h.option(&text(name))) }
 }
 
 /// Tells which VTK the library is inside of: options whose default follows VTK's version (`RTV_EDGES`) take it from here, unless the
 /// environment or the program says otherwise. For all bridges of the process.
 #[unsafe(no_mangle)]
 pub extern "C" fn rtv_host(vtk_major: u32, vtk_minor: u32) {
-    state::set_host(vtk_major, vtk_minor);
+    guarded((), || state::set_host(vtk_major, vtk_minor));
 }
 
 /// Begins a frame. 0 when everything is to be left to OpenGL (`RTV_OFF`).
@@ -101,22 +121,37 @@ pub unsafe extern "C" fn rtv_begin(bridge: *mut RtvBridge) -> i32 {
 /// As `rtv_begin`; every array of `surface` has the length it says and is not written to during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rtv_surface(bridge: *mut RtvBridge, surface: *const RtvSurface) -> i32 {
-    // SAFETY: as above; a null surface is refused.
-    let Some(s) = (unsafe { surface.as_ref() }) else { return -1 };
     // SAFETY: as above.
+    unsafe { rtv_surfaces(bridge, surface, 1) }
+}
+
+/// Adds all surfaces of something to draw, or none of them: how many will be traced, or -1 when the
+/// arrays of one make no sense (a warning names it), so that nothing is drawn twice.
+///
+/// # Safety
+/// As `rtv_surface`, for `count` surfaces one after the other.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtv_surfaces(
+    bridge: *mut RtvBridge,
+    surfaces: *const RtvSurface,
+    count: u64,
+) -> i32 {
+    // SAFETY: as above; the work is done only with surfaces that are not null.
     unsafe {
         with(bridge, -1, |h| {
-            let name = text(s.name);
-            match arrays::surface(s, &name) {
-                Ok(surface) => match h.bridge.add_surface(&surface) {
-                    Added::Traced => 1,
-                    Added::Nothing(_) => 0,
-                },
-                Err(fault) => {
-                    h.bridge.warn(format!("{name}: {fault}; OpenGL draws it"));
-                    -1
+            let Some(given) = arrays::slice(surfaces, count) else { return -1 };
+            let names: Vec<String> = given.iter().map(|s| text(s.name)).collect();
+            let mut read = Vec::with_capacity(given.len());
+            for (s, name) in given.iter().zip(&names) {
+                match arrays::surface(s, name) {
+                    Ok(surface) => read.push(surface),
+                    Err(fault) => {
+                        h.bridge.warn(format!("{name}: {fault}; OpenGL draws it"));
+                        return -1;
+                    }
                 }
             }
+            read.iter().filter(|s| h.bridge.add_surface(s) == Added::Traced).count() as i32
         })
     }
 }
@@ -274,6 +309,12 @@ pub struct RtvApi {
     pub render: unsafe extern "C" fn(*mut RtvBridge, *const RtvView, *mut RtvPicture) -> i32,
     /// [`rtv_end`].
     pub end: unsafe extern "C" fn(*mut RtvBridge),
+    /// [`rtv_set_bridge_option`].
+    pub set_bridge_option: unsafe extern "C" fn(*mut RtvBridge, *const c_char, *const c_char) -> i32,
+    /// [`rtv_bridge_option`].
+    pub bridge_option: unsafe extern "C" fn(*mut RtvBridge, *const c_char) -> f64,
+    /// [`rtv_surfaces`].
+    pub surfaces: unsafe extern "C" fn(*mut RtvBridge, *const RtvSurface, u64) -> i32,
 }
 
 static API: RtvApi = RtvApi {
@@ -293,6 +334,9 @@ static API: RtvApi = RtvApi {
     warn: rtv_warn,
     render: rtv_render,
     end: rtv_end,
+    set_bridge_option: rtv_set_bridge_option,
+    bridge_option: rtv_bridge_option,
+    surfaces: rtv_surfaces,
 };
 
 /// The table; valid as long as the library is loaded.
@@ -315,7 +359,7 @@ unsafe fn text(t: *const c_char) -> String {
 
 /// The options in force, for programs that use the library from Rust and want what the environment says.
 pub fn options_of_process() -> Options {
-    state::options().0
+    state::options()
 }
 
 #[cfg(test)]

@@ -1,12 +1,12 @@
-//! What is behind a handle: a bridge with the process' options; and the guard against panics.
+//! What is behind a handle: a bridge with its options; and the guard against panics.
 
 use super::{RtvBridge, RtvPicture};
 use crate::bridge::Bridge;
 use crate::input::View;
-use crate::options::Options;
+use crate::options::{Options, readable};
 use crate::report;
 use std::collections::BTreeMap;
-use std::ffi::CString;
+use std::ffi::{CString, OsString};
 use std::os::raw::c_char;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
@@ -19,10 +19,21 @@ pub(super) struct Handle {
     poisoned: bool,
     /// The text that the last call gave away.
     answer: CString,
+    /// Options set for this bridge alone, over all others.
+    own: Named,
+    in_force: InForce,
+    /// Between `rtv_begin` and `rtv_end`: options stay what they are.
+    in_frame: bool,
 }
 
-/// Options set by the program, over those of the environment.
-static SET: Mutex<BTreeMap<String, String>> = Mutex::new(BTreeMap::new());
+/// Values of options by name, as they were set.
+type Named = BTreeMap<String, String>;
+
+/// Options set by the program for all bridges, over those of the environment.
+static SET: Mutex<Named> = Mutex::new(BTreeMap::new());
+
+/// The options of the process, for those who ask without a bridge.
+static OF_PROCESS: Mutex<InForce> = Mutex::new(InForce::NONE);
 
 /// VTK's version, as told by [`set_host`]: major in the upper half; 0 when nobody has said.
 static HOST: AtomicU64 = AtomicU64::new(0);
@@ -36,25 +47,92 @@ fn of_host(host: u64) -> Option<(String, String)> {
     ((host >> 32, host & 0xffff_ffff) > (9, 2)).then(|| ("RTV_EDGES".to_owned(), "0".to_owned()))
 }
 
-/// The options in force, and what in them was not understood. The environment is read anew each time, because programs change it (a
-/// script's `os.environ`).
-pub(super) fn options() -> (Options, Vec<String>) {
-    let environment = std::env::vars().filter(|(n, _)| n.starts_with("RTV_"));
-    let set = SET.lock().map(|s| s.clone()).unwrap_or_default();
-    Options::parse(of_host(HOST.load(Ordering::Relaxed)).into_iter().chain(environment).chain(set))
+/// Everything that options are made from; what comes later goes over what comes before.
+#[derive(PartialEq)]
+struct Sources {
+    host: u64,
+    environment: Vec<(OsString, OsString)>,
+    process: Named,
+    own: Named,
 }
 
-pub(super) fn set_option(name: &str, value: &str) -> bool {
-    let Ok(mut set) = SET.lock() else { return false };
+impl Sources {
+    /// As they are now. The environment is read anew each time, because programs change it (a
+    /// script's `os.environ`).
+    fn now(own: &Named) -> Sources {
+        let is_ours = |name: &OsString| name.as_encoded_bytes().starts_with(b"RTV_");
+        Sources {
+            host: HOST.load(Ordering::Relaxed),
+            environment: std::env::vars_os().filter(|(name, _)| is_ours(name)).collect(),
+            process: SET.lock().map(|s| s.clone()).unwrap_or_default(),
+            own: own.clone(),
+        }
+    }
+
+    /// The options, and what in them was not understood.
+    fn parse(&self) -> (Options, Vec<String>) {
+        let (environment, unreadable) = readable(&self.environment);
+        let set = self.process.iter().chain(&self.own).map(|(n, v)| (n.clone(), v.clone()));
+        let pairs = of_host(self.host).into_iter().chain(environment).chain(set);
+        let (options, faults) = Options::parse(pairs);
+        (options, [unreadable, faults].concat())
+    }
+}
+
+/// Options with what they were made from, so that they are parsed once per change.
+struct InForce(Option<(Sources, Options, Vec<String>)>);
+
+impl InForce {
+    const NONE: InForce = InForce(None);
+
+    /// The options for `sources`, and what in them was not understood.
+    fn of(&mut self, sources: Sources) -> (&Options, &[String]) {
+        if self.0.as_ref().is_some_and(|(from, ..)| *from != sources) {
+            self.0 = None;
+        }
+        let (_, options, faults) = self.0.get_or_insert_with(|| {
+            let (options, faults) = sources.parse();
+            (sources, options, faults)
+        });
+        (options, faults)
+    }
+}
+
+/// The options of the process: those of a bridge that has none of its own.
+pub(super) fn options() -> Options {
+    let sources = Sources::now(&Named::new());
+    match OF_PROCESS.lock() {
+        Ok(mut kept) => kept.of(sources).0.clone(),
+        // A panic while another thread held them; they can be made anew.
+        Err(_) => sources.parse().0,
+    }
+}
+
+/// Sets an option among `named`; an empty value takes it back. False when it is not understood.
+fn set(named: &mut Named, name: &str, value: &str) -> bool {
     if value.is_empty() {
-        set.remove(name);
+        named.remove(name);
         return true;
     }
     let understood = Options::default().set(name, value).is_ok();
     if understood {
-        set.insert(name.to_owned(), value.to_owned());
+        named.insert(name.to_owned(), value.to_owned());
     }
     understood
+}
+
+pub(super) fn set_option(name: &str, value: &str) -> bool {
+    SET.lock().is_ok_and(|mut all| set(&mut all, name, value))
+}
+
+/// An option as a number, for the callers in C; -1 for those they need not know.
+pub(super) fn number(options: &Options, name: &str) -> f64 {
+    match name {
+        "RTV_OFF" => f64::from(u8::from(options.off)),
+        "RTV_POINT_RADIUS" => options.point_radius,
+        "RTV_LINE_RADIUS" => options.line_radius,
+        _ => -1.0,
+    }
 }
 
 impl Handle {
@@ -65,7 +143,22 @@ impl Handle {
             number: NUMBER.fetch_add(1, Ordering::Relaxed),
             poisoned: false,
             answer: CString::default(),
+            own: Named::new(),
+            in_force: InForce::NONE,
+            in_frame: false,
         }
+    }
+
+    pub(super) fn set_option(&mut self, name: &str, value: &str) -> bool {
+        set(&mut self.own, name, value)
+    }
+
+    /// As [`number`], with the options of this frame, or those that a frame begun now would have.
+    pub(super) fn option(&mut self, name: &str) -> f64 {
+        if self.in_frame {
+            return number(self.bridge.options(), name);
+        }
+        number(self.in_force.of(Sources::now(&self.own)).0, name)
     }
 
     /// `text` for the caller, until the next call.
@@ -75,11 +168,12 @@ impl Handle {
     }
 
     pub(super) fn begin(&mut self) -> i32 {
-        let (options, faults) = options();
-        self.bridge.begin(&options);
+        let (options, faults) = self.in_force.of(Sources::now(&self.own));
+        self.bridge.begin(options);
         for fault in faults {
-            self.bridge.warn(fault);
+            self.bridge.warn(fault.clone());
         }
+        self.in_frame = !options.off;
         i32::from(!options.off && !self.poisoned)
     }
 
@@ -103,6 +197,7 @@ impl Handle {
     }
 
     pub(super) fn end(&mut self) {
+        self.in_frame = false;
         let warnings = self.bridge.take_warnings();
         let options = self.bridge.options();
         if !options.quiet {
@@ -145,19 +240,25 @@ pub(super) unsafe fn with<T>(bridge: *mut RtvBridge, otherwise: T, work: impl Fn
     if handle.poisoned {
         return otherwise;
     }
-    match catch_unwind(AssertUnwindSafe(|| work(handle))) {
-        Ok(result) => result,
-        Err(panic) => {
-            handle.poisoned = true;
-            let message = panic
-                .downcast_ref::<&str>()
-                .map(|s| (*s).to_owned())
-                .or_else(|| panic.downcast_ref::<String>().cloned())
-                .unwrap_or_default();
-            to_user_once(&format!("internal error, OpenGL draws from now on; please report it: {message}"));
-            otherwise
-        }
-    }
+    let result = guarded(None, || Some(work(handle)));
+    handle.poisoned |= result.is_none();
+    result.unwrap_or(otherwise)
+}
+
+/// Calls `work`; `otherwise` after a panic, which is told. Everything that C calls is inside this:
+/// a panic that reached C would end the program.
+pub(crate) fn guarded<T>(otherwise: T, work: impl FnOnce() -> T) -> T {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+        let message = panic
+            .downcast_ref::<&str>()
+            .map(|s| (*s).to_owned())
+            .or_else(|| panic.downcast_ref::<String>().cloned())
+            .unwrap_or_default();
+        to_user_once(&format!(
+            "internal error, the program draws without us from now on; please report it: {message}"
+        ));
+        otherwise
+    })
 }
 
 #[cfg(test)]

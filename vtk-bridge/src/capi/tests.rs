@@ -1,7 +1,9 @@
 //! The calls as C makes them, with what foreign code gets wrong.
 
 use super::*;
+use std::ffi::OsStr;
 use std::os::raw::c_void;
+use std::os::unix::ffi::OsStrExt;
 use std::ptr;
 
 fn array<T, const N: usize>(values: &[[T; N]], kind: u32) -> RtvArray {
@@ -188,4 +190,162 @@ fn sizes_that_cannot_be_drawn_are_told_and_left_to_opengl() {
         assert_eq!(rtv_render(bridge, &nan, &mut picture), 0);
         rtv_free(bridge);
     }
+}
+
+/// Runs the test `name` of this file alone in a process of its own with `variables`, and gives what
+/// it said. Variables of this process are shared with other tests.
+fn in_a_process_with(name: &str, variables: &[(&OsStr, &OsStr)]) -> std::process::Output {
+    let mut child = std::process::Command::new(std::env::current_exe().unwrap());
+    child.args(["--exact", &format!("capi::tests::{name}"), "--nocapture", "--test-threads=1"]);
+    child.envs(variables.iter().copied()).env(CHILD, "1");
+    child.output().unwrap()
+}
+
+/// Set in processes that [`in_a_process_with`] starts.
+const CHILD: &str = "VTK_BRIDGE_TEST_CHILD";
+
+#[test]
+fn variables_that_are_not_utf8_are_named_and_do_not_abort_the_program() {
+    if std::env::var_os(CHILD).is_some() {
+        let s = surface(&POINTS, &[[0], [3]], &[[0], [1], [2]]);
+        assert_eq!(frame(&s), (1, 1), "a frame is drawn as ever");
+        // SAFETY: a text that ends with zero.
+        let radius = unsafe { rtv_option(c"RTV_POINT_RADIUS".as_ptr()) };
+        assert_eq!(radius, 0.25, "what can be read beside it holds");
+        assert_eq!(options_of_process().ao, 0);
+        return;
+    }
+    let variables = [
+        (OsStr::new("RTV_AO"), OsStr::from_bytes(b"16\xff")),
+        (OsStr::from_bytes(b"RTV_\xfe"), OsStr::new("1")),
+        (OsStr::new("RTV_POINT_RADIUS"), OsStr::new("0.25")),
+        // Others' variables are none of ours, and folders may have any name.
+        (OsStr::new("OTHER_PROGRAM"), OsStr::from_bytes(b"\xff")),
+        (OsStr::from_bytes(b"OTHER_\xff"), OsStr::new("1")),
+        (OsStr::new("RTV_HOME"), OsStr::from_bytes(b"/home/\xff")),
+    ];
+    let name = "variables_that_are_not_utf8_are_named_and_do_not_abort_the_program";
+    let out = in_a_process_with(name, &variables);
+    let told = String::from_utf8_lossy(&out.stderr).into_owned();
+    assert!(out.status.success(), "{:?}: {told}", out.status);
+    for expected in ["RTV_AO", "RTV_\\xFE"] {
+        let about = |l: &&str| l.starts_with("vtk-bridge:") && l.contains(expected);
+        let lines = told.lines().filter(about).collect::<Vec<_>>();
+        assert!(lines.len() == 1 && lines[0].contains("UTF-8"), "{expected}: {lines:?}\n{told}");
+    }
+    assert!(!told.contains("OTHER_") && !told.contains("RTV_HOME"), "{told}");
+}
+
+/// Two views of a program: what one is told must not reach the other, whatever their threads do.
+#[test]
+fn views_in_two_threads_do_not_mix_their_options() {
+    let together = std::sync::Barrier::new(2);
+    let view = |off: bool, radius: &CStr, expected: f64| {
+        let bridge = rtv_new();
+        // SAFETY: texts end with zero, and this thread alone uses the bridge.
+        let set = |name: &CStr, value: &CStr| unsafe {
+            rtv_set_bridge_option(bridge, name.as_ptr(), value.as_ptr())
+        };
+        let mut found = Vec::new();
+        for _ in 0..50 {
+            together.wait();
+            assert_eq!(set(c"RTV_POINT_RADIUS", radius), 1);
+            assert_eq!(set(c"RTV_OFF", if off { c"1" } else { c"0" }), 1);
+            together.wait();
+            // SAFETY: as above.
+            let seen =
+                unsafe { (rtv_begin(bridge), rtv_bridge_option(bridge, c"RTV_POINT_RADIUS".as_ptr())) };
+            found.push(seen);
+            // SAFETY: as above.
+            unsafe { rtv_end(bridge) };
+            together.wait();
+            set(c"RTV_POINT_RADIUS", c"");
+            set(c"RTV_OFF", c"");
+        }
+        // SAFETY: as above; it is not used afterwards.
+        unsafe { rtv_free(bridge) };
+        found.retain(|seen| *seen != (i32::from(!off), expected));
+        found
+    };
+    let wrong = std::thread::scope(|s| {
+        let other = s.spawn(|| view(true, c"0.75", 0.75));
+        [view(false, c"0.5", 0.5), other.join().unwrap()]
+    });
+    assert!(wrong.iter().all(Vec::is_empty), "views that were not as their options say: {wrong:?}");
+}
+
+/// Blocks of one prop: OpenGL draws the whole prop when one of them is refused.
+#[test]
+fn surfaces_of_a_prop_are_added_all_or_none() {
+    let good = surface(&POINTS, &[[0], [3]], &[[0], [1], [2]]);
+    let null = RtvArray { data: ptr::null(), ..good.points };
+    let bad = RtvSurface { points: null, ..good };
+    let drawn = |given: &[RtvSurface]| {
+        let bridge = rtv_new();
+        let mut picture = NO_PICTURE;
+        // SAFETY: as in `frame`.
+        unsafe {
+            rtv_begin(bridge);
+            let added = rtv_surfaces(bridge, given.as_ptr(), given.len() as u64);
+            assert_eq!(rtv_render(bridge, &view(), &mut picture), 1);
+            let bytes = std::slice::from_raw_parts(picture.opaque, 64);
+            let any = bytes.iter().any(|b| *b != 0);
+            rtv_free(bridge);
+            (added, any)
+        }
+    };
+    assert_eq!(drawn(&[good, good]), (2, true));
+    assert_eq!(drawn(&[good, bad]), (-1, false), "the first must not be drawn alone");
+    assert_eq!(drawn(&[bad, good]), (-1, false));
+    assert_eq!(drawn(&[]), (0, false));
+    // SAFETY: null and impossible numbers are refused.
+    unsafe {
+        let bridge = rtv_new();
+        assert_eq!(rtv_surfaces(bridge, ptr::null(), 1), -1);
+        assert_eq!(rtv_surfaces(bridge, &good, u64::MAX), -1);
+        assert_eq!(rtv_surfaces(ptr::null_mut(), &good, 1), -1);
+        rtv_free(bridge);
+    }
+}
+
+#[test]
+fn a_bridge_s_options_go_over_those_of_the_process_and_hold_for_a_frame() {
+    let (bridge, other) = (rtv_new(), rtv_new());
+    let name = c"RTV_LINE_RADIUS".as_ptr();
+    // SAFETY: texts end with zero, and the bridges are used here alone.
+    unsafe {
+        let set = |value: &CStr| rtv_set_bridge_option(bridge, name, value.as_ptr());
+        assert_eq!((set(c"2.5"), set(c"many")), (1, 0), "what is not understood changes nothing");
+        let radius = |b| rtv_bridge_option(b, name);
+        assert_eq!((radius(bridge), radius(other), rtv_option(name)), (2.5, 0.0, 0.0));
+        assert_eq!(rtv_begin(bridge), 1);
+        assert_eq!(set(c"3.5"), 1);
+        assert_eq!(radius(bridge), 2.5, "a frame keeps the options that it began with");
+        rtv_end(bridge);
+        assert_eq!(radius(bridge), 3.5);
+        assert_eq!((set(c""), radius(bridge)), (1, 0.0));
+        assert_eq!(rtv_bridge_option(bridge, c"RTV_NOTHING".as_ptr()), -1.0);
+        assert_eq!(radius(ptr::null_mut()), -1.0);
+        rtv_free(bridge);
+        rtv_free(other);
+    }
+}
+
+/// A panic that reaches C ends the program that we are a guest of.
+#[test]
+fn every_call_from_c_stops_panics() {
+    // Calls that return a constant, or leave all to one that is looked at.
+    let plain = ["rtv_abi", "rtv_api", "rtv_surface", "vtkGetFactoryCompilerUsed"];
+    let sources = [include_str!("mod.rs"), include_str!("../loader/mod.rs")];
+    let mut seen = 0;
+    for source in sources {
+        for part in source.split("#[unsafe(no_mangle)]").skip(1) {
+            let body = part.split("\n}\n").next().unwrap_or_default();
+            let name = body.split(" fn ").nth(1).and_then(|s| s.split('(').next()).unwrap();
+            let caught = ["with(", "guarded("].iter().any(|g| body.contains(g));
+            assert!(caught || plain.contains(&name), "{name} lets a panic through:\n{body}");
+            seen += 1;
+        }
+    }
+    assert!(seen >= 20, "{seen} calls were found");
 }

@@ -7,6 +7,7 @@
 
 mod process;
 
+use crate::capi::guarded;
 use std::ffi::{CStr, CString, c_void};
 use std::os::raw::c_char;
 use std::path::{Path, PathBuf};
@@ -94,12 +95,15 @@ fn home() -> Option<PathBuf> {
 #[allow(non_snake_case, reason = "VTK's name")]
 #[unsafe(no_mangle)]
 pub extern "C" fn vtkGetFactoryVersion() -> *const c_char {
-    match shim() {
+    match guarded(Err(INTERNAL), shim) {
         // SAFETY: the shim's own function of this signature, which returns a literal.
         Ok(s) => unsafe { (s.version)() },
         Err(reason) => reason.as_ptr(),
     }
 }
+
+/// The answer after a panic, which was told.
+const INTERNAL: &CStr = c"none, because of an internal error of vtk-bridge";
 
 /// The question after the compiler, of VTK before 9.1; the shim is compiled where it runs.
 #[allow(non_snake_case, reason = "VTK's name")]
@@ -112,7 +116,7 @@ pub extern "C" fn vtkGetFactoryCompilerUsed() -> *const c_char {
 #[allow(non_snake_case, reason = "VTK's name")]
 #[unsafe(no_mangle)]
 pub extern "C" fn vtkLoad() -> *mut c_void {
-    match shim() {
+    match guarded(Err(INTERNAL), shim) {
         // SAFETY: the shim's own function of this signature; VTK takes over the factory.
         Ok(s) => unsafe { (s.load)() },
         Err(_) => std::ptr::null_mut(),

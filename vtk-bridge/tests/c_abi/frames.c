@@ -132,7 +132,13 @@ int main(void)
   CHECK(api->set_option("RTV_MATERIAL", "glass") == 1);
   draw(api, bridges[0], 9, 1, 0, 1, &picture);
   CHECK(api->set_option("RTV_MATERIAL", "") == 1 && api->set_option("RTV_AO", "many") == 0);
+  /* Options of one bridge alone. */
+  CHECK(api->set_bridge_option(bridges[0], "RTV_OFF", "1") == 1 && api->begin(bridges[0]) == 0 && api->begin(bridges[1]) == 1);
+  api->end(bridges[1]);
+  CHECK(api->bridge_option(bridges[0], "RTV_OFF") == 1 && api->bridge_option(bridges[1], "RTV_OFF") == 0);
+  CHECK(api->set_bridge_option(bridges[0], "RTV_OFF", "") == 1 && api->set_bridge_option(0, "RTV_OFF", "1") == 0);
   /* Misuse: nothing may happen. */
+  CHECK(api->surfaces(bridges[0], 0, 3) == -1 && api->surfaces(0, 0, 0) == -1);
   api->free_bridge(0);
   CHECK(api->begin(0) == 0 && api->render(0, 0, 0) == 0 && api->surface(bridges[0], 0) == -1);
   api->light(bridges[0], 0);

@@ -7,6 +7,7 @@ use super::introspection::Introspection;
 use super::text::text;
 use crate::anari::status::{Code, Listener, Message, Severity};
 use crate::anari::{data_type::DataType, object::Handle};
+use crate::capi::guarded;
 use std::ffi::{c_char, c_void};
 use std::sync::Arc;
 
@@ -106,7 +107,7 @@ pub unsafe extern "C" fn anari_library_rtv_new_library(
     user: *const c_void,
 ) -> *mut c_void {
     // SAFETY: the loader gives its own arguments, which ANARI defines as `new_library` asks.
-    unsafe { new_library(module, callback, user) }
+    guarded(std::ptr::null_mut(), || unsafe { new_library(module, callback, user) })
 }
 
 unsafe extern "C" fn destroy(_this: This) {
@@ -115,10 +116,17 @@ unsafe extern "C" fn destroy(_this: This) {
 
 unsafe extern "C" fn delete(this: This) {
     // SAFETY: `this` came from `Box::into_raw` in `new_library`, and C++ deletes an object once.
-    drop(unsafe { Box::from_raw(this) });
+    guarded((), || drop(unsafe { Box::from_raw(this) }));
 }
 
 unsafe extern "C" fn new_device(this: This, subtype: *const c_char) -> *mut c_void {
+    // SAFETY: the same arguments.
+    guarded(std::ptr::null_mut(), || unsafe { make_device(this, subtype) })
+}
+
+/// # Safety
+/// As ANARI asks of `anariNewDevice`: a library object of ours, and a string that ends with 0 or null.
+unsafe fn make_device(this: This, subtype: *const c_char) -> *mut c_void {
     // SAFETY: the loader calls with the object that it got from us, which nobody changes.
     let library = unsafe { &*this };
     // SAFETY: ANARI passes a string that ends with 0, or null.
@@ -153,11 +161,11 @@ unsafe extern "C" fn new_initialized_device(
 }
 
 unsafe extern "C" fn device_extensions(_this: This, _subtype: *const c_char) -> *const *const c_char {
-    Introspection::get().extensions()
+    guarded(std::ptr::null(), || Introspection::get().extensions())
 }
 
 unsafe extern "C" fn device_subtypes(_this: This) -> *const *const c_char {
-    Introspection::get().subtypes(DataType::DEVICE)
+    guarded(std::ptr::null(), || Introspection::get().subtypes(DataType::DEVICE))
 }
 
 unsafe extern "C" fn load_module(_this: This, _name: *const c_char) {}

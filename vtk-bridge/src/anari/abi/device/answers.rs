@@ -6,6 +6,7 @@ use crate::anari::abi::text::text;
 use crate::anari::data_type::DataType;
 use crate::anari::device::Property;
 use crate::anari::status::Severity;
+use crate::capi::guarded;
 use std::ffi::{c_char, c_int, c_void};
 
 // ---- Questions ------------------------------------------------------------------------------------------------------
@@ -74,7 +75,7 @@ pub(super) unsafe extern "C" fn get_property(
 }
 
 pub(super) unsafe extern "C" fn object_subtypes(_this: This, kind: u32) -> *const *const c_char {
-    Introspection::get().subtypes(DataType(kind))
+    guarded(std::ptr::null(), || Introspection::get().subtypes(DataType(kind)))
 }
 
 pub(super) unsafe extern "C" fn object_info(
@@ -84,9 +85,11 @@ pub(super) unsafe extern "C" fn object_info(
     info: Name,
     wanted: u32,
 ) -> *const c_void {
-    // SAFETY: strings that end with 0, or null.
-    let (subtype, info) = unsafe { (text(subtype), text(info)) };
-    Introspection::get().object_info(DataType(kind), &subtype, &info, DataType(wanted))
+    guarded(std::ptr::null(), || {
+        // SAFETY: strings that end with 0, or null.
+        let (subtype, info) = unsafe { (text(subtype), text(info)) };
+        Introspection::get().object_info(DataType(kind), &subtype, &info, DataType(wanted))
+    })
 }
 
 pub(super) unsafe extern "C" fn parameter_info(
@@ -98,9 +101,12 @@ pub(super) unsafe extern "C" fn parameter_info(
     info: Name,
     wanted: u32,
 ) -> *const c_void {
-    // SAFETY: strings that end with 0, or null.
-    let (subtype, parameter, info) = unsafe { (text(subtype), text(parameter), text(info)) };
-    Introspection::get().parameter_info(DataType(kind), &subtype, &parameter, &info, DataType(wanted))
+    guarded(std::ptr::null(), || {
+        // SAFETY: strings that end with 0, or null.
+        let (subtype, parameter, info) = unsafe { (text(subtype), text(parameter), text(info)) };
+        let all = Introspection::get();
+        all.parameter_info(DataType(kind), &subtype, &parameter, &info, DataType(wanted))
+    })
 }
 
 // ---- Frames ---------------------------------------------------------------------------------------------------------
