@@ -1,5 +1,6 @@
 #include "rtv_arrays.h"
 
+#include <cmath>
 #include <vtkAbstractMapper.h>
 #include <vtkCellArray.h>
 #include <vtkCellData.h>
@@ -30,14 +31,6 @@ unsigned char* RtvKeep::Bytes(size_t count)
 {
   this->ByteArrays.emplace_back(new unsigned char[count]);
   return this->ByteArrays.back().get();
-}
-
-void RtvKeep::Clear()
-{
-  this->Objects.clear();
-  this->DoubleArrays.clear();
-  this->IdArrays.clear();
-  this->ByteArrays.clear();
 }
 
 namespace
@@ -94,20 +87,31 @@ RtvArray PointArray(vtkDataArray* array, RtvKeep& keep)
   return RtvArray{ copy, static_cast<uint64_t>(array->GetNumberOfTuples()), 3, RTV_F64 };
 }
 
-RtvCells CellsOf(vtkCellArray* cells, uint64_t& key)
+// Cells in any storage of vtkCellArray: since VTK 9.6 cells of one size have offsets that are
+// computed, and both arrays may be of any type. Returns why not, or null.
+const char* CellsOf(
+  vtkCellArray* cells, RtvCells& out, uint64_t& key, RtvKeep& keep, std::string& answer)
 {
+  out = RtvCells{ NoArray, NoArray };
   if (!cells || cells->GetNumberOfCells() == 0)
   {
-    return RtvCells{ NoArray, NoArray };
+    return nullptr;
   }
   vtkDataArray* offsets = cells->GetOffsetsArray();
   vtkDataArray* connectivity = cells->GetConnectivityArray();
-  for (vtkObject* o : { static_cast<vtkObject*>(cells), static_cast<vtkObject*>(offsets), static_cast<vtkObject*>(connectivity) })
+  key = rtvMix(rtvMix(key, static_cast<vtkObject*>(cells)), cells->GetMTime());
+  for (vtkDataArray* array : { offsets, connectivity })
   {
-    key = rtvMix(rtvMix(key, o), o->GetMTime());
+    if (!array || !rtvIds(array, array == offsets ? out.offsets : out.connectivity, keep))
+    {
+      answer = std::string("its cells are numbered by ") +
+        (array ? std::to_string(array->GetNumberOfComponents()) + " x " + array->GetDataTypeAsString() + " of " + array->GetClassName()
+               : std::string("no array"));
+      return answer.c_str();
+    }
+    key = rtvMix(rtvMix(key, static_cast<vtkObject*>(array)), array->GetMTime());
   }
-  const uint32_t kind = cells->IsStorage64Bit() ? RTV_I64 : RTV_I32;
-  return RtvCells{ ArrayOf(offsets, kind), ArrayOf(connectivity, kind) };
+  return nullptr;
 }
 
 uint64_t Mixed(uint64_t key, vtkObject* object)
@@ -117,7 +121,50 @@ uint64_t Mixed(uint64_t key, vtkObject* object)
 }
 }
 
-void rtvAddShape(RtvSurface& s, vtkPolyData* data, bool points, RtvKeep& keep)
+bool rtvIds(vtkDataArray* array, RtvArray& out, RtvKeep& keep)
+{
+  if (array->GetNumberOfComponents() != 1)
+  {
+    return false;
+  }
+  const int type = array->GetDataType();
+  const bool isSigned = type == VTK_INT || type == VTK_LONG || type == VTK_LONG_LONG || type == VTK_ID_TYPE;
+  // The element's own size decides, not what the cells say of their storage.
+  const int bytes = array->GetDataTypeSize();
+  if (isSigned && (bytes == 4 || bytes == 8) && array->HasStandardMemoryLayout())
+  {
+    out = ArrayOf(array, bytes == 8 ? RTV_I64 : RTV_I32);
+    return true;
+  }
+  // Computed ones, other layouts, unsigned and narrow types, and even reals, which VTK takes too.
+  // Doubles hold every number that a point in memory can have; what is none becomes one that no
+  // point has.
+  const vtkIdType count = array->GetNumberOfTuples();
+  int64_t* copy = keep.Ids(count);
+  for (vtkIdType i = 0; i < count; ++i)
+  {
+    const double value = array->GetComponent(i, 0);
+    copy[i] = std::fabs(value) < 9.2e18 ? static_cast<int64_t>(value) : -1;
+  }
+  out = RtvArray{ copy, static_cast<uint64_t>(count), 1, RTV_I64 };
+  return true;
+}
+
+const char* rtvCommit(RtvBridge* bridge, const RtvBatch& batch)
+{
+  std::vector<RtvSurface> all;
+  for (const auto& pending : batch)
+  {
+    all.push_back(pending->Surface);
+    all.back().name = pending->Name.c_str();
+  }
+  return !all.empty() && rtvApi->surfaces(bridge, all.data(), all.size()) < 0
+    ? "its arrays do not fit together (a warning names them)"
+    : nullptr;
+}
+
+const char* rtvAddShape(
+  RtvSurface& s, vtkPolyData* data, bool points, RtvKeep& keep, std::string& answer)
 {
   uint64_t key = 1469598103934665603ull;
   vtkDataArray* coordinates = data->GetPoints()->GetData();
@@ -136,12 +183,17 @@ void rtvAddShape(RtvSurface& s, vtkPolyData* data, bool points, RtvKeep& keep)
     s.verts.connectivity = RtvArray{ ids, static_cast<uint64_t>(count), 1, RTV_I64 };
     s.lines = s.polys = s.strips = RtvCells{ NoArray, NoArray };
     s.shape_key = rtvMix(rtvMix(key, 1), s.point_radius);
-    return;
+    return nullptr;
   }
-  s.verts = CellsOf(data->GetVerts(), key);
-  s.lines = CellsOf(data->GetLines(), key);
-  s.polys = CellsOf(data->GetPolys(), key);
-  s.strips = CellsOf(data->GetStrips(), key);
+  vtkCellArray* const cells[] = { data->GetVerts(), data->GetLines(), data->GetPolys(), data->GetStrips() };
+  RtvCells* const to[] = { &s.verts, &s.lines, &s.polys, &s.strips };
+  for (int i = 0; i < 4; ++i)
+  {
+    if (const char* reason = CellsOf(cells[i], *to[i], key, keep, answer))
+    {
+      return reason;
+    }
+  }
   vtkDataArray* ofPoints = data->GetPointData()->GetNormals();
   vtkDataArray* ofCells = data->GetCellData()->GetNormals();
   s.point_normals = s.property.flat ? NoArray : FloatArray(ofPoints, 3, keep);
@@ -154,6 +206,7 @@ void rtvAddShape(RtvSurface& s, vtkPolyData* data, bool points, RtvKeep& keep)
   key = Mixed(Mixed(Mixed(Mixed(key, s.property.flat ? nullptr : ofPoints), ofCells), texcoords), tangents);
   key = rtvMix(rtvMix(rtvMix(rtvMix(key, s.point_radius), s.line_radius), s.edges_only), s.has_back);
   s.shape_key = key;
+  return nullptr;
 }
 
 void rtvAddColors(RtvBridge* bridge, RtvSurface& s, vtkMapper* mapper, vtkPolyData* data, RtvKeep& keep)
@@ -203,6 +256,9 @@ void rtvAddColors(RtvBridge* bridge, RtvSurface& s, vtkMapper* mapper, vtkPolyDa
     {
       int size[3];
       map->GetDimensions(size);
+      // The mapper lets go of them when the next block is coloured.
+      keep.Object(coordinates);
+      keep.Object(texels);
       s.color_source = RTV_COLOR_MAPPED;
       s.colors = ArrayOf(coordinates, RTV_F32);
       s.map = RtvArray{ texels->GetPointer(0), static_cast<uint64_t>(size[0]), 4, RTV_U8 };
@@ -273,7 +329,8 @@ RtvImage ImageOf(const RtvSurface& s, vtkTexture* texture, RtvKeep& keep)
     texture->GetInputAlgorithm()->Update();
   }
   vtkImageData* image = texture->GetInput();
-  vtkDataArray* scalars = image ? image->GetPointData()->GetScalars() : nullptr;
+  vtkDataArray* const given = image ? image->GetPointData()->GetScalars() : nullptr;
+  vtkDataArray* scalars = given;
   if (!scalars || s.texcoords.kind == RTV_NONE)
   {
     return r;
@@ -282,6 +339,13 @@ RtvImage ImageOf(const RtvSurface& s, vtkTexture* texture, RtvKeep& keep)
   image->GetDimensions(size);
   const bool direct = scalars->GetDataType() == VTK_UNSIGNED_CHAR && texture->GetColorMode() != VTK_COLOR_MODE_MAP_SCALARS;
   const int n = direct ? scalars->GetNumberOfComponents() : 4;
+  if (direct && !scalars->HasStandardMemoryLayout())
+  {
+    auto copy = vtkSmartPointer<vtkUnsignedCharArray>::New();
+    copy->DeepCopy(scalars);
+    keep.Object(copy);
+    scalars = copy;
+  }
   const unsigned char* in = direct ? static_cast<const unsigned char*>(scalars->GetVoidPointer(0))
                                    : texture->MapScalarsToColors(scalars);
   const vtkIdType count = scalars->GetNumberOfTuples();
@@ -289,7 +353,7 @@ RtvImage ImageOf(const RtvSurface& s, vtkTexture* texture, RtvKeep& keep)
   {
     return r;
   }
-  r.key = Mixed(Mixed(Mixed(1469598103934665603ull, image), scalars), texture);
+  r.key = Mixed(Mixed(Mixed(1469598103934665603ull, image), given), texture);
   unsigned char* out = keep.Bytes(4 * count);
   for (vtkIdType i = 0; i < count; ++i)
   {

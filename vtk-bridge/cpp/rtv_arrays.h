@@ -25,7 +25,6 @@ public:
   double* Doubles(size_t count);
   int64_t* Ids(size_t count);
   unsigned char* Bytes(size_t count);
-  void Clear();
 
 private:
   std::vector<vtkSmartPointer<vtkObject>> Objects;
@@ -33,6 +32,24 @@ private:
   std::vector<std::unique_ptr<int64_t[]>> IdArrays;
   std::vector<std::unique_ptr<unsigned char[]>> ByteArrays;
 };
+
+// A surface that is ready for the bridge, with all that its pointers lead to.
+struct RtvPending
+{
+  RtvSurface Surface = {};
+  RtvMaps Maps = {};
+  RtvKeep Keep;
+  std::string Name;
+  std::vector<double> Matrices;
+  std::vector<unsigned char> Colors;
+};
+
+// All surfaces of a prop. They go to the bridge together when nothing in the prop is refused: what
+// is drawn by the bridge and by OpenGL would be blended twice where it is translucent.
+using RtvBatch = std::vector<std::unique_ptr<RtvPending>>;
+
+// Gives a prop's surfaces to the bridge: all, or none. Returns why not, or null.
+const char* rtvCommit(RtvBridge* bridge, const RtvBatch& batch);
 
 // A key of everything that was mixed in (FNV-1a).
 template <class T>
@@ -47,8 +64,13 @@ uint64_t rtvMix(uint64_t key, const T& value)
   return key;
 }
 
-// Points, cells, normals, texture coordinates, and the key of all of them. `points`: every point is a vertex.
-void rtvAddShape(RtvSurface& s, vtkPolyData* data, bool points, RtvKeep& keep);
+// Offsets or point numbers of cells, whatever array they are in: where that lies in memory as whole
+// numbers of 32 or 64 bits itself, else a copy. False when it has other than one component.
+bool rtvIds(vtkDataArray* array, RtvArray& out, RtvKeep& keep);
+// Points, cells, normals, texture coordinates, and the key of all of them. `points`: every point is
+// a vertex. Returns why not, or null; `answer` keeps the text.
+const char* rtvAddShape(
+  RtvSurface& s, vtkPolyData* data, bool points, RtvKeep& keep, std::string& answer);
 // Colours of points, cells or a map, as the mapper makes them; only when the bridge does not have them.
 void rtvAddColors(RtvBridge* bridge, RtvSurface& s, vtkMapper* mapper, vtkPolyData* data, RtvKeep& keep);
 void rtvAddTexture(RtvSurface& s, vtkTexture* texture, RtvKeep& keep);
@@ -59,6 +81,6 @@ const char* rtvTextureReason(vtkTexture* texture);
 // A volume. Returns why not, or null; `answer` keeps the text.
 const char* rtvAddVolume(
   RtvBridge* bridge, vtkVolume* volume, vtkRenderer* renderer, const std::string& name, std::string& answer);
-// Copies of the sources of a glyph mapper. Returns why not, or null.
+// Copies of the sources of a glyph mapper. Returns why not, or null; `answer` keeps the text.
 const char* rtvAddGlyphs(RtvBridge* bridge, vtkActor* actor, vtkGlyph3DMapper* mapper, vtkDataObject* data,
-  const RtvProperty& property, const std::string& name);
+  const RtvProperty& property, const std::string& name, std::string& answer);

@@ -46,12 +46,12 @@ struct Actor
   vtkMapper* Mapper;
   vtkMatrix4x4* Matrix;
   vtkCompositeDataDisplayAttributes* Attributes = nullptr;
-  RtvSurface Surface;
-  RtvKeep Keep;
+  RtvBatch Batch;
   std::string Name;
+  // The text of a reason that is made on the way.
+  std::string Answer;
   double PointRadius, LineRadius;
   bool Edges = false, Points = false;
-  int Traced = 0;
 };
 
 void CopyColor(const double* from, float* to)
@@ -88,7 +88,7 @@ RtvProperty PropertyOf(vtkProperty* p)
 }
 
 // Clipping planes are given in world coordinates; a plane with normal n through o keeps n (M x - o) >= 0.
-void AddClipPlanes(Actor& a)
+void AddClipPlanes(Actor& a, RtvPending& pending)
 {
   vtkPlaneCollection* planes = a.Mapper->GetClippingPlanes();
   const int count = planes ? planes->GetNumberOfItems() : 0;
@@ -96,7 +96,7 @@ void AddClipPlanes(Actor& a)
   {
     return;
   }
-  double* out = a.Keep.Doubles(4 * count);
+  double* out = pending.Keep.Doubles(4 * count);
   for (int i = 0; i < count; ++i)
   {
     vtkPlane* plane = planes->GetItem(i);
@@ -113,14 +113,14 @@ void AddClipPlanes(Actor& a)
       }
     }
   }
-  a.Surface.clip_planes = RtvArray{ out, static_cast<uint64_t>(count), 4, RTV_F64 };
+  pending.Surface.clip_planes = RtvArray{ out, static_cast<uint64_t>(count), 4, RTV_F64 };
   for (int i = 0; i < 4 * count; ++i)
   {
-    a.Surface.shape_key = rtvMix(a.Surface.shape_key, out[i]);
+    pending.Surface.shape_key = rtvMix(pending.Surface.shape_key, out[i]);
   }
 }
 
-// Polygons of one data set to the bridge. Returns why not, or null.
+// Makes the surface of one data set ready for the bridge. Returns why not, or null.
 const char* AddPolyData(Actor& a, vtkPolyData* data, const BlockState& block, const std::string& blockName)
 {
   const bool surface = !a.Edges && !a.Points;
@@ -138,10 +138,11 @@ const char* AddPolyData(Actor& a, vtkPolyData* data, const BlockState& block, co
   {
     return nullptr;
   }
-  RtvSurface& s = a.Surface;
-  s = RtvSurface{};
-  const std::string name = blockName.empty() ? a.Name : a.Name + ", block " + blockName;
-  s.name = name.c_str();
+  a.Batch.emplace_back(new RtvPending);
+  RtvPending& pending = *a.Batch.back();
+  RtvSurface& s = pending.Surface;
+  RtvKeep& keep = pending.Keep;
+  pending.Name = blockName.empty() ? a.Name : a.Name + ", block " + blockName;
   s.property = PropertyOf(a.Prop->GetProperty());
   s.property.opacity = static_cast<float>(block.Opacity);
   if (block.HasColor)
@@ -162,11 +163,14 @@ const char* AddPolyData(Actor& a, vtkPolyData* data, const BlockState& block, co
   s.point_radius = a.PointRadius;
   s.line_radius = a.LineRadius;
   s.edges_only = a.Edges ? 1 : 0;
-  rtvAddShape(s, data, a.Points, a.Keep);
-  AddClipPlanes(a);
+  if (const char* reason = rtvAddShape(s, data, a.Points, keep, a.Answer))
+  {
+    return reason;
+  }
+  AddClipPlanes(a, pending);
   if (!block.HasColor)
   {
-    rtvAddColors(a.Bridge, s, a.Mapper, data, a.Keep);
+    rtvAddColors(a.Bridge, s, a.Mapper, data, keep);
   }
   if (s.has_back && s.color_source != RTV_COLOR_PROPERTY)
   {
@@ -190,16 +194,13 @@ const char* AddPolyData(Actor& a, vtkPolyData* data, const BlockState& block, co
     {
       return "it has a texture and colours";
     }
-    rtvAddTexture(s, texture, a.Keep);
+    rtvAddTexture(s, texture, keep);
   }
-  RtvMaps maps;
-  s.maps = rtvMapsOf(s, a.Prop->GetProperty(), maps, a.Keep);
+  s.maps = rtvMapsOf(s, a.Prop->GetProperty(), pending.Maps, keep);
   if (s.maps && s.has_back)
   {
     return "textures of the property on a surface whose backs have a property of their own";
   }
-  a.Traced += rtvApi->surface(a.Bridge, &s) > 0 ? 1 : 0;
-  a.Keep.Clear();
   return nullptr;
 }
 
@@ -406,8 +407,8 @@ bool RtvExtractor::Add(RtvBridge* bridge, vtkRenderer* renderer, vtkProp* prop, 
 {
   Actor a;
   a.Bridge = bridge;
-  a.PointRadius = rtvApi->option("RTV_POINT_RADIUS");
-  a.LineRadius = rtvApi->option("RTV_LINE_RADIUS");
+  a.PointRadius = rtvApi->bridge_option(bridge, "RTV_POINT_RADIUS");
+  a.LineRadius = rtvApi->bridge_option(bridge, "RTV_LINE_RADIUS");
   a.Name = std::string(prop->GetClassName()) + " " + std::to_string(number);
   auto pass = [&](const char* reason) {
     rtvApi->pass(bridge, a.Name.c_str(), reason);
@@ -452,7 +453,7 @@ bool RtvExtractor::Add(RtvBridge* bridge, vtkRenderer* renderer, vtkProp* prop, 
   }
   if (auto glyphs = vtkGlyph3DMapper::SafeDownCast(a.Mapper))
   {
-    const char* reason = rtvAddGlyphs(bridge, a.Prop, glyphs, data, PropertyOf(a.Prop->GetProperty()), a.Name);
+    const char* reason = rtvAddGlyphs(bridge, a.Prop, glyphs, data, PropertyOf(a.Prop->GetProperty()), a.Name, a.Answer);
     return reason ? pass(reason) : true;
   }
   vtkDataSet* set = vtkDataSet::SafeDownCast(data);
@@ -462,15 +463,8 @@ bool RtvExtractor::Add(RtvBridge* bridge, vtkRenderer* renderer, vtkProp* prop, 
   }
   BlockState root;
   root.Opacity = a.Prop->GetProperty()->GetOpacity();
+  // All blocks are looked at before one is given away.
   const char* reason = AddTree(a, data, root, "");
-  if (reason && a.Traced > 0)
-  {
-    // Some blocks are traced already; OpenGL draws all of them again at the same depth, which shows the same picture.
-    return pass(reason);
-  }
-  if (reason)
-  {
-    return pass(reason);
-  }
-  return true;
+  reason = reason ? reason : rtvCommit(bridge, a.Batch);
+  return reason ? pass(reason) : true;
 }

@@ -142,7 +142,7 @@ size_t SourceOf(vtkDataArray* index, vtkIdType i, size_t count)
   return value >= static_cast<double>(count) ? count - 1 : static_cast<size_t>(value);
 }
 
-const char* AddGlyphsOf(RtvBridge* bridge, vtkActor* actor, vtkGlyph3DMapper* mapper, vtkDataSet* data,
+const char* AddGlyphsOf(RtvBatch& batch, std::string& answer, vtkActor* actor, vtkGlyph3DMapper* mapper, vtkDataSet* data,
   const std::vector<vtkPolyData*>& sources, const RtvProperty& property, const std::string& name)
 {
   vtkDataArray* scales = InputArray(mapper, vtkGlyph3DMapper::SCALE, data);
@@ -197,31 +197,33 @@ const char* AddGlyphsOf(RtvBridge* bridge, vtkActor* actor, vtkGlyph3DMapper* ma
 
   for (size_t which = 0; which < sources.size(); ++which)
   {
-    const std::vector<double>& matrices = matricesOf[which];
-    const std::vector<unsigned char>& rgba = rgbaOf[which];
-    if (matrices.empty())
+    if (matricesOf[which].empty())
     {
       continue;
     }
-    RtvKeep keep;
-    RtvSurface s = {};
-    const std::string part = sources.size() > 1 ? name + ", source " + std::to_string(which) : name;
-    s.name = part.c_str();
+    batch.emplace_back(new RtvPending);
+    RtvPending& pending = *batch.back();
+    const std::vector<double>& matrices = pending.Matrices = std::move(matricesOf[which]);
+    const std::vector<unsigned char>& rgba = pending.Colors = std::move(rgbaOf[which]);
+    RtvSurface& s = pending.Surface;
+    pending.Name = sources.size() > 1 ? name + ", source " + std::to_string(which) : name;
     s.property = property;
     const double* m = &actor->GetMatrix()->Element[0][0];
     std::copy(m, m + 16, s.world_from_data);
-    rtvAddShape(s, sources[which], false, keep);
+    if (const char* reason = rtvAddShape(s, sources[which], false, pending.Keep, answer))
+    {
+      return reason;
+    }
     s.glyph_matrices = RtvArray{ matrices.data(), matrices.size() / 16, 16, RTV_F64 };
     s.glyph_colors =
       rgba.empty() ? RtvArray{ nullptr, 0, 0, RTV_NONE } : RtvArray{ rgba.data(), rgba.size() / 4, 4, RTV_U8 };
-    rtvApi->surface(bridge, &s);
   }
   return nullptr;
 }
 }
 
 const char* rtvAddGlyphs(RtvBridge* bridge, vtkActor* actor, vtkGlyph3DMapper* mapper, vtkDataObject* input,
-  const RtvProperty& property, const std::string& name)
+  const RtvProperty& property, const std::string& name, std::string& answer)
 {
   if (mapper->GetUseSourceTableTree())
   {
@@ -236,9 +238,11 @@ const char* rtvAddGlyphs(RtvBridge* bridge, vtkActor* actor, vtkGlyph3DMapper* m
   {
     return reason;
   }
+  RtvBatch batch;
   if (auto data = vtkDataSet::SafeDownCast(input))
   {
-    return AddGlyphsOf(bridge, actor, mapper, data, sources, property, name);
+    const char* reason = AddGlyphsOf(batch, answer, actor, mapper, data, sources, property, name);
+    return reason ? reason : rtvCommit(bridge, batch);
   }
   auto composite = vtkCompositeDataSet::SafeDownCast(input);
   vtkCompositeDataDisplayAttributes* blocks = mapper->GetBlockAttributes();
@@ -251,7 +255,8 @@ const char* rtvAddGlyphs(RtvBridge* bridge, vtkActor* actor, vtkGlyph3DMapper* m
   for (it->InitTraversal(); !it->IsDoneWithTraversal() && !reason; it->GoToNextItem())
   {
     auto leaf = vtkDataSet::SafeDownCast(it->GetCurrentDataObject());
-    reason = leaf ? AddGlyphsOf(bridge, actor, mapper, leaf, sources, property, name) : "glyphs on data without points";
+    reason = leaf ? AddGlyphsOf(batch, answer, actor, mapper, leaf, sources, property, name)
+                  : "glyphs on data without points";
   }
-  return reason;
+  return reason ? reason : rtvCommit(bridge, batch);
 }

@@ -86,6 +86,9 @@ class Extractor:
             data = self._surface_of(mapper, data)
         attributes = mapper.GetCompositeDataDisplayAttributes() if hasattr(mapper, "GetCompositeDataDisplayAttributes") else None
         start = dict(opacity=prop.GetProperty().GetOpacity(), color=None, visible=True)
+        # All blocks are looked at before one is given away: what the library and OpenGL both draw
+        # would be blended twice where it is translucent.
+        batch = []
         representation = prop.GetProperty().GetRepresentation()
         blocks = list(_leaves(data, attributes, start, ""))
         for block, _, _ in blocks:
@@ -93,7 +96,23 @@ class Extractor:
         for block, state, block_name in blocks:
             alone = data is block and not attributes
             if block.GetNumberOfPoints() > 0 and (block.GetNumberOfCells() > 0 or representation == POINTS):
-                self._add_block(prop, mapper, block, state, f"{name}, block {block_name}" if block_name else name, alone)
+                shown_as = f"{name}, block {block_name}" if block_name else name
+                batch.append(self._block(prop, mapper, block, state, shown_as, alone))
+        self._commit(batch)
+        for s, keep, shown in batch:
+            if shown is not None:
+                self._used.add(prop.__this__)
+                self._plain[prop.__this__] = self._times(prop, mapper, shown), s, keep
+
+    def _commit(self, batch):
+        """Gives a prop's surfaces (the first of each entry) to the library: all, or none."""
+        if not batch:
+            return
+        surfaces = (rtv.Surface * len(batch))(*(entry[0] for entry in batch))
+        if self._bridge.surfaces(surfaces, len(batch)) < 0:
+            raise Untraceable("its arrays do not fit together (a warning names them)")
+        for s, *_ in batch:
+            self._shapes.given(s.shape_key)
 
     def _add_again(self, actor, mapper, name):
         """Gives what was given in the frame before when nothing but the actor's place may have changed. False when more did."""
@@ -110,7 +129,7 @@ class Extractor:
         self._used.update((actor.__this__, actor.GetProperty().__this__))
         s.name = name.encode()
         s.world_from_data[:] = actor.GetMatrix().GetData()
-        self._bridge.surface(C.byref(s))
+        self._commit([(s,)])
         return True
 
     def _times(self, actor, mapper, data):
@@ -148,16 +167,20 @@ class Extractor:
         sources = sources_of(mapper, data)
         leaves = leaves_of(mapper, data)
         copies = [c for leaf in leaves for c in self._glyphs.of(mapper, leaf, len(sources))]
+        batch = []
         for which, matrices, rgba in copies:
             s, _ = self._start(actor, f"{name}, source {which}" if len(sources) > 1 else name)
             keep = []
+            batch.append((s, keep))
             self._shapes.add(s, sources[which], False, None, keep)
             s.glyph_matrices = rtv.Array(matrices.ctypes.data, len(matrices), 16, rtv.F64)
             if rgba is not None:
                 s.glyph_colors = rtv.Array.of(rgba)
-            self._bridge.surface(C.byref(s))
+        self._commit(batch)
 
-    def _add_block(self, actor, mapper, data, state, name, alone):
+    def _block(self, actor, mapper, data, state, name, alone):
+        """A block's surface, the arrays that it needs, and its data when the next frame may give
+        the surface again as it is."""
         representation = actor.GetProperty().GetRepresentation()
         keep = []
         s, matrix = self._start(actor, name)
@@ -194,11 +217,11 @@ class Extractor:
             if s.has_back:
                 raise Untraceable("textures of the property on a surface whose backs have a property of their own")
             s.maps = C.pointer(maps)
-        self._bridge.surface(C.byref(s))
-        arrays_given = s.colors.kind or any(cells.offsets.kind for cells in (s.verts, s.lines, s.polys, s.strips))
-        if alone and planes is None and texture is None and maps is None and back is None and not arrays_given and mapper.GetInputDataObject(0, 0) is data:
-            self._used.add(actor.__this__)
-            self._plain[actor.__this__] = self._times(actor, mapper, data), s, keep
+        cells_given = any(c.offsets.kind for c in (s.verts, s.lines, s.polys, s.strips))
+        plain = all(part is None for part in (planes, texture, maps, back))
+        again = alone and plain and not s.colors.kind and not cells_given
+        again = again and mapper.GetInputDataObject(0, 0) is data
+        return s, keep, data if again else None
 
 
 def _add_back(surface, own):

@@ -21,21 +21,28 @@ class Shapes:
     """What the library has: keys of this frame and of the one before."""
 
     def __init__(self):
-        self._known, self._added = {}, {}
+        # `_ready`: filled in for a surface that may yet be refused.
+        self._known, self._added, self._ready = {}, {}, {}
+
+    def given(self, key):
+        """The library has got a surface with the shape of this key."""
+        if key in self._ready:
+            self._added[key] = self._ready[key]
 
     def frame_drawn(self):
         """The library forgets what a frame that it draws does not use."""
-        self._known, self._added = self._added, {}
+        self._known, self._added, self._ready = self._added, {}, {}
 
     def frame_not_drawn(self):
         self._known.update(self._added)
-        self._added = {}
+        self._added, self._ready = {}, {}
 
     def again(self, key):
-        """True when the library has the shape of this key, which is used once more."""
-        if key in self._known:
-            self._added[key] = self._known[key]
-        return key in self._added
+        """True when the library has the shape of this key, so that the key alone will do."""
+        found = self._added if key in self._added else self._known
+        if key in found:
+            self._ready[key] = found[key]
+        return key in found
 
     def add(self, surface, data, as_points, planes, keep):
         """Fills in the shape. Returns the cells that the given ones became (`None`: as they are), for colours of cells."""
@@ -60,14 +67,14 @@ class Shapes:
         if self.again(key):
             # Only how many points there are matters now.
             surface.points = rtv.Array.of(_some_memory(points.GetNumberOfPoints(), keep))
-            return self._added[key]
+            return self._ready[key]
         xyz = numbers(coordinates, _REAL, keep).reshape(-1, 3)
         surface.points = rtv.Array.of(xyz)
         if as_points:
             ids = np.arange(points.GetNumberOfPoints() + 1, dtype=np.int64)
             keep.append(ids)
             surface.verts = rtv.Cells(rtv.Array.of(ids), rtv.Array.of(ids[:-1]))
-            self._added[key] = None
+            self._ready[key] = None
             return None
         runs = [_runs(c, keep) for c in all_cells]
         # As tubes, polygons have their own edges and no others.
@@ -81,7 +88,7 @@ class Shapes:
         surface.point_normals, surface.texcoords = floats(of_points, 3, keep), floats(texcoords, 2, keep)
         surface.cell_normals = floats(of_cells, 3, keep, cell_map)
         surface.tangents = floats(tangents, 3, keep)
-        self._added[key] = cell_map
+        self._ready[key] = cell_map
         return cell_map
 
 
@@ -99,8 +106,7 @@ def _runs(array, keep):
         connectivity = vtk_to_numpy(array.GetConnectivityArray())
         if hasattr(array, "IsStorageFixedSize") and array.IsStorageFixedSize():
             # Cells of one size have no offsets in memory (VTK 9.6 and later).
-            size = array.GetCellSize(0)
-            offsets = np.arange(0, size * array.GetNumberOfCells() + 1, size, dtype=connectivity.dtype)
+            offsets = np.arange(array.GetNumberOfCells() + 1, dtype=np.int64) * array.GetCellSize(0)
         else:
             offsets = vtk_to_numpy(array.GetOffsetsArray())
         if offsets.dtype not in _WHOLE or connectivity.dtype not in _WHOLE:

@@ -4,6 +4,7 @@
 //! say so and pass, unless `RTSV_REQUIRE_PEERS` is set. The pictures stay in `target/tmp/pictures`.
 
 mod capture;
+mod cells;
 mod compare;
 mod effects;
 mod gui;
