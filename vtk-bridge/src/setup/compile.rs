@@ -2,6 +2,8 @@
 
 use super::headers::Flavour;
 use super::{SetupError, io};
+use rayon::prelude::*;
+use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -92,17 +94,38 @@ fn library(
     fs::create_dir_all(folder).map_err(io(folder, "make the folder"))?;
     // Beside, then renamed: a program that is running keeps the old file.
     let beside = out.with_extension("so.new");
-    let compiler = std::env::var("CXX").ok().filter(|c| !c.is_empty()).unwrap_or_else(|| "g++".to_owned());
+    let compiler = compiler();
+    let objects: Vec<PathBuf> =
+        files.iter().map(|f| folder.join(f.file_name().unwrap_or_default()).with_extension("o")).collect();
+    let compile = |file: &PathBuf, object: &PathBuf| {
+        let mut command = Command::new(&compiler);
+        command.args(["-std=c++17", "-O2", "-fPIC", "-fvisibility=hidden", "-w", "-c", "-I"]);
+        command.arg(headers).arg("-isystem").arg(&flavour.include);
+        command.arg(file).arg("-o").arg(object);
+        run(&mut command, &compiler.to_string_lossy(), what.clone(), "apt-get install g++")
+    };
+    let made: Vec<_> = files.par_iter().zip(&objects).map(|(f, o)| compile(f, o)).collect();
+    // The first error in the order of the files.
+    let made: Result<(), SetupError> = made.into_iter().collect();
     let mut command = Command::new(&compiler);
-    command.args(["-std=c++17", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-w"]);
-    command.arg("-I").arg(headers).arg("-isystem").arg(&flavour.include).arg("-o").arg(&beside).args(files);
+    command.args(["-shared", "-o"]).arg(&beside).args(&objects);
     // Libraries of VTK need others of it, which the process has already.
     // Never unloaded: VTK deletes our factory when the process ends, after ParaView has closed its plugins.
     command.args(["-Wl,--allow-shlib-undefined", "-Wl,-z,nodelete"]);
     command.args(modules.iter().filter_map(|m| flavour.library(m)));
     command.args(["-lGL", "-ldl"]);
-    run(&mut command, &compiler, what, "apt-get install g++")?;
+    let mut link = || run(&mut command, &compiler.to_string_lossy(), what.clone(), "apt-get install g++");
+    let linked = made.and_then(|()| link());
+    for object in &objects {
+        let _ = fs::remove_file(object);
+    }
+    linked?;
     fs::rename(&beside, out).map_err(io(out, "put in place"))
+}
+
+/// The C++ compiler: `CXX`, a path of any name, or g++.
+pub(crate) fn compiler() -> OsString {
+    std::env::var_os("CXX").filter(|c| !c.is_empty()).unwrap_or_else(|| "g++".into())
 }
 
 /// Runs a build command; its last lines are part of the error.

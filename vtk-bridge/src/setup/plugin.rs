@@ -41,7 +41,7 @@ pub fn install(layout: &Layout, flavour: &Flavour) -> Result<PathBuf, SetupError
     let out = folder.join(FILE);
     // Beside the folder: ParaView tries to load whatever library lies in it.
     let beside = layout.prefix().join("VtkBridge.so.new");
-    let compiler = std::env::var("CXX").ok().filter(|c| !c.is_empty()).unwrap_or_else(|| "g++".to_owned());
+    let compiler = compile::compiler();
     let mut command = Command::new(&compiler);
     command.args(["-std=c++17", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-w"]);
     command.arg(format!("-DRTV_FLAVOUR=\"{}\"", flavour.name));
@@ -54,7 +54,7 @@ pub fn install(layout: &Layout, flavour: &Flavour) -> Result<PathBuf, SetupError
         .args(MODULES.iter().filter_map(|m| flavour.library(m)))
         .arg("-ldl");
     let what = format!("the plugin for ParaView {}", flavour.name.trim_start_matches("pv"));
-    compile::run(&mut command, &compiler, what, "apt-get install g++")?;
+    compile::run(&mut command, &compiler.to_string_lossy(), what, "apt-get install g++")?;
     fs::rename(&beside, &out).map_err(io(&out, "put in place"))?;
     Ok(out)
 }
