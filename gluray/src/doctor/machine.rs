@@ -72,9 +72,8 @@ pub fn look(library: Option<PathBuf>) -> Machine {
     let display = get("DISPLAY");
     let mut variables: Vec<(String, String)> =
         MATTER.iter().filter_map(|n| Some(((*n).to_owned(), get(n)?))).collect();
-    variables.extend(
-        texts().filter(|(n, v)| n.starts_with("GLURAY_") && !n.ends_with("SECRET") && !v.is_empty()),
-    );
+    variables
+        .extend(texts().filter(|(n, v)| n.starts_with("GLURAY_") && !n.ends_with("SECRET") && !v.is_empty()));
     Machine {
         library,
         lib_gl: find("libGL.so.1"),
