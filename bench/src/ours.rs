@@ -93,6 +93,9 @@ impl View<'_> {
     }
 }
 
+/// What every caller of a [`Tracer`] gives.
+const ONE_EACH: &str = "one block of answers for each of rays";
+
 impl Tracer for View<'_> {
     fn name(&self) -> String {
         format!("{}, {}", self.ours.name(), self.mode.name())
@@ -101,8 +104,8 @@ impl Tracer for View<'_> {
     fn closest(&self, rays: &[RayBlock], hits: &mut [HitBlock]) {
         let world = &self.ours.world;
         self.shifted(rays, |rays| match self.mode {
-            Mode::Coherent => world.closest_coherent(rays, hits),
-            Mode::Incoherent => world.closest_incoherent(rays, hits),
+            Mode::Coherent => world.closest_coherent(rays, hits).expect(ONE_EACH),
+            Mode::Incoherent => world.closest_incoherent(rays, hits).expect(ONE_EACH),
             Mode::Single => {
                 for (r, h) in rays.iter().zip(hits) {
                     for l in 0..LANES {
@@ -116,8 +119,8 @@ impl Tracer for View<'_> {
     fn occluded(&self, rays: &[RayBlock], masks: &mut [u16]) {
         let world = &self.ours.world;
         self.shifted(rays, |rays| match self.mode {
-            Mode::Coherent => world.occluded_coherent(rays, masks),
-            Mode::Incoherent => world.occluded_incoherent(rays, masks),
+            Mode::Coherent => world.occluded_coherent(rays, masks).expect(ONE_EACH),
+            Mode::Incoherent => world.occluded_incoherent(rays, masks).expect(ONE_EACH),
             Mode::Single => {
                 for (r, m) in rays.iter().zip(masks) {
                     *m = (0..LANES).fold(0, |m, l| m | u16::from(world.occluded(&r.get(l))) << l);

@@ -5,7 +5,9 @@
 mod common;
 
 use criterion::{Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
-use rt_core::accel::{BuildOptions, BuildQuality, World};
+use rt_core::accel::{BuildOptions, BuildQuality, Geometry, Instance, World};
+use rt_core::glam::DAffine3;
+use rt_core::mesh::TriMesh;
 use std::hint::black_box;
 use std::sync::Arc;
 
@@ -45,5 +47,28 @@ fn refit(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, build, refit);
+/// Worlds of many geometries: a thousand small ones, each less than a task of its own, and the same beside a large one.
+fn many(c: &mut Criterion) {
+    let small: Vec<Arc<TriMesh>> = (0..1000).map(|k| Arc::new(common::bumpy(k))).collect();
+    let mut with_large = small.clone();
+    with_large.insert(500, Arc::new(common::shells()));
+    let mut group = c.benchmark_group("many geometries");
+    group.sample_size(10).sampling_mode(SamplingMode::Flat);
+    for (name, meshes) in [("1000 small", small), ("1000 small and a large one", with_large)] {
+        let triangles: usize = meshes.iter().map(|m| m.num_triangles()).sum();
+        group.throughput(Throughput::Elements(triangles as u64));
+        let geometries: Vec<Geometry> = meshes.into_iter().map(Geometry::Mesh).collect();
+        let place = |geometry| Instance { geometry, world_from_object: DAffine3::IDENTITY };
+        let instances: Vec<Instance> = (0..geometries.len()).map(place).collect();
+        group.bench_function(name, |b| {
+            b.iter(|| {
+                World::build(geometries.clone(), instances.clone(), &BuildOptions::default())
+                    .expect("sound meshes")
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, build, many, refit);
 criterion_main!(benches);

@@ -42,7 +42,7 @@ fn trace(c: &mut Criterion) {
         let mut masks = vec![0; occlusion.len()];
         group.throughput(Throughput::Elements((primary.len() * LANES) as u64));
         group.bench_function("primary, packets", |b| {
-            b.iter(|| world.closest_coherent(black_box(&primary), &mut hits));
+            b.iter(|| world.closest_coherent(black_box(&primary), &mut hits).expect("one each"));
         });
         group.bench_function("primary, single rays", |b| {
             b.iter(|| {
@@ -55,11 +55,12 @@ fn trace(c: &mut Criterion) {
         });
         group.throughput(Throughput::Elements(points.len() as u64));
         group.bench_function("shadow, packets", |b| {
-            b.iter(|| world.occluded_coherent(black_box(&shadow), &mut masks[..shadow.len()]));
+            let masks = &mut masks[..shadow.len()];
+            b.iter(|| world.occluded_coherent(black_box(&shadow), masks).expect("one each"));
         });
         group.throughput(Throughput::Elements(8 * points.len() as u64));
         group.bench_function("ambient occlusion, streams", |b| {
-            b.iter(|| world.occluded_incoherent(black_box(&occlusion), &mut masks));
+            b.iter(|| world.occluded_incoherent(black_box(&occlusion), &mut masks).expect("one each"));
         });
         group.finish();
     }

@@ -79,7 +79,7 @@ fn main() {
     let mut hits = vec![HitBlock::MISS; blocks.len()];
     let alone = best(rounds, || {
         for (r, h) in blocks.chunks(64).zip(hits.chunks_mut(64)) {
-            world.closest_coherent(r, h);
+            world.closest_coherent(r, h).expect("as many hits as rays");
         }
     });
     println!(
@@ -121,7 +121,7 @@ fn main() {
     scene.lights = vec![Light::point(DVec3::new(3.0, 2.0, 4.0)), Light::ambient([0.3; 3])];
     row("point light, no shadows", &scene, RenderOptions { effects: Some(Effects::NONE), ..options.clone() });
     row("+ shadows", &scene, options.clone());
-    scene.lights[0] = scene.lights[0].with_size(0.5);
+    scene.lights[0] = scene.lights[0].with_size(0.5).expect("a light with a size");
     row("+ soft shadows, 4 rays", &scene, options.clone());
     scene.ambient_occlusion = Some(AmbientOcclusion { distance: 1.0, rays: 8 });
     row("+ ambient occlusion, 8 rays", &scene, options.clone());

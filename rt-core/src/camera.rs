@@ -240,6 +240,15 @@ impl Camera {
         Camera { depth_range, ..self }
     }
 
+    /// Checks what was set without a check.
+    pub(crate) fn check(&self) -> Result<(), CameraError> {
+        let ends = self.depth_range;
+        for (field, end) in [("depth_range[0]", ends[0]), ("depth_range[1]", ends[1])] {
+            in_range(field, end, end.is_finite(), "finite (OpenGL's are 0 to 1)")?;
+        }
+        Ok(())
+    }
+
     /// Whether surfaces before the near plane and behind the far plane are cut away, as OpenGL does (default: yes).
     pub fn with_near_far_clipping(self, near_far_clipping: bool) -> Camera {
         Camera { near_far_clipping, ..self }

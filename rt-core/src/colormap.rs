@@ -28,6 +28,27 @@ impl ColorMap {
         ColorMap { colors, range, log: false, nan_color: [1.0, 0.0, 1.0, 1.0] }
     }
 
+    /// Checks the numbers; the error names the field, its value and what it must be.
+    pub(crate) fn check(&self) -> Result<(), (&'static str, String, &'static str)> {
+        if self.colors.is_empty() {
+            return Err(("color map", "without colours".into(), "one with at least one colour"));
+        }
+        let broken =
+            self.colors.iter().chain([&self.nan_color]).position(|c| !c.iter().all(|v| v.is_finite()));
+        if let Some(i) = broken {
+            let (field, c) = match self.colors.get(i) {
+                Some(c) => ("color map", c),
+                None => ("color map's nan_color", &self.nan_color),
+            };
+            return Err((field, format!("{c:?} at place {i}"), "finite in every channel"));
+        }
+        if self.range.iter().all(|r| if self.log { *r > 0.0 } else { !r.is_nan() }) {
+            return Ok(());
+        }
+        let rule = "two numbers and, for a logarithmic map, positive ones";
+        Err(("color map's range", format!("{:?}", self.range), rule))
+    }
+
     /// Colour of `scalar`.
     #[inline]
     pub fn lookup(&self, scalar: f32) -> Rgba {

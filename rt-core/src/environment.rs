@@ -59,8 +59,87 @@ impl Environment {
         match self {
             Environment::Constant(c) => *c == [0.0; 3],
             Environment::Gradient { bottom, top, .. } => *bottom == [0.0; 3] && *top == [0.0; 3],
-            Environment::Image { image, scale, .. } => {
-                *scale == 0.0 || image.texels().iter().all(|t| t[..3] == [0.0; 3])
+            Environment::Image { image, scale, .. } => *scale == 0.0 || image.is_black(),
+        }
+    }
+}
+
+/// Lengths of `up` that count as 1: an f32 vector that was normalised is within 1e-7, and one written
+/// with four digits within 1e-4. The radiance is off by no more.
+const UNIT: std::ops::RangeInclusive<f32> = 0.999..=1.001;
+
+impl Environment {
+    /// Checks the numbers; the error names the field, its value and what it must be.
+    pub(crate) fn check(&self) -> Result<(), (&'static str, String, &'static str)> {
+        let light = |field, c: [f32; 3]| {
+            let ok = c.iter().all(|v| v.is_finite() && *v >= 0.0);
+            if ok { Ok(()) } else { Err((field, format!("{c:?}"), FINITE_LIGHT)) }
+        };
+        // Every other direction is measured from `up` alone: what stands across it is chosen, so no
+        // unit vector is parallel to anything.
+        let upright = |up: Vec3| {
+            let ok = up.is_finite() && UNIT.contains(&crate::surface::length(up));
+            if ok { Ok(()) } else { Err(("up", up.to_string(), "of unit length: normalise it")) }
+        };
+        match self {
+            Environment::Constant(c) => light("radiance", *c),
+            Environment::Gradient { bottom, top, up } => {
+                light("bottom", *bottom)?;
+                light("top", *top)?;
+                upright(*up)
+            }
+            Environment::Image { image, up, scale } => {
+                upright(*up)?;
+                if !(scale.is_finite() && *scale >= 0.0) {
+                    return Err(("scale", scale.to_string(), "finite and not negative"));
+                }
+                texels("image", image)?;
+                match image.negative_texel() {
+                    None => Ok(()),
+                    Some([x, y]) => Err(("image", texel_in_words(image, x, y), FINITE_LIGHT)),
+                }
+            }
+        }
+    }
+}
+
+const FINITE_LIGHT: &str = "finite and not negative in every channel";
+
+/// Checks the texels of a picture.
+pub(crate) fn texels(
+    field: &'static str,
+    image: &Texture,
+) -> Result<(), (&'static str, String, &'static str)> {
+    match image.unusable_texel() {
+        None => Ok(()),
+        Some([x, y]) => {
+            let rule = "finite in every channel: replace such texels, by black for example";
+            Err((field, texel_in_words(image, x, y), rule))
+        }
+    }
+}
+
+fn texel_in_words(image: &Texture, x: usize, y: usize) -> String {
+    format!("{:?} at texel ({x}, {y})", image.texels()[y * image.size()[0] + x])
+}
+
+impl Background {
+    /// Checks the numbers, as [`Environment::check`].
+    pub(crate) fn check(&self) -> Result<(), (&'static str, String, &'static str)> {
+        let finite = |field, c: &[f32]| {
+            let ok = c.iter().all(|v| v.is_finite() && *v >= 0.0);
+            if ok { Ok(()) } else { Err((field, format!("{c:?}"), FINITE_LIGHT)) }
+        };
+        match self {
+            Background::Transparent | Background::Environment => Ok(()),
+            Background::Constant(c) => {
+                finite("color", &c[..3])?;
+                let ok = (0.0..=1.0).contains(&c[3]);
+                if ok { Ok(()) } else { Err(("alpha", c[3].to_string(), "between 0 and 1")) }
+            }
+            Background::Gradient { bottom, top } => {
+                finite("bottom", bottom)?;
+                finite("top", top)
             }
         }
     }

@@ -116,6 +116,23 @@ pub struct Light {
     pub shadows: bool,
 }
 
+/// Why a light cannot be given a size.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum NoSize {
+    /// It comes from everywhere.
+    #[error("ambient light has no size: it comes from everywhere; leave the size out")]
+    Ambient,
+    /// It comes from the tip.
+    #[error(
+        "a cone light has no size: its light comes from its tip; take LightKind::Ring for a disk that shines within a cone, \
+         or LightKind::Spot, which has a radius"
+    )]
+    Cone,
+    /// Its edges have no length that could be changed.
+    #[error("a quadrangle light whose edges are zero, NaN or infinite cannot be given a size; give it edges")]
+    Quad,
+}
+
 impl Light {
     fn new(kind: LightKind) -> Light {
         Light {
@@ -171,9 +188,13 @@ impl Light {
         Light { color, ..self }
     }
 
-    /// The same light with a size: radius in world units, or for directional light the angular radius in radians. Cones and quadrangles stay as they are.
-    #[must_use]
-    pub fn with_size(mut self, size: f64) -> Light {
+    /// The same light with a size, [`Light::size`]: the radius in world units, for directional light the angular radius in radians, and
+    /// for a quadrangle half of its longer edge. The holes of rings and the shorter edges of quadrangles grow with it; a quadrangle's
+    /// middle stays.
+    ///
+    /// # Errors
+    /// Ambient light and cones have no size, and a quadrangle without edges has none that could grow.
+    pub fn with_size(mut self, size: f64) -> Result<Light, NoSize> {
         match &mut self.kind {
             LightKind::Directional { angular_radius_rad: r, .. }
             | LightKind::Point { radius: r, .. }
@@ -183,9 +204,19 @@ impl Light {
                 *inner_radius *= if *radius > 0.0 { size / *radius } else { 0.0 };
                 *radius = size;
             }
-            LightKind::Ambient | LightKind::Cone { .. } | LightKind::Quad { .. } => {}
+            LightKind::Quad { corner, edges, .. } => {
+                let longer = edges[0].length().max(edges[1].length());
+                if !(longer > 0.0 && longer.is_finite()) {
+                    return Err(NoSize::Quad);
+                }
+                let middle = *corner + 0.5 * (edges[0] + edges[1]);
+                *edges = edges.map(|e| e * (2.0 * size / longer));
+                *corner = middle - 0.5 * (edges[0] + edges[1]);
+            }
+            LightKind::Ambient => return Err(NoSize::Ambient),
+            LightKind::Cone { .. } => return Err(NoSize::Cone),
         }
-        self
+        Ok(self)
     }
 
     /// The same light, whose shadows are left out.
@@ -250,7 +281,9 @@ impl Light {
 
     /// True when its shadow rays can change a picture.
     pub fn casts_shadows(&self) -> bool {
-        self.shadows && !matches!(self.kind, LightKind::Ambient) && self.color != [0.0; 3]
+        self.shadows
+            && !matches!(self.kind, LightKind::Ambient)
+            && (self.color != [0.0; 3] || self.highlight_color.is_some_and(|c| c != [0.0; 3]))
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::colormap::ColorMap;
 use crate::detail::Detail;
+use crate::environment::texels;
 use crate::texture::Texture;
 use std::sync::Arc;
 
@@ -256,6 +257,11 @@ impl Material {
                 Err((field, format!("{v:?}"), "finite and not negative in every channel"))
             }
         };
+        match &self.color_source {
+            ColorSource::Attribute | ColorSource::Constant => {}
+            ColorSource::Scalars(map) => map.check()?,
+            ColorSource::Texture(texture) => texels("texture", texture)?,
+        }
         unit("opacity", self.opacity)?;
         light("color", self.color)?;
         light("emission", self.emission)?;

@@ -8,7 +8,8 @@ use std::ops::AddAssign;
 pub struct RayStats {
     /// Rays from the camera that can hit something (lanes outside the picture are not counted).
     pub primary: u64,
-    /// Rays between surfaces and lights; each further layer of a transparent blocker counts again.
+    /// Rays between surfaces and lights; each further layer of a transparent blocker counts again, unless something opaque is in the
+    /// way.
     pub shadow: u64,
     /// Rays of ambient occlusion.
     pub ambient_occlusion: u64,
@@ -26,6 +27,11 @@ pub struct RayStats {
     pub shadow_blocked: u64,
     /// Ambient occlusion rays that found something.
     pub ambient_occlusion_blocked: u64,
+    /// Shadow and ambient occlusion rays that nothing opaque ended, as often as it was asked which surface that lets light through
+    /// comes next. All others only needed to know whether anything is in their way.
+    pub light_closest: u64,
+    /// Surfaces that were looked up because light may pass through them.
+    pub light_lookups: u64,
     /// Paths cut because they reached `max_bounces`; their rest is missing from the picture.
     pub cut_at_max_bounces: u64,
     /// Rays left out because less than `min_contribution` of what they would have met reaches the
@@ -82,6 +88,8 @@ impl AddAssign for RayStats {
         self.volume += o.volume;
         self.shadow_blocked += o.shadow_blocked;
         self.ambient_occlusion_blocked += o.ambient_occlusion_blocked;
+        self.light_closest += o.light_closest;
+        self.light_lookups += o.light_lookups;
         self.cut_at_max_bounces += o.cut_at_max_bounces;
         self.cut_at_min_contribution += o.cut_at_min_contribution;
         self.opacity_ignored += o.opacity_ignored;

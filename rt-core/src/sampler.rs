@@ -281,7 +281,7 @@ mod tests {
                 let pixels =
                     (&std::array::from_fn(|l| 7 * l as u32), &std::array::from_fn(|l| 100 + l as u32));
                 let mut same_sample = SamplerBlock::new(kind);
-                let level = SimdLevel::resolve(level);
+                let level = SimdLevel::resolve(level).expect("a level of this machine");
                 let (squares, domes, camera) = fearless_simd::dispatch!(level, simd => {
                     same_sample.set_pixels(simd, 12 << 33, pixels, 3, 1);
                     (block.squares(simd), block.cosine_hemispheres(simd), same_sample.squares(simd))

@@ -15,20 +15,22 @@
 //! assert_eq!(output.report.rays.reflection, 0);
 //! ```
 
+mod check;
+mod needs;
 mod part;
 
+pub(crate) use needs::{lets_light_through, requirements};
 pub(crate) use part::attribute_part;
 
 use crate::accel::{BuildError, BuildOptions, Geometry, Instance, World};
-use crate::effects::Effects;
 use crate::environment::{Background, Environment};
-use crate::light::Light;
-use crate::material::{ColorSource, Material, SurfaceModel};
-use crate::mesh::{Attribute, PerElement, TriMesh};
-use crate::shade::reflection_of;
+use crate::light::{Light, LightKind};
+use crate::material::{ColorSource, Material};
+use crate::mesh::{Attribute, TriMesh};
 use crate::shapes::Shape;
 use crate::volume::Volume;
 use glam::DAffine3;
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// How one instance looks.
@@ -37,7 +39,7 @@ pub struct Appearance {
     /// Index into [`Scene::materials`].
     pub material: usize,
     colors: Option<Arc<Attribute<[f32; 4]>>>,
-    colors_have_alpha: bool,
+    color_facts: ColorFacts,
     scalars: Option<Arc<Attribute<f32>>>,
 }
 
@@ -51,7 +53,7 @@ impl Appearance {
     #[must_use]
     pub fn with_colors(mut self, colors: impl Into<Arc<Attribute<[f32; 4]>>>) -> Appearance {
         let colors = colors.into();
-        self.colors_have_alpha = has_alpha(&colors);
+        self.color_facts = ColorFacts::of(&colors);
         self.colors = Some(colors);
         self
     }
@@ -92,6 +94,32 @@ pub struct PlacedVolume {
     pub world_from_object: DAffine3,
 }
 
+/// What is asked of all colours of an attribute in every frame.
+#[derive(Debug, Clone, Copy, Default)]
+struct ColorFacts {
+    /// One lets light through.
+    transparent: bool,
+    /// The first that is NaN or infinite in a channel.
+    unusable: Option<usize>,
+}
+
+impl ColorFacts {
+    fn of(colors: &Attribute<[f32; 4]>) -> ColorFacts {
+        let part = |(k, part): (usize, &[[f32; 4]])| {
+            let unusable = part.iter().position(|c| !c.iter().all(|v| v.is_finite()));
+            ColorFacts {
+                transparent: part.iter().any(|c| c[3] < 1.0),
+                unusable: unusable.map(|i| (k << 16) + i),
+            }
+        };
+        let join = |a: ColorFacts, b: ColorFacts| ColorFacts {
+            transparent: a.transparent || b.transparent,
+            unusable: a.unusable.or(b.unusable),
+        };
+        colors.values.par_chunks(1 << 16).enumerate().map(part).reduce(ColorFacts::default, join)
+    }
+}
+
 /// Everything that is drawn. Materials, lights and appearances may change between frames; the world is built once.
 #[derive(Clone)]
 pub struct Scene {
@@ -111,7 +139,7 @@ pub struct Scene {
     pub ambient_occlusion: Option<AmbientOcclusion>,
     /// Direct volume rendering, in front of, between and behind surfaces. Volumes cast no shadows and have no depth.
     pub volumes: Vec<PlacedVolume>,
-    geometry_has_alpha: Vec<bool>,
+    geometry_colors: Vec<ColorFacts>,
 }
 
 /// Why a scene cannot be drawn.
@@ -138,10 +166,21 @@ pub enum SceneError {
         /// How many there are.
         count: usize,
     },
-    /// A number of a material or light is out of range.
+    /// [`Scene::world`] was replaced by one with other geometries.
+    #[error(
+        "the scene was made of a world with {expected} geometries and now has one with {found}; make a new scene of \
+         the new world with Scene::new"
+    )]
+    OtherWorld {
+        /// Geometries of the world that the scene was made of.
+        expected: usize,
+        /// Geometries of the world it has.
+        found: usize,
+    },
+    /// A number of a material, a light, the environment, ... is out of range.
     #[error("{what} {index}: {field} is {value}; it must be {rule}")]
     OutOfRange {
-        /// "material", "light", ...
+        /// "material", "light", "environment", ...
         what: &'static str,
         /// Its index.
         index: usize,
@@ -153,7 +192,7 @@ pub enum SceneError {
         rule: &'static str,
     },
     /// An attribute override has the wrong length.
-    #[error("appearance {appearance}: {field} has {found} values; its mesh needs {expected}")]
+    #[error("appearance {appearance}: {field} has {found} values; its geometry needs {expected}")]
     AttributeLength {
         /// Index of the appearance.
         appearance: usize,
@@ -170,12 +209,12 @@ impl Scene {
     /// A scene of `world` with one white matte material and a headlight.
     pub fn new(world: impl Into<Arc<World>>) -> Scene {
         let world = world.into();
-        let geometry_has_alpha = world
+        let geometry_colors = world
             .geometries()
-            .iter()
+            .par_iter()
             .map(|g| match g {
-                Geometry::Mesh(m) => m.colors.as_ref().is_some_and(has_alpha),
-                Geometry::Shape(s) => s.has_transparency(),
+                Geometry::Mesh(m) => m.colors.as_ref().map_or_else(ColorFacts::default, ColorFacts::of),
+                Geometry::Shape(s) => ColorFacts { transparent: s.has_transparency(), unusable: None },
             })
             .collect();
         Scene {
@@ -187,121 +226,42 @@ impl Scene {
             background: Background::Transparent,
             ambient_occlusion: None,
             volumes: Vec::new(),
-            geometry_has_alpha,
+            geometry_colors,
         }
-    }
-
-    /// Checks indices and numbers.
-    pub fn check(&self) -> Result<(), SceneError> {
-        let (appearances, instances) = (self.appearances.len(), self.world.instances().len());
-        if appearances != instances {
-            return Err(SceneError::Appearances { appearances, instances });
-        }
-        for (index, m) in self.materials.iter().enumerate() {
-            m.check().map_err(|(field, value, rule)| SceneError::OutOfRange {
-                what: "material",
-                index,
-                field,
-                value,
-                rule,
-            })?;
-        }
-        for (index, l) in self.lights.iter().enumerate() {
-            check_light(l).map_err(|(field, value, rule)| SceneError::OutOfRange {
-                what: "light",
-                index,
-                field,
-                value,
-                rule,
-            })?;
-        }
-        if let Some(ao) = self.ambient_occlusion {
-            let error = |field, value, rule| SceneError::OutOfRange {
-                what: "ambient occlusion",
-                index: 0,
-                field,
-                value,
-                rule,
-            };
-            if ao.distance.is_nan() || ao.distance <= 0.0 {
-                return Err(error("distance", ao.distance.to_string(), "positive (infinity for no limit)"));
-            }
-            if ao.rays == 0 {
-                return Err(error(
-                    "rays",
-                    "0".into(),
-                    "at least 1; leave ambient occlusion out to have none",
-                ));
-            }
-        }
-        for (index, v) in self.volumes.iter().enumerate() {
-            let determinant = v.world_from_object.matrix3.determinant();
-            if !(v.world_from_object.is_finite() && determinant != 0.0 && determinant.is_finite()) {
-                let (field, value, rule) =
-                    ("world_from_object", format!("{:?}", v.world_from_object), "finite and invertible");
-                return Err(SceneError::OutOfRange { what: "volume", index, field, value, rule });
-            }
-        }
-        for (appearance, a) in self.appearances.iter().enumerate() {
-            let (material, count) = (a.material, self.materials.len());
-            if material >= count {
-                return Err(SceneError::NoSuchMaterial { appearance, material, count });
-            }
-            let Geometry::Mesh(mesh) = &self.world.geometries()[self.world.instances()[appearance].geometry]
-            else {
-                continue;
-            };
-            let expected = |per| match per {
-                PerElement::Vertex => mesh.positions.len(),
-                PerElement::Face => mesh.indices.len(),
-            };
-            let colors = a.colors.as_ref().map(|c| ("colors", expected(c.per), c.values.len()));
-            let scalars = a.scalars.as_ref().map(|s| ("scalars", expected(s.per), s.values.len()));
-            for (field, expected, found) in colors.into_iter().chain(scalars) {
-                if expected != found {
-                    return Err(SceneError::AttributeLength { appearance, field, expected, found });
-                }
-            }
-        }
-        Ok(())
     }
 
     /// Requests in the scene that cannot change a pixel, in words: ambient occlusion without ambient light, colour maps without
-    /// scalars, textures without coordinates. They are part of every render report.
+    /// scalars, textures without coordinates, colours that a material does not look at, attenuation of light from infinitely far. They
+    /// are part of every render report.
     pub fn warnings(&self) -> Vec<String> {
         let mut out = Vec::new();
         if self.ambient_occlusion.is_some() && !self.has_ambient() {
             out.push("ambient occlusion changes no pixel: the scene has no ambient light and no environment to dim".into());
         }
-        let mut reported = vec![[false; 3]; self.materials.len()];
-        let mut first =
-            |material: usize, kind: usize| !std::mem::replace(&mut reported[material][kind], true);
-        for (i, a) in self.appearances.iter().enumerate() {
-            let Some(material) = self.materials.get(a.material) else { continue };
-            let Geometry::Mesh(mesh) = &self.world.geometries()[self.world.instances()[i].geometry] else {
-                continue;
+        for (i, l) in self.lights.iter().enumerate() {
+            let kind = match l.kind {
+                LightKind::Ambient => "ambient",
+                LightKind::Directional { .. } => "directional",
+                _ => continue,
             };
-            if let Some(what) = material.detail.as_ref().and_then(|d| d.lacks(mesh))
-                && first(a.material, 2)
-            {
-                out.push(format!("material {} has maps, but instance {i} lacks {what}", a.material));
+            if l.attenuation != [1.0, 0.0, 0.0] {
+                out.push(format!("light {i} is {kind}, without a distance: its attenuation changes nothing"));
             }
-            match &material.color_source {
-                ColorSource::Scalars(_)
-                    if mesh.scalars.is_none() && a.scalars.is_none() && first(a.material, 0) =>
+        }
+        // Of each material, what was said already.
+        let mut told = vec![[false; 5]; self.materials.len()];
+        for (i, (a, instance)) in self.appearances.iter().zip(self.world.instances()).enumerate() {
+            let Some(material) = self.materials.get(a.material) else { continue };
+            let geometry = &self.world.geometries()[instance.geometry];
+            for (kind, warning) in unused(material, a, geometry).into_iter().enumerate() {
+                if let Some((of_material, of_instance)) = warning
+                    && !std::mem::replace(&mut told[a.material][kind], true)
                 {
                     out.push(format!(
-                            "material {} maps scalars to colours, but instance {i} has none: its constant colour is used",
-                            a.material
-                        ));
+                        "material {} {of_material}, but instance {i} {of_instance}",
+                        a.material
+                    ));
                 }
-                ColorSource::Texture(_) if mesh.texcoords.is_none() && first(a.material, 1) => {
-                    out.push(format!(
-                            "material {} has a texture, but instance {i} has no texture coordinates: its constant colour is used",
-                            a.material
-                        ));
-                }
-                _ => {}
             }
         }
         if self.background == Background::Environment && self.environment.is_none() {
@@ -309,152 +269,38 @@ impl Scene {
         }
         out
     }
-
-    /// True when there is ambient light or an environment that is not black.
-    pub(crate) fn has_ambient(&self) -> bool {
-        self.lights.iter().any(|l| matches!(l.kind, crate::light::LightKind::Ambient) && l.color != [0.0; 3])
-            || self.environment.as_ref().is_some_and(|e| !e.is_black())
-    }
-
-    /// Whether instance `i` can let light through.
-    fn may_be_transparent(&self, i: usize) -> bool {
-        let a = &self.appearances[i];
-        let Some(m) = self.materials.get(a.material) else { return false };
-        m.opacity < 1.0
-            || m.culls()
-            || match &m.color_source {
-                ColorSource::Attribute if a.colors.is_some() => a.colors_have_alpha,
-                ColorSource::Attribute => self.geometry_has_alpha[self.world.instances()[i].geometry],
-                ColorSource::Constant => false,
-                ColorSource::Scalars(map) => map.colors.iter().any(|c| c[3] < 1.0) || map.nan_color[3] < 1.0,
-                ColorSource::Texture(t) => t.has_transparency(),
-            }
-    }
 }
 
-fn has_alpha(colors: &Attribute<[f32; 4]>) -> bool {
-    colors.values.iter().any(|c| c[3] < 1.0)
-}
-
-/// See [`Effects::required_by`].
-pub(crate) fn requirements(scene: &Scene) -> Effects {
-    let mut used = vec![false; scene.materials.len()];
-    let mut transparent = false;
-    // With as many instances as a glyph plot has, look at each material and attribute once: materials first, then attributes only
-    // until one is found to be transparent.
-    for i in 0..scene.appearances.len().min(scene.world.instances().len()) {
-        if let Some(u) = used.get_mut(scene.appearances[i].material) {
-            *u = true;
-        }
-        transparent = transparent || scene.may_be_transparent(i);
-    }
-    let used = || scene.materials.iter().zip(&used).filter(|(_, u)| **u).map(|(m, _)| m);
-    let lit = used().any(|m| !matches!(m.model, SurfaceModel::Unlit | SurfaceModel::Dielectric { .. }));
-    let lights = || scene.lights.iter().filter(|l| lit && l.casts_shadows());
-    let dielectric = used().any(|m| matches!(m.model, SurfaceModel::Dielectric { .. }));
-    // Where roughness varies, it may be anything somewhere.
-    let reflects = |m: &Material, effect| {
-        m.reflection_roughness().is_some_and(|r| m.detail.is_some() || reflection_of(r) == effect)
+/// What a material has that this instance has no use for, or the other way round: in words of each.
+fn unused(
+    material: &Material,
+    look: &Appearance,
+    geometry: &Geometry,
+) -> [Option<(&'static str, String)>; 5] {
+    let constant = |lacks: &str| format!("{lacks}: its constant colour is used");
+    let mesh = match geometry {
+        Geometry::Mesh(mesh) => Some(mesh),
+        Geometry::Shape(_) => None,
     };
-    Effects::NONE
-        .with_if(lights().next().is_some(), Effects::SHADOWS)
-        .with_if(lights().any(|l| l.size() > 0.0), Effects::SOFT_SHADOWS)
-        .with_if(lit && scene.ambient_occlusion.is_some() && scene.has_ambient(), Effects::AMBIENT_OCCLUSION)
-        .with_if(dielectric || used().any(|m| reflects(m, Effects::REFLECTION)), Effects::REFLECTION)
-        .with_if(used().any(|m| reflects(m, Effects::GLOSSY_REFLECTION)), Effects::GLOSSY_REFLECTION)
-        .with_if(dielectric, Effects::REFRACTION)
-        .with_if(transparent, Effects::TRANSPARENCY)
-        .with_if(!scene.volumes.is_empty(), Effects::VOLUMES)
-}
-
-fn check_light(l: &Light) -> Result<(), (&'static str, String, &'static str)> {
-    use crate::light::LightKind as K;
-    let color = |field, c: [f32; 3]| {
-        let ok = c.iter().all(|v| v.is_finite());
-        if ok { Ok(()) } else { Err((field, format!("{c:?}"), "finite in every channel")) }
-    };
-    color("color", l.color)?;
-    color("highlight_color", l.highlight_color.unwrap_or(l.color))?;
-    color("attenuation", l.attenuation)?;
-    let size = l.size();
-    if !(size >= 0.0 && size.is_finite()) {
-        return Err(("radius", size.to_string(), "0 or positive, finite"));
-    }
-    let vector = |field, v: glam::DVec3| {
-        let ok = v.is_finite() && v != glam::DVec3::ZERO;
-        if ok { Ok(()) } else { Err((field, v.to_string(), "finite and not zero")) }
-    };
-    // Beyond, distances to it are not finite in f32, and it would be dark.
-    const FARTHEST: f64 = 1e38;
-    let point = |v: glam::DVec3| {
-        if v.abs().max_element() <= FARTHEST {
-            Ok(())
-        } else {
-            let rule = "finite, at most 1e38 from zero; make light from so far directional";
-            Err(("position", v.to_string(), rule))
-        }
-    };
-    match l.kind {
-        K::Ambient => Ok(()),
-        K::Directional { to_light, angular_radius_rad } => {
-            vector("to_light", to_light)?;
-            let ok = angular_radius_rad < std::f64::consts::FRAC_PI_2;
-            if ok {
-                Ok(())
-            } else {
-                Err(("angular_radius_rad", angular_radius_rad.to_string(), "below pi/2"))
-            }
-        }
-        K::Point { position, .. } => point(position),
-        K::Spot { position, direction, cutoff_rad, exponent, .. } => {
-            point(position)?;
-            vector("direction", direction)?;
-            if !(cutoff_rad > 0.0 && cutoff_rad <= std::f64::consts::PI) {
-                return Err(("cutoff_rad", cutoff_rad.to_string(), "above 0 and at most pi"));
-            }
-            let ok = exponent >= 0.0 && exponent.is_finite();
-            if ok { Ok(()) } else { Err(("exponent", exponent.to_string(), "0 or positive, finite")) }
-        }
-        K::Cone { position, direction, inner_rad, outer_rad } => {
-            point(position)?;
-            vector("direction", direction)?;
-            if !(outer_rad > 0.0 && outer_rad <= std::f64::consts::PI) {
-                return Err(("outer_rad", outer_rad.to_string(), "above 0 and at most pi"));
-            }
-            let ok = (0.0..=outer_rad).contains(&inner_rad);
-            if ok { Ok(()) } else { Err(("inner_rad", inner_rad.to_string(), "0 to outer_rad")) }
-        }
-        K::Ring { position, direction, inner_radius, radius, inner_rad, outer_rad } => {
-            point(position)?;
-            vector("direction", direction)?;
-            if radius <= 0.0 {
-                return Err(("radius", radius.to_string(), "positive: a ring needs an area"));
-            }
-            if !(0.0..radius).contains(&inner_radius) {
-                return Err(("inner_radius", inner_radius.to_string(), "0 or positive, below the radius"));
-            }
-            if !(outer_rad > 0.0 && outer_rad <= std::f64::consts::FRAC_PI_2) {
-                return Err(("outer_rad", outer_rad.to_string(), "above 0 and at most pi/2"));
-            }
-            let ok = (0.0..=outer_rad).contains(&inner_rad);
-            if ok { Ok(()) } else { Err(("inner_rad", inner_rad.to_string(), "0 to outer_rad")) }
-        }
-        K::Quad { corner, edges: [a, b], .. } => {
-            point(corner)?;
-            vector("edge 1", a)?;
-            vector("edge 2", b)?;
-            vector("edge 1 x edge 2", a.normalize().cross(b.normalize()))
-        }
-        K::Disk { position, direction, radius } => {
-            point(position)?;
-            vector("direction", direction)?;
-            if radius > 0.0 {
-                Ok(())
-            } else {
-                Err(("radius", radius.to_string(), "positive: a disk needs an area"))
-            }
-        }
-    }
+    let by_scalars = matches!(material.color_source, ColorSource::Scalars(_));
+    let by_texture = matches!(material.color_source, ColorSource::Texture(_));
+    // Whether a shape has scalars shows only at its hits.
+    let no_scalars = mesh.is_some_and(|m| m.scalars.is_none() && look.scalars.is_none());
+    let no_coordinates = mesh.is_none_or(|m| m.texcoords.is_none());
+    let no_maps = material.detail.as_ref().and_then(|d| match mesh {
+        Some(mesh) => d.lacks(mesh),
+        None => d.lacks(&TriMesh::default()),
+    });
+    let of_its_own = |what: &str| format!("has {what} of its own: they are not looked at");
+    let by_attribute = material.color_source == ColorSource::Attribute;
+    [
+        (by_scalars && no_scalars).then(|| ("maps scalars to colours", constant("has none"))),
+        (by_texture && no_coordinates).then(|| ("has a texture", constant("has no texture coordinates"))),
+        no_maps.map(|what| ("has maps", format!("lacks {what}"))),
+        (!by_attribute && look.colors.is_some())
+            .then(|| ("takes its colour from elsewhere", of_its_own("colours"))),
+        (!by_scalars && look.scalars.is_some()).then(|| ("maps no scalars", of_its_own("scalars"))),
+    ]
 }
 
 /// Collects a scene piece by piece.

@@ -31,10 +31,46 @@ pub struct Texture {
     width: usize,
     height: usize,
     texels: Vec<[f32; 4]>,
+    facts: Facts,
     /// Horizontal and vertical behaviour outside 0..=1.
     pub wrap: [Wrap; 2],
     /// How texels are combined.
     pub filter: Filter,
+}
+
+/// What is asked of all texels in every frame; they never change, so it is found out once.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Facts {
+    transparent: bool,
+    black: bool,
+    /// The first texel that no picture can have, and the first that no light can have.
+    unusable: Option<usize>,
+    negative: Option<usize>,
+}
+
+#[cfg(test)]
+thread_local! {
+    /// Textures of this thread whose texels were all looked at.
+    static SCANS: std::cell::Cell<usize> = const { std::cell::Cell::new(0) };
+}
+
+impl Facts {
+    fn of(texels: &[[f32; 4]]) -> Facts {
+        #[cfg(test)]
+        SCANS.set(SCANS.get() + 1);
+        let mut facts = Facts { transparent: false, black: true, unusable: None, negative: None };
+        for (i, t) in texels.iter().enumerate() {
+            facts.transparent |= t[3] < 1.0;
+            facts.black &= t[..3] == [0.0; 3];
+            if facts.unusable.is_none() && !t.iter().all(|v| v.is_finite()) {
+                facts.unusable = Some(i);
+            }
+            if facts.negative.is_none() && t[..3].iter().any(|v| *v < 0.0) {
+                facts.negative = Some(i);
+            }
+        }
+        facts
+    }
 }
 
 /// Why a texture cannot be made.
@@ -63,7 +99,8 @@ impl Texture {
             let (expected, found) = (width.saturating_mul(height).saturating_mul(4), texels.len() * 4);
             return Err(TextureError::Length { width, height, expected, found });
         }
-        Ok(Texture { width, height, texels, wrap: [Wrap::Repeat; 2], filter: Filter::Bilinear })
+        let facts = Facts::of(&texels);
+        Ok(Texture { width, height, texels, facts, wrap: [Wrap::Repeat; 2], filter: Filter::Bilinear })
     }
 
     /// From sRGB-encoded 8-bit RGBA, row 0 at v = 0; alpha is linear.
@@ -94,7 +131,28 @@ impl Texture {
 
     /// True when a texel lets light through.
     pub fn has_transparency(&self) -> bool {
-        self.texels.iter().any(|t| t[3] < 1.0)
+        self.facts.transparent
+    }
+
+    /// True when every texel is black.
+    pub fn is_black(&self) -> bool {
+        self.facts.black
+    }
+
+    /// Column and row of the first texel that is NaN or infinite in a channel.
+    pub fn unusable_texel(&self) -> Option<[usize; 2]> {
+        self.facts.unusable.map(|i| [i % self.width, i / self.width])
+    }
+
+    /// Column and row of the first texel with a negative colour.
+    pub fn negative_texel(&self) -> Option<[usize; 2]> {
+        self.facts.negative.map(|i| [i % self.width, i / self.width])
+    }
+
+    /// How often texels of a texture were all looked at on this thread.
+    #[cfg(test)]
+    pub(crate) fn scans() -> usize {
+        SCANS.get()
     }
 
     /// Linear RGBA at texture coordinates `uv`; non-finite coordinates give texel (0,0).
@@ -152,6 +210,25 @@ mod tests {
         assert_eq!(t.sample(Vec2::new(0.25, 0.5))[0], 0.0);
         assert_eq!(t.sample(Vec2::new(0.75, 0.5))[0], 1.0);
         assert_eq!(t.sample(Vec2::new(0.5, 0.5))[0], 0.5);
+    }
+
+    #[test]
+    fn what_a_texture_says_of_its_texels_is_true_however_it_was_made() {
+        let opaque = two_by_one();
+        assert!(!opaque.has_transparency() && !opaque.is_black());
+        let mut looked_through = Texture::from_srgb8(1, 2, &[0, 0, 0, 255, 0, 0, 0, 254]).unwrap();
+        assert!(looked_through.has_transparency() && looked_through.is_black());
+        // What can change does not touch the texels; what replaces the texture brings its own answers.
+        (looked_through.wrap, looked_through.filter) = ([Wrap::Clamp; 2], Filter::Nearest);
+        assert!(looked_through.clone().has_transparency() && looked_through.is_black());
+        looked_through = opaque;
+        assert!(!looked_through.has_transparency() && !looked_through.is_black());
+        assert_eq!(looked_through.unusable_texel(), None);
+        let mut texels = vec![[0.5; 4]; 12];
+        texels[7][1] = f32::NAN;
+        texels[9][3] = f32::INFINITY;
+        let broken = Texture::from_linear(4, 3, texels).unwrap();
+        assert_eq!(broken.unusable_texel(), Some([3, 1]));
     }
 
     #[test]

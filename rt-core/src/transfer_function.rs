@@ -37,6 +37,16 @@ pub enum TransferFunctionError {
     /// A bad unit distance.
     #[error("opacity unit distance is {0}; it must be finite and positive, in world units")]
     UnitDistance(f32),
+    /// A bad colour.
+    #[error("transfer function: {field} is {value}; it must be {rule}")]
+    Colors {
+        /// Which number.
+        field: &'static str,
+        /// Its value.
+        value: String,
+        /// What is allowed.
+        rule: &'static str,
+    },
     /// A bad colour range.
     #[error("colour map range is {0:?}; it must be finite and, for a logarithmic map, positive")]
     ColorRange([f32; 2]),
@@ -79,6 +89,8 @@ impl TransferFunction {
             |e| e >= 0.0 && e.is_finite(),
             "extinction must be finite and not negative",
         )?;
+        let sound = ColorMap { range: [1.0; 2], ..colors.clone() }.check();
+        sound.map_err(|(field, value, rule)| TransferFunctionError::Colors { field, value, rule })?;
         let range_ok = colors.range.iter().all(|r| r.is_finite() && (!colors.log || *r > 0.0));
         if !range_ok {
             return Err(TransferFunctionError::ColorRange(colors.range));

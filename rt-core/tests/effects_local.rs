@@ -79,7 +79,7 @@ fn headlight_sends_no_shadow_rays() {
 fn soft_light_has_a_penumbra_of_the_right_width() {
     // A half plane x < 0 at height 1, a disk light of radius 0.5 at height 2: the penumbra on the floor is |x| < 0.5.
     let blocker = quad(Vec3::new(-10.0, 0.0, 1.0), Vec3::X * 10.0, Vec3::Y * 20.0);
-    let light = Light::point(DVec3::new(0.0, 0.0, 2.0)).with_size(0.5);
+    let light = Light::point(DVec3::new(0.0, 0.0, 2.0)).with_size(0.5).unwrap();
     let s = scene(
         vec![(floor(0.0, 30.0), Material::matte([1.0; 3])), (blocker, Material::matte([1.0; 3]))],
         vec![light],
@@ -524,7 +524,7 @@ fn leaving_out_any_one_effect_changes_the_picture_and_zeroes_its_counter() {
             (sphere(Vec3::new(0.0, -0.9, 0.0), 0.7, 16), Material::metal([0.9, 0.6, 0.3], 0.0)),
             (sphere(Vec3::new(1.2, 0.0, 0.0), 0.5, 16), Material::matte([0.3, 0.5, 0.9]).with_opacity(0.6)),
         ],
-        vec![Light::point(DVec3::new(3.0, 2.0, 4.0)).with_size(0.4), Light::ambient([0.2; 3])],
+        vec![Light::point(DVec3::new(3.0, 2.0, 4.0)).with_size(0.4).unwrap(), Light::ambient([0.2; 3])],
     );
     s.ambient_occlusion = Some(AmbientOcclusion { distance: 2.0, rays: 4 });
     s.background = Background::Constant([0.5, 0.6, 0.7, 1.0]);

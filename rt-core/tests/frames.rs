@@ -32,7 +32,7 @@ fn busy_scene() -> Scene {
             (sphere(Vec3::new(0.0, -0.9, 0.0), 0.7, 16), Material::metal([0.9, 0.6, 0.3], 0.3)),
             (sphere(Vec3::new(1.2, 0.0, 0.0), 0.5, 16), Material::matte([0.3, 0.5, 0.9]).with_opacity(0.6)),
         ],
-        vec![Light::point(DVec3::new(3.0, 2.0, 4.0)).with_size(0.4), Light::ambient([0.2; 3])],
+        vec![Light::point(DVec3::new(3.0, 2.0, 4.0)).with_size(0.4).unwrap(), Light::ambient([0.2; 3])],
     );
     s.environment = Some(Environment::Gradient { bottom: [0.1; 3], top: [0.5, 0.6, 0.8], up: Vec3::Z });
     s.ambient_occlusion = Some(AmbientOcclusion { distance: 2.0, rays: 4 });

@@ -234,7 +234,7 @@ fn low_discrepancy_samples_converge_faster_than_random_ones() {
     let blocker = quad(Vec3::new(-10.0, 0.0, 1.0), Vec3::X * 10.0, Vec3::Y * 20.0);
     let s = scene(
         vec![(floor(0.0, 30.0), Material::matte([1.0; 3])), (blocker, Material::matte([1.0; 3]))],
-        vec![Light::point(DVec3::new(0.0, 0.0, 2.0)).with_size(0.5)],
+        vec![Light::point(DVec3::new(0.0, 0.0, 2.0)).with_size(0.5).unwrap()],
     );
     let c = rt_core::camera::Camera::orthographic(
         DVec3::new(0.0, 0.0, 0.5),

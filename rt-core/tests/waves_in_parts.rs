@@ -103,7 +103,7 @@ fn cases() -> Vec<Case> {
         },
         Case {
             name: "hard and soft shadows, ambient occlusion",
-            scene: scene(zero, matte(), matte(), &[lamp, sun.with_size(0.05), ambient], Some(0.6)),
+            scene: scene(zero, matte(), matte(), &[lamp, sun.with_size(0.05).unwrap(), ambient], Some(0.6)),
             camera: camera(zero),
             options: options(),
         },
@@ -190,6 +190,23 @@ fn nearer(best: &mut Option<Met>, met: Option<Met>) {
     }
 }
 
+/// What light rays meet: no holder is asked where something opaque is.
+fn light_met(holders: &[Holder<'_>], scene: &Scene, rays: &[rt_core::ray::Ray]) -> Vec<Option<Met>> {
+    let mut best = vec![None; rays.len()];
+    let mut met = Vec::new();
+    for h in holders {
+        h.frame.light_met(rays, &mut met);
+        for (b, m) in best.iter_mut().zip(&met) {
+            // What is blocked has no primitive.
+            let in_whole = |m: Met| {
+                if m.is_blocked() { Met::from_words(&m.to_words()) } else { h.in_whole(scene, m) }
+            };
+            nearer(b, m.map(in_whole));
+        }
+    }
+    best
+}
+
 fn closest(
     holders: &[Holder<'_>],
     scene: &Scene,
@@ -271,7 +288,7 @@ fn one_pass(case: &Case, holders: &[Holder<'_>], tile: &mut TileInWork, pass: Pa
                 if rays.is_empty() {
                     break;
                 }
-                tile.meet_light(owner, &closest(holders, &case.scene, &rays, None)).unwrap();
+                tile.meet_light(owner, &light_met(holders, &case.scene, &rays)).unwrap();
             }
         } else if !tile.light_points().is_empty() {
             let mut words = Vec::new();

@@ -100,7 +100,7 @@ fn quantities(world: World, camera: &Camera) -> Vec<Quantity> {
     ao.ambient_occlusion = Some(AmbientOcclusion { distance: 0.3 * radius, rays: 1 });
     let mut soft = plain.clone();
     let place = eye + camera.world_from_view() * DVec3::new(radius, 1.5 * radius, 0.0);
-    soft.lights = vec![Light::point(place).with_size(0.3 * radius)];
+    soft.lights = vec![Light::point(place).with_size(0.3 * radius).expect("a light with a size")];
     vec![
         Quantity {
             name: "ambient occlusion",

@@ -172,7 +172,7 @@ fn cases(mut plain: Scene, pixels: u32) -> anyhow::Result<Vec<Case>> {
         case("shadows", &|s| s.lights[0].shadows = true),
         case("soft shadows, 4 rays", &|s| {
             s.lights[0].shadows = true;
-            s.lights[0] = s.lights[0].with_size(0.2 * radius);
+            s.lights[0] = s.lights[0].with_size(0.2 * radius).expect("a light with a size");
         }),
         case("ambient occlusion, 4 rays", &|s| {
             s.ambient_occlusion = Some(AmbientOcclusion { distance: 0.3 * radius, rays: 4 });

@@ -175,7 +175,7 @@ impl Look {
         let shadows = self.has(Effects::SHADOWS | Effects::SOFT_SHADOWS | Effects::PATH_TRACING);
         let mut key = Light::directional(DVec3::new(0.5, 0.75, 0.6)).with_color([0.72; 3]).in_camera_frame();
         if self.has(Effects::SOFT_SHADOWS | Effects::PATH_TRACING) {
-            key = key.with_size(KEY_SIZE_RAD);
+            key = key.with_size(KEY_SIZE_RAD).expect("a light with a size");
         }
         let key = if shadows { key } else { key.without_shadows() };
         vec![key, Light::headlight().with_color([0.16; 3]), Light::ambient([0.27; 3])]

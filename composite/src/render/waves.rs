@@ -162,7 +162,7 @@ impl Wave<'_> {
     ) -> Result<bool, FrameError> {
         let rays: Vec<Vec<Ray>> =
             tiles.iter().zip(live).map(|(t, &l)| if l { t.light_rays().collect() } else { vec![] }).collect();
-        let (any, met) = self.first_hits(talk, &rays, None)?;
+        let (any, met) = self.first_hits(talk, &rays, Wanted::Light)?;
         let rank = talk.rank();
         for (tile, met) in tiles.iter_mut().zip(&met).filter(|(_, met)| !met.is_empty()) {
             tile.meet_light(self.side.frame, met).map_err(|source| FrameError::Answer { rank, source })?;
@@ -189,7 +189,8 @@ impl Wave<'_> {
             };
             tiles.iter().zip(&waiting).map(of).collect()
         });
-        let (any, met) = self.first_hits(talk, &rays, pixels.as_deref())?;
+        let wanted = Wanted::Closest { pixels: pixels.as_deref() };
+        let (any, met) = self.first_hits(talk, &rays, wanted)?;
         let rank = talk.rank();
         let mut answers: Vec<Vec<Option<Met>>> = tiles.iter().map(|t| vec![None; t.num_rays()]).collect();
         for (t, answers) in answers.iter_mut().enumerate() {
@@ -214,8 +215,12 @@ impl Wave<'_> {
         &self,
         talk: &mut Talk<'_>,
         rays: &[Vec<Ray>],
-        pixels: Option<&[Vec<u32>]>,
+        wanted: Wanted<'_>,
     ) -> Result<(bool, FirstHits), FrameError> {
+        let (pixels, light) = match wanted {
+            Wanted::Closest { pixels } => (pixels, false),
+            Wanted::Light => (None, true),
+        };
         let (rank, size, side) = (talk.rank(), talk.size(), self.side);
         let mut met: FirstHits = rays.iter().map(|r| vec![None; r.len()]).collect();
         let mut questions: Vec<Vec<u32>> = vec![Vec::new(); size];
@@ -254,12 +259,18 @@ impl Wave<'_> {
             });
             report.answered_rays += rays.len() as u64;
             let mut met = Vec::new();
-            side.frame.closest(&rays, places.as_deref(), &mut met);
+            if light {
+                side.frame.light_met(&rays, &mut met);
+            } else {
+                side.frame.closest(&rays, places.as_deref(), &mut met);
+            }
             // A mask, then what was met.
             let mut out = vec![0; rays.len().div_ceil(32)];
             for (i, m) in met.into_iter().enumerate() {
                 if let Some(mut m) = m {
-                    m.primitive = side.in_whole(m.instance, m.primitive);
+                    if !m.is_blocked() {
+                        m.primitive = side.in_whole(m.instance, m.primitive);
+                    }
                     out[i / 32] |= 1 << (i % 32);
                     out.extend(m.to_words());
                 }
@@ -288,6 +299,15 @@ impl Wave<'_> {
         })?;
         Ok((any, met))
     }
+}
+
+/// What is asked of rays; the same on all ranks.
+#[derive(Clone, Copy)]
+enum Wanted<'a> {
+    /// What they meet first; with pixels, depth and distance as well.
+    Closest { pixels: Option<&'a [Vec<u32>]> },
+    /// Of rays to light: what they meet that may let it through, or that something opaque is in the way.
+    Light,
 }
 
 /// Of each point of the tile a bit for each rank into whose bounds one of its light rays comes.

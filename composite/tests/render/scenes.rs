@@ -96,7 +96,7 @@ pub(crate) const AMBIENT: [f32; 3] = [0.3; 3];
 /// Shadows, area lights and ambient occlusion, with light at a finite place: what the exchange of light bits is for.
 pub(crate) fn shadows_and_occlusion(shift: DVec3) -> Case {
     let lamp = Light::point(shift + DVec3::new(1.0, 1.0, 4.0));
-    let sun = Light::directional(DVec3::new(0.6, -0.3, 0.7)).with_color([0.7; 3]).with_size(0.05);
+    let sun = Light::directional(DVec3::new(0.6, -0.3, 0.7)).with_color([0.7; 3]).with_size(0.05).unwrap();
     let lights = [lamp, sun, Light::ambient(AMBIENT)];
     Case {
         name: "shadows, area light, ambient occlusion",

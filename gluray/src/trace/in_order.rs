@@ -120,7 +120,7 @@ fn of_tile(p: &Prepared<'_>, tile: Rect, near: &Near) -> Vec<Vec<Found>> {
             }
             p.rays.fetch_add(active.len() as u64, Relaxed);
             hits.fill(HitBlock::MISS);
-            p.world.closest_coherent(&blocks, &mut hits);
+            p.world.closest_coherent(&blocks, &mut hits).expect("one block of hits for each of rays");
             active.retain(|&(i, b, l)| {
                 let Some(hit) = hits[b].get(l) else {
                     let mut done = blocks[b].get(l);

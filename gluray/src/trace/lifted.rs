@@ -67,7 +67,7 @@ impl Lifted {
         while !active.is_empty() {
             p.rays.fetch_add(active.len() as u64, Relaxed);
             hits.fill(HitBlock::MISS);
-            self.world.closest_coherent(&blocks, &mut hits);
+            self.world.closest_coherent(&blocks, &mut hits).expect("one block of hits for each of rays");
             active.retain(|&(i, b, l)| {
                 let mut ray = blocks[b].get(l);
                 let more = hits[b].get(l).filter(|hit| take(i, hit.prim as usize));

@@ -187,7 +187,7 @@ fn through(
         }
         p.rays.fetch_add(on, Relaxed);
         rays.hits.fill(HitBlock::MISS);
-        p.world.closest_coherent(&rays.blocks, &mut rays.hits);
+        p.world.closest_coherent(&rays.blocks, &mut rays.hits).expect("one block of hits for each of rays");
     }
     for b in &mut rays.blocks {
         b.t_max = [-1.0; LANES];

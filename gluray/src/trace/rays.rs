@@ -225,7 +225,7 @@ impl TileRays {
         let (level, blocks, shift) = (self.level, &mut self.blocks, &mut self.shift);
         dispatch!(level, simd => make(simd, &p.bundle, area, blocks, shift));
         self.hits.fill(HitBlock::MISS);
-        p.world.closest_coherent(&self.blocks, &mut self.hits);
+        p.world.closest_coherent(&self.blocks, &mut self.hits).expect("one block of hits for each of rays");
         p.rays.fetch_add(area.w as u64 * area.h as u64, Relaxed);
         self.hits.iter().any(|h| h.prim.iter().any(|p| *p != rt_core::ray::NO_HIT))
     }
@@ -254,7 +254,9 @@ impl TileRays {
         }
         if any {
             self.overtakers.fill(HitBlock::MISS);
-            p.world.closest_coherent(&self.behind, &mut self.overtakers);
+            p.world
+                .closest_coherent(&self.behind, &mut self.overtakers)
+                .expect("one block of hits for each of rays");
         }
         self.behind.iter_mut().for_each(|b| b.t_max = [-1.0; LANES]);
         any

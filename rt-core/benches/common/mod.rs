@@ -39,6 +39,24 @@ pub fn shells() -> TriMesh {
     mesh
 }
 
+/// A bumpy plate of 800 triangles, one of many.
+pub fn bumpy(number: usize) -> TriMesh {
+    let (n, place) = (20u32, number as f32);
+    let corner = |k: u32| {
+        let (x, y) = ((k % (n + 1)) as f32 / n as f32, (k / (n + 1)) as f32 / n as f32);
+        Vec3::new(
+            x + place % 32.0,
+            y + (place / 32.0).floor(),
+            0.2 * (9.0 * x + place).sin() * (7.0 * y).cos(),
+        )
+    };
+    let mut mesh = TriMesh::new((0..(n + 1) * (n + 1)).map(corner).collect(), vec![]);
+    for k in (0..n).flat_map(|j| (0..n).map(move |i| j * (n + 1) + i)) {
+        mesh.indices.extend([[k, k + 1, k + n + 1], [k + 1, k + n + 2, k + n + 1]]);
+    }
+    mesh
+}
+
 /// All of the shells, filling most of a square picture.
 pub fn camera() -> Camera {
     let eye = DVec3::new(3.1, 2.2, 4.0);
@@ -65,7 +83,7 @@ pub fn primary_rays(world: &World, size: u32) -> Vec<RayBlock> {
 /// Points that rays met, a little off the surface on the side they came from, with the normal there.
 pub fn points_met(world: &World, mesh: &TriMesh, rays: &[RayBlock]) -> Vec<(Vec3, Vec3)> {
     let mut hits = vec![HitBlock::MISS; rays.len()];
-    world.closest_coherent(rays, &mut hits);
+    world.closest_coherent(rays, &mut hits).expect("one each");
     let lanes = rays.iter().zip(&hits).flat_map(|(r, h)| (0..LANES).map(move |l| (r.get(l), h.get(l))));
     lanes
         .filter_map(|(ray, hit)| {

@@ -17,8 +17,11 @@ mod world;
 pub use options::{BuildOptions, BuildQuality, BuildReport, Robustness};
 pub use part::{ShapePart, Whole};
 pub use refit::{RefitError, RefitReport};
+pub(crate) use streams::Coherence;
+pub use streams::StreamError;
 pub use validate::{InvalidTree, TreeFacts};
 pub(crate) use wide::{Unit, WideBvh};
+pub(crate) use world::Among;
 pub use world::{BuildError, Geometry, Instance, World};
 
 #[cfg(test)]

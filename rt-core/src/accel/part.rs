@@ -5,11 +5,9 @@
 //! over the choices of the whole ([`Whole`]), and the nearest of the hits of all parts, ties to the lowest id, is the whole's hit.
 
 use super::blas::{Blas, LocalFrame};
-use super::build::MAX_PRIMS;
 use super::options::BuildOptions;
 use super::world::{BuildError, Geometry, Instance, World};
 use crate::math::Aabb;
-use crate::mesh::MeshError;
 use crate::ray::Ray;
 use crate::shapes::{Shape, ShapeHit, ShapeSurface};
 use glam::DVec3;
@@ -71,26 +69,19 @@ impl World {
     }
 }
 
-/// The structure of geometry `index`, in its own local space or in that of the whole.
+/// The structure of geometry `index`, which was checked, in its own local space or in that of the
+/// whole.
 pub(super) fn blas_of(
     index: usize,
     geometry: &Geometry,
     options: &BuildOptions,
     whole: Option<&Whole>,
-) -> Result<Blas, BuildError> {
+) -> Blas {
     let given = whole.map(|w| w.geometries[index]);
-    Ok(match geometry {
-        Geometry::Mesh(m) => {
-            let error = |source| BuildError::Mesh { geometry: index, source };
-            m.check().map_err(error)?;
-            if m.indices.len() >= MAX_PRIMS {
-                let found = m.indices.len();
-                return Err(error(MeshError::TooLarge { what: "triangles", found, limit: MAX_PRIMS - 1 }));
-            }
-            Blas::for_mesh(m, options, given)
-        }
+    match geometry {
+        Geometry::Mesh(m) => Blas::for_mesh(m, options, given),
         Geometry::Shape(s) => Blas::for_shape(s.clone(), options, given),
-    })
+    }
 }
 
 /// Some primitives of a shape, in the order of their numbers there. The shape's data stay where they are and are shared.

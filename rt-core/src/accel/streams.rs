@@ -5,7 +5,7 @@ use super::options::Robustness;
 use super::placement::Placement;
 use super::triangles::TriBvh;
 use super::wide::ChildRef;
-use super::world::{ORDINARY_LENGTHS, World, with_ordinary_length};
+use super::world::{Among, ORDINARY_LENGTHS, World, with_ordinary_length};
 use crate::ray::{Hit, HitBlock, LANES, NO_HIT, Ray, RayBlock};
 use crate::stats::{Work, count};
 use crate::traverse::hybrid;
@@ -43,40 +43,101 @@ thread_local! {
     });
 }
 
+/// Slices of different lengths.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("{rays} blocks of rays, but room for the answers of {answers}: give as many of these as of rays")]
+pub struct StreamError {
+    /// Blocks of rays.
+    pub rays: usize,
+    /// Blocks, or masks, for their answers.
+    pub answers: usize,
+}
+
+fn same_length(rays: usize, answers: usize) -> Result<(), StreamError> {
+    if rays == answers { Ok(()) } else { Err(StreamError { rays, answers }) }
+}
+
+/// How alike neighbouring rays are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Coherence {
+    /// They go the same way: to one light, through neighbouring pixels.
+    Alike,
+    /// They go in any direction.
+    Scattered,
+}
+
 impl World {
     /// The closest hits of many rays, in order. Neighbouring rays should be similar (a tile of pixels, rays to one light): they are
     /// traced as packets of up to 256, cut where rays differ too much. Lanes with `t_max <= t_min` are left alone as misses.
     ///
-    /// The answers are those of [`World::closest`], bit for bit. Rays beyond the shorter of the two slices are not traced.
-    pub fn closest_coherent(&self, rays: &[RayBlock], hits: &mut [HitBlock]) {
-        self.closest_stream(rays, hits, true);
+    /// The answers are those of [`World::closest`], bit for bit.
+    ///
+    /// # Errors
+    /// When the slices differ in length; then no ray is traced.
+    pub fn closest_coherent(&self, rays: &[RayBlock], hits: &mut [HitBlock]) -> Result<(), StreamError> {
+        same_length(rays.len(), hits.len())?;
+        self.closest_stream(rays, hits, Coherence::Alike, Among::All);
+        Ok(())
     }
 
     /// Occlusion of many similar rays: bit `lane` of `out[block]` is set when that ray is blocked.
-    pub fn occluded_coherent(&self, rays: &[RayBlock], out: &mut [u16]) {
-        self.occluded_stream(rays, out, true);
+    ///
+    /// # Errors
+    /// When the slices differ in length; then no ray is traced.
+    pub fn occluded_coherent(&self, rays: &[RayBlock], out: &mut [u16]) -> Result<(), StreamError> {
+        same_length(rays.len(), out.len())?;
+        self.occluded_stream(rays, out, Coherence::Alike, Among::All);
+        Ok(())
     }
 
     /// As [`World::closest_coherent`] for rays in any direction (ambient occlusion, glossy and path tracing). Rays of one block should start close to
     /// one another: they share the way through the tree as long as it is the same.
-    pub fn closest_incoherent(&self, rays: &[RayBlock], hits: &mut [HitBlock]) {
-        self.closest_stream(rays, hits, false);
+    ///
+    /// # Errors
+    /// When the slices differ in length; then no ray is traced.
+    pub fn closest_incoherent(&self, rays: &[RayBlock], hits: &mut [HitBlock]) -> Result<(), StreamError> {
+        same_length(rays.len(), hits.len())?;
+        self.closest_stream(rays, hits, Coherence::Scattered, Among::All);
+        Ok(())
     }
 
     /// As [`World::occluded_coherent`] for rays in any direction.
-    pub fn occluded_incoherent(&self, rays: &[RayBlock], out: &mut [u16]) {
-        self.occluded_stream(rays, out, false);
+    ///
+    /// # Errors
+    /// When the slices differ in length; then no ray is traced.
+    pub fn occluded_incoherent(&self, rays: &[RayBlock], out: &mut [u16]) -> Result<(), StreamError> {
+        same_length(rays.len(), out.len())?;
+        self.occluded_stream(rays, out, Coherence::Scattered, Among::All);
+        Ok(())
     }
 
-    fn occluded_stream(&self, rays: &[RayBlock], out: &mut [u16], coherent: bool) {
-        match self.robustness {
+    /// Whether an instance of `among` is in the way of each ray. Slices of one length.
+    pub(crate) fn occluded_stream(
+        &self,
+        rays: &[RayBlock],
+        out: &mut [u16],
+        coherence: Coherence,
+        among: Among<'_>,
+    ) {
+        debug_assert_eq!(rays.len(), out.len(), "checked by the caller");
+        if self.is_nothing_among(among) {
+            out.fill(0);
+            return;
+        }
+        let coherent = coherence == Coherence::Alike;
+        dispatch!(self.level, simd => match self.robustness {
             Robustness::Fast => {
-                dispatch!(self.level, simd => self.occluded_blocks::<_, false>(simd, rays, out, coherent))
+                self.occluded_blocks::<_, false>(simd, rays, out, coherent, among)
             }
             Robustness::Watertight => {
-                dispatch!(self.level, simd => self.occluded_blocks::<_, true>(simd, rays, out, coherent))
+                self.occluded_blocks::<_, true>(simd, rays, out, coherent, among)
             }
-        }
+        })
+    }
+
+    /// Whether there is only one instance, and `among` lacks it.
+    fn is_nothing_among(&self, among: Among<'_>) -> bool {
+        self.placements.len() == 1 && !among.has(0)
     }
 
     fn occluded_blocks<S: Simd, const EXACT: bool>(
@@ -85,13 +146,13 @@ impl World {
         rays: &[RayBlock],
         out: &mut [u16],
         coherent: bool,
+        among: Among<'_>,
     ) {
         SCRATCH.with_borrow_mut(|scratch| {
             let alone = if coherent { self.alone() } else { None };
             let mut hits = [HitBlock::MISS; GROUPS];
             for (r, out) in rays.chunks(GROUPS).zip(out.chunks_mut(GROUPS)) {
-                let n = r.len().min(out.len());
-                let (r, out) = (&r[..n], &mut out[..n]);
+                let n = r.len();
                 if let Some((tris, limits)) = &alone
                     && scratch.inner.load(simd, r, limits)
                 {
@@ -100,7 +161,7 @@ impl World {
                     continue;
                 }
                 let hits = &mut hits[..n];
-                self.group::<S, EXACT, true>(simd, r, hits, coherent, scratch);
+                self.group::<S, EXACT, true>(simd, r, hits, coherent, among, scratch);
                 for (o, h) in out.iter_mut().zip(hits) {
                     *o = (0..LANES).fold(0, |m, l| m | ((h.prim[l] != NO_HIT) as u16) << l);
                 }
@@ -117,15 +178,28 @@ impl World {
         }
     }
 
-    fn closest_stream(&self, rays: &[RayBlock], hits: &mut [HitBlock], coherent: bool) {
-        match self.robustness {
+    /// The closest hit of each ray with an instance of `among`. Slices of one length.
+    pub(crate) fn closest_stream(
+        &self,
+        rays: &[RayBlock],
+        hits: &mut [HitBlock],
+        coherence: Coherence,
+        among: Among<'_>,
+    ) {
+        debug_assert_eq!(rays.len(), hits.len(), "checked by the caller");
+        if self.is_nothing_among(among) {
+            hits.fill(HitBlock::MISS);
+            return;
+        }
+        let coherent = coherence == Coherence::Alike;
+        dispatch!(self.level, simd => match self.robustness {
             Robustness::Fast => {
-                dispatch!(self.level, simd => self.closest_blocks::<_, false>(simd, rays, hits, coherent))
+                self.closest_blocks::<_, false>(simd, rays, hits, coherent, among)
             }
             Robustness::Watertight => {
-                dispatch!(self.level, simd => self.closest_blocks::<_, true>(simd, rays, hits, coherent))
+                self.closest_blocks::<_, true>(simd, rays, hits, coherent, among)
             }
-        }
+        })
     }
 
     fn closest_blocks<S: Simd, const EXACT: bool>(
@@ -134,12 +208,11 @@ impl World {
         rays: &[RayBlock],
         hits: &mut [HitBlock],
         coherent: bool,
+        among: Among<'_>,
     ) {
         SCRATCH.with_borrow_mut(|scratch| {
             let alone = if coherent { self.alone() } else { None };
             for (r, h) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {
-                let n = r.len().min(h.len());
-                let (r, h) = (&r[..n], &mut h[..n]);
                 if let Some((tris, limits)) = &alone
                     && scratch.inner.load(simd, r, limits)
                 {
@@ -147,7 +220,7 @@ impl World {
                     scratch.inner.store_all(simd, h, 0);
                     continue;
                 }
-                self.group::<S, EXACT, false>(simd, r, h, coherent, scratch);
+                self.group::<S, EXACT, false>(simd, r, h, coherent, among, scratch);
             }
         });
     }
@@ -159,15 +232,16 @@ impl World {
         rays: &[RayBlock],
         hits: &mut [HitBlock],
         coherent: bool,
+        among: Among<'_>,
         scratch: &mut Scratch,
     ) {
         hits.fill(HitBlock::MISS);
         if any_unusual_length(simd, rays) {
-            self.one_by_one::<S, EXACT, ANY>(simd, rays, hits);
+            self.one_by_one::<S, EXACT, ANY>(simd, rays, hits, among);
         } else if coherent {
-            self.blocks::<S, EXACT, ANY>(simd, rays, hits, scratch);
+            self.blocks::<S, EXACT, ANY>(simd, rays, hits, among, scratch);
         } else {
-            self.incoherent_blocks::<S, EXACT, ANY>(simd, rays, hits, scratch);
+            self.incoherent_blocks::<S, EXACT, ANY>(simd, rays, hits, among, scratch);
         }
     }
 
@@ -177,6 +251,7 @@ impl World {
         simd: S,
         rays: &[RayBlock],
         hits: &mut [HitBlock],
+        among: Among<'_>,
         scratch: &mut Scratch,
     ) {
         match self.placements.as_slice() {
@@ -192,7 +267,7 @@ impl World {
                     self.instance_blocks::<S, EXACT, ANY>(simd, 0, rays, hits, scratch, false);
                 }
             }
-            _ => self.one_by_one::<S, EXACT, ANY>(simd, rays, hits),
+            _ => self.one_by_one::<S, EXACT, ANY>(simd, rays, hits, among),
         }
     }
 
@@ -202,6 +277,7 @@ impl World {
         simd: S,
         rays: &[RayBlock],
         hits: &mut [HitBlock],
+        among: Among<'_>,
         scratch: &mut Scratch,
     ) {
         if let [only] = self.placements.as_slice() {
@@ -218,7 +294,9 @@ impl World {
             let mut order = std::mem::take(&mut scratch.order);
             order.clear();
             for &(distance, leaf) in &scratch.candidates {
-                order.extend(leaf_ids(&self.tlas.units, leaf).iter().map(|&i| (distance, i)));
+                let met = leaf_ids(&self.tlas.units, leaf).iter();
+                let met = met.filter(|&&i| among.has(i as usize));
+                order.extend(met.map(|&i| (distance, i)));
             }
             let few = order.len() <= MOST_CANDIDATES;
             if few {
@@ -235,7 +313,7 @@ impl World {
                 return;
             }
         }
-        self.one_by_one::<S, EXACT, ANY>(simd, rays, hits);
+        self.one_by_one::<S, EXACT, ANY>(simd, rays, hits, among);
     }
 
     fn one_by_one<S: Simd, const EXACT: bool, const ANY: bool>(
@@ -243,6 +321,7 @@ impl World {
         simd: S,
         rays: &[RayBlock],
         hits: &mut [HitBlock],
+        among: Among<'_>,
     ) {
         for (r, h) in rays.iter().zip(hits) {
             for lane in 0..LANES {
@@ -253,11 +332,11 @@ impl World {
                 count(Work::Fallbacks, 1);
                 let (ray, unit) = with_ordinary_length(&ray);
                 if ANY {
-                    if self.occluded_in::<S, EXACT>(simd, &ray) {
+                    if self.occluded_in::<S, EXACT>(simd, &ray, among) {
                         h.prim[lane] = 0;
                     }
                 } else {
-                    let hit = self.closest_in::<S, EXACT>(simd, &ray);
+                    let hit = self.closest_in::<S, EXACT>(simd, &ray, among);
                     h.set(lane, hit.map(|c| Hit { t: c.t * unit, ..c }));
                 }
             }

@@ -6,6 +6,7 @@ use crate::ray::{HitBlock, LANES, NO_HIT, Ray, RayBlock};
 use crate::simd::SimdLevel;
 use crate::test_shapes::{Random, noise_soup, sphere};
 use glam::Vec3;
+use std::sync::Arc;
 
 /// Every combination of options.
 pub(crate) fn all_options() -> Vec<BuildOptions> {
@@ -85,8 +86,8 @@ fn packets_equal_single_rays_bit_for_bit_at_every_level() {
             let mut coherent = vec![HitBlock::MISS; blocks.len()];
             let mut sorted = coherent.clone();
             let mut single = coherent.clone();
-            world.closest_coherent(&blocks, &mut coherent);
-            world.closest_incoherent(&blocks, &mut sorted);
+            world.closest_coherent(&blocks, &mut coherent).expect("one each");
+            world.closest_incoherent(&blocks, &mut sorted).expect("one each");
             for (i, r) in rays.iter().enumerate() {
                 single[i / LANES].set(i % LANES, world.closest(r));
             }
@@ -104,8 +105,8 @@ fn packets_equal_single_rays_bit_for_bit_at_every_level() {
                 Some(r) => assert!(*r == single, "{name}: {simd:?} differs from the first level"),
             }
             let (mut a, mut b) = (vec![0u16; blocks.len()], vec![0u16; blocks.len()]);
-            world.occluded_coherent(&blocks, &mut a);
-            world.occluded_incoherent(&blocks, &mut b);
+            world.occluded_coherent(&blocks, &mut a).expect("one each");
+            world.occluded_incoherent(&blocks, &mut b).expect("one each");
             for (i, h) in single.iter().enumerate() {
                 let expected = (0..LANES).fold(0, |m, l| m | ((h.prim[l] != NO_HIT) as u16) << l);
                 assert_eq!((a[i], b[i]), (expected, expected), "{name} {simd:?}: occlusion of block {i}");
@@ -123,14 +124,13 @@ fn empty_worlds_and_missing_rays() {
         let no_triangles = World::from_mesh(TriMesh::default(), &options).expect("no triangles are allowed");
         assert_eq!(no_triangles.closest(&ray), None);
         let mut hits = [HitBlock::MISS; 3];
-        no_triangles.closest_coherent(&RayBlock::from_rays(&[ray; 40]), &mut hits);
+        no_triangles.closest_coherent(&RayBlock::from_rays(&[ray; 40]), &mut hits).expect("one each");
         assert!(hits.iter().all(|h| h.prim == [NO_HIT; LANES]));
     }
 }
 
 #[test]
 fn worlds_share_the_trees_of_geometries_they_have_in_common() {
-    use std::sync::Arc;
     let mesh = |seed| Geometry::Mesh(Arc::new(noise_soup(300, seed)));
     let (kept, changed, new) = (mesh(1), mesh(2), mesh(3));
     let at = |geometry, x: f64| Instance {
@@ -159,7 +159,83 @@ fn worlds_share_the_trees_of_geometries_they_have_in_common() {
     assert_eq!(hits(&second), expected);
 
     // Other options: nothing of the old tree fits.
-    let other = BuildOptions { quality: BuildQuality::Fastest, ..options };
+    let other = BuildOptions { quality: BuildQuality::Fast, ..options };
     let third = World::build_sharing(geometries, instances, &other, Some(&second)).expect("valid meshes");
     assert!(!Arc::ptr_eq(&third.blas[0], &second.blas[0]));
+}
+
+// ---- Some of the instances
+
+/// Few instances are traced in packets, many one by one; all sides of a mesh, a mirrored one, and a shape.
+fn many_places(n: usize) -> (Vec<Geometry>, Vec<Instance>) {
+    use crate::shapes::{Radii, Spheres};
+    use glam::{DAffine3, DVec3};
+    let balls = Spheres::new(vec![Vec3::ZERO, Vec3::X * 0.3], Radii::Common(0.2)).expect("balls");
+    let geometries = vec![
+        Geometry::Mesh(Arc::new(noise_soup(60, 5))),
+        Geometry::Mesh(Arc::new(sphere(2))),
+        Geometry::Shape(Arc::new(balls)),
+    ];
+    let mut r = Random::new(n as u64);
+    let instances = (0..n)
+        .map(|i| {
+            let place = (r.direction() * r.unit()).as_dvec3();
+            let scale = DVec3::new(if i % 4 == 0 { -0.4 } else { 0.4 }, 0.3, 0.5);
+            let world_from_object = DAffine3::from_scale_rotation_translation(
+                scale,
+                glam::DQuat::from_rotation_y(i as f64),
+                place,
+            );
+            Instance { geometry: i % 3, world_from_object }
+        })
+        .collect();
+    (geometries, instances)
+}
+
+#[test]
+fn rays_among_some_instances_meet_what_is_met_when_all_others_are_gone() {
+    for n in [1, 2, 7, 60] {
+        let (geometries, instances) = many_places(n);
+        for simd in SimdLevel::available() {
+            let options = BuildOptions { simd: Some(simd), ..BuildOptions::default() };
+            let world = World::build(geometries.clone(), instances.clone(), &options).expect("sound");
+            for marks in [0u64, u64::MAX, 0x5555_5555_5555_5555, 0x0f0f_3c3c_0f0f_3c3c] {
+                let marked: Vec<bool> = (0..n).map(|i| marks >> i & 1 != 0).collect();
+                for (name, rays) in ray_sets() {
+                    check_among(&world, &marked, &rays[..600], &format!("{n} instances, {name}, {simd:?}"));
+                }
+            }
+        }
+    }
+}
+
+/// Each ray is taken through all instances, hit after hit, until it meets one of those that count.
+fn check_among(world: &World, marked: &[bool], rays: &[Ray], what: &str) {
+    let blocks = RayBlock::from_rays(rays);
+    let first_of = |ray: &Ray, wanted: bool| {
+        let level = world.level;
+        let found = (0..marked.len()).filter(|&i| marked[i] == wanted).filter_map(|i| {
+            let only: Vec<bool> = (0..marked.len()).map(|k| k == i).collect();
+            let among = Among::Marked(&only);
+            if marked.len() == 1 {
+                return world.closest(ray);
+            }
+            fearless_simd::dispatch!(level, simd => world.closest_in::<_, true>(simd, ray, among))
+        });
+        found.min_by(|a, b| a.t.total_cmp(&b.t).then(a.instance.cmp(&b.instance)))
+    };
+    for (wanted, among) in [(true, Among::Marked(marked)), (false, Among::Unmarked(marked))] {
+        let expected: Vec<_> = rays.iter().map(|r| first_of(r, wanted)).collect();
+        for coherence in [Coherence::Alike, Coherence::Scattered] {
+            let mut hits = vec![HitBlock::MISS; blocks.len()];
+            let mut any = vec![0u16; blocks.len()];
+            world.closest_stream(&blocks, &mut hits, coherence, among);
+            world.occluded_stream(&blocks, &mut any, coherence, among);
+            for (i, e) in expected.iter().enumerate() {
+                let (b, lane) = (i / LANES, i % LANES);
+                assert_eq!(hits[b].get(lane), *e, "{what}, {coherence:?}, ray {i}");
+                assert_eq!(any[b] >> lane & 1 != 0, e.is_some(), "{what}, {coherence:?}, ray {i}");
+            }
+        }
+    }
 }

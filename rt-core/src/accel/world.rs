@@ -1,7 +1,7 @@
 //! The two-level structure that rays are traced against: instances of geometries.
 
 use super::blas::{Blas, IdWriter, leaf_ids};
-use super::build::{PrimRef, build_wide};
+use super::build::{MAX_PRIMS, PrimRef, build_wide};
 use super::options::{BuildOptions, BuildQuality, BuildReport, Robustness};
 use super::part::{Whole, blas_of};
 use super::placement::{Placement, distance_to_sphere};
@@ -10,10 +10,11 @@ use crate::math::{Aabb, exp2i, max_abs};
 use crate::mesh::{MeshError, TriMesh};
 use crate::ray::{Hit, Ray};
 use crate::shapes::Shape;
-use crate::simd::SimdLevel;
+use crate::simd::{SimdLevel, UnavailableLevel};
 use crate::traverse::single::{LeafTest, RaySetup, beyond, traverse};
 use fearless_simd::{Level, Simd, dispatch};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
+use rayon::prelude::*;
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Instant;
@@ -36,6 +37,26 @@ impl Geometry {
             Geometry::Mesh(m) => Arc::as_ptr(m) as usize,
             Geometry::Shape(s) => s.tree_of().as_ref().map_or_else(|| of_shape(s), of_shape),
         }
+    }
+
+    /// Triangles of a mesh, primitives of a shape.
+    pub fn num_primitives(&self) -> usize {
+        match self {
+            Geometry::Mesh(m) => m.indices.len(),
+            Geometry::Shape(s) => s.num_primitives(),
+        }
+    }
+
+    /// Whether geometry `index` can be built.
+    fn check(&self, index: usize) -> Result<(), BuildError> {
+        let Geometry::Mesh(mesh) = self else { return Ok(()) };
+        let error = |source| BuildError::Mesh { geometry: index, source };
+        mesh.check().map_err(error)?;
+        if mesh.indices.len() >= MAX_PRIMS {
+            let found = mesh.indices.len();
+            return Err(error(MeshError::TooLarge { what: "triangles", found, limit: MAX_PRIMS - 1 }));
+        }
+        Ok(())
     }
 }
 
@@ -79,6 +100,9 @@ pub enum BuildError {
         /// Geometries given.
         found: usize,
     },
+    /// The machine lacks the instruction set asked for.
+    #[error(transparent)]
+    Level(#[from] UnavailableLevel),
     /// An instance's transform cannot be inverted.
     #[error(
         "instance {instance}: its transform has determinant {determinant}; give one that is finite and not singular, or leave the instance out"
@@ -89,6 +113,28 @@ pub enum BuildError {
         /// The determinant found.
         determinant: f64,
     },
+}
+
+/// Which instances rays can meet.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Among<'a> {
+    /// Every one.
+    All,
+    /// Those with a mark. Marks that are missing are not set.
+    Marked(&'a [bool]),
+    /// Those without.
+    Unmarked(&'a [bool]),
+}
+
+impl Among<'_> {
+    #[inline(always)]
+    pub(super) fn has(self, instance: usize) -> bool {
+        match self {
+            Among::All => true,
+            Among::Marked(marks) => marks.get(instance).is_some_and(|m| *m),
+            Among::Unmarked(marks) => !marks.get(instance).is_some_and(|m| *m),
+        }
+    }
 }
 
 /// Instances of geometries, ready for rays.
@@ -140,6 +186,7 @@ impl World {
     ) -> Result<World, BuildError> {
         let start = Instant::now();
         let mut phases = Vec::new();
+        let level = SimdLevel::resolve(options.simd)?;
         for (i, inst) in instances.iter().enumerate() {
             if inst.geometry >= geometries.len() {
                 let count = geometries.len();
@@ -147,15 +194,18 @@ impl World {
             }
         }
         let known = previous.filter(|w| w.options == *options).map(World::trees_by_address);
-        let blas = geometries
-            .iter()
-            .enumerate()
-            .map(|(i, g)| match (known.as_ref().and_then(|k| k.get(&g.address())), g) {
-                (Some(tree), Geometry::Mesh(_)) => Ok(Arc::clone(tree)),
-                (Some(tree), Geometry::Shape(s)) => Ok(Blas::with_shape(tree, s)),
-                (None, _) => blas_of(i, g, options, whole).map(Arc::new),
-            })
-            .collect::<Result<Vec<_>, _>>()?;
+        for (i, g) in geometries.iter().enumerate() {
+            g.check(i)?;
+        }
+        let build = |i: usize| {
+            let g = &geometries[i];
+            match (known.as_ref().and_then(|k| k.get(&g.address())), g) {
+                (Some(tree), Geometry::Mesh(_)) => Arc::clone(tree),
+                (Some(tree), Geometry::Shape(s)) => Blas::with_shape(tree, s),
+                (None, _) => Arc::new(blas_of(i, g, options, whole)),
+            }
+        };
+        let blas = side_by_side(&geometries, build);
         phases.push(("geometries", start.elapsed()));
 
         let mut notes: Vec<String> = blas
@@ -186,7 +236,7 @@ impl World {
             tlas,
             options: *options,
             robustness: options.robustness,
-            level: SimdLevel::resolve(options.simd),
+            level,
         })
     }
 
@@ -267,8 +317,12 @@ impl World {
         }
         let (ray, unit) = with_ordinary_length(ray);
         let hit = match self.robustness {
-            Robustness::Fast => dispatch!(self.level, simd => self.closest_in::<_, false>(simd, &ray)),
-            Robustness::Watertight => dispatch!(self.level, simd => self.closest_in::<_, true>(simd, &ray)),
+            Robustness::Fast => {
+                dispatch!(self.level, simd => self.closest_in::<_, false>(simd, &ray, Among::All))
+            }
+            Robustness::Watertight => {
+                dispatch!(self.level, simd => self.closest_in::<_, true>(simd, &ray, Among::All))
+            }
         };
         hit.map(|h| Hit { t: h.t * unit, ..h })
     }
@@ -280,19 +334,29 @@ impl World {
         }
         let (ray, _) = with_ordinary_length(ray);
         match self.robustness {
-            Robustness::Fast => dispatch!(self.level, simd => self.occluded_in::<_, false>(simd, &ray)),
-            Robustness::Watertight => dispatch!(self.level, simd => self.occluded_in::<_, true>(simd, &ray)),
+            Robustness::Fast => {
+                dispatch!(self.level, simd => self.occluded_in::<_, false>(simd, &ray, Among::All))
+            }
+            Robustness::Watertight => {
+                dispatch!(self.level, simd => self.occluded_in::<_, true>(simd, &ray, Among::All))
+            }
         }
     }
 
-    pub(crate) fn closest_in<S: Simd, const EXACT: bool>(&self, simd: S, ray: &Ray) -> Option<Hit> {
+    /// The closest hit with an instance of `among`; where there is only one instance, it is.
+    pub(crate) fn closest_in<S: Simd, const EXACT: bool>(
+        &self,
+        simd: S,
+        ray: &Ray,
+        among: Among<'_>,
+    ) -> Option<Hit> {
         if let [only] = self.placements.as_slice()
             && only.accepts(ray)
         {
             let c = self.blas[only.geometry].closest::<S, EXACT>(simd, ray);
             return c.found.then_some(Hit { t: c.t, u: c.u, v: c.v, prim: c.prim, instance: 0 });
         }
-        let mut leaves = InstanceClosest::<EXACT> { world: self, ray: *ray, best: None };
+        let mut leaves = InstanceClosest::<EXACT> { world: self, ray: *ray, among, best: None };
         match self.placements.len() {
             0 => return None,
             1 => {
@@ -307,13 +371,19 @@ impl World {
         leaves.best
     }
 
-    pub(crate) fn occluded_in<S: Simd, const EXACT: bool>(&self, simd: S, ray: &Ray) -> bool {
+    /// Whether an instance of `among` is in the way; where there is only one instance, it is.
+    pub(crate) fn occluded_in<S: Simd, const EXACT: bool>(
+        &self,
+        simd: S,
+        ray: &Ray,
+        among: Among<'_>,
+    ) -> bool {
         if let [only] = self.placements.as_slice()
             && only.accepts(ray)
         {
             return self.blas[only.geometry].occluded::<S, EXACT>(simd, ray);
         }
-        let mut leaves = InstanceAny::<EXACT> { world: self, ray: *ray, found: false };
+        let mut leaves = InstanceAny::<EXACT> { world: self, ray: *ray, among, found: false };
         match self.placements.len() {
             0 => return false,
             1 => leaves.found = self.instance_occluded::<S, EXACT>(simd, 0, ray),
@@ -353,6 +423,26 @@ pub(super) fn with_ordinary_length(ray: &Ray) -> (Ray, f32) {
     (Ray { dir: ray.dir * k, t_min: limit(ray.t_min), t_max: limit(ray.t_max.min(f32::MAX)), ..*ray }, k)
 }
 
+/// Geometries of more primitives are built one after the other, each by all threads. Their cuts are
+/// tasks enough, and the builder's boxes (64 bytes a primitive) are in memory for one at a time.
+const ALONE: usize = 1 << 17;
+
+/// `build(i)` for every geometry, in order. What is built does not depend on who builds it when.
+fn side_by_side<T: Send>(geometries: &[Geometry], build: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    let (large, small): (Vec<usize>, Vec<usize>) =
+        (0..geometries.len()).partition(|&i| geometries[i].num_primitives() > ALONE);
+    // The small ones fill the gaps that the first, serial cut of a large one leaves. Each is a task
+    // of its own, so that threads share them whatever their sizes.
+    let (of_large, of_small): (Vec<T>, Vec<T>) = rayon::join(
+        || large.iter().map(|&i| build(i)).collect(),
+        || small.par_iter().with_max_len(1).map(|&i| build(i)).collect(),
+    );
+    let mut built: Vec<(usize, T)> = large.into_iter().zip(of_large).collect();
+    built.extend(small.into_iter().zip(of_small));
+    built.sort_unstable_by_key(|(i, _)| *i);
+    built.into_iter().map(|(_, t)| t).collect()
+}
+
 /// The upper level.
 struct Placed {
     origin: DVec3,
@@ -368,20 +458,19 @@ fn place(
     notes: &mut Vec<String>,
 ) -> Result<Placed, BuildError> {
     let origin = whole.map_or_else(|| choose_origin(instances, blas), |w| w.origin);
-    let placements = instances
-        .iter()
-        .enumerate()
-        .map(|(i, inst)| {
-            let b = &blas[inst.geometry];
-            let bounds = [b.reach(), b.bvh().bounds];
-            Placement::new(inst.geometry, &inst.world_from_object, &b.frame, bounds, origin).ok_or(
-                BuildError::SingularTransform {
-                    instance: i,
-                    determinant: inst.world_from_object.matrix3.determinant(),
-                },
-            )
-        })
-        .collect::<Result<Vec<_>, _>>()?;
+    let place_one = |(i, inst): (usize, &Instance)| {
+        let b = &blas[inst.geometry];
+        let bounds = [b.reach(), b.bvh().bounds];
+        Placement::new(inst.geometry, &inst.world_from_object, &b.frame, bounds, origin).ok_or(
+            BuildError::SingularTransform {
+                instance: i,
+                determinant: inst.world_from_object.matrix3.determinant(),
+            },
+        )
+    };
+    // Of several errors the first is told, whoever finds one first.
+    let placed: Vec<_> = instances.par_iter().enumerate().with_min_len(1024).map(place_one).collect();
+    let placements = placed.into_iter().collect::<Result<Vec<_>, _>>()?;
     let refs = placements
         .iter()
         .enumerate()
@@ -401,19 +490,25 @@ fn choose_origin(instances: &[Instance], blas: &[Arc<Blas>]) -> DVec3 {
     {
         return blas[only.geometry].frame.center + only.world_from_object.translation;
     }
-    let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for inst in instances {
+    let join = |(lo, hi): (DVec3, DVec3), (a, b): (DVec3, DVec3)| (lo.min(a), hi.max(b));
+    let nothing = || (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let of_instance = |inst: &Instance| {
         let b = &blas[inst.geometry];
         let bounds = b.bvh().bounds;
         if bounds.is_empty() {
-            continue;
+            return nothing();
         }
-        for c in bounds.corners() {
-            let p = inst.world_from_object.transform_point3(c.as_dvec3() / b.frame.scale + b.frame.center);
-            lo = lo.min(p);
-            hi = hi.max(p);
-        }
-    }
+        let of_corner = |c: Vec3| {
+            let object = c.as_dvec3() / b.frame.scale + b.frame.center;
+            let p = inst.world_from_object.transform_point3(object);
+            (p, p)
+        };
+        bounds.corners().map(of_corner).into_iter().fold(nothing(), join)
+    };
+    // Pieces of a fixed size, joined in order: the sign of a zero does not depend on the threads.
+    let pieces: Vec<_> =
+        instances.par_chunks(1024).map(|piece| piece.iter().map(of_instance).fold(nothing(), join)).collect();
+    let (lo, hi) = pieces.into_iter().fold(nothing(), join);
     let center = 0.5 * lo + 0.5 * hi;
     let far = center.abs().max_element() > 4.0 * (hi - lo).max_element();
     if center.is_finite() && far { center.as_vec3().as_dvec3() } else { DVec3::ZERO }
@@ -422,6 +517,7 @@ fn choose_origin(instances: &[Instance], blas: &[Arc<Blas>]) -> DVec3 {
 struct InstanceClosest<'w, const EXACT: bool> {
     world: &'w World,
     ray: Ray,
+    among: Among<'w>,
     best: Option<Hit>,
 }
 
@@ -449,7 +545,8 @@ impl<const EXACT: bool> InstanceClosest<'_, EXACT> {
 
 impl<S: Simd, const EXACT: bool> LeafTest<S> for InstanceClosest<'_, EXACT> {
     fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool {
-        for &i in leaf_ids(units, leaf) {
+        let among = self.among;
+        for &i in leaf_ids(units, leaf).iter().filter(|&&i| among.has(i as usize)) {
             self.try_instance(simd, i, skip_t);
         }
         false
@@ -459,14 +556,16 @@ impl<S: Simd, const EXACT: bool> LeafTest<S> for InstanceClosest<'_, EXACT> {
 struct InstanceAny<'w, const EXACT: bool> {
     world: &'w World,
     ray: Ray,
+    among: Among<'w>,
     found: bool,
 }
 
 impl<S: Simd, const EXACT: bool> LeafTest<S> for InstanceAny<'_, EXACT> {
     fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, _: &mut f32) -> bool {
-        let (world, ray) = (self.world, self.ray);
+        let (world, ray, among) = (self.world, self.ray, self.among);
         self.found = leaf_ids(units, leaf)
             .iter()
+            .filter(|&&i| among.has(i as usize))
             .any(|&i| world.instance_occluded::<S, EXACT>(simd, i as usize, &ray));
         self.found
     }

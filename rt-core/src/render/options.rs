@@ -103,6 +103,31 @@ impl RenderOptions {
         self.crop.unwrap_or(Crop { x: 0, y: 0, width: self.width, height: self.height })
     }
 
+    /// Limits and thresholds that cannot do anything, in words.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let mut out = Vec::new();
+        if self.depth_min_opacity != 0.0 && !self.layers.intersects(Layers::GEOMETRY) {
+            out.push(format!(
+                "depth_min_opacity {} changes nothing: no layer of depth, distance, normals or ids is asked for",
+                self.depth_min_opacity
+            ));
+        }
+        if self.max_error_levels.is_some() && self.samples <= 4 {
+            out.push(format!(
+                "max_error_levels changes nothing: it is looked at from 4 samples on, and `samples` is {}; raise `samples`",
+                self.samples
+            ));
+        }
+        if self.time_limit.is_some() && self.samples == 1 {
+            out.push(
+                "time_limit changes nothing: the first sample is always finished, and `samples` is 1; raise `samples`, or use \
+                 `cancel`"
+                    .into(),
+            );
+        }
+        out
+    }
+
     /// Checks every number.
     pub fn check(&self) -> Result<(), RenderError> {
         let error = |field, value: String, rule| Err(RenderError::Option { field, value, rule });

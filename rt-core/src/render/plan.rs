@@ -27,7 +27,9 @@ pub(crate) fn plan_for(
 ) -> Result<Plan, RenderError> {
     options.check()?;
     scene.check()?;
+    camera.check()?;
     let mut warnings = scene.warnings();
+    warnings.extend(options.warnings());
     let asked = options.effects.map(|e| e.with_if(e.contains(Effects::SOFT_SHADOWS), Effects::SHADOWS));
     let path = options.path_tracing || asked.is_some_and(|e| e.contains(Effects::PATH_TRACING));
     let mut needed = by_scene | Effects::required_by_camera(camera);

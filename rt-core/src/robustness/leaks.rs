@@ -5,7 +5,7 @@
 //! its distance.
 
 use super::Random;
-use crate::accel::World;
+use crate::accel::{Among, Coherence, World};
 use crate::mesh::TriMesh;
 use crate::ray::{HitBlock, NO_HIT, Ray, RayBlock};
 use glam::{DVec3, Vec3};
@@ -148,13 +148,10 @@ impl LeakTest<'_> {
             Query::Coherent | Query::Incoherent => {
                 let blocks = RayBlock::from_rays(&rays);
                 let (mut hits, mut any) = (vec![HitBlock::MISS; blocks.len()], vec![0u16; blocks.len()]);
-                if query == Query::Coherent {
-                    self.world.closest_coherent(&blocks, &mut hits);
-                    self.world.occluded_coherent(&blocks, &mut any);
-                } else {
-                    self.world.closest_incoherent(&blocks, &mut hits);
-                    self.world.occluded_incoherent(&blocks, &mut any);
-                }
+                let alike = query == Query::Coherent;
+                let coherence = if alike { Coherence::Alike } else { Coherence::Scattered };
+                self.world.closest_stream(&blocks, &mut hits, coherence, Among::All);
+                self.world.occluded_stream(&blocks, &mut any, coherence, Among::All);
                 let found = hits.iter().map(|h| h.prim.iter().filter(|&&p| p != NO_HIT).count()).sum();
                 (found, any.iter().map(|a| a.count_ones() as usize).sum())
             }

@@ -1,10 +1,11 @@
 //! Ambient and environment light, dimmed by what is near: cosine-weighted rays over the hemisphere, limited in length.
 
 use super::lobes::ambient_albedo;
-use super::shadow::{Coherence, trace_light_rays};
+use super::shadow::trace_light_rays;
 use super::stage::Stage;
 use super::wave::{LightRays, RayState};
 use super::{Dimension, Point, TileArea};
+use crate::accel::Coherence;
 use crate::detail::Varied;
 use crate::effects::Effects;
 use crate::environment::MeanRadiance;
@@ -91,6 +92,7 @@ pub(crate) fn add_ambient_light(
         });
         stats.ambient_occlusion += counts.rays;
         stats.ambient_occlusion_blocked += counts.blocked;
+        counts.add_to(stats);
         start = end;
     }
 }

@@ -1,10 +1,11 @@
 //! Light straight from the scene's lights, with or without shadow rays.
 
 use super::lobes::response;
-use super::shadow::{Coherence, trace_light_rays};
+use super::shadow::trace_light_rays;
 use super::stage::Stage;
 use super::wave::{LightRays, RayState};
 use super::{Dimension, Point, TileArea};
+use crate::accel::Coherence;
 use crate::detail::Varied;
 use crate::effects::Effects;
 use crate::light::{PlacedKind, PlacedLight, cone_share};
@@ -143,6 +144,7 @@ fn shine<const DETAIL: bool>(
             trace_light_rays(stage, rays, Coherence::Alike, |i, light| points[i as usize].radiance += light);
         stats.shadow += counts.rays;
         stats.shadow_blocked += counts.blocked;
+        counts.add_to(stats);
     }
 }
 

@@ -27,6 +27,7 @@ pub(crate) use specular::reflection_of;
 pub(crate) use stage::Stage;
 pub(crate) use tile::{TILE, TileArea, TileLayers};
 
+use crate::accel::{Among, Coherence};
 use crate::detail::Varied;
 use crate::effects::Effects;
 use crate::frame::Layers;
@@ -267,11 +268,9 @@ fn single_rays(
 fn trace(stage: &Stage<'_>, work: &mut Workspace, coherent: bool) {
     // What is in it does not matter: tracing starts with misses everywhere.
     work.hits.resize(work.current.blocks.len(), HitBlock::MISS);
-    if coherent {
-        stage.scene.world.closest_coherent(&work.current.blocks, &mut work.hits);
-    } else {
-        stage.scene.world.closest_incoherent(&work.current.blocks, &mut work.hits);
-    }
+    let coherence = if coherent { Coherence::Alike } else { Coherence::Scattered };
+    let world = &stage.scene.world;
+    world.closest_stream(&work.current.blocks, &mut work.hits, coherence, Among::All);
     prefetch_surfaces(stage, &work.hits);
 }
 

@@ -1,11 +1,14 @@
-//! Which light rays arrive: hard blocking by the any-hit kernels, or what opacity and glass leave of the light.
+//! Which light rays arrive. Opaque instances end a ray: the any-hit kernels say whether one is in the way. Only what is left of the rays is
+//! taken through the instances that may let light through, layer by layer.
 
 use super::microfacet::fresnel_dielectric;
 use super::stage::Stage;
 use super::wave::{Answers, LightRays, Passage};
+use crate::accel::{Among, Coherence};
 use crate::effects::Effects;
 use crate::material::{Material, SurfaceModel};
 use crate::ray::{HitBlock, LANES, Ray};
+use crate::ray_stats::RayStats;
 use crate::surface::{SurfacePoint, length};
 use glam::Vec3;
 
@@ -14,15 +17,18 @@ use glam::Vec3;
 pub(crate) struct Blocking {
     pub(crate) rays: u64,
     pub(crate) blocked: u64,
+    /// See [`crate::ray_stats::RayStats::light_closest`].
+    pub(crate) closest: u64,
+    /// See [`crate::ray_stats::RayStats::light_lookups`].
+    pub(crate) lookups: u64,
 }
 
-/// How alike the rays of a batch are.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Coherence {
-    /// To one light.
-    Alike,
-    /// Over a hemisphere.
-    Scattered,
+impl Blocking {
+    /// Adds what is counted for rays of all kinds together.
+    pub(crate) fn add_to(&self, stats: &mut RayStats) {
+        stats.light_closest += self.closest;
+        stats.light_lookups += self.lookups;
+    }
 }
 
 /// Calls `arrived(point, radiance)` for what reaches its point of each light ray, in order.
@@ -32,7 +38,7 @@ pub(crate) fn trace_light_rays(
     coherence: Coherence,
     mut arrived: impl FnMut(u32, Vec3),
 ) -> Blocking {
-    let mut counts = Blocking { rays: rays.targets.len() as u64, blocked: 0 };
+    let mut counts = Blocking { rays: rays.targets.len() as u64, ..Blocking::default() };
     if rays.targets.is_empty() {
         return counts;
     }
@@ -54,13 +60,10 @@ pub(crate) fn trace_light_rays(
         }
     }
     let world = &stage.scene.world;
+    rays.blocked.clear();
+    rays.blocked.resize(rays.blocks.len(), 0);
     if !stage.light_passes_surfaces() {
-        rays.blocked.clear();
-        rays.blocked.resize(rays.blocks.len(), 0);
-        match coherence {
-            Coherence::Alike => world.occluded_coherent(&rays.blocks, &mut rays.blocked),
-            Coherence::Scattered => world.occluded_incoherent(&rays.blocks, &mut rays.blocked),
-        }
+        world.occluded_stream(&rays.blocks, &mut rays.blocked, coherence, Among::All);
         for (i, &(point, radiance)) in rays.targets.iter().enumerate() {
             if rays.is_blocked(i) {
                 counts.blocked += 1;
@@ -71,16 +74,28 @@ pub(crate) fn trace_light_rays(
         return counts;
     }
 
-    // Follow each ray through its layers; transmittance is a product, so only the set of layers matters.
+    // ---- Anything opaque ends a ray, wherever it is.
+    let marks = stage.see_through.as_slice();
     let mut followed: Vec<_> = rays.targets.iter().map(|(_, light)| Following::new(stage, *light)).collect();
     let mut open = rays.targets.len();
+    if marks.contains(&false) {
+        let opaque = Among::Unmarked(marks);
+        world.occluded_stream(&rays.blocks, &mut rays.blocked, coherence, opaque);
+        for i in 0..rays.targets.len() {
+            if rays.is_blocked(i) {
+                followed[i] = Following::BLOCKED;
+                rays.blocks[i / LANES].t_max[i % LANES] = -1.0;
+                open -= 1;
+            }
+        }
+    }
+
+    // ---- The others through their layers; transmittance is a product, so only the set of layers matters.
     while open > 0 {
+        counts.closest += open as u64;
         rays.hits.clear();
         rays.hits.resize(rays.blocks.len(), HitBlock::MISS);
-        match coherence {
-            Coherence::Alike => world.closest_coherent(&rays.blocks, &mut rays.hits),
-            Coherence::Scattered => world.closest_incoherent(&rays.blocks, &mut rays.hits),
-        }
+        world.closest_stream(&rays.blocks, &mut rays.hits, coherence, Among::Marked(marks));
         open = 0;
         for i in 0..rays.targets.len() {
             let (block, lane) = (&mut rays.blocks[i / LANES], i % LANES);
@@ -89,6 +104,7 @@ pub(crate) fn trace_light_rays(
             }
             let ray = block.get(lane);
             let behind = rays.hits[i / LANES].get(lane).and_then(|hit| {
+                counts.lookups += 1;
                 let placed = stage.placed(&hit);
                 followed[i].pass(stage, placed.material, &placed.surface(&ray, &hit), &ray, hit.t)
             });
@@ -134,6 +150,10 @@ impl Following {
             if exact { 0.0 } else { stage.options.min_contribution / radiance.max_element().max(1.0) };
         Following { left: Vec3::ONE, depth: Vec3::ZERO, met: false, continued: 0, least }
     }
+
+    /// Something opaque is in its way.
+    pub(crate) const BLOCKED: Following =
+        Following { left: Vec3::ZERO, depth: Vec3::ZERO, met: true, continued: 0, least: 0.0 };
 
     /// Meets a surface at `t`; returns from where `ray` goes on, if it does.
     pub(crate) fn pass(
@@ -188,3 +208,6 @@ fn pass(
     }
     surface.t_behind(ray, t)
 }
+
+#[cfg(test)]
+mod tests;

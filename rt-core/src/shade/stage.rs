@@ -10,7 +10,7 @@ use crate::math::Aabb;
 use crate::ray::{Hit, Ray};
 use crate::render::RenderOptions;
 use crate::sampler::Sampler;
-use crate::scene::Scene;
+use crate::scene::{Scene, lets_light_through};
 use crate::surface::{Placed, SurfacePoint};
 use crate::volume::Volume;
 use fearless_simd::Level;
@@ -38,6 +38,8 @@ pub(crate) struct Stage<'a> {
     pub(crate) level: Level,
     /// Whether a material has detail.
     pub(crate) has_detail: bool,
+    /// Of each instance whether light may pass through it; empty where it passes through none.
+    pub(crate) see_through: Vec<bool>,
     /// Volumes with the way into their object space.
     pub(crate) volumes: Vec<(&'a Volume, DAffine3)>,
     /// World position of render space's origin.
@@ -100,6 +102,11 @@ impl<'a> Stage<'a> {
             ambient,
             camera_rays: CameraRays::new(camera, origin, bounds, lens),
             level: Level::new(),
+            see_through: if passes_surfaces(effects) {
+                lets_light_through(scene, effects)
+            } else {
+                Vec::new()
+            },
             has_detail: scene.materials.iter().any(|m| m.detail.is_some()),
             volumes,
             origin,
@@ -109,7 +116,7 @@ impl<'a> Stage<'a> {
 
     /// True when opacity and dielectrics are to be seen by shadow and ambient occlusion rays.
     pub(crate) fn light_passes_surfaces(&self) -> bool {
-        self.effects.intersects(Effects::TRANSPARENCY.union(Effects::REFRACTION))
+        passes_surfaces(self.effects)
     }
 
     #[inline]
@@ -183,6 +190,10 @@ impl<'a> Stage<'a> {
         };
         (depth as f32, distance as f32)
     }
+}
+
+fn passes_surfaces(effects: Effects) -> bool {
+    effects.intersects(Effects::TRANSPARENCY.union(Effects::REFRACTION))
 }
 
 /// World point where a pixel's f64 ray (origin, direction) meets the plane through `on_surface` with normal `n` (any length), so that neither the f32

@@ -65,21 +65,36 @@ impl SimdLevel {
         }
     }
 
-    /// The level as fearless_simd knows it; the machine's best where this one is not available.
-    pub(crate) fn resolve(wanted: Option<SimdLevel>) -> Level {
+    /// The level as fearless_simd knows it; the machine's best where none is asked for.
+    pub(crate) fn resolve(wanted: Option<SimdLevel>) -> Result<Level, UnavailableLevel> {
         let best = Level::new();
+        let Some(wanted) = wanted else { return Ok(best) };
         #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-        let limited = match wanted {
-            Some(SimdLevel::Sse2) => best.as_sse2().map(Level::Sse2),
-            Some(SimdLevel::Sse42) => best.as_sse4_2().map(Level::Sse4_2),
-            Some(SimdLevel::Avx2) => best.as_avx2().map(Level::Avx2),
-            _ => None,
+        let found = match wanted {
+            SimdLevel::Sse2 => best.as_sse2().map(Level::Sse2),
+            SimdLevel::Sse42 => best.as_sse4_2().map(Level::Sse4_2),
+            SimdLevel::Avx2 => best.as_avx2().map(Level::Avx2),
+            SimdLevel::Avx512 => best.as_avx512().map(Level::Avx512),
+            SimdLevel::Neon => None,
         };
         #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
-        let limited = {
-            let _ = wanted;
-            None
-        };
-        limited.unwrap_or(best)
+        let found = SimdLevel::available().contains(&wanted).then_some(best);
+        found.ok_or(UnavailableLevel { wanted })
     }
+}
+
+/// An instruction set that this machine lacks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "this machine has no {}; ask for {}, or for none to get the best there is",
+    wanted.name(), available_names()
+)]
+pub struct UnavailableLevel {
+    /// The level asked for.
+    pub wanted: SimdLevel,
+}
+
+fn available_names() -> String {
+    let names: Vec<_> = SimdLevel::available().into_iter().map(SimdLevel::name).collect();
+    if names.is_empty() { "no level by name".into() } else { names.join(", ") }
 }

@@ -74,10 +74,10 @@ pub(crate) fn hits_all_ways(world: &World, rays: &[Ray], what: &str) -> Vec<Opti
     let blocks = RayBlock::from_rays(rays);
     let (mut packets, mut sorted) = (vec![HitBlock::MISS; blocks.len()], vec![HitBlock::MISS; blocks.len()]);
     let (mut any, mut any_sorted) = (vec![0u16; blocks.len()], vec![0u16; blocks.len()]);
-    world.closest_coherent(&blocks, &mut packets);
-    world.closest_incoherent(&blocks, &mut sorted);
-    world.occluded_coherent(&blocks, &mut any);
-    world.occluded_incoherent(&blocks, &mut any_sorted);
+    world.closest_coherent(&blocks, &mut packets).expect("one each");
+    world.closest_incoherent(&blocks, &mut sorted).expect("one each");
+    world.occluded_coherent(&blocks, &mut any).expect("one each");
+    world.occluded_incoherent(&blocks, &mut any_sorted).expect("one each");
     let (mut wrong, mut example) = ([0usize; 5], String::new());
     for (i, ray) in rays.iter().enumerate() {
         let (b, l) = (i / LANES, i % LANES);

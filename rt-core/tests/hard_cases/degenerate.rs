@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use crate::oracle::check;
-use rt_core::accel::{BuildError, BuildOptions, Geometry, Instance, Robustness, World};
+use rt_core::accel::{BuildError, BuildOptions, Geometry, Instance, Robustness, StreamError, World};
 use rt_core::glam::{DAffine3, DMat3, DVec3, Vec3};
 use rt_core::mesh::TriMesh;
 use rt_core::ray::{HitBlock, NO_HIT, Ray, RayBlock};
@@ -194,15 +194,22 @@ fn sizes_over_the_whole_range_of_f32_give_no_false_hits() {
 }
 
 #[test]
-fn slices_of_different_length_trace_the_shorter() {
+fn slices_of_different_length_are_refused_with_both_lengths() {
     let w = world(&sphere(1, 1.0, DVec3::ZERO), &BuildOptions::default());
     let blocks = RayBlock::from_rays(&inward_rays(64, 6));
-    let mut hits = vec![HitBlock::MISS; 2];
-    w.closest_coherent(&blocks, &mut hits);
+    for n in [0, 2, 7] {
+        let (mut hits, mut masks) = (vec![HitBlock::MISS; n], vec![0u16; n]);
+        let expected = Err(StreamError { rays: 4, answers: n });
+        assert_eq!(w.closest_coherent(&blocks, &mut hits), expected);
+        assert_eq!(w.closest_incoherent(&blocks, &mut hits), expected);
+        assert_eq!(w.occluded_coherent(&blocks, &mut masks), expected);
+        assert_eq!(w.occluded_incoherent(&blocks, &mut masks), expected);
+        assert!(hits.iter().all(|h| *h == HitBlock::MISS) && masks.iter().all(|m| *m == 0));
+        let words = expected.unwrap_err().to_string();
+        assert!(words.contains("4 blocks of rays") && words.contains(&format!("of {n}")), "{words}");
+    }
+    let mut hits = vec![HitBlock::MISS; 4];
+    w.closest_coherent(&blocks, &mut hits).unwrap();
     assert!(hits.iter().any(|h| h.prim.iter().any(|&p| p != NO_HIT)));
-    let mut hits = vec![HitBlock::MISS; 7];
-    w.closest_incoherent(&blocks, &mut hits);
-    assert!(hits[4..].iter().all(|h| *h == HitBlock::MISS), "beyond the rays nothing is written");
-    w.closest_coherent(&[], &mut []);
-    w.occluded_incoherent(&blocks, &mut []);
+    w.closest_coherent(&[], &mut []).unwrap();
 }

@@ -18,4 +18,6 @@ pub(crate) use prim_ref::{MAX_PRIMS, PrimRef};
 pub(crate) use wide_builder::{LeafWriter, Method, Recipe, build_wide};
 
 #[cfg(test)]
+mod many_tests;
+#[cfg(test)]
 mod tests;

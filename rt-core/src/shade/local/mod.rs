@@ -11,6 +11,7 @@ use super::lobes::{ambient_albedo, response};
 use super::stage::Stage;
 use super::tile::{PIXELS, TileArea, TileLayers};
 use super::{OPAQUE, Workspace, camera_blocks, prefetch_surfaces};
+use crate::accel::{Among, Coherence};
 use crate::detail::Varied;
 use crate::effects::Effects;
 use crate::environment::Background;
@@ -39,7 +40,8 @@ pub(super) fn render_tile(
 ) {
     camera_blocks(stage, area, &mut work.current.blocks, sample, stats, out.cost_mut());
     work.hits.resize(PIXELS / LANES, HitBlock::MISS);
-    stage.scene.world.closest_coherent(&work.current.blocks, &mut work.hits);
+    let world = &stage.scene.world;
+    world.closest_stream(&work.current.blocks, &mut work.hits, Coherence::Alike, Among::All);
     let first = sample.is_none_or(|s| s == 0);
     let mut pixels = std::mem::take(if first { &mut out.color } else { &mut work.pixels });
     pixels.resize(PIXELS, [0.0; 4]);

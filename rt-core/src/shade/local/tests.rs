@@ -112,7 +112,7 @@ fn sixteen_at_a_time_have_the_bits_of_one_at_every_level() {
     let (mut met, mut levels) = (vec![0; scene.appearances.len()], 0);
     for level in SimdLevel::available().into_iter().map(Some).chain([None]) {
         let mut stage = Stage::new(&scene, &camera, &options, Effects::NONE);
-        stage.level = SimdLevel::resolve(level);
+        stage.level = SimdLevel::resolve(level).expect("a level of this machine");
         levels += 1;
         for tile in 0..9 {
             let (x, y) = (tile % 3 * TILE, tile / 3 * TILE);

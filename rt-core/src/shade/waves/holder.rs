@@ -6,6 +6,7 @@ use super::super::tile::{PIXELS, TileArea};
 use super::super::wave::{Answers, LightRays};
 use super::super::{Dimension, Workspace, camera_blocks, local, prefetch_surfaces};
 use super::{LightPoint, Met, Pass, WaveFrame};
+use crate::accel::{Among, Coherence};
 use crate::frame::Layers;
 use crate::ray::{Hit, HitBlock, LANES, NO_HIT, Ray, RayBlock};
 use crate::ray_stats::RayStats;
@@ -86,7 +87,8 @@ impl WaveFrame<'_> {
         let work = &mut out.work;
         camera_blocks(&self.stage, &area, &mut work.current.blocks, sample, &mut stats, None);
         work.hits.resize(PIXELS / LANES, HitBlock::MISS);
-        self.stage.scene.world.closest_coherent(&work.current.blocks, &mut work.hits);
+        let world = &self.stage.scene.world;
+        world.closest_stream(&work.current.blocks, &mut work.hits, Coherence::Alike, Among::All);
         prefetch_surfaces(&self.stage, &work.hits);
         (out.area, out.rays) = (Some(area), stats.primary);
     }
@@ -107,7 +109,8 @@ impl WaveFrame<'_> {
     pub fn closest(&self, rays: &[Ray], pixels: Option<&[(u32, u16)]>, out: &mut Vec<Option<Met>>) {
         let blocks = RayBlock::from_rays(rays);
         let mut hits = vec![HitBlock::MISS; blocks.len()];
-        self.stage.scene.world.closest_incoherent(&blocks, &mut hits);
+        let world = &self.stage.scene.world;
+        world.closest_stream(&blocks, &mut hits, Coherence::Scattered, Among::All);
         out.clear();
         for (i, ray) in rays.iter().enumerate() {
             let met = hits[i / LANES].get(i % LANES).map(|hit| {
@@ -120,6 +123,35 @@ impl WaveFrame<'_> {
             });
             out.push(met);
         }
+    }
+
+    /// What light rays meet here that may let light through, one answer each; or [`Met::blocked`] where something opaque is in the way,
+    /// wherever that is.
+    pub fn light_met(&self, rays: &[Ray], out: &mut Vec<Option<Met>>) {
+        let mut blocks = RayBlock::from_rays(rays);
+        let (world, marks) = (&self.stage.scene.world, self.stage.see_through.as_slice());
+        let mut ended = vec![0u16; blocks.len()];
+        let opaque = marks.iter().position(|m| !m);
+        if opaque.is_some() {
+            let among = Among::Unmarked(marks);
+            world.occluded_stream(&blocks, &mut ended, Coherence::Scattered, among);
+        }
+        for (block, &ended) in blocks.iter_mut().zip(&ended) {
+            for lane in (0..LANES).filter(|l| ended >> l & 1 != 0) {
+                block.t_max[lane] = -1.0;
+            }
+        }
+        let mut hits = vec![HitBlock::MISS; blocks.len()];
+        world.closest_stream(&blocks, &mut hits, Coherence::Scattered, Among::Marked(marks));
+        let met = |(i, ray): (usize, &Ray)| {
+            let (block, lane) = (i / LANES, i % LANES);
+            match opaque {
+                Some(instance) if ended[block] >> lane & 1 != 0 => Some(Met::blocked(instance as u32)),
+                _ => hits[block].get(lane).map(|hit| self.met(ray, &hit)),
+            }
+        };
+        out.clear();
+        out.extend(rays.iter().enumerate().map(met));
     }
 
     /// Of every light ray of every point, whether something here is in its way: [`WaveFrame::light_rays_per_point`] bits a point, in whole
@@ -194,11 +226,8 @@ impl WaveFrame<'_> {
         rays.blocked.clear();
         rays.blocked.resize(rays.blocks.len(), 0);
         let world = &self.stage.scene.world;
-        if alike {
-            world.occluded_coherent(&rays.blocks, &mut rays.blocked);
-        } else {
-            world.occluded_incoherent(&rays.blocks, &mut rays.blocked);
-        }
+        let coherence = if alike { Coherence::Alike } else { Coherence::Scattered };
+        world.occluded_stream(&rays.blocks, &mut rays.blocked, coherence, Among::All);
         for (i, (point, number)) in rays.numbered().enumerate() {
             let bit = rays.is_blocked(i) as u64;
             out[point as usize * words + number as usize / 64] |= bit << (number % 64);

@@ -23,6 +23,27 @@ impl Met {
     /// Words of [`Met::to_words`].
     pub const WORDS: usize = 20;
 
+    /// For a light ray: something opaque of this scene is in its way, so that nothing else matters. It comes before every hit. `instance`
+    /// is one through which no light passes.
+    pub fn blocked(instance: u32) -> Met {
+        let surface = SurfacePoint {
+            point: Vec3::ZERO,
+            point_error: 0.0,
+            face_normal: Vec3::Z,
+            normal: Vec3::Z,
+            outside: true,
+            color: Vec3::ZERO,
+            opacity: 1.0,
+        };
+        let t = f32::NEG_INFINITY;
+        Met { t, instance, primitive: 0, depth: 0.0, distance: 0.0, surface }
+    }
+
+    /// Whether this is [`Met::blocked`].
+    pub fn is_blocked(&self) -> bool {
+        self.t == f32::NEG_INFINITY
+    }
+
     /// Whether this hit comes before another one of the same ray: nearer, or as near and of a lower instance and primitive.
     pub fn is_before(&self, other: &Met) -> bool {
         let key = |m: &Met| (m.instance, m.primitive);

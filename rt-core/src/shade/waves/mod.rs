@@ -12,7 +12,7 @@
 //!    ([`TileInWork::meet_light`]).
 //! 3. [`TileInWork::go_on`] shades and says whether there is another wave.
 //!
-//! Holders answer with [`WaveFrame::camera_hits`], [`WaveFrame::closest`] and [`WaveFrame::blocked`].
+//! Holders answer with [`WaveFrame::camera_hits`], [`WaveFrame::closest`], [`WaveFrame::blocked`] and [`WaveFrame::light_met`].
 
 mod holder;
 mod met;

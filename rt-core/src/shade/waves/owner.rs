@@ -326,7 +326,8 @@ impl TileInWork {
         self.waiting.iter().map(|r| r.ray).filter(|r| r.t_max >= r.t_min)
     }
 
-    /// Takes what each of [`TileInWork::light_rays`] met first.
+    /// Takes what [`WaveFrame::light_met`] says of each of [`TileInWork::light_rays`]: of several holders, the answer that
+    /// [`Met::is_before`] the others.
     ///
     /// # Errors
     /// When the answers do not fit the rays.
@@ -343,9 +344,19 @@ impl TileInWork {
                         let (found, expected) = (m.instance as u64, frame.stage.instances.len() as u64);
                         return Err(WrongAnswer { tile: self.tile, what: "an instance", found, expected });
                     };
-                    f.pass(&frame.stage, placed.material, &m.surface, &r.ray, m.t)
+                    self.stats.light_closest += u64::from(!m.is_blocked());
+                    self.stats.light_lookups += u64::from(!m.is_blocked());
+                    if m.is_blocked() {
+                        *f = Following::BLOCKED;
+                        None
+                    } else {
+                        f.pass(&frame.stage, placed.material, &m.surface, &r.ray, m.t)
+                    }
                 }
-                _ => None,
+                _ => {
+                    self.stats.light_closest += 1;
+                    None
+                }
             };
             match behind {
                 Some(t_min) => r.ray.t_min = t_min,
