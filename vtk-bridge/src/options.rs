@@ -133,7 +133,7 @@ pub const NAMES: &[(&str, &str, &str)] = &[
     ("RTV_APERTURE", "radius of the lens, world units (depth of field)", "0 or positive"),
     ("RTV_FOCUS", "distance in focus, world units", "positive, or auto for the camera's focal point"),
     ("RTV_ROBUSTNESS", "watertight: no ray between neighbours; fast", "watertight or fast"),
-    ("RTV_BUILD", "effort of building acceleration structures", "fastest, fast, balanced or best"),
+    ("RTV_BUILD", "effort of building acceleration structures", "fast, balanced or best"),
     ("RTV_POINT_RADIUS", "vertices become spheres of this radius, data units", "0 or positive"),
     ("RTV_LINE_RADIUS", "lines and edges become tubes of this radius, data units", "0 or positive"),
     (
@@ -295,6 +295,14 @@ mod tests {
         assert_eq!((options.ao, options.samples, options.ior), (0, 16, 1.5));
         assert_eq!(faults.len(), 2);
         assert!(faults[0].contains("RTV_AO=-3") && faults[0].contains("0 to 4096"), "{}", faults[0]);
+    }
+
+    #[test]
+    fn a_preset_that_is_gone_is_refused_with_those_there_are() {
+        let (options, faults) = parse(&[("RTV_BUILD", "fastest")]);
+        assert_eq!(options.build, BuildQuality::Balanced);
+        assert!(faults[0].contains("RTV_BUILD=fastest"), "{}", faults[0]);
+        assert!(faults[0].contains("must be fast, balanced or best"), "{}", faults[0]);
     }
 
     #[test]

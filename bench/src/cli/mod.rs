@@ -121,7 +121,7 @@ struct RenderArgs {
     /// fast, watertight
     #[arg(long, default_value = "watertight", value_name = "NAME", value_parser = render::robustness)]
     robustness: Robustness,
-    /// Of the acceleration structure: fastest, fast, balanced, best
+    /// Of the acceleration structure: fast, balanced, best
     #[arg(long, default_value = "balanced", value_name = "NAME", value_parser = render::quality)]
     quality: BuildQuality,
 }

@@ -8,7 +8,7 @@ use crate::picture::{Drawn, Watch, Wish, draw, gallery, save};
 use anyhow::Context as _;
 use datasets::cli::{Cancel, CommonArgs, CureExt as _, Interrupted, UsageError};
 use datasets::colormaps;
-use rt_core::accel::{BuildOptions, BuildQuality, Robustness};
+use rt_core::accel::{BuildOptions, BuildQuality, Robustness, UnknownQuality};
 use rt_core::effects::Effects;
 use rt_core::environment::Background;
 use rt_core::frame::Layers;
@@ -240,7 +240,7 @@ fn by_name<T: Copy>(
 }
 
 pub(super) fn quality(text: &str) -> Result<BuildQuality, String> {
-    by_name(text, "quality", BuildQuality::ALL.into_iter().map(|q| (q.name(), q)))
+    text.parse().map_err(|e: UnknownQuality| e.to_string())
 }
 pub(super) fn robustness(text: &str) -> Result<Robustness, String> {
     by_name(text, "robustness", Robustness::ALL.into_iter().map(|r| (r.name(), r)))
@@ -266,4 +266,18 @@ pub(super) fn background(text: &str) -> Result<Background, String> {
 }
 pub(super) fn colors(text: &str) -> Result<String, String> {
     by_name(text, "colour map", colormaps::NAMES.into_iter().map(|n| (n, n))).map(Into::into)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_preset_that_is_gone_is_refused_with_the_one_to_take() {
+        let words = quality("fastest").unwrap_err();
+        assert!(words.contains("`fastest`") && words.contains("give `fast`"), "{words}");
+        let words = quality("quick").unwrap_err();
+        assert!(words.ends_with("there are: fast, balanced, best"), "{words}");
+        assert_eq!(quality("Best"), Ok(BuildQuality::Best));
+    }
 }

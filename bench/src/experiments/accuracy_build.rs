@@ -141,3 +141,57 @@ fn plot(record: &Record, mesh: &str) -> Plot {
     }
     plot
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::PathBuf;
+
+    /// Of the newest record: mesh, preset, seconds of the build, and seconds of all its rays.
+    fn recorded() -> Vec<(String, String, f64, f64)> {
+        let runs = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("runs");
+        let folders = std::fs::read_dir(runs).expect("bench/runs").flatten();
+        let mut files: Vec<PathBuf> =
+            folders.map(|f| f.path().join("accuracy-build.csv")).filter(|f| f.is_file()).collect();
+        files.sort();
+        let text = std::fs::read_to_string(files.last().expect("a record")).expect("text");
+        let mut lines = text.lines().filter(|l| !l.starts_with('#'));
+        let names: Vec<&str> = lines.next().expect("names").split(',').collect();
+        let place = |name: &str| names.iter().position(|n| n.starts_with(name)).expect("a column");
+        let [mesh, tracer, time, preset, build] =
+            ["mesh", "tracer", "time [ms]", "preset", "build [s]"].map(place);
+        let mut out: Vec<(String, String, f64, f64)> = vec![];
+        // Names of rivals have commas and quotes; ours have none.
+        for row in lines.filter(|l| !l.contains('"')).map(|l| l.split(',').collect::<Vec<_>>()) {
+            assert!(row[tracer].starts_with("rt-core"), "{row:?}");
+            let number = |i: usize| row[i].parse::<f64>().expect("a number");
+            let secs = number(time) / 1e3;
+            match out.iter_mut().find(|(m, p, ..)| m == row[mesh] && p == row[preset]) {
+                Some(known) => known.3 += secs,
+                None => out.push((row[mesh].into(), row[preset].into(), number(build), secs)),
+            }
+        }
+        out
+    }
+
+    /// Reads the record and times nothing: for some mesh and some number of frames, building with the preset and tracing that many frames takes
+    /// the least time.
+    #[test]
+    fn every_preset_is_the_best_choice_somewhere_in_the_record() {
+        let rows = recorded();
+        let mut winners = std::collections::BTreeSet::new();
+        let meshes: std::collections::BTreeSet<&str> = rows.iter().map(|r| r.0.as_str()).collect();
+        let known: Vec<_> = BuildQuality::ALL.iter().map(|q| q.name()).collect();
+        for mesh in meshes {
+            for frames in (0..16).map(|k| f64::from(1 << k)) {
+                let total = |r: &&(String, String, f64, f64)| r.2 + frames * r.3;
+                let best = rows.iter().filter(|r| r.0 == mesh && known.contains(&r.1.as_str()));
+                let best = best.min_by(|a, b| total(a).total_cmp(&total(b))).expect("presets");
+                winners.insert(best.1.as_str());
+            }
+        }
+        for name in known {
+            assert!(winners.contains(name), "`{name}` is never the best choice; these are: {winners:?}");
+        }
+    }
+}

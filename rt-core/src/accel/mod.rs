@@ -14,7 +14,7 @@ mod validate;
 pub(crate) mod wide;
 mod world;
 
-pub use options::{BuildOptions, BuildQuality, BuildReport, Robustness};
+pub use options::{BuildOptions, BuildQuality, BuildReport, Robustness, UnknownQuality};
 pub use part::{ShapePart, Whole};
 pub use refit::{RefitError, RefitReport};
 pub(crate) use streams::Coherence;

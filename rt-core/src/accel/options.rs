@@ -11,15 +11,11 @@ use std::time::Duration;
 ///
 /// | | build | single rays | bytes |
 /// |---|---|---|---|
-/// | `Fastest` | 0.87–0.93 | 1.10–1.16 | 69 |
 /// | `Fast` | 0.82–0.86 | 1.02–1.05 | 59 |
 /// | `Balanced` | 1 | 1 | 56 |
 /// | `Best` | 1.9–2.2 | 0.96–1.00 | 56 |
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum BuildQuality {
-    /// obvhs' PLOC along a Morton curve with its quickest parameters, without optimisation. On the meshes measured, [`BuildQuality::Fast`] builds
-    /// as quickly and traces faster.
-    Fastest,
     /// SAH with 8 bins along the longest axis: for geometry that changes every frame.
     Fast,
     /// SAH with up to 16 bins along all three axes.
@@ -31,15 +27,13 @@ pub enum BuildQuality {
 
 impl BuildQuality {
     /// Every preset, from fast to good: tests and benchmarks loop over it.
-    pub const ALL: [BuildQuality; 4] =
-        [BuildQuality::Fastest, BuildQuality::Fast, BuildQuality::Balanced, BuildQuality::Best];
+    pub const ALL: [BuildQuality; 3] = [BuildQuality::Fast, BuildQuality::Balanced, BuildQuality::Best];
 
     /// What the builders do for this preset.
     pub(crate) fn recipe(self) -> Recipe {
         let quick = SahEffort { bins: 8, longest_axis_only: true };
         let thorough = SahEffort { bins: 16, longest_axis_only: false };
         match self {
-            BuildQuality::Fastest => Recipe { method: Method::Ploc, effort: quick },
             BuildQuality::Fast => Recipe { method: Method::Sah, effort: quick },
             BuildQuality::Balanced => Recipe { method: Method::Sah, effort: thorough },
             BuildQuality::Best => Recipe { method: Method::Reinsertion, effort: thorough },
@@ -49,11 +43,38 @@ impl BuildQuality {
     /// The name used on command lines and in records.
     pub fn name(self) -> &'static str {
         match self {
-            BuildQuality::Fastest => "fastest",
             BuildQuality::Fast => "fast",
             BuildQuality::Balanced => "balanced",
             BuildQuality::Best => "best",
         }
+    }
+}
+
+impl std::str::FromStr for BuildQuality {
+    type Err = UnknownQuality;
+
+    /// By [`BuildQuality::name`], in letters of either case.
+    fn from_str(text: &str) -> Result<BuildQuality, UnknownQuality> {
+        let found = BuildQuality::ALL.into_iter().find(|q| q.name().eq_ignore_ascii_case(text));
+        found.ok_or_else(|| UnknownQuality { found: text.into() })
+    }
+}
+
+/// A name that no preset has.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub struct UnknownQuality {
+    /// The name given.
+    pub found: String,
+}
+
+impl std::fmt::Display for UnknownQuality {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let names = BuildQuality::ALL.map(BuildQuality::name).join(", ");
+        write!(f, "there is no build quality `{}`; there are: {names}", self.found)?;
+        if self.found.eq_ignore_ascii_case("fastest") {
+            f.write_str(" (`fastest` is gone: give `fast`, which builds and traces faster)")?;
+        }
+        Ok(())
     }
 }
 

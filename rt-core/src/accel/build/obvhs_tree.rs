@@ -1,22 +1,19 @@
-//! Binary trees by the crate obvhs: PLOC (Meister and Bittner, "Parallel Locally-Ordered Clustering for Bounding Volume Hierarchy
-//! Construction", 2018) and its reinsertion optimiser (the same authors' "Parallel Reinsertion for Bounding Volume Hierarchy Optimization",
-//! 2018).
+//! Binary trees improved by the reinsertion optimiser of the crate obvhs (Meister and Bittner, "Parallel Reinsertion for Bounding
+//! Volume Hierarchy Optimization", 2018).
 //!
-//! Both run within a fragment of the primitives, which bounds their memory and their time. What obvhs 0.4 cannot take is kept from it:
+//! It runs within a fragment of the primitives, which bounds its memory and its time. What obvhs 0.4 cannot take is kept from it:
 //! - Boxes whose surface overflows f32 lead to comparisons of NaN, which panic: `None` here.
-//! - Where neighbouring costs tie or only grow (100 000 identical triangles, equal boxes on a line), a pass of PLOC merges one pair and the
-//!   whole becomes quadratic: it sees boxes enlarged by up to a sixteenth, differently each, which breaks such runs. The tree's own boxes
-//!   are computed from the primitives afterwards.
 //! - Trees may become as deep as there are primitives: `None` beyond [`MAX_BINARY_DEPTH`].
 //! - The optimiser's stack has a fixed size, twice the depth that the tree claims: it is told the true depth before every pass.
+//!
+//! obvhs' builder (PLOC, Meister and Bittner 2018) was a preset once. It took longer than [`super::sah_tree`] with few bins, and
+//! rays through its trees took longer, too.
 
 use super::binary_tree::BinaryTree;
-use super::prim_ref::{PrimRef, SetBounds};
 use crate::accel::wide::LEAF_SIZE;
 use crate::math::Aabb;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::bvh2::{Bvh2, node::Bvh2Node};
-use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 /// Deeper trees are refused.
 pub(super) const MAX_BINARY_DEPTH: usize = 50;
@@ -26,33 +23,6 @@ const LARGEST_HALF_AREA: f32 = 1e30;
 /// False for NaN as well.
 fn is_ordinary(b: Aabb) -> bool {
     b.half_area() <= LARGEST_HALF_AREA
-}
-
-/// A tree by PLOC; `None` when obvhs cannot make a usable one.
-pub(crate) fn ploc_tree(refs: &[PrimRef], bounds: &SetBounds) -> Option<BinaryTree> {
-    if !is_ordinary(bounds.aabb()) {
-        return None;
-    }
-    let smallest = bounds.aabb().extent().max_element() * 2f32.powi(-20);
-    let boxes: Vec<obvhs::aabb::Aabb> = refs.iter().map(|r| distinct_box(r, smallest)).collect();
-    // The fastest parameters: each node looks at its two neighbours only.
-    let places = (0..refs.len() as u32).collect();
-    let bvh = PlocBuilder::new().build(PlocSearchDistance::Minimum, &boxes, places, SortPrecision::U64, 0);
-    let ids: Vec<u32> = refs.iter().map(PrimRef::id).collect();
-    to_binary_tree(&bvh, &ids, |leaf| refs[leaf.first_index as usize].bounds())
-}
-
-/// The box of `r`, enlarged on both sides by up to a sixteenth of its size plus `smallest`, by an amount drawn from its number. The centre stays:
-/// were it to move with the amount, equal boxes would be sorted by size, and their costs would grow along the curve.
-fn distinct_box(r: &PrimRef, smallest: f32) -> obvhs::aabb::Aabb {
-    let b = r.bounds();
-    // The finaliser of MurmurHash3 (Appleby 2011).
-    let mut h = r.id();
-    h = (h ^ (h >> 16)).wrapping_mul(0x85eb_ca6b);
-    h = (h ^ (h >> 13)).wrapping_mul(0xc2b2_ae35);
-    let random = ((h ^ (h >> 16)) >> 8) as f32 * 2f32.powi(-24);
-    let margin = (b.extent() * 0.0625 + smallest) * random;
-    obvhs::aabb::Aabb { min: (b.min - margin).into(), max: (b.max + margin).into() }
 }
 
 /// `tree` with subtrees moved to where they cost less; `None` when obvhs cannot take it. Each pass tries that part of the nodes which has
@@ -109,7 +79,7 @@ fn depth_of(nodes: &[Bvh2Node]) -> usize {
 /// Renumbers the nodes, makes subtrees of up to four primitives leaves, and computes boxes anew from `leaf_bounds`. The leaves of `bvh`
 /// refer to places in `ids`.
 fn to_binary_tree(bvh: &Bvh2, ids: &[u32], leaf_bounds: impl Fn(&Bvh2Node) -> Aabb) -> Option<BinaryTree> {
-    // ---- Primitives below each node. PLOC numbers parents before children; the optimiser does not keep that.
+    // ---- Primitives below each node. The optimiser does not number parents before children.
     let mut counts = vec![0u32; bvh.nodes.len()];
     let mut depths = vec![0u8; bvh.nodes.len()];
     let mut order: Vec<u32> = (0..bvh.nodes.len() as u32).collect();

@@ -31,14 +31,15 @@ impl PrimRef {
         self.0[3].to_bits() & !TAG
     }
 
+    #[cfg(test)]
+    pub(crate) fn bounds(&self) -> Aabb {
+        Aabb::new(self.lo().truncate(), self.hi().truncate())
+    }
+
     /// Made from an empty box: nothing to build.
     #[inline(always)]
     pub(crate) fn is_empty(&self) -> bool {
         self.0[0] > -self.0[4]
-    }
-
-    pub(crate) fn bounds(&self) -> Aabb {
-        Aabb::new(self.lo().truncate(), self.hi().truncate())
     }
 
     #[inline(always)]

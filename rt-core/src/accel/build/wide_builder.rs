@@ -7,7 +7,7 @@
 use super::binary_tree::BinaryTree;
 use super::binned_sah::{SahEffort, SearchSpace, Split, halve, split_into};
 use super::collapse::{NO_CHILD, WidePlan, plan};
-use super::obvhs_tree::{MAX_BINARY_DEPTH, ploc_tree, reinsert};
+use super::obvhs_tree::{MAX_BINARY_DEPTH, reinsert};
 use super::prim_ref::{PrimRef, SetBounds};
 use super::sah_tree::{MAX_COST_DEPTH, sah_tree};
 use crate::accel::wide::{ChildRef, LEAF_SIZE, MAX_DEPTH, NODE_UNITS, Unit, WIDTH, WideBvh, write_node};
@@ -32,8 +32,6 @@ const _: () =
 pub(crate) enum Method {
     /// Top down by the surface area heuristic.
     Sah,
-    /// Bottom up along a Morton curve, by obvhs.
-    Ploc,
     /// [`Method::Sah`], then obvhs' reinsertion.
     Reinsertion,
 }
@@ -50,7 +48,7 @@ impl Recipe {
     /// Sets up to this size are built by one task into one fragment.
     fn fragment(self) -> usize {
         match self.method {
-            Method::Sah | Method::Ploc => 1 << 14,
+            Method::Sah => 1 << 14,
             Method::Reinsertion => 1 << MAX_FRAGMENT_LOG2,
         }
     }
@@ -91,10 +89,6 @@ impl Fragment {
         let mut fell_back = false;
         let tree = match recipe.method {
             Method::Sah => sah_tree(refs, spare, bounds, recipe.effort, level),
-            Method::Ploc => ploc_tree(refs, bounds).unwrap_or_else(|| {
-                fell_back = true;
-                sah_tree(refs, spare, bounds, recipe.effort, level)
-            }),
             Method::Reinsertion => {
                 let tree = sah_tree(refs, spare, bounds, recipe.effort, level);
                 reinsert(&tree, &REINSERTION_PASSES).unwrap_or_else(|| {
