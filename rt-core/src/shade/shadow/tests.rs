@@ -161,7 +161,7 @@ fn an_opaque_surface_blocks_light_where_a_transparent_one_coincides() {
         b.light(Light::directional(DVec3::Z));
         let scene = b.build().unwrap();
         let mut options = RenderOptions::new(2 * TILE, 2 * TILE);
-        options.max_bounces = 1;
+        options.max_bounces = Some(1);
         let (_, stats) = draw(&scene, &options, false);
         assert!(stats.shadow_blocked > 50, "{stats:?}");
         assert_eq!(stats.light_lookups, 0, "decal first: {decal_first}: {stats:?}");
