@@ -62,3 +62,11 @@ pub mod timeline;
 mod trace;
 mod view;
 mod worker;
+
+/// Whether rays can stand for a program with these shaders; an empty text for a shader that it lacks.
+///
+/// # Errors
+/// Why it is the driver's, as the account of a run says it.
+pub fn recognise(vertex: &str, geometry: &str, fragment: &str) -> Result<(), &'static str> {
+    programs::recognise(vertex, geometry, fragment)
+}

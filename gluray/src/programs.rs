@@ -1,8 +1,8 @@
 //! Programs with shaders: VTK's family (ParaView, PyVista, Slicer, VisIt, Mayavi) is recognised, all others are the driver's.
 //!
-//! VTK assembles its shaders from pieces. Here `main` of both shaders is taken apart into statements, and a program counts as recognised only
-//! when every statement is one whose meaning is written down in `template` and `blocks`: a shader with anything else in it (picking, textures, lights from
-//! pictures) is left to the driver.
+//! VTK assembles its shaders from pieces. A program counts as recognised only when its sources are such pieces, whose meaning is written down in `blocks` and
+//! `template`, in VTK's order and with nothing else among them: a shader with anything else in it (picking, lights from pictures, what a script has replaced) is
+//! left to the driver.
 
 mod blocks;
 mod cells;
@@ -11,6 +11,7 @@ mod peeling;
 mod picture;
 mod recognised;
 mod shadow_maps;
+mod source;
 mod template;
 mod weighted;
 mod wire;
@@ -36,6 +37,11 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use template::{Colors, Peel, Pictured, Template};
 use weighted::Weighted;
+
+/// See [`crate::recognise`].
+pub(crate) fn recognise(vertex: &str, geometry: &str, fragment: &str) -> Result<(), &'static str> {
+    Template::read(vertex, geometry, fragment).map(|_| ())
+}
 
 /// Which buffers a draw reads: while none was written, what was made of them serves again.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]

@@ -295,6 +295,20 @@ fn physically_based_materials_are_the_drivers() {
 }
 
 #[test]
+fn colours_of_blocks_are_over_others_and_over_back_faces() {
+    scenes(&[&["blocks"]], true, 4);
+}
+
+#[test]
+fn a_surface_with_a_scripts_own_shader_is_the_drivers() {
+    // One of the four surfaces is as VTK has it.
+    for report in scenes(&[&["replaced"]], true, 1) {
+        let passed = report.passed_reasons.get("a surface of VTK's with a statement that is not known");
+        assert!(passed.is_some_and(|n| *n >= 3), "{report:?}");
+    }
+}
+
+#[test]
 fn lines_along_edges_of_cells_are_the_drivers() {
     scenes(&[&["edges"], &["edges", "4"]], false, 4);
 }

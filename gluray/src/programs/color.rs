@@ -72,7 +72,7 @@ impl Physical {
         let a = self.roughness * self.roughness;
         let a2 = a * a;
         let d = (n_h * a2 - n_h) * n_h + 1.0;
-        let lobe = a2 / (PI * d * d).max(1e-8);
+        let lobe = a2 / (PI * d * d).max(self.least_divisor);
         let r2 = self.roughness * self.roughness;
         let (ggx_v, ggx_l) =
             (n_l * (r2 + n_v * (n_v - r2 * n_v)).sqrt(), n_v * (r2 + n_l * (n_l - r2 * n_l)).sqrt());
@@ -120,7 +120,7 @@ impl Edges {
 }
 
 impl Recognised {
-    /// Colour and alpha of vertices, triangles or the colour map; `None` for the uniforms' colours.
+    /// Colour and alpha of vertices, triangles or the colour map; no colour where the uniforms' are taken.
     pub(super) fn own_color(
         &self,
         a: &Attributes,
@@ -130,7 +130,6 @@ impl Recognised {
     ) -> (Option<V3>, f32) {
         let corners = mesh.indices[prim].map(|i| i as usize);
         let [r, g, b, alpha] = match self.template.colors {
-            _ if self.overrides => return (None, 1.0),
             Colors::Uniform => return (None, 1.0),
             Colors::PerVertex => mixed(corners.map(|i| a.colors.at(i)), w),
             Colors::Map => {
@@ -139,10 +138,10 @@ impl Recognised {
             }
             Colors::PerCell => self.map.as_ref().map_or([1.0; 4], |m| m.numbered(prim)),
         };
-        (Some([r, g, b]), alpha)
+        (Some([r, g, b]).filter(|_| !self.overrides), alpha)
     }
 
-    /// The surface of a fragment before light falls on it.
+    /// The surface of a fragment before light falls on it, step by step as the shader has it.
     fn surface(&self, a: &Attributes, mesh: &TriMesh, at: &At, picture: Option<[f32; 4]>) -> Surface {
         let mut surface = match self.back {
             Some(back) if !at.front => back,
@@ -158,6 +157,11 @@ impl Recognised {
                 }
             }
         };
+        // The colour of a block is over those of back faces, and is not made linear.
+        if self.overrides {
+            surface.ambient = self.ambient.map(|v| v * self.ambient_intensity);
+            surface.diffuse = self.diffuse.map(|v| v * self.diffuse_intensity);
+        }
         if let Some(edges) = &self.edges {
             let corners = mesh.triangle(at.prim).map(|p| transform(&self.clip_from_object, p.to_array()));
             let line = edges.share(corners, at) * edges.opacity;
@@ -222,7 +226,8 @@ impl Recognised {
         let mut lit = [0.0; 3];
         let mut shine = [0.0; 3];
         if self.template.headlight {
-            let df = normal[2].max(0.000_001) * reaches.lights[0];
+            let least = if self.template.cosines_from_zero { 0.0 } else { 0.000_001 };
+            let df = normal[2].max(least) * reaches.lights[0];
             let sf = df.powf(s.power);
             for k in 0..3 {
                 lit[k] = df * self.lights[0].color[k];
@@ -233,6 +238,7 @@ impl Recognised {
         let others = &self.lights[usize::from(self.template.headlight)..];
         let visible = &reaches.lights[usize::from(self.template.headlight)..];
         let to_eye = normalized(point.map(|v| -v));
+        let least = if self.template.cosines_from_zero { 0.0 } else { 1e-5 };
         for (light, visible) in others.iter().zip(visible) {
             let (travels, share) = light.reaching(point);
             let color = light.color.map(|c| c * visible);
@@ -242,7 +248,7 @@ impl Recognised {
             }
             // reflect(I, N) = I - 2 (N . I) N
             let r: V3 = std::array::from_fn(|k| travels[k] + 2.0 * cosine * normal[k]);
-            let sf = share * dot(r, to_eye).max(1e-5).powf(s.power);
+            let sf = share * dot(r, to_eye).max(least).powf(s.power);
             for k in 0..3 {
                 lit[k] += cosine * share * color[k];
                 shine[k] += sf * color[k];
@@ -298,7 +304,7 @@ mod tests {
 
     #[test]
     fn a_rough_metal_reflects_less_along_the_normal_than_a_smooth_one_and_has_no_diffuse_part() {
-        let p = Physical { metallic: 1.0, roughness: 0.9, base: 0.04, tint: [1.0; 3] };
+        let p = Physical { metallic: 1.0, roughness: 0.9, base: 0.04, tint: [1.0; 3], least_divisor: 1e-8 };
         let smooth = Physical { roughness: 0.2, ..p };
         let along = [1.0, 1.0, 1.0, 1.0];
         let (rough, shiny) = (p.reflected([0.5; 3], along), smooth.reflected([0.5; 3], along));

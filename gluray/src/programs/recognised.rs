@@ -80,6 +80,8 @@ pub(crate) struct Physical {
     /// Reflectance along the normal, and its tint at grazing angles.
     pub(crate) base: f32,
     pub(crate) tint: [f32; 3],
+    /// What the lobe is divided by is not less: 0 before VTK 9.7.
+    pub(crate) least_divisor: f32,
 }
 
 /// Lines along the edges of cells.
@@ -200,6 +202,7 @@ impl Recognised {
                 roughness: one("roughnessUniform"),
                 base: one("baseF0Uniform"),
                 tint: value(program, "edgeTintUniform"),
+                least_divisor: if template.lobes_have_an_end { 1e-8 } else { 0.0 },
             }),
             clip_planes: (0..planes).map(|i| value(program, &format!("clipPlanes[{i}]"))).collect(),
             edges: template.edges.then(|| Edges {

@@ -1,9 +1,10 @@
-//! VTK's shaders, statement by statement: what each of them means, and whether there are others.
+//! VTK's shaders, from their first statement to their last.
+//!
+//! VTK puts a shader together from pieces in one order. A source is VTK's when its `main` is such pieces in that order and nothing else:
+//! the same statements in another order, within a condition or twice are the work of somebody else, who had reasons.
 
-use super::blocks::{
-    BACK, BACK_UNLIT, CLIPPED, CLIPS, CLIPS_LATER, EDGES, EMITS, MEASURES, MOST_LIGHTS, TURNED, WEIGHTED,
-    take, take_albedo, take_lights, take_physical, take_picture, without_peeling,
-};
+use super::blocks::*;
+use super::source::{Stage, split, squeezed, statements, without_comments};
 
 /// Where the surface's colour comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -83,26 +84,56 @@ pub(crate) struct Template {
     pub(super) turned: bool,
     /// Depths are moved back by the slope of the surface and a constant, for lines that lie on it.
     pub(super) moved_back: bool,
+    /// Cosines of highlights, and of a light at the eye, may be 0 (VTK 9.1); later they have a least value.
+    pub(super) cosines_from_zero: bool,
+    /// The lobe of a physically based material has a greatest value (VTK 9.7).
+    pub(super) lobes_have_an_end: bool,
 }
 
-/// Statements of `main`, without blanks and comments; light numbers become `#`.
-fn statements(source: &str) -> Option<Vec<String>> {
-    let mut text = String::new();
-    for line in source.lines() {
-        let line = line.split("//").next().unwrap_or("");
-        if !line.trim_start().starts_with('#') {
-            text += line;
-            text.push('\n');
+/// Statements that are left to read.
+struct Reader<'a> {
+    left: &'a [String],
+}
+
+impl Reader<'_> {
+    /// Reads a piece if it comes next.
+    fn take(&mut self, piece: &str) -> bool {
+        let piece = split(piece).unwrap_or_default();
+        !piece.is_empty() && self.take_all(&piece)
+    }
+
+    fn take_all(&mut self, piece: &[impl AsRef<str>]) -> bool {
+        let there =
+            self.left.len() >= piece.len() && self.left.iter().zip(piece).all(|(s, p)| s == p.as_ref());
+        if there {
+            self.left = &self.left[piece.len()..];
         }
+        there
     }
-    while let Some(start) = text.find("/*") {
-        let end = text[start..].find("*/").map_or(text.len(), |e| start + e + 2);
-        text.replace_range(start..end, " ");
+
+    /// Reads the first of some pieces that comes next, and says which it was.
+    fn one_of<'p>(&mut self, pieces: impl IntoIterator<Item = &'p str>) -> Option<usize> {
+        pieces.into_iter().position(|piece| self.take(piece))
     }
-    let body = &text[text.find("void main")?..];
-    let body = &body[body.find('{')? + 1..body.rfind('}')?];
-    let squeezed: String = body.chars().filter(|c| !c.is_whitespace()).collect();
-    Some(squeezed.split([';', '{', '}']).filter(|s| !s.is_empty()).map(str::to_owned).collect())
+
+    /// Reads pieces that follow one another and are numbered from 0 on.
+    fn take_numbered(&mut self, piece: &str) -> usize {
+        (0..=MOST_LIGHTS).take_while(|n| self.take(&piece.replace('#', &n.to_string()))).count()
+    }
+
+    fn is_done(&self) -> bool {
+        self.left.is_empty()
+    }
+}
+
+/// Lights of a shader.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+struct Lights {
+    /// One at the eye.
+    head: bool,
+    /// From far away or, with `placed`, from a place; how many.
+    others: usize,
+    placed: bool,
 }
 
 impl Template {
@@ -111,352 +142,552 @@ impl Template {
         const NOT_VTK: &str = "a program that is not recognised";
         const UNKNOWN: &str = "a surface of VTK's with a statement that is not known";
         const PICTURE: &str = "a picture on a surface of VTK's";
+        let text = squeezed(&without_comments(fragment));
+        if text.contains("fragOutput0.r=exp(depthC*ldepth);") {
+            return Err(SHADOW_MAP);
+        }
         let mut t = Template::default();
-        let (Some(mut vs), Some(mut fs)) = (statements(vertex), statements(fragment)) else {
-            return Err(NOT_VTK);
-        };
+        let vs = statements(vertex, Stage::Vertex).ok_or(NOT_VTK)?;
+        let mut fs = statements(fragment, Stage::Fragment).ok_or(NOT_VTK)?;
         if !geometry.is_empty() {
             // What goes through has another name behind it.
             fs.iter_mut().for_each(|s| *s = s.replace("GSOutput", "VSOutput"));
-            t.read_geometry(geometry, &mut vs).ok_or("a geometry or tessellation shader")?;
+            t.read_geometry(geometry).ok_or("a geometry or tessellation shader")?;
         }
-        if fs.iter().any(|s| s == "fragOutput0.r=exp(depthC*ldepth)") {
-            return Err(SHADOW_MAP);
-        }
-        t.read_vertex(vs).ok_or(NOT_VTK)?;
-        let pictured = |s: &String| s.contains("texture(actortexture") || s.contains("texture(albedoTex");
-        let why = if fs.iter().any(pictured) { PICTURE } else { UNKNOWN };
-        t.read_fragment(fs).ok_or(why)?;
+        t.read_vertex(&vs).ok_or(NOT_VTK)?;
+        let pictured = text.contains("texture(actortexture") || text.contains("texture(albedoTex");
+        t.read_fragment(&fs).ok_or(if pictured { PICTURE } else { UNKNOWN })?;
+        t.lobes_have_an_end = t.physical && text.contains(LOBES_HAVE_AN_END);
         Ok(t)
     }
 
-    /// The shader that measures edges, which changes nothing else. What it needs of the vertex shader's is taken out of that.
-    fn read_geometry(&mut self, text: &str, vs: &mut Vec<String>) -> Option<()> {
-        let mut gs: Vec<String> =
-            statements(text)?.into_iter().map(|s| s.replace("GSOutput", "VSOutput")).collect();
-        self.edges = take(&mut gs, MEASURES) && take(&mut gs, EMITS);
-        self.clipped = take(&mut gs, CLIPS_LATER) && take(vs, &["clipVertexMC=vertexMC"]);
-        let goes_through = |s: &String| {
-            ["normalVC", "tcoordVC", "colorTCoordVC", "vertexColor", "vertexVC"]
-                .iter()
-                .any(|name| *s == format!("{name}VSOutput={name}VSOutput[i]"))
-        };
-        (self.edges && gs.iter().all(goes_through)).then_some(())
+    /// The shader that measures edges, which changes nothing else.
+    fn read_geometry(&mut self, text: &str) -> Option<()> {
+        let text: Vec<String> =
+            statements(text, Stage::Geometry)?.iter().map(|s| s.replace("GSOutput", "VSOutput")).collect();
+        let mut r = Reader { left: &text };
+        self.edges = r.take(MEASURES) && r.take_all(&CORNERS);
+        let mut through = GOES_THROUGH.map(Some);
+        // These are apart from each other, so that their order does not matter.
+        loop {
+            if !self.clipped && r.take(CLIPS_LATER) {
+                self.clipped = true;
+                continue;
+            }
+            let next = through.iter_mut().find(|name| {
+                name.is_some_and(|name| r.take(&format!("{name}VSOutput = {name}VSOutput[i];")))
+            });
+            match next {
+                Some(name) => *name = None,
+                None => break,
+            }
+        }
+        (self.edges && r.take_all(&EMITS) && r.is_done()).then_some(())
     }
 
-    fn read_vertex(&mut self, mut vs: Vec<String>) -> Option<()> {
-        self.clipped |= take(&mut vs, CLIPS);
-        let [map, picture] = TURNED.map(|block| take(&mut vs, block));
-        let has = |name: &str| vs.iter().any(|s| s.starts_with(name));
-        let plain = [has("colorTCoordVCVSOutput="), has("tcoordVCVSOutput=")];
-        self.turned = map || picture;
-        self.two_coordinates = (map || plain[0]) && (picture || plain[1]);
+    fn read_vertex(&mut self, text: &[String]) -> Option<()> {
+        let mut r = Reader { left: text };
+        r.take(VERTEX_COLOR);
+        r.take(VERTEX_NORMAL);
+        let [map, picture] = [0, 1].map(|i| r.one_of([COORDINATES[i], TURNED[i]]));
+        self.two_coordinates = map.is_some() && picture.is_some();
+        self.turned = map == Some(1) || picture == Some(1);
         // A matrix for one kind of coordinates alone.
-        if self.turned && plain != [false; 2] {
+        if self.turned && (map == Some(0) || picture == Some(0)) {
             return None;
         }
-        let known = |s: &String| {
-            matches!(
-                s.as_str(),
-                "normalVCVSOutput=normalMatrix*normalMC"
-                    | "tcoordVCVSOutput=tcoord"
-                    | "colorTCoordVCVSOutput=colorTCoord"
-                    | "vertexColorVSOutput=scalarColor"
-                    | "vertexVCVSOutput=MCVCMatrix*vertexMC"
-                    | "gl_Position=MCDCMatrix*vertexMC"
-            )
-        };
-        let places = vs.iter().any(|s| s == "gl_Position=MCDCMatrix*vertexMC");
-        (places && vs.iter().all(known)).then_some(())
+        if self.clipped {
+            r.take(CLIPPED_LATER).then_some(())?;
+        } else {
+            self.clipped = r.take(CLIPS);
+        }
+        r.take(VERTEX_VIEW);
+        (r.take(VERTEX_PLACE) && r.is_done()).then_some(())
     }
 
-    fn read_fragment(&mut self, fs: Vec<String>) -> Option<()> {
-        let (peel, mut fs) = without_peeling(fs);
-        self.peel = if take(&mut fs, WEIGHTED) { Peel::Weighted } else { peel };
-        if self.peel != peel && peel != Peel::No {
+    fn read_fragment(&mut self, text: &[String]) -> Option<()> {
+        let mut r = Reader { left: text };
+        r.take(VIEW);
+        let mut slope = r.take(SLOPE);
+        let differences = r.one_of(DIFFERENCES).is_some();
+        slope = slope || r.take(SLOPE);
+        self.moved_back = r.one_of(if slope { MOVED_BY_SLOPE } else { MOVED }).is_some();
+        if slope && !self.moved_back {
             return None;
         }
-        self.back = take(&mut fs, BACK) || take(&mut fs, BACK_UNLIT);
-        if take(&mut fs, CLIPPED) != self.clipped || take(&mut fs, EDGES) != self.edges {
+        let layers = OTHER_EPSILON.map(|e| PEEL_LAYERS.replace(OTHER_EPSILON[0], e));
+        if r.take(PEEL_DEPTHS) {
+            self.peel = Peel::Depths;
+        } else if r.one_of(layers.iter().map(String::as_str)).is_some() {
+            self.peel = Peel::Layers;
+        }
+        if self.moved_back && self.peel != Peel::No {
             return None;
         }
-        self.pictured = take_albedo(&mut fs).or_else(|| take_picture(&mut fs)).unwrap_or_default();
-        let physical = take_physical(&mut fs);
-        self.physical = physical.is_some();
-        self.lit = self.physical;
-        let lights = physical.unwrap_or_else(|| take_lights(&mut fs));
-        (self.headlight, self.lights, self.placed) = (lights.head, lights.others, lights.placed);
-        for s in &fs {
-            self.read_statement(s)?;
-        }
-        if self.moved_back && matches!(self.peel, Peel::Depths | Peel::Layers) {
+        if r.take(CLIPPED) != self.clipped {
             return None;
         }
-        let one_kind = self.headlight != (self.lights > 0);
-        ((!self.lit || one_kind) && self.lights <= MOST_LIGHTS).then_some(())
+        self.read_colors(&mut r)?;
+        if r.take(EDGES) != self.edges {
+            return None;
+        }
+        match r.one_of([SMOOTH, FLAT]) {
+            Some(1) if differences => self.flat = true,
+            Some(1) => return None,
+            _ => {}
+        }
+        self.read_light(&mut r)?;
+        if self.pictured == Pictured::No {
+            self.pictured = read_picture(&mut r);
+        }
+        if !r.take(DISCARDS) {
+            return None;
+        }
+        match self.peel {
+            Peel::Layers if !r.take(PEELED_LAYERS) => return None,
+            Peel::No if r.take(WEIGHTED) => self.peel = Peel::Weighted,
+            _ => {}
+        }
+        r.is_done().then_some(())
     }
 
-    /// A statement that means something by itself.
-    fn read_statement(&mut self, s: &str) -> Option<()> {
-        match s {
-            "vec4vertexVC=vertexVCVSOutput"
-            | "vec3fdx=dFdx(vertexVC.xyz)"
-            | "vec3fdy=dFdy(vertexVC.xyz)"
-            // VTK 9.7 keeps the differences away from underflow; the normal is the same.
-            | "floatscale=1.0/length(fwidth(vertexVC.xyz))"
-            | "vec3fdx=dFdx(vertexVC.xyz)*scale"
-            | "vec3fdy=dFdy(vertexVC.xyz)*scale"
-            | "vec3specularColor=specularIntensity*specularColorUniform"
-            | "floatspecularPower=specularPowerUniform"
-            | "floatcscale=length(vec2(dFdx(gl_FragCoord.z),dFdy(gl_FragCoord.z)))"
-            | "vec3ambientColor=ambientIntensity*ambientColorUniform"
-            | "vec3diffuseColor=diffuseIntensity*diffuseColorUniform"
-            | "floatopacity=opacityUniform"
-            | "vec3normalVCVSOutput=normalize(normalVCVSOutput)"
-            | "if(gl_FrontFacing==false)"
-            | "normalVCVSOutput=-normalVCVSOutput"
-            | "if(cameraParallel==1&&normalVCVSOutput.z<0.0)"
-            | "if(cameraParallel==0&&dot(normalVCVSOutput,vertexVC.xyz)>0.0)"
-            | "normalVCVSOutput=-1.0*normalVCVSOutput"
-            | "floatdf"
-            | "floatsf"
-            | "vec3diffuse=vec3(0,0,0)"
-            | "vec3specular=vec3(0,0,0)"
-            | "vec3vertLightDirectionVC"
-            | "floatattenuation"
-            | "if(fragOutput0.a<=0.0)"
-            | "discard"
-            | "diffuse=diffuse*diffuseColor"
-            | "specular=specular*specularColor"
-            | "floatsf=pow(df,specularPower)"
-            | "vec3diffuse=df*diffuseColor*lightColor0"
-            | "vec3specular=sf*specularColor*lightColor0" => {}
-            "vec4texColor=texture(colortexture,tcoordVCVSOutput.st)"
-            | "vec4texColor=texture(colortexture,colorTCoordVCVSOutput.st)" => self.colors = Colors::Map,
-            "vec4texColor=texelFetchBuffer(textureC,gl_PrimitiveID+PrimitiveIDOffset)" => {
-                self.colors = Colors::PerCell;
-            }
-            "ambientColor=pow(ambientColor,vec3(2.2))" | "diffuseColor=pow(diffuseColor,vec3(2.2))"
-                if self.physical && self.colors != Colors::Uniform =>
-            {
-                self.linear = true;
-            }
-            // Where it comes from was said before.
-            "vec3ambientColor=ambientIntensity*texColor.rgb"
-            | "vec3diffuseColor=diffuseIntensity*texColor.rgb"
-            | "floatopacity=opacityUniform*texColor.a"
-                if matches!(self.colors, Colors::Map | Colors::PerCell) => {}
-            "vec3ambientColor=ambientIntensity*vertexColorVSOutput.rgb"
-            | "vec3diffuseColor=diffuseIntensity*vertexColorVSOutput.rgb"
-            | "floatopacity=opacityUniform*vertexColorVSOutput.a" => self.colors = Colors::PerVertex,
-            // VTK 9.1 to 9.2 and ParaView, and 9.7.
-            "gl_FragDepth=gl_FragCoord.z+1.0*cOffset/65000"
-            | "gl_FragDepth=gl_FragCoord.z+1.0*cOffset/65000.0"
-            | "gl_FragDepth=gl_FragCoord.z+cFactor*cscale+1.0*cOffset/65000"
-            | "gl_FragDepth=gl_FragCoord.z+cFactor*cscale+1.0*cOffset/65000.0" => self.moved_back = true,
-            "if(OverridesColor)" => self.overrides = true,
-            "ambientColor=ambientColorUniform*ambientIntensity"
-            | "diffuseColor=diffuseColorUniform*diffuseIntensity" => {}
-            "vec3normalVCVSOutput=normalize(cross(fdx,fdy))" => self.flat = true,
-            "floatdf=max(0.000001,normalVCVSOutput.z)" if !self.physical => self.headlight = true,
-            "fragOutput0=vec4(ambientColor+diffuse+specular,opacity)" if !self.physical => self.lit = true,
-            "fragOutput0=vec4(ambientColor+diffuseColor,opacity)" if !self.physical => self.lit = false,
-            _ => return None,
+    /// Where the surface's colour comes from, and what changes it before there is light.
+    fn read_colors(&mut self, r: &mut Reader<'_>) -> Option<()> {
+        r.take(SPECULAR);
+        if r.one_of(MAPS).is_some() {
+            self.colors = Colors::Map;
+        } else if r.take(CELLS) {
+            self.colors = Colors::PerCell;
         }
+        if self.colors != Colors::Uniform {
+            r.take(OF_TEXTURE).then_some(())?;
+        } else if r.take(OF_VERTICES) {
+            self.colors = Colors::PerVertex;
+        } else {
+            r.take(OF_UNIFORMS).then_some(())?;
+        }
+        self.linear = self.colors != Colors::Uniform && r.take(LINEAR);
+        self.back = r.one_of(BACK).is_some();
+        self.overrides = r.take(OVERRIDES);
         Some(())
     }
+
+    fn read_light(&mut self, r: &mut Reader<'_>) -> Option<()> {
+        let physical = if r.take(ALBEDO) {
+            true
+        } else if r.take(ALBEDO_OF_TEXTURE) {
+            self.pictured = ALBEDO_ALPHA[r.one_of(ALBEDO_ALPHA.map(|(_, piece)| piece))?].0;
+            true
+        } else {
+            false
+        };
+        self.physical = physical;
+        if physical {
+            let lights = read_physical(r)?;
+            self.lit = true;
+            (self.headlight, self.lights, self.placed) = (lights.head, lights.others, lights.placed);
+        } else if !r.take(UNLIT) {
+            let lights = self.read_lights(r)?;
+            self.lit = true;
+            (self.headlight, self.lights, self.placed) = (lights.head, lights.others, lights.placed);
+        }
+        let one_kind = self.headlight != (self.lights > 0);
+        let known = (!self.lit || one_kind) && self.lights <= MOST_LIGHTS && (physical || !self.linear);
+        known.then_some(())
+    }
+
+    /// Lights of a shader that lights by Phong's rule.
+    fn read_lights(&mut self, r: &mut Reader<'_>) -> Option<Lights> {
+        let at_eye = LEAST_AT_EYE.map(|least| HEADLIGHT.replace(LEAST_AT_EYE[0], least));
+        if let Some(version) = r.one_of(at_eye.iter().map(String::as_str)) {
+            self.cosines_from_zero = version == 1;
+            return Some(Lights { head: true, ..Lights::default() });
+        }
+        let (light, placed) = match r.one_of([LAMPS, SUNS])? {
+            0 => (LAMP, true),
+            _ => (SUN, false),
+        };
+        let of_version = |v: usize| light.replace(LEAST_ELSEWHERE[0], LEAST_ELSEWHERE[v]);
+        let mut others = r.take_numbered(&of_version(0));
+        if others == 0 {
+            self.cosines_from_zero = true;
+            others = r.take_numbered(&of_version(1));
+        }
+        r.take(SUMMED).then_some(Lights { head: false, others, placed })
+    }
+}
+
+/// The rest of a physically based material; its lights.
+fn read_physical(r: &mut Reader<'_>) -> Option<Lights> {
+    r.take(PHYSICAL).then_some(())?;
+    let lights = if r.take(PHYSICAL_HEADLIGHT) {
+        Lights { head: true, ..Lights::default() }
+    } else {
+        match r.take_numbered(PHYSICAL_LAMP) {
+            0 => Lights { others: r.take_numbered(PHYSICAL_SUN), ..Lights::default() },
+            n => Lights { others: n, placed: true, ..Lights::default() },
+        }
+    };
+    r.one_of(PHYSICAL_ENDS).map(|_| lights)
+}
+
+/// A picture that multiplies the lit colour.
+fn read_picture(r: &mut Reader<'_>) -> Pictured {
+    for (pictured, components) in COMPONENTS {
+        for n in 0..MOST_BEFORE {
+            let piece = [READS, components, MULTIPLIES].join(" ").replace('#', &n.to_string());
+            if r.take(&piece) {
+                return pictured;
+            }
+        }
+    }
+    Pictured::No
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::blocks::{
-        ALBEDO, ALBEDO_ALPHA, COMPONENTS, LAMP, MULTIPLIES, PASSES, PHYSICAL, PHYSICAL_ENDS,
-        PHYSICAL_HEADLIGHT, PHYSICAL_LAMP, PHYSICAL_SUN, READS, SUN,
-    };
     use super::*;
+    use proptest::prelude::*;
 
     const VERTEX: &str = "#version 150\nin vec4 vertexMC; // a comment\nvoid main()\n{\n  vertexVCVSOutput = MCVCMatrix * vertexMC;\n  gl_Position = MCDCMatrix * vertexMC;\n}\n";
-    fn fragment(extra: &str) -> String {
-        format!(
-            "#version 150\n/* text */\nvoid main()\n{{\n vec4 vertexVC = vertexVCVSOutput;\n float opacity = opacityUniform;\n\
-             vec3 normalVCVSOutput = normalize(normalVCVSOutput);\n if (gl_FrontFacing == false) {{ normalVCVSOutput = -normalVCVSOutput; }}\n\
-             {extra}\n fragOutput0 = vec4(ambientColor + diffuse + specular, opacity);\n if (fragOutput0.a <= 0.0)\n {{\n discard;\n }}\n}}\n"
-        )
+
+    /// Pieces of a fragment shader, in VTK's order.
+    #[derive(Clone)]
+    struct Parts {
+        depth: String,
+        clip: String,
+        color: String,
+        edges: String,
+        normal: String,
+        light: String,
+        picture: String,
+        end: String,
     }
 
-    fn read(fragment: &str) -> Result<Template, &'static str> {
-        Template::read(VERTEX, "", fragment)
+    impl Default for Parts {
+        fn default() -> Parts {
+            Parts {
+                depth: String::new(),
+                clip: String::new(),
+                color: [SPECULAR, OF_UNIFORMS].concat(),
+                edges: String::new(),
+                normal: SMOOTH.into(),
+                light: HEADLIGHT.into(),
+                picture: String::new(),
+                end: String::new(),
+            }
+        }
     }
 
-    const HEAD: &str = "float df = max(0.000001, normalVCVSOutput.z);";
+    impl Parts {
+        fn text(&self) -> String {
+            let Parts { depth, clip, color, edges, normal, light, picture, end } = self;
+            let pieces = [VIEW, depth, clip, color, edges, normal, light, picture, DISCARDS, end];
+            format!("#version 150\n/* text */\nvoid main()\n{{\n {}\n}}\n", pieces.join("\n  "))
+        }
+
+        fn read(&self) -> Result<Template, &'static str> {
+            Template::read(VERTEX, "", &self.text())
+        }
+    }
+
+    /// The default with something changed.
+    fn with(change: impl FnOnce(&mut Parts)) -> Parts {
+        let mut parts = Parts::default();
+        change(&mut parts);
+        parts
+    }
+
+    fn with_light(light: impl Into<String>) -> Result<Template, &'static str> {
+        with(|p| p.light = light.into()).read()
+    }
+
+    fn numbered(piece: &str, n: usize) -> String {
+        (0..n).map(|i| piece.replace('#', &i.to_string())).collect()
+    }
 
     #[test]
     fn headlights_and_light_kits_are_told_apart() {
-        let head = read(&fragment(HEAD)).expect("known");
-        assert!(head.headlight && head.lit && head.lights == 0);
-        let kit = |block: &[&str], n: usize| -> String {
-            (0..n).map(|i| block.join(";").replace('#', &i.to_string()) + ";").collect()
-        };
-        let far = read(&fragment(&kit(SUN, 5))).expect("known");
+        let head = with_light(HEADLIGHT).expect("known");
+        assert!(head.headlight && head.lit && head.lights == 0 && !head.cosines_from_zero);
+        let before = with_light(HEADLIGHT.replace(LEAST_AT_EYE[0], LEAST_AT_EYE[1])).expect("known");
+        assert!(before.headlight && before.cosines_from_zero);
+        let kit = |begin: &str, light: &str, n| [begin, &numbered(light, n), SUMMED].concat();
+        let far = with_light(kit(SUNS, SUN, 5)).expect("known");
         assert!((far.headlight, far.lights, far.placed) == (false, 5, false));
-        let near = read(&fragment(&kit(LAMP, 3))).expect("known");
+        let near = with_light(kit(LAMPS, LAMP, 3)).expect("known");
         assert!((near.headlight, near.lights, near.placed) == (false, 3, true));
-        assert!(read(&fragment(&kit(&LAMP[1..], 1))).is_err(), "not all of it");
-        assert!(read(&fragment(&kit(SUN, MOST_LIGHTS + 1))).is_err(), "too many");
-        let twice = kit(SUN, 1).replace("sign(df)", "sign(df)*2.0");
-        assert!(read(&fragment(&twice)).is_err(), "brighter than is known");
+        let of_9_1 = SUN.replace(LEAST_ELSEWHERE[0], LEAST_ELSEWHERE[1]);
+        let old = with_light(kit(SUNS, &of_9_1, 2)).expect("known");
+        assert!(old.lights == 2 && old.cosines_from_zero);
+        assert!(with_light(kit(LAMPS, LAMP.split_once(';').expect("two").1, 1)).is_err(), "not all of it");
+        assert!(with_light(kit(SUNS, SUN, MOST_LIGHTS + 1)).is_err(), "too many");
+        assert!(with_light(kit(SUNS, SUN, 0)).is_err(), "lit by nothing");
+        let twice = kit(SUNS, SUN, 1).replace("sign(df)", "sign(df)*2.0");
+        assert!(with_light(twice).is_err(), "brighter than is known");
+        let mixed = [SUNS, &numbered(SUN, 1), &of_9_1.replace('#', "1"), SUMMED].concat();
+        assert!(with_light(mixed).is_err(), "two versions");
     }
 
     #[test]
     fn back_faces_clipping_planes_and_sums_are_known_as_a_whole() {
-        let parts = [BACK, CLIPPED, WEIGHTED].map(|block| block.join(";") + ";");
-        let clips = VERTEX.replace("  vertexVC", &format!("{};vertexVC", CLIPS.join(";")));
-        let read = |text: &str| Template::read(&clips, "", &fragment(text));
-        let all = read(&format!("{}{HEAD}{}{}", parts[1], parts[0], parts[2])).expect("known");
-        assert!(all.back && all.clipped && all.peel == Peel::Weighted);
-        assert!(read(HEAD).is_err(), "planes that only the vertex shader knows");
-        assert!(Template::read(VERTEX, "", &fragment(&format!("{}{HEAD}", parts[1]))).is_err());
-        for block in [BACK, CLIPPED, WEIGHTED] {
-            let less = block[..block.len() - 1].join(";");
-            assert!(read(&format!("{}{HEAD}{less};", parts[1])).is_err(), "{less}");
+        let clips = VERTEX.replace("  vertexVC", &format!("{CLIPS} vertexVC"));
+        let all = with(|p| {
+            p.clip = CLIPPED.into();
+            p.color += BACK[0];
+            p.end = WEIGHTED.into();
+        });
+        let read = |parts: &Parts| Template::read(&clips, "", &parts.text());
+        let known = read(&all).expect("known");
+        assert!(known.back && known.clipped && known.peel == Peel::Weighted);
+        assert!(read(&Parts::default()).is_err(), "planes that only the vertex shader knows");
+        assert!(with(|p| p.clip = CLIPPED.into()).read().is_err(), "planes that nobody measures");
+        for piece in [BACK[0], CLIPPED, WEIGHTED] {
+            let pieces = split(piece).expect("balanced");
+            for left_out in 0..pieces.len() {
+                let mut less = pieces.clone();
+                less.remove(left_out);
+                let text = all.text().replace(piece, &less.concat());
+                assert!(Template::read(&clips, "", &text).is_err(), "{less:?}");
+            }
         }
     }
 
     #[test]
     fn edges_are_known_where_the_geometry_shader_only_measures_them() {
         let geometry = |more: &str| {
+            let (corners, emits) = (CORNERS.concat(), EMITS.concat());
             format!(
-                "void main() {{ {}; vertexVCGSOutput = vertexVCVSOutput[i]; {more} {}; }}",
-                MEASURES.join(";"),
-                EMITS.join(";")
+                "void main() {{ {MEASURES} {corners} vertexVCGSOutput = vertexVCVSOutput[i]; {more} {emits} }}"
             )
         };
-        let edges = format!("{};{HEAD}", EDGES.join(";"));
-        let behind = fragment(&edges).replace("VSOutput", "GSOutput");
+        let edges = with(|p| p.edges = EDGES.into());
+        let behind = edges.text().replace("VSOutput", "GSOutput");
         let known = Template::read(VERTEX, &geometry(""), &behind).expect("known");
         assert!(known.edges && known.headlight);
-        assert!(Template::read(VERTEX, &geometry("gl_Position.xy += offsets[i];"), &behind).is_err());
-        assert!(Template::read(VERTEX, "", &fragment(&edges)).is_err(), "nobody measures");
-        assert!(Template::read(VERTEX, &geometry(""), &fragment(HEAD)).is_err(), "nobody draws them");
+        for more in ["gl_Position.xy += offsets[i];", "vertexVCGSOutput = vertexVCVSOutput[i];"] {
+            assert!(Template::read(VERTEX, &geometry(more), &behind).is_err(), "{more}");
+        }
+        assert!(edges.read().is_err(), "nobody measures");
+        let plain = Parts::default().text();
+        assert!(Template::read(VERTEX, &geometry(""), &plain).is_err(), "nobody draws them");
     }
 
     #[test]
     fn physically_based_materials_are_known_in_both_versions() {
         for end in PHYSICAL_ENDS {
             for (lights, n) in [(PHYSICAL_HEADLIGHT, 0), (PHYSICAL_SUN, 1), (PHYSICAL_LAMP, 1)] {
-                let text = [PHYSICAL, lights, end].concat().join(";").replace('#', "0") + ";";
-                let whole = fragment(&text)
-                    .replace("fragOutput0 = vec4(ambientColor + diffuse + specular, opacity);", "");
-                let t = read(&whole).expect("known");
+                let light = [ALBEDO, PHYSICAL, &numbered(lights, 1), end].concat();
+                let whole = with(|p| p.light.clone_from(&light));
+                let t = whole.read().expect("known");
                 assert!(t.physical && t.lit && t.lights == n && t.headlight == (n == 0));
-                assert!(read(&fragment(&text)).is_err(), "two colours");
-                assert!(read(&whole.replace("floatao=1.0", "floatao=texture(ao)")).is_err());
-                let linear = "diffuseColor=pow(diffuseColor,vec3(2.2));";
-                let colored = "float opacity = opacityUniform * vertexColorVSOutput.a;".to_owned() + linear;
-                assert!(
-                    read(&whole.replace("float opacity = opacityUniform;", &colored)).expect("known").linear
-                );
-                assert!(read(&fragment(&format!("{HEAD}{linear}"))).is_err(), "not physically based");
+                assert!(with_light(light.clone() + SUMMED).is_err(), "two colours");
+                assert!(with_light(light.replace("float ao = 1.0", "float ao = texture(ao)")).is_err());
+                let colored = |light: &str| {
+                    with(|p| {
+                        p.light = light.into();
+                        p.color = [SPECULAR, OF_VERTICES, LINEAR].concat();
+                    })
+                };
+                assert!(colored(&light).read().expect("known").linear);
+                assert!(colored(HEADLIGHT).read().is_err(), "not physically based");
             }
         }
     }
 
     #[test]
     fn pictures_are_known_where_they_are_the_last_that_happens_to_the_colour() {
-        let on = |picture: &str| {
-            let text = fragment(HEAD);
-            text.replace(" if (fragOutput0.a <= 0.0)", &format!("{picture} if (fragOutput0.a <= 0.0)"))
-        };
         for (pictured, components) in COMPONENTS {
-            let numbered = |n: &str| {
-                let all = [READS].into_iter().chain(components).chain(MULTIPLIES);
-                all.map(|s| s.replace('#', n) + ";").collect::<String>()
-            };
-            assert_eq!(read(&on(&numbered("0"))).map(|t| t.pictured), Ok(pictured));
-            assert_eq!(read(&on(&numbered("1"))).map(|t| t.pictured), Ok(pictured));
-            assert!(read(&on(&(numbered("0") + &numbered("1")))).is_err(), "two of them");
-            assert!(read(&fragment(&format!("{HEAD}{}", numbered("0")))).is_err(), "too early");
-            let other = numbered("0").replace("fragOutput0*tcolor", "fragOutput0+tcolor");
-            assert_eq!(read(&on(&other)), Err("a picture on a surface of VTK's"));
+            let piece = |n: &str| [READS, components, MULTIPLIES].concat().replace('#', n);
+            let on = |picture: String| with(|p| p.picture = picture).read();
+            assert_eq!(on(piece("0")).map(|t| t.pictured), Ok(pictured));
+            assert_eq!(on(piece("1")).map(|t| t.pictured), Ok(pictured));
+            assert!(on(piece("0") + &piece("1")).is_err(), "two of them");
+            assert!(with_light(piece("0") + HEADLIGHT).is_err(), "too early");
+            let other = piece("0").replace("fragOutput0 * tcolor", "fragOutput0 + tcolor");
+            assert_eq!(on(other), Err("a picture on a surface of VTK's"));
         }
     }
 
     #[test]
     fn depths_that_are_moved_back_are_known() {
-        let moved = |how: &str| format!("{HEAD} gl_FragDepth = gl_FragCoord.z + {how};");
-        for how in ["1.0*cOffset/65000", "cFactor*cscale + 1.0*cOffset/65000.0"] {
-            assert!(read(&fragment(&moved(how))).is_ok_and(|t| t.moved_back), "{how}");
+        let moved = |how: &str| with(|p| p.depth = how.into()).read();
+        for how in [MOVED[0].into(), MOVED[1].into(), [SLOPE, MOVED_BY_SLOPE[1]].concat()] {
+            assert!(moved(&how).is_ok_and(|t| t.moved_back), "{how}");
         }
-        assert!(read(&fragment(HEAD)).is_ok_and(|t| !t.moved_back));
-        assert!(read(&fragment(&moved("cFactor*cscale + 2.0*cOffset/65000"))).is_err());
+        assert!(Parts::default().read().is_ok_and(|t| !t.moved_back));
+        let twice = MOVED_BY_SLOPE[1].replace("1.0*", "2.0*");
+        assert!(moved(&[SLOPE, &twice].concat()).is_err());
+        assert!(moved(&[MOVED[0], PEEL_DEPTHS].concat()).is_err(), "peeled as well");
     }
 
     #[test]
     fn coordinates_of_pictures_may_have_a_matrix_and_be_apart_from_those_of_colour_maps() {
         let vertex = |text: &str| {
-            let vs = VERTEX.replace("  vertexVC", &format!("{text};vertexVC"));
-            Template::read(&vs, "", &fragment(HEAD)).map(|t| (t.two_coordinates, t.turned))
+            let vs = VERTEX.replace("  vertexVC", &format!("{text} vertexVC"));
+            let t = Template::read(&vs, "", &Parts::default().text());
+            t.map(|t| (t.two_coordinates, t.turned))
         };
-        let plain = ["colorTCoordVCVSOutput=colorTCoord", "tcoordVCVSOutput=tcoord"];
-        let turned = TURNED.map(|block| block.join(";"));
-        assert_eq!(vertex(plain[1]), Ok((false, false)));
-        assert_eq!(vertex(&plain.join(";")), Ok((true, false)));
-        assert_eq!(vertex(&turned[1]), Ok((false, true)));
-        assert_eq!(vertex(&turned.join(";")), Ok((true, true)));
-        assert!(vertex(&format!("{};{}", plain[0], turned[1])).is_err(), "a matrix for one of them");
-        assert!(vertex(&turned[1].replace("/tcoordTmp.w", "")).is_err());
+        assert_eq!(vertex(COORDINATES[1]), Ok((false, false)));
+        assert_eq!(vertex(&COORDINATES.concat()), Ok((true, false)));
+        assert_eq!(vertex(TURNED[1]), Ok((false, true)));
+        assert_eq!(vertex(&TURNED.concat()), Ok((true, true)));
+        assert!(vertex(&[COORDINATES[0], TURNED[1]].concat()).is_err(), "a matrix for one of them");
+        assert!(vertex(&TURNED[1].replace(" / tcoordTmp.w", "")).is_err());
     }
 
     #[test]
     fn physically_based_materials_have_colours_from_pictures() {
         for (pictured, alpha) in ALBEDO_ALPHA {
-            let albedo = [ALBEDO[0], ALBEDO[1], alpha].join(";");
-            let text = [PHYSICAL, PHYSICAL_HEADLIGHT, PHYSICAL_ENDS[0]].concat().join(";") + ";";
-            let text = text.replacen(PHYSICAL[0], &albedo, 1);
-            let whole = fragment(&text)
-                .replace("fragOutput0 = vec4(ambientColor + diffuse + specular, opacity);", "");
-            let t = read(&whole).expect("known");
+            let light = [ALBEDO_OF_TEXTURE, alpha, PHYSICAL, PHYSICAL_HEADLIGHT, PHYSICAL_ENDS[0]].concat();
+            let t = with_light(light.clone()).expect("known");
             assert!(t.physical && t.pictured == pictured);
-            let other = whole.replace("albedoSample.rgb*", "albedoSample.rgb+");
-            assert_eq!(read(&other), Err("a picture on a surface of VTK's"));
+            let other = light.replace("albedoSample.rgb *", "albedoSample.rgb +");
+            assert_eq!(with_light(other), Err("a picture on a surface of VTK's"));
         }
     }
 
     #[test]
     fn normals_out_of_differences_are_known_with_and_without_a_scale() {
-        let normal = "vec3 normalVCVSOutput = normalize(cross(fdx,fdy));";
-        for scale in ["", "*scale"] {
-            let differences =
-                format!("vec3 fdx = dFdx(vertexVC.xyz){scale}; vec3 fdy = dFdy(vertexVC.xyz){scale};");
-            let first = if scale.is_empty() { "" } else { "float scale = 1.0/length(fwidth(vertexVC.xyz));" };
-            let text = format!("{first}{differences}{normal}{HEAD}");
-            assert!(read(&fragment(&text)).expect("known").flat, "{text}");
+        let flat =
+            |differences: &str| with(|p| (p.depth, p.normal) = (differences.into(), FLAT.into())).read();
+        for differences in DIFFERENCES {
+            assert!(flat(differences).expect("known").flat, "{differences}");
         }
+        assert!(flat("").is_err(), "out of nothing");
     }
 
     #[test]
     fn passes_of_depth_peeling_are_known_only_with_all_of_their_statements() {
-        for (peel, pass) in PASSES {
-            let whole = pass.join(";") + ";";
-            let read = |text: &str| read(&fragment(&format!("{text}{HEAD}")));
-            let known = read(&whole.replace("fragOutput0=frag;", "fragOutput0 = frag; // the back\n"));
+        let layers = PEEL_LAYERS.replace(OTHER_EPSILON[0], OTHER_EPSILON[1]);
+        for (peel, begin, end) in [
+            (Peel::Depths, PEEL_DEPTHS, ""),
+            (Peel::Layers, PEEL_LAYERS, PEELED_LAYERS),
+            (Peel::Layers, &layers, PEELED_LAYERS),
+        ] {
+            let pass =
+                |begin: &str, end: &str| with(|p| (p.depth, p.end) = (begin.into(), end.into())).read();
+            let commented = end.replace("fragOutput0 = frag;", "fragOutput0 = frag; // the back\n");
+            let known = pass(begin, &commented);
             assert_eq!(known.map(|t| (t.peel, t.headlight)), Ok((peel, true)));
-            for left_out in pass {
-                let n = pass.iter().filter(|s| *s == left_out).count();
-                assert!(n > 1 || read(&whole.replace(left_out, "")).is_err(), "{peel:?} without {left_out}");
+            for (piece, is_begin) in [(begin, true), (end, false)] {
+                let pieces = split(piece).expect("balanced");
+                for left_out in 0..pieces.len() {
+                    let mut less = pieces.clone();
+                    less.remove(left_out);
+                    let less = less.concat();
+                    let known = if is_begin { pass(&less, end) } else { pass(begin, &less) };
+                    assert!(known.is_err(), "{peel:?} with {less}");
+                }
             }
-            assert!(read(&format!("{whole} gl_FragDepth = 0.5;")).is_err());
+            assert!(pass(&format!("{begin} gl_FragDepth = 0.5;"), end).is_err());
         }
-        assert_eq!(read(&fragment(HEAD)).map(|t| t.peel), Ok(Peel::No));
+        assert_eq!(Parts::default().read().map(|t| t.peel), Ok(Peel::No));
     }
 
     #[test]
     fn a_statement_that_is_not_known_makes_the_program_the_drivers() {
-        let selector = "float df = max(0.000001, normalVCVSOutput.z); fragOutput0 = vec4(propID, 1.0);";
-        assert!(read(&fragment(selector)).is_err());
-        assert!(Template::read("void main() { gl_Position = vec4(sin(t)); }", "", &fragment(HEAD)).is_err());
-        let shadows = format!("{HEAD} fragOutput0.r = exp(depthC*ldepth);");
-        assert_eq!(read(&fragment(&shadows)), Err(SHADOW_MAP));
-        assert!(read(&fragment("")).is_err(), "lit, but by nothing that is known");
+        assert!(with_light("fragOutput0 = vec4(propID, 1.0);").is_err());
+        let bent = "void main() { gl_Position = vec4(sin(t)); }";
+        assert!(Template::read(bent, "", &Parts::default().text()).is_err());
+        let shadows = with(|p| p.picture = "fragOutput0.r = exp(depthC*ldepth);".into());
+        assert_eq!(shadows.read(), Err(SHADOW_MAP));
+        assert!(with_light("").is_err(), "lit, but by nothing that is known");
+    }
+
+    /// Surfaces of all kinds, as fragment shaders that are known.
+    fn known_ones() -> Vec<String> {
+        let kit = |begin: &str, light: &str| [begin, &numbered(light, 2), SUMMED].concat();
+        let physical = [ALBEDO, PHYSICAL, &numbered(PHYSICAL_LAMP, 2), PHYSICAL_ENDS[0]].concat();
+        let on_cells = [SPECULAR, CELLS, OF_TEXTURE, BACK[0], OVERRIDES].concat();
+        let picture = [READS, COMPONENTS[0].1, MULTIPLIES].concat().replace('#', "0");
+        let peeled = |p: &mut Parts| (p.depth, p.end) = (PEEL_LAYERS.into(), PEELED_LAYERS.into());
+        let parts = [
+            Parts::default(),
+            with(|p| p.light = kit(SUNS, SUN)),
+            with(|p| (p.light, p.color) = (kit(LAMPS, LAMP), on_cells)),
+            with(|p| p.light = physical),
+            with(|p| p.picture = picture),
+            with(peeled),
+            with(|p| (p.light, p.end) = (UNLIT.into(), WEIGHTED.into())),
+            with(|p| (p.depth, p.normal) = (DIFFERENCES[1].into(), FLAT.into())),
+        ];
+        parts.iter().map(Parts::text).collect()
+    }
+
+    /// `main` of a source, statement by statement.
+    fn body(text: &str) -> Vec<String> {
+        statements(text, Stage::Fragment).expect("known text")
+    }
+
+    fn source(body: &[String]) -> String {
+        format!("#version 150\nvoid main()\n{{\n{}\n}}\n", body.join("\n"))
+    }
+
+    fn is_known(body: &[String]) -> bool {
+        Template::read(VERTEX, "", &source(body)).is_ok()
+    }
+
+    #[test]
+    fn every_statement_is_needed_once_and_in_its_place() {
+        for text in known_ones() {
+            let whole = body(&text);
+            assert!(is_known(&whole), "{text}");
+            let read = |body: &[String]| Template::read(VERTEX, "", &source(body));
+            for at in 0..whole.len() {
+                let mut less = whole.clone();
+                let gone = less.remove(at);
+                // Some pieces are there or not; what remains is then another surface.
+                assert!(read(&less) != read(&whole) || gone.starts_with("vec4vertexVC"), "without {gone}");
+                let mut twice = whole.clone();
+                twice.insert(at, gone.clone());
+                assert!(!is_known(&twice), "twice {gone}");
+                let mut commented = whole.clone();
+                commented[at] = format!("// {gone}");
+                assert_eq!(read(&commented), read(&less), "a comment is nothing: {gone}");
+                let mut conditional = whole.clone();
+                conditional[at] = format!("#if 0\n{gone}\n#endif");
+                assert!(!is_known(&conditional), "in a condition: {gone}");
+                if gone.ends_with(';') {
+                    for head in ["if (false)", "if (gl_FrontFacing)", "for (int k = 0; k < 2; k++)", ""] {
+                        let mut inside = whole.clone();
+                        inside[at] = format!("{head} {{ {gone} }}");
+                        assert!(!is_known(&inside), "{head} {{ {gone} }}");
+                    }
+                }
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn statements_in_another_order_are_the_work_of_somebody_else(
+            kind in 0_usize..8, a in any::<prop::sample::Index>(), b in any::<prop::sample::Index>()
+        ) {
+            let whole = body(&known_ones()[kind]);
+            let (a, b) = (a.index(whole.len()), b.index(whole.len()));
+            let mut swapped = whole.clone();
+            swapped.swap(a, b);
+            prop_assert_eq!(is_known(&swapped), whole[a] == whole[b]);
+            let mut moved = whole.clone();
+            let statement = moved.remove(a);
+            moved.insert(b, statement);
+            prop_assert_eq!(is_known(&moved), moved == whole);
+        }
+
+        #[test]
+        fn anything_added_makes_a_program_the_drivers(
+            kind in 0_usize..8,
+            at in any::<prop::sample::Index>(),
+            added in prop::sample::select(vec![
+                "discard;", "return;", "diffuse *= 0.5;", "fragOutput0.r = 1.0;", "{", "}", "{ }", "else",
+                "#define pow(a, b) 1.0", "#line 3", "if (opacity > 2.0) discard;", "opacity = 0.5;",
+                "float other;", "normalVCVSOutput = -normalVCVSOutput;", "gl_FragDepth = 0.5;",
+            ])
+        ) {
+            let mut more = body(&known_ones()[kind]);
+            more.insert(at.index(more.len() + 1), added.into());
+            prop_assert!(!is_known(&more), "{}", more.join("\n"));
+        }
     }
 }

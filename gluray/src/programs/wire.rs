@@ -28,11 +28,13 @@ wire_struct!(Template {
     two_coordinates,
     turned,
     moved_back,
+    cosines_from_zero,
+    lobes_have_an_end,
 });
 wire_struct!(Lamp { position, attenuation, cone_deg, exponent });
 wire_struct!(ProgramLight { travels, color, lamp });
 wire_struct!(Surface { ambient, diffuse, specular, power, alpha });
-wire_struct!(Physical { metallic, roughness, base, tint });
+wire_struct!(Physical { metallic, roughness, base, tint, least_divisor });
 
 impl Wire for Edges {
     fn put(&self, out: &mut Vec<u8>) {

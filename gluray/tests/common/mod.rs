@@ -5,19 +5,22 @@ pub(crate) mod cases;
 pub(crate) mod metrics;
 
 use gluray::report::Report;
-use std::io::{BufRead as _, BufReader};
+use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
+
+/// Says that a test does not run and why, or fails where peers are required.
+pub(crate) fn skip(why: &str) {
+    assert!(std::env::var_os("RTSV_REQUIRE_PEERS").is_none_or(|v| v != "1"), "{why}, and peers are required");
+    // libtest swallows what `eprintln!` says in a test that passes.
+    writeln!(std::io::stderr(), "skipped: {why}").ok();
+}
 
 /// A peer by the variable that `cargo xtask test` sets. Without it: `None` and a loud word, or a failure where peers are required.
 pub(crate) fn peer(variable: &str) -> Option<PathBuf> {
     let found = std::env::var_os(variable).map(PathBuf::from).filter(|p| p.exists());
     if found.is_none() {
-        assert!(
-            std::env::var_os("RTSV_REQUIRE_PEERS").is_none(),
-            "{variable} names no file, and peers are required"
-        );
-        eprintln!("SKIPPED: {variable} names no program; `cargo xtask test` installs it");
+        skip(&format!("{variable} names no program; `cargo xtask test` installs it"));
     }
     found
 }

@@ -305,6 +305,41 @@ def images():
     renderer.GetActiveCamera().SetPosition(30, 20, 40)
 
 
+def blocks():
+    """Blocks with colours of their own over others: over colours of points and cells, over back faces, over what is physically based."""
+    for i in range(4):
+        data = vtk.vtkMultiBlockDataSet()
+        for k in range(2):
+            one = sphere(i, radius=0.5 - 0.2 * k, cells=i == 1, points=i != 1)
+            renderer.RemoveActor(one)
+            data.SetBlock(k, one.GetMapper().GetInput())
+        # Before VTK 9.3 the class of the other name does something else.
+        old = vtk.vtkVersion.GetVTKMinorVersion() < 3
+        mapper = made("CompositePolyDataMapper2" if old else "CompositePolyDataMapper", InputDataObject=data)
+        if i == 1:
+            mapper.SetScalarModeToUseCellData()
+        mapper.SetCompositeDataDisplayAttributes(vtk.vtkCompositeDataDisplayAttributes())
+        mapper.SetBlockColor(1, (0.2, 0.5, 0.9))
+        actor = made("Actor", Mapper=mapper)
+        if i == 2:
+            actor.SetBackfaceProperty(made("Property", Color=(0.9, 0.8, 0.1), Specular=0.2))
+            mapper.ScalarVisibilityOff()
+        if i == 3:
+            metal(actor)
+        clip(actor, i, (-1, 0.3, -0.6))
+        renderer.AddActor(actor)
+
+
+def replaced():
+    """A script's own shader: statements of VTK's at other places take back faces away. One surface is as it was."""
+    for i in range(4):
+        actor = sphere(i, normals=i % 2 == 0)
+        clip(actor, i, (-1, 0.3, -0.6))
+        if i:
+            hole = "if (gl_FrontFacing == false) { discard; }\n//VTK::TCoord::Impl"
+            actor.GetShaderProperty().AddFragmentShaderReplacement("//VTK::TCoord::Impl", True, hole, False)
+
+
 def shadows():
     """Lit by lamps, whose shadows VTK adds by drawing everything again."""
     lights()
