@@ -34,6 +34,7 @@ pub mod export;
 mod fault;
 pub mod folders;
 mod frame;
+pub mod glvnd;
 mod immediate;
 mod late;
 mod lighting;

@@ -1,4 +1,5 @@
-//! The sources that VTK 9.1, 9.2 and today's write for surfaces are known, and what scripts have made of them is not.
+//! The sources that VTK 9.1, 9.2 and today's write for surfaces are known, and what scripts have
+//! made of them is not.
 
 mod common;
 
@@ -19,7 +20,8 @@ struct Written {
     programs: Vec<Program>,
 }
 
-/// Surfaces of VTK 9.1 and 9.2 that are left to the driver: a geometry shader that makes triangles larger, another rule for lamps.
+/// Surfaces of VTK 9.1 and 9.2 that are left to the driver: a geometry shader that makes triangles
+/// larger, another rule for lamps.
 const OLD_AND_PASSED: [&str; 2] = ["edges", "physical_lights"];
 
 /// Every VTK that is installed here, asked once.

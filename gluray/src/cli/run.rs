@@ -151,6 +151,26 @@ fn with_first(variable: &str, first: &Path) -> OsString {
     value
 }
 
+/// Variables for the library: what GLVND's had, which are ours now. `__GLX_FORCE_VENDOR_LIBRARY_n` goes before the name for all screens.
+fn vendors_in_front_of() -> Vec<(String, OsString)> {
+    let get = crate::folders::variable;
+    let screen = crate::glvnd::screen_of(&get("DISPLAY").unwrap_or_default());
+    let forced = format!("__GLX_FORCE_VENDOR_LIBRARY_{screen}");
+    let names = ["GLURAY_GLX_VENDOR", forced.as_str(), "__GLX_VENDOR_LIBRARY_NAME"];
+    let named = names.iter().find_map(|n| get(n)).filter(|v| v != "gluray").unwrap_or_default();
+    let egl: Vec<String> = crate::glvnd::egl_vendors(get).into_iter().map(|v| v.name).collect();
+    let mut out = vec![
+        ("GLURAY_GLX_VENDOR".to_owned(), named.into()),
+        ("GLURAY_EGL_VENDOR".to_owned(), egl.join(":").into()),
+    ];
+    let is_forced = |(name, _): &(OsString, OsString)| {
+        name.to_str().is_some_and(|n| n.starts_with("__GLX_FORCE_VENDOR_LIBRARY_"))
+    };
+    let forced = std::env::vars_os().filter(is_forced).filter_map(|(n, _)| n.into_string().ok());
+    out.extend(forced.map(|name| (name, "gluray".into())));
+    out
+}
+
 /// Runs the program; the result is its exit code.
 pub(super) fn run(args: &RunArgs) -> anyhow::Result<u8> {
     let library = library()
@@ -171,7 +191,7 @@ pub(super) fn run(args: &RunArgs) -> anyhow::Result<u8> {
     if vendor {
         let found = Vendor::of(&library)?;
         command
-            .env("GLURAY_GLX_VENDOR", std::env::var_os("__GLX_VENDOR_LIBRARY_NAME").unwrap_or_default())
+            .envs(vendors_in_front_of())
             .env("LD_LIBRARY_PATH", with_first("LD_LIBRARY_PATH", &found.folder))
             .env("__GLX_VENDOR_LIBRARY_NAME", "gluray")
             .env("__EGL_VENDOR_LIBRARY_FILENAMES", &found.egl);

@@ -16,8 +16,8 @@ pub const OTHER_VARIABLES: &[(&str, &str)] = &[
     ("GLURAY_RUN_DIR", "folder that reports are written to"),
     ("GLURAY_RANKS", "sockets of helpers that trace as well, with `:` between them"),
     ("GLURAY_LIBRARY", "the library that `gluray run` puts into programs"),
-    ("GLURAY_GLX_VENDOR", "GLVND vendor that we stand in front of"),
-    ("GLURAY_EGL_VENDOR", "the same for EGL"),
+    ("GLURAY_GLX_VENDOR", "GLX vendor that we stand in front of; without it the one that GLVND would take"),
+    ("GLURAY_EGL_VENDOR", "the same for EGL: names or libraries, with `:` between them"),
 ];
 
 /// The variable of a setting.

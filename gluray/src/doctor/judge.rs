@@ -44,15 +44,11 @@ pub fn findings(m: &Machine) -> Vec<Finding> {
                 .cure("on Debian `apt-get install libegl-mesa0`"),
         );
     }
-    if m.glvnd.is_some()
-        && !m.glx_vendors.is_empty()
-        && !m.glx_vendors.iter().any(|v| v == "mesa")
-        && set("GLURAY_GLX_VENDOR").is_none()
-    {
-        out.push(
-            finding("vendor", Bad, format!("the library stands in front of Mesa, and there is {vendors}"))
-                .cure(format!("set GLURAY_GLX_VENDOR={}", m.glx_vendors[0])),
-        );
+    if m.glvnd.is_some() && !m.glx_vendors.is_empty() {
+        out.push(glx_vendor(m));
+    }
+    if m.glvnd.is_some() && !m.egl_vendors.is_empty() {
+        out.extend(egl_vendor(m));
     }
 
     // The display and the driver behind it.
@@ -164,6 +160,34 @@ pub fn findings(m: &Machine) -> Vec<Finding> {
     out
 }
 
+/// The GLX driver that the library stands in front of: the first of those tried that is here.
+fn glx_vendor(m: &Machine) -> Finding {
+    // Debian's `indirect` is Mesa's by another name.
+    let is_here = |name: &str| name == "indirect" || m.glx_vendors.iter().any(|v| v == name);
+    let tried = &m.in_front_of[0];
+    match tried.iter().find(|v| is_here(&v.name) && (v.name != "indirect" || is_here("mesa"))) {
+        Some(v) => finding("vendor", Grade::Good, format!("GLX: {}, because {}", v.name, v.why)),
+        None => {
+            let names: Vec<&str> = tried.iter().map(|v| v.name.as_str()).collect();
+            let (wanted, here) = (names.join(", "), m.glx_vendors.join(", "));
+            finding("vendor", Grade::Bad, format!("GLX: {wanted} would be taken, and there is {here}"))
+                .cure(format!("set GLURAY_GLX_VENDOR={}", m.glx_vendors[0]))
+        }
+    }
+}
+
+/// The EGL drivers that are asked for displays.
+fn egl_vendor(m: &Machine) -> Option<Finding> {
+    let because = |v: &crate::glvnd::Vendor| format!("{}, because {}", v.name, v.why);
+    let (first, others) = m.in_front_of[1].split_first()?;
+    let mut text = format!("EGL: {}", because(first));
+    if !others.is_empty() {
+        let others: Vec<String> = others.iter().map(because).collect();
+        text += &format!("; where that has no such display: {}", others.join("; "));
+    }
+    Some(finding("vendor", Grade::Good, text))
+}
+
 fn display(m: &Machine) -> Option<Finding> {
     const START: &str = "start one, for example `Xvfb :77 -screen 0 1280x1024x24 +extension GLX -noreset &`, and set DISPLAY=:77";
     let Some(display) = &m.display[0] else {
@@ -189,6 +213,7 @@ fn display(m: &Machine) -> Option<Finding> {
 mod tests {
     use super::super::machine::OpenGl;
     use super::*;
+    use crate::glvnd::Vendor;
 
     /// A Debian 12 with Mesa, and Xvfb.
     fn healthy() -> Machine {
@@ -206,6 +231,10 @@ mod tests {
             glx_vendors: vec!["mesa".into()],
             egl_vendors: vec!["50_mesa.json".into()],
             display: [Some(":77".into()), None],
+            in_front_of: [
+                vec![Vendor { name: "mesa".into(), why: "the X server at :77 names it".into() }],
+                vec![Vendor { name: "libEGL_mesa.so.0".into(), why: "50_mesa.json names it".into() }],
+            ],
             display_answers: Some(true),
             opengl: Some(Ok(gl)),
             threads: 8,
@@ -226,6 +255,22 @@ mod tests {
     fn a_healthy_machine_has_nothing_but_good_findings() {
         assert_eq!(worst(&healthy()), Vec::<String>::new());
         assert!(findings(&healthy()).iter().any(|f| f.found.contains("llvmpipe")));
+    }
+
+    #[test]
+    fn the_vendors_that_are_taken_are_named_with_the_reason() {
+        let mut m = healthy();
+        m.glx_vendors = vec!["mesa".into(), "nvidia".into()];
+        let vendor = |name: &str, why: &str| Vendor { name: name.into(), why: why.into() };
+        m.in_front_of[0].insert(0, vendor("nvidia", "the X server at :0 names it for the screen"));
+        m.in_front_of[0].insert(0, vendor("gone", "the variable X names it"));
+        m.in_front_of[1].insert(0, vendor("libEGL_nvidia.so.0", "10_nvidia.json names it"));
+        let of = findings(&m);
+        let said: Vec<&str> = of.iter().filter(|f| f.about == "vendor").map(|f| f.found.as_str()).collect();
+        assert_eq!(said.len(), 2, "{said:?}");
+        assert_eq!(said[0], "GLX: nvidia, because the X server at :0 names it for the screen");
+        assert!(said[1].starts_with("EGL: libEGL_nvidia.so.0, because 10_nvidia.json"), "{said:?}");
+        assert!(said[1].ends_with("no such display: libEGL_mesa.so.0, because 50_mesa.json names it"));
     }
 
     #[test]

@@ -32,6 +32,8 @@ pub struct Machine {
     pub glx_vendors: Vec<String>,
     /// EGL vendors' files.
     pub egl_vendors: Vec<String>,
+    /// GLX and EGL vendors that we stand in front of, in the order in which they are tried.
+    pub in_front_of: [Vec<crate::glvnd::Vendor>; 2],
     /// `DISPLAY` and `WAYLAND_DISPLAY`.
     pub display: [Option<String>; 2],
     /// An X server's socket for that display is there.
@@ -80,6 +82,7 @@ pub fn look(library: Option<PathBuf>) -> Machine {
         glvnd: find("libGLdispatch.so.0"),
         glx_vendors: glx_vendors(&folders),
         egl_vendors: egl_vendors(),
+        in_front_of: [crate::glvnd::glx_vendors(get), crate::glvnd::egl_vendors(get)],
         display_answers: display
             .as_deref()
             .and_then(local_display)

@@ -1,4 +1,5 @@
-//! What VTK writes into the shaders of surfaces, piece by piece and in the order in which it writes the pieces. `#` is a number.
+//! What VTK writes into the shaders of surfaces, piece by piece and in the order in which it writes
+//! the pieces. `#` is a number.
 
 use super::template::Pictured;
 
@@ -50,7 +51,8 @@ pub(super) const MEASURES: &str = "vec2 pos[4];
      if (edgeValues < 4.0) edgeEqn[2].z = lineWidth;
      if (mod(edgeValues, 4.0) < 2.0) edgeEqn[1].z = lineWidth;
      if (mod(edgeValues, 2.0) < 1.0) edgeEqn[0].z = lineWidth;";
-/// Its loop over the corners, which go through as they are. It is split here: `split` wants whole blocks.
+/// Its loop over the corners, which go through as they are. It is split here: `split` wants whole
+/// blocks.
 pub(super) const CORNERS: [&str; 3] = ["for(inti=0;i<3;i++)", "{", "gl_PrimitiveID=gl_PrimitiveIDIn;"];
 pub(super) const CLIPS_LATER: &str = "for (int planeNum = 0; planeNum < numClipPlanes; planeNum++)
      { clipDistancesVSOutput[planeNum] = dot(clipPlanes[planeNum], clipVertexMC[i]); }";
@@ -63,7 +65,8 @@ pub(super) const EMITS: [&str; 4] =
 
 pub(super) const VIEW: &str = "vec4 vertexVC = vertexVCVSOutput;";
 
-/// What normals of triangles are made of; VTK 9.7 keeps the differences away from underflow, the normal is the same.
+/// What normals of triangles are made of; VTK 9.7 keeps the differences away from underflow, the
+/// normal is the same.
 pub(super) const DIFFERENCES: [&str; 2] = [
     "vec3 fdx = dFdx(vertexVC.xyz); vec3 fdy = dFdy(vertexVC.xyz);",
     "float scale = 1.0/length(fwidth(vertexVC.xyz));
@@ -82,7 +85,8 @@ pub(super) const MOVED_BY_SLOPE: [&str; 2] = [
     "gl_FragDepth = gl_FragCoord.z + cFactor*cscale + 1.0*cOffset/65000.0;",
 ];
 
-/// Depth peeling: the pass that finds how far surfaces reach, and both ends of the pass that takes layers off.
+/// Depth peeling: the pass that finds how far surfaces reach, and both ends of the pass that takes
+/// layers off.
 pub(super) const PEEL_DEPTHS: &str = "gl_FragDepth = gl_FragCoord.z;
      ivec2 pixel = ivec2(gl_FragCoord.xy);
      float oDepth = texelFetch(opaqueDepth, pixel, 0).y;
@@ -230,7 +234,8 @@ pub(super) const LAMP: &str = "attenuation = 1.0;
        normalize(-vertexVC.xyz))), specularPower);
      specular += (sf * lightColor#);";
 
-/// The colour of a physically based material: the surface's, or by a texture with what becomes of its alpha.
+/// The colour of a physically based material: the surface's, or by a texture with what becomes of
+/// its alpha.
 pub(super) const ALBEDO: &str = "vec3 albedo = diffuseColor;";
 pub(super) const ALBEDO_OF_TEXTURE: &str = "vec4 albedoSample = texture(albedoTex, tcoordVCVSOutput);
      vec3 albedo = albedoSample.rgb * diffuseColor;";
@@ -322,7 +327,8 @@ pub(super) const PHYSICAL_ENDS: [&str; 2] = [
      fragOutput0 = vec4(color, opacity);",
 ];
 
-/// The texture of an actor, by its number in the shader: read, its components, and what is done with it.
+/// The texture of an actor, by its number in the shader: read, its components, and what is done
+/// with it.
 pub(super) const READS: &str = "vec4 tcolor_# = texture(actortexture, tcoordVCVSOutput);";
 pub(super) const COMPONENTS: [(Pictured, &str); 4] = [
     (Pictured::Rgb, "tcolor_# = vec4(tcolor_#.r,tcolor_#.g,tcolor_#.b,1.0);"),

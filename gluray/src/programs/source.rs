@@ -1,7 +1,9 @@
-//! GLSL as programs hand it over: without comments and with its conditions decided, its declarations and functions looked at, and `main`
-//! as statements that keep their order and their braces.
+//! GLSL as programs hand it over: without comments and with its conditions decided, its
+//! declarations and functions looked at, and `main` as statements that keep their order and their
+//! braces.
 //!
-//! What is not understood makes the whole source unknown: a condition or a macro, a function, a global variable, an interpolation.
+//! What is not understood makes the whole source unknown: a condition or a macro, a function, a
+//! global variable, an interpolation.
 
 /// Which shader of a program a source is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -11,7 +13,8 @@ pub(super) enum Stage {
     Fragment,
 }
 
-/// Inputs and outputs that VTK's surfaces have, with the suffix of vertex shaders where they have one.
+/// Inputs and outputs that VTK's surfaces have, with the suffix of vertex shaders where they have
+/// one.
 const PASSED_ON: [&str; 13] = [
     "vertexMC",
     "normalMC",
@@ -42,8 +45,9 @@ const MACROS: [&str; 10] = [
     "varying out",
 ];
 
-/// Digests of the functions that VTK puts before `main` for physically based materials without anisotropy and coats: `D_GGX` (of 9.1 to
-/// 9.6, and of 9.7), `V_SmithCorrelated`, `F_Schlick`, `DiffuseLambert`, `SpecularIsotropic`.
+/// Digests of the functions that VTK puts before `main` for physically based materials without
+/// anisotropy and coats: `D_GGX` (of 9.1 to 9.6, and of 9.7), `V_SmithCorrelated`, `F_Schlick`,
+/// `DiffuseLambert`, `SpecularIsotropic`.
 const FUNCTIONS: [u64; 6] = [
     0x63f1_1147_1b76_8cc1,
     0xfc52_4a4f_f71e_6bae,
@@ -53,7 +57,8 @@ const FUNCTIONS: [u64; 6] = [
     0xbb8a_0812_74c1_2afe,
 ];
 
-/// The statements of a stage's `main`; `None` where the source has anything that VTK's surfaces do not have.
+/// The statements of a stage's `main`; `None` where the source has anything that VTK's surfaces do
+/// not have.
 pub(super) fn statements(source: &str, stage: Stage) -> Option<Vec<String>> {
     let text = decided(&without_comments(source))?;
     let (mut main, mut outputs) = (None, Vec::new());
@@ -88,8 +93,9 @@ pub(super) fn statements(source: &str, stage: Stage) -> Option<Vec<String>> {
 
 /// Statements without blanks: those with a semicolon, heads of blocks without one, and braces.
 ///
-/// Blanks go, also between a type and a name: `vec4 x` and `vec4x` are the same here. The second could only be a variable of that
-/// name, and the only ones that a source may declare are inputs, outputs and uniforms, by [`declared`].
+/// Blanks go, also between a type and a name: `vec4 x` and `vec4x` are the same here. The second
+/// could only be a variable of that name, and the only ones that a source may declare are inputs,
+/// outputs and uniforms, by [`declared`].
 pub(super) fn split(body: &str) -> Option<Vec<String>> {
     let (mut out, mut statement) = (Vec::new(), String::new());
     let (mut parentheses, mut braces) = (0_usize, 0_usize);
@@ -159,7 +165,8 @@ pub(super) fn without_comments(source: &str) -> String {
     out + rest
 }
 
-/// The lines that remain when conditions are decided as OpenGL of the desktop decides them; `None` where that is not known.
+/// The lines that remain when conditions are decided as OpenGL of the desktop decides them; `None`
+/// where that is not known.
 fn decided(text: &str) -> Option<String> {
     let mut out = String::new();
     let mut version = 110;
@@ -206,7 +213,8 @@ fn is_defined(name: &str) -> Option<bool> {
     ["GL_ES", "ANISOTROPY", "CLEAR_COAT"].contains(&name).then_some(false)
 }
 
-/// Looks at a declaration outside of functions; the name when it is an output, `None` when VTK's surfaces have no such thing.
+/// Looks at a declaration outside of functions; the name when it is an output, `None` when VTK's
+/// surfaces have no such thing.
 fn declared(text: &str, stage: Stage) -> Option<Option<String>> {
     let words: Vec<&str> = text.split_whitespace().collect();
     let plain = |name: &str| {
@@ -226,7 +234,8 @@ fn declared(text: &str, stage: Stage) -> Option<Option<String>> {
             let is_out = *storage == "out";
             (known && (!of_edges || name == "edgeEqn")).then_some(Some(name).filter(|_| is_out))
         }
-        // Uniforms that no statement has do nothing; those that statements have are asked for by name.
+        // Uniforms that no statement has do nothing; those that statements have are asked for by
+        // name.
         ["uniform", _, name] if !of_edges => {
             plain(name).filter(|name| !PASSED_ON.contains(&name.as_str())).map(|_| None)
         }

@@ -1,7 +1,8 @@
 //! VTK's shaders, from their first statement to their last.
 //!
-//! VTK puts a shader together from pieces in one order. A source is VTK's when its `main` is such pieces in that order and nothing else:
-//! the same statements in another order, within a condition or twice are the work of somebody else, who had reasons.
+//! VTK puts a shader together from pieces in one order. A source is VTK's when its `main` is such
+//! pieces in that order and nothing else: the same statements in another order, within a condition
+//! or twice are the work of somebody else, who had reasons.
 
 use super::blocks::*;
 use super::source::{Stage, split, squeezed, statements, without_comments};
@@ -29,7 +30,8 @@ pub(super) enum Pictured {
     Rgb,
     Grey,
     GreyAlpha,
-    /// It is the colour of a physically based material; its alpha multiplies the opacity, or is it alone.
+    /// It is the colour of a physically based material; its alpha multiplies the opacity, or is it
+    /// alone.
     Albedo,
     AlbedoAlone,
 }
@@ -84,7 +86,8 @@ pub(crate) struct Template {
     pub(super) turned: bool,
     /// Depths are moved back by the slope of the surface and a constant, for lines that lie on it.
     pub(super) moved_back: bool,
-    /// Cosines of highlights, and of a light at the eye, may be 0 (VTK 9.1); later they have a least value.
+    /// Cosines of highlights, and of a light at the eye, may be 0 (VTK 9.1); later they have a
+    /// least value.
     pub(super) cosines_from_zero: bool,
     /// The lobe of a physically based material has a greatest value (VTK 9.7).
     pub(super) lobes_have_an_end: bool,

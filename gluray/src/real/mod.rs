@@ -99,21 +99,29 @@ pub(crate) fn put_glvnd_first() {
             .any(|(library, how)| open(library, how));
 }
 
-/// `__glx_Main` or `__egl_Main` of the vendor that would have been there without us (`GLURAY_GLX_VENDOR`, else Mesa).
-pub(crate) fn vendor_main(egl: bool) -> *const () {
-    let (prefix, variable, main) = match egl {
-        true => ("libEGL", "GLURAY_EGL_VENDOR", c"__egl_Main"),
-        false => ("libGLX", "GLURAY_GLX_VENDOR", c"__glx_Main"),
+/// `__glx_Main` or `__egl_Main` of those vendors that GLVND would have taken without us, the first first; of GLX's one alone.
+pub(crate) fn vendor_mains(egl: bool) -> Vec<*const ()> {
+    let get = crate::folders::variable;
+    let (libraries, main): (Vec<String>, _) = match egl {
+        true => {
+            let vendors = crate::glvnd::egl_vendors(get);
+            (vendors.iter().map(|v| crate::glvnd::egl_library(&v.name)).collect(), c"__egl_Main")
+        }
+        false => {
+            let vendors = crate::glvnd::glx_vendors(get);
+            (vendors.iter().map(|v| format!("libGLX_{}.so.0", v.name)).collect(), c"__glx_Main")
+        }
     };
-    let named = std::env::var(variable).ok().filter(|v| !v.is_empty() && v != "gluray");
-    let vendor = named.unwrap_or_else(|| "mesa".to_owned());
-    let Ok(library) = CString::new(format!("{prefix}_{vendor}.so.0")) else { return core::ptr::null() };
-    let handle = open(&library);
-    if handle.is_null() {
-        return core::ptr::null();
-    }
-    // SAFETY: a handle of dlopen.
-    unsafe { call_dlsym(handle, main) }
+    let main_of = |library: String| {
+        let handle = open(&CString::new(library).ok()?);
+        if handle.is_null() {
+            return None;
+        }
+        // SAFETY: a handle of dlopen.
+        let address = unsafe { call_dlsym(handle, main) };
+        (!address.is_null()).then_some(address)
+    };
+    libraries.into_iter().filter_map(main_of).take(if egl { usize::MAX } else { 1 }).collect()
 }
 
 fn library(slot: &AtomicPtr<c_void>, name: &CStr) -> *mut c_void {
