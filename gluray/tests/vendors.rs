@@ -48,7 +48,11 @@ fn notes(python: &Path, script: &str, variables: &[(&str, &str)]) -> Option<Stri
         let (output, report) = run.program(python, &[file.to_str().expect("UTF-8")]);
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let picture = Picture::read(&place.path().join("out.png"));
-        (picture, report, std::fs::read_to_string(notes).unwrap_or_default())
+        // Displays may be asked for again.
+        let mut lines: Vec<String> =
+            std::fs::read_to_string(notes).unwrap_or_default().lines().map(|l| format!("{l}\n")).collect();
+        lines.dedup();
+        (picture, report, lines.concat())
     };
     let (native, _, natively) = draw(None, "native");
     let (ours, report, through) = draw(Some(&[]), "ours");

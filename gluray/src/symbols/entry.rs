@@ -143,19 +143,22 @@ unsafe extern "C" fn __egl_Main(
     let mut all = Vec::new();
     for main in caught(|| real::vendor_mains(true)).unwrap_or_default() {
         // GLVND gives a cleared table.
-        let mut own: Imports = [core::ptr::null(); 10];
+        let mut own: EglImports = [core::ptr::null(); 16];
         // SAFETY: `__egl_Main` of a driver, with the arguments GLVND gives to it and a table of its
         // own.
         unsafe {
             let main: VendorMain = core::mem::transmute(main);
-            if main(version, exports, vendor, &mut own) != 0 {
+            if main(version, exports, vendor, (&raw mut own).cast()) != 0 {
                 all.push(Driver(own));
             }
         }
     }
     let Some(first) = all.first() else { return 0 };
-    // SAFETY: GLVND's table.
-    unsafe { *imports = first.0 };
+    let table = imports.cast::<*const ()>();
+    for (i, f) in first.0.iter().enumerate().filter(|(i, f)| *i < egl::PATCHES.end || !f.is_null()) {
+        // SAFETY: GLVND's table; what is beyond its first ten members a driver writes by its version.
+        unsafe { *table.add(i) = *f };
+    }
     real::set_vendor(first.0[egl::GET_PROC_ADDRESS], true);
     let several = all.len() > 1;
     if EGL_DRIVERS.set(all).is_err() {
@@ -188,7 +191,9 @@ mod egl {
 }
 
 /// A driver's table of functions.
-struct Driver(Imports);
+struct Driver(EglImports);
+/// GLVND's table for EGL has eleven members today; later ones are added at its end.
+type EglImports = [*const (); 16];
 // SAFETY: addresses of functions, which are never written again.
 unsafe impl Send for Driver {}
 // SAFETY: as above.
