@@ -2,7 +2,9 @@
 
 mod common;
 
+use common::Picture;
 use common::cases::{self, Expected};
+use common::metrics::{compare, depths_beyond_edges, wrong_beyond_edges};
 
 fn check(case: &str, expected: &Expected, options: &[&str]) {
     cases::check("hard_cases.py", case, expected, options);
@@ -97,4 +99,49 @@ fn samples_of_draws_in_order_are_written_one_by_one() {
 #[test]
 fn of_layers_in_one_plane_the_last_is_seen() {
     check("layers_in_one_plane", &Expected { traced: true, exit: 0 }, &["--trace", "all"]);
+}
+
+/// A square of 128 x 128 pixels with something large on it and, where `small` says so, a triangle of three to six pixels a side.
+fn planted(small: Option<usize>) -> (Picture, Vec<f32>) {
+    const SIZE: usize = 128;
+    let (mut pixels, mut depth) = (vec![[20, 20, 40]; SIZE * SIZE], vec![1.0; SIZE * SIZE]);
+    for y in 0..SIZE {
+        for x in 0..SIZE {
+            if x > 10 && y > 10 && x + y < 120 {
+                (pixels[y * SIZE + x], depth[y * SIZE + x]) = ([200, 120, 60], 0.5 + 0.001 * x as f32);
+            }
+            if small.is_some_and(|n| x >= 100 && y >= 100 && x + y < 200 + n) {
+                (pixels[y * SIZE + x], depth[y * SIZE + x]) = ([60, 200, 90], 0.25);
+            }
+        }
+    }
+    (Picture { width: SIZE, height: SIZE, pixels }, depth)
+}
+
+#[test]
+fn a_lost_small_triangle_and_an_added_one_are_found() {
+    let (without, far) = planted(None);
+    for side in 1..7 {
+        let (with, near) = planted(Some(side));
+        let m = compare(&with, &without);
+        assert!(m.raw <= 0.5 && m.overlap >= 0.995, "too small for shares of the picture: {m:?}");
+        assert!(!wrong_beyond_edges(&with, &without).is_empty(), "lost, {side} pixels a side");
+        assert!(!wrong_beyond_edges(&without, &with).is_empty(), "added, {side} pixels a side");
+        assert!(!depths_beyond_edges(128, &near, &far, 1e-6).is_empty(), "lost, {side} pixels a side");
+        assert!(!depths_beyond_edges(128, &far, &near, 1e-6).is_empty(), "added, {side} pixels a side");
+    }
+    assert!(wrong_beyond_edges(&without, &planted(None).0).is_empty());
+}
+
+#[test]
+fn an_edge_that_is_moved_by_a_pixel_is_found_in_corners_and_where_it_is_an_area() {
+    let (native, _) = planted(None);
+    let mut ours = planted(None).0;
+    // A pixel of the slanted edge more, as rounding may have it; then a block of them.
+    ours.pixels[60 * 128 + 60] = [200, 120, 60];
+    assert_eq!(wrong_beyond_edges(&native, &ours), Vec::<String>::new());
+    for (x, y) in [(61, 60), (60, 61), (61, 61)] {
+        ours.pixels[y * 128 + x] = [200, 120, 60];
+    }
+    assert!(!wrong_beyond_edges(&native, &ours).is_empty());
 }

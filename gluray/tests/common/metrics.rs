@@ -84,11 +84,57 @@ pub(crate) fn compare(a: &Picture, b: &Picture) -> Metrics {
     compare_where(a, b, |_, _| true)
 }
 
-impl Metrics {
-    /// Of a picture and itself.
-    pub(crate) const SAME: Metrics =
-        Metrics { raw: 0.0, tolerant: 0.0, interior: 0.0, interior_p99: 0.0, overlap: 1.0 };
+/// Pixels that no difference of two rasterizers explains, in words. Where an edge goes by the middle of a pixel, one of them may draw
+/// what the other draws in the next pixel. So both colours have to be there among the neighbours in the other picture, which those of a
+/// lost or added triangle are not, and what differs may be a line but no area.
+pub(crate) fn wrong_beyond_edges(native: &Picture, ours: &Picture) -> Vec<String> {
+    const LEVELS: i32 = 8;
+    let mut out = Vec::new();
+    let (w, h) = (native.width, native.height);
+    let is_off = |x: usize, y: usize| off(native.pixels[y * w + x], ours.pixels[y * w + x]) > LEVELS;
+    for y in 0..h {
+        for x in (0..w).filter(|x| is_off(*x, y)) {
+            let (p, q) = (native.pixels[y * w + x], ours.pixels[y * w + x]);
+            let is_near = |all: &Picture, one| neighbours(all, x, y).any(|v| off(v, one) <= LEVELS);
+            if !is_near(ours, p) {
+                out.push(format!("({x}, {y}): the driver's {p:?} is nowhere around, ours is {q:?}"));
+            } else if !is_near(native, q) {
+                out.push(format!("({x}, {y}): {q:?} is nowhere around in the driver's picture, {p:?}"));
+            } else if x + 1 < w && y + 1 < h && is_off(x + 1, y) && is_off(x, y + 1) && is_off(x + 1, y + 1) {
+                out.push(format!("({x}, {y}) and the pixels beside and above it: an area differs"));
+            }
+        }
+    }
+    out
+}
 
+/// The same for depths in rows of `w`: those of edges are between those of their neighbours, both ways.
+pub(crate) fn depths_beyond_edges(w: usize, native: &[f32], ours: &[f32], slack: f32) -> Vec<String> {
+    let h = native.len() / w;
+    let is_off = |x: usize, y: usize| (native[y * w + x] - ours[y * w + x]).abs() > slack;
+    let is_between = |all: &[f32], x: usize, y: usize, one: f32| {
+        let near = (0..9).map(|k| {
+            let at = |c: usize, d: usize, n: usize| (c + d).saturating_sub(1).min(n - 1);
+            all[at(y, k / 3, h) * w + at(x, k % 3, w)]
+        });
+        let (lo, hi) = near.fold((f32::MAX, f32::MIN), |(lo, hi), v| (lo.min(v), hi.max(v)));
+        (lo - slack..=hi + slack).contains(&one)
+    };
+    let mut out = Vec::new();
+    for y in 0..h {
+        for x in (0..w).filter(|x| is_off(*x, y)) {
+            let (p, q) = (native[y * w + x], ours[y * w + x]);
+            let area = x + 1 < w && y + 1 < h && is_off(x + 1, y) && is_off(x, y + 1) && is_off(x + 1, y + 1);
+            if area || !is_between(ours, x, y, p) || !is_between(native, x, y, q) {
+                let steps = (p - q) / slack;
+                out.push(format!("({x}, {y}): {p} and {q}, {steps:.1} times what may be, an area: {area}"));
+            }
+        }
+    }
+    out
+}
+
+impl Metrics {
     /// The bars for filled surfaces.
     pub(crate) fn assert_filled(&self, what: &str) {
         let ok = self.tolerant <= 0.02
