@@ -48,7 +48,8 @@ pub struct Options {
     pub in_memory: bool,
     /// The instruction set; `None` is the best this machine has. Changes the time, never the image.
     pub simd: Option<SimdLevel>,
-    /// Longest wait for one message. Must allow for the slowest rank's rendering if ranks do not meet at a barrier first.
+    /// Longest wait for one message without a sign of life of those it depends on. A renderer that takes longer calls
+    /// [`Communicator::alive`] now and then, as for each tile.
     pub timeout: Duration,
     /// Whether all ranks meet at the end, so that success on one rank means success on all. Without it a rank that has sent its
     /// part returns at once and hears of a fault of others only with its next frame.
@@ -189,7 +190,7 @@ impl<P: Composite> Compositor<P> {
             rect
         };
         session.report.compress_secs += session.now() - begin;
-        let ranges = session.meet(drawn, frame.depth_range().unwrap_or([f32::NAN; 2]))?;
+        let ranges = session.meet(size_px, drawn, frame.depth_range().unwrap_or([f32::NAN; 2]))?;
         if !P::HAS_DEPTH {
             check_order(&session.drawn, &ranges, &places.order)?;
         }
@@ -330,6 +331,8 @@ pub(crate) fn fingerprint<P: PixelFormat>(
         places.root.map_or(u64::MAX, |root| root as u64),
         u64::from(options.depth),
         u64::from(options.in_memory),
+        u64::from(options.verify),
+        u64::from(options.confirm),
         options.slice_px.map_or(u64::MAX, |pixels| pixels as u64),
         network.map_or(0, Network::code),
     ];

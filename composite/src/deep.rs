@@ -43,7 +43,7 @@ impl<'a> DeepFrame<'a> {
     ///
     /// # Errors
     /// [`CompositeError::FrameSize`] if `ends` has another length than the image has pixels, [`CompositeError::Options`] if its
-    /// numbers decrease or do not end at the number of fragments.
+    /// numbers decrease or do not end at the number of fragments, or if a pixel has 2^31 of them.
     pub fn new(
         width_px: u32,
         height_px: u32,
@@ -57,6 +57,13 @@ impl<'a> DeepFrame<'a> {
             return Err(CompositeError::Options(format!(
                 "the ends of the pixels' fragments must not decrease and must end at the number of fragments, {}",
                 fragments.len()
+            )));
+        }
+        let first = ends.first().copied().unwrap_or(0);
+        let most = ends.windows(2).map(|pair| pair[1] - pair[0]).fold(first, usize::max);
+        if most as u64 > MOST_FRAGMENTS {
+            return Err(CompositeError::Options(format!(
+                "a pixel has {most} fragments, but can have at most {MOST_FRAGMENTS}"
             )));
         }
         Ok(Self { width_px, height_px, fragments, ends, opaque: None })
@@ -143,8 +150,14 @@ fn composite_or_fail(
     let mut session = Session::new(comm, places.order.clone(), places.own, codec, options.timeout);
     let (drawn, nan) = frame.drawn();
     session.report.nan_depths = nan;
-    session.meet(drawn, [f32::NAN; 2])?;
+    session.meet(size_px, drawn, [f32::NAN; 2])?;
     let totals = session.tell_all(frame.fragments.len() as u64)?;
+    for (place, &found) in totals.iter().enumerate() {
+        let most = (session.drawn[place].pixels() as u64).saturating_mul(MOST_FRAGMENTS);
+        if found > most {
+            return Err(session.unusable(place, WireError::Fragments { found, most }));
+        }
+    }
 
     // Who owns what, and what will come.
     let tiles = balanced(&session.drawn);
@@ -222,6 +235,8 @@ const MAGIC: u64 = u64::from_le_bytes(*b"COMPDEEP");
 const HEADER_BYTES: usize = 64;
 const RECORD_BYTES: usize = 20;
 const HAS_SURFACE: u32 = 1 << 31;
+/// Fragments of a pixel that a message can hold.
+const MOST_FRAGMENTS: u64 = HAS_SURFACE as u64 - 1;
 
 fn encode(frame: &DeepFrame<'_>, part: Rect, fingerprint: u64) -> Vec<u8> {
     let (mut counts, mut records, mut surfaces): (Vec<u32>, Vec<u8>, Vec<u8>) = Default::default();

@@ -12,6 +12,7 @@ use crate::rect::Rect;
 use crate::session::Session;
 use crate::shared::{BAND_ROWS, Rows, merge_band};
 use crate::simd::Kernels;
+use crate::wire::WireError;
 use std::ops::Range;
 
 /// What rooms hold together at most: beyond it pictures travel, piece by piece.
@@ -118,16 +119,28 @@ pub(crate) fn run<P: Composite>(
     let begin = session.comm.working_secs();
     let (drawn, ranks): (Vec<Rect>, Vec<usize>) =
         (0..session.places()).map(|place| (session.drawn[place], session.rank_of(place))).unzip();
-    let is_root = session.place == root;
+    let own_place = session.place;
+    let is_root = own_place == root;
     let mut image = is_root.then(|| blank(width_px, height_px, depths, spare));
     let mut own_bands = vec![false; if is_root { bands.count() } else { 0 }];
     let Some(memory) = session.comm.node_memory() else { return Ok(None) };
-    if !memory.open()? {
-        return Ok(None);
+    match memory.open() {
+        Ok(true) => {}
+        Ok(false) => return Ok(None),
+        Err(error) => return Err(session.comm.reason(error).into()),
     }
+    let Some(memory) = session.comm.node_memory() else { return Ok(None) };
     let memory: &dyn NodeMemory = memory;
-    let views: Vec<View<'_, P>> =
-        drawn.iter().zip(&ranks).map(|(rect, rank)| laid_view(memory, *rank, rect)).collect();
+    let mut views: Vec<View<'_, P>> = Vec::with_capacity(ranks.len());
+    for (place, (rect, rank)) in drawn.iter().zip(&ranks).enumerate() {
+        match laid_view(memory, *rank, rect) {
+            Ok(view) => views.push(view),
+            Err(reason) => {
+                let (rank, from) = (ranks[own_place], ranks[place]);
+                return Err(CompositeError::Message { rank, from, reason });
+            }
+        }
+    }
     let mut rows = Rows::<P>::new(width);
     loop {
         let band = memory.next_band();
@@ -186,16 +199,23 @@ fn copy_rows<P: Composite>(view: &View<'_, P>, planes: &Planes, room: &mut [u8])
     }
 }
 
-fn laid_view<'a, P: Composite>(memory: &'a dyn NodeMemory, rank: usize, rect: &Rect) -> View<'a, P> {
+fn laid_view<'a, P: Composite>(
+    memory: &'a dyn NodeMemory,
+    rank: usize,
+    rect: &Rect,
+) -> Result<View<'a, P>, WireError> {
     let planes = Planes::of::<P>(rect);
     let room = memory.room(rank, planes.depths.end);
-    View {
+    if room.len() < planes.depths.end {
+        return Err(WireError::Length { expected: planes.depths.end as u64, found: room.len() as u64 });
+    }
+    Ok(View {
         bounds: *rect,
         origin: (rect.x0, rect.y0),
         stride: rect.width(),
         colors: bytemuck::cast_slice(&room[..planes.colors]),
         depths: bytemuck::cast_slice(&room[planes.depths]),
-    }
+    })
 }
 
 /// An image whose every pixel will be written.

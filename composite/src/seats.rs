@@ -4,7 +4,7 @@
 //! straight from their planes, on as many threads as there are processors and no more, while the others sleep: to wake eight ranks for bands of
 //! rows on two processors cost as much as merging. The communicator is only used to wait, so lost and stalled ranks are named as with messages.
 use crate::comm::Communicator;
-use crate::compositor::{Composited, Destination, Options, front_to_back, give_up};
+use crate::compositor::{Composited, Destination, Options, Places, fingerprint, give_up};
 use crate::error::CompositeError;
 use crate::frame::{Frame, Image};
 use crate::pixel::Composite;
@@ -12,14 +12,15 @@ use crate::rect::Rect;
 use crate::report::Report;
 use crate::shared::merge;
 use crate::simd::Kernels;
+use crate::wire::WireError;
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Frames that one thread reads in about a third of a millisecond.
 const WORTH_A_THREAD_BYTES: usize = 8 << 20;
 
-/// What one rank has laid down: its image and where it drew.
-type Laid<P> = (Arc<Image<P>>, Rect);
+/// What one rank has laid down: its image, where it drew, and a number of its options.
+type Laid<P> = (Arc<Image<P>>, Rect, u64);
 
 struct Table<P: Composite> {
     laid: Vec<Option<Laid<P>>>,
@@ -102,14 +103,17 @@ impl<P: Composite> Seat<P> {
                 )));
             }
         };
-        let order = front_to_back(options.order.as_deref(), ranks)?;
+        let places = Places::new(comm, options)?;
+        // Images of other sizes are named with both.
+        let agreed = fingerprint::<P>((0, 0), options, &places, None);
+        let order = places.order;
         Rect::of_size(image.width_px, image.height_px).must_contain(&bounds)?;
 
         // Lay it down and wait for the others.
         let spare = if self.rank == root { self.spare.take() } else { None };
         {
             let mut table = self.table();
-            table.laid[self.rank] = Some((Arc::clone(image), bounds));
+            table.laid[self.rank] = Some((Arc::clone(image), bounds, agreed));
             if spare.is_some() {
                 table.spare = spare;
             }
@@ -129,9 +133,15 @@ impl<P: Composite> Seat<P> {
             })
         };
         if let Some((laid, spare)) = work {
+            for (&from, (.., theirs)) in order.iter().zip(&laid) {
+                if *theirs != agreed {
+                    let reason = WireError::Fingerprint;
+                    return Err(CompositeError::Message { rank: self.rank, from, reason });
+                }
+            }
             let frames: Vec<Frame<'_, P>> = laid
                 .iter()
-                .map(|(image, bounds)| Frame::of_image(image).bounded(*bounds))
+                .map(|(image, bounds, _)| Frame::of_image(image).bounded(*bounds))
                 .collect::<Result<_, _>>()?;
             // Where others work too, a new thread may begin later than one would have been done.
             let bytes: usize = frames.iter().map(|frame| frame.bounds().pixels() * P::BYTES).sum();

@@ -88,8 +88,14 @@ impl<'a> Session<'a> {
         self.order.iter().position(|&other| other == rank).unwrap_or(rank)
     }
 
-    /// Tells all places what each drew and how near and far, and finds out whether all are doing the same thing.
-    pub(crate) fn meet(&mut self, drawn: Rect, depths: [f32; 2]) -> Result<Vec<[f32; 2]>, CompositeError> {
+    /// Tells all places what each drew of an image of this size, and how near and far, and finds out whether all are doing the same
+    /// thing. What is [`drawn`](Self::drawn) behind it lies within the image.
+    pub(crate) fn meet(
+        &mut self,
+        (width_px, height_px): (u32, u32),
+        drawn: Rect,
+        depths: [f32; 2],
+    ) -> Result<Vec<[f32; 2]>, CompositeError> {
         let begin = self.now();
         let mut greeting = self.codec.fingerprint.to_le_bytes().to_vec();
         greeting.extend_from_slice(bytemuck::cast_slice(&[drawn.x0, drawn.y0, drawn.x1, drawn.y1]));
@@ -107,7 +113,11 @@ impl<'a> Session<'a> {
                 return Err(self.unusable(place, WireError::Fingerprint));
             }
             let corner = |i: usize| bytemuck::pod_read_unaligned::<u32>(&answer[8 + 4 * i..12 + 4 * i]);
-            self.drawn.push(Rect { x0: corner(0), y0: corner(1), x1: corner(2), y1: corner(3) });
+            let found = Rect { x0: corner(0), y0: corner(1), x1: corner(2), y1: corner(3) };
+            if !Rect::of_size(width_px, height_px).contains(&found) {
+                return Err(self.unusable(place, WireError::Drawn { found, width_px, height_px }));
+            }
+            self.drawn.push(if found.is_empty() { Rect::EMPTY } else { found });
             intervals.push(bytemuck::pod_read_unaligned(&answer[24..32]));
         }
         self.report.exchange_secs += self.now() - begin;

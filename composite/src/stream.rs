@@ -71,7 +71,7 @@ impl<P: Composite> Compositor<P> {
                 session.counts_nan = true;
                 let drawn = if bounds.is_empty() { Rect::EMPTY } else { bounds };
                 let begun = (|| {
-                    session.meet(drawn, [f32::NAN; 2])?;
+                    session.meet(size_px, drawn, [f32::NAN; 2])?;
                     let plan = Plan::new::<P>(
                         &session.drawn,
                         options.slice_px.unwrap_or_else(|| slice_px::<P>(session.comm)),
@@ -202,6 +202,7 @@ impl<P: Composite> Running<'_, P> {
 
     fn tile_done(&mut self, frame: &Frame<'_, P>, tile: Rect) -> Result<(), CompositeError> {
         self.check_size(frame)?;
+        self.session.comm.alive()?;
         let mut finished = Vec::new();
         let mut outside = tile.intersection(&self.session.drawn[self.session.place]).pixels();
         for (position, pending) in self.pending.iter_mut().enumerate() {

@@ -65,7 +65,8 @@ pub enum WireError {
     },
     /// The sender composites something else.
     #[error(
-        "its sender composites another size, pixel format, strategy or rank order: use the same on every rank"
+        "its sender composites another size or pixel format, or has other options (strategy, rank order, destination ...): \
+         use the same on every rank"
     )]
     Fingerprint,
     /// Another part of the image than agreed.
@@ -78,6 +79,27 @@ pub enum WireError {
         found: Rect,
         /// The rectangle it should hold.
         expected: Rect,
+    },
+    /// Something drawn where the image has no pixels.
+    #[error(
+        "it speaks of columns {}..{} and rows {}..{} of an image of {width_px}x{height_px}",
+        found.x0, found.x1, found.y0, found.y1
+    )]
+    Drawn {
+        /// Where the sender says it drew.
+        found: Rect,
+        /// Width of the image.
+        width_px: u32,
+        /// Height of the image.
+        height_px: u32,
+    },
+    /// More fragments than pixels can have.
+    #[error("it announces {found} fragments where at most {most} can be")]
+    Fragments {
+        /// Announced.
+        found: u64,
+        /// As many as the sender's rectangle can have.
+        most: u64,
     },
     /// Flags, mask and count contradict each other.
     #[error("its flags, mask and number of active pixels contradict each other")]

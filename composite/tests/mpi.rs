@@ -234,6 +234,12 @@ fn without_a_launcher_mpi_says_so_and_ends_with_2() {
 
 // ---- Faults -----------------------------------------------------------------------------------------------------
 
+/// Of fault `order`, where ranks share memory. Messages tell a barrier from a meeting by their tags, and end with a timeout.
+#[cfg(target_os = "linux")]
+const OUT_OF_STEP: &str = "ranks 0, 1 came to an all-gather and rank 2 to a barrier";
+#[cfg(not(target_os = "linux"))]
+const OUT_OF_STEP: &str = "in vain";
+
 /// The highest of three ranks fails; all must end, without success, and say these words.
 fn fault(kind: &str, words: &[&str], variables: &[(&str, &Path)], transport: &str) {
     let arguments = ["check", transport, "-n", "3", "--timeout", "2", "--fault", kind];
@@ -252,9 +258,142 @@ fn faults_over_open_mpi_end_with_a_named_error_in_bounded_time() {
     fault("stalled", &["message from rank 2", "rank 2 did not come"], &variables, "--mpi");
     fault("panic", &["rank 2 ended the group: this rank panicked", "on purpose"], &variables, "--mpi");
     fault("size", &["another size", "unusable message"], &variables, "--mpi");
-    fault("order", &["from rank 2", "at a barrier in vain"], &variables, "--mpi");
+    fault("order", &[OUT_OF_STEP], &variables, "--mpi");
     fault("leaves", &["rank 2 on", "had enough"], &variables, "--mpi");
     fault("corrupt", &["checksum", "unusable message from rank 2"], &variables, "--mpi");
+}
+
+#[test]
+fn ranks_that_read_late_do_not_take_a_barrier_for_what_they_expect() {
+    let Some(mpirun) = peer("RTSV_MPIRUN") else { return };
+    // As on a busy machine: the others read what was said at a meeting when rank 2 is long past it.
+    let late = ["check", "--mpi", "-n", "3", "--timeout", "5", "--linger-ms", "300", "--fault", "order"];
+    let ran = run(&late, &[("COMPOSITE_MPIRUN", &mpirun)]);
+    assert_ne!(ran.code, Some(0), "{}", ran.text);
+    assert!(ran.text.contains(OUT_OF_STEP), "{}", ran.text);
+    assert!(!ran.text.contains("No such file"), "{}", ran.text);
+}
+
+/// What `check` says of a job in which the highest rank works for three timeouts.
+fn slow(transport: &str, variables: &[(&str, &Path)]) {
+    let arguments = ["check", transport, "-n", "3", "--timeout", "2", "--fault", "slow", "--json"];
+    let ran = run(&arguments, variables);
+    assert_eq!(ran.code, Some(0), "{transport}: {}", ran.text);
+    assert!(ran.took > Duration::from_secs(6), "{:?}", ran.took);
+}
+
+#[test]
+fn a_rank_that_works_for_longer_than_the_timeout_and_says_so_is_waited_for() {
+    slow("--threads", &[]);
+    for variable in ["RTSV_MPIRUN", "RTSV_MPIRUN_MPICH"] {
+        let Some(mpirun) = peer(variable) else { continue };
+        slow("--mpi", &[("COMPOSITE_MPIRUN", &mpirun)]);
+        // By messages, between machines: rank 0 waits for rank 1, which waits for rank 2.
+        let ran = launched(&mpirun, &[], &["-n", "3"], &APART, &["--timeout", "2", "--fault", "slow"]);
+        assert_eq!(ran.code, Some(0), "{}", ran.text);
+        let stalled = launched(&mpirun, &[], &["-n", "3"], &APART, &["--timeout", "2", "--fault", "stalled"]);
+        assert_ne!(stalled.code, Some(0), "{}", stalled.text);
+        assert!(stalled.text.contains("rank 2"), "{}", stalled.text);
+        assert!(stalled.took < Duration::from_secs(60), "{:?}", stalled.took);
+    }
+}
+
+// ---- Machines ---------------------------------------------------------------------------------------------------
+
+/// Shell words that have every rank say that it is on a machine of its own.
+const APART: [&str; 1] = ["COMPOSITE_NODE=of-${OMPI_COMM_WORLD_RANK:-$PMI_RANK}"];
+
+/// `composite check` started by a launcher with these arguments, each rank in a shell that sets (`A=b`) or unsets (`-u A`) variables.
+fn launched(
+    mpirun: &Path,
+    of_launcher: &[&str],
+    count: &[&str],
+    environment: &[&str],
+    of_check: &[&str],
+) -> Ran {
+    let begin = Instant::now();
+    let mut command = Command::new("timeout");
+    command.args(["--kill-after=5", &BOUND.as_secs().to_string()]).arg(mpirun);
+    command.args(of_launcher).args(count);
+    let program = env!("CARGO_BIN_EXE_composite");
+    let words = environment.join(" ");
+    command.args([
+        "sh",
+        "-c",
+        &format!("exec env {words} \"$0\" \"$@\""),
+        program,
+        "check",
+        "--mpi",
+        "--json",
+    ]);
+    command.args(of_check).stdin(Stdio::null()).env("RUST_BACKTRACE", "0");
+    for (name, value) in [
+        ("OMPI_MCA_btl", "self,vader"),
+        ("OMPI_ALLOW_RUN_AS_ROOT", "1"),
+        ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"),
+        ("OMPI_MCA_rmaps_base_oversubscribe", "1"),
+        ("OMPI_MCA_mpi_yield_when_idle", "1"),
+        ("OMPI_MCA_hwloc_base_binding_policy", "none"),
+    ] {
+        command.env(name, value);
+    }
+    let Output { status, stdout, stderr } = command.output().expect("coreutils' timeout runs");
+    let stdout = String::from_utf8_lossy(&stdout).into_owned();
+    let text = stdout.clone() + &String::from_utf8_lossy(&stderr);
+    let took = begin.elapsed();
+    assert!(took < BOUND, "{of_launcher:?} {environment:?} did not end:\n{text}");
+    Ran { code: status.code(), stdout, text, took }
+}
+
+/// Machines that the ranks found, and images that were composited, all of which must be right.
+fn nodes_and_images(ran: &Ran) -> (u64, u64) {
+    assert_eq!(ran.code, Some(0), "{}", ran.text);
+    let checked: serde_json::Value = serde_json::from_str(ran.stdout.trim()).expect("one line of JSON");
+    assert_eq!(checked["images_differ"].as_u64(), Some(0), "{checked}");
+    (checked["nodes"].as_u64().expect("nodes"), checked["images"].as_u64().expect("images"))
+}
+
+#[test]
+fn ranks_of_one_machine_find_each_other_without_the_variables_of_their_launcher() {
+    // Merged in memory besides, which only ranks of one machine can.
+    let in_memory = if cfg!(target_os = "linux") { 24 } else { 0 };
+    if let Some(mpirun) = peer("RTSV_MPIRUN") {
+        let none = ["-u OMPI_COMM_WORLD_LOCAL_SIZE -u OMPI_COMM_WORLD_LOCAL_RANK -u OMPI_COMM_WORLD_RANK"];
+        let none = [none[0], "-u OMPI_COMM_WORLD_SIZE COMPOSITE_MPI=openmpi"];
+        let ran = launched(&mpirun, &[], &["-n", "3"], &none, &[]);
+        assert_eq!(nodes_and_images(&ran), (1, 120 + in_memory));
+    }
+    if let Some(mpirun) = peer("RTSV_MPIRUN_MPICH") {
+        let none = ["-u MPI_LOCALNRANKS -u MPI_LOCALRANKID COMPOSITE_MPI=mpich"];
+        let ran = launched(&mpirun, &[], &["-n", "2"], &none, &[]);
+        assert_eq!(nodes_and_images(&ran), (1, 120 + in_memory));
+    }
+}
+
+#[test]
+fn ranks_of_two_machines_do_not_believe_that_they_share_one() {
+    // MPICH believes in two machines if they have two names.
+    if let Some(mpirun) = peer("RTSV_MPIRUN_MPICH") {
+        for environment in [&["-u MPI_LOCALNRANKS -u MPI_LOCALRANKID"][..], &[]] {
+            let hosts = ["-launcher", "fork", "-hosts", "localhost:1,127.0.0.1:1"];
+            let ran = launched(&mpirun, &hosts, &["-n", "2"], environment, &[]);
+            assert_eq!(nodes_and_images(&ran), (2, 120), "{environment:?}");
+        }
+    }
+    if let Some(mpirun) = peer("RTSV_MPIRUN") {
+        // Two and one.
+        let halves = ["-u OMPI_COMM_WORLD_LOCAL_SIZE COMPOSITE_NODE=of-$((OMPI_COMM_WORLD_RANK/2))"];
+        let ran = launched(&mpirun, &[], &["-n", "3"], &halves, &[]);
+        assert_eq!(nodes_and_images(&ran), (2, 120));
+    }
+    if peer("RTSV_SMPIRUN").is_some() {
+        let library = simulated_program();
+        let variables: Vec<(&str, &Path)> =
+            library.iter().map(|(name, path)| (*name, path.as_path())).collect();
+        // Each simulated rank is on a host of its own.
+        let ran = run(&["check", "--json", "--smpi", "-n", "5"], &variables);
+        assert_eq!(nodes_and_images(&ran), (5, 120));
+    }
 }
 
 #[test]
@@ -388,6 +527,13 @@ fn a_file_rendered_in_parts_by_threads_models_and_mpi_ranks_is_the_picture_of_on
     for more in [&["--threads", "-n", "64"][..], &["--model", "-n", "8", "--cut-by-view"]] {
         let (others, _) = demo_of(data, more, &[]);
         assert!(alone == others, "{more:?}: the pictures differ");
+    }
+    if let Some(mpich) = peer("RTSV_MPIRUN_MPICH") {
+        let (three, shown) = demo_of(data, &["--mpi", "-n", "3"], &[("COMPOSITE_MPIRUN", &mpich)]);
+        assert!(
+            alone == three && shown["transport"].as_str().is_some_and(|t| t.contains("MPICH")),
+            "{shown}"
+        );
     }
     std::fs::remove_file(&file).expect("the file");
     assert!(alone == parts, "the pictures differ");

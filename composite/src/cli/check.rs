@@ -13,7 +13,7 @@ use crate::strategies::Strategy;
 use datasets::cli::{CommonArgs, Status, UsageError};
 use serde::Serialize;
 use std::ffi::OsString;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Arguments of `composite check`.
 #[derive(Debug, clap::Args)]
@@ -54,6 +54,8 @@ enum Fault {
     Leaves,
     /// A message of pixels arrives with a wrong bit.
     Corrupt,
+    /// No fault: it renders for three timeouts, and says so.
+    Slow,
 }
 
 /// Odd sizes, fewer pixels than ranks, and one that needs more than one word a row.
@@ -70,6 +72,8 @@ const STRATEGIES: [Strategy; 5] = [
 struct Checked {
     ranks: usize,
     transport: String,
+    /// Machines that the ranks are on.
+    nodes: usize,
     /// Numbers of ranks that were checked.
     counts: Vec<usize>,
     images: u64,
@@ -89,6 +93,7 @@ pub(super) fn check(common: CommonArgs, args: &CheckArgs, arguments: &[OsString]
                 fail(comm, fault, timeout)?;
             }
             let transport = comm.transport();
+            let nodes = comm.nodes();
             let size = comm.comm().size();
             let counts = if args.counts.is_empty() { vec![size] } else { args.counts.clone() };
             if let Some(wrong) = counts.iter().find(|c| !(1..=size).contains(*c)) {
@@ -133,7 +138,7 @@ pub(super) fn check(common: CommonArgs, args: &CheckArgs, arguments: &[OsString]
             // Nobody leaves while others still composite.
             comm.comm().barrier(timeout)?;
             let [hard_images, hard_images_differ] = hard;
-            Ok(Checked { ranks: size, transport, counts, images, images_differ, hard_images, hard_images_differ })
+            Ok(Checked { ranks: size, transport, nodes, counts, images, images_differ, hard_images, hard_images_differ })
         },
         |checked| {
             common.result(&checked, || {
@@ -200,12 +205,30 @@ fn bits_are_equal<P: Composite>(a: &crate::Image<P>, b: &crate::Image<P>) -> boo
     a.to_bytes() == b.to_bytes()
 }
 
+/// Room that a receive may take before anything has come: beside its chunk, what the allocator and the library take.
+const MOST_ROOM_BYTES: u64 = 1 << 28;
+
+/// Bytes of this process's address space; 0 where the system does not say.
+fn address_space_bytes() -> u64 {
+    let pages = std::fs::read_to_string("/proc/self/statm").ok();
+    let pages = pages.and_then(|text| text.split(' ').next()?.parse::<u64>().ok());
+    pages.unwrap_or(0) * 4096
+}
+
 /// Messages of many lengths around the ring, each byte checked.
 fn big_messages(comm: &mut dyn Communicator, timeout: Duration) -> anyhow::Result<()> {
     let (rank, size) = (comm.rank(), comm.size());
     let byte = |rank: usize, at: usize| (at.wrapping_mul(31) ^ rank ^ (at >> 8)) as u8;
     let (next, previous) = ((rank + 1) % size, (rank + size - 1) % size);
     const LENGTHS: [usize; 9] = [0, 1, 999, 1000, 1001, 2000, 65_536, 100_000, 3_000_000];
+    // What is announced and does not come takes no room.
+    let before = address_space_bytes();
+    let announced = comm.post_recv(previous, 78, 1 << 40)?;
+    comm.send(next, 78, vec![rank as u8; 3])?;
+    let more = address_space_bytes().saturating_sub(before);
+    anyhow::ensure!(more <= MOST_ROOM_BYTES, "a message of 3 bytes was made room of {more} bytes for");
+    let came = comm.wait_any(&mut vec![announced], timeout)?.message;
+    anyhow::ensure!(came == [previous as u8; 3], "{came:?} from rank {previous}");
     // All are posted before the first is sent, and taken in the order of arrival.
     let mut posted = Vec::new();
     for length in LENGTHS {
@@ -258,6 +281,14 @@ fn fail(comm: &mut RankComm, fault: Fault, timeout: Duration) -> anyhow::Result<
         Fault::Size => {
             let frame = Frame::<DepthPixel<[u8; 4]>>::with_depth(2, 1, &[[1; 4]; 2], &[0.5; 2])?;
             composite(comm, &frame, &Options { timeout, ..Options::default() })?;
+            Ok(())
+        }
+        Fault::Slow => {
+            let begin = Instant::now();
+            while begin.elapsed() < 3 * timeout {
+                std::thread::sleep(timeout / 50);
+                comm.alive()?;
+            }
             Ok(())
         }
         Fault::Order => Ok(comm.barrier(timeout)?),

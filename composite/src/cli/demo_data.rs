@@ -166,6 +166,9 @@ fn finish(common: CommonArgs, args: &DemoArgs, f: Finished) -> anyhow::Result<St
     Ok(Status::Success)
 }
 
+/// What a rank may tell of its frame: some hundred thousand spans.
+const MOST_LINE_BYTES: usize = 1 << 24;
+
 fn frames(comm: &mut RankComm, args: &DemoArgs, prepared: &Prepared) -> anyhow::Result<Finished> {
     let (timeout, transport) = (args.ranks.timeout(), comm.transport());
     let comm = comm.comm();
@@ -186,6 +189,7 @@ fn frames(comm: &mut RankComm, args: &DemoArgs, prepared: &Prepared) -> anyhow::
     let lengths = comm.all_gather(&(mine.len() as u64).to_le_bytes(), 8, timeout)?;
     let length = |bytes: &Vec<u8>| bytes.as_slice().try_into().map_or(0, u64::from_le_bytes) as usize;
     let longest = lengths.iter().map(length).max().unwrap_or(0);
+    anyhow::ensure!(longest <= MOST_LINE_BYTES, "a rank announces {longest} bytes about its frame");
     let all = comm.all_gather(&mine, longest, timeout)?;
     let lines = all.iter().map(|bytes| serde_json::from_slice(bytes)).collect::<Result<_, _>>()?;
     Ok(Finished {

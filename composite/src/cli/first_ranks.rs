@@ -46,6 +46,10 @@ impl Communicator for FirstRanks<'_> {
         self.inner.is_one_node()
     }
 
+    fn reason(&mut self, error: CommError) -> CommError {
+        self.inner.reason(error)
+    }
+
     fn node_memory(&mut self) -> Option<&mut dyn NodeMemory> {
         if self.size == self.inner.size() { self.inner.node_memory() } else { None }
     }
@@ -87,6 +91,10 @@ impl Communicator for FirstRanks<'_> {
             return self.inner.all_gather(mine, longest, timeout);
         }
         collective::all_gather(self, mine, longest, timeout)
+    }
+
+    fn alive(&mut self) -> Result<(), CommError> {
+        self.inner.alive()
     }
 
     fn abort(&mut self, reason: &str) {

@@ -34,9 +34,12 @@ pub(super) struct RankArgs {
     /// Longest wait for one message, in seconds
     #[arg(long, default_value_t = 60.0, value_name = "SECONDS")]
     timeout: f64,
-    /// Cut messages over MPI into chunks of this many bytes, as those of more than 1 GiB are
-    #[arg(long, hide = true, default_value_t = 1 << 30)]
+    /// Cut messages over MPI into chunks of this many bytes, as those of more than 64 MiB are
+    #[arg(long, hide = true, default_value_t = 1 << 26)]
     chunk_bytes: usize,
+    /// Has the ranks but the last wait so many milliseconds behind each meeting in shared memory, as on a busy machine
+    #[arg(long, hide = true, default_value_t = 0)]
+    linger_ms: u64,
 }
 
 /// One rank, whatever it is.
@@ -52,6 +55,15 @@ impl RankComm {
             Self::Thread(comm) => comm,
             Self::Mpi(comm) => &mut **comm,
             Self::Model(comm) => comm,
+        }
+    }
+
+    /// Machines that the ranks are on.
+    pub(super) fn nodes(&mut self) -> usize {
+        match self {
+            Self::Thread(_) => 1,
+            Self::Mpi(comm) => comm.nodes().iter().max().map_or(0, |last| last + 1),
+            Self::Model(comm) => comm.size(),
         }
     }
 
@@ -183,7 +195,12 @@ impl RankArgs {
         work: impl Fn(&mut RankComm) -> anyhow::Result<T>,
         finish: impl FnOnce(T) -> anyhow::Result<Status>,
     ) -> anyhow::Result<Status> {
-        let mut comm = RankComm::Mpi(Box::new(MpiComm::with_chunks(self.chunk_bytes)?));
+        let mut comm = Box::new(MpiComm::with_chunks(self.chunk_bytes)?);
+        #[cfg(target_os = "linux")]
+        if comm.rank() + 1 < comm.size() {
+            comm.linger(Duration::from_millis(self.linger_ms));
+        }
+        let mut comm = RankComm::Mpi(comm);
         let size = comm.comm().size();
         let result = match self.ranks.first().copied() {
             Some(wanted) if wanted != size => Err(anyhow::Error::new(UsageError(format!(

@@ -5,8 +5,8 @@
 pub enum CommError {
     /// A message did not come in time.
     #[error(
-        "rank {rank} waited {waited_ms} ms for a message from rank {peer} (tag {tag}) in vain: \
-         is that rank stalled, or the timeout too short for its rendering?"
+        "rank {rank} waited {waited_ms} ms for a message from rank {peer} (tag {tag}) in vain, without a sign of life: \
+         is that rank stalled, or does its renderer work longer than the timeout without calling Communicator::alive?"
     )]
     Timeout {
         /// Who waited.
@@ -15,7 +15,7 @@ pub enum CommError {
         peer: usize,
         /// Tag of the message.
         tag: u32,
-        /// How long, in milliseconds.
+        /// How long, in milliseconds, since the last sign of life.
         waited_ms: u64,
     },
     /// Not all ranks came to a barrier in time.
@@ -27,6 +27,20 @@ pub enum CommError {
         missing: usize,
         /// How long, in milliseconds.
         waited_ms: u64,
+    },
+    /// Ranks met though they make different calls.
+    #[error(
+        "rank {rank}: {} came to an all-gather and {} to a barrier: all ranks must make the same calls in the same order",
+        ranks(gathering),
+        ranks(waiting)
+    )]
+    OutOfStep {
+        /// Who noticed; all ranks do.
+        rank: usize,
+        /// Ranks that called [`all_gather`](super::Communicator::all_gather).
+        gathering: Vec<usize>,
+        /// Ranks that called [`barrier`](super::Communicator::barrier).
+        waiting: Vec<usize>,
     },
     /// A rank has left the group (its program part ended or panicked).
     #[error("rank {rank} lost rank {peer}: it has left the group")]
@@ -99,4 +113,10 @@ pub enum CommError {
         /// The system's words.
         reason: String,
     },
+}
+
+/// `rank 2`, or `ranks 0, 1`.
+fn ranks(list: &[usize]) -> String {
+    let numbers: Vec<String> = list.iter().map(ToString::to_string).collect();
+    format!("{} {}", if list.len() == 1 { "rank" } else { "ranks" }, numbers.join(", "))
 }

@@ -58,10 +58,11 @@ pub trait NodeMemory {
     /// Opens the rooms of all; false, on all ranks, if there is one that could not be made.
     ///
     /// # Errors
-    /// [`CommError::Transport`] if a room that was made cannot be opened here.
+    /// [`CommError::Transport`] if a room that was made cannot be opened here, or a rank has laid down nothing for this frame;
+    /// [`CommError::PeerLost`] if its process has ended.
     fn open(&mut self) -> Result<bool, CommError>;
 
-    /// The first `bytes` of the room of `rank`, as it has laid them down.
+    /// The first `bytes` of the room of `rank`, as it has laid them down; fewer if it is smaller.
     fn room(&self, rank: usize, bytes: usize) -> &[u8];
 
     /// The next band that nobody has taken, from 0 on.
@@ -110,6 +111,12 @@ pub trait Communicator {
         None
     }
 
+    /// What ended the group, if another rank has given up and this one hears of it only now; else `error`, which this rank came upon by
+    /// itself and which may be no more than what the other's end has left.
+    fn reason(&mut self, error: CommError) -> CommError {
+        error
+    }
+
     /// Hands `message` over to `destination`; does not wait for it to be received.
     ///
     /// # Errors
@@ -127,9 +134,22 @@ pub trait Communicator {
     /// A `timeout` of zero looks once.
     ///
     /// # Errors
-    /// [`CommError::Timeout`] when `timeout` has passed, [`CommError::PeerLost`] when one of the sources has left before it sent,
+    /// [`CommError::Timeout`] when `timeout` has passed since the last [sign of life](Self::alive) of the sources, [`CommError::PeerLost`] when one of the sources has left before it sent,
     /// [`CommError::TooLong`], [`CommError::NothingPosted`] for an empty list, [`CommError::Aborted`], [`CommError::Transport`].
     fn wait_any(&mut self, posted: &mut Vec<Receive>, timeout: Duration) -> Result<Arrival, CommError>;
+
+    /// Says that this rank is at work. Whoever works for long between two messages calls it now and then, as for each tile it has
+    /// rendered; it costs about as much as looking at a clock.
+    ///
+    /// A timeout counts from the last sign of life of those that are waited for, or of those that these wait for themselves: from this
+    /// call, and from any message sent. So a slow rank is waited for as long as it says so, and one that is dead or stalled is missed
+    /// when the timeout has passed since its last sign.
+    ///
+    /// # Errors
+    /// [`CommError::Aborted`] if the group has ended: further work is in vain.
+    fn alive(&mut self) -> Result<(), CommError> {
+        Ok(())
+    }
 
     /// Lets messages with this `tag` leave until at most `most` of them are on their way: where all share a wire, the first ones arrive no sooner
     /// than the last. A hint, with which a transport whose messages leave at once need do nothing; after `patience` it has an end anyway.
@@ -169,7 +189,7 @@ pub trait Communicator {
     /// Waits until all ranks have called it.
     ///
     /// # Errors
-    /// [`CommError::BarrierTimeout`], [`CommError::PeerLost`], [`CommError::Aborted`] or [`CommError::Transport`].
+    /// [`CommError::BarrierTimeout`], [`CommError::OutOfStep`], [`CommError::PeerLost`], [`CommError::Aborted`] or [`CommError::Transport`].
     fn barrier(&mut self, timeout: Duration) -> Result<(), CommError> {
         collective::barrier(self, timeout)
     }
@@ -178,7 +198,7 @@ pub trait Communicator {
     /// lengths, which may differ.
     ///
     /// # Errors
-    /// As [`send`](Self::send) and [`wait_any`](Self::wait_any); [`CommError::TooLong`] if `mine` is longer than `longest`.
+    /// As [`send`](Self::send), [`wait_any`](Self::wait_any) and [`barrier`](Self::barrier); [`CommError::TooLong`] if `mine` is longer than `longest`.
     fn all_gather(
         &mut self,
         mine: &[u8],

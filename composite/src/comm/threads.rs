@@ -16,6 +16,30 @@ struct State {
     aborted: Option<(usize, String)>,
     at_barrier: Vec<bool>,
     barriers_done: u64,
+    /// When each rank has last sent anything or said that it is at work.
+    signs: Vec<Instant>,
+    /// For whom each rank waits: the sources of its receives. At a barrier these are all who are not there.
+    waits_for: Vec<Vec<usize>>,
+}
+
+impl State {
+    /// The last sign of life of those for whom `rank` waits, and of those they wait for in turn, but not of `rank` itself.
+    fn last_sign(&self, rank: usize) -> Option<Instant> {
+        let ranks = 0..self.signs.len();
+        let mut seen = vec![false; ranks.len()];
+        seen[rank] = true;
+        let (mut last, mut to_do) = (None, vec![rank]);
+        while let Some(waiting) = to_do.pop() {
+            let absent = ranks.clone().filter(|&other| self.at_barrier[waiting] && !self.at_barrier[other]);
+            for next in self.waits_for[waiting].iter().copied().chain(absent) {
+                if !std::mem::replace(&mut seen[next], true) {
+                    last = last.max(Some(self.signs[next]));
+                    to_do.push(next);
+                }
+            }
+        }
+        last
+    }
 }
 
 struct Group {
@@ -61,6 +85,8 @@ pub fn group(size: usize) -> Vec<ThreadComm> {
         aborted: None,
         at_barrier: vec![false; size],
         barriers_done: 0,
+        signs: vec![Instant::now(); size],
+        waits_for: vec![Vec::new(); size],
     };
     let wake = (0..size).map(|_| Condvar::new()).collect();
     let group =
@@ -123,28 +149,45 @@ impl ThreadComm {
 }
 
 impl Group {
-    /// Waits until `ready` gives something, the group is aborted, or `timeout` has passed (then `None`).
+    /// Waits until `ready` gives something, the group is aborted, or `timeout` has passed since the last sign of life of the `sources`
+    /// (then `None`).
     fn wait<T>(
         &self,
         rank: usize,
         timeout: Duration,
+        sources: impl Fn(&mut Vec<usize>),
         mut ready: impl FnMut(&mut State) -> Option<Result<T, CommError>>,
     ) -> Result<Option<T>, CommError> {
-        let begin = Instant::now();
+        let mut since = Instant::now();
         let mut state = self.lock();
-        loop {
+        let mut waits = false;
+        let result = loop {
             if let Some((by, reason)) = &state.aborted {
-                return Err(CommError::Aborted { by: *by, reason: reason.clone() });
+                break Err(CommError::Aborted { by: *by, reason: reason.clone() });
             }
             if let Some(result) = ready(&mut state) {
-                return result.map(Some);
+                break result.map(Some);
             }
-            let Some(left) = timeout.checked_sub(begin.elapsed()).filter(|left| !left.is_zero()) else {
-                return Ok(None);
+            if timeout.is_zero() {
+                break Ok(None);
+            }
+            if !waits {
+                waits = true;
+                sources(&mut state.waits_for[rank]);
+            }
+            if since.elapsed() >= timeout {
+                since = state.last_sign(rank).map_or(since, |sign| since.max(sign));
+            }
+            let Some(left) = timeout.checked_sub(since.elapsed()).filter(|left| !left.is_zero()) else {
+                break Ok(None);
             };
             let woken = self.wake[rank].wait_timeout(state, left);
             state = woken.unwrap_or_else(PoisonError::into_inner).0;
+        };
+        if waits {
+            state.waits_for[rank].clear();
         }
+        result
     }
 }
 
@@ -175,6 +218,7 @@ impl Communicator for ThreadComm {
             return Err(CommError::PeerLost { rank: self.rank, peer: destination });
         }
         state.mail[destination][self.rank].push_back((tag, message));
+        state.signs[self.rank] = Instant::now();
         self.group.wake[destination].notify_all();
         Ok(())
     }
@@ -198,7 +242,8 @@ impl Communicator for ThreadComm {
         };
         // Every message goes to the oldest receive of its source and tag, whether that one is waited for now or later.
         let (queues, early) = (&mut self.posted, &mut self.early);
-        let came = self.group.wait(rank, timeout, |state| {
+        let sources = |to: &mut Vec<usize>| to.extend(posted.iter().map(|receive| receive.source));
+        let came = self.group.wait(rank, timeout, sources, |state| {
             for (position, receive) in posted.iter().enumerate() {
                 if let Some(at) = early.iter().position(|(id, _)| *id == receive.id) {
                     return Some(Ok((position, early.swap_remove(at).1)));
@@ -231,6 +276,7 @@ impl Communicator for ThreadComm {
         let before = {
             let mut state = self.group.lock();
             state.at_barrier[rank] = true;
+            state.signs[rank] = Instant::now();
             let before = state.barriers_done;
             if state.at_barrier.iter().all(|&here| here) {
                 state.at_barrier.fill(false);
@@ -239,13 +285,18 @@ impl Communicator for ThreadComm {
             }
             before
         };
-        let passed = self.group.wait(rank, timeout, |state| {
-            if state.barriers_done > before {
-                return Some(Ok(()));
-            }
-            let peer = (0..state.lost.len()).find(|&peer| state.lost[peer] && !state.at_barrier[peer])?;
-            Some(Err(CommError::PeerLost { rank, peer }))
-        })?;
+        let passed = self.group.wait(
+            rank,
+            timeout,
+            |_| {},
+            |state| {
+                if state.barriers_done > before {
+                    return Some(Ok(()));
+                }
+                let peer = (0..state.lost.len()).find(|&peer| state.lost[peer] && !state.at_barrier[peer])?;
+                Some(Err(CommError::PeerLost { rank, peer }))
+            },
+        )?;
         if passed.is_some() {
             return Ok(());
         }
@@ -258,6 +309,15 @@ impl Communicator for ThreadComm {
         // This rank no longer waits: without this, a latecomer would pass a barrier that has failed here.
         state.at_barrier[rank] = false;
         Err(CommError::BarrierTimeout { rank, missing, waited_ms: timeout.as_millis() as u64 })
+    }
+
+    fn alive(&mut self) -> Result<(), CommError> {
+        let mut state = self.group.lock();
+        state.signs[self.rank] = Instant::now();
+        match &state.aborted {
+            Some((by, reason)) => Err(CommError::Aborted { by: *by, reason: reason.clone() }),
+            None => Ok(()),
+        }
     }
 
     fn abort(&mut self, reason: &str) {
@@ -293,6 +353,58 @@ mod tests {
 
     fn results<T: Send>(size: usize, work: impl Fn(ThreadComm) -> T + Sync) -> Vec<T> {
         run(size, work).into_iter().map(|result| result.unwrap()).collect()
+    }
+
+    #[test]
+    fn a_slow_rank_that_gives_signs_of_life_is_waited_for_far_beyond_the_timeout() {
+        const PATIENCE: Duration = Duration::from_secs(2);
+        let begin = Instant::now();
+        let ends = results(4, |mut comm| {
+            match comm.rank() {
+                // At work for three timeouts.
+                3 => {
+                    while begin.elapsed() < 3 * PATIENCE {
+                        std::thread::sleep(PATIENCE / 20);
+                        comm.alive().unwrap();
+                    }
+                    comm.send(2, 1, vec![3]).unwrap();
+                }
+                // Each waits for the next, which waits itself.
+                rank => {
+                    let came = comm.recv(rank + 1, 1, 8, PATIENCE).unwrap();
+                    if let Some(before) = rank.checked_sub(1) {
+                        comm.send(before, 1, came).unwrap();
+                    }
+                }
+            }
+            comm.barrier(PATIENCE).unwrap();
+            begin.elapsed()
+        });
+        assert!(ends.iter().all(|end| *end >= 3 * PATIENCE));
+    }
+
+    #[test]
+    fn a_rank_that_falls_silent_is_missed_though_others_are_at_work() {
+        const PATIENCE: Duration = Duration::from_millis(200);
+        let begin = Instant::now();
+        let errors = results(3, |mut comm| match comm.rank() {
+            // Nobody waits for this one.
+            2 => loop {
+                std::thread::sleep(PATIENCE / 20);
+                if let Err(error) = comm.alive() {
+                    break error;
+                }
+            },
+            // Each waits for the other.
+            rank => {
+                let error = comm.recv(1 - rank, 1, 8, PATIENCE).unwrap_err();
+                comm.abort(&error.to_string());
+                error
+            }
+        });
+        assert!(begin.elapsed() < LONG);
+        assert!(errors.iter().any(|e| matches!(e, CommError::Timeout { .. })), "{errors:?}");
+        assert!(matches!(errors[2], CommError::Aborted { .. }), "who works hears of the end");
     }
 
     #[test]

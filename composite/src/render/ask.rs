@@ -2,7 +2,20 @@
 use super::words::{from_message, message_bytes, to_message};
 use super::{Activity, FrameError, RankReport};
 use crate::comm::{Communicator, Receive};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
+
+/// How often a rank that works on other threads looks whether they get on.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// Calls a function when it is dropped.
+struct OnDrop<F: FnMut()>(F);
+
+impl<F: FnMut()> Drop for OnDrop<F> {
+    fn drop(&mut self) {
+        (self.0)();
+    }
+}
 
 /// Which messages belong together.
 #[derive(Clone, Copy)]
@@ -46,6 +59,48 @@ impl<'a> Talk<'a> {
 
     pub(super) fn size(&self) -> usize {
         self.comm.size()
+    }
+
+    /// Says that this rank is at work. That others have given up is heard with the next message.
+    pub(super) fn alive(&mut self) {
+        let _ = self.comm.alive();
+    }
+
+    /// Does `work` on other threads and says meanwhile that this rank is at work, as far as the number of steps grows.
+    pub(super) fn beside<T: Send>(&mut self, work: impl FnOnce(&AtomicUsize) -> T + Send) -> T {
+        let steps = AtomicUsize::new(0);
+        // A thread of the pool works itself: if it waited, there might be no other.
+        if rayon::current_thread_index().is_some() {
+            let out = work(&steps);
+            self.alive();
+            return out;
+        }
+        let (waiting, done) = (std::thread::current(), AtomicBool::new(false));
+        let mut out = None;
+        rayon::in_place_scope(|scope| {
+            scope.spawn(|_| {
+                // The scope ends with its work, whether that ends or panics.
+                let _end = OnDrop(|| {
+                    done.store(true, Ordering::Release);
+                    waiting.unpark();
+                });
+                out = Some(work(&steps));
+            });
+            let mut seen = 0;
+            while !done.load(Ordering::Acquire) {
+                std::thread::park_timeout(LOOK);
+                let now = steps.load(Ordering::Relaxed);
+                if now != seen {
+                    seen = now;
+                    self.alive();
+                }
+            }
+        });
+        match out {
+            Some(out) => out,
+            // A panic in the scope is this thread's.
+            None => unreachable!("work that did not panic has ended"),
+        }
     }
 
     /// Books the time since the last booking.

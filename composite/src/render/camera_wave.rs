@@ -10,6 +10,7 @@ use super::sort_last::Side;
 use super::{Activity, FrameError};
 use rayon::prelude::*;
 use rt_core::waves::{CameraHits, Met, Pass, WaveFrame};
+use std::sync::atomic::Ordering;
 
 /// Chunks of an owner's tiles at most, one after the other by all ranks. With more, less is left to send at the end, in more messages.
 const CHUNKS: usize = 4;
@@ -210,8 +211,22 @@ impl CameraWave<'_, '_> {
             let any = hits.mask().any(|m| m != 0);
             (tile, any, hits)
         };
-        let traced: Vec<_> =
-            if side.parallel { tiles.par_iter().map(one).collect() } else { tiles.iter().map(one).collect() };
+        let traced: Vec<_> = if side.parallel {
+            talk.beside(|steps| {
+                let count = |hits| {
+                    steps.fetch_add(1, Ordering::Relaxed);
+                    hits
+                };
+                tiles.par_iter().map(one).map(count).collect()
+            })
+        } else {
+            let mut with_sign = |tile| {
+                let hits = one(tile);
+                talk.alive();
+                hits
+            };
+            tiles.iter().map(&mut with_sign).collect()
+        };
         for (tile, any, hits) in traced {
             talk.report.camera_rays += hits.rays();
             if any {

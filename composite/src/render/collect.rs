@@ -77,7 +77,7 @@ impl<'a> Collect<'a> {
         let mut failed = Vec::new();
         let mut work: Vec<_> =
             self.tiles[places.clone()].iter_mut().zip(&answers[places]).map(|w| (w, None)).collect();
-        each(self.side.parallel, &mut work, |_, ((tile, answer), error)| {
+        each(talk, self.side.parallel, &mut work, |_, ((tile, answer), error)| {
             tile.begin(frame, pass);
             *error = tile.choose(frame, &answer.colors()).err();
         });

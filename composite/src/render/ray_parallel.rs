@@ -60,6 +60,7 @@ fn render(
         talk.report.effects = output.report.effects;
         to_words(&output.frame, &mut mine);
         renderer.recycle(output.frame);
+        talk.alive();
     }
     talk.report.camera_rays = talk.report.rays.primary;
     talk.report.light = "every rank holds the whole scene".into();

@@ -12,6 +12,7 @@ use rt_core::glam::Vec3;
 use rt_core::math::Aabb;
 use rt_core::render::RenderOptions;
 use rt_core::waves::{Pass, TileInWork, WaveFrame};
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 /// How light finds what is in its way on other ranks.
@@ -115,7 +116,13 @@ impl DataParallel {
         let mut talk = Talk::new(comm, options.timeout);
         let all = talk.all_gather(&numbers)?;
         let vector = |w: &[u32]| Vec3::new(f32::from_bits(w[0]), f32::from_bits(w[1]), f32::from_bits(w[2]));
-        let bounds = all.iter().map(|w| Aabb::new(vector(&w[..3]), vector(&w[3..]))).collect();
+        let bounds: Vec<Aabb> = all.iter().map(|w| Aabb::new(vector(&w[..3]), vector(&w[3..]))).collect();
+        // No ray would come into such a box: the rank would be left out without a word.
+        if let Some(from) = bounds.iter().position(|b| b.min.is_nan() || b.max.is_nan()) {
+            let error = talk.wrong(from, "bounds of its part", numbers.len());
+            talk.abort(&error.to_string());
+            return Err(error);
+        }
         let boxes = Boxes::new(bounds, part.scene.world.bounds());
         Ok(DataParallel { part, options, boxes, choice: None })
     }
@@ -189,7 +196,7 @@ impl DataParallel {
             let answers = camera_wave::run(talk, &side, &owners, wanted, None)?;
             let rank = talk.rank();
             let fits = |source| FrameError::Answer { rank, source };
-            each(side.parallel, &mut tiles, |_, tile| tile.begin(&frame, pass));
+            each(talk, side.parallel, &mut tiles, |_, tile| tile.begin(&frame, pass));
             if local {
                 for (tile, answer) in tiles.iter_mut().zip(&answers) {
                     tile.choose(&frame, &answer.colors()).map_err(fits)?;
@@ -245,11 +252,24 @@ impl DataParallel {
     }
 }
 
-/// Calls `f` with every item and its place, on several threads if wanted.
-pub(super) fn each<T: Send>(parallel: bool, items: &mut [T], f: impl Fn(usize, &mut T) + Sync) {
+/// Calls `f` with every item and its place, on several threads if wanted; each item done is a sign of life.
+pub(super) fn each<T: Send>(
+    talk: &mut Talk<'_>,
+    parallel: bool,
+    items: &mut [T],
+    f: impl Fn(usize, &mut T) + Sync,
+) {
     if parallel {
-        items.par_iter_mut().enumerate().for_each(|(i, item)| f(i, item));
+        talk.beside(|steps| {
+            items.par_iter_mut().enumerate().for_each(|(i, item)| {
+                f(i, item);
+                steps.fetch_add(1, Ordering::Relaxed);
+            });
+        });
     } else {
-        items.iter_mut().enumerate().for_each(|(i, item)| f(i, item));
+        items.iter_mut().enumerate().for_each(|(i, item)| {
+            f(i, item);
+            talk.alive();
+        });
     }
 }

@@ -56,7 +56,7 @@ impl Wave<'_> {
                 self.light_bits(talk, tiles, &live, &hit_ranks)?;
             }
             let mut work: Vec<(&mut bool, &mut TileInWork)> = live.iter_mut().zip(tiles.iter_mut()).collect();
-            each(self.side.parallel, &mut work, |_, (live, tile)| **live = **live && tile.go_on(frame));
+            each(talk, self.side.parallel, &mut work, |_, (live, tile)| **live = **live && tile.go_on(frame));
             talk.spent(Activity::Shade);
             hit_ranks.iter_mut().for_each(|h| *h = None);
             if !self.later_rays(talk, tiles, &live)? {

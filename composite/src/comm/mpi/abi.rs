@@ -29,6 +29,8 @@ pub(super) struct Constants {
     pub(super) status_source: usize,
     /// `MPI_IN_PLACE`.
     pub(super) in_place: usize,
+    /// `MPI_COMM_TYPE_SHARED`.
+    pub(super) type_shared: i32,
 }
 
 impl Abi {
@@ -75,6 +77,7 @@ impl Abi {
                 any_source: -1,
                 status_source: 0,
                 in_place: 1,
+                type_shared: 0,
             },
             Self::Mpich => Constants {
                 request_bytes: 4,
@@ -82,6 +85,7 @@ impl Abi {
                 any_source: -2,
                 status_source: 8,
                 in_place: usize::MAX,
+                type_shared: 1,
             },
             Self::Smpi => Constants {
                 request_bytes: 8,
@@ -89,6 +93,7 @@ impl Abi {
                 any_source: -555,
                 status_source: 0,
                 in_place: -222_isize as usize,
+                type_shared: 1,
             },
         }
     }

@@ -53,13 +53,6 @@ pub fn choose(variable: impl Fn(&str) -> Option<String>) -> Result<Choice, MpiEr
     Err(MpiError::NotLaunched)
 }
 
-/// Ranks of this job on this machine, as far as the launcher tells.
-pub(super) fn ranks_here(variable: impl Fn(&str) -> Option<String>) -> Option<usize> {
-    ["OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS"]
-        .iter()
-        .find_map(|name| variable(name).and_then(|value| value.parse().ok()))
-}
-
 /// Processors of this machine. What the standard library says is less where the launcher has bound each rank to its own.
 pub(super) fn processors_here() -> usize {
     let online = std::fs::read_to_string("/sys/devices/system/cpu/online").unwrap_or_default();

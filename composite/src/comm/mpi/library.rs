@@ -71,6 +71,11 @@ functions! {
     alltoall: "MPI_Alltoall", fn(*const c_void, c_int, Handle, *mut c_void, c_int, Handle, Handle) -> c_int;
 }
 
+/// `MPI_Comm_split_type`.
+pub(super) type SplitType = unsafe extern "C" fn(Handle, c_int, c_int, Handle, *mut Handle) -> c_int;
+/// `MPI_Comm_free`.
+pub(super) type CommFree = unsafe extern "C" fn(*mut Handle) -> c_int;
+
 /// A loaded library whose ABI is known.
 pub(crate) struct Mpi {
     pub(crate) functions: Functions,
@@ -84,6 +89,11 @@ pub(crate) struct Mpi {
     pub(crate) byte: Handle,
     pub(crate) request_null: Handle,
     pub(super) errors_return: Handle,
+    /// `MPI_INFO_NULL`.
+    pub(super) info_null: Handle,
+    /// Functions of MPI 3, which old libraries lack.
+    pub(super) split_type: Option<SplitType>,
+    pub(super) comm_free: Option<CommFree>,
     // Last, so that nothing outlives it; never unloaded in practice, because MPI libraries leave threads behind.
     _library: std::mem::ManuallyDrop<Library>,
 }
@@ -114,20 +124,29 @@ impl Mpi {
             })?;
             Ok(found.into_raw() as usize)
         };
-        let (world, byte, request_null, errors_return) = match abi {
+        let (world, byte, request_null, errors_return, info_null) = match abi {
             Abi::OpenMpi => (
                 address("ompi_mpi_comm_world")?,
                 address("ompi_mpi_byte")?,
                 address("ompi_request_null")?,
                 address("ompi_mpi_errors_return")?,
+                address("ompi_mpi_info_null")?,
             ),
-            Abi::Mpich => (0x4400_0000, 0x4c00_010d, 0x2c00_0000, 0x5400_0001),
+            Abi::Mpich => (0x4400_0000, 0x4c00_010d, 0x2c00_0000, 0x5400_0001, 0x1c00_0000),
             // The variable's address for now; `started` reads the handle.
             Abi::Smpi => {
-                (address("MPI_COMM_WORLD")?, address("smpi_MPI_BYTE")?, 0, address("smpi_MPI_ERRORS_RETURN")?)
+                let (byte, handler) = (address("smpi_MPI_BYTE")?, address("smpi_MPI_ERRORS_RETURN")?);
+                (address("MPI_COMM_WORLD")?, byte, 0, handler, 0)
             }
         };
         let constants = abi.constants();
+        // SAFETY: the MPI standard fixes these functions' arguments, with handles as in `Functions`.
+        let (split_type, comm_free) = unsafe {
+            (
+                library.get::<SplitType>(b"MPI_Comm_split_type").ok().map(|symbol| *symbol),
+                library.get::<CommFree>(b"MPI_Comm_free").ok().map(|symbol| *symbol),
+            )
+        };
         let library = std::mem::ManuallyDrop::new(library);
         Ok(Self {
             functions,
@@ -138,6 +157,9 @@ impl Mpi {
             byte,
             request_null,
             errors_return,
+            info_null,
+            split_type,
+            comm_free,
             _library: library,
         })
     }

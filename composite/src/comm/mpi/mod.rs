@@ -16,6 +16,8 @@ mod library;
 #[cfg(target_os = "linux")]
 mod node;
 mod notice;
+mod places;
+mod signs;
 mod transfer;
 
 pub use abi::Abi;
@@ -28,14 +30,16 @@ use super::NodeMemory;
 use super::{Arrival, CommError, Communicator, Receive, collective};
 use clock::Clock;
 use notice::{Notice, Notices};
+use signs::{Patience, Signs};
 use std::ffi::c_int;
 use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use transfer::Transfers;
 
-/// Bytes of a full chunk: MPI counts in `int`, and some transports have trouble near 2 GiB.
-const CHUNK_BYTES: usize = 1 << 30;
+/// Bytes of a full chunk: MPI counts in `int`, and some transports have trouble near 2 GiB. Room is made chunk by chunk, as they come:
+/// how long a message may be follows from what its sender has announced, and need not be true.
+const CHUNK_BYTES: usize = 1 << 26;
 /// `MPI_THREAD_FUNNELED` in all three ABIs: there may be other threads, but this one calls.
 const FUNNELED: c_int = 1;
 /// How long a message of a rank that has left may still be on its way.
@@ -51,7 +55,6 @@ const YIELDS: u32 = 100;
 /// How long it sleeps then.
 const NAP: Duration = Duration::from_micros(20);
 /// Longest wait for the other ranks when the group is made.
-#[cfg(target_os = "linux")]
 const START: Duration = Duration::from_secs(300);
 /// How often a waiting rank looks for notices.
 const NOTICE_INTERVAL: Duration = Duration::from_millis(1);
@@ -66,13 +69,19 @@ pub struct MpiComm {
     clock: Clock,
     transfers: Transfers,
     notices: Notices,
+    signs: Signs,
+    /// When notices were last looked for beside work.
+    looked: Instant,
     left: Vec<bool>,
     aborted: Option<(usize, String)>,
     /// Whether there are more ranks here than processors.
     oversubscribed: bool,
-    /// Whether all ranks are here, which all or none of them say.
-    one_node: bool,
+    /// The machine of every rank, numbered in the order of their first ranks; the same on all ranks.
+    nodes: Vec<usize>,
     finalize: bool,
+    /// See [`linger`](Self::linger).
+    #[cfg(target_os = "linux")]
+    linger: Duration,
     /// What ranks of one machine share, if all of them could open it.
     #[cfg(target_os = "linux")]
     node: Option<node::Node>,
@@ -89,7 +98,7 @@ impl MpiComm {
         Self::with_chunks(CHUNK_BYTES)
     }
 
-    /// As [`world`](Self::world), with messages cut into chunks of this many bytes; for tests, because 1 GiB takes long.
+    /// As [`world`](Self::world), with messages cut into chunks of this many bytes (64 MiB at most); for tests.
     ///
     /// # Errors
     /// As [`world`](Self::world).
@@ -148,40 +157,65 @@ impl MpiComm {
         }
         let (rank, size) = (rank as usize, size as usize);
 
-        // More ranks than processors: a rank that spins takes the processor from the one it waits for.
-        let processors = launcher::processors_here();
-        let here = launcher::ranks_here(|name| std::env::var(name).ok()).unwrap_or(size);
         let mut comm = Self {
             rank,
             size,
             clock: Clock::new(mpi.abi),
             transfers: Transfers::new(rank, messages, chunk_bytes),
             notices: Notices::new(notices),
+            signs: Signs::new(rank, size),
+            looked: Instant::now(),
             left: vec![false; size],
             aborted: None,
-            oversubscribed: here > processors,
-            one_node: here >= size && mpi.abi != Abi::Smpi,
+            oversubscribed: false,
+            nodes: (0..size).collect(),
             finalize: initialized == 0,
             mpi: Rc::new(mpi),
             #[cfg(target_os = "linux")]
+            linger: Duration::ZERO,
+            #[cfg(target_os = "linux")]
             node: None,
         };
-        #[cfg(target_os = "linux")]
-        comm.share_memory().map_err(|error| MpiError::Call {
+        let failed = |error: CommError| MpiError::Call {
             call: "the first all-gather".to_string(),
             reason: error.to_string(),
-        })?;
+        };
+        comm.find_nodes().map_err(failed)?;
+        #[cfg(target_os = "linux")]
+        comm.share_memory().map_err(failed)?;
         Ok(comm)
+    }
+
+    /// Finds out which ranks share a machine.
+    fn find_nodes(&mut self) -> Result<(), CommError> {
+        let mine = places::of_this_rank(&self.mpi, self.transfers.comm(), self.rank, &self.processor_name());
+        let all = self.all_gather(&mine, mine.len(), START)?;
+        self.nodes = places::numbered(&all);
+        // More ranks than processors: a rank that spins takes the processor from the one it waits for.
+        let here = self.nodes.iter().filter(|&&node| node == self.nodes[self.rank]).count();
+        self.oversubscribed = here > launcher::processors_here();
+        Ok(())
+    }
+
+    /// The machine of every rank, numbered in the order of their first ranks. Ranks of which neither MPI nor the system says that
+    /// they share one count as apart. The same on all ranks.
+    pub fn nodes(&self) -> &[usize] {
+        &self.nodes
+    }
+
+    /// For tests: has this rank wait so long behind each meeting in shared memory, as one does to whom the system gives no processor.
+    #[cfg(target_os = "linux")]
+    pub fn linger(&mut self, behind_meetings: Duration) {
+        self.linger = behind_meetings;
     }
 
     /// Makes what the ranks of one machine share, if they are all of one machine and all of them can.
     #[cfg(target_os = "linux")]
     fn share_memory(&mut self) -> Result<(), CommError> {
-        if self.size < 2 || self.mpi.abi == Abi::Smpi {
+        if self.size < 2 || !self.is_one_node() {
             return Ok(());
         }
-        // Ranks of several machines may count differently how many of them are here, so all say what they know.
-        let made = if self.rank == 0 && self.one_node { node::Node::make(self.size).ok() } else { None };
+        let made = if self.rank == 0 { node::Node::make(self.size).ok() } else { None };
         let address = made.as_ref().map_or([0; 3], |made| made.1);
         let mine: &[u8] = bytemuck::cast_slice(&address);
         let said = collective::all_gather(self, mine, mine.len(), START)?;
@@ -191,9 +225,7 @@ impl MpiComm {
         };
         let node = match made {
             Some((node, _)) => Some(node),
-            None if self.one_node && address != [0; 3] => {
-                node::Node::join(self.rank, self.size, address).ok()
-            }
+            None if address != [0; 3] => node::Node::join(self.rank, self.size, address).ok(),
             None => None,
         };
         let said = collective::all_gather(self, &[u8::from(node.is_some())], 1, START)?;
@@ -201,14 +233,33 @@ impl MpiComm {
         Ok(())
     }
 
-    /// A barrier of ranks that share memory.
+    /// A barrier of ranks that share memory, or an all-gather of strings, which it gives.
     #[cfg(target_os = "linux")]
-    fn meet_in_memory(&mut self, node: &node::Node, timeout: Duration) -> Result<(), CommError> {
+    fn meet_in_memory(
+        &mut self,
+        string: Option<&[u8]>,
+        timeout: Duration,
+    ) -> Option<Result<Vec<Vec<u8>>, CommError>> {
+        let node = self.node.take()?;
+        let met = self.wait_in_memory(&node, string, timeout);
+        std::thread::sleep(self.linger);
+        let said = met.and_then(|()| node.said());
+        self.node = Some(node);
+        Some(said)
+    }
+
+    #[cfg(target_os = "linux")]
+    fn wait_in_memory(
+        &mut self,
+        node: &node::Node,
+        string: Option<&[u8]>,
+        timeout: Duration,
+    ) -> Result<(), CommError> {
         let rank = self.rank;
         if let Some((by, reason)) = &self.aborted {
             return Err(CommError::Aborted { by: *by, reason: reason.clone() });
         }
-        node.arrive();
+        node.arrive(string);
         for _ in 0..if self.oversubscribed { 1 } else { SPINS } {
             if node.passed() {
                 return Ok(());
@@ -216,6 +267,7 @@ impl MpiComm {
             std::hint::spin_loop();
         }
         let begin = Instant::now();
+        let mut patience = Patience::new(timeout, begin);
         let mut heard = begin;
         loop {
             // What was sent before may need this rank's help to arrive.
@@ -231,13 +283,21 @@ impl MpiComm {
             if now.duration_since(heard) >= NOTICE_INTERVAL {
                 heard = now;
                 self.hear()?;
-                if let Some(peer) = node.missing().filter(|&peer| self.left[peer]) {
+                let missing: Vec<usize> = node.missing().collect();
+                if let Some(&peer) = missing.iter().find(|&&peer| self.left[peer]) {
                     return Err(CommError::PeerLost { rank, peer });
                 }
+                self.keep_patience(&mut patience, &missing, now);
             }
-            if now.duration_since(begin) >= timeout {
+            if patience.is_over(now) {
                 self.hear()?;
-                let missing = node.missing().unwrap_or(rank);
+                // A sign may have come while this rank had no processor.
+                let missing: Vec<usize> = node.missing().collect();
+                self.keep_patience(&mut patience, &missing, now);
+                if !patience.is_over(now) {
+                    continue;
+                }
+                let missing = missing.first().copied().unwrap_or(rank);
                 return Err(CommError::BarrierTimeout {
                     rank,
                     missing,
@@ -301,6 +361,8 @@ impl MpiComm {
             match notice {
                 Notice::Left { rank } if rank < self.size => self.left[rank] = true,
                 Notice::Left { .. } => {}
+                Notice::Asks { rank } => self.signs.asked_by(rank),
+                Notice::Lives { rank, sign } => self.signs.heard(rank, sign),
                 Notice::Aborted { by, reason } => {
                     self.aborted.get_or_insert((by, reason));
                 }
@@ -312,11 +374,39 @@ impl MpiComm {
         }
     }
 
+    /// Answers whoever has asked for a sign of life of this rank, as far as it has done anything.
+    fn answer(&mut self) {
+        let signs = self.signs.own();
+        self.notices.tell_signs(&self.mpi, signs);
+    }
+
+    /// To be called while waiting, behind [`hear`](Self::hear): gives and takes signs of life.
+    fn keep_patience(&mut self, patience: &mut Patience, sources: &[usize], now: Instant) {
+        if self.mpi.abi == Abi::Smpi {
+            return;
+        }
+        self.answer();
+        let (any, to_hand_on) = self.signs.of(|from| sources.contains(&from));
+        if any {
+            patience.renew(now);
+            self.notices.tell_signs(&self.mpi, to_hand_on);
+        }
+        if patience.asks(now) {
+            let mut asked = sources.to_vec();
+            asked.sort_unstable();
+            asked.dedup();
+            let left = &self.left;
+            asked.retain(|&source| source != self.rank && !left[source]);
+            self.notices.ask(&self.mpi, asked.into_iter());
+        }
+    }
+
     /// One of `posted` that is complete.
     fn complete(&mut self, posted: &mut Vec<Receive>) -> Option<Arrival> {
         let position_of = |id| posted.iter().position(|receive| receive.id == id);
         let (position, message) = self.transfers.take(position_of)?;
         let Receive { source, tag, .. } = posted.remove(position);
+        self.signs.step();
         Some(Arrival { source, tag, message })
     }
 }
@@ -338,8 +428,13 @@ impl Communicator for MpiComm {
         self.clock.working_secs(&self.mpi)
     }
 
+    /// Never of simulated ranks, whose messages take simulated time on one machine too.
     fn is_one_node(&self) -> bool {
-        self.one_node
+        self.mpi.abi != Abi::Smpi && self.nodes.iter().all(|&node| node == 0)
+    }
+
+    fn reason(&mut self, error: CommError) -> CommError {
+        self.hear().err().unwrap_or(error)
     }
 
     fn send(&mut self, destination: usize, tag: u32, message: Vec<u8>) -> Result<(), CommError> {
@@ -347,6 +442,8 @@ impl Communicator for MpiComm {
         if self.left[destination] {
             return Err(CommError::PeerLost { rank: self.rank, peer: destination });
         }
+        self.signs.step();
+        self.answer();
         let Self { transfers, mpi, clock, .. } = self;
         clock.around(|| {
             transfers.send(mpi, destination, tag, message)?;
@@ -378,6 +475,7 @@ impl Communicator for MpiComm {
         // Simulated time does not pass while polling, so SMPI has to block.
         let block = self.mpi.abi == Abi::Smpi && !timeout.is_zero();
         let begin = Instant::now();
+        let mut patience = Patience::new(timeout, begin);
         let mut heard = begin;
         let mut lost_since: Option<Instant> = None;
         let mut polls = 0_u32;
@@ -394,12 +492,19 @@ impl Communicator for MpiComm {
                 }
             }
             let now = Instant::now();
-            if now.duration_since(begin) >= timeout {
+            if patience.is_over(now) {
                 // Whoever gave up first knows better what is wrong.
                 if self.mpi.abi != Abi::Smpi {
                     self.hear()?;
                 }
-                return Err(silent);
+                // A sign may have come while this rank had no processor.
+                if !timeout.is_zero() {
+                    let sources: Vec<usize> = posted.iter().map(|receive| receive.source).collect();
+                    self.keep_patience(&mut patience, &sources, now);
+                }
+                if patience.is_over(now) {
+                    return Err(silent);
+                }
             }
             polls += 1;
             if self.oversubscribed && polls > YIELDS {
@@ -412,6 +517,8 @@ impl Communicator for MpiComm {
                 heard = now;
                 self.hear()?;
                 self.transfers.reap(&self.mpi);
+                let sources: Vec<usize> = posted.iter().map(|receive| receive.source).collect();
+                self.keep_patience(&mut patience, &sources, now);
                 if let Some(lost) = posted.iter().find(|receive| self.left[receive.source]) {
                     let since = *lost_since.get_or_insert(now);
                     if now.duration_since(since) >= LAST_MESSAGES {
@@ -422,9 +529,22 @@ impl Communicator for MpiComm {
         }
     }
 
+    fn alive(&mut self) -> Result<(), CommError> {
+        self.signs.step();
+        let now = Instant::now();
+        // Simulated ranks wait without a timeout.
+        if self.mpi.abi == Abi::Smpi || now.duration_since(self.looked) < NOTICE_INTERVAL {
+            return Ok(());
+        }
+        self.looked = now;
+        self.hear()?;
+        self.answer();
+        Ok(())
+    }
+
     fn let_leave(&mut self, tag: u32, most: usize, patience: Duration) {
         // Where no message travels by itself, waiting for it only holds up the others.
-        if self.one_node {
+        if self.is_one_node() {
             return;
         }
         let oversubscribed = self.oversubscribed;
@@ -461,10 +581,8 @@ impl Communicator for MpiComm {
 
     fn barrier(&mut self, timeout: Duration) -> Result<(), CommError> {
         #[cfg(target_os = "linux")]
-        if let Some(node) = self.node.take() {
-            let met = self.meet_in_memory(&node, timeout);
-            self.node = Some(node);
-            return met;
+        if let Some(met) = self.meet_in_memory(None, timeout) {
+            return met.map(|_| ());
         }
         if self.mpi.abi != Abi::Smpi {
             return collective::barrier(self, timeout);
@@ -485,12 +603,8 @@ impl Communicator for MpiComm {
         #[cfg(target_os = "linux")]
         if longest <= node::LONGEST
             && mine.len() <= longest
-            && let Some(node) = self.node.take()
+            && let Some(said) = self.meet_in_memory(Some(mine), timeout)
         {
-            node.say(mine);
-            let met = self.meet_in_memory(&node, timeout);
-            let said = met.map(|()| node.said());
-            self.node = Some(node);
             return said;
         }
         let block = 8 + longest;

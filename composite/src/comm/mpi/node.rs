@@ -16,8 +16,10 @@ use std::time::Duration;
 
 /// Words of 32 bits for a rank's entry: one line of the cache.
 const ENTRY: usize = 16;
-/// Words of a string in [`Node::gather_slot`]: which all-gather it belongs to, its length, and 248 bytes.
+/// Words of what a rank says at a meeting ([`Node::slot`]): the meeting's number, what it came for, and 248 bytes.
 const STRING: usize = 64;
+/// What stands in place of a length where a rank came to a barrier.
+const BARRIER: u32 = u32::MAX;
 /// Longest string that the table holds.
 pub(super) const LONGEST: usize = 4 * (STRING - 2);
 
@@ -33,6 +35,8 @@ const FILE: usize = 2;
 const GENERATION: usize = 3;
 const KIB: usize = 4;
 const REFUSED: usize = 5;
+/// Behind which meeting its room was written last.
+const LAID: usize = 6;
 
 /// Where the table is: process and file of rank 0, and what stands in it, so that the process of that number in another container is not
 /// taken for it.
@@ -101,6 +105,10 @@ fn file_of(process: u32, file: u32) -> std::io::Result<File> {
     OpenOptions::new().read(true).write(true).open(format!("/proc/{process}/fd/{file}"))
 }
 
+fn is_alive(process: u32) -> bool {
+    std::path::Path::new("/proc").join(process.to_string()).exists()
+}
+
 /// A rank's room, as it is mapped here.
 struct Room {
     generation: u32,
@@ -116,9 +124,10 @@ pub(super) struct Node {
     own_file: Option<File>,
     _table_file: Option<File>,
     rooms: Vec<Option<Room>>,
-    /// How often this rank has come to the barrier, and gathered.
+    /// How often this rank has come to a meeting: to a barrier or an all-gather.
     came: Cell<u32>,
-    gathered: Cell<u32>,
+    /// Behind which meeting it has laid its pixels down.
+    laid: Cell<u32>,
 }
 
 fn table_bytes(size: usize) -> usize {
@@ -153,7 +162,7 @@ impl Node {
             _table_file: (rank == 0).then_some(file),
             rooms: (0..size).map(|_| None).collect(),
             came: Cell::new(0),
-            gathered: Cell::new(0),
+            laid: Cell::new(0),
         })
     }
 
@@ -161,10 +170,23 @@ impl Node {
         self.table.word(ENTRY * (rank + 1) + word)
     }
 
-    /// Says that this rank has come to the barrier; wakes all if it is the last one.
-    pub(super) fn arrive(&self) {
+    /// Says that this rank has come to the next meeting, to a barrier or (with a string) to an all-gather; wakes all if it is the
+    /// last one.
+    ///
+    /// The string can be read behind the meeting. There are two sets of them, and a rank is at most one meeting ahead of another, so
+    /// nobody writes what another still reads: a rank that runs ahead is not mistaken for one that came for the same reason.
+    pub(super) fn arrive(&self, string: Option<&[u8]>) {
         let number = self.came.get().wrapping_add(1);
         self.came.set(number);
+        let first = self.slot(self.rank);
+        self.table.word(first).store(number, Ordering::Relaxed);
+        let length = string.map_or(BARRIER, |string| string.len() as u32);
+        self.table.word(first + 1).store(length, Ordering::Relaxed);
+        for (index, four) in string.unwrap_or_default().chunks(4).enumerate() {
+            let mut word = [0; 4];
+            word[..four.len()].copy_from_slice(four);
+            self.table.word(first + 2 + index).store(u32::from_ne_bytes(word), Ordering::Relaxed);
+        }
         self.entry(self.rank, CAME).store(number, Ordering::Release);
         if self.table.word(ARRIVED).fetch_add(1, Ordering::AcqRel) + 1 == self.size as u32 {
             self.table.word(ARRIVED).store(0, Ordering::Relaxed);
@@ -173,7 +195,7 @@ impl Node {
         }
     }
 
-    /// Whether all have come to the barrier at which this rank is.
+    /// Whether all have come to the meeting at which this rank is.
     pub(super) fn passed(&self) -> bool {
         self.table.word(EPOCH).load(Ordering::Acquire) == self.came.get()
     }
@@ -185,47 +207,41 @@ impl Node {
         let _ = futex::wait(self.table.word(EPOCH), futex::Flags::empty(), before, Some(&most));
     }
 
-    /// The first rank that has not come.
-    pub(super) fn missing(&self) -> Option<usize> {
+    /// Ranks that have not come.
+    pub(super) fn missing(&self) -> impl Iterator<Item = usize> {
         let here = self.came.get();
-        (0..self.size).find(|&rank| self.entry(rank, CAME).load(Ordering::Acquire) != here)
+        (0..self.size).filter(move |&rank| self.entry(rank, CAME).load(Ordering::Acquire) != here)
     }
 
-    /// Writes this rank's string of the next all-gather; the others can read it behind the barrier. There are two sets of strings, so nobody
-    /// writes one that another still reads.
-    pub(super) fn say(&self, string: &[u8]) {
-        let first = self.gather_slot(self.rank);
-        self.table.word(first).store(self.gathered.get().wrapping_add(1), Ordering::Relaxed);
-        self.table.word(first + 1).store(string.len() as u32, Ordering::Relaxed);
-        for (index, four) in string.chunks(4).enumerate() {
-            let mut word = [0; 4];
-            word[..four.len()].copy_from_slice(four);
-            self.table.word(first + 2 + index).store(u32::from_ne_bytes(word), Ordering::Relaxed);
+    /// What all have said at the meeting that has passed; nothing if it was a barrier.
+    ///
+    /// # Errors
+    /// [`CommError::OutOfStep`] if some came to a barrier and others to an all-gather.
+    pub(super) fn said(&self) -> Result<Vec<Vec<u8>>, CommError> {
+        let length = |rank| self.table.word(self.slot(rank) + 1).load(Ordering::Relaxed);
+        let (waiting, gathering): (Vec<usize>, Vec<usize>) =
+            (0..self.size).partition(|&rank| length(rank) == BARRIER);
+        if gathering.is_empty() {
+            return Ok(Vec::new());
         }
-    }
-
-    /// What all have said, behind the barrier; nothing of a rank that came to the barrier for another reason.
-    pub(super) fn said(&self) -> Vec<Vec<u8>> {
-        let number = self.gathered.get().wrapping_add(1);
+        if !waiting.is_empty() {
+            return Err(CommError::OutOfStep { rank: self.rank, gathering, waiting });
+        }
         let strings = (0..self.size).map(|rank| {
-            let first = self.gather_slot(rank);
-            if self.table.word(first).load(Ordering::Relaxed) != number {
-                return Vec::new();
-            }
-            let length = (self.table.word(first + 1).load(Ordering::Relaxed) as usize).min(LONGEST);
-            let words = (0..length.div_ceil(4))
-                .map(|index| self.table.word(first + 2 + index).load(Ordering::Relaxed).to_ne_bytes());
+            let first = self.slot(rank) + 2;
+            let length = (length(rank) as usize).min(LONGEST);
+            let words = (first..first + length.div_ceil(4))
+                .map(|word| self.table.word(word).load(Ordering::Relaxed).to_ne_bytes());
             let mut string: Vec<u8> = words.flatten().collect();
             string.truncate(length);
             string
         });
-        let strings = strings.collect();
-        self.gathered.set(number);
-        strings
+        Ok(strings.collect())
     }
 
-    fn gather_slot(&self, rank: usize) -> usize {
-        let set = self.gathered.get() as usize % 2;
+    /// First word of what `rank` says at the meeting at which this rank is.
+    fn slot(&self, rank: usize) -> usize {
+        let set = self.came.get() as usize % 2;
         ENTRY * (self.size + 1) + STRING * (set * self.size + rank)
     }
 
@@ -257,6 +273,8 @@ impl NodeMemory for Node {
     fn lay(&mut self, bytes: usize, used: usize, fill: &mut dyn FnMut(&mut [u8])) {
         let made = self.make_room(bytes.max(1));
         self.entry(self.rank, REFUSED).store(u32::from(made.is_err()), Ordering::Relaxed);
+        self.laid.set(self.came.get());
+        self.entry(self.rank, LAID).store(self.came.get(), Ordering::Relaxed);
         if self.rank == 0 {
             // Whoever took bands of the last frame has come to a barrier since, and nobody takes one before the next.
             self.table.word(NEXT_BAND).store(0, Ordering::Relaxed);
@@ -268,6 +286,16 @@ impl NodeMemory for Node {
     }
 
     fn open(&mut self) -> Result<bool, CommError> {
+        let failed = |rank: usize, reason: String| CommError::Transport {
+            rank: self.rank,
+            call: format!("opening the memory of rank {rank}"),
+            reason,
+        };
+        let late = |rank: &usize| self.entry(*rank, LAID).load(Ordering::Relaxed) != self.laid.get();
+        if let Some(rank) = (0..self.size).find(late) {
+            let reason = "it has laid down nothing for this frame: do all ranks make the same calls?";
+            return Err(failed(rank, reason.to_string()));
+        }
         let refused = |rank| self.entry(rank, REFUSED).load(Ordering::Relaxed) != 0;
         if (0..self.size).any(refused) {
             return Ok(false);
@@ -281,18 +309,22 @@ impl NodeMemory for Node {
                 [PROCESS, FILE, KIB].map(|word| self.entry(rank, word).load(Ordering::Relaxed));
             let mapping =
                 file_of(process, file).and_then(|file| Mapping::of(&file, kib as usize * 1024, true));
-            let mapping = mapping.map_err(|error| CommError::Transport {
-                rank: self.rank,
-                call: format!("opening the memory of rank {rank}"),
-                reason: error.to_string(),
-            })?;
+            let mapping = match mapping {
+                Ok(mapping) => mapping,
+                // A room is there as long as its process is.
+                Err(_) if !is_alive(process) => {
+                    return Err(CommError::PeerLost { rank: self.rank, peer: rank });
+                }
+                Err(error) => return Err(failed(rank, error.to_string())),
+            };
             self.rooms[rank] = Some(Room { generation, mapping });
         }
         Ok(true)
     }
 
     fn room(&self, rank: usize, bytes: usize) -> &[u8] {
-        let Some(room) = &self.rooms[rank] else { return &[] };
+        let Some(room) = self.rooms[rank].as_ref() else { return &[] };
+        let bytes = bytes.min(room.mapping.bytes);
         // SAFETY: behind the barrier that follows `lay` nobody writes what was laid until all have met again.
         unsafe { room.mapping.read(0, bytes) }
     }
@@ -312,5 +344,69 @@ impl NodeMemory for Node {
         let Some(room) = &self.rooms[rank] else { return &[] };
         // SAFETY: behind the barrier that follows the bands nobody writes them.
         unsafe { room.mapping.read(from, bytes) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three ranks in one process, which finds its own files as others would.
+    fn three() -> [Node; 3] {
+        let (first, address) = Node::make(3).unwrap();
+        [first, Node::join(1, 3, address).unwrap(), Node::join(2, 3, address).unwrap()]
+    }
+
+    #[test]
+    fn a_rank_at_a_barrier_is_not_taken_for_one_at_an_all_gather_though_it_runs_ahead() {
+        let nodes = three();
+        for node in &nodes {
+            node.arrive((node.rank < 2).then_some(&b"drawn"[..]));
+        }
+        assert!(nodes.iter().all(Node::passed));
+        // Rank 2 is quick: before the others have read a word, it says what they expect.
+        let expected = |rank| Err(CommError::OutOfStep { rank, gathering: vec![0, 1], waiting: vec![2] });
+        assert_eq!(nodes[2].said(), expected(2));
+        nodes[2].arrive(Some(b"drawn"));
+        for rank in [0, 1] {
+            assert_eq!(nodes[rank].said(), expected(rank));
+        }
+        let text = nodes[0].said().unwrap_err().to_string();
+        assert!(text.contains("ranks 0, 1 came to an all-gather and rank 2 to a barrier"), "{text}");
+    }
+
+    #[test]
+    fn what_was_said_can_be_read_until_the_next_meeting_but_one() {
+        let nodes = three();
+        for number in 0..5_u8 {
+            for node in &nodes {
+                node.arrive(Some(&[number, node.rank as u8]));
+            }
+            let expected = (0..3).map(|rank| vec![number, rank]).collect::<Vec<_>>();
+            assert_eq!(nodes[1].said().as_ref(), Ok(&expected));
+            assert_eq!(nodes[2].said().as_ref(), Ok(&expected));
+            // Two go on to a barrier before the first rank reads.
+            nodes[1].arrive(None);
+            nodes[2].arrive(None);
+            assert_eq!(nodes[0].said().as_ref(), Ok(&expected));
+            nodes[0].arrive(None);
+            assert!(nodes.iter().all(|node| node.passed() && node.said() == Ok(Vec::new())));
+        }
+    }
+
+    #[test]
+    fn a_rank_that_laid_nothing_down_is_named_and_not_looked_for_in_the_file_system() {
+        let mut nodes = three();
+        nodes[0].arrive(Some(&[]));
+        nodes[1].arrive(Some(&[]));
+        nodes[2].arrive(Some(&[]));
+        for node in &mut nodes[..2] {
+            node.lay(8, 8, &mut |room| room.fill(7));
+        }
+        let text = nodes[0].open().unwrap_err().to_string();
+        assert!(text.contains("rank 2 failed: it has laid down nothing for this frame"), "{text}");
+        nodes[2].lay(8, 8, &mut |room| room.fill(9));
+        assert_eq!(nodes[0].open(), Ok(true));
+        assert_eq!(nodes[0].room(2, 8), [9; 8]);
     }
 }

@@ -1,31 +1,47 @@
-//! News about the group itself: a rank gives up, or has left. They go beside the messages, on a communicator of their own, and
+//! News about the group itself: a rank gives up, has left, asks for a sign of life or gives one. They go beside the messages, on a communicator of their own, and
 //! are looked for while waiting.
 use super::library::{Handle, Mpi, Status};
+use super::signs::Sign;
 use std::ffi::c_int;
 
 const TAG: c_int = 1;
 const LEFT: u8 = 0;
 const ABORTED: u8 = 1;
+const ASKS: u8 = 2;
+const LIVES: u8 = 3;
 /// Longer reasons are cut; a notice must be small enough to travel without its receiver's help.
 const LONGEST: usize = 2000;
 
 /// What was heard.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Notice {
-    Left { rank: usize },
-    Aborted { by: usize, reason: String },
+    Left {
+        rank: usize,
+    },
+    Aborted {
+        by: usize,
+        reason: String,
+    },
+    /// It wants a sign of life.
+    Asks {
+        rank: usize,
+    },
+    /// It, or one it waits for, has made so many steps.
+    Lives {
+        rank: usize,
+        sign: Sign,
+    },
 }
 
 pub(super) struct Notices {
     comm: Handle,
-    /// Kept until the process ends: MPI may still be reading them.
-    sent: Vec<Vec<u8>>,
-    requests: Vec<Handle>,
+    /// Notices that MPI may still be reading.
+    sent: Vec<(Handle, Vec<u8>)>,
 }
 
 impl Notices {
     pub(super) fn new(comm: Handle) -> Self {
-        Self { comm, sent: Vec::new(), requests: Vec::new() }
+        Self { comm, sent: Vec::new() }
     }
 
     pub(super) fn tell_left(&mut self, mpi: &Mpi, others: impl Iterator<Item = usize>) {
@@ -40,12 +56,26 @@ impl Notices {
         self.tell(mpi, others, [&[ABORTED], &reason.as_bytes()[..end]].concat());
     }
 
+    pub(super) fn ask(&mut self, mpi: &Mpi, others: impl Iterator<Item = usize>) {
+        self.tell(mpi, others, vec![ASKS]);
+    }
+
+    pub(super) fn tell_signs(&mut self, mpi: &Mpi, signs: Vec<(usize, Sign)>) {
+        for (rank, Sign { origin, steps }) in signs {
+            let mut message = vec![LIVES];
+            message.extend_from_slice(&(origin as u32).to_le_bytes());
+            message.extend_from_slice(&steps.to_le_bytes());
+            self.tell(mpi, std::iter::once(rank), message);
+        }
+    }
+
     fn tell(&mut self, mpi: &Mpi, others: impl Iterator<Item = usize>, message: Vec<u8>) {
+        self.delivered(mpi);
         for rank in others {
+            let message = message.clone();
             let mut request: Handle = 0;
-            // SAFETY: `sent` owns the bytes from here on and is leaked rather than freed while MPI may read them. Whether the
-            // notice could be sent changes nothing: its receivers have their timeouts.
-            unsafe {
+            // SAFETY: `sent` owns the bytes from here on and they are leaked rather than freed while MPI may read them.
+            let code = unsafe {
                 (mpi.functions.isend)(
                     message.as_ptr().cast(),
                     message.len() as c_int,
@@ -54,22 +84,24 @@ impl Notices {
                     TAG,
                     self.comm,
                     &raw mut request,
-                );
+                )
+            };
+            // Whether a notice could be sent changes nothing: its receivers have their timeouts.
+            if code == 0 {
+                self.sent.push((request, message));
             }
-            self.requests.push(request);
         }
-        self.sent.push(message);
     }
 
     /// Whether all notices have left.
     pub(super) fn delivered(&mut self, mpi: &Mpi) -> bool {
-        self.requests.retain_mut(|request| {
+        self.sent.retain_mut(|(request, _)| {
             let mut flag: c_int = 0;
             // SAFETY: a request of MPI_Isend that has not been completed.
             let code = unsafe { (mpi.functions.test)(&raw mut *request, &raw mut flag, mpi.status_ignore()) };
             code == 0 && flag == 0
         });
-        self.requests.is_empty()
+        self.sent.is_empty()
     }
 
     /// The next notice that has come.
@@ -107,6 +139,13 @@ impl Notices {
             Some((&ABORTED, reason)) => {
                 Some(Notice::Aborted { by: rank, reason: String::from_utf8_lossy(reason).into_owned() })
             }
+            Some((&ASKS, _)) => Some(Notice::Asks { rank }),
+            Some((&LIVES, rest)) => {
+                let (origin, steps) = rest.split_first_chunk::<4>()?;
+                let (steps, _) = steps.split_first_chunk::<8>()?;
+                let origin = u32::from_le_bytes(*origin) as usize;
+                Some(Notice::Lives { rank, sign: Sign { origin, steps: u64::from_le_bytes(*steps) } })
+            }
             _ => Some(Notice::Left { rank }),
         }
     }
@@ -114,8 +153,6 @@ impl Notices {
 
 impl Drop for Notices {
     fn drop(&mut self) {
-        if !self.requests.is_empty() {
-            std::mem::forget(std::mem::take(&mut self.sent));
-        }
+        std::mem::forget(std::mem::take(&mut self.sent));
     }
 }

@@ -229,7 +229,7 @@ impl Transfers {
         let this = &mut self.incoming[index];
         let room = (this.capacity - this.received).saturating_add(1).min(self.chunk_bytes);
         if this.buffer.capacity() < this.received + room {
-            this.buffer.try_reserve_exact(this.received + room - this.buffer.len()).map_err(|error| {
+            this.buffer.try_reserve(this.received + room - this.buffer.len()).map_err(|error| {
                 CommError::Transport {
                     rank: self.rank,
                     call: format!("allocating {} bytes", this.received + room),

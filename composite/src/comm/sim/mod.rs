@@ -206,6 +206,7 @@ impl Communicator for SimComm {
         } else {
             let s = &mut *schedule;
             s.ranks[rank].clock_secs += s.network.overhead_secs;
+            s.ranks[rank].sign_secs = s.ranks[rank].clock_secs;
             s.send(rank, destination, tag, message);
             Ok(())
         };
@@ -236,18 +237,30 @@ impl Communicator for SimComm {
         let group = Arc::clone(&self.group);
         let mut schedule = group.lock();
         self.book(&mut schedule);
-        let deadline_secs = schedule.ranks[rank].clock_secs + timeout.as_secs_f64();
-        schedule.wait(rank, wanted.clone(), deadline_secs);
-        let mut schedule = self.until_granted(&group, schedule)?;
-
-        // ---- What arrived first, of the lowest rank among equals.
-        let found = wanted
-            .iter()
-            .enumerate()
-            .filter_map(|(i, w)| schedule.find(rank, w).map(|(at, arrival)| (i, at, arrival, w.source)));
-        let found = found.min_by(|a, b| a.2.total_cmp(&b.2).then(a.3.cmp(&b.3)));
+        let mut deadline_secs = schedule.ranks[rank].clock_secs + timeout.as_secs_f64();
+        let (found, mut schedule) = loop {
+            schedule.wait(rank, wanted.clone(), deadline_secs);
+            schedule = self.until_granted(&group, schedule)?;
+            // ---- What arrived first, of the lowest rank among equals.
+            let found = wanted
+                .iter()
+                .enumerate()
+                .filter_map(|(i, w)| schedule.find(rank, w).map(|(at, arrival)| (i, at, arrival, w.source)));
+            let found = found.min_by(|a, b| a.2.total_cmp(&b.2).then(a.3.cmp(&b.3)));
+            let now_secs = schedule.ranks[rank].clock_secs;
+            let found = found.filter(|f| f.2 <= deadline_secs.max(now_secs));
+            // Who is at work may yet send, or whom it lets wait.
+            let others = schedule.ranks.iter().enumerate().filter(|(other, _)| *other != rank);
+            let sign_secs = others.map(|(_, other)| other.sign_secs).fold(0.0, f64::max);
+            let later_secs = sign_secs + timeout.as_secs_f64();
+            let lost = wanted.iter().any(|w| schedule.is_lost(rank, w));
+            if found.is_some() || lost || timeout.is_zero() || later_secs <= deadline_secs {
+                break (found, schedule);
+            }
+            deadline_secs = later_secs;
+        };
         let now_secs = schedule.ranks[rank].clock_secs;
-        let result = match found.filter(|f| f.2 <= deadline_secs.max(now_secs)) {
+        let result = match found {
             Some((i, at, arrival_secs, source)) => {
                 let s = &mut *schedule;
                 let receive = posted.remove(i);
@@ -274,6 +287,19 @@ impl Communicator for SimComm {
         };
         self.until_computing(schedule);
         result
+    }
+
+    fn alive(&mut self) -> Result<(), CommError> {
+        let group = Arc::clone(&self.group);
+        let mut schedule = group.lock();
+        self.book(&mut schedule);
+        let own = &mut schedule.ranks[self.rank];
+        own.sign_secs = own.clock_secs;
+        self.since_secs = cpu_secs();
+        match &schedule.aborted {
+            Some((by, reason)) => Err(CommError::Aborted { by: *by, reason: reason.clone() }),
+            None => Ok(()),
+        }
     }
 
     fn let_leave(&mut self, tag: u32, most: usize, patience: Duration) {

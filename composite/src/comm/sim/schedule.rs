@@ -49,6 +49,8 @@ pub(super) enum State {
 
 pub(super) struct Rank {
     pub(super) clock_secs: f64,
+    /// When it last said that it is at work, or sent anything.
+    pub(super) sign_secs: f64,
     pub(super) state: State,
     /// By sender.
     pub(super) mail: Vec<VecDeque<Mail>>,
@@ -66,6 +68,7 @@ impl Schedule {
     pub(super) fn new(size: usize, network: Network, cores: usize) -> Schedule {
         let rank = || Rank {
             clock_secs: 0.0,
+            sign_secs: 0.0,
             state: State::Ready,
             mail: (0..size).map(|_| VecDeque::new()).collect(),
         };

@@ -156,3 +156,32 @@ fn a_message_longer_than_its_receive_is_an_error() {
     });
     assert_eq!(outcomes[1], Some(CommError::TooLong { rank: 1, peer: 0, tag: 0, capacity: 8 }));
 }
+
+#[test]
+fn a_slow_modelled_rank_that_gives_signs_of_life_is_waited_for_beyond_the_timeout() {
+    let patience = Duration::from_secs(2);
+    let results = run(3, Network::QDR_AS_SMPI, Compute::Given, |mut comm| match comm.rank() {
+        0 => comm.recv(1, 1, 8, patience).map(|_| ()),
+        1 => {
+            let came = comm.recv(2, 1, 8, patience)?;
+            comm.send(0, 1, came)
+        }
+        _ => {
+            for _ in 0..10 {
+                comm.compute(1.0);
+                comm.alive()?;
+            }
+            comm.send(1, 1, vec![1])
+        }
+    });
+    assert!(results.into_iter().all(|result| result == Ok(Ok(()))));
+    // Without a sign it is missed.
+    let results = run(2, Network::QDR_AS_SMPI, Compute::Given, |mut comm| match comm.rank() {
+        0 => comm.recv(1, 1, 8, patience).map(|_| ()),
+        _ => {
+            comm.compute(10.0);
+            comm.send(0, 1, vec![1])
+        }
+    });
+    assert!(matches!(results[0], Ok(Err(CommError::Timeout { .. }))), "{:?}", results[0]);
+}

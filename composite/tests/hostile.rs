@@ -1,0 +1,221 @@
+//! Peers whose numbers are not to be trusted: what they announce is refused by name before anything is made room for.
+use composite::comm::{Arrival, Receive};
+use composite::{
+    CommError, Communicator, CompositeError, Compositor, DeepFrame, DepthPixel, Destination, Fragment, Frame,
+    Options, PremultipliedPixel, Rect, Strategy, WireError, composite_deep, threads,
+};
+use proptest::prelude::*;
+use std::time::Duration;
+
+const WIDTH: u32 = 20;
+const HEIGHT: u32 = 10;
+const PIXELS: usize = (WIDTH * HEIGHT) as usize;
+const LIAR: usize = 1;
+const STRATEGIES: [Strategy; 4] =
+    [Strategy::DirectSend, Strategy::Tree, Strategy::BinarySwap, Strategy::RadixK { k: 4 }];
+
+/// A communicator whose rank [`LIAR`] changes what it says to all, and that counts the room that is asked for.
+struct Lying<F> {
+    inner: threads::ThreadComm,
+    lie: F,
+    /// All-gathers so far.
+    gathered: usize,
+    /// Bytes of receives and buffers.
+    room: usize,
+}
+
+impl<F: Fn(usize, &mut Vec<u8>)> Communicator for Lying<F> {
+    fn rank(&self) -> usize {
+        self.inner.rank()
+    }
+
+    fn size(&self) -> usize {
+        self.inner.size()
+    }
+
+    fn now(&self) -> f64 {
+        self.inner.now()
+    }
+
+    fn send(&mut self, destination: usize, tag: u32, message: Vec<u8>) -> Result<(), CommError> {
+        self.inner.send(destination, tag, message)
+    }
+
+    fn post_recv(&mut self, source: usize, tag: u32, capacity: usize) -> Result<Receive, CommError> {
+        self.room = self.room.saturating_add(capacity);
+        self.inner.post_recv(source, tag, capacity)
+    }
+
+    fn wait_any(&mut self, posted: &mut Vec<Receive>, timeout: Duration) -> Result<Arrival, CommError> {
+        self.inner.wait_any(posted, timeout)
+    }
+
+    fn barrier(&mut self, timeout: Duration) -> Result<(), CommError> {
+        self.inner.barrier(timeout)
+    }
+
+    fn all_gather(
+        &mut self,
+        mine: &[u8],
+        longest: usize,
+        timeout: Duration,
+    ) -> Result<Vec<Vec<u8>>, CommError> {
+        let mut said = mine.to_vec();
+        if self.rank() == LIAR {
+            (self.lie)(self.gathered, &mut said);
+        }
+        self.gathered += 1;
+        self.inner.all_gather(&said, longest, timeout)
+    }
+
+    fn abort(&mut self, reason: &str) {
+        self.inner.abort(reason);
+    }
+
+    fn buffer(&mut self, capacity: usize) -> Vec<u8> {
+        self.room = self.room.saturating_add(capacity);
+        self.inner.buffer(capacity)
+    }
+
+    fn recycle(&mut self, buffer: Vec<u8>) {
+        self.inner.recycle(buffer);
+    }
+}
+
+type Ended = (Result<(), CompositeError>, usize);
+
+/// What each of three ranks gets, and the room it asked for, when rank [`LIAR`] says `rect` in place of where it drew.
+fn with_rect(rect: [u32; 4], options: &Options) -> Vec<Ended> {
+    let lie = move |number: usize, said: &mut Vec<u8>| {
+        if number == 0 && said.len() == 32 {
+            for (to, corner) in said[8..24].chunks_exact_mut(4).zip(rect) {
+                to.copy_from_slice(&corner.to_le_bytes());
+            }
+        }
+    };
+    let results = threads::run(3, |comm| {
+        let mut comm = Lying { inner: comm, lie, gathered: 0, room: 0 };
+        let (colors, depths) = ([[9_u8; 4]; PIXELS], [0.5; PIXELS]);
+        let frame = Frame::<DepthPixel<[u8; 4]>>::with_depth(WIDTH, HEIGHT, &colors, &depths).unwrap();
+        let result = Compositor::new(options.clone()).composite(&mut comm, &frame);
+        (result.map(|_| ()), comm.room)
+    });
+    results.into_iter().map(|result| result.expect("no rank panics")).collect()
+}
+
+fn reaches_beyond([x0, y0, x1, y1]: [u32; 4]) -> bool {
+    let drawn = Rect { x0, y0, x1, y1 };
+    !Rect::of_size(WIDTH, HEIGHT).contains(&drawn)
+}
+
+fn check_rect(rect: [u32; 4]) {
+    for strategy in STRATEGIES {
+        for destination in [Destination::Rank(0), Destination::Distributed] {
+            let timeout = Duration::from_millis(300);
+            let options = Options { strategy, destination, timeout, ..Options::default() };
+            let ends = with_rect(rect, &options);
+            // Three ranks' parts, joined and collected, twice over for all the rounds there are.
+            let most = 3 * 2 * (PIXELS * 8 + 4096);
+            for (rank, (result, room)) in ends.iter().enumerate() {
+                assert!(*room <= most, "{strategy:?}, {rect:?}: rank {rank} made room of {room} bytes");
+                if !reaches_beyond(rect) {
+                    continue;
+                }
+                let text = result.as_ref().expect_err("it reaches beyond the image").to_string();
+                let [x0, y0, x1, y1] = rect;
+                let words = format!("columns {x0}..{x1} and rows {y0}..{y1} of an image of 20x10");
+                assert!(text.contains("from rank 1") && text.contains(&words), "{text}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_rectangle_beyond_the_image_is_refused_by_the_name_of_its_sender() {
+    for rect in [
+        [0, 0, 21, 10],
+        [0, 0, 20, 11],
+        [0, 0, u32::MAX, u32::MAX],
+        [u32::MAX - 1, 3, u32::MAX, 4],
+        [30, 30, 40, 40],
+        // Inside out: nothing was drawn.
+        [9, 9, 3, 3],
+        [u32::MAX, u32::MAX, 0, 0],
+    ] {
+        check_rect(rect);
+    }
+}
+
+#[test]
+fn more_fragments_than_pixels_can_have_are_refused_and_take_no_room() {
+    for announced in [u64::MAX, 1 << 62, PIXELS as u64 * (1 << 31)] {
+        let lie = move |number: usize, said: &mut Vec<u8>| {
+            if number == 1 {
+                *said = announced.to_le_bytes().to_vec();
+            }
+        };
+        let fragments = vec![Fragment { color: [0.1; 4], depth: 0.5 }; PIXELS];
+        let ends: Vec<usize> = (1..=PIXELS).collect();
+        let frame = DeepFrame::new(WIDTH, HEIGHT, &fragments, &ends).unwrap();
+        let results = threads::run(3, |comm| {
+            let mut comm = Lying { inner: comm, lie, gathered: 0, room: 0 };
+            let result = composite_deep(&mut comm, &frame, &Options::default());
+            (result.map(|_| ()), comm.room)
+        });
+        for result in results {
+            let (result, room) = result.expect("no rank panics");
+            let text = result.unwrap_err().to_string();
+            assert!(text.contains("from rank 1") && text.contains("fragments"), "{text}");
+            assert!(room < 1 << 16, "{room} bytes");
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn whatever_rectangle_a_peer_announces_nobody_panics_or_makes_room_for_it(
+        rect in prop::array::uniform4(prop_oneof![0_u32..24, any::<u32>()]),
+    ) {
+        check_rect(rect);
+    }
+
+    #[test]
+    fn whatever_a_peer_says_at_the_meeting_nobody_panics(
+        said in prop::collection::vec(any::<u8>(), 0..40),
+        keep in 0_usize..3,
+    ) {
+        let lie = move |number: usize, honest: &mut Vec<u8>| {
+            if number == 0 {
+                // With and without the right fingerprint.
+                let honest_part = [0, 8, 24][keep].min(honest.len());
+                honest.truncate(honest_part);
+                honest.extend_from_slice(&said);
+                honest.truncate(32);
+            }
+        };
+        let results = threads::run(3, |comm| {
+            let mut comm = Lying { inner: comm, lie: &lie, gathered: 0, room: 0 };
+            let colors = [[0.5_f32; 4]; PIXELS];
+            let frame = Frame::<PremultipliedPixel<[f32; 4]>>::premultiplied(WIDTH, HEIGHT, &colors).unwrap();
+            let options = Options { timeout: Duration::from_millis(300), ..Options::default() };
+            composite::composite(&mut comm, &frame, &options).map(|_| ())
+        });
+        for result in results {
+            result.expect("no rank panics").err();
+        }
+    }
+}
+
+#[test]
+fn the_error_of_a_rectangle_beyond_the_image_is_a_named_one() {
+    let ends = with_rect([0, 0, 21, 10], &Options::default());
+    let named = |result: &Result<(), CompositeError>| {
+        matches!(
+            result,
+            Err(CompositeError::Message { from: LIAR, reason: WireError::Drawn { width_px: WIDTH, .. }, .. })
+        )
+    };
+    assert!(ends.iter().any(|(result, _)| named(result)), "{ends:?}");
+}
