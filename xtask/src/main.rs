@@ -4,6 +4,7 @@
 //! software of others that some tests compare with; [`licences`] checks what we link against.
 
 mod licences;
+mod main_job;
 mod peers;
 mod plan;
 mod runner;

@@ -2,10 +2,10 @@
 //!
 //! The order is cheap before dear, so that a misplaced comma is reported after seconds and not after minutes.
 //! All steps share one target directory and one set of features, so that nothing is compiled twice without need:
-//! `clippy` and `api-docs` check, `tests` and `book-and-doc-tests` build with the dev profile, `main-job` with release.
+//! `clippy` and `api-docs` check, all others build with the dev profile, whose members are optimised: also `main-job`.
 
 use crate::runner::{Context, Outcome};
-use crate::{licences, runner};
+use crate::{licences, main_job, runner};
 
 /// One check.
 #[derive(Debug)]
@@ -136,14 +136,21 @@ pub(crate) const STEPS: &[Step] = &[
     },
     Step {
         name: "main-job",
-        tells: "the release build that users run starts and lists its experiments",
-        action: cargo(&["run", "--release", "-p", "bench", "--", "list"]),
+        tells: "the main job, the quick form of every experiment, runs to its end",
+        action: Action::Call(main_job::run),
     },
 ];
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_main_job_runs_experiments_and_does_not_only_list_them() {
+        let step = STEPS.iter().find(|s| s.name == "main-job").expect("main-job");
+        assert!(matches!(step.action, Action::Call(_)), "{:?} measures nothing", step.action);
+        assert!(main_job::ARGUMENTS.is_empty(), "without a command, bench runs the quick form of everything");
+    }
 
     #[test]
     fn step_names_are_unique_words() {

@@ -109,7 +109,7 @@ fn summary(report: &[(&str, Outcome, f64)], left: usize, total_secs: f64) -> Str
 }
 
 /// Runs cargo in the root with the peers' variables set.
-fn cargo(context: &Context<'_>, args: &[&str], env: &[(&str, &str)]) -> Outcome {
+pub(crate) fn cargo(context: &Context<'_>, args: &[&str], env: &[(&str, &str)]) -> Outcome {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.args(args).current_dir(context.root).envs(env.iter().copied());
     command.envs(context.peers.environment(context.options.require_peers));
