@@ -15,6 +15,7 @@
 mod book;
 pub mod cli;
 pub mod clock;
+pub mod doubts;
 pub mod experiments;
 pub mod machine;
 pub mod memory;

@@ -1,6 +1,7 @@
 //! What a record has to say about the machine it was made on.
 
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// The machine, its state and the program's version.
@@ -22,8 +23,11 @@ pub struct Machine {
     pub date: String,
     /// Version of this program.
     pub version: String,
-    /// Commit of the working tree, with `+` when it has changes; `null` outside a repository.
+    /// Commit of the working tree; `null` outside a repository. Older records have a `+` behind it for [`Machine::dirty`].
     pub commit: Option<String>,
+    /// Whether files under version control had changes that no commit has, records aside; `null` outside a repository.
+    #[serde(default)]
+    pub dirty: Option<bool>,
     /// Optimised build? Times of a debug build mean nothing.
     pub optimised: bool,
 }
@@ -40,6 +44,7 @@ impl Machine {
         let memory_kib =
             field(&read("/proc/meminfo"), "MemTotal").and_then(|v| leading_number(&v)).unwrap_or(0.0);
         let secs = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
+        let git = GitState::of(Path::new("."));
         let kernel = read("/proc/sys/kernel/osrelease");
         Machine {
             cpu: field(&read("/proc/cpuinfo"), "model name").unwrap_or_else(|| std::env::consts::ARCH.into()),
@@ -50,7 +55,8 @@ impl Machine {
             os: format!("{} {}", std::env::consts::OS, kernel.trim()).trim().to_string(),
             date: iso_8601(secs),
             version: env!("CARGO_PKG_VERSION").into(),
-            commit: commit(),
+            commit: git.as_ref().map(|g| g.commit.clone()),
+            dirty: git.map(|g| g.dirty),
             optimised: !cfg!(debug_assertions),
         }
     }
@@ -88,15 +94,28 @@ fn leading_number(text: &str) -> Option<f64> {
     text.split_whitespace().next()?.parse().ok()
 }
 
-fn commit() -> Option<String> {
-    let git = |args: &[&str]| {
-        let out =
-            std::process::Command::new("git").args(args).stderr(std::process::Stdio::null()).output().ok()?;
-        out.status.success().then(|| String::from_utf8_lossy(&out.stdout).trim().to_string())
-    };
-    let head = git(&["rev-parse", "--short=12", "HEAD"])?;
-    let changed = git(&["status", "--porcelain", "--untracked-files=no"]).is_some_and(|s| !s.is_empty());
-    Some(if changed { head + "+" } else { head })
+/// What git says of the tree.
+#[derive(Debug, PartialEq, Eq)]
+struct GitState {
+    commit: String,
+    dirty: bool,
+}
+
+impl GitState {
+    /// Of the repository that `dir` lies in; `None` where there is none, or no git. Records do not count as changes:
+    /// the first one of a run would make the tree of all others dirty.
+    fn of(dir: &Path) -> Option<GitState> {
+        let git = |args: &[&str]| {
+            let mut git = std::process::Command::new("git");
+            let out = git.arg("-C").arg(dir).args(args).stderr(std::process::Stdio::null()).output().ok()?;
+            out.status.success().then(|| String::from_utf8_lossy(&out.stdout).trim().to_string())
+        };
+        let commit = git(&["rev-parse", "--short=12", "HEAD"])?;
+        let records = ":(top,exclude)bench/runs";
+        let changed = git(&["status", "--porcelain", "--untracked-files=no", "--", ":(top)", records]);
+        // What git cannot say is not clean.
+        Some(GitState { commit, dirty: changed.is_none_or(|s| !s.is_empty()) })
+    }
 }
 
 /// Widest vector instructions this processor has, of those that make a difference here.
@@ -163,6 +182,32 @@ mod tests {
         assert!(!m.cpu.is_empty());
         assert_eq!(m.day().len(), 10);
         assert!(m.slug().chars().all(|c| c.is_ascii_alphanumeric() || c == '-'), "{}", m.slug());
+    }
+
+    #[test]
+    fn a_tree_is_dirty_by_its_sources_and_not_by_records_or_new_files() {
+        let dir = tempfile::tempdir().unwrap();
+        let git = |args: &[&str]| {
+            let identity = ["-c", "user.name=n", "-c", "user.email=e@example.org"];
+            let mut git = std::process::Command::new("git");
+            let done = git.arg("-C").arg(dir.path()).args(identity).args(args).output();
+            assert!(done.is_ok_and(|d| d.status.success()), "git {args:?}");
+        };
+        let write = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
+        assert_eq!(GitState::of(dir.path()), None);
+        git(&["init", "-q"]);
+        std::fs::create_dir_all(dir.path().join("bench/runs")).unwrap();
+        write("source.rs", "1");
+        write("bench/runs/a.json", "1");
+        git(&["add", "."]);
+        git(&["commit", "-q", "-m", "first"]);
+        let dirty = |dir: &Path| GitState::of(dir).unwrap().dirty;
+        assert!(!dirty(dir.path()));
+        write("bench/runs/a.json", "2");
+        write("notes.txt", "new");
+        assert!(!dirty(dir.path()) && !dirty(&dir.path().join("bench")));
+        write("source.rs", "2");
+        assert!(dirty(dir.path()) && dirty(&dir.path().join("bench")));
     }
 
     #[test]

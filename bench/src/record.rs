@@ -90,6 +90,9 @@ pub struct Record {
     pub quick: bool,
     /// Where and when.
     pub machine: Machine,
+    /// What spoke against recording it, where the command line insisted (`--record-despite-doubts`).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub recorded_despite: Vec<String>,
     /// Wall time of the whole experiment, data and builds included.
     pub elapsed_secs: f64,
     /// How to read the rows.
@@ -121,6 +124,7 @@ impl Record {
             chapter,
             quick,
             machine,
+            recorded_despite: vec![],
             elapsed_secs: 0.0,
             columns: vec![],
             rows: vec![],
@@ -156,6 +160,10 @@ impl Record {
         s +=
             &format!("# {form}, {}, {}, {} cores, {}, version {}", m.date, m.cpu, m.cores, m.simd, m.version);
         s += &m.commit.as_ref().map_or("\n".into(), |c| format!(", commit {c}\n"));
+        s += &m.load_1_min.map_or(String::new(), |l| format!("# load {l:.2} when it began\n"));
+        for doubt in self.doubts() {
+            s += &format!("# in doubt: {}\n", one_line(&doubt));
+        }
         let head =
             |c: &Column| if c.unit.is_empty() { c.name.clone() } else { format!("{} [{}]", c.name, c.unit) };
         s += &self.columns.iter().map(|c| csv_field(&head(c))).collect::<Vec<_>>().join(",");
@@ -270,6 +278,7 @@ mod tests {
             low: 1.9,
             high: 2.2,
             rounds: 5,
+            in_turns: true,
         });
         r.missing.push("Embree 4 is not installed".into());
         r.plots.push(Plot {

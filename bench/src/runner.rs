@@ -11,6 +11,10 @@ use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
+/// Rounds without which nothing is called faster or slower: when both are equal, all of five rounds fall on the same
+/// side of 1 once in 16 times; of three, once in 4.
+pub const VERDICT_ROUNDS: usize = 5;
+
 /// How often and how long to measure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Schedule {
@@ -32,7 +36,8 @@ impl Schedule {
     /// For work on one thread: 7 rounds by thread CPU time, pinned.
     pub fn one_thread() -> Schedule {
         let clock = Clock::ThreadCpu;
-        Schedule { warmup_rounds: 1, rounds: 7, budget_secs: 25.0, min_rounds: 3, clock, pin: true }
+        let min_rounds = VERDICT_ROUNDS as u32;
+        Schedule { warmup_rounds: 1, rounds: 7, budget_secs: 25.0, min_rounds, clock, pin: true }
     }
 
     /// For work on several threads: 7 rounds by the wall clock.
@@ -40,7 +45,8 @@ impl Schedule {
         Schedule { clock: Clock::Wall, pin: false, budget_secs: 60.0, ..Schedule::one_thread() }
     }
 
-    /// Few rounds within `budget_secs`, for `--quick`.
+    /// Few rounds within `budget_secs`, for `--quick`: they show that everything runs, and decide nothing
+    /// ([`Ratio::verdict`]).
     pub fn quick(self, budget_secs: f64) -> Schedule {
         Schedule { rounds: 3, min_rounds: 1, budget_secs, ..self }
     }
@@ -51,16 +57,22 @@ pub struct Variant<'a> {
     /// What the rows and ratios call it.
     pub name: String,
     /// Does the work once and returns a number that must be the same every time, such as the hits counted: a variant
-    /// that skips work is found out, and the compiler cannot remove it.
-    run: Box<dyn FnMut() -> u64 + 'a>,
+    /// that skips work is found out, and the compiler cannot remove it. With it come the times, where the work knows
+    /// them better than our clocks.
+    run: Box<dyn FnMut() -> (u64, Option<Sample>) + 'a>,
     /// Gives that number after the clock has stopped, where finding it is work of its own.
     check: Option<Box<dyn FnMut() -> u64 + 'a>>,
 }
 
 impl<'a> Variant<'a> {
     /// A named closure that returns its own check.
-    pub fn new(name: impl Into<String>, run: impl FnMut() -> u64 + 'a) -> Self {
-        Variant { name: name.into(), run: Box::new(run), check: None }
+    pub fn new(name: impl Into<String>, mut run: impl FnMut() -> u64 + 'a) -> Self {
+        Variant { name: name.into(), run: Box::new(move || (run(), None)), check: None }
+    }
+
+    /// A named closure that has another process do the work, or times a part of its own, and says what that took.
+    pub fn timed(name: impl Into<String>, mut run: impl FnMut() -> Sample + 'a) -> Self {
+        Variant { name: name.into(), run: Box::new(move || (0, Some(run()))), check: None }
     }
 
     /// A named closure whose result `check` inspects outside the measured time.
@@ -71,7 +83,7 @@ impl<'a> Variant<'a> {
     ) -> Self {
         let run = move || {
             run();
-            0
+            (0, None)
         };
         Variant { name: name.into(), run: Box::new(run), check: Some(Box::new(check)) }
     }
@@ -123,6 +135,79 @@ pub struct Ratio {
     pub high: f64,
     /// Number of rounds.
     pub rounds: usize,
+    /// Whether both took turns. Where they ran one after the other, what the machine did meanwhile is in the ratio.
+    #[serde(default = "yes", skip_serializing_if = "is_yes")]
+    pub in_turns: bool,
+}
+
+fn yes() -> bool {
+    true
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_yes(value: &bool) -> bool {
+    *value
+}
+
+/// What a [`Ratio`] decides.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// Ours was faster in every round.
+    Faster,
+    /// Ours was slower in every round.
+    Slower,
+    /// Rounds contradict each other.
+    Even,
+    /// Fewer rounds than [`VERDICT_ROUNDS`], or not in turns: nothing is decided.
+    Open,
+}
+
+impl Ratio {
+    /// The ratio of times taken in turns: `per_round` is (rival's time / our time) of each round. `None` without a
+    /// finite one.
+    pub fn of_rounds(name: impl Into<String>, rival: impl Into<String>, per_round: &[f64]) -> Option<Ratio> {
+        let s = Summary::of(per_round)?;
+        Some(Ratio {
+            name: name.into(),
+            rival: rival.into(),
+            value: s.median,
+            spread: s.interquartile_range(),
+            low: s.low,
+            high: s.high,
+            rounds: per_round.iter().filter(|r| r.is_finite()).count(),
+            in_turns: true,
+        })
+    }
+
+    /// What the rounds decide. The only place where that is said: reports, summaries and notes ask here.
+    pub fn verdict(&self) -> Verdict {
+        match (self.rounds >= VERDICT_ROUNDS && self.in_turns, self.low > 1.0, self.high < 1.0) {
+            (false, ..) => Verdict::Open,
+            (_, true, _) => Verdict::Faster,
+            (_, _, true) => Verdict::Slower,
+            _ => Verdict::Even,
+        }
+    }
+
+    /// The ratio and what it decides, in words for a note.
+    pub fn in_words(&self) -> String {
+        let decides = match self.verdict() {
+            Verdict::Faster => "above 1 in every round".into(),
+            Verdict::Slower => "below 1 in every round".into(),
+            Verdict::Even => "rounds on both sides of 1".into(),
+            Verdict::Open => self.why_open().unwrap_or_default(),
+        };
+        format!("{:.3} ({:.3} to {:.3}, {} rounds: {decides})", self.value, self.low, self.high, self.rounds)
+    }
+
+    /// Why there is no verdict, in words; `None` where there is one.
+    pub fn why_open(&self) -> Option<String> {
+        match (self.in_turns, self.rounds) {
+            (false, _) => Some("not in turns: decides nothing".into()),
+            (_, n) if n < VERDICT_ROUNDS => Some(format!("rounds below {VERDICT_ROUNDS} decide nothing")),
+            _ => None,
+        }
+    }
 }
 
 /// All variants of one comparison.
@@ -150,16 +235,7 @@ impl Timings {
         let (a, b) = (self.get(ours)?, self.get(rival)?);
         let per_round: Vec<f64> =
             a.samples.iter().zip(&b.samples).map(|(x, y)| y.by(self.clock) / x.by(self.clock)).collect();
-        let s = Summary::of(&per_round)?;
-        Some(Ratio {
-            name: ours.to_string(),
-            rival: rival.to_string(),
-            value: s.median,
-            spread: s.interquartile_range(),
-            low: s.low,
-            high: s.high,
-            rounds: per_round.len(),
-        })
+        Ratio::of_rounds(ours, rival, &per_round)
     }
 }
 
@@ -188,8 +264,9 @@ impl std::fmt::Display for Unstable {
 impl std::error::Error for Unstable {}
 
 /// The order of round `round` for `n` variants: rotated, and reversed in every second round, so that each variant
-/// runs first, last, and after each of its neighbours equally often.
-fn order(n: usize, round: usize) -> Vec<usize> {
+/// runs first, last, and after each of its neighbours equally often. For what cannot go through [`interleave`], such
+/// as ranks that all have to take the same turn.
+pub fn order(n: usize, round: usize) -> Vec<usize> {
     let mut o: Vec<usize> = (0..n).map(|i| (i + round / 2) % n.max(1)).collect();
     if round % 2 == 1 {
         o.reverse();
@@ -218,7 +295,7 @@ pub fn interleave(schedule: &Schedule, variants: &mut [Variant<'_>]) -> Result<T
     for round in 0..schedule.warmup_rounds as usize {
         cores.pin(round);
         for i in order(variants.len(), round) {
-            let returned = (variants[i].run)();
+            let (returned, _) = (variants[i].run)();
             let value = variants[i].result(returned);
             check(&variants[i].name, &mut firsts[i], value)?;
         }
@@ -237,10 +314,10 @@ pub fn interleave(schedule: &Schedule, variants: &mut [Variant<'_>]) -> Result<T
         }
         cores.pin(round);
         for i in order(variants.len(), round) {
-            let (returned, sample) = clock::measure(|| (variants[i].run)());
+            let ((returned, told), sample) = clock::measure(|| (variants[i].run)());
             let value = variants[i].result(returned);
             check(&variants[i].name, &mut firsts[i], value)?;
-            timed[i].samples.push(sample);
+            timed[i].samples.push(told.unwrap_or(sample));
             timed[i].check = value;
         }
     }
@@ -382,6 +459,39 @@ mod tests {
         let t = interleave(&Schedule { rounds: 2, ..Schedule::all_threads() }, &mut v).unwrap();
         assert_eq!(t.variants[0].check, 5);
         assert!(t.summary("x").unwrap().high < 0.01, "{t:?}");
+    }
+
+    #[test]
+    fn times_that_the_work_tells_stand_in_place_of_ours() {
+        let told = Sample { wall_secs: 7.0, process_cpu_secs: 3.0, ..Default::default() };
+        let mut v = [Variant::timed("elsewhere", || told)];
+        let t = interleave(&Schedule { rounds: 2, ..Schedule::all_threads() }, &mut v).unwrap();
+        assert_eq!(t.variants[0].samples, [told, told]);
+    }
+
+    #[test]
+    fn fewer_than_five_rounds_or_no_turns_decide_nothing() {
+        let of = |n: usize, value: f64| Ratio::of_rounds("ours", "rival", &vec![value; n]).unwrap();
+        for n in 1..VERDICT_ROUNDS {
+            assert_eq!((of(n, 9.0).verdict(), of(n, 0.1).verdict()), (Verdict::Open, Verdict::Open), "{n}");
+            assert!(of(n, 9.0).why_open().unwrap().contains('5'));
+        }
+        assert_eq!((of(5, 9.0).verdict(), of(5, 0.1).verdict()), (Verdict::Faster, Verdict::Slower));
+        assert_eq!(of(5, 9.0).why_open(), None);
+        let apart = Ratio { in_turns: false, ..of(7, 9.0) };
+        assert_eq!(apart.verdict(), Verdict::Open);
+        assert!(apart.why_open().unwrap().contains("turns"));
+        let both = Ratio::of_rounds("a", "b", &[0.9, 1.1, 1.2, 1.3, 1.4]).unwrap();
+        assert_eq!(both.verdict(), Verdict::Even);
+        // A round that could not be measured is none.
+        assert_eq!(Ratio::of_rounds("a", "b", &[2.0, 2.0, 2.0, 2.0, f64::NAN]).unwrap().rounds, 4);
+    }
+
+    #[test]
+    fn a_full_measurement_has_as_many_rounds_as_a_verdict_needs() {
+        for full in [Schedule::one_thread(), Schedule::all_threads()] {
+            assert!(full.min_rounds as usize >= VERDICT_ROUNDS && full.rounds >= full.min_rounds);
+        }
     }
 
     #[test]

@@ -77,7 +77,9 @@ fn a_run_prints_one_object_and_writes_record_table_and_report() {
     let repository = tempfile::tempdir().unwrap();
     std::fs::create_dir_all(repository.path().join("bench/src")).unwrap();
     std::fs::write(repository.path().join("bench/Cargo.toml"), "").unwrap();
-    let args = ["run", "accuracy-robust", "--quick", "--json", "--quiet", "--record", "--out", folder];
+    // Tests run on busy machines, from trees that are being changed, in debug builds.
+    let keep = "--record-despite-doubts";
+    let args = ["run", "accuracy-robust", "--quick", "--json", "--quiet", keep, "--out", folder];
     let out = bench_in(&repository.path().join("bench/src"), &args);
     assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
     assert!(out.stderr.is_empty(), "quiet means quiet: {}", text(&out.stderr));
@@ -99,6 +101,12 @@ fn a_run_prints_one_object_and_writes_record_table_and_report() {
     assert_eq!(written["rows"], record["rows"], "what is printed is what is written");
     assert!(file("accuracy-robust.csv").lines().count() > rows.len());
     assert!(file("index.html").contains("id=\"accuracy-robust\""));
+
+    // What spoke against it is in the record and in the report: here at least that no commit is known.
+    let despite = record["recorded_despite"].as_array().expect("what spoke against it");
+    assert!(despite.iter().any(|d| d.as_str().unwrap().contains("commit is not known")), "{despite:?}");
+    assert!(file("index.html").contains("--record-despite-doubts"));
+    assert!(file("accuracy-robust.csv").contains("# in doubt: the commit is not known"));
 
     remake_report(dir.path());
     check_kept(repository.path(), &record);
@@ -132,6 +140,35 @@ fn check_kept(repository: &Path, record: &Value) {
     }
     let kept: Value = serde_json::from_str(&std::fs::read_to_string(&files[1]).unwrap()).unwrap();
     assert_eq!(&kept, record);
+}
+
+/// A repository with one commit of what `--record` looks for.
+fn repository() -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::create_dir_all(dir.path().join("bench/runs")).unwrap();
+    std::fs::write(dir.path().join("bench/Cargo.toml"), "").unwrap();
+    for args in [&["init", "-q"][..], &["add", "."], &["commit", "-q", "-m", "first"]] {
+        let mut git = Command::new("git");
+        git.arg("-C").arg(dir.path()).args(["-c", "user.name=n", "-c", "user.email=e@example.org"]);
+        assert!(git.args(args).status().is_ok_and(|s| s.success()), "git {args:?}");
+    }
+    dir
+}
+
+#[test]
+fn a_tree_with_uncommitted_changes_is_not_recorded_and_nothing_is_measured() {
+    let repository = repository();
+    std::fs::write(repository.path().join("bench/Cargo.toml"), "# changed").unwrap();
+    let reports = tempfile::tempdir().unwrap();
+    let folder = reports.path().to_str().unwrap();
+    let out =
+        bench_in(repository.path(), &["run", "accuracy-robust", "--quick", "--record", "--out", folder]);
+    let said = text(&out.stderr);
+    assert_eq!(out.status.code(), Some(2), "{said}");
+    assert!(said.contains("uncommitted changes") && said.contains("commit them"), "{said}");
+    assert!(said.contains("--record-despite-doubts"), "{said}");
+    assert!(out.stdout.is_empty() && !reports.path().join("index.html").exists());
+    assert_eq!(std::fs::read_dir(repository.path().join("bench/runs")).unwrap().count(), 0);
 }
 
 #[test]

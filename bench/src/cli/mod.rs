@@ -54,9 +54,13 @@ struct RunArgs {
     /// Smaller data and fewer rounds: each experiment within a minute
     #[arg(long)]
     quick: bool,
-    /// Also keep the records in bench/runs/DATE-MACHINE/
+    /// Also keep the records in bench/runs/DATE-MACHINE/. Refused where the tree has uncommitted changes, the load of
+    /// the machine is above 0.75 per core, or this is no release build
     #[arg(long)]
     record: bool,
+    /// As --record, whatever speaks against it: records and reports then name that
+    #[arg(long)]
+    record_despite_doubts: bool,
     /// Folder for the records and the report [default: bench-report in the build folder]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,

@@ -2,7 +2,9 @@
 
 use super::report::write_page;
 use super::{RunArgs, default_dir};
+use crate::doubts::{Admission, Gate};
 use crate::experiments::{self, Context, Experiment, Outcome};
+use crate::machine::Machine;
 use crate::record::Record;
 use datasets::cli::{Cancel, CommonArgs, Interrupted, ProgressBar, UsageError};
 use serde_json::json;
@@ -14,17 +16,26 @@ pub(super) fn run(common: CommonArgs, args: &RunArgs) -> anyhow::Result<()> {
     let chosen = args.ids.iter().map(|id| find(id)).collect::<Result<Vec<_>, _>>()?;
     let dir = args.out.clone().unwrap_or_else(default_dir);
     let mut dirs = vec![dir.clone()];
-    if args.record {
+    let recording = args.record || args.record_despite_doubts;
+    if recording {
         dirs.push(runs_dir()?);
     }
     let cancel = Cancel::on_ctrl_c()?;
+    let mut gate = gate(args.record_despite_doubts, cancel);
     let steps = Steps::new(common, cancel, chosen.len());
     let mut progress = |what: &str, share: Option<f64>| steps.next(what, share);
     let mut context = Context::new(args.quick, Some(cancel.flag().clone()), &mut progress);
     let mut written = false;
     for (i, experiment) in chosen.into_iter().enumerate() {
         steps.begin(i, experiment.id);
-        let Outcome { record, interrupted } = match experiments::run(experiment, &mut context) {
+        let admission = if recording { gate.admit(i) } else { Admission::Clean };
+        if let Admission::Refused(why) = admission {
+            if written {
+                finish(common, &dir)?;
+            }
+            return Err(refusal(experiment.id, &why).into());
+        }
+        let Outcome { mut record, interrupted } = match experiments::run(experiment, &mut context) {
             Err(e) if e.is::<Interrupted>() && written => {
                 // What was finished is worth its report.
                 finish(common, &dir)?;
@@ -32,6 +43,9 @@ pub(super) fn run(common: CommonArgs, args: &RunArgs) -> anyhow::Result<()> {
             }
             outcome => outcome?,
         };
+        if let Admission::Despite(why) = admission {
+            record.recorded_despite = why;
+        }
         // Half a measurement is no record to keep for years.
         for dir in &dirs[..if interrupted { 1 } else { dirs.len() }] {
             record.write(dir)?;
@@ -45,6 +59,24 @@ pub(super) fn run(common: CommonArgs, args: &RunArgs) -> anyhow::Result<()> {
     }
     drop(steps);
     finish(common, &dir)
+}
+
+/// Between experiments it waits as long as nobody interrupts it.
+fn gate(insist: bool, cancel: Cancel) -> Gate {
+    let pause = move |time| {
+        std::thread::sleep(time);
+        cancel.check().is_ok()
+    };
+    Gate { insist, state: Box::new(Machine::describe), pause: Box::new(pause) }
+}
+
+/// Nothing was measured: it would not have been kept.
+fn refusal(id: &str, why: &[String]) -> UsageError {
+    UsageError(format!(
+        "`{id}` is not recorded:\n  {}\n--record-despite-doubts records it all the same, and its record and report say \
+         why it is in doubt; without --record it is measured and not kept",
+        why.join("\n  ")
+    ))
 }
 
 /// The progress of experiments: a bar on a terminal; elsewhere a line for each experiment, and with -v for each step.
@@ -146,6 +178,13 @@ pub(super) fn everything_quick(common: CommonArgs) -> anyhow::Result<()> {
         );
     }
     anyhow::ensure!(failed.is_empty(), "these experiments failed: {}", failed.join(", "));
+    // Where all peers must be there (CI), what is left out is a fault and not a circumstance.
+    let all_peers = std::env::var_os("RTSV_REQUIRE_PEERS").is_some_and(|v| v == "1");
+    anyhow::ensure!(
+        left_out.is_empty() || !all_peers,
+        "RTSV_REQUIRE_PEERS=1, but these experiments lack a program: {}",
+        left_out.join(", ")
+    );
     Ok(())
 }
 
@@ -174,7 +213,8 @@ fn summary(r: &Record) -> String {
     }
     for x in &r.ratios {
         let low_high = format!("{:.2} to {:.2}", x.low, x.high);
-        text += &format!("\n  {:6.2}  ({low_high})  {}  against  {}", x.value, x.name, x.rival);
+        let open = x.why_open().map_or(String::new(), |why| format!(", {} rounds ({why})", x.rounds));
+        text += &format!("\n  {:6.2}  ({low_high})  {}  against  {}{open}", x.value, x.name, x.rival);
     }
     text
 }
@@ -187,6 +227,6 @@ fn runs_dir() -> anyhow::Result<PathBuf> {
             "--record writes to bench/runs of the repository: start `bench` inside it, or use --out".into(),
         )
     })?;
-    let machine = crate::machine::Machine::describe();
+    let machine = Machine::describe();
     Ok(root.join("bench/runs").join(format!("{}-{}", machine.day(), machine.slug())))
 }

@@ -10,7 +10,7 @@ use crate::peers::embree::{Embree, EmbreeScene, Options, Quality};
 use crate::plot::{Axis, Plot, Point, Series};
 use crate::rays::View;
 use crate::record::{Record, Row};
-use crate::runner::{Ratio, Schedule};
+use crate::runner::{Ratio, Schedule, order};
 use datasets::generate::nested_wavelet::Size;
 use rt_core::accel::{BuildOptions, BuildQuality};
 use rt_core::mesh::TriMesh;
@@ -52,13 +52,21 @@ fn scene(
     pixels: u32,
 ) -> anyhow::Result<()> {
     let mut built: Vec<(BuildQuality, Ours)> = vec![];
-    for quality in BuildQuality::ALL {
-        context.say(format!("{name}: building, {}", quality.name()))?;
-        let options = BuildOptions { quality, ..Default::default() };
-        let first = Ours::build(mesh, &options)?.cost;
-        let mut ours = Ours::build(mesh, &options)?;
-        ours.cost.wall_secs = ours.cost.wall_secs.min(first.wall_secs);
-        built.push((quality, ours));
+    let mut fastest_secs = vec![f64::INFINITY; BuildQuality::ALL.len()];
+    for round in 0..2 {
+        for i in order(fastest_secs.len(), round) {
+            let quality = BuildQuality::ALL[i];
+            context.say(format!("{name}: building, {}, round {}", quality.name(), round + 1))?;
+            let ours = Ours::build(mesh, &BuildOptions { quality, ..Default::default() })?;
+            fastest_secs[i] = fastest_secs[i].min(ours.cost.wall_secs);
+            if round == 1 {
+                built.push((quality, ours));
+            }
+        }
+    }
+    built.sort_by_key(|(quality, _)| BuildQuality::ALL.iter().position(|q| q == quality));
+    for ((_, ours), secs) in built.iter_mut().zip(fastest_secs) {
+        ours.cost.wall_secs = secs;
     }
     let mut rivals: Vec<(String, EmbreeScene)> = vec![];
     for (quality, robust) in

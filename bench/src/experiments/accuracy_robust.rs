@@ -15,6 +15,7 @@ use crate::peers::{Tracer, count_hits};
 use crate::plot::{Axis, Plot, Series};
 use crate::rays::{HitBlock, RaySet};
 use crate::record::{Record, Row};
+use crate::runner::order;
 use crate::{clock, rays};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -88,55 +89,82 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     ];
     for case in &cases {
         let base = Row::new().with("mesh", case.name).with("triangles", case.mesh.num_triangles());
+        context.say(format!("{}: building", case.name))?;
+        let mut ours = vec![];
         for robustness in Robustness::ALL {
             let options = BuildOptions { robustness, ..Default::default() };
-            let ours = Ours::build(&case.mesh, &options)?;
-            let base = base.clone().with("tracer", "rt-core").with("robustness", robustness.name());
-            let views: [&dyn Tracer; 2] = [&ours.view(Mode::Single), &ours.view(Mode::Coherent)];
-            context.say(format!("{}: rt-core, {}", case.name, robustness.name()))?;
-            record.rows.extend(shoot(case, &base, views, per_combination));
+            ours.push((robustness, Ours::build(&case.mesh, &options)?));
         }
+        let mut embree = vec![];
         for e in &installed.embree {
-            for robust in [false, true] {
+            for (robust, name) in [(false, "fast"), (true, "robust")] {
                 let options = Options { robust, ..Default::default() };
-                let scene = EmbreeScene::build(e, &case.mesh, &options)?;
-                let name = if robust { "robust" } else { "fast" };
-                context.say(format!("{}: {}, {name}", case.name, e.name()))?;
-                let base = base.clone().with("tracer", e.name()).with("robustness", name);
-                record.rows.extend(shoot(
-                    case,
-                    &base,
-                    [&scene.view(1, false), &scene.view(16, true)],
-                    rivals,
-                ));
+                embree.push((e.name(), name, EmbreeScene::build(e, &case.mesh, &options)?));
             }
         }
-        context.say(format!("{}: obvhs", case.name))?;
-        let peer = Obvhs::build(&case.mesh, Preset::Medium)?;
-        let base = base.clone().with("tracer", "obvhs").with("robustness", "only");
-        record.rows.extend(shoot(case, &base, [&peer, &peer], rivals));
+        let obvhs = Obvhs::build(&case.mesh, Preset::Medium)?;
+        let row = |tracer: &str, robustness: &str| {
+            base.clone().with("tracer", tracer).with("robustness", robustness)
+        };
+        let mut shooters = vec![];
+        for (robustness, ours) in &ours {
+            let ways: [Box<dyn Tracer + '_>; 2] =
+                [Box::new(ours.view(Mode::Single)), Box::new(ours.view(Mode::Coherent))];
+            shooters.push(Shooter { row: row("rt-core", robustness.name()), ways, count: per_combination });
+        }
+        for (name, robust, scene) in &embree {
+            let ways: [Box<dyn Tracer + '_>; 2] =
+                [Box::new(scene.view(1, false)), Box::new(scene.view(16, true))];
+            shooters.push(Shooter { row: row(name, robust), ways, count: rivals });
+        }
+        let ways: [Box<dyn Tracer + '_>; 2] = [Box::new(&obvhs), Box::new(&obvhs)];
+        shooters.push(Shooter { row: row("obvhs", "only"), ways, count: rivals });
+        context.say(format!("{}: {} tracers in turns", case.name, shooters.len()))?;
+        record.rows.extend(shoot(case, &shooters));
     }
     record.plots.push(plot(record));
     Ok(())
 }
 
-/// One row per aim. `alone` and `packets` are ways into the same tracer, for batches of either sort.
-fn shoot(case: &Case, base: &Row, [alone, packets]: [&dyn Tracer; 2], count: usize) -> Vec<Row> {
-    let row = |aim: Aim| {
-        let (leaks, secs) = (0..count / BATCH)
+/// A tracer in one mode.
+struct Shooter<'a> {
+    /// What its rows begin with.
+    row: Row,
+    /// Ways into it: for rays alone, and for packets.
+    ways: [Box<dyn Tracer + 'a>; 2],
+    /// Rays for each aim.
+    count: usize,
+}
+
+/// One row per shooter and aim. The shooters take turns batch by batch, on the same rays.
+fn shoot(case: &Case, shooters: &[Shooter<'_>]) -> Vec<Row> {
+    let most = shooters.iter().map(|s| s.count / BATCH).max().unwrap_or(0);
+    let mut by_shooter: Vec<Vec<Row>> = vec![vec![]; shooters.len()];
+    for aim in Aim::ALL {
+        let zero = || vec![(0u64, 0.0f64); shooters.len()];
+        let sums = (0..most)
             .into_par_iter()
             .map(|batch| {
                 let rays = aimed(case, aim, batch as u64);
                 let mut hits = vec![HitBlock::MISS; rays.blocks.len()];
-                let tracer = if batch % 2 == 0 { alone } else { packets };
-                let ((), time) = clock::measure(|| tracer.closest(&rays.blocks, &mut hits));
-                (rays.len as u64 - count_hits(&rays, &hits), time.thread_cpu_secs)
+                let mut found = zero();
+                for i in order(shooters.len(), batch) {
+                    let s = &shooters[i];
+                    if batch < s.count / BATCH {
+                        let tracer = &*s.ways[batch % 2];
+                        let ((), time) = clock::measure(|| tracer.closest(&rays.blocks, &mut hits));
+                        found[i] = (rays.len as u64 - count_hits(&rays, &hits), time.thread_cpu_secs);
+                    }
+                }
+                found
             })
-            .reduce(|| (0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
-        let rays = count / BATCH * BATCH;
-        base.clone().with("aim", aim.name()).with("rays", rays).with("leaks", leaks).with("seconds", secs)
-    };
-    Aim::ALL.iter().map(|&a| row(a)).collect()
+            .reduce(zero, |a, b| a.iter().zip(&b).map(|(a, b)| (a.0 + b.0, a.1 + b.1)).collect());
+        for ((s, (leaks, secs)), rows) in shooters.iter().zip(sums).zip(&mut by_shooter) {
+            let row = s.row.clone().with("aim", aim.name()).with("rays", s.count / BATCH * BATCH);
+            rows.push(row.with("leaks", leaks).with("seconds", secs));
+        }
+    }
+    by_shooter.concat()
 }
 
 /// A batch of rays from inside, the same for every tracer: even batches from random points at random triangles, odd
@@ -226,8 +254,9 @@ mod tests {
         let mesh = Arc::new(meshes::crumpled_sphere(3, 0.02, DVec3::ZERO));
         let case = Case { name: "crumpled", mesh, center: DVec3::ZERO, radius: 0.5 };
         let ours = Ours::build(&case.mesh, &BuildOptions::default()).unwrap();
-        let rows =
-            shoot(&case, &Row::new(), [&ours.view(Mode::Single), &ours.view(Mode::Coherent)], 2 * BATCH);
+        let ways: [Box<dyn Tracer + '_>; 2] =
+            [Box::new(ours.view(Mode::Single)), Box::new(ours.view(Mode::Coherent))];
+        let rows = shoot(&case, &[Shooter { row: Row::new(), ways, count: 2 * BATCH }]);
         assert_eq!(rows.len(), 3);
         for r in rows {
             assert_eq!(r.number("leaks"), Some(0.0), "{r:?}");

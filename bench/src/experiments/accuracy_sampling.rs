@@ -1,10 +1,12 @@
 //! Error against time of the sampled effects: low-discrepancy points against independent ones.
 
 use super::Context;
+use crate::clock::{self, Clock, Sample};
 use crate::meshes;
 use crate::picture::framing::Framing;
 use crate::plot::{Axis, Plot, Series};
 use crate::record::{Record, Row};
+use crate::runner::{Schedule, Variant, interleave};
 use datasets::cli::Interrupted;
 use glam::DVec3;
 use rt_core::accel::{BuildOptions, World};
@@ -15,6 +17,7 @@ use rt_core::material::Material;
 use rt_core::render::{RenderOptions, StopReason, render};
 use rt_core::sampler::Sampling;
 use rt_core::scene::{AmbientOcclusion, Scene};
+use std::cell::RefCell;
 
 /// Seed of the references: other points than any measured picture has.
 const REFERENCE_SEED: u64 = 0x5eed;
@@ -31,7 +34,10 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("quantity", "", "what is sampled");
     record.column("sampling", "", "how the points are spread");
     record.column("samples", "", "rays per point on the surface, or samples per pixel");
-    record.column("time", "ms", "wall time of the picture, fastest of the runs");
+    record.column("time", "ms", "wall time of the picture, median over the rounds");
+    record.column("time_low", "ms", "fastest round");
+    record.column("time_high", "ms", "slowest round");
+    record.column("rounds", "", "rounds; all settings of a quantity took turns in them");
     record.column(
         "rms_error",
         "grey level",
@@ -43,7 +49,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.notes.push(format!(
         "A grey level is 1/255 of white in linear light. References have {reference} low-discrepancy samples with another \
          seed. Ambient occlusion and soft shadows are sampled at the pixel’s centre alone, so that each curve shows one \
-         source of error; antialiasing is the pixel’s area. Independent points err as the square root of 1/samples."
+         source of error; antialiasing is the pixel’s area."
     ));
     let mesh = meshes::coarse_wavelet(if context.quick { 41 } else { 101 })?;
     let world = World::from_mesh(mesh, &BuildOptions::default())?;
@@ -58,32 +64,69 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         let plain = RenderOptions { cancel: context.cancel.clone(), ..RenderOptions::new(pixels, pixels) };
         let options = RenderOptions { seed: REFERENCE_SEED, ..plain.clone() };
         let (exact, _) = picture(&quantity, &camera, &options, reference)?;
-        for sampling in Sampling::ALL {
-            context.say(format!("{}: {}", quantity.name, sampling.name()))?;
-            let mut points = vec![];
-            for n in (0..).map(|k| 1u32 << (2 * k)).take_while(|n| *n <= most) {
+        // All settings of a quantity in turns: a slow minute of the machine is slow for all.
+        let counts: Vec<u32> = (0..).map(|k| 1u32 << (2 * k)).take_while(|n| *n <= most).collect();
+        let settings: Vec<(Sampling, u32)> =
+            Sampling::ALL.into_iter().flat_map(|s| counts.iter().map(move |n| (s, *n))).collect();
+        context.say(format!("{}: {} settings in turns", quantity.name, settings.len()))?;
+        let frames: RefCell<Vec<Option<Frame>>> = RefCell::new(vec![None; settings.len()]);
+        let failed: RefCell<Option<anyhow::Error>> = RefCell::new(None);
+        let mut variants: Vec<Variant<'_>> = settings
+            .iter()
+            .enumerate()
+            .map(|(i, &(sampling, n))| {
                 let options = RenderOptions { sampling, ..plain.clone() };
-                let runs = if n <= 16 { 3 } else { 1 };
-                let (mut frame, mut secs) = picture(&quantity, &camera, &options, n)?;
-                for _ in 1..runs {
-                    let again = picture(&quantity, &camera, &options, n)?;
-                    (frame, secs) = (again.0, secs.min(again.1));
-                }
-                let (rms, largest) = difference(&frame, &exact);
-                points.push((secs * 1e3, rms));
-                record.rows.push(
-                    Row::new()
-                        .with("quantity", quantity.name)
-                        .with("sampling", sampling.name())
-                        .with("samples", n)
-                        .with("time", secs * 1e3)
-                        .with("rms_error", rms)
-                        .with("largest_error", largest)
-                        .with("reference_samples", reference),
-                );
-            }
-            plot.series.push(Series::new(sampling.name(), points));
+                let (quantity, camera, frames, failed) = (&quantity, &camera, &frames, &failed);
+                Variant::timed(format!("{}, {n}", sampling.name()), move || {
+                    // After Ctrl-C pictures end at once.
+                    match picture(quantity, camera, &options, n) {
+                        Ok((frame, sample)) => {
+                            frames.borrow_mut()[i] = Some(frame);
+                            sample
+                        }
+                        Err(e) => {
+                            failed.borrow_mut().get_or_insert(e);
+                            Sample::default()
+                        }
+                    }
+                })
+            })
+            .collect();
+        let timings = interleave(&context.schedule(Schedule::all_threads(), 5.0), &mut variants)?;
+        drop(variants);
+        if let Some(e) = failed.into_inner() {
+            return Err(e);
         }
+        for ((timed, (sampling, n)), frame) in timings.variants.iter().zip(&settings).zip(frames.into_inner())
+        {
+            let (Some(frame), time) = (frame, timed.summary(Clock::Wall)) else { continue };
+            let (rms, largest) = difference(&frame, &exact);
+            let row = Row::new().with("quantity", quantity.name).with("sampling", sampling.name());
+            let row = row.with("samples", *n).with("time", time.median * 1e3);
+            let row = row.with("time_low", time.low * 1e3).with("time_high", time.high * 1e3);
+            let row = row.with("rounds", timed.samples.len()).with("rms_error", rms);
+            record.rows.push(row.with("largest_error", largest).with("reference_samples", reference));
+        }
+        let mut words = vec![];
+        for sampling in Sampling::ALL {
+            let of = |r: &&Row| {
+                r.text("quantity") == Some(quantity.name) && r.text("sampling") == Some(sampling.name())
+            };
+            let rows: Vec<&Row> = record.rows.iter().filter(of).collect();
+            let points = rows.iter().filter_map(|r| r.number("time").zip(r.number("rms_error")));
+            plot.series.push(Series::new(sampling.name(), points.collect()));
+            let (first, last) = (rows.first(), rows.last());
+            let ends = first.zip(last).and_then(|(a, b)| a.number("rms_error").zip(b.number("rms_error")));
+            if let Some((few, many)) = ends {
+                words.push(format!("{} {:.1} times", sampling.name(), few / many));
+            }
+        }
+        record.notes.push(format!(
+            "{}: from 1 sample to {most} the error fell: {}. Errors that fall with the square root would have fallen {:.1} times.",
+            quantity.name,
+            words.join(", "),
+            f64::from(most).sqrt()
+        ));
         record.plots.push(plot);
     }
     Ok(())
@@ -124,14 +167,20 @@ fn quantities(world: World, camera: &Camera) -> Vec<Quantity> {
     ]
 }
 
-/// The picture and its seconds.
-fn picture(q: &Quantity, camera: &Camera, options: &RenderOptions, n: u32) -> anyhow::Result<(Frame, f64)> {
+/// The picture and what the renderer took for it.
+fn picture(
+    q: &Quantity,
+    camera: &Camera,
+    options: &RenderOptions,
+    n: u32,
+) -> anyhow::Result<(Frame, Sample)> {
     let (scene, options) = (q.with)(&q.scene, options, n);
-    let output = render(&scene, camera, &options)?;
+    let (output, sample) = clock::measure(|| render(&scene, camera, &options));
+    let output = output?;
     if output.report.stopped == StopReason::Cancelled {
         return Err(Interrupted.into());
     }
-    Ok((output.frame, output.report.elapsed.as_secs_f64()))
+    Ok((output.frame, sample))
 }
 
 /// Root mean square and largest difference of the colour channels, in grey levels.

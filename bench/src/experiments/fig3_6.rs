@@ -19,7 +19,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let (largest, size, count) = if context.quick { (Size::M1, 384, 1) } else { (Size::M8, 1024, 3) };
     record.notes.push(format!(
         "Wavelet surfaces, {size} x {size} pixels, headlight, triangles per rank as constant as the named sizes allow. Every rank traces camera rays \
-         where its part is; the picture is that of one node, bit for bit. The dissertation plots average and maximum render time: what \
+         where its part is; that the picture is that of one node is for composite's tests, and not looked at here. The dissertation plots average and maximum render time: what \
          lies between them is waiting."
     ));
     for ranks in powers(1, 128) {

@@ -11,6 +11,7 @@ use crate::peers::embree::{EmbreeScene, Options, Quality};
 use crate::peers::obvhs::{Obvhs, Preset};
 use crate::plot::{Axis, Plot, Point, Series};
 use crate::record::{Record, Row};
+use crate::runner::{VERDICT_ROUNDS, order};
 use crate::stats::Summary;
 use datasets::generate::nested_wavelet::Size;
 use rt_core::accel::{BuildOptions, BuildQuality};
@@ -63,7 +64,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
                 let mesh = context.wavelet(size)?;
                 // Slow builders drop out where they would take minutes each.
                 let small = size <= Size::M4;
-                measure(context, record, &with, &mesh, if small { 3 } else { 2 }, small)?;
+                measure(context, record, &with, &mesh, VERDICT_ROUNDS, small)?;
             }
         }
     }
@@ -96,12 +97,12 @@ fn measure(
     }
     for round in 0..rounds {
         context.say(format!("{n} triangles, round {} of {rounds}", round + 1))?;
-        for i in 0..builders.len() {
-            let i = (i + round) % builders.len();
-            costs[i].push(builders[i].1()?);
-        }
-        if let Some(frames) = &mut drawn {
-            frames.take(FRAMES_A_ROUND)?;
+        for i in order(builders.len() + 1, round) {
+            match (builders.get(i), &mut drawn) {
+                (Some((_, build)), _) => costs[i].push(build()?),
+                (None, Some(frames)) => frames.take(FRAMES_A_ROUND)?,
+                (None, None) => {}
+            }
         }
     }
     for ((name, _), costs) in builders.iter().zip(&costs) {

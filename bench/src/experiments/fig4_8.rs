@@ -35,8 +35,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         false => (context.wavelet(Size::M1)?, 40),
     };
     record.notes.push(format!(
-        "pvbatch turns a camera around {} triangles for {frames} frames through `gluray run`; the phases are those that the library wrote down meanwhile. \
-         The hierarchy is built once, fast, and once more, better, beside the frames.",
+        "pvbatch turns a camera around {} triangles for {frames} frames through `gluray run`; the phases are those that the library wrote down meanwhile.",
         mesh.num_triangles()
     ));
     context.say("data")?;
@@ -86,7 +85,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     draw(&tools.gluray, &file("report.json"), &[&file("frames.svg")], Some((from, to)))?;
     for (name, caption) in [
         ("chart.svg", "The run: builds and frames."),
-        ("frames.svg", "Some frames after both builds."),
+        ("frames.svg", "The last frames of the run."),
         ("trace.json", "The same for chrome://tracing and Perfetto."),
     ] {
         let bytes = std::fs::read(file(name))?;

@@ -28,9 +28,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("picture", "", "which picture");
     record.column("time", "s", "wall time of the picture from the field at hand");
     record.notes.push(
-        "Traced: Verlet, cubic b-spline, half a voxel a step. Line of sight leaves out that rays bend, so its relative error grows \
-         in proportion to n - 1. For gases in a laboratory (1e-4 and less) it is below a thousandth, and the tolerance decides which one is taken. \
-         Flows are scaled to each amplitude. Volume rendering of |grad n| has no optics in it and no unit: nothing can be compared but the look."
+        "Traced: Verlet, cubic b-spline, half a voxel a step. Line of sight leaves out that rays bend. Flows are scaled to each amplitude. Volume rendering of |grad n| has no optics in it and no unit: nothing can be compared but the look."
             .into(),
     );
     pictures(context, record)?;
@@ -68,8 +66,30 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         plot.series.push(Series::new(format!("{name}, deflection"), deflection));
         plot.series.push(Series::new(format!("{name}, optical path"), path));
     }
+    record.notes.push(words(&record.rows));
     record.plots.push(plot);
     Ok(())
+}
+
+/// How far the two are apart in a gas of the laboratory, and how that grows with n - 1.
+fn words(rows: &[Row]) -> String {
+    let mut flows: Vec<&str> = rows.iter().filter_map(|r| r.text("flow")).collect();
+    flows.dedup();
+    let each = flows.iter().filter_map(|flow| {
+        let at = |amplitude: f64| {
+            let here = |r: &&Row| {
+                let a = r.number("amplitude").unwrap_or(0.0);
+                r.text("flow") == Some(*flow) && (a / amplitude - 1.0).abs() < 1e-6
+            };
+            rows.iter().find(here)?.number("deflection_rms")
+        };
+        let (weak, strong) = (at(1e-4)?, at(1e-3)?);
+        Some(format!("{flow} {weak:.1e} at 1e-4, {:.1} times that at 1e-3", strong / weak))
+    });
+    format!(
+        "Root mean square difference of deflections, as part of the largest: {}.",
+        each.collect::<Vec<_>>().join("; ")
+    )
 }
 
 fn scaled(field: &Field, factor: f64) -> anyhow::Result<Field> {

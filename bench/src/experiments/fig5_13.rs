@@ -187,10 +187,21 @@ fn filters(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
         plot.series.push(Series::new(name, points));
     }
     record.plots.push(plot);
-    record.notes.push(
-        "Filters shrink as photons are added (radius as N^(-1/6)), so each converges to the sharp picture; without a filter the error is noise alone. \
-         Times of a whole picture, field at hand."
-            .into(),
-    );
+    let error = |filter: &str, samples: u32| {
+        let here =
+            |r: &&Row| r.text("filter") == Some(filter) && r.number("samples") == Some(f64::from(samples));
+        record.rows.iter().find(here).and_then(|r| r.number("rms_error")).unwrap_or(f64::NAN)
+    };
+    let least = |samples: u32| {
+        let names = FILTERS.map(|f| f.0);
+        let best = names.into_iter().min_by(|a, b| error(a, samples).total_cmp(&error(b, samples)));
+        format!("{samples} photons: {}", best.unwrap_or_default())
+    };
+    let least: Vec<String> = counts.iter().map(|n| least(*n)).collect();
+    record.notes.push(format!(
+        "Filters shrink as photons are added (radius as N^(-1/6)). The least error had, with {}. Times are those of a whole picture, field at hand, \
+         seen once.",
+        least.join("; ")
+    ));
     Ok(())
 }

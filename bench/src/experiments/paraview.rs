@@ -6,7 +6,7 @@
 use super::Context;
 use crate::plot::{Axis, Plot, Series};
 use crate::record::{Record, Row};
-use crate::runner::Ratio;
+use crate::runner::{self, Ratio, VERDICT_ROUNDS};
 use crate::stats::Summary;
 use anyhow::{Context as _, bail};
 use datasets::catalogue::{self, Data};
@@ -34,15 +34,15 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let (pixels, subjects): (u32, &[Subject]) = if context.quick {
         (384, &[Subject { data: "wavelet", size: "1M", frames: 3, rounds: 1 }])
     } else {
-        let full = |data, size, frames, rounds| Subject { data, size, frames, rounds };
+        let full = |data, size, frames| Subject { data, size, frames, rounds: VERDICT_ROUNDS };
         (
             1024,
             &[
-                full("wavelet", "1M", 6, 3),
-                full("mixing-layer", "medium", 4, 2),
-                full("plasma", "medium", 4, 2),
-                full("wavelet", "4M", 6, 3),
-                full("wavelet", "16M", 4, 2),
+                full("wavelet", "1M", 6),
+                full("mixing-layer", "medium", 4),
+                full("plasma", "medium", 4),
+                full("wavelet", "4M", 6),
+                full("wavelet", "16M", 4),
             ],
         )
     };
@@ -59,10 +59,11 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         let order = order(subject, pixels, context.quick, &folder.0)?;
         let mut rounds = Vec::new();
         for round in 0..subject.rounds {
-            let mut pair = Vec::new();
-            for program in PROGRAMS {
+            let mut pair = vec![Value::Null; PROGRAMS.len()];
+            for p in runner::order(PROGRAMS.len(), round) {
+                let program = PROGRAMS[p];
                 context.say(format!("{name}: {program}, round {}", round + 1))?;
-                pair.push(host.frames(program, &order, &folder.0)?);
+                pair[p] = host.frames(program, &order, &folder.0)?;
             }
             rounds.push(pair);
         }
@@ -170,7 +171,7 @@ fn rows(record: &mut Record, data: &str, rounds: &[Vec<Value>]) -> anyhow::Resul
                 rival / ours
             };
             let what = if name == "cpu" { "CPU seconds of a frame" } else { "wall time of a frame" };
-            record.ratios.push(ratio(
+            record.ratios.extend(ratio(
                 format!("{what}, {data} {view}, {triangles} triangles"),
                 rounds.iter().map(per_round).collect(),
             ));
@@ -179,7 +180,7 @@ fn rows(record: &mut Record, data: &str, rounds: &[Vec<Value>]) -> anyhow::Resul
     for (name, what) in [("first_secs", "first frame"), ("peak_gb", "peak memory")] {
         let of = |r: &Vec<Value>, p: usize| r[p][name].as_f64().unwrap_or(f64::NAN);
         let each = rounds.iter().map(|r| of(r, 0) / of(r, 1)).collect();
-        record.ratios.push(ratio(format!("{what}, {data}, {triangles} triangles"), each));
+        record.ratios.extend(ratio(format!("{what}, {data}, {triangles} triangles"), each));
     }
     Ok(())
 }
@@ -189,18 +190,8 @@ fn median(values: &[f64]) -> f64 {
     Summary::of(values).map_or(f64::NAN, |s| s.median)
 }
 
-fn ratio(name: String, rounds: Vec<f64>) -> Ratio {
-    let (low, high) =
-        rounds.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-    Ratio {
-        name: format!("vtk-bridge: {name}"),
-        rival: "ParaView with llvmpipe".into(),
-        value: median(&rounds),
-        spread: high - low,
-        low,
-        high,
-        rounds: rounds.len(),
-    }
+fn ratio(name: String, rounds: Vec<f64>) -> Option<Ratio> {
+    Ratio::of_rounds(format!("vtk-bridge: {name}"), "ParaView with llvmpipe", &rounds)
 }
 
 fn plots(record: &mut Record) {

@@ -18,9 +18,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("imbalance", "", "slowest rank’s render time over the mean");
     record.column("most_triangles", "", "triangles of the rank that has most");
     record.notes.push(
-        "A partition for the view must be made anew for every view: that cost is not in these times. It pays where most of the data is out of sight or far \
-         away, as from within the layer (RMI), and does not where everything is in view."
-            .into(),
+        "A partition for the view must be made anew for every view: that cost is not in these times.".into(),
     );
     let quick = context.quick;
     let (pixels, count) = if quick { (320, 1) } else { (1024, 3) };
@@ -58,6 +56,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             }
         }
     }
+    record.notes.push(words(&record.rows));
     let mut plot =
         Plot::lines("Partitions", Axis::log("ranks", ""), Axis::log("slowest rank’s render", "ms"));
     for (data, view, _) in cases {
@@ -73,4 +72,28 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     }
     record.plots.push(plot);
     Ok(())
+}
+
+/// The slowest rank's time with parts of as many triangles by that with parts of as much work, view by view.
+fn words(rows: &[Row]) -> String {
+    let mut views: Vec<&str> = rows.iter().filter_map(|r| r.text("view")).collect();
+    views.dedup();
+    let most = rows.iter().filter_map(|r| r.number("ranks")).fold(0.0, f64::max);
+    let slowest = |view: &str, partition: &str| {
+        let here = |r: &&Row| {
+            r.text("view") == Some(view)
+                && r.text("partition") == Some(partition)
+                && r.number("ranks") == Some(most)
+        };
+        rows.iter().find(here).and_then(|r| r.number("render_max"))
+    };
+    let each: Vec<String> = views
+        .iter()
+        .filter_map(|v| Some(format!("{v} {:.2}", slowest(v, "triangles")? / slowest(v, "view")?)))
+        .collect();
+    format!(
+        "On {most:.0} ranks the slowest rank's render time with parts of as many triangles, by that with parts of as much work, was: {}. Above 1 the \
+         partition for the view has gained.",
+        each.join(", ")
+    )
 }

@@ -3,6 +3,7 @@
 use super::Context;
 use crate::opengl::{Display, Tools};
 use crate::record::{Record, Row};
+use crate::runner;
 use crate::stats::Summary;
 use anyhow::Context as _;
 use datasets::cli::UsageError;
@@ -57,8 +58,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let mut order: Vec<String> = Vec::new();
     for n in 0..runs {
         context.say(format!("run {} of {runs}", n + 1))?;
-        for i in 0..WAYS.len() {
-            let way = (i + n) % WAYS.len();
+        for way in runner::order(WAYS.len(), n) {
             for (call, ns) in measure(tools, &display, &program, WAYS[way].1)? {
                 if !order.contains(&call) {
                     order.push(call.clone());

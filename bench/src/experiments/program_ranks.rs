@@ -3,6 +3,7 @@
 use super::Context;
 use crate::opengl::{Display, Program, Session, Tools, Way, write};
 use crate::record::{Record, Row};
+use crate::runner::order;
 use crate::stats::Summary;
 use datasets::generate::nested_wavelet::Size;
 
@@ -31,8 +32,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     };
     record.notes.push(format!(
         "`{SHARING}`: {} in a window of {SIZE_PX} x {SIZE_PX} pixels, through `gluray run --mode match --ranks N`. Its ranks are real processes on the cores of this \
-         machine, which they share: one rank has all cores, more have their part of them, so wall time cannot fall below that of one, and says what \
-         sharing costs. `render` is wall time there, of a rank's share of a frame.",
+         machine, which they share: one rank has all cores, more have their part of them, so wall time shows what sharing costs and not what more machines would gain. `render` is wall time there, of a rank's share of a frame.",
         PROGRAM.name()
     ));
     let display = Display::start(&tools.xvfb)?;
@@ -56,8 +56,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let mut times = vec![Vec::new(); counts.len()];
     for round in 0..groups {
         context.say(format!("{}: group {} of {groups}", PROGRAM.name(), round + 1))?;
-        for i in 0..counts.len() {
-            let i = (i + round as usize) % counts.len();
+        for i in order(counts.len(), round as usize) {
             times[i].push(sessions[i].frames(frames)?.wall_secs / f64::from(frames));
         }
     }

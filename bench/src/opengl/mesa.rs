@@ -2,6 +2,7 @@
 
 use super::programs::find;
 use super::{Cost, Display, Program, Session, Way, write};
+use crate::clock::Sample;
 use crate::record::Row;
 use crate::stats::Summary;
 use rt_core::mesh::TriMesh;
@@ -77,6 +78,18 @@ impl MesaFrames {
             self.costs.push(self.session.frames(1)?);
         }
         Ok(())
+    }
+
+    /// What one more frame took.
+    pub fn frame(&mut self) -> anyhow::Result<Sample> {
+        let cost = self.session.frames(1)?;
+        let (wall_secs, process_cpu_secs) = (cost.wall_secs, cost.cpu_secs);
+        Ok(Sample { wall_secs, process_cpu_secs, ..Sample::default() })
+    }
+
+    /// Ends the program whose frames somebody else has kept the times of.
+    pub fn close(self) -> anyhow::Result<()> {
+        self.session.end().map(drop)
     }
 
     /// Ends the program. `row` with the columns `time`, `time_low`, `time_high` and `cpu` of a frame, where `per_second` of their unit

@@ -7,7 +7,7 @@ mod table;
 
 use crate::plot::escape;
 use crate::record::Record;
-use crate::runner::Ratio;
+use crate::runner::{Ratio, Verdict};
 use std::collections::BTreeMap;
 
 /// The whole page. Records are shown by chapter, then by id.
@@ -39,7 +39,8 @@ pub fn page(records: &[Record]) -> String {
         for r in list {
             let (id, title) = (escape(&r.id), escape(&r.title));
             let gaps = if r.missing.is_empty() { "" } else { " <span class=\"gap\">(with gaps)</span>" };
-            s += &format!("<li><a href=\"#{id}\">{id}</a> {title}{gaps}</li>");
+            let doubt = if r.doubts().is_empty() { "" } else { " <span class=\"doubt\">(in doubt)</span>" };
+            s += &format!("<li><a href=\"#{id}\">{id}</a> {title}{gaps}{doubt}</li>");
         }
         s += "</ul>";
     }
@@ -57,9 +58,19 @@ fn section(r: &Record) -> String {
     let id = escape(&r.id);
     let mut s = format!("<section id=\"{id}\"><h3>{id}: {}</h3>\n", escape(&r.title));
     let form = if r.quick { "Quick form: smaller data, fewer rounds. " } else { "" };
-    s += &format!("<p class=\"when\">{form}{}, took {:.1} s.</p>\n", escape(&r.machine.date), r.elapsed_secs);
-    if !r.machine.optimised {
-        s += "<p class=\"missing\">Measured with a debug build: these times mean nothing. Use --release.</p>\n";
+    let m = &r.machine;
+    let load = m.load_1_min.map_or("load not known".into(), |l| format!("load {l:.2}"));
+    s += &format!(
+        "<p class=\"when\">{form}{}, took {:.1} s; {load} on {} cores when it began.</p>\n",
+        escape(&m.date),
+        r.elapsed_secs,
+        m.cores
+    );
+    if !r.recorded_despite.is_empty() {
+        s += "<p class=\"doubt\">Recorded despite what spoke against it (<code>--record-despite-doubts</code>).</p>\n";
+    }
+    for doubt in r.doubts() {
+        s += &format!("<p class=\"doubt\">In doubt: {}</p>\n", escape(&doubt));
     }
     for m in &r.missing {
         s += &format!("<p class=\"missing\">Missing: {}</p>\n", escape(m));
@@ -100,22 +111,22 @@ fn ratios(ratios: &[Ratio]) -> String {
          <th class=\"n\">spread</th><th class=\"n\">lowest to highest</th><th class=\"n\">rounds</th></tr></thead><tbody>",
     );
     for r in ratios {
-        // Rounds that contradict each other decide nothing.
-        let class = match (r.low > 1.0, r.high < 1.0) {
-            (true, _) => "faster",
-            (_, true) => "slower",
-            _ => "even",
+        let class = match r.verdict() {
+            Verdict::Faster => "faster",
+            Verdict::Slower => "slower",
+            Verdict::Even => "even",
+            Verdict::Open => "open",
         };
+        let rounds = r.why_open().map_or(r.rounds.to_string(), |why| format!("{} ({why})", r.rounds));
         s += &format!(
             "<tr><td>{}</td><td>{}</td><td class=\"n {class}\">{:.2}</td><td class=\"n\">{:.2}</td>\
-             <td class=\"n\">{:.2} to {:.2}</td><td class=\"n\">{}</td></tr>",
+             <td class=\"n\">{:.2} to {:.2}</td><td class=\"n\">{rounds}</td></tr>",
             escape(&r.name),
             escape(&r.rival),
             r.value,
             r.spread,
             r.low,
-            r.high,
-            r.rounds
+            r.high
         );
     }
     s + "</tbody></table></div>\n"
@@ -126,10 +137,11 @@ fn machines(records: &[Record]) -> String {
         .iter()
         .map(|r| {
             let m = &r.machine;
-            let commit = m.commit.as_ref().map_or(String::new(), |c| format!(", commit {c}"));
+            let commit = m.commit.as_ref().map_or(", commit not known".into(), |c| format!(", commit {c}"));
+            let changed = if m.is_dirty() { ", with uncommitted changes" } else { "" };
             let memory = m.memory_gib;
             format!(
-                "{}, {} cores, {}, {memory:.0} GiB, {}; version {}{commit}",
+                "{}, {} cores, {}, {memory:.0} GiB, {}; version {}{commit}{changed}",
                 m.cpu, m.cores, m.simd, m.os, m.version
             )
         })
@@ -238,6 +250,7 @@ mod tests {
             low,
             high,
             rounds: 7,
+            in_turns: true,
         };
         for (r, class) in [
             (ratio(1.1, 1.2, 1.3), "faster"),

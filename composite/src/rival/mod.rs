@@ -102,6 +102,8 @@ impl IcetStrategy {
 pub enum IcetMode {
     /// RGBA8 and depth, nearest wins.
     Depth,
+    /// Premultiplied RGBA8, in order.
+    BlendU8,
     /// Premultiplied RGBA f32, in order.
     BlendF32,
 }
@@ -111,6 +113,8 @@ pub enum IcetMode {
 pub enum IcetFrame<'a> {
     /// For [`IcetMode::Depth`].
     Depth(&'a [[u8; 4]], &'a [f32]),
+    /// For [`IcetMode::BlendU8`].
+    BlendU8(&'a [[u8; 4]]),
     /// For [`IcetMode::BlendF32`].
     BlendF32(&'a [[f32; 4]]),
 }
@@ -211,6 +215,7 @@ impl Icet {
         // Numbers are those of IceT.h.
         let (composite_mode, color, depth) = match mode {
             IcetMode::Depth => (0x0301, 0xC001, 0xD001),
+            IcetMode::BlendU8 => (0x0302, 0xC001, 0xD000),
             IcetMode::BlendF32 => (0x0302, 0xC002, 0xD000),
         };
         let f = &library.functions;
@@ -272,6 +277,10 @@ impl Icet {
                 self.fits(depths.len())?;
                 (colors.as_ptr().cast(), depths.as_ptr().cast())
             }
+            IcetFrame::BlendU8(colors) => {
+                self.fits(colors.len())?;
+                (colors.as_ptr().cast(), std::ptr::null())
+            }
             IcetFrame::BlendF32(colors) => {
                 self.fits(colors.len())?;
                 (colors.as_ptr().cast(), std::ptr::null())
@@ -309,7 +318,7 @@ impl Icet {
                     let first = (self.library.functions.image_colors_f32)(image);
                     IcetImage::RgbaF32(std::slice::from_raw_parts(first, self.pixels))
                 }
-                IcetMode::Depth => {
+                IcetMode::Depth | IcetMode::BlendU8 => {
                     let first = (self.library.functions.image_colors_u8)(image);
                     IcetImage::Rgba8(std::slice::from_raw_parts(first, self.pixels))
                 }

@@ -112,6 +112,32 @@ impl<'a> Bench<'a> {
         })
     }
 
+    /// The frame at hand by IceT's strategy of this number, and what `look` makes of the image where it is.
+    fn theirs<T>(
+        &mut self,
+        strategy: usize,
+        timed: bool,
+        times_ms: &mut [Vec<f64>],
+        look: impl FnOnce(IcetImage<'_>) -> T,
+    ) -> anyhow::Result<Option<T>> {
+        let Setting { pixels, timeout, .. } = self.setting;
+        let chosen = IcetStrategy::ALL[strategy];
+        self.icet.set_strategy(chosen);
+        self.comm.comm().barrier(timeout)?;
+        let begin = self.comm.comm().now();
+        let frame = match pixels {
+            Pixels::Depth => IcetFrame::Depth(&self.drawn.colors, &self.drawn.depths),
+            Pixels::Blend => IcetFrame::BlendF32(&self.glass),
+        };
+        let theirs = self.icet.composite(self.comm.comm(), frame, self.drawn.bounds);
+        let theirs = theirs.with_context(|| format!("IceT's {}", chosen.name()))?;
+        self.comm.comm().barrier(timeout)?;
+        if timed {
+            times_ms[strategy].push(1e3 * (self.comm.comm().now() - begin));
+        }
+        Ok(theirs.map(look))
+    }
+
     /// Frames of one scene.
     pub(super) fn measure(&mut self, scene: Scene, mut seats: Option<&mut Seats>) -> anyhow::Result<Row> {
         let (rank, ranks) = (self.comm.comm().rank(), self.comm.comm().size());
@@ -129,8 +155,16 @@ impl<'a> Bench<'a> {
             }
             let timed = moment >= WARM_UP;
 
-            // Ours. Renderers of one process draw into images that they can share.
+            // Renderers of one process draw into images that they can share.
             let shared = seats.is_some().then(|| self.shared()).transpose()?;
+            let turns = turns(1 + IcetStrategy::ALL.len(), moment);
+            let ours_at = turns.iter().position(|turn| *turn == 0).unwrap_or(0);
+            let mut copies = Vec::new();
+            for turn in &turns[..ours_at] {
+                copies.extend(self.theirs(turn - 1, timed, &mut rivals_ms, |image| Theirs::copied(&image))?);
+            }
+
+            // Ours.
             self.comm.comm().barrier(timeout)?;
             let begin = self.comm.comm().now();
             let (image, report) = match (&shared, &mut seats) {
@@ -167,24 +201,16 @@ impl<'a> Bench<'a> {
                 reports.push(report);
             }
 
-            // Theirs, each strategy in turn.
-            for (times, strategy) in rivals_ms.iter_mut().zip(IcetStrategy::ALL) {
-                self.icet.set_strategy(strategy);
-                self.comm.comm().barrier(timeout)?;
-                let begin = self.comm.comm().now();
-                let frame = match pixels {
-                    Pixels::Depth => IcetFrame::Depth(&self.drawn.colors, &self.drawn.depths),
-                    Pixels::Blend => IcetFrame::BlendF32(&self.glass),
-                };
-                let theirs = self.icet.composite(self.comm.comm(), frame, self.drawn.bounds);
-                let theirs = theirs.with_context(|| format!("IceT's {}", strategy.name()))?;
-                self.comm.comm().barrier(timeout)?;
-                if timed {
-                    times.push(1e3 * (self.comm.comm().now() - begin));
-                }
-                if let (Some(ours), Some(theirs)) = (&image, theirs) {
-                    pixels_differ += differing(ours, theirs);
-                }
+            // IceT's strategies whose turn was before ours, and those whose turn is now.
+            if let Some(ours) = &image {
+                pixels_differ += copies.iter().map(|theirs| differing(ours, theirs.image())).sum::<u64>();
+            }
+            drop(copies);
+            for turn in &turns[ours_at + 1..] {
+                let differ = self.theirs(turn - 1, timed, &mut rivals_ms, |theirs| {
+                    image.as_ref().map_or(0, |ours| differing(ours, theirs))
+                })?;
+                pixels_differ += differ.unwrap_or(0);
             }
             match (image, &mut seats) {
                 (Some(Ours::Depth(image)), Some(seats)) => seats.depth.recycle(image),
@@ -241,6 +267,39 @@ impl<'a> Bench<'a> {
     }
 }
 
+/// The order of a frame's turns, the same on all ranks: rotated from frame to frame, and reversed in every second one, so
+/// that each is first, last and behind each neighbour equally often. As in `runner` of the member bench, which may use
+/// composite and may not be used by it.
+fn turns(count: usize, frame: u64) -> Vec<usize> {
+    let mut turns: Vec<usize> = (0..count).map(|i| (i + frame as usize / 2) % count.max(1)).collect();
+    if frame % 2 == 1 {
+        turns.reverse();
+    }
+    turns
+}
+
+/// IceT's image, which it keeps only until its next frame.
+enum Theirs {
+    Rgba8(Vec<[u8; 4]>),
+    RgbaF32(Vec<[f32; 4]>),
+}
+
+impl Theirs {
+    fn copied(image: &IcetImage<'_>) -> Theirs {
+        match image {
+            IcetImage::Rgba8(colors) => Theirs::Rgba8(colors.to_vec()),
+            IcetImage::RgbaF32(colors) => Theirs::RgbaF32(colors.to_vec()),
+        }
+    }
+
+    fn image(&self) -> IcetImage<'_> {
+        match self {
+            Theirs::Rgba8(colors) => IcetImage::Rgba8(colors),
+            Theirs::RgbaF32(colors) => IcetImage::RgbaF32(colors),
+        }
+    }
+}
+
 /// What a rank has drawn, as an image of its own.
 enum Shared {
     Depth(Arc<Image<DepthPixel<[u8; 4]>>>),
@@ -277,4 +336,20 @@ fn median(values: &[f64]) -> f64 {
 
 fn smallest(values: &[f64]) -> f64 {
     values.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ours_does_not_always_have_the_first_turn() {
+        let count = 1 + IcetStrategy::ALL.len();
+        for place in 0..count {
+            for contender in 0..count {
+                let here = (0..2 * count as u64).filter(|frame| turns(count, *frame)[place] == contender);
+                assert_eq!(here.count(), 2, "contender {contender} at place {place}");
+            }
+        }
+    }
 }

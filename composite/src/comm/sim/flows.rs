@@ -25,12 +25,21 @@ pub(super) struct Flows {
     active: Vec<Flow>,
     /// When those that are through were.
     through_secs: BTreeMap<u64, f64>,
+    /// Whom those went to that are through since [`take_receivers`](Self::take_receivers).
+    reached: Vec<usize>,
     next: u64,
 }
 
 impl Flows {
     pub(super) fn new(ranks: usize) -> Flows {
-        Flows { ranks, since_secs: 0.0, active: Vec::new(), through_secs: BTreeMap::new(), next: 0 }
+        Flows {
+            ranks,
+            since_secs: 0.0,
+            active: Vec::new(),
+            through_secs: BTreeMap::new(),
+            reached: Vec::new(),
+            next: 0,
+        }
     }
 
     /// Begins a message that would take `secs` alone; what ended before must have been [`end`](Self::end_next)ed. Returns its number.
@@ -50,13 +59,25 @@ impl Flows {
         if next_secs > until_secs {
             return false;
         }
-        let through: Vec<u64> =
-            self.active.iter().filter(|flow| ends(flow) <= next_secs).map(|flow| flow.number).collect();
+        let ending = || self.active.iter().filter(|flow| ends(flow) <= next_secs);
+        let through: Vec<u64> = ending().map(|flow| flow.number).collect();
+        let reached: Vec<usize> = ending().map(|flow| flow.to).collect();
+        self.reached.extend(reached);
         self.go_on(next_secs);
         self.active.retain(|flow| !through.contains(&flow.number));
         self.through_secs.extend(through.into_iter().map(|number| (number, next_secs)));
         self.share();
         true
+    }
+
+    /// Whose messages have another time of arrival than when this was asked last: all that are on their way, because a
+    /// beginning or an end changes what others have, and those that are through since.
+    pub(super) fn take_receivers(&mut self) -> Vec<usize> {
+        let mut receivers = std::mem::take(&mut self.reached);
+        receivers.extend(self.active.iter().map(|flow| flow.to));
+        receivers.sort_unstable();
+        receivers.dedup();
+        receivers
     }
 
     /// How many messages of a sender with this tag are on their way, and when, as far as is known, the first of them will be through.
