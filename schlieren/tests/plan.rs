@@ -203,8 +203,8 @@ fn the_tolerance_asked_for_is_got_or_a_warning_names_why_not() {
                     let planned = section.paths(&scene, 0, Wanted { opd }, false, true).unwrap();
                     let [angle, path] = errors(&*planned.paths, &starts, &truths);
                     let what = format!(
-                        "{name} along {axis}, {tolerance:e} asked: {angle:.1e} rad, {path:.1e} m got by {}; the lattice's {of_lattice:.1e?}; {:?}",
-                        planned.description, planned.warnings
+                        "{name} along {axis}, {tolerance:e} asked: {angle:.1e} rad, {path:.1e} m got by {}; the lattice's {:.1e} rad, {:.1e} m; {:?}",
+                        planned.description, of_lattice[0], of_lattice[1], planned.warnings
                     );
                     if planned.description.starts_with("line-of-sight") {
                         straight += 1;
