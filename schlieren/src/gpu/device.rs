@@ -211,6 +211,10 @@ impl Gpu {
         let internal = self.device.push_error_scope(ErrorFilter::Internal);
         let done = work();
         let errors = [internal, validation, memory].map(|scope| pollster::block_on(scope.pop()));
+        if errors.iter().any(Option::is_some) {
+            // A device that is lost says so when it is asked; what was caught may be no more than a consequence.
+            let _ = self.device.poll(wgpu::PollType::Poll);
+        }
         match errors.into_iter().flatten().next() {
             Some(e) => Err(self.failed(e.to_string())),
             None => self.failure().map_or(Ok(done), |e| Err(self.failed(e))),

@@ -96,7 +96,7 @@ pub(crate) fn made_up_for(failure: &GpuError) -> String {
 }
 
 /// A failure, without what can be done about it.
-fn failed(failure: &GpuError) -> String {
+pub(crate) fn failed(failure: &GpuError) -> String {
     match failure {
         GpuError::Failed { adapter, reason } => format!("the GPU `{adapter}` failed ({reason})"),
         other => other.to_string(),

@@ -102,7 +102,7 @@ pub(super) fn on_gpu<'a>(
         let paths = loop {
             match GpuPaths::new(Arc::clone(&gpu), field, view, plan.interpolant, options) {
                 Err(e @ GpuError::Failed { .. }) if gpu.failure().is_some() => {
-                    told.get_or_insert(format!("{e}; it was opened again"));
+                    told.get_or_insert(format!("{}; it was opened again", crate::gpu::failed(&e)));
                     gpu = Gpu::shared()?;
                 }
                 made => break made?,
