@@ -44,7 +44,7 @@ fn ray(of: impl Strategy<Value = f32> + Clone) -> impl Strategy<Value = Ray> {
 }
 
 fn options() -> impl Strategy<Value = BuildOptions> {
-    (0usize..4, any::<bool>()).prop_map(|(q, exact)| BuildOptions {
+    (0..BuildQuality::ALL.len(), any::<bool>()).prop_map(|(q, exact)| BuildOptions {
         quality: BuildQuality::ALL[q],
         robustness: if exact { Robustness::Watertight } else { Robustness::Fast },
         simd: None,
