@@ -192,7 +192,7 @@ fn attributes_of_shapes_must_fit_and_worlds_cannot_be_swapped() {
 #[test]
 fn a_camera_whose_depth_range_is_nan_is_refused() {
     let camera = camera().with_depth_range([0.0, f64::NAN]);
-    let words = render(&plain(), &camera, &RenderOptions::new(4, 4)).err().expect("NaN").to_string();
+    let words = render(&plain(), &camera, &RenderOptions::new(4, 4)).unwrap_err().to_string();
     assert!(words.contains("depth_range[1]") && words.contains("NaN"), "{words}");
 }
 

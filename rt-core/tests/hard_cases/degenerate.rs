@@ -199,13 +199,14 @@ fn slices_of_different_length_are_refused_with_both_lengths() {
     let blocks = RayBlock::from_rays(&inward_rays(64, 6));
     for n in [0, 2, 7] {
         let (mut hits, mut masks) = (vec![HitBlock::MISS; n], vec![0u16; n]);
-        let expected = Err(StreamError { rays: 4, answers: n });
+        let refusal = StreamError { rays: 4, answers: n };
+        let expected = Err(refusal);
         assert_eq!(w.closest_coherent(&blocks, &mut hits), expected);
         assert_eq!(w.closest_incoherent(&blocks, &mut hits), expected);
         assert_eq!(w.occluded_coherent(&blocks, &mut masks), expected);
         assert_eq!(w.occluded_incoherent(&blocks, &mut masks), expected);
         assert!(hits.iter().all(|h| *h == HitBlock::MISS) && masks.iter().all(|m| *m == 0));
-        let words = expected.unwrap_err().to_string();
+        let words = refusal.to_string();
         assert!(words.contains("4 blocks of rays") && words.contains(&format!("of {n}")), "{words}");
     }
     let mut hits = vec![HitBlock::MISS; 4];
