@@ -25,6 +25,7 @@ pub mod ours;
 pub mod peers;
 pub mod picture;
 pub mod plot;
+pub mod quote;
 pub mod rays;
 pub mod record;
 pub mod report;

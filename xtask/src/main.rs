@@ -32,6 +32,9 @@ cargo xtask vtk [--release] [OPTIONS OF vtk-bridge install]
       --release         build it optimised, into target/release
       --prefix FOLDER, --include FOLDER, --plugin    as of `vtk-bridge install`
 
+cargo xtask book
+    Writes the tables and plots that the book quotes anew from the records in bench/runs.
+
 cargo xtask ci-list
     Prints the steps and their commands without running them.
 
@@ -43,6 +46,7 @@ Exit status: 0 all passed, 1 a step failed, 2 the command line was wrong, 3 a re
 enum Command {
     Help,
     Setup,
+    Book,
     CiList,
     Test(TestOptions),
     Vtk { release: bool, install: Vec<String> },
@@ -80,6 +84,7 @@ fn parse(args: &[String]) -> Result<Command, String> {
     match command {
         "help" | "--help" | "-h" => Ok(Command::Help),
         "setup" => no_options(Command::Setup),
+        "book" => no_options(Command::Book),
         "ci-list" => no_options(Command::CiList),
         "test" => {
             let mut options = TestOptions::default();
@@ -111,7 +116,7 @@ fn parse(args: &[String]) -> Result<Command, String> {
             release: rest.iter().any(|a| a == "--release"),
             install: rest.iter().filter(|a| *a != "--release").cloned().collect(),
         }),
-        other => Err(format!("no command `{other}`; there are test, setup, vtk, ci-list and help")),
+        other => Err(format!("no command `{other}`; there are test, setup, vtk, book, ci-list and help")),
     }
 }
 
@@ -122,9 +127,17 @@ fn workspace_root() -> PathBuf {
 
 /// Builds vtk-bridge and lets it install itself. Its own options and messages are its business.
 fn vtk(release: bool, install: &[String]) -> Exit {
+    let mut args = vec!["--bin", "vtk-bridge"];
+    args.extend(release.then_some("--release"));
+    args.extend(["--", "install"]);
+    args.extend(install.iter().map(String::as_str));
+    run_member("vtk-bridge", &args)
+}
+
+/// `cargo run -p MEMBER ARGS` in the root of the workspace.
+fn run_member(member: &str, args: &[&str]) -> Exit {
     let mut cargo = std::process::Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    cargo.current_dir(workspace_root()).args(["run", "--quiet", "-p", "vtk-bridge", "--bin", "vtk-bridge"]);
-    cargo.args(release.then_some("--release")).args(["--", "install"]).args(install);
+    cargo.current_dir(workspace_root()).args(["run", "--quiet", "-p", member]).args(args);
     match cargo.status() {
         Ok(status) if status.success() => Exit::Success,
         Ok(status) if status.code() == Some(2) => Exit::Usage,
@@ -157,6 +170,7 @@ fn main() -> ExitCode {
             if found.missing().is_empty() { Exit::Success } else { Exit::PeerMissing }
         }
         Ok(Command::Vtk { release, install }) => vtk(release, &install),
+        Ok(Command::Book) => run_member("bench", &["--", "quote"]),
         Ok(Command::Test(options)) => runner::run(&workspace_root(), &options),
     };
     ExitCode::from(exit as u8)

@@ -2,6 +2,7 @@
 
 mod list;
 mod peers;
+mod quote;
 mod render;
 mod report;
 mod run;
@@ -35,6 +36,8 @@ enum Command {
     Run(RunArgs),
     /// Makes the report of records again
     Report(ReportArgs),
+    /// Writes the tables and plots of the book anew from the records in bench/runs
+    Quote,
     /// Draws a file: meshes, isosurfaces of image data, lines as tubes, points as spheres
     Render(RenderArgs),
     /// Draws one of the report's pictures of generated data
@@ -161,6 +164,7 @@ fn execute(cli: Cli) -> anyhow::Result<()> {
         Some(Command::List) => list::list(common),
         Some(Command::Run(args)) => run::run(common, &args),
         Some(Command::Report(args)) => report::report(common, &args),
+        Some(Command::Quote) => quote::quote(common),
         Some(Command::Render(args)) => render::render(common, &args),
         Some(Command::Picture(args)) => render::picture(common, &args),
         Some(Command::Peers) => peers::peers(common),
