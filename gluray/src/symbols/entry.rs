@@ -1,7 +1,7 @@
 //! How programs and GLVND find the trampolines: `dlsym`, `glXGetProcAddress`, `__glx_Main`,
 //! `__egl_Main`.
 
-use super::{index_of, trampoline};
+use super::{NAMES, index_of, trampoline};
 use crate::fault::caught;
 use crate::real;
 use core::ffi::{CStr, c_char, c_int, c_void};
