@@ -12,6 +12,7 @@ use rt_core::render::RenderOptions;
 use rt_core::scene::{Scene, SceneBuilder};
 use rt_core::simd::SimdLevel;
 use scenes_common::*;
+use std::f64::consts::FRAC_PI_2;
 
 /// A pixel is 1/16: the nearest centre is 1/32 from the blocker's edge, and its shadow is off by at
 /// most the gap times the slope of the light.
@@ -144,7 +145,7 @@ fn turned(mut mesh: TriMesh, turn: DMat3, scale: f64) -> TriMesh {
 #[test]
 fn a_light_on_a_surface_is_not_hidden_by_it() {
     // A room of floor and ceiling. Lights on the ceiling, of size 0 and with an area whose own
-    // geometry is in the ceiling.
+    // geometry is in the ceiling; the sphere hangs from it, or half of it would be above.
     let turns = [
         DMat3::IDENTITY,
         DMat3::from_axis_angle(DVec3::new(0.6, -0.8, 0.0), 0.7) * DMat3::from_rotation_z(0.3),
@@ -156,7 +157,8 @@ fn a_light_on_a_surface_is_not_hidden_by_it() {
                 for below in [0.0, 1e-3] {
                     let mut b = SceneBuilder::new();
                     b.mesh(turned(floor(0.0, 6.0), turn, scale), Material::matte([1.0; 3]));
-                    let ceiling = floor(3.0 + below as f32, 6.0);
+                    let hangs = if name == "sphere" { light.size() as f32 } else { 0.0 };
+                    let ceiling = floor(3.0 + hangs + below as f32, 6.0);
                     b.mesh(turned(ceiling, turn, scale), Material::matte([1.0; 3]));
                     b.light(moved(light, turn, scale));
                     let scene = b.build().unwrap();
@@ -186,9 +188,17 @@ fn flat_lights_are_not_hidden_by_their_own_plane_however_flat_they_fall() {
     // its top at 1/3000 of the horizontal.
     for scale in [1e-6, 1.0, 1e6] {
         for (name, light) in lights(DVec3::Z, 3.0) {
-            if !matches!(name, "disk" | "ring" | "quad") {
-                continue;
-            }
+            let light = match light.kind {
+                LightKind::Disk { .. } | LightKind::Quad { .. } => light,
+                // As wide as a ring's cone may be: light as flat as here is within it.
+                LightKind::Ring { position, direction, inner_radius, radius, .. } => {
+                    let (inner_rad, outer_rad) = (FRAC_PI_2, FRAC_PI_2);
+                    let kind =
+                        LightKind::Ring { position, direction, inner_radius, radius, inner_rad, outer_rad };
+                    Light { kind, ..light }
+                }
+                _ => continue,
+            };
             let turn = DMat3::from_axis_angle(DVec3::new(0.6, -0.8, 0.0), 0.7);
             let mut b = SceneBuilder::new();
             b.mesh(turned(floor(3.0, 6.0), turn, scale), Material::matte([1.0; 3]));
