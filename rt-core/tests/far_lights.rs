@@ -38,7 +38,7 @@ fn lights(dir: DVec3, distance: f64) -> Vec<(&'static str, Light)> {
     let as_point = |kind| Light { kind, ..Light::point(at) };
     vec![
         ("point", Light::point(at)),
-        ("sphere", Light::point(at).with_size(size)),
+        ("sphere", Light::point(at).with_size(size).expect("a point may have a size")),
         ("spot", Light::spot(at, -dir, 1.5)),
         ("cone", as_point(cone)),
         ("disk", Light::disk(at, -dir, size)),
