@@ -65,7 +65,7 @@ pub enum WireError {
     },
     /// The sender composites something else.
     #[error(
-        "its sender composites another size or pixel format, or has other options (strategy, rank order, destination ...): \
+        "its sender composites another size, pixel format, strategy or rank order, or has other options: \
          use the same on every rank"
     )]
     Fingerprint,

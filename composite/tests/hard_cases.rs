@@ -158,7 +158,7 @@ fn ranks_with_different_strategies_or_options_hear_of_it_at_once() {
         });
         for text in results {
             let text = text.unwrap();
-            assert!(text.contains("another size or pixel format, or has other options"), "{other:?}: {text}");
+            assert!(text.contains("another size, pixel format, strategy"), "{other:?}: {text}");
         }
     }
 }
@@ -198,36 +198,34 @@ fn layer_color(alpha: f64, layer: usize, k: usize) -> [f64; 4] {
     [a * 0.9 * vary(0.569_840), a * 0.5, a * 0.2, a]
 }
 
-/// Largest error in units of 1/255 of 128 layers at `pixels`, against exact arithmetic: what the format makes of the colours and
-/// opacities themselves counts too.
-fn error_of_128_layers<C: composite::Color>(alpha: f64, pixels: impl Iterator<Item = usize>) -> f64
+/// Largest error of these layers in units of 1/255 against `exact`: what the format makes of the colours and opacities themselves
+/// counts too.
+fn error_of_layers<C: composite::Color>(layers: &[Vec<[f64; 4]>], exact: &[[f64; 4]]) -> f64
 where
     PremultipliedPixel<C>: Composite<Color = C>,
 {
-    let pixels: Vec<usize> = pixels.collect();
-    let mut exact = vec![[0.0_f64; 4]; pixels.len()];
-    let layers: Vec<Vec<C>> = (0..LAYERS)
-        .map(|layer| {
-            let of_pixel = |(&k, sum): (&usize, &mut [f64; 4])| {
-                let color = layer_color(alpha, layer, k);
-                let left = 1.0 - sum[3];
-                (0..4).for_each(|i| sum[i] += left * color[i]);
-                C::from_f32(color.map(|channel| channel as f32))
-            };
-            pixels.iter().zip(&mut exact).map(of_pixel).collect()
-        })
-        .collect();
-    let width_px = pixels.len() as u32;
+    let stored = |color: &[f64; 4]| C::from_f32(color.map(|channel| channel as f32));
+    let layers: Vec<Vec<C>> = layers.iter().map(|layer| layer.iter().map(stored).collect()).collect();
+    let width_px = exact.len() as u32;
     let frames: Vec<Frame<'_, PremultipliedPixel<C>>> =
         layers.iter().map(|colors| Frame::premultiplied(width_px, 1, colors).unwrap()).collect();
     let found = composite_serial(&frames).unwrap();
-    let mut worst = 0.0_f64;
-    for (found, exact) in found.colors().iter().zip(&exact) {
-        for (found, exact) in found.to_f32().iter().zip(exact) {
-            worst = worst.max(255.0 * (f64::from(*found) - exact).abs());
+    let channels = found.colors().iter().map(|color| color.to_f32()).zip(exact);
+    channels
+        .flat_map(|(found, exact)| (0..4).map(move |i| 255.0 * (f64::from(found[i]) - exact[i]).abs()))
+        .fold(0.0, f64::max)
+}
+
+/// The sum of layers, front to back.
+fn sum_of_layers(layers: &[Vec<[f64; 4]>]) -> Vec<[f64; 4]> {
+    let mut sums = vec![[0.0_f64; 4]; layers[0].len()];
+    for layer in layers {
+        for (sum, color) in sums.iter_mut().zip(layer) {
+            let left = 1.0 - sum[3];
+            (0..4).for_each(|i| sum[i] += left * color[i]);
         }
     }
-    worst
+    sums
 }
 
 /// The largest error of each format in the newest record of `accuracy-composite`.
@@ -247,7 +245,7 @@ fn recorded() -> Vec<(String, f64)> {
     let mut worst: Vec<(String, f64)> = Vec::new();
     for row in rows {
         let cells: Vec<&str> = row.split(',').collect();
-        let (name, error) = (cells[format].to_string(), cells[error].parse().expect("a number"));
+        let (name, error) = (cells[format].to_string(), cells[error].parse::<f64>().expect("a number"));
         match worst.iter_mut().find(|(known, _)| *known == name) {
             Some((_, most)) => *most = error.max(*most),
             None => worst.push((name, error)),
@@ -258,23 +256,49 @@ fn recorded() -> Vec<(String, f64)> {
 
 #[test]
 fn errors_of_128_faint_layers_are_those_of_the_table() {
-    let alphas = [0.005, 0.02, 0.1];
-    // A prime number of pixels apart, so that all columns and rows take part.
-    let pixels = || (0..PIXELS).step_by(13);
-    let worst = |of: &dyn Fn(f64) -> f64| alphas.iter().map(|alpha| of(*alpha)).fold(0.0, f64::max);
-    let found = [
-        ("u8", worst(&|alpha| error_of_128_layers::<[u8; 4]>(alpha, pixels()))),
-        ("u16", worst(&|alpha| error_of_128_layers::<[u16; 4]>(alpha, pixels()))),
-        ("f16", worst(&|alpha| error_of_128_layers::<[f16; 4]>(alpha, pixels()))),
-        ("f32", worst(&|alpha| error_of_128_layers::<[f32; 4]>(alpha, pixels()))),
-    ];
-    let recorded = recorded();
-    for (format, error) in found {
-        let (_, most) = recorded.iter().find(|(name, _)| name == format).expect("a format of the record");
-        // A share of the record's pixels, which come near to the worst of all.
-        let near = 0.8 * most..=1.000_001 * most;
-        assert!(near.contains(&error), "{format}: {error}, and {most} in the record");
+    /// Pixels at once, so that the layers fit into the cache.
+    const AT_ONCE: usize = 1 << 10;
+    let mut worst = [("u8", 0.0_f64), ("u16", 0.0), ("f16", 0.0), ("f32", 0.0)];
+    for alpha in [0.005, 0.02, 0.1] {
+        for first in (0..PIXELS).step_by(AT_ONCE) {
+            let of_layer = |layer| (first..first + AT_ONCE).map(|k| layer_color(alpha, layer, k)).collect();
+            let layers: Vec<Vec<[f64; 4]>> = (0..LAYERS).map(of_layer).collect();
+            let exact = sum_of_layers(&layers);
+            let errors = [
+                error_of_layers::<[u8; 4]>(&layers, &exact),
+                error_of_layers::<[u16; 4]>(&layers, &exact),
+                error_of_layers::<[f16; 4]>(&layers, &exact),
+                error_of_layers::<[f32; 4]>(&layers, &exact),
+            ];
+            worst.iter_mut().zip(errors).for_each(|((_, worst), error)| *worst = worst.max(error));
+        }
     }
+    let recorded = recorded();
+    for (format, error) in worst {
+        let (_, most) = recorded.iter().find(|(name, _)| name == format).expect("a format of the record");
+        // The same bits as those of the experiment; only the arithmetic of the error itself may be rounded otherwise.
+        assert!((error - most).abs() <= 1e-9 * most, "{format}: {error}, and {most} in the record");
+    }
+}
+
+#[test]
+fn errors_of_128_equal_white_layers_are_those_of_the_book() {
+    fn error_of_white_layers<C: composite::Color>(alpha: f64) -> f64
+    where
+        PremultipliedPixel<C>: Composite<Color = C>,
+    {
+        error_of_layers::<C>(&vec![vec![[alpha; 4]]; LAYERS], &[[1.0 - (1.0 - alpha).powi(128); 4]])
+    }
+    for alpha in [0.005, 0.02, 0.1] {
+        let u16_error = error_of_white_layers::<[u16; 4]>(alpha);
+        let f16_error = error_of_white_layers::<[f16; 4]>(alpha);
+        let f32_error = error_of_white_layers::<[f32; 4]>(alpha);
+        assert!(u16_error <= 0.07, "u16, alpha {alpha}: {u16_error}");
+        assert!(f16_error <= 0.25, "f16, alpha {alpha}: {f16_error}");
+        assert!(f32_error <= 1.3e-4, "f32, alpha {alpha}: {f32_error}");
+    }
+    // Guards the limits: eight bits do not keep them.
+    assert!(error_of_white_layers::<[u8; 4]>(0.005) > 10.0);
 }
 
 #[test]
@@ -282,7 +306,6 @@ fn the_book_quotes_the_record_of_128_faint_layers() {
     let book = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/src/composite/formats.md");
     let book = std::fs::read_to_string(book).expect("the book");
     let recorded = recorded();
-    assert_eq!(recorded.len(), 4);
     for (format, row) in [
         ("u8", "| premultiplied RGBA8 |"),
         ("u16", "| premultiplied RGBA16 |"),
@@ -299,37 +322,38 @@ fn the_book_quotes_the_record_of_128_faint_layers() {
 }
 
 #[test]
-fn whatever_the_colours_an_integer_format_errs_by_less_than_a_step_a_layer() {
+fn an_integer_format_errs_by_two_steps_a_layer_at_most_whatever_the_colours() {
+    // Half a step where a colour is stored, half where it is joined. What is left of the light errs by a step a layer likewise, and
+    // of these steps a layer takes no more into a colour than it takes away by its opacity: all layers together one a layer.
+    const MOST: f64 = 2.0 * LAYERS as f64;
+    fn steps_of_error<C: composite::Color>(steps: f64, layers: &[Vec<[f64; 4]>]) -> f64
+    where
+        PremultipliedPixel<C>: Composite<Color = C>,
+    {
+        steps / 255.0 * error_of_layers::<C>(layers, &sum_of_layers(layers))
+    }
     fn check<C: composite::Color>(steps: f64)
     where
         PremultipliedPixel<C>: Composite<Color = C>,
     {
-        let mut worst = 0.0_f64;
-        for pixel in 0..2000 {
-            // Colours and opacities of all sizes, and those that are lost by rounding in every layer.
-            let unit = |c, layer| noise(c, 17, layer, pixel) as f64 / 65536.0;
-            let share = [1.0, unit(1, 0), 0.499 / (steps * unit(2, 0).max(1e-3)), unit(3, 0)];
-            let layers: Vec<[f64; 4]> = (0..LAYERS)
-                .map(|layer| {
-                    let alpha = unit(2, 0).powi(3) * unit(4, layer);
-                    [share[1], share[2].min(1.0), share[3], 1.0].map(|share| share * alpha)
-                })
-                .collect();
-            let mut exact = [0.0; 4];
-            for color in &layers {
-                let left: f64 = 1.0 - exact[3];
-                (0..4).for_each(|i| exact[i] += left * color[i]);
-            }
-            let stored: Vec<[C; 1]> = layers.iter().map(|c| [C::from_f32(c.map(|v| v as f32))]).collect();
-            let frames: Vec<_> = stored.iter().map(|c| Frame::premultiplied(1, 1, c).unwrap()).collect();
-            let found = composite_serial(&frames).unwrap().colors()[0].to_f32();
-            for (found, exact) in found.iter().zip(exact) {
-                worst = worst.max(steps * (f64::from(*found) - exact).abs());
-            }
-        }
-        // Half of what can be: half a step where a colour is stored and half where it is joined, and as much through its opacity.
-        assert!(worst <= LAYERS as f64, "{worst} steps");
-        assert!(worst >= LAYERS as f64 / 16.0, "{worst} steps: the colours are too easy");
+        // Too faint to be stored at all: everything is lost.
+        let alpha = 0.499 / steps;
+        let faint = steps_of_error::<C>(steps, &vec![vec![[alpha; 4]]; LAYERS]);
+        let all = steps * (1.0 - (1.0 - alpha).powi(LAYERS as i32));
+        assert!((faint - all).abs() < 1e-9 * all && faint <= MOST, "{faint} steps of {all}");
+        // Colours and opacities of all sizes, and some that are lost by rounding in every layer.
+        let unit = |c, layer, pixel| noise(c, 17, layer, pixel) as f64 / 65536.0;
+        let color = |layer, pixel| {
+            let most = unit(2, 0, pixel);
+            let alpha = most.powi(3) * unit(4, layer, pixel);
+            let lost = (0.499 / (steps * most.max(1e-3))).min(1.0);
+            [unit(1, 0, pixel), lost, unit(3, 0, pixel), 1.0].map(|share| share * alpha)
+        };
+        let of_layer = |layer| (0..2000).map(|pixel| color(layer, pixel)).collect();
+        let layers: Vec<Vec<[f64; 4]>> = (0..LAYERS).map(of_layer).collect();
+        let worst = steps_of_error::<C>(steps, &layers);
+        // These colours are always the same. They were measured to err by 31.4 steps of 8 bits and 31.6 of 16.
+        assert!((31.0..=32.0).contains(&worst), "{worst} steps");
     }
     check::<[u8; 4]>(255.0);
     check::<[u16; 4]>(65535.0);

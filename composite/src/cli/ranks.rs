@@ -1,6 +1,6 @@
 //! Where the ranks of a job run, and how they are started.
 use super::{mpirun, smpirun};
-use crate::comm::mpi::{MpiComm, launcher};
+use crate::comm::mpi::{Abi, MpiComm, launcher};
 use crate::comm::{CommError, Communicator, sim, threads};
 use crate::error::CompositeError;
 use datasets::cli::{CommonArgs, Status, UsageError};
@@ -64,6 +64,14 @@ impl RankComm {
             Self::Thread(_) => 1,
             Self::Mpi(comm) => comm.nodes().iter().max().map_or(0, |last| last + 1),
             Self::Model(comm) => comm.size(),
+        }
+    }
+
+    /// Whether no other rank runs in this process.
+    pub(super) fn is_a_process(&self) -> bool {
+        match self {
+            Self::Mpi(comm) => comm.abi() != Abi::Smpi,
+            Self::Thread(_) | Self::Model(_) => false,
         }
     }
 

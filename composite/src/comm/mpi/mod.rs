@@ -242,7 +242,9 @@ impl MpiComm {
     ) -> Option<Result<Vec<Vec<u8>>, CommError>> {
         let node = self.node.take()?;
         let met = self.wait_in_memory(&node, string, timeout);
-        std::thread::sleep(self.linger);
+        if !self.linger.is_zero() {
+            std::thread::sleep(self.linger);
+        }
         let said = met.and_then(|()| node.said());
         self.node = Some(node);
         Some(said)
