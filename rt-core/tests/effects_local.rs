@@ -555,16 +555,8 @@ fn leaving_out_any_one_effect_changes_the_picture_and_zeroes_its_counter() {
         };
         assert_eq!(count, 0, "{name}");
     }
-    let o = draw(
-        &s,
-        &c,
-        RenderOptions {
-            effects: Some(
-                all.without(Effects::REFLECTION | Effects::GLOSSY_REFLECTION | Effects::REFRACTION),
-            ),
-            ..options(48)
-        },
-    );
+    let asked = all.without(Effects::REFLECTION | Effects::GLOSSY_REFLECTION | Effects::REFRACTION);
+    let o = draw(&s, &c, RenderOptions { effects: Some(asked), ..options(48) });
     assert_eq!(o.report.rays.reflection, 0);
 }
 

@@ -222,7 +222,7 @@ fn variables_that_are_not_utf8_are_named_and_do_not_abort_the_program() {
         // Others' variables are none of ours, and folders may have any name.
         (OsStr::new("OTHER_PROGRAM"), OsStr::from_bytes(b"\xff")),
         (OsStr::from_bytes(b"OTHER_\xff"), OsStr::new("1")),
-        (OsStr::new("RTV_HOME"), OsStr::from_bytes(b"/home/\xff")),
+        (OsStr::new("RTV_HOME"), OsStr::from_bytes(b"/data/\xff")),
     ];
     let name = "variables_that_are_not_utf8_are_named_and_do_not_abort_the_program";
     let out = in_a_process_with(name, &variables);
