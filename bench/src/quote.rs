@@ -45,8 +45,7 @@ pub fn update(root: &Path) -> anyhow::Result<Vec<PathBuf>> {
             std::fs::create_dir_all(folder)
                 .with_context(|| format!("cannot make the folder `{}`", folder.display()))?;
         }
-        std::fs::write(&path, &file.text)
-            .with_context(|| format!("cannot write `{}`", path.display()))?;
+        std::fs::write(&path, &file.text).with_context(|| format!("cannot write `{}`", path.display()))?;
         written.push(file.path);
     }
     Ok(written)
@@ -198,11 +197,8 @@ fn table(record: &Record, request: &str) -> anyhow::Result<String> {
             .with_context(|| format!("`{}` is not `COLUMN = VALUE`", condition.trim()))?;
         wanted.push((known(name.trim())?.name.as_str(), value.trim()));
     }
-    let rows: Vec<&Row> = record
-        .rows
-        .iter()
-        .filter(|r| wanted.iter().all(|(name, value)| cell(r, name) == *value))
-        .collect();
+    let rows: Vec<&Row> =
+        record.rows.iter().filter(|r| wanted.iter().all(|(name, value)| cell(r, name) == *value)).collect();
     ensure!(!rows.is_empty(), "`{}` has no row with {}", record.id, conditions.trim());
 
     let head = |c: &&Column| match c.unit.as_str() {
@@ -271,7 +267,10 @@ mod tests {
         );
         assert_eq!(update(root.path()).unwrap(), [Path::new("docs/src/bench/page.md")]);
         let text = std::fs::read_to_string(root.path().join("docs/src/bench/page.md")).unwrap();
-        assert!(text.contains("| mesh | time [ms] |\n| --- | --- |\n| small | 0.123 |\n\n*Measured"), "{text}");
+        assert!(
+            text.contains("| mesh | time [ms] |\n| --- | --- |\n| small | 0.123 |\n\n*Measured"),
+            "{text}"
+        );
         assert!(text.contains("(../../../bench/runs/2026-01-02-b/speed.csv)"), "{text}");
         assert!(!text.contains("old") && text.starts_with("a\n") && text.ends_with("-->\nb\n"), "{text}");
         assert_eq!(stale(root.path()).unwrap(), []);
