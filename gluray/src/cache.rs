@@ -10,7 +10,7 @@ use rt_core::glam::Vec3;
 use rt_core::math::Aabb;
 use rt_core::mesh::TriMesh;
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, OnceLock, Weak};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
 
 /// A mesh with the structure that rays need, made when the first ray comes.
 pub(crate) struct Geometry {
@@ -66,23 +66,32 @@ impl Geometry {
             self.improve();
             return self.best.get().cloned();
         }
-        let mut slot = self.world.lock().unwrap_or_else(|e| e.into_inner());
-        if slot.is_none() {
-            *slot = self.before.upgrade().and_then(|before| moved::structure(&before, &self.mesh));
-            match slot.is_some() {
-                true => made.refitted += 1,
-                false => {
-                    made.built += 1;
-                    *slot = build(&self.mesh, BuildQuality::Fast);
-                }
-            }
+        if let Some(world) = self.kept().clone() {
+            return Some(world);
         }
-        slot.clone()
+        // Nothing is locked meanwhile. Several frames' jobs are on the pool that builds: a thread of it
+        // which waits for a part of the build takes another job, and that may want the same structure.
+        let moved = self.before.upgrade().and_then(|before| moved::structure(&before, &self.mesh));
+        let refitted = moved.is_some();
+        let world = moved.or_else(|| build(&self.mesh, BuildQuality::Fast));
+        let mut kept = self.kept();
+        // Another may have come first: all take that one. A mesh that cannot be built is tried again.
+        if kept.is_none() {
+            made.refitted += u64::from(refitted);
+            made.built += u64::from(!refitted);
+            *kept = world;
+        }
+        kept.clone()
     }
 
-    /// The structure, if there is one and nobody is making it just now.
+    /// What there is of the quick structures. To be held for an instant, and not while rays are traced or trees are built.
+    fn kept(&self) -> MutexGuard<'_, Option<Arc<World>>> {
+        self.world.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The structure, if there is one.
     fn structure_now(&self) -> Option<Arc<World>> {
-        self.best.get().cloned().or_else(|| self.world.try_lock().ok()?.clone())
+        self.best.get().cloned().or_else(|| self.kept().clone())
     }
 
     /// Builds the best structure and keeps it: for geometry that rests, in the background.
@@ -91,7 +100,7 @@ impl Geometry {
             && let Some(world) = build(&self.mesh, BuildQuality::Best)
         {
             self.best.set(world).ok();
-            *self.world.lock().unwrap_or_else(|e| e.into_inner()) = None;
+            *self.kept() = None;
         }
     }
 }
@@ -332,6 +341,36 @@ mod tests {
         let c = cache.of_runs(&p, &[Run { mode: TRIANGLES, count: 300_000, times: 1 }], &Split::default());
         assert!(!Arc::ptr_eq(&a, &c));
         assert_eq!((cache.hits, cache.misses), (1, 3));
+    }
+
+    /// A thread that waits for a part of a build takes the next job of the pool, which wants the same.
+    #[test]
+    fn jobs_of_one_pool_that_want_the_same_structure_do_not_wait_for_each_other() {
+        use std::sync::mpsc::channel;
+        use std::time::Duration;
+        const JOBS: usize = 20;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("two threads");
+        for round in 0..40 {
+            let positions: Vec<Vec3> =
+                (0..60_000_u32).map(|i| Vec3::new(i as f32, (i * i % 173) as f32, (i % 5) as f32)).collect();
+            let triangles = (0..20_000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+            let geometry = Arc::new(Geometry::new(round, TriMesh::new(positions, triangles), Weak::new()));
+            let (sender, receiver) = channel();
+            for _ in 0..JOBS {
+                let (geometry, sender) = (geometry.clone(), sender.clone());
+                pool.spawn(move || {
+                    let mut made = Structures::default();
+                    let world = geometry.world(&mut made);
+                    sender.send((world.expect("a mesh that can be built"), made)).ok();
+                });
+                // So that a build is under way, in parts, when the next job comes.
+                std::thread::sleep(Duration::from_micros(200));
+            }
+            let next = |_| receiver.recv_timeout(Duration::from_secs(60)).expect("no job waits for ever");
+            let all: Vec<_> = (0..JOBS).map(next).collect();
+            assert!(all.iter().all(|(w, _)| Arc::ptr_eq(w, &all[0].0)), "all have one structure");
+            assert_eq!(all.iter().map(|(_, made)| made.built).sum::<u64>(), 1);
+        }
     }
 
     #[test]
