@@ -3,6 +3,7 @@
 //! Two ranks count as of one machine if MPI finds them in one memory and all else that is known of their machines is the same: the
 //! kernel's boot, the name, and what the variable [`NODE_VARIABLE`] says. Where MPI cannot tell, the kernel's boot must be known.
 //! Variables of launchers are not asked: not every launcher sets them.
+use super::Communicator as _;
 use super::library::{Handle, Mpi};
 use std::ffi::c_int;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
@@ -86,6 +87,19 @@ pub(super) fn numbered(said: &[Vec<u8>]) -> Vec<usize> {
             })
         })
         .collect()
+}
+
+impl super::MpiComm {
+    /// Finds out which ranks share a machine.
+    pub(super) fn find_nodes(&mut self) -> Result<(), super::CommError> {
+        let mine = of_this_rank(&self.mpi, self.transfers.comm(), self.rank, &self.processor_name());
+        let all = self.all_gather(&mine, mine.len(), super::START)?;
+        self.nodes = numbered(&all);
+        // More ranks than processors: a rank that spins takes the processor from the one it waits for.
+        let here = self.nodes.iter().filter(|&&node| node == self.nodes[self.rank]).count();
+        self.oversubscribed = here > super::launcher::processors_here();
+        Ok(())
+    }
 }
 
 #[cfg(test)]
