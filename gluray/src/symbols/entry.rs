@@ -1,7 +1,7 @@
 //! How programs and GLVND find the trampolines: `dlsym`, `glXGetProcAddress`, `__glx_Main`,
 //! `__egl_Main`.
 
-use super::{NAMES, index_of, trampoline};
+use super::{index_of, trampoline};
 use crate::fault::caught;
 use crate::real;
 use core::ffi::{CStr, c_char, c_int, c_void};
@@ -281,9 +281,4 @@ unsafe extern "C" fn egl_dispatch_index(name: *const c_char, index: c_int) {
             }
         }
     }
-}
-
-/// Index of a name that is known to be in the list.
-pub(crate) fn known(name: &str) -> usize {
-    index_of(name.as_bytes()).unwrap_or(NAMES.len())
 }

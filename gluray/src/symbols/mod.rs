@@ -86,22 +86,25 @@ pub(crate) fn thread_leaves() {
     ATTENTION.fetch_sub(2, Relaxed);
 }
 
+/// What stays ours after a fault: books of contexts, addresses, errors that we kept, and lists, since those that we compiled are ours to play.
+fn keeps_books(index: usize) -> bool {
+    let name = NAMES[index].to_bytes();
+    let kept: [&[u8]; 7] = [
+        b"glCallList",
+        b"glCallLists",
+        b"glNewList",
+        b"glEndList",
+        b"glDeleteLists",
+        b"glGenLists",
+        b"glGetError",
+    ];
+    name.starts_with(b"glX") || name.starts_with(b"egl") || kept.contains(&name)
+}
+
 /// After a fault of ours every entry point becomes the driver's, thread by thread: see [`leaving`].
 pub(crate) fn retire() {
     for (i, slot) in TABLE.iter().enumerate() {
-        // What keeps the books of contexts, gives out addresses or hands out errors that we kept stays. So do lists: those that we compiled are ours to play.
-        let name = NAMES[i].to_bytes();
-        let kept: [&[u8]; 7] = [
-            b"glCallList",
-            b"glCallLists",
-            b"glNewList",
-            b"glEndList",
-            b"glDeleteLists",
-            b"glGenLists",
-            b"glGetError",
-        ];
-        let book = name.starts_with(b"glX") || name.starts_with(b"egl") || kept.contains(&name);
-        if !book && HOOKS[i].is_some() {
+        if HOOKS[i].is_some() && !keeps_books(i) {
             slot.store(leaving as *mut (), Relaxed);
         }
     }
@@ -128,7 +131,8 @@ pub(crate) fn at_exit() {
 
 extern "C" fn resolve(index: usize) -> *const () {
     crate::fault::in_program();
-    let hook = HOOKS[index].filter(|_| !crate::fault::happened());
+    // Also what is called for the first time after a fault.
+    let hook = HOOKS[index].filter(|_| !crate::fault::happened() || keeps_books(index));
     let target = crate::fault::caught(|| match hook {
         Some(hook) => hook.0,
         None => {
