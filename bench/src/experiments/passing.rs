@@ -18,6 +18,33 @@ const WAYS: [(&str, &[&str]); 3] = [
     ("LD_PRELOAD", &["run", "--via", "preload", "--"]),
 ];
 
+/// The program that calls.
+const CALLS: &str = include_str!("../opengl/scripts/calls.c");
+
+/// The calls that the program tells the times of, in its order.
+fn calls_of(source: &str) -> Vec<&str> {
+    let timed = source.lines().filter_map(|l| l.trim_start().strip_prefix("TIME(\""));
+    timed.filter_map(|l| l.split('"').next()).collect()
+}
+
+/// Refuses a run that does not tell each call once: there is nothing to compare the others with.
+fn all_told(way: &str, calls: &[&str], told: &[(String, f64)]) -> anyhow::Result<()> {
+    let missing: Vec<&str> = calls.iter().copied().filter(|c| told.iter().all(|(t, _)| t != c)).collect();
+    anyhow::ensure!(
+        missing.is_empty(),
+        "{way}: the program of calls ended well, but told no time of {}; is the gluray beside bench as new as \
+         bench? `cargo build --workspace` builds both",
+        missing.join(", ")
+    );
+    anyhow::ensure!(
+        told.len() == calls.len(),
+        "{way}: the program of calls told {} times of {} calls",
+        told.len(),
+        calls.len()
+    );
+    Ok(())
+}
+
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     record.column("call", "", "an OpenGL call outside of Begin and End");
     record.column(
@@ -49,30 +76,29 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     };
     let dir = tempfile::tempdir()?;
     let (source, program) = (dir.path().join("calls.c"), dir.path().join("calls"));
-    std::fs::write(&source, include_str!("../opengl/scripts/calls.c"))?;
+    std::fs::write(&source, CALLS)?;
     let made = Command::new(compiler).arg("-O2").arg("-o").arg(&program).arg(&source).arg("-ldl").output()?;
     anyhow::ensure!(made.status.success(), "the C compiler: {}", String::from_utf8_lossy(&made.stderr));
     let display = Display::start(&tools.xvfb)?;
     let runs = if context.quick { 3 } else { 11 };
     let mut times: BTreeMap<(String, usize), Vec<f64>> = BTreeMap::new();
-    let mut order: Vec<String> = Vec::new();
+    let calls = calls_of(CALLS);
     for n in 0..runs {
         context.say(format!("run {} of {runs}", n + 1))?;
         for way in runner::order(WAYS.len(), n) {
-            for (call, ns) in measure(tools, &display, &program, WAYS[way].1)? {
-                if !order.contains(&call) {
-                    order.push(call.clone());
-                }
+            let told = measure(tools, &display, &program, WAYS[way].1)?;
+            all_told(WAYS[way].0, &calls, &told)?;
+            for (call, ns) in told {
                 times.entry((call, way)).or_default().push(ns);
             }
         }
     }
-    for call in order {
+    for call in calls {
         for (way, (name, _)) in WAYS.iter().enumerate() {
-            let (own, native) = (&times[&(call.clone(), way)], &times[&(call.clone(), 0)]);
+            let (own, native) = (&times[&(call.to_string(), way)], &times[&(call.to_string(), 0)]);
             let more: Vec<f64> = own.iter().zip(native).map(|(o, n)| o - n).collect();
             let Some(t) = Summary::of(own) else { continue };
-            let row = Row::new().with("call", call.as_str()).with("way", *name).with("time", t.median);
+            let row = Row::new().with("call", call).with("way", *name).with("time", t.median);
             let row = row.with("time_low", t.low).with("time_high", t.high);
             record.rows.push(row.with("overhead", Summary::of(&more).map(|s| s.median)));
         }
@@ -111,4 +137,23 @@ fn measure(
             Ok((call.to_string(), ns.parse()?))
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_that_leaves_a_call_out_is_refused_with_its_way_and_the_call() {
+        let calls = calls_of(CALLS);
+        assert_eq!(calls.len(), 8, "{calls:?}");
+        let mut told: Vec<(String, f64)> = calls.iter().map(|c| (c.to_string(), 1.0)).collect();
+        all_told("native", &calls, &told).expect("all are told");
+        told.retain(|(call, _)| call != "glEnable");
+        let why = all_told("LD_PRELOAD", &calls, &told).expect_err("one is missing").to_string();
+        assert!(
+            why.contains("LD_PRELOAD") && why.contains("glEnable") && !why.contains("glColor3f"),
+            "{why}"
+        );
+    }
 }
