@@ -172,8 +172,9 @@ def textures_that_nobody_writes(w):
     finish()
 
     def frame():
+        # Reading it back has it drawn, so that each frame looks for its texture anew.
         textured_square()
-        F("glFlush")()
+        seen()
 
     for _ in range(30):
         frame()
