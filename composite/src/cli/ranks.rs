@@ -5,6 +5,7 @@ use crate::comm::{CommError, Communicator, sim, threads};
 use crate::error::CompositeError;
 use datasets::cli::{CommonArgs, Status, UsageError};
 use std::ffi::OsString;
+use std::io::Write as _;
 use std::time::Duration;
 
 /// The largest job that is started: more threads or processes on one machine measure nothing.
@@ -225,7 +226,9 @@ impl RankArgs {
                 }
             }
             Err(error) => {
-                eprintln!("error: {}: {error:#}", comm.place());
+                // In one piece: all ranks write here, and what they write piece by piece is mixed.
+                let line = format!("error: {}: {error:#}\n", comm.place());
+                let _ = std::io::stderr().write_all(line.as_bytes());
                 comm.comm().abort(&format!("{error:#}"));
                 let status = if error.is::<UsageError>() { Status::Usage } else { Status::Failure };
                 if let RankComm::Mpi(comm) = comm {
