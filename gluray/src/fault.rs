@@ -164,6 +164,8 @@ impl Context {
         self.sink = Sink::Outside;
         if let Some(r) = &mut self.recording {
             r.give_up();
+            // What was swallowed before the list cannot be drawn while the driver compiles it: the first call after its end does.
+            self.given_up = false;
         } else {
             let mode = self.recorder.mode();
             let primitive = open.then(|| attempt(|| self.recorder.withdraw()).unwrap_or((mode, Vec::new())));

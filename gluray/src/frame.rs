@@ -241,6 +241,8 @@ impl Context {
             }
         }
         self.counters.flushed(before);
+        // Also of contexts that never end a frame.
+        self.counters.report.textures_read = self.presenter.images.read;
         self.frame.told.traced(self.counters.report.frames + 1, pending.iter().map(|(d, _)| d));
         // What the driver drew after a traced surface wins ties with it, as LEQUAL says; what it drew before loses them.
         let func = if others { LESS } else { pending[0].0.state.depth_func };

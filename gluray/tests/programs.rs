@@ -60,6 +60,7 @@ fn both(
     program: &Path,
     arguments: &[&str],
     picture: &str,
+    least: Share,
     prepare: impl Fn(&Path),
 ) -> Option<(Metrics, Report)> {
     let x = Xvfb::start()?;
@@ -83,7 +84,47 @@ fn both(
         report.passed_reasons
     );
     assert!(report.traced_draws > 0, "{report:?}");
+    let name = program.file_name().expect("a file").to_string_lossy();
+    Share::of(&native, &report).assert(&format!("{name} {arguments:?}"), least, &report);
     Some((m, report))
+}
+
+/// How much of what a program draws is traced.
+#[derive(Debug, Clone, Copy)]
+struct Share {
+    /// Of its draws.
+    draws: f64,
+    /// Pixels of traced surfaces, by the pixels that are not background in all frames. Surfaces that are behind others in one go
+    /// count once, so that more than 1 says that something is drawn over what was traced.
+    pixels: f64,
+}
+
+/// These shares were measured to be traced.
+const fn share(draws: f64, pixels: f64) -> Share {
+    Share { draws, pixels }
+}
+
+/// Every pixel but those of silhouettes.
+const ALL: Share = share(0.99, 0.99);
+
+impl Share {
+    fn of(native: &Picture, report: &Report) -> Share {
+        let seen = native.pixels.iter().filter(|p| (0..3).any(|k| p[k].abs_diff(native.pixels[0][k]) > 2));
+        let draws = (report.traced_draws + report.passed_draws).max(1);
+        let pixels = seen.count() as f64 * report.frames.max(1) as f64;
+        Share {
+            draws: report.traced_draws as f64 / draws as f64,
+            pixels: report.pixels as f64 / pixels.max(1.0),
+        }
+    }
+
+    /// At least half of `least`: how often a window is drawn, and so how many of its frames are the
+    /// ones that are traced, is the machine's affair.
+    fn assert(self, what: &str, least: Share, report: &Report) {
+        let enough = self.draws >= 0.5 * least.draws && self.pixels >= 0.5 * least.pixels;
+        let (frames, passed) = (report.frames, &report.passed_reasons);
+        assert!(enough, "{what}: {self:?}, measured {least:?}, {frames} frames, passed {passed:?}");
+    }
 }
 
 fn program(variable: &str) -> Option<PathBuf> {
@@ -99,7 +140,8 @@ fn gmsh_draws_the_drivers_picture() {
         write_stl(&f.join("s.stl"));
         std::fs::write(f.join("s.geo"), lines).expect("a temporary file");
     };
-    if let Some((m, _)) = both(&gmsh, &["s.geo"], "out.png", prepare) {
+    // As much as two of its three frames: one is drawn without a depth test. Lines are passed.
+    if let Some((m, _)) = both(&gmsh, &["s.geo"], "out.png", share(0.33, 0.66), prepare) {
         m.assert_filled("gmsh");
     }
 }
@@ -113,7 +155,9 @@ fn geomview_draws_the_drivers_picture() {
         write_off(&f.join("s.off"));
         std::fs::write(f.join("s.gcl"), lines).expect("a temporary file");
     };
-    if let Some((m, _)) = both(&geomview, &["-nopanels", "-c", "s.gcl"], "out.ppm", prepare) {
+    // 0.916 of what its last picture covers, over eight frames; the number of frames is the machine's.
+    if let Some((m, _)) = both(&geomview, &["-nopanels", "-c", "s.gcl"], "out.ppm", share(0.99, 0.8), prepare)
+    {
         m.assert_filled("geomview");
     }
 }
@@ -125,7 +169,7 @@ fn openscad_draws_the_drivers_picture() {
     let prepare = |f: &Path| std::fs::write(f.join("s.scad"), scene).expect("a temporary file");
     let arguments =
         ["-o", "out.png", "--imgsize=768,768", "--render", "--camera=0,0,0,60,0,30,150", "s.scad"];
-    if let Some((m, _)) = both(&openscad, &arguments, "out.png", prepare) {
+    if let Some((m, _)) = both(&openscad, &arguments, "out.png", ALL, prepare) {
         m.assert_filled("openscad");
     }
 }
@@ -135,7 +179,8 @@ fn octave_draws_the_drivers_picture() {
     let Some(octave) = program("RTSV_OCTAVE") else { return };
     let file = script("octave.m");
     let arguments = ["--no-gui", "--quiet", "--no-init-file", file.as_str()];
-    if let Some((m, _)) = both(&octave, &arguments, "out.png", |_| ()) {
+    // Half of the draws are blended, and passed.
+    if let Some((m, _)) = both(&octave, &arguments, "out.png", share(0.49, 0.99), |_| ()) {
         m.assert_lines("octave");
     }
 }
@@ -146,7 +191,8 @@ fn pymol_without_shaders_draws_the_drivers_picture() {
     let lines = "set internal_gui, 0\nfragment trp\nviewport 768,768\nhide everything\nshow sticks\nshow spheres\nset use_shaders, 0\n\
                  bg_color white\norient\npng out.png, ray=0\nquit\n";
     let prepare = |f: &Path| std::fs::write(f.join("s.pml"), lines).expect("a temporary file");
-    if let Some((m, _)) = both(&pymol, &["-q", "s.pml"], "out.png", prepare) {
+    // As much as one of its three frames.
+    if let Some((m, _)) = both(&pymol, &["-q", "s.pml"], "out.png", share(0.99, 0.33), prepare) {
         m.assert_filled("pymol");
     }
 }
@@ -155,7 +201,8 @@ fn pymol_without_shaders_draws_the_drivers_picture() {
 fn paraview_draws_the_drivers_picture() {
     let Some(pvbatch) = program("RTSV_PVBATCH") else { return };
     let file = script("paraview_scene.py");
-    if let Some((m, _)) = both(&pvbatch, &[file.as_str()], "out.png", |_| ()) {
+    // As much as three of its four frames, less the lines, which are passed.
+    if let Some((m, _)) = both(&pvbatch, &[file.as_str()], "out.png", share(0.53, 0.72), |_| ()) {
         m.assert_filled("pvbatch");
     }
 }
@@ -164,7 +211,7 @@ fn paraview_draws_the_drivers_picture() {
 fn vtk_in_python_draws_the_drivers_picture() {
     let (Some(python), Some(_)) = (program("RTSV_SYSTEM_PYTHON"), program("RTSV_PVBATCH")) else { return };
     let file = script("vtk_scene.py");
-    if let Some((m, _)) = both(&python, &[file.as_str()], "out.png", |_| ()) {
+    if let Some((m, _)) = both(&python, &[file.as_str()], "out.png", share(0.66, 0.93), |_| ()) {
         m.assert_filled("python vtk");
     }
 }
@@ -192,7 +239,7 @@ fn assert_peeled(report: &Report) {
 fn translucent_surfaces_that_vtk_peels_are_traced_in_one_go_and_are_the_drivers_picture() {
     let (Some(python), Some(_)) = (program("RTSV_SYSTEM_PYTHON"), program("RTSV_PVBATCH")) else { return };
     let file = script("vtk_translucent.py");
-    if let Some((m, report)) = both(&python, &[file.as_str()], "out.png", |_| ()) {
+    if let Some((m, report)) = both(&python, &[file.as_str()], "out.png", share(0.33, 0.99), |_| ()) {
         m.assert_filled("translucent surfaces in VTK");
         assert_peeled(&report);
     }
@@ -202,7 +249,8 @@ fn translucent_surfaces_that_vtk_peels_are_traced_in_one_go_and_are_the_drivers_
 fn paraviews_translucent_contours_are_traced_in_one_go_and_are_the_drivers_picture() {
     let Some(pvbatch) = program("RTSV_PVBATCH") else { return };
     let file = script("paraview_translucent.py");
-    if let Some((m, report)) = both(&pvbatch, &[file.as_str()], "out.png", |_| ()) {
+    // As in `paraview_draws_the_drivers_picture`.
+    if let Some((m, report)) = both(&pvbatch, &[file.as_str()], "out.png", share(0.41, 0.72), |_| ()) {
         m.assert_filled("translucent contours in ParaView");
         assert_peeled(&report);
     }
@@ -212,7 +260,9 @@ fn paraviews_translucent_contours_are_traced_in_one_go_and_are_the_drivers_pictu
 fn lines_among_translucent_surfaces_leave_the_whole_peeling_to_the_driver() {
     let (Some(python), Some(_)) = (program("RTSV_SYSTEM_PYTHON"), program("RTSV_PVBATCH")) else { return };
     let file = script("vtk_translucent.py");
-    if let Some((m, report)) = both(&python, &[file.as_str(), "lines"], "out.png", |_| ()) {
+    // One draw of each frame; what is peeled is passed.
+    if let Some((m, report)) = both(&python, &[file.as_str(), "lines"], "out.png", share(0.02, 0.13), |_| ())
+    {
         m.assert_filled("lines among translucent surfaces");
         assert_eq!(report.flushes.get("depth peeling"), None, "{report:?}");
         assert!(report.passed_reasons.contains_key("translucent surfaces that VTK peels"), "{report:?}");
@@ -223,8 +273,31 @@ fn lines_among_translucent_surfaces_leave_the_whole_peeling_to_the_driver() {
 fn vtk_by_egl_draws_the_drivers_picture() {
     let (Some(python), Some(_)) = (program("RTSV_PYTHON"), program("RTSV_XVFB")) else { return };
     let file = script("egl_scene.py");
-    if let Some((m, _)) = both(&python, &[file.as_str()], "out.png", |_| ()) {
+    if let Some((m, _)) = both(&python, &[file.as_str()], "out.png", ALL, |_| ()) {
         m.assert_filled("VTK by EGL");
+    }
+}
+
+/// What is traced of a scene of `wheel_scene.py`. With four samples each counts.
+fn share_of_scene(kind: &[&str]) -> Share {
+    match kind {
+        // One of the four surfaces is as VTK has it.
+        ["replaced"] => share(0.25, 0.74),
+        // Two of four have a texture with anisotropic filtering.
+        ["pictures_smaller"] => share(0.5, 0.59),
+        // Shadow maps themselves are the driver's; in a second frame so are the surfaces.
+        ["shadows"] => share(0.25, 0.99),
+        ["shadows", "0", "2"] => share(0.16, 0.49),
+        // A third of the draws are lines; what is not recognised is VTK's own pass over the picture.
+        ["moved_back"] => share(0.66, 0.99),
+        ["moved_back", "4"] => share(0.61, 3.9),
+        ["translucent_moved_back"] => share(0.61, 0.9),
+        // VTK's own passes over the whole picture.
+        ["peeled"] => share(0.42, 0.99),
+        ["translucent"] => share(0.85, 0.99),
+        ["translucent_pictures"] => share(0.83, 0.99),
+        [_, "4"] => share(0.8, 3.9),
+        _ => ALL,
     }
 }
 
@@ -238,7 +311,8 @@ fn scenes(kinds: &[&[&str]], old: bool, least: u64) -> Vec<Report> {
     for python in [Some(python), older].iter().flatten() {
         for kind in kinds {
             let arguments = [&[file.as_str()], *kind].concat();
-            let Some((m, report)) = both(python, &arguments, "out.png", |_| ()) else { continue };
+            let share = share_of_scene(kind);
+            let Some((m, report)) = both(python, &arguments, "out.png", share, |_| ()) else { continue };
             m.assert_filled(&format!("{kind:?} in {}", python.display()));
             assert!(report.traced_draws >= least, "{kind:?}: {report:?}");
             assert_eq!(report.problems, Vec::<String>::new());

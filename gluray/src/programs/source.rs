@@ -154,9 +154,9 @@ pub(super) fn without_comments(source: &str) -> String {
         out.push_str(before);
         rest = if comment.starts_with("//") {
             comment.find('\n').map_or("", |end| &comment[end..])
-        } else if comment.starts_with("/*") {
+        } else if let Some(inside) = comment.strip_prefix("/*") {
             out.push(' ');
-            comment[2..].find("*/").map_or("", |end| &comment[end + 4..])
+            inside.find("*/").map_or("", |end| &inside[end + 2..])
         } else {
             out.push('/');
             &comment[1..]
