@@ -114,14 +114,14 @@ fn lights_at_the_eye_give_the_picture_of_the_same_lights_in_the_world() {
     // A mirror shows what the light at the eye misses. No ray goes through its edges: there the
     // camera's ray may miss what the ray to the light meets.
     let with_mirror = |light| {
-        let mut s = square_above_floor(light);
-        let mut parts = vec![
+        let mirror = quad(Vec3::new(1.2, 0.0, 2.0), Vec3::Y * 1.9, Vec3::Z * 2.0);
+        let square = quad(Vec3::new(0.5, 0.0, 1.0), Vec3::X * 0.25, Vec3::Y * 0.5);
+        let parts = vec![
             (floor(0.0, 10.0), Material::matte([1.0; 3])),
-            (quad(Vec3::new(0.5, 0.0, 1.0), Vec3::X * 0.25, Vec3::Y * 0.5), Material::matte([1.0; 3])),
-            (quad(Vec3::new(1.2, 0.0, 2.0), Vec3::Y * 1.9, Vec3::Z * 2.0), Material::metal([1.0; 3], 0.0)),
+            (square, Material::matte([1.0; 3])),
+            (mirror, Material::metal([1.0; 3], 0.0)),
         ];
-        std::mem::swap(&mut s.lights, &mut vec![light]);
-        scene(std::mem::take(&mut parts), s.lights)
+        scene(parts, vec![light])
     };
     compare("mirror", with_mirror, &perspective(), &plain, true);
     // Light that comes through a translucent surface is dimmed as the eye's view is.
