@@ -110,6 +110,8 @@ impl Report {
 /// When the file is to be written.
 #[derive(Debug, Default)]
 struct Schedule {
+    /// The first change.
+    begun: Option<Instant>,
     written: Option<Instant>,
     /// Something has changed since.
     behind: bool,
@@ -129,25 +131,36 @@ enum Step {
 }
 
 impl Schedule {
-    /// Between two writings, but for those at an end.
-    const PAUSE: Duration = Duration::from_secs(1);
+    /// Longest time between two writings.
+    const LONGEST: Duration = Duration::from_secs(1);
+    /// Shortest time, but for writings at an end.
+    const SHORTEST: Duration = Duration::from_millis(20);
 
     const fn new() -> Schedule {
-        Schedule { written: None, behind: false, waiting: None }
+        Schedule { begun: None, written: None, behind: false, waiting: None }
+    }
+
+    /// Time between two writings: a tenth of the program's life so far, within the limits. Nothing of
+    /// ours runs in a program that is killed, and this is what its report lacks then.
+    fn pause(&self, now: Instant) -> Duration {
+        let life = self.begun.map_or(Duration::ZERO, |b| now.saturating_duration_since(b));
+        (life / 10).clamp(Self::SHORTEST, Self::LONGEST)
     }
 
     /// Something has changed; `at_once` when the process or a context may be at its end.
     fn changed(&mut self, now: Instant, at_once: bool, process: u32) -> Step {
         self.behind = true;
-        let since = self.written.map_or(Self::PAUSE, |t| now.saturating_duration_since(t));
-        if at_once || since >= Self::PAUSE {
+        self.begun.get_or_insert(now);
+        let pause = self.pause(now);
+        let since = self.written.map_or(pause, |t| now.saturating_duration_since(t));
+        if at_once || since >= pause {
             return Step::Write;
         }
         if self.waiting == Some(process) {
             return Step::Leave;
         }
         self.waiting = Some(process);
-        Step::Wait(Self::PAUSE - since)
+        Step::Wait(pause - since)
     }
 
     /// Whoever waited has waited; true when there still is something to write.
@@ -336,10 +349,14 @@ mod tests {
             let start = Instant::now();
             let mut schedule = Schedule::new();
             let (mut writings, mut due) = (0, None);
-            let frames = 10 * frames_per_sec;
-            let at = |frame: u32| start + Duration::from_secs(10) * frame / frames;
+            let mut after_ten_secs = 0;
+            let frames = 20 * frames_per_sec;
+            let at = |frame: u32| start + Duration::from_secs(20) * frame / frames;
             for frame in 0..frames {
                 let now = at(frame);
+                if frame == frames / 2 {
+                    after_ten_secs = writings;
+                }
                 if due.is_some_and(|d| d <= now) {
                     due = None;
                     if schedule.waited() {
@@ -359,7 +376,10 @@ mod tests {
                     Step::Leave => assert!(due.is_some(), "somebody waits"),
                 }
             }
-            assert!((9..=11).contains(&writings), "{writings} in ten seconds at {frames_per_sec} a second");
+            let later = writings - after_ten_secs;
+            assert!((9..=11).contains(&later), "{later} in ten seconds at {frames_per_sec} a second");
+            // 20 ms apart up to 0.2 s, then each a tenth of its time after the other: ln 50 / ln 1.1.
+            assert!(after_ten_secs <= 10 + 42, "{after_ten_secs} at first, at {frames_per_sec} a second");
             // The program sits idle, or ends.
             assert!(!schedule.behind || due.is_some(), "the last frame comes into the file");
             assert_eq!(schedule.changed(at(frames), true, 7), Step::Write, "an end is not put off");
