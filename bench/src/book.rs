@@ -1,4 +1,5 @@
-//! Compiles and runs the Rust examples of the book (docs/src) as documentation tests, so that none can rot.
+//! Compiles and runs the Rust examples of the book (docs/src) and of READMEs as documentation tests, so that none can
+//! rot.
 //!
 //! bench does this because it may use every member, as an example may. A chapter with examples that is missing here
 //! is found by the test `the_book_is_complete`.
@@ -20,4 +21,8 @@ chapters! {
     rt_core_embedding "../../docs/src/rt-core/embedding.md"
     rt_core_geometry "../../docs/src/rt-core/geometry.md"
     numerical_methods "../../docs/src/numerical_methods.md"
+    readme "../../README.md"
+    rt_core_readme "../../rt-core/README.md"
+    datasets_readme "../../datasets/README.md"
+    composite_readme "../../composite/README.md"
 }
