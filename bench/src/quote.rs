@@ -9,10 +9,12 @@
 //! <!-- end record -->
 //! ```
 //!
-//! `table` names columns, and which rows; `plot` names the beginning of a plot's title. The newest
-//! record of that name is taken. The test `documents_quote_their_records` fails when a document and
+//! `table` names columns, and which rows (`where mode = fast | slow` takes either); `plot` names the
+//! beginning of a plot's title. The newest record of that name is taken, and what speaks against it
+//! stands below the quotation. The test `documents_quote_their_records` fails when a document and
 //! its record differ.
 
+use crate::doubts::MOST_LOAD_PER_CORE;
 use crate::plot::Plot;
 use crate::record::{Column, Record, Row};
 use anyhow::{Context as _, bail, ensure};
@@ -127,8 +129,9 @@ fn quote(root: &Path, path: &Path, request: &str) -> anyhow::Result<(String, Opt
     let up = "../".repeat(levels);
     let folder = folder.strip_prefix(root).unwrap_or(&folder).display().to_string();
     let machine = &record.machine;
+    let doubts = doubts_in_short(&record);
     let source = format!(
-        "*Measured on {}, {}, {} cores: [{id}]({up}{folder}/{id}.csv).*\n",
+        "*Measured on {}, {}, {} cores: [{id}]({up}{folder}/{id}.csv).{doubts}*\n",
         machine.day(),
         machine.cpu,
         machine.cores,
@@ -146,6 +149,21 @@ fn quote(root: &Path, path: &Path, request: &str) -> anyhow::Result<(String, Opt
         return Ok((image, Some(file)));
     }
     bail!("`{what}` is neither `table COLUMNS` nor `plot TITLE`")
+}
+
+/// What speaks against a record, for a reader who has only a line for it.
+fn doubts_in_short(record: &Record) -> String {
+    let machine = &record.machine;
+    let mut why = vec![];
+    if machine.commit.is_none() || machine.is_dirty() {
+        why.push("no commit has the program that measured it".to_owned());
+    }
+    let busy = |load: &f64| *load > MOST_LOAD_PER_CORE * machine.cores as f64;
+    why.extend(machine.load_1_min.filter(busy).map(|load| format!("the load was {load:.2}")));
+    if !machine.optimised {
+        why.push("it was a debug build".to_owned());
+    }
+    if why.is_empty() { String::new() } else { format!(" In doubt: {}.", why.join("; ")) }
 }
 
 /// The newest record of that name: folders of `bench/runs` begin with their dates.
@@ -197,8 +215,11 @@ fn table(record: &Record, request: &str) -> anyhow::Result<String> {
             .with_context(|| format!("`{}` is not `COLUMN = VALUE`", condition.trim()))?;
         wanted.push((known(name.trim())?.name.as_str(), value.trim()));
     }
-    let rows: Vec<&Row> =
-        record.rows.iter().filter(|r| wanted.iter().all(|(name, value)| cell(r, name) == *value)).collect();
+    let rows: Vec<&Row> = record
+        .rows
+        .iter()
+        .filter(|r| wanted.iter().all(|(name, values)| is_one_of(r, name, values)))
+        .collect();
     ensure!(!rows.is_empty(), "`{}` has no row with {}", record.id, conditions.trim());
 
     let head = |c: &&Column| match c.unit.as_str() {
@@ -212,6 +233,12 @@ fn table(record: &Record, request: &str) -> anyhow::Result<String> {
         s += &line(columns.iter().map(|c| cell(row, &c.name)).collect());
     }
     Ok(s)
+}
+
+/// Whether the cell is one of `values`, which ` | ` parts.
+fn is_one_of(row: &Row, column: &str, values: &str) -> bool {
+    let cell = cell(row, column);
+    values.split(" | ").any(|v| v.trim() == cell)
 }
 
 fn cell(row: &Row, column: &str) -> String {
@@ -274,6 +301,31 @@ mod tests {
         assert!(text.contains("(../../../bench/runs/2026-01-02-b/speed.csv)"), "{text}");
         assert!(!text.contains("old") && text.starts_with("a\n") && text.ends_with("-->\nb\n"), "{text}");
         assert_eq!(stale(root.path()).unwrap(), []);
+    }
+
+    #[test]
+    fn a_condition_takes_either_of_two_values_and_no_others() {
+        let root = repository(
+            "<!-- record speed: table mesh, time where mesh = small | huge -->\n<!-- end record -->\n",
+        );
+        update(root.path()).unwrap();
+        let text = std::fs::read_to_string(root.path().join("docs/src/bench/page.md")).unwrap();
+        assert!(text.contains("| small |") && !text.contains("| large |"), "{text}");
+    }
+
+    #[test]
+    fn what_speaks_against_a_record_stands_below_its_quotation() {
+        let mut record = Record::new("speed", "How fast", 4, true, Machine::describe());
+        (record.machine.commit, record.machine.dirty) = (Some("97db1462332d".into()), Some(false));
+        (record.machine.cores, record.machine.optimised) = (2, true);
+        record.machine.load_1_min = Some(1.5);
+        assert_eq!(doubts_in_short(&record), "");
+        record.machine.load_1_min = Some(3.31);
+        assert_eq!(doubts_in_short(&record), " In doubt: the load was 3.31.");
+        record.machine.dirty = Some(true);
+        record.machine.optimised = false;
+        let all = doubts_in_short(&record);
+        assert!(all.contains("no commit") && all.contains("3.31") && all.contains("debug"), "{all}");
     }
 
     #[test]
