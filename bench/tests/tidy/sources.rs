@@ -3,7 +3,7 @@
 use crate::tree::{File, files, words};
 
 /// The only places where `unsafe` may be written, and why it cannot be avoided there. ARCHITECTURE.md explains each.
-const UNSAFE_ROOMS: &[(&str, &str)] = &[
+pub(crate) const UNSAFE_ROOMS: &[(&str, &str)] = &[
     ("rt-core/src/simd", "vector loads and huge pages below the safe SIMD layer"),
     ("gluray/src/symbols", "exported OpenGL symbols, called by programs we do not know"),
     ("gluray/src/real", "calls into the real OpenGL library"),

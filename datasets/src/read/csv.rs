@@ -3,7 +3,7 @@
 //! Cells may be quoted (`"a, b"`, a quote inside is doubled) but not contain line breaks. Empty lines and lines that begin with
 //! `#` are skipped. Columns are asked for by name, so their order does not matter.
 //!
-//! The lexer is our own because the crate csv does not refuse broken quotes: ARCHITECTURE.md, "Decisions".
+//! The lexer is our own because the crate csv does not refuse broken quotes: the book, "Decisions and their reasons".
 
 use super::ReadError;
 use super::error::{At, Fault, read_bytes};
