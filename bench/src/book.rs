@@ -21,6 +21,7 @@ chapters! {
     rt_core_embedding "../../docs/src/rt-core/embedding.md"
     rt_core_geometry "../../docs/src/rt-core/geometry.md"
     numerical_methods "../../docs/src/numerical_methods.md"
+    your_own_file "../../docs/src/your_own_file.md"
     readme "../../README.md"
     rt_core_readme "../../rt-core/README.md"
     datasets_readme "../../datasets/README.md"
