@@ -97,7 +97,7 @@ pub(crate) fn colors(
     let sky = settings.lights.sky as f32;
     let beyond = Beyond {
         view,
-        eye_from_object: draws.iter().map(eye_from_object).collect(),
+        eye_from_object: draws.iter().map(|p| eye_from_object(p.draw)).collect(),
         around,
         sky: background.map(|v| v + sky),
         reflection: AtomicU64::new(0),
@@ -130,7 +130,7 @@ pub(crate) fn colors(
 pub(crate) fn distances(draws: &[Prepared<'_>]) -> [f64; 2] {
     let (mut near, mut far) = (f64::INFINITY, 0.0_f64);
     for p in draws {
-        let (m, b) = (eye_from_object(p), p.draw.geometry.bounds());
+        let (m, b) = (eye_from_object(p.draw), p.draw.geometry.bounds());
         for corner in 0..8 {
             let pick = |bit: i32, k: usize| f64::from(if corner & bit == 0 { b.min[k] } else { b.max[k] });
             let z = -m.transform_point3(DVec3::new(pick(1, 0), pick(2, 1), pick(4, 2))).z;

@@ -1,11 +1,13 @@
 //! What rays add to OpenGL's lighting: lights that are hidden, and corners that see little of the surroundings.
 //!
-//! Only what is asked for and can change a pixel is computed: no shadow rays to lights at the eye, none where a surface faces away, and no
-//! occlusion rays when none are set. Rays are made in eye space, where all draws of a frame meet, and go through each draw's own structure.
+//! Only what is asked for and can change a pixel is computed: no shadow rays from what the eye sees to a point light at the eye, none
+//! where a surface faces away, and no occlusion rays when none are set. Rays are made in eye space, where all draws of a frame meet, and go
+//! through each draw's own structure.
 
-use crate::capture::Shading;
+use crate::capture::{Draw, Shading};
 use crate::config::{Mode, Settings};
 use crate::trace::Prepared;
+use rt_core::camera::Camera;
 use rt_core::glam::{DMat4, DVec3, Vec3};
 use rt_core::ray::Ray;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -36,12 +38,46 @@ pub(crate) enum Place {
     Near(DVec3),
 }
 
+/// From where a draw is seen, in eye space. The origin is not always it: a program may keep the
+/// place of its camera in the projection.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Eye {
+    /// A point, and how far from it the draw is.
+    Point(DVec3, f64),
+    /// The direction that parallel rays come from.
+    Parallel(DVec3),
+}
+
+impl Eye {
+    /// Of the camera that a draw is seen by, given in the draw's own space; `middle` is the draw's.
+    pub(crate) fn of(camera: &Camera, eye_from_object: &DMat4, middle: DVec3) -> Eye {
+        match camera.eye() {
+            Some(at) => {
+                let at = eye_from_object.transform_point3(at);
+                Eye::Point(at, (eye_from_object.transform_point3(middle) - at).length())
+            }
+            None => {
+                let along = eye_from_object.transform_vector3(camera.world_ray([0.0; 2]).1);
+                Eye::Parallel(-along.normalize_or_zero())
+            }
+        }
+    }
+}
+
 impl Place {
-    /// What a light at the eye misses the eye cannot see.
-    fn is_at_eye(self) -> bool {
-        match self {
-            Place::Far(d) => d.x == 0.0 && d.y == 0.0 && d.z > 0.0,
-            Place::Near(p) => p == DVec3::ZERO,
+    /// Whether its light goes along the rays of this eye: what it misses the eye cannot see. That is
+    /// so of a point at the eye of a perspective, and of parallel light along parallel rays. Parallel
+    /// light along the view is no such light in perspective: its shadows show beside what casts them.
+    pub(crate) fn follows_rays_of(self, eye: Eye) -> bool {
+        // What is left of f32 matrices moves a shadow by much less than a pixel.
+        const SLACK: f64 = 1e-5;
+        match (self, eye) {
+            (Place::Near(p), Eye::Point(at, far)) => (p - at).length() <= SLACK * far,
+            (Place::Far(d), Eye::Parallel(back)) => {
+                let d = d.normalize_or_zero();
+                d.dot(back) > 0.0 && d.cross(back).length() <= SLACK
+            }
+            _ => false,
         }
     }
 }
@@ -61,9 +97,9 @@ pub(crate) struct Surroundings<'a> {
 }
 
 /// Where a draw's vertices are in eye space.
-pub(crate) fn eye_from_object(p: &Prepared<'_>) -> DMat4 {
-    let m = match &p.draw.shading {
-        Shading::Fixed => &p.draw.state.model_view,
+pub(crate) fn eye_from_object(draw: &Draw) -> DMat4 {
+    let m = match &draw.shading {
+        Shading::Fixed => &draw.state.model_view,
         Shading::Program(program) => &program.view_from_object,
     };
     DMat4::from_cols_array(&m.map(f64::from))
@@ -83,7 +119,7 @@ impl<'a> Surroundings<'a> {
     pub(crate) fn of(draws: &'a [Prepared<'a>], settings: &'a Settings) -> Surroundings<'a> {
         let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for p in draws {
-            let (m, b) = (eye_from_object(p), p.draw.geometry.bounds());
+            let (m, b) = (eye_from_object(p.draw), p.draw.geometry.bounds());
             for corner in 0..8 {
                 let pick =
                     |bit: i32, k: usize| f64::from(if corner & bit == 0 { b.min[k] } else { b.max[k] });
@@ -92,7 +128,7 @@ impl<'a> Surroundings<'a> {
             }
         }
         let invert = |p: &Prepared<'_>| {
-            let m = eye_from_object(p);
+            let m = eye_from_object(p.draw);
             (m.determinant() != 0.0).then(|| m.inverse())
         };
         // Places are multiples of a sixteenth of a pixel in [-1/2, 1/2).
@@ -121,8 +157,16 @@ impl<'a> Surroundings<'a> {
         })
     }
 
-    /// What reaches a point with the given normal (towards the viewer), both in eye space.
-    pub(crate) fn at(&self, point: DVec3, normal: DVec3, lights: &[Place], pixel: (i32, i32)) -> Visibility {
+    /// What reaches a point with the given normal (towards the viewer), both in eye space. `eye` is
+    /// there for a point that is the first on a ray of its.
+    pub(crate) fn at(
+        &self,
+        point: DVec3,
+        normal: DVec3,
+        lights: &[Place],
+        eye: Option<Eye>,
+        pixel: (i32, i32),
+    ) -> Visibility {
         let mut v = Visibility::FULL;
         // Off the surface by a share of the scene that f32 positions in any of its parts cannot reach.
         let from = point + normal * (self.diagonal * 2e-5);
@@ -130,7 +174,8 @@ impl<'a> Surroundings<'a> {
         let mut random = Random::new((pixel.0 ^ self.sample, pixel.1));
         if effects.shadows {
             for (light, share) in lights.iter().zip(&mut v.lights) {
-                if light.is_at_eye() && effects.light_radius_deg == 0.0 {
+                let follows = eye.is_some_and(|eye| light.follows_rays_of(eye));
+                if follows && effects.light_radius_deg == 0.0 {
                     continue;
                 }
                 let (dir, most) = match *light {
@@ -199,13 +244,24 @@ pub(crate) fn vector(v: [f32; 3]) -> DVec3 {
 }
 
 #[cfg(test)]
+mod eye_lights;
+
+#[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn lights_at_the_eye_are_known() {
-        assert!(Place::Far(DVec3::Z).is_at_eye() && Place::Near(DVec3::ZERO).is_at_eye());
-        assert!(!Place::Far(DVec3::new(0.1, 0.0, 1.0)).is_at_eye() && !Place::Far(DVec3::NEG_Z).is_at_eye());
+    fn lights_that_go_along_the_rays_of_an_eye_are_known() {
+        let point = |at| Eye::Point(at, 10.0);
+        assert!(Place::Near(DVec3::ZERO).follows_rays_of(point(DVec3::ZERO)));
+        assert!(Place::Near(DVec3::X).follows_rays_of(point(DVec3::new(1.0, 1e-6, 0.0))));
+        assert!(!Place::Near(DVec3::ZERO).follows_rays_of(point(DVec3::X)));
+        assert!(!Place::Far(DVec3::Z).follows_rays_of(point(DVec3::ZERO)));
+        let parallel = Eye::Parallel(DVec3::Z);
+        assert!(Place::Far(DVec3::Z * 3.0).follows_rays_of(parallel));
+        assert!(!Place::Far(DVec3::new(0.1, 0.0, 1.0)).follows_rays_of(parallel));
+        assert!(!Place::Far(DVec3::NEG_Z).follows_rays_of(parallel));
+        assert!(!Place::Near(DVec3::ZERO).follows_rays_of(parallel));
     }
 
     #[test]

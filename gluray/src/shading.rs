@@ -31,7 +31,7 @@ impl Prepared<'_> {
 
     /// Object-space normals from those of eye space: the transposed model-view.
     pub(crate) fn normal_from_eye(&self) -> Mat3 {
-        let m = crate::effects::eye_from_object(self);
+        let m = crate::effects::eye_from_object(self.draw);
         rt_core::glam::DMat3::from_mat4(m).transpose().as_mat3()
     }
 
@@ -171,9 +171,9 @@ impl Prepared<'_> {
         let [a, b, c] = [at([1.0, 0.0, 0.0]), at([0.0, 1.0, 0.0]), at([0.0, 0.0, 1.0])];
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let normal = if normal.dot(towards) < 0.0 { -normal } else { normal };
-        let reaches = around.at(vector(eye), normal, &self.places, pixel);
+        let reaches = around.at(vector(eye), normal, &self.places, seen.then_some(self.eye), pixel);
         if mode != Mode::Enhance {
-            // Lights at the eye cast no shadow that it could see; corners dim them all the same.
+            // Point lights at the eye cast no shadow that it could see; corners dim them all the same.
             let mut r = reaches;
             r.lights.iter_mut().for_each(|l| *l *= 0.5 + 0.5 * reaches.ambient);
             return self.color(prim, f, per_pixel, &r, own);

@@ -14,7 +14,7 @@ mod rays;
 
 use crate::cache::Structures;
 use crate::capture::{Draw, Shading};
-use crate::effects::Place;
+use crate::effects::{Eye, Place};
 use crate::enums::*;
 use crate::lighting::{Lit, Setup, transform};
 use crate::raster::{covers, gradient, moves_back, steepness};
@@ -91,6 +91,8 @@ pub(crate) struct Prepared<'a> {
     pub(crate) draw: &'a Draw,
     pub(crate) world: Arc<World>,
     pub(crate) places: Vec<Place>,
+    /// Where it is seen from, in the space of `places`.
+    pub(crate) eye: Eye,
     camera: Camera,
     /// Rows of planes in object space that points must be above: near, far, the user's.
     planes: Vec<[f64; 4]>,
@@ -173,10 +175,13 @@ impl<'a> Prepared<'a> {
             Shading::Fixed => lighting.places(),
             Shading::Program(program) => program.places(),
         };
+        let bounds = draw.geometry.bounds();
+        let middle = (bounds.min.as_dvec3() + bounds.max.as_dvec3()) / 2.0;
         let mut out = Prepared {
             draw,
             world,
             places,
+            eye: Eye::of(&camera, &crate::effects::eye_from_object(draw), middle),
             camera,
             planes,
             clip_planes,

@@ -2,6 +2,7 @@
 
 use crate::capture::Shading;
 use crate::config::Settings;
+use crate::effects::{Eye, Place};
 use crate::state::snapshot::GlLight;
 use crate::trace::Prepared;
 use rt_core::glam::DVec3;
@@ -15,7 +16,7 @@ fn vector(v: [f32; 4]) -> DVec3 {
     DVec3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2]))
 }
 
-fn of_opengl(l: &GlLight, radius_rad: f64) -> Option<Light> {
+fn of_opengl(l: &GlLight, radius_rad: f64, eye: Eye) -> Option<Light> {
     let (color, highlight) = (sane(l.diffuse), sane(l.specular));
     if color == [0.0; 3] && highlight == [0.0; 3] {
         return None;
@@ -40,14 +41,26 @@ fn of_opengl(l: &GlLight, radius_rad: f64) -> Option<Light> {
             radius,
         }
     };
-    let at_eye = if w == 0.0 { at.x == 0.0 && at.y == 0.0 && at.z > 0.0 } else { at == DVec3::ZERO };
     let light = Light {
         kind,
         highlight_color: Some(highlight),
         attenuation: l.attenuation,
         ..Light::directional(DVec3::Z).with_color(color)
     };
-    Some(if at_eye && radius_rad == 0.0 { light.without_shadows() } else { light })
+    let place = if w == 0.0 { Place::Far(at) } else { Place::Near(at) };
+    if radius > 0.0 || !place.follows_rays_of(eye) {
+        return Some(light);
+    }
+    // Said so, the renderer leaves shadow rays out where the eye cannot see what they would find, and only there.
+    let kind = match light.kind {
+        LightKind::Directional { angular_radius_rad, .. } => {
+            LightKind::Directional { to_light: DVec3::Z, angular_radius_rad }
+        }
+        LightKind::Point { radius, .. } => LightKind::Point { position: DVec3::ZERO, radius },
+        // The axis of a cone is given in eye space.
+        _ => return Some(light),
+    };
+    Some(Light { kind, ..light }.in_camera_frame())
 }
 
 /// Lamps, and the radiance that comes from everywhere.
@@ -86,10 +99,10 @@ pub(super) fn of(
             let share =
                 if tracked { 1.0 } else { (sum(m.ambient) / sum(m.diffuse).max(1e-6)).clamp(0.0, 1.0) };
             (0..3).for_each(|k| ambient[k] += total[k] * share);
-            s.lights.iter().filter_map(|l| of_opengl(l, radius_rad)).collect()
+            s.lights.iter().filter_map(|l| of_opengl(l, radius_rad, first.eye)).collect()
         }
         Shading::Program(program) => {
-            program.lights.iter().filter_map(|l| of_opengl(&l.as_opengl(), radius_rad)).collect()
+            program.lights.iter().filter_map(|l| of_opengl(&l.as_opengl(), radius_rad, first.eye)).collect()
         }
     };
     if !settings.effects.shadows {

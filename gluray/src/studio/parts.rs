@@ -54,7 +54,7 @@ pub(super) fn part(
     settings: &Settings,
     warnings: &mut Vec<String>,
 ) -> Option<Part> {
-    let m = eye_from_object(p);
+    let m = eye_from_object(p.draw);
     if m.row(3).truncate().length() > 1e-6 * m.row(3).w.abs() || m.row(3).w == 0.0 || !m.is_finite() {
         warn(warnings, "a draw whose model-view matrix is projective is left out");
         return None;
