@@ -32,7 +32,7 @@ pub(crate) enum Trace {
 }
 
 /// Pixels of a viewport from which on pictures would cost gigabytes.
-const MOST_PIXELS: i32 = 1 << 26;
+pub(crate) const MOST_PIXELS: i32 = 1 << 26;
 
 /// The verdict over filled primitives in state `s`.
 pub(crate) fn filled(s: &Snapshot, trace: Trace) -> Verdict {

@@ -1,6 +1,8 @@
 //! A helper's life: it keeps what it was told of the scene, and makes the rows it is asked for.
 
-use super::orders::{ANSWER, AnswerHead, Cost, MOST_ORDER_BYTES, ORDER, Order, Seen, Work, numbers, rect};
+use super::orders::{
+    ANSWER, AnswerHead, Cost, MOST_ORDER_BYTES, ORDER, Order, Seen, Work, numbers, pixels, rect,
+};
 use super::parcels::Parcel;
 use super::rows::{Share, put_rows};
 use crate::beyond;
@@ -9,7 +11,7 @@ use crate::capture::{Attributes, Draw, Shading};
 use crate::config::{self, Quality, Settings};
 use crate::studio::Studio;
 use crate::texturing::Image;
-use crate::trace::{self, Prepared};
+use crate::trace::{self, Prepared, Rect};
 use crate::view::View;
 use crate::worker;
 use composite::comm::{CommError, Communicator};
@@ -22,6 +24,10 @@ use std::time::{Duration, Instant};
 
 /// How often somebody who waits for work looks whether it is over.
 const LOOK: Duration = Duration::from_millis(500);
+
+/// Most pixels of the rectangle around all views of a picture: no driver's framebuffer is larger
+/// than 16384 x 16384.
+const MOST_BETWEEN: i64 = 1 << 28;
 
 /// The scene as far as a program has told it, and what is made of it.
 #[derive(Default)]
@@ -108,6 +114,11 @@ impl Helper {
         (cost.builds, cost.refits) = (structures.built, structures.refitted);
         let (area, rows, warnings) = match order.work {
             Work::Nearest => {
+                // Views that are small each may lie so far apart that no memory holds all between them.
+                let Rect { x, y, w, h } = ready.iter().fold(Rect::default(), |r, p| r.or(p.rect));
+                if pixels(w, h) > MOST_BETWEEN {
+                    return Err(format!("a picture of {w} x {h} pixels at ({x}, {y})"));
+                }
                 let (layer, extra) = trace::nearest(&ready, &settings, order.share);
                 cost.add("primary", ready.iter().map(|p| p.rays.load(Relaxed)).sum());
                 cost.add("shadow", extra[0]);

@@ -5,6 +5,7 @@ use super::rows::Share;
 use super::wire::{Malformed, Reader, Wire, put_pods, wire_struct};
 use crate::capture::Attributes;
 use crate::config::Settings;
+use crate::decide::MOST_PIXELS;
 use crate::texturing::Image;
 use crate::trace::Rect;
 use rt_core::glam::Vec3;
@@ -82,17 +83,24 @@ impl Wire for Work {
 impl Seen {
     fn checked(from: &mut Reader<'_>) -> Result<Seen, Malformed> {
         let seen = Seen::get(from)?;
-        const FAR: i32 = 1 << 24;
-        let fits = |r: &[i32; 4]| {
-            r.iter().all(|v| (-FAR..=FAR).contains(v))
-                && (1..=1 << 16).contains(&r[2])
-                && (1..=1 << 16).contains(&r[3])
-        };
+        let fits = |r: &[i32; 4]| r[2] > 0 && r[3] > 0 && is_traced(r);
         match fits(&seen.viewport) && fits(&seen.rect) {
             true => Ok(seen),
             false => Err(from.fault(format!("a view {:?} of {:?}", seen.rect, seen.viewport))),
         }
     }
+}
+
+/// Whether a rectangle is one of those that a program's first rank asks for: larger views are the
+/// driver's, so nobody need make room for what a peer says beyond them.
+pub(super) fn is_traced([x, y, w, h]: &[i32; 4]) -> bool {
+    const FAR: i32 = 1 << 24;
+    [x, y, w, h].iter().all(|v| (-FAR..=FAR).contains(*v)) && pixels(*w, *h) <= MOST_PIXELS.into()
+}
+
+/// Pixels of a rectangle; none where a side is negative.
+pub(super) fn pixels(w: i32, h: i32) -> i64 {
+    i64::from(w.max(0)) * i64::from(h.max(0))
 }
 
 /// One picture's order. News come first, so that an order that is refused later still leaves a helper with what it was told.

@@ -214,10 +214,8 @@ impl Parcel {
     pub(super) fn check(&self, from: &Reader<'_>) -> Result<(), Malformed> {
         const FAR: i32 = 1 << 24;
         let s = &self.state;
-        let small =
-            |r: &[i32; 4]| r.iter().all(|v| (-FAR..=FAR).contains(v)) && r[2] <= 1 << 16 && r[3] <= 1 << 16;
         let lights = self.program.as_ref().map_or(0, Recognised::missing_lights);
-        if !small(&s.viewport) || s.viewport[2] <= 0 || s.viewport[3] <= 0 {
+        if !super::orders::is_traced(&s.viewport) || s.viewport[2] <= 0 || s.viewport[3] <= 0 {
             Err(from.fault(format!("a viewport of {:?}", s.viewport)))
         } else if s.scissor.is_some_and(|r| r.iter().any(|v| !(-FAR..=FAR).contains(v))) {
             Err(from.fault(format!("scissors of {:?}", s.scissor)))

@@ -1,9 +1,10 @@
 use super::group::{lead_group, serve_group};
-use super::helper::serve;
+use super::helper::{Helper, serve};
 use super::lead::{Lead, Made};
-use super::orders::{ANSWER, ORDER, Work};
+use super::orders::{ANSWER, AnswerHead, ORDER, Work};
 use super::rows::Share;
 use super::sockets::SocketComm;
+use super::wire::{Reader, Wire};
 use crate::cache::Cache;
 use crate::cache::Structures;
 use crate::capture::{Attributes, Draw, Shading, Values};
@@ -229,6 +230,53 @@ fn orders_that_are_none_are_refused_and_the_next_is_obeyed() {
         comm.send(0, ANSWER, answers).expect("sent");
     });
     assert!(lost.iter().all(Option::is_none), "{lost:?}");
+}
+
+/// What a helper says of an order by a first rank that asks for `work` with these viewports.
+fn said_of(work: Work, viewports: [[i32; 4]; 2]) -> Option<String> {
+    let mut group = threads::group(2);
+    let (mut helper, first) = (group.pop().expect("two"), group.pop().expect("two"));
+    let mut draws = draws(0.1);
+    for (draw, viewport) in draws.iter_mut().zip(viewports) {
+        Arc::make_mut(&mut draw.state).viewport = viewport;
+    }
+    let mut lead = Lead::new(Box::new(first));
+    lead.patience = Duration::ZERO;
+    let ready: Vec<Prepared<'_>> =
+        draws.iter().map(|d| Prepared::new(d, None, &mut Structures::default()).expect("seen")).collect();
+    lead.make(&ready, &settings(Mode::Match), &work, |_| Made {
+        rect: trace::Rect::default(),
+        first: Vec::<[u8; 4]>::new(),
+        second: Vec::<f32>::new(),
+        rays: Vec::new(),
+        warnings: Vec::new(),
+    });
+    let order = helper.recv(0, ORDER, 1 << 30, Duration::from_secs(20)).expect("an order");
+    let answer = Helper::default().answer(&order);
+    AnswerHead::get(&mut Reader::new(&answer)).expect("an answer").complaint
+}
+
+#[test]
+fn a_peer_cannot_make_a_helper_reserve_more_than_a_view_that_is_traced() {
+    const SMALL: [i32; 4] = [3, 5, 333, 277];
+    let far = (1 << 24) - 400;
+    let beyond = |viewport, rect| {
+        let projection = IDENTITY.map(f64::from);
+        Work::Beyond(super::orders::Seen { projection, viewport, rect }, [0.0; 3])
+    };
+    assert_eq!(said_of(Work::Nearest, [SMALL; 2]), None);
+    assert_eq!(said_of(beyond(SMALL, SMALL), [SMALL; 2]), None);
+    let large = [0, 0, 1 << 16, 1 << 16];
+    let lies = [
+        ("a view", beyond(large, large), [SMALL; 2]),
+        ("a view", beyond(SMALL, large), [SMALL; 2]),
+        ("a viewport", Work::Nearest, [SMALL, large]),
+        ("a picture of", Work::Nearest, [[-far, -far, 333, 277], [far, far, 333, 277]]),
+    ];
+    for (words, work, viewports) in lies {
+        let said = said_of(work, viewports);
+        assert!(said.as_ref().is_some_and(|s| s.contains(words)), "{work:?}: {said:?}");
+    }
 }
 
 #[test]
