@@ -248,3 +248,15 @@ fn a_term_ends_the_program_and_the_report_is_written() {
     let text = std::fs::read_to_string(&report).expect("the report is there");
     assert!(serde_json::from_str::<Report>(&text).is_ok(), "{text}");
 }
+
+#[test]
+fn run_refuses_variables_of_ours_that_are_no_text_by_name() {
+    use std::os::unix::ffi::OsStrExt;
+    let no_text = std::ffi::OsStr::from_bytes(b"3f2a.mirror=0.5\xff");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_gluray"));
+    command.args(["run", "--set", "objects.3f2a.mirror=0.3", "--", "true"]).env("GLURAY_OBJECTS", no_text);
+    let output = command.output().expect("the program starts");
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+    let said = err(&output);
+    assert!(said.contains("`GLURAY_OBJECTS` is not UTF-8") && said.contains("set it to text"), "{said}");
+}

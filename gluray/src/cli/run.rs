@@ -3,7 +3,7 @@
 use super::helpers::Helpers;
 use super::vendor::Vendor;
 use super::{last_report, library};
-use crate::config::environment::{OBJECTS, parse_pair, variable_of};
+use crate::config::environment::{OBJECTS, parse_pair, texts, variable_of};
 use crate::config::{Assignment, ConfigFile, SettingError, Settings, assign};
 use crate::report::Report;
 use anyhow::Context as _;
@@ -74,6 +74,12 @@ fn settings(args: &RunArgs) -> Result<Vec<(String, String)>, UsageError> {
         if !errors.is_empty() {
             return Err(usage(&errors));
         }
+    }
+    // The program's part of us would not obey them, nor could it say so before the end.
+    let (_, no_text) = texts(std::env::vars_os());
+    let ours: Vec<SettingError> = no_text.into_iter().filter(|e| e.path.starts_with("GLURAY_")).collect();
+    if !ours.is_empty() {
+        return Err(usage(&ours));
     }
     let mut variables: Vec<(String, String)> = Vec::new();
     match args.mode.as_deref() {

@@ -5,6 +5,7 @@
 use super::assign::{Assignment, SettingError};
 use super::fields::{FIELDS, Field, Kind};
 use serde_json::{Value, json};
+use std::ffi::OsString;
 
 /// Variables that are no settings: (name, what for).
 pub const OTHER_VARIABLES: &[(&str, &str)] = &[
@@ -19,6 +20,36 @@ pub const OTHER_VARIABLES: &[(&str, &str)] = &[
     ("GLURAY_GLX_VENDOR", "GLX vendor that we stand in front of; without it the one that GLVND would take"),
     ("GLURAY_EGL_VENDOR", "the same for EGL: names or libraries, with `:` between them"),
 ];
+
+/// Variables of others that say where things are.
+const PLACES: [&str; 6] =
+    ["HOME", "XDG_CONFIG_HOME", "XDG_CACHE_HOME", "XDG_STATE_HOME", "XDG_RUNTIME_DIR", "DISPLAY"];
+
+/// The variables that are text, and an error for each that is not and would have counted: it is not
+/// obeyed, and nobody would know.
+pub fn texts(
+    all: impl IntoIterator<Item = (OsString, OsString)>,
+) -> (Vec<(String, String)>, Vec<SettingError>) {
+    let (mut out, mut errors) = (Vec::new(), Vec::new());
+    for (name, value) in all {
+        let shown = name.to_string_lossy().into_owned();
+        match (name.into_string(), value.into_string()) {
+            (Ok(name), Ok(value)) => out.push((name, value)),
+            (_, Ok(_)) if !shown.starts_with("GLURAY_") => {}
+            (_, value) if shown.starts_with("GLURAY_") || PLACES.contains(&shown.as_str()) => {
+                let value = value.unwrap_or_else(|v| v.to_string_lossy().into_owned());
+                errors.push(SettingError {
+                    origin: "environment".into(),
+                    path: shown.chars().take(80).collect(),
+                    what: format!("is not UTF-8: {:?}", value.chars().take(80).collect::<String>()),
+                    cure: "set it to text; it counts as not set".into(),
+                });
+            }
+            _ => {}
+        }
+    }
+    (out, errors)
+}
 
 /// The variable of a setting.
 pub fn variable_of(path: &str) -> String {
@@ -144,6 +175,30 @@ mod tests {
         assert_eq!((s.mode, s.effects.shadows, s.samples), (Mode::Rich, false, 1));
         assert_eq!((s.material.color, s.lights.added_direction), (Some([1.0, 0.0, 0.0]), [0.0, 1.0, 0.0]));
         assert_eq!(s.material_of("Ab").mirror, Some(0.5));
+    }
+
+    #[test]
+    fn variables_that_are_no_text_are_named_and_not_passed_over_in_silence() {
+        use std::os::unix::ffi::OsStringExt;
+        let no_text = |text: &str| OsString::from_vec([text.as_bytes(), b"\xff"].concat());
+        let all = [
+            ("GLURAY_MODE".into(), no_text("rich")),
+            ("GLURAY_SAMPLES".into(), "4".into()),
+            ("HOME".into(), no_text("/home/a")),
+            ("TITLE".into(), no_text("of somebody else's")),
+            (no_text("GLURAY_"), "1".into()),
+        ];
+        let (texts, errors) = texts(all);
+        assert_eq!(texts, variables(&[("GLURAY_SAMPLES", "4")]));
+        let errors: Vec<String> = errors.iter().map(ToString::to_string).collect();
+        assert_eq!(
+            errors,
+            [
+                "environment: `GLURAY_MODE` is not UTF-8: \"rich\u{fffd}\"; set it to text; it counts as not set",
+                "environment: `HOME` is not UTF-8: \"/home/a\u{fffd}\"; set it to text; it counts as not set",
+                "environment: `GLURAY_\u{fffd}` is not UTF-8: \"1\"; set it to text; it counts as not set",
+            ]
+        );
     }
 
     #[test]

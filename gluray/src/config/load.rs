@@ -17,6 +17,8 @@ pub struct Sources {
     pub program: Vec<String>,
     /// Environment variables.
     pub variables: Vec<(String, String)>,
+    /// What is wrong with variables that would have counted.
+    pub refused: Vec<SettingError>,
 }
 
 /// The settings of a program, and what was wrong on the way.
@@ -33,13 +35,11 @@ pub struct Loaded {
 impl Sources {
     /// Of this process.
     pub fn of_this_process() -> Sources {
-        let variables: Vec<(String, String)> = std::env::vars_os()
-            .filter_map(|(n, v)| Some((n.into_string().ok()?, v.into_string().ok()?)))
-            .collect();
+        let (variables, refused) = environment::texts(std::env::vars_os());
         let arguments: Vec<String> =
             std::env::args_os().take(8).map(|a| a.to_string_lossy().into_owned()).collect();
         let executable = std::fs::read_link("/proc/self/exe").ok();
-        Sources::new(variables, program_names(executable.as_deref(), &arguments))
+        Sources { refused, ..Sources::new(variables, program_names(executable.as_deref(), &arguments)) }
     }
 
     /// Of a program with these variables.
@@ -48,7 +48,7 @@ impl Sources {
             |name: &str| variables.iter().find(|(n, v)| n == name && !v.is_empty()).map(|(_, v)| v.clone());
         let named = get("GLURAY_CONFIG").map(PathBuf::from);
         let file = named.clone().or_else(|| ConfigFile::usual_path(get));
-        Sources { file, file_is_required: named.is_some(), program, variables }
+        Sources { file, file_is_required: named.is_some(), program, variables, refused: Vec::new() }
     }
 
     /// Reads and puts together all layers below the panel's.
@@ -76,7 +76,8 @@ impl Sources {
         assignments.extend(variables);
         let (settings, errors) = assign(&Settings::default(), &assignments);
         loaded.settings = settings;
-        loaded.problems.extend(errors.iter().chain(&unknown).map(SettingError::to_string));
+        let errors = errors.iter().chain(&unknown).chain(&self.refused);
+        loaded.problems.extend(errors.map(SettingError::to_string));
         loaded
     }
 }
