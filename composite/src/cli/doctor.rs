@@ -61,7 +61,7 @@ fn mpi(what: &'static str, names: &[&str], package: &str) -> Finding {
 }
 
 /// First line that a program prints of itself.
-fn version_of(program: &str, flag: &str) -> Option<String> {
+fn version_of(program: impl AsRef<std::ffi::OsStr>, flag: &str) -> Option<String> {
     let output = Command::new(program).arg(flag).output().ok()?;
     let text =
         String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
@@ -70,7 +70,9 @@ fn version_of(program: &str, flag: &str) -> Option<String> {
 
 fn mpirun_program(processors: usize) -> Finding {
     let name = mpirun::launcher();
-    match version_of(&name, "--version") {
+    let version = version_of(&name, "--version");
+    let name = name.display();
+    match version {
         Some(version) => {
             let settings: Vec<String> = mpirun::settings(processors + 1)
                 .iter()
@@ -96,7 +98,7 @@ fn mpirun_program(processors: usize) -> Finding {
 }
 
 fn this_process() -> Finding {
-    let found = match launcher::choose(|name| std::env::var(name).ok()) {
+    let found = match launcher::choose(launcher::variable) {
         Ok(choice) => format!("a rank: {} ({})", choice.libraries.join(" or "), choice.reason),
         Err(_) => "not started by an MPI launcher; --mpi starts one".to_string(),
     };

@@ -8,11 +8,8 @@ use std::process::{Command, ExitStatus};
 pub(super) const LAUNCHER_VARIABLE: &str = "COMPOSITE_MPIRUN";
 
 /// The launcher that is used.
-pub(super) fn launcher() -> String {
-    std::env::var(LAUNCHER_VARIABLE)
-        .ok()
-        .filter(|name| !name.is_empty())
-        .unwrap_or_else(|| "mpirun".to_string())
+pub(super) fn launcher() -> OsString {
+    std::env::var_os(LAUNCHER_VARIABLE).filter(|name| !name.is_empty()).unwrap_or_else(|| "mpirun".into())
 }
 
 /// Whether this is the superuser, without whom Open MPI does not ask twice.
@@ -42,6 +39,7 @@ pub(super) fn settings(ranks: usize) -> Vec<(&'static str, &'static str)> {
 /// Runs `mpirun -n RANKS this-program ARGUMENTS` and waits for it.
 pub(super) fn start(common: CommonArgs, ranks: usize, arguments: &[OsString]) -> anyhow::Result<Status> {
     let launcher = launcher();
+    let name = launcher.display();
     let program = std::env::current_exe()?;
     let mut command = Command::new(&launcher);
     command.args(["-n", &ranks.to_string()]).arg(program).args(arguments).envs(settings(ranks));
@@ -49,12 +47,12 @@ pub(super) fn start(common: CommonArgs, ranks: usize, arguments: &[OsString]) ->
     let status = match command.status() {
         Err(error) if error.kind() == ErrorKind::NotFound => {
             return Err(UsageError(format!(
-                "there is no program {launcher}: install an MPI (Debian: openmpi-bin or mpich), \
+                "there is no program {name}: install an MPI (Debian: openmpi-bin or mpich), \
                  or name its launcher in {LAUNCHER_VARIABLE}"
             ))
             .into());
         }
-        other => other.cure(format_args!("try `{launcher} --version`"))?,
+        other => other.cure(format_args!("try `{name} --version`"))?,
     };
     Ok(outcome(status))
 }

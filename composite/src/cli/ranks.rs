@@ -121,7 +121,7 @@ impl RankArgs {
 
     /// Whether this process is one of the ranks already.
     pub(super) fn is_rank(&self) -> bool {
-        smpirun::inside() || (self.mpi && launcher::launched(|name| std::env::var(name).ok()))
+        smpirun::inside() || (self.mpi && launcher::launched(launcher::variable))
     }
 
     /// Whether ranks are threads, of which all that this process has work at once.

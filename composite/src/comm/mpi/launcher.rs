@@ -1,5 +1,6 @@
 //! Which MPI a process belongs to: the one whose launcher started it.
 use super::MpiError;
+use std::ffi::OsString;
 
 /// Names this variable may have, or the path of a library.
 pub const CHOICE_VARIABLE: &str = "COMPOSITE_MPI";
@@ -17,6 +18,16 @@ pub struct Choice {
 pub const OPEN_MPI: &[&str] = &["libmpi.so.40", "libmpi.so"];
 /// File names of MPICH's library; Intel MPI and MVAPICH use the second.
 pub const MPICH: &[&str] = &["libmpich.so.12", "libmpi.so.12", "libmpich.so"];
+
+/// A variable of this process. One that is not UTF-8 is set too, and a library whose name is not is named as well as it can be
+/// by the error that says it was not found: as if it were not set, another library would be taken without a word.
+pub fn variable(name: &str) -> Option<String> {
+    std::env::var_os(name).map(text)
+}
+
+fn text(value: OsString) -> String {
+    value.into_string().unwrap_or_else(|value| value.to_string_lossy().into_owned())
+}
 
 /// Whether this process looks like a rank of an MPI job.
 pub fn launched(variable: impl Fn(&str) -> Option<String>) -> bool {
@@ -74,6 +85,14 @@ mod tests {
 
     fn with(set: &[(&str, &str)]) -> Result<Choice, MpiError> {
         choose(|name| set.iter().find(|(n, _)| *n == name).map(|(_, value)| value.to_string()))
+    }
+
+    #[test]
+    fn a_wish_that_is_not_utf_8_is_a_wish() {
+        use std::os::unix::ffi::OsStringExt as _;
+        let wish = text(OsString::from_vec(b"/opt/m\xffi.so".to_vec()));
+        let choice = with(&[(CHOICE_VARIABLE, &wish)]).unwrap();
+        assert_eq!(choice.libraries, ["/opt/m\u{fffd}i.so"]);
     }
 
     #[test]

@@ -105,7 +105,7 @@ impl Mpi {
         if has(&this, "MPI_Init") {
             return Self::of(this, "this program");
         }
-        let choice = launcher::choose(|name| std::env::var(name).ok())?;
+        let choice = launcher::choose(launcher::variable)?;
         // Global, because Open MPI's plug-ins look for its symbols there.
         let (library, name) = open_first(&choice, RTLD_NOW | RTLD_GLOBAL)?;
         Self::of(library, &name)
