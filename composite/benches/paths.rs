@@ -94,10 +94,10 @@ const SHARED: &str = "shared merge";
 
 fn main() {
     let cores = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
-    let numbers: Vec<usize> = std::env::args().skip(1).filter_map(|word| word.parse().ok()).collect();
+    let arguments = || std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
+    let numbers: Vec<usize> = arguments().filter_map(|word| word.parse().ok()).collect();
     // Other words choose lines whose scene or variant contains them.
-    let words: Vec<String> =
-        std::env::args().skip(1).filter(|w| w.parse::<usize>().is_err() && w != "--bench").collect();
+    let words: Vec<String> = arguments().filter(|w| w.parse::<usize>().is_err() && w != "--bench").collect();
     let size = numbers.first().copied().unwrap_or(1024) as u32;
     let counts = if numbers.len() > 1 { numbers[1..].to_vec() } else { vec![2, 4, 8] };
     let frames = 24;

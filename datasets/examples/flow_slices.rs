@@ -8,10 +8,12 @@ use std::io::Write;
 use std::path::Path;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let arguments: Vec<_> = std::env::args_os().skip(1).collect();
     let [name, size, directory] = arguments.as_slice() else {
         return Err("usage: flow_slices NAME SIZE DIRECTORY".into());
     };
+    let text = |a: &std::ffi::OsString| a.to_str().map(str::to_string).ok_or(format!("{a:?} is not UTF-8"));
+    let (name, size) = (&text(name)?, &text(size)?);
     let mut out = std::io::stdout().lock();
     let start = std::time::Instant::now();
     let flow = find(name)?.generate(size, Fields::All)?;

@@ -19,8 +19,9 @@ const X_M: [f64; 4] = [-0.010, 0.0, 0.050, 0.100];
 const TOP_M: f64 = 0.060;
 
 fn main() -> Result<(), Failure> {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let arguments: Vec<_> = std::env::args_os().skip(1).collect();
+    let text = |a| <&str>::try_from(a).map_err(|e| format!("argument {a:?} is no text ({e}): use UTF-8"));
+    let arguments: Vec<&str> = arguments.iter().map(|a| text(a.as_os_str())).collect::<Result<_, _>>()?;
     let options = VtkOptions { compress: true, ..Default::default() };
     match arguments.as_slice() {
         ["slice", from, to] => {

@@ -55,7 +55,9 @@ fn best(rounds: u32, mut run: impl FnMut()) -> Duration {
 }
 
 fn main() {
-    let mut arguments = std::env::args().skip(1).map(|a| a.parse::<u32>().expect("a whole number"));
+    // `args` would panic at what is not UTF-8 before anything could be said about it.
+    let number = |a: std::ffi::OsString| a.to_str().and_then(|a| a.parse::<u32>().ok());
+    let mut arguments = std::env::args_os().skip(1).map(|a| number(a).expect("a whole number"));
     let (n, rounds) = (arguments.next().unwrap_or(512), arguments.next().unwrap_or(3));
     let world = World::from_mesh(bumpy_sphere(), &BuildOptions::default()).expect("the mesh is sound");
     let camera =
