@@ -1,4 +1,4 @@
-//! Writes one trampoline per OpenGL, GLX and EGL entry point of `src/symbols/names.txt`, and the hooks of the calls that
+//! Writes one trampoline per OpenGL, GLX and EGL entry point of `src/interpose/symbols/names.txt`, and the hooks of the calls that
 //! come per vertex. Nothing of OpenGL is needed on the machine that builds.
 
 use std::fmt::Write as _;
@@ -382,13 +382,14 @@ fn hot_calls() -> Vec<Hot> {
     out
 }
 
-/// Hooks written by hand in `src/symbols/hooks.rs`.
+/// Hooks written by hand in `src/interpose/symbols/hooks.rs`.
 fn hand_written() -> Vec<String> {
-    let text = std::fs::read_to_string("src/symbols/hooks.rs").expect("src/symbols/hooks.rs can be read");
+    let text = std::fs::read_to_string("src/interpose/symbols/hooks.rs")
+        .expect("src/interpose/symbols/hooks.rs can be read");
     let named = |n: &&str| n.starts_with("gl") || n.starts_with("egl");
     let functions = text.lines().filter_map(|l| {
         let l = l.trim_start();
-        let l = l.strip_prefix("pub(in crate::symbols) unsafe extern \"C\" ").unwrap_or(l);
+        let l = l.strip_prefix("pub(in crate::interpose::symbols) unsafe extern \"C\" ").unwrap_or(l);
         l.strip_prefix("fn ")?.split('(').next()
     });
     let addresses =
@@ -398,13 +399,14 @@ fn hand_written() -> Vec<String> {
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
-    println!("cargo:rerun-if-changed=src/symbols/names.txt");
-    println!("cargo:rerun-if-changed=src/symbols/hooks.rs");
+    println!("cargo:rerun-if-changed=src/interpose/symbols/names.txt");
+    println!("cargo:rerun-if-changed=src/interpose/symbols/hooks.rs");
     // Without -Bsymbolic the addresses of our own functions bind to libGL's of the same name when we are a vendor
     // library: an endless loop of jumps. nodelete: our threads must not lose their code.
     println!("cargo:rustc-cdylib-link-arg=-Wl,-Bsymbolic");
     println!("cargo:rustc-cdylib-link-arg=-Wl,-z,nodelete");
-    let text = std::fs::read_to_string("src/symbols/names.txt").expect("src/symbols/names.txt can be read");
+    let text = std::fs::read_to_string("src/interpose/symbols/names.txt")
+        .expect("src/interpose/symbols/names.txt can be read");
     let names: Vec<&str> = text.split_whitespace().collect();
     assert!(
         names.windows(2).all(|w| w[0] < w[1]),
@@ -456,9 +458,9 @@ fn main() {
             ),
             Kind::Always => format!("\"mov r11d, {i}\", \"jmp {{s}}\", s = sym slow"),
         };
-        writeln!(s, "#[unsafe(naked)] #[unsafe(no_mangle)] pub(in crate::symbols) unsafe extern \"C\" fn {x}() {{ core::arch::naked_asm!({code}) }}").unwrap();
+        writeln!(s, "#[unsafe(naked)] #[unsafe(no_mangle)] pub(in crate::interpose::symbols) unsafe extern \"C\" fn {x}() {{ core::arch::naked_asm!({code}) }}").unwrap();
     }
-    writeln!(s, "}}\n#[allow(clippy::unnecessary_cast, reason = \"written by a program\")] mod hot_hooks {{ use super::hot; use crate::immediate::Step; use crate::real::found; use super::forward_plainly;").unwrap();
+    writeln!(s, "}}\n#[allow(clippy::unnecessary_cast, reason = \"written by a program\")] mod hot_hooks {{ use super::current_context; use crate::capture::immediate_mode::Step; use crate::interpose::driver::found; use super::forward_plainly;").unwrap();
     for h in &hot {
         let (args, call, types) = if h.pointer {
             (format!("p: *const {}", h.c_type), "p".to_owned(), format!("*const {}", h.c_type))
@@ -484,12 +486,12 @@ fn main() {
         // SAFETY comments are those of the code that is written.
         writeln!(
             s,
-            "#[cold] #[inline(never)] unsafe extern \"C\" fn {name}_slowly({args}) {{ {read} if !hot::with({index}, |c| {body}) {{
+            "#[cold] #[inline(never)] unsafe extern \"C\" fn {name}_slowly({args}) {{ {read} if !current_context::with({index}, |c| {body}) {{
                 // SAFETY: the driver's function of this name and signature.
                 let f: unsafe extern \"C\" fn({types}) = unsafe {{ core::mem::transmute(forward_plainly({index})) }};
                 // SAFETY: the program's own arguments.
                 unsafe {{ f({call}) }} }} }}
-            pub(in crate::symbols) unsafe extern \"C\" fn {name}({args}) {{ {read} match hot::step({index}, |c| {step}) {{
+            pub(in crate::interpose::symbols) unsafe extern \"C\" fn {name}({args}) {{ {read} match current_context::step({index}, |c| {step}) {{
                 Step::Done => (),
                 Step::Driver if let Some(known) = found({index}) => {{
                     // SAFETY: as above.

@@ -48,7 +48,7 @@ fn said_of(code: &str) -> String {
     let file = folder.path().join("lib.rs");
     let module = |name: &str| format!("#[path = {:?}]\nmod {name};\n", sources.join(format!("{name}.rs")));
     let safe = format!(
-        "mod safe {{\n#![forbid(unsafe_code)]\nuse crate::client_memory::*;\nuse std::borrow::Cow;\n{code}\n}}\n"
+        "mod safe {{\n#![forbid(unsafe_code)]\nuse crate::interpose::client_memory::*;\nuse std::borrow::Cow;\n{code}\n}}\n"
     );
     let text = [REST, &module("enums"), &module("client_memory"), &safe].concat();
     std::fs::write(&file, text).expect("written");

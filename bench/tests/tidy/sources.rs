@@ -5,9 +5,9 @@ use crate::tree::{File, files, words};
 /// The only places where `unsafe` may be written, and why it cannot be avoided there. ARCHITECTURE.md explains each.
 pub(crate) const UNSAFE_ROOMS: &[(&str, &str)] = &[
     ("rt-core/src/simd", "vector loads and huge pages below the safe SIMD layer"),
-    ("gluray/src/symbols", "exported OpenGL symbols, called by programs we do not know"),
-    ("gluray/src/real", "calls into the real OpenGL library"),
-    ("gluray/src/client_memory", "vertex arrays that live in the program's own memory"),
+    ("gluray/src/interpose/symbols", "exported OpenGL symbols, called by programs we do not know"),
+    ("gluray/src/interpose/driver", "calls into the real OpenGL library"),
+    ("gluray/src/interpose/client_memory", "vertex arrays that live in the program's own memory"),
     ("vtk-bridge/src/capi", "the C ABI for VTK and ParaView"),
     ("vtk-bridge/src/loader", "finds the VTK that is in the process and loads what fits it"),
     ("vtk-bridge/src/anari/abi", "the C++ vtables through which ANARI programs call a device"),

@@ -1,9 +1,9 @@
 //! `gluray doctor`: what this machine has, and what is missing.
 
 use super::library;
-use crate::config::FIELDS;
-use crate::config::environment::{OBJECTS, OTHER_VARIABLES, variable_of};
 use crate::doctor::{Finding, Grade, findings, look};
+use crate::host::config::FIELDS;
+use crate::host::config::environment::{OBJECTS, OTHER_VARIABLES, variable_of};
 use datasets::cli::{CommonArgs, Status};
 use serde_json::json;
 

@@ -1,8 +1,8 @@
 //! `gluray explain`: an account of a run, in words.
 
 use super::last_report;
-use crate::reasons::advice;
-use crate::report::Report;
+use crate::classify::reasons::advice;
+use crate::host::report::Report;
 use anyhow::Context as _;
 use datasets::cli::{CommonArgs, CureExt as _, Status};
 use std::collections::BTreeMap;

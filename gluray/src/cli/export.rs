@@ -1,6 +1,6 @@
 //! `gluray export`.
 
-use crate::export::{ConvertReport, Scene, read_scene, scenes_folder, to_mesh, to_poly_data};
+use crate::host::export::{ConvertReport, Scene, read_scene, scenes_folder, to_mesh, to_poly_data};
 use anyhow::Context;
 use clap::Args;
 use datasets::cli::{CommonArgs, CureExt, UsageError};
@@ -120,7 +120,7 @@ fn list(common: CommonArgs, scene: &Scene) -> anyhow::Result<()> {
 }
 
 fn newest() -> Option<PathBuf> {
-    let folder = scenes_folder(crate::folders::variable)?;
+    let folder = scenes_folder(crate::host::folders::variable)?;
     let files = std::fs::read_dir(folder).ok()?.filter_map(Result::ok).map(|e| e.path());
     files
         .filter(|p| ending(p).as_deref() == Some("gluray"))

@@ -1,7 +1,7 @@
 //! The helpers of `gluray run --ranks N`: started before the program, ended after it.
 
-use crate::config::environment::variable_of;
-use crate::ranks::SOCKETS;
+use crate::cluster::SOCKETS;
+use crate::host::config::environment::variable_of;
 use anyhow::{Context as _, bail};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};

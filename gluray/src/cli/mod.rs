@@ -81,7 +81,7 @@ fn execute(cli: Cli, code: &mut Option<u8>) -> anyhow::Result<Status> {
 
 /// Where the account of the last run is kept.
 fn last_report() -> PathBuf {
-    crate::folders::state(crate::folders::variable).unwrap_or_default().join("last.json")
+    crate::host::folders::state(crate::host::folders::variable).unwrap_or_default().join("last.json")
 }
 
 /// The shared library that belongs to this program: the one that is named, else the newest of those near it. `cargo test` leaves it in `deps`, `cargo

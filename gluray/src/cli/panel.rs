@@ -1,6 +1,6 @@
 //! `gluray panel`.
 
-use crate::panel::{PanelError, serve};
+use crate::host::panel::{PanelError, serve};
 use clap::Args;
 use datasets::cli::{Cancel, CommonArgs, Interrupted, UsageError};
 use serde_json::json;

@@ -3,9 +3,9 @@
 use super::helpers::Helpers;
 use super::vendor::Vendor;
 use super::{last_report, library};
-use crate::config::environment::{OBJECTS, parse_pair, texts, variable_of};
-use crate::config::{Assignment, ConfigFile, SettingError, Settings, assign};
-use crate::report::Report;
+use crate::host::config::environment::{OBJECTS, parse_pair, texts, variable_of};
+use crate::host::config::{Assignment, ConfigFile, SettingError, Settings, assign};
+use crate::host::report::Report;
 use anyhow::Context as _;
 use datasets::cli::{CureExt as _, UsageError};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -159,12 +159,12 @@ fn with_first(variable: &str, first: &Path) -> OsString {
 
 /// Variables for the library: what GLVND's had, which are ours now. `__GLX_FORCE_VENDOR_LIBRARY_n` goes before the name for all screens.
 fn vendors_in_front_of() -> Vec<(String, OsString)> {
-    let get = crate::folders::variable;
-    let screen = crate::glvnd::screen_of(&get("DISPLAY").unwrap_or_default());
+    let get = crate::host::folders::variable;
+    let screen = crate::interpose::glvnd::screen_of(&get("DISPLAY").unwrap_or_default());
     let forced = format!("__GLX_FORCE_VENDOR_LIBRARY_{screen}");
     let names = ["GLURAY_GLX_VENDOR", forced.as_str(), "__GLX_VENDOR_LIBRARY_NAME"];
     let named = names.iter().find_map(|n| get(n)).filter(|v| v != "gluray").unwrap_or_default();
-    let egl: Vec<String> = crate::glvnd::egl_vendors(get).into_iter().map(|v| v.name).collect();
+    let egl: Vec<String> = crate::interpose::glvnd::egl_vendors(get).into_iter().map(|v| v.name).collect();
     let mut out = vec![
         ("GLURAY_GLX_VENDOR".to_owned(), named.into()),
         ("GLURAY_EGL_VENDOR".to_owned(), egl.join(":").into()),

@@ -1,11 +1,11 @@
 //! `gluray serve-rays`: a helper that traces its share of other programs' pictures, or an MPI job of helpers.
 
-use crate::config::environment::variable_of;
-use crate::config::{self, Settings};
-use crate::ranks::SOCKETS;
-use crate::ranks::group::{lead_group, serve_group};
-use crate::ranks::helper::serve;
-use crate::ranks::sockets::SocketComm;
+use crate::cluster::SOCKETS;
+use crate::cluster::helper::serve;
+use crate::cluster::mpi_group::{lead_group, serve_group};
+use crate::cluster::socket_comm::SocketComm;
+use crate::host::config::environment::variable_of;
+use crate::host::config::{self, Settings};
 use anyhow::Context as _;
 use composite::Communicator as _;
 use composite::comm::mpi::{MpiComm, launcher};
@@ -69,7 +69,7 @@ impl Socket {
 
 pub(super) fn serve_rays(common: &CommonArgs, args: &ServeRaysArgs) -> anyhow::Result<()> {
     let cancel = Cancel::on_ctrl_c()?;
-    crate::fault::silence();
+    crate::interpose::panic_guard::silence();
     let over = Arc::new(AtomicBool::new(false));
     watch(cancel, args.until_input_ends, &over);
     if args.mpi {

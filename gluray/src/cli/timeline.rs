@@ -1,7 +1,7 @@
 //! `gluray timeline`.
 
 use super::explain::read_report;
-use crate::timeline::{GanttOptions, chrome_trace, gantt_svg};
+use crate::host::timeline::{GanttOptions, chrome_trace, gantt_svg};
 use anyhow::Context;
 use clap::Args;
 use datasets::cli::{CommonArgs, UsageError};
@@ -39,7 +39,7 @@ pub(super) fn timeline(common: CommonArgs, args: &TimelineArgs) -> anyhow::Resul
     let (path, report) = read_report(args.report.as_deref())?;
     let spans = &report.timeline;
     let first = spans.iter().map(|s| s.start_ms).fold(f64::INFINITY, f64::min);
-    let last = spans.iter().map(crate::timeline::Span::end_ms).fold(f64::NEG_INFINITY, f64::max);
+    let last = spans.iter().map(crate::host::timeline::Span::end_ms).fold(f64::NEG_INFINITY, f64::max);
     let window = [args.from.unwrap_or(first), args.to.unwrap_or(last)];
     let asked = args.from.is_some() || args.to.is_some();
     if asked && (window[0] >= window[1] || window.iter().any(|v| v.is_nan())) {

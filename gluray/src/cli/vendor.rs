@@ -4,7 +4,7 @@
 //! folder, and must find a vendor there when it first uses OpenGL. So it lies where the user's files of running programs lie, and only the user may write to
 //! it and to what it lies in, because programs load code from there.
 
-use crate::folders;
+use crate::host::folders;
 use anyhow::{Context as _, bail};
 use datasets::cli::CureExt as _;
 use std::fs;

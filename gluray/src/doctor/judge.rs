@@ -152,7 +152,7 @@ pub fn findings(m: &Machine) -> Vec<Finding> {
                 .map(|p| finding("settings", Bad, p.clone()).cure("the rest of the file is used as it is")),
         ),
     }
-    let (_, unknown) = crate::config::environment::assignments(&m.variables);
+    let (_, unknown) = crate::host::config::environment::assignments(&m.variables);
     out.extend(unknown.iter().map(|e| finding("settings", Note, e.to_string())));
     if let Some(address) = &m.panel {
         out.push(finding("panel", Good, format!("running, programs connect to {address}")));
@@ -178,7 +178,7 @@ fn glx_vendor(m: &Machine) -> Finding {
 
 /// The EGL drivers that are asked for displays.
 fn egl_vendor(m: &Machine) -> Option<Finding> {
-    let because = |v: &crate::glvnd::Vendor| format!("{}, because {}", v.name, v.why);
+    let because = |v: &crate::interpose::glvnd::Vendor| format!("{}, because {}", v.name, v.why);
     let (first, others) = m.in_front_of[1].split_first()?;
     let mut text = format!("EGL: {}", because(first));
     if !others.is_empty() {
@@ -213,7 +213,7 @@ fn display(m: &Machine) -> Option<Finding> {
 mod tests {
     use super::super::machine::OpenGl;
     use super::*;
-    use crate::glvnd::Vendor;
+    use crate::interpose::glvnd::Vendor;
 
     /// A Debian 12 with Mesa, and Xvfb.
     fn healthy() -> Machine {

@@ -33,7 +33,7 @@ pub struct Machine {
     /// EGL vendors' files.
     pub egl_vendors: Vec<String>,
     /// GLX and EGL vendors that we stand in front of, in the order in which they are tried.
-    pub in_front_of: [Vec<crate::glvnd::Vendor>; 2],
+    pub in_front_of: [Vec<crate::interpose::glvnd::Vendor>; 2],
     /// `DISPLAY` and `WAYLAND_DISPLAY`.
     pub display: [Option<String>; 2],
     /// An X server's socket for that display is there.
@@ -68,7 +68,7 @@ const MATTER: [&str; 12] = [
 
 /// Looks around. `library` is the one that goes into programs.
 pub fn look(library: Option<PathBuf>) -> Machine {
-    let get = crate::folders::variable;
+    let get = crate::host::folders::variable;
     let folders = library_folders(get("LD_LIBRARY_PATH").as_deref());
     let find = |name: &str| folders.iter().map(|f| f.join(name)).find(|p| p.exists());
     let display = get("DISPLAY");
@@ -82,7 +82,7 @@ pub fn look(library: Option<PathBuf>) -> Machine {
         glvnd: find("libGLdispatch.so.0"),
         glx_vendors: glx_vendors(&folders),
         egl_vendors: egl_vendors(),
-        in_front_of: [crate::glvnd::glx_vendors(get), crate::glvnd::egl_vendors(get)],
+        in_front_of: [crate::interpose::glvnd::glx_vendors(get), crate::interpose::glvnd::egl_vendors(get)],
         display_answers: display
             .as_deref()
             .and_then(local_display)
@@ -92,13 +92,13 @@ pub fn look(library: Option<PathBuf>) -> Machine {
         variables,
         threads: std::thread::available_parallelism().map_or(1, usize::from),
         settings: settings(),
-        panel: crate::panel::Meeting::find(get).map(|m| m.address.to_string()),
+        panel: crate::host::panel::Meeting::find(get).map(|m| m.address.to_string()),
     }
 }
 
 /// GLVND's dispatch library.
 pub fn look_for_glvnd() -> Option<PathBuf> {
-    let folders = library_folders(crate::folders::variable("LD_LIBRARY_PATH").as_deref());
+    let folders = library_folders(crate::host::folders::variable("LD_LIBRARY_PATH").as_deref());
     folders.iter().map(|f| f.join("libGLdispatch.so.0")).find(|p| p.exists())
 }
 
@@ -202,7 +202,7 @@ fn texts() -> impl Iterator<Item = (String, String)> {
 }
 
 fn settings() -> Option<(PathBuf, Vec<String>)> {
-    use crate::config::{ConfigFile, Settings, Sources, assign};
+    use crate::host::config::{ConfigFile, Settings, Sources, assign};
     let sources = Sources::new(texts().collect(), Vec::new());
     let path = sources.file.clone().filter(|p| sources.file_is_required || p.exists())?;
     let problems = match ConfigFile::read(&path) {

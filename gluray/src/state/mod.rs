@@ -3,7 +3,7 @@
 //! The driver keeps all state; we ask it (`snapshot`) when a draw comes and something may have changed since we asked last. Only what
 //! changes from vertex to vertex is kept here (`current`).
 
-pub(crate) mod current;
-pub(crate) mod lists;
-pub(crate) mod properties;
+pub(crate) mod current_attributes;
+pub(crate) mod enums;
+pub(crate) mod material_properties;
 pub(crate) mod snapshot;

@@ -1,8 +1,8 @@
 //! The state that decides how filled primitives look, as the driver tells it.
 
-use crate::enums::*;
-use crate::real::gl;
-use crate::symbols::class;
+use crate::interpose::driver::gl;
+use crate::interpose::symbols::class;
+use crate::state::enums::*;
 
 /// A light source; places and directions in eye space, as OpenGL keeps them.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -292,14 +292,14 @@ impl Snapshot {
 
     /// Says of points in object space whether they are outside of what is seen, so that the driver has to clip.
     pub(crate) fn clips(&self) -> impl Fn([f32; 3]) -> bool {
-        let m = crate::lighting::product(&self.projection, &self.model_view);
+        let m = crate::trace::lighting::product(&self.projection, &self.model_view);
         let (model_view, planes) = (self.model_view, self.clip_planes.clone());
         let depth_clamp = self.depth_clamp;
         move |p| {
-            let [x, y, z, w] = crate::lighting::transform(&m, p);
+            let [x, y, z, w] = crate::trace::lighting::transform(&m, p);
             let beyond = |v: f32| v > w || v < -w;
             let cut = |plane: &[f64; 4]| {
-                let eye = crate::lighting::transform(&model_view, p);
+                let eye = crate::trace::lighting::transform(&model_view, p);
                 eye.iter().zip(plane).map(|(a, b)| f64::from(*a) * b).sum::<f64>() < 0.0
             };
             beyond(x) || beyond(y) || (!depth_clamp && beyond(z)) || planes.iter().any(cut)
@@ -356,7 +356,7 @@ impl Snapshot {
                 self.texture = Some(unit_0(target));
                 // The names say what is bound; where its image comes from is asked for when it is used.
                 self.foreign_texturing =
-                    self.foreign_texturing.or(crate::texturing::unfollowed(target, can.version));
+                    self.foreign_texturing.or(crate::trace::texturing::unfollowed(target, can.version));
             } else {
                 self.foreign_texturing = Some("a texture that is neither 1-D nor 2-D");
             }

@@ -4,9 +4,9 @@
 //! centre) is left to it.
 
 use super::{DEPTH_STEPS, Fragment, Prepared, SLACK};
-use crate::enums::*;
-use crate::raster::moves_back;
+use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
+use crate::trace::raster::moves_back;
 use rt_core::ray::{HitBlock, LANES, NO_HIT};
 
 /// What came of a lane.
@@ -181,7 +181,7 @@ fn rounded(v: f32) -> f32 {
     t + f32::from(u8::from(d >= 0.5)) - f32::from(u8::from(d <= -0.5))
 }
 
-/// As [`crate::raster::covers`], where that is exact in f64; false elsewhere.
+/// As [`crate::trace::raster::covers`], where that is exact in f64; false elsewhere.
 #[inline(always)]
 fn covered(c: &[[[f32; LANES]; 4]; 3], viewport: [i32; 4], x: i32, y: i32) -> [bool; LANES] {
     let [vx, vy, vw, vh] = viewport.map(|v| v as f32);
@@ -219,7 +219,7 @@ fn covered(c: &[[[f32; LANES]; 4]; 3], viewport: [i32; 4], x: i32, y: i32) -> [b
     out
 }
 
-/// As [`crate::raster::steepness`] or [`moves_back`], whichever the state asks for: what the factor of polygon offset multiplies, and what comes to it.
+/// As [`crate::trace::raster::steepness`] or [`moves_back`], whichever the state asks for: what the factor of polygon offset multiplies, and what comes to it.
 #[inline(always)]
 fn slopes(c: &[[[f32; LANES]; 4]; 3], s: &Snapshot) -> [[f64; LANES]; 2] {
     let depth_scale = s.depth_range[1] - s.depth_range[0];
@@ -251,7 +251,7 @@ fn slopes(c: &[[[f32; LANES]; 4]; 3], s: &Snapshot) -> [[f64; LANES]; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raster;
+    use crate::trace::raster;
 
     /// Corners all over the window, on pixel centres and between, with w from 0.5 to 2.
     fn triangles() -> Vec<[[f32; 4]; 3]> {

@@ -1,13 +1,13 @@
 //! The nearest fragment of every pixel, tile by tile: rays, fragments of what they hit, colours.
 
-use super::batch::Batch;
+use super::fragment_batch::Batch;
 use super::fragments::{FragmentBlock, Lane};
-use super::rays::{BLOCKS, TileRays, slot};
+use super::tile_rays::{BLOCKS, TileRays, slot};
 use super::{DEPTH_STEPS, Fragment, Layer, Prepared, Rect, TILE, UNCOVERED, to_bytes};
-use crate::config::{Mode, Settings};
-use crate::effects::Surroundings;
-use crate::enums::*;
-use crate::ranks::rows::Share;
+use crate::cluster::row_share::Share;
+use crate::host::config::{Mode, Settings};
+use crate::state::enums::*;
+use crate::trace::occlusion::Surroundings;
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 use rt_core::ray::{HitBlock, LANES, NO_HIT};

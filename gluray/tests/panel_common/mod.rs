@@ -4,7 +4,7 @@
 use gluray::config::Settings;
 use gluray::export::{Object, Scene, write_scene};
 use gluray::panel::link::Wish;
-use gluray::panel::{FrameStats, Hello, Link, Meeting, ObjectInfo, meeting};
+use gluray::panel::{FrameStats, Hello, Link, Meeting, ObjectInfo, endpoint};
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -63,7 +63,7 @@ impl Panel {
     }
 
     pub(crate) fn meeting_file(&self) -> PathBuf {
-        meeting::file_in(&self.runtime.path().join("gluray"))
+        endpoint::file_in(&self.runtime.path().join("gluray"))
     }
 
     pub(crate) fn meeting(&self) -> Meeting {

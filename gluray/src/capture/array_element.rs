@@ -1,0 +1,70 @@
+//! `glArrayElement`: a vertex of the arrays between Begin and End.
+
+use crate::capture::vertex_arrays::Arrays;
+use crate::interpose::client_memory::{Call, Elements, Source};
+use crate::interpose::context::{Context, Sink};
+
+impl Context {
+    /// Values of element `i` become current, and a vertex of the primitive that is recorded or compiled.
+    pub(crate) fn array_element(&mut self, call: &Call<'_>) -> bool {
+        match self.sink {
+            Sink::Trace => {}
+            Sink::List if self.recording.as_ref().is_some_and(|r| r.is_open()) => {}
+            Sink::List => {
+                if let Some(r) = &mut self.recording {
+                    r.note_driver_call(0, false, true);
+                }
+                return false;
+            }
+            Sink::Pass => return false,
+            // Values become current, and that is all.
+            Sink::Outside => {
+                self.mark_current();
+                return false;
+            }
+        }
+        let why = match self.take_element(call) {
+            Ok(taken) => return taken,
+            Err(why) => why,
+        };
+        match self.sink {
+            Sink::Trace => self.unswallow(why),
+            _ => {
+                if let Some(r) = &mut self.recording {
+                    r.note_driver_call(0, false, true);
+                }
+            }
+        }
+        false
+    }
+
+    fn take_element(&mut self, call: &Call<'_>) -> Result<bool, &'static str> {
+        let element = Elements::of(call, None)?;
+        // Nothing about arrays can change before End.
+        let arrays = match self.element_arrays {
+            Some(arrays) => arrays,
+            None => *self.element_arrays.insert(Arrays::query(self.can.version)?),
+        };
+        let [normal, color, tex] = [arrays.normal, arrays.color, arrays.tex];
+        let position = value(arrays.position, &element)?;
+        let [normal, color, tex] = [of(normal, &element)?, of(color, &element)?, of(tex, &element)?];
+        if let Some([x, y, z, _]) = normal {
+            self.normal([x, y, z]);
+        }
+        if let Some(c) = color {
+            self.color(c);
+        }
+        if let Some(t) = tex {
+            self.tex_coord(t);
+        }
+        Ok(self.vertex(position))
+    }
+}
+
+fn of(source: Option<Source>, i: &Elements<'_>) -> Result<Option<[f32; 4]>, &'static str> {
+    source.map(|s| value(s, i)).transpose()
+}
+
+fn value(source: Source, i: &Elements<'_>) -> Result<[f32; 4], &'static str> {
+    Ok(source.read(i)?.at(0, [0.0, 0.0, 0.0, 1.0]))
+}

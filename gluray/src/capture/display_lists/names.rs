@@ -1,0 +1,86 @@
+//! Names of lists: those that `glGenLists` gives, and those that `glCallLists` gets in any of OpenGL's types.
+
+use super::FIRST_PIECE;
+use crate::interpose::context::{Context, Sink};
+use crate::interpose::driver::gl;
+use crate::state::enums::*;
+
+/// Names in one go that programs may want; nobody waits for more.
+const MOST_NAMES: i32 = 1 << 20;
+
+impl Context {
+    /// `glGenLists`. The driver would give the names after the greatest that is in use, which is one of our pieces; programs that count their lists (Survex's
+    /// aven) end there. So they get the names after the greatest of their own, as Mesa gives them, and an empty list of the driver's for each. `None` leaves
+    /// the call to the driver.
+    pub(crate) fn gen_lists(&mut self, n: i32) -> Option<u32> {
+        if self.sink == Sink::Trace {
+            self.unswallow("glGenLists between Begin and End");
+        }
+        if !(1..=MOST_NAMES).contains(&n)
+            || self.sink == Sink::Pass
+            || self.can.core
+            || crate::interpose::panic_guard::happened()
+        {
+            return None;
+        }
+        let first = {
+            let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
+            let last = lists.greatest.checked_add(n.cast_unsigned()).filter(|last| *last < FIRST_PIECE)?;
+            std::mem::replace(&mut lists.greatest, last) + 1
+        };
+        // Where a list is compiled its piece ends before.
+        let compiling = self.recording.is_some();
+        if compiling {
+            self.close_piece();
+        }
+        for name in first..first + n.cast_unsigned() {
+            gl::new_list(name, COMPILE);
+            gl::end_list();
+        }
+        if compiling {
+            self.open_piece();
+        }
+        Some(first)
+    }
+}
+
+/// Bytes of a name of `glCallLists`; `None` for a type that OpenGL refuses.
+pub(crate) fn width(kind: u32) -> Option<usize> {
+    match kind {
+        BYTE | UNSIGNED_BYTE => Some(1),
+        SHORT | UNSIGNED_SHORT | 0x1407 => Some(2),
+        INT | UNSIGNED_INT | FLOAT | 0x1409 => Some(4),
+        0x1408 => Some(3),
+        _ => None,
+    }
+}
+
+/// The names of `glCallLists`; `None` for a type that OpenGL refuses.
+pub(super) fn decode(kind: u32, bytes: &[u8]) -> Option<Vec<u32>> {
+    let width = width(kind)?;
+    let name = |b: &[u8]| match (kind, b) {
+        (BYTE, &[a]) => i32::from(a.cast_signed()).cast_unsigned(),
+        (SHORT, &[a, b]) => i32::from(i16::from_ne_bytes([a, b])).cast_unsigned(),
+        (UNSIGNED_SHORT, &[a, b]) => u32::from(u16::from_ne_bytes([a, b])),
+        (FLOAT, &[a, b, c, d]) => (f32::from_ne_bytes([a, b, c, d]) as i32).cast_unsigned(),
+        (INT | UNSIGNED_INT, &[a, b, c, d]) => u32::from_ne_bytes([a, b, c, d]),
+        // The types GL_2_BYTES and so on: the high byte first.
+        (_, b) => b.iter().fold(0, |h, x| h << 8 | u32::from(*x)),
+    };
+    Some(bytes.chunks_exact(width).map(name).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_lists_are_read_in_every_type() {
+        let bytes = [1, 2, 3, 4];
+        assert_eq!(decode(UNSIGNED_BYTE, &bytes), Some(vec![1, 2, 3, 4]));
+        assert_eq!(decode(0x1407, &bytes), Some(vec![0x0102, 0x0304]));
+        assert_eq!(decode(0x1409, &bytes), Some(vec![0x0102_0304]));
+        assert_eq!(decode(0x1234, &bytes), None);
+        assert_eq!(decode(BYTE, &[255]), Some(vec![u32::MAX]));
+    }
+}

@@ -1,0 +1,450 @@
+//! Vertex arrays: client memory or buffer objects, indexed or not, to meshes.
+//!
+//! The driver is asked which arrays are on when the draw comes. Client memory is copied then and there, because the program may change
+//! it as soon as the call returns.
+
+use crate::capture::draw::{Attributes, Draw, Packed, Shading, Values, component_bytes};
+use crate::capture::geometry_cache::hash;
+use crate::capture::primitives::{Split, is_filled, triangulate};
+use crate::classify::rules::Verdict;
+use crate::classify::vtk::DrawCall;
+use crate::interpose::client_memory::{Call, Elements, Named, Size, Source};
+use crate::interpose::context::{Context, Sink};
+use crate::interpose::driver::gl;
+use crate::state::enums::*;
+use crate::state::snapshot::Snapshot;
+use crate::trace::overrides::Look;
+use std::borrow::Cow;
+use std::sync::Arc;
+
+/// What the driver is asked about the array of positions.
+const POSITION: [u32; 4] =
+    [VERTEX_ARRAY_TYPE, VERTEX_ARRAY_STRIDE, VERTEX_ARRAY_POINTER, VERTEX_ARRAY_BUFFER_BINDING];
+
+/// The fixed-function arrays that are on.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Arrays {
+    pub(crate) position: Source,
+    pub(crate) normal: Option<Source>,
+    pub(crate) color: Option<Source>,
+    pub(crate) tex: Option<Source>,
+}
+
+impl Arrays {
+    /// The array of positions alone.
+    pub(crate) fn query_position() -> Result<Source, &'static str> {
+        if !gl::is_enabled(VERTEX_ARRAY) {
+            return Err("no vertex array");
+        }
+        Ok(Source::of_fixed(Size::Asked(VERTEX_ARRAY_SIZE), POSITION, false, true))
+    }
+
+    /// As the driver has them; an error in words when rays cannot stand for them.
+    pub(crate) fn query(version: u32) -> Result<Arrays, &'static str> {
+        let buffers = version >= 15;
+        if !gl::is_enabled(VERTEX_ARRAY) {
+            return Err("no vertex array");
+        }
+        for (cap, least) in [(SECONDARY_COLOR_ARRAY, 14), (FOG_COORD_ARRAY, 14), (INDEX_ARRAY, 11)] {
+            if version >= least && gl::is_enabled(cap) {
+                return Err("arrays of secondary colours, fog coordinates or colour indices");
+            }
+        }
+        if version >= 20 && (0..8).any(|i| gl::vertex_attrib_i::<1>(i, VERTEX_ATTRIB_ARRAY_ENABLED)[0] != 0) {
+            return Err("generic attributes without a program");
+        }
+        let position = Source::of_fixed(Size::Asked(VERTEX_ARRAY_SIZE), POSITION, false, buffers);
+        let normal = gl::is_enabled(NORMAL_ARRAY).then(|| {
+            let asked =
+                [NORMAL_ARRAY_TYPE, NORMAL_ARRAY_STRIDE, NORMAL_ARRAY_POINTER, NORMAL_ARRAY_BUFFER_BINDING];
+            Source::of_fixed(Size::Three, asked, true, buffers)
+        });
+        let color = match gl::is_enabled(COLOR_ARRAY) {
+            true => {
+                if gl::word(COLOR_ARRAY_SIZE) == BGRA {
+                    return Err("colours in the order BGRA");
+                }
+                let asked =
+                    [COLOR_ARRAY_TYPE, COLOR_ARRAY_STRIDE, COLOR_ARRAY_POINTER, COLOR_ARRAY_BUFFER_BINDING];
+                Some(Source::of_fixed(Size::Asked(COLOR_ARRAY_SIZE), asked, true, buffers))
+            }
+            false => None,
+        };
+        let client_unit = if version >= 13 { gl::word(CLIENT_ACTIVE_TEXTURE) } else { TEXTURE0 };
+        if client_unit != TEXTURE0 {
+            return Err("a client texture unit other than 0 is active");
+        }
+        let tex = gl::is_enabled(TEXTURE_COORD_ARRAY).then(|| {
+            let asked = [
+                TEXTURE_COORD_ARRAY_TYPE,
+                TEXTURE_COORD_ARRAY_STRIDE,
+                TEXTURE_COORD_ARRAY_POINTER,
+                TEXTURE_COORD_ARRAY_BUFFER_BINDING,
+            ];
+            Source::of_fixed(Size::Asked(TEXTURE_COORD_ARRAY_SIZE), asked, false, buffers)
+        });
+        Ok(Arrays { position, normal, color, tex })
+    }
+}
+
+/// What became of a draw that is not left to the driver alone.
+pub(crate) enum Taken {
+    /// Rays make its pixels.
+    Traced,
+    /// The driver makes its colours, rays its shadows.
+    Shape,
+}
+
+/// Which vertices a draw takes.
+pub(crate) enum Which {
+    /// Neighbours in the arrays.
+    Range { first: usize, count: usize },
+    /// By index; `least` is the smallest, `count` the span.
+    Indexed { indices: Vec<u32>, least: usize, count: usize },
+}
+
+impl Which {
+    /// Stands for the index at which a primitive ends and another begins.
+    const RESTART: u32 = u32::MAX;
+
+    /// From indices of `width` bytes each, and the one that restarts primitives.
+    pub(crate) fn indexed(
+        bytes: &[u8],
+        width: usize,
+        base: i32,
+        restart: Option<u32>,
+    ) -> Result<Which, &'static str> {
+        let decode = |b: &[u8]| match *b {
+            [a] => u32::from(a),
+            [a, b] => u32::from(u16::from_ne_bytes([a, b])),
+            [a, b, c, d] => u32::from_ne_bytes([a, b, c, d]),
+            _ => 0,
+        };
+        let place = |raw: u32| match restart {
+            Some(r) if r == raw => Which::RESTART,
+            _ => raw.wrapping_add_signed(base),
+        };
+        let indices: Vec<u32> = bytes.chunks_exact(width).map(|b| place(decode(b))).collect();
+        let real = || indices.iter().filter(|i| restart.is_none() || **i != Which::RESTART);
+        let (Some(&least), Some(&most)) = (real().min(), real().max()) else {
+            return Ok(Which::Indexed { indices, least: 0, count: 0 });
+        };
+        let count = (most - least) as usize + 1;
+        // Client arrays of unknown length: an index that is out of order must not make us read gigabytes.
+        if count > 1 << 28 {
+            return Err("indices that are too far apart");
+        }
+        Ok(Which::Indexed { indices, least: least as usize, count })
+    }
+
+    /// Names the geometry of these elements of an array of positions, whose bytes are given.
+    fn key(&self, mode: u32, bytes: &[u8], layout: (usize, u32, usize, bool), split: &Split) -> u128 {
+        let (stride, kind, size, _) = layout;
+        let rules = u64::from(split.first_provokes) << 1 | u64::from(split.all_turned);
+        let (_, count) = self.span();
+        let tail = [stride as u64, u64::from(kind), size as u64, u64::from(mode), rules, count as u64];
+        let tail = bytemuck::cast_slice(&tail);
+        match self {
+            Which::Range { .. } => hash(&[bytes, tail, bytemuck::cast_slice(&split.turned)]),
+            Which::Indexed { indices, least, .. } => {
+                hash(&[bytes, bytemuck::cast_slice(indices), &least.to_ne_bytes(), tail])
+            }
+        }
+    }
+
+    /// First vertex, and how many there are from it on.
+    pub(crate) fn span(&self) -> (usize, usize) {
+        match self {
+            Which::Range { first, count } => (*first, *count),
+            Which::Indexed { least, count, .. } => (*least, *count),
+        }
+    }
+
+    /// Up to `most` different vertices, spread over the draw.
+    pub(crate) fn some(&self, most: usize) -> Vec<u32> {
+        let n = match self {
+            Which::Range { count, .. } => *count,
+            Which::Indexed { indices, .. } => indices.len(),
+        };
+        let take = most.min(n);
+        let number = |i: usize| match self {
+            Which::Range { first, .. } => (first + i) as u32,
+            Which::Indexed { indices, .. } => indices[i],
+        };
+        let mut out: Vec<u32> = (0..take).map(|i| number(i * (n - 1) / (take - 1).max(1))).collect();
+        out.sort_unstable();
+        out.dedup();
+        out
+    }
+
+    /// How the driver splits quads where nobody knows what it clips.
+    pub(crate) fn plain_split(&self, first_provokes: bool) -> Split {
+        Split { first_provokes, all_turned: matches!(self, Which::Indexed { .. }), turned: Vec::new() }
+    }
+
+    /// How the driver would split quads: see [`Split`].
+    pub(crate) fn split(&self, mode: u32, s: &Snapshot, position: &Source, bytes: &[u8]) -> Split {
+        let mut split = self.plain_split(s.first_vertex_provokes);
+        split.all_turned |= s.flat;
+        let (_, count) = self.span();
+        if mode == QUADS && !split.all_turned {
+            let clipped = s.clips();
+            let (step, one, size) = (position.step(), component_bytes(position.kind), position.size.min(3));
+            split.look_for_clipped(0, count as u32, |from, to| {
+                (from..to).any(|i| {
+                    let at = i as usize * step;
+                    let mut p = [0.0; 3];
+                    for (k, v) in p.iter_mut().enumerate().take(size) {
+                        let b = bytes.get(at + k * one..at + (k + 1) * one);
+                        *v = b.map_or(0.0, |b| crate::capture::draw::component(b, position.kind, false));
+                    }
+                    clipped(p)
+                })
+            });
+        }
+        split
+    }
+
+    /// Triangles, in vertex numbers of the span.
+    pub(crate) fn triangles(&self, mode: u32, split: &Split) -> Vec<[u32; 3]> {
+        let mut out = Vec::new();
+        match self {
+            Which::Range { count, .. } => triangulate(mode, 0, *count as u32, split, &mut out),
+            Which::Indexed { indices, least, .. } => {
+                triangulate(mode, 0, indices.len() as u32, split, &mut out);
+                let vertex = |i: u32| indices[i as usize] - *least as u32;
+                out.iter_mut().for_each(|t| *t = t.map(vertex));
+            }
+        }
+        out
+    }
+
+    /// Vertex numbers of the span in the order they are drawn; `None` where a primitive ends and another begins.
+    fn order(&self) -> Box<dyn Iterator<Item = Option<usize>> + '_> {
+        match self {
+            Which::Range { count, .. } => Box::new((0..*count).map(Some)),
+            Which::Indexed { indices, least, .. } => {
+                let place = move |i: &u32| (*i as usize).checked_sub(*least);
+                Box::new(indices.iter().map(move |i| place(i).filter(|_| *i != Which::RESTART)))
+            }
+        }
+    }
+}
+
+/// Positions as x, y, z; points with w > 0 are divided by it.
+pub(crate) fn positions(p: &Packed) -> Result<Vec<[f32; 3]>, &'static str> {
+    if p.kind == FLOAT && p.size == 3 {
+        return Ok(bytemuck::pod_collect_to_vec(&p.bytes));
+    }
+    let element = component_bytes(p.kind) * p.size;
+    (0..p.bytes.len() / element.max(1))
+        .map(|i| {
+            let [x, y, z, w] = p.at::<4>(i, [0.0, 0.0, 0.0, 1.0]);
+            match w {
+                1.0 => Ok([x, y, z]),
+                w if w > 0.0 => Ok([x / w, y / w, z / w]),
+                _ => Err("vertices with w not positive"),
+            }
+        })
+        .collect()
+}
+
+impl Context {
+    /// A draw call of arrays, by their order or by indices.
+    pub(crate) fn draw(&mut self, mode: u32, call: &Call<'_>) -> bool {
+        let (key, restart) = match call.named() {
+            Named::Elements { count, kind, at, base } => {
+                let buffer = gl::word(ELEMENT_ARRAY_BUFFER_BINDING) as usize;
+                let first = (buffer << 32) | base as u32 as usize;
+                let key = DrawCall { first, count: count.max(0) as usize, kind, at };
+                (key, if self.sink == Sink::List { self.restart_index(kind) } else { None })
+            }
+            Named::Arrays { first, count } => {
+                let (first, count) = (first.max(0) as usize, count.max(0) as usize);
+                (DrawCall { first, count, kind: 0, at: 0 }, None)
+            }
+            Named::Element(_) => return false,
+        };
+        self.array_draw(mode, key, || Elements::of(call, restart))
+    }
+
+    fn array_draw<'c>(
+        &mut self,
+        mode: u32,
+        call: DrawCall,
+        elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
+    ) -> bool {
+        if self.sink == Sink::Trace {
+            self.unswallow("a draw call between Begin and End");
+            return false;
+        }
+        if self.sink == Sink::List {
+            return self.array_into_list(mode, elements);
+        }
+        if self.sink == Sink::Pass {
+            return false;
+        }
+        let verdict = self.verdict();
+        self.keep_errors();
+        let taken = match verdict {
+            _ if !is_filled(mode) => Err("lines and points"),
+            _ if self.restarts() => Err("primitive restart"),
+            _ if self.state.program != 0 && self.config.settings.enabled && self.is_refused() => {
+                Err(crate::present::framebuffer_pass::REFUSED)
+            }
+            // Recognised programs decide for themselves what blending means.
+            _ if self.state.program != 0 => self.take_program_arrays(mode, call, elements),
+            Verdict::Pass(why) => Err(why),
+            v => self.take_arrays(mode, elements, v).map(|()| Taken::Traced),
+        };
+        self.drop_errors();
+        match taken {
+            Ok(Taken::Traced) => true,
+            // The driver draws it, and rays darken it when the frame ends.
+            Ok(Taken::Shape) => {
+                self.sync();
+                self.mark_current();
+                false
+            }
+            Err(why) => {
+                self.passing(why, is_filled(mode));
+                if is_filled(mode) {
+                    self.draw_over();
+                }
+                // The arrays of the driver's draw leave some current values undefined.
+                self.mark_current();
+                false
+            }
+        }
+    }
+
+    fn restarts(&self) -> bool {
+        self.can.version >= 31 && gl::is_enabled(PRIMITIVE_RESTART)
+            || self.can.version >= 43 && gl::is_enabled(PRIMITIVE_RESTART_FIXED_INDEX)
+    }
+
+    /// The index that restarts primitives, if one does.
+    fn restart_index(&self, kind: u32) -> Option<u32> {
+        if self.can.version >= 43 && gl::is_enabled(PRIMITIVE_RESTART_FIXED_INDEX) {
+            return Some(u32::MAX >> (32 - 8 * component_bytes(kind).clamp(1, 4)));
+        }
+        self.restarts().then(|| gl::word(PRIMITIVE_RESTART_INDEX))
+    }
+
+    fn take_arrays<'c>(
+        &mut self,
+        mode: u32,
+        elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
+        verdict: Verdict,
+    ) -> Result<(), &'static str> {
+        let arrays = Arrays::query(self.can.version)?;
+        let elements = elements()?;
+        let (_, count) = elements.span();
+        let seen = arrays.position.view(&elements)?;
+        let split = elements.split(mode, &self.state, &arrays.position, &seen);
+        let key = elements.key(mode, &seen, arrays.position.layout(), &split);
+        let geometry = match self.cache.known(key) {
+            Some(geometry) => geometry,
+            None => {
+                let positions = positions(&arrays.position.pack(seen))?;
+                let triangles = elements.triangles(mode, &split);
+                self.cache.put(key, &positions, triangles)
+            }
+        };
+        let mut read = |s: &Option<Source>| -> Result<Option<Arc<Packed>>, &'static str> {
+            let Some(s) = s else { return Ok(None) };
+            let bytes = s.view(&elements)?;
+            Ok(Some(self.packed.get(&bytes, s.layout(), || s.pack(Cow::Borrowed(&bytes)))))
+        };
+        let (normal, color, tex) = (read(&arrays.normal)?, read(&arrays.color)?, read(&arrays.tex)?);
+        if let Verdict::TraceIfOpaque(why) = verdict {
+            let by_color = !self.state.lighting
+                || self
+                    .state
+                    .color_material
+                    .is_some_and(|(_, what)| matches!(what, DIFFUSE | AMBIENT_AND_DIFFUSE));
+            let opaque = match &color {
+                Some(p) if by_color => (0..count).all(|i| p.at::<4>(i, [1.0; 4])[3] == 1.0),
+                _ => self.is_opaque_now(),
+            };
+            if !opaque {
+                return Err(why);
+            }
+        }
+        self.sync();
+        if verdict == Verdict::TraceInOrder {
+            self.flush("a draw whose order matters");
+        }
+        self.end_batch();
+        let mut attributes = Attributes::constant(&self.current);
+        if let Some(p) = normal {
+            attributes.normals = Values::Packed(p);
+        }
+        if let Some(p) = color {
+            attributes.colors = Values::Packed(p);
+        }
+        if let Some(p) = tex {
+            attributes.tex = Values::Packed(p);
+        }
+        let state = self.state.clone();
+        let clip_from_object = crate::trace::lighting::product(&state.projection, &state.model_view);
+        let (attributes, shading, look) = (Arc::new(attributes), Shading::Fixed, Look::default());
+        let draw = Draw { geometry, attributes, state, shading, clip_from_object, calls: 1, look };
+        self.add(draw, verdict == Verdict::TraceInOrder);
+        Ok(())
+    }
+
+    /// Hands a finished draw to the frame.
+    pub(crate) fn mark_current(&mut self) {
+        if !self.can.core {
+            self.dirty |= crate::interpose::symbols::class::CURRENT;
+        }
+    }
+
+    /// While a list is compiled the arrays are read at once, as OpenGL says, and become steps of it.
+    fn array_into_list<'c>(
+        &mut self,
+        mode: u32,
+        elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
+    ) -> bool {
+        if !is_filled(mode) {
+            if let Some(r) = &mut self.recording {
+                r.note_driver_call(0, false, true);
+            }
+            return false;
+        }
+        let read = || -> Result<_, &'static str> {
+            let arrays = Arrays::query(self.can.version)?;
+            let elements = elements()?;
+            let read = |s: &Option<Source>| s.map(|s| s.read(&elements)).transpose();
+            let position = arrays.position.read(&elements)?;
+            Ok((position, read(&arrays.normal)?, read(&arrays.color)?, read(&arrays.tex)?, elements))
+        };
+        let Ok((position, normal, color, tex, elements)) = read() else {
+            if let Some(r) = &mut self.recording {
+                r.note_driver_call(0, false, true);
+            }
+            return false;
+        };
+        let end = [0.0, 0.0, 0.0, 1.0];
+        self.list_begin_arrays(mode);
+        for i in elements.order() {
+            let Some(i) = i else {
+                self.list_end();
+                self.list_begin_arrays(mode);
+                continue;
+            };
+            if let Some(p) = &normal {
+                self.list_normal(p.at(i, [0.0; 3]));
+            }
+            if let Some(p) = &color {
+                self.list_color(p.at(i, end));
+            }
+            if let Some(p) = &tex {
+                self.list_tex(p.at(i, end));
+            }
+            self.list_vertex(position.at(i, end));
+        }
+        self.list_end()
+    }
+}

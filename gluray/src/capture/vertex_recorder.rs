@@ -1,0 +1,409 @@
+//! Immediate mode, recorded: positions, attributes that cost nothing while they do not change, and how vertices make primitives.
+//!
+//! A call only puts its values into a ring. Whenever it is full, its vertices are compared, all at once and bit for bit, with those that came at the same
+//! place of the frame before, and written down where they are others.
+
+mod attribute_stream;
+mod earlier_frames;
+
+use crate::capture::draw::{Attributes, Run, Values};
+use crate::capture::geometry_cache::Geometry;
+use crate::state::current_attributes::{Current, Materials};
+use crate::state::enums::QUADS;
+use attribute_stream::Stream;
+pub(crate) use attribute_stream::same_bits;
+use earlier_frames::Expected;
+use rt_core::mesh::TriMesh;
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// Vertices of the ring.
+const RING: usize = 64;
+
+/// The latest vertices, which nobody has looked at.
+struct Ring {
+    positions: [[f32; 3]; RING],
+    normals: [[f32; 3]; RING],
+    /// Vertices that came with a normal of their own: bit by bit.
+    set: u64,
+}
+
+impl Default for Ring {
+    fn default() -> Self {
+        Ring { positions: [[0.0; 3]; RING], normals: [[0.0; 3]; RING], set: 0 }
+    }
+}
+
+const NO_RUN: Run = Run { mode: 0, count: u32::MAX, times: 0 };
+
+/// Immediate mode: the vertices since the state changed last.
+pub(crate) struct Recorder {
+    /// Vertices so far. Those from `settled` on are in the ring alone.
+    count: usize,
+    /// At this count a vertex takes the long way.
+    limit: usize,
+    settled: usize,
+    ring: Ring,
+    /// First vertex of the primitive between Begin and End, and its mode.
+    open: usize,
+    mode: u32,
+    /// Primitives of one kind and size that are not in `runs` yet.
+    run: Run,
+    /// Current values were set outside of Begin and End, and the streams do not know.
+    pub(crate) behind: bool,
+    /// An attribute besides positions and normals is written down for each vertex.
+    more: bool,
+    /// Positions, unless they are those of `expected` so far.
+    pub(crate) positions: Vec<[f32; 3]>,
+    /// What this batch seems to be. While it is right no position is written down, and in the end nothing has to be hashed.
+    expected: Option<Arc<TriMesh>>,
+    /// Batches of earlier frames by their first position.
+    earlier: HashMap<[u32; 3], Expected>,
+    frame: u64,
+    normals: Stream<3>,
+    /// The values of `normals` are those of a whole earlier batch: of this version, unless one was changed.
+    kept: Option<u64>,
+    changed: bool,
+    /// The latest vertex' normal.
+    last_normal: [f32; 3],
+    colors: Stream<4>,
+    tex: Stream<4>,
+    materials: Vec<Materials>,
+    material_of: Vec<u32>,
+    pub(crate) runs: Vec<Run>,
+    /// There are quads in the batch.
+    pub(crate) quads: bool,
+    versions: u64,
+}
+
+impl Default for Recorder {
+    fn default() -> Self {
+        Recorder {
+            count: 0,
+            limit: RING,
+            settled: 0,
+            ring: Ring::default(),
+            open: 0,
+            mode: 0,
+            run: NO_RUN,
+            behind: false,
+            more: false,
+            positions: Vec::new(),
+            expected: None,
+            earlier: HashMap::new(),
+            frame: 0,
+            normals: Stream::default(),
+            kept: None,
+            changed: false,
+            last_normal: [0.0; 3],
+            colors: Stream::default(),
+            tex: Stream::default(),
+            materials: Vec::new(),
+            material_of: Vec::new(),
+            runs: Vec::new(),
+            quads: false,
+            versions: 0,
+        }
+    }
+}
+
+impl Recorder {
+    /// A primitive begins.
+    #[inline(always)]
+    pub(crate) fn begin(&mut self, mode: u32, current: &Current) {
+        self.open = self.count;
+        self.mode = mode;
+        if self.count == 0 || self.behind {
+            self.take_up(current);
+        }
+    }
+
+    /// The mode of the primitive that is open, or was last.
+    pub(crate) fn mode(&self) -> u32 {
+        self.mode
+    }
+
+    /// A batch begins, or what was set between its primitives counts from now on.
+    #[cold]
+    #[inline(never)]
+    fn take_up(&mut self, current: &Current) {
+        self.behind = false;
+        self.set_normal(current.normal);
+        self.set_color(current.color);
+        self.set_tex(current.tex);
+        if self.count == 0 {
+            (self.normals.constant, self.last_normal) = (current.normal, current.normal);
+            self.materials.clear();
+            self.materials.push(current.materials);
+            self.material_of.clear();
+        }
+    }
+
+    /// The primitive ends.
+    #[inline(always)]
+    pub(crate) fn end(&mut self) {
+        let count = (self.count - self.open) as u32;
+        if self.run.count == count && self.run.mode == self.mode {
+            self.run.times += 1;
+        } else {
+            self.next_run(count);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn next_run(&mut self, count: u32) {
+        self.put_run();
+        self.run = Run { mode: self.mode, count, times: 1 };
+        self.quads |= self.mode == QUADS;
+    }
+
+    fn put_run(&mut self) {
+        let run = std::mem::replace(&mut self.run, NO_RUN);
+        if run.times > 0 {
+            self.runs.push(run);
+        }
+    }
+
+    /// The next vertex has another normal.
+    #[inline(always)]
+    pub(crate) fn set_normal(&mut self, v: [f32; 3]) {
+        let at = self.count % RING;
+        self.ring.normals[at] = v;
+        self.ring.set |= 1 << at;
+    }
+
+    #[inline(always)]
+    pub(crate) fn set_color(&mut self, v: [f32; 4]) {
+        self.colors.set(v, self.count);
+        if self.colors.varying && !self.more {
+            self.write_more();
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn set_tex(&mut self, v: [f32; 4]) {
+        self.tex.set(v, self.count);
+        if self.tex.varying && !self.more {
+            self.write_more();
+        }
+    }
+
+    /// From now on vertices have more than positions and normals.
+    #[cold]
+    #[inline(never)]
+    fn write_more(&mut self) {
+        self.more = true;
+        self.limit = self.count + 1;
+    }
+
+    /// The material is another from the next vertex on.
+    pub(crate) fn set_materials(&mut self, m: &Materials) {
+        let n = self.count;
+        if n == 0 {
+            self.materials.clear();
+        } else if self.materials.last() == Some(m) {
+            return;
+        } else if self.material_of.is_empty() {
+            self.material_of.resize(n, 0);
+            self.write_more();
+        }
+        self.materials.push(*m);
+    }
+
+    /// A vertex with what is current.
+    #[inline(always)]
+    pub(crate) fn vertex(&mut self, v: [f32; 3], current: &Current) {
+        self.ring.positions[self.count % RING] = v;
+        self.count += 1;
+        if self.count == self.limit {
+            self.vertex_more(current);
+        }
+    }
+
+    #[inline(never)]
+    fn vertex_more(&mut self, current: &Current) {
+        if self.colors.varying {
+            self.colors.values.push(current.color);
+        }
+        if self.tex.varying {
+            self.tex.values.push(current.tex);
+        }
+        if !self.material_of.is_empty() {
+            self.material_of.push(self.materials.len() as u32 - 1);
+        }
+        if self.count.is_multiple_of(RING) {
+            self.empty_ring();
+        }
+        self.set_limit();
+    }
+
+    fn set_limit(&mut self) {
+        self.limit = if self.more { self.count + 1 } else { (self.count / RING + 1) * RING };
+    }
+
+    /// Looks at what is in the ring.
+    fn empty_ring(&mut self) {
+        let n = self.count - self.settled;
+        if n == 0 {
+            return;
+        }
+        let first = self.settled % RING;
+        self.settle_positions(first..first + n);
+        self.settle_normals(first..first + n);
+        self.settled = self.count;
+        self.ring.set = 0;
+    }
+
+    fn settle_positions(&mut self, new: std::ops::Range<usize>) {
+        if self.settled == 0 {
+            self.positions.clear();
+            let first = self.ring.positions[new.start].map(f32::to_bits);
+            self.expected = self.earlier.get(&first).map(|e| e.mesh.clone());
+        }
+        let new = &self.ring.positions[new];
+        if let Some(mesh) = &self.expected {
+            let all: &[[f32; 3]] = bytemuck::cast_slice(&mesh.positions);
+            if all.get(self.settled..self.settled + new.len()).is_some_and(|old| same_bits(old, new)) {
+                return;
+            }
+            self.write_down();
+        }
+        self.positions
+            .extend_from_slice(&self.ring.positions[self.settled % RING..][..self.count - self.settled]);
+    }
+
+    fn settle_normals(&mut self, new: std::ops::Range<usize>) {
+        let ring = &mut self.ring;
+        // Only what was set before one of these vertices counts.
+        let of_these = (u64::MAX >> (RING - new.len())) << new.start;
+        let set = ring.set & of_these;
+        if set == 0 && !self.normals.varying {
+            return;
+        }
+        if set != of_these {
+            let mut last = self.last_normal;
+            for i in new.clone() {
+                if set >> i & 1 == 0 {
+                    ring.normals[i] = last;
+                }
+                last = ring.normals[i];
+            }
+        }
+        let new = &ring.normals[new];
+        self.last_normal = new[new.len() - 1];
+        if !self.normals.varying {
+            if self.settled == 0 {
+                self.normals.constant = new[0];
+            }
+            let constant = self.normals.constant;
+            if new.iter().all(|v| same_bits(&[*v], &[constant])) {
+                return;
+            }
+            self.vary_normals();
+        }
+        let at = self.settled;
+        let new = &self.ring.normals[at % RING..][..self.count - at];
+        let values = &mut self.normals.values;
+        if self.kept.is_none() {
+            values.extend_from_slice(new);
+        } else if !same_bits(&values[at..at + new.len()], new) {
+            values[at..at + new.len()].copy_from_slice(new);
+            self.changed = true;
+        }
+    }
+
+    /// All that came is looked at, and all primitives are in `runs`.
+    pub(crate) fn settle(&mut self) {
+        self.empty_ring();
+        self.put_run();
+    }
+
+    /// Whether any position of a range of the batch is what `is` looks for.
+    pub(crate) fn any_position(&self, from: u32, to: u32, is: impl Fn([f32; 3]) -> bool) -> bool {
+        let range = from as usize..to as usize;
+        match &self.expected {
+            Some(mesh) => mesh.positions[range].iter().any(|p| is(p.to_array())),
+            None => self.positions[range].iter().any(|p| is(*p)),
+        }
+    }
+
+    /// The vertices that were followed become our own.
+    pub(crate) fn write_down(&mut self) {
+        if let Some(mesh) = self.expected.take() {
+            self.positions.clear();
+            self.positions.extend(mesh.positions[..self.settled].iter().map(|p| p.to_array()));
+            if self.kept.take().is_some() {
+                self.normals.values.truncate(self.settled);
+            }
+        }
+    }
+
+    /// The vertices of the open primitive with their attributes, taken out again: for the driver.
+    pub(crate) fn withdraw(&mut self) -> (u32, Vec<([f32; 3], Current)>) {
+        self.empty_ring();
+        self.write_down();
+        let all = self.attributes_now();
+        let out = (self.open..self.positions.len())
+            .map(|i| {
+                let current = Current {
+                    normal: all.normals.at(i),
+                    color: all.colors.at(i),
+                    tex: all.tex.at(i),
+                    materials: *all.materials_at(i),
+                };
+                (self.positions[i], current)
+            })
+            .collect();
+        self.positions.truncate(self.open);
+        if self.normals.varying {
+            self.normals.values.truncate(self.open);
+        }
+        for s in [&mut self.colors, &mut self.tex] {
+            if s.varying {
+                s.values.truncate(self.open);
+            }
+        }
+        self.material_of.truncate(self.open);
+        (self.count, self.settled) = (self.open, self.open);
+        self.last_normal = if self.open > 0 { all.normals.at(self.open - 1) } else { self.normals.constant };
+        self.ring.set = 0;
+        self.set_limit();
+        (self.mode, out)
+    }
+
+    fn attributes_now(&self) -> Attributes {
+        fn values<const N: usize>(s: &Stream<N>) -> Values<N> {
+            if s.varying { Values::PerVertex(s.values.clone()) } else { Values::Constant(s.constant) }
+        }
+        Attributes {
+            normals: values(&self.normals),
+            colors: values(&self.colors),
+            tex: values(&self.tex),
+            materials: self.materials.clone(),
+            material_of: self.material_of.clone(),
+            version: 0,
+        }
+    }
+
+    /// All attributes of the batch, which is of this geometry; the recorder is empty then but for positions and runs, which stay for the caller to look at
+    /// and clear. The batch must be settled.
+    pub(crate) fn take_attributes(&mut self, geometry: &Arc<Geometry>) -> Attributes {
+        let version = self.version(geometry);
+        self.more = false;
+        (self.count, self.settled, self.limit) = (0, 0, RING);
+        self.ring.set = 0;
+        (self.kept, self.changed) = (None, false);
+        Attributes {
+            normals: self.normals.take(),
+            colors: self.colors.take(),
+            tex: self.tex.take(),
+            materials: std::mem::take(&mut self.materials),
+            material_of: std::mem::take(&mut self.material_of),
+            version,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

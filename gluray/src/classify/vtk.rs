@@ -1,0 +1,345 @@
+//! Programs with shaders: VTK's family (ParaView, PyVista, Slicer, VisIt, Mayavi) is recognised, all others are the driver's.
+//!
+//! VTK assembles its shaders from pieces. A program counts as recognised only when its sources are such pieces, whose meaning is written down in `blocks` and
+//! `template`, in VTK's order and with nothing else among them: a shader with anything else in it (picking, lights from pictures, what a script has replaced) is
+//! left to the driver.
+
+mod actor_texture;
+mod blocks;
+mod cell_data;
+mod codec;
+mod color;
+mod depth_peeling;
+mod glsl;
+mod program;
+mod shadow_maps;
+mod signature;
+mod weighted_blending;
+
+use crate::capture::draw::{Attributes, Draw, Shading, Values};
+use crate::capture::geometry_cache::Geometry;
+use crate::capture::vertex_arrays::{Taken, positions};
+use crate::classify::rules::{self, Verdict};
+use crate::host::config::Mode;
+use crate::interpose::client_memory::{Elements, Source};
+use crate::interpose::context::Context;
+use crate::interpose::driver::gl;
+use crate::state::current_attributes::Current;
+use crate::state::enums::*;
+use crate::trace::overrides::Look;
+use crate::trace::texturing::{self, Image};
+pub(crate) use color::At;
+use depth_peeling::Peeling;
+use program::PerTriangle;
+pub(crate) use program::{ProgramLight, ProgramSkin, Recognised};
+use shadow_maps::ShadowMaps;
+use signature::{Colors, Peel, Pictured, Template};
+use std::collections::HashMap;
+use std::sync::Arc;
+use weighted_blending::Weighted;
+
+/// See [`crate::recognise`].
+pub(crate) fn recognise(vertex: &str, geometry: &str, fragment: &str) -> Result<(), &'static str> {
+    Template::read(vertex, geometry, fragment).map(|_| ())
+}
+
+/// Which buffers a draw reads: while none was written, what was made of them serves again.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+struct Key {
+    sources: Sources,
+    elements: (u32, usize, usize, u32, usize),
+    /// The number of the first triangle in buffer textures.
+    first: i32,
+    /// When each of them was written last.
+    written: [u64; 8],
+}
+
+/// Positions, normals, colours, texture coordinates; colours and edges of cells; coordinates of pictures where they are apart.
+type Sources = [Option<Source>; 7];
+
+/// The programs of a context.
+#[derive(Default)]
+pub(crate) struct Programs {
+    templates: HashMap<u32, Result<Template, &'static str>>,
+    made: HashMap<Key, Made>,
+    frame: u64,
+    pub(crate) peeling: Peeling,
+    pub(crate) weighted: Weighted,
+    shadow_maps: ShadowMaps,
+}
+
+/// What was made of a draw's buffers, and the frame that used it last.
+struct Made {
+    geometry: Arc<Geometry>,
+    attributes: Arc<Attributes>,
+    cells: PerTriangle,
+    used: u64,
+}
+
+impl Programs {
+    /// A frame is over: what no draw asked for goes.
+    pub(crate) fn frame_done(&mut self) {
+        const KEPT_FRAMES: u64 = 3;
+        self.frame += 1;
+        let now = self.frame;
+        self.made.retain(|_, m| now - m.used <= KEPT_FRAMES);
+    }
+}
+
+/// A generic attribute's array by name; `None` when the program has no such attribute or its array is off.
+pub(crate) fn attribute(program: u32, name: &str) -> Option<Source> {
+    let at = u32::try_from(gl::attrib_location(program, name)).ok()?;
+    Source::of_attribute(at)
+}
+
+impl Context {
+    /// `glLinkProgram`: the shaders are attached now, and perhaps never again.
+    pub(crate) fn link_program(&mut self, program: u32) -> bool {
+        self.sync();
+        gl::link_program(program);
+        self.keep_errors();
+        let [mut vertex, mut geometry, mut fragment] = [const { String::new() }; 3];
+        let mut other = false;
+        for shader in gl::attached(program) {
+            match gl::shader_i::<1>(shader, 0x8b4f)[0].cast_unsigned() {
+                VERTEX_SHADER => vertex = gl::source_of(shader),
+                FRAGMENT_SHADER => fragment = gl::source_of(shader),
+                GEOMETRY_SHADER => geometry = gl::source_of(shader),
+                _ => other = true,
+            }
+        }
+        self.drop_errors();
+        let template = match other {
+            true => Err("a geometry or tessellation shader"),
+            false => Template::read(&vertex, &geometry, &fragment),
+        };
+        if template.is_err() && !other && geometry.is_empty() {
+            self.prepare_probe(program);
+            self.drop_errors();
+        }
+        self.programs.templates.insert(program, template);
+        true
+    }
+
+    /// A draw with a program.
+    pub(crate) fn take_program_arrays<'c>(
+        &mut self,
+        mode: u32,
+        call: DrawCall,
+        elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
+    ) -> Result<Taken, &'static str> {
+        let program = self.state.program;
+        let template =
+            self.programs.templates.get(&program).copied().unwrap_or(Err("a program linked before us"));
+        if template.is_err() && self.config.settings.mode == Mode::Enhance && self.config.settings.enabled {
+            return self.take_shape(mode, call, elements).map(|()| Taken::Shape);
+        }
+        if !matches!(template, Ok(t) if t.peel != Peel::No) {
+            self.is_drawn_once(&template)?;
+        }
+        let template = template?;
+        self.peels(template.peel)?;
+        let position = attribute(program, "vertexMC").ok_or("a program without positions")?;
+        let cells = |wanted: bool, sampler: &str| -> Result<Option<Source>, &'static str> {
+            wanted.then(|| cell_data::buffer_texture(program, sampler)).transpose()
+        };
+        let sources = [
+            Some(position),
+            attribute(program, "normalMC"),
+            attribute(program, "scalarColor"),
+            // VTK 9.7 names the coordinates of colour maps apart from those of pictures.
+            attribute(program, "colorTCoord").or_else(|| attribute(program, "tcoord")),
+            cells(template.colors == Colors::PerCell, "textureC")?,
+            cells(template.edges, "edgeTexture")?,
+            attribute(program, "tcoord").filter(|_| template.two_coordinates),
+        ];
+        if sources.iter().flatten().any(|s| s.buffer == 0) {
+            return Err("a program with arrays in client memory");
+        }
+        let map = match template.colors {
+            Colors::Map => Some(self.image_of(program, "colortexture", texturing::followed)?),
+            _ => None,
+        };
+        let picture = match template.pictured {
+            Pictured::No => None,
+            over => Some(self.picture_of(program, over)?),
+        };
+        let recognised = Recognised::query(program, template, [map, picture]);
+        let first = match gl::uniform_location(program, "PrimitiveIDOffset") {
+            -1 => 0,
+            at => gl::uniform_i::<1>(program, at)[0],
+        };
+        let key = Key {
+            sources,
+            elements: (mode, call.first, call.count, call.kind, call.at),
+            first,
+            written: self.writes().last(&sources, (call.first >> 32) as u32),
+        };
+        let now = self.programs.frame;
+        let known = self.programs.made.get_mut(&key).map(|m| {
+            m.used = now;
+            (m.geometry.clone(), m.attributes.clone(), m.cells.clone())
+        });
+        let (geometry, attributes, cells) = match known {
+            Some(known) => known,
+            None => {
+                let (geometry, attributes) = self.read_program_arrays(mode, &sources, elements)?;
+                let cells = read_cells(&sources, first, geometry.mesh.num_triangles())?;
+                let same = |k: &Key| (&k.sources, k.elements, k.first) == (&key.sources, key.elements, first);
+                self.programs.made.retain(|k, _| !same(k));
+                let made = Made {
+                    geometry: geometry.clone(),
+                    attributes: attributes.clone(),
+                    cells: cells.clone(),
+                    used: now,
+                };
+                self.programs.made.insert(key, made);
+                (geometry, attributes, cells)
+            }
+        };
+        let recognised = recognised.with_cells(&cells);
+        self.cache.touch(&geometry);
+        // VTK leaves blending on; without transparency it changes nothing.
+        let mut state = (*self.state).clone();
+        if template.moved_back {
+            if state.polygon_offset.is_some() {
+                return Err("polygon offset of OpenGL's and of VTK's");
+            }
+            state.polygon_offset = Some(moved_back_by(program));
+            state.offset_by_length = true;
+        }
+        if matches!(template.peel, Peel::Layers | Peel::Weighted) {
+            match template.peel {
+                Peel::Weighted => self.weighted_surface(&mut state)?,
+                _ => self.peeled_surface(&mut state)?,
+            }
+            let clip_from_object = recognised.clip_from_object;
+            let shading = Shading::Program(Arc::new(recognised));
+            let (state, look) = (Arc::new(state), Look::default());
+            let draw = Draw { geometry, attributes, state, shading, clip_from_object, calls: 1, look };
+            match template.peel {
+                Peel::Weighted => self.take_weighted(draw),
+                _ => self.take_peeled(draw),
+            }
+            return Ok(Taken::Traced);
+        }
+        let offset = (state.polygon_offset, state.offset_by_length);
+        if state.blend_is_over && recognised.is_opaque(&attributes, geometry.mesh.positions.len()) {
+            state.blend = false;
+        }
+        let in_order = match rules::filled(&state, self.config.trace()) {
+            Verdict::Pass(why) | Verdict::TraceIfOpaque(why) => return Err(why),
+            v => v == Verdict::TraceInOrder,
+        };
+        if in_order {
+            self.flush("a draw whose order matters");
+        }
+        self.end_batch();
+        let (clip_from_object, shading) =
+            (recognised.clip_from_object, Shading::Program(Arc::new(recognised)));
+        let (mut state, look) = (self.state.clone(), Look::default());
+        if template.moved_back {
+            let state = Arc::make_mut(&mut state);
+            (state.polygon_offset, state.offset_by_length) = offset;
+        }
+        self.add(Draw { geometry, attributes, state, shading, clip_from_object, calls: 1, look }, in_order);
+        Ok(Taken::Traced)
+    }
+
+    fn picture_of(&mut self, program: u32, pictured: Pictured) -> Result<Arc<Image>, &'static str> {
+        let sampler = if pictured.is_over_all() { "actortexture" } else { "albedoTex" };
+        let version = self.can.version;
+        let image =
+            self.image_of(program, sampler, |target| match texturing::unfollowed(target, version) {
+                Some(why) => Err(why),
+                None => Ok(()),
+            })?;
+        // Only there do all samplers see what is stored.
+        if image.is_of_colors() { Ok(image) } else { Err("a picture of luminance or alpha alone") }
+    }
+
+    /// The image that a program's sampler has, if rays can follow its filters.
+    fn image_of(
+        &mut self,
+        program: u32,
+        sampler: &str,
+        followed: impl FnOnce(u32) -> Result<(), &'static str>,
+    ) -> Result<Arc<Image>, &'static str> {
+        let at = gl::uniform_location(program, sampler);
+        let unit = if at < 0 { 0 } else { gl::uniform_i::<1>(program, at)[0].max(0) };
+        let active = gl::word(ACTIVE_TEXTURE);
+        gl::active_texture(TEXTURE0 + unit as u32);
+        let name = gl::word(TEXTURE_BINDING_2D);
+        let followed = followed(TEXTURE_2D);
+        let version = self.texture_version();
+        let image = self.presenter.images.get(TEXTURE_2D, name, version);
+        gl::active_texture(active);
+        followed?;
+        image.ok_or("a texture without an image")
+    }
+
+    fn read_program_arrays<'c>(
+        &mut self,
+        mode: u32,
+        sources: &Sources,
+        elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
+    ) -> Result<(Arc<Geometry>, Arc<Attributes>), &'static str> {
+        let elements = elements()?;
+        let (_, count) = elements.span();
+        let read = |s: &Option<Source>| s.map(|s| s.read(&elements)).transpose();
+        let [position, normal, color, tex, _, _, picture] = sources;
+        let positions = positions(&read(position)?.ok_or("a program without positions")?)?;
+        let triangles = elements.triangles(mode, &elements.plain_split(self.state.first_vertex_provokes));
+        let geometry = self.cache.of_indices(&positions, &triangles);
+        let mut attributes = Attributes::constant(&Current::default());
+        if let Some(p) = read(normal)? {
+            attributes.normals = Values::Packed(Arc::new(p));
+        }
+        if let Some(p) = read(color)? {
+            attributes.colors = Values::Packed(Arc::new(p));
+        }
+        if let Some(p) = read(tex)? {
+            attributes.tex = match read(picture)? {
+                None => Values::Packed(Arc::new(p)),
+                Some(q) => {
+                    let both = |i| {
+                        let ([s, t], [u, v]) = (p.at(i, [0.0; 2]), q.at(i, [0.0; 2]));
+                        [s, t, u, v]
+                    };
+                    Values::PerVertex((0..count).map(both).collect())
+                }
+            };
+        }
+        Ok((geometry, Arc::new(attributes)))
+    }
+}
+
+/// Factor and units of polygon offset that move depths as VTK's shader does.
+fn moved_back_by(program: u32) -> (f32, f32) {
+    let one = |name: &str| match gl::uniform_location(program, name) {
+        -1 => 0.0,
+        at => gl::uniform_f::<1>(program, at)[0],
+    };
+    // A unit is two steps of the depth buffer.
+    let units = f64::from(one("cOffset")) / 65_000.0 * crate::trace::DEPTH_STEPS / 2.0;
+    (one("cFactor"), units as f32)
+}
+
+/// What buffer textures have for the triangles of a draw, of which the first has number `first`.
+fn read_cells(sources: &Sources, first: i32, triangles: usize) -> Result<PerTriangle, &'static str> {
+    let first = usize::try_from(first).map_err(|_| "a negative number of a cell")?;
+    let [.., colors, sides, _] = sources;
+    Ok(PerTriangle {
+        colors: colors.map(|s| cell_data::colors(&s, first, triangles)).transpose()?,
+        sides: sides.map(|s| cell_data::sides(&s, first, triangles)).transpose()?,
+    })
+}
+
+/// The arguments of a draw call, for its key.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct DrawCall {
+    pub(crate) first: usize,
+    pub(crate) count: usize,
+    pub(crate) kind: u32,
+    pub(crate) at: usize,
+}

@@ -1,0 +1,122 @@
+//! Recognised programs as messages to other ranks. Colour map and picture go by their names.
+
+use super::color::Surface;
+use super::program::{Edges, Lamp, Physical, ProgramLight};
+use super::signature::{Colors, Peel, Pictured, Template};
+use super::{Image, Recognised};
+use crate::cluster::codec::{Malformed, Reader, Wire, put_pods, wire_enum, wire_struct};
+use std::sync::Arc;
+
+wire_enum!(Colors { Uniform, PerVertex, Map, PerCell });
+wire_enum!(Peel { No, Depths, Layers, Weighted });
+wire_enum!(Pictured { No, Rgba, Rgb, Grey, GreyAlpha, Albedo, AlbedoAlone });
+wire_struct!(Template {
+    colors,
+    overrides,
+    flat,
+    headlight,
+    lights,
+    placed,
+    lit,
+    peel,
+    back,
+    clipped,
+    edges,
+    physical,
+    linear,
+    pictured,
+    two_coordinates,
+    turned,
+    moved_back,
+    cosines_from_zero,
+    lobes_have_an_end,
+});
+wire_struct!(Lamp { position, attenuation, cone_deg, exponent });
+wire_struct!(ProgramLight { travels, color, lamp });
+wire_struct!(Surface { ambient, diffuse, specular, power, alpha });
+wire_struct!(Physical { metallic, roughness, base, tint, least_divisor });
+
+impl Wire for Edges {
+    fn put(&self, out: &mut Vec<u8>) {
+        put_pods(out, &self.sides);
+        ([self.width, self.opacity], self.color).put(out);
+        self.viewport.put(out);
+    }
+    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
+        let sides = Arc::new(from.pods()?);
+        let ([width, opacity], color) = Wire::get(from)?;
+        Ok(Edges { sides, width, color, opacity, viewport: Wire::get(from)? })
+    }
+}
+
+impl Recognised {
+    /// Colour map and picture.
+    pub(crate) fn images(&self) -> [Option<&Arc<Image>>; 2] {
+        [self.map.as_ref(), self.picture.as_ref()]
+    }
+
+    /// The same with a colour map and a picture.
+    pub(crate) fn with_images(mut self, [map, picture]: [Option<Arc<Image>>; 2]) -> Recognised {
+        (self.map, self.picture) = (map, picture);
+        self
+    }
+
+    /// Lights that the program computes with and that are not there; also those that are more than can be.
+    pub(crate) fn missing_lights(&self) -> usize {
+        let most = crate::trace::occlusion::MOST_LIGHTS;
+        usize::from(self.template.headlight && self.lights.is_empty())
+            + self.lights.len().saturating_sub(most)
+    }
+}
+
+impl Wire for Recognised {
+    fn put(&self, out: &mut Vec<u8>) {
+        (self.clip_from_object, self.view_from_object).put(out);
+        self.normal_matrix.put(out);
+        self.template.put(out);
+        [self.ambient, self.diffuse, self.specular].put(out);
+        [self.ambient_intensity, self.diffuse_intensity, self.specular_power, self.opacity].put(out);
+        [self.parallel, self.overrides].put(out);
+        self.lights.put(out);
+        (self.back, self.physical).put(out);
+        self.clip_planes.put(out);
+        self.edges.put(out);
+        (self.picture_on_backs, self.turn).put(out);
+    }
+    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
+        let (clip_from_object, view_from_object) = Wire::get(from)?;
+        let (normal_matrix, template) = Wire::get(from)?;
+        let [ambient, diffuse, specular] = Wire::get(from)?;
+        let [ambient_intensity, diffuse_intensity, specular_power, opacity] = Wire::get(from)?;
+        let [parallel, overrides] = Wire::get(from)?;
+        let lights = Wire::get(from)?;
+        let (back, physical) = Wire::get(from)?;
+        let clip_planes = Wire::get(from)?;
+        let edges = Wire::get(from)?;
+        let (picture_on_backs, turn) = Wire::get(from)?;
+        Ok(Recognised {
+            clip_from_object,
+            view_from_object,
+            normal_matrix,
+            template,
+            ambient,
+            diffuse,
+            specular,
+            ambient_intensity,
+            diffuse_intensity,
+            specular_power,
+            opacity,
+            parallel,
+            overrides,
+            lights,
+            back,
+            physical,
+            clip_planes,
+            edges,
+            map: None,
+            picture: None,
+            picture_on_backs,
+            turn,
+        })
+    }
+}

@@ -1,0 +1,345 @@
+//! The colour of a fragment, step by step as VTK's shaders compute it: the surface's own, that of back faces, edges, lights.
+
+use super::program::{Edges, Physical, ProgramLight, Recognised};
+use super::signature::{Colors, Pictured};
+use crate::capture::draw::Attributes;
+use crate::trace::lighting::{normalized, transform};
+use crate::trace::mixed;
+use crate::trace::occlusion::Visibility;
+use rt_core::mesh::TriMesh;
+
+type V3 = [f32; 3];
+
+/// What light falls on: colours with their coefficients.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Surface {
+    pub(super) ambient: V3,
+    pub(super) diffuse: V3,
+    pub(super) specular: V3,
+    pub(super) power: f32,
+    pub(super) alpha: f32,
+}
+
+/// Where a fragment is.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct At {
+    pub(crate) prim: usize,
+    pub(crate) weights: V3,
+    pub(crate) front: bool,
+    /// The window's pixel that sees it, where the eye does.
+    pub(crate) pixel: Option<(i32, i32)>,
+    /// Texels of the picture that the pixel covers, where that is known.
+    pub(crate) texels: Option<f32>,
+    /// The sample's place, from the middle of the pixel, that everything was moved by.
+    pub(crate) moved_by: [f32; 2],
+}
+
+fn dot(a: V3, b: V3) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn mix(a: V3, b: V3, t: f32) -> V3 {
+    std::array::from_fn(|k| a[k] * (1.0 - t) + b[k] * t)
+}
+
+impl ProgramLight {
+    /// Direction in which its light comes to a point, and what of it comes there.
+    fn reaching(&self, at: V3) -> (V3, f32) {
+        let Some(lamp) = self.lamp else { return (self.travels, 1.0) };
+        let away: V3 = std::array::from_fn(|k| at[k] - lamp.position[k]);
+        let distance = dot(away, away).sqrt();
+        let travels = normalized(away);
+        let [constant, linear, quadratic] = lamp.attenuation;
+        let mut share = 1.0 / (constant + linear * distance + quadratic * distance * distance);
+        if lamp.cone_deg < 90.0 {
+            let cosine = dot(travels, self.travels);
+            share *=
+                if cosine >= lamp.cone_deg.to_radians().cos() { cosine.powf(lamp.exponent) } else { 0.0 };
+        }
+        (travels, share)
+    }
+}
+
+impl Physical {
+    /// Reflected light by that which comes along `l`, as VTK has it: Lambert's and an isotropic GGX lobe with the height-correlated Smith term and
+    /// Schlick's Fresnel factor. `cosines` are those of the half vector with the normal, the view, the light, and of half vector and light.
+    fn reflected(&self, albedo: V3, [n_h, n_v, n_l, h_l]: [f32; 4]) -> V3 {
+        use std::f32::consts::PI;
+        let f0 = mix([self.base; 3], albedo, self.metallic);
+        let grazing = (f0.iter().sum::<f32>() * 50.0 * 0.33).clamp(0.0, 1.0);
+        let f90 = mix([grazing; 3], self.tint, self.metallic);
+        let schlick = (1.0 - h_l).powi(5);
+        let a = self.roughness * self.roughness;
+        let a2 = a * a;
+        let d = (n_h * a2 - n_h) * n_h + 1.0;
+        let lobe = a2 / (PI * d * d).max(self.least_divisor);
+        let r2 = self.roughness * self.roughness;
+        let (ggx_v, ggx_l) =
+            (n_l * (r2 + n_v * (n_v - r2 * n_v)).sqrt(), n_v * (r2 + n_l * (n_l - r2 * n_l)).sqrt());
+        let visible = 0.5 / (ggx_v + ggx_l);
+        std::array::from_fn(|k| {
+            let f = f0[k] + (f90[k] - f0[k]) * schlick;
+            (1.0 - self.metallic) * (1.0 - f) * albedo[k] / PI + lobe * visible * f
+        })
+    }
+}
+
+impl Edges {
+    /// How much of a fragment is line. `corners` are the triangle's in clip space.
+    fn share(&self, corners: [[f32; 4]; 3], at: &At) -> f32 {
+        let sides = self.sides.get(at.prim).copied().unwrap_or(7);
+        let [vx, vy, vw, vh] = self.viewport;
+        let p = corners.map(|c| {
+            [(c[0] / c[3] * 0.5 + 0.5) * vw + vx, (c[1] / c[3] * 0.5 + 0.5) * vh + vy].map(f64::from)
+        });
+        let cross = (p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) - (p[1][1] - p[0][1]) * (p[2][0] - p[0][0]);
+        let turn = if cross < 0.0 { -1.0 } else { 1.0 };
+        let [mx, my] = at.moved_by.map(f64::from);
+        let (px, py) = match at.pixel {
+            Some((x, y)) => (f64::from(x) + 0.5 - mx, f64::from(y) + 0.5 - my),
+            // Anywhere in a pixel, or seen in a mirror: where the eye would see it.
+            None => {
+                let [x, y, _, w] = mixed(corners, at.weights);
+                (f64::from((x / w * 0.5 + 0.5) * vw + vx), f64::from((y / w * 0.5 + 0.5) * vh + vy))
+            }
+        };
+        let mut nearest = f64::INFINITY;
+        for i in 0..3 {
+            let (a, b) = (p[i], p[(i + 1) % 3]);
+            let along = [b[0] - a[0], b[1] - a[1]];
+            let length = along[0].hypot(along[1]);
+            let inward = [-along[1] * turn / length, along[0] * turn / length];
+            let mut distance = inward[0] * (px - a[0]) + inward[1] * (py - a[1]);
+            if sides & 1 << i == 0 {
+                distance += f64::from(self.width);
+            }
+            nearest = nearest.min(distance);
+        }
+        ((0.5 + 0.5 * f64::from(self.width) - nearest) as f32).clamp(0.0, 1.0)
+    }
+}
+
+impl Recognised {
+    /// Colour and alpha of vertices, triangles or the colour map; no colour where the uniforms' are taken.
+    pub(super) fn own_color(
+        &self,
+        a: &Attributes,
+        mesh: &TriMesh,
+        prim: usize,
+        w: [f32; 3],
+    ) -> (Option<V3>, f32) {
+        let corners = mesh.indices[prim].map(|i| i as usize);
+        let [r, g, b, alpha] = match self.template.colors {
+            Colors::Uniform => return (None, 1.0),
+            Colors::PerVertex => mixed(corners.map(|i| a.colors.at(i)), w),
+            Colors::Map => {
+                let [s, t] = mixed(corners.map(|i| self.map_coordinates(a, i)), w);
+                self.map.as_ref().map_or([1.0; 4], |m| m.sample(s, t))
+            }
+            Colors::PerCell => self.map.as_ref().map_or([1.0; 4], |m| m.numbered(prim)),
+        };
+        (Some([r, g, b]).filter(|_| !self.overrides), alpha)
+    }
+
+    /// The surface of a fragment before light falls on it, step by step as the shader has it.
+    fn surface(&self, a: &Attributes, mesh: &TriMesh, at: &At, picture: Option<[f32; 4]>) -> Surface {
+        let mut surface = match self.back {
+            Some(back) if !at.front => back,
+            _ => {
+                let (own, alpha) = self.own_color(a, mesh, at.prim, at.weights);
+                let plain = |v: f32| if self.template.linear { v.powf(2.2) } else { v };
+                Surface {
+                    ambient: own.unwrap_or(self.ambient).map(|v| plain(v * self.ambient_intensity)),
+                    diffuse: own.unwrap_or(self.diffuse).map(|v| plain(v * self.diffuse_intensity)),
+                    specular: self.specular,
+                    power: self.specular_power,
+                    alpha: alpha * self.opacity,
+                }
+            }
+        };
+        // The colour of a block is over those of back faces, and is not made linear.
+        if self.overrides {
+            surface.ambient = self.ambient.map(|v| v * self.ambient_intensity);
+            surface.diffuse = self.diffuse.map(|v| v * self.diffuse_intensity);
+        }
+        if let Some(edges) = &self.edges {
+            let corners = mesh.triangle(at.prim).map(|p| transform(&self.clip_from_object, p.to_array()));
+            let line = edges.share(corners, at) * edges.opacity;
+            surface.diffuse = mix(surface.diffuse, [0.0; 3], line);
+            surface.ambient = mix(surface.ambient, edges.color, line);
+        }
+        if let (Pictured::Albedo | Pictured::AlbedoAlone, Some([r, g, b, alpha])) =
+            (self.template.pictured, picture)
+        {
+            let [x, y, z] = surface.diffuse;
+            surface.diffuse = [x * r, y * g, z * b];
+            surface.alpha =
+                if self.template.pictured == Pictured::Albedo { self.opacity * alpha } else { alpha };
+        }
+        surface
+    }
+
+    /// Place and normal of a fragment in eye space.
+    fn eye_point(&self, a: &Attributes, mesh: &TriMesh, at: &At) -> (V3, V3) {
+        let corners = mesh.indices[at.prim].map(|i| i as usize);
+        let view = corners.map(|i| {
+            let v = transform(&self.view_from_object, mesh.positions[i].to_array());
+            [v[0], v[1], v[2]]
+        });
+        let point = mixed(view, at.weights);
+        let normal = if self.template.flat {
+            let e = |k: usize| -> V3 { std::array::from_fn(|c| view[k][c] - view[0][c]) };
+            let (p, q) = (e(1), e(2));
+            let n =
+                normalized([p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]);
+            let away = if self.parallel { n[2] < 0.0 } else { dot(n, point) > 0.0 };
+            if away { n.map(|v| -v) } else { n }
+        } else {
+            let m = &self.normal_matrix;
+            let each = corners.map(|i| {
+                let n = a.normals.at(i);
+                std::array::from_fn(|r| m[r] * n[0] + m[3 + r] * n[1] + m[6 + r] * n[2])
+            });
+            let n = normalized(mixed(each, at.weights));
+            if at.front { n } else { n.map(|v| -v) }
+        };
+        (point, normal)
+    }
+
+    /// The fragment's colour, as the shader computes it.
+    pub(crate) fn color(&self, a: &Attributes, mesh: &TriMesh, at: &At, reaches: &Visibility) -> [f32; 4] {
+        let picture = self.picture_at(a, mesh, at.prim, at.weights, at.texels);
+        let s = self.surface(a, mesh, at, picture);
+        let out = if !self.template.lit {
+            std::array::from_fn(|k| s.ambient[k] + s.diffuse[k])
+        } else {
+            let (point, normal) = self.eye_point(a, mesh, at);
+            match &self.physical {
+                Some(p) => self.physically_lit(p, &s, point, normal, reaches),
+                None => self.lit(&s, point, normal, reaches),
+            }
+        };
+        self.under_picture([out[0], out[1], out[2], s.alpha], picture, at.front)
+    }
+
+    fn lit(&self, s: &Surface, point: V3, normal: V3, reaches: &Visibility) -> V3 {
+        let mut lit = [0.0; 3];
+        let mut shine = [0.0; 3];
+        if self.template.headlight {
+            let least = if self.template.cosines_from_zero { 0.0 } else { 0.000_001 };
+            let df = normal[2].max(least) * reaches.lights[0];
+            let sf = df.powf(s.power);
+            for k in 0..3 {
+                lit[k] = df * self.lights[0].color[k];
+                shine[k] = sf * self.lights[0].color[k];
+            }
+        }
+        // A light that the user has added to one at the eye is one like others.
+        let others = &self.lights[usize::from(self.template.headlight)..];
+        let visible = &reaches.lights[usize::from(self.template.headlight)..];
+        let to_eye = normalized(point.map(|v| -v));
+        let least = if self.template.cosines_from_zero { 0.0 } else { 1e-5 };
+        for (light, visible) in others.iter().zip(visible) {
+            let (travels, share) = light.reaching(point);
+            let color = light.color.map(|c| c * visible);
+            let cosine = -dot(normal, travels);
+            if cosine * share <= 0.0 {
+                continue;
+            }
+            // reflect(I, N) = I - 2 (N . I) N
+            let r: V3 = std::array::from_fn(|k| travels[k] + 2.0 * cosine * normal[k]);
+            let sf = share * dot(r, to_eye).max(least).powf(s.power);
+            for k in 0..3 {
+                lit[k] += cosine * share * color[k];
+                shine[k] += sf * color[k];
+            }
+        }
+        std::array::from_fn(|k| {
+            s.ambient[k] * reaches.ambient + s.diffuse[k] * lit[k] + s.specular[k] * shine[k]
+        })
+    }
+
+    fn physically_lit(&self, p: &Physical, s: &Surface, point: V3, normal: V3, reaches: &Visibility) -> V3 {
+        let cosine = |a: V3, b: V3| dot(a, b).clamp(1e-5, 1.0);
+        let to_eye = normalized(point.map(|v| -v));
+        let n_v = cosine(normal, to_eye);
+        let mut sum = [0.0_f32; 3];
+        for (i, (light, visible)) in self.lights.iter().zip(&reaches.lights).enumerate() {
+            let (cosines, share) = if self.template.headlight && i == 0 {
+                ([n_v, n_v, n_v, 1.0], 1.0)
+            } else {
+                let (travels, share) = light.reaching(point);
+                let l = normalized(travels.map(|v| -v));
+                let h = normalized(std::array::from_fn(|k| to_eye[k] + l[k]));
+                ([cosine(normal, h), n_v, cosine(normal, l), cosine(h, l)], share)
+            };
+            let reflected = p.reflected(s.diffuse, cosines);
+            for k in 0..3 {
+                sum[k] += light.color[k] * share * visible * reflected[k] * cosines[2];
+            }
+        }
+        sum.map(|v| v.powf(1.0 / 2.2))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::program::Lamp;
+    use super::*;
+    use std::sync::Arc;
+
+    #[test]
+    fn lamps_lose_strength_with_distance_and_outside_of_their_cones() {
+        let lamp = Lamp { position: [0.0; 3], attenuation: [0.5, 0.25, 0.0], cone_deg: 45.0, exponent: 2.0 };
+        let light = ProgramLight { travels: [0.0, 0.0, -1.0], color: [1.0; 3], lamp: Some(lamp) };
+        let (travels, share) = light.reaching([0.0, 0.0, -2.0]);
+        assert_eq!((travels, share), ([0.0, 0.0, -1.0], 1.0));
+        let (_, beside) = light.reaching([1.0, 0.0, -2.0]);
+        let (distance, cosine) = (5.0_f32.sqrt(), 2.0 / 5.0_f32.sqrt());
+        assert!((beside - cosine * cosine / (0.5 + 0.25 * distance)).abs() < 1e-6);
+        assert_eq!(light.reaching([3.0, 0.0, -2.0]).1, 0.0, "outside of the cone");
+        let far = ProgramLight { lamp: None, ..light };
+        assert_eq!(far.reaching([3.0, 0.0, -2.0]), ([0.0, 0.0, -1.0], 1.0));
+    }
+
+    #[test]
+    fn a_rough_metal_reflects_less_along_the_normal_than_a_smooth_one_and_has_no_diffuse_part() {
+        let p = Physical { metallic: 1.0, roughness: 0.9, base: 0.04, tint: [1.0; 3], least_divisor: 1e-8 };
+        let smooth = Physical { roughness: 0.2, ..p };
+        let along = [1.0, 1.0, 1.0, 1.0];
+        let (rough, shiny) = (p.reflected([0.5; 3], along), smooth.reflected([0.5; 3], along));
+        assert!(rough[0] < shiny[0], "{rough:?} {shiny:?}");
+        // D V F with N = V = L = H: 1 / (pi a²) 1/4 F0, where V is 0.5 / (1 + 1).
+        let a2 = 0.9_f32.powi(4);
+        assert!((rough[0] - 0.5 * 0.25 / (std::f32::consts::PI * a2)).abs() < 1e-5, "{rough:?}");
+    }
+
+    #[test]
+    fn lines_lie_along_the_sides_that_are_edges_of_cells() {
+        let corners = [[-1.0, -1.0, 0.0, 1.0], [1.0, -1.0, 0.0, 1.0], [-1.0, 1.0, 0.0, 1.0]];
+        let edges = |sides: u8| Edges {
+            sides: Arc::new(vec![sides]),
+            width: 1.0,
+            color: [0.0; 3],
+            opacity: 1.0,
+            viewport: [0.0, 0.0, 20.0, 20.0],
+        };
+        let at = |x, y| At {
+            prim: 0,
+            weights: [1.0, 0.0, 0.0],
+            front: true,
+            pixel: Some((x, y)),
+            texels: None,
+            moved_by: [0.0; 2],
+        };
+        // Half a pixel from the lower side, far from the others.
+        assert_eq!(edges(1).share(corners, &at(6, 0)), 0.5);
+        assert_eq!(edges(2).share(corners, &at(6, 0)), 0.0, "that side is none");
+        assert_eq!(edges(4).share(corners, &at(0, 6)), 0.5, "the third side is the left one");
+        assert_eq!(edges(7).share(corners, &at(5, 5)), 0.0, "inside");
+        // The same place by the corners' weights: 6.5 and 0.5 of 20.
+        let weights = [0.65, 0.325, 0.025];
+        let by_weights = edges(1).share(corners, &At { pixel: None, weights, ..at(0, 0) });
+        assert!((by_weights - 0.5).abs() < 1e-5, "{by_weights}");
+    }
+}

@@ -1,0 +1,355 @@
+//! A program that we know, with its uniforms at one draw.
+
+use super::color::Surface;
+use super::signature::{Colors, Pictured, Template};
+use crate::capture::draw::Attributes;
+use crate::interpose::driver::gl;
+use crate::state::snapshot::GlLight;
+use crate::trace::lighting::normalized;
+use crate::trace::mixed;
+use crate::trace::occlusion::{Place, vector};
+use crate::trace::texturing::Image;
+use rt_core::mesh::TriMesh;
+use std::sync::Arc;
+
+/// What colours a program's surface.
+pub(crate) enum ProgramSkin<'a> {
+    /// Uniforms.
+    Constant,
+    /// The vertices' colours, times this.
+    PerVertex(f32),
+    /// A colour map, times this.
+    Map(&'a Image, f32),
+    /// A picture over uniforms.
+    Picture(&'a Image),
+    /// A colour for each triangle, times this.
+    PerCell(&'a Image, f32),
+}
+
+/// A light in eye space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ProgramLight {
+    /// Where its light, or the middle of its cone, travels.
+    pub(crate) travels: [f32; 3],
+    pub(crate) color: [f32; 3],
+    /// `None` far away.
+    pub(crate) lamp: Option<Lamp>,
+}
+
+/// A light with a place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Lamp {
+    pub(crate) position: [f32; 3],
+    /// Constant, linear, quadratic.
+    pub(crate) attenuation: [f32; 3],
+    /// 90 or more for no cone.
+    pub(crate) cone_deg: f32,
+    pub(crate) exponent: f32,
+}
+
+impl ProgramLight {
+    /// The same as a light of fixed function.
+    pub(crate) fn as_opengl(&self) -> GlLight {
+        let [r, g, b] = self.color;
+        let light = GlLight {
+            diffuse: [r, g, b, 1.0],
+            specular: [r, g, b, 1.0],
+            position: [-self.travels[0], -self.travels[1], -self.travels[2], 0.0],
+            spot_cutoff_deg: 180.0,
+            attenuation: [1.0, 0.0, 0.0],
+            ..GlLight::default()
+        };
+        let Some(lamp) = self.lamp else { return light };
+        let [x, y, z] = lamp.position;
+        GlLight {
+            position: [x, y, z, 1.0],
+            spot_direction: self.travels,
+            spot_exponent: lamp.exponent,
+            spot_cutoff_deg: if lamp.cone_deg < 90.0 { lamp.cone_deg } else { 180.0 },
+            attenuation: lamp.attenuation,
+            ..light
+        }
+    }
+}
+
+/// Constants of a physically based material.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Physical {
+    pub(crate) metallic: f32,
+    pub(crate) roughness: f32,
+    /// Reflectance along the normal, and its tint at grazing angles.
+    pub(crate) base: f32,
+    pub(crate) tint: [f32; 3],
+    /// What the lobe is divided by is not less: 0 before VTK 9.7.
+    pub(crate) least_divisor: f32,
+}
+
+/// Lines along the edges of cells.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Edges {
+    /// For each triangle which of its sides are edges of its cell: bits.
+    pub(crate) sides: Arc<Vec<u8>>,
+    /// In pixels.
+    pub(crate) width: f32,
+    pub(crate) color: [f32; 3],
+    pub(crate) opacity: f32,
+    /// The viewport as the program gave it.
+    pub(crate) viewport: [f32; 4],
+}
+
+/// What a draw's buffer textures have for each triangle.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct PerTriangle {
+    pub(crate) colors: Option<Arc<Image>>,
+    pub(crate) sides: Option<Arc<Vec<u8>>>,
+}
+
+/// A program whose picture we can make, with its uniforms at one draw.
+#[derive(Debug, Clone)]
+pub(crate) struct Recognised {
+    pub(crate) clip_from_object: [f32; 16],
+    pub(crate) view_from_object: [f32; 16],
+    pub(super) normal_matrix: [f32; 9],
+    pub(super) template: Template,
+    pub(crate) ambient: [f32; 3],
+    pub(crate) diffuse: [f32; 3],
+    pub(super) ambient_intensity: f32,
+    pub(super) diffuse_intensity: f32,
+    pub(crate) specular: [f32; 3],
+    pub(crate) specular_power: f32,
+    pub(crate) opacity: f32,
+    pub(super) parallel: bool,
+    pub(super) overrides: bool,
+    pub(crate) lights: Vec<ProgramLight>,
+    /// Of back faces, where they have one of their own.
+    pub(super) back: Option<Surface>,
+    pub(super) physical: Option<Physical>,
+    /// Planes in object space that fragments must be above.
+    pub(super) clip_planes: Vec<[f32; 4]>,
+    pub(super) edges: Option<Edges>,
+    /// The colour map, or a colour for each triangle.
+    pub(super) map: Option<Arc<Image>>,
+    /// The texture of the actor, and whether back faces have it.
+    pub(super) picture: Option<Arc<Image>>,
+    pub(super) picture_on_backs: bool,
+    /// The matrix for texture coordinates.
+    pub(super) turn: Option<[f32; 16]>,
+}
+
+/// Most clipping planes of VTK's.
+const MOST_PLANES: i32 = 6;
+
+impl Recognised {
+    /// The uniforms now.
+    pub(super) fn query(program: u32, template: Template, images: [Option<Arc<Image>>; 2]) -> Recognised {
+        let [map, picture] = images;
+        fn value<const N: usize>(program: u32, name: &str) -> [f32; N] {
+            match gl::uniform_location(program, name) {
+                -1 => [0.0; N],
+                at => gl::uniform_f(program, at),
+            }
+        }
+        let one = |name: &str| value::<1>(program, name)[0];
+        let number = |name: &str| match gl::uniform_location(program, name) {
+            -1 => 0,
+            at => gl::uniform_i::<1>(program, at)[0],
+        };
+        let intensity = one("specularIntensity");
+        let light = |i: usize| ProgramLight {
+            travels: value(program, &format!("lightDirectionVC{i}")),
+            color: value(program, &format!("lightColor{i}")),
+            lamp: (template.placed && number(&format!("lightPositional{i}")) != 0).then(|| Lamp {
+                position: value(program, &format!("lightPositionVC{i}")),
+                attenuation: value(program, &format!("lightAttenuation{i}")),
+                cone_deg: one(&format!("lightConeAngle{i}")),
+                exponent: one(&format!("lightExponent{i}")),
+            }),
+        };
+        let lights = match template.headlight {
+            true => vec![ProgramLight {
+                travels: [0.0, 0.0, -1.0],
+                color: value(program, "lightColor0"),
+                lamp: None,
+            }],
+            false => (0..template.lights).map(light).collect(),
+        };
+        let times = |name: &str, factor: &str| value::<3>(program, name).map(|v| v * one(factor));
+        let planes = if template.clipped { number("numClipPlanes").clamp(0, MOST_PLANES) } else { 0 };
+        Recognised {
+            clip_from_object: value(program, "MCDCMatrix"),
+            view_from_object: value(program, "MCVCMatrix"),
+            normal_matrix: value(program, "normalMatrix"),
+            template,
+            ambient: value(program, "ambientColorUniform"),
+            diffuse: value(program, "diffuseColorUniform"),
+            ambient_intensity: one("ambientIntensity"),
+            diffuse_intensity: one("diffuseIntensity"),
+            specular: value::<3>(program, "specularColorUniform").map(|v| v * intensity),
+            specular_power: one("specularPowerUniform"),
+            opacity: one("opacityUniform"),
+            parallel: number("cameraParallel") != 0,
+            overrides: template.overrides && number("OverridesColor") != 0,
+            lights,
+            back: template.back.then(|| Surface {
+                ambient: times("ambientColorUniformBF", "ambientIntensityBF"),
+                diffuse: times("diffuseColorUniformBF", "diffuseIntensityBF"),
+                specular: times("specularColorUniformBF", "specularIntensityBF"),
+                power: one("specularPowerUniformBF"),
+                alpha: one("opacityUniformBF"),
+            }),
+            physical: template.physical.then(|| Physical {
+                metallic: one("metallicUniform"),
+                roughness: one("roughnessUniform"),
+                base: one("baseF0Uniform"),
+                tint: value(program, "edgeTintUniform"),
+                least_divisor: if template.lobes_have_an_end { 1e-8 } else { 0.0 },
+            }),
+            clip_planes: (0..planes).map(|i| value(program, &format!("clipPlanes[{i}]"))).collect(),
+            edges: template.edges.then(|| Edges {
+                sides: Arc::default(),
+                width: one("lineWidth"),
+                color: value(program, "edgeColor"),
+                // VTK gives it only where lines let something through.
+                opacity: match gl::uniform_location(program, "edgeOpacity") {
+                    -1 => 1.0,
+                    at => gl::uniform_f::<1>(program, at)[0],
+                },
+                viewport: value(program, "vpDims"),
+            }),
+            map,
+            picture,
+            picture_on_backs: number("showTexturesOnBackface") != 0,
+            turn: template.turned.then(|| value(program, "tcMatrix")),
+        }
+    }
+
+    /// What buffer textures have for each triangle of the draw.
+    pub(super) fn with_cells(mut self, cells: &PerTriangle) -> Recognised {
+        if self.template.colors == Colors::PerCell {
+            self.map = cells.colors.clone();
+        }
+        if let (Some(edges), Some(sides)) = (&mut self.edges, &cells.sides) {
+            edges.sides = sides.clone();
+        }
+        self
+    }
+
+    /// One colour everywhere, instead of colour maps and colours of vertices and cells.
+    pub(crate) fn paint(&mut self, color: [f32; 3]) {
+        (self.ambient, self.diffuse) = (color, color);
+        self.template.colors = Colors::Uniform;
+        self.template.pictured = Pictured::No;
+        self.picture = None;
+        self.back = None;
+    }
+
+    /// Where the lights are, in eye space.
+    pub(crate) fn places(&self) -> Vec<Place> {
+        let place = |l: &ProgramLight| match l.lamp {
+            None => Place::Far(vector(l.travels.map(|v| -v))),
+            Some(lamp) => Place::Near(vector(lamp.position)),
+        };
+        self.lights.iter().map(place).collect()
+    }
+
+    /// Planes in object space that fragments must be above.
+    pub(crate) fn clip_planes(&self) -> &[[f32; 4]] {
+        &self.clip_planes
+    }
+
+    /// True when every fragment has alpha 1.
+    pub(crate) fn is_opaque(&self, attributes: &Attributes, vertices: usize) -> bool {
+        self.opacity == 1.0
+            && self.back.is_none_or(|b| b.alpha == 1.0)
+            && self.picture_is_opaque()
+            && match self.template.colors {
+                Colors::Uniform => true,
+                Colors::Map | Colors::PerCell => self.map.as_ref().is_some_and(|m| m.is_opaque()),
+                Colors::PerVertex => (0..vertices).all(|i| attributes.colors.at(i)[3] == 1.0),
+            }
+    }
+
+    /// Diffuse colour with its coefficient, and opacity; with the picture on it.
+    pub(crate) fn base(&self, a: &Attributes, mesh: &TriMesh, prim: usize, w: [f32; 3]) -> ([f32; 3], f32) {
+        let (color, alpha) = self.ground(a, mesh, prim, w);
+        match self.picture_at(a, mesh, prim, w, None) {
+            Some([r, g, b, share]) => ([color[0] * r, color[1] * g, color[2] * b], alpha * share),
+            None => (color, alpha),
+        }
+    }
+
+    /// The same without the picture.
+    pub(crate) fn ground(&self, a: &Attributes, mesh: &TriMesh, prim: usize, w: [f32; 3]) -> ([f32; 3], f32) {
+        let (own, alpha) = self.own_color(a, mesh, prim, w);
+        let unlit = if self.template.lit { 0.0 } else { self.ambient_intensity };
+        let color: [f32; 3] = match own {
+            Some(c) => c.map(|v| v * (self.diffuse_intensity + unlit)),
+            None => {
+                std::array::from_fn(|k| self.diffuse[k] * self.diffuse_intensity + self.ambient[k] * unlit)
+            }
+        };
+        (color, alpha * self.opacity)
+    }
+
+    /// Where colours come from, with the factor on them.
+    pub(crate) fn skin(&self) -> ProgramSkin<'_> {
+        let unlit = if self.template.lit { 0.0 } else { self.ambient_intensity };
+        let factor = self.diffuse_intensity + unlit;
+        match (self.template.colors, &self.map) {
+            (Colors::PerVertex, _) if !self.overrides => ProgramSkin::PerVertex(factor),
+            (Colors::Map, Some(map)) if !self.overrides => ProgramSkin::Map(map, factor),
+            (Colors::PerCell, Some(map)) if !self.overrides => ProgramSkin::PerCell(map, factor),
+            _ => self.picture_alone().map_or(ProgramSkin::Constant, |image| ProgramSkin::Picture(image)),
+        }
+    }
+
+    /// What a scene of paths has no place for, in words.
+    pub(crate) fn left_out_of_paths(&self) -> impl Iterator<Item = &'static str> {
+        let left_out = [
+            (self.edges.is_some(), "edges of cells"),
+            (self.back.is_some(), "materials of back faces"),
+            (self.physical.is_some(), "VTK's rules for physically based materials"),
+            (self.picture.is_some() && self.picture_alone().is_none(), "pictures over other colours"),
+        ];
+        left_out.into_iter().filter_map(|(there, what)| there.then_some(what))
+    }
+
+    /// True when the surface answers lights.
+    pub(crate) fn is_lit(&self) -> bool {
+        self.template.lit
+    }
+
+    /// True when a single light at the eye is all there is (VTK then makes highlights by N·L).
+    pub(crate) fn has_headlight(&self) -> bool {
+        self.template.headlight
+    }
+
+    /// The part of the light that no light has to send.
+    pub(crate) fn ambient_light(&self) -> [f32; 3] {
+        match self.physical {
+            Some(_) => [0.0; 3],
+            None => self.ambient.map(|v| v * self.ambient_intensity),
+        }
+    }
+
+    /// Eye space from the normals of vertices; `None` where triangles have none but their own.
+    pub(crate) fn eye_from_normal(&self) -> Option<&[f32; 9]> {
+        (!self.template.flat).then_some(&self.normal_matrix)
+    }
+
+    /// Shading normal in eye space.
+    pub(crate) fn smooth_normal(&self, a: &Attributes, mesh: &TriMesh, prim: usize, w: [f32; 3]) -> [f32; 3] {
+        let corners = mesh.indices[prim].map(|i| i as usize);
+        match self.eye_from_normal() {
+            Some(m) => {
+                let each = corners.map(|i| {
+                    let n = a.normals.at(i);
+                    std::array::from_fn(|r| m[r] * n[0] + m[3 + r] * n[1] + m[6 + r] * n[2])
+                });
+                normalized(mixed(each, w))
+            }
+            // The triangle's own decides.
+            None => [0.0; 3],
+        }
+    }
+}

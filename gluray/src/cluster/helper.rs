@@ -1,0 +1,224 @@
+//! A helper's life: it keeps what it was told of the scene, and makes the rows it is asked for.
+
+use super::draw_message::Parcel;
+use super::requests::{
+    ANSWER, AnswerHead, Cost, MOST_ORDER_BYTES, ORDER, Order, Seen, Work, numbers, pixels, rect,
+};
+use super::row_share::{Share, put_rows};
+use crate::capture::draw::{Attributes, Draw, Shading};
+use crate::capture::geometry_cache::{Cache, Geometry};
+use crate::host::config::{self, Quality, Settings};
+use crate::trace::path_tracing::Studio;
+use crate::trace::texturing::Image;
+use crate::trace::thread_pool;
+use crate::trace::view::View;
+use crate::trace::whitted;
+use crate::trace::{self, Prepared, Rect};
+use composite::comm::{CommError, Communicator};
+use rt_core::glam::DMat4;
+use std::collections::HashMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::time::{Duration, Instant};
+
+/// How often somebody who waits for work looks whether it is over.
+const LOOK: Duration = Duration::from_millis(500);
+
+/// Most pixels of the rectangle around all views of a picture: no driver's framebuffer is larger
+/// than 16384 x 16384.
+const MOST_BETWEEN: i64 = 1 << 28;
+
+/// The scene as far as a program has told it, and what is made of it.
+#[derive(Default)]
+pub(super) struct Helper {
+    geometries: HashMap<u128, Arc<Geometry>>,
+    attributes: HashMap<u128, Arc<Attributes>>,
+    images: HashMap<u128, Arc<Image>>,
+    /// Builds better structures for what rests.
+    cache: Cache,
+    studio: Studio,
+}
+
+/// Serves the first rank until it leaves or `over` is set.
+///
+/// # Errors
+/// What ended the group other than that the first rank left.
+pub(crate) fn serve(comm: &mut dyn Communicator, over: &AtomicBool) -> Result<(), CommError> {
+    let mut helper = Helper::default();
+    while !over.load(Relaxed) {
+        let order = match comm.recv(0, ORDER, MOST_ORDER_BYTES, LOOK) {
+            Ok(order) => order,
+            Err(CommError::Timeout { .. }) => continue,
+            Err(CommError::PeerLost { .. }) => return Ok(()),
+            Err(e) => return Err(e),
+        };
+        let answer = helper.answer(&order);
+        comm.recycle(order);
+        match comm.send(0, ANSWER, answer) {
+            Err(CommError::PeerLost { .. }) => return Ok(()),
+            other => other?,
+        }
+    }
+    Ok(())
+}
+
+fn complaint(number: u64, text: String) -> Vec<u8> {
+    let head = AnswerHead {
+        number,
+        complaint: Some(text),
+        rect: [0; 4],
+        cost: Cost::default(),
+        warnings: Vec::new(),
+    };
+    super::codec::bytes_of(&head)
+}
+
+impl Helper {
+    /// The answer to an order, whatever that is.
+    pub(super) fn answer(&mut self, order: &[u8]) -> Vec<u8> {
+        let order = match Order::read(order) {
+            Ok(order) => order,
+            Err(malformed) => return complaint(0, format!("an order that is none: {malformed}")),
+        };
+        let number = order.number;
+        let made = catch_unwind(AssertUnwindSafe(|| thread_pool::on_pool(|| self.make(order))));
+        match made {
+            Ok(Ok(answer)) => answer,
+            Ok(Err(why)) => complaint(number, why),
+            Err(_) => complaint(number, "a fault of the helper's".to_owned()),
+        }
+    }
+
+    fn make(&mut self, order: Order) -> Result<Vec<u8>, String> {
+        let start = Instant::now();
+        for name in &order.forget {
+            self.geometries.remove(name);
+            self.attributes.remove(name);
+            self.images.remove(name);
+        }
+        for (name, (positions, triangles)) in order.news.geometries {
+            let positions: Vec<[f32; 3]> = positions.iter().map(|p| p.to_array()).collect();
+            self.geometries.insert(name, self.cache.put(name, &positions, triangles));
+        }
+        self.attributes.extend(order.news.attributes.into_iter().map(|(k, a)| (k, Arc::new(a))));
+        self.images.extend(order.news.images.into_iter().map(|(k, i)| (k, Arc::new(i))));
+        let settings = obeyed(order.settings);
+        let draws = order.draws.into_iter().map(|p| self.draw(p)).collect::<Result<Vec<_>, _>>()?;
+        let (mut cost, mut structures) =
+            (Cost::default(), crate::capture::geometry_cache::Structures::default());
+        let ready: Vec<Prepared<'_>> = draws
+            .iter()
+            .map(|(d, image)| Prepared::new(d, image.clone(), &mut structures))
+            .map(|p| p.ok_or("a draw that cannot be seen"))
+            .collect::<Result<_, _>>()?;
+        (cost.builds, cost.refits) = (structures.built, structures.refitted);
+        let (area, rows, warnings) = match order.work {
+            Work::Nearest => {
+                // Views that are small each may lie so far apart that no memory holds all between them.
+                let Rect { x, y, w, h } = ready.iter().fold(Rect::default(), |r, p| r.or(p.rect));
+                if pixels(w, h) > MOST_BETWEEN {
+                    return Err(format!("a picture of {w} x {h} pixels at ({x}, {y})"));
+                }
+                let (layer, extra) = trace::nearest(&ready, &settings, order.share);
+                cost.add("primary", ready.iter().map(|p| p.rays.load(Relaxed)).sum());
+                cost.add("shadow", extra[0]);
+                cost.add("ambient occlusion", extra[1]);
+                let size = [layer.rect.w.max(0) as usize, layer.rect.h.max(0) as usize];
+                let mut rows = Vec::new();
+                let there = |i: usize| layer.depth[i] < 1.5;
+                put_rows(&mut rows, order.share, size, (&layer.color, &layer.depth), there);
+                (layer.rect, rows, Vec::new())
+            }
+            Work::Beyond(seen, background) => {
+                let view = view(&seen)?;
+                let colors =
+                    whitted::colors(&ready, &view, rect(seen.rect), &settings, background, order.share);
+                (colors.rect, self::colors(&colors, order.share, &mut cost), colors.warnings)
+            }
+            Work::Paths(seen, [number, picture]) => {
+                let view = view(&seen)?;
+                let number = usize::try_from(number).map_err(|_| "a view without end")?;
+                let (at, share) = (rect(seen.rect), order.share);
+                let colors = self.studio.picture(&ready, &view, number, at, &settings, picture, share);
+                (colors.rect, self::colors(&colors, order.share, &mut cost), colors.warnings)
+            }
+        };
+        drop(ready);
+        self.picture_done(settings.quality);
+        cost.took_us = start.elapsed().as_micros() as u64;
+        let number = order.number;
+        let head = AnswerHead { number, complaint: None, rect: numbers(area), cost, warnings };
+        let mut out = super::codec::bytes_of(&head);
+        out.extend_from_slice(&rows);
+        Ok(out)
+    }
+
+    fn draw(&self, p: Parcel) -> Result<(Draw, Option<Arc<Image>>), String> {
+        let lost = |what: &str, name: u128| format!("{what} {name:x} was never sent");
+        let image = |name: Option<u128>| match name {
+            None => Ok(None),
+            Some(n) => self.images.get(&n).cloned().map(Some).ok_or_else(|| lost("image", n)),
+        };
+        let [texture, map, picture] = p.images.map(image);
+        let texture = texture?;
+        let shading = match p.program {
+            None => Shading::Fixed,
+            Some(program) => Shading::Program(Arc::new(program.with_images([map?, picture?]))),
+        };
+        let draw = Draw {
+            geometry: self
+                .geometries
+                .get(&p.geometry)
+                .cloned()
+                .ok_or_else(|| lost("geometry", p.geometry))?,
+            attributes: (self.attributes.get(&p.attributes).cloned())
+                .ok_or_else(|| lost("attributes", p.attributes))?,
+            state: Arc::new(p.state),
+            shading,
+            clip_from_object: p.clip_from_object,
+            calls: 1,
+            look: p.look,
+        };
+        Ok((draw, texture))
+    }
+
+    /// Better structures for what rests; what was not forgotten stays.
+    fn picture_done(&mut self, quality: Quality) {
+        #[expect(clippy::iter_over_hash_type, reason = "each entry for itself")]
+        for g in self.geometries.values() {
+            self.cache.touch(g);
+        }
+        let auto = quality == Quality::Auto;
+        self.cache.frame_done(|g| {
+            if auto {
+                thread_pool::in_background(move || g.improve());
+            }
+            auto
+        });
+        self.studio.frame_done();
+    }
+}
+
+fn view(seen: &Seen) -> Result<View, String> {
+    let projection = DMat4::from_cols_array(&seen.projection);
+    View::new(projection, rect(seen.viewport)).ok_or_else(|| "a projection without rays".to_owned())
+}
+
+fn colors(colors: &whitted::Colors, share: Share, cost: &mut Cost) -> Vec<u8> {
+    colors.rays.iter().for_each(|(kind, n)| cost.add(kind, *n));
+    let size = [colors.rect.w.max(0) as usize, colors.rect.h.max(0) as usize];
+    let mut rows = Vec::new();
+    put_rows(&mut rows, share, size, (&colors.rgba, &[0_u8; 0]), |i| colors.rgba[i] != [0.0; 4]);
+    rows
+}
+
+/// The first rank's settings, but for the number of threads, which is this process' own.
+fn obeyed(settings: Settings) -> Settings {
+    let now = config::current();
+    let settings = Settings { threads: now.settings.threads, ..settings };
+    if now.settings != settings {
+        config::replace(settings.clone());
+    }
+    settings
+}

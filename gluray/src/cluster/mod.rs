@@ -1,0 +1,197 @@
+//! Ray-parallel mode with replicated data (dissertation, sections 4.1.3 and 6.2): several processes make one program's picture.
+//!
+//! The program is the first rank. Helpers (`gluray serve-rays`) have the whole scene, of which they are told what is new, and make every so many rows of each
+//! picture. They talk by composite's communicator. `group` does the same for helpers that are an MPI job. Every rank sends the packets of rays that one process would, so pictures are the same bit by bit
+//! whatever the number of ranks.
+
+pub(crate) mod codec;
+mod coordinator;
+mod draw_message;
+pub(crate) mod helper;
+pub(crate) mod mpi_group;
+mod rank_stats;
+pub(crate) mod requests;
+pub(crate) mod row_share;
+pub(crate) mod socket_comm;
+
+pub use rank_stats::RankAccount;
+
+use crate::host::config::Settings;
+use crate::trace::path_tracing::Studio;
+use crate::trace::view::View;
+use crate::trace::whitted::{self, Colors};
+use crate::trace::{self, Layer, Prepared, Rect};
+use coordinator::{Lead, Made, seen};
+use requests::Work;
+use row_share::Share;
+use socket_comm::SocketComm;
+use std::os::unix::net::UnixStream;
+use std::sync::atomic::Ordering::Relaxed;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// The variable with the helpers' sockets, one after the other with `:` between them.
+pub(crate) const SOCKETS: &str = "GLURAY_RANKS";
+/// Pixels below which asking costs more than it saves.
+const LEAST_PIXELS: i64 = 128 * 128;
+
+/// What became of the helpers of this process.
+enum State {
+    /// Nothing was traced yet.
+    Unknown,
+    /// No helpers were given.
+    Alone,
+    /// The process that made the connections, and the first rank.
+    Together(u32, Box<Lead>),
+}
+
+static STATE: Mutex<State> = Mutex::new(State::Unknown);
+/// What each rank did; apart from the rest, so that nobody who reports waits for a picture.
+static ACCOUNTS: Mutex<Vec<RankAccount>> = Mutex::new(Vec::new());
+/// Helpers that could not be reached.
+static PROBLEMS: Mutex<Vec<String>> = Mutex::new(Vec::new());
+
+fn connect(place: &str) -> std::io::Result<UnixStream> {
+    let end = Instant::now() + Duration::from_secs(5);
+    loop {
+        match UnixStream::connect(place) {
+            // It may be between its first two steps.
+            Err(e) if e.kind() == std::io::ErrorKind::ConnectionRefused && Instant::now() < end => {
+                std::thread::sleep(Duration::from_millis(10));
+            }
+            other => return other,
+        }
+    }
+}
+
+fn begin() -> State {
+    let Some(places) = crate::host::folders::variable(SOCKETS) else { return State::Alone };
+    let mut problems = PROBLEMS.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut streams = Vec::new();
+    for place in places.split(':').filter(|p| !p.is_empty()) {
+        match connect(place) {
+            Ok(stream) => streams.push(stream),
+            Err(e) => problems.push(format!("no helper at {place} ({e}): others make its rows")),
+        }
+    }
+    match SocketComm::first(streams) {
+        Ok(comm) => State::Together(std::process::id(), Box::new(Lead::new(Box::new(comm)))),
+        Err(e) => {
+            problems.push(format!("helpers cannot be talked to: {e}"));
+            State::Alone
+        }
+    }
+}
+
+/// Runs `f` on the first rank where there are helpers that a picture of this size is worth asking.
+fn together<R>(rect: Rect, f: impl FnOnce(&mut Lead) -> R) -> Option<R> {
+    if i64::from(rect.w) * i64::from(rect.h) < LEAST_PIXELS {
+        return None;
+    }
+    let mut state = STATE.lock().unwrap_or_else(PoisonError::into_inner);
+    if matches!(*state, State::Unknown) {
+        *state = begin();
+    }
+    match &mut *state {
+        State::Together(pid, lead) if *pid == std::process::id() && lead.has_helpers() => {
+            let made = f(lead);
+            ACCOUNTS.lock().unwrap_or_else(PoisonError::into_inner).clone_from(&lead.accounts.all().to_vec());
+            Some(made)
+        }
+        _ => None,
+    }
+}
+
+/// What each rank did so far; empty without helpers.
+pub(crate) fn accounts() -> Vec<RankAccount> {
+    ACCOUNTS.lock().unwrap_or_else(PoisonError::into_inner).clone()
+}
+
+/// What went wrong with helpers.
+pub(crate) fn problems() -> Vec<String> {
+    let mut out = PROBLEMS.lock().unwrap_or_else(PoisonError::into_inner).clone();
+    let lost = |a: &RankAccount| {
+        let why = a.lost.as_ref()?;
+        Some(format!("helper rank {} was lost ({why}): others make its rows", a.rank))
+    };
+    out.extend(accounts().iter().filter_map(lost));
+    out
+}
+
+/// [`trace::nearest`], by all ranks.
+pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings) -> (Layer, [u64; 2]) {
+    let rect = draws.iter().fold(Rect::default(), |r, d| r.or(d.rect));
+    let primary = || draws.iter().map(|d| d.rays.load(Relaxed)).sum::<u64>();
+    let made = together(rect, |lead| {
+        let before = primary();
+        let made = lead.make(draws, settings, &Work::Nearest, |share| {
+            let (layer, extra) = trace::nearest(draws, settings, share);
+            let rays = vec![("shadow", extra[0]), ("ambient occlusion", extra[1])];
+            let (rect, first, second) = (layer.rect, layer.color, layer.depth);
+            Made { rect, first, second, rays, warnings: Vec::new() }
+        });
+        lead.accounts.of(0).rays += primary() - before;
+        made
+    });
+    let Some(made) = made else { return trace::nearest(draws, settings, Share::WHOLE) };
+    let sum = |kind: &str| made.rays.iter().filter(|(k, _)| *k == kind).map(|(_, n)| n).sum::<u64>();
+    // Our own primary rays are counted already, draw by draw.
+    draws[0].rays.fetch_add(sum("primary"), Relaxed);
+    let extra = [sum("shadow"), sum("ambient occlusion")];
+    let covered = made.second.iter().filter(|d| **d < 1.5).count();
+    (Layer { rect: made.rect, color: made.first, depth: made.second, covered }, extra)
+}
+
+fn of_colors(c: Colors) -> Made<[f32; 4], u8> {
+    Made { rect: c.rect, first: c.rgba, second: Vec::new(), rays: c.rays, warnings: c.warnings }
+}
+
+fn to_colors(made: Made<[f32; 4], u8>) -> Colors {
+    let mut warnings = made.warnings;
+    let mut rays: Vec<(&'static str, u64)> = Vec::new();
+    for (kind, n) in made.rays {
+        match rays.iter_mut().find(|(k, _)| *k == kind) {
+            Some((_, sum)) => *sum += n,
+            None => rays.push((kind, n)),
+        }
+    }
+    warnings.sort();
+    warnings.dedup();
+    Colors { rect: made.rect, rgba: made.first, rays, warnings }
+}
+
+/// [`whitted::colors`], by all ranks.
+pub(crate) fn beyond(
+    draws: &[Prepared<'_>],
+    view: &View,
+    rect: Rect,
+    settings: &Settings,
+    background: [f32; 3],
+) -> Colors {
+    let make = |share| whitted::colors(draws, view, rect, settings, background, share);
+    let work = Work::Beyond(seen(view, rect), background);
+    let made = together(rect, |lead| lead.make(draws, settings, &work, |share| of_colors(make(share))));
+    made.map_or_else(|| make(Share::WHOLE), to_colors)
+}
+
+/// [`Studio::picture`], by all ranks.
+pub(crate) fn paths(
+    studio: &mut Studio,
+    draws: &[Prepared<'_>],
+    view: &View,
+    number: usize,
+    rect: Rect,
+    settings: &Settings,
+    picture: u64,
+) -> Colors {
+    let mut make = |share| studio.picture(draws, view, number, rect, settings, picture, share);
+    let work = Work::Paths(seen(view, rect), [number as u64, picture]);
+    let made = together(rect, |lead| lead.make(draws, settings, &work, |share| of_colors(make(share))));
+    match made {
+        Some(made) => to_colors(made),
+        None => make(Share::WHOLE),
+    }
+}
+
+#[cfg(test)]
+mod tests;

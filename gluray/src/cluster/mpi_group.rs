@@ -1,0 +1,348 @@
+//! Helpers that are an MPI job: the first of them stands between programs, which know sockets alone, and the others, who may be on other machines.
+//!
+//! There is a socket for each rank, so that a program finds as many helpers as the job has ranks, and loses one when one is lost. Orders and answers are handed on as they are. The
+//! program itself is no rank of the job.
+
+use super::helper::Helper;
+use super::requests::{ANSWER, MOST_ORDER_BYTES, ORDER};
+use super::socket_comm::Peer;
+use composite::comm::{CommError, Communicator, Receive};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use std::collections::HashMap;
+use std::io::{ErrorKind, Write as _};
+use std::os::unix::net::UnixListener;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::time::{Duration, Instant};
+
+/// What goes before every message: its kind, whose it is, and how long it is.
+const HEAD: u32 = 10;
+/// The message itself.
+const BODY: u32 = 11;
+const HEAD_BYTES: usize = 16;
+/// How long somebody who waits for work rests, and somebody whose work is under way.
+const REST: Duration = Duration::from_millis(2);
+const NAP: Duration = Duration::from_micros(50);
+/// How long after work one stays awake.
+const AWAKE: Duration = Duration::from_millis(300);
+
+/// What a message is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    /// An order, or the answer to it.
+    Work,
+    /// The program is gone, or not served any longer.
+    Close,
+    /// The job ends.
+    End,
+}
+
+/// Announces a message of `length` bytes for or from a program.
+fn head(kind: Kind, program: u32, length: usize) -> Vec<u8> {
+    let mut out = Vec::with_capacity(HEAD_BYTES);
+    out.extend((kind as u32).to_le_bytes());
+    out.extend(program.to_le_bytes());
+    out.extend((length as u64).to_le_bytes());
+    out
+}
+
+/// The parts of a head; `None` for what is none.
+fn read_head(bytes: &[u8]) -> Option<(Kind, u32, usize)> {
+    let bytes: &[u8; HEAD_BYTES] = bytes.try_into().ok()?;
+    let word = |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
+    let kind = [Kind::Work, Kind::Close, Kind::End].into_iter().find(|k| *k as u32 == word(0))?;
+    let length = u64::from(word(8)) | u64::from(word(12)) << 32;
+    Some((kind, word(4), usize::try_from(length).ok().filter(|n| *n <= MOST_ORDER_BYTES)?))
+}
+
+// ---- The others ------------------------------------------------------------------------------------------------------
+
+/// Serves programs through the first rank, until that ends or `over` is set.
+///
+/// # Errors
+/// What ended the job other than its first rank's wish.
+pub(crate) fn serve_group(comm: &mut dyn Communicator, over: &AtomicBool) -> Result<(), CommError> {
+    // Of each program what it has told.
+    let mut programs: HashMap<u32, Helper> = HashMap::new();
+    let mut posted = vec![comm.post_recv(0, HEAD, HEAD_BYTES)?];
+    let mut coming = None;
+    let mut worked = Instant::now();
+    while !over.load(Relaxed) {
+        let arrival = match comm.test_any(&mut posted) {
+            Ok(Some(arrival)) => arrival,
+            Ok(None) => {
+                std::thread::sleep(if worked.elapsed() < AWAKE { NAP } else { REST });
+                continue;
+            }
+            Err(CommError::PeerLost { .. }) => return Ok(()),
+            Err(e) => return Err(e),
+        };
+        worked = Instant::now();
+        match (arrival.tag, coming.take()) {
+            (HEAD, _) => match read_head(&arrival.message) {
+                Some((Kind::Work, program, length)) => {
+                    coming = Some(program);
+                    posted.push(comm.post_recv(0, BODY, length)?);
+                }
+                Some((Kind::Close, program, _)) => {
+                    programs.remove(&program);
+                    posted.push(comm.post_recv(0, HEAD, HEAD_BYTES)?);
+                }
+                // The end, or what is no head: nothing can be understood from here on.
+                Some((Kind::End, ..)) | None => return Ok(()),
+            },
+            (_, Some(program)) => {
+                let answer = programs.entry(program).or_default().answer(&arrival.message);
+                comm.send(0, HEAD, head(Kind::Work, program, answer.len()))?;
+                comm.send(0, BODY, answer)?;
+                posted.push(comm.post_recv(0, HEAD, HEAD_BYTES)?);
+                worked = Instant::now();
+            }
+            (_, None) => return Ok(()),
+        }
+        comm.recycle(arrival.message);
+    }
+    // So that programs do without this rank from now on.
+    match comm.send(0, HEAD, head(Kind::End, 0, 0)) {
+        Err(CommError::PeerLost { .. }) => Ok(()),
+        other => other,
+    }
+}
+
+// ---- The first -------------------------------------------------------------------------------------------------------
+
+/// A program's socket to one rank.
+struct Line {
+    program: u32,
+    rank: usize,
+    peer: Peer,
+    /// What is still to be written, from `written` on.
+    out: Vec<u8>,
+    written: usize,
+}
+
+impl Line {
+    /// Writes what can be written without waiting; true when something was.
+    fn write(&mut self) -> bool {
+        let before = self.written;
+        while self.written < self.out.len() && !self.peer.lost {
+            match self.peer.stream.write(&self.out[self.written..]) {
+                Ok(n) => self.written += n,
+                Err(e) if e.kind() == ErrorKind::Interrupted => {}
+                Err(e) if e.kind() == ErrorKind::WouldBlock => break,
+                Err(_) => self.peer.lost = true,
+            }
+        }
+        let moved = self.written > before;
+        if self.written == self.out.len() {
+            self.out.clear();
+            self.written = 0;
+        }
+        moved
+    }
+
+    fn answer(&mut self, answer: &[u8]) {
+        self.out.extend(super::socket_comm::head_of(ANSWER, answer.len()));
+        self.out.extend_from_slice(answer);
+    }
+}
+
+/// The first rank at work.
+struct Head<'a> {
+    comm: &'a mut dyn Communicator,
+    /// Where programs find rank i + 1; `None` once that is lost.
+    listeners: Vec<Option<UnixListener>>,
+    lines: Vec<Line>,
+    posted: Vec<Receive>,
+    /// Of each rank whose answer is coming.
+    coming: Vec<Option<u32>>,
+    programs: u32,
+}
+
+/// Hands programs' orders on to the other ranks, and their answers back, until `over` is set. `listeners[i]` is where programs find rank i + 1.
+///
+/// # Errors
+/// What ended the job.
+pub(crate) fn lead_group(
+    comm: &mut dyn Communicator,
+    listeners: Vec<UnixListener>,
+    over: &AtomicBool,
+) -> Result<(), CommError> {
+    let size = comm.size();
+    let mut head = Head {
+        comm,
+        listeners: listeners.into_iter().map(Some).collect(),
+        lines: Vec::new(),
+        posted: Vec::new(),
+        coming: vec![None; size],
+        programs: 0,
+    };
+    for rank in 1..size {
+        head.expect(rank, HEAD, HEAD_BYTES)?;
+    }
+    let mut awake = Instant::now();
+    while !over.load(Relaxed) {
+        let moved = head.welcome() | head.orders()? | head.answers()? | head.write();
+        head.part()?;
+        if moved {
+            awake = Instant::now();
+        } else {
+            rest(&head.lines, &head.listeners, if awake.elapsed() < AWAKE { NAP } else { REST });
+        }
+    }
+    for rank in 1..size {
+        head.tell(rank, Kind::End, 0, None)?;
+    }
+    Ok(())
+}
+
+impl Head<'_> {
+    fn expect(&mut self, rank: usize, tag: u32, capacity: usize) -> Result<(), CommError> {
+        self.posted.push(self.comm.post_recv(rank, tag, capacity)?);
+        Ok(())
+    }
+
+    /// Says something to a rank; nothing to one that is lost.
+    fn tell(
+        &mut self,
+        rank: usize,
+        kind: Kind,
+        program: u32,
+        body: Option<Vec<u8>>,
+    ) -> Result<(), CommError> {
+        if self.listeners[rank - 1].is_none() {
+            return Ok(());
+        }
+        let announced = head(kind, program, body.as_ref().map_or(0, Vec::len));
+        let told = self.comm.send(rank, HEAD, announced);
+        match told.and_then(|()| body.map_or(Ok(()), |body| self.comm.send(rank, BODY, body))) {
+            Err(CommError::PeerLost { .. }) => self.lose(rank),
+            other => other?,
+        }
+        Ok(())
+    }
+
+    /// Programs lose this rank now, and find it no more.
+    fn lose(&mut self, rank: usize) {
+        self.listeners[rank - 1] = None;
+        self.posted.retain(|r| r.source != rank);
+        self.lines.iter_mut().filter(|l| l.rank == rank).for_each(|l| l.peer.lost = true);
+    }
+
+    /// Programs that come; true when one did, as below.
+    fn welcome(&mut self) -> bool {
+        let before = self.programs;
+        for (i, listener) in self.listeners.iter().enumerate() {
+            while let Some(Ok((stream, _))) = listener.as_ref().map(UnixListener::accept) {
+                if let Ok(peer) = Peer::new(stream) {
+                    self.programs += 1;
+                    let program = self.programs;
+                    self.lines.push(Line { program, rank: i + 1, peer, out: Vec::new(), written: 0 });
+                }
+            }
+        }
+        self.programs > before
+    }
+
+    fn orders(&mut self) -> Result<bool, CommError> {
+        let mut orders = Vec::new();
+        for line in &mut self.lines {
+            // What is no message ends the talk.
+            line.peer.lost |= !line.peer.read(MOST_ORDER_BYTES);
+            while let Some((tag, order)) = line.peer.mail.pop_front() {
+                if tag == ORDER {
+                    orders.push((line.rank, line.program, order));
+                } else {
+                    line.peer.lost = true;
+                }
+            }
+        }
+        let moved = !orders.is_empty();
+        for (rank, program, order) in orders {
+            self.tell(rank, Kind::Work, program, Some(order))?;
+        }
+        Ok(moved)
+    }
+
+    fn answers(&mut self) -> Result<bool, CommError> {
+        let mut moved = false;
+        while !self.posted.is_empty() {
+            let arrival = match self.comm.test_any(&mut self.posted) {
+                Ok(Some(arrival)) => arrival,
+                Ok(None) => break,
+                Err(CommError::PeerLost { peer, .. }) => {
+                    self.lose(peer);
+                    continue;
+                }
+                Err(e) => return Err(e),
+            };
+            moved = true;
+            let rank = arrival.source;
+            if arrival.tag == BODY {
+                let program = self.coming[rank].take();
+                // Nobody, when the program has gone meanwhile.
+                if let Some(line) = self.lines.iter_mut().find(|l| Some(l.program) == program) {
+                    line.answer(&arrival.message);
+                }
+                self.comm.recycle(arrival.message);
+                self.expect(rank, HEAD, HEAD_BYTES)?;
+            } else if let Some((Kind::Work, program, length)) = read_head(&arrival.message) {
+                self.coming[rank] = Some(program);
+                self.expect(rank, BODY, length)?;
+            } else {
+                self.lose(rank);
+            }
+        }
+        Ok(moved)
+    }
+
+    fn write(&mut self) -> bool {
+        let mut moved = false;
+        for line in &mut self.lines {
+            moved |= line.write();
+        }
+        moved
+    }
+
+    /// Programs that go.
+    fn part(&mut self) -> Result<(), CommError> {
+        let gone: Vec<(usize, u32)> =
+            self.lines.iter().filter(|l| l.peer.lost).map(|l| (l.rank, l.program)).collect();
+        self.lines.retain(|l| !l.peer.lost);
+        for (rank, program) in gone {
+            self.tell(rank, Kind::Close, program, None)?;
+        }
+        Ok(())
+    }
+}
+
+/// Waits until a program says something, at most `time`: MPI cannot be waited for together with sockets.
+fn rest(lines: &[Line], listeners: &[Option<UnixListener>], time: Duration) {
+    let said = lines.iter().map(|l| {
+        let more = if l.out.is_empty() { PollFlags::IN } else { PollFlags::IN | PollFlags::OUT };
+        PollFd::new(&l.peer.stream, more)
+    });
+    let come = listeners.iter().flatten().map(|l| PollFd::new(l, PollFlags::IN));
+    let mut all: Vec<PollFd<'_>> = said.chain(come).collect();
+    let time = Timespec::try_from(time).ok();
+    // Interrupted or not: what is there is looked at again.
+    let _ = poll(&mut all, time.as_ref());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn heads_come_back_as_they_were_and_what_is_none_is_refused() {
+        for (kind, program, length) in
+            [(Kind::Work, 7, 5 << 30), (Kind::Close, 0, 0), (Kind::End, u32::MAX, 1)]
+        {
+            assert_eq!(read_head(&head(kind, program, length)), Some((kind, program, length)));
+        }
+        let mut unknown = head(Kind::End, 1, 1);
+        unknown[0] = 9;
+        assert_eq!(read_head(&unknown), None);
+        assert_eq!(read_head(&unknown[..15]), None);
+        assert_eq!(read_head(&head(Kind::Work, 1, usize::MAX)), None);
+    }
+}

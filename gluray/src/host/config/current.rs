@@ -1,0 +1,152 @@
+//! The settings of this process: read once when they are first asked for, replaced when the panel says so.
+
+use super::fields::{FIELDS, Field};
+use super::load::Sources;
+use super::settings::{Mode, Settings, Trace};
+use crate::classify::rules;
+use std::path::PathBuf;
+use std::sync::{Arc, PoisonError, RwLock};
+
+/// What the library goes by.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Config {
+    /// What can be set.
+    pub(crate) settings: Settings,
+    /// What was wrong with it.
+    pub(crate) problems: Vec<String>,
+    /// Where reports are written; `None` writes none.
+    pub(crate) run_dir: Option<PathBuf>,
+    /// What people call the program.
+    pub(crate) program: String,
+}
+
+impl Config {
+    /// What filled primitives are looked at for.
+    pub(crate) fn trace(&self) -> rules::Trace {
+        match (self.settings.enabled, self.settings.trace) {
+            (false, _) => rules::Trace::Nothing,
+            (true, Trace::All) => rules::Trace::All,
+            (true, Trace::Scene) if self.settings.sees_through() => rules::Trace::Translucent,
+            (true, Trace::Scene) => rules::Trace::Surfaces,
+        }
+    }
+
+    fn of_this_process() -> Config {
+        let sources = Sources::of_this_process();
+        let loaded = sources.load();
+        let run_dir = crate::host::folders::variable("GLURAY_RUN_DIR").map(PathBuf::from);
+        // The last is the one that people know it by: `view.py`, not `python3.11`.
+        let program = sources.program.last().cloned().unwrap_or_default();
+        let mut problems = loaded.problems;
+        problems.extend(not_obeyed(&loaded.settings));
+        Config { settings: loaded.settings, problems, run_dir, program }
+    }
+}
+
+/// Paths of settings that the library obeys today. The panel disables the others, and whoever sets one is told in the report.
+pub(crate) const OBEYED: &[&str] = &[
+    "asynchronous",
+    "enabled",
+    "mode",
+    "trace",
+    "samples",
+    "quality",
+    "threads",
+    "effects.shadows",
+    "effects.light_radius_deg",
+    "effects.ambient_occlusion_samples",
+    "effects.ambient_occlusion_radius",
+    "effects.reflections",
+    "effects.refraction",
+    "effects.transparency",
+    "effects.max_bounces",
+    "effects.aperture_radius",
+    "effects.focus",
+    "lights.program",
+    "lights.ambient",
+    "lights.sky",
+    "lights.added",
+    "lights.added_direction",
+    "lights.added_color",
+    "material.surface",
+    "material.color",
+    "material.opacity",
+    "material.specular",
+    "material.shininess",
+    "material.mirror",
+    "material.roughness",
+    "material.ior",
+    "material.emission",
+];
+
+/// What was set in vain.
+fn not_obeyed(settings: &Settings) -> Vec<String> {
+    let tree = |s: &Settings| serde_json::to_value(s).unwrap_or_default();
+    let (now, usual) = (tree(settings), tree(&Settings::default()));
+    let value =
+        |tree: &serde_json::Value, path: &str| tree.pointer(&format!("/{}", path.replace('.', "/"))).cloned();
+    let in_vain = |f: &&Field| !OBEYED.contains(&f.path) && value(&now, f.path) != value(&usual, f.path);
+    let mut out: Vec<String> = FIELDS
+        .iter()
+        .filter(in_vain)
+        .map(|f| format!("`{}` is set, and this version of the library does not obey it yet", f.path))
+        .collect();
+    // What changes nothing in this mode is said, too, and in which it would.
+    let elsewhere = |f: &&Field| {
+        f.modes.len() < Mode::ALL.len()
+            && !f.matters_in(settings.mode.name())
+            && value(&now, f.path) != value(&usual, f.path)
+    };
+    out.extend(FIELDS.iter().filter(elsewhere).map(|f| {
+        format!(
+            "`{}` is set, but changes nothing in mode {}: it is for {}",
+            f.path,
+            settings.mode.name(),
+            f.modes.join(", ")
+        )
+    }));
+    if !settings.objects.is_empty() && !OBEYED.iter().any(|p| p.starts_with("material.")) {
+        out.push("`objects` are set, and this version of the library does not obey them yet".into());
+    }
+    out
+}
+
+static CURRENT: RwLock<Option<Arc<Config>>> = RwLock::new(None);
+
+/// The settings now.
+pub(crate) fn current() -> Arc<Config> {
+    if let Some(config) = CURRENT.read().unwrap_or_else(PoisonError::into_inner).as_ref() {
+        return config.clone();
+    }
+    let mut slot = CURRENT.write().unwrap_or_else(PoisonError::into_inner);
+    slot.get_or_insert_with(|| Arc::new(Config::of_this_process())).clone()
+}
+
+/// Other settings from now on. Contexts take them up at the end of their frame.
+pub(crate) fn replace(settings: Settings) {
+    let config = Config { settings, ..Config::clone(&current()) };
+    *CURRENT.write().unwrap_or_else(PoisonError::into_inner) = Some(Arc::new(config));
+}
+
+/// What people call this program.
+pub(crate) fn program_name() -> String {
+    current().program.clone()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_obeyed_is_a_setting_and_the_rest_is_told() {
+        for path in OBEYED {
+            assert!(FIELDS.iter().any(|f| f.path == *path), "{path}");
+        }
+        assert_eq!(not_obeyed(&Settings::default()), Vec::<String>::new());
+        let settings = Settings { enabled: false, asynchronous: true, ..Settings::default() };
+        let told = not_obeyed(&settings);
+        let expected = usize::from(!OBEYED.contains(&"asynchronous"));
+        assert_eq!(told.iter().filter(|t| t.contains("`asynchronous`")).count(), expected, "{told:?}");
+        assert_eq!(told.len(), expected, "{told:?}");
+    }
+}

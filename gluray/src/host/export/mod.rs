@@ -1,0 +1,18 @@
+//! The captured scene as a file: what the library saw, for other programs.
+//!
+//! ```text
+//!   library ── [`write_scene`] ── .gluray file ([format]) ── `gluray export` ── [convert] ── PLY, GLB, VTP (datasets' writers)
+//! ```
+//! The library writes the plain file when asked by the panel or by `GLURAY_DUMP`: one pass over its arrays, without any conversion in somebody
+//! else's process.
+
+pub mod convert;
+pub mod format;
+
+pub use convert::{ConvertReport, to_mesh, to_poly_data};
+pub use format::{Object, Scene, SceneError, read_scene, write_scene};
+
+/// Where the library puts scenes that the panel asks for: `scenes` in the folder for state.
+pub fn scenes_folder(variable: impl Fn(&str) -> Option<String>) -> Option<std::path::PathBuf> {
+    crate::host::folders::state(variable).map(|f| f.join("scenes"))
+}

@@ -1,0 +1,9 @@
+//! The user's side: settings, reports, timelines, the control panel and exported scenes.
+
+pub mod config;
+pub mod export;
+pub mod folders;
+pub mod panel;
+pub(crate) mod panel_client;
+pub mod report;
+pub mod timeline;

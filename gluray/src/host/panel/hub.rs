@@ -1,0 +1,327 @@
+//! What the panel knows: the programs, their settings, numbers and objects.
+
+use super::protocol::{FrameStats, Hello, ObjectInfo, ToPanel, ToProgram};
+use crate::host::config::{Assignment, SettingError, Settings, assign};
+use serde::Serialize;
+use serde_json::Value;
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use tokio::sync::{mpsc, watch};
+
+/// Frames that are remembered of each program: a minute at ten a second.
+pub const HISTORY: usize = 600;
+/// Frames in the state: what came while the page was drawing.
+const RECENT: usize = 20;
+/// Ended programs that stay on the list.
+const ENDED: usize = 8;
+/// Most assignments of the panel for one program.
+const MAX_ASSIGNMENTS: usize = 20_000;
+
+/// A program, as the page sees it.
+#[derive(Debug, Clone, Serialize)]
+pub struct Program {
+    /// Its number on this panel.
+    pub id: u64,
+    /// Its name.
+    pub program: String,
+    /// Its process.
+    pub process: u32,
+    /// False once it is gone.
+    pub running: bool,
+    /// Settings it has now.
+    pub settings: Settings,
+    /// Settings it had before anybody touched the panel.
+    pub base: Settings,
+    /// What was changed here.
+    pub assignments: BTreeMap<String, Value>,
+    /// What was wrong in its files and environment, and what it refused.
+    pub problems: Vec<String>,
+    /// Paths of settings it obeys; empty for all.
+    pub obeys: Vec<String>,
+    /// Its objects, largest first.
+    pub objects: Vec<ObjectInfo>,
+    /// How many there are in all.
+    pub objects_total: u64,
+    /// The file that its scene was written to last, or why there is none.
+    pub exported: Option<Result<String, String>>,
+    /// The last few frames.
+    pub recent: Vec<FrameStats>,
+}
+
+struct Entry {
+    shown: Program,
+    hello_problems: Vec<String>,
+    history: VecDeque<FrameStats>,
+    outgoing: mpsc::Sender<ToProgram>,
+}
+
+#[derive(Default)]
+struct Inner {
+    programs: BTreeMap<u64, Entry>,
+    last_id: u64,
+}
+
+/// Why something cannot be done.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Refused {
+    /// No such program.
+    #[error("program {0} is not running any more; choose another one")]
+    Gone(u64),
+    /// It does not read its messages.
+    #[error("the program takes no messages; it may hang or compute, try again")]
+    Busy,
+    /// Too many changes.
+    #[error("more than {MAX_ASSIGNMENTS} changes; save them in a file and start the program again")]
+    TooMany,
+    /// Settings that make no sense.
+    #[error("{0}")]
+    Setting(String),
+}
+
+/// All programs, shared between the link and the page.
+pub struct Hub {
+    inner: Mutex<Inner>,
+    /// Counts changes; who waits for news waits here.
+    pub news: watch::Sender<u64>,
+}
+
+impl Default for Hub {
+    fn default() -> Self {
+        Hub { inner: Mutex::default(), news: watch::Sender::new(1) }
+    }
+}
+
+impl Hub {
+    fn lock(&self) -> MutexGuard<'_, Inner> {
+        // Nothing in here is half changed when a thread panics.
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn tell(&self) {
+        self.news.send_modify(|n| *n += 1);
+    }
+
+    /// A program has come. Its messages go through the receiver.
+    pub fn join(&self, hello: Hello) -> (u64, mpsc::Receiver<ToProgram>) {
+        let (outgoing, receiver) = mpsc::channel(32);
+        let mut inner = self.lock();
+        inner.last_id += 1;
+        let id = inner.last_id;
+        let shown = Program {
+            id,
+            program: super::protocol::clipped(&hello.program),
+            process: hello.process,
+            running: true,
+            settings: hello.settings.clone(),
+            base: hello.settings,
+            assignments: BTreeMap::new(),
+            problems: hello.problems.clone(),
+            obeys: hello.obeys,
+            objects: Vec::new(),
+            objects_total: 0,
+            exported: None,
+            recent: Vec::new(),
+        };
+        inner
+            .programs
+            .insert(id, Entry { shown, hello_problems: hello.problems, history: VecDeque::new(), outgoing });
+        drop(inner);
+        self.tell();
+        (id, receiver)
+    }
+
+    /// A program said something.
+    pub fn hear(&self, id: u64, message: ToPanel) {
+        let mut inner = self.lock();
+        let Some(e) = inner.programs.get_mut(&id) else { return };
+        match message {
+            ToPanel::Hello { .. } => return,
+            ToPanel::Frame { stats } => {
+                if e.history.len() == HISTORY {
+                    e.history.pop_front();
+                }
+                e.history.push_back(*stats);
+            }
+            ToPanel::Objects { objects, total } => {
+                (e.shown.objects, e.shown.objects_total) = (objects, total)
+            }
+            ToPanel::InForce { settings, refused } => {
+                e.shown.settings = *settings;
+                e.shown.problems = [e.hello_problems.clone(), refused].concat();
+            }
+            ToPanel::Exported { file, error } => {
+                e.shown.exported =
+                    Some(file.ok_or_else(|| error.unwrap_or_else(|| "no reason given".into())));
+            }
+        }
+        drop(inner);
+        self.tell();
+    }
+
+    /// A program is gone. The last few stay on the list.
+    pub fn leave(&self, id: u64) {
+        let mut inner = self.lock();
+        if let Some(e) = inner.programs.get_mut(&id) {
+            e.shown.running = false;
+        }
+        let mut ended: Vec<u64> =
+            inner.programs.iter().filter(|(_, e)| !e.shown.running).map(|(id, _)| *id).collect();
+        ended.truncate(ended.len().saturating_sub(ENDED));
+        ended.iter().for_each(|id| drop(inner.programs.remove(id)));
+        drop(inner);
+        self.tell();
+    }
+
+    /// Number of programs that run.
+    pub fn running(&self) -> usize {
+        self.lock().programs.values().filter(|e| e.shown.running).count()
+    }
+
+    /// Every program on the list.
+    pub fn programs(&self) -> Vec<Program> {
+        let inner = self.lock();
+        let recent =
+            |e: &Entry| e.history.iter().skip(e.history.len().saturating_sub(RECENT)).cloned().collect();
+        inner.programs.values().map(|e| Program { recent: recent(e), ..e.shown.clone() }).collect()
+    }
+
+    /// The frames remembered of a program.
+    pub fn history(&self, id: u64) -> Option<Vec<FrameStats>> {
+        self.lock().programs.get(&id).map(|e| e.history.iter().cloned().collect())
+    }
+
+    /// Sets some settings and takes changes of others back; all or nothing.
+    pub fn change(&self, id: u64, set: BTreeMap<String, Value>, reset: &[String]) -> Result<(), Refused> {
+        let mut inner = self.lock();
+        let e = inner.programs.get_mut(&id).filter(|e| e.shown.running).ok_or(Refused::Gone(id))?;
+        let mut assignments = e.shown.assignments.clone();
+        assignments.retain(|path, _| {
+            !reset
+                .iter()
+                .any(|r| r == path || path.strip_prefix(r.as_str()).is_some_and(|rest| rest.starts_with('.')))
+        });
+        assignments.extend(set);
+        if assignments.len() > MAX_ASSIGNMENTS {
+            return Err(Refused::TooMany);
+        }
+        let list: Vec<Assignment> =
+            assignments.iter().map(|(p, v)| Assignment::new("panel", p, v.clone())).collect();
+        let (_, errors) = assign(&e.shown.base, &list);
+        if !errors.is_empty() {
+            return Err(Refused::Setting(
+                errors.iter().take(3).map(SettingError::to_string).collect::<Vec<_>>().join("; "),
+            ));
+        }
+        let message = ToProgram::Change { assignments: assignments.clone() };
+        e.outgoing.try_send(message).map_err(|_| Refused::Busy)?;
+        e.shown.assignments = assignments;
+        drop(inner);
+        self.tell();
+        Ok(())
+    }
+
+    /// Asks a program for its scene.
+    pub fn export(&self, id: u64) -> Result<(), Refused> {
+        let mut inner = self.lock();
+        let e = inner.programs.get_mut(&id).filter(|e| e.shown.running).ok_or(Refused::Gone(id))?;
+        e.outgoing.try_send(ToProgram::Export {}).map_err(|_| Refused::Busy)?;
+        e.shown.exported = None;
+        Ok(())
+    }
+
+    /// What was changed here, as a section of the settings' file.
+    pub fn toml(&self, id: u64) -> Result<String, Refused> {
+        let inner = self.lock();
+        let e = inner.programs.get(&id).ok_or(Refused::Gone(id))?;
+        let mut section = toml::Table::new();
+        for (path, value) in &e.shown.assignments {
+            let mut at = &mut section;
+            let (folders, name) = path.rsplit_once('.').unwrap_or(("", path));
+            for folder in folders.split('.').filter(|f| !f.is_empty()) {
+                let next = at.entry(folder).or_insert_with(|| toml::Value::Table(toml::Table::new()));
+                match next {
+                    toml::Value::Table(next) => at = next,
+                    _ => return Err(Refused::Setting(format!("`{path}` has no place in a file"))),
+                }
+            }
+            // `null` stands for "as the program has it", which a file says by silence.
+            if let Ok(value) = toml::Value::try_from(value) {
+                at.insert(name.to_owned(), value);
+            }
+        }
+        let program = toml::Table::from_iter([(e.shown.program.clone(), toml::Value::Table(section))]);
+        let file = toml::Table::from_iter([("program".to_owned(), toml::Value::Table(program))]);
+        toml::to_string(&file).map_err(|e| Refused::Setting(e.to_string()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn set(list: &[(&str, Value)]) -> BTreeMap<String, Value> {
+        list.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect()
+    }
+
+    #[test]
+    fn changes_add_up_are_taken_back_and_become_a_file_that_means_the_same() {
+        let hub = Hub::default();
+        let (id, mut messages) = hub.join(Hello { program: "my prog".into(), ..Hello::default() });
+        hub.change(id, set(&[("mode", json!("rich")), ("objects.a1.color", json!([1, 0.5, 0]))]), &[])
+            .unwrap();
+        hub.change(id, set(&[("samples", json!(4)), ("material.mirror", json!(0.5))]), &["mode".into()])
+            .unwrap();
+        let mut last = None;
+        while let Ok(m) = messages.try_recv() {
+            last = Some(m);
+        }
+        let expected = set(&[
+            ("objects.a1.color", json!([1, 0.5, 0])),
+            ("samples", json!(4)),
+            ("material.mirror", json!(0.5)),
+        ]);
+        assert_eq!(last, Some(ToProgram::Change { assignments: expected.clone() }));
+
+        let text = hub.toml(id).unwrap();
+        let file = crate::host::config::ConfigFile::parse(std::path::Path::new("x"), &text).unwrap();
+        let from_file = assign(&Settings::default(), &file.assignments(&["my prog".into()]));
+        let list: Vec<Assignment> =
+            expected.iter().map(|(p, v)| Assignment::new("panel", p, v.clone())).collect();
+        assert_eq!(from_file, assign(&Settings::default(), &list), "{text}");
+
+        hub.change(id, BTreeMap::new(), &["objects.a1".into()]).unwrap();
+        assert_eq!(hub.programs()[0].assignments.len(), 2);
+    }
+
+    #[test]
+    fn nonsense_changes_nothing_and_who_is_gone_cannot_be_changed() {
+        let hub = Hub::default();
+        let (id, mut messages) = hub.join(Hello::default());
+        let e = hub.change(id, set(&[("samples", json!(4)), ("mode", json!("x"))]), &[]).unwrap_err();
+        assert!(e.to_string().contains("`mode` is \"x\""), "{e}");
+        assert!(messages.try_recv().is_err() && hub.programs()[0].assignments.is_empty());
+        assert_eq!(hub.change(99, BTreeMap::new(), &[]), Err(Refused::Gone(99)));
+        hub.leave(id);
+        assert_eq!(hub.export(id), Err(Refused::Gone(id)));
+        assert_eq!((hub.running(), hub.programs().len()), (0, 1));
+        for _ in 0..2 * ENDED {
+            let (id, _r) = hub.join(Hello::default());
+            hub.leave(id);
+        }
+        assert_eq!(hub.programs().len(), ENDED);
+    }
+
+    #[test]
+    fn a_program_that_reads_nothing_and_one_that_says_much_cost_a_fixed_amount() {
+        let hub = Hub::default();
+        let (id, _messages) = hub.join(Hello::default());
+        let results: Vec<_> = (1..100).map(|i| hub.change(id, set(&[("samples", json!(i))]), &[])).collect();
+        assert!(results.contains(&Err(Refused::Busy)));
+        for frame in 0..2000 {
+            hub.hear(id, ToPanel::Frame { stats: Box::new(FrameStats { frame, ..FrameStats::default() }) });
+        }
+        let history = hub.history(id).unwrap();
+        assert_eq!((history.len(), history[HISTORY - 1].frame), (HISTORY, 1999));
+    }
+}

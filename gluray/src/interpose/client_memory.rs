@@ -1,0 +1,307 @@
+//! The program's own memory: vertex arrays, index arrays, parameters behind pointers.
+//!
+//! A program that calls OpenGL promises that what the call names can be read; the driver would read it just so. Two things have to come together before anything is read, and neither can be
+//! made outside of the rooms for unsafe code:
+//!
+//! - [`Call`], with the arguments of the draw call that the program is in. Hooks make it. [`Elements`] come from it alone, so they are the vertices which that call names, and
+//!   what is read of them lives as long as the call.
+//! - [`Source`], an array as the driver has it, asked of the driver here. Nobody else can make one of client memory, or change one.
+//!
+//! This is a room for unsafe code.
+#![allow(unsafe_code, reason = "a room: vertex arrays live in the program's memory")]
+
+use crate::capture::draw::{Packed, component_bytes};
+use crate::capture::vertex_arrays::Which;
+use crate::interpose::driver::gl;
+use crate::state::enums::*;
+use core::marker::PhantomData;
+use core::ops::Deref;
+use std::borrow::Cow;
+
+/// Bytes of the program's memory.
+///
+/// # Safety
+/// The program is in a call that promises that `length` bytes from `address` on can be read (with null: that nothing is), and nobody writes to them or frees them while `'a` lasts,
+/// which must end with the call.
+pub(crate) unsafe fn view<'a>(address: usize, length: usize) -> &'a [u8] {
+    if address == 0 || length == 0 {
+        return &[];
+    }
+    // SAFETY: as the caller promises.
+    unsafe { core::slice::from_raw_parts(address as *const u8, length) }
+}
+
+/// `N` floats behind a parameter pointer; zeros behind null.
+///
+/// # Safety
+/// As of [`view`], for `4 * N` bytes.
+pub(crate) unsafe fn floats<const N: usize>(address: usize) -> [f32; N] {
+    // SAFETY: as the caller promises; nothing is kept.
+    let (four, _) = unsafe { view(address, 4 * N) }.as_chunks::<4>();
+    std::array::from_fn(|i| four.get(i).map_or(0.0, |b| f32::from_ne_bytes(*b)))
+}
+
+/// `N` doubles behind a parameter pointer; zeros behind null.
+///
+/// # Safety
+/// As of [`view`], for `8 * N` bytes.
+pub(crate) unsafe fn doubles<const N: usize>(address: usize) -> [f64; N] {
+    // SAFETY: as the caller promises; nothing is kept.
+    let (eight, _) = unsafe { view(address, 8 * N) }.as_chunks::<8>();
+    std::array::from_fn(|i| eight.get(i).map_or(0.0, |b| f64::from_ne_bytes(*b)))
+}
+
+/// `N` integers behind a parameter pointer; zeros behind null.
+///
+/// # Safety
+/// As of [`view`], for `4 * N` bytes.
+pub(crate) unsafe fn ints<const N: usize>(address: usize) -> [i32; N] {
+    // SAFETY: as the caller promises.
+    unsafe { floats::<N>(address) }.map(|f| f.to_bits().cast_signed())
+}
+
+// ---- The vertices that a call names ----------------------------------------------------------------------------------
+
+/// What a draw call names.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Named {
+    /// `glDrawArrays`.
+    Arrays { first: i32, count: i32 },
+    /// `glDrawElements` and its like.
+    Elements { count: i32, kind: u32, at: usize, base: i32 },
+    /// `glArrayElement`.
+    Element(i32),
+}
+
+/// A draw call that the program is in.
+pub(crate) struct Call<'c> {
+    named: Named,
+    call: PhantomData<&'c ()>,
+}
+
+impl Call<'_> {
+    /// # Safety
+    /// The program is in a call of OpenGL's with these arguments, which does not return before this goes.
+    pub(crate) unsafe fn new(named: Named) -> Self {
+        Call { named, call: PhantomData }
+    }
+
+    pub(crate) fn named(&self) -> Named {
+        self.named
+    }
+}
+
+/// The vertices that a call names, as [`Which`] has them.
+pub(crate) struct Elements<'c>(Which, PhantomData<&'c ()>);
+
+impl Deref for Elements<'_> {
+    type Target = Which;
+    fn deref(&self) -> &Which {
+        &self.0
+    }
+}
+
+impl<'c> Elements<'c> {
+    /// Of a call, and the index that restarts primitives.
+    pub(crate) fn of(call: &'c Call<'_>, restart: Option<u32>) -> Result<Elements<'c>, &'static str> {
+        const NEGATIVE: &str = "a negative count";
+        let which = match call.named {
+            Named::Arrays { first, count } => match (usize::try_from(first), usize::try_from(count)) {
+                (Ok(first), Ok(count)) => Which::Range { first, count },
+                _ => return Err(NEGATIVE),
+            },
+            Named::Element(i) => match usize::try_from(i) {
+                Ok(first) => Which::Range { first, count: 1 },
+                Err(_) => return Err("an element of a negative number"),
+            },
+            Named::Elements { count, kind, at, base } => {
+                let n = usize::try_from(count).map_err(|_| NEGATIVE)?;
+                let width = component_bytes(kind);
+                if !matches!(kind, UNSIGNED_BYTE | UNSIGNED_SHORT | UNSIGNED_INT) {
+                    return Err("indices of a type that OpenGL refuses");
+                }
+                let buffer = gl::word(ELEMENT_ARRAY_BUFFER_BINDING);
+                let bytes: Cow<'_, [u8]> = match buffer {
+                    0 if at == 0 => return Err("indices without an address"),
+                    // SAFETY: the call names so many indices there, and it lasts longer than `call` is lent.
+                    0 => Cow::Borrowed(unsafe { view(at, n * width) }),
+                    buffer => Cow::Owned(read_buffer(buffer, at, n * width)?),
+                };
+                Which::indexed(&bytes, width, base, restart)?
+            }
+        };
+        Ok(Elements(which, PhantomData))
+    }
+}
+
+// ---- Arrays ----------------------------------------------------------------------------------------------------------
+
+/// Where an array is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct Layout {
+    pub(crate) size: usize,
+    pub(crate) kind: u32,
+    pub(crate) stride: usize,
+    pub(crate) address: usize,
+    /// 0 for client memory.
+    pub(crate) buffer: u32,
+    pub(crate) normalized: bool,
+}
+
+impl Layout {
+    fn element(&self) -> usize {
+        component_bytes(self.kind) * self.size
+    }
+
+    /// Bytes from one vertex to the next.
+    pub(crate) fn step(&self) -> usize {
+        if self.stride == 0 { self.element() } else { self.stride }
+    }
+
+    /// What makes the same bytes another array.
+    pub(crate) fn layout(&self) -> (usize, u32, usize, bool) {
+        (self.step(), self.kind, self.size, self.normalized)
+    }
+
+    /// Bytes of [`Source::view`] tightly packed.
+    pub(crate) fn pack(&self, bytes: Cow<'_, [u8]>) -> Packed {
+        let (element, step) = (self.element(), self.step());
+        let bytes = match step == element {
+            true => bytes.into_owned(),
+            false => {
+                let mut out = Vec::with_capacity(bytes.len() / step * element + element);
+                // A stride below the element's size makes vertices overlap.
+                for at in (0..(bytes.len() + 1).saturating_sub(element)).step_by(step) {
+                    out.extend_from_slice(&bytes[at..at + element]);
+                }
+                out
+            }
+        };
+        Packed { bytes, kind: self.kind, size: self.size, normalized: self.normalized }
+    }
+
+    /// Offset and length of vertices `first..first + count`; an error in words when they cannot be read.
+    fn range(&self, first: usize, count: usize) -> Result<(usize, usize), &'static str> {
+        const FAR: &str = "arrays beyond the end of memory";
+        let element = self.element();
+        if element == 0 || self.size > 4 {
+            return Err("an array of a type that is not read");
+        }
+        let start = first.checked_mul(self.step()).and_then(|o| o.checked_add(self.address)).ok_or(FAR)?;
+        let length = match count.checked_sub(1) {
+            None => 0,
+            Some(more) => more.checked_mul(self.step()).and_then(|n| n.checked_add(element)).ok_or(FAR)?,
+        };
+        match start.checked_add(length).is_some_and(|end| isize::try_from(end).is_ok()) {
+            true => Ok((start, length)),
+            false => Err(FAR),
+        }
+    }
+}
+
+/// How many components the elements of a fixed-function array have.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Size {
+    /// As OpenGL has it: normals have three.
+    Three,
+    /// What the driver says to this.
+    Asked(u32),
+}
+
+/// An array as the driver has it, or in a buffer. Its fields can be read and not changed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct Source(Layout);
+
+impl Deref for Source {
+    type Target = Layout;
+    fn deref(&self) -> &Layout {
+        &self.0
+    }
+}
+
+impl Source {
+    /// A fixed-function array, asked of the driver by these names. Where there are no buffers all arrays are in client memory.
+    pub(crate) fn of_fixed(
+        size: Size,
+        [kind, stride, pointer, buffer]: [u32; 4],
+        normalized: bool,
+        buffers: bool,
+    ) -> Source {
+        let size = match size {
+            Size::Three => 3,
+            Size::Asked(what) => gl::int(what).max(0) as usize,
+        };
+        Source(Layout {
+            size,
+            kind: gl::word(kind),
+            stride: gl::int(stride).max(0) as usize,
+            address: gl::pointer(pointer),
+            buffer: if buffers { gl::word(buffer) } else { 0 },
+            normalized,
+        })
+    }
+
+    /// The array of a generic attribute, where that is on.
+    pub(crate) fn of_attribute(at: u32) -> Option<Source> {
+        let get = |what| gl::vertex_attrib_i::<1>(at, what)[0];
+        (get(VERTEX_ATTRIB_ARRAY_ENABLED) != 0).then(|| {
+            Source(Layout {
+                size: get(VERTEX_ATTRIB_ARRAY_SIZE).max(0) as usize,
+                kind: get(VERTEX_ATTRIB_ARRAY_TYPE).cast_unsigned(),
+                stride: get(VERTEX_ATTRIB_ARRAY_STRIDE).max(0) as usize,
+                address: gl::vertex_attrib_address(at),
+                buffer: get(VERTEX_ATTRIB_ARRAY_BUFFER_BINDING).cast_unsigned(),
+                normalized: get(VERTEX_ATTRIB_ARRAY_NORMALIZED) != 0,
+            })
+        })
+    }
+
+    /// Anything in a buffer, which the driver keeps readers within; `None` without one.
+    pub(crate) fn in_buffer(layout: Layout) -> Option<Source> {
+        (layout.buffer != 0).then_some(Source(layout))
+    }
+
+    /// The vertices that a call names where they are, with gaps; an error in words when they cannot be read.
+    pub(crate) fn view<'c>(&self, elements: &Elements<'c>) -> Result<Cow<'c, [u8]>, &'static str> {
+        let (first, count) = elements.span();
+        let (start, length) = self.range(first, count)?;
+        match self.buffer {
+            0 if self.address == 0 => Err("an array without an address"),
+            // SAFETY: the program has given this array to OpenGL (`of_fixed`, `of_attribute`), and is in a call that names these of its elements (`Elements::of`), for
+            // the time of `'c`.
+            0 => Ok(Cow::Borrowed(unsafe { view(start, length) })),
+            buffer => read_buffer(buffer, start, length).map(Cow::Owned),
+        }
+    }
+
+    /// The same tightly packed.
+    pub(crate) fn read(&self, elements: &Elements<'_>) -> Result<Packed, &'static str> {
+        Ok(self.pack(self.view(elements)?))
+    }
+
+    /// Elements `first..first + count` of an array in a buffer, tightly packed.
+    pub(crate) fn read_range(&self, first: usize, count: usize) -> Result<Packed, &'static str> {
+        let (start, length) = self.range(first, count)?;
+        match self.buffer {
+            0 => Err("an array in client memory"),
+            buffer => Ok(self.pack(Cow::Owned(read_buffer(buffer, start, length)?))),
+        }
+    }
+}
+
+/// A part of a buffer object.
+fn read_buffer(buffer: u32, start: usize, length: usize) -> Result<Vec<u8>, &'static str> {
+    let bound = gl::word(ARRAY_BUFFER_BINDING);
+    gl::bind_buffer(ARRAY_BUFFER, buffer);
+    let size = gl::buffer_i::<1>(ARRAY_BUFFER, BUFFER_SIZE)[0].max(0) as usize;
+    let mapped = gl::buffer_i::<1>(ARRAY_BUFFER, BUFFER_MAPPED)[0] != 0;
+    let answer = if mapped {
+        Err("a mapped buffer")
+    } else if start.checked_add(length).is_none_or(|end| end > size) {
+        Err("arrays beyond the end of their buffer")
+    } else {
+        Ok(gl::buffer_bytes(ARRAY_BUFFER, start, length))
+    };
+    gl::bind_buffer(ARRAY_BUFFER, bound);
+    answer
+}

@@ -1,0 +1,504 @@
+//! The books of contexts: which is current where, and what each knows.
+//!
+//! A context is owned by the thread it is current on (see `symbols/current_context.rs`) or, while it is current nowhere, by the register. So no call needs a
+//! lock, and a context that is destroyed in flight lives on until its thread leaves it, as OpenGL says.
+//!
+//! It goes into the register before the driver lets go of it, and out of it after the driver has taken it: in between another thread may make it
+//! current, and must find it.
+
+use crate::capture::attribute_cache::Packs;
+use crate::capture::buffer_writes::Writes;
+use crate::capture::display_lists::{Lists, Recording};
+use crate::capture::evaluators::Evaluators;
+use crate::capture::geometry_cache::Cache;
+use crate::capture::vertex_arrays::Arrays;
+use crate::capture::vertex_recorder::Recorder;
+use crate::classify::affine_probe::Probes;
+use crate::classify::rules::{self, Verdict};
+use crate::classify::vtk::Programs;
+use crate::host::config::Config;
+use crate::host::report::Counters;
+use crate::interpose::driver::gl;
+use crate::interpose::share_group::{Shared, TextureWrites};
+use crate::interpose::symbols::{self, class};
+use crate::present::frame::Frame;
+use crate::present::framebuffer_pass::Presenter;
+use crate::state::current_attributes::Current;
+use crate::state::enums::*;
+use crate::state::material_properties::Properties;
+use crate::state::snapshot::{Abilities, Snapshot};
+use crate::trace::path_tracing::Studio;
+use std::collections::{HashMap, HashSet};
+use std::sync::{Arc, Mutex, OnceLock};
+
+/// Where the calls of immediate mode go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Sink {
+    /// Not between Begin and End.
+    Outside,
+    /// Between Begin and End of a traced primitive.
+    Trace,
+    /// Between Begin and End of a primitive that the driver draws.
+    Pass,
+    /// Into a display list.
+    List,
+}
+
+/// What we know of one OpenGL context.
+pub(crate) struct Context {
+    handle: usize,
+    doomed: bool,
+    pub(crate) can: Abilities,
+    pub(crate) config: Arc<Config>,
+    pub(crate) sink: Sink,
+    /// Classes of state to ask the driver about again.
+    pub(crate) dirty: u8,
+    pub(crate) state: Arc<Snapshot>,
+    pub(crate) verdict: Verdict,
+    pub(crate) current: Current,
+    /// A colour that colour material did not take over (see `Current::unfollowed`).
+    pub(crate) unfollowed: Option<[f32; 4]>,
+    /// What of `current` the driver does not know yet.
+    pub(crate) stale: u8,
+    /// Of its materials, these.
+    pub(crate) stale_properties: Properties,
+    /// What `glMaterial` set since the last draw.
+    pub(crate) set_since_draw: Properties,
+    pub(crate) recorder: Recorder,
+    pub(crate) evaluators: Evaluators,
+    /// The arrays that `glArrayElement` takes the vertices of the open primitive from.
+    pub(crate) element_arrays: Option<Arrays>,
+    pub(crate) lists: Arc<Mutex<Lists>>,
+    pub(crate) writes: Arc<Mutex<Writes>>,
+    pub(crate) recording: Option<Recording>,
+    pub(crate) depth_of_lists: u32,
+    pub(crate) cache: Cache,
+    pub(crate) packed: Packs,
+    pub(crate) frame: Frame,
+    pub(crate) presenter: Presenter,
+    pub(crate) studio: Studio,
+    pub(crate) probes: Probes,
+    pub(crate) programs: Programs,
+    pub(crate) counters: Counters,
+    /// Errors that came up behind the program's back or were kept for it.
+    pub(crate) errors: Vec<u32>,
+    pub(crate) texture_writes: TextureWrites,
+    /// This context may have written a texture since it last let others see what it wrote.
+    pub(crate) wrote_textures: bool,
+    /// We saw it created, so we know with whom it shares.
+    pub(crate) seen_created: bool,
+    /// A fault of ours has ended the tracing, and the driver knows what it was not told before.
+    pub(crate) given_up: bool,
+    watched: u32,
+}
+
+struct Register {
+    idle: HashMap<usize, Box<Context>>,
+    shared: HashMap<usize, Shared>,
+    /// Contexts whose creation we saw.
+    seen: HashSet<usize>,
+}
+
+static REGISTER: OnceLock<Mutex<Register>> = OnceLock::new();
+
+fn register() -> std::sync::MutexGuard<'static, Register> {
+    let new = || Mutex::new(Register { idle: HashMap::new(), shared: HashMap::new(), seen: HashSet::new() });
+    REGISTER.get_or_init(new).lock().unwrap_or_else(|e| e.into_inner())
+}
+
+/// A context was created; `share` is one whose lists it shares.
+pub(crate) fn created(handle: usize, share: usize) {
+    if handle == 0 {
+        return;
+    }
+    let mut r = register();
+    let shared = if share == 0 { Shared::default() } else { r.shared.entry(share).or_default().clone() };
+    r.shared.insert(handle, shared);
+    r.seen.insert(handle);
+    // The address of a context that was destroyed may come again.
+    let gone = r.idle.remove(&handle);
+    drop(r);
+    drop(gone);
+}
+
+/// A context was destroyed; when it is current it lives until it is left.
+pub(crate) fn destroyed(handle: usize) {
+    let here = symbols::with_context(|c| {
+        let mine = c.handle == handle;
+        c.doomed |= mine;
+        mine
+    });
+    // Programs destroy their contexts before they end, whatever way they do.
+    crate::host::report::write_the_rest();
+    let mut r = register();
+    let gone = if here == Some(true) { None } else { r.idle.remove(&handle) };
+    r.shared.remove(&handle);
+    r.seen.remove(&handle);
+    drop(r);
+    drop(gone);
+}
+
+/// What was current before another context is made current.
+pub(crate) enum Left {
+    /// None.
+    Nothing,
+    /// This one, which is in the register; and the textures of its group, when it has written any.
+    Idle(usize, Option<TextureWrites>),
+    /// One that is destroyed, and current nowhere else.
+    Doomed(Box<Context>),
+}
+
+/// Before the current context changes: what is pending is drawn, and the context is there for other threads.
+pub(crate) fn leave() -> Left {
+    crate::interpose::panic_guard::give_up_here();
+    let wrote = symbols::with_context(|c| {
+        c.flush("context switch");
+        c.sync();
+        c.counters.publish(false);
+        c.publish_textures()
+    });
+    let Some(old) = symbols::take() else { return Left::Nothing };
+    symbols::thread_leaves();
+    if old.doomed {
+        return Left::Doomed(old);
+    }
+    let left = Left::Idle(old.handle, (wrote == Some(true)).then(|| old.texture_writes.clone()));
+    let before = register().idle.insert(old.handle, old);
+    drop(before);
+    left
+}
+
+/// The change was refused: all stays as it was.
+pub(crate) fn stay(left: Left) {
+    let context = match left {
+        Left::Nothing => None,
+        // It is current here still, so no other thread can have taken it.
+        Left::Idle(handle, _) => register().idle.remove(&handle),
+        Left::Doomed(context) => Some(context),
+    };
+    if let Some(mut context) = context {
+        context.dirty = class::ALL;
+        place(context);
+    }
+}
+
+/// `handle` is current on this thread now (0: none), and what was `left` is not.
+pub(crate) fn enter(handle: usize, left: Left) {
+    if let Left::Idle(_, Some(textures)) = &left {
+        // Changing contexts flushes, so others see now what it wrote.
+        textures.change();
+    }
+    drop(left);
+    if let Some(old) = symbols::take() {
+        // A fault kept it from being left in order.
+        symbols::thread_leaves();
+        if !old.doomed {
+            let before = register().idle.insert(old.handle, old);
+            drop(before);
+        }
+    }
+    if handle == 0 {
+        return;
+    }
+    let mut context = {
+        let mut r = register();
+        let shared = r.shared.entry(handle).or_default().clone();
+        let seen = r.seen.contains(&handle);
+        r.idle.remove(&handle).unwrap_or_else(|| Box::new(Context::new(handle, shared, seen)))
+    };
+    // After a fault the books are kept all the same: lists that we compiled are ours to play.
+    if !crate::interpose::panic_guard::happened() {
+        context.wake();
+    }
+    place(context);
+}
+
+fn place(context: Box<Context>) {
+    // Before it is there, so that its thread is told of all calls from the first on.
+    symbols::thread_enters();
+    match symbols::install(context) {
+        Ok(()) => symbols::attend(),
+        // Some programs change contexts in exit handlers, when the thread's storage is gone already.
+        Err(context) => {
+            symbols::thread_leaves();
+            let before = register().idle.insert(context.handle, context);
+            drop(before);
+        }
+    }
+}
+
+/// A watched call is about to run.
+pub(crate) fn watched(index: usize, class: u8, flushes: bool, draws: bool) {
+    symbols::with_context(|c| c.watched_call(index, class, flushes, draws));
+}
+
+fn indices_of(names: &[&str]) -> Vec<usize> {
+    names.iter().filter_map(|n| symbols::index_of(n.as_bytes())).collect()
+}
+
+/// Calls that end a frame for the one who looks at the screen.
+fn swaps() -> &'static [usize] {
+    static SWAPS: OnceLock<Vec<usize>> = OnceLock::new();
+    SWAPS.get_or_init(|| {
+        let damage = ["eglSwapBuffersWithDamageKHR", "eglSwapBuffersWithDamageEXT"];
+        indices_of(&[&["glXSwapBuffers", "eglSwapBuffers", "glXSwapBuffersMscOML"][..], &damage].concat())
+    })
+}
+
+/// Calls by which a program looks at what it drew.
+fn reads() -> &'static [usize] {
+    static READS: OnceLock<Vec<usize>> = OnceLock::new();
+    READS.get_or_init(|| indices_of(&["glReadPixels", "glReadnPixels", "glReadnPixelsARB", "glGetTexImage"]))
+}
+
+/// Calls that show something only when the front buffer is drawn to.
+fn front_only() -> &'static [usize] {
+    static FRONT_ONLY: OnceLock<Vec<usize>> = OnceLock::new();
+    FRONT_ONLY.get_or_init(|| indices_of(&["glFlush", "glFinish"]))
+}
+
+impl Drop for Context {
+    /// Also when a thread or the program ends with its context current.
+    fn drop(&mut self) {
+        crate::interpose::panic_guard::guard(|| self.counters.publish(true));
+    }
+}
+
+impl Context {
+    fn new(handle: usize, shared: Shared, seen_created: bool) -> Context {
+        let Shared { lists, writes, texture_writes } = shared;
+        Context {
+            handle,
+            doomed: false,
+            can: Abilities::default(),
+            config: crate::host::config::current(),
+            sink: Sink::Outside,
+            dirty: class::ALL,
+            state: Arc::default(),
+            verdict: Verdict::Pass("nothing drawn yet"),
+            current: Current::default(),
+            unfollowed: None,
+            stale: 0,
+            stale_properties: Properties::default(),
+            set_since_draw: Properties::default(),
+            recorder: Recorder::default(),
+            evaluators: Evaluators::default(),
+            element_arrays: None,
+            lists,
+            writes,
+            recording: None,
+            depth_of_lists: 0,
+            cache: Cache::default(),
+            packed: Packs::default(),
+            frame: Frame::default(),
+            presenter: Presenter::default(),
+            studio: Studio::default(),
+            probes: Probes::default(),
+            programs: Programs::default(),
+            counters: Counters::default(),
+            errors: Vec::new(),
+            texture_writes,
+            wrote_textures: false,
+            seen_created,
+            given_up: false,
+            watched: 0,
+        }
+    }
+
+    /// One that no driver knows.
+    #[cfg(test)]
+    pub(crate) fn for_tests(handle: usize) -> Context {
+        Context::new(handle, Shared::default(), true)
+    }
+
+    /// As the driver calls it.
+    #[cfg(test)]
+    pub(crate) fn handle(&self) -> usize {
+        self.handle
+    }
+
+    #[cfg(test)]
+    pub(crate) fn rename(&mut self, handle: usize) {
+        self.handle = handle;
+    }
+
+    /// Current again: the driver may have been told anything meanwhile.
+    fn wake(&mut self) {
+        self.dirty = class::ALL;
+        self.textures_meanwhile();
+        self.stale = 0;
+        (self.stale_properties, self.set_since_draw) = (Properties::default(), Properties::default());
+        if self.can.version == 0 {
+            self.keep_errors();
+            self.can = Abilities::query();
+            // As large as the window until the program says otherwise.
+            self.frame.begins_with(gl::ints(SCISSOR_BOX));
+            self.drop_errors();
+            self.counters.set_driver(&gl::string(RENDERER), &gl::string(VERSION));
+        }
+    }
+
+    // ---- Errors: ours must not be seen, the program's must not be lost ------------------------------------------------
+
+    /// Takes the driver's pending errors into our keeping.
+    pub(crate) fn keep_errors(&mut self) {
+        for _ in 0..8 {
+            match gl::get_error() {
+                0 => return,
+                e if self.errors.contains(&e) => {}
+                e => self.errors.push(e),
+            }
+        }
+    }
+
+    /// Forgets errors that our own calls made.
+    pub(crate) fn drop_errors(&mut self) {
+        for _ in 0..8 {
+            if gl::get_error() == 0 {
+                return;
+            }
+        }
+    }
+
+    /// An error kept for the program; the driver is asked when there is none.
+    pub(crate) fn take_error(&mut self) -> Option<u32> {
+        if self.sink == Sink::Trace {
+            self.unswallow("glGetError between Begin and End");
+        }
+        if self.errors.is_empty() { None } else { Some(self.errors.remove(0)) }
+    }
+
+    // ---- Watched calls ------------------------------------------------------------------------------------------------
+
+    pub(crate) fn watched_call(&mut self, index: usize, class: u8, flushes: bool, draws: bool) {
+        if self.sink == Sink::Trace {
+            self.unswallow("another call between Begin and End");
+        }
+        self.drawn_over();
+        self.heed_others(index, class);
+        if let Some(r) = &mut self.recording {
+            r.note_driver_call(class, flushes, draws);
+        }
+        if flushes {
+            let invisible =
+                front_only().contains(&index) && self.can.double_buffered && !self.draws_to_front();
+            if !invisible && self.recording.is_none() {
+                self.flush(symbols::NAMES[index].to_str().unwrap_or("a call"));
+            }
+            if draws && self.recording.is_none() {
+                self.counters.pass("a draw call that is not followed", 1);
+            }
+            if swaps().contains(&index) {
+                self.frame_done();
+            } else if reads().contains(&index) {
+                if self.can.version >= 21 && gl::word(PIXEL_PACK_BUFFER_BINDING) != 0 {
+                    self.writes().any();
+                }
+                self.read_back();
+            }
+        }
+        // A program that sets much state between draws pays for the first calls only.
+        let told_enough = self.watched >= 12;
+        if class & class::TEXTURE != 0 && self.state.texture.is_some() {
+            // What was drawn with a texture is drawn with what it is now.
+            self.end_batch();
+        }
+        self.sync();
+        self.mark(class);
+        self.watched += 1;
+        if told_enough && self.recording.is_none() && symbols::is_alone() {
+            // Of buffers and textures that are written we are told all the same.
+            self.mark(class::ALL & !(class::BUFFER | class::TEXTURE));
+            symbols::relax();
+        }
+    }
+
+    /// What was written to the buffers of the share group.
+    pub(crate) fn writes(&self) -> std::sync::MutexGuard<'_, Writes> {
+        self.writes.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
+    fn mark(&mut self, class: u8) {
+        self.dirty |= class;
+        if class & class::BUFFER != 0 {
+            self.writes().any();
+        }
+        if class & class::TEXTURE != 0 {
+            self.textures_change();
+        }
+    }
+
+    fn draws_to_front(&self) -> bool {
+        self.state.draw_buffer != BACK && self.state.draw_buffer != BACK_LEFT && self.state.framebuffer == 0
+    }
+
+    /// Tells the driver the current attributes it does not know.
+    pub(crate) fn sync(&mut self) {
+        if self.stale != 0 {
+            let bits = std::mem::take(&mut self.stale);
+            self.current.send(bits, std::mem::take(&mut self.stale_properties));
+        }
+    }
+
+    // ---- State --------------------------------------------------------------------------------------------------------
+
+    /// The state now. Ends the batch of immediate mode when it changed.
+    pub(crate) fn refresh(&mut self) {
+        const DRAWS: u8 = class::MATRIX | class::LIGHT | class::RASTER | class::TEXTURE | class::CURRENT;
+        self.watched = 0;
+        symbols::attend();
+        self.drawn_over();
+        if self.state.texture.as_ref().is_some_and(|t| t.version != self.texture_version()) {
+            // Another context of the share group may have written it.
+            self.dirty |= class::TEXTURE;
+        }
+        if self.dirty & DRAWS == 0 {
+            return;
+        }
+        if self.dirty & class::RASTER != 0 {
+            self.evaluators.forget();
+        }
+        self.sync();
+        self.keep_errors();
+        let mut fresh = (*self.state).clone();
+        fresh.refresh(self.dirty, &self.can);
+        fresh.window_height = self.frame.window_height(&fresh);
+        if let Some(t) = &mut fresh.texture {
+            t.version = self.texture_version();
+        }
+        if self.dirty & class::CURRENT != 0 && !self.can.core {
+            let now = Current::query();
+            self.unfollowed = now.unfollowed(fresh.color_material.filter(|_| fresh.lighting));
+            if now != self.current {
+                self.end_batch();
+                self.current = now;
+            }
+        }
+        self.drop_errors();
+        self.dirty &= !DRAWS;
+        if fresh != *self.state {
+            self.end_batch();
+            self.state = Arc::new(fresh);
+        }
+        self.verdict = rules::filled(&self.state, self.config.trace());
+        if !matches!(self.verdict, Verdict::Pass(_)) && self.is_refused() {
+            self.verdict = Verdict::Pass(crate::present::framebuffer_pass::REFUSED);
+        }
+        if let Some(t) = &self.state.texture
+            && !matches!(self.verdict, Verdict::Pass(_))
+        {
+            // Now, as it is bound now: when a batch of immediate mode ends another may be.
+            self.presenter.images.get(t.target, t.name, t.version);
+        }
+    }
+
+    /// What becomes of filled primitives in the state now.
+    pub(crate) fn verdict(&mut self) -> Verdict {
+        self.refresh();
+        self.set_since_draw = Properties::default();
+        match self.verdict {
+            _ if crate::trace::thread_pool::forked() => Verdict::Pass("a forked process"),
+            v => v,
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! A fault of ours must never become a fault of the program: it is logged, and from then on the driver draws everything.
+//!
+//! Everything that the program can call is run under [`caught`], which costs nothing while there is no fault. After one each thread hands over what its context has swallowed
+//! and not drawn ([`Context::give_up`]), at once or at its next call.
+
+use crate::interpose::context::{Context, Sink};
+use crate::interpose::driver::gl;
+use crate::interpose::symbols;
+use crate::state::current_attributes::{Current, stale};
+use crate::state::material_properties::Properties;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering::Relaxed};
+use std::sync::{Mutex, Once, OnceLock};
+
+static HAPPENED: AtomicBool = AtomicBool::new(false);
+/// We are in somebody's program: all panics of this library are ours.
+static IN_PROGRAM: AtomicBool = AtomicBool::new(false);
+/// Calls of [`guard`] that are running, in programs of our own.
+static GUARDED: AtomicUsize = AtomicUsize::new(0);
+static MESSAGES: Mutex<Vec<String>> = Mutex::new(Vec::new());
+
+/// True once there was one.
+#[inline]
+pub(crate) fn happened() -> bool {
+    HAPPENED.load(Relaxed)
+}
+
+/// What happened, for the report.
+pub(crate) fn messages() -> Vec<String> {
+    MESSAGES.lock().map_or_else(|e| e.into_inner().clone(), |m| m.clone())
+}
+
+// ---- Faults that tests ask for --------------------------------------------------------------------------------------
+
+fn asked_for() -> Option<&'static str> {
+    static PLACE: OnceLock<Option<String>> = OnceLock::new();
+    PLACE.get_or_init(|| crate::host::folders::variable("GLURAY_INJECT_FAULT")).as_deref()
+}
+
+/// Panics when `GLURAY_INJECT_FAULT` names this place: so that tests see what programs get when something of ours breaks.
+pub(crate) fn injected(place: &str) {
+    assert!(!is_asked_for(place), "a fault in {place}, as GLURAY_INJECT_FAULT asks");
+}
+
+/// True when `GLURAY_INJECT_FAULT` names this place.
+pub(crate) fn is_asked_for(place: &str) -> bool {
+    asked_for() == Some(place)
+}
+
+/// The entry point that is to fail, and how many of its calls may pass before.
+static ENTRY: AtomicUsize = AtomicUsize::new(usize::MAX);
+static CALLS_BEFORE: AtomicU32 = AtomicU32::new(0);
+
+/// `GLURAY_INJECT_FAULT=glEnd` fails in the first call of `glEnd` that is run by us, `glEnd:3` in the third.
+fn plan_injection() {
+    let Some(text) = asked_for() else { return };
+    let (name, call) = text.split_once(':').unwrap_or((text, "1"));
+    if let (Some(index), Ok(call)) = (symbols::index_of(name.as_bytes()), call.parse::<u32>()) {
+        CALLS_BEFORE.store(call.saturating_sub(1), Relaxed);
+        ENTRY.store(index, Relaxed);
+    }
+}
+
+/// Panics when a test wants this entry point to fail.
+#[inline(always)]
+pub(crate) fn inject_at(index: usize) {
+    if index == ENTRY.load(Relaxed) {
+        inject_now(index);
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn inject_now(index: usize) {
+    if CALLS_BEFORE.fetch_update(Relaxed, Relaxed, |n| n.checked_sub(1)).is_err() {
+        ENTRY.store(usize::MAX, Relaxed);
+        panic!("a fault in {:?}, as GLURAY_INJECT_FAULT asks", symbols::NAMES[index]);
+    }
+}
+
+// ---- Catching -------------------------------------------------------------------------------------------------------
+
+/// The program has called us for the first time.
+#[cold]
+pub(crate) fn in_program() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        IN_PROGRAM.store(true, Relaxed);
+        silence();
+        plan_injection();
+        symbols::at_exit();
+    });
+}
+
+/// Keeps Rust's panic message from stderr.
+pub(crate) fn silence() {
+    let before = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        // The library has a standard library of its own, so no panic of the program comes here.
+        if IN_PROGRAM.load(Relaxed) || GUARDED.load(Relaxed) > 0 {
+            let (mut messages, text) = (MESSAGES.lock().unwrap_or_else(|e| e.into_inner()), info.to_string());
+            // What is tried again may fail again.
+            if !messages.contains(&text) {
+                messages.push(text);
+            }
+        } else {
+            before(info);
+        }
+    }));
+}
+
+/// Runs `f`, a part of a call of the program's. When it panics: `None`, and the tracing ends.
+#[inline(always)]
+pub(crate) fn caught<R>(f: impl FnOnce() -> R) -> Option<R> {
+    match catch_unwind(AssertUnwindSafe(f)) {
+        Ok(r) => Some(r),
+        Err(payload) => {
+            // It may be anything, and its destructor may panic.
+            std::mem::forget(payload);
+            end();
+            None
+        }
+    }
+}
+
+/// The same for work that no program has called for.
+pub(crate) fn guard<R>(f: impl FnOnce() -> R) -> Option<R> {
+    GUARDED.fetch_add(1, Relaxed);
+    let out = caught(f);
+    GUARDED.fetch_sub(1, Relaxed);
+    out
+}
+
+fn attempt<R>(f: impl FnOnce() -> R) -> Option<R> {
+    catch_unwind(AssertUnwindSafe(f)).map_err(std::mem::forget).ok()
+}
+
+#[cold]
+#[inline(never)]
+fn end() {
+    if !HAPPENED.swap(true, Relaxed) {
+        attempt(symbols::retire);
+    }
+    give_up_here();
+}
+
+/// After a fault: the context of this thread hands over what it has swallowed, unless it has done so.
+pub(crate) fn give_up_here() {
+    if happened() {
+        attempt(|| symbols::with_context(Context::give_up));
+    }
+}
+
+impl Context {
+    /// A fault of ours has ended the tracing: what was swallowed is drawn, by rays if they still can be sent, and the driver gets to know what it was not told.
+    /// Between Begin and End of a primitive that the driver draws nothing of this is possible; then it waits.
+    pub(crate) fn give_up(&mut self) {
+        if self.given_up || self.sink == Sink::Pass {
+            return;
+        }
+        self.given_up = true;
+        self.depth_of_lists = 0;
+        let open = self.sink == Sink::Trace;
+        self.sink = Sink::Outside;
+        if let Some(r) = &mut self.recording {
+            r.give_up();
+            // What was swallowed before the list cannot be drawn while the driver compiles it: the first call after its end does.
+            self.given_up = false;
+        } else {
+            let mode = self.recorder.mode();
+            let primitive = open.then(|| attempt(|| self.recorder.withdraw()).unwrap_or((mode, Vec::new())));
+            attempt(|| self.flush_now("a fault of ours"));
+            attempt(|| self.sync());
+            if let Some((mode, vertices)) = primitive {
+                self.begin_again_with(mode, vertices);
+            }
+        }
+        attempt(|| self.sync());
+        attempt(|| self.counters.publish(true));
+    }
+
+    /// Begin, and the vertices that were recorded since, for the driver.
+    pub(crate) fn begin_again_with(&mut self, mode: u32, vertices: Vec<([f32; 3], Current)>) {
+        let end = self.current;
+        if let Some((_, first)) = vertices.first() {
+            first.send(0xf, Properties::ALL);
+        }
+        gl::begin(mode);
+        let mut before: Option<Current> = None;
+        for (p, c) in vertices {
+            let changed = before.is_none_or(|b| b.materials != c.materials);
+            let bits = stale::NORMAL | stale::COLOR | stale::TEX;
+            c.send(bits | if changed { stale::MATERIAL } else { 0 }, Properties::ALL);
+            gl::vertex4f(p[0], p[1], p[2], 1.0);
+            before = Some(c);
+        }
+        end.send(0xf, Properties::ALL);
+        (self.stale, self.stale_properties) = (0, Properties::default());
+    }
+}

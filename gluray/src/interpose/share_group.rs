@@ -1,0 +1,123 @@
+//! What the contexts of a share group have in common, and when one of them sees what another has done to a texture.
+//!
+//! Images of textures are read again when the group's count of writes is another. A context counts before the driver makes a write. That is enough for itself, but not
+//! for the others: one of them may read between the count and the write, or before the write has got out of the writer's queue. OpenGL promises a write to another
+//! context after the writer has finished (or flushed, or the reader has waited for a fence) and the reader has bound the texture again (OpenGL 4.6, section 5.3), so at these
+//! points the writer (or the reader that waited) counts once more: what was read before has another number then.
+//!
+//! What is drawn into a texture is not told of draw by draw. While a framebuffer object is bound those same points count it.
+
+use crate::capture::buffer_writes::Writes;
+use crate::capture::display_lists::Lists;
+use crate::interpose::context::{Context, Sink};
+use crate::interpose::driver::gl;
+use crate::interpose::symbols;
+use crate::state::enums::*;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, OnceLock};
+
+/// What the contexts of a share group have in common.
+#[derive(Clone, Default)]
+pub(crate) struct Shared {
+    pub(crate) lists: Arc<Mutex<Lists>>,
+    pub(crate) writes: Arc<Mutex<Writes>>,
+    pub(crate) texture_writes: TextureWrites,
+}
+
+/// Counts what may have changed a texture of the group.
+#[derive(Clone, Default)]
+pub(crate) struct TextureWrites(Arc<AtomicU64>);
+
+impl TextureWrites {
+    pub(crate) fn change(&self) {
+        self.0.fetch_add(1, Ordering::Release);
+    }
+
+    fn now(&self) -> u64 {
+        self.0.load(Ordering::Acquire)
+    }
+
+    /// Other contexts have the same textures: each has its count here and in the register.
+    fn are_shared(&self) -> bool {
+        Arc::strong_count(&self.0) > 2
+    }
+}
+
+/// Some texture has its texels from elsewhere (another API, another process, a group that shares the image alone): nobody tells of writes.
+static FOREIGN_TEXELS: AtomicBool = AtomicBool::new(false);
+
+/// Calls that give textures such texels.
+fn foreign(index: usize) -> bool {
+    static FOREIGN: OnceLock<Vec<usize>> = OnceLock::new();
+    let names = [
+        "glEGLImageTargetTexture2DOES",
+        "glEGLImageTargetTexStorageEXT",
+        "glEGLImageTargetTextureStorageEXT",
+        "glTexStorageMem2DEXT",
+        "glTextureStorageMem2DEXT",
+        "glVDPAURegisterVideoSurfaceNV",
+        "glVDPAURegisterOutputSurfaceNV",
+    ];
+    let find = || names.iter().filter_map(|n| symbols::index_of(n.as_bytes())).collect();
+    FOREIGN.get_or_init(find).contains(&index)
+}
+
+/// Calls after which a context sees what others have done.
+fn waits(index: usize) -> bool {
+    static WAITS: OnceLock<Vec<usize>> = OnceLock::new();
+    let names = [
+        "glWaitSync",
+        "glClientWaitSync",
+        "eglWaitSync",
+        "eglWaitSyncKHR",
+        "eglClientWaitSync",
+        "eglClientWaitSyncKHR",
+        "glWaitSemaphoreEXT",
+    ];
+    let find = || names.iter().filter_map(|n| symbols::index_of(n.as_bytes())).collect();
+    WAITS.get_or_init(find).contains(&index)
+}
+
+impl Context {
+    /// Textures of the share group may be others from now on.
+    pub(crate) fn textures_change(&mut self) {
+        self.texture_writes.change();
+        self.wrote_textures = true;
+    }
+
+    /// While it is the same, so are the textures of the share group.
+    pub(crate) fn texture_version(&self) -> u64 {
+        self.texture_writes.now()
+    }
+
+    /// A call that other contexts, or what comes from elsewhere, may have to do with.
+    pub(crate) fn heed_others(&mut self, index: usize, class: u8) {
+        if class & symbols::class::TEXTURE != 0 && foreign(index) {
+            FOREIGN_TEXELS.store(true, Ordering::Relaxed);
+        }
+        if FOREIGN_TEXELS.load(Ordering::Relaxed) || self.texture_writes.are_shared() && waits(index) {
+            self.texture_writes.change();
+        }
+    }
+
+    /// What this context has written, others can see from now on. True when it has written anything.
+    pub(crate) fn publish_textures(&mut self) -> bool {
+        if self.sink == Sink::Pass || !self.texture_writes.are_shared() {
+            return false;
+        }
+        let drawing = || self.can.version >= 30 && gl::word(FRAMEBUFFER_BINDING) != 0;
+        let wrote = self.wrote_textures || drawing();
+        if wrote {
+            self.texture_writes.change();
+        }
+        self.wrote_textures = false;
+        wrote
+    }
+
+    /// Current again, and others may have written meanwhile whom we do not know.
+    pub(crate) fn textures_meanwhile(&mut self) {
+        if !self.seen_created || FOREIGN_TEXELS.load(Ordering::Relaxed) {
+            self.texture_writes.change();
+        }
+    }
+}

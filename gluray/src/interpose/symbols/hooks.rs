@@ -1,0 +1,455 @@
+//! Hooks of the calls that are taken apart. Each hands its arguments to the current context, whose method says whether that
+//! was all; if not, the driver gets the call as it came.
+//!
+//! The build script reads this file: a line that begins with `fn gl…(` or `fn egl…(` is a hook.
+
+use super::lookup::replaced;
+use super::{at, current_context, with_context};
+use crate::capture::display_lists::names::width;
+use crate::capture::evaluators::Kind;
+use crate::capture::immediate_mode::Step;
+use crate::interpose::client_memory::{self, Call, Named};
+use crate::interpose::context;
+use crate::interpose::driver::Int;
+use crate::interpose::panic_guard::caught;
+use core::ffi::{c_char, c_void};
+
+/// What is called when the driver lacks a function: nothing happens, zero comes back.
+pub(crate) extern "C" fn no_context() -> usize {
+    0
+}
+
+/// Calls the driver's function of the same name.
+macro_rules! driver {
+    ($name:ident($($a:expr),*): ($($t:ty),*) $(-> $r:ty)?) => {{
+        // SAFETY: OpenGL's signature of this name, with the program's own arguments.
+        unsafe {
+            let f: unsafe extern "C" fn($($t),*) $(-> $r)? = core::mem::transmute(super::forward_plainly(at::$name));
+            f($($a),*)
+        }
+    }};
+}
+
+/// Hooks whose method says whether the driver is still to be called.
+macro_rules! hooks {
+    ($($(#[$m:meta])* fn $name:ident($($a:ident: $t:ty),*) => |$c:ident| $body:expr;)*) => { $(
+        $(#[$m])*
+        pub(in crate::interpose::symbols) unsafe extern "C" fn $name($($a: $t),*) {
+            if !current_context::with(at::$name, |$c| $body) {
+                driver!($name($($a),*): ($($t),*));
+            }
+        }
+    )* };
+}
+
+/// The same for calls that come by the million: first the short way, then the long one.
+macro_rules! hot_hooks {
+    ($($(#[$m:meta])* fn $name:ident($($a:ident: $t:ty),*) => |$c:ident| $step:expr, $body:expr;)*) => { $(
+        $(#[$m])*
+        pub(in crate::interpose::symbols) unsafe extern "C" fn $name($($a: $t),*) {
+            #[cold]
+            #[inline(never)]
+            unsafe extern "C" fn slowly($($a: $t),*) {
+                if !current_context::with(at::$name, |$c| $body) {
+                    driver!($name($($a),*): ($($t),*));
+                }
+            }
+            if current_context::step(at::$name, |$c| $step) != Step::Done {
+                // SAFETY: the program's own arguments.
+                unsafe { slowly($($a),*) }
+            }
+        }
+    )* };
+}
+
+type Address = *const c_void;
+
+/// Values that `glMaterial` reads for a parameter.
+///
+/// # Safety
+/// The program has called `glMaterial` with these.
+unsafe fn material_values(what: u32, address: Address, integers: bool) -> [f32; 4] {
+    let count = match what {
+        0x1601 => 1,
+        0x1603 => 3,
+        _ => 4,
+    };
+    let mut out = [0.0; 4];
+    for (i, v) in out.iter_mut().enumerate().take(count) {
+        let at = address as usize + 4 * i;
+        // SAFETY: one of the values that the call names.
+        *v = match (integers, unsafe { client_memory::ints::<1>(at) }) {
+            (false, [bits]) => f32::from_bits(bits.cast_unsigned()),
+            (true, [n]) if count == 4 => ((2.0 * f64::from(n) + 1.0) / f64::from(u32::MAX)) as f32,
+            (true, [n]) => n as f32,
+        };
+    }
+    out
+}
+
+hot_hooks! {
+    fn glBegin(mode: u32) => |c| c.begin_step(mode), c.begin(mode);
+    fn glEnd() => |c| c.end_step(), c.end();
+}
+
+/// The same for calls that have no short way.
+macro_rules! long_hooks {
+    ($($(#[$m:meta])* fn $name:ident($($a:ident: $t:ty),*) => |$c:ident| $body:expr;)*) => { $(
+        $(#[$m])*
+        pub(in crate::interpose::symbols) unsafe extern "C" fn $name($($a: $t),*) {
+            if !current_context::with(at::$name, |$c| $body) {
+                driver!($name($($a),*): ($($t),*));
+            }
+        }
+    )* };
+}
+
+long_hooks! {
+    fn glMaterialfv(face: u32, what: u32, v: Address) => |c| {
+        // SAFETY: the program's own arguments.
+        let values = unsafe { material_values(what, v, false) };
+        c.material(face, what, values)
+    };
+    fn glMaterialiv(face: u32, what: u32, v: Address) => |c| {
+        // SAFETY: the program's own arguments.
+        let values = unsafe { material_values(what, v, true) };
+        c.material(face, what, values)
+    };
+    fn glMaterialf(face: u32, what: u32, v: f32) => |c| c.material(face, what, [v, 0.0, 0.0, 0.0]);
+    fn glMateriali(face: u32, what: u32, v: Int) => |c| c.material(face, what, [v as f32, 0.0, 0.0, 0.0]);
+}
+
+hooks! {
+    fn glRectf(x: f32, y: f32, x2: f32, y2: f32) => |c| c.rect([x, y, x2, y2]);
+    fn glRectd(x: f64, y: f64, x2: f64, y2: f64) => |c| c.rect([x, y, x2, y2].map(|v| v as f32));
+    fn glRecti(x: Int, y: Int, x2: Int, y2: Int) => |c| c.rect([x, y, x2, y2].map(|v| v as f32));
+    fn glRects(x: i16, y: i16, x2: i16, y2: i16) => |c| c.rect([x, y, x2, y2].map(f32::from));
+    fn glArrayElement(i: Int) => |c| {
+        // SAFETY: the program's own call, which waits for us.
+        let call = unsafe { Call::new(Named::Element(i)) };
+        c.array_element(&call)
+    };
+    fn glArrayElementEXT(i: Int) => |c| {
+        // SAFETY: the program's own call, which waits for us.
+        let call = unsafe { Call::new(Named::Element(i)) };
+        c.array_element(&call)
+    };
+    fn glMap1f(target: u32, u1: f32, u2: f32, stride: Int, order: Int, points: Address) => |c| c.maps_change();
+    fn glMap1d(target: u32, u1: f64, u2: f64, stride: Int, order: Int, points: Address) => |c| c.maps_change();
+    fn glMap2f(target: u32, u1: f32, u2: f32, ustride: Int, uorder: Int, v1: f32, v2: f32, vstride: Int, vorder: Int, points: Address) => |c| c.maps_change();
+    fn glMap2d(target: u32, u1: f64, u2: f64, ustride: Int, uorder: Int, v1: f64, v2: f64, vstride: Int, vorder: Int, points: Address) => |c| c.maps_change();
+    fn glMapGrid1f(n: Int, u1: f32, u2: f32) => |c| c.maps_change();
+    fn glMapGrid1d(n: Int, u1: f64, u2: f64) => |c| c.maps_change();
+    fn glMapGrid2f(un: Int, u1: f32, u2: f32, vn: Int, v1: f32, v2: f32) => |c| c.maps_change();
+    fn glMapGrid2d(un: Int, u1: f64, u2: f64, vn: Int, v1: f64, v2: f64) => |c| c.maps_change();
+    fn glEvalCoord1f(u: f32) => |c| c.eval_coord(Kind::Curve, [u, 0.0]);
+    fn glEvalCoord1d(u: f64) => |c| c.eval_coord(Kind::Curve, [u as f32, 0.0]);
+    fn glEvalCoord1fv(v: Address) => |c| {
+        // SAFETY: the call names so many numbers there.
+        let at = unsafe { client_memory::floats::<1>(v as usize) };
+        c.eval_coord(Kind::Curve, [at[0], 0.0])
+    };
+    fn glEvalCoord1dv(v: Address) => |c| {
+        // SAFETY: the call names so many numbers there.
+        let at = unsafe { client_memory::doubles::<1>(v as usize) };
+        c.eval_coord(Kind::Curve, [at[0] as f32, 0.0])
+    };
+    fn glEvalCoord2f(u: f32, v: f32) => |c| c.eval_coord(Kind::Surface, [u, v]);
+    fn glEvalCoord2d(u: f64, v: f64) => |c| c.eval_coord(Kind::Surface, [u as f32, v as f32]);
+    fn glEvalCoord2fv(v: Address) => |c| {
+        // SAFETY: the call names so many numbers there.
+        let at = unsafe { client_memory::floats::<2>(v as usize) };
+        c.eval_coord(Kind::Surface, at)
+    };
+    fn glEvalCoord2dv(v: Address) => |c| {
+        // SAFETY: the call names so many numbers there.
+        let at = unsafe { client_memory::doubles::<2>(v as usize) };
+        c.eval_coord(Kind::Surface, at.map(|x| x as f32))
+    };
+    fn glEvalPoint1(i: Int) => |c| c.eval_point(Kind::Curve, [i, 0]);
+    fn glEvalPoint2(i: Int, j: Int) => |c| c.eval_point(Kind::Surface, [i, j]);
+    fn glEvalMesh1(mode: u32, i1: Int, i2: Int) => |c| c.eval_mesh_1(mode);
+    fn glEvalMesh2(mode: u32, i1: Int, i2: Int, j1: Int, j2: Int) => |c| c.eval_mesh_2(mode, [i1, i2, j1, j2]);
+    fn glPrimitiveRestartNV() => |c| c.primitive_restart();
+    fn glDrawArrays(mode: u32, first: Int, count: Int) => |c| {
+        // SAFETY: the program's own call, which waits for us.
+        let call = unsafe { Call::new(Named::Arrays { first, count }) };
+        c.draw(mode, &call)
+    };
+    fn glDrawArraysEXT(mode: u32, first: Int, count: Int) => |c| {
+        // SAFETY: the program's own call, which waits for us.
+        let call = unsafe { Call::new(Named::Arrays { first, count }) };
+        c.draw(mode, &call)
+    };
+    fn glDrawElements(mode: u32, count: Int, kind: u32, at: Address) => |c| {
+        // SAFETY: the program's own call, which waits for us.
+        let call = unsafe { Call::new(Named::Elements { count, kind, at: at as usize, base: 0 }) };
+        c.draw(mode, &call)
+    };
+    fn glDrawRangeElements(mode: u32, start: u32, end: u32, count: Int, kind: u32, at: Address) => |c| {
+        // SAFETY: the program's own call, which waits for us.
+        let call = unsafe { Call::new(Named::Elements { count, kind, at: at as usize, base: 0 }) };
+        c.draw(mode, &call)
+    };
+    fn glDrawRangeElementsEXT(mode: u32, start: u32, end: u32, count: Int, kind: u32, at: Address) => |c| {
+        // SAFETY: the program's own call, which waits for us.
+        let call = unsafe { Call::new(Named::Elements { count, kind, at: at as usize, base: 0 }) };
+        c.draw(mode, &call)
+    };
+    fn glDrawElementsBaseVertex(mode: u32, count: Int, kind: u32, at: Address, base: Int) => |c| {
+        // SAFETY: the program's own call, which waits for us.
+        let call = unsafe { Call::new(Named::Elements { count, kind, at: at as usize, base }) };
+        c.draw(mode, &call)
+    };
+    fn glDrawRangeElementsBaseVertex(mode: u32, start: u32, end: u32, count: Int, kind: u32, at: Address, base: Int) => |c| {
+        // SAFETY: the program's own call, which waits for us.
+        let call = unsafe { Call::new(Named::Elements { count, kind, at: at as usize, base }) };
+        c.draw(mode, &call)
+    };
+    fn glBufferData(target: u32, size: isize, data: Address, usage: u32) => |c| c.buffer_written(target);
+    fn glBufferDataARB(target: u32, size: isize, data: Address, usage: u32) => |c| c.buffer_written(target);
+    fn glBufferSubData(target: u32, at: isize, size: isize, data: Address) => |c| c.buffer_written(target);
+    fn glBufferSubDataARB(target: u32, at: isize, size: isize, data: Address) => |c| c.buffer_written(target);
+    fn glDeleteBuffers(n: Int, names: Address) => |c| {
+        // SAFETY: the call has so many names there.
+        let names = unsafe { client_memory::view(names as usize, 4 * usize::try_from(n).unwrap_or(0)) };
+        c.buffers_deleted(names)
+    };
+    fn glDeleteBuffersARB(n: Int, names: Address) => |c| {
+        // SAFETY: the call has so many names there.
+        let names = unsafe { client_memory::view(names as usize, 4 * usize::try_from(n).unwrap_or(0)) };
+        c.buffers_deleted(names)
+    };
+    fn glClear(mask: u32) => |c| c.clear(mask);
+    fn glLinkProgram(program: u32) => |c| c.link_program(program);
+}
+
+/// The same for lists, which stay ours after a fault.
+macro_rules! book_hooks {
+    ($(fn $name:ident($($a:ident: $t:ty),*) => |$c:ident| $body:expr;)*) => { $(
+        pub(in crate::interpose::symbols) unsafe extern "C" fn $name($($a: $t),*) {
+            if !current_context::with_books(at::$name, |$c| $body) {
+                driver!($name($($a),*): ($($t),*));
+            }
+        }
+    )* };
+}
+
+book_hooks! {
+    fn glNewList(list: u32, mode: u32) => |c| c.new_list(list, mode);
+    fn glEndList() => |c| c.end_list();
+    fn glCallList(list: u32) => |c| c.call_list(list);
+    fn glCallLists(n: Int, kind: u32, names: Address) => |c| {
+        let bytes = usize::try_from(n).unwrap_or(0) * width(kind).unwrap_or(0);
+        // SAFETY: the call has so many names of that type there.
+        let names = unsafe { client_memory::view(names as usize, bytes) };
+        n >= 0 && c.call_lists(kind, names)
+    };
+    fn glDeleteLists(first: u32, n: Int) => |c| c.delete_lists(first, n);
+}
+
+/// The same for calls after which others see what this context has written to textures: told of like others before they run, and again after.
+macro_rules! publishing_hooks {
+    ($(fn $name:ident();)*) => { $(
+        pub(in crate::interpose::symbols) unsafe extern "C" fn $name() {
+            current_context::with(at::$name, |c| {
+                c.watched_call(at::$name, 0, true, false);
+                false
+            });
+            driver!($name(): ());
+            caught(|| with_context(context::Context::publish_textures));
+        }
+    )* };
+}
+
+publishing_hooks! {
+    fn glFlush();
+    fn glFinish();
+}
+
+pub(in crate::interpose::symbols) unsafe extern "C" fn glGetError() -> u32 {
+    let take = || {
+        crate::interpose::panic_guard::inject_at(at::glGetError);
+        with_context(context::Context::take_error)
+    };
+    let kept = caught(take).flatten().flatten();
+    kept.unwrap_or_else(|| driver!(glGetError(): () -> u32))
+}
+
+pub(in crate::interpose::symbols) unsafe extern "C" fn glGenLists(n: Int) -> u32 {
+    let give = || {
+        crate::interpose::panic_guard::inject_at(at::glGenLists);
+        with_context(|c| c.gen_lists(n))
+    };
+    let given = caught(give).flatten().flatten();
+    given.unwrap_or_else(|| driver!(glGenLists(n): (Int) -> u32))
+}
+
+// ---- Addresses ------------------------------------------------------------------------------------------------------
+
+macro_rules! get_proc_address {
+    ($($name:ident)*) => { $(
+        pub(in crate::interpose::symbols) unsafe extern "C" fn $name(name: *const c_char) -> *const () {
+            let address = driver!($name(name): (*const c_char) -> *const ());
+            let ours = || {
+                crate::interpose::panic_guard::inject_at(at::$name);
+                replaced(name, address)
+            };
+            caught(ours).unwrap_or(address)
+        }
+    )* };
+}
+get_proc_address! { glXGetProcAddress glXGetProcAddressARB eglGetProcAddress }
+
+// ---- Contexts -------------------------------------------------------------------------------------------------------
+
+type Handle = *mut c_void;
+
+/// Brackets a change of the current context: what is pending is drawn with the old one, then the books follow.
+fn making_current(index: usize, context: Handle, real: impl FnOnce() -> u32) -> u32 {
+    let leave = || {
+        crate::interpose::panic_guard::inject_at(index);
+        context::leave()
+    };
+    // After a fault once more: whose context is current must be known.
+    let left = caught(leave).or_else(|| caught(leave)).unwrap_or(context::Left::Nothing);
+    let done = real();
+    caught(|| match done {
+        0 => context::stay(left),
+        _ => context::enter(context as usize, left),
+    });
+    done
+}
+
+pub(in crate::interpose::symbols) unsafe extern "C" fn glXMakeCurrent(
+    display: Handle,
+    drawable: usize,
+    context: Handle,
+) -> u32 {
+    making_current(
+        at::glXMakeCurrent,
+        context,
+        || driver!(glXMakeCurrent(display, drawable, context): (Handle, usize, Handle) -> u32),
+    )
+}
+
+pub(in crate::interpose::symbols) unsafe extern "C" fn glXMakeContextCurrent(
+    display: Handle,
+    draw: usize,
+    read: usize,
+    context: Handle,
+) -> u32 {
+    making_current(
+        at::glXMakeContextCurrent,
+        context,
+        || driver!(glXMakeContextCurrent(display, draw, read, context): (Handle, usize, usize, Handle) -> u32),
+    )
+}
+
+pub(in crate::interpose::symbols) unsafe extern "C" fn glXMakeCurrentReadSGI(
+    display: Handle,
+    draw: usize,
+    read: usize,
+    context: Handle,
+) -> u32 {
+    making_current(
+        at::glXMakeCurrentReadSGI,
+        context,
+        || driver!(glXMakeCurrentReadSGI(display, draw, read, context): (Handle, usize, usize, Handle) -> u32),
+    )
+}
+
+pub(in crate::interpose::symbols) unsafe extern "C" fn eglMakeCurrent(
+    display: Handle,
+    draw: Handle,
+    read: Handle,
+    context: Handle,
+) -> u32 {
+    making_current(
+        at::eglMakeCurrent,
+        context,
+        || driver!(eglMakeCurrent(display, draw, read, context): (Handle, Handle, Handle, Handle) -> u32),
+    )
+}
+
+fn destroyed(index: usize, context: Handle) {
+    caught(|| {
+        crate::interpose::panic_guard::inject_at(index);
+        context::destroyed(context as usize);
+    });
+}
+
+fn created(index: usize, context: Handle, share: Handle) -> Handle {
+    caught(|| {
+        crate::interpose::panic_guard::inject_at(index);
+        context::created(context as usize, share as usize);
+    });
+    context
+}
+
+pub(in crate::interpose::symbols) unsafe extern "C" fn glXCreateContext(
+    display: Handle,
+    visual: Handle,
+    share: Handle,
+    direct: Int,
+) -> Handle {
+    created(
+        at::glXCreateContext,
+        driver!(glXCreateContext(display, visual, share, direct): (Handle, Handle, Handle, Int) -> Handle),
+        share,
+    )
+}
+
+pub(in crate::interpose::symbols) unsafe extern "C" fn glXCreateNewContext(
+    display: Handle,
+    config: Handle,
+    kind: Int,
+    share: Handle,
+    direct: Int,
+) -> Handle {
+    created(
+        at::glXCreateNewContext,
+        driver!(glXCreateNewContext(display, config, kind, share, direct): (Handle, Handle, Int, Handle, Int) -> Handle),
+        share,
+    )
+}
+
+pub(in crate::interpose::symbols) unsafe extern "C" fn glXCreateContextAttribsARB(
+    display: Handle,
+    config: Handle,
+    share: Handle,
+    direct: Int,
+    attributes: Address,
+) -> Handle {
+    created(
+        at::glXCreateContextAttribsARB,
+        driver!(glXCreateContextAttribsARB(display, config, share, direct, attributes): (Handle, Handle, Handle, Int, Address) -> Handle),
+        share,
+    )
+}
+
+pub(in crate::interpose::symbols) unsafe extern "C" fn eglCreateContext(
+    display: Handle,
+    config: Handle,
+    share: Handle,
+    attributes: Address,
+) -> Handle {
+    created(
+        at::eglCreateContext,
+        driver!(eglCreateContext(display, config, share, attributes): (Handle, Handle, Handle, Address) -> Handle),
+        share,
+    )
+}
+
+pub(in crate::interpose::symbols) unsafe extern "C" fn glXDestroyContext(display: Handle, context: Handle) {
+    destroyed(at::glXDestroyContext, context);
+    driver!(glXDestroyContext(display, context): (Handle, Handle));
+}
+
+pub(in crate::interpose::symbols) unsafe extern "C" fn eglDestroyContext(
+    display: Handle,
+    context: Handle,
+) -> u32 {
+    destroyed(at::eglDestroyContext, context);
+    driver!(eglDestroyContext(display, context): (Handle, Handle) -> u32)
+}

@@ -1,0 +1,284 @@
+//! The OpenGL library that programs see: one trampoline per entry point, a table of where each goes, and the hooks.
+//!
+//! A trampoline has no prototype: it jumps through [`TABLE`] with all registers as the program left them. Calls that may change
+//! state are *watched*: while [`ATTENTION`] is set we are told before they run (`slow`), at a price of some ten nanoseconds; as soon as
+//! nobody needs to know, they cost one comparison. This is what lets the driver keep all state: we ask it when a draw comes, and
+//! only again after a watched call.
+//!
+//! This is a room for unsafe code: everything here is called by programs we do not know.
+#![allow(unsafe_code, reason = "a room: exported OpenGL symbols are called by programs we do not know")]
+#![allow(non_snake_case, reason = "the names of OpenGL")]
+
+mod current_context;
+pub(crate) mod hooks;
+mod lookup;
+
+pub(crate) use current_context::{install, take, with_context};
+
+use crate::interpose::driver;
+use std::ffi::CStr;
+use std::sync::atomic::{AtomicPtr, AtomicU32, AtomicU64, Ordering::Relaxed};
+
+/// Classes of state that a call can change; the driver is asked again about those only.
+#[allow(dead_code, reason = "some classes are only told apart by the build script")]
+pub(crate) mod class {
+    /// Matrices.
+    pub(crate) const MATRIX: u8 = 1;
+    /// Lights and the lighting model.
+    pub(crate) const LIGHT: u8 = 2;
+    /// Everything about rasters, enables, framebuffers.
+    pub(crate) const RASTER: u8 = 4;
+    /// Textures and their environment.
+    pub(crate) const TEXTURE: u8 = 8;
+    /// Current colour, normal, texture coordinate, material.
+    pub(crate) const CURRENT: u8 = 16;
+    /// Contents of buffers.
+    pub(crate) const BUFFER: u8 = 32;
+    /// Uniforms.
+    pub(crate) const UNIFORM: u8 = 64;
+    /// Vertex arrays and buffer bindings.
+    pub(crate) const ARRAYS: u8 = 128;
+    /// All of it.
+    pub(crate) const ALL: u8 = 255;
+}
+
+#[derive(Clone, Copy)]
+struct Target(*const ());
+// SAFETY: addresses of functions.
+unsafe impl Sync for Target {}
+
+include!(concat!(env!("OUT_DIR"), "/trampolines.rs"));
+
+/// Where each trampoline goes: `lazy` at first, then our hook or the driver's function.
+static TABLE: [AtomicPtr<()>; COUNT] = [const { AtomicPtr::new(lazy as *mut ()) }; COUNT];
+/// Zero while watched calls need not be reported: exactly one thread has a context, and nobody asked. Bit 0 says that somebody asked; above it are the threads that have
+/// a context, less one. In one word, so that none of the two changes unseen while the other is looked at.
+static ATTENTION: AtomicU32 = AtomicU32::new(0_u32.wrapping_sub(2));
+/// Watched calls that went straight to the driver.
+static CALLS: AtomicU64 = AtomicU64::new(0);
+
+/// Asks to be told of the next watched call.
+#[inline]
+pub(crate) fn attend() {
+    if ATTENTION.load(Relaxed) & 1 == 0 {
+        ATTENTION.fetch_or(1, Relaxed);
+    }
+}
+
+/// Lets watched calls pass without a word, unless another thread has a context, too.
+pub(crate) fn relax() {
+    // Refused when a second thread has come since somebody looked.
+    ATTENTION.compare_exchange(1, 0, Relaxed, Relaxed).ok();
+}
+
+/// One thread alone has a context.
+pub(crate) fn is_alone() -> bool {
+    ATTENTION.load(Relaxed) & !1 == 0
+}
+
+/// A thread gets a context. From now on, and until as many have left, all watched calls are reported when it is not the only one.
+pub(crate) fn thread_enters() {
+    ATTENTION.fetch_add(2, Relaxed);
+}
+
+/// A thread has no context any longer.
+pub(crate) fn thread_leaves() {
+    ATTENTION.fetch_sub(2, Relaxed);
+}
+
+/// What stays ours after a fault: books of contexts, addresses, errors that we kept, and lists, since those that we compiled are ours to play.
+fn keeps_books(index: usize) -> bool {
+    let name = NAMES[index].to_bytes();
+    let kept: [&[u8]; 7] = [
+        b"glCallList",
+        b"glCallLists",
+        b"glNewList",
+        b"glEndList",
+        b"glDeleteLists",
+        b"glGenLists",
+        b"glGetError",
+    ];
+    name.starts_with(b"glX") || name.starts_with(b"egl") || kept.contains(&name)
+}
+
+/// After a fault of ours every entry point becomes the driver's, thread by thread: see [`leaving`].
+pub(crate) fn retire() {
+    for (i, slot) in TABLE.iter().enumerate() {
+        if HOOKS[i].is_some() && !keeps_books(i) {
+            slot.store(leaving as *mut (), Relaxed);
+        }
+    }
+}
+
+/// Index of an entry point.
+pub(crate) fn index_of(name: &[u8]) -> Option<usize> {
+    NAMES.binary_search_by(|n| n.to_bytes().cmp(name)).ok()
+}
+
+/// The trampoline of an entry point.
+fn trampoline(name: &CStr) -> Option<*const ()> {
+    index_of(name.to_bytes()).map(|i| TRAMPOLINES[i] as *const ())
+}
+
+/// Has the report brought up to date when the program ends in order.
+pub(crate) fn at_exit() {
+    extern "C" fn at_exit() {
+        crate::interpose::panic_guard::guard(crate::host::report::write_the_rest);
+    }
+    // SAFETY: a function of ours, and the library is never unloaded (`-z nodelete`).
+    unsafe { libc::atexit(at_exit) };
+}
+
+extern "C" fn resolve(index: usize) -> *const () {
+    crate::interpose::panic_guard::in_program();
+    // Also what is called for the first time after a fault.
+    let hook = HOOKS[index].filter(|_| !crate::interpose::panic_guard::happened() || keeps_books(index));
+    let target = crate::interpose::panic_guard::caught(|| match hook {
+        Some(hook) => hook.0,
+        None => {
+            crate::interpose::panic_guard::inject_at(index);
+            driver::forward(index)
+        }
+    });
+    let target = target.unwrap_or_else(|| forward_plainly(index));
+    TABLE[index].store(target.cast_mut(), Relaxed);
+    target
+}
+
+/// After a fault in the search for a function of the driver's: found, or nothing is called.
+fn forward_plainly(index: usize) -> *const () {
+    crate::interpose::panic_guard::caught(|| driver::forward(index)).unwrap_or(hooks::no_context as *const ())
+}
+
+extern "C" fn told(index: usize) {
+    if crate::interpose::panic_guard::happened() {
+        crate::interpose::panic_guard::give_up_here();
+        return;
+    }
+    let (class, flush) = (CLASSES[index], FLUSHES[index]);
+    crate::interpose::panic_guard::caught(|| {
+        crate::interpose::panic_guard::inject_at(index);
+        crate::interpose::context::watched(index, class, flush & 1 != 0, flush & 2 != 0);
+    });
+}
+
+/// Entry `index` of those that were ours before a fault: the thread's context hands over what it has swallowed, and the driver is called.
+extern "C" fn left(index: usize) -> *const () {
+    leave_at(index);
+    forward_plainly(index)
+}
+
+/// The same without the call.
+fn leave_at(index: usize) {
+    crate::interpose::panic_guard::give_up_here();
+    let over = crate::interpose::panic_guard::caught(|| {
+        let given_up = with_context(|c| {
+            if NAMES[index] == c"glEnd" && c.sink == crate::interpose::context::Sink::Pass {
+                // The driver's primitive ends now, and with the next call all is handed over.
+                c.sink = crate::interpose::context::Sink::Outside;
+            }
+            c.given_up
+        });
+        given_up == Some(true) && is_alone()
+    });
+    if over == Some(true) && TABLE[index].load(Relaxed) == leaving as *mut () {
+        TABLE[index].store(forward_plainly(index).cast_mut(), Relaxed);
+        relax();
+    }
+}
+
+/// Finds the target of entry r11 and goes there, with all argument registers as they were.
+#[unsafe(naked)]
+unsafe extern "C" fn lazy() {
+    core::arch::naked_asm!(
+        "push rbp", "mov rbp, rsp", "push rdi", "push rsi", "push rdx", "push rcx", "push r8", "push r9", "push rax", "push r11",
+        "sub rsp, 128", "movdqu [rsp], xmm0", "movdqu [rsp+16], xmm1", "movdqu [rsp+32], xmm2", "movdqu [rsp+48], xmm3",
+        "movdqu [rsp+64], xmm4", "movdqu [rsp+80], xmm5", "movdqu [rsp+96], xmm6", "movdqu [rsp+112], xmm7",
+        "mov edi, r11d", "call {resolve}", "mov r10, rax",
+        "movdqu xmm0, [rsp]", "movdqu xmm1, [rsp+16]", "movdqu xmm2, [rsp+32]", "movdqu xmm3, [rsp+48]",
+        "movdqu xmm4, [rsp+64]", "movdqu xmm5, [rsp+80]", "movdqu xmm6, [rsp+96]", "movdqu xmm7, [rsp+112]",
+        "add rsp, 128", "pop r11", "pop rax", "pop r9", "pop r8", "pop rcx", "pop rdx", "pop rsi", "pop rdi", "pop rbp", "jmp r10",
+        resolve = sym resolve
+    )
+}
+
+/// The target of what was a hook before a fault: see [`left`].
+#[unsafe(naked)]
+unsafe extern "C" fn leaving() {
+    core::arch::naked_asm!(
+        "push rbp", "mov rbp, rsp", "push rdi", "push rsi", "push rdx", "push rcx", "push r8", "push r9", "push rax", "push r11",
+        "sub rsp, 128", "movdqu [rsp], xmm0", "movdqu [rsp+16], xmm1", "movdqu [rsp+32], xmm2", "movdqu [rsp+48], xmm3",
+        "movdqu [rsp+64], xmm4", "movdqu [rsp+80], xmm5", "movdqu [rsp+96], xmm6", "movdqu [rsp+112], xmm7",
+        "mov edi, r11d", "call {left}", "mov r10, rax",
+        "movdqu xmm0, [rsp]", "movdqu xmm1, [rsp+16]", "movdqu xmm2, [rsp+32]", "movdqu xmm3, [rsp+48]",
+        "movdqu xmm4, [rsp+64]", "movdqu xmm5, [rsp+80]", "movdqu xmm6, [rsp+96]", "movdqu xmm7, [rsp+112]",
+        "add rsp, 128", "pop r11", "pop rax", "pop r9", "pop r8", "pop rcx", "pop rdx", "pop rsi", "pop rdi", "pop rbp", "jmp r10",
+        left = sym left
+    )
+}
+
+/// Reports entry r11, then goes where the table says, with all argument registers as they were.
+#[unsafe(naked)]
+unsafe extern "C" fn slow() {
+    core::arch::naked_asm!(
+        "push rbp", "mov rbp, rsp", "push rdi", "push rsi", "push rdx", "push rcx", "push r8", "push r9", "push rax", "push r11",
+        "sub rsp, 128", "movdqu [rsp], xmm0", "movdqu [rsp+16], xmm1", "movdqu [rsp+32], xmm2", "movdqu [rsp+48], xmm3",
+        "movdqu [rsp+64], xmm4", "movdqu [rsp+80], xmm5", "movdqu [rsp+96], xmm6", "movdqu [rsp+112], xmm7",
+        "mov edi, r11d", "call {told}",
+        "movdqu xmm0, [rsp]", "movdqu xmm1, [rsp+16]", "movdqu xmm2, [rsp+32]", "movdqu xmm3, [rsp+48]",
+        "movdqu xmm4, [rsp+64]", "movdqu xmm5, [rsp+80]", "movdqu xmm6, [rsp+96]", "movdqu xmm7, [rsp+112]",
+        "add rsp, 128", "pop r11", "pop rax", "pop r9", "pop r8", "pop rcx", "pop rdx", "pop rsi", "pop rdi", "pop rbp",
+        "lea r10, [rip + {table}]", "jmp qword ptr [r10 + 8*r11]",
+        told = sym told, table = sym TABLE
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn calls_that_come_with_each_vertex_are_not_told_of_for_the_sake_of_textures() {
+        let starts = |name: &[u8]| {
+            let of_vertices: [&[u8]; 6] = [
+                b"glSecondaryColor",
+                b"glMultiTexCoord",
+                b"glFogCoord",
+                b"glVertexAttrib",
+                b"glEdgeFlag",
+                b"glVertexP",
+            ];
+            of_vertices.iter().any(|b| name.starts_with(b))
+        };
+        let always = class::TEXTURE | class::BUFFER;
+        let mut seen = 0;
+        for (i, name) in NAMES.iter().enumerate().filter(|(_, n)| starts(n.to_bytes())) {
+            seen += 1;
+            assert!(CLASSES[i] & always == 0 || HOOKS[i].is_some(), "{name:?} costs ten nanoseconds");
+        }
+        assert!(seen > 100, "{seen}");
+    }
+
+    #[test]
+    fn the_table_of_injected_faults_has_every_hook() {
+        let hooks: Vec<&str> =
+            (0..COUNT).filter(|i| HOOKS[*i].is_some()).map(|i| NAMES[i].to_str().expect("ASCII")).collect();
+        let mut listed: Vec<&str> = include_str!("../../../tests/programs/hooks.txt").lines().collect();
+        listed.sort_unstable();
+        assert_eq!(listed, hooks, "tests/programs/hooks.txt is what tests/faults.rs walks through");
+    }
+
+    #[test]
+    fn calls_that_write_texels_are_told_of_at_all_times() {
+        for name in [
+            c"glTexSubImage2D",
+            c"glTextureSubImage2D",
+            c"glCopyTexImage2D",
+            c"glPopAttrib",
+            c"glBindFramebuffer",
+        ] {
+            let i = index_of(name.to_bytes()).expect("a call of OpenGL's");
+            assert!(CLASSES[i] & class::TEXTURE != 0 || HOOKS[i].is_some(), "{name:?}");
+        }
+    }
+}

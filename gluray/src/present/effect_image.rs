@@ -1,0 +1,278 @@
+//! Pictures that more than the nearest surface of each pixel goes into: mode `path`, and `rich` with mirrors, glass, translucency, a lens or several samples.
+//!
+//! Depths stay those of the rasterizer's fragments, so that lines and text of the driver meet the same surfaces as in every mode; colours come premultiplied
+//! and are put over what is there.
+
+use crate::capture::draw::{Draw, Shading};
+use crate::capture::geometry_cache::Structures;
+use crate::cluster;
+use crate::host::config::{Mode, Settings};
+use crate::interpose::context::Context;
+use crate::interpose::driver::gl;
+use crate::present::framebuffer_pass::Fate;
+use crate::state::enums::*;
+use crate::state::snapshot::Fog;
+use crate::trace::path_tracing::fog;
+use crate::trace::texturing::Image;
+use crate::trace::thread_pool;
+use crate::trace::view::{View, views};
+use crate::trace::whitted::{self, Colors};
+use crate::trace::{Layer, Prepared, Rect, UNCOVERED};
+use std::borrow::Cow;
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
+use std::time::Instant;
+
+/// Whether the mode may need such pictures.
+pub(crate) fn is_for(settings: &Settings) -> bool {
+    match settings.mode {
+        Mode::Path | Mode::Rich => true,
+        Mode::Enhance => settings.samples > 1,
+        Mode::Match | Mode::Phong => false,
+    }
+}
+
+/// Whether the mode's own rays smooth silhouettes as well as `samples` of a pixel do: then all samples of a pixel get one colour.
+pub(crate) fn has_samples_for(settings: &Settings, samples: u32) -> bool {
+    settings.mode == Mode::Path || is_for(settings) && settings.samples > samples
+}
+
+/// The settings with at least `samples` rays through a pixel.
+pub(crate) fn with_samples(settings: &Settings, samples: u32) -> Cow<'_, Settings> {
+    match settings.samples < samples {
+        true => Cow::Owned(Settings { samples, ..settings.clone() }),
+        false => Cow::Borrowed(settings),
+    }
+}
+
+/// One view's part of a frame.
+enum Made {
+    /// The nearest surfaces are all that is needed.
+    Surfaces(Layer, Vec<(&'static str, u64)>),
+    /// Colours over what is there, with the depths of what is opaque, and of all.
+    Over { colors: Colors, opaque: Layer, all: Layer },
+}
+
+/// A colour as the framebuffer has it.
+pub(crate) fn bytes(c: [f32; 4]) -> [u8; 4] {
+    c.map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
+}
+
+/// Depths alone.
+fn depths(draws: &[Prepared<'_>], settings: &Settings) -> Layer {
+    // Shading is wasted here, so the cheapest.
+    let cheap = Settings { mode: Mode::Match, ..settings.clone() };
+    cluster::nearest(draws, &cheap).0
+}
+
+impl Context {
+    /// Draws what is pending as a picture, or into one sample of each pixel.
+    pub(crate) fn draw_picture(
+        &mut self,
+        pending: &[(Draw, Option<Arc<Image>>)],
+        func: u32,
+        settings: &Settings,
+        sample: Option<u32>,
+    ) {
+        let start = Instant::now();
+        self.keep_errors();
+        let [r, g, b, _] = gl::floats::<4>(COLOR_CLEAR_VALUE);
+        self.drop_errors();
+        let (mut structures, mut primary) = (Structures::default(), 0);
+        let groups = views(pending.iter().map(|(d, _)| d));
+        let studio = &mut self.studio;
+        let mut made: Vec<Made> = Vec::new();
+        let mut warnings = Vec::new();
+        thread_pool::on_pool(|| {
+            for (number, (view, members)) in groups.iter().enumerate() {
+                let ready: Vec<Prepared<'_>> = members
+                    .iter()
+                    .filter_map(|i| Prepared::new(&pending[*i].0, pending[*i].1.clone(), &mut structures))
+                    .collect();
+                if ready.is_empty() {
+                    continue;
+                }
+                made.push(make(&ready, view, number, settings, [r, g, b], studio, &mut warnings));
+                primary += ready.iter().map(|p| p.rays.load(Relaxed)).sum::<u64>();
+            }
+        });
+        self.counters.spent("trace", start.elapsed());
+        self.counters.rays("primary", primary);
+        self.counters.made(structures);
+        warnings.into_iter().for_each(|w| self.counters.warn(w));
+        for part in made {
+            let start = Instant::now();
+            match part {
+                Made::Surfaces(layer, rays) => {
+                    rays.into_iter().for_each(|(kind, n)| self.counters.rays(kind, n));
+                    self.counters.report.pixels += layer.covered as u64;
+                    if layer.covered > 0 {
+                        self.present_sample(&[layer], Fate::Surface(func), sample);
+                    }
+                }
+                Made::Over { colors, opaque, all } => {
+                    colors.rays.iter().for_each(|(kind, n)| self.counters.rays(kind, *n));
+                    let [solid, fringe] = split(&colors, &opaque, &all);
+                    self.counters.report.pixels += (solid.covered + fringe.covered) as u64;
+                    if solid.covered > 0 {
+                        self.present_sample(&[solid], Fate::Over(func), sample);
+                    }
+                    if fringe.covered > 0 {
+                        self.present_sample(&[fringe], Fate::Fringe(func), sample);
+                    }
+                }
+            }
+            self.counters.spent("present", start.elapsed());
+        }
+    }
+}
+
+impl Context {
+    /// Multiplies what the driver drew of these by how light they are.
+    pub(crate) fn shade_over(&mut self, draws: &[Draw], settings: &Settings) {
+        let start = Instant::now();
+        let settings = crate::classify::affine_probe::factor_settings(settings);
+        let (mut structures, mut rays) = (Structures::default(), [0; 3]);
+        let groups = views(draws.iter());
+        let mut layers = Vec::new();
+        thread_pool::on_pool(|| {
+            for (_, members) in &groups {
+                let ready: Vec<Prepared<'_>> =
+                    members.iter().filter_map(|i| Prepared::new(&draws[*i], None, &mut structures)).collect();
+                let (mut layer, extra) = cluster::nearest(&ready, &settings);
+                // The driver's own depth may be some roundings nearer.
+                layer
+                    .depth
+                    .iter_mut()
+                    .filter(|d| **d < 1.5)
+                    .for_each(|d| *d = (*d - DEPTH_ROUNDINGS).max(0.0));
+                rays[0] += ready.iter().map(|p| p.rays.load(Relaxed)).sum::<u64>();
+                (rays[1], rays[2]) = (rays[1] + extra[0], rays[2] + extra[1]);
+                layers.push(layer);
+            }
+        });
+        self.counters.spent("trace", start.elapsed());
+        self.counters.made(structures);
+        for (kind, n) in ["primary", "shadow", "ambient occlusion"].into_iter().zip(rays) {
+            self.counters.rays(kind, n);
+        }
+        let start = Instant::now();
+        for layer in layers.into_iter().filter(|l| l.covered > 0) {
+            self.counters.report.pixels += layer.covered as u64;
+            self.present(&[layer], Fate::Times);
+        }
+        self.counters.spent("present", start.elapsed());
+    }
+}
+
+/// Sixteen steps of a depth buffer of 24 bits.
+const DEPTH_ROUNDINGS: f32 = 1e-6;
+
+fn make(
+    ready: &[Prepared<'_>],
+    view: &View,
+    number: usize,
+    settings: &Settings,
+    background: [f32; 3],
+    studio: &mut crate::trace::path_tracing::Studio,
+    warnings: &mut Vec<String>,
+) -> Made {
+    if settings.mode != Mode::Path && !whitted::wanted(ready, settings) {
+        let (layer, extra) = cluster::nearest(ready, settings);
+        return Made::Surfaces(layer, vec![("shadow", extra[0]), ("ambient occlusion", extra[1])]);
+    }
+    let all = depths(ready, settings);
+    let mut colors = match settings.mode {
+        Mode::Path => studio.colors(ready, view, number, all.rect, settings),
+        _ => cluster::beyond(ready, view, all.rect, settings, background),
+    };
+    warnings.append(&mut colors.warnings);
+    if settings.mode == Mode::Path {
+        fogged(&mut colors, ready, view, &all, settings);
+    }
+    let clear: Vec<bool> =
+        ready.iter().map(|p| p.draw.state.blend && whitted::is_clear(p, settings)).collect();
+    let opaque = match clear.contains(&true) {
+        false => Layer { rect: all.rect, color: Vec::new(), depth: all.depth.clone(), covered: all.covered },
+        true => {
+            // Blended surfaces write no depth, as programs have it.
+            let mut depth = vec![UNCOVERED; all.depth.len()];
+            for (p, _) in ready.iter().zip(&clear).filter(|(_, clear)| !**clear) {
+                let one = depths(std::slice::from_ref(p), settings);
+                merge(&mut depth, all.rect, &one);
+            }
+            Layer { rect: all.rect, color: Vec::new(), depth, covered: 0 }
+        }
+    };
+    Made::Over { colors, opaque, all }
+}
+
+/// Puts each draw's fog over a path-traced picture.
+fn fogged(colors: &mut Colors, ready: &[Prepared<'_>], view: &View, all: &Layer, settings: &Settings) {
+    let mut done: Vec<(Fog, [f64; 2])> = Vec::new();
+    for p in ready {
+        let s = &p.draw.state;
+        let Some(fog) = s.fog.filter(|_| matches!(p.draw.shading, Shading::Fixed)) else { continue };
+        let this = (fog, s.depth_range);
+        if done.contains(&this) {
+            continue;
+        }
+        done.push(this);
+        let has = |p: &Prepared<'_>| p.draw.state.fog == Some(fog) && p.draw.state.depth_range == this.1;
+        if ready.iter().all(has) {
+            return fog::over(colors, view, &fog, this.1, all, all);
+        }
+        let mut depth = vec![UNCOVERED; all.depth.len()];
+        for p in ready.iter().filter(|p| has(p)) {
+            merge(&mut depth, all.rect, &depths(std::slice::from_ref(p), settings));
+        }
+        let surfaces = Layer { rect: all.rect, color: Vec::new(), depth, covered: 0 };
+        fog::over(colors, view, &fog, this.1, &surfaces, all);
+    }
+}
+
+/// The nearer depth at every pixel.
+fn merge(depth: &mut [f32], rect: Rect, one: &Layer) {
+    for y in 0..one.rect.h {
+        for x in 0..one.rect.w {
+            let from = (y * one.rect.w + x) as usize;
+            let to = ((y + one.rect.y - rect.y) * rect.w + x + one.rect.x - rect.x) as usize;
+            depth[to] = depth[to].min(one.depth[from]);
+        }
+    }
+}
+
+/// Pixels with an opaque surface at their centre, and those that have colour without one.
+fn split(colors: &Colors, opaque: &Layer, all: &Layer) -> [Layer; 2] {
+    let rect = colors.rect;
+    let n = colors.rgba.len();
+    let blank = || Layer { rect, color: vec![[0; 4]; n], depth: vec![UNCOVERED; n], covered: 0 };
+    let (mut solid, mut fringe) = (blank(), blank());
+    let at = |layer: &Layer, x: i32, y: i32| {
+        let (x, y) = (x - layer.rect.x, y - layer.rect.y);
+        let inside = (0..layer.rect.w).contains(&x) && (0..layer.rect.h).contains(&y);
+        if inside { layer.depth[(y * layer.rect.w + x) as usize] } else { UNCOVERED }
+    };
+    for i in 0..n {
+        if colors.rgba[i][3] <= 0.0 && colors.rgba[i][..3] == [0.0; 3] {
+            continue;
+        }
+        let (x, y) = (rect.x + i as i32 % rect.w, rect.y + i as i32 / rect.w);
+        let depth = at(opaque, x, y);
+        let (layer, depth) = if depth < 1.5 {
+            (&mut solid, depth)
+        } else {
+            // A silhouette has the depth of the surface beside it; a blurred one that is far from any is before everything.
+            let mut near = UNCOVERED;
+            for dy in -1..=1 {
+                for dx in -1..=1 {
+                    near = near.min(at(all, x + dx, y + dy));
+                }
+            }
+            (&mut fringe, if near < 1.5 { near } else { 0.0 })
+        };
+        (layer.color[i], layer.depth[i]) = (bytes(colors.rgba[i]), depth);
+        layer.covered += 1;
+    }
+    [solid, fringe]
+}

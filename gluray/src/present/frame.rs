@@ -1,0 +1,488 @@
+//! What is drawn but not in the framebuffer yet, and when it has to be there.
+
+use crate::capture::draw::{Draw, Shading};
+use crate::capture::primitives::Split;
+use crate::host::config::Mode;
+use crate::interpose::context::Context;
+use crate::present::frame_reuse::{self, Again};
+use crate::present::framebuffer_pass::Fate;
+use crate::present::pipelined::{self, Late, Traced};
+use crate::state::enums::*;
+use crate::trace::lighting::{product, transform};
+use crate::trace::overrides::Look;
+use crate::trace::texturing::Image;
+use crate::trace::thread_pool;
+use crate::trace::{self, Layer, Prepared};
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
+use std::time::Instant;
+
+/// A draw with the image of its texture.
+pub(crate) type Pending = (Draw, Option<Arc<Image>>);
+
+/// Before what the driver draws of which nobody knows what it does to what is there.
+pub(crate) const ORDER_MATTERS: &str = "a draw of the driver's whose order matters";
+
+/// Draws that wait for the end of the frame.
+#[derive(Default)]
+pub(crate) struct Frame {
+    pending: Vec<Pending>,
+    /// Pictures that may be asked for again.
+    again: Again,
+    /// What is shown one frame late.
+    pub(crate) late: Late,
+    /// The driver drew something that commutes since the first of them.
+    others: bool,
+    /// Something was traced since the last frame ended.
+    traced: bool,
+    /// Where: framebuffer and viewport.
+    places: Vec<(u32, [i32; 4])>,
+    /// The highest row that viewports of the window reached in the frame before, and in this one.
+    tops: [i32; 2],
+    /// What the control panel and reports are told of it.
+    told: crate::host::panel_client::Told,
+}
+
+impl Frame {
+    /// The driver drew lines or points whose order does not matter but for ties.
+    pub(crate) fn others_drew(&mut self) {
+        self.others |= !self.pending.is_empty();
+    }
+}
+
+impl Frame {
+    /// A new context's scissors.
+    pub(crate) fn begins_with(&mut self, [_, y, _, h]: [i32; 4]) {
+        self.tops[0] = y.saturating_add(h);
+    }
+
+    /// Rows of the window: no call asks for them, but some viewport reaches the top.
+    pub(crate) fn window_height(&mut self, s: &crate::state::snapshot::Snapshot) -> i32 {
+        let top = s.viewport[1].saturating_add(s.viewport[3]);
+        if s.framebuffer != 0 {
+            return top;
+        }
+        self.tops[1] = self.tops[1].max(top);
+        self.tops[0].max(self.tops[1])
+    }
+
+    /// Peeled surfaces are traced for this frame.
+    pub(crate) fn traced_peeled(&mut self, frame: u64, draws: &[Pending]) {
+        self.traced = true;
+        self.told.traced(frame, draws.iter().map(|(d, _)| d));
+    }
+}
+
+impl Context {
+    /// The recorded immediate mode becomes a draw.
+    pub(crate) fn end_batch(&mut self) {
+        let start = Instant::now();
+        self.recorder.settle();
+        if self.recorder.runs.is_empty() {
+            return;
+        }
+        let kind = &self.split_of_batch();
+        let geometry = match self.recorder.followed(kind) {
+            Some(geometry) => {
+                self.cache.hits += 1;
+                self.cache.touch(&geometry);
+                geometry
+            }
+            None => {
+                self.recorder.write_down();
+                let geometry = self.cache.of_runs(&self.recorder.positions, &self.recorder.runs, kind);
+                self.recorder.expect(&geometry, kind);
+                geometry
+            }
+        };
+        let attributes = Arc::new(self.recorder.take_attributes(&geometry));
+        let clip_from_object = product(&self.state.projection, &self.state.model_view);
+        let calls = self.recorder.runs.iter().map(|r| u64::from(r.times)).sum();
+        self.recorder.positions.clear();
+        self.recorder.runs.clear();
+        let state = self.state.clone();
+        let in_order = matches!(
+            crate::classify::rules::filled(&state, self.config.trace()),
+            crate::classify::rules::Verdict::TraceInOrder
+        );
+        self.counters.spent("capture", start.elapsed());
+        self.add(
+            Draw {
+                geometry,
+                attributes,
+                state,
+                shading: Shading::Fixed,
+                clip_from_object,
+                calls,
+                look: Look::default(),
+            },
+            in_order,
+        );
+    }
+
+    /// How the driver would split the quads of the batch.
+    fn split_of_batch(&mut self) -> Split {
+        let s = &self.state;
+        // Lists end batches with quads before and after them.
+        let all_turned = s.flat || self.depth_of_lists > 0;
+        let mut split = Split { first_provokes: s.first_vertex_provokes, all_turned, turned: Vec::new() };
+        if std::mem::take(&mut self.recorder.quads) && !all_turned {
+            let clipped = self.state.clips();
+            let outside = |from, to| self.recorder.any_position(from, to, &clipped);
+            // Begin and End after Begin and End of quads is one draw for the driver.
+            let (mut at, mut first) = (0, 0);
+            for (i, r) in self.recorder.runs.iter().enumerate() {
+                let next = self.recorder.runs.get(i + 1).map(|r| r.mode);
+                let end = at + r.count * r.times;
+                if r.mode == QUADS && next != Some(QUADS) {
+                    split.look_for_clipped(first, end, outside);
+                }
+                at = end;
+                first = if r.mode == QUADS && next == Some(QUADS) { first } else { at };
+            }
+        }
+        split
+    }
+
+    /// Takes a draw into the frame, or traces it at once when its order matters.
+    pub(crate) fn add(&mut self, mut draw: Draw, in_order: bool) {
+        self.counters.report.traced_draws += draw.calls;
+        self.counters.report.triangles += draw.geometry.mesh.num_triangles() as u64;
+        if draw.geometry.mesh.indices.is_empty() {
+            return;
+        }
+        if let Some(color) = self.unfollowed
+            && draw.state.color_material.is_some()
+            && matches!(&draw.attributes.colors, crate::capture::draw::Values::Constant(c) if *c == color)
+        {
+            Arc::make_mut(&mut draw.state).color_material = None;
+        }
+        crate::trace::overrides::apply(&mut draw, &self.config.settings);
+        if !trace::has_rays(&draw.clip_from_object) {
+            // A model-view that flattens everything (a shadow on a floor): rays need the flattened triangles themselves.
+            self.flatten(&mut draw);
+        }
+        if draw.state.blend && self.config.settings.sees_through() && draw.has_full_alpha() {
+            // Programs leave blending on; what lets no light through is opaque all the same.
+            Arc::make_mut(&mut draw.state).blend = false;
+        }
+        let image = draw.state.texture.and_then(|t| {
+            self.keep_errors();
+            let image = self.presenter.images.get(t.target, t.name, t.version);
+            self.drop_errors();
+            image
+        });
+        if in_order {
+            self.trace_in_order(&draw, image);
+        } else {
+            let samples = |d: &Draw| d.state.samples.max(1);
+            if self.frame.pending.first().is_some_and(|(d, _)| samples(d) != samples(&draw)) {
+                self.flush("a draw with more or fewer samples");
+            }
+            self.frame.pending.push((draw, image));
+        }
+    }
+
+    fn flatten(&mut self, draw: &mut Draw) {
+        let m = draw.state.model_view;
+        let eye = |p: &rt_core::glam::Vec3| {
+            let v = transform(&m, p.to_array());
+            [v[0], v[1], v[2]]
+        };
+        let positions: Vec<[f32; 3]> = draw.geometry.mesh.positions.iter().map(eye).collect();
+        let indices = draw.geometry.mesh.indices.clone();
+        // Lit where the program lit it: normals cannot be found again from a singular matrix, colours are lit beforehand.
+        let setup = crate::trace::lighting::Setup::new(&draw.state);
+        let object = &draw.geometry.mesh.positions;
+        let colors =
+            (0..object.len()).map(|i| setup.vertex(&draw.attributes, i, object[i].to_array()).primary[0]);
+        let colors = crate::capture::draw::Values::PerVertex(colors.collect());
+        Arc::make_mut(&mut draw.attributes).colors = colors;
+        let mut state = (*draw.state).clone();
+        state.lighting = false;
+        state.model_view = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
+        draw.clip_from_object = state.projection;
+        draw.state = Arc::new(state);
+        draw.geometry = self.cache.of_indices(&positions, &indices);
+    }
+
+    /// Draws what is pending into the framebuffer.
+    pub(crate) fn flush(&mut self, before: &str) {
+        if !crate::interpose::panic_guard::happened() {
+            self.flush_now(before);
+        }
+    }
+
+    /// The same also after a fault: what was swallowed before it.
+    pub(crate) fn flush_now(&mut self, before: &str) {
+        crate::interpose::panic_guard::injected("flush");
+        self.end_batch();
+        if self.programs.peeling.has_draws() && matches!(before, "glBeginQuery" | ORDER_MATTERS) {
+            self.gather_peeled();
+        }
+        if self.programs.weighted.has_draws() {
+            self.sum_weighted();
+        }
+        let pending = std::mem::take(&mut self.frame.pending);
+        let others = std::mem::take(&mut self.frame.others);
+        if !self.probes.draws.is_empty() {
+            self.counters.flushed(before);
+            self.frame.traced = true;
+            self.darken();
+        }
+        if pending.is_empty() {
+            return;
+        }
+        self.frame.traced = true;
+        for (d, _) in &pending {
+            let place = (d.state.framebuffer, d.state.viewport);
+            if !self.frame.places.contains(&place) {
+                self.frame.places.push(place);
+            }
+        }
+        self.counters.flushed(before);
+        // Also of contexts that never end a frame.
+        self.counters.report.textures_read = self.presenter.images.read;
+        self.frame.told.traced(self.counters.report.frames + 1, pending.iter().map(|(d, _)| d));
+        // What the driver drew after a traced surface wins ties with it, as LEQUAL says; what it drew before loses them.
+        let func = if others { LESS } else { pending[0].0.state.depth_func };
+        let mut pending = pending;
+        if !matches!(self.config.settings.mode, Mode::Match | Mode::Phong) {
+            crate::trace::view::place(&mut pending);
+        }
+        let samples = pending[0].0.state.samples.max(1).cast_unsigned();
+        let places = match crate::present::effect_image::has_samples_for(&self.config.settings, samples) {
+            true => None,
+            false => self.sample_places(pending.iter().map(|(d, _)| d)),
+        };
+        if let Some(places) = places {
+            return self.flush_samples(&pending, func, &places);
+        }
+        if crate::present::effect_image::is_for(&self.config.settings) {
+            let config = self.config.clone();
+            let settings = crate::present::effect_image::with_samples(&config.settings, samples);
+            return self.draw_picture(&pending, func, &settings, None);
+        }
+        self.warn_of_samples(pending.iter().map(|(d, _)| d));
+        if self.may_be_late(before) {
+            return self.flush_late(pending, func);
+        }
+        if let Some(layer) = self.frame.again.find(&pending, &self.config) {
+            return self.put_again(pending, layer, func);
+        }
+        let settings = &self.config.settings;
+        let drawn = frame_reuse::Drawn::of(&pending, settings);
+        let traced = thread_pool::on_pool(|| pipelined::trace(pending, settings));
+        let layer = self.put(traced, Fate::Surface(func), None);
+        self.frame.again.keep(drawn, &self.config, layer);
+    }
+
+    /// One ray stands for all samples of a pixel.
+    fn warn_of_samples<'a>(&mut self, draws: impl Iterator<Item = &'a Draw>) {
+        if let Some(n) = draws.map(|d| d.state.samples).find(|n| *n > 1) {
+            self.counters.warn(format!(
+                "the program has {n} samples a pixel: one ray stands for all of them, so silhouettes are not smoothed as the driver's are"
+            ));
+        }
+    }
+
+    /// Puts what was traced into the framebuffer, or into one sample of each of its pixels.
+    pub(crate) fn put(&mut self, traced: Traced, fate: Fate, sample: Option<u32>) -> Layer {
+        self.counters.spent("trace", traced.took);
+        self.counters.rays("primary", traced.primary);
+        self.counters.rays("shadow", traced.extra[0]);
+        self.counters.rays("ambient occlusion", traced.extra[1]);
+        self.counters.made(traced.structures);
+        self.counters.report.pixels += traced.layer.covered as u64;
+        let start = Instant::now();
+        if traced.layer.covered > 0 {
+            self.present_sample(std::slice::from_ref(&traced.layer), fate, sample);
+        }
+        self.counters.spent("present", start.elapsed());
+        self.give_back(traced.draws);
+        traced.layer
+    }
+
+    /// Shows the picture that the same draws came to before.
+    fn put_again(&mut self, draws: Vec<Pending>, layer: Layer, func: u32) {
+        self.counters.report.pictures_again += 1;
+        self.counters.report.pixels += layer.covered as u64;
+        let start = Instant::now();
+        if layer.covered > 0 {
+            self.present(std::slice::from_ref(&layer), Fate::Surface(func));
+        }
+        self.counters.spent("present", start.elapsed());
+        self.frame.again.put_back(layer);
+        self.give_back(draws);
+    }
+
+    fn give_back(&mut self, draws: Vec<Pending>) {
+        for (draw, _) in draws {
+            if let Some(attributes) = Arc::into_inner(draw.attributes) {
+                self.recorder.give_back(attributes, &draw.geometry);
+            }
+        }
+    }
+
+    fn trace_in_order(&mut self, draw: &Draw, image: Option<Arc<Image>>) {
+        self.frame.traced = true;
+        self.counters.flushed("in order");
+        self.frame.told.traced(self.counters.report.frames + 1, std::iter::once(draw));
+        let samples = match self.sample_places([draw]) {
+            Some(places) => Context::each_sample(draw, &places),
+            None => {
+                self.warn_of_samples(std::iter::once(draw));
+                vec![(draw.clone(), None)]
+            }
+        };
+        for (draw, sample) in samples {
+            let before = self.frame.again.find_ordered(&draw, image.as_ref(), &self.config);
+            if let Some(layers) = before {
+                self.counters.report.pictures_again += 1;
+                self.put_ordered(&draw, image.as_ref(), layers, sample);
+                continue;
+            }
+            let start = Instant::now();
+            let mut structures = crate::capture::geometry_cache::Structures::default();
+            let texels = image.clone();
+            let (layers, rays) =
+                thread_pool::on_pool(|| match Prepared::new(&draw, texels, &mut structures) {
+                    Some(p) => (trace::in_order(&p), p.rays.load(Relaxed)),
+                    None => (Vec::new(), 0),
+                });
+            self.counters.spent("trace", start.elapsed());
+            self.counters.rays("primary", rays);
+            self.counters.made(structures);
+            self.put_ordered(&draw, image.as_ref(), layers, sample);
+        }
+    }
+
+    /// Draws the layers of a draw whose order matters, and keeps them for the next like it.
+    fn put_ordered(
+        &mut self,
+        draw: &Draw,
+        image: Option<&Arc<Image>>,
+        layers: Vec<Layer>,
+        sample: Option<u32>,
+    ) {
+        let start = Instant::now();
+        self.counters.report.pixels += layers.iter().map(|l| l.covered as u64).sum::<u64>();
+        if !layers.is_empty() {
+            self.present_sample(&layers, Fate::AsDrawn, sample);
+        }
+        self.counters.spent("present", start.elapsed());
+        self.frame.again.keep_ordered(draw, image, &self.config, layers);
+    }
+
+    /// Whoever looks at the screen sees a picture now.
+    pub(crate) fn frame_done(&mut self) {
+        self.counters.report.frames += 1;
+        self.frame.traced = false;
+        self.frame.places.clear();
+        if self.frame.tops[1] > 0 {
+            self.frame.tops = [self.frame.tops[1], 0];
+        }
+        self.frame.late.frame_done();
+        (self.counters.report.cache_hits, self.counters.report.cache_misses) =
+            (self.cache.hits, self.cache.misses);
+        self.counters.report.textures_read = self.presenter.images.read;
+        self.studio.frame_done();
+        let fast = self.config.settings.quality == crate::host::config::Quality::Fast;
+        self.programs.frame_done();
+        self.packed.frame_done();
+        self.recorder.frame_done();
+        self.frame.again.frame_done();
+        self.cache.frame_done(|g| {
+            if !fast {
+                thread_pool::in_background(move || g.improve());
+            }
+            !fast
+        });
+        let size = [2, 3].map(|i| self.state.viewport[i].max(0).cast_unsigned());
+        self.counters.report.objects = self.frame.told.frame_done(&self.counters.report, size);
+        if let Some(problem) = self.frame.told.take_problem() {
+            self.counters.warn(problem);
+        }
+        self.take_up_settings();
+        self.counters.publish(false);
+    }
+
+    /// Other settings hold from the next frame on.
+    fn take_up_settings(&mut self) {
+        let config = crate::host::config::current();
+        if !Arc::ptr_eq(&config, &self.config) {
+            self.config = config;
+            // Verdicts depend on settings.
+            self.dirty = crate::interpose::symbols::class::ALL;
+            crate::interpose::symbols::attend();
+        }
+    }
+
+    /// The program reads what was drawn: a frame, too, when something was traced for it.
+    pub(crate) fn read_back(&mut self) {
+        self.frame.late.read();
+        if self.frame.traced {
+            self.frame_done();
+        }
+    }
+
+    /// What was traced is cleared: a frame is over that nobody swapped or read, as in programs that draw into framebuffer objects alone.
+    fn begin_again(&mut self) {
+        // Only then is the state asked for: windows have their frames when they are swapped, and to ask for materials heals what Mesa holds
+        // of them (osgbillboard, osgtessellate).
+        if !self.frame.pending.is_empty()
+            || self.frame.places.iter().all(|(framebuffer, _)| *framebuffer == 0)
+        {
+            return;
+        }
+        self.refresh();
+        let [x, y, w, h] = self.state.scissor.unwrap_or(self.state.viewport);
+        let target = self.state.framebuffer;
+        let meets = |&(f, [a, b, c, d]): &(u32, [i32; 4])| {
+            f == target && a < x + w && x < a + c && b < y + h && y < b + d
+        };
+        if target != 0 && self.frame.places.iter().any(meets) {
+            self.frame_done();
+        }
+    }
+
+    /// `glClear`. A clear of everything makes what is pending invisible; a clear of a part comes after it.
+    pub(crate) fn clear(&mut self, mask: u32) -> bool {
+        if self.recording.is_some() {
+            if let Some(r) = &mut self.recording {
+                r.note_driver_call(0, true, true);
+            }
+            return false;
+        }
+        if self.sink == crate::interpose::context::Sink::Trace {
+            self.unswallow("glClear between Begin and End");
+            return false;
+        }
+        self.end_batch();
+        self.programs.peeling.cleared(self.counters.report.passed_draws);
+        if self.programs.weighted.has_draws() {
+            self.flush("glClear");
+        }
+        const COLOR_AND_DEPTH: u32 = 0x4100;
+        if self.frame.traced && mask & COLOR_AND_DEPTH == COLOR_AND_DEPTH {
+            self.begin_again();
+        }
+        if !self.frame.pending.is_empty() || !self.probes.draws.is_empty() {
+            self.refresh();
+            let whole = mask & COLOR_AND_DEPTH == COLOR_AND_DEPTH
+                && self.state.scissor.is_none()
+                && self.state.color_mask
+                && self.state.depth_mask
+                && self.frame.pending.iter().all(|(d, _)| d.state.framebuffer == self.state.framebuffer);
+            if whole {
+                self.frame.pending.clear();
+                self.probes.draws.clear();
+                self.frame.others = false;
+            } else {
+                self.flush("glClear of a part");
+            }
+        }
+        self.sync();
+        false
+    }
+}

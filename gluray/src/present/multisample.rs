@@ -1,0 +1,81 @@
+//! Framebuffers with several samples a pixel: each sample has rays of its own, and is written by itself through the sample mask; the driver resolves
+//! them as it resolves its own.
+//!
+//! The samples' places are the driver's (`glGetMultisamplefv`). A scene that is moved so that a sample lies in the middle of its pixel is a scene like any
+//! other: rays, coverage by the fill rule and depths need not know. Colours are those of the middle of the pixel, as the driver shades once for all samples
+//! of a triangle.
+
+use crate::capture::draw::{Draw, Shading};
+use crate::host::config::Settings;
+use crate::interpose::context::Context;
+use crate::interpose::driver::gl;
+use crate::present::frame::Pending;
+use crate::present::framebuffer_pass::Fate;
+use crate::present::pipelined;
+use crate::trace::thread_pool;
+use std::sync::Arc;
+
+/// More than any driver has.
+const MOST_SAMPLES: i32 = 32;
+
+/// The draw, moved by part of a pixel to the left and down.
+fn moved(draw: &Draw, [x, y]: [f32; 2]) -> Draw {
+    let mut draw = draw.clone();
+    let [_, _, w, h] = draw.state.viewport.map(|v| v as f32);
+    let (dx, dy) = (-2.0 * x / w, -2.0 * y / h);
+    let shift = |m: &mut [f32; 16]| {
+        for column in m.chunks_exact_mut(4) {
+            column[0] += dx * column[3];
+            column[1] += dy * column[3];
+        }
+    };
+    shift(&mut draw.clip_from_object);
+    let mut state = (*draw.state).clone();
+    shift(&mut state.projection);
+    state.sample_place = [x, y];
+    draw.state = Arc::new(state);
+    if let Shading::Program(p) = &mut draw.shading {
+        shift(&mut Arc::make_mut(p).clip_from_object);
+    }
+    draw
+}
+
+impl Context {
+    /// Where the samples of what `draws` are drawn into lie, from the middle of the pixel. `None` for one sample, and where they cannot be written one by one:
+    /// before OpenGL 3.2 there is no sample mask.
+    pub(crate) fn sample_places<'a>(
+        &mut self,
+        draws: impl IntoIterator<Item = &'a Draw>,
+    ) -> Option<Vec<[f32; 2]>> {
+        let mut all = draws.into_iter().map(|d| d.state.samples);
+        let n = all.next()?;
+        if !(2..=MOST_SAMPLES).contains(&n) || all.any(|m| m != n) || self.can.version < 32 || self.can.es {
+            return None;
+        }
+        self.keep_errors();
+        let places = (0..n as u32).map(|i| gl::sample_place(i).map(|v| v - 0.5)).collect();
+        self.drop_errors();
+        Some(places)
+    }
+
+    /// Traces what is pending for each sample by itself.
+    pub(crate) fn flush_samples(&mut self, pending: &[Pending], func: u32, places: &[[f32; 2]]) {
+        // The samples are as many rays as were asked for.
+        let settings = &Settings { samples: 1, ..self.config.settings.clone() };
+        for (i, place) in places.iter().enumerate() {
+            let draws: Vec<Pending> =
+                pending.iter().map(|(d, image)| (moved(d, *place), image.clone())).collect();
+            if crate::present::effect_image::is_for(settings) {
+                self.draw_picture(&draws, func, settings, Some(i as u32));
+                continue;
+            }
+            let traced = thread_pool::on_pool(|| pipelined::trace(draws, settings));
+            self.put(traced, Fate::Surface(func), Some(i as u32));
+        }
+    }
+
+    /// The same for a draw whose order matters.
+    pub(crate) fn each_sample(draw: &Draw, places: &[[f32; 2]]) -> Vec<(Draw, Option<u32>)> {
+        places.iter().enumerate().map(|(i, p)| (moved(draw, *p), Some(i as u32))).collect()
+    }
+}

@@ -1,0 +1,114 @@
+//! Sets of the ten properties of both sides' materials: which of them a program set, and which of them the driver has to be told.
+//!
+//! Mesa keeps what `glMaterial` sets back until it has to know it, at a draw or a query, and then writes it over whatever colour material made of the colour
+//! meanwhile. So a program that sets a material at the end of a frame, and switches colour material on at the beginning of the next (OpenSceneGraph), is drawn
+//! with the material. Whoever asks or draws in between takes that away from it; and so does one who tells Mesa of more than the program set.
+
+use super::current_attributes::{Materials, sides};
+use crate::interpose::driver::gl;
+use crate::state::enums::*;
+
+/// Properties in the order of the bits; those of the back come after those of the front.
+const NAMES: [u32; 5] = [AMBIENT, DIFFUSE, SPECULAR, EMISSION, SHININESS];
+
+/// A set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Properties(u16);
+
+impl Properties {
+    pub(crate) const ALL: Properties = Properties(0x3ff);
+
+    /// What a call of `glMaterial` sets.
+    pub(crate) fn of(face: u32, what: u32) -> Properties {
+        let one = |name: u32| NAMES.iter().position(|n| *n == name).map_or(0, |i| 1_u16 << i);
+        let bits = match what {
+            AMBIENT_AND_DIFFUSE => one(AMBIENT) | one(DIFFUSE),
+            _ => one(what),
+        };
+        Properties(sides(face).iter().fold(0, |all, side| all | bits << (5 * side)))
+    }
+
+    /// Those that differ.
+    pub(crate) fn changed(a: &Materials, b: &Materials) -> Properties {
+        let differs = |i: &usize| value(a, *i) != value(b, *i);
+        Properties((0..10).filter(differs).fold(0, |bits, i| bits | 1 << i))
+    }
+
+    pub(crate) fn add(&mut self, other: Properties) {
+        self.0 |= other.0;
+    }
+
+    pub(crate) fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    fn each(self) -> impl Iterator<Item = usize> {
+        (0..10).filter(move |i| self.0 >> i & 1 == 1)
+    }
+
+    /// Tells the driver what `materials` have.
+    pub(crate) fn send(self, materials: &Materials) {
+        for i in self.each() {
+            let (face, name) = place(i);
+            gl::materialfv(face, name, &value(materials, i));
+        }
+    }
+
+    /// Sets what the driver has once more, so that it keeps it back as it did before we drew.
+    pub(crate) fn set_again(self) {
+        let values: Vec<_> = self.each().map(|i| (i, place(i))).collect();
+        let asked = values.into_iter().map(|(i, (face, name))| match i % 5 {
+            4 => (face, name, [gl::material::<1>(face, name)[0], 0.0, 0.0, 0.0]),
+            _ => (face, name, gl::material::<4>(face, name)),
+        });
+        // All questions first: each makes the driver write down what it kept back.
+        let asked: Vec<_> = asked.collect();
+        for (face, name, v) in asked {
+            gl::materialfv(face, name, &v);
+        }
+    }
+}
+
+fn place(i: usize) -> (u32, u32) {
+    (if i < 5 { FRONT } else { BACK }, NAMES[i % 5])
+}
+
+fn value(materials: &Materials, i: usize) -> [f32; 4] {
+    let m = &materials[i / 5];
+    match i % 5 {
+        0 => m.ambient,
+        1 => m.diffuse,
+        2 => m.specular,
+        3 => m.emission,
+        _ => [m.shininess, 0.0, 0.0, 0.0],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::current_attributes::set_material;
+    use super::*;
+
+    #[test]
+    fn calls_name_the_properties_that_they_change() {
+        let calls = [
+            (FRONT, AMBIENT),
+            (BACK, DIFFUSE),
+            (FRONT_AND_BACK, SPECULAR),
+            (BACK, AMBIENT_AND_DIFFUSE),
+            (FRONT, EMISSION),
+            (FRONT_AND_BACK, SHININESS),
+        ];
+        for (face, what) in calls {
+            let (before, mut after) = (Materials::default(), Materials::default());
+            assert!(set_material(&mut after, face, what, [1.0, 2.0, 3.0, 4.0]));
+            let of = Properties::of(face, what);
+            assert_eq!(Properties::changed(&before, &after), of, "{face:x} {what:x}");
+            assert!(!of.is_empty());
+        }
+        assert!(Properties::of(7, AMBIENT).is_empty() && Properties::of(FRONT, 7).is_empty());
+        let mut all = Properties::default();
+        NAMES.iter().for_each(|n| all.add(Properties::of(FRONT_AND_BACK, *n)));
+        assert_eq!(all, Properties::ALL);
+    }
+}

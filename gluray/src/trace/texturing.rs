@@ -1,0 +1,169 @@
+//! Texture unit 0 of fixed function: coordinates at a vertex, texels at a fragment, and the environment that brings both together
+//! (compatibility profile specification, sections 12.1.3, 8.14 and 16.1).
+
+mod image;
+mod sampling;
+
+use crate::capture::draw::Attributes;
+use crate::interpose::driver::gl;
+use crate::state::enums::*;
+use crate::state::snapshot::{Snapshot, TextureUnit};
+use crate::trace::lighting::{Setup, normalized, transform};
+use image::Base;
+pub(crate) use image::{Image, Images};
+
+/// Texels of the greatest texture that is read.
+const MOST_TEXELS: i64 = 1 << 26;
+
+/// Whether rays can follow the sampling of the bound texture; the reason if not.
+pub(crate) fn followed(target: u32) -> Result<(), &'static str> {
+    let min = gl::tex_parameter_i::<1>(target, TEXTURE_MIN_FILTER)[0].cast_unsigned();
+    let mag = gl::tex_parameter_i::<1>(target, TEXTURE_MAG_FILTER)[0].cast_unsigned();
+    if min != mag {
+        return Err("a texture with mipmaps or two filters");
+    }
+    Ok(())
+}
+
+/// Why fixed function's sampling of the bound texture cannot be followed; `None` when it can, or when the texture is incomplete and so left out.
+pub(crate) fn unfollowed(target: u32, version: u32) -> Option<&'static str> {
+    const TEXTURE_BASE_LEVEL: u32 = 0x813c;
+    const TEXTURE_MAX_ANISOTROPY: u32 = 0x84fe;
+    const TEXTURE_SWIZZLE: [u32; 4] = [0x8e42, 0x8e43, 0x8e44, 0x8e45];
+    const SAMPLER_BINDING: u32 = 0x8919;
+    const IN_ORDER: [i32; 4] = [0x1903, 0x1904, 0x1905, 0x1906];
+    let parameter = |what| gl::tex_parameter_i::<1>(target, what)[0];
+    let base = parameter(TEXTURE_BASE_LEVEL).clamp(0, 31);
+    let level = |what| gl::tex_level_i::<1>(target, base, what)[0];
+    let (width, height) = (i64::from(level(TEXTURE_WIDTH)), i64::from(level(TEXTURE_HEIGHT)));
+    if width <= 0 || height <= 0 {
+        return None;
+    }
+    if width * height > MOST_TEXELS {
+        return Some("a texture too large to read");
+    }
+    match level(TEXTURE_INTERNAL_FORMAT).cast_unsigned() {
+        0x1902 | 0x84f9 | 0x81a5..=0x81a7 | 0x88f0 | 0x8cac | 0x8cad => return Some("a texture of depths"),
+        0x8d70..=0x8d8f => return Some("a texture of integers"),
+        _ => {}
+    }
+    if gl::tex_parameter_f::<1>(target, TEXTURE_MAX_ANISOTROPY)[0] > 1.0 {
+        return Some("a texture with anisotropic filtering");
+    }
+    if version >= 33 && TEXTURE_SWIZZLE.map(parameter) != IN_ORDER {
+        return Some("a texture with its components in another order");
+    }
+    if version >= 33 && gl::word(SAMPLER_BINDING) != 0 {
+        return Some("a sampler object");
+    }
+    None
+}
+
+/// Texture coordinates of vertex `i`, generated and transformed.
+pub(crate) fn coordinates(
+    unit: &TextureUnit,
+    state: &Snapshot,
+    attributes: &Attributes,
+    lighting: &Setup<'_>,
+    i: usize,
+    p: [f32; 3],
+) -> [f32; 4] {
+    let mut c = attributes.tex.at(i);
+    if unit.generate.iter().any(|g| g.0 != 0) {
+        let eye = transform(&state.model_view, p);
+        let normal = lighting.eye_normal(attributes.normals.at(i));
+        let toward = normalized([eye[0], eye[1], eye[2]]);
+        let twice = 2.0 * (normal[0] * toward[0] + normal[1] * toward[1] + normal[2] * toward[2]);
+        let reflected: [f32; 3] = std::array::from_fn(|k| toward[k] - normal[k] * twice);
+        let m = 2.0 * (reflected[0].powi(2) + reflected[1].powi(2) + (reflected[2] + 1.0).powi(2)).sqrt();
+        for (k, (mode, plane)) in unit.generate.iter().enumerate() {
+            let dot = |v: [f32; 4]| (0..4).map(|j| plane[j] * v[j]).sum::<f32>();
+            c[k] = match *mode {
+                OBJECT_LINEAR => dot([p[0], p[1], p[2], 1.0]),
+                EYE_LINEAR => dot(eye),
+                SPHERE_MAP if k < 2 => reflected[k] / m + 0.5,
+                REFLECTION_MAP if k < 3 => reflected[k],
+                NORMAL_MAP if k < 3 => normal[k],
+                _ => c[k],
+            };
+        }
+    }
+    let m = &unit.matrix;
+    std::array::from_fn(|r| m[r] * c[0] + m[4 + r] * c[1] + m[8 + r] * c[2] + m[12 + r] * c[3])
+}
+
+/// Where coordinates are on the texture.
+pub(crate) fn divided(coords: [f32; 4]) -> [f32; 2] {
+    let q = if coords[3] == 0.0 { 1.0 } else { coords[3] };
+    [coords[0] / q, coords[1] / q]
+}
+
+/// The fragment's colour after the texture environment. `rho` is how many texels its pixel covers, where that is known.
+pub(crate) fn apply(
+    unit: &TextureUnit,
+    image: &Image,
+    f: [f32; 4],
+    coords: [f32; 4],
+    rho: Option<f32>,
+) -> [f32; 4] {
+    let [u, v] = divided(coords);
+    let t = match rho {
+        Some(rho) => image.sample_over(u, v, rho),
+        None => image.sample(u, v),
+    };
+    environment(unit.env_mode, unit.env_color, image.base, f, t)
+}
+
+fn environment(mode: u32, constant: [f32; 4], base: Base, f: [f32; 4], t: [f32; 4]) -> [f32; 4] {
+    // What GetTexImage gives for luminance and intensity is in the first component.
+    let (ct, at) = match base {
+        Base::Alpha => ([0.0; 3], t[3]),
+        Base::Luminance => ([t[0]; 3], 1.0),
+        Base::LuminanceAlpha => ([t[0]; 3], t[3]),
+        Base::Intensity => ([t[0]; 3], t[0]),
+        Base::Rgb => ([t[0], t[1], t[2]], 1.0),
+        Base::Rgba => ([t[0], t[1], t[2]], t[3]),
+    };
+    let (has_color, has_alpha) = (base != Base::Alpha, !matches!(base, Base::Luminance | Base::Rgb));
+    let mut out = f;
+    for k in 0..3 {
+        out[k] = match mode {
+            _ if !has_color => f[k],
+            REPLACE => ct[k],
+            DECAL if base == Base::Rgba => f[k] * (1.0 - at) + ct[k] * at,
+            DECAL => ct[k],
+            BLEND => f[k] * (1.0 - ct[k]) + constant[k] * ct[k],
+            ADD => f[k] + ct[k],
+            _ => f[k] * ct[k],
+        };
+    }
+    out[3] = match mode {
+        DECAL => f[3],
+        _ if !has_alpha => f[3],
+        REPLACE => at,
+        BLEND | ADD if base == Base::Intensity => {
+            if mode == ADD {
+                f[3] + at
+            } else {
+                f[3] * (1.0 - at) + constant[3] * at
+            }
+        }
+        _ => f[3] * at,
+    };
+    out.map(|v| v.clamp(0.0, 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn environments_follow_the_table_of_the_specification() {
+        let (f, t, c) = ([0.5, 0.5, 0.5, 0.5], [1.0, 0.0, 0.25, 0.5], [1.0; 4]);
+        assert_eq!(environment(MODULATE, c, Base::Rgba, f, t), [0.5, 0.0, 0.125, 0.25]);
+        assert_eq!(environment(DECAL, c, Base::Rgba, f, t), [0.75, 0.25, 0.375, 0.5]);
+        assert_eq!(environment(REPLACE, c, Base::Rgb, f, t), [1.0, 0.0, 0.25, 0.5]);
+        assert_eq!(environment(BLEND, c, Base::Luminance, f, t), [1.0, 1.0, 1.0, 0.5]);
+        assert_eq!(environment(MODULATE, c, Base::Alpha, f, t), [0.5, 0.5, 0.5, 0.25]);
+    }
+}

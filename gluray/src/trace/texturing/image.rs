@@ -1,0 +1,319 @@
+//! Images of textures, read from the driver level by level and kept as it stores them.
+
+use super::sampling::{Filters, Mip};
+use crate::cluster::codec::{Malformed, Reader, Wire, put_pods};
+use crate::interpose::driver::gl;
+use crate::state::enums::*;
+use rt_core::texture::{Filter, Texture, Wrap};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// What a texture's components stand for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Base {
+    Alpha,
+    Luminance,
+    LuminanceAlpha,
+    Intensity,
+    Rgb,
+    Rgba,
+}
+
+/// Texels, row by row.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Texels {
+    /// Eight bits a component, as most textures have: a quarter of the memory, and read from the driver by copying.
+    Bytes(Vec<[u8; 4]>),
+    /// What has other sizes.
+    Floats(Vec<[f32; 4]>),
+}
+
+impl Texels {
+    fn len(&self) -> usize {
+        match self {
+            Texels::Bytes(v) => v.len(),
+            Texels::Floats(v) => v.len(),
+        }
+    }
+
+    #[inline]
+    pub(super) fn at(&self, i: usize) -> [f32; 4] {
+        match self {
+            Texels::Bytes(v) => v[i].map(|c| f32::from(c) * (1.0 / 255.0)),
+            Texels::Floats(v) => v[i],
+        }
+    }
+}
+
+/// One level of a texture.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Level {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) texels: Texels,
+}
+
+/// A texture: its base level and, with mipmaps, those that follow.
+#[derive(Debug, Clone)]
+pub(crate) struct Image {
+    /// Never empty.
+    pub(super) levels: Vec<Level>,
+    pub(super) base: Base,
+    pub(super) filters: Filters,
+    pub(super) wrap: [u32; 2],
+    pub(super) border: [f32; 4],
+}
+
+crate::cluster::codec::wire_enum!(Base { Alpha, Luminance, LuminanceAlpha, Intensity, Rgb, Rgba });
+
+impl Wire for Level {
+    fn put(&self, out: &mut Vec<u8>) {
+        (self.width, self.height).put(out);
+        match &self.texels {
+            Texels::Bytes(v) => {
+                false.put(out);
+                put_pods(out, v);
+            }
+            Texels::Floats(v) => {
+                true.put(out);
+                put_pods(out, v);
+            }
+        }
+    }
+    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
+        let (width, height): (usize, usize) = Wire::get(from)?;
+        let texels =
+            if Wire::get(from)? { Texels::Floats(from.pods()?) } else { Texels::Bytes(from.pods()?) };
+        if width.checked_mul(height) != Some(texels.len()) || texels.len() == 0 {
+            return Err(from.fault(format!("an image of {width} x {height} with {} texels", texels.len())));
+        }
+        Ok(Level { width, height, texels })
+    }
+}
+
+impl Wire for Image {
+    fn put(&self, out: &mut Vec<u8>) {
+        self.levels.put(out);
+        self.base.put(out);
+        self.filters.put(out);
+        self.wrap.put(out);
+        self.border.put(out);
+    }
+    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
+        let levels: Vec<Level> = Wire::get(from)?;
+        if levels.is_empty() {
+            return Err(from.fault("an image without a level".to_owned()));
+        }
+        let (base, filters) = Wire::get(from)?;
+        let (wrap, border) = Wire::get(from)?;
+        Ok(Image { levels, base, filters, wrap, border })
+    }
+}
+
+/// What components stand for, from the sizes of red, green, blue, alpha, luminance and intensity: formats are too many to know all by name.
+fn base_of([red, _, _, alpha, luminance, intensity]: [i32; 6]) -> Base {
+    match (red > 0, alpha > 0, luminance > 0, intensity > 0) {
+        (_, _, _, true) => Base::Intensity,
+        (_, true, true, _) => Base::LuminanceAlpha,
+        (_, false, true, _) => Base::Luminance,
+        (false, true, ..) => Base::Alpha,
+        (_, false, ..) => Base::Rgb,
+        _ => Base::Rgba,
+    }
+}
+
+/// The version at which a texture was read, and what it was.
+type Versioned = (u64, Option<Arc<Image>>);
+
+/// Images by texture name, with the version they were read at.
+#[derive(Default)]
+pub(crate) struct Images {
+    images: HashMap<(u32, u32), Versioned>,
+    /// Memory of an image that has gone: programs that replace a texture in each frame replace it by one of its size.
+    spare: Vec<[u8; 4]>,
+    /// How many were read from the driver.
+    pub(crate) read: u64,
+}
+
+impl Images {
+    /// The image of a texture; `None` when it is incomplete (then OpenGL leaves texturing out) or cannot be followed.
+    ///
+    /// Nothing is read before something is drawn with it. Images of earlier versions can never be asked for again and go at once, so that no
+    /// more are held than the program has.
+    pub(crate) fn get(&mut self, target: u32, name: u32, version: u64) -> Option<Arc<Image>> {
+        if let Some((v, image)) = self.images.get(&(target, name))
+            && *v == version
+        {
+            return image.clone();
+        }
+        let stale: Vec<Arc<Image>> =
+            self.images.extract_if(|_, (v, _)| *v != version).filter_map(|(_, (_, i))| i).collect();
+        for image in stale.into_iter().filter_map(Arc::into_inner) {
+            for level in image.levels {
+                if let Texels::Bytes(v) = level.texels
+                    && v.len() > self.spare.len()
+                {
+                    self.spare = v;
+                }
+            }
+        }
+        let image = read_bound(target, name, &mut self.spare).map(Arc::new);
+        self.read += u64::from(image.is_some());
+        self.images.insert((target, name), (version, image.clone()));
+        image
+    }
+}
+
+/// Reads a texture by its name: what is bound may be another by now.
+fn read_bound(target: u32, name: u32, spare: &mut Vec<[u8; 4]>) -> Option<Image> {
+    let bound = gl::word(if target == TEXTURE_1D { TEXTURE_BINDING_1D } else { TEXTURE_BINDING_2D });
+    if bound != name {
+        gl::bind_texture(target, name);
+    }
+    let image = gl::plain_reading(|plainly| read(plainly, target, spare));
+    if bound != name {
+        gl::bind_texture(target, bound);
+    }
+    image
+}
+
+const TEXTURE_BASE_LEVEL: u32 = 0x813c;
+const TEXTURE_MAX_LEVEL: u32 = 0x813d;
+const TEXTURE_SRGB_DECODE: u32 = 0x8a48;
+const SKIP_DECODE: u32 = 0x8a4a;
+/// Sizes of red, green, blue, alpha, luminance, intensity.
+const COMPONENT_SIZES: [u32; 6] = [0x805c, 0x805d, 0x805e, 0x805f, 0x8060, 0x8061];
+
+fn read(plainly: &gl::Plainly, target: u32, spare: &mut Vec<[u8; 4]>) -> Option<Image> {
+    let of_level = |n: i32, what| gl::tex_level_i::<1>(target, n, what)[0];
+    let size = |n: i32| [TEXTURE_WIDTH, TEXTURE_HEIGHT].map(|what| of_level(n, what).max(0) as usize);
+    let parameter = |what| gl::tex_parameter_i::<1>(target, what)[0].cast_unsigned();
+    let first = parameter(TEXTURE_BASE_LEVEL).min(31).cast_signed();
+    let [width, height] = size(first);
+    if width == 0 || height == 0 || width * height > 1 << 26 {
+        return None;
+    }
+    let format = of_level(first, TEXTURE_INTERNAL_FORMAT).cast_unsigned();
+    let filters = Filters::query(target, parameter(TEXTURE_MIN_FILTER), parameter(TEXTURE_MAG_FILTER));
+    // Complete means: all levels are there down to one texel or the last that is allowed, in one format.
+    let smallest = first + width.max(height).ilog2().cast_signed();
+    let last = match filters.mip {
+        Mip::None => first,
+        _ => smallest.min(parameter(TEXTURE_MAX_LEVEL).min(1000).cast_signed()),
+    };
+    if last < first {
+        return None;
+    }
+    let halved = |n: i32| [width, height].map(|v| (v >> (n - first)).max(1));
+    let is_complete = (first + 1..=last)
+        .all(|n| size(n) == halved(n) && of_level(n, TEXTURE_INTERNAL_FORMAT).cast_unsigned() == format);
+    if !is_complete {
+        return None;
+    }
+    // Signed components have other steps.
+    let signed = matches!(format, 0x8f90..=0x8f9b | 0x9010..=0x901b);
+    let sizes = COMPONENT_SIZES.map(|what| of_level(first, what));
+    let whole = !signed && sizes.iter().all(|bits| matches!(bits, 0 | 8));
+    // Decoded before they are filtered, as the driver does.
+    let encoded = matches!(format, 0x8c40..=0x8c4f) && parameter(TEXTURE_SRGB_DECODE) != SKIP_DECODE;
+    let levels = (first..=last).map(|n| {
+        let [width, height] = halved(n);
+        let texels = if whole && !encoded {
+            Texels::Bytes(gl::tex_image_bytes(plainly, target, n, std::mem::take(spare)))
+        } else {
+            let mut texels = gl::tex_image_rgba(plainly, target, n);
+            if encoded {
+                texels.iter_mut().for_each(|t| (0..3).for_each(|k| t[k] = decoded(t[k])));
+            }
+            Texels::Floats(texels)
+        };
+        Level { width, height, texels }
+    });
+    let levels: Vec<Level> = levels.collect();
+    if levels.iter().any(|l| l.texels.len() != l.width * l.height) {
+        // Another thread has given it another size meanwhile.
+        return None;
+    }
+    Some(Image {
+        levels,
+        base: base_of(sizes),
+        filters,
+        wrap: [
+            parameter(TEXTURE_WRAP_S),
+            if target == TEXTURE_1D { CLAMP_TO_EDGE } else { parameter(TEXTURE_WRAP_T) },
+        ],
+        border: gl::tex_parameter_f(target, TEXTURE_BORDER_COLOR),
+    })
+}
+
+/// A component of sRGB, linear (OpenGL 4.6, equation 8.17).
+fn decoded(v: f32) -> f32 {
+    if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+}
+
+impl Image {
+    /// Colours in a row, found by their numbers.
+    fn of_row(texels: Texels) -> Image {
+        let level = Level { width: texels.len(), height: 1, texels };
+        Image {
+            levels: vec![level],
+            base: Base::Rgba,
+            filters: Filters::NEAREST,
+            wrap: [CLAMP_TO_EDGE; 2],
+            border: [0.0; 4],
+        }
+    }
+
+    /// The same of eight bits a component.
+    pub(crate) fn of_bytes(texels: Vec<[u8; 4]>) -> Image {
+        Image::of_row(Texels::Bytes(texels))
+    }
+
+    /// The same of numbers of any size.
+    pub(crate) fn of_floats(texels: Vec<[f32; 4]>) -> Image {
+        Image::of_row(Texels::Floats(texels))
+    }
+
+    /// The colour of a number; white where there is none.
+    pub(crate) fn numbered(&self, i: usize) -> [f32; 4] {
+        let texels = &self.levels[0].texels;
+        if i < texels.len() { texels.at(i) } else { [1.0; 4] }
+    }
+
+    /// True when its components are red, green, blue and alpha, or the first of these.
+    pub(crate) fn is_of_colors(&self) -> bool {
+        matches!(self.base, Base::Rgb | Base::Rgba)
+    }
+
+    /// True when no texel lets anything through.
+    pub(crate) fn is_opaque(&self) -> bool {
+        let opaque = |l: &Level| match &l.texels {
+            Texels::Bytes(v) => v.iter().all(|t| t[3] == 255),
+            Texels::Floats(v) => v.iter().all(|t| t[3] == 1.0),
+        };
+        self.levels.iter().all(opaque) && (self.wrap != [CLAMP_TO_BORDER; 2] || self.border[3] == 1.0)
+    }
+
+    /// The picture as a texture of rt-core's, with what its components stand for; `None` when it cannot be one.
+    pub(crate) fn as_texture(&self) -> Option<Texture> {
+        let rgba = |t: [f32; 4]| match self.base {
+            Base::Alpha => [1.0, 1.0, 1.0, t[3]],
+            Base::Luminance => [t[0], t[0], t[0], 1.0],
+            Base::LuminanceAlpha => [t[0], t[0], t[0], t[3]],
+            Base::Intensity => [t[0]; 4],
+            Base::Rgb => [t[0], t[1], t[2], 1.0],
+            Base::Rgba => t,
+        };
+        let level = &self.levels[0];
+        let texels = (0..level.texels.len()).map(|i| rgba(level.texels.at(i))).collect();
+        let wrap = self.wrap.map(|w| match w {
+            REPEAT => Wrap::Repeat,
+            MIRRORED_REPEAT => Wrap::Mirror,
+            _ => Wrap::Clamp,
+        });
+        let filter = if self.filters.mag_linear { Filter::Bilinear } else { Filter::Nearest };
+        let mut texture = Texture::from_linear(level.width, level.height, texels).ok()?;
+        (texture.wrap, texture.filter) = (wrap, filter);
+        Some(texture)
+    }
+}

@@ -1,0 +1,241 @@
+//! Texels at a fragment: wrapping, filters, and the choice among mipmaps.
+//!
+//! The footprint of a pixel is the longer of the two derivatives (compatibility profile specification, equation 8.7), taken as llvmpipe takes them: the
+//! differences within each two by two pixels.
+
+use super::image::{Image, Level};
+use crate::interpose::driver::gl;
+use crate::state::enums::*;
+
+/// How levels are chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Mip {
+    /// The base level alone.
+    None,
+    /// The nearest.
+    Nearest,
+    /// Two, blended.
+    Linear,
+}
+
+/// Filters of a texture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Filters {
+    pub(super) mag_linear: bool,
+    pub(super) min_linear: bool,
+    pub(super) mip: Mip,
+    /// Added to the level of detail.
+    pub(super) bias: f32,
+    /// Its limits.
+    pub(super) lod: [f32; 2],
+}
+
+crate::cluster::codec::wire_enum!(Mip { None, Nearest, Linear });
+crate::cluster::codec::wire_struct!(Filters { mag_linear, min_linear, mip, bias, lod });
+
+const TEXTURE_MIN_LOD: u32 = 0x813a;
+const TEXTURE_MAX_LOD: u32 = 0x813b;
+const TEXTURE_FILTER_CONTROL: u32 = 0x8500;
+const TEXTURE_LOD_BIAS: u32 = 0x8501;
+/// The driver's limit for levels of detail that it does not look at.
+const DEEPEST: f32 = 14.0;
+
+/// A logarithm as llvmpipe has it: of the square, from one power of two to the next along a straight line, so up to 0.043 too small.
+fn log2(rho: f32) -> f32 {
+    let square = rho * rho;
+    let whole = square.log2().floor();
+    0.5 * (whole + square / whole.exp2() - 1.0)
+}
+
+impl Filters {
+    /// None at all.
+    pub(super) const NEAREST: Filters =
+        Filters { mag_linear: false, min_linear: false, mip: Mip::None, bias: 0.0, lod: [0.0; 2] };
+
+    /// Of the bound texture and its unit.
+    pub(super) fn query(target: u32, min: u32, mag: u32) -> Filters {
+        let one = |what| gl::tex_parameter_f::<1>(target, what)[0];
+        Filters {
+            mag_linear: mag == LINEAR,
+            min_linear: matches!(min, LINEAR | 0x2701 | 0x2703),
+            mip: match min {
+                NEAREST | LINEAR => Mip::None,
+                0x2700 | 0x2701 => Mip::Nearest,
+                _ => Mip::Linear,
+            },
+            bias: one(TEXTURE_LOD_BIAS) + gl::tex_env_f::<1>(TEXTURE_FILTER_CONTROL, TEXTURE_LOD_BIAS)[0],
+            lod: [one(TEXTURE_MIN_LOD), one(TEXTURE_MAX_LOD)],
+        }
+    }
+
+    /// What a footprint of `rho` texels means: whether the texture is made smaller, the level, and the share of the level after it.
+    fn choose(&self, rho: f32, last: usize) -> (bool, usize, f32) {
+        let [least, most] = [self.lod[0].max(0.0), self.lod[1]];
+        let plain = self.bias == 0.0 && least == 0.0 && most >= DEEPEST;
+        // As the driver adjusts it, and only where there is something to adjust.
+        let lod = (log2(rho) + self.bias).max(least).min(most.max(least));
+        let smaller = if plain { rho > 1.0 } else { lod > 0.0 };
+        let level = match self.mip {
+            Mip::None => 0.0,
+            Mip::Nearest if plain => (rho * std::f32::consts::SQRT_2).log2().floor(),
+            Mip::Nearest => (lod + 0.5).floor(),
+            Mip::Linear => lod.floor(),
+        };
+        let share = if self.mip == Mip::Linear { lod - level } else { 0.0 };
+        // Also where the footprint is no number.
+        let inside = level >= 0.0;
+        match level as usize {
+            _ if !inside => (smaller, 0, 0.0),
+            n if n >= last => (smaller, last, 0.0),
+            n => (smaller, n, share.clamp(0.0, 1.0)),
+        }
+    }
+}
+
+impl Image {
+    /// True when the footprint of a pixel decides what is sampled.
+    pub(crate) fn needs_footprint(&self) -> bool {
+        self.filters.mip != Mip::None || self.filters.min_linear != self.filters.mag_linear
+    }
+
+    /// Texels of the base level across and up.
+    pub(crate) fn size(&self) -> [f32; 2] {
+        [self.levels[0].width as f32, self.levels[0].height as f32]
+    }
+
+    /// The texel at (s, t) of the base level, magnified.
+    pub(crate) fn sample(&self, s: f32, t: f32) -> [f32; 4] {
+        self.filtered(&self.levels[0], self.filters.mag_linear, s, t)
+    }
+
+    /// The texel at (s, t) for a pixel that covers `rho` texels of the base level.
+    pub(crate) fn sample_over(&self, s: f32, t: f32, rho: f32) -> [f32; 4] {
+        let f = &self.filters;
+        let (smaller, level, share) = f.choose(rho, self.levels.len() - 1);
+        if !smaller && f.min_linear != f.mag_linear {
+            return self.sample(s, t);
+        }
+        let near = self.filtered(&self.levels[level], f.min_linear, s, t);
+        if share <= 0.0 {
+            return near;
+        }
+        let far = self.filtered(&self.levels[level + 1], f.min_linear, s, t);
+        std::array::from_fn(|k| near[k] + (far[k] - near[k]) * share)
+    }
+
+    fn texel(&self, level: &Level, x: i64, y: i64) -> [f32; 4] {
+        let (w, h) = (level.width as i64, level.height as i64);
+        let place = |i: i64, n: i64, wrap: u32| match wrap {
+            REPEAT => Some(i.rem_euclid(n)),
+            MIRRORED_REPEAT => {
+                let k = i.rem_euclid(2 * n);
+                Some(if k < n { k } else { 2 * n - 1 - k })
+            }
+            CLAMP_TO_EDGE => Some(i.clamp(0, n - 1)),
+            _ => (0..n).contains(&i).then_some(i),
+        };
+        match (place(x, w, self.wrap[0]), place(y, h, self.wrap[1])) {
+            (Some(x), Some(y)) => level.texels.at((y * w + x) as usize),
+            _ => self.border,
+        }
+    }
+
+    fn filtered(&self, level: &Level, linear: bool, s: f32, t: f32) -> [f32; 4] {
+        let clamp = |v: f32, wrap: u32| if wrap == CLAMP { v.clamp(0.0, 1.0) } else { v };
+        let x = clamp(s, self.wrap[0]) * level.width as f32;
+        let y = clamp(t, self.wrap[1]) * level.height as f32;
+        if !(x.is_finite() && y.is_finite()) {
+            return self.border;
+        }
+        if !linear {
+            // GL_CLAMP at 1 is the last texel here.
+            let last = |v: f32, n: usize, wrap: u32| {
+                let i = v.floor() as i64;
+                if wrap == CLAMP { i.min(n as i64 - 1) } else { i }
+            };
+            let (x, y) = (last(x, level.width, self.wrap[0]), last(y, level.height, self.wrap[1]));
+            return self.texel(level, x, y);
+        }
+        let (x, y) = (x - 0.5, y - 0.5);
+        let (i, j) = (x.floor(), y.floor());
+        let (a, b) = (x - i, y - j);
+        let (i, j) = (i as i64, j as i64);
+        let [p, q, r, u] = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| self.texel(level, i + dx, j + dy));
+        std::array::from_fn(|k| {
+            let (lo, hi) = (p[k] + (q[k] - p[k]) * a, r[k] + (u[k] - r[k]) * a);
+            lo + (hi - lo) * b
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::image::{Base, Texels};
+    use super::*;
+
+    fn image(linear: bool, wrap: u32) -> Image {
+        let texels = Texels::Bytes(vec![[0; 4], [255; 4]]);
+        Image {
+            levels: vec![Level { width: 2, height: 1, texels }],
+            base: Base::Rgba,
+            filters: Filters {
+                mag_linear: linear,
+                min_linear: linear,
+                mip: Mip::None,
+                bias: 0.0,
+                lod: [-1000.0, 1000.0],
+            },
+            wrap: [wrap, CLAMP_TO_EDGE],
+            border: [0.5; 4],
+        }
+    }
+
+    #[test]
+    fn filters_and_wraps_are_opengls() {
+        assert_eq!(image(false, REPEAT).sample(1.3, 0.0)[0], 0.0);
+        assert_eq!(image(false, MIRRORED_REPEAT).sample(1.3, 0.0)[0], 1.0);
+        assert_eq!(image(false, CLAMP_TO_BORDER).sample(1.3, 0.0)[0], 0.5);
+        assert_eq!(image(true, CLAMP_TO_EDGE).sample(0.5, 0.5)[0], 0.5);
+        assert_eq!(image(true, CLAMP_TO_EDGE).sample(9.0, 0.5)[0], 1.0);
+        assert_eq!(image(true, CLAMP).sample(1.0, 0.5)[0], 0.75, "half edge, half border");
+    }
+
+    #[test]
+    fn levels_follow_the_footprint_within_their_limits() {
+        let mut f = image(true, REPEAT).filters;
+        f.mip = Mip::Nearest;
+        assert_eq!(f.choose(0.3, 5), (false, 0, 0.0));
+        assert_eq!(f.choose(2.0, 5), (true, 1, 0.0));
+        assert_eq!(f.choose(2.9, 5), (true, 2, 0.0));
+        assert_eq!(f.choose(1e9, 5), (true, 5, 0.0), "no level beyond the last");
+        assert_eq!(f.choose(f32::NAN, 5).1, 0);
+        f.bias = 1.0;
+        assert_eq!(f.choose(2.0, 5), (true, 2, 0.0));
+        f.lod = [0.0, 1.0];
+        assert_eq!(f.choose(64.0, 5), (true, 1, 0.0));
+        f.lod = [3.0, 1000.0];
+        assert_eq!(f.choose(0.01, 5), (true, 3, 0.0), "at least that deep");
+    }
+
+    #[test]
+    fn two_levels_are_blended_by_the_fraction_of_the_level_of_detail() {
+        let mut f = image(true, REPEAT).filters;
+        f.mip = Mip::Linear;
+        assert_eq!(f.choose(2.0, 5), (true, 1, 0.0));
+        assert_eq!(f.choose(0.5, 5), (false, 0, 0.0));
+        let (_, level, share) = f.choose(2.0 * std::f32::consts::SQRT_2, 5);
+        assert!(level == 1 && (share - 0.5).abs() < 1e-5, "{level} {share}");
+        f.bias = -0.25;
+        let (_, level, share) = f.choose(2.0 * std::f32::consts::SQRT_2, 5);
+        assert!(level == 1 && (share - 0.25).abs() < 1e-5, "{level} {share}");
+    }
+
+    #[test]
+    fn one_filter_makes_larger_and_another_smaller() {
+        let mut i = image(true, CLAMP_TO_EDGE);
+        i.filters.min_linear = false;
+        assert!(i.needs_footprint());
+        assert_eq!(i.sample_over(0.5, 0.5, 0.9)[0], 0.5);
+        assert_eq!(i.sample_over(0.5, 0.5, 1.1)[0], 1.0);
+    }
+}

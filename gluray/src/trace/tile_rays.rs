@@ -1,0 +1,306 @@
+//! Rays of a tile: through the centres of 16 x 16 pixels, made 16 at a time.
+//!
+//! Origins and directions are affine in window coordinates, and so are the numerators and denominators of where planes cut a ray; so what costs a
+//! matrix product and a sum of magnitudes per plane for one ray ([`Prepared::ray`]) costs a few multiplications here. Rays only find triangles,
+//! so the last bits of both ways need not agree.
+
+use super::{Prepared, Rect, TILE};
+use crate::capture::draw::Draw;
+use fearless_simd::{
+    Level, Select, Simd, SimdBase, SimdMask, SimdNarrow, dispatch, f32x16, f64x8, mask32x16,
+};
+use rt_core::glam::{DVec3, DVec4};
+use rt_core::ray::{HitBlock, LANES, Ray, RayBlock};
+use std::sync::atomic::Ordering::Relaxed;
+
+/// Blocks of a tile.
+pub(super) const BLOCKS: usize = 16;
+
+/// A number that is affine in window coordinates: its value at the window's origin, its change with x, with y.
+#[derive(Debug, Clone, Copy, Default)]
+struct Affine([f64; 3]);
+
+impl Affine {
+    #[inline(always)]
+    fn at(&self, x: f64, y: f64) -> f64 {
+        self.0[0] + self.0[1] * x + self.0[2] * y
+    }
+
+    #[inline(always)]
+    fn row<S: Simd>(&self, x: f64x8<S>, y: f64x8<S>) -> f64x8<S> {
+        x * self.0[1] + self.0[0] + y * self.0[2]
+    }
+}
+
+/// Two rows of a block.
+struct Half<S: Simd> {
+    origin: [f64x8<S>; 3],
+    dir: [f64x8<S>; 3],
+    /// Where rays begin, and what of them is not cut off, from there on.
+    back: f64x8<S>,
+    from: f64x8<S>,
+    to: f64x8<S>,
+    /// Lanes of which anything is left.
+    some: u64,
+}
+
+/// The rays of a draw as functions of window coordinates.
+#[derive(Default)]
+pub(super) struct Bundle {
+    origin: [Affine; 3],
+    dir: [Affine; 3],
+    /// How far above each plane the origin is (a little more than it is), and how that grows along the ray.
+    planes: Vec<[Affine; 2]>,
+    /// Parameter at which rays begin when the scene is far away, so that f32 loses nothing.
+    start: f64,
+    /// Clip z and w, of the origin and of the direction: what depth a parameter has.
+    depth: [[Affine; 2]; 2],
+}
+
+impl Bundle {
+    pub(super) fn new(p: &Prepared<'_>) -> Bundle {
+        let [vx, vy, vw, vh] = p.draw.state.viewport.map(f64::from);
+        let ndc = |x: f64, y: f64| [2.0 * (x - vx) / vw - 1.0, 2.0 * (y - vy) / vh - 1.0];
+        // Across the whole viewport, so that differences lose nothing.
+        let [zero, right, up] =
+            [[vx, vy], [vx + vw, vy], [vx, vy + vh]].map(|[x, y]| p.camera.world_ray(ndc(x, y)));
+        let affine = |f: &dyn Fn((DVec3, DVec3)) -> f64| {
+            let (dx, dy) = ((f(right) - f(zero)) / vw, (f(up) - f(zero)) / vh);
+            Affine([f(zero) - dx * vx - dy * vy, dx, dy])
+        };
+        let axes = [0, 1, 2];
+        let center = p.world.origin();
+        let rect = p.rect;
+        let corners = [(0, 0), (rect.w, 0), (0, rect.h), (rect.w, rect.h)]
+            .map(|(x, y)| (f64::from(rect.x + x), f64::from(rect.y + y)));
+        let origin = axes.map(|k| affine(&|(o, _)| o[k] - center[k]));
+        let dir = axes.map(|k| affine(&|(_, d)| d[k]));
+        let planes = p
+            .planes
+            .iter()
+            .map(|plane| {
+                let plane = DVec4::from_array(*plane);
+                let n = plane.truncate();
+                // The exact test is that of the fragment: the most that rounding may be anywhere in the rectangle.
+                let size = corners.map(|(x, y)| {
+                    let o = axes.map(|k| origin[k].at(x, y) + center[k]);
+                    (0..3).map(|k| (n[k] * o[k]).abs()).sum::<f64>() + plane.w.abs()
+                });
+                let slack = 1e-6 * size.into_iter().fold(0.0, f64::max);
+                let mut above = affine(&|(o, _)| n.dot(o) + plane.w);
+                above.0[0] += slack;
+                [above, affine(&|(_, d)| n.dot(d))]
+            })
+            .collect();
+        let clip = super::matrix(&p.draw.clip_from_object);
+        let rows = [clip.row(2), clip.row(3)];
+        let depth = [
+            rows.map(|r| affine(&|(o, _)| r.dot(o.extend(1.0)))),
+            rows.map(|r| affine(&|(_, d)| r.dot(d.extend(0.0)))),
+        ];
+        let mut bundle = Bundle { origin, dir, planes, start: 0.0, depth };
+        bundle.start = bundle.beginning(p, &corners);
+        bundle
+    }
+
+    /// Where the bounds begin along the rays, when they are so far off that f32 would lose bits; else 0. The parameter is clip w or the share of
+    /// the way from the near plane to the far one: both are the same for all points of a plane before the viewer.
+    fn beginning(&self, p: &Prepared<'_>, corners: &[(f64, f64); 4]) -> f64 {
+        let bounds = p.draw.geometry.bounds();
+        let (middle, radius) = (bounds.center().as_dvec3() - p.world.origin(), f64::from(bounds.radius()));
+        let far = |(x, y): (f64, f64)| {
+            let o = DVec3::from_array(self.origin.map(|a| a.at(x, y)));
+            (o - middle).abs().max_element() > 64.0 * radius
+        };
+        if !corners.iter().any(|c| far(*c)) {
+            return 0.0;
+        }
+        let (x, y) = corners[0];
+        let origin = DVec3::from_array(self.origin.map(|a| a.at(x, y)));
+        let dir = DVec3::from_array(self.dir.map(|a| a.at(x, y)));
+        let clip = super::matrix(&p.draw.clip_from_object);
+        let (z, w) = (clip.row(2), clip.row(3));
+        let parallel = w.truncate() == DVec3::ZERO;
+        // Along a ray the parameter is w itself, or (z + w) / w.
+        let row = if parallel { (z + w) / w.w } else { w };
+        let at = |v: DVec3| row.truncate().dot(v + p.world.origin()) + row.w;
+        debug_assert!(dir.is_finite() && origin.is_finite(), "cameras are finite");
+        let nearest = at(middle) - row.truncate().length() * radius;
+        (nearest - nearest.abs() * 1e-6).max(0.0)
+    }
+
+    /// The rays of one block, whose pixels begin at (`x`, `y`); `used` has a bit for each lane that is wanted.
+    #[inline(always)]
+    fn block<S: Simd>(
+        &self,
+        simd: S,
+        [x, y]: [f64; 2],
+        used: u16,
+        out: &mut RayBlock,
+        shift: &mut [f64; LANES],
+    ) {
+        let [a, b] = [self.half(simd, x, y), self.half(simd, x, y + 2.0)];
+        a.back.store_slice(&mut shift[..8]);
+        b.back.store_slice(&mut shift[8..]);
+        for (k, o) in [&mut out.ox, &mut out.oy, &mut out.oz].into_iter().enumerate() {
+            a.origin[k].narrow(b.origin[k]).store_slice(o);
+        }
+        for (k, d) in [&mut out.dx, &mut out.dy, &mut out.dz].into_iter().enumerate() {
+            a.dir[k].narrow(b.dir[k]).store_slice(d);
+        }
+        let zero = f32x16::splat(simd, 0.0);
+        let least = a.from.narrow(b.from);
+        least.simd_gt(zero).select(least, zero).store_slice(&mut out.t_min);
+        // A little more, as `next_up` would give.
+        let most = a.to.narrow(b.to);
+        let more = most + most.abs() * 1.2e-7;
+        let finite = most.simd_lt(f32x16::splat(simd, f32::MAX));
+        let most = finite.select(more, f32x16::splat(simd, f32::INFINITY));
+        let wanted = u64::from(used) & (a.some | b.some << 8);
+        mask32x16::from_bitmask(simd, wanted)
+            .select(most, f32x16::splat(simd, -1.0))
+            .store_slice(&mut out.t_max);
+    }
+
+    /// Two rows of a block.
+    #[inline(always)]
+    fn half<S: Simd>(&self, simd: S, x: f64, y: f64) -> Half<S> {
+        let splat = |v: f64| f64x8::splat(simd, v);
+        let px = splat(x) + f64x8::from_slice(simd, &[0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0]);
+        let py = splat(y) + f64x8::from_slice(simd, &[0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]);
+        let (zero, before_all) = (splat(0.0), splat(f64::NEG_INFINITY));
+        let (mut t0, mut t1) = (before_all, splat(f64::INFINITY));
+        let mut none = 0;
+        for [above, along] in &self.planes {
+            let (a, b) = (above.row(px, py), along.row(px, py));
+            let t = -a / b;
+            t0 = (b.simd_gt(zero) & t.simd_gt(t0)).select(t, t0);
+            t1 = (b.simd_lt(zero) & t.simd_lt(t1)).select(t, t1);
+            none |= (b.simd_eq(zero) & a.simd_lt(zero)).to_bitmask();
+        }
+        // Rays of a parallel projection begin where the program's near plane is; a plane before it may be the first.
+        let before = t0.simd_lt(zero) & t0.simd_gt(before_all);
+        let back = before.select(t0, splat(self.start));
+        let (mut origin, mut dir) = ([zero; 3], [zero; 3]);
+        for k in 0..3 {
+            dir[k] = self.dir[k].row(px, py);
+            origin[k] = self.origin[k].row(px, py) + dir[k] * back;
+        }
+        Half { origin, dir, back, from: t0 - back, to: t1 - back, some: t0.simd_lt(t1).to_bitmask() & !none }
+    }
+
+    /// The parameter, from the ray's own origin on, at which the ray through (`x`, `y`) has this z by w.
+    #[inline]
+    fn parameter(&self, x: f64, y: f64, z_by_w: f64, shift: f64) -> f32 {
+        let [[z, w], [dz, dw]] = self.depth.map(|d| d.map(|a| a.at(x, y)));
+        ((z_by_w * w - z) / (dz - z_by_w * dw) - shift) as f32
+    }
+}
+
+/// The rays and hits of a tile: pixel (x, y) of the tile is lane `x % 4 + 4 (y % 4)` of block `x / 4 + 4 (y / 4)`.
+pub(super) struct TileRays {
+    level: Level,
+    pub(super) blocks: Vec<RayBlock>,
+    pub(super) hits: Vec<HitBlock>,
+    shift: [[f64; LANES]; BLOCKS],
+    /// A second look behind the first hits.
+    behind: Vec<RayBlock>,
+    pub(super) overtakers: Vec<HitBlock>,
+}
+
+impl TileRays {
+    pub(super) fn new() -> TileRays {
+        TileRays {
+            level: Level::new(),
+            blocks: vec![RayBlock::INACTIVE; BLOCKS],
+            hits: vec![HitBlock::MISS; BLOCKS],
+            shift: [[0.0; LANES]; BLOCKS],
+            behind: vec![RayBlock::INACTIVE; BLOCKS],
+            overtakers: vec![HitBlock::MISS; BLOCKS],
+        }
+    }
+
+    /// Sends rays through the pixels of `area`, which is no larger than a tile. False when nothing was hit.
+    pub(super) fn send(&mut self, p: &Prepared<'_>, area: Rect) -> bool {
+        let (level, blocks, shift) = (self.level, &mut self.blocks, &mut self.shift);
+        dispatch!(level, simd => make(simd, &p.bundle, area, blocks, shift));
+        self.hits.fill(HitBlock::MISS);
+        p.world.closest_coherent(&self.blocks, &mut self.hits).expect("one block of hits for each of rays");
+        p.rays.fetch_add(area.w as u64 * area.h as u64, Relaxed);
+        self.hits.iter().any(|h| h.prim.iter().any(|p| *p != rt_core::ray::NO_HIT))
+    }
+
+    /// Looks behind first hits that polygon offset moved back: is there anything up to where it moved them? `depth` is that place (z by w) for
+    /// each pixel; NaN for those that were not moved.
+    pub(super) fn look_behind(&mut self, p: &Prepared<'_>, area: Rect, z_by_w: &[f64; 256]) -> bool {
+        let mut any = false;
+        for y in 0..area.h {
+            for x in 0..area.w {
+                let (b, l) = slot(x, y);
+                let z = z_by_w[b * LANES + l];
+                let hit = self.hits[b].t[l];
+                self.behind[b].t_max[l] = -1.0;
+                if !z.is_nan() {
+                    let (px, py) = (f64::from(area.x + x) + 0.5, f64::from(area.y + y) + 0.5);
+                    let limit = p.bundle.parameter(px, py, z, self.shift[b][l]);
+                    let ray = self.blocks[b].get(l);
+                    let (from, to) = (hit.next_up(), limit.min(ray.t_max));
+                    if from < to {
+                        self.behind[b].set(l, &Ray { t_min: from, t_max: to, ..ray });
+                        any = true;
+                    }
+                }
+            }
+        }
+        if any {
+            self.overtakers.fill(HitBlock::MISS);
+            p.world
+                .closest_coherent(&self.behind, &mut self.overtakers)
+                .expect("one block of hits for each of rays");
+        }
+        self.behind.iter_mut().for_each(|b| b.t_max = [-1.0; LANES]);
+        any
+    }
+}
+
+#[inline(always)]
+fn make<S: Simd>(
+    simd: S,
+    bundle: &Bundle,
+    area: Rect,
+    blocks: &mut [RayBlock],
+    shift: &mut [[f64; LANES]; BLOCKS],
+) {
+    for (b, (out, shift)) in blocks.iter_mut().zip(shift).enumerate() {
+        let (x, y) = (4 * (b as i32 % 4), 4 * (b as i32 / 4));
+        let mut used = 0_u16;
+        for l in 0..LANES as i32 {
+            used |= u16::from(x + l % 4 < area.w && y + l / 4 < area.h) << l;
+        }
+        if used == 0 {
+            *out = RayBlock::INACTIVE;
+        } else {
+            let at = [f64::from(area.x + x) + 0.5, f64::from(area.y + y) + 0.5];
+            bundle.block(simd, at, used, out, shift);
+        }
+    }
+}
+
+/// Two planes across clip z between which all of a draw is.
+pub(super) fn slab(draw: &Draw, z: DVec4) -> [[f64; 4]; 2] {
+    let b = draw.geometry.bounds();
+    let at = |corner: i32| {
+        let pick = |bit: i32, k: usize| f64::from(if corner & bit == 0 { b.min[k] } else { b.max[k] });
+        z.dot(DVec4::new(pick(1, 0), pick(2, 1), pick(4, 2), 1.0))
+    };
+    let (lo, hi) = (0..8).map(at).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    let more = 1e-3 * (hi - lo) + 1e-6 * (hi.abs() + lo.abs());
+    [(z - DVec4::W * (lo - more)).to_array(), (DVec4::W * (hi + more) - z).to_array()]
+}
+
+/// Block and lane of a pixel of a tile.
+#[inline]
+pub(super) fn slot(x: i32, y: i32) -> (usize, usize) {
+    debug_assert!((0..TILE).contains(&x) && (0..TILE).contains(&y), "a pixel of the tile");
+    ((x / 4 + 4 * (y / 4)) as usize, (x % 4 + 4 * (y % 4)) as usize)
+}

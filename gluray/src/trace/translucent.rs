@@ -1,0 +1,267 @@
+//! Translucent surfaces in one go: all fragments of a pixel before its opaque surface, blended in the order of their depths.
+//!
+//! Rays go from surface to surface, 256 at a time. Where a hit is none of the rasterizer's fragments, an edge is near, and four rays beside the centre
+//! find the triangle that the fill rule gives the pixel to.
+
+use super::{
+    DEPTH_STEPS, Fragment, Layer, MOST_STEPS, Prepared, Rect, TILE, TileRays, UNCOVERED, slot, to_bytes,
+};
+use crate::host::config::Settings;
+use crate::trace::occlusion::Surroundings;
+use crate::trace::raster::steepness;
+use rayon::prelude::*;
+use rt_core::ray::{HitBlock, LANES, NO_HIT};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+/// Depths that fragments may have at most, by pixel of the framebuffer.
+pub(crate) struct Limit {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) depth: Vec<f32>,
+    /// Depths of other surfaces, as a depth buffer has them; otherwise those of the farthest fragments that count themselves.
+    pub(crate) exact: bool,
+}
+
+/// Sums over all fragments of a pixel that count.
+#[derive(Default)]
+pub(crate) struct Sums {
+    pub(crate) rect: Rect,
+    /// Colours times alpha, added; and what all layers together keep from coming through.
+    pub(crate) colors: Vec<[f32; 4]>,
+    /// Alphas, added.
+    pub(crate) weights: Vec<f32>,
+    pub(crate) covered: usize,
+}
+
+/// How far behind its limit a fragment still counts, as VTK has it: the limit is a depth that the driver computed for such a fragment.
+const EPSILON: f64 = 1e-7;
+/// Roundings of a driver that interpolates in f32 from the window's corner on, per depth that a triangle gains from one pixel to the next.
+const ROUNDINGS: f64 = 4096.0 / 16_777_216.0;
+/// What comes through behind this changes no pixel of eight bits.
+const LEAST: f32 = 1.0 / 1024.0;
+/// How far beside a centre, in pixels.
+const OFF: f64 = 1.0 / 200.0;
+
+/// A fragment of a pixel.
+struct Found {
+    draw: usize,
+    prim: usize,
+    fragment: Fragment,
+}
+
+/// Effects of the mode on translucent surfaces.
+fn surroundings<'a>(draws: &'a [Prepared<'a>], settings: &'a Settings) -> Option<Surroundings<'a>> {
+    Surroundings::new(draws, settings).map(|mut around| {
+        // What lets light through casts no shadow.
+        around.clear.fill(true);
+        around
+    })
+}
+
+/// Gives each pixel's fragments to `put`, with the places that it has in `out`, row by row. Returns how many pixels have any.
+fn each_pixel<T: Send>(
+    draws: &[Prepared<'_>],
+    limit: &Limit,
+    rect: Rect,
+    out: &mut [T],
+    put: impl Fn(&mut T, &mut [Found], (i32, i32)) + Sync,
+) -> usize {
+    let w = rect.w as usize;
+    let covered = AtomicU64::new(0);
+    out.par_chunks_mut(w * TILE as usize).enumerate().for_each_init(TileRays::new, |rays, (i, out)| {
+        let y = rect.y + i as i32 * TILE;
+        let rows = (out.len() / w) as i32;
+        for x in (rect.x..rect.x + rect.w).step_by(TILE as usize) {
+            let tile = Rect { x, y, w: TILE.min(rect.x + rect.w - x), h: rows };
+            let mut found: [Vec<Found>; 256] = [const { Vec::new() }; 256];
+            for (number, p) in draws.iter().enumerate() {
+                through(p, number, tile, limit, rays, &mut found);
+            }
+            for (k, found) in found.iter_mut().enumerate().filter(|(_, f)| !f.is_empty()) {
+                let at = (x + (k % 16) as i32, y + (k / 16) as i32);
+                put(&mut out[(at.1 - y) as usize * w + (at.0 - rect.x) as usize], found, at);
+                covered.fetch_add(1, Relaxed);
+            }
+        }
+    });
+    covered.into_inner() as usize
+}
+
+/// Where anything of the draws may be seen.
+fn bounds(draws: &[Prepared<'_>], limit: &Limit) -> Rect {
+    let all = Rect { x: 0, y: 0, w: limit.width as i32, h: limit.height as i32 };
+    draws.iter().fold(Rect::default(), |r, d| r.or(d.rect)).and(all)
+}
+
+/// Premultiplied colours of all draws; what it cost beside primary rays.
+pub(crate) fn peeled(draws: &[Prepared<'_>], limit: &Limit, settings: &Settings) -> (Layer, [u64; 2]) {
+    let around = surroundings(draws, settings);
+    let rect = bounds(draws, limit);
+    let n = (rect.w.max(0) * rect.h.max(0)) as usize;
+    if n == 0 {
+        return (Layer { rect, ..Layer::default() }, [0; 2]);
+    }
+    let mut pixels = vec![([0; 4], UNCOVERED); n];
+    let covered = each_pixel(draws, limit, rect, &mut pixels, |pixel, found, at| {
+        *pixel = (blended(draws, found, settings, around.as_ref(), at), 0.0);
+    });
+    let (color, depth) = pixels.into_iter().unzip();
+    (Layer { rect, color, depth, covered }, cost(around))
+}
+
+/// Sums of all draws' fragments, in any order; what it cost beside primary rays.
+pub(crate) fn summed(draws: &[Prepared<'_>], limit: &Limit, settings: &Settings) -> (Sums, [u64; 2]) {
+    let around = surroundings(draws, settings);
+    let rect = bounds(draws, limit);
+    let n = (rect.w.max(0) * rect.h.max(0)) as usize;
+    if n == 0 {
+        return (Sums::default(), [0; 2]);
+    }
+    let mut pixels = vec![([0.0_f32; 4], 0.0_f32); n];
+    let covered = each_pixel(draws, limit, rect, &mut pixels, |(sum, weight), found, at| {
+        let mut through = 1.0;
+        for f in found {
+            let p = &draws[f.draw];
+            let [r, g, b, a] = p.shaded(f.prim, &f.fragment, settings.mode, around.as_ref(), at);
+            let a = (a * p.draw.look.opacity).clamp(0.0, 1.0);
+            for (sum, c) in sum.iter_mut().zip([r, g, b]) {
+                *sum += a * c;
+            }
+            *weight += a;
+            through *= 1.0 - a;
+        }
+        sum[3] = 1.0 - through;
+    });
+    let (colors, weights) = pixels.into_iter().unzip();
+    (Sums { rect, colors, weights, covered }, cost(around))
+}
+
+/// Shadow rays and ambient occlusion rays.
+fn cost(around: Option<Surroundings<'_>>) -> [u64; 2] {
+    around.map_or([0; 2], |a| [a.shadow_rays.into_inner(), a.occlusion_rays.into_inner()])
+}
+
+/// All fragments of a draw in a tile.
+fn through(
+    p: &Prepared<'_>,
+    draw: usize,
+    tile: Rect,
+    limit: &Limit,
+    rays: &mut TileRays,
+    found: &mut [Vec<Found>; 256],
+) {
+    if tile.and(p.rect).is_empty() || !rays.send(p, tile) {
+        return;
+    }
+    let most = |x: i32, y: i32| {
+        let depth = f64::from(limit.depth[y as usize * limit.width + x as usize]);
+        Most { depth: depth + if limit.exact { 0.5 / DEPTH_STEPS } else { EPSILON }, exact: limit.exact }
+    };
+    let mut edges = [false; 256];
+    for _ in 0..MOST_STEPS {
+        let mut on = 0;
+        for y in 0..tile.h {
+            for x in 0..tile.w {
+                let (b, l) = slot(x, y);
+                if rays.hits[b].prim[l] == NO_HIT {
+                    rays.blocks[b].t_max[l] = -1.0;
+                    continue;
+                }
+                let (at, k) = ((tile.x + x, tile.y + y), (x + 16 * y) as usize);
+                let (prim, t) = (rays.hits[b].prim[l] as usize, rays.hits[b].t[l]);
+                match p.fragment(prim, at.0, at.1) {
+                    None => edges[k] = true,
+                    // Everything that follows is behind it.
+                    Some(f) if is_behind(p, prim, &f, most(at.0, at.1)) => {
+                        rays.blocks[b].t_max[l] = -1.0;
+                        continue;
+                    }
+                    Some(fragment) => found[k].push(Found { draw, prim, fragment }),
+                }
+                rays.blocks[b].t_min[l] = t.next_up();
+                on += 1;
+            }
+        }
+        if on == 0 {
+            break;
+        }
+        p.rays.fetch_add(on, Relaxed);
+        rays.hits.fill(HitBlock::MISS);
+        p.world.closest_coherent(&rays.blocks, &mut rays.hits).expect("one block of hits for each of rays");
+    }
+    for b in &mut rays.blocks {
+        b.t_max = [-1.0; LANES];
+    }
+    for (k, _) in edges.iter().enumerate().filter(|(_, edge)| **edge) {
+        let at = (tile.x + (k % 16) as i32, tile.y + (k / 16) as i32);
+        beside(p, draw, at, most(at.0, at.1), &mut found[k]);
+    }
+}
+
+/// How deep fragments of a pixel may be.
+#[derive(Clone, Copy)]
+struct Most {
+    depth: f64,
+    exact: bool,
+}
+
+/// Whether a fragment is behind its limit, where that is not exact by more than roundings.
+fn is_behind(p: &Prepared<'_>, prim: usize, f: &Fragment, most: Most) -> bool {
+    if most.exact {
+        return f.depth > most.depth;
+    }
+    let s = &*p.draw.state;
+    let scale = s.depth_range[1] - s.depth_range[0];
+    f.plain_depth > most.depth
+        && f.plain_depth - most.depth > EPSILON + ROUNDINGS * steepness(&p.corners(prim), s.viewport, scale)
+}
+
+/// Fragments of triangles that rays beside the centre meet.
+fn beside(p: &Prepared<'_>, draw: usize, (x, y): (i32, i32), most: Most, found: &mut Vec<Found>) {
+    for (dx, dy) in [(-OFF, -OFF), (OFF, -OFF), (-OFF, OFF), (OFF, OFF)] {
+        let Some((mut ray, _)) = p.ray(f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy) else { continue };
+        for _ in 0..MOST_STEPS {
+            p.rays.fetch_add(1, Relaxed);
+            let Some(hit) = p.world.closest(&ray) else { break };
+            let prim = hit.prim as usize;
+            ray.t_min = hit.t.next_up();
+            let Some(fragment) = p.fragment(prim, x, y) else { continue };
+            if is_behind(p, prim, &fragment, most) {
+                break;
+            }
+            if !found.iter().any(|f| f.draw == draw && f.prim == prim) {
+                found.push(Found { draw, prim, fragment });
+            }
+        }
+    }
+}
+
+/// Front to back, premultiplied.
+fn blended(
+    draws: &[Prepared<'_>],
+    found: &mut [Found],
+    settings: &Settings,
+    around: Option<&Surroundings<'_>>,
+    at: (i32, i32),
+) -> [u8; 4] {
+    found.sort_by(|a, b| {
+        let by_depth = a.fragment.depth.total_cmp(&b.fragment.depth);
+        by_depth.then(a.draw.cmp(&b.draw)).then(a.prim.cmp(&b.prim))
+    });
+    let (mut sum, mut left) = ([0.0_f32; 3], 1.0_f32);
+    for f in found {
+        let p = &draws[f.draw];
+        let [r, g, b, a] = p.shaded(f.prim, &f.fragment, settings.mode, around, at);
+        let a = (a * p.draw.look.opacity).clamp(0.0, 1.0);
+        for (sum, c) in sum.iter_mut().zip([r, g, b]) {
+            // As each step is written to a buffer of colours from 0 to 1.
+            *sum = (*sum + left * a * c.max(0.0)).min(1.0);
+        }
+        left *= 1.0 - a;
+        if left < LEAST {
+            left = 0.0;
+            break;
+        }
+    }
+    to_bytes([sum[0], sum[1], sum[2], 1.0 - left])
+}
