@@ -9,7 +9,7 @@ use std::path::Path;
 enum Kind {
     /// Straight through the table: our own hooks, which look after themselves.
     Direct,
-    /// Through the table unless `ATTENTION` is set: then we are told first.
+    /// Through the table unless `ARMED` is set: then we are told first.
     Watched,
     /// We are always told first.
     Always,
@@ -441,7 +441,7 @@ fn main() {
     }
     writeln!(s, "];\n/// The trampolines' addresses.\npub(super) static TRAMPOLINES: [unsafe extern \"C\" fn(); COUNT] = [").unwrap();
     names.iter().for_each(|x| writeln!(s, "trampolines::{x},").unwrap());
-    writeln!(s, "];\nmod trampolines {{ use super::{{TABLE, ATTENTION, slow, CALLS}};").unwrap();
+    writeln!(s, "];\nmod trampolines {{ use super::{{TABLE, ARMED, slow, CALLS}};").unwrap();
     for (i, x) in names.iter().enumerate() {
         let kind = match (hooked(x), flushes(x) || class(x) & (BUFFER | TEXTURE) != 0) {
             (true, _) => Kind::Direct,
@@ -454,13 +454,13 @@ fn main() {
                 format!("\"mov r11d, {i}\", \"jmp qword ptr [rip + {{t}} + {at}]\", t = sym TABLE")
             }
             Kind::Watched => format!(
-                "\"cmp dword ptr [rip + {{a}}], 0\", \"jne 2f\", \"inc qword ptr [rip + {{c}}]\", \"mov r11d, {i}\", \"jmp qword ptr [rip + {{t}} + {at}]\", \"2:\", \"mov r11d, {i}\", \"jmp {{s}}\", a = sym ATTENTION, c = sym CALLS, t = sym TABLE, s = sym slow"
+                "\"cmp dword ptr [rip + {{a}}], 0\", \"jne 2f\", \"inc qword ptr [rip + {{c}}]\", \"mov r11d, {i}\", \"jmp qword ptr [rip + {{t}} + {at}]\", \"2:\", \"mov r11d, {i}\", \"jmp {{s}}\", a = sym ARMED, c = sym CALLS, t = sym TABLE, s = sym slow"
             ),
             Kind::Always => format!("\"mov r11d, {i}\", \"jmp {{s}}\", s = sym slow"),
         };
         writeln!(s, "#[unsafe(naked)] #[unsafe(no_mangle)] pub(in crate::interpose::symbols) unsafe extern \"C\" fn {x}() {{ core::arch::naked_asm!({code}) }}").unwrap();
     }
-    writeln!(s, "}}\n#[allow(clippy::unnecessary_cast, reason = \"written by a program\")] mod hot_hooks {{ use super::current_context; use crate::capture::immediate_mode::Step; use crate::interpose::driver::found; use super::forward_plainly;").unwrap();
+    writeln!(s, "}}\n#[allow(clippy::unnecessary_cast, reason = \"written by a program\")] mod hot_hooks {{ use super::current_context; use crate::capture::immediate_mode::FastPathResult; use crate::interpose::driver::found; use super::forward_plainly;").unwrap();
     for h in &hot {
         let (args, call, types) = if h.pointer {
             (format!("p: *const {}", h.c_type), "p".to_owned(), format!("*const {}", h.c_type))
@@ -482,24 +482,24 @@ fn main() {
             String::new()
         };
         let (name, body) = (&h.name, &h.body);
-        let step = body.replacen('(', "_step(", 1);
+        let step = body.replacen('(', "_fast(", 1);
         // SAFETY comments are those of the code that is written.
         writeln!(
             s,
-            "#[cold] #[inline(never)] unsafe extern \"C\" fn {name}_slowly({args}) {{ {read} if !current_context::with({index}, |c| {body}) {{
+            "#[cold] #[inline(never)] unsafe extern \"C\" fn {name}_slow({args}) {{ {read} if !current_context::with({index}, |c| {body}) {{
                 // SAFETY: the driver's function of this name and signature.
                 let f: unsafe extern \"C\" fn({types}) = unsafe {{ core::mem::transmute(forward_plainly({index})) }};
                 // SAFETY: the program's own arguments.
                 unsafe {{ f({call}) }} }} }}
-            pub(in crate::interpose::symbols) unsafe extern \"C\" fn {name}({args}) {{ {read} match current_context::step({index}, |c| {step}) {{
-                Step::Done => (),
-                Step::Driver if let Some(known) = found({index}) => {{
+            pub(in crate::interpose::symbols) unsafe extern \"C\" fn {name}({args}) {{ {read} match current_context::fast_call({index}, |c| {step}) {{
+                FastPathResult::Done => (),
+                FastPathResult::Driver if let Some(known) = found({index}) => {{
                     // SAFETY: as above.
                     let f: unsafe extern \"C\" fn({types}) = unsafe {{ core::mem::transmute(known) }};
                     // SAFETY: as above.
                     unsafe {{ f({call}) }} }}
                 // SAFETY: as above.
-                _ => unsafe {{ {name}_slowly({call}) }} }} }}"
+                _ => unsafe {{ {name}_slow({call}) }} }} }}"
         )
         .unwrap();
     }

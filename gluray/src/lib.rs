@@ -25,7 +25,7 @@ mod state;
 mod trace;
 
 pub use classify::reasons;
-pub use cluster::RankAccount;
+pub use cluster::RankStats;
 pub use host::{config, export, folders, panel, report, timeline};
 pub use interpose::glvnd;
 

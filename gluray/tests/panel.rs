@@ -17,7 +17,7 @@ use std::time::Duration;
 fn a_change_on_the_page_reaches_the_program_and_ends_with_the_panel() {
     let scenes = tempfile::tempdir().unwrap();
     let p = Panel::start();
-    let fake = Fake::start("gmsh", p.meeting(), scenes.path());
+    let fake = Fake::start("gmsh", p.endpoint(), scenes.path());
     let id = p.until("a program", |list| list.len() == 1)[0]["id"].clone();
     let change = |set: serde_json::Value| p.ask("POST", "change", &json!({"id": id, "set": set}).to_string());
     assert_eq!(
@@ -132,7 +132,7 @@ fn nonsense_requests_are_refused_in_words_and_the_panel_goes_on() {
 
 /// Says something on the link's port; true when the panel closes the connection without an answer.
 fn is_shown_the_door(p: &Panel, words: &[u8]) -> bool {
-    let mut stream = TcpStream::connect(p.meeting().address).unwrap();
+    let mut stream = TcpStream::connect(p.endpoint().address).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(30))).unwrap();
     let _ = stream.write_all(words);
     let _ = stream.shutdown(std::net::Shutdown::Write);
@@ -149,7 +149,7 @@ fn who_does_not_know_the_token_is_no_program() {
         let hello = json!({"program": "x", "process": 1, "settings": settings});
         json!({"type": "hello", "version": version, "token": token, "hello": hello}).to_string() + "\n"
     };
-    let right = p.meeting().secret.token().to_owned();
+    let right = p.endpoint().secret.token().to_owned();
     for words in [
         hello(1, &"0".repeat(32)),
         hello(1, ""),
@@ -161,7 +161,7 @@ fn who_does_not_know_the_token_is_no_program() {
         assert!(is_shown_the_door(&p, words.as_bytes()), "{words:.100}");
     }
     // The same words with the right token are a program: the test would notice a panel that lets nobody in.
-    let mut stream = TcpStream::connect(p.meeting().address).unwrap();
+    let mut stream = TcpStream::connect(p.endpoint().address).unwrap();
     stream.write_all(hello(1, &right).as_bytes()).unwrap();
     p.until("a program", |list| list.len() == 1);
     // A program that goes mad is put out; the panel stays.

@@ -50,7 +50,7 @@ fn programs_appear_are_changed_live_and_show_what_it_costs() {
     b.wait_for("document.readyState === 'complete' && document.body.innerText.includes('No program yet')");
 
     // A program starts later and appears by itself, with its numbers.
-    let gmsh = Fake::start("gmsh", p.meeting(), scenes.path());
+    let gmsh = Fake::start("gmsh", p.endpoint(), scenes.path());
     b.wait_for("document.querySelectorAll('nav button').length === 1 && document.querySelector('nav button').innerText.startsWith('gmsh')");
     b.wait_for("Number(document.getElementById('times').dataset.frames) > 8");
     for word in ["frames per second", "1024 × 1024", "match", "1.40 M"] {
@@ -137,7 +137,7 @@ fn programs_appear_are_changed_live_and_show_what_it_costs() {
     );
 
     // A second program has settings of its own; the first one's end is seen, and switching off is one click.
-    let octave = Fake::start("octave", p.meeting(), scenes.path());
+    let octave = Fake::start("octave", p.endpoint(), scenes.path());
     b.wait_for("document.querySelectorAll('nav button').length === 2");
     b.evaluate("document.querySelectorAll('nav button')[1].click()");
     b.wait_for("document.querySelector('nav button[aria-selected=true]').innerText.startsWith('octave') && document.querySelector('[data-path=mode] select').value === 'match'");

@@ -1,24 +1,24 @@
 //! `glArrayElement`: a vertex of the arrays between Begin and End.
 
-use crate::capture::vertex_arrays::Arrays;
-use crate::interpose::client_memory::{Call, Elements, Source};
-use crate::interpose::context::{Context, Sink};
+use crate::capture::vertex_arrays::VertexArrays;
+use crate::interpose::client_memory::{ActiveCall, ArraySource, Elements};
+use crate::interpose::context::{Context, ImmediateModeTarget};
 
 impl Context {
     /// Values of element `i` become current, and a vertex of the primitive that is recorded or compiled.
-    pub(crate) fn array_element(&mut self, call: &Call<'_>) -> bool {
-        match self.sink {
-            Sink::Trace => {}
-            Sink::List if self.recording.as_ref().is_some_and(|r| r.is_open()) => {}
-            Sink::List => {
+    pub(crate) fn array_element(&mut self, call: &ActiveCall<'_>) -> bool {
+        match self.immediate_target {
+            ImmediateModeTarget::Trace => {}
+            ImmediateModeTarget::List if self.recording.as_ref().is_some_and(|r| r.is_open()) => {}
+            ImmediateModeTarget::List => {
                 if let Some(r) = &mut self.recording {
                     r.note_driver_call(0, false, true);
                 }
                 return false;
             }
-            Sink::Pass => return false,
+            ImmediateModeTarget::Pass => return false,
             // Values become current, and that is all.
-            Sink::Outside => {
+            ImmediateModeTarget::Outside => {
                 self.mark_current();
                 return false;
             }
@@ -27,8 +27,8 @@ impl Context {
             Ok(taken) => return taken,
             Err(why) => why,
         };
-        match self.sink {
-            Sink::Trace => self.unswallow(why),
+        match self.immediate_target {
+            ImmediateModeTarget::Trace => self.replay_to_driver(why),
             _ => {
                 if let Some(r) = &mut self.recording {
                     r.note_driver_call(0, false, true);
@@ -38,12 +38,12 @@ impl Context {
         false
     }
 
-    fn take_element(&mut self, call: &Call<'_>) -> Result<bool, &'static str> {
+    fn take_element(&mut self, call: &ActiveCall<'_>) -> Result<bool, &'static str> {
         let element = Elements::of(call, None)?;
         // Nothing about arrays can change before End.
         let arrays = match self.element_arrays {
             Some(arrays) => arrays,
-            None => *self.element_arrays.insert(Arrays::query(self.can.version)?),
+            None => *self.element_arrays.insert(VertexArrays::query(self.capabilities.version)?),
         };
         let [normal, color, tex] = [arrays.normal, arrays.color, arrays.tex];
         let position = value(arrays.position, &element)?;
@@ -61,10 +61,10 @@ impl Context {
     }
 }
 
-fn of(source: Option<Source>, i: &Elements<'_>) -> Result<Option<[f32; 4]>, &'static str> {
+fn of(source: Option<ArraySource>, i: &Elements<'_>) -> Result<Option<[f32; 4]>, &'static str> {
     source.map(|s| value(s, i)).transpose()
 }
 
-fn value(source: Source, i: &Elements<'_>) -> Result<[f32; 4], &'static str> {
+fn value(source: ArraySource, i: &Elements<'_>) -> Result<[f32; 4], &'static str> {
     Ok(source.read(i)?.at(0, [0.0, 0.0, 0.0, 1.0]))
 }

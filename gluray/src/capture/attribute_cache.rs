@@ -2,15 +2,15 @@
 //!
 //! Reading an array is half the price of copying it, and the copy's fresh memory costs as much again; so arrays are hashed where they are.
 
-use crate::capture::draw::Packed;
+use crate::capture::draw::PackedArray;
 use crate::capture::geometry_cache::hash;
 use std::collections::HashMap;
 use std::sync::Arc;
 
 /// Arrays by content.
 #[derive(Default)]
-pub(crate) struct Packs {
-    known: HashMap<u128, (Arc<Packed>, u64)>,
+pub(crate) struct AttributeCache {
+    known: HashMap<u128, (Arc<PackedArray>, u64)>,
     frame: u64,
 }
 
@@ -18,18 +18,18 @@ pub(crate) struct Packs {
 const WORTH_HASHING: usize = 4096;
 
 /// Whether the same content is the same memory; shorter arrays are copied for each draw.
-pub(crate) fn is_shared(packed: &Packed) -> bool {
+pub(crate) fn is_shared(packed: &PackedArray) -> bool {
     packed.bytes.len() >= WORTH_HASHING
 }
 
-impl Packs {
+impl AttributeCache {
     /// `bytes` as an array of such components; `copy` makes the same bytes tightly packed.
     pub(crate) fn get(
         &mut self,
         bytes: &[u8],
         layout: (usize, u32, usize, bool),
-        copy: impl FnOnce() -> Packed,
-    ) -> Arc<Packed> {
+        copy: impl FnOnce() -> PackedArray,
+    ) -> Arc<PackedArray> {
         if bytes.len() < WORTH_HASHING {
             return Arc::new(copy());
         }
@@ -58,14 +58,14 @@ mod tests {
 
     #[test]
     fn the_same_bytes_are_copied_once_and_other_bytes_again() {
-        let mut packs = Packs::default();
+        let mut packs = AttributeCache::default();
         let mut bytes = vec![1_u8; 6000];
         let layout = (3, BYTE, 3, true);
         let mut copies = 0;
-        let mut get = |packs: &mut Packs, bytes: &[u8]| {
+        let mut get = |packs: &mut AttributeCache, bytes: &[u8]| {
             packs.get(bytes, layout, || {
                 copies += 1;
-                Packed { bytes: bytes.to_vec(), kind: BYTE, size: 3, normalized: true }
+                PackedArray { bytes: bytes.to_vec(), kind: BYTE, size: 3, normalized: true }
             })
         };
         let first = get(&mut packs, &bytes);

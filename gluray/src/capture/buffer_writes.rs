@@ -1,7 +1,7 @@
 //! When buffer objects were written: geometry in buffers is read once, and again only after somebody wrote to them.
 
-use crate::interpose::client_memory::Source;
-use crate::interpose::context::{Context, Sink};
+use crate::interpose::client_memory::ArraySource;
+use crate::interpose::context::{Context, ImmediateModeTarget};
 use crate::interpose::driver::gl;
 use crate::interpose::symbols::class;
 use crate::state::enums::*;
@@ -9,7 +9,7 @@ use std::collections::HashMap;
 
 /// The writes to the buffers of a share group, counted.
 #[derive(Debug, Default)]
-pub(crate) struct Writes {
+pub(crate) struct BufferWrites {
     count: u64,
     /// The last one to each buffer that was named.
     named: HashMap<u32, u64>,
@@ -17,7 +17,7 @@ pub(crate) struct Writes {
     unnamed: u64,
 }
 
-impl Writes {
+impl BufferWrites {
     /// A buffer was written, and nobody said which.
     pub(crate) fn any(&mut self) {
         self.count += 1;
@@ -36,7 +36,7 @@ impl Writes {
     }
 
     /// When the buffers of arrays and indices were written last.
-    pub(crate) fn last(&self, arrays: &[Option<Source>; 7], indices: u32) -> [u64; 8] {
+    pub(crate) fn last(&self, arrays: &[Option<ArraySource>; 7], indices: u32) -> [u64; 8] {
         let of = |buffer: u32| self.named.get(&buffer).copied().unwrap_or(self.unnamed);
         let array = |i: usize| arrays[i].map_or(0, |s| of(s.buffer));
         [array(0), array(1), array(2), array(3), array(4), array(5), array(6), of(indices)]
@@ -48,11 +48,11 @@ impl Context {
     pub(crate) fn buffer_written(&mut self, target: u32) -> bool {
         self.watched_call(0, 0, false, false);
         let binding = match target {
-            _ if self.sink == Sink::Pass => 0,
+            _ if self.immediate_target == ImmediateModeTarget::Pass => 0,
             ARRAY_BUFFER => ARRAY_BUFFER_BINDING,
             ELEMENT_ARRAY_BUFFER => ELEMENT_ARRAY_BUFFER_BINDING,
             // The name of the target is that of its binding; OpenGL 3.1.
-            TEXTURE_BUFFER if self.can.version >= 31 => TEXTURE_BUFFER,
+            TEXTURE_BUFFER if self.capabilities.version >= 31 => TEXTURE_BUFFER,
             _ => 0,
         };
         match if binding == 0 { 0 } else { gl::word(binding) } {
@@ -79,12 +79,12 @@ impl Context {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interpose::client_memory::Layout;
+    use crate::interpose::client_memory::ArrayLayout;
 
     #[test]
     fn a_write_is_seen_by_the_draws_that_read_the_buffer_and_by_no_others() {
         let source = |buffer: u32| {
-            Source::in_buffer(Layout {
+            ArraySource::in_buffer(ArrayLayout {
                 size: 3,
                 kind: FLOAT,
                 stride: 0,
@@ -94,7 +94,7 @@ mod tests {
             })
         };
         let arrays = [source(5), source(6), None, None, None, None, None];
-        let mut w = Writes::default();
+        let mut w = BufferWrites::default();
         let before = w.last(&arrays, 7);
         w.to(8);
         assert_eq!(w.last(&arrays, 7), before);

@@ -6,18 +6,18 @@
 
 pub(crate) mod names;
 
-use crate::capture::evaluators::Kind;
-use crate::interpose::context::{Context, Sink};
+use crate::capture::evaluators::MapKind;
+use crate::interpose::context::{Context, ImmediateModeTarget};
 use crate::interpose::driver::gl;
 use crate::interpose::symbols::{self, class};
-use crate::state::current_attributes::Current;
+use crate::state::current_attributes::CurrentAttributes;
 use crate::state::enums::*;
 use std::collections::HashMap;
 use std::sync::Arc;
 
 /// A step of a list.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Op {
+pub(crate) enum ListOp {
     Begin(u32),
     /// The beginning of a draw of arrays, which is an error between Begin and End: then nothing of it is drawn.
     BeginArrays(u32),
@@ -41,39 +41,39 @@ pub(crate) enum Op {
     CallFromBase(u32),
     Rect([f32; 4]),
     /// `glEvalCoord` of a curve, whose second parameter is nothing, or of a surface.
-    EvalCoord(Kind, [f32; 2]),
-    EvalPoint(Kind, [i32; 2]),
+    EvalCoord(MapKind, [f32; 2]),
+    EvalPoint(MapKind, [i32; 2]),
     /// A filled mesh.
     EvalMesh([i32; 4]),
 }
 
 /// A finished list.
 #[derive(Debug, Default)]
-pub(crate) struct List {
-    ops: Vec<Op>,
+pub(crate) struct DisplayList {
+    ops: Vec<ListOp>,
     materials: Vec<(u32, u32, [f32; 4])>,
     /// The driver's lists beside the one of the same name.
-    pieces: Vec<u32>,
+    segments: Vec<u32>,
 }
 
 /// The lists of a share group.
 #[derive(Debug, Default)]
-pub(crate) struct Lists {
-    lists: HashMap<u32, Arc<List>>,
-    next_piece: u32,
+pub(crate) struct DisplayLists {
+    lists: HashMap<u32, Arc<DisplayList>>,
+    next_segment: u32,
     /// The greatest name that the program has used or was given.
     greatest: u32,
 }
 
 /// Names of our pieces begin here: no program counts its lists so far.
-const FIRST_PIECE: u32 = 0x4000_0000;
+const FIRST_SEGMENT: u32 = 0x4000_0000;
 
 /// A list while it is compiled.
-pub(crate) struct Recording {
+pub(crate) struct ListRecording {
     name: u32,
     execute: bool,
-    list: List,
-    piece: u32,
+    list: DisplayList,
+    segment: u32,
     used: bool,
     draws: bool,
     /// Something besides maps is in the driver's piece.
@@ -86,7 +86,7 @@ pub(crate) struct Recording {
     mode: u32,
 }
 
-impl Recording {
+impl ListRecording {
     /// Between a Begin and its End.
     pub(crate) fn is_open(&self) -> bool {
         self.open
@@ -100,7 +100,7 @@ impl Recording {
     }
 
     /// A fault of ours has ended the tracing: the rest of the list is the driver's, to its end.
-    pub(crate) fn give_up(&mut self) {
+    pub(crate) fn stop_tracing(&mut self) {
         self.note_driver_call(class::ALL, true, true);
         self.open = false;
     }
@@ -111,11 +111,11 @@ impl Recording {
     }
 
     /// The driver's piece ends, and is a step of the list when anything is in it.
-    fn end_piece(&mut self) {
+    fn end_segment(&mut self) {
         gl::end_list();
         if self.used {
-            let (list, draws, only_maps, textures) = (self.piece, self.draws, !self.more, self.textures);
-            self.list.ops.push(Op::Driver { list, draws, only_maps, textures });
+            let (list, draws, only_maps, textures) = (self.segment, self.draws, !self.more, self.textures);
+            self.list.ops.push(ListOp::Driver { list, draws, only_maps, textures });
         }
         (self.used, self.draws, self.more, self.textures) = (false, false, false, false);
     }
@@ -130,11 +130,12 @@ impl Context {
             self.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.remove(&name);
             return false;
         }
-        if self.sink == Sink::Trace {
-            self.unswallow("glNewList between Begin and End");
+        if self.immediate_target == ImmediateModeTarget::Trace {
+            self.replay_to_driver("glNewList between Begin and End");
         }
-        let wrong = name == 0 || self.recording.is_some() || self.sink == Sink::Pass;
-        if wrong || !(mode == COMPILE || mode == COMPILE_AND_EXECUTE) || self.can.core {
+        let wrong =
+            name == 0 || self.recording.is_some() || self.immediate_target == ImmediateModeTarget::Pass;
+        if wrong || !(mode == COMPILE || mode == COMPILE_AND_EXECUTE) || self.capabilities.core {
             return false;
         }
         self.sync();
@@ -142,14 +143,14 @@ impl Context {
         {
             let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
             lists.greatest = lists.greatest.max(name);
-            lists.next_piece = lists.next_piece.max(name.saturating_sub(FIRST_PIECE));
+            lists.next_segment = lists.next_segment.max(name.saturating_sub(FIRST_SEGMENT));
         }
         let execute = mode == COMPILE_AND_EXECUTE;
-        self.recording = Some(Recording {
+        self.recording = Some(ListRecording {
             name,
             execute,
-            list: List::default(),
-            piece: name,
+            list: DisplayList::default(),
+            segment: name,
             used: false,
             draws: false,
             more: false,
@@ -157,14 +158,14 @@ impl Context {
             open: false,
             mode: 0,
         });
-        self.sink = Sink::List;
-        symbols::attend();
+        self.immediate_target = ImmediateModeTarget::List;
+        symbols::arm();
         true
     }
 
     pub(crate) fn end_list(&mut self) -> bool {
-        if self.sink == Sink::Trace {
-            self.unswallow("glEndList between Begin and End");
+        if self.immediate_target == ImmediateModeTarget::Trace {
+            self.replay_to_driver("glEndList between Begin and End");
         }
         if self.recording.as_ref().is_some_and(|r| r.execute && r.open) {
             // What is compiled is also executed, and there a primitive is open.
@@ -172,13 +173,13 @@ impl Context {
             return true;
         }
         let Some(mut r) = self.recording.take() else { return false };
-        r.end_piece();
-        self.sink = Sink::Outside;
+        r.end_segment();
+        self.immediate_target = ImmediateModeTarget::Outside;
         let old = {
             let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
             lists.lists.insert(r.name, Arc::new(r.list))
         };
-        delete_pieces(old);
+        delete_segments(old);
         if r.execute {
             self.call_list(r.name);
         }
@@ -186,10 +187,10 @@ impl Context {
     }
 
     /// Puts a step of ours into the list; calls that went to the driver before it end their piece.
-    pub(crate) fn list_op(&mut self, op: Op) -> bool {
+    pub(crate) fn list_op(&mut self, op: ListOp) -> bool {
         if self.recording.as_ref().is_some_and(|r| r.used) {
-            self.close_piece();
-            self.open_piece();
+            self.close_segment();
+            self.open_segment();
         }
         let Some(r) = &mut self.recording else { return false };
         r.list.ops.push(op);
@@ -197,19 +198,19 @@ impl Context {
     }
 
     /// The driver's piece of the list that is compiled ends here.
-    fn close_piece(&mut self) {
+    fn close_segment(&mut self) {
         if let Some(r) = &mut self.recording {
-            r.end_piece();
+            r.end_segment();
         }
     }
 
-    fn open_piece(&mut self) {
+    fn open_segment(&mut self) {
         let Some(r) = &mut self.recording else { return };
         let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
-        lists.next_piece += 1;
-        r.piece = FIRST_PIECE + lists.next_piece;
-        r.list.pieces.push(r.piece);
-        gl::new_list(r.piece, COMPILE);
+        lists.next_segment += 1;
+        r.segment = FIRST_SEGMENT + lists.next_segment;
+        r.list.segments.push(r.segment);
+        gl::new_list(r.segment, COMPILE);
     }
 
     pub(crate) fn list_begin(&mut self, mode: u32) -> bool {
@@ -217,68 +218,68 @@ impl Context {
             (r.open, r.mode) = (true, mode);
         }
         self.element_arrays = None;
-        self.list_op(Op::Begin(mode))
+        self.list_op(ListOp::Begin(mode))
     }
 
     /// `glPrimitiveRestartNV`: an End, and a Begin of the same mode.
     pub(crate) fn primitive_restart(&mut self) -> bool {
-        let mode = match self.sink {
-            Sink::Trace => self.recorder.mode(),
-            Sink::List => match &self.recording {
+        let mode = match self.immediate_target {
+            ImmediateModeTarget::Trace => self.recorder.mode(),
+            ImmediateModeTarget::List => match &self.recording {
                 Some(r) if r.open => r.mode,
                 _ => return false,
             },
-            Sink::Pass | Sink::Outside => return false,
+            ImmediateModeTarget::Pass | ImmediateModeTarget::Outside => return false,
         };
         self.end() && self.begin(mode)
     }
 
     /// Vertices of arrays follow.
     pub(crate) fn list_begin_arrays(&mut self, mode: u32) -> bool {
-        self.list_op(Op::BeginArrays(mode))
+        self.list_op(ListOp::BeginArrays(mode))
     }
 
     pub(crate) fn list_end(&mut self) -> bool {
         if let Some(r) = &mut self.recording {
             r.open = false;
         }
-        self.list_op(Op::End)
+        self.list_op(ListOp::End)
     }
 
     pub(crate) fn list_vertex(&mut self, v: [f32; 4]) -> bool {
-        self.list_op(Op::Vertex(v))
+        self.list_op(ListOp::Vertex(v))
     }
 
     pub(crate) fn list_normal(&mut self, v: [f32; 3]) -> bool {
-        self.list_op(Op::Normal(v))
+        self.list_op(ListOp::Normal(v))
     }
 
     pub(crate) fn list_color(&mut self, v: [f32; 4]) -> bool {
-        self.list_op(Op::Color(v))
+        self.list_op(ListOp::Color(v))
     }
 
     pub(crate) fn list_tex(&mut self, v: [f32; 4]) -> bool {
-        self.list_op(Op::Tex(v))
+        self.list_op(ListOp::Tex(v))
     }
 
     pub(crate) fn list_material(&mut self, face: u32, what: u32, v: [f32; 4]) -> bool {
         let Some(r) = &mut self.recording else { return false };
         let at = r.list.materials.len() as u32;
         r.list.materials.push((face, what, v));
-        self.list_op(Op::Material(at))
+        self.list_op(ListOp::Material(at))
     }
 
     /// A rectangle, a primitive of its own.
     pub(crate) fn list_rect(&mut self, v: [f32; 4]) -> bool {
-        self.list_op(Op::Rect(v))
+        self.list_op(ListOp::Rect(v))
     }
 
     pub(crate) fn call_list(&mut self, name: u32) -> bool {
         if self.recording.is_some() {
-            return self.list_op(Op::Call(name));
+            return self.list_op(ListOp::Call(name));
         }
         if crate::interpose::panic_guard::happened() {
-            return self.play_plainly(name);
+            return self.execute_in_driver(name);
         }
         let known = self.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.get(&name).cloned();
         let Some(list) = known else {
@@ -290,12 +291,18 @@ impl Context {
             return true;
         }
         // Quads in lists are split in another way than others: they are batches of their own.
-        if self.depth_of_lists == 0 && self.recorder.quads && self.sink == Sink::Outside {
+        if self.depth_of_lists == 0
+            && self.recorder.quads
+            && self.immediate_target == ImmediateModeTarget::Outside
+        {
             self.end_batch();
         }
         self.depth_of_lists += 1;
-        self.play(&list);
-        if self.depth_of_lists == 1 && self.recorder.quads && self.sink == Sink::Outside {
+        self.execute(&list);
+        if self.depth_of_lists == 1
+            && self.recorder.quads
+            && self.immediate_target == ImmediateModeTarget::Outside
+        {
             self.end_batch();
         }
         self.depth_of_lists -= 1;
@@ -303,57 +310,59 @@ impl Context {
     }
 
     /// After a fault of ours: a list of ours into the driver as it is.
-    fn play_plainly(&mut self, name: u32) -> bool {
+    fn execute_in_driver(&mut self, name: u32) -> bool {
         let known = self.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.get(&name).cloned();
         let Some(list) = known.filter(|_| self.depth_of_lists < DEEPEST) else { return false };
         self.depth_of_lists += 1;
         for op in &list.ops {
             match *op {
-                Op::Begin(mode) | Op::BeginArrays(mode) => gl::begin(mode),
-                Op::End => gl::end(),
-                Op::Vertex(v) => gl::vertex4f(v[0], v[1], v[2], v[3]),
-                Op::Normal(v) => gl::normal3f(v[0], v[1], v[2]),
-                Op::Color(v) => gl::color4f(v[0], v[1], v[2], v[3]),
-                Op::Tex(v) => gl::tex_coord4f(v[0], v[1], v[2], v[3]),
-                Op::Material(at) => {
+                ListOp::Begin(mode) | ListOp::BeginArrays(mode) => gl::begin(mode),
+                ListOp::End => gl::end(),
+                ListOp::Vertex(v) => gl::vertex4f(v[0], v[1], v[2], v[3]),
+                ListOp::Normal(v) => gl::normal3f(v[0], v[1], v[2]),
+                ListOp::Color(v) => gl::color4f(v[0], v[1], v[2], v[3]),
+                ListOp::Tex(v) => gl::tex_coord4f(v[0], v[1], v[2], v[3]),
+                ListOp::Material(at) => {
                     let (face, what, v) = list.materials[at as usize];
                     gl::materialfv(face, what, &v);
                 }
-                Op::Driver { list, .. } => gl::call_list(list),
-                Op::Call(name) => self.play_plainly_or_call(name),
-                Op::CallFromBase(name) => self.play_plainly_or_call(gl::word(LIST_BASE).wrapping_add(name)),
-                Op::Rect(v) => gl::rectf(v[0], v[1], v[2], v[3]),
-                Op::EvalCoord(..) | Op::EvalPoint(..) | Op::EvalMesh(_) => evaluate_plainly(op),
+                ListOp::Driver { list, .. } => gl::call_list(list),
+                ListOp::Call(name) => self.execute_in_driver_or_call(name),
+                ListOp::CallFromBase(name) => {
+                    self.execute_in_driver_or_call(gl::word(LIST_BASE).wrapping_add(name))
+                }
+                ListOp::Rect(v) => gl::rectf(v[0], v[1], v[2], v[3]),
+                ListOp::EvalCoord(..) | ListOp::EvalPoint(..) | ListOp::EvalMesh(_) => evaluate_in_driver(op),
             }
         }
         self.depth_of_lists -= 1;
         true
     }
 
-    fn play_plainly_or_call(&mut self, name: u32) {
-        if !self.play_plainly(name) {
+    fn execute_in_driver_or_call(&mut self, name: u32) {
+        if !self.execute_in_driver(name) {
             gl::call_list(name);
         }
     }
 
     fn call_driver(&mut self, list: u32, draws: bool, textures: bool) {
         if draws {
-            self.counters.pass("text, lines by arrays, or curves of a display list", 1);
+            self.counters.count_driver_draws("text, lines by arrays, or curves of a display list", 1);
         }
-        self.before_driver(draws, textures);
+        self.before_driver_list(draws, textures);
         gl::call_list(list);
     }
 
     /// The driver is about to play lists of its own.
-    fn before_driver(&mut self, draws: bool, textures: bool) {
-        if self.sink == Sink::Trace {
-            self.unswallow("a list between Begin and End");
+    fn before_driver_list(&mut self, draws: bool, textures: bool) {
+        if self.immediate_target == ImmediateModeTarget::Trace {
+            self.replay_to_driver("a list between Begin and End");
         }
         self.end_batch();
-        if draws && self.sink == Sink::Outside {
+        if draws && self.immediate_target == ImmediateModeTarget::Outside {
             self.refresh();
             if crate::classify::rules::commutes(&self.state) {
-                self.frame.others_drew();
+                self.frame.driver_drew();
             } else {
                 self.flush("a display list of the driver's");
             }
@@ -361,105 +370,108 @@ impl Context {
         self.sync();
         self.dirty = class::ALL;
         if textures {
-            self.textures_change();
+            self.invalidate_textures();
         }
     }
 
-    fn play(&mut self, list: &List) {
+    fn execute(&mut self, list: &DisplayList) {
         let mut left_out = false;
         let mut done = 0;
         // Arrays leave current values undefined, and Mesa as they were.
-        let mut before_arrays: Option<Current> = None;
+        let mut before_arrays: Option<CurrentAttributes> = None;
         for (i, op) in list.ops.iter().enumerate() {
             if i < done {
                 continue;
             }
             if left_out {
-                left_out = *op != Op::End;
+                left_out = *op != ListOp::End;
                 continue;
             }
             match *op {
-                Op::BeginArrays(_) if self.sink != Sink::Outside => {
+                ListOp::BeginArrays(_) if self.immediate_target != ImmediateModeTarget::Outside => {
                     self.errors.push(INVALID_OPERATION);
                     left_out = true;
                 }
-                Op::Begin(mode) | Op::BeginArrays(mode) => {
+                ListOp::Begin(mode) | ListOp::BeginArrays(mode) => {
                     let swallowed = self.begin(mode);
                     // Not earlier: Begin asks the driver what is current.
-                    before_arrays = matches!(op, Op::BeginArrays(_)).then_some(self.current);
+                    before_arrays = matches!(op, ListOp::BeginArrays(_)).then_some(self.current);
                     if !swallowed {
-                        match self.play_quads(mode, list, &list.ops[i + 1..]) {
+                        match self.execute_quads(mode, list, &list.ops[i + 1..]) {
                             Some(n) => {
                                 done = i + 1 + n;
-                                self.go_back_to(before_arrays.take());
+                                self.restore_current_attributes(before_arrays.take());
                             }
                             None => gl::begin(mode),
                         }
                     }
                 }
-                Op::End => {
+                ListOp::End => {
                     if !self.end() {
                         gl::end();
                     }
-                    self.go_back_to(before_arrays.take());
+                    self.restore_current_attributes(before_arrays.take());
                 }
-                Op::Vertex(v) => {
+                ListOp::Vertex(v) => {
                     if !self.vertex(v) {
                         gl::vertex4f(v[0], v[1], v[2], v[3]);
                     }
                 }
-                Op::Normal(v) => {
+                ListOp::Normal(v) => {
                     if !self.normal(v) {
                         gl::normal3f(v[0], v[1], v[2]);
                     }
                 }
-                Op::Color(v) => {
+                ListOp::Color(v) => {
                     if !self.color(v) {
                         gl::color4f(v[0], v[1], v[2], v[3]);
                     }
                 }
-                Op::Tex(v) => {
+                ListOp::Tex(v) => {
                     if !self.tex_coord(v) {
                         gl::tex_coord4f(v[0], v[1], v[2], v[3]);
                     }
                 }
-                Op::Material(at) => {
+                ListOp::Material(at) => {
                     let (face, what, v) = list.materials[at as usize];
                     if !self.material(face, what, v) {
                         gl::materialfv(face, what, &v);
                     }
                 }
-                Op::Driver { list, only_maps: true, .. } => {
-                    self.maps_change();
+                ListOp::Driver { list, only_maps: true, .. } => {
+                    self.invalidate_maps();
                     gl::call_list(list);
                 }
-                Op::Driver { list, draws, textures, .. } => self.call_driver(list, draws, textures),
-                Op::Call(name) => {
+                ListOp::Driver { list, draws, textures, .. } => self.call_driver(list, draws, textures),
+                ListOp::Call(name) => {
                     self.call_list(name);
                 }
-                Op::CallFromBase(name) => {
-                    let base =
-                        if self.sink == Sink::Pass { self.state.list_base } else { gl::word(LIST_BASE) };
+                ListOp::CallFromBase(name) => {
+                    let base = if self.immediate_target == ImmediateModeTarget::Pass {
+                        self.state.list_base
+                    } else {
+                        gl::word(LIST_BASE)
+                    };
                     self.call_list(base.wrapping_add(name));
                 }
-                Op::Rect(v) => {
+                ListOp::Rect(v) => {
                     if !self.rect(v) {
                         gl::rectf(v[0], v[1], v[2], v[3]);
                     }
                 }
-                Op::EvalCoord(kind, at) => {
+                ListOp::EvalCoord(kind, at) => {
                     if !self.eval_coord(kind, at) {
-                        evaluate_plainly(op);
+                        evaluate_in_driver(op);
                     }
                 }
-                Op::EvalPoint(kind, places) => {
+                ListOp::EvalPoint(kind, places) => {
                     if !self.eval_point(kind, places) {
-                        evaluate_plainly(op);
+                        evaluate_in_driver(op);
                     }
                 }
-                Op::EvalMesh(range) => {
+                ListOp::EvalMesh(range) => {
                     if !self.eval_mesh_2(FILL, range) {
-                        evaluate_plainly(op);
+                        evaluate_in_driver(op);
                     }
                 }
             }
@@ -467,7 +479,7 @@ impl Context {
     }
 
     /// Current values are what they were before arrays.
-    fn go_back_to(&mut self, before: Option<Current>) {
+    fn restore_current_attributes(&mut self, before: Option<CurrentAttributes>) {
         let Some(b) = before else { return };
         if b.normal != self.current.normal && !self.normal(b.normal) {
             gl::normal3f(b.normal[0], b.normal[1], b.normal[2]);
@@ -482,28 +494,39 @@ impl Context {
 
     /// Quads of a list that the driver draws, as the triangles that it makes of quads in lists: it splits those of immediate mode along the
     /// other diagonal. Gives how many steps that were; `None` where a quad is more than two filled triangles, or more than vertices come.
-    fn play_quads(&mut self, mode: u32, list: &List, ops: &[Op]) -> Option<usize> {
+    fn execute_quads(&mut self, mode: u32, list: &DisplayList, ops: &[ListOp]) -> Option<usize> {
         let filled = self.state.polygon_mode == [FILL; 2];
-        if mode != QUADS || !filled || self.sink != Sink::Pass || self.state.program != 0 {
+        if mode != QUADS
+            || !filled
+            || self.immediate_target != ImmediateModeTarget::Pass
+            || self.state.program != 0
+        {
             return None;
         }
-        let plain = |op: &Op| {
-            matches!(op, Op::Vertex(_) | Op::Normal(_) | Op::Color(_) | Op::Tex(_) | Op::Material(_))
+        let plain = |op: &ListOp| {
+            matches!(
+                op,
+                ListOp::Vertex(_)
+                    | ListOp::Normal(_)
+                    | ListOp::Color(_)
+                    | ListOp::Tex(_)
+                    | ListOp::Material(_)
+            )
         };
-        let n = ops.iter().position(|op| !plain(op)).filter(|n| ops[*n] == Op::End)?;
+        let n = ops.iter().position(|op| !plain(op)).filter(|n| ops[*n] == ListOp::End)?;
         gl::begin(TRIANGLES);
         let mut corners = Vec::with_capacity(4);
         let mut sent = self.current;
         for op in &ops[..n] {
             match *op {
-                Op::Normal(v) => self.current.normal = v,
-                Op::Color(v) => self.current.color = v,
-                Op::Tex(v) => self.current.tex = v,
-                Op::Material(at) => {
+                ListOp::Normal(v) => self.current.normal = v,
+                ListOp::Color(v) => self.current.color = v,
+                ListOp::Tex(v) => self.current.tex = v,
+                ListOp::Material(at) => {
                     let (face, what, v) = list.materials[at as usize];
                     self.material(face, what, v);
                 }
-                Op::Vertex(v) => corners.push((v, self.current)),
+                ListOp::Vertex(v) => corners.push((v, self.current)),
                 _ => {}
             }
             if let [a, b, c, d] = corners[..] {
@@ -525,24 +548,28 @@ impl Context {
         let Some(names) = names::decode(kind, names) else { return false };
         if crate::interpose::panic_guard::happened() {
             let base = gl::word(LIST_BASE);
-            names.into_iter().for_each(|n| self.play_plainly_or_call(base.wrapping_add(n)));
+            names.into_iter().for_each(|n| self.execute_in_driver_or_call(base.wrapping_add(n)));
             return true;
         }
         if self.recording.is_some() {
             for name in names {
-                self.list_op(Op::CallFromBase(name));
+                self.list_op(ListOp::CallFromBase(name));
             }
             return true;
         }
         // Between Begin and End of a primitive that the driver draws it answers no questions.
-        let base = if self.sink == Sink::Pass { self.state.list_base } else { gl::word(LIST_BASE) };
+        let base = if self.immediate_target == ImmediateModeTarget::Pass {
+            self.state.list_base
+        } else {
+            gl::word(LIST_BASE)
+        };
         let ours = {
             let lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
             names.iter().any(|n| lists.lists.contains_key(&base.wrapping_add(*n)))
         };
         if !ours {
             // A line of text in a font of glXUseXFont: one call for the driver.
-            self.before_driver(true, true);
+            self.before_driver_list(true, true);
             return false;
         }
         for name in names {
@@ -553,8 +580,8 @@ impl Context {
 
     /// Forgets our part; the driver then deletes its own.
     pub(crate) fn delete_lists(&mut self, first: u32, n: i32) -> bool {
-        if self.sink == Sink::Trace {
-            self.unswallow("glDeleteLists between Begin and End");
+        if self.immediate_target == ImmediateModeTarget::Trace {
+            self.replay_to_driver("glDeleteLists between Begin and End");
         }
         let range = first..first.saturating_add(n.max(0).cast_unsigned());
         let gone: Vec<_> = {
@@ -567,25 +594,25 @@ impl Context {
                 false => range.filter_map(|name| lists.lists.remove(&name)).collect(),
             }
         };
-        gone.into_iter().for_each(|list| delete_pieces(Some(list)));
+        gone.into_iter().for_each(|list| delete_segments(Some(list)));
         false
     }
 }
 
 /// A step by evaluators, for the driver.
-fn evaluate_plainly(op: &Op) {
+fn evaluate_in_driver(op: &ListOp) {
     match *op {
-        Op::EvalCoord(Kind::Curve, [u, _]) => gl::eval_coord1f(u),
-        Op::EvalCoord(Kind::Surface, [u, v]) => gl::eval_coord2f(u, v),
-        Op::EvalPoint(Kind::Curve, [i, _]) => gl::eval_point1(i),
-        Op::EvalPoint(Kind::Surface, [i, j]) => gl::eval_point2(i, j),
-        Op::EvalMesh([i1, i2, j1, j2]) => gl::eval_mesh2(FILL, i1, i2, j1, j2),
+        ListOp::EvalCoord(MapKind::Curve, [u, _]) => gl::eval_coord1f(u),
+        ListOp::EvalCoord(MapKind::Surface, [u, v]) => gl::eval_coord2f(u, v),
+        ListOp::EvalPoint(MapKind::Curve, [i, _]) => gl::eval_point1(i),
+        ListOp::EvalPoint(MapKind::Surface, [i, j]) => gl::eval_point2(i, j),
+        ListOp::EvalMesh([i1, i2, j1, j2]) => gl::eval_mesh2(FILL, i1, i2, j1, j2),
         _ => {}
     }
 }
 
-fn delete_pieces(list: Option<Arc<List>>) {
-    for piece in list.iter().flat_map(|l| &l.pieces) {
-        gl::delete_lists(*piece, 1);
+fn delete_segments(list: Option<Arc<DisplayList>>) {
+    for segment in list.iter().flat_map(|l| &l.segments) {
+        gl::delete_lists(*segment, 1);
     }
 }

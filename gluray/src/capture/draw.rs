@@ -1,11 +1,11 @@
 //! Draw calls as meshes: what is drawn, with which attributes, under which state.
 
 use crate::capture::geometry_cache::Geometry;
-use crate::classify::vtk::Recognised;
-use crate::state::current_attributes::{Current, Materials};
+use crate::classify::vtk::VtkProgram;
+use crate::state::current_attributes::{CurrentAttributes, Materials};
 use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
-use crate::trace::overrides::Look;
+use crate::trace::overrides::RayMaterial;
 use std::sync::Arc;
 
 /// An attribute of `N` components.
@@ -16,12 +16,12 @@ pub(crate) enum Values<const N: usize> {
     /// One per vertex.
     PerVertex(Vec<[f32; N]>),
     /// One per vertex, as the program's arrays have them.
-    Packed(Arc<Packed>),
+    Packed(Arc<PackedArray>),
 }
 
 /// A tightly packed array as the program gave it.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Packed {
+pub(crate) struct PackedArray {
     pub(crate) bytes: Vec<u8>,
     pub(crate) kind: u32,
     pub(crate) size: usize,
@@ -58,7 +58,7 @@ pub(crate) fn component(b: &[u8], kind: u32, normalized: bool) -> f32 {
     }
 }
 
-impl Packed {
+impl PackedArray {
     /// The value of vertex `i`; components that are not there come from `fill`.
     pub(crate) fn at<const N: usize>(&self, i: usize, fill: [f32; N]) -> [f32; N] {
         let one = component_bytes(self.kind);
@@ -100,7 +100,7 @@ pub(crate) struct Attributes {
 
 impl Attributes {
     /// The same for all vertices.
-    pub(crate) fn constant(current: &Current) -> Attributes {
+    pub(crate) fn constant(current: &CurrentAttributes) -> Attributes {
         Attributes {
             normals: Values::Constant(current.normal),
             colors: Values::Constant(current.color),
@@ -123,7 +123,7 @@ pub(crate) enum Shading {
     /// OpenGL's fixed function.
     Fixed,
     /// A shader that we know.
-    Program(Arc<Recognised>),
+    Program(Arc<VtkProgram>),
 }
 
 /// A draw to trace.
@@ -138,7 +138,7 @@ pub(crate) struct Draw {
     /// Counts the program's draw calls in it.
     pub(crate) calls: u64,
     /// What the user makes of it.
-    pub(crate) look: Look,
+    pub(crate) ray_material: RayMaterial,
 }
 
 impl Draw {
@@ -160,7 +160,7 @@ impl Draw {
 
 /// Primitives of one kind and size that follow one another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) struct Run {
+pub(crate) struct PrimitiveRun {
     pub(crate) mode: u32,
     pub(crate) count: u32,
     pub(crate) times: u32,
@@ -172,9 +172,9 @@ mod tests {
 
     #[test]
     fn byte_normals_are_read_as_arrays_have_them() {
-        let p = Packed { bytes: vec![127, 129, 128, 0], kind: BYTE, size: 3, normalized: true };
+        let p = PackedArray { bytes: vec![127, 129, 128, 0], kind: BYTE, size: 3, normalized: true };
         assert_eq!(p.at::<3>(0, [0.0; 3]), [1.0, -1.0, -1.0]);
-        let p = Packed { bytes: vec![255, 0, 51, 255], kind: UNSIGNED_BYTE, size: 4, normalized: true };
+        let p = PackedArray { bytes: vec![255, 0, 51, 255], kind: UNSIGNED_BYTE, size: 4, normalized: true };
         assert_eq!(p.at::<4>(0, [0.0; 4]), [1.0, 0.0, 0.2, 1.0]);
     }
 }

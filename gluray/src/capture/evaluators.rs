@@ -7,14 +7,14 @@ mod bernstein;
 mod casteljau;
 mod maps;
 
-use crate::capture::display_lists::Op;
-use crate::classify::rules::Verdict;
-use crate::interpose::context::{Context, Sink};
+use crate::capture::display_lists::ListOp;
+use crate::classify::rules::Classification;
+use crate::interpose::context::{Context, ImmediateModeTarget};
 use crate::interpose::driver::gl;
 use crate::interpose::symbols;
 use crate::state::enums::*;
-pub(crate) use maps::Kind;
-use maps::{Evaluated, Maps};
+pub(crate) use maps::MapKind;
+use maps::{EvaluatedVertex, EvaluatorMaps};
 
 /// Points in a row of a mesh; with more the driver is left alone.
 const MOST_IN_ROW: i64 = 1 << 20;
@@ -23,19 +23,19 @@ const LINE: u32 = 0x1b01;
 
 /// The grid that `glEvalPoint` and `glEvalMesh` count in.
 #[derive(Debug, Clone, Copy, Default)]
-struct Grid {
+struct EvaluatorGrid {
     first: [f32; 2],
     step: [f32; 2],
 }
 
-impl Grid {
-    fn query(kind: Kind) -> Grid {
+impl EvaluatorGrid {
+    fn query(kind: MapKind) -> EvaluatorGrid {
         let (domain, segments) = match kind {
-            Kind::Curve => (MAP1_GRID_DOMAIN, MAP1_GRID_SEGMENTS),
-            Kind::Surface => (MAP2_GRID_DOMAIN, MAP2_GRID_SEGMENTS),
+            MapKind::Curve => (MAP1_GRID_DOMAIN, MAP1_GRID_SEGMENTS),
+            MapKind::Surface => (MAP2_GRID_DOMAIN, MAP2_GRID_SEGMENTS),
         };
         let (ends, n) = (gl::floats::<4>(domain), gl::ints::<2>(segments));
-        Grid {
+        EvaluatorGrid {
             first: [ends[0], ends[2]],
             step: std::array::from_fn(|k| (ends[2 * k + 1] - ends[2 * k]) / n[k].max(1) as f32),
         }
@@ -49,8 +49,8 @@ impl Grid {
 /// What we know of the driver's maps and grids: curves, and surfaces.
 #[derive(Default)]
 pub(crate) struct Evaluators {
-    maps: [Option<Maps>; 2],
-    grids: [Option<Grid>; 2],
+    maps: [Option<EvaluatorMaps>; 2],
+    grids: [Option<EvaluatorGrid>; 2],
 }
 
 impl Evaluators {
@@ -59,65 +59,65 @@ impl Evaluators {
         *self = Evaluators::default();
     }
 
-    fn maps(&mut self, kind: Kind) -> &Maps {
-        self.maps[kind as usize].get_or_insert_with(|| Maps::query(kind))
+    fn maps(&mut self, kind: MapKind) -> &EvaluatorMaps {
+        self.maps[kind as usize].get_or_insert_with(|| EvaluatorMaps::query(kind))
     }
 
-    fn grid(&mut self, kind: Kind) -> Grid {
-        *self.grids[kind as usize].get_or_insert_with(|| Grid::query(kind))
+    fn grid(&mut self, kind: MapKind) -> EvaluatorGrid {
+        *self.grids[kind as usize].get_or_insert_with(|| EvaluatorGrid::query(kind))
     }
 }
 
 impl Context {
     /// `glMap` and `glMapGrid`.
-    pub(crate) fn maps_change(&mut self) -> bool {
-        match self.sink {
+    pub(crate) fn invalidate_maps(&mut self) -> bool {
+        match self.immediate_target {
             // An error, which the driver is to report.
-            Sink::Trace => self.unswallow("a map between Begin and End"),
-            Sink::List => {
+            ImmediateModeTarget::Trace => self.replay_to_driver("a map between Begin and End"),
+            ImmediateModeTarget::List => {
                 if let Some(r) = &mut self.recording {
                     r.note_map();
                 }
             }
-            Sink::Pass | Sink::Outside => {}
+            ImmediateModeTarget::Pass | ImmediateModeTarget::Outside => {}
         }
         self.evaluators.forget();
         false
     }
 
     /// The draw that comes goes into the driver's piece of the list that is compiled.
-    fn put_into_driver_piece(&mut self) {
+    fn put_into_driver_segment(&mut self) {
         if let Some(r) = &mut self.recording {
             r.note_driver_call(0, true, true);
         }
     }
 
     /// `glEvalCoord`.
-    pub(crate) fn eval_coord(&mut self, kind: Kind, at: [f32; 2]) -> bool {
-        match self.sink {
-            Sink::Trace => self.eval_vertex(kind, at),
-            Sink::List => self.list_op(Op::EvalCoord(kind, at)),
-            Sink::Pass | Sink::Outside => false,
+    pub(crate) fn eval_coord(&mut self, kind: MapKind, at: [f32; 2]) -> bool {
+        match self.immediate_target {
+            ImmediateModeTarget::Trace => self.eval_vertex(kind, at),
+            ImmediateModeTarget::List => self.list_op(ListOp::EvalCoord(kind, at)),
+            ImmediateModeTarget::Pass | ImmediateModeTarget::Outside => false,
         }
     }
 
     /// `glEvalPoint`.
-    pub(crate) fn eval_point(&mut self, kind: Kind, places: [i32; 2]) -> bool {
-        match self.sink {
-            Sink::Trace => {
+    pub(crate) fn eval_point(&mut self, kind: MapKind, places: [i32; 2]) -> bool {
+        match self.immediate_target {
+            ImmediateModeTarget::Trace => {
                 let at = self.evaluators.grid(kind).at(places);
                 self.eval_vertex(kind, at)
             }
-            Sink::List => self.list_op(Op::EvalPoint(kind, places)),
-            Sink::Pass | Sink::Outside => false,
+            ImmediateModeTarget::List => self.list_op(ListOp::EvalPoint(kind, places)),
+            ImmediateModeTarget::Pass | ImmediateModeTarget::Outside => false,
         }
     }
 
     /// A vertex of a primitive that is traced.
-    fn eval_vertex(&mut self, kind: Kind, at: [f32; 2]) -> bool {
+    fn eval_vertex(&mut self, kind: MapKind, at: [f32; 2]) -> bool {
         let maps = self.evaluators.maps(kind);
-        if let Some(why) = maps.unfollowed() {
-            self.unswallow(why);
+        if let Some(why) = maps.unsupported() {
+            self.replay_to_driver(why);
             return false;
         }
         let Some(e) = maps.at(at) else { return true };
@@ -139,20 +139,20 @@ impl Context {
     }
 
     /// Records a vertex. When that cannot be, the driver has what there is of the primitive, and false comes back.
-    fn take_evaluated(&mut self, e: &Evaluated) -> bool {
+    fn take_evaluated(&mut self, e: &EvaluatedVertex) -> bool {
         let [x, y, z, w] = e.position;
         let mut with = self.current;
         with.color = e.color.unwrap_or(with.color);
         with.normal = e.normal.unwrap_or(with.normal);
         with.tex = e.tex.unwrap_or(with.tex);
         if !(w > 0.0 && w.is_finite()) {
-            self.unswallow("vertices with w not positive");
+            self.replay_to_driver("vertices with w not positive");
             return false;
         }
-        if let Verdict::TraceIfOpaque(why) = self.verdict
+        if let Classification::TraceIfOpaque(why) = self.classification
             && !self.is_opaque_with(with.color)
         {
-            self.unswallow(why);
+            self.replay_to_driver(why);
             return false;
         }
         if e.normal.is_some() {
@@ -170,22 +170,22 @@ impl Context {
 
     /// `glEvalMesh1`: points or lines, which are the driver's.
     pub(crate) fn eval_mesh_1(&mut self, mode: u32) -> bool {
-        match self.sink {
-            Sink::Trace => self.unswallow("a mesh between Begin and End"),
-            Sink::List => self.put_into_driver_piece(),
-            Sink::Outside => {
-                if matches!(mode, POINT | LINE) && self.has_vertices(Kind::Curve) {
-                    self.passing("lines and points", false);
+        match self.immediate_target {
+            ImmediateModeTarget::Trace => self.replay_to_driver("a mesh between Begin and End"),
+            ImmediateModeTarget::List => self.put_into_driver_segment(),
+            ImmediateModeTarget::Outside => {
+                if matches!(mode, POINT | LINE) && self.has_vertices(MapKind::Curve) {
+                    self.before_driver_draw("lines and points", false);
                 }
             }
-            Sink::Pass => {}
+            ImmediateModeTarget::Pass => {}
         }
         false
     }
 
     /// Something comes out of `glEvalMesh`.
-    fn has_vertices(&mut self, kind: Kind) -> bool {
-        if self.can.core || self.can.es {
+    fn has_vertices(&mut self, kind: MapKind) -> bool {
+        if self.capabilities.core || self.capabilities.es {
             return false;
         }
         self.refresh();
@@ -195,45 +195,46 @@ impl Context {
     /// `glEvalMesh2` from `i1` to `i2` and `j1` to `j2`.
     pub(crate) fn eval_mesh_2(&mut self, mode: u32, range: [i32; 4]) -> bool {
         let filled = mode == FILL;
-        match self.sink {
-            Sink::Trace => {
+        match self.immediate_target {
+            ImmediateModeTarget::Trace => {
                 // An error, which the driver is to report.
-                self.unswallow("a mesh between Begin and End");
+                self.replay_to_driver("a mesh between Begin and End");
                 return false;
             }
-            Sink::Pass => return false,
-            Sink::List if filled => return self.list_op(Op::EvalMesh(range)),
-            Sink::List => {
-                self.put_into_driver_piece();
+            ImmediateModeTarget::Pass => return false,
+            ImmediateModeTarget::List if filled => return self.list_op(ListOp::EvalMesh(range)),
+            ImmediateModeTarget::List => {
+                self.put_into_driver_segment();
                 return false;
             }
-            Sink::Outside => {}
+            ImmediateModeTarget::Outside => {}
         }
         let [i1, i2, j1, j2] = range.map(i64::from);
-        if !matches!(mode, POINT | LINE | FILL) || i1 > i2 || j1 > j2 || !self.has_vertices(Kind::Surface) {
+        if !matches!(mode, POINT | LINE | FILL) || i1 > i2 || j1 > j2 || !self.has_vertices(MapKind::Surface)
+        {
             return false;
         }
-        let verdict = self.verdict();
+        let classification = self.classification();
         let opaque = self.is_opaque_now();
-        let maps = self.evaluators.maps(Kind::Surface);
-        let why = match verdict {
+        let maps = self.evaluators.maps(MapKind::Surface);
+        let why = match classification {
             _ if !filled => Some("lines and points"),
-            Verdict::Pass(why) => Some(why),
-            Verdict::TraceIfOpaque(why) if !maps.has_colors() && !opaque => Some(why),
+            Classification::Pass(why) => Some(why),
+            Classification::TraceIfOpaque(why) if !maps.has_colors() && !opaque => Some(why),
             _ if self.state.program != 0 => Some("evaluators with a program"),
             _ if i2 - i1 > MOST_IN_ROW => Some("a mesh with too many points in a row"),
-            _ => maps.unfollowed(),
+            _ => maps.unsupported(),
         };
         if let Some(why) = why {
-            self.passing(why, filled);
+            self.before_driver_draw(why, filled);
             return false;
         }
-        if verdict == Verdict::TraceInOrder {
+        if classification == Classification::TraceInOrder {
             self.flush("a draw whose order matters");
         }
-        symbols::attend();
+        symbols::arm();
         self.trace_mesh(range);
-        if verdict == Verdict::TraceInOrder {
+        if classification == Classification::TraceInOrder {
             self.end_batch();
         }
         true
@@ -241,7 +242,7 @@ impl Context {
 
     /// Rows of a mesh as Mesa draws them: parameters are summed up, and quads are split as strips of triangles are.
     fn trace_mesh(&mut self, [i1, i2, j1, j2]: [i32; 4]) {
-        let Grid { first, step } = self.evaluators.grid(Kind::Surface);
+        let EvaluatorGrid { first, step } = self.evaluators.grid(MapKind::Surface);
         let mut along = Vec::new();
         let mut u = first[0] + i1 as f32 * step[0];
         for _ in i1..=i2 {
@@ -260,25 +261,25 @@ impl Context {
         self.recorder.behind = true;
     }
 
-    fn row(&mut self, along: &[f32], v: f32) -> Vec<Evaluated> {
-        let maps = self.evaluators.maps(Kind::Surface);
+    fn row(&mut self, along: &[f32], v: f32) -> Vec<EvaluatedVertex> {
+        let maps = self.evaluators.maps(MapKind::Surface);
         along.iter().filter_map(|u| maps.at([*u, v])).collect()
     }
 
-    fn trace_strip(&mut self, along: &[f32], across: [f32; 2], rows: [&[Evaluated]; 2]) {
+    fn trace_strip(&mut self, along: &[f32], across: [f32; 2], rows: [&[EvaluatedVertex]; 2]) {
         self.recorder.begin(TRIANGLE_STRIP, &self.current);
-        self.sink = Sink::Trace;
+        self.immediate_target = ImmediateModeTarget::Trace;
         for ((u, lower), upper) in along.iter().zip(rows[0]).zip(rows[1]) {
             for (v, e) in across.iter().zip([lower, upper]) {
-                if self.sink != Sink::Trace || !self.take_evaluated(e) {
+                if self.immediate_target != ImmediateModeTarget::Trace || !self.take_evaluated(e) {
                     gl::eval_coord2f(*u, *v);
                 }
             }
         }
-        match self.sink {
-            Sink::Trace => self.recorder.end(),
+        match self.immediate_target {
+            ImmediateModeTarget::Trace => self.recorder.end(),
             _ => gl::end(),
         }
-        self.sink = Sink::Outside;
+        self.immediate_target = ImmediateModeTarget::Outside;
     }
 }

@@ -3,8 +3,8 @@
 
 mod refit;
 
-use crate::capture::draw::Run;
-use crate::capture::primitives::{Split, triangulate};
+use crate::capture::draw::PrimitiveRun;
+use crate::capture::primitives::{QuadSplit, triangulate};
 use rt_core::accel::{BuildOptions, BuildQuality, World};
 use rt_core::glam::Vec3;
 use rt_core::math::Aabb;
@@ -27,7 +27,7 @@ pub(crate) struct Geometry {
 
 /// How structures came to be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Structures {
+pub(crate) struct BuildCounts {
     /// Built.
     pub(crate) built: u64,
     /// Taken over from where the triangles were before.
@@ -57,7 +57,7 @@ impl Geometry {
     }
 
     /// The structure, built now if need be; `None` when the mesh cannot be built.
-    pub(crate) fn world(&self, made: &mut Structures) -> Option<Arc<World>> {
+    pub(crate) fn world(&self, made: &mut BuildCounts) -> Option<Arc<World>> {
         if let Some(best) = self.best.get() {
             return Some(best.clone());
         }
@@ -115,7 +115,7 @@ fn build(mesh: &Arc<TriMesh>, quality: BuildQuality) -> Option<Arc<World>> {
     world
 }
 
-struct Entry {
+struct CacheEntry {
     geometry: Arc<Geometry>,
     /// Frame in which it was used last, and in how many frames it was.
     last_used: u64,
@@ -125,8 +125,8 @@ struct Entry {
 
 /// All geometry of a context.
 #[derive(Default)]
-pub(crate) struct Cache {
-    entries: HashMap<u128, Entry>,
+pub(crate) struct GeometryCache {
+    entries: HashMap<u128, CacheEntry>,
     frame: u64,
     /// Look-ups that found something, and those that did not.
     pub(crate) hits: u64,
@@ -140,9 +140,14 @@ const RESTING_FRAMES: u32 = 4;
 /// Triangles from which a better structure is worth a thread.
 const WORTH_IMPROVING: usize = 20_000;
 
-impl Cache {
+impl GeometryCache {
     /// The geometry of primitives in a row.
-    pub(crate) fn of_runs(&mut self, positions: &[[f32; 3]], runs: &[Run], split: &Split) -> Arc<Geometry> {
+    pub(crate) fn of_runs(
+        &mut self,
+        positions: &[[f32; 3]],
+        runs: &[PrimitiveRun],
+        split: &QuadSplit,
+    ) -> Arc<Geometry> {
         let mut key = hash(&[bytes_of(positions)]);
         for r in runs {
             key = mix(key, u64::from(r.mode) << 32 | u64::from(r.count));
@@ -204,7 +209,8 @@ impl Cache {
         self.misses += 1;
         let before = self.before(&mesh);
         let geometry = Arc::new(Geometry::new(key, mesh, before));
-        let entry = Entry { geometry: geometry.clone(), last_used: self.frame, frames: 1, improving: false };
+        let entry =
+            CacheEntry { geometry: geometry.clone(), last_used: self.frame, frames: 1, improving: false };
         self.entries.insert(key, entry);
         geometry
     }
@@ -230,7 +236,8 @@ impl Cache {
     /// Geometry that was found another way is in use.
     pub(crate) fn touch(&mut self, geometry: &Arc<Geometry>) {
         let frame = self.frame;
-        let fresh = || Entry { geometry: geometry.clone(), last_used: frame, frames: 0, improving: false };
+        let fresh =
+            || CacheEntry { geometry: geometry.clone(), last_used: frame, frames: 0, improving: false };
         let e = self.entries.entry(geometry.key).or_insert_with(fresh);
         e.frames += u32::from(e.last_used != frame);
         e.last_used = frame;
@@ -329,16 +336,20 @@ mod tests {
 
     #[test]
     fn the_key_is_positions_and_connectivity_alone() {
-        let mut cache = Cache::default();
+        let mut cache = GeometryCache::default();
         let p = grid(300_000);
-        let runs = [Run { mode: TRIANGLES, count: 3, times: 100_000 }];
-        let a = cache.of_runs(&p, &runs, &Split::default());
-        let b = cache.of_runs(&p, &runs, &Split::default());
+        let runs = [PrimitiveRun { mode: TRIANGLES, count: 3, times: 100_000 }];
+        let a = cache.of_runs(&p, &runs, &QuadSplit::default());
+        let b = cache.of_runs(&p, &runs, &QuadSplit::default());
         assert!(Arc::ptr_eq(&a, &b));
         let mut moved = p.clone();
         moved[299_999][2] = f32::from_bits(moved[299_999][2].to_bits() ^ 1);
-        assert!(!Arc::ptr_eq(&a, &cache.of_runs(&moved, &runs, &Split::default())));
-        let c = cache.of_runs(&p, &[Run { mode: TRIANGLES, count: 300_000, times: 1 }], &Split::default());
+        assert!(!Arc::ptr_eq(&a, &cache.of_runs(&moved, &runs, &QuadSplit::default())));
+        let c = cache.of_runs(
+            &p,
+            &[PrimitiveRun { mode: TRIANGLES, count: 300_000, times: 1 }],
+            &QuadSplit::default(),
+        );
         assert!(!Arc::ptr_eq(&a, &c));
         assert_eq!((cache.hits, cache.misses), (1, 3));
     }
@@ -359,7 +370,7 @@ mod tests {
             for _ in 0..JOBS {
                 let (geometry, sender) = (geometry.clone(), sender.clone());
                 pool.spawn(move || {
-                    let mut made = Structures::default();
+                    let mut made = BuildCounts::default();
                     let world = geometry.world(&mut made);
                     sender.send((world.expect("a mesh that can be built"), made)).ok();
                 });
@@ -375,10 +386,14 @@ mod tests {
 
     #[test]
     fn geometry_made_anew_each_frame_does_not_pile_up() {
-        let mut cache = Cache::default();
+        let mut cache = GeometryCache::default();
         for i in 0..50 {
             let p = vec![[i as f32; 3]; 30_000];
-            cache.of_runs(&p, &[Run { mode: TRIANGLES, count: 3, times: 10_000 }], &Split::default());
+            cache.of_runs(
+                &p,
+                &[PrimitiveRun { mode: TRIANGLES, count: 3, times: 10_000 }],
+                &QuadSplit::default(),
+            );
             cache.frame_done(|_| true);
         }
         assert!(cache.entries.len() <= KEPT_FRAMES as usize + 1, "{}", cache.entries.len());

@@ -1,16 +1,16 @@
 //! Immediate mode: Begin and End, and the attributes that vertices take with them.
 
-use crate::classify::rules::{self, Verdict};
-use crate::interpose::context::{Context, Sink};
+use crate::classify::rules::{self, Classification};
+use crate::interpose::context::{Context, ImmediateModeTarget};
 use crate::interpose::symbols::{self, class};
 use crate::state::current_attributes::{set_material, stale};
 use crate::state::enums::*;
-use crate::state::material_properties::Properties;
+use crate::state::material_properties::MaterialProperties;
 
 /// What the short way of a call came to. It takes values and calls nothing, so that they stay in registers: a value that has been put into
 /// memory in parts and is read back whole costs more than all the rest of a call.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Step {
+pub(crate) enum FastPathResult {
     /// That was all.
     Done,
     /// The driver draws what is between Begin and End.
@@ -22,26 +22,26 @@ pub(crate) enum Step {
 impl Context {
     /// The short way of `glBegin`.
     #[inline(always)]
-    pub(crate) fn begin_step(&mut self, mode: u32) -> Step {
+    pub(crate) fn begin_fast(&mut self, mode: u32) -> FastPathResult {
         const DRAWS: u8 = class::MATRIX | class::LIGHT | class::RASTER | class::TEXTURE | class::CURRENT;
-        let ready = self.sink == Sink::Outside && self.dirty & DRAWS == 0;
+        let ready = self.immediate_target == ImmediateModeTarget::Outside && self.dirty & DRAWS == 0;
         if ready
-            && self.verdict == Verdict::Trace
+            && self.classification == Classification::Trace
             && self.state.program == 0
             && (TRIANGLES..=POLYGON).contains(&mode)
         {
             self.recorder.begin(mode, &self.current);
-            self.sink = Sink::Trace;
-            (self.set_since_draw, self.element_arrays) = (Properties::default(), None);
-            return Step::Done;
+            self.immediate_target = ImmediateModeTarget::Trace;
+            (self.set_since_draw, self.element_arrays) = (MaterialProperties::default(), None);
+            return FastPathResult::Done;
         }
-        Step::Slow
+        FastPathResult::Slow
     }
 
     pub(crate) fn begin(&mut self, mode: u32) -> bool {
-        match self.begin_step(mode) {
-            Step::Slow => self.begin_slowly(mode),
-            step => step == Step::Done,
+        match self.begin_fast(mode) {
+            FastPathResult::Slow => self.begin_slow(mode),
+            step => step == FastPathResult::Done,
         }
     }
 
@@ -65,143 +65,147 @@ impl Context {
     /// Alpha left 1 while that was what a draw was traced for.
     #[inline]
     fn watch_alpha(&mut self) {
-        if self.sink == Sink::Trace
-            && let Verdict::TraceIfOpaque(why) = self.verdict
+        if self.immediate_target == ImmediateModeTarget::Trace
+            && let Classification::TraceIfOpaque(why) = self.classification
             && !self.is_opaque_now()
         {
-            self.unswallow(why);
+            self.replay_to_driver(why);
         }
     }
 
     #[cold]
-    fn begin_slowly(&mut self, mode: u32) -> bool {
-        match self.sink {
-            Sink::List => return self.list_begin(mode),
+    fn begin_slow(&mut self, mode: u32) -> bool {
+        match self.immediate_target {
+            ImmediateModeTarget::List => return self.list_begin(mode),
             // An error, which the driver is to report.
-            Sink::Trace => {
-                self.unswallow("Begin between Begin and End");
+            ImmediateModeTarget::Trace => {
+                self.replay_to_driver("Begin between Begin and End");
                 return false;
             }
-            Sink::Pass => return false,
-            Sink::Outside => {}
+            ImmediateModeTarget::Pass => return false,
+            ImmediateModeTarget::Outside => {}
         }
-        let verdict = self.verdict();
+        let classification = self.classification();
         let filled = crate::capture::primitives::is_filled(mode);
         let fixed = self.state.program == 0;
-        let verdict = match verdict {
-            Verdict::TraceIfOpaque(why) if !self.is_opaque_now() => Verdict::Pass(why),
+        let classification = match classification {
+            Classification::TraceIfOpaque(why) if !self.is_opaque_now() => Classification::Pass(why),
             v => v,
         };
-        match verdict {
-            Verdict::Trace | Verdict::TraceInOrder | Verdict::TraceIfOpaque(_) if filled && fixed => {
-                if verdict == Verdict::TraceInOrder {
+        match classification {
+            Classification::Trace | Classification::TraceInOrder | Classification::TraceIfOpaque(_)
+                if filled && fixed =>
+            {
+                if classification == Classification::TraceInOrder {
                     self.flush("a draw whose order matters");
                 }
                 self.recorder.begin(mode, &self.current);
-                self.sink = Sink::Trace;
+                self.immediate_target = ImmediateModeTarget::Trace;
                 self.element_arrays = None;
-                symbols::attend();
+                symbols::arm();
                 true
             }
             _ => {
-                let why = match verdict {
+                let why = match classification {
                     _ if !filled => "lines and points",
-                    Verdict::Pass(why) => why,
+                    Classification::Pass(why) => why,
                     _ => "immediate mode with a program",
                 };
-                self.passing(why, filled);
-                self.sink = Sink::Pass;
+                self.before_driver_draw(why, filled);
+                self.immediate_target = ImmediateModeTarget::Pass;
                 false
             }
         }
     }
 
     /// The driver is about to draw something.
-    pub(crate) fn passing(&mut self, why: &'static str, filled: bool) {
+    pub(crate) fn before_driver_draw(&mut self, why: &'static str, filled: bool) {
         self.end_batch();
         if rules::commutes(&self.state) && !filled {
-            self.frame.others_drew();
+            self.frame.driver_drew();
         } else {
             self.flush(crate::present::frame::ORDER_MATTERS);
         }
         self.sync();
-        self.counters.pass(why, 1);
+        self.counters.count_driver_draws(why, 1);
     }
 
     /// The short way of `glEnd`.
     #[inline(always)]
-    pub(crate) fn end_step(&mut self) -> Step {
-        if self.sink == Sink::Trace && self.verdict != Verdict::TraceInOrder {
+    pub(crate) fn end_fast(&mut self) -> FastPathResult {
+        if self.immediate_target == ImmediateModeTarget::Trace
+            && self.classification != Classification::TraceInOrder
+        {
             self.recorder.end();
-            self.sink = Sink::Outside;
-            return Step::Done;
+            self.immediate_target = ImmediateModeTarget::Outside;
+            return FastPathResult::Done;
         }
-        Step::Slow
+        FastPathResult::Slow
     }
 
     pub(crate) fn end(&mut self) -> bool {
-        match self.end_step() {
-            Step::Slow => self.end_slowly(),
-            step => step == Step::Done,
+        match self.end_fast() {
+            FastPathResult::Slow => self.end_slow(),
+            step => step == FastPathResult::Done,
         }
     }
 
     #[cold]
-    fn end_slowly(&mut self) -> bool {
-        match self.sink {
-            Sink::List => self.list_end(),
-            Sink::Pass => {
-                self.sink = Sink::Outside;
+    fn end_slow(&mut self) -> bool {
+        match self.immediate_target {
+            ImmediateModeTarget::List => self.list_end(),
+            ImmediateModeTarget::Pass => {
+                self.immediate_target = ImmediateModeTarget::Outside;
                 false
             }
-            Sink::Trace => {
+            ImmediateModeTarget::Trace => {
                 self.recorder.end();
-                self.sink = Sink::Outside;
+                self.immediate_target = ImmediateModeTarget::Outside;
                 self.end_batch();
                 true
             }
-            Sink::Outside => false,
+            ImmediateModeTarget::Outside => false,
         }
     }
 
     /// The primitive that is being recorded goes to the driver after all.
-    pub(crate) fn unswallow(&mut self, why: &'static str) {
-        self.sink = Sink::Pass;
-        let (mode, vertices) = self.recorder.withdraw();
-        self.passing(why, true);
-        self.begin_again_with(mode, vertices);
+    pub(crate) fn replay_to_driver(&mut self, why: &'static str) {
+        self.immediate_target = ImmediateModeTarget::Pass;
+        let (mode, vertices) = self.recorder.take_open_primitive();
+        self.before_driver_draw(why, true);
+        self.replay_primitive(mode, vertices);
     }
 
     /// The short way of `glVertex`.
     #[inline(always)]
-    pub(crate) fn vertex_step(&mut self, v: [f32; 4]) -> Step {
-        match self.sink {
-            Sink::Trace if v[3] == 1.0 => {
+    pub(crate) fn vertex_fast(&mut self, v: [f32; 4]) -> FastPathResult {
+        match self.immediate_target {
+            ImmediateModeTarget::Trace if v[3] == 1.0 => {
                 self.recorder.vertex([v[0], v[1], v[2]], &self.current);
-                Step::Done
+                FastPathResult::Done
             }
-            Sink::Pass => Step::Driver,
-            _ => Step::Slow,
+            ImmediateModeTarget::Pass => FastPathResult::Driver,
+            _ => FastPathResult::Slow,
         }
     }
 
     pub(crate) fn vertex(&mut self, v: [f32; 4]) -> bool {
-        match self.vertex_step(v) {
-            Step::Slow => self.vertex_slowly(v),
-            step => step == Step::Done,
+        match self.vertex_fast(v) {
+            FastPathResult::Slow => self.vertex_slow(v),
+            step => step == FastPathResult::Done,
         }
     }
 
     #[cold]
-    fn vertex_slowly(&mut self, v: [f32; 4]) -> bool {
-        match self.sink {
-            Sink::List => self.list_vertex(v),
-            Sink::Trace if v[3] > 0.0 && v[3].is_finite() => {
+    fn vertex_slow(&mut self, v: [f32; 4]) -> bool {
+        match self.immediate_target {
+            ImmediateModeTarget::List => self.list_vertex(v),
+            ImmediateModeTarget::Trace if v[3] > 0.0 && v[3].is_finite() => {
                 self.recorder.vertex([v[0] / v[3], v[1] / v[3], v[2] / v[3]], &self.current);
                 true
             }
-            Sink::Trace => {
-                self.unswallow("vertices with w not positive");
+            ImmediateModeTarget::Trace => {
+                self.replay_to_driver("vertices with w not positive");
                 false
             }
             _ => false,
@@ -210,129 +214,131 @@ impl Context {
 
     /// The short way of `glNormal`. Outside of Begin and End it is only remembered: what vertices take counts, and the next Begin looks.
     #[inline(always)]
-    pub(crate) fn normal_step(&mut self, v: [f32; 3]) -> Step {
-        match self.sink {
-            Sink::Outside => {
+    pub(crate) fn normal_fast(&mut self, v: [f32; 3]) -> FastPathResult {
+        match self.immediate_target {
+            ImmediateModeTarget::Outside => {
                 self.current.normal = v;
                 self.recorder.behind = true;
-                self.now_stale(stale::NORMAL);
-                Step::Done
+                self.mark_stale(stale::NORMAL);
+                FastPathResult::Done
             }
-            Sink::Trace => {
+            ImmediateModeTarget::Trace => {
                 self.current.normal = v;
                 self.recorder.set_normal(v);
-                self.now_stale(stale::NORMAL);
-                Step::Done
+                self.mark_stale(stale::NORMAL);
+                FastPathResult::Done
             }
-            Sink::Pass => {
+            ImmediateModeTarget::Pass => {
                 self.current.normal = v;
-                Step::Driver
+                FastPathResult::Driver
             }
-            Sink::List => Step::Slow,
+            ImmediateModeTarget::List => FastPathResult::Slow,
         }
     }
 
     pub(crate) fn normal(&mut self, v: [f32; 3]) -> bool {
-        match self.normal_step(v) {
-            Step::Slow => self.list_normal(v),
-            step => step == Step::Done,
+        match self.normal_fast(v) {
+            FastPathResult::Slow => self.list_normal(v),
+            step => step == FastPathResult::Done,
         }
     }
 
     /// The short way of `glColor`.
     #[inline(always)]
-    pub(crate) fn color_step(&mut self, v: [f32; 4]) -> Step {
-        match self.sink {
-            Sink::Outside => {
+    pub(crate) fn color_fast(&mut self, v: [f32; 4]) -> FastPathResult {
+        match self.immediate_target {
+            ImmediateModeTarget::Outside => {
                 self.current.color = v;
                 self.recorder.behind = true;
-                self.now_stale(stale::COLOR);
-                Step::Done
+                self.mark_stale(stale::COLOR);
+                FastPathResult::Done
             }
-            Sink::Trace if !matches!(self.verdict, Verdict::TraceIfOpaque(_)) => {
+            ImmediateModeTarget::Trace
+                if !matches!(self.classification, Classification::TraceIfOpaque(_)) =>
+            {
                 self.current.color = v;
                 self.recorder.set_color(v);
-                self.now_stale(stale::COLOR);
-                Step::Done
+                self.mark_stale(stale::COLOR);
+                FastPathResult::Done
             }
-            Sink::Pass => {
+            ImmediateModeTarget::Pass => {
                 self.current.color = v;
-                Step::Driver
+                FastPathResult::Driver
             }
-            _ => Step::Slow,
+            _ => FastPathResult::Slow,
         }
     }
 
     pub(crate) fn color(&mut self, v: [f32; 4]) -> bool {
-        match self.color_step(v) {
-            Step::Slow if self.sink == Sink::List => self.list_color(v),
-            Step::Slow => {
+        match self.color_fast(v) {
+            FastPathResult::Slow if self.immediate_target == ImmediateModeTarget::List => self.list_color(v),
+            FastPathResult::Slow => {
                 self.current.color = v;
                 self.recorder.set_color(v);
-                self.now_stale(stale::COLOR);
+                self.mark_stale(stale::COLOR);
                 self.watch_alpha();
                 true
             }
-            step => step == Step::Done,
+            step => step == FastPathResult::Done,
         }
     }
 
     /// The short way of `glTexCoord`.
     #[inline(always)]
-    pub(crate) fn tex_coord_step(&mut self, v: [f32; 4]) -> Step {
-        match self.sink {
-            Sink::Outside => {
+    pub(crate) fn tex_coord_fast(&mut self, v: [f32; 4]) -> FastPathResult {
+        match self.immediate_target {
+            ImmediateModeTarget::Outside => {
                 self.current.tex = v;
                 self.recorder.behind = true;
-                self.now_stale(stale::TEX);
-                Step::Done
+                self.mark_stale(stale::TEX);
+                FastPathResult::Done
             }
-            Sink::Trace => {
+            ImmediateModeTarget::Trace => {
                 self.current.tex = v;
                 self.recorder.set_tex(v);
-                self.now_stale(stale::TEX);
-                Step::Done
+                self.mark_stale(stale::TEX);
+                FastPathResult::Done
             }
-            Sink::Pass => {
+            ImmediateModeTarget::Pass => {
                 self.current.tex = v;
-                Step::Driver
+                FastPathResult::Driver
             }
-            Sink::List => Step::Slow,
+            ImmediateModeTarget::List => FastPathResult::Slow,
         }
     }
 
     pub(crate) fn tex_coord(&mut self, v: [f32; 4]) -> bool {
-        match self.tex_coord_step(v) {
-            Step::Slow => self.list_tex(v),
-            step => step == Step::Done,
+        match self.tex_coord_fast(v) {
+            FastPathResult::Slow => self.list_tex(v),
+            step => step == FastPathResult::Done,
         }
     }
 
     pub(crate) fn material(&mut self, face: u32, what: u32, v: [f32; 4]) -> bool {
-        if self.sink == Sink::List {
+        if self.immediate_target == ImmediateModeTarget::List {
             return self.list_material(face, what, v);
         }
         let mut materials = self.current.materials;
         if !set_material(&mut materials, face, what, v) {
             // An error, which the driver is to report.
-            if self.sink == Sink::Trace {
-                self.unswallow("an invalid material");
+            if self.immediate_target == ImmediateModeTarget::Trace {
+                self.replay_to_driver("an invalid material");
             }
             return false;
         }
-        let properties = Properties::of(face, what);
-        if self.sink == Sink::Outside {
+        let properties = MaterialProperties::of(face, what);
+        if self.immediate_target == ImmediateModeTarget::Outside {
             self.set_since_draw.add(properties);
         }
         // Ours may be behind the driver's (after PopAttrib, say): then the driver alone is told.
-        if self.sink == Sink::Pass || self.dirty & class::CURRENT != 0 {
+        if self.immediate_target == ImmediateModeTarget::Pass || self.dirty & class::CURRENT != 0 {
             self.current.materials = materials;
             return false;
         }
         if materials != self.current.materials {
             self.current.materials = materials;
             self.recorder.set_materials(&materials);
-            self.now_stale(stale::MATERIAL);
+            self.mark_stale(stale::MATERIAL);
             self.stale_properties.add(properties);
             self.watch_alpha();
         }
@@ -340,32 +346,32 @@ impl Context {
     }
 
     #[inline(always)]
-    fn now_stale(&mut self, bit: u8) {
+    fn mark_stale(&mut self, bit: u8) {
         if self.stale == 0 {
-            symbols::attend();
+            symbols::arm();
         }
         self.stale |= bit;
     }
 
     pub(crate) fn rect(&mut self, [x, y, x2, y2]: [f32; 4]) -> bool {
-        if self.sink == Sink::Trace {
+        if self.immediate_target == ImmediateModeTarget::Trace {
             // An error, which the driver is to report.
-            self.unswallow("a rectangle between Begin and End");
+            self.replay_to_driver("a rectangle between Begin and End");
         }
-        if self.sink == Sink::Pass {
+        if self.immediate_target == ImmediateModeTarget::Pass {
             return false;
         }
-        if self.sink == Sink::List {
+        if self.immediate_target == ImmediateModeTarget::List {
             return self.list_rect([x, y, x2, y2]);
         }
         {
-            let traced = match self.verdict() {
-                Verdict::Trace | Verdict::TraceInOrder => self.state.program == 0,
-                Verdict::TraceIfOpaque(_) => self.state.program == 0 && self.is_opaque_now(),
-                Verdict::Pass(_) => false,
+            let traced = match self.classification() {
+                Classification::Trace | Classification::TraceInOrder => self.state.program == 0,
+                Classification::TraceIfOpaque(_) => self.state.program == 0 && self.is_opaque_now(),
+                Classification::Pass(_) => false,
             };
             if !traced {
-                self.passing("a rectangle in a state that is passed", true);
+                self.before_driver_draw("a rectangle in a state that is passed", true);
                 return false;
             }
         }

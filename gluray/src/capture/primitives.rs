@@ -14,7 +14,7 @@ pub(crate) fn is_filled(mode: u32) -> bool {
 /// are flat, indexed, or in a display list, and when it has to clip any vertex of the up to 4096 that it draws at once; else from the first to the
 /// third. Colours and bent quads show which.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
-pub(crate) struct Split {
+pub(crate) struct QuadSplit {
     /// The convention for the vertex of the flat colour.
     pub(crate) first_provokes: bool,
     /// All quads are split from the second vertex to the fourth.
@@ -23,13 +23,13 @@ pub(crate) struct Split {
     pub(crate) turned: Vec<[u32; 2]>,
 }
 
-impl Split {
+impl QuadSplit {
     fn turns(&self, vertex: u32) -> bool {
         self.all_turned || self.turned.iter().any(|[first, end]| (*first..*end).contains(&vertex))
     }
 
     /// Finds what is clipped: `outside` says for a range of vertices whether any of them is. `first..end` is one draw of quads to the driver.
-    pub(crate) fn look_for_clipped(&mut self, first: u32, end: u32, outside: impl Fn(u32, u32) -> bool) {
+    pub(crate) fn find_clipped_quads(&mut self, first: u32, end: u32, outside: impl Fn(u32, u32) -> bool) {
         // Beyond, geometry would be built anew for what nobody sees: quads of that number are small.
         const MOST: u32 = 1 << 16;
         const AT_ONCE: u32 = 4096;
@@ -47,7 +47,7 @@ impl Split {
 
 /// The triangles of a primitive whose vertices are numbered `first..first + count`; the vertex that gives the flat colour comes
 /// last. Incomplete primitives give nothing, as OpenGL has it.
-pub(crate) fn triangulate(mode: u32, first: u32, count: u32, split: &Split, out: &mut Vec<[u32; 3]>) {
+pub(crate) fn triangulate(mode: u32, first: u32, count: u32, split: &QuadSplit, out: &mut Vec<[u32; 3]>) {
     let v = |i: u32| first + i;
     let first_provokes = split.first_provokes;
     // Rotates so that vertex 0 (the first) comes last; the orientation stays.
@@ -87,14 +87,14 @@ fn quad([a, b, c, d]: [u32; 4], turned: bool) -> [[u32; 3]; 2] {
 mod tests {
     use super::*;
 
-    fn split(first_provokes: bool, all_turned: bool) -> Split {
-        Split { first_provokes, all_turned, turned: Vec::new() }
+    fn split(first_provokes: bool, all_turned: bool) -> QuadSplit {
+        QuadSplit { first_provokes, all_turned, turned: Vec::new() }
     }
 
     #[test]
     fn quads_that_are_clipped_are_split_the_other_way_with_all_that_are_drawn_at_once() {
-        let mut s = Split::default();
-        s.look_for_clipped(8, 8 + 3 * 4096, |from, to| (from..to).contains(&5000));
+        let mut s = QuadSplit::default();
+        s.find_clipped_quads(8, 8 + 3 * 4096, |from, to| (from..to).contains(&5000));
         assert_eq!(s.turned, [[8 + 4096, 8 + 2 * 4096]]);
         let mut out = Vec::new();
         triangulate(QUADS, 0, 4 * 4096, &s, &mut out);

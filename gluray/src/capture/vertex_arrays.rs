@@ -3,17 +3,17 @@
 //! The driver is asked which arrays are on when the draw comes. Client memory is copied then and there, because the program may change
 //! it as soon as the call returns.
 
-use crate::capture::draw::{Attributes, Draw, Packed, Shading, Values, component_bytes};
+use crate::capture::draw::{Attributes, Draw, PackedArray, Shading, Values, component_bytes};
 use crate::capture::geometry_cache::hash;
-use crate::capture::primitives::{Split, is_filled, triangulate};
-use crate::classify::rules::Verdict;
+use crate::capture::primitives::{QuadSplit, is_filled, triangulate};
+use crate::classify::rules::Classification;
 use crate::classify::vtk::DrawCall;
-use crate::interpose::client_memory::{Call, Elements, Named, Size, Source};
-use crate::interpose::context::{Context, Sink};
+use crate::interpose::client_memory::{ActiveCall, ArraySource, ComponentCount, DrawArguments, Elements};
+use crate::interpose::context::{Context, ImmediateModeTarget};
 use crate::interpose::driver::gl;
 use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
-use crate::trace::overrides::Look;
+use crate::trace::overrides::RayMaterial;
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -23,24 +23,24 @@ const POSITION: [u32; 4] =
 
 /// The fixed-function arrays that are on.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Arrays {
-    pub(crate) position: Source,
-    pub(crate) normal: Option<Source>,
-    pub(crate) color: Option<Source>,
-    pub(crate) tex: Option<Source>,
+pub(crate) struct VertexArrays {
+    pub(crate) position: ArraySource,
+    pub(crate) normal: Option<ArraySource>,
+    pub(crate) color: Option<ArraySource>,
+    pub(crate) tex: Option<ArraySource>,
 }
 
-impl Arrays {
+impl VertexArrays {
     /// The array of positions alone.
-    pub(crate) fn query_position() -> Result<Source, &'static str> {
+    pub(crate) fn query_position() -> Result<ArraySource, &'static str> {
         if !gl::is_enabled(VERTEX_ARRAY) {
             return Err("no vertex array");
         }
-        Ok(Source::of_fixed(Size::Asked(VERTEX_ARRAY_SIZE), POSITION, false, true))
+        Ok(ArraySource::of_fixed(ComponentCount::Asked(VERTEX_ARRAY_SIZE), POSITION, false, true))
     }
 
     /// As the driver has them; an error in words when rays cannot stand for them.
-    pub(crate) fn query(version: u32) -> Result<Arrays, &'static str> {
+    pub(crate) fn query(version: u32) -> Result<VertexArrays, &'static str> {
         let buffers = version >= 15;
         if !gl::is_enabled(VERTEX_ARRAY) {
             return Err("no vertex array");
@@ -53,11 +53,12 @@ impl Arrays {
         if version >= 20 && (0..8).any(|i| gl::vertex_attrib_i::<1>(i, VERTEX_ATTRIB_ARRAY_ENABLED)[0] != 0) {
             return Err("generic attributes without a program");
         }
-        let position = Source::of_fixed(Size::Asked(VERTEX_ARRAY_SIZE), POSITION, false, buffers);
+        let position =
+            ArraySource::of_fixed(ComponentCount::Asked(VERTEX_ARRAY_SIZE), POSITION, false, buffers);
         let normal = gl::is_enabled(NORMAL_ARRAY).then(|| {
             let asked =
                 [NORMAL_ARRAY_TYPE, NORMAL_ARRAY_STRIDE, NORMAL_ARRAY_POINTER, NORMAL_ARRAY_BUFFER_BINDING];
-            Source::of_fixed(Size::Three, asked, true, buffers)
+            ArraySource::of_fixed(ComponentCount::Three, asked, true, buffers)
         });
         let color = match gl::is_enabled(COLOR_ARRAY) {
             true => {
@@ -66,7 +67,7 @@ impl Arrays {
                 }
                 let asked =
                     [COLOR_ARRAY_TYPE, COLOR_ARRAY_STRIDE, COLOR_ARRAY_POINTER, COLOR_ARRAY_BUFFER_BINDING];
-                Some(Source::of_fixed(Size::Asked(COLOR_ARRAY_SIZE), asked, true, buffers))
+                Some(ArraySource::of_fixed(ComponentCount::Asked(COLOR_ARRAY_SIZE), asked, true, buffers))
             }
             false => None,
         };
@@ -81,14 +82,14 @@ impl Arrays {
                 TEXTURE_COORD_ARRAY_POINTER,
                 TEXTURE_COORD_ARRAY_BUFFER_BINDING,
             ];
-            Source::of_fixed(Size::Asked(TEXTURE_COORD_ARRAY_SIZE), asked, false, buffers)
+            ArraySource::of_fixed(ComponentCount::Asked(TEXTURE_COORD_ARRAY_SIZE), asked, false, buffers)
         });
-        Ok(Arrays { position, normal, color, tex })
+        Ok(VertexArrays { position, normal, color, tex })
     }
 }
 
 /// What became of a draw that is not left to the driver alone.
-pub(crate) enum Taken {
+pub(crate) enum ArrayDrawOutcome {
     /// Rays make its pixels.
     Traced,
     /// The driver makes its colours, rays its shadows.
@@ -96,14 +97,14 @@ pub(crate) enum Taken {
 }
 
 /// Which vertices a draw takes.
-pub(crate) enum Which {
+pub(crate) enum VertexSelection {
     /// Neighbours in the arrays.
     Range { first: usize, count: usize },
     /// By index; `least` is the smallest, `count` the span.
     Indexed { indices: Vec<u32>, least: usize, count: usize },
 }
 
-impl Which {
+impl VertexSelection {
     /// Stands for the index at which a primitive ends and another begins.
     const RESTART: u32 = u32::MAX;
 
@@ -113,7 +114,7 @@ impl Which {
         width: usize,
         base: i32,
         restart: Option<u32>,
-    ) -> Result<Which, &'static str> {
+    ) -> Result<VertexSelection, &'static str> {
         let decode = |b: &[u8]| match *b {
             [a] => u32::from(a),
             [a, b] => u32::from(u16::from_ne_bytes([a, b])),
@@ -121,32 +122,32 @@ impl Which {
             _ => 0,
         };
         let place = |raw: u32| match restart {
-            Some(r) if r == raw => Which::RESTART,
+            Some(r) if r == raw => VertexSelection::RESTART,
             _ => raw.wrapping_add_signed(base),
         };
         let indices: Vec<u32> = bytes.chunks_exact(width).map(|b| place(decode(b))).collect();
-        let real = || indices.iter().filter(|i| restart.is_none() || **i != Which::RESTART);
+        let real = || indices.iter().filter(|i| restart.is_none() || **i != VertexSelection::RESTART);
         let (Some(&least), Some(&most)) = (real().min(), real().max()) else {
-            return Ok(Which::Indexed { indices, least: 0, count: 0 });
+            return Ok(VertexSelection::Indexed { indices, least: 0, count: 0 });
         };
         let count = (most - least) as usize + 1;
         // Client arrays of unknown length: an index that is out of order must not make us read gigabytes.
         if count > 1 << 28 {
             return Err("indices that are too far apart");
         }
-        Ok(Which::Indexed { indices, least: least as usize, count })
+        Ok(VertexSelection::Indexed { indices, least: least as usize, count })
     }
 
     /// Names the geometry of these elements of an array of positions, whose bytes are given.
-    fn key(&self, mode: u32, bytes: &[u8], layout: (usize, u32, usize, bool), split: &Split) -> u128 {
+    fn key(&self, mode: u32, bytes: &[u8], layout: (usize, u32, usize, bool), split: &QuadSplit) -> u128 {
         let (stride, kind, size, _) = layout;
         let rules = u64::from(split.first_provokes) << 1 | u64::from(split.all_turned);
         let (_, count) = self.span();
         let tail = [stride as u64, u64::from(kind), size as u64, u64::from(mode), rules, count as u64];
         let tail = bytemuck::cast_slice(&tail);
         match self {
-            Which::Range { .. } => hash(&[bytes, tail, bytemuck::cast_slice(&split.turned)]),
-            Which::Indexed { indices, least, .. } => {
+            VertexSelection::Range { .. } => hash(&[bytes, tail, bytemuck::cast_slice(&split.turned)]),
+            VertexSelection::Indexed { indices, least, .. } => {
                 hash(&[bytes, bytemuck::cast_slice(indices), &least.to_ne_bytes(), tail])
             }
         }
@@ -155,21 +156,21 @@ impl Which {
     /// First vertex, and how many there are from it on.
     pub(crate) fn span(&self) -> (usize, usize) {
         match self {
-            Which::Range { first, count } => (*first, *count),
-            Which::Indexed { least, count, .. } => (*least, *count),
+            VertexSelection::Range { first, count } => (*first, *count),
+            VertexSelection::Indexed { least, count, .. } => (*least, *count),
         }
     }
 
     /// Up to `most` different vertices, spread over the draw.
     pub(crate) fn some(&self, most: usize) -> Vec<u32> {
         let n = match self {
-            Which::Range { count, .. } => *count,
-            Which::Indexed { indices, .. } => indices.len(),
+            VertexSelection::Range { count, .. } => *count,
+            VertexSelection::Indexed { indices, .. } => indices.len(),
         };
         let take = most.min(n);
         let number = |i: usize| match self {
-            Which::Range { first, .. } => (first + i) as u32,
-            Which::Indexed { indices, .. } => indices[i],
+            VertexSelection::Range { first, .. } => (first + i) as u32,
+            VertexSelection::Indexed { indices, .. } => indices[i],
         };
         let mut out: Vec<u32> = (0..take).map(|i| number(i * (n - 1) / (take - 1).max(1))).collect();
         out.sort_unstable();
@@ -178,19 +179,23 @@ impl Which {
     }
 
     /// How the driver splits quads where nobody knows what it clips.
-    pub(crate) fn plain_split(&self, first_provokes: bool) -> Split {
-        Split { first_provokes, all_turned: matches!(self, Which::Indexed { .. }), turned: Vec::new() }
+    pub(crate) fn plain_split(&self, first_provokes: bool) -> QuadSplit {
+        QuadSplit {
+            first_provokes,
+            all_turned: matches!(self, VertexSelection::Indexed { .. }),
+            turned: Vec::new(),
+        }
     }
 
-    /// How the driver would split quads: see [`Split`].
-    pub(crate) fn split(&self, mode: u32, s: &Snapshot, position: &Source, bytes: &[u8]) -> Split {
+    /// How the driver would split quads: see [`QuadSplit`].
+    pub(crate) fn split(&self, mode: u32, s: &Snapshot, position: &ArraySource, bytes: &[u8]) -> QuadSplit {
         let mut split = self.plain_split(s.first_vertex_provokes);
         split.all_turned |= s.flat;
         let (_, count) = self.span();
         if mode == QUADS && !split.all_turned {
             let clipped = s.clips();
             let (step, one, size) = (position.step(), component_bytes(position.kind), position.size.min(3));
-            split.look_for_clipped(0, count as u32, |from, to| {
+            split.find_clipped_quads(0, count as u32, |from, to| {
                 (from..to).any(|i| {
                     let at = i as usize * step;
                     let mut p = [0.0; 3];
@@ -206,11 +211,11 @@ impl Which {
     }
 
     /// Triangles, in vertex numbers of the span.
-    pub(crate) fn triangles(&self, mode: u32, split: &Split) -> Vec<[u32; 3]> {
+    pub(crate) fn triangles(&self, mode: u32, split: &QuadSplit) -> Vec<[u32; 3]> {
         let mut out = Vec::new();
         match self {
-            Which::Range { count, .. } => triangulate(mode, 0, *count as u32, split, &mut out),
-            Which::Indexed { indices, least, .. } => {
+            VertexSelection::Range { count, .. } => triangulate(mode, 0, *count as u32, split, &mut out),
+            VertexSelection::Indexed { indices, least, .. } => {
                 triangulate(mode, 0, indices.len() as u32, split, &mut out);
                 let vertex = |i: u32| indices[i as usize] - *least as u32;
                 out.iter_mut().for_each(|t| *t = t.map(vertex));
@@ -222,17 +227,17 @@ impl Which {
     /// Vertex numbers of the span in the order they are drawn; `None` where a primitive ends and another begins.
     fn order(&self) -> Box<dyn Iterator<Item = Option<usize>> + '_> {
         match self {
-            Which::Range { count, .. } => Box::new((0..*count).map(Some)),
-            Which::Indexed { indices, least, .. } => {
+            VertexSelection::Range { count, .. } => Box::new((0..*count).map(Some)),
+            VertexSelection::Indexed { indices, least, .. } => {
                 let place = move |i: &u32| (*i as usize).checked_sub(*least);
-                Box::new(indices.iter().map(move |i| place(i).filter(|_| *i != Which::RESTART)))
+                Box::new(indices.iter().map(move |i| place(i).filter(|_| *i != VertexSelection::RESTART)))
             }
         }
     }
 }
 
 /// Positions as x, y, z; points with w > 0 are divided by it.
-pub(crate) fn positions(p: &Packed) -> Result<Vec<[f32; 3]>, &'static str> {
+pub(crate) fn positions(p: &PackedArray) -> Result<Vec<[f32; 3]>, &'static str> {
     if p.kind == FLOAT && p.size == 3 {
         return Ok(bytemuck::pod_collect_to_vec(&p.bytes));
     }
@@ -251,19 +256,26 @@ pub(crate) fn positions(p: &Packed) -> Result<Vec<[f32; 3]>, &'static str> {
 
 impl Context {
     /// A draw call of arrays, by their order or by indices.
-    pub(crate) fn draw(&mut self, mode: u32, call: &Call<'_>) -> bool {
+    pub(crate) fn draw(&mut self, mode: u32, call: &ActiveCall<'_>) -> bool {
         let (key, restart) = match call.named() {
-            Named::Elements { count, kind, at, base } => {
+            DrawArguments::Elements { count, kind, at, base } => {
                 let buffer = gl::word(ELEMENT_ARRAY_BUFFER_BINDING) as usize;
                 let first = (buffer << 32) | base as u32 as usize;
                 let key = DrawCall { first, count: count.max(0) as usize, kind, at };
-                (key, if self.sink == Sink::List { self.restart_index(kind) } else { None })
+                (
+                    key,
+                    if self.immediate_target == ImmediateModeTarget::List {
+                        self.restart_index(kind)
+                    } else {
+                        None
+                    },
+                )
             }
-            Named::Arrays { first, count } => {
+            DrawArguments::Arrays { first, count } => {
                 let (first, count) = (first.max(0) as usize, count.max(0) as usize);
                 (DrawCall { first, count, kind: 0, at: 0 }, None)
             }
-            Named::Element(_) => return false,
+            DrawArguments::Element(_) => return false,
         };
         self.array_draw(mode, key, || Elements::of(call, restart))
     }
@@ -274,19 +286,19 @@ impl Context {
         call: DrawCall,
         elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
     ) -> bool {
-        if self.sink == Sink::Trace {
-            self.unswallow("a draw call between Begin and End");
+        if self.immediate_target == ImmediateModeTarget::Trace {
+            self.replay_to_driver("a draw call between Begin and End");
             return false;
         }
-        if self.sink == Sink::List {
+        if self.immediate_target == ImmediateModeTarget::List {
             return self.array_into_list(mode, elements);
         }
-        if self.sink == Sink::Pass {
+        if self.immediate_target == ImmediateModeTarget::Pass {
             return false;
         }
-        let verdict = self.verdict();
+        let classification = self.classification();
         self.keep_errors();
-        let taken = match verdict {
+        let taken = match classification {
             _ if !is_filled(mode) => Err("lines and points"),
             _ if self.restarts() => Err("primitive restart"),
             _ if self.state.program != 0 && self.config.settings.enabled && self.is_refused() => {
@@ -294,22 +306,22 @@ impl Context {
             }
             // Recognised programs decide for themselves what blending means.
             _ if self.state.program != 0 => self.take_program_arrays(mode, call, elements),
-            Verdict::Pass(why) => Err(why),
-            v => self.take_arrays(mode, elements, v).map(|()| Taken::Traced),
+            Classification::Pass(why) => Err(why),
+            v => self.take_arrays(mode, elements, v).map(|()| ArrayDrawOutcome::Traced),
         };
         self.drop_errors();
         match taken {
-            Ok(Taken::Traced) => true,
+            Ok(ArrayDrawOutcome::Traced) => true,
             // The driver draws it, and rays darken it when the frame ends.
-            Ok(Taken::Shape) => {
+            Ok(ArrayDrawOutcome::Shape) => {
                 self.sync();
                 self.mark_current();
                 false
             }
             Err(why) => {
-                self.passing(why, is_filled(mode));
+                self.before_driver_draw(why, is_filled(mode));
                 if is_filled(mode) {
-                    self.draw_over();
+                    self.begin_redraw();
                 }
                 // The arrays of the driver's draw leave some current values undefined.
                 self.mark_current();
@@ -319,13 +331,13 @@ impl Context {
     }
 
     fn restarts(&self) -> bool {
-        self.can.version >= 31 && gl::is_enabled(PRIMITIVE_RESTART)
-            || self.can.version >= 43 && gl::is_enabled(PRIMITIVE_RESTART_FIXED_INDEX)
+        self.capabilities.version >= 31 && gl::is_enabled(PRIMITIVE_RESTART)
+            || self.capabilities.version >= 43 && gl::is_enabled(PRIMITIVE_RESTART_FIXED_INDEX)
     }
 
     /// The index that restarts primitives, if one does.
     fn restart_index(&self, kind: u32) -> Option<u32> {
-        if self.can.version >= 43 && gl::is_enabled(PRIMITIVE_RESTART_FIXED_INDEX) {
+        if self.capabilities.version >= 43 && gl::is_enabled(PRIMITIVE_RESTART_FIXED_INDEX) {
             return Some(u32::MAX >> (32 - 8 * component_bytes(kind).clamp(1, 4)));
         }
         self.restarts().then(|| gl::word(PRIMITIVE_RESTART_INDEX))
@@ -335,29 +347,29 @@ impl Context {
         &mut self,
         mode: u32,
         elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
-        verdict: Verdict,
+        classification: Classification,
     ) -> Result<(), &'static str> {
-        let arrays = Arrays::query(self.can.version)?;
+        let arrays = VertexArrays::query(self.capabilities.version)?;
         let elements = elements()?;
         let (_, count) = elements.span();
         let seen = arrays.position.view(&elements)?;
         let split = elements.split(mode, &self.state, &arrays.position, &seen);
         let key = elements.key(mode, &seen, arrays.position.layout(), &split);
-        let geometry = match self.cache.known(key) {
+        let geometry = match self.geometry_cache.known(key) {
             Some(geometry) => geometry,
             None => {
                 let positions = positions(&arrays.position.pack(seen))?;
                 let triangles = elements.triangles(mode, &split);
-                self.cache.put(key, &positions, triangles)
+                self.geometry_cache.put(key, &positions, triangles)
             }
         };
-        let mut read = |s: &Option<Source>| -> Result<Option<Arc<Packed>>, &'static str> {
+        let mut read = |s: &Option<ArraySource>| -> Result<Option<Arc<PackedArray>>, &'static str> {
             let Some(s) = s else { return Ok(None) };
             let bytes = s.view(&elements)?;
-            Ok(Some(self.packed.get(&bytes, s.layout(), || s.pack(Cow::Borrowed(&bytes)))))
+            Ok(Some(self.attribute_cache.get(&bytes, s.layout(), || s.pack(Cow::Borrowed(&bytes)))))
         };
         let (normal, color, tex) = (read(&arrays.normal)?, read(&arrays.color)?, read(&arrays.tex)?);
-        if let Verdict::TraceIfOpaque(why) = verdict {
+        if let Classification::TraceIfOpaque(why) = classification {
             let by_color = !self.state.lighting
                 || self
                     .state
@@ -372,7 +384,7 @@ impl Context {
             }
         }
         self.sync();
-        if verdict == Verdict::TraceInOrder {
+        if classification == Classification::TraceInOrder {
             self.flush("a draw whose order matters");
         }
         self.end_batch();
@@ -388,15 +400,16 @@ impl Context {
         }
         let state = self.state.clone();
         let clip_from_object = crate::trace::lighting::product(&state.projection, &state.model_view);
-        let (attributes, shading, look) = (Arc::new(attributes), Shading::Fixed, Look::default());
-        let draw = Draw { geometry, attributes, state, shading, clip_from_object, calls: 1, look };
-        self.add(draw, verdict == Verdict::TraceInOrder);
+        let (attributes, shading, ray_material) =
+            (Arc::new(attributes), Shading::Fixed, RayMaterial::default());
+        let draw = Draw { geometry, attributes, state, shading, clip_from_object, calls: 1, ray_material };
+        self.add(draw, classification == Classification::TraceInOrder);
         Ok(())
     }
 
     /// Hands a finished draw to the frame.
     pub(crate) fn mark_current(&mut self) {
-        if !self.can.core {
+        if !self.capabilities.core {
             self.dirty |= crate::interpose::symbols::class::CURRENT;
         }
     }
@@ -414,9 +427,9 @@ impl Context {
             return false;
         }
         let read = || -> Result<_, &'static str> {
-            let arrays = Arrays::query(self.can.version)?;
+            let arrays = VertexArrays::query(self.capabilities.version)?;
             let elements = elements()?;
-            let read = |s: &Option<Source>| s.map(|s| s.read(&elements)).transpose();
+            let read = |s: &Option<ArraySource>| s.map(|s| s.read(&elements)).transpose();
             let position = arrays.position.read(&elements)?;
             Ok((position, read(&arrays.normal)?, read(&arrays.color)?, read(&arrays.tex)?, elements))
         };

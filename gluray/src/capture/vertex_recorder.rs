@@ -6,13 +6,13 @@
 mod attribute_stream;
 mod earlier_frames;
 
-use crate::capture::draw::{Attributes, Run, Values};
+use crate::capture::draw::{Attributes, PrimitiveRun, Values};
 use crate::capture::geometry_cache::Geometry;
-use crate::state::current_attributes::{Current, Materials};
+use crate::state::current_attributes::{CurrentAttributes, Materials};
 use crate::state::enums::QUADS;
-use attribute_stream::Stream;
+use attribute_stream::AttributeStream;
 pub(crate) use attribute_stream::same_bits;
-use earlier_frames::Expected;
+use earlier_frames::EarlierBatch;
 use rt_core::mesh::TriMesh;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -21,34 +21,34 @@ use std::sync::Arc;
 const RING: usize = 64;
 
 /// The latest vertices, which nobody has looked at.
-struct Ring {
+struct VertexRing {
     positions: [[f32; 3]; RING],
     normals: [[f32; 3]; RING],
     /// Vertices that came with a normal of their own: bit by bit.
     set: u64,
 }
 
-impl Default for Ring {
+impl Default for VertexRing {
     fn default() -> Self {
-        Ring { positions: [[0.0; 3]; RING], normals: [[0.0; 3]; RING], set: 0 }
+        VertexRing { positions: [[0.0; 3]; RING], normals: [[0.0; 3]; RING], set: 0 }
     }
 }
 
-const NO_RUN: Run = Run { mode: 0, count: u32::MAX, times: 0 };
+const NO_RUN: PrimitiveRun = PrimitiveRun { mode: 0, count: u32::MAX, times: 0 };
 
 /// Immediate mode: the vertices since the state changed last.
-pub(crate) struct Recorder {
-    /// Vertices so far. Those from `settled` on are in the ring alone.
+pub(crate) struct VertexRecorder {
+    /// Vertices so far. Those from `flushed` on are in the ring alone.
     count: usize,
     /// At this count a vertex takes the long way.
     limit: usize,
-    settled: usize,
-    ring: Ring,
+    flushed: usize,
+    ring: VertexRing,
     /// First vertex of the primitive between Begin and End, and its mode.
     open: usize,
     mode: u32,
     /// Primitives of one kind and size that are not in `runs` yet.
-    run: Run,
+    run: PrimitiveRun,
     /// Current values were set outside of Begin and End, and the streams do not know.
     pub(crate) behind: bool,
     /// An attribute besides positions and normals is written down for each vertex.
@@ -58,31 +58,31 @@ pub(crate) struct Recorder {
     /// What this batch seems to be. While it is right no position is written down, and in the end nothing has to be hashed.
     expected: Option<Arc<TriMesh>>,
     /// Batches of earlier frames by their first position.
-    earlier: HashMap<[u32; 3], Expected>,
+    earlier: HashMap<[u32; 3], EarlierBatch>,
     frame: u64,
-    normals: Stream<3>,
+    normals: AttributeStream<3>,
     /// The values of `normals` are those of a whole earlier batch: of this version, unless one was changed.
     kept: Option<u64>,
     changed: bool,
     /// The latest vertex' normal.
     last_normal: [f32; 3],
-    colors: Stream<4>,
-    tex: Stream<4>,
+    colors: AttributeStream<4>,
+    tex: AttributeStream<4>,
     materials: Vec<Materials>,
     material_of: Vec<u32>,
-    pub(crate) runs: Vec<Run>,
+    pub(crate) runs: Vec<PrimitiveRun>,
     /// There are quads in the batch.
     pub(crate) quads: bool,
     versions: u64,
 }
 
-impl Default for Recorder {
+impl Default for VertexRecorder {
     fn default() -> Self {
-        Recorder {
+        VertexRecorder {
             count: 0,
             limit: RING,
-            settled: 0,
-            ring: Ring::default(),
+            flushed: 0,
+            ring: VertexRing::default(),
             open: 0,
             mode: 0,
             run: NO_RUN,
@@ -92,12 +92,12 @@ impl Default for Recorder {
             expected: None,
             earlier: HashMap::new(),
             frame: 0,
-            normals: Stream::default(),
+            normals: AttributeStream::default(),
             kept: None,
             changed: false,
             last_normal: [0.0; 3],
-            colors: Stream::default(),
-            tex: Stream::default(),
+            colors: AttributeStream::default(),
+            tex: AttributeStream::default(),
             materials: Vec::new(),
             material_of: Vec::new(),
             runs: Vec::new(),
@@ -107,10 +107,10 @@ impl Default for Recorder {
     }
 }
 
-impl Recorder {
+impl VertexRecorder {
     /// A primitive begins.
     #[inline(always)]
-    pub(crate) fn begin(&mut self, mode: u32, current: &Current) {
+    pub(crate) fn begin(&mut self, mode: u32, current: &CurrentAttributes) {
         self.open = self.count;
         self.mode = mode;
         if self.count == 0 || self.behind {
@@ -126,7 +126,7 @@ impl Recorder {
     /// A batch begins, or what was set between its primitives counts from now on.
     #[cold]
     #[inline(never)]
-    fn take_up(&mut self, current: &Current) {
+    fn take_up(&mut self, current: &CurrentAttributes) {
         self.behind = false;
         self.set_normal(current.normal);
         self.set_color(current.color);
@@ -154,7 +154,7 @@ impl Recorder {
     #[inline(never)]
     fn next_run(&mut self, count: u32) {
         self.put_run();
-        self.run = Run { mode: self.mode, count, times: 1 };
+        self.run = PrimitiveRun { mode: self.mode, count, times: 1 };
         self.quads |= self.mode == QUADS;
     }
 
@@ -213,7 +213,7 @@ impl Recorder {
 
     /// A vertex with what is current.
     #[inline(always)]
-    pub(crate) fn vertex(&mut self, v: [f32; 3], current: &Current) {
+    pub(crate) fn vertex(&mut self, v: [f32; 3], current: &CurrentAttributes) {
         self.ring.positions[self.count % RING] = v;
         self.count += 1;
         if self.count == self.limit {
@@ -222,7 +222,7 @@ impl Recorder {
     }
 
     #[inline(never)]
-    fn vertex_more(&mut self, current: &Current) {
+    fn vertex_more(&mut self, current: &CurrentAttributes) {
         if self.colors.varying {
             self.colors.values.push(current.color);
         }
@@ -244,19 +244,19 @@ impl Recorder {
 
     /// Looks at what is in the ring.
     fn empty_ring(&mut self) {
-        let n = self.count - self.settled;
+        let n = self.count - self.flushed;
         if n == 0 {
             return;
         }
-        let first = self.settled % RING;
-        self.settle_positions(first..first + n);
-        self.settle_normals(first..first + n);
-        self.settled = self.count;
+        let first = self.flushed % RING;
+        self.flush_positions(first..first + n);
+        self.flush_normals(first..first + n);
+        self.flushed = self.count;
         self.ring.set = 0;
     }
 
-    fn settle_positions(&mut self, new: std::ops::Range<usize>) {
-        if self.settled == 0 {
+    fn flush_positions(&mut self, new: std::ops::Range<usize>) {
+        if self.flushed == 0 {
             self.positions.clear();
             let first = self.ring.positions[new.start].map(f32::to_bits);
             self.expected = self.earlier.get(&first).map(|e| e.mesh.clone());
@@ -264,16 +264,16 @@ impl Recorder {
         let new = &self.ring.positions[new];
         if let Some(mesh) = &self.expected {
             let all: &[[f32; 3]] = bytemuck::cast_slice(&mesh.positions);
-            if all.get(self.settled..self.settled + new.len()).is_some_and(|old| same_bits(old, new)) {
+            if all.get(self.flushed..self.flushed + new.len()).is_some_and(|old| same_bits(old, new)) {
                 return;
             }
-            self.write_down();
+            self.copy_followed_vertices();
         }
         self.positions
-            .extend_from_slice(&self.ring.positions[self.settled % RING..][..self.count - self.settled]);
+            .extend_from_slice(&self.ring.positions[self.flushed % RING..][..self.count - self.flushed]);
     }
 
-    fn settle_normals(&mut self, new: std::ops::Range<usize>) {
+    fn flush_normals(&mut self, new: std::ops::Range<usize>) {
         let ring = &mut self.ring;
         // Only what was set before one of these vertices counts.
         let of_these = (u64::MAX >> (RING - new.len())) << new.start;
@@ -293,7 +293,7 @@ impl Recorder {
         let new = &ring.normals[new];
         self.last_normal = new[new.len() - 1];
         if !self.normals.varying {
-            if self.settled == 0 {
+            if self.flushed == 0 {
                 self.normals.constant = new[0];
             }
             let constant = self.normals.constant;
@@ -302,7 +302,7 @@ impl Recorder {
             }
             self.vary_normals();
         }
-        let at = self.settled;
+        let at = self.flushed;
         let new = &self.ring.normals[at % RING..][..self.count - at];
         let values = &mut self.normals.values;
         if self.kept.is_none() {
@@ -314,7 +314,7 @@ impl Recorder {
     }
 
     /// All that came is looked at, and all primitives are in `runs`.
-    pub(crate) fn settle(&mut self) {
+    pub(crate) fn flush_ring(&mut self) {
         self.empty_ring();
         self.put_run();
     }
@@ -329,24 +329,24 @@ impl Recorder {
     }
 
     /// The vertices that were followed become our own.
-    pub(crate) fn write_down(&mut self) {
+    pub(crate) fn copy_followed_vertices(&mut self) {
         if let Some(mesh) = self.expected.take() {
             self.positions.clear();
-            self.positions.extend(mesh.positions[..self.settled].iter().map(|p| p.to_array()));
+            self.positions.extend(mesh.positions[..self.flushed].iter().map(|p| p.to_array()));
             if self.kept.take().is_some() {
-                self.normals.values.truncate(self.settled);
+                self.normals.values.truncate(self.flushed);
             }
         }
     }
 
     /// The vertices of the open primitive with their attributes, taken out again: for the driver.
-    pub(crate) fn withdraw(&mut self) -> (u32, Vec<([f32; 3], Current)>) {
+    pub(crate) fn take_open_primitive(&mut self) -> (u32, Vec<([f32; 3], CurrentAttributes)>) {
         self.empty_ring();
-        self.write_down();
+        self.copy_followed_vertices();
         let all = self.attributes_now();
         let out = (self.open..self.positions.len())
             .map(|i| {
-                let current = Current {
+                let current = CurrentAttributes {
                     normal: all.normals.at(i),
                     color: all.colors.at(i),
                     tex: all.tex.at(i),
@@ -365,7 +365,7 @@ impl Recorder {
             }
         }
         self.material_of.truncate(self.open);
-        (self.count, self.settled) = (self.open, self.open);
+        (self.count, self.flushed) = (self.open, self.open);
         self.last_normal = if self.open > 0 { all.normals.at(self.open - 1) } else { self.normals.constant };
         self.ring.set = 0;
         self.set_limit();
@@ -373,7 +373,7 @@ impl Recorder {
     }
 
     fn attributes_now(&self) -> Attributes {
-        fn values<const N: usize>(s: &Stream<N>) -> Values<N> {
+        fn values<const N: usize>(s: &AttributeStream<N>) -> Values<N> {
             if s.varying { Values::PerVertex(s.values.clone()) } else { Values::Constant(s.constant) }
         }
         Attributes {
@@ -391,7 +391,7 @@ impl Recorder {
     pub(crate) fn take_attributes(&mut self, geometry: &Arc<Geometry>) -> Attributes {
         let version = self.version(geometry);
         self.more = false;
-        (self.count, self.settled, self.limit) = (0, 0, RING);
+        (self.count, self.flushed, self.limit) = (0, 0, RING);
         self.ring.set = 0;
         (self.kept, self.changed) = (None, false);
         Attributes {

@@ -7,16 +7,16 @@
 use crate::capture::draw::{Attributes, Draw, Shading};
 use crate::capture::geometry_cache::{Geometry, hash};
 use crate::capture::vertex_arrays::positions;
-use crate::classify::rules::{self, Verdict};
+use crate::classify::rules::{self, Classification};
 use crate::classify::vtk::DrawCall;
 use crate::host::config::{Mode, Settings};
-use crate::interpose::client_memory::{Elements, Source};
+use crate::interpose::client_memory::{ArraySource, Elements};
 use crate::interpose::context::Context;
 use crate::interpose::driver::{feedback, gl};
-use crate::state::current_attributes::{Current, Material};
+use crate::state::current_attributes::{CurrentAttributes, Material};
 use crate::state::enums::*;
 use crate::state::snapshot::{GlLight, Snapshot};
-use crate::trace::overrides::Look;
+use crate::trace::overrides::RayMaterial;
 use rt_core::glam::{DMat4, DVec3, DVec4};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -31,7 +31,7 @@ const MOST_KEPT: usize = 4096;
 
 /// What is kept of the programs that were asked.
 #[derive(Default)]
-pub(crate) struct Probes {
+pub(crate) struct AffineProbes {
     /// Programs whose positions can be captured.
     ready: HashMap<u32, bool>,
     made: HashMap<u128, Arc<Geometry>>,
@@ -96,7 +96,9 @@ fn by_uniforms(program: u32, points: &[[f32; 3]], clip: &[[f32; 4]]) -> Option<D
 impl Context {
     /// Links `program` once more so that its positions can be captured, where nobody captures anything else.
     pub(crate) fn prepare_probe(&mut self, program: u32) {
-        let possible = self.config.settings.mode == Mode::Enhance && self.can.version >= 30 && !self.can.es;
+        let possible = self.config.settings.mode == Mode::Enhance
+            && self.capabilities.version >= 30
+            && !self.capabilities.es;
         let free = possible
             && gl::program_i::<1>(program, LINK_STATUS)[0] != 0
             && gl::program_i::<1>(program, TRANSFORM_FEEDBACK_VARYINGS)[0] == 0;
@@ -121,7 +123,7 @@ impl Context {
         elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
     ) -> Result<(), &'static str> {
         let program = self.state.program;
-        if self.can.es {
+        if self.capabilities.es {
             return Err("OpenGL ES");
         }
         match self.probes.ready.get(&program) {
@@ -129,12 +131,12 @@ impl Context {
             Some(false) => return Err("a program whose positions cannot be captured"),
             None => return Err("a program linked before mode enhance"),
         }
-        match rules::filled(&self.state, rules::Trace::Surfaces) {
-            Verdict::Trace => {}
-            Verdict::TraceIfOpaque(why) | Verdict::Pass(why) => return Err(why),
-            Verdict::TraceInOrder => return Err("a draw whose order matters"),
+        match rules::classify(&self.state, rules::TraceFilter::Surfaces) {
+            Classification::Trace => {}
+            Classification::TraceIfOpaque(why) | Classification::Pass(why) => return Err(why),
+            Classification::TraceInOrder => return Err("a draw whose order matters"),
         }
-        let sources = candidates(program, self.can.core);
+        let sources = candidates(program, self.capabilities.core);
         if sources.is_empty() {
             return Err("a program without arrays of positions");
         }
@@ -160,7 +162,7 @@ impl Context {
                     let Ok(positions) = positions(&packed) else { continue };
                     let split = elements.plain_split(self.state.first_vertex_provokes);
                     let triangles = elements.triangles(mode, &split);
-                    self.cache.of_indices(&positions, &triangles)
+                    self.geometry_cache.of_indices(&positions, &triangles)
                 }
             };
             let of = |i: &u32| geometry.mesh.positions.get(*i as usize - first).map(|p| p.to_array());
@@ -174,7 +176,7 @@ impl Context {
                 self.probes.made.clear();
             }
             self.probes.made.insert(key, geometry.clone());
-            self.cache.touch(&geometry);
+            self.geometry_cache.touch(&geometry);
             return self.add_shape(geometry, m);
         }
         Err("a vertex shader that is no matrix times a position")
@@ -211,7 +213,8 @@ impl Context {
             ..(*self.state).clone()
         };
         let white = Material { emission: [1.0; 4], diffuse: [0.0, 0.0, 0.0, 1.0], ..Material::default() };
-        let current = Current { color: [1.0; 4], materials: [white; 2], ..Current::default() };
+        let current =
+            CurrentAttributes { color: [1.0; 4], materials: [white; 2], ..CurrentAttributes::default() };
         self.end_batch();
         self.probes.draws.push(Draw {
             geometry,
@@ -220,7 +223,7 @@ impl Context {
             shading: Shading::Fixed,
             clip_from_object: f32s(m),
             calls: 1,
-            look: Look::default(),
+            ray_material: RayMaterial::default(),
         });
         self.counters.report.traced_draws += 1;
         Ok(())
@@ -233,7 +236,7 @@ impl Context {
         if draws.is_empty() {
             return;
         }
-        self.shade_over(&draws, &self.config.settings.clone());
+        self.darken_drawn(&draws, &self.config.settings.clone());
     }
 }
 
@@ -243,15 +246,15 @@ pub(crate) fn factor_settings(settings: &Settings) -> Settings {
 }
 
 /// Arrays that may be positions: three or four floating-point components, or two.
-fn candidates(program: u32, core: bool) -> Vec<Source> {
-    let mut out: Vec<Source> = feedback::active_attributes(program)
+fn candidates(program: u32, core: bool) -> Vec<ArraySource> {
+    let mut out: Vec<ArraySource> = feedback::active_attributes(program)
         .into_iter()
         .filter_map(|name| crate::classify::vtk::attribute(program, &name))
         .filter(|s| matches!(s.kind, FLOAT | DOUBLE | SHORT | HALF_FLOAT) && s.size >= 2)
         .collect();
     // Positions mostly come first, and have more components than texture coordinates.
     out.sort_by_key(|s| s.size < 3);
-    if !core && let Ok(arrays) = crate::capture::vertex_arrays::Arrays::query_position() {
+    if !core && let Ok(arrays) = crate::capture::vertex_arrays::VertexArrays::query_position() {
         out.insert(0, arrays);
     }
     out

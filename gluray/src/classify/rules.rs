@@ -6,7 +6,7 @@ use crate::state::snapshot::Snapshot;
 
 /// What becomes of a draw.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Verdict {
+pub(crate) enum Classification {
     /// Traced with the frame's others; the nearest wins, as with any depth test.
     Trace,
     /// Traced as long as every vertex has alpha 1: blending and alpha test then change nothing. Otherwise passed, for the reason.
@@ -19,7 +19,7 @@ pub(crate) enum Verdict {
 
 /// What the user wants traced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) enum Trace {
+pub(crate) enum TraceFilter {
     /// Opaque surfaces with a depth test: see the rules below.
     #[default]
     Surfaces,
@@ -35,9 +35,9 @@ pub(crate) enum Trace {
 pub(crate) const MOST_PIXELS: i32 = 1 << 26;
 
 /// The verdict over filled primitives in state `s`.
-pub(crate) fn filled(s: &Snapshot, trace: Trace) -> Verdict {
-    use Verdict::Pass;
-    if trace == Trace::Nothing {
+pub(crate) fn classify(s: &Snapshot, trace: TraceFilter) -> Classification {
+    use Classification::Pass;
+    if trace == TraceFilter::Nothing {
         return Pass("tracing is off");
     }
     // ---- What rays cannot stand for ----
@@ -104,13 +104,13 @@ pub(crate) fn filled(s: &Snapshot, trace: Trace) -> Verdict {
         "colour mask"
     } else if !s.depth_test {
         "no depth test"
-    } else if trace == Trace::Translucent
+    } else if trace == TraceFilter::Translucent
         && s.blend_is_over
         && matches!(s.depth_func, LESS | LEQUAL)
         && s.texture.is_none()
         && (!s.alpha_test || s.alpha_test_passes_one)
     {
-        return Verdict::Trace;
+        return Classification::Trace;
     } else if !s.depth_mask {
         "depth is not written"
     } else if !matches!(s.depth_func, LESS | LEQUAL) {
@@ -118,20 +118,24 @@ pub(crate) fn filled(s: &Snapshot, trace: Trace) -> Verdict {
     } else if s.blend || s.alpha_test {
         let harmless = (!s.blend || s.blend_is_over) && (!s.alpha_test || s.alpha_test_passes_one);
         let why = if s.blend { "blending" } else { "alpha test" };
-        if harmless && s.texture.is_none() && trace != Trace::All {
-            return Verdict::TraceIfOpaque(why);
+        if harmless && s.texture.is_none() && trace != TraceFilter::All {
+            return Classification::TraceIfOpaque(why);
         }
         why
     } else if s.texture.is_some() && !s.lighting {
         // Text and pictures; surfaces with colour maps are lit.
-        return if trace == Trace::All { Verdict::Trace } else { Pass("texture without lighting") };
+        return if trace == TraceFilter::All {
+            Classification::Trace
+        } else {
+            Pass("texture without lighting")
+        };
     } else {
-        return Verdict::Trace;
+        return Classification::Trace;
     };
     match trace {
         // The test is the driver's, of alphas in eight bits.
-        Trace::All if s.alpha_test_of_equality => Pass("an alpha test for equality"),
-        Trace::All => Verdict::TraceInOrder,
+        TraceFilter::All if s.alpha_test_of_equality => Pass("an alpha test for equality"),
+        TraceFilter::All => Classification::TraceInOrder,
         _ => Pass(why),
     }
 }
@@ -167,8 +171,8 @@ mod tests {
 
     #[test]
     fn opaque_surfaces_with_a_depth_test_are_traced() {
-        assert_eq!(filled(&surface(), Trace::Surfaces), Verdict::Trace);
-        assert_eq!(filled(&surface(), Trace::Nothing), Verdict::Pass("tracing is off"));
+        assert_eq!(classify(&surface(), TraceFilter::Surfaces), Classification::Trace);
+        assert_eq!(classify(&surface(), TraceFilter::Nothing), Classification::Pass("tracing is off"));
     }
 
     #[test]
@@ -187,22 +191,22 @@ mod tests {
         for (why, change) in cases {
             let mut s = surface();
             change(&mut s);
-            assert_eq!(filled(&s, Trace::Surfaces), Verdict::Pass(why));
-            assert_eq!(filled(&s, Trace::All), Verdict::TraceInOrder, "{why}");
+            assert_eq!(classify(&s, TraceFilter::Surfaces), Classification::Pass(why));
+            assert_eq!(classify(&s, TraceFilter::All), Classification::TraceInOrder, "{why}");
         }
     }
 
     #[test]
     fn blending_of_opaque_surfaces_is_no_reason_to_pass_them() {
         let s = Snapshot { blend: true, blend_is_over: true, ..surface() };
-        assert_eq!(filled(&s, Trace::Surfaces), Verdict::TraceIfOpaque("blending"));
+        assert_eq!(classify(&s, TraceFilter::Surfaces), Classification::TraceIfOpaque("blending"));
         let textured =
             Snapshot { texture: Some(crate::state::snapshot::TextureUnit::default()), ..s.clone() };
-        assert_eq!(filled(&textured, Trace::Surfaces), Verdict::Pass("blending"));
+        assert_eq!(classify(&textured, TraceFilter::Surfaces), Classification::Pass("blending"));
         let tested = Snapshot { alpha_test: true, ..s };
         assert_eq!(
-            filled(&tested, Trace::Surfaces),
-            Verdict::Pass("blending"),
+            classify(&tested, TraceFilter::Surfaces),
+            Classification::Pass("blending"),
             "the test may discard alpha 1"
         );
     }
@@ -210,12 +214,12 @@ mod tests {
     #[test]
     fn a_stencil_that_tells_front_from_back_is_never_traced() {
         let s = Snapshot { stencil_test: true, two_sided_stencil: true, ..surface() };
-        assert_eq!(filled(&s, Trace::All), Verdict::Pass("a stencil of two sides"));
+        assert_eq!(classify(&s, TraceFilter::All), Classification::Pass("a stencil of two sides"));
     }
 
     #[test]
     fn selection_is_never_traced() {
         let s = Snapshot { render_mode: 0x1c02, ..surface() };
-        assert_eq!(filled(&s, Trace::All), Verdict::Pass("selection or feedback"));
+        assert_eq!(classify(&s, TraceFilter::All), Classification::Pass("selection or feedback"));
     }
 }

@@ -1,7 +1,7 @@
 //! Programs with shaders: VTK's family (ParaView, PyVista, Slicer, VisIt, Mayavi) is recognised, all others are the driver's.
 //!
 //! VTK assembles its shaders from pieces. A program counts as recognised only when its sources are such pieces, whose meaning is written down in `blocks` and
-//! `template`, in VTK's order and with nothing else among them: a shader with anything else in it (picking, lights from pictures, what a script has replaced) is
+//! `signature`, in VTK's order and with nothing else among them: a shader with anything else in it (picking, lights from pictures, what a script has replaced) is
 //! left to the driver.
 
 mod actor_texture;
@@ -18,34 +18,34 @@ mod weighted_blending;
 
 use crate::capture::draw::{Attributes, Draw, Shading, Values};
 use crate::capture::geometry_cache::Geometry;
-use crate::capture::vertex_arrays::{Taken, positions};
-use crate::classify::rules::{self, Verdict};
+use crate::capture::vertex_arrays::{ArrayDrawOutcome, positions};
+use crate::classify::rules::{self, Classification};
 use crate::host::config::Mode;
-use crate::interpose::client_memory::{Elements, Source};
+use crate::interpose::client_memory::{ArraySource, Elements};
 use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
-use crate::state::current_attributes::Current;
+use crate::state::current_attributes::CurrentAttributes;
 use crate::state::enums::*;
-use crate::trace::overrides::Look;
+use crate::trace::overrides::RayMaterial;
 use crate::trace::texturing::{self, Image};
-pub(crate) use color::At;
-use depth_peeling::Peeling;
-use program::PerTriangle;
-pub(crate) use program::{ProgramLight, ProgramSkin, Recognised};
+pub(crate) use color::FragmentSample;
+use depth_peeling::DepthPeeling;
+use program::CellData;
+pub(crate) use program::{ProgramColorSource, ProgramLight, VtkProgram};
 use shadow_maps::ShadowMaps;
-use signature::{Colors, Peel, Pictured, Template};
+use signature::{ActorTexture, ColorSource, TranslucencyPass, VtkShaderSignature};
 use std::collections::HashMap;
 use std::sync::Arc;
-use weighted_blending::Weighted;
+use weighted_blending::WeightedBlending;
 
 /// See [`crate::recognise`].
 pub(crate) fn recognise(vertex: &str, geometry: &str, fragment: &str) -> Result<(), &'static str> {
-    Template::read(vertex, geometry, fragment).map(|_| ())
+    VtkShaderSignature::read(vertex, geometry, fragment).map(|_| ())
 }
 
 /// Which buffers a draw reads: while none was written, what was made of them serves again.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-struct Key {
+struct DrawCacheKey {
     sources: Sources,
     elements: (u32, usize, usize, u32, usize),
     /// The number of the first triangle in buffer textures.
@@ -55,28 +55,28 @@ struct Key {
 }
 
 /// Positions, normals, colours, texture coordinates; colours and edges of cells; coordinates of pictures where they are apart.
-type Sources = [Option<Source>; 7];
+type Sources = [Option<ArraySource>; 7];
 
 /// The programs of a context.
 #[derive(Default)]
-pub(crate) struct Programs {
-    templates: HashMap<u32, Result<Template, &'static str>>,
-    made: HashMap<Key, Made>,
+pub(crate) struct VtkPrograms {
+    signatures: HashMap<u32, Result<VtkShaderSignature, &'static str>>,
+    made: HashMap<DrawCacheKey, CachedDraw>,
     frame: u64,
-    pub(crate) peeling: Peeling,
-    pub(crate) weighted: Weighted,
+    pub(crate) peeling: DepthPeeling,
+    pub(crate) weighted: WeightedBlending,
     shadow_maps: ShadowMaps,
 }
 
 /// What was made of a draw's buffers, and the frame that used it last.
-struct Made {
+struct CachedDraw {
     geometry: Arc<Geometry>,
     attributes: Arc<Attributes>,
-    cells: PerTriangle,
+    cells: CellData,
     used: u64,
 }
 
-impl Programs {
+impl VtkPrograms {
     /// A frame is over: what no draw asked for goes.
     pub(crate) fn frame_done(&mut self) {
         const KEPT_FRAMES: u64 = 3;
@@ -87,9 +87,9 @@ impl Programs {
 }
 
 /// A generic attribute's array by name; `None` when the program has no such attribute or its array is off.
-pub(crate) fn attribute(program: u32, name: &str) -> Option<Source> {
+pub(crate) fn attribute(program: u32, name: &str) -> Option<ArraySource> {
     let at = u32::try_from(gl::attrib_location(program, name)).ok()?;
-    Source::of_attribute(at)
+    ArraySource::of_attribute(at)
 }
 
 impl Context {
@@ -109,15 +109,15 @@ impl Context {
             }
         }
         self.drop_errors();
-        let template = match other {
+        let signature = match other {
             true => Err("a geometry or tessellation shader"),
-            false => Template::read(&vertex, &geometry, &fragment),
+            false => VtkShaderSignature::read(&vertex, &geometry, &fragment),
         };
-        if template.is_err() && !other && geometry.is_empty() {
+        if signature.is_err() && !other && geometry.is_empty() {
             self.prepare_probe(program);
             self.drop_errors();
         }
-        self.programs.templates.insert(program, template);
+        self.programs.signatures.insert(program, signature);
         true
     }
 
@@ -127,20 +127,20 @@ impl Context {
         mode: u32,
         call: DrawCall,
         elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
-    ) -> Result<Taken, &'static str> {
+    ) -> Result<ArrayDrawOutcome, &'static str> {
         let program = self.state.program;
-        let template =
-            self.programs.templates.get(&program).copied().unwrap_or(Err("a program linked before us"));
-        if template.is_err() && self.config.settings.mode == Mode::Enhance && self.config.settings.enabled {
-            return self.take_shape(mode, call, elements).map(|()| Taken::Shape);
+        let signature =
+            self.programs.signatures.get(&program).copied().unwrap_or(Err("a program linked before us"));
+        if signature.is_err() && self.config.settings.mode == Mode::Enhance && self.config.settings.enabled {
+            return self.take_shape(mode, call, elements).map(|()| ArrayDrawOutcome::Shape);
         }
-        if !matches!(template, Ok(t) if t.peel != Peel::No) {
-            self.is_drawn_once(&template)?;
+        if !matches!(signature, Ok(t) if t.peel != TranslucencyPass::No) {
+            self.is_drawn_once(&signature)?;
         }
-        let template = template?;
-        self.peels(template.peel)?;
+        let signature = signature?;
+        self.check_peeling_pass(signature.peel)?;
         let position = attribute(program, "vertexMC").ok_or("a program without positions")?;
-        let cells = |wanted: bool, sampler: &str| -> Result<Option<Source>, &'static str> {
+        let cells = |wanted: bool, sampler: &str| -> Result<Option<ArraySource>, &'static str> {
             wanted.then(|| cell_data::buffer_texture(program, sampler)).transpose()
         };
         let sources = [
@@ -149,27 +149,27 @@ impl Context {
             attribute(program, "scalarColor"),
             // VTK 9.7 names the coordinates of colour maps apart from those of pictures.
             attribute(program, "colorTCoord").or_else(|| attribute(program, "tcoord")),
-            cells(template.colors == Colors::PerCell, "textureC")?,
-            cells(template.edges, "edgeTexture")?,
-            attribute(program, "tcoord").filter(|_| template.two_coordinates),
+            cells(signature.colors == ColorSource::PerCell, "textureC")?,
+            cells(signature.edges, "edgeTexture")?,
+            attribute(program, "tcoord").filter(|_| signature.two_coordinates),
         ];
         if sources.iter().flatten().any(|s| s.buffer == 0) {
             return Err("a program with arrays in client memory");
         }
-        let map = match template.colors {
-            Colors::Map => Some(self.image_of(program, "colortexture", texturing::followed)?),
+        let map = match signature.colors {
+            ColorSource::Map => Some(self.image_of(program, "colortexture", texturing::check_sampling)?),
             _ => None,
         };
-        let picture = match template.pictured {
-            Pictured::No => None,
+        let picture = match signature.actor_texture {
+            ActorTexture::No => None,
             over => Some(self.picture_of(program, over)?),
         };
-        let recognised = Recognised::query(program, template, [map, picture]);
+        let recognised = VtkProgram::from_uniforms(program, signature, [map, picture]);
         let first = match gl::uniform_location(program, "PrimitiveIDOffset") {
             -1 => 0,
             at => gl::uniform_i::<1>(program, at)[0],
         };
-        let key = Key {
+        let key = DrawCacheKey {
             sources,
             elements: (mode, call.first, call.count, call.kind, call.at),
             first,
@@ -185,9 +185,11 @@ impl Context {
             None => {
                 let (geometry, attributes) = self.read_program_arrays(mode, &sources, elements)?;
                 let cells = read_cells(&sources, first, geometry.mesh.num_triangles())?;
-                let same = |k: &Key| (&k.sources, k.elements, k.first) == (&key.sources, key.elements, first);
+                let same = |k: &DrawCacheKey| {
+                    (&k.sources, k.elements, k.first) == (&key.sources, key.elements, first)
+                };
                 self.programs.made.retain(|k, _| !same(k));
-                let made = Made {
+                let made = CachedDraw {
                     geometry: geometry.clone(),
                     attributes: attributes.clone(),
                     cells: cells.clone(),
@@ -198,38 +200,39 @@ impl Context {
             }
         };
         let recognised = recognised.with_cells(&cells);
-        self.cache.touch(&geometry);
+        self.geometry_cache.touch(&geometry);
         // VTK leaves blending on; without transparency it changes nothing.
         let mut state = (*self.state).clone();
-        if template.moved_back {
+        if signature.depth_offset {
             if state.polygon_offset.is_some() {
                 return Err("polygon offset of OpenGL's and of VTK's");
             }
-            state.polygon_offset = Some(moved_back_by(program));
+            state.polygon_offset = Some(polygon_offset_of(program));
             state.offset_by_length = true;
         }
-        if matches!(template.peel, Peel::Layers | Peel::Weighted) {
-            match template.peel {
-                Peel::Weighted => self.weighted_surface(&mut state)?,
-                _ => self.peeled_surface(&mut state)?,
+        if matches!(signature.peel, TranslucencyPass::Layers | TranslucencyPass::Weighted) {
+            match signature.peel {
+                TranslucencyPass::Weighted => self.check_weighted_surface(&mut state)?,
+                _ => self.check_peeled_surface(&mut state)?,
             }
             let clip_from_object = recognised.clip_from_object;
             let shading = Shading::Program(Arc::new(recognised));
-            let (state, look) = (Arc::new(state), Look::default());
-            let draw = Draw { geometry, attributes, state, shading, clip_from_object, calls: 1, look };
-            match template.peel {
-                Peel::Weighted => self.take_weighted(draw),
+            let (state, ray_material) = (Arc::new(state), RayMaterial::default());
+            let draw =
+                Draw { geometry, attributes, state, shading, clip_from_object, calls: 1, ray_material };
+            match signature.peel {
+                TranslucencyPass::Weighted => self.take_weighted(draw),
                 _ => self.take_peeled(draw),
             }
-            return Ok(Taken::Traced);
+            return Ok(ArrayDrawOutcome::Traced);
         }
         let offset = (state.polygon_offset, state.offset_by_length);
         if state.blend_is_over && recognised.is_opaque(&attributes, geometry.mesh.positions.len()) {
             state.blend = false;
         }
-        let in_order = match rules::filled(&state, self.config.trace()) {
-            Verdict::Pass(why) | Verdict::TraceIfOpaque(why) => return Err(why),
-            v => v == Verdict::TraceInOrder,
+        let in_order = match rules::classify(&state, self.config.trace()) {
+            Classification::Pass(why) | Classification::TraceIfOpaque(why) => return Err(why),
+            v => v == Classification::TraceInOrder,
         };
         if in_order {
             self.flush("a draw whose order matters");
@@ -237,23 +240,27 @@ impl Context {
         self.end_batch();
         let (clip_from_object, shading) =
             (recognised.clip_from_object, Shading::Program(Arc::new(recognised)));
-        let (mut state, look) = (self.state.clone(), Look::default());
-        if template.moved_back {
+        let (mut state, ray_material) = (self.state.clone(), RayMaterial::default());
+        if signature.depth_offset {
             let state = Arc::make_mut(&mut state);
             (state.polygon_offset, state.offset_by_length) = offset;
         }
-        self.add(Draw { geometry, attributes, state, shading, clip_from_object, calls: 1, look }, in_order);
-        Ok(Taken::Traced)
+        self.add(
+            Draw { geometry, attributes, state, shading, clip_from_object, calls: 1, ray_material },
+            in_order,
+        );
+        Ok(ArrayDrawOutcome::Traced)
     }
 
-    fn picture_of(&mut self, program: u32, pictured: Pictured) -> Result<Arc<Image>, &'static str> {
-        let sampler = if pictured.is_over_all() { "actortexture" } else { "albedoTex" };
-        let version = self.can.version;
-        let image =
-            self.image_of(program, sampler, |target| match texturing::unfollowed(target, version) {
+    fn picture_of(&mut self, program: u32, actor_texture: ActorTexture) -> Result<Arc<Image>, &'static str> {
+        let sampler = if actor_texture.is_over_all() { "actortexture" } else { "albedoTex" };
+        let version = self.capabilities.version;
+        let image = self.image_of(program, sampler, |target| {
+            match texturing::unsupported_sampling(target, version) {
                 Some(why) => Err(why),
                 None => Ok(()),
-            })?;
+            }
+        })?;
         // Only there do all samplers see what is stored.
         if image.is_of_colors() { Ok(image) } else { Err("a picture of luminance or alpha alone") }
     }
@@ -286,12 +293,12 @@ impl Context {
     ) -> Result<(Arc<Geometry>, Arc<Attributes>), &'static str> {
         let elements = elements()?;
         let (_, count) = elements.span();
-        let read = |s: &Option<Source>| s.map(|s| s.read(&elements)).transpose();
+        let read = |s: &Option<ArraySource>| s.map(|s| s.read(&elements)).transpose();
         let [position, normal, color, tex, _, _, picture] = sources;
         let positions = positions(&read(position)?.ok_or("a program without positions")?)?;
         let triangles = elements.triangles(mode, &elements.plain_split(self.state.first_vertex_provokes));
-        let geometry = self.cache.of_indices(&positions, &triangles);
-        let mut attributes = Attributes::constant(&Current::default());
+        let geometry = self.geometry_cache.of_indices(&positions, &triangles);
+        let mut attributes = Attributes::constant(&CurrentAttributes::default());
         if let Some(p) = read(normal)? {
             attributes.normals = Values::Packed(Arc::new(p));
         }
@@ -315,7 +322,7 @@ impl Context {
 }
 
 /// Factor and units of polygon offset that move depths as VTK's shader does.
-fn moved_back_by(program: u32) -> (f32, f32) {
+fn polygon_offset_of(program: u32) -> (f32, f32) {
     let one = |name: &str| match gl::uniform_location(program, name) {
         -1 => 0.0,
         at => gl::uniform_f::<1>(program, at)[0],
@@ -326,10 +333,10 @@ fn moved_back_by(program: u32) -> (f32, f32) {
 }
 
 /// What buffer textures have for the triangles of a draw, of which the first has number `first`.
-fn read_cells(sources: &Sources, first: i32, triangles: usize) -> Result<PerTriangle, &'static str> {
+fn read_cells(sources: &Sources, first: i32, triangles: usize) -> Result<CellData, &'static str> {
     let first = usize::try_from(first).map_err(|_| "a negative number of a cell")?;
     let [.., colors, sides, _] = sources;
-    Ok(PerTriangle {
+    Ok(CellData {
         colors: colors.map(|s| cell_data::colors(&s, first, triangles)).transpose()?,
         sides: sides.map(|s| cell_data::sides(&s, first, triangles)).transpose()?,
     })

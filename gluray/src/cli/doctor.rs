@@ -1,7 +1,7 @@
 //! `gluray doctor`: what this machine has, and what is missing.
 
 use super::library;
-use crate::doctor::{Finding, Grade, findings, look};
+use crate::doctor::{Finding, Grade, findings, inspect};
 use crate::host::config::FIELDS;
 use crate::host::config::environment::{OBJECTS, OTHER_VARIABLES, variable_of};
 use datasets::cli::{CommonArgs, Status};
@@ -25,7 +25,7 @@ pub(super) fn doctor(args: &DoctorArgs, common: &CommonArgs) -> anyhow::Result<S
     if args.variables {
         return variables(common);
     }
-    let found = findings(&look(library()));
+    let found = findings(&inspect(library()));
     common.result(&found, || found.iter().map(in_words).collect::<Vec<_>>().join("\n"))?;
     Ok(if found.iter().any(|f| f.grade == Grade::Bad) { Status::Failure } else { Status::Success })
 }

@@ -25,7 +25,7 @@ pub(super) fn panel(common: CommonArgs, args: &PanelArgs) -> anyhow::Result<()> 
     let cancel = Cancel::on_ctrl_c()?;
     let mut printed = Ok(());
     let outcome = serve(args.listen, None, cancel.flag(), |opened| {
-        let value = json!({ "url": opened.url, "link": opened.meeting.address });
+        let value = json!({ "url": opened.url, "link": opened.endpoint.address });
         printed = common.result(&value, || format!("open {}", opened.url));
         common.note(0, "programs find the panel by themselves; Ctrl-C ends");
     });

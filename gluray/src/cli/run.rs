@@ -1,7 +1,7 @@
 //! `gluray run`: the environment for the library, the program, and the account of what happened.
 
 use super::helpers::Helpers;
-use super::vendor::Vendor;
+use super::vendor::VendorFolder;
 use super::{last_report, library};
 use crate::host::config::environment::{OBJECTS, parse_pair, texts, variable_of};
 use crate::host::config::{Assignment, ConfigFile, SettingError, Settings, assign};
@@ -110,7 +110,7 @@ fn settings(args: &RunArgs) -> Result<Vec<(String, String)>, UsageError> {
 
 /// True when OpenGL here is GLVND's, which takes vendor libraries.
 fn has_glvnd() -> bool {
-    crate::doctor::look_for_glvnd().is_some()
+    crate::doctor::find_glvnd().is_some()
 }
 
 /// A folder for reports and sockets that goes when the run is over; nobody else may enter it.
@@ -195,7 +195,7 @@ pub(super) fn run(args: &RunArgs) -> anyhow::Result<u8> {
     }
     let vendor = args.via == Via::Vendor || (args.via == Via::Auto && has_glvnd());
     if vendor {
-        let found = Vendor::of(&library)?;
+        let found = VendorFolder::of(&library)?;
         command
             .envs(vendors_in_front_of())
             .env("LD_LIBRARY_PATH", with_first("LD_LIBRARY_PATH", &found.folder))

@@ -2,7 +2,7 @@
 
 use crate::cluster::SOCKETS;
 use crate::cluster::helper::serve;
-use crate::cluster::mpi_group::{lead_group, serve_group};
+use crate::cluster::mpi_group::{coordinate_group, serve_group};
 use crate::cluster::socket_comm::SocketComm;
 use crate::host::config::environment::variable_of;
 use crate::host::config::{self, Settings};
@@ -44,16 +44,16 @@ pub(super) struct ServeRaysArgs {
 }
 
 /// A socket that goes with its helper.
-struct Socket(PathBuf);
+struct BoundSocket(PathBuf);
 
-impl Drop for Socket {
+impl Drop for BoundSocket {
     fn drop(&mut self) {
         std::fs::remove_file(&self.0).ok();
     }
 }
 
-impl Socket {
-    fn bind(path: &Path) -> anyhow::Result<(UnixListener, Socket)> {
+impl BoundSocket {
+    fn bind(path: &Path) -> anyhow::Result<(UnixListener, BoundSocket)> {
         let bound = UnixListener::bind(path);
         // That of a helper that was killed: nobody answers there.
         let dead = bound.as_ref().is_err_and(|e| e.kind() == ErrorKind::AddrInUse)
@@ -63,7 +63,7 @@ impl Socket {
             .with_context(|| format!("cannot make the socket {}", path.display()))
             .cure("name a file that is not there yet, in a folder that you can write to, with fewer than 108 bytes in all")?;
         listener.set_nonblocking(true).context("the socket")?;
-        Ok((listener, Socket(path.to_owned())))
+        Ok((listener, BoundSocket(path.to_owned())))
     }
 }
 
@@ -75,7 +75,7 @@ pub(super) fn serve_rays(common: &CommonArgs, args: &ServeRaysArgs) -> anyhow::R
     if args.mpi {
         serve_job(common, args, &over)?;
     } else {
-        let (listener, _socket) = Socket::bind(&args.socket)?;
+        let (listener, _socket) = BoundSocket::bind(&args.socket)?;
         let socket = args.socket.display();
         common.note(0, format!("programs with {SOCKETS}={socket} are helped; Ctrl-C ends"));
         accept(&listener, &over)?;
@@ -141,7 +141,7 @@ fn serve_job(common: &CommonArgs, args: &ServeRaysArgs, over: &Arc<AtomicBool>) 
     let served = if comm.rank() > 0 {
         serve_group(&mut comm, over).map_err(anyhow::Error::from)
     } else {
-        lead_job(common, args, &mut comm, over)
+        coordinate_job(common, args, &mut comm, over)
     };
     if let Err(e) = served {
         // The others end as well: nobody waits for a job that is not whole.
@@ -165,19 +165,19 @@ fn share_machine(variable: impl Fn(&str) -> Option<String>) {
 }
 
 /// The first rank: it helps by its own socket, and stands before the others.
-fn lead_job(
+fn coordinate_job(
     common: &CommonArgs,
     args: &ServeRaysArgs,
     comm: &mut MpiComm,
     over: &Arc<AtomicBool>,
 ) -> anyhow::Result<()> {
-    let (own, own_socket) = Socket::bind(&args.socket)?;
+    let (own, own_socket) = BoundSocket::bind(&args.socket)?;
     let mut sockets = vec![own_socket];
     let mut listeners = Vec::new();
     for rank in 1..comm.size() {
         let mut name = args.socket.clone().into_os_string();
         name.push(format!(".{rank}"));
-        let (listener, socket) = Socket::bind(Path::new(&name))?;
+        let (listener, socket) = BoundSocket::bind(Path::new(&name))?;
         listeners.push(listener);
         sockets.push(socket);
     }
@@ -192,7 +192,7 @@ fn lead_job(
     );
     let flag = over.clone();
     let own = std::thread::spawn(move || accept(&own, &flag));
-    let led = lead_group(comm, listeners, over);
+    let led = coordinate_group(comm, listeners, over);
     over.store(true, Relaxed);
     let helped = own.join().unwrap_or(Ok(()));
     drop(sockets);

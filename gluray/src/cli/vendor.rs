@@ -13,18 +13,18 @@ use std::os::unix::fs::{DirBuilderExt as _, MetadataExt as _};
 use std::path::{Path, PathBuf};
 
 /// The folder with its files, and the description for EGL in it.
-pub(super) struct Vendor {
+pub(super) struct VendorFolder {
     pub(super) folder: PathBuf,
     pub(super) egl: PathBuf,
 }
 
-impl Vendor {
+impl VendorFolder {
     /// The folder for `library`, an absolute path: with the files of running programs, or in the cache where that cannot be.
-    pub(super) fn of(library: &Path) -> anyhow::Result<Vendor> {
+    pub(super) fn of(library: &Path) -> anyhow::Result<VendorFolder> {
         let places = [folders::runtime(folders::variable), folders::cache(folders::variable)];
         let mut made = Err(anyhow::anyhow!("there is no folder for running programs"));
         for place in places.into_iter().flatten() {
-            made = Vendor::within(&place, library);
+            made = VendorFolder::within(&place, library);
             if made.is_ok() {
                 break;
             }
@@ -33,7 +33,7 @@ impl Vendor {
             .cure("set XDG_RUNTIME_DIR to a folder of your own that others may not write to, or run with `--via preload`")
     }
 
-    fn within(place: &Path, library: &Path) -> anyhow::Result<Vendor> {
+    fn within(place: &Path, library: &Path) -> anyhow::Result<VendorFolder> {
         let folder = place.join(format!("vendor-{:016x}", name_of(library)));
         for made in [place, &folder] {
             private(made)?;
@@ -52,7 +52,7 @@ impl Vendor {
         if there.as_ref() != Some(&text) {
             put(&egl, |new| fs::write(new, &text))?;
         }
-        Ok(Vendor { folder, egl })
+        Ok(VendorFolder { folder, egl })
     }
 }
 
@@ -99,7 +99,7 @@ mod tests {
         let place = tempfile::tempdir().expect("a folder");
         let library = Path::new("/somewhere/libgluray.so");
         let inside = place.path().join("gluray");
-        let of = |library| Vendor::within(&inside, library);
+        let of = |library| VendorFolder::within(&inside, library);
         let (one, again) = (of(library).expect("a folder"), of(library).expect("a folder"));
         assert_eq!((&one.folder, &one.egl), (&again.folder, &again.egl));
         for folder in [&inside, &one.folder] {
@@ -127,6 +127,6 @@ mod tests {
         }
         let link = place.path().join("link");
         std::os::unix::fs::symlink(&inside, &link).expect("a link");
-        assert!(Vendor::within(&link, library).is_err(), "a link may lead to another place later");
+        assert!(VendorFolder::within(&link, library).is_err(), "a link may lead to another place later");
     }
 }

@@ -5,7 +5,7 @@ use bytemuck::Pod;
 /// A message that is none of ours.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("byte {at}: {what}")]
-pub(crate) struct Malformed {
+pub(crate) struct MalformedMessage {
     /// Where reading stopped.
     pub(crate) at: usize,
     /// What was wrong.
@@ -23,11 +23,11 @@ impl<'a> Reader<'a> {
         Reader { bytes, at: 0 }
     }
 
-    pub(crate) fn fault(&self, what: impl Into<String>) -> Malformed {
-        Malformed { at: self.at, what: what.into() }
+    pub(crate) fn fault(&self, what: impl Into<String>) -> MalformedMessage {
+        MalformedMessage { at: self.at, what: what.into() }
     }
 
-    pub(crate) fn take(&mut self, n: usize) -> Result<&'a [u8], Malformed> {
+    pub(crate) fn take(&mut self, n: usize) -> Result<&'a [u8], MalformedMessage> {
         let part = self.bytes.get(self.at..).and_then(|rest| rest.get(..n));
         let part = part.ok_or_else(|| self.fault(format!("{n} bytes more were expected")))?;
         self.at += n;
@@ -35,7 +35,7 @@ impl<'a> Reader<'a> {
     }
 
     /// A list of plain numbers.
-    pub(crate) fn pods<T: Pod>(&mut self) -> Result<Vec<T>, Malformed> {
+    pub(crate) fn pods<T: Pod>(&mut self) -> Result<Vec<T>, MalformedMessage> {
         let n = usize::try_from(u64::get(self)?).unwrap_or(usize::MAX);
         let bytes = n.checked_mul(size_of::<T>()).ok_or_else(|| self.fault("a list without end"))?;
         let bytes = self.take(bytes)?;
@@ -45,7 +45,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Nothing may come after the last value.
-    pub(crate) fn end(&self) -> Result<(), Malformed> {
+    pub(crate) fn end(&self) -> Result<(), MalformedMessage> {
         match self.bytes.len() - self.at {
             0 => Ok(()),
             n => Err(self.fault(format!("{n} bytes too many"))),
@@ -66,8 +66,8 @@ pub(crate) trait Wire: Sized {
     /// Reads them.
     ///
     /// # Errors
-    /// [`Malformed`] when they are none.
-    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed>;
+    /// [`MalformedMessage`] when they are none.
+    fn get(from: &mut Reader<'_>) -> Result<Self, MalformedMessage>;
 }
 
 macro_rules! numbers {
@@ -76,7 +76,7 @@ macro_rules! numbers {
             fn put(&self, out: &mut Vec<u8>) {
                 out.extend_from_slice(&self.to_ne_bytes());
             }
-            fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
+            fn get(from: &mut Reader<'_>) -> Result<Self, MalformedMessage> {
                 let bytes = from.take(size_of::<$t>())?;
                 Ok(<$t>::from_ne_bytes(bytes.try_into().expect("as many as were taken")))
             }
@@ -89,7 +89,7 @@ impl Wire for bool {
     fn put(&self, out: &mut Vec<u8>) {
         out.push(u8::from(*self));
     }
-    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
+    fn get(from: &mut Reader<'_>) -> Result<Self, MalformedMessage> {
         match u8::get(from)? {
             0 => Ok(false),
             1 => Ok(true),
@@ -102,7 +102,7 @@ impl Wire for usize {
     fn put(&self, out: &mut Vec<u8>) {
         (*self as u64).put(out);
     }
-    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
+    fn get(from: &mut Reader<'_>) -> Result<Self, MalformedMessage> {
         usize::try_from(u64::get(from)?).map_err(|_| from.fault("a number too large"))
     }
 }
@@ -111,7 +111,7 @@ impl<T: Wire + Copy, const N: usize> Wire for [T; N] {
     fn put(&self, out: &mut Vec<u8>) {
         self.iter().for_each(|v| v.put(out));
     }
-    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
+    fn get(from: &mut Reader<'_>) -> Result<Self, MalformedMessage> {
         let mut out = [None; N];
         for slot in &mut out {
             *slot = Some(T::get(from)?);
@@ -125,7 +125,7 @@ impl<T: Wire> Wire for Vec<T> {
         self.len().put(out);
         self.iter().for_each(|v| v.put(out));
     }
-    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
+    fn get(from: &mut Reader<'_>) -> Result<Self, MalformedMessage> {
         let n = usize::get(from)?;
         // Whoever says that there are more values than bytes is not made room for.
         if n > from.bytes.len() - from.at {
@@ -140,7 +140,7 @@ impl<T: Wire> Wire for Option<T> {
         self.is_some().put(out);
         self.iter().for_each(|v| v.put(out));
     }
-    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
+    fn get(from: &mut Reader<'_>) -> Result<Self, MalformedMessage> {
         Ok(if bool::get(from)? { Some(T::get(from)?) } else { None })
     }
 }
@@ -150,7 +150,7 @@ impl<A: Wire, B: Wire> Wire for (A, B) {
         self.0.put(out);
         self.1.put(out);
     }
-    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
+    fn get(from: &mut Reader<'_>) -> Result<Self, MalformedMessage> {
         Ok((A::get(from)?, B::get(from)?))
     }
 }
@@ -159,7 +159,7 @@ impl Wire for String {
     fn put(&self, out: &mut Vec<u8>) {
         put_pods(out, self.as_bytes());
     }
-    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
+    fn get(from: &mut Reader<'_>) -> Result<Self, MalformedMessage> {
         String::from_utf8(from.pods()?).map_err(|_| from.fault("text that is no UTF-8"))
     }
 }
@@ -173,7 +173,7 @@ macro_rules! wire_struct {
             }
             fn get(
                 from: &mut $crate::cluster::codec::Reader<'_>,
-            ) -> Result<Self, $crate::cluster::codec::Malformed> {
+            ) -> Result<Self, $crate::cluster::codec::MalformedMessage> {
                 Ok($t { $( $field: $crate::cluster::codec::Wire::get(from)?, )* })
             }
         }
@@ -192,7 +192,7 @@ macro_rules! wire_enum {
             }
             fn get(
                 from: &mut $crate::cluster::codec::Reader<'_>,
-            ) -> Result<Self, $crate::cluster::codec::Malformed> {
+            ) -> Result<Self, $crate::cluster::codec::MalformedMessage> {
                 const ALL: &[$t] = &[$($t::$variant),*];
                 let at = u8::get(from)?;
                 let found = ALL.get(usize::from(at)).copied();

@@ -3,12 +3,12 @@
 //! Who does not answer, or answers what cannot be, is left alone from then on, and its share is made here: a frame is never lost.
 
 use super::codec::{Reader, Wire};
-use super::draw_message::{Parcel, images_of, name_of_attributes, name_of_image};
-use super::rank_stats::Accounts;
+use super::draw_message::{DrawMessage, images_of, name_of_attributes, name_of_image};
+use super::rank_stats::RankStatsTable;
 use super::requests::{
-    ANSWER, AnswerHead, ORDER, Seen, Work, numbers, put_end, put_geometry, put_head, rect,
+    REPLY, REQUEST, ReplyHeader, ViewParameters, Work, numbers, put_end, put_geometry, put_head, rect,
 };
-use super::row_share::{Share, get_rows, most_bytes};
+use super::row_share::{RowShare, get_rows, most_bytes};
 use crate::capture::draw::{Attributes, Shading};
 use crate::host::config::Settings;
 use crate::trace::texturing::Image;
@@ -23,34 +23,34 @@ const KEPT_ORDERS: u64 = 12;
 /// What a helper may take in addition to ten times our own share.
 const PATIENCE: Duration = Duration::from_secs(20);
 /// Bytes of an answer beside its rows.
-const ANSWER_HEAD: usize = 1 << 16;
+const REPLY_HEADER: usize = 1 << 16;
 
 /// A helper as the first rank sees it.
 #[derive(Default)]
-struct Helper {
+struct HelperState {
     lost: bool,
     has: HashSet<u128>,
 }
 
 /// The first rank.
-pub(crate) struct Lead {
+pub(crate) struct Coordinator {
     comm: Box<dyn Communicator + Send>,
     /// By rank; the first is never used.
-    helpers: Vec<Helper>,
+    helpers: Vec<HelperState>,
     number: u64,
     /// Names of content, with the order that used it last.
     used: HashMap<u128, u64>,
-    attributes: Names<Attributes>,
-    images: Names<Image>,
-    pub(crate) accounts: Accounts,
+    attributes: ContentIds<Attributes>,
+    images: ContentIds<Image>,
+    pub(crate) rank_stats: RankStatsTable,
     /// How much longer than ten times our own share a helper may take.
     pub(crate) patience: Duration,
 }
 
 /// Names that were found out already.
-struct Names<T>(HashMap<usize, (Weak<T>, u128)>);
+struct ContentIds<T>(HashMap<usize, (Weak<T>, u128)>);
 
-impl<T> Names<T> {
+impl<T> ContentIds<T> {
     fn of(&mut self, value: &Arc<T>, name: impl FnOnce(&T) -> u128) -> u128 {
         let place = Arc::as_ptr(value) as usize;
         // What was there before may be gone, and something else in its place.
@@ -67,7 +67,7 @@ impl<T> Names<T> {
 }
 
 /// Layers of a picture, as far as a share has been made.
-pub(crate) struct Made<A, B> {
+pub(crate) struct PartialImage<A, B> {
     pub(crate) rect: Rect,
     pub(crate) first: Vec<A>,
     pub(crate) second: Vec<B>,
@@ -75,17 +75,17 @@ pub(crate) struct Made<A, B> {
     pub(crate) warnings: Vec<String>,
 }
 
-impl Lead {
-    pub(crate) fn new(comm: Box<dyn Communicator + Send>) -> Lead {
+impl Coordinator {
+    pub(crate) fn new(comm: Box<dyn Communicator + Send>) -> Coordinator {
         let size = comm.size();
-        Lead {
+        Coordinator {
             comm,
-            helpers: (0..size).map(|_| Helper::default()).collect(),
+            helpers: (0..size).map(|_| HelperState::default()).collect(),
             number: 0,
             used: HashMap::new(),
-            attributes: Names(HashMap::new()),
-            images: Names(HashMap::new()),
-            accounts: Accounts::new(size),
+            attributes: ContentIds(HashMap::new()),
+            images: ContentIds(HashMap::new()),
+            rank_stats: RankStatsTable::new(size),
             patience: PATIENCE,
         }
     }
@@ -105,11 +105,11 @@ impl Lead {
         draws: &[Prepared<'_>],
         settings: &Settings,
         work: &Work,
-        mut own: impl FnMut(Share) -> Made<A, B>,
-    ) -> Made<A, B> {
+        mut own: impl FnMut(RowShare) -> PartialImage<A, B>,
+    ) -> PartialImage<A, B> {
         self.number += 1;
         let settings_text = serde_json::to_string(settings).unwrap_or_default();
-        let parcels = self.parcels(draws);
+        let draw_messages = self.draw_messages(draws);
         let forget = self.stale();
 
         // ---- Orders ----
@@ -117,13 +117,13 @@ impl Lead {
         let count = ranks.len() as u32 + 1;
         let mut asked = Vec::new();
         for (i, rank) in ranks.into_iter().enumerate() {
-            let share = Share { index: i as u32 + 1, count };
+            let share = RowShare { index: i as u32 + 1, count };
             let mut order = Vec::new();
             put_head(&mut order, self.number, &forget);
-            self.put_news(&mut order, rank, draws, &parcels, &forget);
-            put_end(&mut order, &settings_text, share, work, &parcels);
-            self.accounts.of(rank).sent_bytes += order.len() as u64;
-            match self.comm.send(rank, ORDER, order) {
+            self.put_update(&mut order, rank, draws, &draw_messages, &forget);
+            put_end(&mut order, &settings_text, share, work, &draw_messages);
+            self.rank_stats.of(rank).sent_bytes += order.len() as u64;
+            match self.comm.send(rank, REQUEST, order) {
                 Ok(()) => asked.push((rank, share)),
                 Err(e) => {
                     self.lose(rank, &e.to_string());
@@ -134,9 +134,9 @@ impl Lead {
 
         // ---- Our own share ----
         let start = Instant::now();
-        let mut made = own(Share { index: 0, count });
+        let mut made = own(RowShare { index: 0, count });
         let took = start.elapsed();
-        let account = self.accounts.of(0);
+        let account = self.rank_stats.of(0);
         account.pictures += 1;
         account.trace_ms += took.as_secs_f64() * 1e3;
         account.rays += made.rays.iter().map(|(_, n)| n).sum::<u64>();
@@ -149,7 +149,7 @@ impl Lead {
                 true => Err(String::new()),
                 false => self.gather(rank, share, &mut made, patience),
             };
-            self.accounts.of(0).wait_ms += start.elapsed().as_secs_f64() * 1e3;
+            self.rank_stats.of(0).wait_ms += start.elapsed().as_secs_f64() * 1e3;
             if let Err(why) = done {
                 self.lose(rank, &why);
                 put_in(&mut made, own(share), share);
@@ -163,20 +163,20 @@ impl Lead {
         if !helper.lost {
             helper.lost = true;
             helper.has.clear();
-            self.accounts.lost(rank, why);
+            self.rank_stats.lost(rank, why);
         }
     }
 
     /// The draws with the names of what they need.
-    fn parcels(&mut self, draws: &[Prepared<'_>]) -> Vec<Parcel> {
+    fn draw_messages(&mut self, draws: &[Prepared<'_>]) -> Vec<DrawMessage> {
         let number = self.number;
-        let mut parcels = Vec::new();
+        let mut draw_messages = Vec::new();
         for p in draws {
             let draw = p.draw;
             let (images, attributes) = (&mut self.images, &mut self.attributes);
             let mut name = |i: &Arc<Image>| images.of(i, name_of_image);
             let [map, picture] = images_of(draw);
-            let parcel = Parcel {
+            let parcel = DrawMessage {
                 geometry: draw.geometry.key,
                 attributes: attributes.of(&draw.attributes, name_of_attributes),
                 images: [p.image.as_ref().map(&mut name), map.map(&mut name), picture.map(&mut name)],
@@ -186,14 +186,14 @@ impl Lead {
                     Shading::Program(program) => Some((**program).clone().with_images([None, None])),
                 },
                 clip_from_object: draw.clip_from_object,
-                look: draw.look,
+                ray_material: draw.ray_material,
             };
             self.used.insert(parcel.geometry, number);
             self.used.insert(parcel.attributes, number);
             self.used.extend(parcel.images.iter().flatten().map(|n| (*n, number)));
-            parcels.push(parcel);
+            draw_messages.push(parcel);
         }
-        parcels
+        draw_messages
     }
 
     /// Names that nobody asked for lately.
@@ -209,12 +209,12 @@ impl Lead {
     }
 
     /// What a helper does not have yet.
-    fn put_news(
+    fn put_update(
         &mut self,
         out: &mut Vec<u8>,
         rank: usize,
         draws: &[Prepared<'_>],
-        parcels: &[Parcel],
+        draw_messages: &[DrawMessage],
         forget: &[u128],
     ) {
         let has = &mut self.helpers[rank].has;
@@ -223,7 +223,7 @@ impl Lead {
         });
         let (mut geometries, mut attributes, mut images) = (Vec::new(), Vec::new(), Vec::new());
         let mut counts = [0_u64; 3];
-        for (p, parcel) in draws.iter().zip(parcels) {
+        for (p, parcel) in draws.iter().zip(draw_messages) {
             if has.insert(parcel.geometry) {
                 let mesh = &p.draw.geometry.mesh;
                 put_geometry(&mut geometries, parcel.geometry, &mesh.positions, &mesh.indices);
@@ -257,18 +257,18 @@ impl Lead {
     fn gather<A: bytemuck::Pod, B: bytemuck::Pod>(
         &mut self,
         rank: usize,
-        share: Share,
-        made: &mut Made<A, B>,
+        share: RowShare,
+        made: &mut PartialImage<A, B>,
         patience: Duration,
     ) -> Result<(), String> {
         let size = [made.rect.w.max(0) as usize, made.rect.h.max(0) as usize];
         let pixel = size_of::<A>() + if made.second.is_empty() { 0 } else { size_of::<B>() };
-        let most = ANSWER_HEAD + most_bytes(share, size, pixel);
-        let answer = self.comm.recv(rank, ANSWER, most, patience).map_err(|e| e.to_string())?;
+        let most = REPLY_HEADER + most_bytes(share, size, pixel);
+        let answer = self.comm.recv(rank, REPLY, most, patience).map_err(|e| e.to_string())?;
         let from = &mut Reader::new(&answer);
-        let head = AnswerHead::get(from).map_err(|e| format!("its answer: {e}"))?;
-        if let Some(complaint) = head.complaint {
-            return Err(complaint.chars().filter(|c| !c.is_control()).take(300).collect());
+        let head = ReplyHeader::get(from).map_err(|e| format!("its answer: {e}"))?;
+        if let Some(error_reply) = head.error_reply {
+            return Err(error_reply.chars().filter(|c| !c.is_control()).take(300).collect());
         }
         if head.number != self.number || rect(head.rect) != made.rect {
             return Err(format!(
@@ -285,7 +285,7 @@ impl Lead {
         let kinds = super::requests::RAYS.into_iter().zip(head.cost.rays);
         made.rays.extend(kinds.filter(|(_, n)| *n > 0));
         made.warnings.extend(head.warnings);
-        let account = self.accounts.of(rank);
+        let account = self.rank_stats.of(rank);
         account.pictures += 1;
         account.trace_ms += head.cost.took_us as f64 * 1e-3;
         account.received_bytes += answer.len() as u64;
@@ -298,7 +298,7 @@ impl Lead {
 }
 
 /// A share that was made here into the picture.
-fn put_in<A: Copy, B: Copy>(made: &mut Made<A, B>, part: Made<A, B>, share: Share) {
+fn put_in<A: Copy, B: Copy>(made: &mut PartialImage<A, B>, part: PartialImage<A, B>, share: RowShare) {
     for range in share.pixels(made.rect.w.max(0) as usize, made.rect.h.max(0) as usize) {
         made.first[range.clone()].copy_from_slice(&part.first[range.clone()]);
         if !made.second.is_empty() {
@@ -310,8 +310,8 @@ fn put_in<A: Copy, B: Copy>(made: &mut Made<A, B>, part: Made<A, B>, share: Shar
 }
 
 /// How a view is told.
-pub(crate) fn seen(view: &crate::trace::view::View, rect: Rect) -> Seen {
-    Seen {
+pub(crate) fn view_parameters(view: &crate::trace::view::View, rect: Rect) -> ViewParameters {
+    ViewParameters {
         projection: view.projection.to_cols_array(),
         viewport: numbers(view.viewport),
         rect: numbers(rect),

@@ -1,14 +1,14 @@
 //! Draws as messages. What is large (shapes, attributes, images) goes by name, and its content once.
 
-use super::codec::{Malformed, Reader, Wire, bytes_of, put_pods, wire_enum, wire_struct};
-use crate::capture::draw::{Attributes, Draw, Packed, Shading, Values, component_bytes};
+use super::codec::{MalformedMessage, Reader, Wire, bytes_of, put_pods, wire_enum, wire_struct};
+use crate::capture::draw::{Attributes, Draw, PackedArray, Shading, Values, component_bytes};
 use crate::capture::geometry_cache::hash;
-use crate::classify::vtk::Recognised;
+use crate::classify::vtk::VtkProgram;
 use crate::host::config::Surface;
 use crate::state::current_attributes::Material;
 use crate::state::snapshot::{Fog, GlLight, Snapshot, TextureUnit};
 use crate::trace::occlusion::MOST_LIGHTS;
-use crate::trace::overrides::Look;
+use crate::trace::overrides::RayMaterial;
 use crate::trace::texturing::Image;
 use std::sync::Arc;
 
@@ -26,8 +26,8 @@ wire_struct!(GlLight {
 wire_struct!(Fog { mode, density, start, end, color });
 wire_struct!(TextureUnit { target, name, env_mode, env_color, generate, matrix, version });
 wire_enum!(Surface { Program, Matte, Metal, Glass });
-wire_struct!(Look { surface, opacity, mirror, roughness, ior, tint });
-wire_struct!(Packed { bytes, kind, size, normalized });
+wire_struct!(RayMaterial { surface, opacity, mirror, roughness, ior, tint });
+wire_struct!(PackedArray { bytes, kind, size, normalized });
 wire_struct!(Snapshot {
     model_view,
     projection,
@@ -92,7 +92,7 @@ wire_struct!(Snapshot {
 /// Reasons of the first rank's: draws that have one are not traced, so none is ever sent.
 impl Wire for &'static str {
     fn put(&self, _: &mut Vec<u8>) {}
-    fn get(_: &mut Reader<'_>) -> Result<Self, Malformed> {
+    fn get(_: &mut Reader<'_>) -> Result<Self, MalformedMessage> {
         Ok("a reason that was not sent")
     }
 }
@@ -119,7 +119,7 @@ where
             }
         }
     }
-    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
+    fn get(from: &mut Reader<'_>) -> Result<Self, MalformedMessage> {
         Ok(match u8::get(from)? {
             0 => Values::Constant(Wire::get(from)?),
             1 => Values::PerVertex(from.pods()?),
@@ -129,7 +129,7 @@ where
                 if component_bytes(kind) == 0 || !(1..=4).contains(&size) {
                     return Err(from.fault(format!("attributes of {size} components of type {kind:#x}")));
                 }
-                Values::Packed(Arc::new(Packed { bytes: from.pods()?, kind, size, normalized }))
+                Values::Packed(Arc::new(PackedArray { bytes: from.pods()?, kind, size, normalized }))
             }
             n => return Err(from.fault(format!("{n} is no kind of attribute"))),
         })
@@ -144,7 +144,7 @@ impl Wire for Attributes {
         self.materials.put(out);
         put_pods(out, &self.material_of);
     }
-    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
+    fn get(from: &mut Reader<'_>) -> Result<Self, MalformedMessage> {
         let a = Attributes {
             normals: Wire::get(from)?,
             colors: Wire::get(from)?,
@@ -196,25 +196,25 @@ pub(super) fn images_of(draw: &Draw) -> [Option<&Arc<Image>>; 2] {
 }
 
 /// A draw, with the names of what is large.
-pub(super) struct Parcel {
+pub(super) struct DrawMessage {
     pub(super) geometry: u128,
     pub(super) attributes: u128,
     /// Of texture unit 0, of the program's colour map, and of its picture.
     pub(super) images: [Option<u128>; 3],
     pub(super) state: Snapshot,
-    pub(super) program: Option<Recognised>,
+    pub(super) program: Option<VtkProgram>,
     pub(super) clip_from_object: [f32; 16],
-    pub(super) look: Look,
+    pub(super) ray_material: RayMaterial,
 }
 
-wire_struct!(Parcel { geometry, attributes, images, state, program, clip_from_object, look });
+wire_struct!(DrawMessage { geometry, attributes, images, state, program, clip_from_object, ray_material });
 
-impl Parcel {
+impl DrawMessage {
     /// Refuses what the tracer could not bear.
-    pub(super) fn check(&self, from: &Reader<'_>) -> Result<(), Malformed> {
+    pub(super) fn check(&self, from: &Reader<'_>) -> Result<(), MalformedMessage> {
         const FAR: i32 = 1 << 24;
         let s = &self.state;
-        let lights = self.program.as_ref().map_or(0, Recognised::missing_lights);
+        let lights = self.program.as_ref().map_or(0, VtkProgram::missing_lights);
         if !super::requests::is_traced(&s.viewport) || s.viewport[2] <= 0 || s.viewport[3] <= 0 {
             Err(from.fault(format!("a viewport of {:?}", s.viewport)))
         } else if s.scissor.is_some_and(|r| r.iter().any(|v| !(-FAR..=FAR).contains(v))) {

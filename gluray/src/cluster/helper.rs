@@ -1,14 +1,15 @@
 //! A helper's life: it keeps what it was told of the scene, and makes the rows it is asked for.
 
-use super::draw_message::Parcel;
+use super::draw_message::DrawMessage;
 use super::requests::{
-    ANSWER, AnswerHead, Cost, MOST_ORDER_BYTES, ORDER, Order, Seen, Work, numbers, pixels, rect,
+    MAX_REQUEST_BYTES, REPLY, REQUEST, ReplyHeader, TraceCost, TraceRequest, ViewParameters, Work, numbers,
+    pixels, rect,
 };
-use super::row_share::{Share, put_rows};
+use super::row_share::{RowShare, put_rows};
 use crate::capture::draw::{Attributes, Draw, Shading};
-use crate::capture::geometry_cache::{Cache, Geometry};
+use crate::capture::geometry_cache::{Geometry, GeometryCache};
 use crate::host::config::{self, Quality, Settings};
-use crate::trace::path_tracing::Studio;
+use crate::trace::path_tracing::PathTracer;
 use crate::trace::texturing::Image;
 use crate::trace::thread_pool;
 use crate::trace::view::View;
@@ -36,8 +37,8 @@ pub(super) struct Helper {
     attributes: HashMap<u128, Arc<Attributes>>,
     images: HashMap<u128, Arc<Image>>,
     /// Builds better structures for what rests.
-    cache: Cache,
-    studio: Studio,
+    cache: GeometryCache,
+    path_tracer: PathTracer,
 }
 
 /// Serves the first rank until it leaves or `over` is set.
@@ -47,7 +48,7 @@ pub(super) struct Helper {
 pub(crate) fn serve(comm: &mut dyn Communicator, over: &AtomicBool) -> Result<(), CommError> {
     let mut helper = Helper::default();
     while !over.load(Relaxed) {
-        let order = match comm.recv(0, ORDER, MOST_ORDER_BYTES, LOOK) {
+        let order = match comm.recv(0, REQUEST, MAX_REQUEST_BYTES, LOOK) {
             Ok(order) => order,
             Err(CommError::Timeout { .. }) => continue,
             Err(CommError::PeerLost { .. }) => return Ok(()),
@@ -55,7 +56,7 @@ pub(crate) fn serve(comm: &mut dyn Communicator, over: &AtomicBool) -> Result<()
         };
         let answer = helper.answer(&order);
         comm.recycle(order);
-        match comm.send(0, ANSWER, answer) {
+        match comm.send(0, REPLY, answer) {
             Err(CommError::PeerLost { .. }) => return Ok(()),
             other => other?,
         }
@@ -63,12 +64,12 @@ pub(crate) fn serve(comm: &mut dyn Communicator, over: &AtomicBool) -> Result<()
     Ok(())
 }
 
-fn complaint(number: u64, text: String) -> Vec<u8> {
-    let head = AnswerHead {
+fn error_reply(number: u64, text: String) -> Vec<u8> {
+    let head = ReplyHeader {
         number,
-        complaint: Some(text),
+        error_reply: Some(text),
         rect: [0; 4],
-        cost: Cost::default(),
+        cost: TraceCost::default(),
         warnings: Vec::new(),
     };
     super::codec::bytes_of(&head)
@@ -77,36 +78,36 @@ fn complaint(number: u64, text: String) -> Vec<u8> {
 impl Helper {
     /// The answer to an order, whatever that is.
     pub(super) fn answer(&mut self, order: &[u8]) -> Vec<u8> {
-        let order = match Order::read(order) {
+        let order = match TraceRequest::read(order) {
             Ok(order) => order,
-            Err(malformed) => return complaint(0, format!("an order that is none: {malformed}")),
+            Err(malformed) => return error_reply(0, format!("an order that is none: {malformed}")),
         };
         let number = order.number;
         let made = catch_unwind(AssertUnwindSafe(|| thread_pool::on_pool(|| self.make(order))));
         match made {
             Ok(Ok(answer)) => answer,
-            Ok(Err(why)) => complaint(number, why),
-            Err(_) => complaint(number, "a fault of the helper's".to_owned()),
+            Ok(Err(why)) => error_reply(number, why),
+            Err(_) => error_reply(number, "a fault of the helper's".to_owned()),
         }
     }
 
-    fn make(&mut self, order: Order) -> Result<Vec<u8>, String> {
+    fn make(&mut self, order: TraceRequest) -> Result<Vec<u8>, String> {
         let start = Instant::now();
         for name in &order.forget {
             self.geometries.remove(name);
             self.attributes.remove(name);
             self.images.remove(name);
         }
-        for (name, (positions, triangles)) in order.news.geometries {
+        for (name, (positions, triangles)) in order.update.geometries {
             let positions: Vec<[f32; 3]> = positions.iter().map(|p| p.to_array()).collect();
             self.geometries.insert(name, self.cache.put(name, &positions, triangles));
         }
-        self.attributes.extend(order.news.attributes.into_iter().map(|(k, a)| (k, Arc::new(a))));
-        self.images.extend(order.news.images.into_iter().map(|(k, i)| (k, Arc::new(i))));
-        let settings = obeyed(order.settings);
+        self.attributes.extend(order.update.attributes.into_iter().map(|(k, a)| (k, Arc::new(a))));
+        self.images.extend(order.update.images.into_iter().map(|(k, i)| (k, Arc::new(i))));
+        let settings = with_own_thread_count(order.settings);
         let draws = order.draws.into_iter().map(|p| self.draw(p)).collect::<Result<Vec<_>, _>>()?;
         let (mut cost, mut structures) =
-            (Cost::default(), crate::capture::geometry_cache::Structures::default());
+            (TraceCost::default(), crate::capture::geometry_cache::BuildCounts::default());
         let ready: Vec<Prepared<'_>> = draws
             .iter()
             .map(|(d, image)| Prepared::new(d, image.clone(), &mut structures))
@@ -130,17 +131,23 @@ impl Helper {
                 put_rows(&mut rows, order.share, size, (&layer.color, &layer.depth), there);
                 (layer.rect, rows, Vec::new())
             }
-            Work::Beyond(seen, background) => {
-                let view = view(&seen)?;
-                let colors =
-                    whitted::colors(&ready, &view, rect(seen.rect), &settings, background, order.share);
+            Work::Whitted(view_parameters, background) => {
+                let view = view(&view_parameters)?;
+                let colors = whitted::colors(
+                    &ready,
+                    &view,
+                    rect(view_parameters.rect),
+                    &settings,
+                    background,
+                    order.share,
+                );
                 (colors.rect, self::colors(&colors, order.share, &mut cost), colors.warnings)
             }
-            Work::Paths(seen, [number, picture]) => {
-                let view = view(&seen)?;
+            Work::Paths(view_parameters, [number, picture]) => {
+                let view = view(&view_parameters)?;
                 let number = usize::try_from(number).map_err(|_| "a view without end")?;
-                let (at, share) = (rect(seen.rect), order.share);
-                let colors = self.studio.picture(&ready, &view, number, at, &settings, picture, share);
+                let (at, share) = (rect(view_parameters.rect), order.share);
+                let colors = self.path_tracer.picture(&ready, &view, number, at, &settings, picture, share);
                 (colors.rect, self::colors(&colors, order.share, &mut cost), colors.warnings)
             }
         };
@@ -148,13 +155,13 @@ impl Helper {
         self.picture_done(settings.quality);
         cost.took_us = start.elapsed().as_micros() as u64;
         let number = order.number;
-        let head = AnswerHead { number, complaint: None, rect: numbers(area), cost, warnings };
+        let head = ReplyHeader { number, error_reply: None, rect: numbers(area), cost, warnings };
         let mut out = super::codec::bytes_of(&head);
         out.extend_from_slice(&rows);
         Ok(out)
     }
 
-    fn draw(&self, p: Parcel) -> Result<(Draw, Option<Arc<Image>>), String> {
+    fn draw(&self, p: DrawMessage) -> Result<(Draw, Option<Arc<Image>>), String> {
         let lost = |what: &str, name: u128| format!("{what} {name:x} was never sent");
         let image = |name: Option<u128>| match name {
             None => Ok(None),
@@ -178,7 +185,7 @@ impl Helper {
             shading,
             clip_from_object: p.clip_from_object,
             calls: 1,
-            look: p.look,
+            ray_material: p.ray_material,
         };
         Ok((draw, texture))
     }
@@ -196,16 +203,17 @@ impl Helper {
             }
             auto
         });
-        self.studio.frame_done();
+        self.path_tracer.frame_done();
     }
 }
 
-fn view(seen: &Seen) -> Result<View, String> {
-    let projection = DMat4::from_cols_array(&seen.projection);
-    View::new(projection, rect(seen.viewport)).ok_or_else(|| "a projection without rays".to_owned())
+fn view(view_parameters: &ViewParameters) -> Result<View, String> {
+    let projection = DMat4::from_cols_array(&view_parameters.projection);
+    View::new(projection, rect(view_parameters.viewport))
+        .ok_or_else(|| "a projection without rays".to_owned())
 }
 
-fn colors(colors: &whitted::Colors, share: Share, cost: &mut Cost) -> Vec<u8> {
+fn colors(colors: &whitted::ColorImage, share: RowShare, cost: &mut TraceCost) -> Vec<u8> {
     colors.rays.iter().for_each(|(kind, n)| cost.add(kind, *n));
     let size = [colors.rect.w.max(0) as usize, colors.rect.h.max(0) as usize];
     let mut rows = Vec::new();
@@ -214,7 +222,7 @@ fn colors(colors: &whitted::Colors, share: Share, cost: &mut Cost) -> Vec<u8> {
 }
 
 /// The first rank's settings, but for the number of threads, which is this process' own.
-fn obeyed(settings: Settings) -> Settings {
+fn with_own_thread_count(settings: Settings) -> Settings {
     let now = config::current();
     let settings = Settings { threads: now.settings.threads, ..settings };
     if now.settings != settings {

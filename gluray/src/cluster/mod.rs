@@ -14,16 +14,16 @@ pub(crate) mod requests;
 pub(crate) mod row_share;
 pub(crate) mod socket_comm;
 
-pub use rank_stats::RankAccount;
+pub use rank_stats::RankStats;
 
 use crate::host::config::Settings;
-use crate::trace::path_tracing::Studio;
+use crate::trace::path_tracing::PathTracer;
 use crate::trace::view::View;
-use crate::trace::whitted::{self, Colors};
+use crate::trace::whitted::{self, ColorImage};
 use crate::trace::{self, Layer, Prepared, Rect};
-use coordinator::{Lead, Made, seen};
+use coordinator::{Coordinator, PartialImage, view_parameters};
 use requests::Work;
-use row_share::Share;
+use row_share::RowShare;
 use socket_comm::SocketComm;
 use std::os::unix::net::UnixStream;
 use std::sync::atomic::Ordering::Relaxed;
@@ -42,12 +42,12 @@ enum State {
     /// No helpers were given.
     Alone,
     /// The process that made the connections, and the first rank.
-    Together(u32, Box<Lead>),
+    Together(u32, Box<Coordinator>),
 }
 
 static STATE: Mutex<State> = Mutex::new(State::Unknown);
 /// What each rank did; apart from the rest, so that nobody who reports waits for a picture.
-static ACCOUNTS: Mutex<Vec<RankAccount>> = Mutex::new(Vec::new());
+static ACCOUNTS: Mutex<Vec<RankStats>> = Mutex::new(Vec::new());
 /// Helpers that could not be reached.
 static PROBLEMS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
@@ -75,7 +75,7 @@ fn begin() -> State {
         }
     }
     match SocketComm::first(streams) {
-        Ok(comm) => State::Together(std::process::id(), Box::new(Lead::new(Box::new(comm)))),
+        Ok(comm) => State::Together(std::process::id(), Box::new(Coordinator::new(Box::new(comm)))),
         Err(e) => {
             problems.push(format!("helpers cannot be talked to: {e}"));
             State::Alone
@@ -84,7 +84,7 @@ fn begin() -> State {
 }
 
 /// Runs `f` on the first rank where there are helpers that a picture of this size is worth asking.
-fn together<R>(rect: Rect, f: impl FnOnce(&mut Lead) -> R) -> Option<R> {
+fn with_coordinator<R>(rect: Rect, f: impl FnOnce(&mut Coordinator) -> R) -> Option<R> {
     if i64::from(rect.w) * i64::from(rect.h) < LEAST_PIXELS {
         return None;
     }
@@ -93,9 +93,12 @@ fn together<R>(rect: Rect, f: impl FnOnce(&mut Lead) -> R) -> Option<R> {
         *state = begin();
     }
     match &mut *state {
-        State::Together(pid, lead) if *pid == std::process::id() && lead.has_helpers() => {
-            let made = f(lead);
-            ACCOUNTS.lock().unwrap_or_else(PoisonError::into_inner).clone_from(&lead.accounts.all().to_vec());
+        State::Together(pid, coordinator) if *pid == std::process::id() && coordinator.has_helpers() => {
+            let made = f(coordinator);
+            ACCOUNTS
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .clone_from(&coordinator.rank_stats.all().to_vec());
             Some(made)
         }
         _ => None,
@@ -103,18 +106,18 @@ fn together<R>(rect: Rect, f: impl FnOnce(&mut Lead) -> R) -> Option<R> {
 }
 
 /// What each rank did so far; empty without helpers.
-pub(crate) fn accounts() -> Vec<RankAccount> {
+pub(crate) fn rank_stats() -> Vec<RankStats> {
     ACCOUNTS.lock().unwrap_or_else(PoisonError::into_inner).clone()
 }
 
 /// What went wrong with helpers.
 pub(crate) fn problems() -> Vec<String> {
     let mut out = PROBLEMS.lock().unwrap_or_else(PoisonError::into_inner).clone();
-    let lost = |a: &RankAccount| {
+    let lost = |a: &RankStats| {
         let why = a.lost.as_ref()?;
         Some(format!("helper rank {} was lost ({why}): others make its rows", a.rank))
     };
-    out.extend(accounts().iter().filter_map(lost));
+    out.extend(rank_stats().iter().filter_map(lost));
     out
 }
 
@@ -122,18 +125,18 @@ pub(crate) fn problems() -> Vec<String> {
 pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings) -> (Layer, [u64; 2]) {
     let rect = draws.iter().fold(Rect::default(), |r, d| r.or(d.rect));
     let primary = || draws.iter().map(|d| d.rays.load(Relaxed)).sum::<u64>();
-    let made = together(rect, |lead| {
+    let made = with_coordinator(rect, |coordinator| {
         let before = primary();
-        let made = lead.make(draws, settings, &Work::Nearest, |share| {
+        let made = coordinator.make(draws, settings, &Work::Nearest, |share| {
             let (layer, extra) = trace::nearest(draws, settings, share);
             let rays = vec![("shadow", extra[0]), ("ambient occlusion", extra[1])];
             let (rect, first, second) = (layer.rect, layer.color, layer.depth);
-            Made { rect, first, second, rays, warnings: Vec::new() }
+            PartialImage { rect, first, second, rays, warnings: Vec::new() }
         });
-        lead.accounts.of(0).rays += primary() - before;
+        coordinator.rank_stats.of(0).rays += primary() - before;
         made
     });
-    let Some(made) = made else { return trace::nearest(draws, settings, Share::WHOLE) };
+    let Some(made) = made else { return trace::nearest(draws, settings, RowShare::WHOLE) };
     let sum = |kind: &str| made.rays.iter().filter(|(k, _)| *k == kind).map(|(_, n)| n).sum::<u64>();
     // Our own primary rays are counted already, draw by draw.
     draws[0].rays.fetch_add(sum("primary"), Relaxed);
@@ -142,11 +145,11 @@ pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings) -> (Layer, [u
     (Layer { rect: made.rect, color: made.first, depth: made.second, covered }, extra)
 }
 
-fn of_colors(c: Colors) -> Made<[f32; 4], u8> {
-    Made { rect: c.rect, first: c.rgba, second: Vec::new(), rays: c.rays, warnings: c.warnings }
+fn of_colors(c: ColorImage) -> PartialImage<[f32; 4], u8> {
+    PartialImage { rect: c.rect, first: c.rgba, second: Vec::new(), rays: c.rays, warnings: c.warnings }
 }
 
-fn to_colors(made: Made<[f32; 4], u8>) -> Colors {
+fn to_colors(made: PartialImage<[f32; 4], u8>) -> ColorImage {
     let mut warnings = made.warnings;
     let mut rays: Vec<(&'static str, u64)> = Vec::new();
     for (kind, n) in made.rays {
@@ -157,39 +160,43 @@ fn to_colors(made: Made<[f32; 4], u8>) -> Colors {
     }
     warnings.sort();
     warnings.dedup();
-    Colors { rect: made.rect, rgba: made.first, rays, warnings }
+    ColorImage { rect: made.rect, rgba: made.first, rays, warnings }
 }
 
 /// [`whitted::colors`], by all ranks.
-pub(crate) fn beyond(
+pub(crate) fn whitted(
     draws: &[Prepared<'_>],
     view: &View,
     rect: Rect,
     settings: &Settings,
     background: [f32; 3],
-) -> Colors {
+) -> ColorImage {
     let make = |share| whitted::colors(draws, view, rect, settings, background, share);
-    let work = Work::Beyond(seen(view, rect), background);
-    let made = together(rect, |lead| lead.make(draws, settings, &work, |share| of_colors(make(share))));
-    made.map_or_else(|| make(Share::WHOLE), to_colors)
+    let work = Work::Whitted(view_parameters(view, rect), background);
+    let made = with_coordinator(rect, |coordinator| {
+        coordinator.make(draws, settings, &work, |share| of_colors(make(share)))
+    });
+    made.map_or_else(|| make(RowShare::WHOLE), to_colors)
 }
 
-/// [`Studio::picture`], by all ranks.
+/// [`PathTracer::picture`], by all ranks.
 pub(crate) fn paths(
-    studio: &mut Studio,
+    path_tracer: &mut PathTracer,
     draws: &[Prepared<'_>],
     view: &View,
     number: usize,
     rect: Rect,
     settings: &Settings,
     picture: u64,
-) -> Colors {
-    let mut make = |share| studio.picture(draws, view, number, rect, settings, picture, share);
-    let work = Work::Paths(seen(view, rect), [number as u64, picture]);
-    let made = together(rect, |lead| lead.make(draws, settings, &work, |share| of_colors(make(share))));
+) -> ColorImage {
+    let mut make = |share| path_tracer.picture(draws, view, number, rect, settings, picture, share);
+    let work = Work::Paths(view_parameters(view, rect), [number as u64, picture]);
+    let made = with_coordinator(rect, |coordinator| {
+        coordinator.make(draws, settings, &work, |share| of_colors(make(share)))
+    });
     match made {
         Some(made) => to_colors(made),
-        None => make(Share::WHOLE),
+        None => make(RowShare::WHOLE),
     }
 }
 

@@ -4,7 +4,7 @@
 //! program itself is no rank of the job.
 
 use super::helper::Helper;
-use super::requests::{ANSWER, MOST_ORDER_BYTES, ORDER};
+use super::requests::{MAX_REQUEST_BYTES, REPLY, REQUEST};
 use super::socket_comm::Peer;
 use composite::comm::{CommError, Communicator, Receive};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -15,19 +15,19 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
 /// What goes before every message: its kind, whose it is, and how long it is.
-const HEAD: u32 = 10;
+const HEADER: u32 = 10;
 /// The message itself.
 const BODY: u32 = 11;
-const HEAD_BYTES: usize = 16;
+const HEADER_BYTES: usize = 16;
 /// How long somebody who waits for work rests, and somebody whose work is under way.
-const REST: Duration = Duration::from_millis(2);
-const NAP: Duration = Duration::from_micros(50);
+const IDLE_WAIT: Duration = Duration::from_millis(2);
+const BUSY_WAIT: Duration = Duration::from_micros(50);
 /// How long after work one stays awake.
 const AWAKE: Duration = Duration::from_millis(300);
 
 /// What a message is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum MessageKind {
     /// An order, or the answer to it.
     Work,
     /// The program is gone, or not served any longer.
@@ -37,8 +37,8 @@ enum Kind {
 }
 
 /// Announces a message of `length` bytes for or from a program.
-fn head(kind: Kind, program: u32, length: usize) -> Vec<u8> {
-    let mut out = Vec::with_capacity(HEAD_BYTES);
+fn header(kind: MessageKind, program: u32, length: usize) -> Vec<u8> {
+    let mut out = Vec::with_capacity(HEADER_BYTES);
     out.extend((kind as u32).to_le_bytes());
     out.extend(program.to_le_bytes());
     out.extend((length as u64).to_le_bytes());
@@ -46,12 +46,14 @@ fn head(kind: Kind, program: u32, length: usize) -> Vec<u8> {
 }
 
 /// The parts of a head; `None` for what is none.
-fn read_head(bytes: &[u8]) -> Option<(Kind, u32, usize)> {
-    let bytes: &[u8; HEAD_BYTES] = bytes.try_into().ok()?;
+fn read_header(bytes: &[u8]) -> Option<(MessageKind, u32, usize)> {
+    let bytes: &[u8; HEADER_BYTES] = bytes.try_into().ok()?;
     let word = |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
-    let kind = [Kind::Work, Kind::Close, Kind::End].into_iter().find(|k| *k as u32 == word(0))?;
+    let kind = [MessageKind::Work, MessageKind::Close, MessageKind::End]
+        .into_iter()
+        .find(|k| *k as u32 == word(0))?;
     let length = u64::from(word(8)) | u64::from(word(12)) << 32;
-    Some((kind, word(4), usize::try_from(length).ok().filter(|n| *n <= MOST_ORDER_BYTES)?))
+    Some((kind, word(4), usize::try_from(length).ok().filter(|n| *n <= MAX_REQUEST_BYTES)?))
 }
 
 // ---- The others ------------------------------------------------------------------------------------------------------
@@ -63,14 +65,14 @@ fn read_head(bytes: &[u8]) -> Option<(Kind, u32, usize)> {
 pub(crate) fn serve_group(comm: &mut dyn Communicator, over: &AtomicBool) -> Result<(), CommError> {
     // Of each program what it has told.
     let mut programs: HashMap<u32, Helper> = HashMap::new();
-    let mut posted = vec![comm.post_recv(0, HEAD, HEAD_BYTES)?];
+    let mut posted = vec![comm.post_recv(0, HEADER, HEADER_BYTES)?];
     let mut coming = None;
     let mut worked = Instant::now();
     while !over.load(Relaxed) {
         let arrival = match comm.test_any(&mut posted) {
             Ok(Some(arrival)) => arrival,
             Ok(None) => {
-                std::thread::sleep(if worked.elapsed() < AWAKE { NAP } else { REST });
+                std::thread::sleep(if worked.elapsed() < AWAKE { BUSY_WAIT } else { IDLE_WAIT });
                 continue;
             }
             Err(CommError::PeerLost { .. }) => return Ok(()),
@@ -78,23 +80,23 @@ pub(crate) fn serve_group(comm: &mut dyn Communicator, over: &AtomicBool) -> Res
         };
         worked = Instant::now();
         match (arrival.tag, coming.take()) {
-            (HEAD, _) => match read_head(&arrival.message) {
-                Some((Kind::Work, program, length)) => {
+            (HEADER, _) => match read_header(&arrival.message) {
+                Some((MessageKind::Work, program, length)) => {
                     coming = Some(program);
                     posted.push(comm.post_recv(0, BODY, length)?);
                 }
-                Some((Kind::Close, program, _)) => {
+                Some((MessageKind::Close, program, _)) => {
                     programs.remove(&program);
-                    posted.push(comm.post_recv(0, HEAD, HEAD_BYTES)?);
+                    posted.push(comm.post_recv(0, HEADER, HEADER_BYTES)?);
                 }
                 // The end, or what is no head: nothing can be understood from here on.
-                Some((Kind::End, ..)) | None => return Ok(()),
+                Some((MessageKind::End, ..)) | None => return Ok(()),
             },
             (_, Some(program)) => {
                 let answer = programs.entry(program).or_default().answer(&arrival.message);
-                comm.send(0, HEAD, head(Kind::Work, program, answer.len()))?;
+                comm.send(0, HEADER, header(MessageKind::Work, program, answer.len()))?;
                 comm.send(0, BODY, answer)?;
-                posted.push(comm.post_recv(0, HEAD, HEAD_BYTES)?);
+                posted.push(comm.post_recv(0, HEADER, HEADER_BYTES)?);
                 worked = Instant::now();
             }
             (_, None) => return Ok(()),
@@ -102,7 +104,7 @@ pub(crate) fn serve_group(comm: &mut dyn Communicator, over: &AtomicBool) -> Res
         comm.recycle(arrival.message);
     }
     // So that programs do without this rank from now on.
-    match comm.send(0, HEAD, head(Kind::End, 0, 0)) {
+    match comm.send(0, HEADER, header(MessageKind::End, 0, 0)) {
         Err(CommError::PeerLost { .. }) => Ok(()),
         other => other,
     }
@@ -111,7 +113,7 @@ pub(crate) fn serve_group(comm: &mut dyn Communicator, over: &AtomicBool) -> Res
 // ---- The first -------------------------------------------------------------------------------------------------------
 
 /// A program's socket to one rank.
-struct Line {
+struct ProgramConnection {
     program: u32,
     rank: usize,
     peer: Peer,
@@ -120,7 +122,7 @@ struct Line {
     written: usize,
 }
 
-impl Line {
+impl ProgramConnection {
     /// Writes what can be written without waiting; true when something was.
     fn write(&mut self) -> bool {
         let before = self.written;
@@ -141,17 +143,17 @@ impl Line {
     }
 
     fn answer(&mut self, answer: &[u8]) {
-        self.out.extend(super::socket_comm::head_of(ANSWER, answer.len()));
+        self.out.extend(super::socket_comm::header_of(REPLY, answer.len()));
         self.out.extend_from_slice(answer);
     }
 }
 
 /// The first rank at work.
-struct Head<'a> {
+struct JobCoordinator<'a> {
     comm: &'a mut dyn Communicator,
     /// Where programs find rank i + 1; `None` once that is lost.
     listeners: Vec<Option<UnixListener>>,
-    lines: Vec<Line>,
+    connections: Vec<ProgramConnection>,
     posted: Vec<Receive>,
     /// Of each rank whose answer is coming.
     coming: Vec<Option<u32>>,
@@ -162,40 +164,47 @@ struct Head<'a> {
 ///
 /// # Errors
 /// What ended the job.
-pub(crate) fn lead_group(
+pub(crate) fn coordinate_group(
     comm: &mut dyn Communicator,
     listeners: Vec<UnixListener>,
     over: &AtomicBool,
 ) -> Result<(), CommError> {
     let size = comm.size();
-    let mut head = Head {
+    let mut coordinator = JobCoordinator {
         comm,
         listeners: listeners.into_iter().map(Some).collect(),
-        lines: Vec::new(),
+        connections: Vec::new(),
         posted: Vec::new(),
         coming: vec![None; size],
         programs: 0,
     };
     for rank in 1..size {
-        head.expect(rank, HEAD, HEAD_BYTES)?;
+        coordinator.expect(rank, HEADER, HEADER_BYTES)?;
     }
     let mut awake = Instant::now();
     while !over.load(Relaxed) {
-        let moved = head.welcome() | head.orders()? | head.answers()? | head.write();
-        head.part()?;
+        let moved = coordinator.accept_programs()
+            | coordinator.forward_requests()?
+            | coordinator.forward_replies()?
+            | coordinator.write();
+        coordinator.remove_closed()?;
         if moved {
             awake = Instant::now();
         } else {
-            rest(&head.lines, &head.listeners, if awake.elapsed() < AWAKE { NAP } else { REST });
+            rest(
+                &coordinator.connections,
+                &coordinator.listeners,
+                if awake.elapsed() < AWAKE { BUSY_WAIT } else { IDLE_WAIT },
+            );
         }
     }
     for rank in 1..size {
-        head.tell(rank, Kind::End, 0, None)?;
+        coordinator.tell(rank, MessageKind::End, 0, None)?;
     }
     Ok(())
 }
 
-impl Head<'_> {
+impl JobCoordinator<'_> {
     fn expect(&mut self, rank: usize, tag: u32, capacity: usize) -> Result<(), CommError> {
         self.posted.push(self.comm.post_recv(rank, tag, capacity)?);
         Ok(())
@@ -205,15 +214,15 @@ impl Head<'_> {
     fn tell(
         &mut self,
         rank: usize,
-        kind: Kind,
+        kind: MessageKind,
         program: u32,
         body: Option<Vec<u8>>,
     ) -> Result<(), CommError> {
         if self.listeners[rank - 1].is_none() {
             return Ok(());
         }
-        let announced = head(kind, program, body.as_ref().map_or(0, Vec::len));
-        let told = self.comm.send(rank, HEAD, announced);
+        let announced = header(kind, program, body.as_ref().map_or(0, Vec::len));
+        let told = self.comm.send(rank, HEADER, announced);
         match told.and_then(|()| body.map_or(Ok(()), |body| self.comm.send(rank, BODY, body))) {
             Err(CommError::PeerLost { .. }) => self.lose(rank),
             other => other?,
@@ -225,45 +234,51 @@ impl Head<'_> {
     fn lose(&mut self, rank: usize) {
         self.listeners[rank - 1] = None;
         self.posted.retain(|r| r.source != rank);
-        self.lines.iter_mut().filter(|l| l.rank == rank).for_each(|l| l.peer.lost = true);
+        self.connections.iter_mut().filter(|l| l.rank == rank).for_each(|l| l.peer.lost = true);
     }
 
     /// Programs that come; true when one did, as below.
-    fn welcome(&mut self) -> bool {
+    fn accept_programs(&mut self) -> bool {
         let before = self.programs;
         for (i, listener) in self.listeners.iter().enumerate() {
             while let Some(Ok((stream, _))) = listener.as_ref().map(UnixListener::accept) {
                 if let Ok(peer) = Peer::new(stream) {
                     self.programs += 1;
                     let program = self.programs;
-                    self.lines.push(Line { program, rank: i + 1, peer, out: Vec::new(), written: 0 });
+                    self.connections.push(ProgramConnection {
+                        program,
+                        rank: i + 1,
+                        peer,
+                        out: Vec::new(),
+                        written: 0,
+                    });
                 }
             }
         }
         self.programs > before
     }
 
-    fn orders(&mut self) -> Result<bool, CommError> {
-        let mut orders = Vec::new();
-        for line in &mut self.lines {
+    fn forward_requests(&mut self) -> Result<bool, CommError> {
+        let mut requests = Vec::new();
+        for line in &mut self.connections {
             // What is no message ends the talk.
-            line.peer.lost |= !line.peer.read(MOST_ORDER_BYTES);
+            line.peer.lost |= !line.peer.read(MAX_REQUEST_BYTES);
             while let Some((tag, order)) = line.peer.mail.pop_front() {
-                if tag == ORDER {
-                    orders.push((line.rank, line.program, order));
+                if tag == REQUEST {
+                    requests.push((line.rank, line.program, order));
                 } else {
                     line.peer.lost = true;
                 }
             }
         }
-        let moved = !orders.is_empty();
-        for (rank, program, order) in orders {
-            self.tell(rank, Kind::Work, program, Some(order))?;
+        let moved = !requests.is_empty();
+        for (rank, program, order) in requests {
+            self.tell(rank, MessageKind::Work, program, Some(order))?;
         }
         Ok(moved)
     }
 
-    fn answers(&mut self) -> Result<bool, CommError> {
+    fn forward_replies(&mut self) -> Result<bool, CommError> {
         let mut moved = false;
         while !self.posted.is_empty() {
             let arrival = match self.comm.test_any(&mut self.posted) {
@@ -280,12 +295,12 @@ impl Head<'_> {
             if arrival.tag == BODY {
                 let program = self.coming[rank].take();
                 // Nobody, when the program has gone meanwhile.
-                if let Some(line) = self.lines.iter_mut().find(|l| Some(l.program) == program) {
+                if let Some(line) = self.connections.iter_mut().find(|l| Some(l.program) == program) {
                     line.answer(&arrival.message);
                 }
                 self.comm.recycle(arrival.message);
-                self.expect(rank, HEAD, HEAD_BYTES)?;
-            } else if let Some((Kind::Work, program, length)) = read_head(&arrival.message) {
+                self.expect(rank, HEADER, HEADER_BYTES)?;
+            } else if let Some((MessageKind::Work, program, length)) = read_header(&arrival.message) {
                 self.coming[rank] = Some(program);
                 self.expect(rank, BODY, length)?;
             } else {
@@ -297,27 +312,27 @@ impl Head<'_> {
 
     fn write(&mut self) -> bool {
         let mut moved = false;
-        for line in &mut self.lines {
+        for line in &mut self.connections {
             moved |= line.write();
         }
         moved
     }
 
     /// Programs that go.
-    fn part(&mut self) -> Result<(), CommError> {
+    fn remove_closed(&mut self) -> Result<(), CommError> {
         let gone: Vec<(usize, u32)> =
-            self.lines.iter().filter(|l| l.peer.lost).map(|l| (l.rank, l.program)).collect();
-        self.lines.retain(|l| !l.peer.lost);
+            self.connections.iter().filter(|l| l.peer.lost).map(|l| (l.rank, l.program)).collect();
+        self.connections.retain(|l| !l.peer.lost);
         for (rank, program) in gone {
-            self.tell(rank, Kind::Close, program, None)?;
+            self.tell(rank, MessageKind::Close, program, None)?;
         }
         Ok(())
     }
 }
 
 /// Waits until a program says something, at most `time`: MPI cannot be waited for together with sockets.
-fn rest(lines: &[Line], listeners: &[Option<UnixListener>], time: Duration) {
-    let said = lines.iter().map(|l| {
+fn rest(connections: &[ProgramConnection], listeners: &[Option<UnixListener>], time: Duration) {
+    let said = connections.iter().map(|l| {
         let more = if l.out.is_empty() { PollFlags::IN } else { PollFlags::IN | PollFlags::OUT };
         PollFd::new(&l.peer.stream, more)
     });
@@ -335,14 +350,14 @@ mod tests {
     #[test]
     fn heads_come_back_as_they_were_and_what_is_none_is_refused() {
         for (kind, program, length) in
-            [(Kind::Work, 7, 5 << 30), (Kind::Close, 0, 0), (Kind::End, u32::MAX, 1)]
+            [(MessageKind::Work, 7, 5 << 30), (MessageKind::Close, 0, 0), (MessageKind::End, u32::MAX, 1)]
         {
-            assert_eq!(read_head(&head(kind, program, length)), Some((kind, program, length)));
+            assert_eq!(read_header(&header(kind, program, length)), Some((kind, program, length)));
         }
-        let mut unknown = head(Kind::End, 1, 1);
+        let mut unknown = header(MessageKind::End, 1, 1);
         unknown[0] = 9;
-        assert_eq!(read_head(&unknown), None);
-        assert_eq!(read_head(&unknown[..15]), None);
-        assert_eq!(read_head(&head(Kind::Work, 1, usize::MAX)), None);
+        assert_eq!(read_header(&unknown), None);
+        assert_eq!(read_header(&unknown[..15]), None);
+        assert_eq!(read_header(&header(MessageKind::Work, 1, usize::MAX)), None);
     }
 }

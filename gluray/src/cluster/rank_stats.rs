@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// The account of one rank; 0 is the program itself.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct RankAccount {
+pub struct RankStats {
     /// Its number.
     pub rank: usize,
     /// Pictures that it made a share of.
@@ -28,9 +28,9 @@ pub struct RankAccount {
     pub lost: Option<String>,
 }
 
-impl RankAccount {
+impl RankStats {
     /// Adds another process' account of the same rank.
-    pub fn add(&mut self, other: &RankAccount) {
+    pub fn add(&mut self, other: &RankStats) {
         self.pictures += other.pictures;
         self.trace_ms += other.trace_ms;
         self.wait_ms += other.wait_ms;
@@ -46,18 +46,18 @@ impl RankAccount {
 }
 
 /// The accounts of all ranks.
-pub(crate) struct Accounts(Vec<RankAccount>);
+pub(crate) struct RankStatsTable(Vec<RankStats>);
 
-impl Accounts {
-    pub(crate) fn new(size: usize) -> Accounts {
-        Accounts((0..size).map(|rank| RankAccount { rank, ..RankAccount::default() }).collect())
+impl RankStatsTable {
+    pub(crate) fn new(size: usize) -> RankStatsTable {
+        RankStatsTable((0..size).map(|rank| RankStats { rank, ..RankStats::default() }).collect())
     }
 
-    pub(crate) fn of(&mut self, rank: usize) -> &mut RankAccount {
+    pub(crate) fn of(&mut self, rank: usize) -> &mut RankStats {
         &mut self.0[rank]
     }
 
-    pub(crate) fn all(&self) -> &[RankAccount] {
+    pub(crate) fn all(&self) -> &[RankStats] {
         &self.0
     }
 

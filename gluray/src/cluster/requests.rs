@@ -1,8 +1,8 @@
 //! What the first rank asks of a helper, and what it gets.
 
-use super::codec::{Malformed, Reader, Wire, put_pods, wire_struct};
-use super::draw_message::Parcel;
-use super::row_share::Share;
+use super::codec::{MalformedMessage, Reader, Wire, put_pods, wire_struct};
+use super::draw_message::DrawMessage;
+use super::row_share::RowShare;
 use crate::capture::draw::Attributes;
 use crate::classify::rules::MOST_PIXELS;
 use crate::host::config::Settings;
@@ -11,23 +11,23 @@ use crate::trace::texturing::Image;
 use rt_core::glam::Vec3;
 
 /// Tags of the communicator.
-pub(crate) const ORDER: u32 = 1;
-pub(crate) const ANSWER: u32 = 2;
+pub(crate) const REQUEST: u32 = 1;
+pub(crate) const REPLY: u32 = 2;
 
 /// Both ends have to be of one build: messages are memory as it is.
 const GREETING: &str = concat!("gluray ranks 2, version ", env!("CARGO_PKG_VERSION"));
 /// Written as a number, so that machines with the other order of bytes are found out.
-const ORDER_OF_BYTES: u32 = 0x0102_0304;
+const BYTE_ORDER: u32 = 0x0102_0304;
 
 /// The most bytes of an order: a scene of 300 million triangles.
-pub(crate) const MOST_ORDER_BYTES: usize = 1 << 34;
+pub(crate) const MAX_REQUEST_BYTES: usize = 1 << 34;
 
 /// Positions and triangles.
 type Shape = (Vec<Vec3>, Vec<[u32; 3]>);
 
 /// Content that a helper does not have.
 #[derive(Default)]
-pub(super) struct News {
+pub(super) struct SceneUpdate {
     pub(super) geometries: Vec<(u128, Shape)>,
     pub(super) attributes: Vec<(u128, Attributes)>,
     pub(super) images: Vec<(u128, Image)>,
@@ -35,13 +35,13 @@ pub(super) struct News {
 
 /// How eye space comes to the screen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Seen {
+pub(crate) struct ViewParameters {
     pub(crate) projection: [f64; 16],
     pub(crate) viewport: [i32; 4],
     pub(crate) rect: [i32; 4],
 }
 
-wire_struct!(Seen { projection, viewport, rect });
+wire_struct!(ViewParameters { projection, viewport, rect });
 
 /// What is to be made.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,44 +49,47 @@ pub(crate) enum Work {
     /// The nearest surfaces: colours and depths.
     Nearest,
     /// Rays beyond them, with the colour behind everything.
-    Beyond(Seen, [f32; 3]),
+    Whitted(ViewParameters, [f32; 3]),
     /// Paths: the number of the view, and of the picture of it.
-    Paths(Seen, [u64; 2]),
+    Paths(ViewParameters, [u64; 2]),
 }
 
 impl Wire for Work {
     fn put(&self, out: &mut Vec<u8>) {
         match self {
             Work::Nearest => out.push(0),
-            Work::Beyond(seen, background) => {
+            Work::Whitted(view_parameters, background) => {
                 out.push(1);
-                seen.put(out);
+                view_parameters.put(out);
                 background.put(out);
             }
-            Work::Paths(seen, numbers) => {
+            Work::Paths(view_parameters, numbers) => {
                 out.push(2);
-                seen.put(out);
+                view_parameters.put(out);
                 numbers.put(out);
             }
         }
     }
-    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
+    fn get(from: &mut Reader<'_>) -> Result<Self, MalformedMessage> {
         Ok(match u8::get(from)? {
             0 => Work::Nearest,
-            1 => Work::Beyond(Seen::checked(from)?, Wire::get(from)?),
-            2 => Work::Paths(Seen::checked(from)?, Wire::get(from)?),
+            1 => Work::Whitted(ViewParameters::checked(from)?, Wire::get(from)?),
+            2 => Work::Paths(ViewParameters::checked(from)?, Wire::get(from)?),
             n => return Err(from.fault(format!("{n} is no kind of work"))),
         })
     }
 }
 
-impl Seen {
-    fn checked(from: &mut Reader<'_>) -> Result<Seen, Malformed> {
-        let seen = Seen::get(from)?;
+impl ViewParameters {
+    fn checked(from: &mut Reader<'_>) -> Result<ViewParameters, MalformedMessage> {
+        let view_parameters = ViewParameters::get(from)?;
         let fits = |r: &[i32; 4]| r[2] > 0 && r[3] > 0 && is_traced(r);
-        match fits(&seen.viewport) && fits(&seen.rect) {
-            true => Ok(seen),
-            false => Err(from.fault(format!("a view {:?} of {:?}", seen.rect, seen.viewport))),
+        match fits(&view_parameters.viewport) && fits(&view_parameters.rect) {
+            true => Ok(view_parameters),
+            false => {
+                Err(from
+                    .fault(format!("a view {:?} of {:?}", view_parameters.rect, view_parameters.viewport)))
+            }
         }
     }
 }
@@ -104,20 +107,20 @@ pub(super) fn pixels(w: i32, h: i32) -> i64 {
 }
 
 /// One picture's order. News come first, so that an order that is refused later still leaves a helper with what it was told.
-pub(super) struct Order {
+pub(super) struct TraceRequest {
     pub(super) number: u64,
     pub(super) forget: Vec<u128>,
-    pub(super) news: News,
+    pub(super) update: SceneUpdate,
     pub(super) settings: Settings,
-    pub(super) share: Share,
+    pub(super) share: RowShare,
     pub(super) work: Work,
-    pub(super) draws: Vec<Parcel>,
+    pub(super) draws: Vec<DrawMessage>,
 }
 
 /// The beginning of an order: news are put behind it, and then the [`OrderEnd`].
 pub(super) fn put_head(out: &mut Vec<u8>, number: u64, forget: &[u128]) {
     GREETING.to_owned().put(out);
-    ORDER_OF_BYTES.put(out);
+    BYTE_ORDER.put(out);
     number.put(out);
     forget.to_vec().put(out);
 }
@@ -129,20 +132,20 @@ pub(super) fn put_geometry(out: &mut Vec<u8>, name: u128, positions: &[Vec3], tr
     put_pods(out, triangles);
 }
 
-impl Order {
-    pub(super) fn read(bytes: &[u8]) -> Result<Order, Malformed> {
+impl TraceRequest {
+    pub(super) fn read(bytes: &[u8]) -> Result<TraceRequest, MalformedMessage> {
         let from = &mut Reader::new(bytes);
         let greeting = String::get(from)?;
         if greeting != GREETING {
             return Err(from
                 .fault(format!("`{}` is not `{GREETING}`", greeting.chars().take(80).collect::<String>())));
         }
-        if u32::get(from)? != ORDER_OF_BYTES {
+        if u32::get(from)? != BYTE_ORDER {
             return Err(from.fault("numbers of another kind of machine"));
         }
         let number = Wire::get(from)?;
         let forget = Wire::get(from)?;
-        let mut news = News::default();
+        let mut update = SceneUpdate::default();
         for _ in 0..u32::get(from)? {
             let name = Wire::get(from)?;
             let (positions, triangles): (Vec<Vec3>, Vec<[u32; 3]>) = (from.pods()?, from.pods()?);
@@ -150,27 +153,33 @@ impl Order {
             if let Some(t) = triangles.iter().find(|t| t.iter().any(|i| *i as usize >= most)) {
                 return Err(from.fault(format!("triangle {t:?} of {most} vertices")));
             }
-            news.geometries.push((name, (positions, triangles)));
+            update.geometries.push((name, (positions, triangles)));
         }
-        news.attributes = Wire::get(from)?;
-        news.images = Wire::get(from)?;
+        update.attributes = Wire::get(from)?;
+        update.images = Wire::get(from)?;
         let settings = String::get(from)?;
         let settings = serde_json::from_str(&settings)
             .map_err(|e| from.fault(format!("settings that are none: {e}")))?;
-        let share: Share = Wire::get(from)?;
+        let share: RowShare = Wire::get(from)?;
         if share.index >= share.count {
             return Err(from.fault(format!("share {} of {}", share.index, share.count)));
         }
         let work = Wire::get(from)?;
-        let draws: Vec<Parcel> = Wire::get(from)?;
+        let draws: Vec<DrawMessage> = Wire::get(from)?;
         draws.iter().try_for_each(|d| d.check(from))?;
         from.end()?;
-        Ok(Order { number, forget, news, settings, share, work, draws })
+        Ok(TraceRequest { number, forget, update, settings, share, work, draws })
     }
 }
 
 /// The end of an order.
-pub(super) fn put_end(out: &mut Vec<u8>, settings: &str, share: Share, work: &Work, draws: &[Parcel]) {
+pub(super) fn put_end(
+    out: &mut Vec<u8>,
+    settings: &str,
+    share: RowShare,
+    work: &Work,
+    draws: &[DrawMessage],
+) {
     settings.to_owned().put(out);
     share.put(out);
     work.put(out);
@@ -180,7 +189,7 @@ pub(super) fn put_end(out: &mut Vec<u8>, settings: &str, share: Share, work: &Wo
 
 /// What a share cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Cost {
+pub(crate) struct TraceCost {
     /// Primary, shadow, ambient occlusion, reflection, refraction, transparency, path.
     pub(crate) rays: [u64; 7],
     /// Structures built, and those taken over from where the triangles were before.
@@ -189,13 +198,13 @@ pub(crate) struct Cost {
     pub(crate) took_us: u64,
 }
 
-wire_struct!(Cost { rays, builds, refits, took_us });
+wire_struct!(TraceCost { rays, builds, refits, took_us });
 
-/// Kinds of rays in their order in a [`Cost`].
+/// Kinds of rays in their order in a [`TraceCost`].
 pub(crate) const RAYS: [&str; 7] =
     ["primary", "shadow", "ambient occlusion", "reflection", "refraction", "transparency", "path"];
 
-impl Cost {
+impl TraceCost {
     /// Counts rays of a kind.
     pub(crate) fn add(&mut self, kind: &str, n: u64) {
         if let Some(at) = RAYS.iter().position(|k| *k == kind) {
@@ -205,15 +214,15 @@ impl Cost {
 }
 
 /// The beginning of an answer; rows come behind it where it has no complaint.
-pub(super) struct AnswerHead {
+pub(super) struct ReplyHeader {
     pub(super) number: u64,
-    pub(super) complaint: Option<String>,
+    pub(super) error_reply: Option<String>,
     pub(super) rect: [i32; 4],
-    pub(super) cost: Cost,
+    pub(super) cost: TraceCost,
     pub(super) warnings: Vec<String>,
 }
 
-wire_struct!(AnswerHead { number, complaint, rect, cost, warnings });
+wire_struct!(ReplyHeader { number, error_reply, rect, cost, warnings });
 
 pub(crate) fn numbers(r: Rect) -> [i32; 4] {
     [r.x, r.y, r.w, r.h]

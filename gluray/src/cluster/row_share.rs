@@ -1,6 +1,6 @@
 //! Which rows of a picture are whose, and rows as messages: what is covered, without the pixels between.
 
-use super::codec::{Malformed, Reader, put_pods};
+use super::codec::{MalformedMessage, Reader, put_pods};
 use bytemuck::Pod;
 
 /// Rows that go together: a row of the packets that rays are sent in, so that every rank sends the packets that one process would.
@@ -8,16 +8,16 @@ pub(crate) const BAND: usize = 16;
 
 /// The part of a picture that one rank makes: every `count`-th band from `index` on, so that everybody has a little of everything.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Share {
+pub(crate) struct RowShare {
     pub(crate) index: u32,
     pub(crate) count: u32,
 }
 
-super::codec::wire_struct!(Share { index, count });
+super::codec::wire_struct!(RowShare { index, count });
 
-impl Share {
+impl RowShare {
     /// All of it.
-    pub(crate) const WHOLE: Share = Share { index: 0, count: 1 };
+    pub(crate) const WHOLE: RowShare = RowShare { index: 0, count: 1 };
 
     /// Whether a band belongs to it.
     pub(crate) fn has(self, band: usize) -> bool {
@@ -34,7 +34,7 @@ impl Share {
 /// Pixels as they are sent: two layers, and which pixels there are at all.
 pub(crate) fn put_rows<A: Pod, B: Pod>(
     out: &mut Vec<u8>,
-    share: Share,
+    share: RowShare,
     [w, h]: [usize; 2],
     (a, b): (&[A], &[B]),
     there: impl Fn(usize) -> bool,
@@ -61,10 +61,10 @@ pub(crate) fn put_rows<A: Pod, B: Pod>(
 /// Puts such rows into a picture; the number of pixels that came. A layer that is empty takes none.
 pub(crate) fn get_rows<A: Pod, B: Pod>(
     from: &mut Reader<'_>,
-    share: Share,
+    share: RowShare,
     [w, h]: [usize; 2],
     (a, b): (&mut [A], &mut [B]),
-) -> Result<usize, Malformed> {
+) -> Result<usize, MalformedMessage> {
     let runs: Vec<u32> = from.pods()?;
     let (first, second): (Vec<A>, Vec<B>) = (from.pods()?, from.pods()?);
     let (mut runs, mut done) = (runs.chunks_exact(2), 0);
@@ -98,7 +98,7 @@ fn copy<T: Pod>(to: &mut [T], begin: usize, from: &[T], done: usize, n: usize) -
 }
 
 /// The most bytes that the rows of a share can come to, with `pixel` bytes a pixel.
-pub(crate) fn most_bytes(share: Share, [w, h]: [usize; 2], pixel: usize) -> usize {
+pub(crate) fn most_bytes(share: RowShare, [w, h]: [usize; 2], pixel: usize) -> usize {
     // Every second pixel covered is the worst: two numbers for each of them.
     share.pixels(w, h).map(|r| r.len() * (pixel + 4) + 16).sum::<usize>() + 64
 }
@@ -124,7 +124,7 @@ mod tests {
             let (mut c, mut d) = (vec![[0_u8; 4]; color.len()], vec![2.0_f32; color.len()]);
             let mut pixels = 0;
             for index in 0..count {
-                let share = Share { index, count };
+                let share = RowShare { index, count };
                 let mut bytes = Vec::new();
                 put_rows(&mut bytes, share, SIZE, (&color, &depth), |i| depth[i] < 1.5);
                 assert!(bytes.len() <= most_bytes(share, SIZE, 8));
@@ -140,11 +140,11 @@ mod tests {
     #[test]
     fn rows_that_are_not_those_asked_for_are_refused() {
         let (color, depth) = picture();
-        let share = Share { index: 0, count: 2 };
+        let share = RowShare { index: 0, count: 2 };
         let mut bytes = Vec::new();
         put_rows(&mut bytes, share, SIZE, (&color, &depth), |i| depth[i] < 1.5);
         let (mut c, mut d) = (color.clone(), depth.clone());
-        let other = Share { index: 1, count: 2 };
+        let other = RowShare { index: 1, count: 2 };
         assert!(get_rows(&mut Reader::new(&bytes), other, SIZE, (&mut c, &mut d)).is_err());
         for n in 0..bytes.len() {
             assert!(get_rows(&mut Reader::new(&bytes[..n]), share, SIZE, (&mut c, &mut d)).is_err());

@@ -8,18 +8,18 @@ use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
 /// Bytes before each message: its tag and its length.
-const HEAD: usize = 16;
+const HEADER: usize = 16;
 /// How long a peer may take none of what is sent.
 const STALLED: Duration = Duration::from_secs(20);
 /// Bytes that are made room for at once: about what a socket holds, and a peer that announces more has to send it.
 const ROOM: usize = 1 << 18;
 
 /// What goes before a message of `length` bytes.
-pub(super) fn head_of(tag: u32, length: usize) -> [u8; HEAD] {
-    let mut head = [0; HEAD];
-    head[..4].copy_from_slice(&tag.to_ne_bytes());
-    head[8..].copy_from_slice(&(length as u64).to_ne_bytes());
-    head
+pub(super) fn header_of(tag: u32, length: usize) -> [u8; HEADER] {
+    let mut header = [0; HEADER];
+    header[..4].copy_from_slice(&tag.to_ne_bytes());
+    header[8..].copy_from_slice(&(length as u64).to_ne_bytes());
+    header
 }
 
 /// The other end of a socket.
@@ -40,7 +40,7 @@ impl Peer {
 
     /// Bytes of the message that is coming, when its head has come.
     fn announced(&self) -> Option<u64> {
-        let length = self.part.get(8..HEAD)?;
+        let length = self.part.get(8..HEADER)?;
         Some(u64::from_ne_bytes(length.try_into().expect("eight bytes")))
     }
 
@@ -48,14 +48,14 @@ impl Peer {
     pub(super) fn read(&mut self, capacity: usize) -> bool {
         while !self.lost {
             let want = match self.announced() {
-                None => HEAD - self.part.len(),
+                None => HEADER - self.part.len(),
                 Some(n) if n > capacity as u64 => return false,
-                Some(n) => HEAD + n as usize - self.part.len(),
+                Some(n) => HEADER + n as usize - self.part.len(),
             };
             if want == 0 {
                 let tag = u32::from_ne_bytes(self.part[..4].try_into().expect("four bytes"));
                 let mut message = std::mem::take(&mut self.part);
-                message.drain(..HEAD);
+                message.drain(..HEADER);
                 self.mail.push_back((tag, message));
                 return true;
             }
@@ -140,8 +140,8 @@ impl Communicator for SocketComm {
         self.check(destination)?;
         let lost = CommError::PeerLost { rank: self.rank, peer: destination };
         let Some(peer) = self.peers[destination].as_mut().filter(|p| !p.lost) else { return Err(lost) };
-        let head = head_of(tag, message.len());
-        for part in [&head[..], &message] {
+        let header = header_of(tag, message.len());
+        for part in [&header[..], &message] {
             let (mut at, mut moved) = (0, Instant::now());
             while at < part.len() {
                 match peer.stream.write(&part[at..]) {
@@ -245,9 +245,9 @@ mod tests {
     #[test]
     fn a_message_longer_than_allowed_ends_the_talk_without_being_read() {
         let (mut first, _helper, mut raw) = pair();
-        let mut head = [0_u8; HEAD];
-        head[8..].copy_from_slice(&u64::MAX.to_ne_bytes());
-        raw.write_all(&head).expect("written");
+        let mut header = [0_u8; HEADER];
+        header[8..].copy_from_slice(&u64::MAX.to_ne_bytes());
+        raw.write_all(&header).expect("written");
         let got = first.recv(1, 0, 1000, Duration::from_secs(5));
         assert!(matches!(got, Err(CommError::TooLong { .. })), "{got:?}");
         assert!(matches!(first.send(1, 0, vec![1]), Err(CommError::PeerLost { .. })));

@@ -1,18 +1,18 @@
 use super::codec::{Reader, Wire};
-use super::coordinator::{Lead, Made};
+use super::coordinator::{Coordinator, PartialImage};
 use super::helper::{Helper, serve};
-use super::mpi_group::{lead_group, serve_group};
-use super::requests::{ANSWER, AnswerHead, ORDER, Work};
-use super::row_share::Share;
+use super::mpi_group::{coordinate_group, serve_group};
+use super::requests::{REPLY, REQUEST, ReplyHeader, Work};
+use super::row_share::RowShare;
 use super::socket_comm::SocketComm;
 use crate::capture::draw::{Attributes, Draw, Shading, Values};
-use crate::capture::geometry_cache::Cache;
-use crate::capture::geometry_cache::Structures;
+use crate::capture::geometry_cache::BuildCounts;
+use crate::capture::geometry_cache::GeometryCache;
 use crate::host::config::{Mode, Settings};
-use crate::state::current_attributes::{Current, Material};
+use crate::state::current_attributes::{CurrentAttributes, Material};
 use crate::state::enums::*;
 use crate::state::snapshot::{GlLight, Snapshot};
-use crate::trace::overrides::Look;
+use crate::trace::overrides::RayMaterial;
 use crate::trace::{self, Layer, Prepared};
 use composite::comm::{CommError, Communicator, threads};
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -21,7 +21,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Duration;
 
 /// Colours, and the bits of depths.
-type Seen = (Vec<[u8; 4]>, Vec<u32>);
+type TestPixels = (Vec<[u8; 4]>, Vec<u32>);
 
 const IDENTITY: [f32; 16] = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
 
@@ -37,12 +37,12 @@ fn draws(turn: f32) -> Vec<Draw> {
     let cells = (0..(n - 1) * (n - 1)).map(|c| c / (n - 1) * n + c % (n - 1));
     let triangles: Vec<[u32; 3]> =
         cells.flat_map(|a| [[a, a + 1, a + n], [a + 1, a + n + 1, a + n]]).collect();
-    let mut cache = Cache::default();
-    let current = Current {
+    let mut cache = GeometryCache::default();
+    let current = CurrentAttributes {
         normal: [0.0, 0.0, 1.0],
         color: [0.3, 0.6, 0.9, 1.0],
         materials: [Material { diffuse: [0.8, 0.7, 0.2, 1.0], ..Material::default() }; 2],
-        ..Current::default()
+        ..CurrentAttributes::default()
     };
     let mut attributes = Attributes::constant(&current);
     let bend = |p: &[f32; 3]| [p[0] + turn, p[1], 0.7];
@@ -72,15 +72,16 @@ fn draws(turn: f32) -> Vec<Draw> {
         color_mask: true,
         ..Snapshot::default()
     });
-    let draw = |positions: &[[f32; 3]], triangles: &[[u32; 3]], cache: &mut Cache, a: &Attributes| Draw {
-        geometry: cache.of_indices(positions, triangles),
-        attributes: Arc::new(a.clone()),
-        state: state.clone(),
-        shading: Shading::Fixed,
-        clip_from_object: crate::trace::lighting::product(&state.projection, &state.model_view),
-        calls: 1,
-        look: Look::default(),
-    };
+    let draw =
+        |positions: &[[f32; 3]], triangles: &[[u32; 3]], cache: &mut GeometryCache, a: &Attributes| Draw {
+            geometry: cache.of_indices(positions, triangles),
+            attributes: Arc::new(a.clone()),
+            state: state.clone(),
+            shading: Shading::Fixed,
+            clip_from_object: crate::trace::lighting::product(&state.projection, &state.model_view),
+            calls: 1,
+            ray_material: RayMaterial::default(),
+        };
     let cut = [[-0.7, -0.8, 0.3], [0.8, 0.1, -0.3], [-0.2, 0.9, 0.1]];
     let plain = Attributes::constant(&current);
     vec![draw(&positions, &triangles, &mut cache, &attributes), draw(&cut, &[[0, 1, 2]], &mut cache, &plain)]
@@ -91,22 +92,29 @@ fn settings(mode: Mode) -> Settings {
 }
 
 /// The pictures of `frames` by a first rank and what its helpers are.
-fn pictures(lead: &mut Lead, frames: &[f32], settings: &Settings, sent: &mut Vec<u64>) -> Vec<Seen> {
+fn pictures(
+    coordinator: &mut Coordinator,
+    frames: &[f32],
+    settings: &Settings,
+    sent: &mut Vec<u64>,
+) -> Vec<TestPixels> {
     let mut out = Vec::new();
     for turn in frames {
         let draws = draws(*turn);
-        let ready: Vec<Prepared<'_>> =
-            draws.iter().map(|d| Prepared::new(d, None, &mut Structures::default()).expect("seen")).collect();
-        let made = lead.make(&ready, settings, &Work::Nearest, |share| own(&ready, settings, share));
-        sent.push(lead.accounts.all().iter().map(|a| a.sent_bytes).sum());
+        let ready: Vec<Prepared<'_>> = draws
+            .iter()
+            .map(|d| Prepared::new(d, None, &mut BuildCounts::default()).expect("seen"))
+            .collect();
+        let made = coordinator.make(&ready, settings, &Work::Nearest, |share| own(&ready, settings, share));
+        sent.push(coordinator.rank_stats.all().iter().map(|a| a.sent_bytes).sum());
         out.push((made.first, made.second.iter().map(|d| d.to_bits()).collect()));
     }
     out
 }
 
-fn own(ready: &[Prepared<'_>], settings: &Settings, share: Share) -> Made<[u8; 4], f32> {
+fn own(ready: &[Prepared<'_>], settings: &Settings, share: RowShare) -> PartialImage<[u8; 4], f32> {
     let (Layer { rect, color, depth, .. }, _) = trace::nearest(ready, settings, share);
-    Made { rect, first: color, second: depth, rays: Vec::new(), warnings: Vec::new() }
+    PartialImage { rect, first: color, second: depth, rays: Vec::new(), warnings: Vec::new() }
 }
 
 /// The pictures of a group whose helpers run `help`.
@@ -115,7 +123,7 @@ fn with_helpers(
     frames: &[f32],
     mode: Mode,
     help: impl Fn(usize, &mut dyn Communicator) + Sync + Send,
-) -> (Vec<Seen>, Vec<u64>, Vec<Option<String>>) {
+) -> (Vec<TestPixels>, Vec<u64>, Vec<Option<String>>) {
     let mut group = threads::group(ranks);
     let helpers = group.split_off(1);
     let first = group.pop().expect("the first rank");
@@ -124,12 +132,12 @@ fn with_helpers(
             let help = &help;
             scope.spawn(move || help(comm.rank(), &mut comm));
         }
-        let mut lead = Lead::new(Box::new(first));
+        let mut coordinator = Coordinator::new(Box::new(first));
         // However busy the machine is that tests it.
-        lead.patience = Duration::from_secs(600);
+        coordinator.patience = Duration::from_secs(600);
         let mut sent = Vec::new();
-        let out = pictures(&mut lead, frames, &settings(mode), &mut sent);
-        let lost = lead.accounts.all().iter().map(|a| a.lost.clone()).collect();
+        let out = pictures(&mut coordinator, frames, &settings(mode), &mut sent);
+        let lost = coordinator.rank_stats.all().iter().map(|a| a.lost.clone()).collect();
         (out, sent, lost)
     })
 }
@@ -166,12 +174,12 @@ fn helpers_are_told_of_what_is_new_and_of_nothing_else() {
 fn whoever_does_not_answer_or_answers_nonsense_is_replaced_and_named() {
     let frames = [0.1, 0.2, 0.3];
     let (one, ..) = with_helpers(1, &frames, Mode::Match, honest);
-    let order = |comm: &mut dyn Communicator| comm.recv(0, ORDER, 1 << 30, Duration::from_secs(20));
+    let order = |comm: &mut dyn Communicator| comm.recv(0, REQUEST, 1 << 30, Duration::from_secs(20));
     type Fault = fn(&mut dyn Communicator) -> Result<(), CommError>;
     let nonsense: [(&str, Fault); 4] = [
         ("left the group", |_| Err(CommError::NothingPosted { rank: 0 })),
-        ("answer", |c| c.send(0, ANSWER, vec![3; 40])),
-        ("longer than", |c| c.send(0, ANSWER, vec![0; 1 << 26])),
+        ("answer", |c| c.send(0, REPLY, vec![3; 40])),
+        ("longer than", |c| c.send(0, REPLY, vec![0; 1 << 26])),
         ("complains", |c| {
             let mut text = vec![0_u8; 8];
             text.push(1);
@@ -179,7 +187,7 @@ fn whoever_does_not_answer_or_answers_nonsense_is_replaced_and_named() {
             text.extend(b"complains");
             // Rectangle, cost and warnings.
             text.extend([0; 16 + 7 * 8 + 24 + 8]);
-            c.send(0, ANSWER, text)
+            c.send(0, REPLY, text)
         }),
     ];
     for (words, fault) in nonsense {
@@ -202,14 +210,14 @@ fn whoever_does_not_answer_or_answers_nonsense_is_replaced_and_named() {
 #[test]
 fn orders_that_are_none_are_refused_and_the_next_is_obeyed() {
     let (_, _, lost) = with_helpers(2, &[0.1], Mode::Match, |_, comm| {
-        let order = comm.recv(0, ORDER, 1 << 30, Duration::from_secs(20)).expect("an order");
+        let order = comm.recv(0, REQUEST, 1 << 30, Duration::from_secs(20)).expect("an order");
         let mut group = threads::group(2);
         let (mut helper, mut first) = (group.pop().expect("two"), group.pop().expect("two"));
         let answers = std::thread::scope(|scope| {
             scope.spawn(move || serve(&mut helper, &AtomicBool::new(false)).expect("served"));
             let mut ask = |bytes: Vec<u8>| {
-                first.send(1, ORDER, bytes).expect("sent");
-                first.recv(1, ANSWER, 1 << 30, Duration::from_secs(20)).expect("answered")
+                first.send(1, REQUEST, bytes).expect("sent");
+                first.recv(1, REPLY, 1 << 30, Duration::from_secs(20)).expect("answered")
             };
             // Cut short anywhere, or with any byte of the scene's or the states' changed: never a hang or a panic.
             for n in [0, 1, 8, 30, order.len() / 2, order.len() - 1] {
@@ -221,13 +229,13 @@ fn orders_that_are_none_are_refused_and_the_next_is_obeyed() {
                 changed[i] ^= 0xff;
                 ask(changed);
             }
-            first.send(1, ORDER, order.clone()).expect("sent");
-            let good = first.recv(1, ANSWER, 1 << 30, Duration::from_secs(20)).expect("answered");
+            first.send(1, REQUEST, order.clone()).expect("sent");
+            let good = first.recv(1, REPLY, 1 << 30, Duration::from_secs(20)).expect("answered");
             drop(first);
             good
         });
         assert_eq!(answers[8], 0, "the last order was a good one");
-        comm.send(0, ANSWER, answers).expect("sent");
+        comm.send(0, REPLY, answers).expect("sent");
     });
     assert!(lost.iter().all(Option::is_none), "{lost:?}");
 }
@@ -240,36 +248,36 @@ fn said_of(work: Work, viewports: [[i32; 4]; 2]) -> Option<String> {
     for (draw, viewport) in draws.iter_mut().zip(viewports) {
         Arc::make_mut(&mut draw.state).viewport = viewport;
     }
-    let mut lead = Lead::new(Box::new(first));
-    lead.patience = Duration::ZERO;
+    let mut coordinator = Coordinator::new(Box::new(first));
+    coordinator.patience = Duration::ZERO;
     let ready: Vec<Prepared<'_>> =
-        draws.iter().map(|d| Prepared::new(d, None, &mut Structures::default()).expect("seen")).collect();
-    lead.make(&ready, &settings(Mode::Match), &work, |_| Made {
+        draws.iter().map(|d| Prepared::new(d, None, &mut BuildCounts::default()).expect("seen")).collect();
+    coordinator.make(&ready, &settings(Mode::Match), &work, |_| PartialImage {
         rect: trace::Rect::default(),
         first: Vec::<[u8; 4]>::new(),
         second: Vec::<f32>::new(),
         rays: Vec::new(),
         warnings: Vec::new(),
     });
-    let order = helper.recv(0, ORDER, 1 << 30, Duration::from_secs(20)).expect("an order");
+    let order = helper.recv(0, REQUEST, 1 << 30, Duration::from_secs(20)).expect("an order");
     let answer = Helper::default().answer(&order);
-    AnswerHead::get(&mut Reader::new(&answer)).expect("an answer").complaint
+    ReplyHeader::get(&mut Reader::new(&answer)).expect("an answer").error_reply
 }
 
 #[test]
 fn a_peer_cannot_make_a_helper_reserve_more_than_a_view_that_is_traced() {
     const SMALL: [i32; 4] = [3, 5, 333, 277];
     let far = (1 << 24) - 400;
-    let beyond = |viewport, rect| {
+    let whitted = |viewport, rect| {
         let projection = IDENTITY.map(f64::from);
-        Work::Beyond(super::requests::Seen { projection, viewport, rect }, [0.0; 3])
+        Work::Whitted(super::requests::ViewParameters { projection, viewport, rect }, [0.0; 3])
     };
     assert_eq!(said_of(Work::Nearest, [SMALL; 2]), None);
-    assert_eq!(said_of(beyond(SMALL, SMALL), [SMALL; 2]), None);
+    assert_eq!(said_of(whitted(SMALL, SMALL), [SMALL; 2]), None);
     let large = [0, 0, 1 << 16, 1 << 16];
     let lies = [
-        ("a view", beyond(large, large), [SMALL; 2]),
-        ("a view", beyond(SMALL, large), [SMALL; 2]),
+        ("a view", whitted(large, large), [SMALL; 2]),
+        ("a view", whitted(SMALL, large), [SMALL; 2]),
         ("a viewport", Work::Nearest, [SMALL, large]),
         ("a picture of", Work::Nearest, [[-far, -far, 333, 277], [far, far, 333, 277]]),
     ];
@@ -295,30 +303,31 @@ fn a_group_behind_one_head_makes_the_bits_of_one_and_ranks_that_leave_are_named(
                 let (over, listeners) =
                     (&over[comm.rank()], listeners.iter().map(|l| l.try_clone()).collect());
                 scope.spawn(move || match comm.rank() {
-                    0 => lead_group(&mut comm, Result::expect(listeners, "sockets"), over),
+                    0 => coordinate_group(&mut comm, Result::expect(listeners, "sockets"), over),
                     _ => serve_group(&mut comm, over),
                 })
             })
             .collect();
         let connect = || {
             let streams = places.iter().map(|p| UnixStream::connect(p).expect("a rank is there")).collect();
-            let mut lead = Lead::new(Box::new(SocketComm::first(streams).expect("sockets")));
-            lead.patience = Duration::from_secs(600);
-            lead
+            let mut coordinator = Coordinator::new(Box::new(SocketComm::first(streams).expect("sockets")));
+            coordinator.patience = Duration::from_secs(600);
+            coordinator
         };
         // Two programs, one of which says nonsense and costs the other nothing.
-        let (mut lead, mut other) = (connect(), UnixStream::connect(&places[0]).expect("a rank is there"));
+        let (mut coordinator, mut other) =
+            (connect(), UnixStream::connect(&places[0]).expect("a rank is there"));
         std::io::Write::write_all(&mut other, &[0xee; 4096]).expect("nonsense");
-        let mut many = pictures(&mut lead, &[0.1], &settings(Mode::Match), &mut Vec::new());
-        assert!(lead.accounts.all().iter().all(|a| a.lost.is_none() && a.pictures == 1));
-        assert!(lead.accounts.all()[1..].iter().all(|a| a.builds == 2 && a.rays > 1000));
+        let mut many = pictures(&mut coordinator, &[0.1], &settings(Mode::Match), &mut Vec::new());
+        assert!(coordinator.rank_stats.all().iter().all(|a| a.lost.is_none() && a.pictures == 1));
+        assert!(coordinator.rank_stats.all()[1..].iter().all(|a| a.builds == 2 && a.rays > 1000));
         // The second rank goes.
         over[2].store(true, Relaxed);
         while !ranks[2].is_finished() {
             std::thread::sleep(Duration::from_millis(2));
         }
-        many.extend(pictures(&mut lead, &[0.4, 0.2], &settings(Mode::Match), &mut Vec::new()));
-        let lost: Vec<bool> = lead.accounts.all().iter().map(|a| a.lost.is_some()).collect();
+        many.extend(pictures(&mut coordinator, &[0.4, 0.2], &settings(Mode::Match), &mut Vec::new()));
+        let lost: Vec<bool> = coordinator.rank_stats.all().iter().map(|a| a.lost.is_some()).collect();
         assert_eq!(lost, [false, false, true, false]);
         assert!(one == many, "the pictures differ");
         // The head's end is everybody's.
@@ -326,7 +335,7 @@ fn a_group_behind_one_head_makes_the_bits_of_one_and_ranks_that_leave_are_named(
         for rank in ranks {
             rank.join().expect("no panic").expect("no fault");
         }
-        let again = pictures(&mut lead, &[0.2], &settings(Mode::Match), &mut Vec::new());
-        assert!(again[0] == one[2] && lead.accounts.all()[1..].iter().all(|a| a.lost.is_some()));
+        let again = pictures(&mut coordinator, &[0.2], &settings(Mode::Match), &mut Vec::new());
+        assert!(again[0] == one[2] && coordinator.rank_stats.all()[1..].iter().all(|a| a.lost.is_some()));
     });
 }

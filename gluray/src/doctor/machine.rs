@@ -67,7 +67,7 @@ const MATTER: [&str; 12] = [
 ];
 
 /// Looks around. `library` is the one that goes into programs.
-pub fn look(library: Option<PathBuf>) -> Machine {
+pub fn inspect(library: Option<PathBuf>) -> Machine {
     let get = crate::host::folders::variable;
     let folders = library_folders(get("LD_LIBRARY_PATH").as_deref());
     let find = |name: &str| folders.iter().map(|f| f.join(name)).find(|p| p.exists());
@@ -92,12 +92,12 @@ pub fn look(library: Option<PathBuf>) -> Machine {
         variables,
         threads: std::thread::available_parallelism().map_or(1, usize::from),
         settings: settings(),
-        panel: crate::host::panel::Meeting::find(get).map(|m| m.address.to_string()),
+        panel: crate::host::panel::PanelEndpoint::find(get).map(|m| m.address.to_string()),
     }
 }
 
 /// GLVND's dispatch library.
-pub fn look_for_glvnd() -> Option<PathBuf> {
+pub fn find_glvnd() -> Option<PathBuf> {
     let folders = library_folders(crate::host::folders::variable("LD_LIBRARY_PATH").as_deref());
     folders.iter().map(|f| f.join("libGLdispatch.so.0")).find(|p| p.exists())
 }

@@ -7,7 +7,7 @@ mod judge;
 mod machine;
 
 pub use judge::findings;
-pub use machine::{Machine, OpenGl, look, look_for_glvnd};
+pub use machine::{Machine, OpenGl, find_glvnd, inspect};
 
 use serde::Serialize;
 

@@ -6,7 +6,7 @@ use crate::capture::draw::{Draw, Shading};
 use crate::capture::geometry_cache::Geometry;
 use crate::host::config::{self, Settings};
 use crate::host::export::{Object, Scene, scenes_folder, write_scene};
-use crate::host::panel::link::Wish;
+use crate::host::panel::link::PanelCommand;
 use crate::host::panel::{FrameStats, Hello, Link, ObjectInfo};
 use crate::host::report::Report;
 use rt_core::glam::DMat4;
@@ -21,12 +21,12 @@ const IN_REPORT: usize = 100;
 
 /// What is known between two frames.
 #[derive(Default)]
-pub(crate) struct Told {
+pub(crate) struct FrameTelemetry {
     /// Counts at the last frame, for the difference.
     before: Report,
     frame_ended: Option<Instant>,
     /// Objects of this frame.
-    objects: BTreeMap<u128, Seen>,
+    objects: BTreeMap<u128, TracedObject>,
     /// Frame at which `GLURAY_DUMP` is written next.
     next_dump: u64,
     /// The answer to the panel's wish for the scene.
@@ -34,7 +34,7 @@ pub(crate) struct Told {
     problem: Option<String>,
 }
 
-struct Seen {
+struct TracedObject {
     triangles: u64,
     calls: u64,
     color: [f32; 3],
@@ -50,11 +50,11 @@ pub(crate) fn key_of(geometry: &Geometry) -> String {
     format!("{:016x}", geometry.key as u64)
 }
 
-impl Told {
+impl FrameTelemetry {
     /// These draws are being traced.
     pub(crate) fn traced<'a>(&mut self, frame: u64, draws: impl Iterator<Item = &'a Draw> + Clone) {
         for d in draws.clone() {
-            let seen = self.objects.entry(d.geometry.key).or_insert_with(|| Seen {
+            let seen = self.objects.entry(d.geometry.key).or_insert_with(|| TracedObject {
                 triangles: 0,
                 calls: 0,
                 color: color(d, 0),
@@ -73,7 +73,7 @@ impl Told {
             self.problem = write_scene(file, &scene).err().map(|e| format!("GLURAY_DUMP: {e}"));
         }
         if EXPORT.swap(false, Relaxed) {
-            self.exported = Some(to_scenes_folder(&scene));
+            self.exported = Some(write_to_scenes_folder(&scene));
         }
     }
 
@@ -114,8 +114,8 @@ impl Told {
         drop(slot);
         match wish {
             None => {}
-            Some(Wish::Export) => EXPORT.store(true, Relaxed),
-            Some(Wish::Settings(settings)) => config::replace(*settings),
+            Some(PanelCommand::Export) => EXPORT.store(true, Relaxed),
+            Some(PanelCommand::Settings(settings)) => config::replace(*settings),
         }
         objects.truncate(IN_REPORT);
         objects
@@ -150,7 +150,7 @@ fn hello() -> Hello {
         process: std::process::id(),
         settings: Settings::clone(&config.settings),
         problems: config.problems.clone(),
-        obeys: config::OBEYED.iter().map(|p| (*p).to_owned()).collect(),
+        obeys: config::SUPPORTED_SETTINGS.iter().map(|p| (*p).to_owned()).collect(),
     }
 }
 
@@ -224,7 +224,7 @@ fn calls(n: u64) -> String {
     format!("{n} draw call{}", if n == 1 { "" } else { "s" })
 }
 
-fn to_scenes_folder(scene: &Scene) -> Result<PathBuf, String> {
+fn write_to_scenes_folder(scene: &Scene) -> Result<PathBuf, String> {
     let folder =
         scenes_folder(crate::host::folders::variable).ok_or("neither XDG_STATE_HOME nor HOME is set")?;
     std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;

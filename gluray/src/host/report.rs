@@ -1,7 +1,7 @@
 //! What was traced, what was passed and why: a JSON file per process, rewritten once a second while frames come, because many programs end without
 //! running any of their exit handlers, and when a context or the program ends.
 
-use crate::host::timeline::Recorder;
+use crate::host::timeline::SpanRecorder;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io::Write as _;
@@ -57,7 +57,7 @@ pub struct Report {
     /// Settings that made no sense and were not taken.
     pub problems: Vec<String>,
     /// What each rank did, where helpers trace as well; 0 is the program.
-    pub ranks: Vec<crate::cluster::RankAccount>,
+    pub ranks: Vec<crate::cluster::RankStats>,
     /// Objects of the last frame, largest first.
     pub objects: Vec<crate::host::panel::ObjectInfo>,
     /// When each phase ran, in the order in which they ended: the first two hundred thousand.
@@ -109,7 +109,7 @@ impl Report {
 
 /// When the file is to be written.
 #[derive(Debug, Default)]
-struct Schedule {
+struct WriteSchedule {
     /// The first change.
     begun: Option<Instant>,
     written: Option<Instant>,
@@ -121,7 +121,7 @@ struct Schedule {
 
 /// What becomes of a change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Step {
+enum WriteDecision {
     /// The file is written.
     Write,
     /// After this time, by somebody who waits for it.
@@ -130,14 +130,14 @@ enum Step {
     Leave,
 }
 
-impl Schedule {
+impl WriteSchedule {
     /// Longest time between two writings.
     const LONGEST: Duration = Duration::from_secs(1);
     /// Shortest time, but for writings at an end.
     const SHORTEST: Duration = Duration::from_millis(20);
 
-    const fn new() -> Schedule {
-        Schedule { begun: None, written: None, behind: false, waiting: None }
+    const fn new() -> WriteSchedule {
+        WriteSchedule { begun: None, written: None, behind: false, waiting: None }
     }
 
     /// Time between two writings: a tenth of the program's life so far, within the limits. Nothing of
@@ -148,19 +148,19 @@ impl Schedule {
     }
 
     /// Something has changed; `at_once` when the process or a context may be at its end.
-    fn changed(&mut self, now: Instant, at_once: bool, process: u32) -> Step {
+    fn changed(&mut self, now: Instant, at_once: bool, process: u32) -> WriteDecision {
         self.behind = true;
         self.begun.get_or_insert(now);
         let pause = self.pause(now);
         let since = self.written.map_or(pause, |t| now.saturating_duration_since(t));
         if at_once || since >= pause {
-            return Step::Write;
+            return WriteDecision::Write;
         }
         if self.waiting == Some(process) {
-            return Step::Leave;
+            return WriteDecision::Leave;
         }
         self.waiting = Some(process);
-        Step::Wait(pause - since)
+        WriteDecision::Wait(pause - since)
     }
 
     /// Whoever waited has waited; true when there still is something to write.
@@ -176,11 +176,11 @@ impl Schedule {
 
 /// The process that drew: a child that was forked and draws nothing has its parent's numbers, and nothing to tell.
 static DRAWING: AtomicU32 = AtomicU32::new(0);
-static SCHEDULE: Mutex<Schedule> = Mutex::new(Schedule::new());
+static SCHEDULE: Mutex<WriteSchedule> = Mutex::new(WriteSchedule::new());
 /// One writing at a time.
 static WRITING: Mutex<()> = Mutex::new(());
 
-fn schedule() -> std::sync::MutexGuard<'static, Schedule> {
+fn schedule() -> std::sync::MutexGuard<'static, WriteSchedule> {
     SCHEDULE.lock().unwrap_or_else(|e| e.into_inner())
 }
 
@@ -193,7 +193,7 @@ pub(crate) struct Counters {
 }
 
 /// Phases that have ended since the last writing.
-static SPANS: Mutex<Recorder> = Mutex::new(Recorder::new(20_000));
+static SPANS: Mutex<SpanRecorder> = Mutex::new(SpanRecorder::new(20_000));
 /// Lines of phases in the file; a run of hours must not fill a disk.
 static SPANS_WRITTEN: AtomicUsize = AtomicUsize::new(0);
 const MOST_SPANS: usize = 200_000;
@@ -226,7 +226,7 @@ impl Counters {
     }
 
     /// Acceleration structures were made.
-    pub(crate) fn made(&mut self, structures: crate::capture::geometry_cache::Structures) {
+    pub(crate) fn count_builds(&mut self, structures: crate::capture::geometry_cache::BuildCounts) {
         self.report.builds += structures.built;
         self.report.refits += structures.refitted;
     }
@@ -239,7 +239,7 @@ impl Counters {
     }
 
     /// The driver draws `n` calls.
-    pub(crate) fn pass(&mut self, why: &'static str, n: u64) {
+    pub(crate) fn count_driver_draws(&mut self, why: &'static str, n: u64) {
         self.report.passed_draws += n;
         match self.report.passed_reasons.get_mut(why) {
             Some(v) => *v += n,
@@ -249,17 +249,17 @@ impl Counters {
         }
     }
 
-    pub(crate) fn flushed(&mut self, before: &str) {
+    pub(crate) fn count_flush(&mut self, before: &str) {
         *self.report.flushes.entry(before.to_owned()).or_default() += 1;
     }
 
-    pub(crate) fn rays(&mut self, kind: &str, n: u64) {
+    pub(crate) fn add_rays(&mut self, kind: &str, n: u64) {
         if n > 0 {
             *self.report.rays.entry(kind.to_owned()).or_default() += n;
         }
     }
 
-    pub(crate) fn spent(&mut self, phase: &str, time: Duration) {
+    pub(crate) fn add_time(&mut self, phase: &str, time: Duration) {
         span("program", phase, self.report.frames + 1, time);
         *self.report.milliseconds.entry(phase.to_owned()).or_default() += time.as_secs_f64() * 1e3;
     }
@@ -281,9 +281,9 @@ impl Counters {
         // Bound, so that the lock is not held while the file is written.
         let step = schedule().changed(Instant::now(), at_once, std::process::id());
         match step {
-            Step::Write => write(&dir),
-            Step::Leave => {}
-            Step::Wait(time) => {
+            WriteDecision::Write => write(&dir),
+            WriteDecision::Leave => {}
+            WriteDecision::Wait(time) => {
                 let wait = move || {
                     std::thread::sleep(time);
                     let behind = schedule().waited();
@@ -302,7 +302,7 @@ impl Counters {
 }
 
 /// The process ends: what has not been written yet is.
-pub(crate) fn write_the_rest() {
+pub(crate) fn write_final_report() {
     if DRAWING.load(Relaxed) != std::process::id() {
         return;
     }
@@ -324,7 +324,7 @@ fn write(dir: &Path) {
     sum.mode = crate::host::config::current().settings.mode.name().to_owned();
     sum.faults = crate::interpose::panic_guard::messages();
     sum.problems.extend(crate::host::config::current().problems.iter().cloned());
-    sum.ranks = crate::cluster::accounts();
+    sum.ranks = crate::cluster::rank_stats();
     if let Some(own) = sum.ranks.first_mut() {
         (own.builds, own.refits) = (sum.builds, sum.refits);
     }
@@ -347,7 +347,7 @@ mod tests {
     fn the_report_is_written_once_a_second_whatever_the_frame_rate_and_its_last_state_always() {
         for frames_per_sec in [1_u32, 7, 60, 400, 5000] {
             let start = Instant::now();
-            let mut schedule = Schedule::new();
+            let mut schedule = WriteSchedule::new();
             let (mut writings, mut due) = (0, None);
             let mut after_ten_secs = 0;
             let frames = 20 * frames_per_sec;
@@ -365,15 +365,15 @@ mod tests {
                     }
                 }
                 match schedule.changed(now, false, 7) {
-                    Step::Write => {
+                    WriteDecision::Write => {
                         writings += 1;
                         schedule.wrote(now);
                     }
-                    Step::Wait(time) => {
+                    WriteDecision::Wait(time) => {
                         assert!(due.is_none(), "one waits, and no more");
                         due = Some(now + time);
                     }
-                    Step::Leave => assert!(due.is_some(), "somebody waits"),
+                    WriteDecision::Leave => assert!(due.is_some(), "somebody waits"),
                 }
             }
             let later = writings - after_ten_secs;
@@ -382,18 +382,18 @@ mod tests {
             assert!(after_ten_secs <= 10 + 42, "{after_ten_secs} at first, at {frames_per_sec} a second");
             // The program sits idle, or ends.
             assert!(!schedule.behind || due.is_some(), "the last frame comes into the file");
-            assert_eq!(schedule.changed(at(frames), true, 7), Step::Write, "an end is not put off");
+            assert_eq!(schedule.changed(at(frames), true, 7), WriteDecision::Write, "an end is not put off");
         }
     }
 
     #[test]
     fn a_forked_child_has_nobody_who_waits() {
         let now = Instant::now();
-        let mut schedule = Schedule::new();
+        let mut schedule = WriteSchedule::new();
         schedule.wrote(now);
         let soon = now + Duration::from_millis(10);
-        assert!(matches!(schedule.changed(soon, false, 7), Step::Wait(_)));
-        assert_eq!(schedule.changed(soon, false, 7), Step::Leave);
-        assert!(matches!(schedule.changed(soon, false, 8), Step::Wait(_)));
+        assert!(matches!(schedule.changed(soon, false, 7), WriteDecision::Wait(_)));
+        assert_eq!(schedule.changed(soon, false, 7), WriteDecision::Leave);
+        assert!(matches!(schedule.changed(soon, false, 8), WriteDecision::Wait(_)));
     }
 }

@@ -3,15 +3,15 @@
 //! A program that calls OpenGL promises that what the call names can be read; the driver would read it just so. Two things have to come together before anything is read, and neither can be
 //! made outside of the rooms for unsafe code:
 //!
-//! - [`Call`], with the arguments of the draw call that the program is in. Hooks make it. [`Elements`] come from it alone, so they are the vertices which that call names, and
+//! - [`ActiveCall`], with the arguments of the draw call that the program is in. Hooks make it. [`Elements`] come from it alone, so they are the vertices which that call names, and
 //!   what is read of them lives as long as the call.
-//! - [`Source`], an array as the driver has it, asked of the driver here. Nobody else can make one of client memory, or change one.
+//! - [`ArraySource`], an array as the driver has it, asked of the driver here. Nobody else can make one of client memory, or change one.
 //!
 //! This is a room for unsafe code.
 #![allow(unsafe_code, reason = "a room: vertex arrays live in the program's memory")]
 
-use crate::capture::draw::{Packed, component_bytes};
-use crate::capture::vertex_arrays::Which;
+use crate::capture::draw::{PackedArray, component_bytes};
+use crate::capture::vertex_arrays::VertexSelection;
 use crate::interpose::driver::gl;
 use crate::state::enums::*;
 use core::marker::PhantomData;
@@ -64,7 +64,7 @@ pub(crate) unsafe fn ints<const N: usize>(address: usize) -> [i32; N] {
 
 /// What a draw call names.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Named {
+pub(crate) enum DrawArguments {
     /// `glDrawArrays`.
     Arrays { first: i32, count: i32 },
     /// `glDrawElements` and its like.
@@ -74,47 +74,49 @@ pub(crate) enum Named {
 }
 
 /// A draw call that the program is in.
-pub(crate) struct Call<'c> {
-    named: Named,
+pub(crate) struct ActiveCall<'c> {
+    named: DrawArguments,
     call: PhantomData<&'c ()>,
 }
 
-impl Call<'_> {
+impl ActiveCall<'_> {
     /// # Safety
     /// The program is in a call of OpenGL's with these arguments, which does not return before this goes.
-    pub(crate) unsafe fn new(named: Named) -> Self {
-        Call { named, call: PhantomData }
+    pub(crate) unsafe fn new(named: DrawArguments) -> Self {
+        ActiveCall { named, call: PhantomData }
     }
 
-    pub(crate) fn named(&self) -> Named {
+    pub(crate) fn named(&self) -> DrawArguments {
         self.named
     }
 }
 
-/// The vertices that a call names, as [`Which`] has them.
-pub(crate) struct Elements<'c>(Which, PhantomData<&'c ()>);
+/// The vertices that a call names, as [`VertexSelection`] has them.
+pub(crate) struct Elements<'c>(VertexSelection, PhantomData<&'c ()>);
 
 impl Deref for Elements<'_> {
-    type Target = Which;
-    fn deref(&self) -> &Which {
+    type Target = VertexSelection;
+    fn deref(&self) -> &VertexSelection {
         &self.0
     }
 }
 
 impl<'c> Elements<'c> {
     /// Of a call, and the index that restarts primitives.
-    pub(crate) fn of(call: &'c Call<'_>, restart: Option<u32>) -> Result<Elements<'c>, &'static str> {
+    pub(crate) fn of(call: &'c ActiveCall<'_>, restart: Option<u32>) -> Result<Elements<'c>, &'static str> {
         const NEGATIVE: &str = "a negative count";
         let which = match call.named {
-            Named::Arrays { first, count } => match (usize::try_from(first), usize::try_from(count)) {
-                (Ok(first), Ok(count)) => Which::Range { first, count },
-                _ => return Err(NEGATIVE),
-            },
-            Named::Element(i) => match usize::try_from(i) {
-                Ok(first) => Which::Range { first, count: 1 },
+            DrawArguments::Arrays { first, count } => {
+                match (usize::try_from(first), usize::try_from(count)) {
+                    (Ok(first), Ok(count)) => VertexSelection::Range { first, count },
+                    _ => return Err(NEGATIVE),
+                }
+            }
+            DrawArguments::Element(i) => match usize::try_from(i) {
+                Ok(first) => VertexSelection::Range { first, count: 1 },
                 Err(_) => return Err("an element of a negative number"),
             },
-            Named::Elements { count, kind, at, base } => {
+            DrawArguments::Elements { count, kind, at, base } => {
                 let n = usize::try_from(count).map_err(|_| NEGATIVE)?;
                 let width = component_bytes(kind);
                 if !matches!(kind, UNSIGNED_BYTE | UNSIGNED_SHORT | UNSIGNED_INT) {
@@ -127,7 +129,7 @@ impl<'c> Elements<'c> {
                     0 => Cow::Borrowed(unsafe { view(at, n * width) }),
                     buffer => Cow::Owned(read_buffer(buffer, at, n * width)?),
                 };
-                Which::indexed(&bytes, width, base, restart)?
+                VertexSelection::indexed(&bytes, width, base, restart)?
             }
         };
         Ok(Elements(which, PhantomData))
@@ -138,7 +140,7 @@ impl<'c> Elements<'c> {
 
 /// Where an array is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) struct Layout {
+pub(crate) struct ArrayLayout {
     pub(crate) size: usize,
     pub(crate) kind: u32,
     pub(crate) stride: usize,
@@ -148,7 +150,7 @@ pub(crate) struct Layout {
     pub(crate) normalized: bool,
 }
 
-impl Layout {
+impl ArrayLayout {
     fn element(&self) -> usize {
         component_bytes(self.kind) * self.size
     }
@@ -163,8 +165,8 @@ impl Layout {
         (self.step(), self.kind, self.size, self.normalized)
     }
 
-    /// Bytes of [`Source::view`] tightly packed.
-    pub(crate) fn pack(&self, bytes: Cow<'_, [u8]>) -> Packed {
+    /// Bytes of [`ArraySource::view`] tightly packed.
+    pub(crate) fn pack(&self, bytes: Cow<'_, [u8]>) -> PackedArray {
         let (element, step) = (self.element(), self.step());
         let bytes = match step == element {
             true => bytes.into_owned(),
@@ -177,7 +179,7 @@ impl Layout {
                 out
             }
         };
-        Packed { bytes, kind: self.kind, size: self.size, normalized: self.normalized }
+        PackedArray { bytes, kind: self.kind, size: self.size, normalized: self.normalized }
     }
 
     /// Offset and length of vertices `first..first + count`; an error in words when they cannot be read.
@@ -201,7 +203,7 @@ impl Layout {
 
 /// How many components the elements of a fixed-function array have.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Size {
+pub(crate) enum ComponentCount {
     /// As OpenGL has it: normals have three.
     Three,
     /// What the driver says to this.
@@ -210,28 +212,28 @@ pub(crate) enum Size {
 
 /// An array as the driver has it, or in a buffer. Its fields can be read and not changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) struct Source(Layout);
+pub(crate) struct ArraySource(ArrayLayout);
 
-impl Deref for Source {
-    type Target = Layout;
-    fn deref(&self) -> &Layout {
+impl Deref for ArraySource {
+    type Target = ArrayLayout;
+    fn deref(&self) -> &ArrayLayout {
         &self.0
     }
 }
 
-impl Source {
+impl ArraySource {
     /// A fixed-function array, asked of the driver by these names. Where there are no buffers all arrays are in client memory.
     pub(crate) fn of_fixed(
-        size: Size,
+        size: ComponentCount,
         [kind, stride, pointer, buffer]: [u32; 4],
         normalized: bool,
         buffers: bool,
-    ) -> Source {
+    ) -> ArraySource {
         let size = match size {
-            Size::Three => 3,
-            Size::Asked(what) => gl::int(what).max(0) as usize,
+            ComponentCount::Three => 3,
+            ComponentCount::Asked(what) => gl::int(what).max(0) as usize,
         };
-        Source(Layout {
+        ArraySource(ArrayLayout {
             size,
             kind: gl::word(kind),
             stride: gl::int(stride).max(0) as usize,
@@ -242,10 +244,10 @@ impl Source {
     }
 
     /// The array of a generic attribute, where that is on.
-    pub(crate) fn of_attribute(at: u32) -> Option<Source> {
+    pub(crate) fn of_attribute(at: u32) -> Option<ArraySource> {
         let get = |what| gl::vertex_attrib_i::<1>(at, what)[0];
         (get(VERTEX_ATTRIB_ARRAY_ENABLED) != 0).then(|| {
-            Source(Layout {
+            ArraySource(ArrayLayout {
                 size: get(VERTEX_ATTRIB_ARRAY_SIZE).max(0) as usize,
                 kind: get(VERTEX_ATTRIB_ARRAY_TYPE).cast_unsigned(),
                 stride: get(VERTEX_ATTRIB_ARRAY_STRIDE).max(0) as usize,
@@ -257,8 +259,8 @@ impl Source {
     }
 
     /// Anything in a buffer, which the driver keeps readers within; `None` without one.
-    pub(crate) fn in_buffer(layout: Layout) -> Option<Source> {
-        (layout.buffer != 0).then_some(Source(layout))
+    pub(crate) fn in_buffer(layout: ArrayLayout) -> Option<ArraySource> {
+        (layout.buffer != 0).then_some(ArraySource(layout))
     }
 
     /// The vertices that a call names where they are, with gaps; an error in words when they cannot be read.
@@ -275,12 +277,12 @@ impl Source {
     }
 
     /// The same tightly packed.
-    pub(crate) fn read(&self, elements: &Elements<'_>) -> Result<Packed, &'static str> {
+    pub(crate) fn read(&self, elements: &Elements<'_>) -> Result<PackedArray, &'static str> {
         Ok(self.pack(self.view(elements)?))
     }
 
     /// Elements `first..first + count` of an array in a buffer, tightly packed.
-    pub(crate) fn read_range(&self, first: usize, count: usize) -> Result<Packed, &'static str> {
+    pub(crate) fn read_range(&self, first: usize, count: usize) -> Result<PackedArray, &'static str> {
         let (start, length) = self.range(first, count)?;
         match self.buffer {
             0 => Err("an array in client memory"),

@@ -6,34 +6,34 @@
 //! It goes into the register before the driver lets go of it, and out of it after the driver has taken it: in between another thread may make it
 //! current, and must find it.
 
-use crate::capture::attribute_cache::Packs;
-use crate::capture::buffer_writes::Writes;
-use crate::capture::display_lists::{Lists, Recording};
+use crate::capture::attribute_cache::AttributeCache;
+use crate::capture::buffer_writes::BufferWrites;
+use crate::capture::display_lists::{DisplayLists, ListRecording};
 use crate::capture::evaluators::Evaluators;
-use crate::capture::geometry_cache::Cache;
-use crate::capture::vertex_arrays::Arrays;
-use crate::capture::vertex_recorder::Recorder;
-use crate::classify::affine_probe::Probes;
-use crate::classify::rules::{self, Verdict};
-use crate::classify::vtk::Programs;
+use crate::capture::geometry_cache::GeometryCache;
+use crate::capture::vertex_arrays::VertexArrays;
+use crate::capture::vertex_recorder::VertexRecorder;
+use crate::classify::affine_probe::AffineProbes;
+use crate::classify::rules::{self, Classification};
+use crate::classify::vtk::VtkPrograms;
 use crate::host::config::Config;
 use crate::host::report::Counters;
 use crate::interpose::driver::gl;
-use crate::interpose::share_group::{Shared, TextureWrites};
+use crate::interpose::share_group::{ShareGroup, TextureWrites};
 use crate::interpose::symbols::{self, class};
 use crate::present::frame::Frame;
 use crate::present::framebuffer_pass::Presenter;
-use crate::state::current_attributes::Current;
+use crate::state::current_attributes::CurrentAttributes;
 use crate::state::enums::*;
-use crate::state::material_properties::Properties;
-use crate::state::snapshot::{Abilities, Snapshot};
-use crate::trace::path_tracing::Studio;
+use crate::state::material_properties::MaterialProperties;
+use crate::state::snapshot::{DriverCapabilities, Snapshot};
+use crate::trace::path_tracing::PathTracer;
 use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex, OnceLock};
 
 /// Where the calls of immediate mode go.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Sink {
+pub(crate) enum ImmediateModeTarget {
     /// Not between Begin and End.
     Outside,
     /// Between Begin and End of a traced primitive.
@@ -47,38 +47,38 @@ pub(crate) enum Sink {
 /// What we know of one OpenGL context.
 pub(crate) struct Context {
     handle: usize,
-    doomed: bool,
-    pub(crate) can: Abilities,
+    destroyed_while_current: bool,
+    pub(crate) capabilities: DriverCapabilities,
     pub(crate) config: Arc<Config>,
-    pub(crate) sink: Sink,
+    pub(crate) immediate_target: ImmediateModeTarget,
     /// Classes of state to ask the driver about again.
     pub(crate) dirty: u8,
     pub(crate) state: Arc<Snapshot>,
-    pub(crate) verdict: Verdict,
-    pub(crate) current: Current,
-    /// A colour that colour material did not take over (see `Current::unfollowed`).
-    pub(crate) unfollowed: Option<[f32; 4]>,
+    pub(crate) classification: Classification,
+    pub(crate) current: CurrentAttributes,
+    /// A colour that colour material did not take over (see `CurrentAttributes::untracked_color`).
+    pub(crate) untracked_color: Option<[f32; 4]>,
     /// What of `current` the driver does not know yet.
     pub(crate) stale: u8,
     /// Of its materials, these.
-    pub(crate) stale_properties: Properties,
+    pub(crate) stale_properties: MaterialProperties,
     /// What `glMaterial` set since the last draw.
-    pub(crate) set_since_draw: Properties,
-    pub(crate) recorder: Recorder,
+    pub(crate) set_since_draw: MaterialProperties,
+    pub(crate) recorder: VertexRecorder,
     pub(crate) evaluators: Evaluators,
     /// The arrays that `glArrayElement` takes the vertices of the open primitive from.
-    pub(crate) element_arrays: Option<Arrays>,
-    pub(crate) lists: Arc<Mutex<Lists>>,
-    pub(crate) writes: Arc<Mutex<Writes>>,
-    pub(crate) recording: Option<Recording>,
+    pub(crate) element_arrays: Option<VertexArrays>,
+    pub(crate) lists: Arc<Mutex<DisplayLists>>,
+    pub(crate) writes: Arc<Mutex<BufferWrites>>,
+    pub(crate) recording: Option<ListRecording>,
     pub(crate) depth_of_lists: u32,
-    pub(crate) cache: Cache,
-    pub(crate) packed: Packs,
+    pub(crate) geometry_cache: GeometryCache,
+    pub(crate) attribute_cache: AttributeCache,
     pub(crate) frame: Frame,
     pub(crate) presenter: Presenter,
-    pub(crate) studio: Studio,
-    pub(crate) probes: Probes,
-    pub(crate) programs: Programs,
+    pub(crate) path_tracer: PathTracer,
+    pub(crate) probes: AffineProbes,
+    pub(crate) programs: VtkPrograms,
     pub(crate) counters: Counters,
     /// Errors that came up behind the program's back or were kept for it.
     pub(crate) errors: Vec<u32>,
@@ -88,22 +88,23 @@ pub(crate) struct Context {
     /// We saw it created, so we know with whom it shares.
     pub(crate) seen_created: bool,
     /// A fault of ours has ended the tracing, and the driver knows what it was not told before.
-    pub(crate) given_up: bool,
-    watched: u32,
+    pub(crate) tracing_stopped: bool,
+    on_watched_call: u32,
 }
 
-struct Register {
+struct ContextRegistry {
     idle: HashMap<usize, Box<Context>>,
-    shared: HashMap<usize, Shared>,
+    shared: HashMap<usize, ShareGroup>,
     /// Contexts whose creation we saw.
     seen: HashSet<usize>,
 }
 
-static REGISTER: OnceLock<Mutex<Register>> = OnceLock::new();
+static CONTEXT_REGISTRY: OnceLock<Mutex<ContextRegistry>> = OnceLock::new();
 
-fn register() -> std::sync::MutexGuard<'static, Register> {
-    let new = || Mutex::new(Register { idle: HashMap::new(), shared: HashMap::new(), seen: HashSet::new() });
-    REGISTER.get_or_init(new).lock().unwrap_or_else(|e| e.into_inner())
+fn registry() -> std::sync::MutexGuard<'static, ContextRegistry> {
+    let new =
+        || Mutex::new(ContextRegistry { idle: HashMap::new(), shared: HashMap::new(), seen: HashSet::new() });
+    CONTEXT_REGISTRY.get_or_init(new).lock().unwrap_or_else(|e| e.into_inner())
 }
 
 /// A context was created; `share` is one whose lists it shares.
@@ -111,8 +112,8 @@ pub(crate) fn created(handle: usize, share: usize) {
     if handle == 0 {
         return;
     }
-    let mut r = register();
-    let shared = if share == 0 { Shared::default() } else { r.shared.entry(share).or_default().clone() };
+    let mut r = registry();
+    let shared = if share == 0 { ShareGroup::default() } else { r.shared.entry(share).or_default().clone() };
     r.shared.insert(handle, shared);
     r.seen.insert(handle);
     // The address of a context that was destroyed may come again.
@@ -125,12 +126,12 @@ pub(crate) fn created(handle: usize, share: usize) {
 pub(crate) fn destroyed(handle: usize) {
     let here = symbols::with_context(|c| {
         let mine = c.handle == handle;
-        c.doomed |= mine;
+        c.destroyed_while_current |= mine;
         mine
     });
     // Programs destroy their contexts before they end, whatever way they do.
-    crate::host::report::write_the_rest();
-    let mut r = register();
+    crate::host::report::write_final_report();
+    let mut r = registry();
     let gone = if here == Some(true) { None } else { r.idle.remove(&handle) };
     r.shared.remove(&handle);
     r.seen.remove(&handle);
@@ -139,7 +140,7 @@ pub(crate) fn destroyed(handle: usize) {
 }
 
 /// What was current before another context is made current.
-pub(crate) enum Left {
+pub(crate) enum PreviousContext {
     /// None.
     Nothing,
     /// This one, which is in the register; and the textures of its group, when it has written any.
@@ -149,42 +150,42 @@ pub(crate) enum Left {
 }
 
 /// Before the current context changes: what is pending is drawn, and the context is there for other threads.
-pub(crate) fn leave() -> Left {
-    crate::interpose::panic_guard::give_up_here();
+pub(crate) fn release_current() -> PreviousContext {
+    crate::interpose::panic_guard::hand_over_to_driver();
     let wrote = symbols::with_context(|c| {
         c.flush("context switch");
         c.sync();
         c.counters.publish(false);
         c.publish_textures()
     });
-    let Some(old) = symbols::take() else { return Left::Nothing };
+    let Some(old) = symbols::take() else { return PreviousContext::Nothing };
     symbols::thread_leaves();
-    if old.doomed {
-        return Left::Doomed(old);
+    if old.destroyed_while_current {
+        return PreviousContext::Doomed(old);
     }
-    let left = Left::Idle(old.handle, (wrote == Some(true)).then(|| old.texture_writes.clone()));
-    let before = register().idle.insert(old.handle, old);
+    let left = PreviousContext::Idle(old.handle, (wrote == Some(true)).then(|| old.texture_writes.clone()));
+    let before = registry().idle.insert(old.handle, old);
     drop(before);
     left
 }
 
 /// The change was refused: all stays as it was.
-pub(crate) fn stay(left: Left) {
+pub(crate) fn restore_current(left: PreviousContext) {
     let context = match left {
-        Left::Nothing => None,
+        PreviousContext::Nothing => None,
         // It is current here still, so no other thread can have taken it.
-        Left::Idle(handle, _) => register().idle.remove(&handle),
-        Left::Doomed(context) => Some(context),
+        PreviousContext::Idle(handle, _) => registry().idle.remove(&handle),
+        PreviousContext::Doomed(context) => Some(context),
     };
     if let Some(mut context) = context {
         context.dirty = class::ALL;
-        place(context);
+        install_current(context);
     }
 }
 
 /// `handle` is current on this thread now (0: none), and what was `left` is not.
-pub(crate) fn enter(handle: usize, left: Left) {
-    if let Left::Idle(_, Some(textures)) = &left {
+pub(crate) fn make_current(handle: usize, left: PreviousContext) {
+    if let PreviousContext::Idle(_, Some(textures)) = &left {
         // Changing contexts flushes, so others see now what it wrote.
         textures.change();
     }
@@ -192,8 +193,8 @@ pub(crate) fn enter(handle: usize, left: Left) {
     if let Some(old) = symbols::take() {
         // A fault kept it from being left in order.
         symbols::thread_leaves();
-        if !old.doomed {
-            let before = register().idle.insert(old.handle, old);
+        if !old.destroyed_while_current {
+            let before = registry().idle.insert(old.handle, old);
             drop(before);
         }
     }
@@ -201,34 +202,34 @@ pub(crate) fn enter(handle: usize, left: Left) {
         return;
     }
     let mut context = {
-        let mut r = register();
+        let mut r = registry();
         let shared = r.shared.entry(handle).or_default().clone();
         let seen = r.seen.contains(&handle);
         r.idle.remove(&handle).unwrap_or_else(|| Box::new(Context::new(handle, shared, seen)))
     };
     // After a fault the books are kept all the same: lists that we compiled are ours to play.
     if !crate::interpose::panic_guard::happened() {
-        context.wake();
+        context.on_made_current();
     }
-    place(context);
+    install_current(context);
 }
 
-fn place(context: Box<Context>) {
+fn install_current(context: Box<Context>) {
     // Before it is there, so that its thread is told of all calls from the first on.
     symbols::thread_enters();
     match symbols::install(context) {
-        Ok(()) => symbols::attend(),
+        Ok(()) => symbols::arm(),
         // Some programs change contexts in exit handlers, when the thread's storage is gone already.
         Err(context) => {
             symbols::thread_leaves();
-            let before = register().idle.insert(context.handle, context);
+            let before = registry().idle.insert(context.handle, context);
             drop(before);
         }
     }
 }
 
 /// A watched call is about to run.
-pub(crate) fn watched(index: usize, class: u8, flushes: bool, draws: bool) {
+pub(crate) fn on_watched_call(index: usize, class: u8, flushes: bool, draws: bool) {
     symbols::with_context(|c| c.watched_call(index, class, flushes, draws));
 }
 
@@ -265,50 +266,50 @@ impl Drop for Context {
 }
 
 impl Context {
-    fn new(handle: usize, shared: Shared, seen_created: bool) -> Context {
-        let Shared { lists, writes, texture_writes } = shared;
+    fn new(handle: usize, shared: ShareGroup, seen_created: bool) -> Context {
+        let ShareGroup { lists, writes, texture_writes } = shared;
         Context {
             handle,
-            doomed: false,
-            can: Abilities::default(),
+            destroyed_while_current: false,
+            capabilities: DriverCapabilities::default(),
             config: crate::host::config::current(),
-            sink: Sink::Outside,
+            immediate_target: ImmediateModeTarget::Outside,
             dirty: class::ALL,
             state: Arc::default(),
-            verdict: Verdict::Pass("nothing drawn yet"),
-            current: Current::default(),
-            unfollowed: None,
+            classification: Classification::Pass("nothing drawn yet"),
+            current: CurrentAttributes::default(),
+            untracked_color: None,
             stale: 0,
-            stale_properties: Properties::default(),
-            set_since_draw: Properties::default(),
-            recorder: Recorder::default(),
+            stale_properties: MaterialProperties::default(),
+            set_since_draw: MaterialProperties::default(),
+            recorder: VertexRecorder::default(),
             evaluators: Evaluators::default(),
             element_arrays: None,
             lists,
             writes,
             recording: None,
             depth_of_lists: 0,
-            cache: Cache::default(),
-            packed: Packs::default(),
+            geometry_cache: GeometryCache::default(),
+            attribute_cache: AttributeCache::default(),
             frame: Frame::default(),
             presenter: Presenter::default(),
-            studio: Studio::default(),
-            probes: Probes::default(),
-            programs: Programs::default(),
+            path_tracer: PathTracer::default(),
+            probes: AffineProbes::default(),
+            programs: VtkPrograms::default(),
             counters: Counters::default(),
             errors: Vec::new(),
             texture_writes,
             wrote_textures: false,
             seen_created,
-            given_up: false,
-            watched: 0,
+            tracing_stopped: false,
+            on_watched_call: 0,
         }
     }
 
     /// One that no driver knows.
     #[cfg(test)]
     pub(crate) fn for_tests(handle: usize) -> Context {
-        Context::new(handle, Shared::default(), true)
+        Context::new(handle, ShareGroup::default(), true)
     }
 
     /// As the driver calls it.
@@ -323,16 +324,17 @@ impl Context {
     }
 
     /// Current again: the driver may have been told anything meanwhile.
-    fn wake(&mut self) {
+    fn on_made_current(&mut self) {
         self.dirty = class::ALL;
-        self.textures_meanwhile();
+        self.invalidate_shared_textures();
         self.stale = 0;
-        (self.stale_properties, self.set_since_draw) = (Properties::default(), Properties::default());
-        if self.can.version == 0 {
+        (self.stale_properties, self.set_since_draw) =
+            (MaterialProperties::default(), MaterialProperties::default());
+        if self.capabilities.version == 0 {
             self.keep_errors();
-            self.can = Abilities::query();
+            self.capabilities = DriverCapabilities::query();
             // As large as the window until the program says otherwise.
-            self.frame.begins_with(gl::ints(SCISSOR_BOX));
+            self.frame.set_initial_height(gl::ints(SCISSOR_BOX));
             self.drop_errors();
             self.counters.set_driver(&gl::string(RENDERER), &gl::string(VERSION));
         }
@@ -362,8 +364,8 @@ impl Context {
 
     /// An error kept for the program; the driver is asked when there is none.
     pub(crate) fn take_error(&mut self) -> Option<u32> {
-        if self.sink == Sink::Trace {
-            self.unswallow("glGetError between Begin and End");
+        if self.immediate_target == ImmediateModeTarget::Trace {
+            self.replay_to_driver("glGetError between Begin and End");
         }
         if self.errors.is_empty() { None } else { Some(self.errors.remove(0)) }
     }
@@ -371,50 +373,50 @@ impl Context {
     // ---- Watched calls ------------------------------------------------------------------------------------------------
 
     pub(crate) fn watched_call(&mut self, index: usize, class: u8, flushes: bool, draws: bool) {
-        if self.sink == Sink::Trace {
-            self.unswallow("another call between Begin and End");
+        if self.immediate_target == ImmediateModeTarget::Trace {
+            self.replay_to_driver("another call between Begin and End");
         }
-        self.drawn_over();
-        self.heed_others(index, class);
+        self.finish_redraw();
+        self.observe_other_contexts(index, class);
         if let Some(r) = &mut self.recording {
             r.note_driver_call(class, flushes, draws);
         }
         if flushes {
             let invisible =
-                front_only().contains(&index) && self.can.double_buffered && !self.draws_to_front();
+                front_only().contains(&index) && self.capabilities.double_buffered && !self.draws_to_front();
             if !invisible && self.recording.is_none() {
                 self.flush(symbols::NAMES[index].to_str().unwrap_or("a call"));
             }
             if draws && self.recording.is_none() {
-                self.counters.pass("a draw call that is not followed", 1);
+                self.counters.count_driver_draws("a draw call that is not followed", 1);
             }
             if swaps().contains(&index) {
                 self.frame_done();
             } else if reads().contains(&index) {
-                if self.can.version >= 21 && gl::word(PIXEL_PACK_BUFFER_BINDING) != 0 {
+                if self.capabilities.version >= 21 && gl::word(PIXEL_PACK_BUFFER_BINDING) != 0 {
                     self.writes().any();
                 }
                 self.read_back();
             }
         }
         // A program that sets much state between draws pays for the first calls only.
-        let told_enough = self.watched >= 12;
+        let watched_enough = self.on_watched_call >= 12;
         if class & class::TEXTURE != 0 && self.state.texture.is_some() {
             // What was drawn with a texture is drawn with what it is now.
             self.end_batch();
         }
         self.sync();
         self.mark(class);
-        self.watched += 1;
-        if told_enough && self.recording.is_none() && symbols::is_alone() {
+        self.on_watched_call += 1;
+        if watched_enough && self.recording.is_none() && symbols::is_alone() {
             // Of buffers and textures that are written we are told all the same.
             self.mark(class::ALL & !(class::BUFFER | class::TEXTURE));
-            symbols::relax();
+            symbols::disarm();
         }
     }
 
     /// What was written to the buffers of the share group.
-    pub(crate) fn writes(&self) -> std::sync::MutexGuard<'_, Writes> {
+    pub(crate) fn writes(&self) -> std::sync::MutexGuard<'_, BufferWrites> {
         self.writes.lock().unwrap_or_else(|e| e.into_inner())
     }
 
@@ -424,7 +426,7 @@ impl Context {
             self.writes().any();
         }
         if class & class::TEXTURE != 0 {
-            self.textures_change();
+            self.invalidate_textures();
         }
     }
 
@@ -445,9 +447,9 @@ impl Context {
     /// The state now. Ends the batch of immediate mode when it changed.
     pub(crate) fn refresh(&mut self) {
         const DRAWS: u8 = class::MATRIX | class::LIGHT | class::RASTER | class::TEXTURE | class::CURRENT;
-        self.watched = 0;
-        symbols::attend();
-        self.drawn_over();
+        self.on_watched_call = 0;
+        symbols::arm();
+        self.finish_redraw();
         if self.state.texture.as_ref().is_some_and(|t| t.version != self.texture_version()) {
             // Another context of the share group may have written it.
             self.dirty |= class::TEXTURE;
@@ -461,14 +463,14 @@ impl Context {
         self.sync();
         self.keep_errors();
         let mut fresh = (*self.state).clone();
-        fresh.refresh(self.dirty, &self.can);
+        fresh.refresh(self.dirty, &self.capabilities);
         fresh.window_height = self.frame.window_height(&fresh);
         if let Some(t) = &mut fresh.texture {
             t.version = self.texture_version();
         }
-        if self.dirty & class::CURRENT != 0 && !self.can.core {
-            let now = Current::query();
-            self.unfollowed = now.unfollowed(fresh.color_material.filter(|_| fresh.lighting));
+        if self.dirty & class::CURRENT != 0 && !self.capabilities.core {
+            let now = CurrentAttributes::query();
+            self.untracked_color = now.untracked_color(fresh.color_material.filter(|_| fresh.lighting));
             if now != self.current {
                 self.end_batch();
                 self.current = now;
@@ -480,12 +482,12 @@ impl Context {
             self.end_batch();
             self.state = Arc::new(fresh);
         }
-        self.verdict = rules::filled(&self.state, self.config.trace());
-        if !matches!(self.verdict, Verdict::Pass(_)) && self.is_refused() {
-            self.verdict = Verdict::Pass(crate::present::framebuffer_pass::REFUSED);
+        self.classification = rules::classify(&self.state, self.config.trace());
+        if !matches!(self.classification, Classification::Pass(_)) && self.is_refused() {
+            self.classification = Classification::Pass(crate::present::framebuffer_pass::REFUSED);
         }
         if let Some(t) = &self.state.texture
-            && !matches!(self.verdict, Verdict::Pass(_))
+            && !matches!(self.classification, Classification::Pass(_))
         {
             // Now, as it is bound now: when a batch of immediate mode ends another may be.
             self.presenter.images.get(t.target, t.name, t.version);
@@ -493,11 +495,11 @@ impl Context {
     }
 
     /// What becomes of filled primitives in the state now.
-    pub(crate) fn verdict(&mut self) -> Verdict {
+    pub(crate) fn classification(&mut self) -> Classification {
         self.refresh();
-        self.set_since_draw = Properties::default();
-        match self.verdict {
-            _ if crate::trace::thread_pool::forked() => Verdict::Pass("a forked process"),
+        self.set_since_draw = MaterialProperties::default();
+        match self.classification {
+            _ if crate::trace::thread_pool::forked() => Classification::Pass("a forked process"),
             v => v,
         }
     }

@@ -1,13 +1,13 @@
 //! A fault of ours must never become a fault of the program: it is logged, and from then on the driver draws everything.
 //!
 //! Everything that the program can call is run under [`caught`], which costs nothing while there is no fault. After one each thread hands over what its context has swallowed
-//! and not drawn ([`Context::give_up`]), at once or at its next call.
+//! and not drawn ([`Context::stop_tracing`]), at once or at its next call.
 
-use crate::interpose::context::{Context, Sink};
+use crate::interpose::context::{Context, ImmediateModeTarget};
 use crate::interpose::driver::gl;
 use crate::interpose::symbols;
-use crate::state::current_attributes::{Current, stale};
-use crate::state::material_properties::Properties;
+use crate::state::current_attributes::{CurrentAttributes, stale};
+use crate::state::material_properties::MaterialProperties;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering::Relaxed};
 use std::sync::{Mutex, Once, OnceLock};
@@ -141,38 +141,39 @@ fn end() {
     if !HAPPENED.swap(true, Relaxed) {
         attempt(symbols::retire);
     }
-    give_up_here();
+    hand_over_to_driver();
 }
 
 /// After a fault: the context of this thread hands over what it has swallowed, unless it has done so.
-pub(crate) fn give_up_here() {
+pub(crate) fn hand_over_to_driver() {
     if happened() {
-        attempt(|| symbols::with_context(Context::give_up));
+        attempt(|| symbols::with_context(Context::stop_tracing));
     }
 }
 
 impl Context {
     /// A fault of ours has ended the tracing: what was swallowed is drawn, by rays if they still can be sent, and the driver gets to know what it was not told.
     /// Between Begin and End of a primitive that the driver draws nothing of this is possible; then it waits.
-    pub(crate) fn give_up(&mut self) {
-        if self.given_up || self.sink == Sink::Pass {
+    pub(crate) fn stop_tracing(&mut self) {
+        if self.tracing_stopped || self.immediate_target == ImmediateModeTarget::Pass {
             return;
         }
-        self.given_up = true;
+        self.tracing_stopped = true;
         self.depth_of_lists = 0;
-        let open = self.sink == Sink::Trace;
-        self.sink = Sink::Outside;
+        let open = self.immediate_target == ImmediateModeTarget::Trace;
+        self.immediate_target = ImmediateModeTarget::Outside;
         if let Some(r) = &mut self.recording {
-            r.give_up();
+            r.stop_tracing();
             // What was swallowed before the list cannot be drawn while the driver compiles it: the first call after its end does.
-            self.given_up = false;
+            self.tracing_stopped = false;
         } else {
             let mode = self.recorder.mode();
-            let primitive = open.then(|| attempt(|| self.recorder.withdraw()).unwrap_or((mode, Vec::new())));
+            let primitive =
+                open.then(|| attempt(|| self.recorder.take_open_primitive()).unwrap_or((mode, Vec::new())));
             attempt(|| self.flush_now("a fault of ours"));
             attempt(|| self.sync());
             if let Some((mode, vertices)) = primitive {
-                self.begin_again_with(mode, vertices);
+                self.replay_primitive(mode, vertices);
             }
         }
         attempt(|| self.sync());
@@ -180,21 +181,21 @@ impl Context {
     }
 
     /// Begin, and the vertices that were recorded since, for the driver.
-    pub(crate) fn begin_again_with(&mut self, mode: u32, vertices: Vec<([f32; 3], Current)>) {
+    pub(crate) fn replay_primitive(&mut self, mode: u32, vertices: Vec<([f32; 3], CurrentAttributes)>) {
         let end = self.current;
         if let Some((_, first)) = vertices.first() {
-            first.send(0xf, Properties::ALL);
+            first.send(0xf, MaterialProperties::ALL);
         }
         gl::begin(mode);
-        let mut before: Option<Current> = None;
+        let mut before: Option<CurrentAttributes> = None;
         for (p, c) in vertices {
             let changed = before.is_none_or(|b| b.materials != c.materials);
             let bits = stale::NORMAL | stale::COLOR | stale::TEX;
-            c.send(bits | if changed { stale::MATERIAL } else { 0 }, Properties::ALL);
+            c.send(bits | if changed { stale::MATERIAL } else { 0 }, MaterialProperties::ALL);
             gl::vertex4f(p[0], p[1], p[2], 1.0);
             before = Some(c);
         }
-        end.send(0xf, Properties::ALL);
-        (self.stale, self.stale_properties) = (0, Properties::default());
+        end.send(0xf, MaterialProperties::ALL);
+        (self.stale, self.stale_properties) = (0, MaterialProperties::default());
     }
 }

@@ -7,9 +7,9 @@
 //!
 //! What is drawn into a texture is not told of draw by draw. While a framebuffer object is bound those same points count it.
 
-use crate::capture::buffer_writes::Writes;
-use crate::capture::display_lists::Lists;
-use crate::interpose::context::{Context, Sink};
+use crate::capture::buffer_writes::BufferWrites;
+use crate::capture::display_lists::DisplayLists;
+use crate::interpose::context::{Context, ImmediateModeTarget};
 use crate::interpose::driver::gl;
 use crate::interpose::symbols;
 use crate::state::enums::*;
@@ -18,9 +18,9 @@ use std::sync::{Arc, Mutex, OnceLock};
 
 /// What the contexts of a share group have in common.
 #[derive(Clone, Default)]
-pub(crate) struct Shared {
-    pub(crate) lists: Arc<Mutex<Lists>>,
-    pub(crate) writes: Arc<Mutex<Writes>>,
+pub(crate) struct ShareGroup {
+    pub(crate) lists: Arc<Mutex<DisplayLists>>,
+    pub(crate) writes: Arc<Mutex<BufferWrites>>,
     pub(crate) texture_writes: TextureWrites,
 }
 
@@ -80,7 +80,7 @@ fn waits(index: usize) -> bool {
 
 impl Context {
     /// Textures of the share group may be others from now on.
-    pub(crate) fn textures_change(&mut self) {
+    pub(crate) fn invalidate_textures(&mut self) {
         self.texture_writes.change();
         self.wrote_textures = true;
     }
@@ -91,7 +91,7 @@ impl Context {
     }
 
     /// A call that other contexts, or what comes from elsewhere, may have to do with.
-    pub(crate) fn heed_others(&mut self, index: usize, class: u8) {
+    pub(crate) fn observe_other_contexts(&mut self, index: usize, class: u8) {
         if class & symbols::class::TEXTURE != 0 && foreign(index) {
             FOREIGN_TEXELS.store(true, Ordering::Relaxed);
         }
@@ -102,10 +102,10 @@ impl Context {
 
     /// What this context has written, others can see from now on. True when it has written anything.
     pub(crate) fn publish_textures(&mut self) -> bool {
-        if self.sink == Sink::Pass || !self.texture_writes.are_shared() {
+        if self.immediate_target == ImmediateModeTarget::Pass || !self.texture_writes.are_shared() {
             return false;
         }
-        let drawing = || self.can.version >= 30 && gl::word(FRAMEBUFFER_BINDING) != 0;
+        let drawing = || self.capabilities.version >= 30 && gl::word(FRAMEBUFFER_BINDING) != 0;
         let wrote = self.wrote_textures || drawing();
         if wrote {
             self.texture_writes.change();
@@ -115,7 +115,7 @@ impl Context {
     }
 
     /// Current again, and others may have written meanwhile whom we do not know.
-    pub(crate) fn textures_meanwhile(&mut self) {
+    pub(crate) fn invalidate_shared_textures(&mut self) {
         if !self.seen_created || FOREIGN_TEXELS.load(Ordering::Relaxed) {
             self.texture_writes.change();
         }

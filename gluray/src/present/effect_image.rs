@@ -4,19 +4,19 @@
 //! and are put over what is there.
 
 use crate::capture::draw::{Draw, Shading};
-use crate::capture::geometry_cache::Structures;
+use crate::capture::geometry_cache::BuildCounts;
 use crate::cluster;
 use crate::host::config::{Mode, Settings};
 use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
-use crate::present::framebuffer_pass::Fate;
+use crate::present::framebuffer_pass::CompositeMode;
 use crate::state::enums::*;
 use crate::state::snapshot::Fog;
 use crate::trace::path_tracing::fog;
 use crate::trace::texturing::Image;
 use crate::trace::thread_pool;
 use crate::trace::view::{View, views};
-use crate::trace::whitted::{self, Colors};
+use crate::trace::whitted::{self, ColorImage};
 use crate::trace::{Layer, Prepared, Rect, UNCOVERED};
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -24,7 +24,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::time::Instant;
 
 /// Whether the mode may need such pictures.
-pub(crate) fn is_for(settings: &Settings) -> bool {
+pub(crate) fn is_needed(settings: &Settings) -> bool {
     match settings.mode {
         Mode::Path | Mode::Rich => true,
         Mode::Enhance => settings.samples > 1,
@@ -34,7 +34,7 @@ pub(crate) fn is_for(settings: &Settings) -> bool {
 
 /// Whether the mode's own rays smooth silhouettes as well as `samples` of a pixel do: then all samples of a pixel get one colour.
 pub(crate) fn has_samples_for(settings: &Settings, samples: u32) -> bool {
-    settings.mode == Mode::Path || is_for(settings) && settings.samples > samples
+    settings.mode == Mode::Path || is_needed(settings) && settings.samples > samples
 }
 
 /// The settings with at least `samples` rays through a pixel.
@@ -46,11 +46,11 @@ pub(crate) fn with_samples(settings: &Settings, samples: u32) -> Cow<'_, Setting
 }
 
 /// One view's part of a frame.
-enum Made {
+enum ViewImage {
     /// The nearest surfaces are all that is needed.
     Surfaces(Layer, Vec<(&'static str, u64)>),
     /// Colours over what is there, with the depths of what is opaque, and of all.
-    Over { colors: Colors, opaque: Layer, all: Layer },
+    Over { colors: ColorImage, opaque: Layer, all: Layer },
 }
 
 /// A colour as the framebuffer has it.
@@ -67,7 +67,7 @@ fn depths(draws: &[Prepared<'_>], settings: &Settings) -> Layer {
 
 impl Context {
     /// Draws what is pending as a picture, or into one sample of each pixel.
-    pub(crate) fn draw_picture(
+    pub(crate) fn draw_effect_image(
         &mut self,
         pending: &[(Draw, Option<Arc<Image>>)],
         func: u32,
@@ -78,10 +78,10 @@ impl Context {
         self.keep_errors();
         let [r, g, b, _] = gl::floats::<4>(COLOR_CLEAR_VALUE);
         self.drop_errors();
-        let (mut structures, mut primary) = (Structures::default(), 0);
+        let (mut structures, mut primary) = (BuildCounts::default(), 0);
         let groups = views(pending.iter().map(|(d, _)| d));
-        let studio = &mut self.studio;
-        let mut made: Vec<Made> = Vec::new();
+        let path_tracer = &mut self.path_tracer;
+        let mut made: Vec<ViewImage> = Vec::new();
         let mut warnings = Vec::new();
         thread_pool::on_pool(|| {
             for (number, (view, members)) in groups.iter().enumerate() {
@@ -92,47 +92,47 @@ impl Context {
                 if ready.is_empty() {
                     continue;
                 }
-                made.push(make(&ready, view, number, settings, [r, g, b], studio, &mut warnings));
+                made.push(make(&ready, view, number, settings, [r, g, b], path_tracer, &mut warnings));
                 primary += ready.iter().map(|p| p.rays.load(Relaxed)).sum::<u64>();
             }
         });
-        self.counters.spent("trace", start.elapsed());
-        self.counters.rays("primary", primary);
-        self.counters.made(structures);
+        self.counters.add_time("trace", start.elapsed());
+        self.counters.add_rays("primary", primary);
+        self.counters.count_builds(structures);
         warnings.into_iter().for_each(|w| self.counters.warn(w));
         for part in made {
             let start = Instant::now();
             match part {
-                Made::Surfaces(layer, rays) => {
-                    rays.into_iter().for_each(|(kind, n)| self.counters.rays(kind, n));
+                ViewImage::Surfaces(layer, rays) => {
+                    rays.into_iter().for_each(|(kind, n)| self.counters.add_rays(kind, n));
                     self.counters.report.pixels += layer.covered as u64;
                     if layer.covered > 0 {
-                        self.present_sample(&[layer], Fate::Surface(func), sample);
+                        self.present_sample(&[layer], CompositeMode::Surface(func), sample);
                     }
                 }
-                Made::Over { colors, opaque, all } => {
-                    colors.rays.iter().for_each(|(kind, n)| self.counters.rays(kind, *n));
+                ViewImage::Over { colors, opaque, all } => {
+                    colors.rays.iter().for_each(|(kind, n)| self.counters.add_rays(kind, *n));
                     let [solid, fringe] = split(&colors, &opaque, &all);
                     self.counters.report.pixels += (solid.covered + fringe.covered) as u64;
                     if solid.covered > 0 {
-                        self.present_sample(&[solid], Fate::Over(func), sample);
+                        self.present_sample(&[solid], CompositeMode::Over(func), sample);
                     }
                     if fringe.covered > 0 {
-                        self.present_sample(&[fringe], Fate::Fringe(func), sample);
+                        self.present_sample(&[fringe], CompositeMode::Fringe(func), sample);
                     }
                 }
             }
-            self.counters.spent("present", start.elapsed());
+            self.counters.add_time("present", start.elapsed());
         }
     }
 }
 
 impl Context {
     /// Multiplies what the driver drew of these by how light they are.
-    pub(crate) fn shade_over(&mut self, draws: &[Draw], settings: &Settings) {
+    pub(crate) fn darken_drawn(&mut self, draws: &[Draw], settings: &Settings) {
         let start = Instant::now();
         let settings = crate::classify::affine_probe::factor_settings(settings);
-        let (mut structures, mut rays) = (Structures::default(), [0; 3]);
+        let (mut structures, mut rays) = (BuildCounts::default(), [0; 3]);
         let groups = views(draws.iter());
         let mut layers = Vec::new();
         thread_pool::on_pool(|| {
@@ -151,17 +151,17 @@ impl Context {
                 layers.push(layer);
             }
         });
-        self.counters.spent("trace", start.elapsed());
-        self.counters.made(structures);
+        self.counters.add_time("trace", start.elapsed());
+        self.counters.count_builds(structures);
         for (kind, n) in ["primary", "shadow", "ambient occlusion"].into_iter().zip(rays) {
-            self.counters.rays(kind, n);
+            self.counters.add_rays(kind, n);
         }
         let start = Instant::now();
         for layer in layers.into_iter().filter(|l| l.covered > 0) {
             self.counters.report.pixels += layer.covered as u64;
-            self.present(&[layer], Fate::Times);
+            self.present(&[layer], CompositeMode::Multiply);
         }
-        self.counters.spent("present", start.elapsed());
+        self.counters.add_time("present", start.elapsed());
     }
 }
 
@@ -174,17 +174,17 @@ fn make(
     number: usize,
     settings: &Settings,
     background: [f32; 3],
-    studio: &mut crate::trace::path_tracing::Studio,
+    path_tracer: &mut crate::trace::path_tracing::PathTracer,
     warnings: &mut Vec<String>,
-) -> Made {
-    if settings.mode != Mode::Path && !whitted::wanted(ready, settings) {
+) -> ViewImage {
+    if settings.mode != Mode::Path && !whitted::is_needed(ready, settings) {
         let (layer, extra) = cluster::nearest(ready, settings);
-        return Made::Surfaces(layer, vec![("shadow", extra[0]), ("ambient occlusion", extra[1])]);
+        return ViewImage::Surfaces(layer, vec![("shadow", extra[0]), ("ambient occlusion", extra[1])]);
     }
     let all = depths(ready, settings);
     let mut colors = match settings.mode {
-        Mode::Path => studio.colors(ready, view, number, all.rect, settings),
-        _ => cluster::beyond(ready, view, all.rect, settings, background),
+        Mode::Path => path_tracer.colors(ready, view, number, all.rect, settings),
+        _ => cluster::whitted(ready, view, all.rect, settings, background),
     };
     warnings.append(&mut colors.warnings);
     if settings.mode == Mode::Path {
@@ -204,11 +204,11 @@ fn make(
             Layer { rect: all.rect, color: Vec::new(), depth, covered: 0 }
         }
     };
-    Made::Over { colors, opaque, all }
+    ViewImage::Over { colors, opaque, all }
 }
 
 /// Puts each draw's fog over a path-traced picture.
-fn fogged(colors: &mut Colors, ready: &[Prepared<'_>], view: &View, all: &Layer, settings: &Settings) {
+fn fogged(colors: &mut ColorImage, ready: &[Prepared<'_>], view: &View, all: &Layer, settings: &Settings) {
     let mut done: Vec<(Fog, [f64; 2])> = Vec::new();
     for p in ready {
         let s = &p.draw.state;
@@ -243,7 +243,7 @@ fn merge(depth: &mut [f32], rect: Rect, one: &Layer) {
 }
 
 /// Pixels with an opaque surface at their centre, and those that have colour without one.
-fn split(colors: &Colors, opaque: &Layer, all: &Layer) -> [Layer; 2] {
+fn split(colors: &ColorImage, opaque: &Layer, all: &Layer) -> [Layer; 2] {
     let rect = colors.rect;
     let n = colors.rgba.len();
     let blank = || Layer { rect, color: vec![[0; 4]; n], depth: vec![UNCOVERED; n], covered: 0 };

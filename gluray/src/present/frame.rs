@@ -1,15 +1,15 @@
 //! What is drawn but not in the framebuffer yet, and when it has to be there.
 
 use crate::capture::draw::{Draw, Shading};
-use crate::capture::primitives::Split;
+use crate::capture::primitives::QuadSplit;
 use crate::host::config::Mode;
 use crate::interpose::context::Context;
-use crate::present::frame_reuse::{self, Again};
-use crate::present::framebuffer_pass::Fate;
-use crate::present::pipelined::{self, Late, Traced};
+use crate::present::frame_reuse::{self, FrameReuse};
+use crate::present::framebuffer_pass::CompositeMode;
+use crate::present::pipelined::{self, PipelinedPresent, TracedFrame};
 use crate::state::enums::*;
 use crate::trace::lighting::{product, transform};
-use crate::trace::overrides::Look;
+use crate::trace::overrides::RayMaterial;
 use crate::trace::texturing::Image;
 use crate::trace::thread_pool;
 use crate::trace::{self, Layer, Prepared};
@@ -28,9 +28,9 @@ pub(crate) const ORDER_MATTERS: &str = "a draw of the driver's whose order matte
 pub(crate) struct Frame {
     pending: Vec<Pending>,
     /// Pictures that may be asked for again.
-    again: Again,
+    reuse: FrameReuse,
     /// What is shown one frame late.
-    pub(crate) late: Late,
+    pub(crate) pipelined: PipelinedPresent,
     /// The driver drew something that commutes since the first of them.
     others: bool,
     /// Something was traced since the last frame ended.
@@ -40,19 +40,19 @@ pub(crate) struct Frame {
     /// The highest row that viewports of the window reached in the frame before, and in this one.
     tops: [i32; 2],
     /// What the control panel and reports are told of it.
-    told: crate::host::panel_client::Told,
+    telemetry: crate::host::panel_client::FrameTelemetry,
 }
 
 impl Frame {
     /// The driver drew lines or points whose order does not matter but for ties.
-    pub(crate) fn others_drew(&mut self) {
+    pub(crate) fn driver_drew(&mut self) {
         self.others |= !self.pending.is_empty();
     }
 }
 
 impl Frame {
     /// A new context's scissors.
-    pub(crate) fn begins_with(&mut self, [_, y, _, h]: [i32; 4]) {
+    pub(crate) fn set_initial_height(&mut self, [_, y, _, h]: [i32; 4]) {
         self.tops[0] = y.saturating_add(h);
     }
 
@@ -67,9 +67,9 @@ impl Frame {
     }
 
     /// Peeled surfaces are traced for this frame.
-    pub(crate) fn traced_peeled(&mut self, frame: u64, draws: &[Pending]) {
+    pub(crate) fn record_peeled(&mut self, frame: u64, draws: &[Pending]) {
         self.traced = true;
-        self.told.traced(frame, draws.iter().map(|(d, _)| d));
+        self.telemetry.traced(frame, draws.iter().map(|(d, _)| d));
     }
 }
 
@@ -77,21 +77,22 @@ impl Context {
     /// The recorded immediate mode becomes a draw.
     pub(crate) fn end_batch(&mut self) {
         let start = Instant::now();
-        self.recorder.settle();
+        self.recorder.flush_ring();
         if self.recorder.runs.is_empty() {
             return;
         }
         let kind = &self.split_of_batch();
-        let geometry = match self.recorder.followed(kind) {
+        let geometry = match self.recorder.take_followed_geometry(kind) {
             Some(geometry) => {
-                self.cache.hits += 1;
-                self.cache.touch(&geometry);
+                self.geometry_cache.hits += 1;
+                self.geometry_cache.touch(&geometry);
                 geometry
             }
             None => {
-                self.recorder.write_down();
-                let geometry = self.cache.of_runs(&self.recorder.positions, &self.recorder.runs, kind);
-                self.recorder.expect(&geometry, kind);
+                self.recorder.copy_followed_vertices();
+                let geometry =
+                    self.geometry_cache.of_runs(&self.recorder.positions, &self.recorder.runs, kind);
+                self.recorder.remember_batch(&geometry, kind);
                 geometry
             }
         };
@@ -102,10 +103,10 @@ impl Context {
         self.recorder.runs.clear();
         let state = self.state.clone();
         let in_order = matches!(
-            crate::classify::rules::filled(&state, self.config.trace()),
-            crate::classify::rules::Verdict::TraceInOrder
+            crate::classify::rules::classify(&state, self.config.trace()),
+            crate::classify::rules::Classification::TraceInOrder
         );
-        self.counters.spent("capture", start.elapsed());
+        self.counters.add_time("capture", start.elapsed());
         self.add(
             Draw {
                 geometry,
@@ -114,18 +115,18 @@ impl Context {
                 shading: Shading::Fixed,
                 clip_from_object,
                 calls,
-                look: Look::default(),
+                ray_material: RayMaterial::default(),
             },
             in_order,
         );
     }
 
     /// How the driver would split the quads of the batch.
-    fn split_of_batch(&mut self) -> Split {
+    fn split_of_batch(&mut self) -> QuadSplit {
         let s = &self.state;
         // Lists end batches with quads before and after them.
         let all_turned = s.flat || self.depth_of_lists > 0;
-        let mut split = Split { first_provokes: s.first_vertex_provokes, all_turned, turned: Vec::new() };
+        let mut split = QuadSplit { first_provokes: s.first_vertex_provokes, all_turned, turned: Vec::new() };
         if std::mem::take(&mut self.recorder.quads) && !all_turned {
             let clipped = self.state.clips();
             let outside = |from, to| self.recorder.any_position(from, to, &clipped);
@@ -135,7 +136,7 @@ impl Context {
                 let next = self.recorder.runs.get(i + 1).map(|r| r.mode);
                 let end = at + r.count * r.times;
                 if r.mode == QUADS && next != Some(QUADS) {
-                    split.look_for_clipped(first, end, outside);
+                    split.find_clipped_quads(first, end, outside);
                 }
                 at = end;
                 first = if r.mode == QUADS && next == Some(QUADS) { first } else { at };
@@ -151,7 +152,7 @@ impl Context {
         if draw.geometry.mesh.indices.is_empty() {
             return;
         }
-        if let Some(color) = self.unfollowed
+        if let Some(color) = self.untracked_color
             && draw.state.color_material.is_some()
             && matches!(&draw.attributes.colors, crate::capture::draw::Values::Constant(c) if *c == color)
         {
@@ -173,7 +174,7 @@ impl Context {
             image
         });
         if in_order {
-            self.trace_in_order(&draw, image);
+            self.trace_ordered(&draw, image);
         } else {
             let samples = |d: &Draw| d.state.samples.max(1);
             if self.frame.pending.first().is_some_and(|(d, _)| samples(d) != samples(&draw)) {
@@ -192,7 +193,7 @@ impl Context {
         let positions: Vec<[f32; 3]> = draw.geometry.mesh.positions.iter().map(eye).collect();
         let indices = draw.geometry.mesh.indices.clone();
         // Lit where the program lit it: normals cannot be found again from a singular matrix, colours are lit beforehand.
-        let setup = crate::trace::lighting::Setup::new(&draw.state);
+        let setup = crate::trace::lighting::LightingSetup::new(&draw.state);
         let object = &draw.geometry.mesh.positions;
         let colors =
             (0..object.len()).map(|i| setup.vertex(&draw.attributes, i, object[i].to_array()).primary[0]);
@@ -203,7 +204,7 @@ impl Context {
         state.model_view = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
         draw.clip_from_object = state.projection;
         draw.state = Arc::new(state);
-        draw.geometry = self.cache.of_indices(&positions, &indices);
+        draw.geometry = self.geometry_cache.of_indices(&positions, &indices);
     }
 
     /// Draws what is pending into the framebuffer.
@@ -218,7 +219,7 @@ impl Context {
         crate::interpose::panic_guard::injected("flush");
         self.end_batch();
         if self.programs.peeling.has_draws() && matches!(before, "glBeginQuery" | ORDER_MATTERS) {
-            self.gather_peeled();
+            self.composite_peeled();
         }
         if self.programs.weighted.has_draws() {
             self.sum_weighted();
@@ -226,7 +227,7 @@ impl Context {
         let pending = std::mem::take(&mut self.frame.pending);
         let others = std::mem::take(&mut self.frame.others);
         if !self.probes.draws.is_empty() {
-            self.counters.flushed(before);
+            self.counters.count_flush(before);
             self.frame.traced = true;
             self.darken();
         }
@@ -240,15 +241,15 @@ impl Context {
                 self.frame.places.push(place);
             }
         }
-        self.counters.flushed(before);
+        self.counters.count_flush(before);
         // Also of contexts that never end a frame.
         self.counters.report.textures_read = self.presenter.images.read;
-        self.frame.told.traced(self.counters.report.frames + 1, pending.iter().map(|(d, _)| d));
+        self.frame.telemetry.traced(self.counters.report.frames + 1, pending.iter().map(|(d, _)| d));
         // What the driver drew after a traced surface wins ties with it, as LEQUAL says; what it drew before loses them.
         let func = if others { LESS } else { pending[0].0.state.depth_func };
         let mut pending = pending;
         if !matches!(self.config.settings.mode, Mode::Match | Mode::Phong) {
-            crate::trace::view::place(&mut pending);
+            crate::trace::view::assign_eye_spaces(&mut pending);
         }
         let samples = pending[0].0.state.samples.max(1).cast_unsigned();
         let places = match crate::present::effect_image::has_samples_for(&self.config.settings, samples) {
@@ -258,23 +259,23 @@ impl Context {
         if let Some(places) = places {
             return self.flush_samples(&pending, func, &places);
         }
-        if crate::present::effect_image::is_for(&self.config.settings) {
+        if crate::present::effect_image::is_needed(&self.config.settings) {
             let config = self.config.clone();
             let settings = crate::present::effect_image::with_samples(&config.settings, samples);
-            return self.draw_picture(&pending, func, &settings, None);
+            return self.draw_effect_image(&pending, func, &settings, None);
         }
         self.warn_of_samples(pending.iter().map(|(d, _)| d));
-        if self.may_be_late(before) {
-            return self.flush_late(pending, func);
+        if self.may_be_pipelined(before) {
+            return self.flush_pipelined(pending, func);
         }
-        if let Some(layer) = self.frame.again.find(&pending, &self.config) {
-            return self.put_again(pending, layer, func);
+        if let Some(layer) = self.frame.reuse.find(&pending, &self.config) {
+            return self.present_reused(pending, layer, func);
         }
         let settings = &self.config.settings;
-        let drawn = frame_reuse::Drawn::of(&pending, settings);
+        let drawn = frame_reuse::DrawKey::of(&pending, settings);
         let traced = thread_pool::on_pool(|| pipelined::trace(pending, settings));
-        let layer = self.put(traced, Fate::Surface(func), None);
-        self.frame.again.keep(drawn, &self.config, layer);
+        let layer = self.present_traced(traced, CompositeMode::Surface(func), None);
+        self.frame.reuse.keep(drawn, &self.config, layer);
     }
 
     /// One ray stands for all samples of a pixel.
@@ -287,47 +288,52 @@ impl Context {
     }
 
     /// Puts what was traced into the framebuffer, or into one sample of each of its pixels.
-    pub(crate) fn put(&mut self, traced: Traced, fate: Fate, sample: Option<u32>) -> Layer {
-        self.counters.spent("trace", traced.took);
-        self.counters.rays("primary", traced.primary);
-        self.counters.rays("shadow", traced.extra[0]);
-        self.counters.rays("ambient occlusion", traced.extra[1]);
-        self.counters.made(traced.structures);
+    pub(crate) fn present_traced(
+        &mut self,
+        traced: TracedFrame,
+        composite_mode: CompositeMode,
+        sample: Option<u32>,
+    ) -> Layer {
+        self.counters.add_time("trace", traced.took);
+        self.counters.add_rays("primary", traced.primary);
+        self.counters.add_rays("shadow", traced.extra[0]);
+        self.counters.add_rays("ambient occlusion", traced.extra[1]);
+        self.counters.count_builds(traced.structures);
         self.counters.report.pixels += traced.layer.covered as u64;
         let start = Instant::now();
         if traced.layer.covered > 0 {
-            self.present_sample(std::slice::from_ref(&traced.layer), fate, sample);
+            self.present_sample(std::slice::from_ref(&traced.layer), composite_mode, sample);
         }
-        self.counters.spent("present", start.elapsed());
-        self.give_back(traced.draws);
+        self.counters.add_time("present", start.elapsed());
+        self.recycle(traced.draws);
         traced.layer
     }
 
     /// Shows the picture that the same draws came to before.
-    fn put_again(&mut self, draws: Vec<Pending>, layer: Layer, func: u32) {
+    fn present_reused(&mut self, draws: Vec<Pending>, layer: Layer, func: u32) {
         self.counters.report.pictures_again += 1;
         self.counters.report.pixels += layer.covered as u64;
         let start = Instant::now();
         if layer.covered > 0 {
-            self.present(std::slice::from_ref(&layer), Fate::Surface(func));
+            self.present(std::slice::from_ref(&layer), CompositeMode::Surface(func));
         }
-        self.counters.spent("present", start.elapsed());
-        self.frame.again.put_back(layer);
-        self.give_back(draws);
+        self.counters.add_time("present", start.elapsed());
+        self.frame.reuse.put_back(layer);
+        self.recycle(draws);
     }
 
-    fn give_back(&mut self, draws: Vec<Pending>) {
+    fn recycle(&mut self, draws: Vec<Pending>) {
         for (draw, _) in draws {
             if let Some(attributes) = Arc::into_inner(draw.attributes) {
-                self.recorder.give_back(attributes, &draw.geometry);
+                self.recorder.recycle(attributes, &draw.geometry);
             }
         }
     }
 
-    fn trace_in_order(&mut self, draw: &Draw, image: Option<Arc<Image>>) {
+    fn trace_ordered(&mut self, draw: &Draw, image: Option<Arc<Image>>) {
         self.frame.traced = true;
-        self.counters.flushed("in order");
-        self.frame.told.traced(self.counters.report.frames + 1, std::iter::once(draw));
+        self.counters.count_flush("in order");
+        self.frame.telemetry.traced(self.counters.report.frames + 1, std::iter::once(draw));
         let samples = match self.sample_places([draw]) {
             Some(places) => Context::each_sample(draw, &places),
             None => {
@@ -336,29 +342,29 @@ impl Context {
             }
         };
         for (draw, sample) in samples {
-            let before = self.frame.again.find_ordered(&draw, image.as_ref(), &self.config);
+            let before = self.frame.reuse.find_ordered(&draw, image.as_ref(), &self.config);
             if let Some(layers) = before {
                 self.counters.report.pictures_again += 1;
-                self.put_ordered(&draw, image.as_ref(), layers, sample);
+                self.present_ordered(&draw, image.as_ref(), layers, sample);
                 continue;
             }
             let start = Instant::now();
-            let mut structures = crate::capture::geometry_cache::Structures::default();
+            let mut structures = crate::capture::geometry_cache::BuildCounts::default();
             let texels = image.clone();
             let (layers, rays) =
                 thread_pool::on_pool(|| match Prepared::new(&draw, texels, &mut structures) {
-                    Some(p) => (trace::in_order(&p), p.rays.load(Relaxed)),
+                    Some(p) => (trace::ordered_layers(&p), p.rays.load(Relaxed)),
                     None => (Vec::new(), 0),
                 });
-            self.counters.spent("trace", start.elapsed());
-            self.counters.rays("primary", rays);
-            self.counters.made(structures);
-            self.put_ordered(&draw, image.as_ref(), layers, sample);
+            self.counters.add_time("trace", start.elapsed());
+            self.counters.add_rays("primary", rays);
+            self.counters.count_builds(structures);
+            self.present_ordered(&draw, image.as_ref(), layers, sample);
         }
     }
 
     /// Draws the layers of a draw whose order matters, and keeps them for the next like it.
-    fn put_ordered(
+    fn present_ordered(
         &mut self,
         draw: &Draw,
         image: Option<&Arc<Image>>,
@@ -368,10 +374,10 @@ impl Context {
         let start = Instant::now();
         self.counters.report.pixels += layers.iter().map(|l| l.covered as u64).sum::<u64>();
         if !layers.is_empty() {
-            self.present_sample(&layers, Fate::AsDrawn, sample);
+            self.present_sample(&layers, CompositeMode::AsDrawn, sample);
         }
-        self.counters.spent("present", start.elapsed());
-        self.frame.again.keep_ordered(draw, image, &self.config, layers);
+        self.counters.add_time("present", start.elapsed());
+        self.frame.reuse.keep_ordered(draw, image, &self.config, layers);
     }
 
     /// Whoever looks at the screen sees a picture now.
@@ -382,52 +388,52 @@ impl Context {
         if self.frame.tops[1] > 0 {
             self.frame.tops = [self.frame.tops[1], 0];
         }
-        self.frame.late.frame_done();
+        self.frame.pipelined.frame_done();
         (self.counters.report.cache_hits, self.counters.report.cache_misses) =
-            (self.cache.hits, self.cache.misses);
+            (self.geometry_cache.hits, self.geometry_cache.misses);
         self.counters.report.textures_read = self.presenter.images.read;
-        self.studio.frame_done();
+        self.path_tracer.frame_done();
         let fast = self.config.settings.quality == crate::host::config::Quality::Fast;
         self.programs.frame_done();
-        self.packed.frame_done();
+        self.attribute_cache.frame_done();
         self.recorder.frame_done();
-        self.frame.again.frame_done();
-        self.cache.frame_done(|g| {
+        self.frame.reuse.frame_done();
+        self.geometry_cache.frame_done(|g| {
             if !fast {
                 thread_pool::in_background(move || g.improve());
             }
             !fast
         });
         let size = [2, 3].map(|i| self.state.viewport[i].max(0).cast_unsigned());
-        self.counters.report.objects = self.frame.told.frame_done(&self.counters.report, size);
-        if let Some(problem) = self.frame.told.take_problem() {
+        self.counters.report.objects = self.frame.telemetry.frame_done(&self.counters.report, size);
+        if let Some(problem) = self.frame.telemetry.take_problem() {
             self.counters.warn(problem);
         }
-        self.take_up_settings();
+        self.apply_new_settings();
         self.counters.publish(false);
     }
 
     /// Other settings hold from the next frame on.
-    fn take_up_settings(&mut self) {
+    fn apply_new_settings(&mut self) {
         let config = crate::host::config::current();
         if !Arc::ptr_eq(&config, &self.config) {
             self.config = config;
             // Verdicts depend on settings.
             self.dirty = crate::interpose::symbols::class::ALL;
-            crate::interpose::symbols::attend();
+            crate::interpose::symbols::arm();
         }
     }
 
     /// The program reads what was drawn: a frame, too, when something was traced for it.
     pub(crate) fn read_back(&mut self) {
-        self.frame.late.read();
+        self.frame.pipelined.read();
         if self.frame.traced {
             self.frame_done();
         }
     }
 
     /// What was traced is cleared: a frame is over that nobody swapped or read, as in programs that draw into framebuffer objects alone.
-    fn begin_again(&mut self) {
+    fn end_unswapped_frame(&mut self) {
         // Only then is the state asked for: windows have their frames when they are swapped, and to ask for materials heals what Mesa holds
         // of them (osgbillboard, osgtessellate).
         if !self.frame.pending.is_empty()
@@ -454,8 +460,8 @@ impl Context {
             }
             return false;
         }
-        if self.sink == crate::interpose::context::Sink::Trace {
-            self.unswallow("glClear between Begin and End");
+        if self.immediate_target == crate::interpose::context::ImmediateModeTarget::Trace {
+            self.replay_to_driver("glClear between Begin and End");
             return false;
         }
         self.end_batch();
@@ -465,7 +471,7 @@ impl Context {
         }
         const COLOR_AND_DEPTH: u32 = 0x4100;
         if self.frame.traced && mask & COLOR_AND_DEPTH == COLOR_AND_DEPTH {
-            self.begin_again();
+            self.end_unswapped_frame();
         }
         if !self.frame.pending.is_empty() || !self.probes.draws.is_empty() {
             self.refresh();

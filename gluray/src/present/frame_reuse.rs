@@ -13,7 +13,7 @@ use crate::host::config::{Config, Mode, Settings};
 use crate::present::effect_image::bytes as bytes_of;
 use crate::present::frame::Pending;
 use crate::state::snapshot::Snapshot;
-use crate::trace::overrides::Look;
+use crate::trace::overrides::RayMaterial;
 use crate::trace::texturing::Image;
 use crate::trace::{Layer, UNCOVERED};
 use std::sync::Arc;
@@ -28,16 +28,16 @@ const MOST_ORDERED: usize = 16;
 const MOST_PIXELS: usize = 1 << 24;
 
 /// What one draw was made of.
-pub(crate) struct Drawn {
+pub(crate) struct DrawKey {
     geometry: u128,
     state: Arc<Snapshot>,
     clip_from_object: [u32; 16],
-    look: Look,
-    attributes: Kept,
+    ray_material: RayMaterial,
+    attributes: AttributesKey,
     image: Option<Arc<Image>>,
 }
 
-enum Kept {
+enum AttributesKey {
     Version(u64),
     Content(Arc<Attributes>),
     /// Nothing but one colour, which may be another.
@@ -54,33 +54,33 @@ fn plain_color(d: &Draw) -> Option<[u8; 4]> {
     }
 }
 
-impl Drawn {
+impl DrawKey {
     /// What draws are made of; `None` when that cannot be compared, or costs too much.
-    pub(crate) fn of(draws: &[Pending], settings: &Settings) -> Option<Vec<Drawn>> {
+    pub(crate) fn of(draws: &[Pending], settings: &Settings) -> Option<Vec<DrawKey>> {
         if settings.mode != Mode::Match {
             return None;
         }
-        draws.iter().map(|(d, image)| Drawn::one(d, image.as_ref())).collect()
+        draws.iter().map(|(d, image)| DrawKey::of_draw(d, image.as_ref())).collect()
     }
 
-    fn one(d: &Draw, image: Option<&Arc<Image>>) -> Option<Drawn> {
+    fn of_draw(d: &Draw, image: Option<&Arc<Image>>) -> Option<DrawKey> {
         let attributes = match d.attributes.version {
             _ if !matches!(d.shading, Shading::Fixed) => return None,
             0 if bytes(&d.attributes) > MOST_BYTES => return None,
-            0 => Kept::Content(d.attributes.clone()),
-            version => Kept::Version(version),
+            0 => AttributesKey::Content(d.attributes.clone()),
+            version => AttributesKey::Version(version),
         };
-        Some(Drawn {
+        Some(DrawKey {
             geometry: d.geometry.key,
             state: d.state.clone(),
             clip_from_object: d.clip_from_object.map(f32::to_bits),
-            look: d.look,
+            ray_material: d.ray_material,
             attributes,
             image: image.cloned(),
         })
     }
 
-    fn is(&self, d: &Draw, image: Option<&Arc<Image>>) -> bool {
+    fn matches(&self, d: &Draw, image: Option<&Arc<Image>>) -> bool {
         let images = match (&self.image, image) {
             (None, None) => true,
             (Some(a), Some(b)) => Arc::ptr_eq(a, b),
@@ -90,12 +90,12 @@ impl Drawn {
             && matches!(d.shading, Shading::Fixed)
             && self.geometry == d.geometry.key
             && self.clip_from_object == d.clip_from_object.map(f32::to_bits)
-            && self.look == d.look
+            && self.ray_material == d.ray_material
             && *self.state == *d.state
             && match &self.attributes {
-                Kept::Version(version) => *version == d.attributes.version,
-                Kept::Content(a) => same(a, &d.attributes, d.state.texture.is_some()),
-                Kept::Plain => plain_color(d).is_some(),
+                AttributesKey::Version(version) => *version == d.attributes.version,
+                AttributesKey::Content(a) => same(a, &d.attributes, d.state.texture.is_some()),
+                AttributesKey::Plain => plain_color(d).is_some(),
             }
     }
 }
@@ -137,8 +137,8 @@ fn same(a: &Attributes, b: &Attributes, textured: bool) -> bool {
         && (!textured || values(&a.tex, &b.tex))
 }
 
-struct Picture {
-    drawn: Vec<Drawn>,
+struct ReusableImage {
+    drawn: Vec<DrawKey>,
     config: Arc<Config>,
     layer: Layer,
     /// Frames ago.
@@ -146,8 +146,8 @@ struct Picture {
 }
 
 /// A draw whose order matters.
-struct Ordered {
-    drawn: Drawn,
+struct ReusableLayers {
+    drawn: DrawKey,
     config: Arc<Config>,
     layers: Vec<Layer>,
     /// Frames ago.
@@ -156,20 +156,20 @@ struct Ordered {
 
 /// The latest pictures.
 #[derive(Default)]
-pub(crate) struct Again {
+pub(crate) struct FrameReuse {
     /// The latest come last.
-    pictures: Vec<Picture>,
+    pictures: Vec<ReusableImage>,
     /// Likewise.
-    ordered: Vec<Ordered>,
+    ordered: Vec<ReusableLayers>,
 }
 
-impl Again {
-    /// The picture of these draws, lent until [`Again::put_back`].
+impl FrameReuse {
+    /// The picture of these draws, lent until [`FrameReuse::put_back`].
     pub(crate) fn find(&mut self, draws: &[Pending], config: &Arc<Config>) -> Option<Layer> {
-        let is = |p: &Picture| {
+        let is = |p: &ReusableImage| {
             p.drawn.len() == draws.len()
                 && Arc::ptr_eq(&p.config, config)
-                && p.drawn.iter().zip(draws).all(|(was, (d, image))| was.is(d, image.as_ref()))
+                && p.drawn.iter().zip(draws).all(|(was, (d, image))| was.matches(d, image.as_ref()))
         };
         let i = self.pictures.iter().position(is)?;
         let mut found = self.pictures.remove(i);
@@ -179,7 +179,7 @@ impl Again {
         Some(layer)
     }
 
-    /// The picture that [`Again::find`] lent.
+    /// The picture that [`FrameReuse::find`] lent.
     pub(crate) fn put_back(&mut self, layer: Layer) {
         if let Some(p) = self.pictures.last_mut() {
             p.layer = layer;
@@ -187,11 +187,11 @@ impl Again {
     }
 
     /// What draws came to.
-    pub(crate) fn keep(&mut self, drawn: Option<Vec<Drawn>>, config: &Arc<Config>, layer: Layer) {
+    pub(crate) fn keep(&mut self, drawn: Option<Vec<DrawKey>>, config: &Arc<Config>, layer: Layer) {
         let Some(drawn) = drawn else { return };
-        let new = Picture { drawn, config: config.clone(), layer, age: 0 };
+        let new = ReusableImage { drawn, config: config.clone(), layer, age: 0 };
         self.pictures.push(new);
-        let pixels = |all: &[Picture]| all.iter().map(|p| p.layer.depth.len()).sum::<usize>();
+        let pixels = |all: &[ReusableImage]| all.iter().map(|p| p.layer.depth.len()).sum::<usize>();
         while self.pictures.len() > MOST_PICTURES || pixels(&self.pictures) > MOST_PIXELS {
             self.pictures.remove(0);
         }
@@ -205,14 +205,14 @@ impl Again {
         self.ordered.retain(|o| o.age < 2);
     }
 
-    /// The layers of a draw whose order matters, in its colour, lent until [`Again::keep_ordered`] has them again.
+    /// The layers of a draw whose order matters, in its colour, lent until [`FrameReuse::keep_ordered`] has them again.
     pub(crate) fn find_ordered(
         &mut self,
         draw: &Draw,
         image: Option<&Arc<Image>>,
         config: &Arc<Config>,
     ) -> Option<Vec<Layer>> {
-        let is = |o: &Ordered| Arc::ptr_eq(&o.config, config) && o.drawn.is(draw, image);
+        let is = |o: &ReusableLayers| Arc::ptr_eq(&o.config, config) && o.drawn.matches(draw, image);
         let i = self.ordered.iter().position(is)?;
         let mut layers = self.ordered.remove(i).layers;
         if let Some(color) = plain_color(draw) {
@@ -234,13 +234,13 @@ impl Again {
             let fragments = layers.iter().flat_map(|l| l.color.iter().zip(&l.depth));
             fragments.filter(|(_, depth)| **depth != UNCOVERED).all(|(c, _)| *c == color)
         };
-        let Some(mut drawn) = Drawn::one(draw, image) else { return };
+        let Some(mut drawn) = DrawKey::of_draw(draw, image) else { return };
         if color.is_some_and(is_plain) {
-            drawn.attributes = Kept::Plain;
+            drawn.attributes = AttributesKey::Plain;
         }
-        self.ordered.push(Ordered { drawn, config: config.clone(), layers, age: 0 });
+        self.ordered.push(ReusableLayers { drawn, config: config.clone(), layers, age: 0 });
         let pixels =
-            |all: &[Ordered]| all.iter().flat_map(|o| &o.layers).map(|l| l.depth.len()).sum::<usize>();
+            |all: &[ReusableLayers]| all.iter().flat_map(|o| &o.layers).map(|l| l.depth.len()).sum::<usize>();
         while self.ordered.len() > MOST_ORDERED || pixels(&self.ordered) > MOST_PIXELS {
             self.ordered.remove(0);
         }
@@ -250,8 +250,8 @@ impl Again {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capture::geometry_cache::Cache;
-    use crate::state::current_attributes::Current;
+    use crate::capture::geometry_cache::GeometryCache;
+    use crate::state::current_attributes::CurrentAttributes;
     use crate::trace::Rect;
 
     fn config(mode: Mode) -> Arc<Config> {
@@ -260,16 +260,16 @@ mod tests {
     }
 
     fn draw(positions: [[f32; 3]; 3]) -> Draw {
-        let mut attributes = Attributes::constant(&Current::default());
+        let mut attributes = Attributes::constant(&CurrentAttributes::default());
         attributes.normals = Values::PerVertex(vec![[0.0, f32::NAN, 1.0]; 3]);
         Draw {
-            geometry: Cache::default().of_indices(&positions, &[[0, 1, 2]]),
+            geometry: GeometryCache::default().of_indices(&positions, &[[0, 1, 2]]),
             attributes: Arc::new(attributes),
             state: Arc::default(),
             shading: Shading::Fixed,
             clip_from_object: [0.5; 16],
             calls: 1,
-            look: Look::default(),
+            ray_material: RayMaterial::default(),
         }
     }
 
@@ -282,10 +282,10 @@ mod tests {
     fn a_picture_is_shown_again_only_while_nothing_has_changed() {
         let positions = [[0.0; 3], [1.0, 0.0, f32::NAN], [0.0, 1.0, 0.0]];
         let config = config(Mode::Match);
-        let mut again = Again::default();
+        let mut again = FrameReuse::default();
         let first = [(draw(positions), None)];
         assert!(again.find(&first, &config).is_none());
-        again.keep(Drawn::of(&first, &config.settings), &config, layer());
+        again.keep(DrawKey::of(&first, &config.settings), &config, layer());
         let mut same = |d: Draw| {
             let found = again.find(&[(d, None)], &config);
             let is = found.is_some();
@@ -310,7 +310,7 @@ mod tests {
             |d| Arc::make_mut(&mut d.state).lighting = true,
             |d| {
                 let moved = [[0.0; 3], [1.0, 0.0, bit(f32::NAN)], [0.0, 1.0, 0.0]];
-                d.geometry = Cache::default().of_indices(&moved, &[[0, 1, 2]]);
+                d.geometry = GeometryCache::default().of_indices(&moved, &[[0, 1, 2]]);
             },
         ];
         for (i, change) in changes.into_iter().enumerate() {
@@ -322,7 +322,7 @@ mod tests {
         assert!(same(draw(positions)), "back to what it was");
         let other = super::tests::config(Mode::Match);
         assert!(again.find(&first, &other).is_none(), "other settings");
-        assert!(Drawn::of(&first, &super::tests::config(Mode::Phong).settings).is_none());
+        assert!(DrawKey::of(&first, &super::tests::config(Mode::Phong).settings).is_none());
         again.frame_done();
         again.frame_done();
         assert!(again.find(&first, &config).is_none(), "the frame after is over");
@@ -342,7 +342,7 @@ mod tests {
             |color| vec![Layer { color: vec![color, [0; 4]], depth: vec![0.5, UNCOVERED], ..layer() }];
         let [red, green] = [[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0]];
         for lit in [false, true] {
-            let mut again = Again::default();
+            let mut again = FrameReuse::default();
             assert!(again.find_ordered(&colored(red, lit), None, &config).is_none());
             again.keep_ordered(&colored(red, lit), None, &config, layers([255, 0, 0, 255]));
             let found = again.find_ordered(&colored(green, lit), None, &config);
@@ -361,7 +361,7 @@ mod tests {
             );
         }
         // Fragments of more than the one colour are not what this is about.
-        let mut again = Again::default();
+        let mut again = FrameReuse::default();
         again.keep_ordered(&colored(red, false), None, &config, layers([9, 9, 9, 9]));
         assert!(again.find_ordered(&colored(green, false), None, &config).is_none());
         assert!(again.find_ordered(&colored(red, false), None, &config).is_some());

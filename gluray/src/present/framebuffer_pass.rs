@@ -12,17 +12,17 @@ use crate::trace::{Layer, Rect};
 
 /// What the fragments meet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Fate {
+pub(crate) enum CompositeMode {
     /// The depth test with this function, nothing else: the nearest surfaces of a frame.
     Surface(u32),
     /// The same with premultiplied colours over what is there: several samples a pixel, or surfaces that let light through.
     Over(u32),
     /// What is there times the colours, where it has this depth or is behind: no depths are written.
-    Times,
+    Multiply,
     /// The same again without depths: pixels whose centre sees no opaque surface.
     Fringe(u32),
     /// Premultiplied colours over what is there, whatever the depths.
-    Gathered,
+    OverIgnoringDepth,
     /// Everything the program has set: a draw whose order matters.
     AsDrawn,
 }
@@ -37,7 +37,7 @@ pub(crate) struct Presenter {
     textures: [u32; 2],
     size: [i32; 2],
     vertex_array: u32,
-    tried: Tried,
+    support: PassSupport,
 }
 
 /// Of the textures of colours and depths: internal format, format and type.
@@ -45,7 +45,7 @@ const FORMATS: [(u32, u32, u32); 2] = [(RGBA8, RGBA, UNSIGNED_BYTE), (R32F, RED,
 
 /// Whether the driver takes what the pass needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-enum Tried {
+enum PassSupport {
     #[default]
     NotYet,
     /// The shader is there; of all else there is nothing.
@@ -114,8 +114,8 @@ impl Presenter {
     }
 
     /// Compiles the shader and asks for the kinds of its textures, without changing what is current, bound or compiled into a list. The driver's words when it refuses.
-    fn try_out(&mut self, core: bool) -> Result<(), String> {
-        self.tried = Tried::Refused;
+    fn check_support(&mut self, core: bool) -> Result<(), String> {
+        self.support = PassSupport::Refused;
         let (vertex, mut fragment) =
             if core { (VERTEX_150, FRAGMENT_150) } else { (VERTEX_120, FRAGMENT_120) };
         if crate::interpose::panic_guard::is_asked_for("shader") {
@@ -141,17 +141,17 @@ impl Presenter {
             }
         }
         self.program = program;
-        self.tried = Tried::Linked;
+        self.support = PassSupport::Linked;
         Ok(())
     }
 
     /// Makes the rest of the objects; false when the driver has refused the shader.
     fn prepare(&mut self, core: bool) -> bool {
-        if self.tried == Tried::NotYet {
-            self.try_out(core).ok();
+        if self.support == PassSupport::NotYet {
+            self.check_support(core).ok();
         }
-        if self.tried != Tried::Linked {
-            return self.tried == Tried::Ready;
+        if self.support != PassSupport::Linked {
+            return self.support == PassSupport::Ready;
         }
         self.part = gl::uniform_location(self.program, "part");
         gl::use_program(self.program);
@@ -161,7 +161,7 @@ impl Presenter {
         if core {
             self.vertex_array = gl::gen_vertex_array();
         }
-        self.tried = Tried::Ready;
+        self.support = PassSupport::Ready;
         true
     }
 
@@ -192,7 +192,7 @@ impl Presenter {
 }
 
 /// The part of core state that the pass changes; in compatibility contexts the attribute stacks keep the rest.
-struct Kept {
+struct SavedState {
     program: i32,
     vertex_array: i32,
     unpack_buffer: i32,
@@ -230,8 +230,8 @@ const OPERATIONS: [u32; 3] = [BLEND, STENCIL_TEST, COLOR_LOGIC_OP];
 /// The same of fixed function.
 const LEGACY: [u32; 2] = [POLYGON_STIPPLE, VERTEX_PROGRAM_ARB];
 
-impl Kept {
-    fn keep(core: bool, version: u32) -> Kept {
+impl SavedState {
+    fn keep(core: bool, version: u32) -> SavedState {
         let samplers_exist = version >= 33;
         let mut textures = [0; 2];
         let mut samplers = [0; 2];
@@ -245,7 +245,7 @@ impl Kept {
             true => [&OFF[..], &OPERATIONS, &[DEPTH_TEST, DEPTH_CLAMP, SCISSOR_TEST]].concat(),
             false => Vec::new(),
         };
-        Kept {
+        SavedState {
             program: gl::int(CURRENT_PROGRAM),
             vertex_array: if core { gl::int(VERTEX_ARRAY_BINDING) } else { 0 },
             unpack_buffer: if version >= 21 { gl::int(PIXEL_UNPACK_BUFFER_BINDING) } else { 0 },
@@ -303,29 +303,34 @@ impl Context {
     /// True when the driver has refused the pass: then nothing may be swallowed. It is tried when it is first asked for, which is before anything of the context is
     /// swallowed; programs of which nothing is traced pay nothing. Not to be asked between Begin and End.
     pub(crate) fn is_refused(&mut self) -> bool {
-        if self.presenter.tried == Tried::NotYet {
+        if self.presenter.support == PassSupport::NotYet {
             self.keep_errors();
-            if let Err(words) = self.presenter.try_out(self.can.core) {
+            if let Err(words) = self.presenter.check_support(self.capabilities.core) {
                 self.counters.warn(format!("{REFUSED}, so nothing is traced: {words}"));
             }
             self.drop_errors();
         }
-        self.presenter.tried == Tried::Refused
+        self.presenter.support == PassSupport::Refused
     }
 
     /// Draws the layers over one another.
-    pub(crate) fn present(&mut self, layers: &[Layer], fate: Fate) {
-        self.present_sample(layers, fate, None);
+    pub(crate) fn present(&mut self, layers: &[Layer], composite_mode: CompositeMode) {
+        self.present_sample(layers, composite_mode, None);
     }
 
     /// The same into one sample of each pixel alone.
-    pub(crate) fn present_sample(&mut self, layers: &[Layer], fate: Fate, sample: Option<u32>) {
-        self.in_own_state(|c| {
+    pub(crate) fn present_sample(
+        &mut self,
+        layers: &[Layer],
+        composite_mode: CompositeMode,
+        sample: Option<u32>,
+    ) {
+        self.with_saved_state(|c| {
             let mask = sample.map(gl::only_sample);
-            if c.presenter.prepare(c.can.core) {
-                c.pass(layers, fate);
+            if c.presenter.prepare(c.capabilities.core) {
+                c.draw_pass(layers, composite_mode);
             } else {
-                c.counters.pass("the driver refuses our shader: what was traced is lost", 1);
+                c.counters.count_driver_draws("the driver refuses our shader: what was traced is lost", 1);
             }
             if let Some(mask) = mask {
                 gl::all_samples(mask);
@@ -334,13 +339,13 @@ impl Context {
     }
 
     /// Runs `f` with plain unpacking of pixels, and leaves no trace of what it does to the driver's state.
-    pub(crate) fn in_own_state(&mut self, f: impl FnOnce(&mut Context)) {
+    pub(crate) fn with_saved_state(&mut self, f: impl FnOnce(&mut Context)) {
         self.keep_errors();
-        let core = self.can.core;
-        let kept = Kept::keep(core, self.can.version);
+        let core = self.capabilities.core;
+        let kept = SavedState::keep(core, self.capabilities.version);
         if !core {
             gl::push_attrib(0x000f_ffff);
-            gl::plain_transfer();
+            gl::reset_pixel_transfer();
         }
         UNPACK.into_iter().for_each(|what| gl::pixel_storei(what, i32::from(what == UNPACK_ALIGNMENT)));
         if kept.unpack_buffer != 0 {
@@ -360,14 +365,16 @@ impl Context {
         self.drop_errors();
     }
 
-    fn pass(&mut self, layers: &[Layer], fate: Fate) {
-        let core = self.can.core;
+    fn draw_pass(&mut self, layers: &[Layer], composite_mode: CompositeMode) {
+        let core = self.capabilities.core;
         let p = &mut self.presenter;
         gl::use_program(p.program);
-        OFF.into_iter().filter(|c| *c != RASTERIZER_DISCARD || self.can.version >= 30).for_each(gl::disable);
+        OFF.into_iter()
+            .filter(|c| *c != RASTERIZER_DISCARD || self.capabilities.version >= 30)
+            .for_each(gl::disable);
         if !core {
-            (0..self.can.clip_planes).for_each(|i| gl::disable(CLIP_PLANE0 + i));
-            let vp = self.can.arb_programs;
+            (0..self.capabilities.clip_planes).for_each(|i| gl::disable(CLIP_PLANE0 + i));
+            let vp = self.capabilities.arb_programs;
             LEGACY.into_iter().filter(|c| *c != VERTEX_PROGRAM_ARB || vp).for_each(gl::disable);
             if vp {
                 gl::disable(FRAGMENT_PROGRAM_ARB);
@@ -375,7 +382,7 @@ impl Context {
         }
         gl::polygon_mode(FRONT_AND_BACK, FILL);
         gl::depth_range(0.0, 1.0);
-        if fate == Fate::Times {
+        if composite_mode == CompositeMode::Multiply {
             OPERATIONS.into_iter().for_each(gl::disable);
             if !core {
                 gl::disable(ALPHA_TEST);
@@ -389,7 +396,7 @@ impl Context {
             gl::depth_mask(0);
             gl::color_mask(1, 1, 1, 0);
         }
-        if fate == Fate::Gathered {
+        if composite_mode == CompositeMode::OverIgnoringDepth {
             OPERATIONS.into_iter().for_each(gl::disable);
             gl::disable(SCISSOR_TEST);
             gl::disable(DEPTH_TEST);
@@ -398,9 +405,11 @@ impl Context {
             gl::blend_func(ONE, ONE_MINUS_SRC_ALPHA);
             gl::color_mask(1, 1, 1, 1);
         }
-        if let Fate::Surface(func) | Fate::Over(func) | Fate::Fringe(func) = fate {
+        if let CompositeMode::Surface(func) | CompositeMode::Over(func) | CompositeMode::Fringe(func) =
+            composite_mode
+        {
             OPERATIONS.into_iter().for_each(gl::disable);
-            if !matches!(fate, Fate::Surface(_)) {
+            if !matches!(composite_mode, CompositeMode::Surface(_)) {
                 gl::enable(BLEND);
                 gl::blend_equation(FUNC_ADD);
                 gl::blend_func(ONE, ONE_MINUS_SRC_ALPHA);
@@ -412,7 +421,7 @@ impl Context {
             gl::disable(SCISSOR_TEST);
             gl::enable(DEPTH_TEST);
             gl::depth_func(func);
-            gl::depth_mask(u8::from(!matches!(fate, Fate::Fringe(_))));
+            gl::depth_mask(u8::from(!matches!(composite_mode, CompositeMode::Fringe(_))));
             gl::color_mask(1, 1, 1, 1);
         }
         if core {

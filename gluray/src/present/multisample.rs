@@ -10,7 +10,7 @@ use crate::host::config::Settings;
 use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
 use crate::present::frame::Pending;
-use crate::present::framebuffer_pass::Fate;
+use crate::present::framebuffer_pass::CompositeMode;
 use crate::present::pipelined;
 use crate::trace::thread_pool;
 use std::sync::Arc;
@@ -49,7 +49,11 @@ impl Context {
     ) -> Option<Vec<[f32; 2]>> {
         let mut all = draws.into_iter().map(|d| d.state.samples);
         let n = all.next()?;
-        if !(2..=MOST_SAMPLES).contains(&n) || all.any(|m| m != n) || self.can.version < 32 || self.can.es {
+        if !(2..=MOST_SAMPLES).contains(&n)
+            || all.any(|m| m != n)
+            || self.capabilities.version < 32
+            || self.capabilities.es
+        {
             return None;
         }
         self.keep_errors();
@@ -65,12 +69,12 @@ impl Context {
         for (i, place) in places.iter().enumerate() {
             let draws: Vec<Pending> =
                 pending.iter().map(|(d, image)| (moved(d, *place), image.clone())).collect();
-            if crate::present::effect_image::is_for(settings) {
-                self.draw_picture(&draws, func, settings, Some(i as u32));
+            if crate::present::effect_image::is_needed(settings) {
+                self.draw_effect_image(&draws, func, settings, Some(i as u32));
                 continue;
             }
             let traced = thread_pool::on_pool(|| pipelined::trace(draws, settings));
-            self.put(traced, Fate::Surface(func), Some(i as u32));
+            self.present_traced(traced, CompositeMode::Surface(func), Some(i as u32));
         }
     }
 

@@ -4,10 +4,10 @@
 //! draws are sent by other threads until the program comes here again. Lines and text of the driver's are those of the new frame. Only windows are late:
 //! what is drawn into framebuffer objects is drawn to be used at once, and a program that reads its window is not made to read an old picture twice.
 
-use crate::capture::geometry_cache::Structures;
+use crate::capture::geometry_cache::BuildCounts;
 use crate::interpose::context::Context;
 use crate::present::frame::Pending;
-use crate::present::framebuffer_pass::Fate;
+use crate::present::framebuffer_pass::CompositeMode;
 use crate::trace::thread_pool;
 use crate::trace::{Layer, Prepared};
 use std::sync::atomic::Ordering::Relaxed;
@@ -16,34 +16,34 @@ use std::time::{Duration, Instant};
 
 /// What draws came to.
 #[derive(Default)]
-pub(crate) struct Traced {
+pub(crate) struct TracedFrame {
     pub(crate) layer: Layer,
     /// Shadow rays, ambient occlusion rays.
     pub(crate) extra: [u64; 2],
     pub(crate) primary: u64,
-    pub(crate) structures: Structures,
+    pub(crate) structures: BuildCounts,
     pub(crate) took: Duration,
     /// The draws, whose memory serves again.
     pub(crate) draws: Vec<Pending>,
 }
 
 /// Traces draws on the threads of the pool, of which this is one.
-pub(crate) fn trace(draws: Vec<Pending>, settings: &crate::host::config::Settings) -> Traced {
+pub(crate) fn trace(draws: Vec<Pending>, settings: &crate::host::config::Settings) -> TracedFrame {
     let start = Instant::now();
-    let mut structures = Structures::default();
+    let mut structures = BuildCounts::default();
     let (layer, extra, primary) = {
         let ready: Vec<Prepared<'_>> =
             draws.iter().filter_map(|(d, image)| Prepared::new(d, image.clone(), &mut structures)).collect();
         let (layer, extra) = crate::cluster::nearest(&ready, settings);
         (layer, extra, ready.iter().map(|p| p.rays.load(Relaxed)).sum())
     };
-    Traced { layer, extra, primary, structures, took: start.elapsed(), draws }
+    TracedFrame { layer, extra, primary, structures, took: start.elapsed(), draws }
 }
 
 /// The layers that are on their way, by their place in the frame.
 #[derive(Default)]
-pub(crate) struct Late {
-    jobs: Vec<Receiver<Traced>>,
+pub(crate) struct PipelinedPresent {
+    jobs: Vec<Receiver<TracedFrame>>,
     /// The next place of this frame.
     place: usize,
     /// Frames for which nothing is late, because the program read its window.
@@ -53,7 +53,7 @@ pub(crate) struct Late {
 /// Frames after a read-back in which the program may read again.
 const READING_FRAMES: u32 = 8;
 
-impl Late {
+impl PipelinedPresent {
     /// A frame is over.
     pub(crate) fn frame_done(&mut self) {
         // Draws that this frame did not have show nothing in the next.
@@ -71,24 +71,24 @@ impl Late {
 
 impl Context {
     /// True when what is pending may be shown in the next frame.
-    pub(crate) fn may_be_late(&self, before: &str) -> bool {
+    pub(crate) fn may_be_pipelined(&self, before: &str) -> bool {
         let reads = ["Read", "Copy", "Blit", "GetTex", "Accum", "Query"];
         self.config.settings.asynchronous
-            && self.frame.late.reads == 0
+            && self.frame.pipelined.reads == 0
             && self.state.framebuffer == 0
             && !reads.iter().any(|r| before.contains(r))
             && !thread_pool::forked()
     }
 
     /// Sends `draws` off and shows what came of those of the last frame; without such, waits for these.
-    pub(crate) fn flush_late(&mut self, draws: Vec<Pending>, func: u32) {
+    pub(crate) fn flush_pipelined(&mut self, draws: Vec<Pending>, func: u32) {
         let (sender, receiver) = channel();
         let settings = self.config.settings.clone();
         let start = Instant::now();
         // The one before first: two at a time would only take threads from each other.
-        let place = self.frame.late.place;
-        let before = self.frame.late.jobs.get(place).and_then(|r| r.recv().ok());
-        thread_pool::beside(move || {
+        let place = self.frame.pipelined.place;
+        let before = self.frame.pipelined.jobs.get(place).and_then(|r| r.recv().ok());
+        thread_pool::spawn(move || {
             // Nobody waits for it when the context has gone.
             sender.send(trace(draws, &settings)).ok();
         });
@@ -100,20 +100,20 @@ impl Context {
                 let (sender, again) = channel();
                 if let Some(t) = &first {
                     let layer = t.layer.clone();
-                    sender.send(Traced { layer, took: Duration::ZERO, ..Traced::default() }).ok();
+                    sender.send(TracedFrame { layer, took: Duration::ZERO, ..TracedFrame::default() }).ok();
                 }
                 (first, again)
             }
         };
-        self.counters.spent("wait", start.elapsed());
-        if place < self.frame.late.jobs.len() {
-            self.frame.late.jobs[place] = next;
+        self.counters.add_time("wait", start.elapsed());
+        if place < self.frame.pipelined.jobs.len() {
+            self.frame.pipelined.jobs[place] = next;
         } else {
-            self.frame.late.jobs.push(next);
+            self.frame.pipelined.jobs.push(next);
         }
-        self.frame.late.place += 1;
+        self.frame.pipelined.place += 1;
         if let Some(traced) = shown {
-            drop(self.put(traced, Fate::Surface(func), None));
+            drop(self.present_traced(traced, CompositeMode::Surface(func), None));
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Current normal, colour, texture coordinate and material: what a vertex takes with it.
 
-use super::material_properties::Properties;
+use super::material_properties::MaterialProperties;
 use crate::interpose::driver::gl;
 use crate::state::enums::*;
 
@@ -50,7 +50,7 @@ pub(crate) fn set_material(materials: &mut Materials, face: u32, what: u32, v: [
 
 /// What the next vertex takes with it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Current {
+pub(crate) struct CurrentAttributes {
     pub(crate) normal: [f32; 3],
     pub(crate) color: [f32; 4],
     pub(crate) tex: [f32; 4],
@@ -65,9 +65,9 @@ pub(crate) mod stale {
     pub(crate) const MATERIAL: u8 = 8;
 }
 
-impl Current {
+impl CurrentAttributes {
     /// The driver's values.
-    pub(crate) fn query() -> Current {
+    pub(crate) fn query() -> CurrentAttributes {
         let mut materials = Materials::default();
         for (m, face) in materials.iter_mut().zip([FRONT, BACK]) {
             m.ambient = gl::material(face, AMBIENT);
@@ -76,7 +76,7 @@ impl Current {
             m.emission = gl::material(face, EMISSION);
             m.shininess = gl::material::<1>(face, SHININESS)[0];
         }
-        Current {
+        CurrentAttributes {
             normal: gl::floats(CURRENT_NORMAL),
             color: gl::floats(CURRENT_COLOR),
             tex: gl::floats(CURRENT_TEXTURE_COORDS),
@@ -86,7 +86,7 @@ impl Current {
 
     /// The colour, where the driver's material is not what colour material makes of it. Mesa compares colours: set the same colour again after
     /// `glMaterial`, and the material stays, which then lights what has no colours of its own.
-    pub(crate) fn unfollowed(&self, color_material: Option<(u32, u32)>) -> Option<[f32; 4]> {
+    pub(crate) fn untracked_color(&self, color_material: Option<(u32, u32)>) -> Option<[f32; 4]> {
         let (face, what) = color_material?;
         let mut followed = self.materials;
         set_material(&mut followed, face, what, self.color);
@@ -94,7 +94,7 @@ impl Current {
     }
 
     /// Tells the driver what `bits` name; of materials, these properties.
-    pub(crate) fn send(&self, bits: u8, of_materials: Properties) {
+    pub(crate) fn send(&self, bits: u8, of_materials: MaterialProperties) {
         let [r, g, b, a] = self.color;
         if bits & stale::MATERIAL != 0 {
             of_materials.send(&self.materials);
@@ -112,14 +112,14 @@ impl Current {
     }
 
     /// Tells the driver, which knows `before`, what is new.
-    pub(crate) fn send_changes(&self, before: &Current) {
+    pub(crate) fn send_changes(&self, before: &CurrentAttributes) {
         let bit = |changed: bool, bits: u8| if changed { bits } else { 0 };
         // Materials may replace what colour material made of the colour.
         let bits = bit(self.materials != before.materials, stale::MATERIAL | stale::COLOR)
             | bit(self.color != before.color, stale::COLOR)
             | bit(self.normal != before.normal, stale::NORMAL)
             | bit(self.tex != before.tex, stale::TEX);
-        self.send(bits, Properties::changed(&self.materials, &before.materials));
+        self.send(bits, MaterialProperties::changed(&self.materials, &before.materials));
     }
 }
 
@@ -129,14 +129,14 @@ mod tests {
 
     #[test]
     fn a_material_that_is_not_its_colour_is_found() {
-        let mut now = Current { color: [0.8; 4], ..Current::default() };
+        let mut now = CurrentAttributes { color: [0.8; 4], ..CurrentAttributes::default() };
         set_material(&mut now.materials, FRONT_AND_BACK, AMBIENT_AND_DIFFUSE, [0.8; 4]);
         let follows = Some((FRONT_AND_BACK, AMBIENT_AND_DIFFUSE));
-        assert_eq!(now.unfollowed(follows), None);
+        assert_eq!(now.untracked_color(follows), None);
         set_material(&mut now.materials, FRONT_AND_BACK, AMBIENT, [0.2; 4]);
-        assert_eq!(now.unfollowed(follows), Some([0.8; 4]));
-        assert_eq!(now.unfollowed(Some((FRONT, DIFFUSE))), None);
-        assert_eq!(now.unfollowed(None), None);
+        assert_eq!(now.untracked_color(follows), Some([0.8; 4]));
+        assert_eq!(now.untracked_color(Some((FRONT, DIFFUSE))), None);
+        assert_eq!(now.untracked_color(None), None);
     }
 
     #[test]

@@ -13,28 +13,28 @@ const NAMES: [u32; 5] = [AMBIENT, DIFFUSE, SPECULAR, EMISSION, SHININESS];
 
 /// A set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Properties(u16);
+pub(crate) struct MaterialProperties(u16);
 
-impl Properties {
-    pub(crate) const ALL: Properties = Properties(0x3ff);
+impl MaterialProperties {
+    pub(crate) const ALL: MaterialProperties = MaterialProperties(0x3ff);
 
     /// What a call of `glMaterial` sets.
-    pub(crate) fn of(face: u32, what: u32) -> Properties {
+    pub(crate) fn of(face: u32, what: u32) -> MaterialProperties {
         let one = |name: u32| NAMES.iter().position(|n| *n == name).map_or(0, |i| 1_u16 << i);
         let bits = match what {
             AMBIENT_AND_DIFFUSE => one(AMBIENT) | one(DIFFUSE),
             _ => one(what),
         };
-        Properties(sides(face).iter().fold(0, |all, side| all | bits << (5 * side)))
+        MaterialProperties(sides(face).iter().fold(0, |all, side| all | bits << (5 * side)))
     }
 
     /// Those that differ.
-    pub(crate) fn changed(a: &Materials, b: &Materials) -> Properties {
+    pub(crate) fn changed(a: &Materials, b: &Materials) -> MaterialProperties {
         let differs = |i: &usize| value(a, *i) != value(b, *i);
-        Properties((0..10).filter(differs).fold(0, |bits, i| bits | 1 << i))
+        MaterialProperties((0..10).filter(differs).fold(0, |bits, i| bits | 1 << i))
     }
 
-    pub(crate) fn add(&mut self, other: Properties) {
+    pub(crate) fn add(&mut self, other: MaterialProperties) {
         self.0 |= other.0;
     }
 
@@ -102,13 +102,13 @@ mod tests {
         for (face, what) in calls {
             let (before, mut after) = (Materials::default(), Materials::default());
             assert!(set_material(&mut after, face, what, [1.0, 2.0, 3.0, 4.0]));
-            let of = Properties::of(face, what);
-            assert_eq!(Properties::changed(&before, &after), of, "{face:x} {what:x}");
+            let of = MaterialProperties::of(face, what);
+            assert_eq!(MaterialProperties::changed(&before, &after), of, "{face:x} {what:x}");
             assert!(!of.is_empty());
         }
-        assert!(Properties::of(7, AMBIENT).is_empty() && Properties::of(FRONT, 7).is_empty());
-        let mut all = Properties::default();
-        NAMES.iter().for_each(|n| all.add(Properties::of(FRONT_AND_BACK, *n)));
-        assert_eq!(all, Properties::ALL);
+        assert!(MaterialProperties::of(7, AMBIENT).is_empty() && MaterialProperties::of(FRONT, 7).is_empty());
+        let mut all = MaterialProperties::default();
+        NAMES.iter().for_each(|n| all.add(MaterialProperties::of(FRONT_AND_BACK, *n)));
+        assert_eq!(all, MaterialProperties::ALL);
     }
 }

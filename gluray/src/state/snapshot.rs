@@ -120,7 +120,7 @@ pub(crate) struct Snapshot {
 
 /// What a context can be asked.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Abilities {
+pub(crate) struct DriverCapabilities {
     /// Version times ten.
     pub(crate) version: u32,
     /// No fixed function.
@@ -139,9 +139,9 @@ pub(crate) struct Abilities {
     pub(crate) double_buffered: bool,
 }
 
-impl Abilities {
+impl DriverCapabilities {
     /// Asks the driver.
-    pub(crate) fn query() -> Abilities {
+    pub(crate) fn query() -> DriverCapabilities {
         let text = gl::string(VERSION);
         let es = text.starts_with("OpenGL ES");
         let digits = text.trim_start_matches(|c: char| !c.is_ascii_digit());
@@ -152,7 +152,7 @@ impl Abilities {
         let legacy = !core && !es;
         let extensions = if legacy { gl::string(0x1f03) } else { String::new() };
         let has = |e: &str| extensions.split(' ').any(|x| x == e);
-        Abilities {
+        DriverCapabilities {
             version,
             core,
             es,
@@ -173,11 +173,11 @@ impl Abilities {
 
 impl Snapshot {
     /// Asks the driver again about the classes in `dirty`.
-    pub(crate) fn refresh(&mut self, dirty: u8, can: &Abilities) {
+    pub(crate) fn refresh(&mut self, dirty: u8, capabilities: &DriverCapabilities) {
         if dirty & class::RASTER != 0 {
-            self.raster(can);
+            self.raster(capabilities);
         }
-        if can.core {
+        if capabilities.core {
             return;
         }
         if dirty & (class::MATRIX | class::RASTER) != 0 {
@@ -188,11 +188,11 @@ impl Snapshot {
             self.lighting();
         }
         if dirty & (class::TEXTURE | class::RASTER | class::MATRIX | class::LIGHT) != 0 {
-            self.texturing(can);
+            self.texturing(capabilities);
         }
     }
 
-    fn raster(&mut self, can: &Abilities) {
+    fn raster(&mut self, capabilities: &DriverCapabilities) {
         self.viewport = gl::ints(VIEWPORT);
         self.depth_range = gl::doubles(DEPTH_RANGE);
         self.cull = gl::is_enabled(CULL_FACE).then(|| gl::word(CULL_FACE_MODE));
@@ -202,51 +202,52 @@ impl Snapshot {
         self.depth_test = gl::is_enabled(DEPTH_TEST);
         self.depth_func = gl::word(DEPTH_FUNC);
         self.depth_mask = gl::int(DEPTH_WRITEMASK) != 0;
-        self.depth_clamp = can.depth_clamp && gl::is_enabled(DEPTH_CLAMP);
+        self.depth_clamp = capabilities.depth_clamp && gl::is_enabled(DEPTH_CLAMP);
         self.blend = gl::is_enabled(BLEND);
         self.blend_is_over =
             self.blend && gl::word(BLEND_SRC_RGB) == 0x0302 && gl::word(BLEND_DST_RGB) == 0x0303;
-        if self.blend_is_over && can.version >= 14 {
+        if self.blend_is_over && capabilities.version >= 14 {
             self.blend_is_over = gl::word(BLEND_EQUATION) == FUNC_ADD;
         }
         self.stencil_test = gl::is_enabled(STENCIL_TEST);
         self.two_sided_stencil = self.stencil_test
-            && (can.stencil_two_side && gl::is_enabled(STENCIL_TEST_TWO_SIDE)
-                || can.version >= 20
+            && (capabilities.stencil_two_side && gl::is_enabled(STENCIL_TEST_TWO_SIDE)
+                || capabilities.version >= 20
                     && STENCIL_FRONT_AND_BACK
                         .iter()
                         .any(|(front, back)| gl::word(*front) != gl::word(*back)));
         self.logic_op = gl::is_enabled(COLOR_LOGIC_OP);
         self.color_mask = gl::ints::<4>(COLOR_WRITEMASK).iter().all(|v| *v != 0);
-        self.polygon_mode = match can.core {
+        self.polygon_mode = match capabilities.core {
             true => [gl::word(POLYGON_MODE); 2],
             false => gl::ints::<2>(POLYGON_MODE).map(i32::cast_unsigned),
         };
         self.scissor = gl::is_enabled(SCISSOR_TEST).then(|| gl::ints(SCISSOR_BOX));
-        self.program = if can.version >= 20 { gl::word(CURRENT_PROGRAM) } else { 0 };
-        self.pipeline = can.pipelines && self.program == 0 && gl::word(PROGRAM_PIPELINE_BINDING) != 0;
-        self.framebuffer = if can.version >= 30 { gl::word(FRAMEBUFFER_BINDING) } else { 0 };
+        self.program = if capabilities.version >= 20 { gl::word(CURRENT_PROGRAM) } else { 0 };
+        self.pipeline =
+            capabilities.pipelines && self.program == 0 && gl::word(PROGRAM_PIPELINE_BINDING) != 0;
+        self.framebuffer = if capabilities.version >= 30 { gl::word(FRAMEBUFFER_BINDING) } else { 0 };
         self.draw_buffer = gl::word(DRAW_BUFFER);
-        self.clip_control = can.clip_control
+        self.clip_control = capabilities.clip_control
             && (gl::word(CLIP_ORIGIN) != LOWER_LEFT || gl::word(CLIP_DEPTH_MODE) != NEGATIVE_ONE_TO_ONE);
         self.unclamped_colors = self.framebuffer != 0
             && self.draw_buffer != 0
             && !matches!(gl::component_type(self.draw_buffer), UNSIGNED_NORMALIZED | 0);
-        self.encoded_colors = can.version >= 30 && gl::is_enabled(FRAMEBUFFER_SRGB);
-        self.more_draw_buffers = can.version >= 20 && gl::word(DRAW_BUFFER0 + 1) != 0;
+        self.encoded_colors = capabilities.version >= 30 && gl::is_enabled(FRAMEBUFFER_SRGB);
+        self.more_draw_buffers = capabilities.version >= 20 && gl::word(DRAW_BUFFER0 + 1) != 0;
         self.samples = match gl::int(SAMPLE_BUFFERS) != 0 && gl::is_enabled(MULTISAMPLE) {
             true => gl::int(SAMPLES),
             false => 0,
         };
         const MASKS: [u32; 4] = [0x809e, 0x809f, 0x80a0, 0x8e51];
         self.masked_samples = self.samples > 1
-            && MASKS.iter().any(|c| (*c != 0x8e51 || can.version >= 32) && gl::is_enabled(*c));
-        self.discard = can.version >= 30 && gl::is_enabled(RASTERIZER_DISCARD);
-        self.feedback_active = can.version >= 40 && gl::int(TRANSFORM_FEEDBACK_ACTIVE) != 0;
+            && MASKS.iter().any(|c| (*c != 0x8e51 || capabilities.version >= 32) && gl::is_enabled(*c));
+        self.discard = capabilities.version >= 30 && gl::is_enabled(RASTERIZER_DISCARD);
+        self.feedback_active = capabilities.version >= 40 && gl::int(TRANSFORM_FEEDBACK_ACTIVE) != 0;
         self.first_vertex_provokes =
-            can.version >= 32 && gl::word(PROVOKING_VERTEX) == FIRST_VERTEX_CONVENTION;
+            capabilities.version >= 32 && gl::word(PROVOKING_VERTEX) == FIRST_VERTEX_CONVENTION;
         self.smooth_polygons = gl::is_enabled(POLYGON_SMOOTH);
-        if can.core {
+        if capabilities.core {
             return;
         }
         self.alpha_test = gl::is_enabled(ALPHA_TEST);
@@ -262,23 +263,23 @@ impl Snapshot {
         self.alpha_test_of_equality = self.alpha_test && matches!(gl::word(0x0bc1), EQUAL | NOTEQUAL);
         self.stipple = gl::is_enabled(POLYGON_STIPPLE);
         self.render_mode = gl::word(RENDER_MODE);
-        self.arb_program = can.arb_programs
+        self.arb_program = capabilities.arb_programs
             && (gl::is_enabled(VERTEX_PROGRAM_ARB) || gl::is_enabled(FRAGMENT_PROGRAM_ARB))
-            || can.ati_shaders && gl::is_enabled(FRAGMENT_SHADER_ATI);
+            || capabilities.ati_shaders && gl::is_enabled(FRAGMENT_SHADER_ATI);
         self.flat = gl::word(SHADE_MODEL) == FLAT;
         self.list_base = gl::word(LIST_BASE);
         self.normalize = gl::is_enabled(NORMALIZE);
-        self.rescale_normal = can.version >= 12 && gl::is_enabled(RESCALE_NORMAL);
-        self.color_sum = can.version >= 14 && gl::is_enabled(COLOR_SUM);
-        self.clip_planes = (0..can.clip_planes)
+        self.rescale_normal = capabilities.version >= 12 && gl::is_enabled(RESCALE_NORMAL);
+        self.color_sum = capabilities.version >= 14 && gl::is_enabled(COLOR_SUM);
+        self.clip_planes = (0..capabilities.clip_planes)
             .filter(|i| gl::is_enabled(CLIP_PLANE0 + i))
             .map(|i| gl::clip_plane(CLIP_PLANE0 + i))
             .collect();
         self.fog = gl::is_enabled(FOG).then(|| Fog {
             // Fog by coordinates is the driver's: `decide` knows it by mode 0.
             // Likewise by distances in space: `GL_NV_fog_distance`, but for its plain form.
-            mode: match can.version >= 14 && gl::word(FOG_COORD_SRC) == FOG_COORD
-                || can.fog_distance && gl::word(FOG_DISTANCE_MODE) != EYE_PLANE_ABSOLUTE
+            mode: match capabilities.version >= 14 && gl::word(FOG_COORD_SRC) == FOG_COORD
+                || capabilities.fog_distance && gl::word(FOG_DISTANCE_MODE) != EYE_PLANE_ABSOLUTE
             {
                 true => 0,
                 false => gl::word(FOG_MODE),
@@ -333,15 +334,15 @@ impl Snapshot {
         }));
     }
 
-    fn texturing(&mut self, can: &Abilities) {
+    fn texturing(&mut self, capabilities: &DriverCapabilities) {
         self.texture = None;
         self.foreign_texturing = None;
         let active = gl::word(ACTIVE_TEXTURE);
         let mut targets = vec![TEXTURE_1D, TEXTURE_2D, TEXTURE_3D, TEXTURE_CUBE_MAP];
-        if can.rectangle {
+        if capabilities.rectangle {
             targets.push(TEXTURE_RECTANGLE);
         }
-        let units = can.texture_units.max(1) as u32;
+        let units = capabilities.texture_units.max(1) as u32;
         for unit in 0..units {
             if units > 1 {
                 gl::active_texture(TEXTURE0 + unit);
@@ -355,8 +356,9 @@ impl Snapshot {
             } else if target == TEXTURE_1D || target == TEXTURE_2D {
                 self.texture = Some(unit_0(target));
                 // The names say what is bound; where its image comes from is asked for when it is used.
-                self.foreign_texturing =
-                    self.foreign_texturing.or(crate::trace::texturing::unfollowed(target, can.version));
+                self.foreign_texturing = self
+                    .foreign_texturing
+                    .or(crate::trace::texturing::unsupported_sampling(target, capabilities.version));
             } else {
                 self.foreign_texturing = Some("a texture that is neither 1-D nor 2-D");
             }

@@ -1,14 +1,14 @@
 //! Fragments that wait until 16 of one draw can be lit together.
 
-use super::nearest::Seen;
+use super::nearest::PixelHit;
 use super::{Prepared, mixed, to_bytes};
-use crate::trace::lighting::Lit;
+use crate::trace::lighting::VertexColors;
 use fearless_simd::{Level, dispatch};
 use rt_core::ray::LANES;
 
 /// Up to 16 fragments of one draw that are lit together.
 #[derive(Default)]
-pub(super) struct Batch {
+pub(super) struct FragmentBatch {
     pub(super) draw: u32,
     pub(super) count: usize,
     pixels: [usize; LANES],
@@ -17,8 +17,15 @@ pub(super) struct Batch {
     back: [bool; LANES],
 }
 
-impl Batch {
-    pub(super) fn add(&mut self, p: &Prepared<'_>, draw: u32, pixel: usize, s: &Seen, color: &mut [[u8; 4]]) {
+impl FragmentBatch {
+    pub(super) fn add(
+        &mut self,
+        p: &Prepared<'_>,
+        draw: u32,
+        pixel: usize,
+        s: &PixelHit,
+        color: &mut [[u8; 4]],
+    ) {
         // One with room left is of the same draw: others are shaded before the draw changes.
         debug_assert!(self.count == 0 || self.draw == draw, "a batch is of one draw");
         self.draw = draw;
@@ -51,7 +58,7 @@ impl Batch {
     }
 
     /// Colours between vertices that are lit already.
-    fn interpolate(&mut self, p: &Prepared<'_>, lit: &[Lit], color: &mut [[u8; 4]]) {
+    fn interpolate(&mut self, p: &Prepared<'_>, lit: &[VertexColors], color: &mut [[u8; 4]]) {
         let s = &*p.draw.state;
         let two = s.lighting && s.two_side;
         for l in 0..self.count {

@@ -6,12 +6,12 @@
 use super::{DEPTH_STEPS, Fragment, Prepared, SLACK};
 use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
-use crate::trace::raster::moves_back;
+use crate::trace::raster::polygon_offset;
 use rt_core::ray::{HitBlock, LANES, NO_HIT};
 
 /// What came of a lane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Lane {
+pub(super) enum LaneState {
     /// Nothing was hit.
     Empty,
     /// A fragment.
@@ -22,7 +22,7 @@ pub(super) enum Lane {
 
 /// Fragments of a block.
 pub(super) struct FragmentBlock {
-    pub(super) lane: [Lane; LANES],
+    pub(super) lane: [LaneState; LANES],
     weights: [[f64; LANES]; 3],
     depth: [f64; LANES],
     plain: [f64; LANES],
@@ -39,7 +39,7 @@ const EXACT: f32 = 33_554_432.0;
 
 impl FragmentBlock {
     pub(super) const EMPTY: FragmentBlock = FragmentBlock {
-        lane: [Lane::Empty; LANES],
+        lane: [LaneState::Empty; LANES],
         weights: [[0.0; LANES]; 3],
         depth: [0.0; LANES],
         plain: [0.0; LANES],
@@ -61,7 +61,7 @@ impl FragmentBlock {
     #[inline(always)]
     pub(super) fn moved_back(&self, [n, f]: [f64; 2], out: &mut [f64]) {
         for l in 0..LANES {
-            let moved = self.lane[l] == Lane::Found && self.depth[l] > self.plain[l];
+            let moved = self.lane[l] == LaneState::Found && self.depth[l] > self.plain[l];
             out[l] = if moved { ((self.depth[l] - n) / (f - n) - 0.5) * 2.0 } else { f64::NAN };
         }
     }
@@ -80,9 +80,9 @@ impl FragmentBlock {
             }
         }
         for l in 0..LANES {
-            self.lane[l] = Lane::Empty;
+            self.lane[l] = LaneState::Empty;
             if hits.prim[l] != NO_HIT {
-                self.lane[l] = Lane::Ask;
+                self.lane[l] = LaneState::Ask;
                 for (corner, i) in corners.p.iter_mut().zip(indices[l]) {
                     let v = mesh.positions[i as usize];
                     (corner[0][l], corner[1][l], corner[2][l]) = (v.x, v.y, v.z);
@@ -166,8 +166,8 @@ impl FragmentBlock {
             }
         }
         for l in 0..LANES {
-            if good[l] && self.lane[l] == Lane::Ask {
-                self.lane[l] = Lane::Found;
+            if good[l] && self.lane[l] == LaneState::Ask {
+                self.lane[l] = LaneState::Found;
             }
         }
     }
@@ -219,7 +219,7 @@ fn covered(c: &[[[f32; LANES]; 4]; 3], viewport: [i32; 4], x: i32, y: i32) -> [b
     out
 }
 
-/// As [`crate::trace::raster::steepness`] or [`moves_back`], whichever the state asks for: what the factor of polygon offset multiplies, and what comes to it.
+/// As [`crate::trace::raster::steepness`] or [`polygon_offset`], whichever the state asks for: what the factor of polygon offset multiplies, and what comes to it.
 #[inline(always)]
 fn slopes(c: &[[[f32; LANES]; 4]; 3], s: &Snapshot) -> [[f64; LANES]; 2] {
     let depth_scale = s.depth_range[1] - s.depth_range[0];
@@ -240,7 +240,7 @@ fn slopes(c: &[[[f32; LANES]; 4]; 3], s: &Snapshot) -> [[f64; LANES]; 2] {
         let det = ax * by - bx * ay;
         let (dx, dy) = ((az * by - bz * ay) / det, (bz * ax - az * bx) / det);
         let [slope, shift] = match s.offset_by_length {
-            true => moves_back([dx, dy], s.sample_place),
+            true => polygon_offset([dx, dy], s.sample_place),
             false => [dx.abs().max(dy.abs()), 0.0],
         };
         (out[0][l], out[1][l]) = if det == 0.0 { (0.0, 0.0) } else { (slope, shift) };
@@ -300,7 +300,7 @@ mod tests {
             let [length, shift] = slopes(&c, &state(true));
             assert_eq!(
                 [length[0], shift[0]],
-                moves_back(raster::gradient(&t, viewport, 1.0), place),
+                polygon_offset(raster::gradient(&t, viewport, 1.0), place),
                 "{t:?}"
             );
         }

@@ -8,11 +8,11 @@ use crate::capture::draw::Attributes;
 use crate::state::current_attributes::{Material, sides};
 use crate::state::enums::*;
 use crate::state::snapshot::{GlLight, Snapshot};
-use crate::trace::occlusion::{Place, Visibility, vector};
+use crate::trace::occlusion::{LightPosition, Visibility, vector};
 
 /// Colours of a vertex, clamped: primary and secondary (separate specular), front and back.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Lit {
+pub(crate) struct VertexColors {
     pub(crate) primary: [[f32; 4]; 2],
     pub(crate) secondary: [[f32; 3]; 2],
 }
@@ -54,7 +54,7 @@ pub(crate) fn transform(m: &[f32; 16], p: V3) -> [f32; 4] {
 }
 
 /// What does not change from vertex to vertex.
-pub(crate) struct Setup<'a> {
+pub(crate) struct LightingSetup<'a> {
     state: &'a Snapshot,
     /// Inverse of the model-view's upper left, for normals; row by row of the transposed.
     normal_matrix: [[f32; 3]; 3],
@@ -70,8 +70,8 @@ struct PreparedLight<'a> {
     spot: Option<(V3, f32)>,
 }
 
-impl<'a> Setup<'a> {
-    pub(crate) fn new(state: &'a Snapshot) -> Setup<'a> {
+impl<'a> LightingSetup<'a> {
+    pub(crate) fn new(state: &'a Snapshot) -> LightingSetup<'a> {
         let inverse = inverse_3(&state.model_view);
         // GL_RESCALE_NORMAL: one over the length of the third row of the inverse.
         let row = [inverse[2][0], inverse[2][1], inverse[2][2]];
@@ -92,7 +92,7 @@ impl<'a> Setup<'a> {
             })
             .collect();
         let rescale = if rescale.is_finite() { rescale } else { 1.0 };
-        Setup { state, normal_matrix: inverse, rescale, lights }
+        LightingSetup { state, normal_matrix: inverse, rescale, lights }
     }
 
     /// Eye-space normal as lighting takes it.
@@ -104,11 +104,11 @@ impl<'a> Setup<'a> {
     }
 
     /// Colours of vertex `i` at object-space position `p`.
-    pub(crate) fn vertex(&self, attributes: &Attributes, i: usize, p: V3) -> Lit {
+    pub(crate) fn vertex(&self, attributes: &Attributes, i: usize, p: V3) -> VertexColors {
         let color = attributes.colors.at(i);
         if !self.state.lighting {
             let c = color.map(|v| v.clamp(0.0, 1.0));
-            return Lit { primary: [c; 2], secondary: [[0.0; 3]; 2] };
+            return VertexColors { primary: [c; 2], secondary: [[0.0; 3]; 2] };
         }
         let eye = transform(&self.state.model_view, p);
         let eye = [eye[0] / eye[3], eye[1] / eye[3], eye[2] / eye[3]];
@@ -120,7 +120,7 @@ impl<'a> Setup<'a> {
             true => self.side(&self.tracked(&materials[1], 1, color), eye, scaled(normal, -1.0), full),
             false => front,
         };
-        Lit { primary: [front.0, back.0], secondary: [front.1, back.1] }
+        VertexColors { primary: [front.0, back.0], secondary: [front.1, back.1] }
     }
 
     /// Colours of a point lit by itself: primary and secondary. `normal` and `color` are interpolated, the normal in eye space.
@@ -139,10 +139,10 @@ impl<'a> Setup<'a> {
     }
 
     /// Where the lights are, in eye space.
-    pub(crate) fn places(&self) -> Vec<Place> {
+    pub(crate) fn light_positions(&self) -> Vec<LightPosition> {
         let place = |p: &PreparedLight<'_>| match p.directional {
-            true => Place::Far(vector(p.to_light)),
-            false => Place::Near(vector(p.to_light)),
+            true => LightPosition::Directional(vector(p.to_light)),
+            false => LightPosition::Positional(vector(p.to_light)),
         };
         self.lights.iter().map(place).collect()
     }
@@ -240,11 +240,11 @@ fn inverse_3(m: &[f32; 16]) -> [[f32; 3]; 3] {
 mod tests {
     use super::*;
     use crate::capture::draw::Values;
-    use crate::state::current_attributes::Current;
+    use crate::state::current_attributes::CurrentAttributes;
 
     const IDENTITY: [f32; 16] = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
 
-    fn lit(change: impl Fn(&mut Snapshot, &mut Attributes)) -> Lit {
+    fn lit(change: impl Fn(&mut Snapshot, &mut Attributes)) -> VertexColors {
         let mut material = Material {
             diffuse: [1.0, 0.5, 0.25, 0.5],
             specular: [1.0; 4],
@@ -252,7 +252,7 @@ mod tests {
             ..Material::default()
         };
         material.ambient = [0.1, 0.1, 0.1, 1.0];
-        let current = Current {
+        let current = CurrentAttributes {
             normal: [0.0, 0.0, 1.0],
             color: [0.0, 1.0, 0.0, 1.0],
             tex: [0.0; 4],
@@ -275,7 +275,7 @@ mod tests {
             ..Snapshot::default()
         };
         change(&mut state, &mut attributes);
-        Setup::new(&state).vertex(&attributes, 0, [0.0, 0.0, -2.0])
+        LightingSetup::new(&state).vertex(&attributes, 0, [0.0, 0.0, -2.0])
     }
 
     #[test]
@@ -337,7 +337,7 @@ mod tests {
     #[test]
     fn byte_normals_light_like_floats() {
         let l = lit(|_, a| {
-            let packed = crate::capture::draw::Packed {
+            let packed = crate::capture::draw::PackedArray {
                 bytes: vec![0, 0, 127],
                 kind: BYTE,
                 size: 3,

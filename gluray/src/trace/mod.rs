@@ -23,14 +23,14 @@ pub(crate) mod view;
 pub(crate) mod whitted;
 
 use crate::capture::draw::{Draw, Shading};
-use crate::capture::geometry_cache::Structures;
+use crate::capture::geometry_cache::BuildCounts;
 use crate::state::enums::*;
-use crate::trace::lighting::{Lit, Setup, transform};
-use crate::trace::occlusion::{Eye, Place};
-use crate::trace::raster::{covers, gradient, moves_back, steepness};
+use crate::trace::lighting::{LightingSetup, VertexColors, transform};
+use crate::trace::occlusion::{Eye, LightPosition};
+use crate::trace::raster::{covers, gradient, polygon_offset, steepness};
 use crate::trace::texturing::Image;
 pub(crate) use nearest::nearest;
-pub(crate) use primitive_order::in_order;
+pub(crate) use primitive_order::ordered_layers;
 use rayon::prelude::*;
 use rt_core::accel::World;
 use rt_core::camera::Camera;
@@ -39,8 +39,8 @@ use rt_core::ray::Ray;
 use screen_bounds::screen_bounds;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
-use tile_rays::{Bundle, TileRays, slot};
-pub(crate) use translucent::{Limit, Sums, peeled, summed};
+use tile_rays::{AffineRays, TileRays, slot};
+pub(crate) use translucent::{DepthLimits, WeightedSums, depth_sorted, weighted_sums};
 
 /// A rectangle of window pixels, y up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -100,8 +100,8 @@ const SLACK: f64 = 1e-6;
 pub(crate) struct Prepared<'a> {
     pub(crate) draw: &'a Draw,
     pub(crate) world: Arc<World>,
-    pub(crate) places: Vec<Place>,
-    /// Where it is seen from, in the space of `places`.
+    pub(crate) light_positions: Vec<LightPosition>,
+    /// Where it is seen from, in the space of `light_positions`.
     pub(crate) eye: Eye,
     camera: Camera,
     /// Rows of planes in object space that points must be above: near, far, the user's.
@@ -111,9 +111,9 @@ pub(crate) struct Prepared<'a> {
     /// A shader throws away what is below them; otherwise triangles are cut.
     discards: bool,
     pub(crate) rect: Rect,
-    pub(crate) lighting: Setup<'a>,
-    pub(crate) lit: Option<Vec<Lit>>,
-    bundle: Bundle,
+    pub(crate) lighting: LightingSetup<'a>,
+    pub(crate) lit: Option<Vec<VertexColors>>,
+    affine_rays: AffineRays,
     /// OpenGL's lighting at the vertices can be had for 16 fragments at a time.
     blocks: bool,
     pub(crate) image: Option<Arc<Image>>,
@@ -145,7 +145,7 @@ impl<'a> Prepared<'a> {
     pub(crate) fn new(
         draw: &'a Draw,
         image: Option<Arc<Image>>,
-        made: &mut Structures,
+        made: &mut BuildCounts,
     ) -> Option<Prepared<'a>> {
         let s = &*draw.state;
         let clip = matrix(&draw.clip_from_object);
@@ -180,17 +180,17 @@ impl<'a> Prepared<'a> {
         if !discards || s.sample_place == [0.0; 2] {
             planes.extend(&clip_planes);
         }
-        let lighting = Setup::new(s);
-        let places = match &draw.shading {
-            Shading::Fixed => lighting.places(),
-            Shading::Program(program) => program.places(),
+        let lighting = LightingSetup::new(s);
+        let light_positions = match &draw.shading {
+            Shading::Fixed => lighting.light_positions(),
+            Shading::Program(program) => program.light_positions(),
         };
         let bounds = draw.geometry.bounds();
         let middle = (bounds.min.as_dvec3() + bounds.max.as_dvec3()) / 2.0;
         let mut out = Prepared {
             draw,
             world,
-            places,
+            light_positions,
             eye: Eye::of(&camera, &crate::trace::occlusion::eye_from_object(draw), middle),
             camera,
             planes,
@@ -199,7 +199,7 @@ impl<'a> Prepared<'a> {
             rect,
             lighting,
             lit: None,
-            bundle: Bundle::default(),
+            affine_rays: AffineRays::default(),
             blocks: false,
             image,
             rays: AtomicU64::new(0),
@@ -217,7 +217,7 @@ impl<'a> Prepared<'a> {
                 false => positions.par_iter().enumerate().map(light).collect(),
             });
         }
-        out.bundle = Bundle::new(&out);
+        out.affine_rays = AffineRays::new(&out);
         Some(out)
     }
 
@@ -356,7 +356,7 @@ impl<'a> Prepared<'a> {
         // The unit of polygon offset is two steps of the depth buffer (Mesa).
         if let Some((factor, units)) = s.polygon_offset {
             let [slope, shift] = match s.offset_by_length {
-                true => moves_back(gradient(&c, s.viewport, f - n), s.sample_place),
+                true => polygon_offset(gradient(&c, s.viewport, f - n), s.sample_place),
                 false => [steepness(&c, s.viewport, f - n), 0.0],
             };
             depth += f64::from(factor) * slope + 2.0 * f64::from(units) / DEPTH_STEPS + shift;
@@ -383,14 +383,14 @@ impl<'a> Prepared<'a> {
             if let Some(f) = self.fragment(h.prim as usize, x, y) {
                 let found = (h.prim as usize, f);
                 return Some(if f.depth > f.plain_depth {
-                    self.overtaken(found, ray, h.t, x, y)
+                    self.nearest_with_offset(found, ray, h.t, x, y)
                 } else {
                     found
                 });
             }
             // On an edge the rule of the rasterizer may give the pixel to a neighbour that the ray saw beside it.
             if step == 0
-                && let Some(found) = self.beside(h.t, x, y)
+                && let Some(found) = self.hit_beside_center(h.t, x, y)
             {
                 return Some(found);
             }
@@ -402,7 +402,14 @@ impl<'a> Prepared<'a> {
     }
 
     /// Polygon offset pushes steep triangles far back, at silhouettes behind others of the same draw: the nearest *with* offset counts.
-    fn overtaken(&self, first: (usize, Fragment), mut ray: Ray, t: f32, x: i32, y: i32) -> (usize, Fragment) {
+    fn nearest_with_offset(
+        &self,
+        first: (usize, Fragment),
+        mut ray: Ray,
+        t: f32,
+        x: i32,
+        y: i32,
+    ) -> (usize, Fragment) {
         let mut best = first;
         let mut t = t;
         for _ in 0..8 {
@@ -440,7 +447,7 @@ impl<'a> Prepared<'a> {
         t.is_finite().then_some(t)
     }
 
-    fn beside(&self, t: f32, x: i32, y: i32) -> Option<(usize, Fragment)> {
+    fn hit_beside_center(&self, t: f32, x: i32, y: i32) -> Option<(usize, Fragment)> {
         const OFF: f64 = 1.0 / 200.0;
         let mut best: Option<(usize, Fragment)> = None;
         for (dx, dy) in [(-OFF, -OFF), (OFF, -OFF), (-OFF, OFF), (OFF, OFF)] {

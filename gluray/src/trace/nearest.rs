@@ -1,13 +1,13 @@
 //! The nearest fragment of every pixel, tile by tile: rays, fragments of what they hit, colours.
 
-use super::fragment_batch::Batch;
-use super::fragments::{FragmentBlock, Lane};
+use super::fragment_batch::FragmentBatch;
+use super::fragments::{FragmentBlock, LaneState};
 use super::tile_rays::{BLOCKS, TileRays, slot};
 use super::{DEPTH_STEPS, Fragment, Layer, Prepared, Rect, TILE, UNCOVERED, to_bytes};
-use crate::cluster::row_share::Share;
+use crate::cluster::row_share::RowShare;
 use crate::host::config::{Mode, Settings};
 use crate::state::enums::*;
-use crate::trace::occlusion::Surroundings;
+use crate::trace::occlusion::RayScene;
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 use rt_core::ray::{HitBlock, LANES, NO_HIT};
@@ -18,14 +18,14 @@ const PIXELS: usize = (TILE * TILE) as usize;
 
 /// What a pixel sees.
 #[derive(Clone, Copy)]
-pub(super) struct Seen {
+pub(super) struct PixelHit {
     depth_bits: u32,
     draw: u32,
     pub(super) prim: u32,
     pub(super) fragment: Fragment,
 }
 
-const NOTHING: Seen = Seen {
+const NOTHING: PixelHit = PixelHit {
     depth_bits: u32::MAX,
     draw: u32::MAX,
     prim: 0,
@@ -33,16 +33,16 @@ const NOTHING: Seen = Seen {
 };
 
 /// What a thread needs for a tile.
-struct Desk {
+struct TileScratch {
     rays: TileRays,
     fragments: [FragmentBlock; BLOCKS],
     moved: [f64; PIXELS],
-    seen: [Seen; PIXELS],
+    seen: [PixelHit; PIXELS],
 }
 
-impl Desk {
-    fn new() -> Box<Desk> {
-        Box::new(Desk {
+impl TileScratch {
+    fn new() -> Box<TileScratch> {
+        Box::new(TileScratch {
             rays: TileRays::new(),
             fragments: [const { FragmentBlock::EMPTY }; BLOCKS],
             moved: [f64::NAN; PIXELS],
@@ -52,8 +52,8 @@ impl Desk {
 }
 
 /// The nearest fragment of all draws at every pixel of a share of the rows.
-pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings, share: Share) -> (Layer, [u64; 2]) {
-    let around = Surroundings::new(draws, settings);
+pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings, share: RowShare) -> (Layer, [u64; 2]) {
+    let ray_scene = RayScene::new(draws, settings);
     let mode = settings.mode;
     let rect = draws.iter().fold(Rect::default(), |r, d| r.or(d.rect));
     let (w, h) = (rect.w.max(0) as usize, rect.h.max(0) as usize);
@@ -64,29 +64,29 @@ pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings, share: Share)
     let band = w * TILE as usize;
     let covered = AtomicU64::new(0);
     let bands = layer.color.par_chunks_mut(band).zip(layer.depth.par_chunks_mut(band)).enumerate();
-    bands.filter(|(i, _)| share.has(*i)).for_each_init(Desk::new, |desk, (i, (color, depth))| {
+    bands.filter(|(i, _)| share.has(*i)).for_each_init(TileScratch::new, |scratch, (i, (color, depth))| {
         let y = rect.y + i as i32 * TILE;
         let tile_h = (color.len() / w) as i32;
         let mut n = 0;
-        let mut batch = Batch::default();
+        let mut batch = FragmentBatch::default();
         // Tile by tile: what was seen of one stays in the first cache until it is shaded.
         for x in (rect.x..rect.x + rect.w).step_by(TILE as usize) {
             let tile = Rect { x, y, w: TILE.min(rect.x + rect.w - x), h: tile_h };
             let mut any = false;
             for (d, p) in draws.iter().enumerate() {
-                any |= see(p, d as u32, tile, desk, any);
+                any |= trace_draw(p, d as u32, tile, scratch, any);
             }
             if !any {
                 continue;
             }
-            for (j, s) in desk.seen.iter().enumerate().filter(|(_, s)| s.draw != u32::MAX) {
+            for (j, s) in scratch.seen.iter().enumerate().filter(|(_, s)| s.draw != u32::MAX) {
                 let (tx, ty) = (j % TILE as usize, j / TILE as usize);
                 let k = ty * w + (x - rect.x) as usize + tx;
                 depth[k] = s.fragment.depth as f32;
                 n += 1;
                 let p = &draws[s.draw as usize];
                 let at = (x + tx as i32, y + ty as i32);
-                let s = &Seen { fragment: p.centred(s.prim as usize, s.fragment, at.0, at.1), ..*s };
+                let s = &PixelHit { fragment: p.centred(s.prim as usize, s.fragment, at.0, at.1), ..*s };
                 if p.blocks && mode == Mode::Match {
                     if batch.count > 0 && batch.draw != s.draw {
                         batch.shade(&draws[batch.draw as usize], color);
@@ -94,7 +94,7 @@ pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings, share: Share)
                     batch.add(p, s.draw, k, s, color);
                     continue;
                 }
-                color[k] = to_bytes(p.shaded(s.prim as usize, &s.fragment, mode, around.as_ref(), at));
+                color[k] = to_bytes(p.shaded(s.prim as usize, &s.fragment, mode, ray_scene.as_ref(), at));
             }
         }
         if batch.count > 0 {
@@ -103,13 +103,13 @@ pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings, share: Share)
         covered.fetch_add(n, Relaxed);
     });
     layer.covered = covered.into_inner() as usize;
-    let extra = around.map_or([0; 2], |a| [a.shadow_rays.into_inner(), a.occlusion_rays.into_inner()]);
+    let extra = ray_scene.map_or([0; 2], |a| [a.shadow_rays.into_inner(), a.occlusion_rays.into_inner()]);
     (layer, extra)
 }
 
 /// One draw against what was seen so far in a tile, row by row; false when none of it is there. Unless `begun` nothing was seen so far.
-fn see(p: &Prepared<'_>, index: u32, area: Rect, desk: &mut Desk, begun: bool) -> bool {
-    let Desk { rays, fragments, moved, seen } = desk;
+fn trace_draw(p: &Prepared<'_>, index: u32, area: Rect, scratch: &mut TileScratch, begun: bool) -> bool {
+    let TileScratch { rays, fragments, moved, seen } = scratch;
     let tile = area.and(p.rect);
     if tile.is_empty() || !rays.send(p, tile) {
         return false;
@@ -122,15 +122,16 @@ fn see(p: &Prepared<'_>, index: u32, area: Rect, desk: &mut Desk, begun: bool) -
     let (blocks, targets) = (&mut *fragments, &mut *moved);
     dispatch!(Level::new(), _simd => fill(p, hits, tile, blocks, targets, range));
     // Polygon offset pushes steep triangles far back, at silhouettes behind others of the same draw.
-    let overtaken = p.draw.state.polygon_offset.is_some() && rays.look_behind(p, tile, moved);
+    let has_candidates =
+        p.draw.state.polygon_offset.is_some() && rays.trace_offset_candidates(p, tile, moved);
     for y in 0..tile.h {
         for x in 0..tile.w {
             let (b, l) = slot(x, y);
-            let behind = overtaken && rays.overtakers[b].prim[l] != NO_HIT;
+            let behind = has_candidates && rays.offset_candidates[b].prim[l] != NO_HIT;
             let (px, py) = (tile.x + x, tile.y + y);
             let (prim, f) = match fragments[b].lane[l] {
-                Lane::Empty => continue,
-                Lane::Found if !behind => (rays.hits[b].prim[l] as usize, fragments[b].get(l)),
+                LaneState::Empty => continue,
+                LaneState::Found if !behind => (rays.hits[b].prim[l] as usize, fragments[b].get(l)),
                 _ => match p.resolve(rays.blocks[b].get(l), rays.hits[b].get(l), px, py) {
                     Some(found) => found,
                     None => continue,
@@ -139,7 +140,7 @@ fn see(p: &Prepared<'_>, index: u32, area: Rect, desk: &mut Desk, begun: bool) -
             let at = &mut seen[((py - area.y) * TILE + px - area.x) as usize];
             let bits = (f.depth * DEPTH_STEPS + 0.5) as u32;
             if bits < at.depth_bits || (later_wins_ties && bits == at.depth_bits) {
-                *at = Seen { depth_bits: bits, draw: index, prim: prim as u32, fragment: f };
+                *at = PixelHit { depth_bits: bits, draw: index, prim: prim as u32, fragment: f };
             }
         }
     }
@@ -160,7 +161,7 @@ fn fill(
         let (x, y) = (4 * (b as i32 % 4), 4 * (b as i32 / 4));
         let moved = &mut moved[b * LANES..(b + 1) * LANES];
         if hits[b].prim.iter().all(|p| *p == NO_HIT) {
-            out.lane = [Lane::Empty; LANES];
+            out.lane = [LaneState::Empty; LANES];
             moved.fill(f64::NAN);
             continue;
         }

@@ -31,11 +31,11 @@ impl Visibility {
 
 /// Where a light of a draw is, in eye space.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Place {
+pub(crate) enum LightPosition {
     /// Direction to it.
-    Far(DVec3),
+    Directional(DVec3),
     /// A point.
-    Near(DVec3),
+    Positional(DVec3),
 }
 
 /// From where a draw is seen, in eye space. The origin is not always it: a program may keep the
@@ -64,7 +64,7 @@ impl Eye {
     }
 }
 
-impl Place {
+impl LightPosition {
     /// Whether its light goes along the rays of this eye: what it misses the eye cannot see. That is
     /// so of a point at the eye of a perspective, and of parallel light along parallel rays. Parallel
     /// light along the view is no such light in perspective: its shadows show beside what casts them.
@@ -72,8 +72,8 @@ impl Place {
         // What is left of f32 matrices moves a shadow by much less than a pixel.
         const SLACK: f64 = 1e-5;
         match (self, eye) {
-            (Place::Near(p), Eye::Point(at, far)) => (p - at).length() <= SLACK * far,
-            (Place::Far(d), Eye::Parallel(back)) => {
+            (LightPosition::Positional(p), Eye::Point(at, far)) => (p - at).length() <= SLACK * far,
+            (LightPosition::Directional(d), Eye::Parallel(back)) => {
                 let d = d.normalize_or_zero();
                 d.dot(back) > 0.0 && d.cross(back).length() <= SLACK
             }
@@ -83,7 +83,7 @@ impl Place {
 }
 
 /// All draws of a frame, for rays that begin on one and end on any.
-pub(crate) struct Surroundings<'a> {
+pub(crate) struct RayScene<'a> {
     pub(crate) draws: &'a [Prepared<'a>],
     pub(crate) object_from_eye: Vec<Option<DMat4>>,
     /// Which draws let light through: they cast no shadow.
@@ -105,18 +105,18 @@ pub(crate) fn eye_from_object(draw: &Draw) -> DMat4 {
     DMat4::from_cols_array(&m.map(f64::from))
 }
 
-impl<'a> Surroundings<'a> {
+impl<'a> RayScene<'a> {
     /// `None` when the mode asks for nothing beyond OpenGL's lighting.
-    pub(crate) fn new(draws: &'a [Prepared<'a>], settings: &'a Settings) -> Option<Surroundings<'a>> {
+    pub(crate) fn new(draws: &'a [Prepared<'a>], settings: &'a Settings) -> Option<RayScene<'a>> {
         let wanted = settings.effects.shadows || settings.effects.ambient_occlusion_samples > 0;
         if !matches!(settings.mode, Mode::Rich | Mode::Enhance | Mode::Path) || !wanted {
             return None;
         }
-        Some(Surroundings::of(draws, settings))
+        Some(RayScene::of(draws, settings))
     }
 
     /// The draws, whatever is asked for.
-    pub(crate) fn of(draws: &'a [Prepared<'a>], settings: &'a Settings) -> Surroundings<'a> {
+    pub(crate) fn of(draws: &'a [Prepared<'a>], settings: &'a Settings) -> RayScene<'a> {
         let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for p in draws {
             let (m, b) = (eye_from_object(p.draw), p.draw.geometry.bounds());
@@ -134,7 +134,7 @@ impl<'a> Surroundings<'a> {
         // Places are multiples of a sixteenth of a pixel in [-1/2, 1/2).
         let [x, y] = draws.first().map_or([0.0; 2], |p| p.draw.state.sample_place);
         let sample = ((x * 256.0) as i32) << 20 ^ ((y * 256.0) as i32) << 11;
-        Surroundings {
+        RayScene {
             sample,
             object_from_eye: draws.iter().map(invert).collect(),
             clear: vec![false; draws.len()],
@@ -159,11 +159,11 @@ impl<'a> Surroundings<'a> {
 
     /// What reaches a point with the given normal (towards the viewer), both in eye space. `eye` is
     /// there for a point that is the first on a ray of its.
-    pub(crate) fn at(
+    pub(crate) fn visibility(
         &self,
         point: DVec3,
         normal: DVec3,
-        lights: &[Place],
+        lights: &[LightPosition],
         eye: Option<Eye>,
         pixel: (i32, i32),
     ) -> Visibility {
@@ -171,7 +171,7 @@ impl<'a> Surroundings<'a> {
         // Off the surface by a share of the scene that f32 positions in any of its parts cannot reach.
         let from = point + normal * (self.diagonal * 2e-5);
         let effects = &self.settings.effects;
-        let mut random = Random::new((pixel.0 ^ self.sample, pixel.1));
+        let mut random = PixelRng::new((pixel.0 ^ self.sample, pixel.1));
         if effects.shadows {
             for (light, share) in lights.iter().zip(&mut v.lights) {
                 let follows = eye.is_some_and(|eye| light.follows_rays_of(eye));
@@ -179,8 +179,8 @@ impl<'a> Surroundings<'a> {
                     continue;
                 }
                 let (dir, most) = match *light {
-                    Place::Far(d) => (d.normalize_or_zero(), f64::INFINITY),
-                    Place::Near(p) => ((p - from).normalize_or_zero(), (p - from).length()),
+                    LightPosition::Directional(d) => (d.normalize_or_zero(), f64::INFINITY),
+                    LightPosition::Positional(p) => ((p - from).normalize_or_zero(), (p - from).length()),
                 };
                 if dir.dot(normal) <= 0.0 {
                     continue;
@@ -215,11 +215,11 @@ impl<'a> Surroundings<'a> {
 }
 
 /// Numbers that depend on the pixel alone, so that a still picture does not flicker.
-pub(crate) struct Random(u64);
+pub(crate) struct PixelRng(u64);
 
-impl Random {
-    pub(crate) fn new((x, y): (i32, i32)) -> Random {
-        Random((x as u64) << 32 ^ (y as u64) ^ 0x9e37_79b9_7f4a_7c15)
+impl PixelRng {
+    pub(crate) fn new((x, y): (i32, i32)) -> PixelRng {
+        PixelRng((x as u64) << 32 ^ (y as u64) ^ 0x9e37_79b9_7f4a_7c15)
     }
 
     /// From 0 to below 1.
@@ -253,22 +253,23 @@ mod tests {
     #[test]
     fn lights_that_go_along_the_rays_of_an_eye_are_known() {
         let point = |at| Eye::Point(at, 10.0);
-        assert!(Place::Near(DVec3::ZERO).follows_rays_of(point(DVec3::ZERO)));
-        assert!(Place::Near(DVec3::X).follows_rays_of(point(DVec3::new(1.0, 1e-6, 0.0))));
-        assert!(!Place::Near(DVec3::ZERO).follows_rays_of(point(DVec3::X)));
-        assert!(!Place::Far(DVec3::Z).follows_rays_of(point(DVec3::ZERO)));
+        assert!(LightPosition::Positional(DVec3::ZERO).follows_rays_of(point(DVec3::ZERO)));
+        assert!(LightPosition::Positional(DVec3::X).follows_rays_of(point(DVec3::new(1.0, 1e-6, 0.0))));
+        assert!(!LightPosition::Positional(DVec3::ZERO).follows_rays_of(point(DVec3::X)));
+        assert!(!LightPosition::Directional(DVec3::Z).follows_rays_of(point(DVec3::ZERO)));
         let parallel = Eye::Parallel(DVec3::Z);
-        assert!(Place::Far(DVec3::Z * 3.0).follows_rays_of(parallel));
-        assert!(!Place::Far(DVec3::new(0.1, 0.0, 1.0)).follows_rays_of(parallel));
-        assert!(!Place::Far(DVec3::NEG_Z).follows_rays_of(parallel));
-        assert!(!Place::Near(DVec3::ZERO).follows_rays_of(parallel));
+        assert!(LightPosition::Directional(DVec3::Z * 3.0).follows_rays_of(parallel));
+        assert!(!LightPosition::Directional(DVec3::new(0.1, 0.0, 1.0)).follows_rays_of(parallel));
+        assert!(!LightPosition::Directional(DVec3::NEG_Z).follows_rays_of(parallel));
+        assert!(!LightPosition::Positional(DVec3::ZERO).follows_rays_of(parallel));
     }
 
     #[test]
     fn numbers_of_a_pixel_are_the_same_in_every_frame_and_fill_the_disk() {
         let points: Vec<_> =
-            (0..256).map(|_| 0).scan(Random::new((3, 7)), |r, _| Some(r.on_disk())).collect();
-        let again: Vec<_> = (0..256).map(|_| 0).scan(Random::new((3, 7)), |r, _| Some(r.on_disk())).collect();
+            (0..256).map(|_| 0).scan(PixelRng::new((3, 7)), |r, _| Some(r.on_disk())).collect();
+        let again: Vec<_> =
+            (0..256).map(|_| 0).scan(PixelRng::new((3, 7)), |r, _| Some(r.on_disk())).collect();
         assert_eq!(points, again);
         assert!(points.iter().all(|(x, y)| x * x + y * y <= 1.0));
         let mean = points.iter().map(|p| p.0).sum::<f64>() / 256.0;

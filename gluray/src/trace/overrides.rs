@@ -3,7 +3,7 @@
 //! Mode `match` shows the driver's picture, so nothing is changed there.
 
 use crate::capture::draw::{Attributes, Draw, Shading, Values};
-use crate::classify::vtk::{ProgramLight, Recognised};
+use crate::classify::vtk::{ProgramLight, VtkProgram};
 use crate::host::config::{Lights, Material, Mode, Settings, Surface};
 use crate::host::panel_client::key_of;
 use crate::state::snapshot::{GlLight, Snapshot};
@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 /// What the user makes of a surface beyond OpenGL's lighting.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Look {
+pub(crate) struct RayMaterial {
     pub(crate) surface: Surface,
     /// Times the program's own.
     pub(crate) opacity: f32,
@@ -24,9 +24,9 @@ pub(crate) struct Look {
     pub(crate) tint: [f32; 3],
 }
 
-impl Default for Look {
+impl Default for RayMaterial {
     fn default() -> Self {
-        Look {
+        RayMaterial {
             surface: Surface::Program,
             opacity: 1.0,
             mirror: 0.0,
@@ -37,13 +37,13 @@ impl Default for Look {
     }
 }
 
-impl Look {
-    fn new(m: &Material) -> Look {
-        let usual = Look::default();
+impl RayMaterial {
+    fn new(m: &Material) -> RayMaterial {
+        let usual = RayMaterial::default();
         let surface = m.surface.unwrap_or_default();
         // A surface that is told to have no highlight reflects nothing, and sends no rays for it.
         let dull = surface == Surface::Matte || m.specular == Some(0.0);
-        Look {
+        RayMaterial {
             surface,
             opacity: m.opacity.map_or(usual.opacity, |v| v as f32),
             mirror: if dull { 0.0 } else { m.mirror.map_or(usual.mirror, |v| v as f32) },
@@ -73,7 +73,7 @@ pub(crate) fn apply(draw: &mut Draw, settings: &Settings) {
     if material.is_empty() {
         return;
     }
-    draw.look = Look::new(&material);
+    draw.ray_material = RayMaterial::new(&material);
     match &mut draw.shading {
         Shading::Fixed => repaint(Arc::make_mut(&mut draw.attributes), &material),
         Shading::Program(program) => repaint_program(Arc::make_mut(program), &material),
@@ -110,7 +110,7 @@ fn repaint(a: &mut Attributes, m: &Material) {
     }
 }
 
-fn repaint_program(p: &mut Recognised, m: &Material) {
+fn repaint_program(p: &mut VtkProgram, m: &Material) {
     if let Some(c) = m.color.map(rgb) {
         p.paint(c);
     }
@@ -145,7 +145,7 @@ fn relight(s: &mut Snapshot, l: &Lights) {
     }
 }
 
-fn relight_program(p: &mut Recognised, l: &Lights) {
+fn relight_program(p: &mut VtkProgram, l: &Lights) {
     for light in &mut p.lights {
         light.color.iter_mut().for_each(|v| *v *= l.program as f32);
     }
@@ -153,20 +153,20 @@ fn relight_program(p: &mut Recognised, l: &Lights) {
     if l.added > 0.0 && p.lights.len() < MOST_LIGHTS {
         let length = l.added_direction.iter().map(|v| v * v).sum::<f64>().sqrt();
         // VTK's shaders have the direction in which light travels.
-        let travels = l.added_direction.map(|v| (-v / length) as f32);
+        let direction = l.added_direction.map(|v| (-v / length) as f32);
         let color = rgb(l.added_color).map(|v| v * l.added as f32);
-        p.lights.push(ProgramLight { travels, color, lamp: None });
+        p.lights.push(ProgramLight { direction, color, lamp: None });
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::state::current_attributes::Current;
+    use crate::state::current_attributes::CurrentAttributes;
 
     #[test]
     fn colours_and_highlights_replace_those_of_both_sides_and_of_vertices() {
-        let mut a = Attributes::constant(&Current::default());
+        let mut a = Attributes::constant(&CurrentAttributes::default());
         a.colors = Values::PerVertex(vec![[0.1, 0.2, 0.3, 0.5]; 3]);
         a.materials[0][1].specular = [0.7; 4];
         repaint(

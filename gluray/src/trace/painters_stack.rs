@@ -19,14 +19,14 @@ const MOST: usize = 1 << 22;
 const EXACT: i64 = 1 << 24;
 
 /// The stack.
-pub(super) struct Lifted {
+pub(super) struct PaintersStack {
     world: World,
     triangles: usize,
 }
 
-impl Lifted {
+impl PaintersStack {
     /// `None` when corners are behind the eye, or too many or too far off to be stacked.
-    pub(super) fn new(p: &Prepared<'_>) -> Option<Lifted> {
+    pub(super) fn new(p: &Prepared<'_>) -> Option<PaintersStack> {
         let n = p.draw.geometry.mesh.num_triangles();
         if n > MOST {
             return None;
@@ -47,7 +47,7 @@ impl Lifted {
         let indices = (0..n as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
         let mesh = Arc::new(TriMesh::new(positions, indices));
         let options = BuildOptions { quality: BuildQuality::Fast, ..BuildOptions::default() };
-        Some(Lifted { world: World::from_mesh(mesh, &options).ok()?, triangles: n })
+        Some(PaintersStack { world: World::from_mesh(mesh, &options).ok()?, triangles: n })
     }
 
     /// For each pixel of a tile the triangles over its centre, the last first, until `take` has enough of them.

@@ -1,10 +1,10 @@
 //! Every fragment of one draw, for states in which the order of triangles matters.
 //!
-//! Where all of the draw is before the eye its triangles are stacked by their order ([`Lifted`]), and one ray a layer finds them. Elsewhere rays go through
+//! Where all of the draw is before the eye its triangles are stacked by their order ([`PaintersStack`]), and one ray a layer finds them. Elsewhere rays go through
 //! each pixel's centre from surface to surface, 256 at a time; where an edge comes near a centre, four more rays beside it find the triangles that the fill
 //! rule may give the pixel to. Of layers in one plane those rays see the first alone.
 
-use super::painters_stack::Lifted;
+use super::painters_stack::PaintersStack;
 use super::{Layer, MOST_STEPS, Prepared, Rect, TILE, UNCOVERED, slot, to_bytes};
 use crate::state::enums::ALWAYS;
 use crate::trace::occlusion::Visibility;
@@ -18,17 +18,17 @@ const OFF: f64 = 1.0 / 200.0;
 const NEAR: f64 = 1.0 / 32.0;
 
 /// Colour and depth of a fragment.
-type Found = ([u8; 4], f32);
+type OrderedFragment = ([u8; 4], f32);
 
 /// Layers: the n-th has the n-th fragment of each pixel in the order of the triangles.
-pub(crate) fn in_order(p: &Prepared<'_>) -> Vec<Layer> {
+pub(crate) fn ordered_layers(p: &Prepared<'_>) -> Vec<Layer> {
     let rect = p.rect;
     let (w, h) = (rect.w.max(0) as usize, rect.h.max(0) as usize);
     if w * h == 0 {
         return Vec::new();
     }
-    let lifted = Lifted::new(p);
-    let near = if lifted.is_none() { near_edges(p) } else { Near { rect, marks: None } };
+    let lifted = PaintersStack::new(p);
+    let near = if lifted.is_none() { near_edges(p) } else { EdgePixels { rect, marks: None } };
     let step = TILE as usize;
     let tiles: Vec<Rect> = (0..h)
         .step_by(step)
@@ -40,7 +40,7 @@ pub(crate) fn in_order(p: &Prepared<'_>) -> Vec<Layer> {
             h: step.min(h - y) as i32,
         })
         .collect();
-    let made: Vec<Vec<Vec<Found>>> = tiles
+    let made: Vec<Vec<Vec<OrderedFragment>>> = tiles
         .par_iter()
         .map(|tile| match &lifted {
             Some(lifted) => of_stack(p, *tile, lifted),
@@ -74,15 +74,15 @@ fn last_is_all(p: &Prepared<'_>) -> bool {
 }
 
 /// The fragment of a triangle, as it is drawn.
-fn fragment(p: &Prepared<'_>, prim: usize, x: i32, y: i32) -> Option<Found> {
+fn fragment(p: &Prepared<'_>, prim: usize, x: i32, y: i32) -> Option<OrderedFragment> {
     let f = p.fragment(prim, x, y)?;
     let f = p.centred(prim, f, x, y);
     Some((to_bytes(p.color(prim, &f, false, &Visibility::FULL, Some((x, y)))), f.depth as f32))
 }
 
-fn of_stack(p: &Prepared<'_>, tile: Rect, stack: &Lifted) -> Vec<Vec<Found>> {
+fn of_stack(p: &Prepared<'_>, tile: Rect, stack: &PaintersStack) -> Vec<Vec<OrderedFragment>> {
     let last = last_is_all(p);
-    let mut made: Vec<Vec<Found>> = vec![Vec::new(); (tile.w * tile.h) as usize];
+    let mut made: Vec<Vec<OrderedFragment>> = vec![Vec::new(); (tile.w * tile.h) as usize];
     stack.each(p, tile, |i, prim| {
         let (x, y) = (tile.x + i as i32 % tile.w, tile.y + i as i32 / tile.w);
         let found = fragment(p, prim, x, y);
@@ -94,7 +94,7 @@ fn of_stack(p: &Prepared<'_>, tile: Rect, stack: &Lifted) -> Vec<Vec<Found>> {
     made
 }
 
-fn of_tile(p: &Prepared<'_>, tile: Rect, near: &Near) -> Vec<Vec<Found>> {
+fn of_tile(p: &Prepared<'_>, tile: Rect, near: &EdgePixels) -> Vec<Vec<OrderedFragment>> {
     let n = (tile.w * tile.h) as usize;
     let mut triangles: Vec<Vec<u32>> = vec![Vec::new(); n];
     let mut blocks = vec![RayBlock::INACTIVE; 16];
@@ -154,20 +154,20 @@ fn of_tile(p: &Prepared<'_>, tile: Rect, near: &Near) -> Vec<Vec<Found>> {
 }
 
 /// Pixels whose centres are near an edge.
-struct Near {
+struct EdgePixels {
     rect: Rect,
     /// `None`: all of them.
     marks: Option<Vec<bool>>,
 }
 
-impl Near {
+impl EdgePixels {
     fn at(&self, x: i32, y: i32) -> bool {
         let (x, y) = (x - self.rect.x, y - self.rect.y);
         self.marks.as_ref().is_none_or(|m| m[(y * self.rect.w + x) as usize])
     }
 }
 
-fn near_edges(p: &Prepared<'_>) -> Near {
+fn near_edges(p: &Prepared<'_>) -> EdgePixels {
     let rect = p.rect;
     let [vx, vy, vw, vh] = p.draw.state.viewport.map(f64::from);
     let mut marks = vec![false; (rect.w * rect.h) as usize];
@@ -175,7 +175,7 @@ fn near_edges(p: &Prepared<'_>) -> Near {
         let c = p.corners(prim);
         if c.iter().any(|v| v[3] <= 0.0 || !v[3].is_finite()) {
             // Where an edge goes through the plane of the eye is not worth finding out.
-            return Near { rect, marks: None };
+            return EdgePixels { rect, marks: None };
         }
         let at = c.map(|v| {
             let w = f64::from(v[3]);
@@ -188,7 +188,7 @@ fn near_edges(p: &Prepared<'_>) -> Near {
             mark(&mut marks, [rect.w, rect.h], at[k], at[(k + 1) % 3]);
         }
     }
-    Near { rect, marks: Some(marks) }
+    EdgePixels { rect, marks: Some(marks) }
 }
 
 /// Marks the pixels whose centres are near the line from `a` to `b`: where it crosses the rows of centres, and the columns.

@@ -59,7 +59,7 @@ pub(crate) fn gradient(c: &[[f32; 4]; 3], viewport: [i32; 4], depth_scale: f64) 
 
 /// How VTK's shaders move depths back: by the gradient's length. The depth that they start from, and write for all samples, is that of the pixel's middle: how
 /// far that is from the depth at a sample is the second number.
-pub(crate) fn moves_back([dx, dy]: [f64; 2], sample_place: [f32; 2]) -> [f64; 2] {
+pub(crate) fn polygon_offset([dx, dy]: [f64; 2], sample_place: [f32; 2]) -> [f64; 2] {
     let [x, y] = sample_place.map(f64::from);
     [(dx * dx + dy * dy).sqrt(), -(dx * x + dy * y)]
 }
@@ -91,7 +91,7 @@ mod tests {
         // z_window rises by 0.1 per 50 pixels in x, falls by 0.4 per 25 in y.
         let c = [[0.0, 0.0, 0.0, 1.0], [1.0, 0.0, 0.2, 1.0], [0.0, 1.0, -0.8, 1.0]];
         assert!((steepness(&c, viewport, 1.0) - 0.4 / 25.0).abs() < 1e-9);
-        let [length, shift] = moves_back(gradient(&c, viewport, 1.0), [0.25, -0.5]);
+        let [length, shift] = polygon_offset(gradient(&c, viewport, 1.0), [0.25, -0.5]);
         assert!((length - (0.1_f64 / 50.0).hypot(0.4 / 25.0)).abs() < 1e-9);
         assert!((shift + 0.25 * 0.1 / 50.0 + 0.5 * 0.4 / 25.0).abs() < 1e-9, "{shift}");
     }

@@ -1,12 +1,12 @@
 //! The colour of a fragment: vertex colours, texture, fog; or lighting at the fragment itself with what rays found out about it.
 
 use crate::capture::draw::Shading;
-use crate::classify::vtk::At;
+use crate::classify::vtk::FragmentSample;
 use crate::host::config::Mode;
 use crate::state::enums::*;
 use crate::state::snapshot::TextureUnit;
-use crate::trace::lighting::{Lit, transform};
-use crate::trace::occlusion::{Surroundings, Visibility, vector};
+use crate::trace::lighting::{VertexColors, transform};
+use crate::trace::occlusion::{RayScene, Visibility, vector};
 use crate::trace::texturing;
 use crate::trace::{Fragment, Prepared, matrix, mixed};
 use rt_core::glam::{DVec3, Mat3};
@@ -117,7 +117,7 @@ impl Prepared<'_> {
         prim: usize,
         f: &Fragment,
         mode: Mode,
-        around: Option<&Surroundings<'_>>,
+        ray_scene: Option<&RayScene<'_>>,
         pixel: (i32, i32),
     ) -> [f32; 4] {
         let per_pixel = matches!(mode, Mode::Phong | Mode::Rich | Mode::Path);
@@ -125,14 +125,14 @@ impl Prepared<'_> {
             Shading::Fixed => self.draw.state.lighting,
             Shading::Program(_) => true,
         };
-        if around.is_none() || !lit {
+        if ray_scene.is_none() || !lit {
             return self.color(prim, f, per_pixel, &Visibility::FULL, Some(pixel));
         }
         let (eye, _) = self.eye_point(prim, f.weights.map(|w| w as f32));
         let clip = matrix(&self.draw.state.projection);
         let parallel = matches!(self.draw.shading, Shading::Fixed) && clip.row(3).truncate() == DVec3::ZERO;
         let towards = if parallel { DVec3::Z } else { -vector(eye) };
-        self.lit_from(prim, f, mode, around, (pixel, true), towards)
+        self.lit_from(prim, f, mode, ray_scene, (pixel, true), towards)
     }
 
     /// The same, as somebody sees it who looks along `-towards` (eye space).
@@ -141,11 +141,11 @@ impl Prepared<'_> {
         prim: usize,
         f: &Fragment,
         mode: Mode,
-        around: Option<&Surroundings<'_>>,
+        ray_scene: Option<&RayScene<'_>>,
         pixel: (i32, i32),
         towards: DVec3,
     ) -> [f32; 4] {
-        self.lit_from(prim, f, mode, around, (pixel, false), towards)
+        self.lit_from(prim, f, mode, ray_scene, (pixel, false), towards)
     }
 
     /// Of the pixel we also know whether the eye sees the fragment there.
@@ -154,14 +154,14 @@ impl Prepared<'_> {
         prim: usize,
         f: &Fragment,
         mode: Mode,
-        around: Option<&Surroundings<'_>>,
+        ray_scene: Option<&RayScene<'_>>,
         (pixel, seen): ((i32, i32), bool),
         towards: DVec3,
     ) -> [f32; 4] {
         let own = seen.then_some(pixel);
         let per_pixel = matches!(mode, Mode::Phong | Mode::Rich | Mode::Path);
         let lit = self.draw.state.lighting || matches!(self.draw.shading, Shading::Program(_));
-        let (Some(around), true) = (around, lit) else {
+        let (Some(ray_scene), true) = (ray_scene, lit) else {
             return self.color(prim, f, per_pixel, &Visibility::FULL, own);
         };
         // The plane of the triangle, turned to the viewer: what is in front of it is what the eye sees.
@@ -171,7 +171,8 @@ impl Prepared<'_> {
         let [a, b, c] = [at([1.0, 0.0, 0.0]), at([0.0, 1.0, 0.0]), at([0.0, 0.0, 1.0])];
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let normal = if normal.dot(towards) < 0.0 { -normal } else { normal };
-        let reaches = around.at(vector(eye), normal, &self.places, seen.then_some(self.eye), pixel);
+        let reaches =
+            ray_scene.visibility(vector(eye), normal, &self.light_positions, seen.then_some(self.eye), pixel);
         if mode != Mode::Enhance {
             // Point lights at the eye cast no shadow that it could see; corners dim them all the same.
             let mut r = reaches;
@@ -179,7 +180,7 @@ impl Prepared<'_> {
             return self.color(prim, f, per_pixel, &r, own);
         }
         let color = self.color(prim, f, per_pixel, &Visibility::FULL, own);
-        let n = self.places.len().clamp(1, crate::trace::occlusion::MOST_LIGHTS);
+        let n = self.light_positions.len().clamp(1, crate::trace::occlusion::MOST_LIGHTS);
         let light = reaches.lights[..n].iter().sum::<f32>() / n as f32;
         let dim = (0.4 + 0.6 * light) * (0.3 + 0.7 * reaches.ambient);
         [color[0] * dim, color[1] * dim, color[2] * dim, color[3]]
@@ -203,20 +204,20 @@ impl Prepared<'_> {
                 let coordinates = corners.map(|i| program.picture_coordinates(&self.draw.attributes, i));
                 self.footprint(prim, coordinates.map(|[s, t]| [s, t, 0.0, 1.0]), image.size(), at)
             });
-            let at = At {
+            let at = FragmentSample {
                 prim,
                 weights: f.weights.map(|w| w as f32),
                 front: f.front,
                 pixel,
                 texels,
-                moved_by: self.draw.state.sample_place,
+                sample_offset: self.draw.state.sample_place,
             };
             return program.color(&self.draw.attributes, mesh, &at, reaches);
         }
         let s = &*self.draw.state;
         let side = usize::from(!f.front && s.lighting && s.two_side);
         let lit = corners.map(|i| match &self.lit {
-            _ if per_pixel && s.lighting => Lit::default(),
+            _ if per_pixel && s.lighting => VertexColors::default(),
             Some(all) => all[i],
             None => self.lighting.vertex(&self.draw.attributes, i, mesh.positions[i].to_array()),
         });

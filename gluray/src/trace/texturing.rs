@@ -8,15 +8,15 @@ use crate::capture::draw::Attributes;
 use crate::interpose::driver::gl;
 use crate::state::enums::*;
 use crate::state::snapshot::{Snapshot, TextureUnit};
-use crate::trace::lighting::{Setup, normalized, transform};
-use image::Base;
+use crate::trace::lighting::{LightingSetup, normalized, transform};
+use image::BaseFormat;
 pub(crate) use image::{Image, Images};
 
 /// Texels of the greatest texture that is read.
 const MOST_TEXELS: i64 = 1 << 26;
 
 /// Whether rays can follow the sampling of the bound texture; the reason if not.
-pub(crate) fn followed(target: u32) -> Result<(), &'static str> {
+pub(crate) fn check_sampling(target: u32) -> Result<(), &'static str> {
     let min = gl::tex_parameter_i::<1>(target, TEXTURE_MIN_FILTER)[0].cast_unsigned();
     let mag = gl::tex_parameter_i::<1>(target, TEXTURE_MAG_FILTER)[0].cast_unsigned();
     if min != mag {
@@ -26,7 +26,7 @@ pub(crate) fn followed(target: u32) -> Result<(), &'static str> {
 }
 
 /// Why fixed function's sampling of the bound texture cannot be followed; `None` when it can, or when the texture is incomplete and so left out.
-pub(crate) fn unfollowed(target: u32, version: u32) -> Option<&'static str> {
+pub(crate) fn unsupported_sampling(target: u32, version: u32) -> Option<&'static str> {
     const TEXTURE_BASE_LEVEL: u32 = 0x813c;
     const TEXTURE_MAX_ANISOTROPY: u32 = 0x84fe;
     const TEXTURE_SWIZZLE: [u32; 4] = [0x8e42, 0x8e43, 0x8e44, 0x8e45];
@@ -64,7 +64,7 @@ pub(crate) fn coordinates(
     unit: &TextureUnit,
     state: &Snapshot,
     attributes: &Attributes,
-    lighting: &Setup<'_>,
+    lighting: &LightingSetup<'_>,
     i: usize,
     p: [f32; 3],
 ) -> [f32; 4] {
@@ -114,23 +114,24 @@ pub(crate) fn apply(
     environment(unit.env_mode, unit.env_color, image.base, f, t)
 }
 
-fn environment(mode: u32, constant: [f32; 4], base: Base, f: [f32; 4], t: [f32; 4]) -> [f32; 4] {
+fn environment(mode: u32, constant: [f32; 4], base: BaseFormat, f: [f32; 4], t: [f32; 4]) -> [f32; 4] {
     // What GetTexImage gives for luminance and intensity is in the first component.
     let (ct, at) = match base {
-        Base::Alpha => ([0.0; 3], t[3]),
-        Base::Luminance => ([t[0]; 3], 1.0),
-        Base::LuminanceAlpha => ([t[0]; 3], t[3]),
-        Base::Intensity => ([t[0]; 3], t[0]),
-        Base::Rgb => ([t[0], t[1], t[2]], 1.0),
-        Base::Rgba => ([t[0], t[1], t[2]], t[3]),
+        BaseFormat::Alpha => ([0.0; 3], t[3]),
+        BaseFormat::Luminance => ([t[0]; 3], 1.0),
+        BaseFormat::LuminanceAlpha => ([t[0]; 3], t[3]),
+        BaseFormat::Intensity => ([t[0]; 3], t[0]),
+        BaseFormat::Rgb => ([t[0], t[1], t[2]], 1.0),
+        BaseFormat::Rgba => ([t[0], t[1], t[2]], t[3]),
     };
-    let (has_color, has_alpha) = (base != Base::Alpha, !matches!(base, Base::Luminance | Base::Rgb));
+    let (has_color, has_alpha) =
+        (base != BaseFormat::Alpha, !matches!(base, BaseFormat::Luminance | BaseFormat::Rgb));
     let mut out = f;
     for k in 0..3 {
         out[k] = match mode {
             _ if !has_color => f[k],
             REPLACE => ct[k],
-            DECAL if base == Base::Rgba => f[k] * (1.0 - at) + ct[k] * at,
+            DECAL if base == BaseFormat::Rgba => f[k] * (1.0 - at) + ct[k] * at,
             DECAL => ct[k],
             BLEND => f[k] * (1.0 - ct[k]) + constant[k] * ct[k],
             ADD => f[k] + ct[k],
@@ -141,7 +142,7 @@ fn environment(mode: u32, constant: [f32; 4], base: Base, f: [f32; 4], t: [f32; 
         DECAL => f[3],
         _ if !has_alpha => f[3],
         REPLACE => at,
-        BLEND | ADD if base == Base::Intensity => {
+        BLEND | ADD if base == BaseFormat::Intensity => {
             if mode == ADD {
                 f[3] + at
             } else {
@@ -160,10 +161,10 @@ mod tests {
     #[test]
     fn environments_follow_the_table_of_the_specification() {
         let (f, t, c) = ([0.5, 0.5, 0.5, 0.5], [1.0, 0.0, 0.25, 0.5], [1.0; 4]);
-        assert_eq!(environment(MODULATE, c, Base::Rgba, f, t), [0.5, 0.0, 0.125, 0.25]);
-        assert_eq!(environment(DECAL, c, Base::Rgba, f, t), [0.75, 0.25, 0.375, 0.5]);
-        assert_eq!(environment(REPLACE, c, Base::Rgb, f, t), [1.0, 0.0, 0.25, 0.5]);
-        assert_eq!(environment(BLEND, c, Base::Luminance, f, t), [1.0, 1.0, 1.0, 0.5]);
-        assert_eq!(environment(MODULATE, c, Base::Alpha, f, t), [0.5, 0.5, 0.5, 0.25]);
+        assert_eq!(environment(MODULATE, c, BaseFormat::Rgba, f, t), [0.5, 0.0, 0.125, 0.25]);
+        assert_eq!(environment(DECAL, c, BaseFormat::Rgba, f, t), [0.75, 0.25, 0.375, 0.5]);
+        assert_eq!(environment(REPLACE, c, BaseFormat::Rgb, f, t), [1.0, 0.0, 0.25, 0.5]);
+        assert_eq!(environment(BLEND, c, BaseFormat::Luminance, f, t), [1.0, 1.0, 1.0, 0.5]);
+        assert_eq!(environment(MODULATE, c, BaseFormat::Alpha, f, t), [0.5, 0.5, 0.5, 0.25]);
     }
 }

@@ -43,7 +43,7 @@ pub(crate) fn on_pool<R: Send>(f: impl FnOnce() -> R + Send) -> R {
 }
 
 /// Starts `f` on the pool and goes on; does it here when there is no pool.
-pub(crate) fn beside(f: impl FnOnce() + Send + 'static) {
+pub(crate) fn spawn(f: impl FnOnce() + Send + 'static) {
     match if forked() { None } else { pool() } {
         Some(pool) => pool.spawn(move || {
             crate::interpose::panic_guard::guard(f);

@@ -18,9 +18,9 @@ pub(super) const BLOCKS: usize = 16;
 
 /// A number that is affine in window coordinates: its value at the window's origin, its change with x, with y.
 #[derive(Debug, Clone, Copy, Default)]
-struct Affine([f64; 3]);
+struct AffineFunction([f64; 3]);
 
-impl Affine {
+impl AffineFunction {
     #[inline(always)]
     fn at(&self, x: f64, y: f64) -> f64 {
         self.0[0] + self.0[1] * x + self.0[2] * y
@@ -33,7 +33,7 @@ impl Affine {
 }
 
 /// Two rows of a block.
-struct Half<S: Simd> {
+struct HalfBlock<S: Simd> {
     origin: [f64x8<S>; 3],
     dir: [f64x8<S>; 3],
     /// Where rays begin, and what of them is not cut off, from there on.
@@ -46,19 +46,19 @@ struct Half<S: Simd> {
 
 /// The rays of a draw as functions of window coordinates.
 #[derive(Default)]
-pub(super) struct Bundle {
-    origin: [Affine; 3],
-    dir: [Affine; 3],
+pub(super) struct AffineRays {
+    origin: [AffineFunction; 3],
+    dir: [AffineFunction; 3],
     /// How far above each plane the origin is (a little more than it is), and how that grows along the ray.
-    planes: Vec<[Affine; 2]>,
+    planes: Vec<[AffineFunction; 2]>,
     /// Parameter at which rays begin when the scene is far away, so that f32 loses nothing.
     start: f64,
     /// Clip z and w, of the origin and of the direction: what depth a parameter has.
-    depth: [[Affine; 2]; 2],
+    depth: [[AffineFunction; 2]; 2],
 }
 
-impl Bundle {
-    pub(super) fn new(p: &Prepared<'_>) -> Bundle {
+impl AffineRays {
+    pub(super) fn new(p: &Prepared<'_>) -> AffineRays {
         let [vx, vy, vw, vh] = p.draw.state.viewport.map(f64::from);
         let ndc = |x: f64, y: f64| [2.0 * (x - vx) / vw - 1.0, 2.0 * (y - vy) / vh - 1.0];
         // Across the whole viewport, so that differences lose nothing.
@@ -66,7 +66,7 @@ impl Bundle {
             [[vx, vy], [vx + vw, vy], [vx, vy + vh]].map(|[x, y]| p.camera.world_ray(ndc(x, y)));
         let affine = |f: &dyn Fn((DVec3, DVec3)) -> f64| {
             let (dx, dy) = ((f(right) - f(zero)) / vw, (f(up) - f(zero)) / vh);
-            Affine([f(zero) - dx * vx - dy * vy, dx, dy])
+            AffineFunction([f(zero) - dx * vx - dy * vy, dx, dy])
         };
         let axes = [0, 1, 2];
         let center = p.world.origin();
@@ -98,9 +98,9 @@ impl Bundle {
             rows.map(|r| affine(&|(o, _)| r.dot(o.extend(1.0)))),
             rows.map(|r| affine(&|(_, d)| r.dot(d.extend(0.0)))),
         ];
-        let mut bundle = Bundle { origin, dir, planes, start: 0.0, depth };
-        bundle.start = bundle.beginning(p, &corners);
-        bundle
+        let mut affine_rays = AffineRays { origin, dir, planes, start: 0.0, depth };
+        affine_rays.start = affine_rays.beginning(p, &corners);
+        affine_rays
     }
 
     /// Where the bounds begin along the rays, when they are so far off that f32 would lose bits; else 0. The parameter is clip w or the share of
@@ -164,7 +164,7 @@ impl Bundle {
 
     /// Two rows of a block.
     #[inline(always)]
-    fn half<S: Simd>(&self, simd: S, x: f64, y: f64) -> Half<S> {
+    fn half<S: Simd>(&self, simd: S, x: f64, y: f64) -> HalfBlock<S> {
         let splat = |v: f64| f64x8::splat(simd, v);
         let px = splat(x) + f64x8::from_slice(simd, &[0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0]);
         let py = splat(y) + f64x8::from_slice(simd, &[0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]);
@@ -186,7 +186,14 @@ impl Bundle {
             dir[k] = self.dir[k].row(px, py);
             origin[k] = self.origin[k].row(px, py) + dir[k] * back;
         }
-        Half { origin, dir, back, from: t0 - back, to: t1 - back, some: t0.simd_lt(t1).to_bitmask() & !none }
+        HalfBlock {
+            origin,
+            dir,
+            back,
+            from: t0 - back,
+            to: t1 - back,
+            some: t0.simd_lt(t1).to_bitmask() & !none,
+        }
     }
 
     /// The parameter, from the ray's own origin on, at which the ray through (`x`, `y`) has this z by w.
@@ -205,7 +212,7 @@ pub(super) struct TileRays {
     shift: [[f64; LANES]; BLOCKS],
     /// A second look behind the first hits.
     behind: Vec<RayBlock>,
-    pub(super) overtakers: Vec<HitBlock>,
+    pub(super) offset_candidates: Vec<HitBlock>,
 }
 
 impl TileRays {
@@ -216,14 +223,14 @@ impl TileRays {
             hits: vec![HitBlock::MISS; BLOCKS],
             shift: [[0.0; LANES]; BLOCKS],
             behind: vec![RayBlock::INACTIVE; BLOCKS],
-            overtakers: vec![HitBlock::MISS; BLOCKS],
+            offset_candidates: vec![HitBlock::MISS; BLOCKS],
         }
     }
 
     /// Sends rays through the pixels of `area`, which is no larger than a tile. False when nothing was hit.
     pub(super) fn send(&mut self, p: &Prepared<'_>, area: Rect) -> bool {
         let (level, blocks, shift) = (self.level, &mut self.blocks, &mut self.shift);
-        dispatch!(level, simd => make(simd, &p.bundle, area, blocks, shift));
+        dispatch!(level, simd => make(simd, &p.affine_rays, area, blocks, shift));
         self.hits.fill(HitBlock::MISS);
         p.world.closest_coherent(&self.blocks, &mut self.hits).expect("one block of hits for each of rays");
         p.rays.fetch_add(area.w as u64 * area.h as u64, Relaxed);
@@ -232,7 +239,12 @@ impl TileRays {
 
     /// Looks behind first hits that polygon offset moved back: is there anything up to where it moved them? `depth` is that place (z by w) for
     /// each pixel; NaN for those that were not moved.
-    pub(super) fn look_behind(&mut self, p: &Prepared<'_>, area: Rect, z_by_w: &[f64; 256]) -> bool {
+    pub(super) fn trace_offset_candidates(
+        &mut self,
+        p: &Prepared<'_>,
+        area: Rect,
+        z_by_w: &[f64; 256],
+    ) -> bool {
         let mut any = false;
         for y in 0..area.h {
             for x in 0..area.w {
@@ -242,7 +254,7 @@ impl TileRays {
                 self.behind[b].t_max[l] = -1.0;
                 if !z.is_nan() {
                     let (px, py) = (f64::from(area.x + x) + 0.5, f64::from(area.y + y) + 0.5);
-                    let limit = p.bundle.parameter(px, py, z, self.shift[b][l]);
+                    let limit = p.affine_rays.parameter(px, py, z, self.shift[b][l]);
                     let ray = self.blocks[b].get(l);
                     let (from, to) = (hit.next_up(), limit.min(ray.t_max));
                     if from < to {
@@ -253,9 +265,9 @@ impl TileRays {
             }
         }
         if any {
-            self.overtakers.fill(HitBlock::MISS);
+            self.offset_candidates.fill(HitBlock::MISS);
             p.world
-                .closest_coherent(&self.behind, &mut self.overtakers)
+                .closest_coherent(&self.behind, &mut self.offset_candidates)
                 .expect("one block of hits for each of rays");
         }
         self.behind.iter_mut().for_each(|b| b.t_max = [-1.0; LANES]);
@@ -266,7 +278,7 @@ impl TileRays {
 #[inline(always)]
 fn make<S: Simd>(
     simd: S,
-    bundle: &Bundle,
+    affine_rays: &AffineRays,
     area: Rect,
     blocks: &mut [RayBlock],
     shift: &mut [[f64; LANES]; BLOCKS],
@@ -281,7 +293,7 @@ fn make<S: Simd>(
             *out = RayBlock::INACTIVE;
         } else {
             let at = [f64::from(area.x + x) + 0.5, f64::from(area.y + y) + 0.5];
-            bundle.block(simd, at, used, out, shift);
+            affine_rays.block(simd, at, used, out, shift);
         }
     }
 }

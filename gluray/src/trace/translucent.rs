@@ -7,14 +7,14 @@ use super::{
     DEPTH_STEPS, Fragment, Layer, MOST_STEPS, Prepared, Rect, TILE, TileRays, UNCOVERED, slot, to_bytes,
 };
 use crate::host::config::Settings;
-use crate::trace::occlusion::Surroundings;
+use crate::trace::occlusion::RayScene;
 use crate::trace::raster::steepness;
 use rayon::prelude::*;
 use rt_core::ray::{HitBlock, LANES, NO_HIT};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// Depths that fragments may have at most, by pixel of the framebuffer.
-pub(crate) struct Limit {
+pub(crate) struct DepthLimits {
     pub(crate) width: usize,
     pub(crate) height: usize,
     pub(crate) depth: Vec<f32>,
@@ -24,7 +24,7 @@ pub(crate) struct Limit {
 
 /// Sums over all fragments of a pixel that count.
 #[derive(Default)]
-pub(crate) struct Sums {
+pub(crate) struct WeightedSums {
     pub(crate) rect: Rect,
     /// Colours times alpha, added; and what all layers together keep from coming through.
     pub(crate) colors: Vec<[f32; 4]>,
@@ -43,28 +43,28 @@ const LEAST: f32 = 1.0 / 1024.0;
 const OFF: f64 = 1.0 / 200.0;
 
 /// A fragment of a pixel.
-struct Found {
+struct LayerFragment {
     draw: usize,
     prim: usize,
     fragment: Fragment,
 }
 
 /// Effects of the mode on translucent surfaces.
-fn surroundings<'a>(draws: &'a [Prepared<'a>], settings: &'a Settings) -> Option<Surroundings<'a>> {
-    Surroundings::new(draws, settings).map(|mut around| {
+fn occlusion_scene<'a>(draws: &'a [Prepared<'a>], settings: &'a Settings) -> Option<RayScene<'a>> {
+    RayScene::new(draws, settings).map(|mut ray_scene| {
         // What lets light through casts no shadow.
-        around.clear.fill(true);
-        around
+        ray_scene.clear.fill(true);
+        ray_scene
     })
 }
 
 /// Gives each pixel's fragments to `put`, with the places that it has in `out`, row by row. Returns how many pixels have any.
 fn each_pixel<T: Send>(
     draws: &[Prepared<'_>],
-    limit: &Limit,
+    limit: &DepthLimits,
     rect: Rect,
     out: &mut [T],
-    put: impl Fn(&mut T, &mut [Found], (i32, i32)) + Sync,
+    put: impl Fn(&mut T, &mut [LayerFragment], (i32, i32)) + Sync,
 ) -> usize {
     let w = rect.w as usize;
     let covered = AtomicU64::new(0);
@@ -73,7 +73,7 @@ fn each_pixel<T: Send>(
         let rows = (out.len() / w) as i32;
         for x in (rect.x..rect.x + rect.w).step_by(TILE as usize) {
             let tile = Rect { x, y, w: TILE.min(rect.x + rect.w - x), h: rows };
-            let mut found: [Vec<Found>; 256] = [const { Vec::new() }; 256];
+            let mut found: [Vec<LayerFragment>; 256] = [const { Vec::new() }; 256];
             for (number, p) in draws.iter().enumerate() {
                 through(p, number, tile, limit, rays, &mut found);
             }
@@ -88,14 +88,18 @@ fn each_pixel<T: Send>(
 }
 
 /// Where anything of the draws may be seen.
-fn bounds(draws: &[Prepared<'_>], limit: &Limit) -> Rect {
+fn bounds(draws: &[Prepared<'_>], limit: &DepthLimits) -> Rect {
     let all = Rect { x: 0, y: 0, w: limit.width as i32, h: limit.height as i32 };
     draws.iter().fold(Rect::default(), |r, d| r.or(d.rect)).and(all)
 }
 
 /// Premultiplied colours of all draws; what it cost beside primary rays.
-pub(crate) fn peeled(draws: &[Prepared<'_>], limit: &Limit, settings: &Settings) -> (Layer, [u64; 2]) {
-    let around = surroundings(draws, settings);
+pub(crate) fn depth_sorted(
+    draws: &[Prepared<'_>],
+    limit: &DepthLimits,
+    settings: &Settings,
+) -> (Layer, [u64; 2]) {
+    let ray_scene = occlusion_scene(draws, settings);
     let rect = bounds(draws, limit);
     let n = (rect.w.max(0) * rect.h.max(0)) as usize;
     if n == 0 {
@@ -103,27 +107,31 @@ pub(crate) fn peeled(draws: &[Prepared<'_>], limit: &Limit, settings: &Settings)
     }
     let mut pixels = vec![([0; 4], UNCOVERED); n];
     let covered = each_pixel(draws, limit, rect, &mut pixels, |pixel, found, at| {
-        *pixel = (blended(draws, found, settings, around.as_ref(), at), 0.0);
+        *pixel = (blended(draws, found, settings, ray_scene.as_ref(), at), 0.0);
     });
     let (color, depth) = pixels.into_iter().unzip();
-    (Layer { rect, color, depth, covered }, cost(around))
+    (Layer { rect, color, depth, covered }, cost(ray_scene))
 }
 
 /// Sums of all draws' fragments, in any order; what it cost beside primary rays.
-pub(crate) fn summed(draws: &[Prepared<'_>], limit: &Limit, settings: &Settings) -> (Sums, [u64; 2]) {
-    let around = surroundings(draws, settings);
+pub(crate) fn weighted_sums(
+    draws: &[Prepared<'_>],
+    limit: &DepthLimits,
+    settings: &Settings,
+) -> (WeightedSums, [u64; 2]) {
+    let ray_scene = occlusion_scene(draws, settings);
     let rect = bounds(draws, limit);
     let n = (rect.w.max(0) * rect.h.max(0)) as usize;
     if n == 0 {
-        return (Sums::default(), [0; 2]);
+        return (WeightedSums::default(), [0; 2]);
     }
     let mut pixels = vec![([0.0_f32; 4], 0.0_f32); n];
     let covered = each_pixel(draws, limit, rect, &mut pixels, |(sum, weight), found, at| {
         let mut through = 1.0;
         for f in found {
             let p = &draws[f.draw];
-            let [r, g, b, a] = p.shaded(f.prim, &f.fragment, settings.mode, around.as_ref(), at);
-            let a = (a * p.draw.look.opacity).clamp(0.0, 1.0);
+            let [r, g, b, a] = p.shaded(f.prim, &f.fragment, settings.mode, ray_scene.as_ref(), at);
+            let a = (a * p.draw.ray_material.opacity).clamp(0.0, 1.0);
             for (sum, c) in sum.iter_mut().zip([r, g, b]) {
                 *sum += a * c;
             }
@@ -133,12 +141,12 @@ pub(crate) fn summed(draws: &[Prepared<'_>], limit: &Limit, settings: &Settings)
         sum[3] = 1.0 - through;
     });
     let (colors, weights) = pixels.into_iter().unzip();
-    (Sums { rect, colors, weights, covered }, cost(around))
+    (WeightedSums { rect, colors, weights, covered }, cost(ray_scene))
 }
 
 /// Shadow rays and ambient occlusion rays.
-fn cost(around: Option<Surroundings<'_>>) -> [u64; 2] {
-    around.map_or([0; 2], |a| [a.shadow_rays.into_inner(), a.occlusion_rays.into_inner()])
+fn cost(ray_scene: Option<RayScene<'_>>) -> [u64; 2] {
+    ray_scene.map_or([0; 2], |a| [a.shadow_rays.into_inner(), a.occlusion_rays.into_inner()])
 }
 
 /// All fragments of a draw in a tile.
@@ -146,16 +154,19 @@ fn through(
     p: &Prepared<'_>,
     draw: usize,
     tile: Rect,
-    limit: &Limit,
+    limit: &DepthLimits,
     rays: &mut TileRays,
-    found: &mut [Vec<Found>; 256],
+    found: &mut [Vec<LayerFragment>; 256],
 ) {
     if tile.and(p.rect).is_empty() || !rays.send(p, tile) {
         return;
     }
     let most = |x: i32, y: i32| {
         let depth = f64::from(limit.depth[y as usize * limit.width + x as usize]);
-        Most { depth: depth + if limit.exact { 0.5 / DEPTH_STEPS } else { EPSILON }, exact: limit.exact }
+        DepthLimit {
+            depth: depth + if limit.exact { 0.5 / DEPTH_STEPS } else { EPSILON },
+            exact: limit.exact,
+        }
     };
     let mut edges = [false; 256];
     for _ in 0..MOST_STEPS {
@@ -176,7 +187,7 @@ fn through(
                         rays.blocks[b].t_max[l] = -1.0;
                         continue;
                     }
-                    Some(fragment) => found[k].push(Found { draw, prim, fragment }),
+                    Some(fragment) => found[k].push(LayerFragment { draw, prim, fragment }),
                 }
                 rays.blocks[b].t_min[l] = t.next_up();
                 on += 1;
@@ -194,19 +205,19 @@ fn through(
     }
     for (k, _) in edges.iter().enumerate().filter(|(_, edge)| **edge) {
         let at = (tile.x + (k % 16) as i32, tile.y + (k / 16) as i32);
-        beside(p, draw, at, most(at.0, at.1), &mut found[k]);
+        hit_beside_center(p, draw, at, most(at.0, at.1), &mut found[k]);
     }
 }
 
 /// How deep fragments of a pixel may be.
 #[derive(Clone, Copy)]
-struct Most {
+struct DepthLimit {
     depth: f64,
     exact: bool,
 }
 
 /// Whether a fragment is behind its limit, where that is not exact by more than roundings.
-fn is_behind(p: &Prepared<'_>, prim: usize, f: &Fragment, most: Most) -> bool {
+fn is_behind(p: &Prepared<'_>, prim: usize, f: &Fragment, most: DepthLimit) -> bool {
     if most.exact {
         return f.depth > most.depth;
     }
@@ -217,7 +228,13 @@ fn is_behind(p: &Prepared<'_>, prim: usize, f: &Fragment, most: Most) -> bool {
 }
 
 /// Fragments of triangles that rays beside the centre meet.
-fn beside(p: &Prepared<'_>, draw: usize, (x, y): (i32, i32), most: Most, found: &mut Vec<Found>) {
+fn hit_beside_center(
+    p: &Prepared<'_>,
+    draw: usize,
+    (x, y): (i32, i32),
+    most: DepthLimit,
+    found: &mut Vec<LayerFragment>,
+) {
     for (dx, dy) in [(-OFF, -OFF), (OFF, -OFF), (-OFF, OFF), (OFF, OFF)] {
         let Some((mut ray, _)) = p.ray(f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy) else { continue };
         for _ in 0..MOST_STEPS {
@@ -230,7 +247,7 @@ fn beside(p: &Prepared<'_>, draw: usize, (x, y): (i32, i32), most: Most, found: 
                 break;
             }
             if !found.iter().any(|f| f.draw == draw && f.prim == prim) {
-                found.push(Found { draw, prim, fragment });
+                found.push(LayerFragment { draw, prim, fragment });
             }
         }
     }
@@ -239,9 +256,9 @@ fn beside(p: &Prepared<'_>, draw: usize, (x, y): (i32, i32), most: Most, found: 
 /// Front to back, premultiplied.
 fn blended(
     draws: &[Prepared<'_>],
-    found: &mut [Found],
+    found: &mut [LayerFragment],
     settings: &Settings,
-    around: Option<&Surroundings<'_>>,
+    ray_scene: Option<&RayScene<'_>>,
     at: (i32, i32),
 ) -> [u8; 4] {
     found.sort_by(|a, b| {
@@ -251,8 +268,8 @@ fn blended(
     let (mut sum, mut left) = ([0.0_f32; 3], 1.0_f32);
     for f in found {
         let p = &draws[f.draw];
-        let [r, g, b, a] = p.shaded(f.prim, &f.fragment, settings.mode, around, at);
-        let a = (a * p.draw.look.opacity).clamp(0.0, 1.0);
+        let [r, g, b, a] = p.shaded(f.prim, &f.fragment, settings.mode, ray_scene, at);
+        let a = (a * p.draw.ray_material.opacity).clamp(0.0, 1.0);
         for (sum, c) in sum.iter_mut().zip([r, g, b]) {
             // As each step is written to a buffer of colours from 0 to 1.
             *sum = (*sum + left * a * c.max(0.0)).min(1.0);

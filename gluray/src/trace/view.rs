@@ -114,7 +114,7 @@ pub(crate) fn eye_from_clip(clip: DMat4, reference: Option<(DMat4, DMat4)>) -> O
 }
 
 /// Gives eye spaces to draws whose shaders do without: VTK's, where a light at the eye needs normals alone.
-pub(crate) fn place<T>(draws: &mut [(Draw, T)]) {
+pub(crate) fn assign_eye_spaces<T>(draws: &mut [(Draw, T)]) {
     let matrices = |d: &Draw| match &d.shading {
         Shading::Program(p) => Some((matrix(&p.clip_from_object), matrix(&p.view_from_object))),
         Shading::Fixed => None,

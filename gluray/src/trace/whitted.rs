@@ -4,10 +4,10 @@
 //! Surfaces are lit as everywhere in these modes, by OpenGL's lighting at the point with shadows and occlusion. Each kind of ray is sent only where a
 //! material or a setting asks for it.
 
-use crate::cluster::row_share::{BAND, Share};
+use crate::cluster::row_share::{BAND, RowShare};
 use crate::host::config::{Mode, Settings, Surface};
 use crate::state::enums::*;
-use crate::trace::occlusion::{Random, Surroundings, eye_from_object};
+use crate::trace::occlusion::{PixelRng, RayScene, eye_from_object};
 use crate::trace::view::View;
 use crate::trace::{Fragment, Prepared, Rect};
 use rayon::prelude::*;
@@ -16,7 +16,7 @@ use rt_core::ray::Ray;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// Premultiplied colours of a rectangle of the window, and what they cost.
-pub(crate) struct Colors {
+pub(crate) struct ColorImage {
     pub(crate) rect: Rect,
     pub(crate) rgba: Vec<[f32; 4]>,
     pub(crate) rays: Vec<(&'static str, u64)>,
@@ -25,17 +25,17 @@ pub(crate) struct Colors {
 
 /// True when a draw's surface is not opaque, by the program or by the user.
 pub(crate) fn is_clear(p: &Prepared<'_>, settings: &Settings) -> bool {
-    let look = &p.draw.look;
-    let through = settings.effects.transparency && (look.opacity < 1.0 || p.draw.state.blend);
-    through || (look.surface == Surface::Glass && settings.effects.refraction)
+    let ray_material = &p.draw.ray_material;
+    let through = settings.effects.transparency && (ray_material.opacity < 1.0 || p.draw.state.blend);
+    through || (ray_material.surface == Surface::Glass && settings.effects.refraction)
 }
 
 /// True when one ray a pixel and OpenGL's lighting are not all that is asked for.
-pub(crate) fn wanted(draws: &[Prepared<'_>], settings: &Settings) -> bool {
+pub(crate) fn is_needed(draws: &[Prepared<'_>], settings: &Settings) -> bool {
     let (e, rich) = (&settings.effects, settings.mode == Mode::Rich);
     let answers = |p: &Prepared<'_>| {
-        let look = &p.draw.look;
-        let mirrors = e.reflections && (look.mirror > 0.0 || look.surface == Surface::Metal);
+        let ray_material = &p.draw.ray_material;
+        let mirrors = e.reflections && (ray_material.mirror > 0.0 || ray_material.surface == Surface::Metal);
         mirrors || is_clear(p, settings)
     };
     (rich || settings.mode == Mode::Enhance) && settings.samples > 1
@@ -43,8 +43,8 @@ pub(crate) fn wanted(draws: &[Prepared<'_>], settings: &Settings) -> bool {
 }
 
 /// A frame's draws of one view, for rays of any origin.
-struct Beyond<'a> {
-    around: Surroundings<'a>,
+struct WhittedTracer<'a> {
+    ray_scene: RayScene<'a>,
     view: &'a View,
     eye_from_object: Vec<DMat4>,
     /// Radiance of what leaves the scene.
@@ -56,7 +56,7 @@ struct Beyond<'a> {
 }
 
 /// A point that a ray met.
-struct Met {
+struct SurfaceHit {
     draw: usize,
     prim: usize,
     fragment: Fragment,
@@ -69,7 +69,7 @@ struct Met {
 
 /// A ray in eye space and how it came about.
 #[derive(Clone, Copy)]
-struct Path {
+struct WhittedRay {
     origin: DVec3,
     dir: DVec3,
     span: [f64; 2],
@@ -90,15 +90,15 @@ pub(crate) fn colors(
     rect: Rect,
     settings: &Settings,
     background: [f32; 3],
-    share: Share,
-) -> Colors {
-    let mut around = Surroundings::of(draws, settings);
-    around.clear = draws.iter().map(|p| is_clear(p, settings)).collect();
+    share: RowShare,
+) -> ColorImage {
+    let mut ray_scene = RayScene::of(draws, settings);
+    ray_scene.clear = draws.iter().map(|p| is_clear(p, settings)).collect();
     let sky = settings.lights.sky as f32;
-    let beyond = Beyond {
+    let beyond = WhittedTracer {
         view,
         eye_from_object: draws.iter().map(|p| eye_from_object(p.draw)).collect(),
-        around,
+        ray_scene,
         sky: background.map(|v| v + sky),
         reflection: AtomicU64::new(0),
         refraction: AtomicU64::new(0),
@@ -117,13 +117,13 @@ pub(crate) fn colors(
         .collect();
     let rays = [
         ("primary", &beyond.primary),
-        ("shadow", &beyond.around.shadow_rays),
-        ("ambient occlusion", &beyond.around.occlusion_rays),
+        ("shadow", &beyond.ray_scene.shadow_rays),
+        ("ambient occlusion", &beyond.ray_scene.occlusion_rays),
         ("reflection", &beyond.reflection),
         ("refraction", &beyond.refraction),
         ("transparency", &beyond.transparency),
     ];
-    Colors { rect, rgba, rays: rays.map(|(name, n)| (name, n.load(Relaxed))).to_vec(), warnings }
+    ColorImage { rect, rgba, rays: rays.map(|(name, n)| (name, n.load(Relaxed))).to_vec(), warnings }
 }
 
 /// Distances along the viewing direction of the nearest and the farthest point of the draws, at least a little before the eye.
@@ -161,9 +161,9 @@ pub(crate) fn lens(
     Ok(Some([e.aperture_radius * diagonal, near + (far - near) * e.focus]))
 }
 
-impl Beyond<'_> {
+impl WhittedTracer<'_> {
     fn lens(&self, warnings: &mut Vec<String>) -> Option<[f64; 2]> {
-        let found = lens(self.around.draws, self.view, self.around.settings, self.around.diagonal);
+        let found = lens(self.ray_scene.draws, self.view, self.ray_scene.settings, self.ray_scene.diagonal);
         found.unwrap_or_else(|why| {
             warnings.push(why);
             None
@@ -172,13 +172,13 @@ impl Beyond<'_> {
 
     /// The mean of a pixel's samples.
     fn pixel(&self, x: i32, y: i32, lens: Option<[f64; 2]>) -> [f32; 4] {
-        let n = self.around.settings.samples.max(1);
+        let n = self.ray_scene.settings.samples.max(1);
         let side = f64::from(n).sqrt().ceil() as u32;
         let mut sum = [0.0_f32; 4];
         for sample in 0..n {
             // Sample 0 of an ordinary picture goes through the centre; the cells of a grid else.
             let seed = (x.wrapping_add((sample as i32).wrapping_mul(0x1_0001)), y ^ (sample as i32) << 16);
-            let mut random = Random::new(seed);
+            let mut random = PixelRng::new(seed);
             let (cx, cy) = (f64::from(sample % side), f64::from(sample / side));
             let (dx, dy) = match n {
                 1 => (0.5, 0.5),
@@ -203,7 +203,7 @@ impl Beyond<'_> {
     }
 
     /// The ray through a point of the window between the near and the far plane.
-    fn primary(&self, x: f64, y: f64, pixel: (i32, i32)) -> Option<Path> {
+    fn primary(&self, x: f64, y: f64, pixel: (i32, i32)) -> Option<WhittedRay> {
         let (origin, dir) = self.view.camera.world_ray(self.view.ndc(x, y));
         let m = self.view.projection;
         let mut span = [f64::NEG_INFINITY, f64::INFINITY];
@@ -221,14 +221,14 @@ impl Beyond<'_> {
         // From the near plane on, so that parallel projections see what is before their origin.
         let (origin, span) =
             if self.view.parallel { (origin + dir * back, [0.0, span[1] - back]) } else { (origin, span) };
-        Some(Path { origin, dir, span: [span[0].max(0.0), span[1]], bounce: 0, weight: 1.0, pixel })
+        Some(WhittedRay { origin, dir, span: [span[0].max(0.0), span[1]], bounce: 0, weight: 1.0, pixel })
     }
 
     /// The nearest surface on a ray; with `pixel` only draws that may cover it.
-    fn closest(&self, path: &Path, pixel: Option<(i32, i32)>) -> Option<Met> {
-        let mut best: Option<Met> = None;
-        for (i, p) in self.around.draws.iter().enumerate() {
-            let Some(m) = self.around.object_from_eye[i] else { continue };
+    fn closest(&self, path: &WhittedRay, pixel: Option<(i32, i32)>) -> Option<SurfaceHit> {
+        let mut best: Option<SurfaceHit> = None;
+        for (i, p) in self.ray_scene.draws.iter().enumerate() {
+            let Some(m) = self.ray_scene.object_from_eye[i] else { continue };
             if let Some((x, y)) = pixel
                 && p.rect.and(Rect { x, y, w: 1, h: 1 }).is_empty()
             {
@@ -240,16 +240,16 @@ impl Beyond<'_> {
             ray.t_min = ((path.span[0] - moved) as f32).max(0.0);
             let t_max = (most - moved) as f32;
             ray.t_max = if t_max.is_finite() { t_max } else { f32::INFINITY };
-            if let Some(met) = self.first_visible(i, path, ray, moved) {
-                best = Some(met);
+            if let Some(hit) = self.first_visible(i, path, ray, moved) {
+                best = Some(hit);
             }
         }
         best
     }
 
     /// The first triangle of a draw on a ray that is neither culled nor clipped.
-    fn first_visible(&self, draw: usize, path: &Path, mut ray: Ray, moved: f64) -> Option<Met> {
-        let p = &self.around.draws[draw];
+    fn first_visible(&self, draw: usize, path: &WhittedRay, mut ray: Ray, moved: f64) -> Option<SurfaceHit> {
+        let p = &self.ray_scene.draws[draw];
         for _ in 0..MOST_LAYERS {
             let hit = p.world.closest(&ray)?;
             let prim = hit.prim as usize;
@@ -279,7 +279,7 @@ impl Beyond<'_> {
             }
             let normal = if left { across } else { -across };
             let fragment = Fragment { weights, depth: 0.0, plain_depth: 0.0, front };
-            return Some(Met {
+            return Some(SurfaceHit {
                 draw,
                 prim,
                 fragment,
@@ -293,13 +293,13 @@ impl Beyond<'_> {
     }
 
     /// What comes along a ray, premultiplied by how much of it surfaces make.
-    fn radiance(&self, path: &Path, pixel: Option<(i32, i32)>) -> [f32; 4] {
+    fn radiance(&self, path: &WhittedRay, pixel: Option<(i32, i32)>) -> [f32; 4] {
         let mut out = [0.0_f32; 4];
         let mut left = 1.0_f32;
         let mut path = *path;
         for _ in 0..MOST_LAYERS {
-            let Some(met) = self.closest(&path, pixel) else { break };
-            let (color, opacity) = self.surface(&met, &path, left);
+            let Some(hit) = self.closest(&path, pixel) else { break };
+            let (color, opacity) = self.surface(&hit, &path, left);
             for k in 0..3 {
                 out[k] += left * opacity * color[k];
             }
@@ -310,7 +310,7 @@ impl Beyond<'_> {
                 break;
             }
             self.transparency.fetch_add(1, Relaxed);
-            path.span[0] = met.t + self.around.diagonal * 1e-6 / path.dir.length();
+            path.span[0] = hit.t + self.ray_scene.diagonal * 1e-6 / path.dir.length();
             path.pixel.1 = path.pixel.1.wrapping_add(0x3331);
         }
         if path.bounce > 0 {
@@ -321,52 +321,53 @@ impl Beyond<'_> {
     }
 
     /// Colour and opacity of a surface.
-    fn surface(&self, met: &Met, path: &Path, left: f32) -> ([f32; 3], f32) {
-        let settings = self.around.settings;
-        let (e, p) = (&settings.effects, &self.around.draws[met.draw]);
-        let look = &p.draw.look;
+    fn surface(&self, hit: &SurfaceHit, path: &WhittedRay, left: f32) -> ([f32; 3], f32) {
+        let settings = self.ray_scene.settings;
+        let (e, p) = (&settings.effects, &self.ray_scene.draws[hit.draw]);
+        let ray_material = &p.draw.ray_material;
         let rgb = |c: [f32; 4]| [c[0], c[1], c[2]];
         let weight = path.weight * left;
         let more = path.bounce < e.max_bounces && weight > LEAST_WEIGHT && settings.mode == Mode::Rich;
         let dir = path.dir.normalize();
-        let cosine = -met.normal.dot(dir);
-        let eye_normal = self.shading_normal(met);
+        let cosine = -hit.normal.dot(dir);
+        let eye_normal = self.shading_normal(hit);
         let mirrored = dir - eye_normal * (2.0 * dir.dot(eye_normal));
         // Shading normals may send a mirrored ray into the surface.
-        let mirrored = mirrored + met.normal * (1e-3 - mirrored.dot(met.normal)).max(0.0);
-        if look.surface == Surface::Glass && e.refraction && more {
-            return (self.glass(met, path, dir, weight), 1.0);
+        let mirrored = mirrored + hit.normal * (1e-3 - mirrored.dot(hit.normal)).max(0.0);
+        if ray_material.surface == Surface::Glass && e.refraction && more {
+            return (self.glass(hit, path, dir, weight), 1.0);
         }
         let lit =
-            || p.shaded_from(met.prim, &met.fragment, settings.mode, Some(&self.around), path.pixel, -dir);
-        if look.surface == Surface::Metal && e.reflections && more {
-            let base = rgb(p.base_color(met.prim, &met.fragment));
+            || p.shaded_from(hit.prim, &hit.fragment, settings.mode, Some(&self.ray_scene), path.pixel, -dir);
+        if ray_material.surface == Surface::Metal && e.reflections && more {
+            let base = rgb(p.base_color(hit.prim, &hit.fragment));
             let grazing = (1.0 - cosine.clamp(0.0, 1.0)).powi(5) as f32;
             let share: [f32; 3] = std::array::from_fn(|k| base[k] + (1.0 - base[k]) * grazing);
-            let rays = if look.roughness > 0.0 && path.bounce == 0 && settings.samples < 16 { 8 } else { 1 };
-            let mut random = Random::new((path.pixel.0 ^ 0x5bd1, path.pixel.1));
+            let rays =
+                if ray_material.roughness > 0.0 && path.bounce == 0 && settings.samples < 16 { 8 } else { 1 };
+            let mut random = PixelRng::new((path.pixel.0 ^ 0x5bd1, path.pixel.1));
             let mut sum = [0.0_f32; 3];
             for _ in 0..rays {
                 // A lobe as wide as GGX' half vectors of this roughness have it at their median.
-                let spread = f64::from(look.roughness * look.roughness);
+                let spread = f64::from(ray_material.roughness * ray_material.roughness);
                 let (u, v) = mirrored.any_orthonormal_pair();
                 let (x, y) = random.on_disk();
                 let d = (mirrored + (u * x + v * y) * spread).normalize();
-                let d = d + met.normal * (1e-3 - d.dot(met.normal)).max(0.0);
-                let c = self.send(met, path, d, weight, &self.reflection);
+                let d = d + hit.normal * (1e-3 - d.dot(hit.normal)).max(0.0);
+                let c = self.send(hit, path, d, weight, &self.reflection);
                 (0..3).for_each(|k| sum[k] += c[k] / rays as f32);
             }
             return (std::array::from_fn(|k| share[k] * sum[k]), 1.0);
         }
         let lit = lit();
         let mut color = rgb(lit);
-        if look.mirror > 0.0 && e.reflections && more {
-            let c = self.send(met, path, mirrored, weight * look.mirror, &self.reflection);
-            (0..3).for_each(|k| color[k] += look.mirror * c[k]);
+        if ray_material.mirror > 0.0 && e.reflections && more {
+            let c = self.send(hit, path, mirrored, weight * ray_material.mirror, &self.reflection);
+            (0..3).for_each(|k| color[k] += ray_material.mirror * c[k]);
         }
         let opacity = if e.transparency && (settings.mode == Mode::Rich) {
             let own = if p.draw.state.blend { lit[3].clamp(0.0, 1.0) } else { 1.0 };
-            own * look.opacity
+            own * ray_material.opacity
         } else {
             1.0
         };
@@ -374,11 +375,11 @@ impl Beyond<'_> {
     }
 
     /// Fresnel's equations for unpolarised light at an interface, and the two rays that they weigh.
-    fn glass(&self, met: &Met, path: &Path, dir: DVec3, weight: f32) -> [f32; 3] {
-        let look = &self.around.draws[met.draw].draw.look;
-        let ior = f64::from(look.ior);
-        let n = met.normal;
-        let eta = if met.outside { 1.0 / ior } else { ior };
+    fn glass(&self, hit: &SurfaceHit, path: &WhittedRay, dir: DVec3, weight: f32) -> [f32; 3] {
+        let ray_material = &self.ray_scene.draws[hit.draw].draw.ray_material;
+        let ior = f64::from(ray_material.ior);
+        let n = hit.normal;
+        let eta = if hit.outside { 1.0 / ior } else { ior };
         let cos_i = -dir.dot(n);
         let sin2_t = eta * eta * (1.0 - cos_i * cos_i);
         let (share, bent) = if sin2_t >= 1.0 {
@@ -393,24 +394,31 @@ impl Beyond<'_> {
         };
         let share = share as f32;
         let mut out = [0.0; 3];
-        if self.around.settings.effects.reflections && weight * share > LEAST_WEIGHT {
-            let c = self.send(met, path, dir + n * (2.0 * cos_i), weight * share, &self.reflection);
+        if self.ray_scene.settings.effects.reflections && weight * share > LEAST_WEIGHT {
+            let c = self.send(hit, path, dir + n * (2.0 * cos_i), weight * share, &self.reflection);
             (0..3).for_each(|k| out[k] += share * c[k]);
         }
         if share < 1.0 {
-            let inside = Met { normal: -n, ..*met };
+            let inside = SurfaceHit { normal: -n, ..*hit };
             let c = self.send(&inside, path, bent, weight * (1.0 - share), &self.refraction);
-            (0..3).for_each(|k| out[k] += (1.0 - share) * look.tint[k] * c[k]);
+            (0..3).for_each(|k| out[k] += (1.0 - share) * ray_material.tint[k] * c[k]);
         }
         out
     }
 
     /// Light from direction `dir`, on the side of the normal.
-    fn send(&self, met: &Met, path: &Path, dir: DVec3, weight: f32, count: &AtomicU64) -> [f32; 3] {
+    fn send(
+        &self,
+        hit: &SurfaceHit,
+        path: &WhittedRay,
+        dir: DVec3,
+        weight: f32,
+        count: &AtomicU64,
+    ) -> [f32; 3] {
         count.fetch_add(1, Relaxed);
-        let from = Path {
+        let from = WhittedRay {
             // Off the surface as rays to lights are.
-            origin: met.point + met.normal * (self.around.diagonal * 2e-5),
+            origin: hit.point + hit.normal * (self.ray_scene.diagonal * 2e-5),
             dir,
             span: [0.0, f64::INFINITY],
             bounce: path.bounce + 1,
@@ -422,12 +430,12 @@ impl Beyond<'_> {
     }
 
     /// Unit shading normal on the side that the ray came from.
-    fn shading_normal(&self, met: &Met) -> DVec3 {
-        let p = &self.around.draws[met.draw];
-        let n = p.smooth_normal(met.prim, met.fragment.weights.map(|w| w as f32));
+    fn shading_normal(&self, hit: &SurfaceHit) -> DVec3 {
+        let p = &self.ray_scene.draws[hit.draw];
+        let n = p.smooth_normal(hit.prim, hit.fragment.weights.map(|w| w as f32));
         let n = DVec3::from_array(n.map(f64::from)).normalize_or_zero();
-        match n.dot(met.normal) {
-            0.0 => met.normal,
+        match n.dot(hit.normal) {
+            0.0 => hit.normal,
             d if d < 0.0 => -n,
             _ => n,
         }

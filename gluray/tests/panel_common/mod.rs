@@ -3,8 +3,8 @@
 
 use gluray::config::Settings;
 use gluray::export::{Object, Scene, write_scene};
-use gluray::panel::link::Wish;
-use gluray::panel::{FrameStats, Hello, Link, Meeting, ObjectInfo, endpoint};
+use gluray::panel::link::PanelCommand;
+use gluray::panel::{FrameStats, Hello, Link, ObjectInfo, PanelEndpoint, endpoint};
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -66,8 +66,8 @@ impl Panel {
         endpoint::file_in(&self.runtime.path().join("gluray"))
     }
 
-    pub(crate) fn meeting(&self) -> Meeting {
-        Meeting::read(&self.meeting_file()).expect("the panel has published where it is")
+    pub(crate) fn endpoint(&self) -> PanelEndpoint {
+        PanelEndpoint::read(&self.meeting_file()).expect("the panel has published where it is")
     }
 
     /// Sends bytes as they are to the page's port and reads the answer, if one comes.
@@ -130,12 +130,12 @@ pub(crate) struct Fake {
 }
 
 impl Fake {
-    pub(crate) fn start(name: &str, meeting: Meeting, scenes: &Path) -> Fake {
+    pub(crate) fn start(name: &str, endpoint: PanelEndpoint, scenes: &Path) -> Fake {
         let settings = Arc::new(Mutex::new(Settings::default()));
         let stop = Arc::new(AtomicBool::new(false));
         let (mine, ends, name, scenes) =
             (settings.clone(), stop.clone(), name.to_owned(), scenes.to_path_buf());
-        let thread = std::thread::spawn(move || run(&name, meeting, &scenes, &mine, &ends));
+        let thread = std::thread::spawn(move || run(&name, endpoint, &scenes, &mine, &ends));
         Fake { settings, stop, thread: Some(thread) }
     }
 
@@ -162,9 +162,9 @@ impl Drop for Fake {
     }
 }
 
-fn run(name: &str, meeting: Meeting, scenes: &Path, settings: &Mutex<Settings>, stop: &AtomicBool) {
+fn run(name: &str, endpoint: PanelEndpoint, scenes: &Path, settings: &Mutex<Settings>, stop: &AtomicBool) {
     let hello = Hello { program: name.into(), process: std::process::id(), ..Hello::default() };
-    let mut link = Link::connect(meeting, hello);
+    let mut link = Link::connect(endpoint, hello);
     let objects: Vec<ObjectInfo> = (0..30u64)
         .map(|i| ObjectInfo {
             key: format!("{:08x}", 0x3f2a_0000 + i),
@@ -177,8 +177,8 @@ fn run(name: &str, meeting: Meeting, scenes: &Path, settings: &Mutex<Settings>, 
     while !stop.load(Ordering::Relaxed) {
         frame += 1;
         match link.poll() {
-            Some(Wish::Settings(s)) => *settings.lock().unwrap() = *s,
-            Some(Wish::Export) => {
+            Some(PanelCommand::Settings(s)) => *settings.lock().unwrap() = *s,
+            Some(PanelCommand::Export) => {
                 let file = scenes.join(format!("{name}-{frame}.gluray"));
                 write_scene(&file, &triangle(name, frame)).unwrap();
                 link.exported(Ok(&file));

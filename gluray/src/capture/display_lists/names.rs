@@ -1,7 +1,7 @@
 //! Names of lists: those that `glGenLists` gives, and those that `glCallLists` gets in any of OpenGL's types.
 
-use super::FIRST_PIECE;
-use crate::interpose::context::{Context, Sink};
+use super::FIRST_SEGMENT;
+use crate::interpose::context::{Context, ImmediateModeTarget};
 use crate::interpose::driver::gl;
 use crate::state::enums::*;
 
@@ -13,32 +13,32 @@ impl Context {
     /// aven) end there. So they get the names after the greatest of their own, as Mesa gives them, and an empty list of the driver's for each. `None` leaves
     /// the call to the driver.
     pub(crate) fn gen_lists(&mut self, n: i32) -> Option<u32> {
-        if self.sink == Sink::Trace {
-            self.unswallow("glGenLists between Begin and End");
+        if self.immediate_target == ImmediateModeTarget::Trace {
+            self.replay_to_driver("glGenLists between Begin and End");
         }
         if !(1..=MOST_NAMES).contains(&n)
-            || self.sink == Sink::Pass
-            || self.can.core
+            || self.immediate_target == ImmediateModeTarget::Pass
+            || self.capabilities.core
             || crate::interpose::panic_guard::happened()
         {
             return None;
         }
         let first = {
             let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
-            let last = lists.greatest.checked_add(n.cast_unsigned()).filter(|last| *last < FIRST_PIECE)?;
+            let last = lists.greatest.checked_add(n.cast_unsigned()).filter(|last| *last < FIRST_SEGMENT)?;
             std::mem::replace(&mut lists.greatest, last) + 1
         };
         // Where a list is compiled its piece ends before.
         let compiling = self.recording.is_some();
         if compiling {
-            self.close_piece();
+            self.close_segment();
         }
         for name in first..first + n.cast_unsigned() {
             gl::new_list(name, COMPILE);
             gl::end_list();
         }
         if compiling {
-            self.open_piece();
+            self.open_segment();
         }
         Some(first)
     }

@@ -6,7 +6,7 @@ use crate::state::enums::*;
 
 /// How many parameters maps have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(crate) enum MapKind {
     /// `GL_MAP1_…`: curves.
     Curve,
     /// `GL_MAP2_…`: surfaces.
@@ -15,7 +15,7 @@ pub(crate) enum Kind {
 
 /// One map. Its control points have four values, of which the program gave the first `size`.
 #[derive(Debug, Clone, PartialEq)]
-struct Map {
+struct ControlPointMap {
     points: Vec<[f32; 4]>,
     size: usize,
     /// Points in `u` and in `v`; one of the latter for a curve.
@@ -27,7 +27,7 @@ struct Map {
 
 /// A vertex by evaluators. What no map gives is current.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Evaluated {
+pub(crate) struct EvaluatedVertex {
     pub(crate) position: [f32; 4],
     pub(crate) normal: Option<[f32; 3]>,
     pub(crate) color: Option<[f32; 4]>,
@@ -36,12 +36,12 @@ pub(crate) struct Evaluated {
 
 /// The maps of one kind that count.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Maps {
-    vertex: Option<Map>,
+pub(crate) struct EvaluatorMaps {
+    vertex: Option<ControlPointMap>,
     auto_normal: bool,
-    normal: Option<Map>,
-    color: Option<Map>,
-    tex: Option<Map>,
+    normal: Option<ControlPointMap>,
+    color: Option<ControlPointMap>,
+    tex: Option<ControlPointMap>,
 }
 
 /// Targets in the order that OpenGL numbers them in from `GL_MAP1_COLOR_4` and `GL_MAP2_COLOR_4` on.
@@ -51,15 +51,15 @@ const TEXTURE_COORD_1: u32 = 3;
 const VERTEX_3: u32 = 7;
 const VERTEX_4: u32 = 8;
 
-impl Map {
+impl ControlPointMap {
     /// The driver's map of `size` values a point.
-    fn query(kind: Kind, target: u32, size: usize) -> Map {
-        let (orders, values) = gl::map_points(target, size, kind == Kind::Surface);
+    fn query(kind: MapKind, target: u32, size: usize) -> ControlPointMap {
+        let (orders, values) = gl::map_points(target, size, kind == MapKind::Surface);
         let domain = gl::map_domain(target);
         let four = |v: &[f32]| std::array::from_fn(|k| v.get(k).copied().unwrap_or(0.0));
         let points = values.chunks_exact(size).map(four).collect();
-        let mut map = Map { points, size, orders, first: [0.0; 2], scale: [0.0; 2] };
-        for k in 0..if kind == Kind::Surface { 2 } else { 1 } {
+        let mut map = ControlPointMap { points, size, orders, first: [0.0; 2], scale: [0.0; 2] };
+        for k in 0..if kind == MapKind::Surface { 2 } else { 1 } {
             map.first[k] = domain[2 * k];
             map.scale[k] = 1.0 / (domain[2 * k + 1] - domain[2 * k]);
         }
@@ -81,19 +81,19 @@ impl Map {
     }
 }
 
-impl Maps {
+impl EvaluatorMaps {
     /// Asks the driver.
-    pub(crate) fn query(kind: Kind) -> Maps {
-        let first = if kind == Kind::Curve { MAP1_COLOR_4 } else { MAP2_COLOR_4 };
+    pub(crate) fn query(kind: MapKind) -> EvaluatorMaps {
+        let first = if kind == MapKind::Curve { MAP1_COLOR_4 } else { MAP2_COLOR_4 };
         // The last one that is on has precedence.
         let one_of = |targets: std::ops::RangeInclusive<u32>, least: usize| {
             let from = *targets.start();
             let on = targets.rev().find(|t| gl::is_enabled(first + t))?;
-            Some(Map::query(kind, first + on, least + (on - from) as usize))
+            Some(ControlPointMap::query(kind, first + on, least + (on - from) as usize))
         };
-        Maps {
+        EvaluatorMaps {
             vertex: one_of(VERTEX_3..=VERTEX_4, 3),
-            auto_normal: kind == Kind::Surface && gl::is_enabled(AUTO_NORMAL),
+            auto_normal: kind == MapKind::Surface && gl::is_enabled(AUTO_NORMAL),
             normal: one_of(NORMAL..=NORMAL, 3),
             color: one_of(COLOR_4..=COLOR_4, 4),
             tex: one_of(TEXTURE_COORD_1..=TEXTURE_COORD_1 + 3, 1),
@@ -111,7 +111,7 @@ impl Maps {
     }
 
     /// What evaluation leaves to the driver, in words.
-    pub(crate) fn unfollowed(&self) -> Option<&'static str> {
+    pub(crate) fn unsupported(&self) -> Option<&'static str> {
         let map = self.vertex.as_ref().filter(|_| self.auto_normal)?;
         if map.orders.contains(&1) {
             return Some("automatic normals of a surface that has no tangents");
@@ -122,11 +122,12 @@ impl Maps {
     }
 
     /// The vertex at a point of the domain. `None` when there is no map of vertices: then nothing is drawn.
-    pub(crate) fn at(&self, at: [f32; 2]) -> Option<Evaluated> {
+    pub(crate) fn at(&self, at: [f32; 2]) -> Option<EvaluatedVertex> {
         let map = self.vertex.as_ref()?;
-        let of = |m: &Option<Map>| m.as_ref().map(|m| m.at(at));
-        let mut out = Evaluated { color: of(&self.color), tex: of(&self.tex), ..Evaluated::default() };
-        if self.auto_normal && self.unfollowed().is_none() {
+        let of = |m: &Option<ControlPointMap>| m.as_ref().map(|m| m.at(at));
+        let mut out =
+            EvaluatedVertex { color: of(&self.color), tex: of(&self.tex), ..EvaluatedVertex::default() };
+        if self.auto_normal && self.unsupported().is_none() {
             let found = casteljau::point_and_tangents(&map.points, map.orders, map.inner(at));
             out.position = map.filled(found[0]);
             out.normal = Some(casteljau::normal(found, map.size == 4));
@@ -142,16 +143,19 @@ impl Maps {
 mod tests {
     use super::*;
 
-    fn map(points: &[[f32; 4]], orders: [usize; 2], size: usize) -> Option<Map> {
-        Some(Map { points: points.to_vec(), size, orders, first: [1.0, 2.0], scale: [0.5, 0.25] })
+    fn map(points: &[[f32; 4]], orders: [usize; 2], size: usize) -> Option<ControlPointMap> {
+        Some(ControlPointMap { points: points.to_vec(), size, orders, first: [1.0, 2.0], scale: [0.5, 0.25] })
     }
 
     #[test]
     fn domains_are_mapped_and_what_no_map_gives_stays_current() {
         let corners =
             [[0.0, 0.0, 0.0, 0.0], [0.0, 4.0, 0.0, 0.0], [2.0, 0.0, 0.0, 0.0], [2.0, 4.0, 1.0, 0.0]];
-        let mut maps =
-            Maps { vertex: map(&corners, [2, 2], 3), tex: map(&corners, [2, 2], 2), ..Maps::default() };
+        let mut maps = EvaluatorMaps {
+            vertex: map(&corners, [2, 2], 3),
+            tex: map(&corners, [2, 2], 2),
+            ..EvaluatorMaps::default()
+        };
         let found = maps.at([2.0, 4.0]).unwrap();
         assert_eq!(found.position, [1.0, 2.0, 0.25, 1.0]);
         assert_eq!(found.tex, Some([1.0, 2.0, 0.0, 1.0]));
@@ -166,13 +170,14 @@ mod tests {
     #[test]
     fn automatic_normals_that_drivers_do_not_agree_on_are_told_by_name() {
         let points = [[0.0; 4]; 4];
-        let mut maps = Maps { vertex: map(&points, [2, 2], 3), auto_normal: true, ..Maps::default() };
-        assert_eq!(maps.unfollowed(), None);
+        let mut maps =
+            EvaluatorMaps { vertex: map(&points, [2, 2], 3), auto_normal: true, ..EvaluatorMaps::default() };
+        assert_eq!(maps.unsupported(), None);
         maps.vertex.as_mut().unwrap().scale[1] = -0.25;
-        assert!(maps.unfollowed().unwrap().contains("backwards"));
+        assert!(maps.unsupported().unwrap().contains("backwards"));
         maps.vertex = map(&points, [4, 1], 3);
-        assert!(maps.unfollowed().unwrap().contains("no tangents"));
+        assert!(maps.unsupported().unwrap().contains("no tangents"));
         maps.auto_normal = false;
-        assert_eq!(maps.unfollowed(), None);
+        assert_eq!(maps.unsupported(), None);
     }
 }

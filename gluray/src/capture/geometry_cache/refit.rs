@@ -28,9 +28,9 @@ pub(super) fn structure(before: &Geometry, mesh: &Arc<TriMesh>) -> Option<Arc<Wo
 
 #[cfg(test)]
 mod tests {
-    use crate::capture::draw::Run;
-    use crate::capture::geometry_cache::{Cache, Structures};
-    use crate::capture::primitives::Split;
+    use crate::capture::draw::PrimitiveRun;
+    use crate::capture::geometry_cache::{BuildCounts, GeometryCache};
+    use crate::capture::primitives::QuadSplit;
     use crate::state::enums::TRIANGLES;
     use rt_core::glam::Vec3;
     use rt_core::ray::Ray;
@@ -51,11 +51,11 @@ mod tests {
 
     #[test]
     fn triangles_that_move_a_little_keep_their_tree_and_those_that_scatter_get_a_new_one() {
-        let mut cache = Cache::default();
-        let runs = [Run { mode: TRIANGLES, count: 3, times: 7200 }];
-        let mut made = Structures::default();
+        let mut cache = GeometryCache::default();
+        let runs = [PrimitiveRun { mode: TRIANGLES, count: 3, times: 7200 }];
+        let mut made = BuildCounts::default();
         let mut frame = |phase: f32, scattered: bool| {
-            let g = cache.of_runs(&sheet(phase, scattered), &runs, &Split::default());
+            let g = cache.of_runs(&sheet(phase, scattered), &runs, &QuadSplit::default());
             let world = g.world(&mut made).expect("a mesh that can be built");
             let (origin, toward) = (Vec3::new(20.3, 30.6, 50.0), -Vec3::Z);
             let hit = world
@@ -65,16 +65,16 @@ mod tests {
             (hit, made)
         };
         let (_, first) = frame(0.0, false);
-        assert_eq!(first, Structures { built: 1, refitted: 0 });
+        assert_eq!(first, BuildCounts { built: 1, refitted: 0 });
         let (moved, second) = frame(0.2, false);
-        assert_eq!(second, Structures { built: 1, refitted: 1 });
+        assert_eq!(second, BuildCounts { built: 1, refitted: 1 });
         let (_, back) = frame(0.0, false);
         assert_eq!(back, second, "what was before kept its own tree");
         let (_, third) = frame(0.2, true);
-        assert_eq!(third, Structures { built: 2, refitted: 1 });
-        let mut fresh = Cache::default();
-        let g = fresh.of_runs(&sheet(0.2, false), &runs, &Split::default());
-        let world = g.world(&mut Structures::default()).expect("a mesh that can be built");
+        assert_eq!(third, BuildCounts { built: 2, refitted: 1 });
+        let mut fresh = GeometryCache::default();
+        let g = fresh.of_runs(&sheet(0.2, false), &runs, &QuadSplit::default());
+        let world = g.world(&mut BuildCounts::default()).expect("a mesh that can be built");
         let ray: Ray = world.ray_from_world(Vec3::new(20.3, 30.6, 50.0).as_dvec3(), -Vec3::Z.as_dvec3()).0;
         assert_eq!(world.closest(&ray), Some(moved));
     }

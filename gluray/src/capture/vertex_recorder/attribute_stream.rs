@@ -3,7 +3,7 @@
 use crate::capture::draw::Values;
 
 /// A stream of one attribute that costs nothing while it does not change.
-pub(super) struct Stream<const N: usize> {
+pub(super) struct AttributeStream<const N: usize> {
     pub(super) varying: bool,
     pub(super) constant: [f32; N],
     pub(super) values: Vec<[f32; N]>,
@@ -11,13 +11,13 @@ pub(super) struct Stream<const N: usize> {
     spares: Vec<Vec<[f32; N]>>,
 }
 
-impl<const N: usize> Default for Stream<N> {
+impl<const N: usize> Default for AttributeStream<N> {
     fn default() -> Self {
-        Stream { varying: false, constant: [0.0; N], values: Vec::new(), spares: Vec::new() }
+        AttributeStream { varying: false, constant: [0.0; N], values: Vec::new(), spares: Vec::new() }
     }
 }
 
-impl<const N: usize> Stream<N> {
+impl<const N: usize> AttributeStream<N> {
     #[inline(always)]
     pub(super) fn set(&mut self, v: [f32; N], vertices: usize) {
         if self.varying {
@@ -47,8 +47,8 @@ impl<const N: usize> Stream<N> {
         }
     }
 
-    /// Takes back what [`Stream::take`] gave out.
-    pub(super) fn give_back(&mut self, values: Values<N>) {
+    /// Takes back what [`AttributeStream::take`] gave out.
+    pub(super) fn recycle(&mut self, values: Values<N>) {
         if let Values::PerVertex(v) = values {
             self.spare(v);
         }

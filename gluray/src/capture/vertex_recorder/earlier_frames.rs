@@ -1,30 +1,30 @@
 //! Batches of earlier frames, which may come again vertex by vertex.
 
-use super::Recorder;
+use super::VertexRecorder;
 use super::attribute_stream::same_bits;
-use crate::capture::draw::{Attributes, Run, Values};
+use crate::capture::draw::{Attributes, PrimitiveRun, Values};
 use crate::capture::geometry_cache::Geometry;
-use crate::capture::primitives::Split;
+use crate::capture::primitives::QuadSplit;
 use crate::state::current_attributes::Materials;
 use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 
 /// A batch of an earlier frame, which may come again vertex by vertex.
-pub(super) struct Expected {
+pub(super) struct EarlierBatch {
     geometry: Arc<Geometry>,
     pub(super) mesh: Arc<TriMesh>,
-    runs: Vec<Run>,
-    kind: Split,
+    runs: Vec<PrimitiveRun>,
+    kind: QuadSplit,
     frame: u64,
     /// Its normals when nobody needs them any more, and the version of the attributes that they are of.
     normals: Option<(Vec<[f32; 3]>, u64)>,
     /// What else the attributes of that version are, where that is the same for all vertices.
-    constants: Option<Constants>,
+    constants: Option<ConstantAttributes>,
 }
 
 /// Attributes that are the same for all vertices of a batch.
 #[derive(Clone, PartialEq)]
-pub(super) struct Constants {
+pub(super) struct ConstantAttributes {
     version: u64,
     /// Of batches of one normal.
     normal: Option<[u32; 3]>,
@@ -33,7 +33,7 @@ pub(super) struct Constants {
     materials: Materials,
 }
 
-impl Recorder {
+impl VertexRecorder {
     /// Normals are not all the same: those of the earlier batch are compared with, or all are written down.
     #[cold]
     pub(super) fn vary_normals(&mut self) {
@@ -43,8 +43,8 @@ impl Recorder {
             let (values, version) = e.normals.take()?;
             (values.len() == mesh.positions.len()).then_some((values, version))
         });
-        let Some((mut values, version)) = expected else { return self.normals.vary(self.settled) };
-        let (before, constant) = (&mut values[..self.settled], self.normals.constant);
+        let Some((mut values, version)) = expected else { return self.normals.vary(self.flushed) };
+        let (before, constant) = (&mut values[..self.flushed], self.normals.constant);
         self.changed = !before.iter().all(|v| same_bits(&[*v], &[constant]));
         before.fill(constant);
         self.kept = Some(version);
@@ -53,7 +53,7 @@ impl Recorder {
     }
 
     /// The geometry of the batch, when it is all that an earlier one was.
-    pub(crate) fn followed(&mut self, kind: &Split) -> Option<Arc<Geometry>> {
+    pub(crate) fn take_followed_geometry(&mut self, kind: &QuadSplit) -> Option<Arc<Geometry>> {
         let mesh = self.expected.as_ref()?;
         let first = mesh.positions[0].to_array().map(f32::to_bits);
         let e = self.earlier.get_mut(&first)?;
@@ -67,12 +67,12 @@ impl Recorder {
     }
 
     /// This is what the batch was; it may come again.
-    pub(crate) fn expect(&mut self, geometry: &Arc<Geometry>, kind: &Split) {
+    pub(crate) fn remember_batch(&mut self, geometry: &Arc<Geometry>, kind: &QuadSplit) {
         const WORTH_FOLLOWING: usize = 1000;
         if self.positions.len() >= WORTH_FOLLOWING {
             let (geometry, mesh) = (geometry.clone(), geometry.mesh.clone());
             let (runs, kind, frame) = (self.runs.clone(), kind.clone(), self.frame);
-            let e = Expected { geometry, mesh, runs, kind, frame, normals: None, constants: None };
+            let e = EarlierBatch { geometry, mesh, runs, kind, frame, normals: None, constants: None };
             self.earlier.insert(self.positions[0].map(f32::to_bits), e);
         }
     }
@@ -85,13 +85,13 @@ impl Recorder {
         self.earlier.retain(|_, e| now - e.frame <= KEPT_FRAMES);
     }
 
-    fn earlier(&mut self, geometry: &Arc<Geometry>) -> Option<&mut Expected> {
+    fn earlier(&mut self, geometry: &Arc<Geometry>) -> Option<&mut EarlierBatch> {
         let first = geometry.mesh.positions.first()?.to_array().map(f32::to_bits);
         self.earlier.get_mut(&first).filter(|e| Arc::ptr_eq(&e.geometry, geometry))
     }
 
     /// Attributes that nobody needs any more: their memory serves again, and the normals are what is compared with next.
-    pub(crate) fn give_back(&mut self, a: Attributes, geometry: &Arc<Geometry>) {
+    pub(crate) fn recycle(&mut self, a: Attributes, geometry: &Arc<Geometry>) {
         let version = a.version;
         let mut normals = a.normals;
         if let Values::PerVertex(v) = &mut normals
@@ -102,15 +102,15 @@ impl Recorder {
             let old = e.normals.replace((std::mem::take(v), version));
             normals = old.map_or(Values::Constant([0.0; 3]), |(v, _)| Values::PerVertex(v));
         }
-        self.normals.give_back(normals);
-        self.colors.give_back(a.colors);
-        self.tex.give_back(a.tex);
+        self.normals.recycle(normals);
+        self.colors.recycle(a.colors);
+        self.tex.recycle(a.tex);
     }
 
     /// Names the attributes of a batch that may come again: those that are what they were in the frame before have the name that they had. 0 for others.
     pub(super) fn version(&mut self, geometry: &Arc<Geometry>) -> u64 {
         let one = self.normals.constant.map(f32::to_bits);
-        let mut constants = Constants {
+        let mut constants = ConstantAttributes {
             version: self.versions + 1,
             normal: (!self.normals.varying).then_some(one),
             color: self.colors.constant.map(f32::to_bits),

@@ -1,7 +1,7 @@
 //! What VTK writes into the shaders of surfaces, piece by piece and in the order in which it writes
 //! the pieces. `#` is a number.
 
-use super::signature::Pictured;
+use super::signature::ActorTexture;
 
 /// Most lights that VTK writes into a shader.
 pub(super) const MOST_LIGHTS: usize = 6;
@@ -239,9 +239,9 @@ pub(super) const LAMP: &str = "attenuation = 1.0;
 pub(super) const ALBEDO: &str = "vec3 albedo = diffuseColor;";
 pub(super) const ALBEDO_OF_TEXTURE: &str = "vec4 albedoSample = texture(albedoTex, tcoordVCVSOutput);
      vec3 albedo = albedoSample.rgb * diffuseColor;";
-pub(super) const ALBEDO_ALPHA: [(Pictured, &str); 2] = [
-    (Pictured::Albedo, "opacity = opacityUniform * albedoSample.a;"),
-    (Pictured::AlbedoAlone, "opacity = albedoSample.a;"),
+pub(super) const ALBEDO_ALPHA: [(ActorTexture, &str); 2] = [
+    (ActorTexture::Albedo, "opacity = opacityUniform * albedoSample.a;"),
+    (ActorTexture::AlbedoAlone, "opacity = albedoSample.a;"),
 ];
 /// What goes on behind it.
 pub(super) const PHYSICAL: &str = "float roughness = roughnessUniform;
@@ -330,11 +330,11 @@ pub(super) const PHYSICAL_ENDS: [&str; 2] = [
 /// The texture of an actor, by its number in the shader: read, its components, and what is done
 /// with it.
 pub(super) const READS: &str = "vec4 tcolor_# = texture(actortexture, tcoordVCVSOutput);";
-pub(super) const COMPONENTS: [(Pictured, &str); 4] = [
-    (Pictured::Rgb, "tcolor_# = vec4(tcolor_#.r,tcolor_#.g,tcolor_#.b,1.0);"),
-    (Pictured::Grey, "tcolor_# = vec4(tcolor_#.r,tcolor_#.r,tcolor_#.r,1.0);"),
-    (Pictured::GreyAlpha, "tcolor_# = vec4(tcolor_#.r,tcolor_#.r,tcolor_#.r,tcolor_#.g);"),
-    (Pictured::Rgba, ""),
+pub(super) const COMPONENTS: [(ActorTexture, &str); 4] = [
+    (ActorTexture::Rgb, "tcolor_# = vec4(tcolor_#.r,tcolor_#.g,tcolor_#.b,1.0);"),
+    (ActorTexture::Grey, "tcolor_# = vec4(tcolor_#.r,tcolor_#.r,tcolor_#.r,1.0);"),
+    (ActorTexture::GreyAlpha, "tcolor_# = vec4(tcolor_#.r,tcolor_#.r,tcolor_#.r,tcolor_#.g);"),
+    (ActorTexture::Rgba, ""),
 ];
 pub(super) const MULTIPLIES: &str = "vec4 tcolor = tcolor_#;
      if (gl_FrontFacing == true || showTexturesOnBackface)

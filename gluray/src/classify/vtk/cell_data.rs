@@ -1,6 +1,6 @@
 //! Buffer textures: what VTK has for each cell, by the number of the triangle.
 
-use crate::interpose::client_memory::{Layout, Source};
+use crate::interpose::client_memory::{ArrayLayout, ArraySource};
 use crate::interpose::driver::gl;
 use crate::state::enums::*;
 use crate::trace::texturing::Image;
@@ -12,7 +12,7 @@ const RGBA32F: u32 = 0x8814;
 const R8: u32 = 0x8229;
 
 /// The buffer behind the buffer texture that a program's sampler has.
-pub(super) fn buffer_texture(program: u32, sampler: &str) -> Result<Source, &'static str> {
+pub(super) fn buffer_texture(program: u32, sampler: &str) -> Result<ArraySource, &'static str> {
     let at = gl::uniform_location(program, sampler);
     let unit = if at < 0 { 0 } else { gl::uniform_i::<1>(program, at)[0].max(0) };
     let active = gl::word(ACTIVE_TEXTURE);
@@ -30,12 +30,12 @@ pub(super) fn buffer_texture(program: u32, sampler: &str) -> Result<Source, &'st
     if bound == 0 {
         return Err("a buffer texture without a buffer");
     }
-    let layout = Layout { size, kind, stride: 0, address: 0, buffer, normalized };
-    Source::in_buffer(layout).ok_or("a buffer texture without a buffer")
+    let layout = ArrayLayout { size, kind, stride: 0, address: 0, buffer, normalized };
+    ArraySource::in_buffer(layout).ok_or("a buffer texture without a buffer")
 }
 
 /// Colours of `count` triangles from number `first` on.
-pub(super) fn colors(source: &Source, first: usize, count: usize) -> Result<Arc<Image>, &'static str> {
+pub(super) fn colors(source: &ArraySource, first: usize, count: usize) -> Result<Arc<Image>, &'static str> {
     let packed = source.read_range(first, count)?;
     if packed.size != 4 {
         return Err("colours of cells without four components");
@@ -47,7 +47,7 @@ pub(super) fn colors(source: &Source, first: usize, count: usize) -> Result<Arc<
 }
 
 /// Which sides of `count` triangles from number `first` on are edges of their cells.
-pub(super) fn sides(source: &Source, first: usize, count: usize) -> Result<Arc<Vec<u8>>, &'static str> {
+pub(super) fn sides(source: &ArraySource, first: usize, count: usize) -> Result<Arc<Vec<u8>>, &'static str> {
     let packed = source.read_range(first, count)?;
     match (packed.kind, packed.size) {
         (UNSIGNED_BYTE, 1) => Ok(Arc::new(packed.bytes)),

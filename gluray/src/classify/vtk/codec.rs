@@ -1,16 +1,16 @@
 //! Recognised programs as messages to other ranks. Colour map and picture go by their names.
 
 use super::color::Surface;
-use super::program::{Edges, Lamp, Physical, ProgramLight};
-use super::signature::{Colors, Peel, Pictured, Template};
-use super::{Image, Recognised};
-use crate::cluster::codec::{Malformed, Reader, Wire, put_pods, wire_enum, wire_struct};
+use super::program::{CellEdges, PbrMaterial, PositionalLight, ProgramLight};
+use super::signature::{ActorTexture, ColorSource, TranslucencyPass, VtkShaderSignature};
+use super::{Image, VtkProgram};
+use crate::cluster::codec::{MalformedMessage, Reader, Wire, put_pods, wire_enum, wire_struct};
 use std::sync::Arc;
 
-wire_enum!(Colors { Uniform, PerVertex, Map, PerCell });
-wire_enum!(Peel { No, Depths, Layers, Weighted });
-wire_enum!(Pictured { No, Rgba, Rgb, Grey, GreyAlpha, Albedo, AlbedoAlone });
-wire_struct!(Template {
+wire_enum!(ColorSource { Uniform, PerVertex, Map, PerCell });
+wire_enum!(TranslucencyPass { No, Depths, Layers, Weighted });
+wire_enum!(ActorTexture { No, Rgba, Rgb, Grey, GreyAlpha, Albedo, AlbedoAlone });
+wire_struct!(VtkShaderSignature {
     colors,
     overrides,
     flat,
@@ -24,39 +24,39 @@ wire_struct!(Template {
     edges,
     physical,
     linear,
-    pictured,
+    actor_texture,
     two_coordinates,
-    turned,
-    moved_back,
+    has_texture_matrix,
+    depth_offset,
     cosines_from_zero,
     lobes_have_an_end,
 });
-wire_struct!(Lamp { position, attenuation, cone_deg, exponent });
-wire_struct!(ProgramLight { travels, color, lamp });
+wire_struct!(PositionalLight { position, attenuation, cone_deg, exponent });
+wire_struct!(ProgramLight { direction, color, lamp });
 wire_struct!(Surface { ambient, diffuse, specular, power, alpha });
-wire_struct!(Physical { metallic, roughness, base, tint, least_divisor });
+wire_struct!(PbrMaterial { metallic, roughness, base, tint, least_divisor });
 
-impl Wire for Edges {
+impl Wire for CellEdges {
     fn put(&self, out: &mut Vec<u8>) {
         put_pods(out, &self.sides);
         ([self.width, self.opacity], self.color).put(out);
         self.viewport.put(out);
     }
-    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
+    fn get(from: &mut Reader<'_>) -> Result<Self, MalformedMessage> {
         let sides = Arc::new(from.pods()?);
         let ([width, opacity], color) = Wire::get(from)?;
-        Ok(Edges { sides, width, color, opacity, viewport: Wire::get(from)? })
+        Ok(CellEdges { sides, width, color, opacity, viewport: Wire::get(from)? })
     }
 }
 
-impl Recognised {
+impl VtkProgram {
     /// Colour map and picture.
     pub(crate) fn images(&self) -> [Option<&Arc<Image>>; 2] {
         [self.map.as_ref(), self.picture.as_ref()]
     }
 
     /// The same with a colour map and a picture.
-    pub(crate) fn with_images(mut self, [map, picture]: [Option<Arc<Image>>; 2]) -> Recognised {
+    pub(crate) fn with_images(mut self, [map, picture]: [Option<Arc<Image>>; 2]) -> VtkProgram {
         (self.map, self.picture) = (map, picture);
         self
     }
@@ -64,16 +64,16 @@ impl Recognised {
     /// Lights that the program computes with and that are not there; also those that are more than can be.
     pub(crate) fn missing_lights(&self) -> usize {
         let most = crate::trace::occlusion::MOST_LIGHTS;
-        usize::from(self.template.headlight && self.lights.is_empty())
+        usize::from(self.signature.headlight && self.lights.is_empty())
             + self.lights.len().saturating_sub(most)
     }
 }
 
-impl Wire for Recognised {
+impl Wire for VtkProgram {
     fn put(&self, out: &mut Vec<u8>) {
         (self.clip_from_object, self.view_from_object).put(out);
         self.normal_matrix.put(out);
-        self.template.put(out);
+        self.signature.put(out);
         [self.ambient, self.diffuse, self.specular].put(out);
         [self.ambient_intensity, self.diffuse_intensity, self.specular_power, self.opacity].put(out);
         [self.parallel, self.overrides].put(out);
@@ -83,9 +83,9 @@ impl Wire for Recognised {
         self.edges.put(out);
         (self.picture_on_backs, self.turn).put(out);
     }
-    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
+    fn get(from: &mut Reader<'_>) -> Result<Self, MalformedMessage> {
         let (clip_from_object, view_from_object) = Wire::get(from)?;
-        let (normal_matrix, template) = Wire::get(from)?;
+        let (normal_matrix, signature) = Wire::get(from)?;
         let [ambient, diffuse, specular] = Wire::get(from)?;
         let [ambient_intensity, diffuse_intensity, specular_power, opacity] = Wire::get(from)?;
         let [parallel, overrides] = Wire::get(from)?;
@@ -94,11 +94,11 @@ impl Wire for Recognised {
         let clip_planes = Wire::get(from)?;
         let edges = Wire::get(from)?;
         let (picture_on_backs, turn) = Wire::get(from)?;
-        Ok(Recognised {
+        Ok(VtkProgram {
             clip_from_object,
             view_from_object,
             normal_matrix,
-            template,
+            signature,
             ambient,
             diffuse,
             specular,

@@ -1,7 +1,7 @@
 //! The colour of a fragment, step by step as VTK's shaders compute it: the surface's own, that of back faces, edges, lights.
 
-use super::program::{Edges, Physical, ProgramLight, Recognised};
-use super::signature::{Colors, Pictured};
+use super::program::{CellEdges, PbrMaterial, ProgramLight, VtkProgram};
+use super::signature::{ActorTexture, ColorSource};
 use crate::capture::draw::Attributes;
 use crate::trace::lighting::{normalized, transform};
 use crate::trace::mixed;
@@ -22,7 +22,7 @@ pub(crate) struct Surface {
 
 /// Where a fragment is.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct At {
+pub(crate) struct FragmentSample {
     pub(crate) prim: usize,
     pub(crate) weights: V3,
     pub(crate) front: bool,
@@ -31,7 +31,7 @@ pub(crate) struct At {
     /// Texels of the picture that the pixel covers, where that is known.
     pub(crate) texels: Option<f32>,
     /// The sample's place, from the middle of the pixel, that everything was moved by.
-    pub(crate) moved_by: [f32; 2],
+    pub(crate) sample_offset: [f32; 2],
 }
 
 fn dot(a: V3, b: V3) -> f32 {
@@ -45,22 +45,22 @@ fn mix(a: V3, b: V3, t: f32) -> V3 {
 impl ProgramLight {
     /// Direction in which its light comes to a point, and what of it comes there.
     fn reaching(&self, at: V3) -> (V3, f32) {
-        let Some(lamp) = self.lamp else { return (self.travels, 1.0) };
+        let Some(lamp) = self.lamp else { return (self.direction, 1.0) };
         let away: V3 = std::array::from_fn(|k| at[k] - lamp.position[k]);
         let distance = dot(away, away).sqrt();
-        let travels = normalized(away);
+        let direction = normalized(away);
         let [constant, linear, quadratic] = lamp.attenuation;
         let mut share = 1.0 / (constant + linear * distance + quadratic * distance * distance);
         if lamp.cone_deg < 90.0 {
-            let cosine = dot(travels, self.travels);
+            let cosine = dot(direction, self.direction);
             share *=
                 if cosine >= lamp.cone_deg.to_radians().cos() { cosine.powf(lamp.exponent) } else { 0.0 };
         }
-        (travels, share)
+        (direction, share)
     }
 }
 
-impl Physical {
+impl PbrMaterial {
     /// Reflected light by that which comes along `l`, as VTK has it: Lambert's and an isotropic GGX lobe with the height-correlated Smith term and
     /// Schlick's Fresnel factor. `cosines` are those of the half vector with the normal, the view, the light, and of half vector and light.
     fn reflected(&self, albedo: V3, [n_h, n_v, n_l, h_l]: [f32; 4]) -> V3 {
@@ -84,9 +84,9 @@ impl Physical {
     }
 }
 
-impl Edges {
+impl CellEdges {
     /// How much of a fragment is line. `corners` are the triangle's in clip space.
-    fn share(&self, corners: [[f32; 4]; 3], at: &At) -> f32 {
+    fn share(&self, corners: [[f32; 4]; 3], at: &FragmentSample) -> f32 {
         let sides = self.sides.get(at.prim).copied().unwrap_or(7);
         let [vx, vy, vw, vh] = self.viewport;
         let p = corners.map(|c| {
@@ -94,7 +94,7 @@ impl Edges {
         });
         let cross = (p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) - (p[1][1] - p[0][1]) * (p[2][0] - p[0][0]);
         let turn = if cross < 0.0 { -1.0 } else { 1.0 };
-        let [mx, my] = at.moved_by.map(f64::from);
+        let [mx, my] = at.sample_offset.map(f64::from);
         let (px, py) = match at.pixel {
             Some((x, y)) => (f64::from(x) + 0.5 - mx, f64::from(y) + 0.5 - my),
             // Anywhere in a pixel, or seen in a mirror: where the eye would see it.
@@ -119,7 +119,7 @@ impl Edges {
     }
 }
 
-impl Recognised {
+impl VtkProgram {
     /// Colour and alpha of vertices, triangles or the colour map; no colour where the uniforms' are taken.
     pub(super) fn own_color(
         &self,
@@ -129,25 +129,31 @@ impl Recognised {
         w: [f32; 3],
     ) -> (Option<V3>, f32) {
         let corners = mesh.indices[prim].map(|i| i as usize);
-        let [r, g, b, alpha] = match self.template.colors {
-            Colors::Uniform => return (None, 1.0),
-            Colors::PerVertex => mixed(corners.map(|i| a.colors.at(i)), w),
-            Colors::Map => {
+        let [r, g, b, alpha] = match self.signature.colors {
+            ColorSource::Uniform => return (None, 1.0),
+            ColorSource::PerVertex => mixed(corners.map(|i| a.colors.at(i)), w),
+            ColorSource::Map => {
                 let [s, t] = mixed(corners.map(|i| self.map_coordinates(a, i)), w);
                 self.map.as_ref().map_or([1.0; 4], |m| m.sample(s, t))
             }
-            Colors::PerCell => self.map.as_ref().map_or([1.0; 4], |m| m.numbered(prim)),
+            ColorSource::PerCell => self.map.as_ref().map_or([1.0; 4], |m| m.numbered(prim)),
         };
         (Some([r, g, b]).filter(|_| !self.overrides), alpha)
     }
 
     /// The surface of a fragment before light falls on it, step by step as the shader has it.
-    fn surface(&self, a: &Attributes, mesh: &TriMesh, at: &At, picture: Option<[f32; 4]>) -> Surface {
+    fn surface(
+        &self,
+        a: &Attributes,
+        mesh: &TriMesh,
+        at: &FragmentSample,
+        picture: Option<[f32; 4]>,
+    ) -> Surface {
         let mut surface = match self.back {
             Some(back) if !at.front => back,
             _ => {
                 let (own, alpha) = self.own_color(a, mesh, at.prim, at.weights);
-                let plain = |v: f32| if self.template.linear { v.powf(2.2) } else { v };
+                let plain = |v: f32| if self.signature.linear { v.powf(2.2) } else { v };
                 Surface {
                     ambient: own.unwrap_or(self.ambient).map(|v| plain(v * self.ambient_intensity)),
                     diffuse: own.unwrap_or(self.diffuse).map(|v| plain(v * self.diffuse_intensity)),
@@ -168,26 +174,29 @@ impl Recognised {
             surface.diffuse = mix(surface.diffuse, [0.0; 3], line);
             surface.ambient = mix(surface.ambient, edges.color, line);
         }
-        if let (Pictured::Albedo | Pictured::AlbedoAlone, Some([r, g, b, alpha])) =
-            (self.template.pictured, picture)
+        if let (ActorTexture::Albedo | ActorTexture::AlbedoAlone, Some([r, g, b, alpha])) =
+            (self.signature.actor_texture, picture)
         {
             let [x, y, z] = surface.diffuse;
             surface.diffuse = [x * r, y * g, z * b];
-            surface.alpha =
-                if self.template.pictured == Pictured::Albedo { self.opacity * alpha } else { alpha };
+            surface.alpha = if self.signature.actor_texture == ActorTexture::Albedo {
+                self.opacity * alpha
+            } else {
+                alpha
+            };
         }
         surface
     }
 
     /// Place and normal of a fragment in eye space.
-    fn eye_point(&self, a: &Attributes, mesh: &TriMesh, at: &At) -> (V3, V3) {
+    fn eye_point(&self, a: &Attributes, mesh: &TriMesh, at: &FragmentSample) -> (V3, V3) {
         let corners = mesh.indices[at.prim].map(|i| i as usize);
         let view = corners.map(|i| {
             let v = transform(&self.view_from_object, mesh.positions[i].to_array());
             [v[0], v[1], v[2]]
         });
         let point = mixed(view, at.weights);
-        let normal = if self.template.flat {
+        let normal = if self.signature.flat {
             let e = |k: usize| -> V3 { std::array::from_fn(|c| view[k][c] - view[0][c]) };
             let (p, q) = (e(1), e(2));
             let n =
@@ -207,10 +216,16 @@ impl Recognised {
     }
 
     /// The fragment's colour, as the shader computes it.
-    pub(crate) fn color(&self, a: &Attributes, mesh: &TriMesh, at: &At, reaches: &Visibility) -> [f32; 4] {
+    pub(crate) fn color(
+        &self,
+        a: &Attributes,
+        mesh: &TriMesh,
+        at: &FragmentSample,
+        reaches: &Visibility,
+    ) -> [f32; 4] {
         let picture = self.picture_at(a, mesh, at.prim, at.weights, at.texels);
         let s = self.surface(a, mesh, at, picture);
-        let out = if !self.template.lit {
+        let out = if !self.signature.lit {
             std::array::from_fn(|k| s.ambient[k] + s.diffuse[k])
         } else {
             let (point, normal) = self.eye_point(a, mesh, at);
@@ -225,8 +240,8 @@ impl Recognised {
     fn lit(&self, s: &Surface, point: V3, normal: V3, reaches: &Visibility) -> V3 {
         let mut lit = [0.0; 3];
         let mut shine = [0.0; 3];
-        if self.template.headlight {
-            let least = if self.template.cosines_from_zero { 0.0 } else { 0.000_001 };
+        if self.signature.headlight {
+            let least = if self.signature.cosines_from_zero { 0.0 } else { 0.000_001 };
             let df = normal[2].max(least) * reaches.lights[0];
             let sf = df.powf(s.power);
             for k in 0..3 {
@@ -235,19 +250,19 @@ impl Recognised {
             }
         }
         // A light that the user has added to one at the eye is one like others.
-        let others = &self.lights[usize::from(self.template.headlight)..];
-        let visible = &reaches.lights[usize::from(self.template.headlight)..];
+        let others = &self.lights[usize::from(self.signature.headlight)..];
+        let visible = &reaches.lights[usize::from(self.signature.headlight)..];
         let to_eye = normalized(point.map(|v| -v));
-        let least = if self.template.cosines_from_zero { 0.0 } else { 1e-5 };
+        let least = if self.signature.cosines_from_zero { 0.0 } else { 1e-5 };
         for (light, visible) in others.iter().zip(visible) {
-            let (travels, share) = light.reaching(point);
+            let (direction, share) = light.reaching(point);
             let color = light.color.map(|c| c * visible);
-            let cosine = -dot(normal, travels);
+            let cosine = -dot(normal, direction);
             if cosine * share <= 0.0 {
                 continue;
             }
             // reflect(I, N) = I - 2 (N . I) N
-            let r: V3 = std::array::from_fn(|k| travels[k] + 2.0 * cosine * normal[k]);
+            let r: V3 = std::array::from_fn(|k| direction[k] + 2.0 * cosine * normal[k]);
             let sf = share * dot(r, to_eye).max(least).powf(s.power);
             for k in 0..3 {
                 lit[k] += cosine * share * color[k];
@@ -259,17 +274,24 @@ impl Recognised {
         })
     }
 
-    fn physically_lit(&self, p: &Physical, s: &Surface, point: V3, normal: V3, reaches: &Visibility) -> V3 {
+    fn physically_lit(
+        &self,
+        p: &PbrMaterial,
+        s: &Surface,
+        point: V3,
+        normal: V3,
+        reaches: &Visibility,
+    ) -> V3 {
         let cosine = |a: V3, b: V3| dot(a, b).clamp(1e-5, 1.0);
         let to_eye = normalized(point.map(|v| -v));
         let n_v = cosine(normal, to_eye);
         let mut sum = [0.0_f32; 3];
         for (i, (light, visible)) in self.lights.iter().zip(&reaches.lights).enumerate() {
-            let (cosines, share) = if self.template.headlight && i == 0 {
+            let (cosines, share) = if self.signature.headlight && i == 0 {
                 ([n_v, n_v, n_v, 1.0], 1.0)
             } else {
-                let (travels, share) = light.reaching(point);
-                let l = normalized(travels.map(|v| -v));
+                let (direction, share) = light.reaching(point);
+                let l = normalized(direction.map(|v| -v));
                 let h = normalized(std::array::from_fn(|k| to_eye[k] + l[k]));
                 ([cosine(normal, h), n_v, cosine(normal, l), cosine(h, l)], share)
             };
@@ -284,16 +306,21 @@ impl Recognised {
 
 #[cfg(test)]
 mod tests {
-    use super::super::program::Lamp;
+    use super::super::program::PositionalLight;
     use super::*;
     use std::sync::Arc;
 
     #[test]
     fn lamps_lose_strength_with_distance_and_outside_of_their_cones() {
-        let lamp = Lamp { position: [0.0; 3], attenuation: [0.5, 0.25, 0.0], cone_deg: 45.0, exponent: 2.0 };
-        let light = ProgramLight { travels: [0.0, 0.0, -1.0], color: [1.0; 3], lamp: Some(lamp) };
-        let (travels, share) = light.reaching([0.0, 0.0, -2.0]);
-        assert_eq!((travels, share), ([0.0, 0.0, -1.0], 1.0));
+        let lamp = PositionalLight {
+            position: [0.0; 3],
+            attenuation: [0.5, 0.25, 0.0],
+            cone_deg: 45.0,
+            exponent: 2.0,
+        };
+        let light = ProgramLight { direction: [0.0, 0.0, -1.0], color: [1.0; 3], lamp: Some(lamp) };
+        let (direction, share) = light.reaching([0.0, 0.0, -2.0]);
+        assert_eq!((direction, share), ([0.0, 0.0, -1.0], 1.0));
         let (_, beside) = light.reaching([1.0, 0.0, -2.0]);
         let (distance, cosine) = (5.0_f32.sqrt(), 2.0 / 5.0_f32.sqrt());
         assert!((beside - cosine * cosine / (0.5 + 0.25 * distance)).abs() < 1e-6);
@@ -304,8 +331,9 @@ mod tests {
 
     #[test]
     fn a_rough_metal_reflects_less_along_the_normal_than_a_smooth_one_and_has_no_diffuse_part() {
-        let p = Physical { metallic: 1.0, roughness: 0.9, base: 0.04, tint: [1.0; 3], least_divisor: 1e-8 };
-        let smooth = Physical { roughness: 0.2, ..p };
+        let p =
+            PbrMaterial { metallic: 1.0, roughness: 0.9, base: 0.04, tint: [1.0; 3], least_divisor: 1e-8 };
+        let smooth = PbrMaterial { roughness: 0.2, ..p };
         let along = [1.0, 1.0, 1.0, 1.0];
         let (rough, shiny) = (p.reflected([0.5; 3], along), smooth.reflected([0.5; 3], along));
         assert!(rough[0] < shiny[0], "{rough:?} {shiny:?}");
@@ -317,20 +345,20 @@ mod tests {
     #[test]
     fn lines_lie_along_the_sides_that_are_edges_of_cells() {
         let corners = [[-1.0, -1.0, 0.0, 1.0], [1.0, -1.0, 0.0, 1.0], [-1.0, 1.0, 0.0, 1.0]];
-        let edges = |sides: u8| Edges {
+        let edges = |sides: u8| CellEdges {
             sides: Arc::new(vec![sides]),
             width: 1.0,
             color: [0.0; 3],
             opacity: 1.0,
             viewport: [0.0, 0.0, 20.0, 20.0],
         };
-        let at = |x, y| At {
+        let at = |x, y| FragmentSample {
             prim: 0,
             weights: [1.0, 0.0, 0.0],
             front: true,
             pixel: Some((x, y)),
             texels: None,
-            moved_by: [0.0; 2],
+            sample_offset: [0.0; 2],
         };
         // Half a pixel from the lower side, far from the others.
         assert_eq!(edges(1).share(corners, &at(6, 0)), 0.5);
@@ -339,7 +367,7 @@ mod tests {
         assert_eq!(edges(7).share(corners, &at(5, 5)), 0.0, "inside");
         // The same place by the corners' weights: 6.5 and 0.5 of 20.
         let weights = [0.65, 0.325, 0.025];
-        let by_weights = edges(1).share(corners, &At { pixel: None, weights, ..at(0, 0) });
+        let by_weights = edges(1).share(corners, &FragmentSample { pixel: None, weights, ..at(0, 0) });
         assert!((by_weights - 0.5).abs() < 1e-5, "{by_weights}");
     }
 }

@@ -7,24 +7,24 @@
 //! Only when every draw of the first pass was a surface that we know is anything taken out of the second. Text, lines or volumes among them leave the
 //! whole to the driver.
 
-use super::signature::Peel;
-use crate::capture::geometry_cache::Structures;
-use crate::classify::rules::{self, Verdict};
+use super::signature::TranslucencyPass;
+use crate::capture::geometry_cache::BuildCounts;
+use crate::classify::rules::{self, Classification};
 use crate::host::config::Mode;
 use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
 use crate::present::frame::Pending;
-use crate::present::framebuffer_pass::Fate;
+use crate::present::framebuffer_pass::CompositeMode;
 use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
 use crate::trace::thread_pool;
-use crate::trace::{Limit, Prepared, peeled};
+use crate::trace::{DepthLimits, Prepared, depth_sorted};
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Instant;
 
 /// Where VTK is with it.
 #[derive(Default)]
-pub(crate) struct Peeling {
+pub(crate) struct DepthPeeling {
     /// Draws of the driver's when something was cleared last.
     at_clear: u64,
     /// Draws of the first pass so far that we know.
@@ -33,11 +33,11 @@ pub(crate) struct Peeling {
     whole: bool,
     /// What was taken out of the second pass, and the framebuffer it was drawn into.
     taken: Vec<Pending>,
-    limit: Option<Limit>,
+    limit: Option<DepthLimits>,
     framebuffer: u32,
 }
 
-impl Peeling {
+impl DepthPeeling {
     /// Something is cleared; the driver drew so many draws until now.
     pub(crate) fn cleared(&mut self, passed: u64) {
         if self.depths > 0 {
@@ -55,24 +55,24 @@ impl Peeling {
 
 impl Context {
     /// What becomes of a draw of a pass for translucency; the reason when the driver draws it. `Ok`: it is to be taken.
-    pub(super) fn peels(&mut self, pass: Peel) -> Result<(), &'static str> {
+    pub(super) fn check_peeling_pass(&mut self, pass: TranslucencyPass) -> Result<(), &'static str> {
         const PEELED: &str = "translucent surfaces that VTK peels";
-        if pass == Peel::Weighted {
-            return self.weighs();
+        if pass == TranslucencyPass::Weighted {
+            return self.check_weighted_pass();
         }
         let peeling = &mut self.programs.peeling;
         let settings = &self.config.settings;
         let traced = settings.enabled && matches!(settings.mode, Mode::Match | Mode::Phong | Mode::Rich);
         match pass {
-            Peel::No | Peel::Weighted => Ok(()),
-            Peel::Depths => {
+            TranslucencyPass::No | TranslucencyPass::Weighted => Ok(()),
+            TranslucencyPass::Depths => {
                 if peeling.depths == 0 {
                     peeling.whole = false;
                 }
                 peeling.depths += 1;
                 Err("depths of translucent surfaces that VTK peels")
             }
-            Peel::Layers => {
+            TranslucencyPass::Layers => {
                 let first = peeling.taken.is_empty();
                 let here = self.state.framebuffer;
                 let untouched = self.counters.report.passed_draws == peeling.at_clear;
@@ -90,13 +90,13 @@ impl Context {
     }
 
     /// Whether a peeled surface can be traced: but for what peeling itself sets, its state is that of any surface.
-    pub(super) fn peeled_surface(&self, state: &mut Snapshot) -> Result<(), &'static str> {
+    pub(super) fn check_peeled_surface(&self, state: &mut Snapshot) -> Result<(), &'static str> {
         (state.more_draw_buffers, state.blend, state.depth_test) = (false, false, true);
         (state.depth_mask, state.depth_func) = (true, LEQUAL);
-        match rules::filled(state, self.config.trace()) {
-            Verdict::Trace => Ok(()),
-            Verdict::Pass(why) | Verdict::TraceIfOpaque(why) => Err(why),
-            Verdict::TraceInOrder => Err("a peeled surface whose order matters"),
+        match rules::classify(state, self.config.trace()) {
+            Classification::Trace => Ok(()),
+            Classification::Pass(why) | Classification::TraceIfOpaque(why) => Err(why),
+            Classification::TraceInOrder => Err("a peeled surface whose order matters"),
         }
     }
 
@@ -109,14 +109,14 @@ impl Context {
     }
 
     /// VTK is about to gather what the pass has peeled.
-    pub(crate) fn gather_peeled(&mut self) {
+    pub(crate) fn composite_peeled(&mut self) {
         let mut taken = std::mem::take(&mut self.programs.peeling.taken);
         let limit = self.programs.peeling.limit.take();
         self.programs.peeling.whole = false;
         self.refresh();
         let Some(limit) = limit else { return };
-        self.frame.traced_peeled(self.counters.report.frames + 1, &taken);
-        self.counters.flushed("depth peeling");
+        self.frame.record_peeled(self.counters.report.frames + 1, &taken);
+        self.counters.count_flush("depth peeling");
         let buffers = [0, 1, 2, 3].map(|i| gl::word(DRAW_BUFFER0 + i));
         let there = match buffers {
             // What is farthest back: gathered there from layer to layer, blended over.
@@ -133,35 +133,35 @@ impl Context {
         };
         let start = Instant::now();
         if self.config.settings.mode != Mode::Match {
-            crate::trace::view::place(&mut taken);
+            crate::trace::view::assign_eye_spaces(&mut taken);
         }
         let settings = &self.config.settings;
         let (layer, rays, structures) = thread_pool::on_pool(|| {
-            let mut structures = Structures::default();
+            let mut structures = BuildCounts::default();
             let ready: Vec<Prepared<'_>> =
                 taken.iter().filter_map(|(d, _)| Prepared::new(d, None, &mut structures)).collect();
-            let (layer, extra) = peeled(&ready, &limit, settings);
+            let (layer, extra) = depth_sorted(&ready, &limit, settings);
             let primary = ready.iter().map(|p| p.rays.load(Relaxed)).sum::<u64>();
             (layer, [primary, extra[0], extra[1]], structures)
         });
-        self.counters.spent("trace", start.elapsed());
+        self.counters.add_time("trace", start.elapsed());
         for (kind, n) in ["primary", "shadow", "ambient occlusion"].into_iter().zip(rays) {
-            self.counters.rays(kind, n);
+            self.counters.add_rays(kind, n);
         }
-        self.counters.made(structures);
+        self.counters.count_builds(structures);
         self.counters.report.pixels += layer.covered as u64;
         let start = Instant::now();
         if layer.covered > 0 {
             gl::draw_buffers(&target);
-            self.present(&[layer], Fate::Gathered);
+            self.present(&[layer], CompositeMode::OverIgnoringDepth);
             gl::draw_buffers(&before);
         }
-        self.counters.spent("present", start.elapsed());
+        self.counters.add_time("present", start.elapsed());
     }
 }
 
 /// How deep surfaces count: the second component of the texture that the first pass made.
-fn limit(program: u32) -> Option<Limit> {
+fn limit(program: u32) -> Option<DepthLimits> {
     let at = gl::uniform_location(program, "lastDepthPeel");
     if at < 0 {
         return None;
@@ -174,10 +174,10 @@ fn limit(program: u32) -> Option<Limit> {
     let fits = width * height > 0 && width * height <= 1 << 26;
     let depth = fits.then(|| {
         // However the program wants its own pixels packed.
-        let texels = gl::plain_reading(|plainly| gl::tex_image_rgba(plainly, TEXTURE_2D, 0));
+        let texels = gl::with_raw_pixel_reads(|plainly| gl::tex_image_rgba(plainly, TEXTURE_2D, 0));
         texels.into_iter().map(|t| t[1]).collect::<Vec<f32>>()
     });
     let depth = depth.filter(|d| d.len() == width * height);
     gl::active_texture(active);
-    Some(Limit { width, height, depth: depth?, exact: false })
+    Some(DepthLimits { width, height, depth: depth?, exact: false })
 }

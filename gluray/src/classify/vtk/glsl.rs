@@ -7,7 +7,7 @@
 
 /// Which shader of a program a source is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Stage {
+pub(super) enum ShaderStage {
     Vertex,
     Geometry,
     Fragment,
@@ -59,8 +59,8 @@ const FUNCTIONS: [u64; 6] = [
 
 /// The statements of a stage's `main`; `None` where the source has anything that VTK's surfaces do
 /// not have.
-pub(super) fn statements(source: &str, stage: Stage) -> Option<Vec<String>> {
-    let text = decided(&without_comments(source))?;
+pub(super) fn statements(source: &str, stage: ShaderStage) -> Option<Vec<String>> {
+    let text = with_conditions_resolved(&without_comments(source))?;
     let (mut main, mut outputs) = (None, Vec::new());
     let (mut item, mut depth) = (String::new(), 0_usize);
     for c in text.chars() {
@@ -73,9 +73,9 @@ pub(super) fn statements(source: &str, stage: Stage) -> Option<Vec<String>> {
             continue;
         }
         match item.strip_suffix(';') {
-            Some(declaration) => outputs.extend(declared(declaration, stage)?),
+            Some(declaration) => outputs.extend(output_declaration(declaration, stage)?),
             None => {
-                let text = squeezed(&item);
+                let text = without_whitespace(&item);
                 match text.strip_prefix("voidmain(){").and_then(|t| t.strip_suffix('}')) {
                     Some(body) if main.is_none() => main = Some(split(body)?),
                     _ if FUNCTIONS.contains(&digest(&text)) => {}
@@ -88,14 +88,14 @@ pub(super) fn statements(source: &str, stage: Stage) -> Option<Vec<String>> {
     let main = main.filter(|_| item.trim().is_empty() && depth == 0)?;
     // An output that nobody writes has any value whatever.
     let written = |name: &String| main.iter().any(|s| assigns(s, name));
-    (stage == Stage::Fragment || outputs.iter().all(written)).then_some(main)
+    (stage == ShaderStage::Fragment || outputs.iter().all(written)).then_some(main)
 }
 
 /// Statements without blanks: those with a semicolon, heads of blocks without one, and braces.
 ///
 /// Blanks go, also between a type and a name: `vec4 x` and `vec4x` are the same here. The second
 /// could only be a variable of that name, and the only ones that a source may declare are inputs,
-/// outputs and uniforms, by [`declared`].
+/// outputs and uniforms, by [`output_declaration`].
 pub(super) fn split(body: &str) -> Option<Vec<String>> {
     let (mut out, mut statement) = (Vec::new(), String::new());
     let (mut parentheses, mut braces) = (0_usize, 0_usize);
@@ -132,7 +132,7 @@ pub(super) fn split(body: &str) -> Option<Vec<String>> {
     (statement.is_empty() && parentheses == 0 && braces == 0).then_some(out)
 }
 
-pub(super) fn squeezed(text: &str) -> String {
+pub(super) fn without_whitespace(text: &str) -> String {
     text.chars().filter(|c| !c.is_whitespace()).collect()
 }
 
@@ -167,7 +167,7 @@ pub(super) fn without_comments(source: &str) -> String {
 
 /// The lines that remain when conditions are decided as OpenGL of the desktop decides them; `None`
 /// where that is not known.
-fn decided(text: &str) -> Option<String> {
+fn with_conditions_resolved(text: &str) -> Option<String> {
     let mut out = String::new();
     let mut version = 110;
     // For each condition that is open: whether its lines count, and whether `else` came.
@@ -215,7 +215,7 @@ fn is_defined(name: &str) -> Option<bool> {
 
 /// Looks at a declaration outside of functions; the name when it is an output, `None` when VTK's
 /// surfaces have no such thing.
-fn declared(text: &str, stage: Stage) -> Option<Option<String>> {
+fn output_declaration(text: &str, stage: ShaderStage) -> Option<Option<String>> {
     let words: Vec<&str> = text.split_whitespace().collect();
     let plain = |name: &str| {
         let name = name.split('[').next().unwrap_or("");
@@ -228,7 +228,7 @@ fn declared(text: &str, stage: Stage) -> Option<Option<String>> {
         [storage @ ("in" | "out"), _, name] => {
             let name = plain(name)?;
             let known = PASSED_ON.contains(&name.replace("GSOutput", "VSOutput").as_str())
-                || (stage == Stage::Fragment
+                || (stage == ShaderStage::Fragment
                     && *storage == "out"
                     && ["fragOutput0", "fragOutput1", "fragOutput2"].contains(&name.as_str()));
             let is_out = *storage == "out";
@@ -241,9 +241,9 @@ fn declared(text: &str, stage: Stage) -> Option<Option<String>> {
         }
         ["precision", ..] if !of_edges => Some(None),
         _ => {
-            let text = squeezed(text);
+            let text = without_whitespace(text);
             let exact = match stage {
-                Stage::Geometry => {
+                ShaderStage::Geometry => {
                     ["layout(triangles)in", "layout(triangle_strip,max_vertices=3)out"].as_slice()
                 }
                 _ => &["constfloatPI=3.14159265359", "constfloatrecPI=0.31830988618"],
@@ -258,7 +258,7 @@ mod tests {
     use super::*;
 
     fn read(source: &str) -> Option<Vec<String>> {
-        statements(source, Stage::Fragment)
+        statements(source, ShaderStage::Fragment)
     }
 
     #[test]
@@ -301,7 +301,7 @@ mod tests {
             "out vec4 fragOutput0;",
             "const float PI = 3.14159265359;",
         ];
-        assert!(known.iter().all(|text| with(text, Stage::Fragment)));
+        assert!(known.iter().all(|text| with(text, ShaderStage::Fragment)));
         let unknown = [
             "flat in vec3 normalVCVSOutput;",
             "noperspective in vec3 normalVCVSOutput;",
@@ -316,10 +316,10 @@ mod tests {
             "layout(early_fragment_tests) in;",
         ];
         for text in unknown {
-            assert!(!with(text, Stage::Fragment), "{text}");
+            assert!(!with(text, ShaderStage::Fragment), "{text}");
         }
-        assert!(!with("out vec3 normalVCVSOutput;", Stage::Vertex), "nobody writes it");
-        assert!(!with("void main() {}", Stage::Fragment), "two of them");
+        assert!(!with("out vec3 normalVCVSOutput;", ShaderStage::Vertex), "nobody writes it");
+        assert!(!with("void main() {}", ShaderStage::Fragment), "two of them");
     }
 
     #[test]

@@ -1,19 +1,19 @@
 //! A program that we know, with its uniforms at one draw.
 
 use super::color::Surface;
-use super::signature::{Colors, Pictured, Template};
+use super::signature::{ActorTexture, ColorSource, VtkShaderSignature};
 use crate::capture::draw::Attributes;
 use crate::interpose::driver::gl;
 use crate::state::snapshot::GlLight;
 use crate::trace::lighting::normalized;
 use crate::trace::mixed;
-use crate::trace::occlusion::{Place, vector};
+use crate::trace::occlusion::{LightPosition, vector};
 use crate::trace::texturing::Image;
 use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 
 /// What colours a program's surface.
-pub(crate) enum ProgramSkin<'a> {
+pub(crate) enum ProgramColorSource<'a> {
     /// Uniforms.
     Constant,
     /// The vertices' colours, times this.
@@ -30,15 +30,15 @@ pub(crate) enum ProgramSkin<'a> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ProgramLight {
     /// Where its light, or the middle of its cone, travels.
-    pub(crate) travels: [f32; 3],
+    pub(crate) direction: [f32; 3],
     pub(crate) color: [f32; 3],
     /// `None` far away.
-    pub(crate) lamp: Option<Lamp>,
+    pub(crate) lamp: Option<PositionalLight>,
 }
 
 /// A light with a place.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Lamp {
+pub(crate) struct PositionalLight {
     pub(crate) position: [f32; 3],
     /// Constant, linear, quadratic.
     pub(crate) attenuation: [f32; 3],
@@ -54,7 +54,7 @@ impl ProgramLight {
         let light = GlLight {
             diffuse: [r, g, b, 1.0],
             specular: [r, g, b, 1.0],
-            position: [-self.travels[0], -self.travels[1], -self.travels[2], 0.0],
+            position: [-self.direction[0], -self.direction[1], -self.direction[2], 0.0],
             spot_cutoff_deg: 180.0,
             attenuation: [1.0, 0.0, 0.0],
             ..GlLight::default()
@@ -63,7 +63,7 @@ impl ProgramLight {
         let [x, y, z] = lamp.position;
         GlLight {
             position: [x, y, z, 1.0],
-            spot_direction: self.travels,
+            spot_direction: self.direction,
             spot_exponent: lamp.exponent,
             spot_cutoff_deg: if lamp.cone_deg < 90.0 { lamp.cone_deg } else { 180.0 },
             attenuation: lamp.attenuation,
@@ -74,7 +74,7 @@ impl ProgramLight {
 
 /// Constants of a physically based material.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Physical {
+pub(crate) struct PbrMaterial {
     pub(crate) metallic: f32,
     pub(crate) roughness: f32,
     /// Reflectance along the normal, and its tint at grazing angles.
@@ -86,7 +86,7 @@ pub(crate) struct Physical {
 
 /// Lines along the edges of cells.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Edges {
+pub(crate) struct CellEdges {
     /// For each triangle which of its sides are edges of its cell: bits.
     pub(crate) sides: Arc<Vec<u8>>,
     /// In pixels.
@@ -99,18 +99,18 @@ pub(crate) struct Edges {
 
 /// What a draw's buffer textures have for each triangle.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct PerTriangle {
+pub(crate) struct CellData {
     pub(crate) colors: Option<Arc<Image>>,
     pub(crate) sides: Option<Arc<Vec<u8>>>,
 }
 
 /// A program whose picture we can make, with its uniforms at one draw.
 #[derive(Debug, Clone)]
-pub(crate) struct Recognised {
+pub(crate) struct VtkProgram {
     pub(crate) clip_from_object: [f32; 16],
     pub(crate) view_from_object: [f32; 16],
     pub(super) normal_matrix: [f32; 9],
-    pub(super) template: Template,
+    pub(super) signature: VtkShaderSignature,
     pub(crate) ambient: [f32; 3],
     pub(crate) diffuse: [f32; 3],
     pub(super) ambient_intensity: f32,
@@ -123,10 +123,10 @@ pub(crate) struct Recognised {
     pub(crate) lights: Vec<ProgramLight>,
     /// Of back faces, where they have one of their own.
     pub(super) back: Option<Surface>,
-    pub(super) physical: Option<Physical>,
+    pub(super) physical: Option<PbrMaterial>,
     /// Planes in object space that fragments must be above.
     pub(super) clip_planes: Vec<[f32; 4]>,
-    pub(super) edges: Option<Edges>,
+    pub(super) edges: Option<CellEdges>,
     /// The colour map, or a colour for each triangle.
     pub(super) map: Option<Arc<Image>>,
     /// The texture of the actor, and whether back faces have it.
@@ -139,9 +139,13 @@ pub(crate) struct Recognised {
 /// Most clipping planes of VTK's.
 const MOST_PLANES: i32 = 6;
 
-impl Recognised {
+impl VtkProgram {
     /// The uniforms now.
-    pub(super) fn query(program: u32, template: Template, images: [Option<Arc<Image>>; 2]) -> Recognised {
+    pub(super) fn from_uniforms(
+        program: u32,
+        signature: VtkShaderSignature,
+        images: [Option<Arc<Image>>; 2],
+    ) -> VtkProgram {
         let [map, picture] = images;
         fn value<const N: usize>(program: u32, name: &str) -> [f32; N] {
             match gl::uniform_location(program, name) {
@@ -156,30 +160,32 @@ impl Recognised {
         };
         let intensity = one("specularIntensity");
         let light = |i: usize| ProgramLight {
-            travels: value(program, &format!("lightDirectionVC{i}")),
+            direction: value(program, &format!("lightDirectionVC{i}")),
             color: value(program, &format!("lightColor{i}")),
-            lamp: (template.placed && number(&format!("lightPositional{i}")) != 0).then(|| Lamp {
-                position: value(program, &format!("lightPositionVC{i}")),
-                attenuation: value(program, &format!("lightAttenuation{i}")),
-                cone_deg: one(&format!("lightConeAngle{i}")),
-                exponent: one(&format!("lightExponent{i}")),
+            lamp: (signature.placed && number(&format!("lightPositional{i}")) != 0).then(|| {
+                PositionalLight {
+                    position: value(program, &format!("lightPositionVC{i}")),
+                    attenuation: value(program, &format!("lightAttenuation{i}")),
+                    cone_deg: one(&format!("lightConeAngle{i}")),
+                    exponent: one(&format!("lightExponent{i}")),
+                }
             }),
         };
-        let lights = match template.headlight {
+        let lights = match signature.headlight {
             true => vec![ProgramLight {
-                travels: [0.0, 0.0, -1.0],
+                direction: [0.0, 0.0, -1.0],
                 color: value(program, "lightColor0"),
                 lamp: None,
             }],
-            false => (0..template.lights).map(light).collect(),
+            false => (0..signature.lights).map(light).collect(),
         };
         let times = |name: &str, factor: &str| value::<3>(program, name).map(|v| v * one(factor));
-        let planes = if template.clipped { number("numClipPlanes").clamp(0, MOST_PLANES) } else { 0 };
-        Recognised {
+        let planes = if signature.clipped { number("numClipPlanes").clamp(0, MOST_PLANES) } else { 0 };
+        VtkProgram {
             clip_from_object: value(program, "MCDCMatrix"),
             view_from_object: value(program, "MCVCMatrix"),
             normal_matrix: value(program, "normalMatrix"),
-            template,
+            signature,
             ambient: value(program, "ambientColorUniform"),
             diffuse: value(program, "diffuseColorUniform"),
             ambient_intensity: one("ambientIntensity"),
@@ -188,24 +194,24 @@ impl Recognised {
             specular_power: one("specularPowerUniform"),
             opacity: one("opacityUniform"),
             parallel: number("cameraParallel") != 0,
-            overrides: template.overrides && number("OverridesColor") != 0,
+            overrides: signature.overrides && number("OverridesColor") != 0,
             lights,
-            back: template.back.then(|| Surface {
+            back: signature.back.then(|| Surface {
                 ambient: times("ambientColorUniformBF", "ambientIntensityBF"),
                 diffuse: times("diffuseColorUniformBF", "diffuseIntensityBF"),
                 specular: times("specularColorUniformBF", "specularIntensityBF"),
                 power: one("specularPowerUniformBF"),
                 alpha: one("opacityUniformBF"),
             }),
-            physical: template.physical.then(|| Physical {
+            physical: signature.physical.then(|| PbrMaterial {
                 metallic: one("metallicUniform"),
                 roughness: one("roughnessUniform"),
                 base: one("baseF0Uniform"),
                 tint: value(program, "edgeTintUniform"),
-                least_divisor: if template.lobes_have_an_end { 1e-8 } else { 0.0 },
+                least_divisor: if signature.lobes_have_an_end { 1e-8 } else { 0.0 },
             }),
             clip_planes: (0..planes).map(|i| value(program, &format!("clipPlanes[{i}]"))).collect(),
-            edges: template.edges.then(|| Edges {
+            edges: signature.edges.then(|| CellEdges {
                 sides: Arc::default(),
                 width: one("lineWidth"),
                 color: value(program, "edgeColor"),
@@ -219,13 +225,13 @@ impl Recognised {
             map,
             picture,
             picture_on_backs: number("showTexturesOnBackface") != 0,
-            turn: template.turned.then(|| value(program, "tcMatrix")),
+            turn: signature.has_texture_matrix.then(|| value(program, "tcMatrix")),
         }
     }
 
     /// What buffer textures have for each triangle of the draw.
-    pub(super) fn with_cells(mut self, cells: &PerTriangle) -> Recognised {
-        if self.template.colors == Colors::PerCell {
+    pub(super) fn with_cells(mut self, cells: &CellData) -> VtkProgram {
+        if self.signature.colors == ColorSource::PerCell {
             self.map = cells.colors.clone();
         }
         if let (Some(edges), Some(sides)) = (&mut self.edges, &cells.sides) {
@@ -237,17 +243,17 @@ impl Recognised {
     /// One colour everywhere, instead of colour maps and colours of vertices and cells.
     pub(crate) fn paint(&mut self, color: [f32; 3]) {
         (self.ambient, self.diffuse) = (color, color);
-        self.template.colors = Colors::Uniform;
-        self.template.pictured = Pictured::No;
+        self.signature.colors = ColorSource::Uniform;
+        self.signature.actor_texture = ActorTexture::No;
         self.picture = None;
         self.back = None;
     }
 
     /// Where the lights are, in eye space.
-    pub(crate) fn places(&self) -> Vec<Place> {
+    pub(crate) fn light_positions(&self) -> Vec<LightPosition> {
         let place = |l: &ProgramLight| match l.lamp {
-            None => Place::Far(vector(l.travels.map(|v| -v))),
-            Some(lamp) => Place::Near(vector(lamp.position)),
+            None => LightPosition::Directional(vector(l.direction.map(|v| -v))),
+            Some(lamp) => LightPosition::Positional(vector(lamp.position)),
         };
         self.lights.iter().map(place).collect()
     }
@@ -262,10 +268,10 @@ impl Recognised {
         self.opacity == 1.0
             && self.back.is_none_or(|b| b.alpha == 1.0)
             && self.picture_is_opaque()
-            && match self.template.colors {
-                Colors::Uniform => true,
-                Colors::Map | Colors::PerCell => self.map.as_ref().is_some_and(|m| m.is_opaque()),
-                Colors::PerVertex => (0..vertices).all(|i| attributes.colors.at(i)[3] == 1.0),
+            && match self.signature.colors {
+                ColorSource::Uniform => true,
+                ColorSource::Map | ColorSource::PerCell => self.map.as_ref().is_some_and(|m| m.is_opaque()),
+                ColorSource::PerVertex => (0..vertices).all(|i| attributes.colors.at(i)[3] == 1.0),
             }
     }
 
@@ -281,7 +287,7 @@ impl Recognised {
     /// The same without the picture.
     pub(crate) fn ground(&self, a: &Attributes, mesh: &TriMesh, prim: usize, w: [f32; 3]) -> ([f32; 3], f32) {
         let (own, alpha) = self.own_color(a, mesh, prim, w);
-        let unlit = if self.template.lit { 0.0 } else { self.ambient_intensity };
+        let unlit = if self.signature.lit { 0.0 } else { self.ambient_intensity };
         let color: [f32; 3] = match own {
             Some(c) => c.map(|v| v * (self.diffuse_intensity + unlit)),
             None => {
@@ -292,19 +298,21 @@ impl Recognised {
     }
 
     /// Where colours come from, with the factor on them.
-    pub(crate) fn skin(&self) -> ProgramSkin<'_> {
-        let unlit = if self.template.lit { 0.0 } else { self.ambient_intensity };
+    pub(crate) fn color_source(&self) -> ProgramColorSource<'_> {
+        let unlit = if self.signature.lit { 0.0 } else { self.ambient_intensity };
         let factor = self.diffuse_intensity + unlit;
-        match (self.template.colors, &self.map) {
-            (Colors::PerVertex, _) if !self.overrides => ProgramSkin::PerVertex(factor),
-            (Colors::Map, Some(map)) if !self.overrides => ProgramSkin::Map(map, factor),
-            (Colors::PerCell, Some(map)) if !self.overrides => ProgramSkin::PerCell(map, factor),
-            _ => self.picture_alone().map_or(ProgramSkin::Constant, |image| ProgramSkin::Picture(image)),
+        match (self.signature.colors, &self.map) {
+            (ColorSource::PerVertex, _) if !self.overrides => ProgramColorSource::PerVertex(factor),
+            (ColorSource::Map, Some(map)) if !self.overrides => ProgramColorSource::Map(map, factor),
+            (ColorSource::PerCell, Some(map)) if !self.overrides => ProgramColorSource::PerCell(map, factor),
+            _ => self
+                .picture_alone()
+                .map_or(ProgramColorSource::Constant, |image| ProgramColorSource::Picture(image)),
         }
     }
 
     /// What a scene of paths has no place for, in words.
-    pub(crate) fn left_out_of_paths(&self) -> impl Iterator<Item = &'static str> {
+    pub(crate) fn unsupported_in_path_mode(&self) -> impl Iterator<Item = &'static str> {
         let left_out = [
             (self.edges.is_some(), "edges of cells"),
             (self.back.is_some(), "materials of back faces"),
@@ -316,12 +324,12 @@ impl Recognised {
 
     /// True when the surface answers lights.
     pub(crate) fn is_lit(&self) -> bool {
-        self.template.lit
+        self.signature.lit
     }
 
     /// True when a single light at the eye is all there is (VTK then makes highlights by N·L).
     pub(crate) fn has_headlight(&self) -> bool {
-        self.template.headlight
+        self.signature.headlight
     }
 
     /// The part of the light that no light has to send.
@@ -334,7 +342,7 @@ impl Recognised {
 
     /// Eye space from the normals of vertices; `None` where triangles have none but their own.
     pub(crate) fn eye_from_normal(&self) -> Option<&[f32; 9]> {
-        (!self.template.flat).then_some(&self.normal_matrix)
+        (!self.signature.flat).then_some(&self.normal_matrix)
     }
 
     /// Shading normal in eye space.

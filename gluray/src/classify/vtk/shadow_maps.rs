@@ -25,14 +25,14 @@ pub(super) struct ShadowMaps {
 }
 
 impl Context {
-    /// Whether a surface can be traced that VTK may draw again; `template` is what is known of its program.
+    /// Whether a surface can be traced that VTK may draw again; `signature` is what is known of its program.
     pub(super) fn is_drawn_once<T>(
         &mut self,
-        template: &Result<T, &'static str>,
+        signature: &Result<T, &'static str>,
     ) -> Result<(), &'static str> {
         let now = self.programs.frame;
         let maps = &mut self.programs.shadow_maps;
-        match template {
+        match signature {
             Err(why) if *why == SHADOW_MAP => maps.until = now + IN_USE_FRAMES,
             Ok(_) if now < maps.until && maps.last_traced != Some(now) => {
                 return Err("surfaces that VTK draws again with its shadow maps");
@@ -44,11 +44,11 @@ impl Context {
     }
 
     /// The driver is about to draw something filled.
-    pub(crate) fn draw_over(&mut self) {
+    pub(crate) fn begin_redraw(&mut self) {
         let now = self.programs.frame;
         let maps = &mut self.programs.shadow_maps;
         let s = &self.state;
-        let is_map = self.programs.templates.get(&s.program) == Some(&Err(SHADOW_MAP));
+        let is_map = self.programs.signatures.get(&s.program) == Some(&Err(SHADOW_MAP));
         let again = maps.last_traced == Some(now) && now < maps.until && s.program != 0 && !is_map;
         if !again || !s.depth_test || !s.depth_mask || s.depth_func != LEQUAL || maps.kept.is_some() {
             return;
@@ -60,7 +60,7 @@ impl Context {
     }
 
     /// It has drawn, and the program goes on.
-    pub(crate) fn drawn_over(&mut self) {
+    pub(crate) fn finish_redraw(&mut self) {
         let Some((on, [factor, units])) = self.programs.shadow_maps.kept.take() else { return };
         gl::polygon_offset(factor, units);
         if !on {

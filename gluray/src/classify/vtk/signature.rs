@@ -5,11 +5,11 @@
 //! or twice are the work of somebody else, who had reasons.
 
 use super::blocks::*;
-use super::glsl::{Stage, split, squeezed, statements, without_comments};
+use super::glsl::{ShaderStage, split, statements, without_comments, without_whitespace};
 
 /// Where the surface's colour comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) enum Colors {
+pub(super) enum ColorSource {
     #[default]
     Uniform,
     /// Attribute `scalarColor`.
@@ -22,7 +22,7 @@ pub(super) enum Colors {
 
 /// What a texture of the actor's does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) enum Pictured {
+pub(super) enum ActorTexture {
     #[default]
     No,
     /// It multiplies the lit colour, by all of its components or by these.
@@ -36,16 +36,16 @@ pub(super) enum Pictured {
     AlbedoAlone,
 }
 
-impl Pictured {
+impl ActorTexture {
     /// True when light and all is multiplied.
     pub(super) fn is_over_all(self) -> bool {
-        matches!(self, Pictured::Rgba | Pictured::Rgb | Pictured::Grey | Pictured::GreyAlpha)
+        matches!(self, ActorTexture::Rgba | ActorTexture::Rgb | ActorTexture::Grey | ActorTexture::GreyAlpha)
     }
 }
 
 /// What a program does for translucency.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) enum Peel {
+pub(super) enum TranslucencyPass {
     #[default]
     No,
     /// Finds how far surfaces reach.
@@ -61,8 +61,8 @@ pub(super) const SHADOW_MAP: &str = "a shadow map";
 
 /// What a program's text says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Template {
-    pub(super) colors: Colors,
+pub(crate) struct VtkShaderSignature {
+    pub(super) colors: ColorSource,
     pub(super) overrides: bool,
     /// Normals from the triangle instead of an attribute.
     pub(super) flat: bool,
@@ -71,7 +71,7 @@ pub(crate) struct Template {
     pub(super) lights: usize,
     pub(super) placed: bool,
     pub(super) lit: bool,
-    pub(super) peel: Peel,
+    pub(super) peel: TranslucencyPass,
     /// Back faces have a material of their own.
     pub(super) back: bool,
     pub(super) clipped: bool,
@@ -80,12 +80,12 @@ pub(crate) struct Template {
     /// The material is physically based, and its colours are made linear for it.
     pub(super) physical: bool,
     pub(super) linear: bool,
-    pub(super) pictured: Pictured,
+    pub(super) actor_texture: ActorTexture,
     /// Colour map and picture have coordinates of their own, and whether a matrix multiplies those.
     pub(super) two_coordinates: bool,
-    pub(super) turned: bool,
+    pub(super) has_texture_matrix: bool,
     /// Depths are moved back by the slope of the surface and a constant, for lines that lie on it.
-    pub(super) moved_back: bool,
+    pub(super) depth_offset: bool,
     /// Cosines of highlights, and of a light at the eye, may be 0 (VTK 9.1); later they have a
     /// least value.
     pub(super) cosines_from_zero: bool,
@@ -94,11 +94,11 @@ pub(crate) struct Template {
 }
 
 /// Statements that are left to read.
-struct Reader<'a> {
+struct StatementReader<'a> {
     left: &'a [String],
 }
 
-impl Reader<'_> {
+impl StatementReader<'_> {
     /// Reads a piece if it comes next.
     fn take(&mut self, piece: &str) -> bool {
         let piece = split(piece).unwrap_or_default();
@@ -139,36 +139,42 @@ struct Lights {
     placed: bool,
 }
 
-impl Template {
+impl VtkShaderSignature {
     /// Reads the shaders; the error says why the program is not recognised.
-    pub(crate) fn read(vertex: &str, geometry: &str, fragment: &str) -> Result<Template, &'static str> {
+    pub(crate) fn read(
+        vertex: &str,
+        geometry: &str,
+        fragment: &str,
+    ) -> Result<VtkShaderSignature, &'static str> {
         const NOT_VTK: &str = "a program that is not recognised";
         const UNKNOWN: &str = "a surface of VTK's with a statement that is not known";
         const PICTURE: &str = "a picture on a surface of VTK's";
-        let text = squeezed(&without_comments(fragment));
+        let text = without_whitespace(&without_comments(fragment));
         if text.contains("fragOutput0.r=exp(depthC*ldepth);") {
             return Err(SHADOW_MAP);
         }
-        let mut t = Template::default();
-        let vs = statements(vertex, Stage::Vertex).ok_or(NOT_VTK)?;
-        let mut fs = statements(fragment, Stage::Fragment).ok_or(NOT_VTK)?;
+        let mut t = VtkShaderSignature::default();
+        let vs = statements(vertex, ShaderStage::Vertex).ok_or(NOT_VTK)?;
+        let mut fs = statements(fragment, ShaderStage::Fragment).ok_or(NOT_VTK)?;
         if !geometry.is_empty() {
             // What goes through has another name behind it.
             fs.iter_mut().for_each(|s| *s = s.replace("GSOutput", "VSOutput"));
             t.read_geometry(geometry).ok_or("a geometry or tessellation shader")?;
         }
         t.read_vertex(&vs).ok_or(NOT_VTK)?;
-        let pictured = text.contains("texture(actortexture") || text.contains("texture(albedoTex");
-        t.read_fragment(&fs).ok_or(if pictured { PICTURE } else { UNKNOWN })?;
+        let actor_texture = text.contains("texture(actortexture") || text.contains("texture(albedoTex");
+        t.read_fragment(&fs).ok_or(if actor_texture { PICTURE } else { UNKNOWN })?;
         t.lobes_have_an_end = t.physical && text.contains(LOBES_HAVE_AN_END);
         Ok(t)
     }
 
     /// The shader that measures edges, which changes nothing else.
     fn read_geometry(&mut self, text: &str) -> Option<()> {
-        let text: Vec<String> =
-            statements(text, Stage::Geometry)?.iter().map(|s| s.replace("GSOutput", "VSOutput")).collect();
-        let mut r = Reader { left: &text };
+        let text: Vec<String> = statements(text, ShaderStage::Geometry)?
+            .iter()
+            .map(|s| s.replace("GSOutput", "VSOutput"))
+            .collect();
+        let mut r = StatementReader { left: &text };
         self.edges = r.take(MEASURES) && r.take_all(&CORNERS);
         let mut through = GOES_THROUGH.map(Some);
         // These are apart from each other, so that their order does not matter.
@@ -189,14 +195,14 @@ impl Template {
     }
 
     fn read_vertex(&mut self, text: &[String]) -> Option<()> {
-        let mut r = Reader { left: text };
+        let mut r = StatementReader { left: text };
         r.take(VERTEX_COLOR);
         r.take(VERTEX_NORMAL);
         let [map, picture] = [0, 1].map(|i| r.one_of([COORDINATES[i], TURNED[i]]));
         self.two_coordinates = map.is_some() && picture.is_some();
-        self.turned = map == Some(1) || picture == Some(1);
+        self.has_texture_matrix = map == Some(1) || picture == Some(1);
         // A matrix for one kind of coordinates alone.
-        if self.turned && (map == Some(0) || picture == Some(0)) {
+        if self.has_texture_matrix && (map == Some(0) || picture == Some(0)) {
             return None;
         }
         if self.clipped {
@@ -209,22 +215,22 @@ impl Template {
     }
 
     fn read_fragment(&mut self, text: &[String]) -> Option<()> {
-        let mut r = Reader { left: text };
+        let mut r = StatementReader { left: text };
         r.take(VIEW);
         let mut slope = r.take(SLOPE);
         let differences = r.one_of(DIFFERENCES).is_some();
         slope = slope || r.take(SLOPE);
-        self.moved_back = r.one_of(if slope { MOVED_BY_SLOPE } else { MOVED }).is_some();
-        if slope && !self.moved_back {
+        self.depth_offset = r.one_of(if slope { MOVED_BY_SLOPE } else { MOVED }).is_some();
+        if slope && !self.depth_offset {
             return None;
         }
         let layers = OTHER_EPSILON.map(|e| PEEL_LAYERS.replace(OTHER_EPSILON[0], e));
         if r.take(PEEL_DEPTHS) {
-            self.peel = Peel::Depths;
+            self.peel = TranslucencyPass::Depths;
         } else if r.one_of(layers.iter().map(String::as_str)).is_some() {
-            self.peel = Peel::Layers;
+            self.peel = TranslucencyPass::Layers;
         }
-        if self.moved_back && self.peel != Peel::No {
+        if self.depth_offset && self.peel != TranslucencyPass::No {
             return None;
         }
         if r.take(CLIPPED) != self.clipped {
@@ -240,46 +246,46 @@ impl Template {
             _ => {}
         }
         self.read_light(&mut r)?;
-        if self.pictured == Pictured::No {
-            self.pictured = read_picture(&mut r);
+        if self.actor_texture == ActorTexture::No {
+            self.actor_texture = read_picture(&mut r);
         }
         if !r.take(DISCARDS) {
             return None;
         }
         match self.peel {
-            Peel::Layers if !r.take(PEELED_LAYERS) => return None,
-            Peel::No if r.take(WEIGHTED) => self.peel = Peel::Weighted,
+            TranslucencyPass::Layers if !r.take(PEELED_LAYERS) => return None,
+            TranslucencyPass::No if r.take(WEIGHTED) => self.peel = TranslucencyPass::Weighted,
             _ => {}
         }
         r.is_done().then_some(())
     }
 
     /// Where the surface's colour comes from, and what changes it before there is light.
-    fn read_colors(&mut self, r: &mut Reader<'_>) -> Option<()> {
+    fn read_colors(&mut self, r: &mut StatementReader<'_>) -> Option<()> {
         r.take(SPECULAR);
         if r.one_of(MAPS).is_some() {
-            self.colors = Colors::Map;
+            self.colors = ColorSource::Map;
         } else if r.take(CELLS) {
-            self.colors = Colors::PerCell;
+            self.colors = ColorSource::PerCell;
         }
-        if self.colors != Colors::Uniform {
+        if self.colors != ColorSource::Uniform {
             r.take(OF_TEXTURE).then_some(())?;
         } else if r.take(OF_VERTICES) {
-            self.colors = Colors::PerVertex;
+            self.colors = ColorSource::PerVertex;
         } else {
             r.take(OF_UNIFORMS).then_some(())?;
         }
-        self.linear = self.colors != Colors::Uniform && r.take(LINEAR);
+        self.linear = self.colors != ColorSource::Uniform && r.take(LINEAR);
         self.back = r.one_of(BACK).is_some();
         self.overrides = r.take(OVERRIDES);
         Some(())
     }
 
-    fn read_light(&mut self, r: &mut Reader<'_>) -> Option<()> {
+    fn read_light(&mut self, r: &mut StatementReader<'_>) -> Option<()> {
         let physical = if r.take(ALBEDO) {
             true
         } else if r.take(ALBEDO_OF_TEXTURE) {
-            self.pictured = ALBEDO_ALPHA[r.one_of(ALBEDO_ALPHA.map(|(_, piece)| piece))?].0;
+            self.actor_texture = ALBEDO_ALPHA[r.one_of(ALBEDO_ALPHA.map(|(_, piece)| piece))?].0;
             true
         } else {
             false
@@ -300,7 +306,7 @@ impl Template {
     }
 
     /// Lights of a shader that lights by Phong's rule.
-    fn read_lights(&mut self, r: &mut Reader<'_>) -> Option<Lights> {
+    fn read_lights(&mut self, r: &mut StatementReader<'_>) -> Option<Lights> {
         let at_eye = LEAST_AT_EYE.map(|least| HEADLIGHT.replace(LEAST_AT_EYE[0], least));
         if let Some(version) = r.one_of(at_eye.iter().map(String::as_str)) {
             self.cosines_from_zero = version == 1;
@@ -321,7 +327,7 @@ impl Template {
 }
 
 /// The rest of a physically based material; its lights.
-fn read_physical(r: &mut Reader<'_>) -> Option<Lights> {
+fn read_physical(r: &mut StatementReader<'_>) -> Option<Lights> {
     r.take(PHYSICAL).then_some(())?;
     let lights = if r.take(PHYSICAL_HEADLIGHT) {
         Lights { head: true, ..Lights::default() }
@@ -335,16 +341,16 @@ fn read_physical(r: &mut Reader<'_>) -> Option<Lights> {
 }
 
 /// A picture that multiplies the lit colour.
-fn read_picture(r: &mut Reader<'_>) -> Pictured {
-    for (pictured, components) in COMPONENTS {
+fn read_picture(r: &mut StatementReader<'_>) -> ActorTexture {
+    for (actor_texture, components) in COMPONENTS {
         for n in 0..MOST_BEFORE {
             let piece = [READS, components, MULTIPLIES].join(" ").replace('#', &n.to_string());
             if r.take(&piece) {
-                return pictured;
+                return actor_texture;
             }
         }
     }
-    Pictured::No
+    ActorTexture::No
 }
 
 #[cfg(test)]
@@ -389,8 +395,8 @@ mod tests {
             format!("#version 150\n/* text */\nvoid main()\n{{\n {}\n}}\n", pieces.join("\n  "))
         }
 
-        fn read(&self) -> Result<Template, &'static str> {
-            Template::read(VERTEX, "", &self.text())
+        fn read(&self) -> Result<VtkShaderSignature, &'static str> {
+            VtkShaderSignature::read(VERTEX, "", &self.text())
         }
     }
 
@@ -401,7 +407,7 @@ mod tests {
         parts
     }
 
-    fn with_light(light: impl Into<String>) -> Result<Template, &'static str> {
+    fn with_light(light: impl Into<String>) -> Result<VtkShaderSignature, &'static str> {
         with(|p| p.light = light.into()).read()
     }
 
@@ -440,9 +446,9 @@ mod tests {
             p.color += BACK[0];
             p.end = WEIGHTED.into();
         });
-        let read = |parts: &Parts| Template::read(&clips, "", &parts.text());
+        let read = |parts: &Parts| VtkShaderSignature::read(&clips, "", &parts.text());
         let known = read(&all).expect("known");
-        assert!(known.back && known.clipped && known.peel == Peel::Weighted);
+        assert!(known.back && known.clipped && known.peel == TranslucencyPass::Weighted);
         assert!(read(&Parts::default()).is_err(), "planes that only the vertex shader knows");
         assert!(with(|p| p.clip = CLIPPED.into()).read().is_err(), "planes that nobody measures");
         for piece in [BACK[0], CLIPPED, WEIGHTED] {
@@ -451,7 +457,7 @@ mod tests {
                 let mut less = pieces.clone();
                 less.remove(left_out);
                 let text = all.text().replace(piece, &less.concat());
-                assert!(Template::read(&clips, "", &text).is_err(), "{less:?}");
+                assert!(VtkShaderSignature::read(&clips, "", &text).is_err(), "{less:?}");
             }
         }
     }
@@ -466,14 +472,14 @@ mod tests {
         };
         let edges = with(|p| p.edges = EDGES.into());
         let behind = edges.text().replace("VSOutput", "GSOutput");
-        let known = Template::read(VERTEX, &geometry(""), &behind).expect("known");
+        let known = VtkShaderSignature::read(VERTEX, &geometry(""), &behind).expect("known");
         assert!(known.edges && known.headlight);
         for more in ["gl_Position.xy += offsets[i];", "vertexVCGSOutput = vertexVCVSOutput[i];"] {
-            assert!(Template::read(VERTEX, &geometry(more), &behind).is_err(), "{more}");
+            assert!(VtkShaderSignature::read(VERTEX, &geometry(more), &behind).is_err(), "{more}");
         }
         assert!(edges.read().is_err(), "nobody measures");
         let plain = Parts::default().text();
-        assert!(Template::read(VERTEX, &geometry(""), &plain).is_err(), "nobody draws them");
+        assert!(VtkShaderSignature::read(VERTEX, &geometry(""), &plain).is_err(), "nobody draws them");
     }
 
     #[test]
@@ -500,11 +506,11 @@ mod tests {
 
     #[test]
     fn pictures_are_known_where_they_are_the_last_that_happens_to_the_colour() {
-        for (pictured, components) in COMPONENTS {
+        for (actor_texture, components) in COMPONENTS {
             let piece = |n: &str| [READS, components, MULTIPLIES].concat().replace('#', n);
             let on = |picture: String| with(|p| p.picture = picture).read();
-            assert_eq!(on(piece("0")).map(|t| t.pictured), Ok(pictured));
-            assert_eq!(on(piece("1")).map(|t| t.pictured), Ok(pictured));
+            assert_eq!(on(piece("0")).map(|t| t.actor_texture), Ok(actor_texture));
+            assert_eq!(on(piece("1")).map(|t| t.actor_texture), Ok(actor_texture));
             assert!(on(piece("0") + &piece("1")).is_err(), "two of them");
             assert!(with_light(piece("0") + HEADLIGHT).is_err(), "too early");
             let other = piece("0").replace("fragOutput0 * tcolor", "fragOutput0 + tcolor");
@@ -516,9 +522,9 @@ mod tests {
     fn depths_that_are_moved_back_are_known() {
         let moved = |how: &str| with(|p| p.depth = how.into()).read();
         for how in [MOVED[0].into(), MOVED[1].into(), [SLOPE, MOVED_BY_SLOPE[1]].concat()] {
-            assert!(moved(&how).is_ok_and(|t| t.moved_back), "{how}");
+            assert!(moved(&how).is_ok_and(|t| t.depth_offset), "{how}");
         }
-        assert!(Parts::default().read().is_ok_and(|t| !t.moved_back));
+        assert!(Parts::default().read().is_ok_and(|t| !t.depth_offset));
         let twice = MOVED_BY_SLOPE[1].replace("1.0*", "2.0*");
         assert!(moved(&[SLOPE, &twice].concat()).is_err());
         assert!(moved(&[MOVED[0], PEEL_DEPTHS].concat()).is_err(), "peeled as well");
@@ -528,8 +534,8 @@ mod tests {
     fn coordinates_of_pictures_may_have_a_matrix_and_be_apart_from_those_of_colour_maps() {
         let vertex = |text: &str| {
             let vs = VERTEX.replace("  vertexVC", &format!("{text} vertexVC"));
-            let t = Template::read(&vs, "", &Parts::default().text());
-            t.map(|t| (t.two_coordinates, t.turned))
+            let t = VtkShaderSignature::read(&vs, "", &Parts::default().text());
+            t.map(|t| (t.two_coordinates, t.has_texture_matrix))
         };
         assert_eq!(vertex(COORDINATES[1]), Ok((false, false)));
         assert_eq!(vertex(&COORDINATES.concat()), Ok((true, false)));
@@ -541,10 +547,10 @@ mod tests {
 
     #[test]
     fn physically_based_materials_have_colours_from_pictures() {
-        for (pictured, alpha) in ALBEDO_ALPHA {
+        for (actor_texture, alpha) in ALBEDO_ALPHA {
             let light = [ALBEDO_OF_TEXTURE, alpha, PHYSICAL, PHYSICAL_HEADLIGHT, PHYSICAL_ENDS[0]].concat();
             let t = with_light(light.clone()).expect("known");
-            assert!(t.physical && t.pictured == pictured);
+            assert!(t.physical && t.actor_texture == actor_texture);
             let other = light.replace("albedoSample.rgb *", "albedoSample.rgb +");
             assert_eq!(with_light(other), Err("a picture on a surface of VTK's"));
         }
@@ -564,9 +570,9 @@ mod tests {
     fn passes_of_depth_peeling_are_known_only_with_all_of_their_statements() {
         let layers = PEEL_LAYERS.replace(OTHER_EPSILON[0], OTHER_EPSILON[1]);
         for (peel, begin, end) in [
-            (Peel::Depths, PEEL_DEPTHS, ""),
-            (Peel::Layers, PEEL_LAYERS, PEELED_LAYERS),
-            (Peel::Layers, &layers, PEELED_LAYERS),
+            (TranslucencyPass::Depths, PEEL_DEPTHS, ""),
+            (TranslucencyPass::Layers, PEEL_LAYERS, PEELED_LAYERS),
+            (TranslucencyPass::Layers, &layers, PEELED_LAYERS),
         ] {
             let pass =
                 |begin: &str, end: &str| with(|p| (p.depth, p.end) = (begin.into(), end.into())).read();
@@ -585,14 +591,14 @@ mod tests {
             }
             assert!(pass(&format!("{begin} gl_FragDepth = 0.5;"), end).is_err());
         }
-        assert_eq!(Parts::default().read().map(|t| t.peel), Ok(Peel::No));
+        assert_eq!(Parts::default().read().map(|t| t.peel), Ok(TranslucencyPass::No));
     }
 
     #[test]
     fn a_statement_that_is_not_known_makes_the_program_the_drivers() {
         assert!(with_light("fragOutput0 = vec4(propID, 1.0);").is_err());
         let bent = "void main() { gl_Position = vec4(sin(t)); }";
-        assert!(Template::read(bent, "", &Parts::default().text()).is_err());
+        assert!(VtkShaderSignature::read(bent, "", &Parts::default().text()).is_err());
         let shadows = with(|p| p.picture = "fragOutput0.r = exp(depthC*ldepth);".into());
         assert_eq!(shadows.read(), Err(SHADOW_MAP));
         assert!(with_light("").is_err(), "lit, but by nothing that is known");
@@ -620,7 +626,7 @@ mod tests {
 
     /// `main` of a source, statement by statement.
     fn body(text: &str) -> Vec<String> {
-        statements(text, Stage::Fragment).expect("known text")
+        statements(text, ShaderStage::Fragment).expect("known text")
     }
 
     fn source(body: &[String]) -> String {
@@ -628,7 +634,7 @@ mod tests {
     }
 
     fn is_known(body: &[String]) -> bool {
-        Template::read(VERTEX, "", &source(body)).is_ok()
+        VtkShaderSignature::read(VERTEX, "", &source(body)).is_ok()
     }
 
     #[test]
@@ -636,7 +642,7 @@ mod tests {
         for text in known_ones() {
             let whole = body(&text);
             assert!(is_known(&whole), "{text}");
-            let read = |body: &[String]| Template::read(VERTEX, "", &source(body));
+            let read = |body: &[String]| VtkShaderSignature::read(VERTEX, "", &source(body));
             for at in 0..whole.len() {
                 let mut less = whole.clone();
                 let gone = less.remove(at);

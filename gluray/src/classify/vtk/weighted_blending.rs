@@ -4,7 +4,7 @@
 //! into the same sums (lines, text, what is not known) is added as it would be.
 
 use crate::capture::draw::Draw;
-use crate::capture::geometry_cache::Structures;
+use crate::capture::geometry_cache::BuildCounts;
 use crate::host::config::Mode;
 use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
@@ -12,13 +12,13 @@ use crate::present::frame::Pending;
 use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
 use crate::trace::thread_pool;
-use crate::trace::{Limit, Prepared, Sums, summed};
+use crate::trace::{DepthLimits, Prepared, WeightedSums, weighted_sums};
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Instant;
 
 /// What waits to be summed.
 #[derive(Default)]
-pub(crate) struct Weighted {
+pub(crate) struct WeightedBlending {
     taken: Vec<Pending>,
     /// Program and textures of the pass that writes sums.
     program: u32,
@@ -28,7 +28,7 @@ pub(crate) struct Weighted {
     failed: bool,
 }
 
-impl Weighted {
+impl WeightedBlending {
     pub(crate) fn has_draws(&self) -> bool {
         !self.taken.is_empty()
     }
@@ -55,7 +55,7 @@ const RGBA32F: u32 = 0x8814;
 
 impl Context {
     /// Whether a draw into such sums can be taken: the reason when not.
-    pub(super) fn weighs(&self) -> Result<(), &'static str> {
+    pub(super) fn check_weighted_pass(&self) -> Result<(), &'static str> {
         let (s, settings) = (&self.state, &self.config.settings);
         let traced = settings.enabled && matches!(settings.mode, Mode::Match | Mode::Phong | Mode::Rich);
         let adds = [BLEND_SRC_RGB, BLEND_DST_RGB, BLEND_SRC_ALPHA, BLEND_DST_ALPHA].map(gl::word)
@@ -67,7 +67,7 @@ impl Context {
         let readable = s.framebuffer != 0
             && gl::word(READ_FRAMEBUFFER_BINDING) == s.framebuffer
             && s.samples <= 1
-            && self.can.core;
+            && self.capabilities.core;
         if traced && s.blend && adds && two && tested && readable {
             Ok(())
         } else {
@@ -76,9 +76,9 @@ impl Context {
     }
 
     /// Whether such a surface can be traced: but for what summing sets, its state is that of any.
-    pub(super) fn weighted_surface(&self, state: &mut Snapshot) -> Result<(), &'static str> {
+    pub(super) fn check_weighted_surface(&self, state: &mut Snapshot) -> Result<(), &'static str> {
         state.unclamped_colors = false;
-        self.peeled_surface(state)
+        self.check_peeled_surface(state)
     }
 
     /// Takes a draw.
@@ -92,10 +92,10 @@ impl Context {
     /// Adds what was taken to the framebuffer's sums.
     pub(crate) fn sum_weighted(&mut self) {
         let mut taken = std::mem::take(&mut self.programs.weighted.taken);
-        self.frame.traced_peeled(self.counters.report.frames + 1, &taken);
-        self.counters.flushed("translucent sums");
+        self.frame.record_peeled(self.counters.report.frames + 1, &taken);
+        self.counters.count_flush("translucent sums");
         if self.config.settings.mode != Mode::Match {
-            crate::trace::view::place(&mut taken);
+            crate::trace::view::assign_eye_spaces(&mut taken);
         }
         // As far as the viewport reaches, opaque surfaces hide what is behind them.
         let [x, y, w, h] = taken.first().map_or([0; 4], |(d, _)| d.state.viewport);
@@ -106,33 +106,33 @@ impl Context {
         self.keep_errors();
         let depth = gl::depths(width as i32, height as i32);
         self.drop_errors();
-        let limit = Limit { width, height, depth, exact: true };
+        let limit = DepthLimits { width, height, depth, exact: true };
         let start = Instant::now();
         let settings = &self.config.settings;
         let (sums, rays, structures) = thread_pool::on_pool(|| {
-            let mut structures = Structures::default();
+            let mut structures = BuildCounts::default();
             let ready: Vec<Prepared<'_>> =
                 taken.iter().filter_map(|(d, _)| Prepared::new(d, None, &mut structures)).collect();
-            let (sums, extra) = summed(&ready, &limit, settings);
+            let (sums, extra) = weighted_sums(&ready, &limit, settings);
             let primary = ready.iter().map(|p| p.rays.load(Relaxed)).sum::<u64>();
             (sums, [primary, extra[0], extra[1]], structures)
         });
-        self.counters.spent("trace", start.elapsed());
+        self.counters.add_time("trace", start.elapsed());
         for (kind, n) in ["primary", "shadow", "ambient occlusion"].into_iter().zip(rays) {
-            self.counters.rays(kind, n);
+            self.counters.add_rays(kind, n);
         }
-        self.counters.made(structures);
+        self.counters.count_builds(structures);
         self.counters.report.pixels += sums.covered as u64;
         let start = Instant::now();
         if sums.covered > 0 {
-            self.in_own_state(|c| c.add_sums(&sums));
+            self.with_saved_state(|c| c.add_sums(&sums));
         }
-        self.counters.spent("present", start.elapsed());
+        self.counters.add_time("present", start.elapsed());
     }
 
-    fn add_sums(&mut self, sums: &Sums) {
+    fn add_sums(&mut self, sums: &WeightedSums) {
         if !self.programs.weighted.prepare(self.presenter.vertex_array()) {
-            self.counters.pass("the driver refuses our shader: what was traced is lost", 1);
+            self.counters.count_driver_draws("the driver refuses our shader: what was traced is lost", 1);
             return;
         }
         let p = &mut self.programs.weighted;
@@ -171,7 +171,7 @@ impl Context {
     }
 }
 
-impl Weighted {
+impl WeightedBlending {
     /// Makes the objects; false when the driver refuses them.
     fn prepare(&mut self, vertex_array: u32) -> bool {
         if self.program != 0 || self.failed || vertex_array == 0 {

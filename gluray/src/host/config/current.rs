@@ -22,12 +22,12 @@ pub(crate) struct Config {
 
 impl Config {
     /// What filled primitives are looked at for.
-    pub(crate) fn trace(&self) -> rules::Trace {
+    pub(crate) fn trace(&self) -> rules::TraceFilter {
         match (self.settings.enabled, self.settings.trace) {
-            (false, _) => rules::Trace::Nothing,
-            (true, Trace::All) => rules::Trace::All,
-            (true, Trace::Scene) if self.settings.sees_through() => rules::Trace::Translucent,
-            (true, Trace::Scene) => rules::Trace::Surfaces,
+            (false, _) => rules::TraceFilter::Nothing,
+            (true, Trace::All) => rules::TraceFilter::All,
+            (true, Trace::Scene) if self.settings.sees_through() => rules::TraceFilter::Translucent,
+            (true, Trace::Scene) => rules::TraceFilter::Surfaces,
         }
     }
 
@@ -38,13 +38,13 @@ impl Config {
         // The last is the one that people know it by: `view.py`, not `python3.11`.
         let program = sources.program.last().cloned().unwrap_or_default();
         let mut problems = loaded.problems;
-        problems.extend(not_obeyed(&loaded.settings));
+        problems.extend(unsupported_settings(&loaded.settings));
         Config { settings: loaded.settings, problems, run_dir, program }
     }
 }
 
 /// Paths of settings that the library obeys today. The panel disables the others, and whoever sets one is told in the report.
-pub(crate) const OBEYED: &[&str] = &[
+pub(crate) const SUPPORTED_SETTINGS: &[&str] = &[
     "asynchronous",
     "enabled",
     "mode",
@@ -80,12 +80,13 @@ pub(crate) const OBEYED: &[&str] = &[
 ];
 
 /// What was set in vain.
-fn not_obeyed(settings: &Settings) -> Vec<String> {
+fn unsupported_settings(settings: &Settings) -> Vec<String> {
     let tree = |s: &Settings| serde_json::to_value(s).unwrap_or_default();
     let (now, usual) = (tree(settings), tree(&Settings::default()));
     let value =
         |tree: &serde_json::Value, path: &str| tree.pointer(&format!("/{}", path.replace('.', "/"))).cloned();
-    let in_vain = |f: &&Field| !OBEYED.contains(&f.path) && value(&now, f.path) != value(&usual, f.path);
+    let in_vain =
+        |f: &&Field| !SUPPORTED_SETTINGS.contains(&f.path) && value(&now, f.path) != value(&usual, f.path);
     let mut out: Vec<String> = FIELDS
         .iter()
         .filter(in_vain)
@@ -105,7 +106,7 @@ fn not_obeyed(settings: &Settings) -> Vec<String> {
             f.modes.join(", ")
         )
     }));
-    if !settings.objects.is_empty() && !OBEYED.iter().any(|p| p.starts_with("material.")) {
+    if !settings.objects.is_empty() && !SUPPORTED_SETTINGS.iter().any(|p| p.starts_with("material.")) {
         out.push("`objects` are set, and this version of the library does not obey them yet".into());
     }
     out
@@ -139,13 +140,13 @@ mod tests {
 
     #[test]
     fn what_is_obeyed_is_a_setting_and_the_rest_is_told() {
-        for path in OBEYED {
+        for path in SUPPORTED_SETTINGS {
             assert!(FIELDS.iter().any(|f| f.path == *path), "{path}");
         }
-        assert_eq!(not_obeyed(&Settings::default()), Vec::<String>::new());
+        assert_eq!(unsupported_settings(&Settings::default()), Vec::<String>::new());
         let settings = Settings { enabled: false, asynchronous: true, ..Settings::default() };
-        let told = not_obeyed(&settings);
-        let expected = usize::from(!OBEYED.contains(&"asynchronous"));
+        let told = unsupported_settings(&settings);
+        let expected = usize::from(!SUPPORTED_SETTINGS.contains(&"asynchronous"));
         assert_eq!(told.iter().filter(|t| t.contains("`asynchronous`")).count(), expected, "{told:?}");
         assert_eq!(told.len(), expected, "{told:?}");
     }

@@ -18,7 +18,7 @@ pub mod load;
 pub mod settings;
 
 pub use assign::{Assignment, SettingError, assign};
-pub(crate) use current::{Config, OBEYED, current, program_name, replace};
+pub(crate) use current::{Config, SUPPORTED_SETTINGS, current, program_name, replace};
 pub use fields::{FIELDS, Field, Kind};
 pub use file::ConfigFile;
 pub use load::{Loaded, Sources};

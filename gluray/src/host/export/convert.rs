@@ -27,14 +27,14 @@ impl ConvertReport {
 }
 
 /// One object in the world's axes.
-struct Placed {
+struct WorldSpaceMesh {
     positions: Vec<DVec3>,
     normals: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
     colors: Vec<[u8; 4]>,
 }
 
-fn placed(o: &Object, with_normals: bool, report: &mut ConvertReport) -> Placed {
+fn to_world_space(o: &Object, with_normals: bool, report: &mut ConvertReport) -> WorldSpaceMesh {
     let world = DMat4::from_cols_array(&o.world_from_object);
     let positions: Vec<DVec3> =
         o.positions.iter().map(|p| world.project_point3(DVec3::from(p.map(f64::from)))).collect();
@@ -77,7 +77,7 @@ fn placed(o: &Object, with_normals: bool, report: &mut ConvertReport) -> Placed 
     }
     let constant = o.color.map(|c| (255.0 * c.clamp(0.0, 1.0) + 0.5) as u8);
     let colors = if o.colors.is_empty() { vec![constant; positions.len()] } else { o.colors.clone() };
-    Placed { positions, normals, triangles, colors }
+    WorldSpaceMesh { positions, normals, triangles, colors }
 }
 
 /// True when the object is one of those asked for; none asked for means all.
@@ -88,13 +88,13 @@ fn wanted(o: &Object, keys: &[String]) -> bool {
 /// The objects with these keys (all, when there is none) as one mesh with colours, and with normals when any has some. OpenGL's colours are what the
 /// screen gets, so they count as sRGB.
 pub fn to_mesh(scene: &Scene, keys: &[String]) -> (TriMesh, ConvertReport) {
-    let (mesh, _, report) = joined(scene, keys);
+    let (mesh, _, report) = merge_objects(scene, keys);
     (mesh, report)
 }
 
 /// The same as polygons for VTK. The cell array `object` numbers the objects, whose keys stand in the text `object keys` in that order.
 pub fn to_poly_data(scene: &Scene, keys: &[String]) -> (PolyData, ConvertReport) {
-    let (mesh, triangles, report) = joined(scene, keys);
+    let (mesh, triangles, report) = merge_objects(scene, keys);
     let mut poly = PolyData::from_trimesh(&mesh);
     let numbers = triangles.iter().enumerate().flat_map(|(i, (_, n))| std::iter::repeat_n(i as i32, *n));
     poly.attributes.cell.push(DataArray::new("object", 1, Values::I32(numbers.collect())));
@@ -104,14 +104,14 @@ pub fn to_poly_data(scene: &Scene, keys: &[String]) -> (PolyData, ConvertReport)
 }
 
 /// One mesh, and the objects in it with their triangles.
-fn joined(scene: &Scene, keys: &[String]) -> (TriMesh, Vec<(String, usize)>, ConvertReport) {
+fn merge_objects(scene: &Scene, keys: &[String]) -> (TriMesh, Vec<(String, usize)>, ConvertReport) {
     let mut report = ConvertReport::default();
     let with_normals = scene.objects.iter().any(|o| wanted(o, keys) && !o.normals.is_empty());
     let (mut positions, mut indices, mut normals, mut colors) =
         (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let mut triangles = Vec::new();
     for o in scene.objects.iter().filter(|o| wanted(o, keys)) {
-        let p = placed(o, with_normals, &mut report);
+        let p = to_world_space(o, with_normals, &mut report);
         triangles.push((o.key.clone(), p.triangles.len()));
         let first = positions.len() as u32;
         indices.extend(p.triangles.iter().map(|t| t.map(|i| i + first)));

@@ -45,25 +45,25 @@ async fn serve(stream: TcpStream, hub: &Hub, secret: &Secret) {
     // Small messages that are to be seen at once; without it they come later, and that is all.
     let _ = stream.set_nodelay(true);
     let (from, into) = stream.into_split();
-    let mut incoming = Incoming { from, lines: Lines::default() };
+    let mut incoming = MessageReader { from, lines: Lines::default() };
     let introduction = tokio::time::timeout(INTRODUCTION, incoming.hello(secret)).await;
     let Ok(Some(hello)) = introduction else { return };
-    let (id, messages) = hub.join(hello);
+    let (id, messages) = hub.register(hello);
     let answer = ToProgram::Welcome { version: VERSION, answer: secret.answer().to_owned() };
     let writer = tokio::spawn(write(into, answer, messages));
     while let Some(message) = incoming.message(MAX_REPORT_BYTES).await {
-        hub.hear(id, message);
+        hub.handle_message(id, message);
     }
     writer.abort();
-    hub.leave(id);
+    hub.unregister(id);
 }
 
-struct Incoming {
+struct MessageReader {
     from: OwnedReadHalf,
     lines: Lines,
 }
 
-impl Incoming {
+impl MessageReader {
     /// Who it is, if it knows the token and speaks our version.
     async fn hello(&mut self, secret: &Secret) -> Option<Hello> {
         match self.message(MAX_HELLO_BYTES).await? {

@@ -66,7 +66,7 @@ pub fn same(a: &str, b: &str) -> bool {
 /// Where the panel is.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Meeting {
+pub struct PanelEndpoint {
     /// Of the link, not of the page.
     pub address: SocketAddr,
     /// What both ends know.
@@ -75,7 +75,7 @@ pub struct Meeting {
 
 /// Why a file of the runtime folder is not believed, or cannot be made.
 #[derive(Debug, thiserror::Error)]
-pub enum MeetingError {
+pub enum PanelEndpointError {
     /// Nothing names a runtime folder.
     #[error("there is no folder for running programs; set XDG_RUNTIME_DIR")]
     NoFolder,
@@ -97,21 +97,21 @@ pub enum MeetingError {
     },
 }
 
-impl Meeting {
+impl PanelEndpoint {
     /// By `GLURAY_PANEL` and `GLURAY_PANEL_SECRET`, when both are set and make sense, else by the file.
-    pub fn find(variable: impl Fn(&str) -> Option<String>) -> Option<Meeting> {
+    pub fn find(variable: impl Fn(&str) -> Option<String>) -> Option<PanelEndpoint> {
         let named = variable("GLURAY_PANEL").zip(variable("GLURAY_PANEL_SECRET"));
-        let meeting = match named {
+        let endpoint = match named {
             Some((address, secret)) => {
-                Meeting { address: address.parse().ok()?, secret: Secret::try_from(secret).ok()? }
+                PanelEndpoint { address: address.parse().ok()?, secret: Secret::try_from(secret).ok()? }
             }
-            None => Meeting::read(&file_in(&folders::runtime(variable)?))?,
+            None => PanelEndpoint::read(&file_in(&folders::runtime(variable)?))?,
         };
-        meeting.address.ip().is_loopback().then_some(meeting)
+        endpoint.address.ip().is_loopback().then_some(endpoint)
     }
 
     /// Reads a file, if it is believable.
-    pub fn read(path: &Path) -> Option<Meeting> {
+    pub fn read(path: &Path) -> Option<PanelEndpoint> {
         use std::io::Read;
         let (file, about) = folders::open_own(path)?;
         if about.mode() & 0o077 != 0 || about.len() > 4096 {
@@ -119,20 +119,20 @@ impl Meeting {
         }
         let mut text = String::new();
         file.take(4096).read_to_string(&mut text).ok()?;
-        serde_json::from_str::<Meeting>(&text).ok().filter(|m| m.address.ip().is_loopback())
+        serde_json::from_str::<PanelEndpoint>(&text).ok().filter(|m| m.address.ip().is_loopback())
     }
 
     /// Writes the file into a folder, which is made when it is not there. It is removed when the guard goes.
-    pub fn publish(&self, folder: &Path) -> Result<Published, MeetingError> {
+    pub fn publish(&self, folder: &Path) -> Result<EndpointFile, PanelEndpointError> {
         let io = |path: &Path| {
             let path = path.to_path_buf();
-            move |source| MeetingError::Io { path, source }
+            move |source| PanelEndpointError::Io { path, source }
         };
         std::fs::DirBuilder::new().recursive(true).mode(0o700).create(folder).map_err(io(folder))?;
         let about = std::fs::symlink_metadata(folder).map_err(io(folder))?;
         if !about.is_dir() || Some(about.uid()) != folders::user_id() || about.mode() & 0o022 != 0 {
             let what = "is no folder of yours, or others may write to it".into();
-            return Err(MeetingError::NotPrivate { path: folder.into(), what });
+            return Err(PanelEndpointError::NotPrivate { path: folder.into(), what });
         }
         let path = file_in(folder);
         let temporary = folder.join(format!("panel.{}.partial", std::process::id()));
@@ -145,7 +145,7 @@ impl Meeting {
             std::fs::rename(&temporary, &path)
         };
         write().map_err(io(&path))?;
-        Ok(Published { path, meeting: self.clone() })
+        Ok(EndpointFile { path, endpoint: self.clone() })
     }
 }
 
@@ -156,15 +156,15 @@ pub fn file_in(folder: &Path) -> PathBuf {
 
 /// A published meeting.
 #[derive(Debug)]
-pub struct Published {
+pub struct EndpointFile {
     path: PathBuf,
-    meeting: Meeting,
+    endpoint: PanelEndpoint,
 }
 
-impl Drop for Published {
+impl Drop for EndpointFile {
     fn drop(&mut self) {
         // A later panel's file stays.
-        if Meeting::read(&self.path).is_some_and(|m| m == self.meeting) {
+        if PanelEndpoint::read(&self.path).is_some_and(|m| m == self.endpoint) {
             let _ = std::fs::remove_file(&self.path);
         }
     }
@@ -175,27 +175,27 @@ mod tests {
     use super::*;
     use std::os::unix::fs::PermissionsExt;
 
-    fn meeting(address: &str) -> Meeting {
-        Meeting { address: address.parse().unwrap(), secret: Secret::of([7; HALF]) }
+    fn endpoint(address: &str) -> PanelEndpoint {
+        PanelEndpoint { address: address.parse().unwrap(), secret: Secret::of([7; HALF]) }
     }
 
     #[test]
     fn the_file_is_private_is_believed_and_goes_with_the_panel() {
         let dir = tempfile::tempdir().unwrap();
         let folder = dir.path().join("gluray");
-        let m = meeting("127.0.0.1:9");
+        let m = endpoint("127.0.0.1:9");
         let published = m.publish(&folder).unwrap();
         let path = file_in(&folder);
         assert_eq!(std::fs::metadata(&path).unwrap().mode() & 0o777, 0o600);
         assert_eq!(std::fs::metadata(&folder).unwrap().mode() & 0o777, 0o700);
         let runtime = dir.path().to_str().unwrap().to_owned();
-        assert_eq!(Meeting::find(|n| (n == "XDG_RUNTIME_DIR").then(|| runtime.clone())), Some(m));
+        assert_eq!(PanelEndpoint::find(|n| (n == "XDG_RUNTIME_DIR").then(|| runtime.clone())), Some(m));
 
         // Another panel takes over; the first one's end does not take its file away.
-        let second = meeting("127.0.0.1:10");
+        let second = endpoint("127.0.0.1:10");
         let published_second = second.publish(&folder).unwrap();
         drop(published);
-        assert_eq!(Meeting::read(&path), Some(second));
+        assert_eq!(PanelEndpoint::read(&path), Some(second));
         drop(published_second);
         assert!(!path.exists());
     }
@@ -204,17 +204,17 @@ mod tests {
     fn files_of_others_open_files_and_other_hosts_are_not_believed() {
         let dir = tempfile::tempdir().unwrap();
         let path = file_in(dir.path());
-        let _published = meeting("127.0.0.1:9").publish(dir.path()).unwrap();
+        let _published = endpoint("127.0.0.1:9").publish(dir.path()).unwrap();
         std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o644)).unwrap();
-        assert_eq!(Meeting::read(&path), None, "others may read it");
+        assert_eq!(PanelEndpoint::read(&path), None, "others may read it");
         std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o600)).unwrap();
-        assert!(Meeting::read(&path).is_some());
-        let _abroad = meeting("192.0.2.1:9").publish(dir.path()).unwrap();
-        assert_eq!(Meeting::read(&path), None, "not on loopback");
+        assert!(PanelEndpoint::read(&path).is_some());
+        let _abroad = endpoint("192.0.2.1:9").publish(dir.path()).unwrap();
+        assert_eq!(PanelEndpoint::read(&path), None, "not on loopback");
         let secret = String::from(Secret::of([1; HALF]));
         let by_variables = |address: &str, secret: &str| {
             let set = [("GLURAY_PANEL", address.to_owned()), ("GLURAY_PANEL_SECRET", secret.to_owned())];
-            Meeting::find(move |n| set.iter().find(|(k, _)| *k == n).map(|(_, v)| v.clone()))
+            PanelEndpoint::find(move |n| set.iter().find(|(k, _)| *k == n).map(|(_, v)| v.clone()))
         };
         assert!(
             by_variables("127.0.0.1:80", &secret).is_some() && by_variables("[::1]:80", &secret).is_some()
@@ -225,18 +225,21 @@ mod tests {
             assert_eq!(by_variables(address, secret), None, "{address}");
         }
         // Names that lead elsewhere are not followed, not even to a file that would be believed.
-        let _here = meeting("127.0.0.1:9").publish(dir.path()).unwrap();
+        let _here = endpoint("127.0.0.1:9").publish(dir.path()).unwrap();
         let elsewhere = dir.path().join("elsewhere.json");
         std::fs::rename(&path, &elsewhere).unwrap();
-        assert!(Meeting::read(&elsewhere).is_some());
+        assert!(PanelEndpoint::read(&elsewhere).is_some());
         std::os::unix::fs::symlink(&elsewhere, &path).unwrap();
-        assert_eq!(Meeting::read(&path), None, "a link");
+        assert_eq!(PanelEndpoint::read(&path), None, "a link");
         std::fs::remove_file(&path).unwrap();
         std::fs::create_dir(&path).unwrap();
-        assert_eq!(Meeting::read(&path), None, "a folder");
+        assert_eq!(PanelEndpoint::read(&path), None, "a folder");
         std::fs::remove_dir(&path).unwrap();
         std::fs::set_permissions(dir.path(), std::fs::Permissions::from_mode(0o777)).unwrap();
-        assert!(matches!(meeting("127.0.0.1:9").publish(dir.path()), Err(MeetingError::NotPrivate { .. })));
+        assert!(matches!(
+            endpoint("127.0.0.1:9").publish(dir.path()),
+            Err(PanelEndpointError::NotPrivate { .. })
+        ));
     }
 
     #[test]
@@ -247,7 +250,7 @@ mod tests {
         assert!(made.success());
         let (sender, receiver) = std::sync::mpsc::channel();
         let read = path.clone();
-        std::thread::spawn(move || sender.send(Meeting::read(&read)));
+        std::thread::spawn(move || sender.send(PanelEndpoint::read(&read)));
         // Whoever waits for a writer waits for ever; the time is for a busy machine.
         let answer = receiver.recv_timeout(std::time::Duration::from_secs(60));
         assert_eq!(answer, Ok(None), "looked at before it is waited for");

@@ -48,7 +48,7 @@ pub struct Program {
     pub recent: Vec<FrameStats>,
 }
 
-struct Entry {
+struct ProgramEntry {
     shown: Program,
     hello_problems: Vec<String>,
     history: VecDeque<FrameStats>,
@@ -57,13 +57,13 @@ struct Entry {
 
 #[derive(Default)]
 struct Inner {
-    programs: BTreeMap<u64, Entry>,
+    programs: BTreeMap<u64, ProgramEntry>,
     last_id: u64,
 }
 
 /// Why something cannot be done.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum Refused {
+pub enum HubError {
     /// No such program.
     #[error("program {0} is not running any more; choose another one")]
     Gone(u64),
@@ -82,12 +82,12 @@ pub enum Refused {
 pub struct Hub {
     inner: Mutex<Inner>,
     /// Counts changes; who waits for news waits here.
-    pub news: watch::Sender<u64>,
+    pub changes: watch::Sender<u64>,
 }
 
 impl Default for Hub {
     fn default() -> Self {
-        Hub { inner: Mutex::default(), news: watch::Sender::new(1) }
+        Hub { inner: Mutex::default(), changes: watch::Sender::new(1) }
     }
 }
 
@@ -97,12 +97,12 @@ impl Hub {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn tell(&self) {
-        self.news.send_modify(|n| *n += 1);
+    fn notify(&self) {
+        self.changes.send_modify(|n| *n += 1);
     }
 
     /// A program has come. Its messages go through the receiver.
-    pub fn join(&self, hello: Hello) -> (u64, mpsc::Receiver<ToProgram>) {
+    pub fn register(&self, hello: Hello) -> (u64, mpsc::Receiver<ToProgram>) {
         let (outgoing, receiver) = mpsc::channel(32);
         let mut inner = self.lock();
         inner.last_id += 1;
@@ -122,16 +122,17 @@ impl Hub {
             exported: None,
             recent: Vec::new(),
         };
-        inner
-            .programs
-            .insert(id, Entry { shown, hello_problems: hello.problems, history: VecDeque::new(), outgoing });
+        inner.programs.insert(
+            id,
+            ProgramEntry { shown, hello_problems: hello.problems, history: VecDeque::new(), outgoing },
+        );
         drop(inner);
-        self.tell();
+        self.notify();
         (id, receiver)
     }
 
     /// A program said something.
-    pub fn hear(&self, id: u64, message: ToPanel) {
+    pub fn handle_message(&self, id: u64, message: ToPanel) {
         let mut inner = self.lock();
         let Some(e) = inner.programs.get_mut(&id) else { return };
         match message {
@@ -155,11 +156,11 @@ impl Hub {
             }
         }
         drop(inner);
-        self.tell();
+        self.notify();
     }
 
     /// A program is gone. The last few stay on the list.
-    pub fn leave(&self, id: u64) {
+    pub fn unregister(&self, id: u64) {
         let mut inner = self.lock();
         if let Some(e) = inner.programs.get_mut(&id) {
             e.shown.running = false;
@@ -169,7 +170,7 @@ impl Hub {
         ended.truncate(ended.len().saturating_sub(ENDED));
         ended.iter().for_each(|id| drop(inner.programs.remove(id)));
         drop(inner);
-        self.tell();
+        self.notify();
     }
 
     /// Number of programs that run.
@@ -180,8 +181,9 @@ impl Hub {
     /// Every program on the list.
     pub fn programs(&self) -> Vec<Program> {
         let inner = self.lock();
-        let recent =
-            |e: &Entry| e.history.iter().skip(e.history.len().saturating_sub(RECENT)).cloned().collect();
+        let recent = |e: &ProgramEntry| {
+            e.history.iter().skip(e.history.len().saturating_sub(RECENT)).cloned().collect()
+        };
         inner.programs.values().map(|e| Program { recent: recent(e), ..e.shown.clone() }).collect()
     }
 
@@ -191,9 +193,9 @@ impl Hub {
     }
 
     /// Sets some settings and takes changes of others back; all or nothing.
-    pub fn change(&self, id: u64, set: BTreeMap<String, Value>, reset: &[String]) -> Result<(), Refused> {
+    pub fn change(&self, id: u64, set: BTreeMap<String, Value>, reset: &[String]) -> Result<(), HubError> {
         let mut inner = self.lock();
-        let e = inner.programs.get_mut(&id).filter(|e| e.shown.running).ok_or(Refused::Gone(id))?;
+        let e = inner.programs.get_mut(&id).filter(|e| e.shown.running).ok_or(HubError::Gone(id))?;
         let mut assignments = e.shown.assignments.clone();
         assignments.retain(|path, _| {
             !reset
@@ -202,37 +204,37 @@ impl Hub {
         });
         assignments.extend(set);
         if assignments.len() > MAX_ASSIGNMENTS {
-            return Err(Refused::TooMany);
+            return Err(HubError::TooMany);
         }
         let list: Vec<Assignment> =
             assignments.iter().map(|(p, v)| Assignment::new("panel", p, v.clone())).collect();
         let (_, errors) = assign(&e.shown.base, &list);
         if !errors.is_empty() {
-            return Err(Refused::Setting(
+            return Err(HubError::Setting(
                 errors.iter().take(3).map(SettingError::to_string).collect::<Vec<_>>().join("; "),
             ));
         }
         let message = ToProgram::Change { assignments: assignments.clone() };
-        e.outgoing.try_send(message).map_err(|_| Refused::Busy)?;
+        e.outgoing.try_send(message).map_err(|_| HubError::Busy)?;
         e.shown.assignments = assignments;
         drop(inner);
-        self.tell();
+        self.notify();
         Ok(())
     }
 
     /// Asks a program for its scene.
-    pub fn export(&self, id: u64) -> Result<(), Refused> {
+    pub fn export(&self, id: u64) -> Result<(), HubError> {
         let mut inner = self.lock();
-        let e = inner.programs.get_mut(&id).filter(|e| e.shown.running).ok_or(Refused::Gone(id))?;
-        e.outgoing.try_send(ToProgram::Export {}).map_err(|_| Refused::Busy)?;
+        let e = inner.programs.get_mut(&id).filter(|e| e.shown.running).ok_or(HubError::Gone(id))?;
+        e.outgoing.try_send(ToProgram::Export {}).map_err(|_| HubError::Busy)?;
         e.shown.exported = None;
         Ok(())
     }
 
     /// What was changed here, as a section of the settings' file.
-    pub fn toml(&self, id: u64) -> Result<String, Refused> {
+    pub fn toml(&self, id: u64) -> Result<String, HubError> {
         let inner = self.lock();
-        let e = inner.programs.get(&id).ok_or(Refused::Gone(id))?;
+        let e = inner.programs.get(&id).ok_or(HubError::Gone(id))?;
         let mut section = toml::Table::new();
         for (path, value) in &e.shown.assignments {
             let mut at = &mut section;
@@ -241,7 +243,7 @@ impl Hub {
                 let next = at.entry(folder).or_insert_with(|| toml::Value::Table(toml::Table::new()));
                 match next {
                     toml::Value::Table(next) => at = next,
-                    _ => return Err(Refused::Setting(format!("`{path}` has no place in a file"))),
+                    _ => return Err(HubError::Setting(format!("`{path}` has no place in a file"))),
                 }
             }
             // `null` stands for "as the program has it", which a file says by silence.
@@ -251,7 +253,7 @@ impl Hub {
         }
         let program = toml::Table::from_iter([(e.shown.program.clone(), toml::Value::Table(section))]);
         let file = toml::Table::from_iter([("program".to_owned(), toml::Value::Table(program))]);
-        toml::to_string(&file).map_err(|e| Refused::Setting(e.to_string()))
+        toml::to_string(&file).map_err(|e| HubError::Setting(e.to_string()))
     }
 }
 
@@ -267,7 +269,7 @@ mod tests {
     #[test]
     fn changes_add_up_are_taken_back_and_become_a_file_that_means_the_same() {
         let hub = Hub::default();
-        let (id, mut messages) = hub.join(Hello { program: "my prog".into(), ..Hello::default() });
+        let (id, mut messages) = hub.register(Hello { program: "my prog".into(), ..Hello::default() });
         hub.change(id, set(&[("mode", json!("rich")), ("objects.a1.color", json!([1, 0.5, 0]))]), &[])
             .unwrap();
         hub.change(id, set(&[("samples", json!(4)), ("material.mirror", json!(0.5))]), &["mode".into()])
@@ -297,17 +299,17 @@ mod tests {
     #[test]
     fn nonsense_changes_nothing_and_who_is_gone_cannot_be_changed() {
         let hub = Hub::default();
-        let (id, mut messages) = hub.join(Hello::default());
+        let (id, mut messages) = hub.register(Hello::default());
         let e = hub.change(id, set(&[("samples", json!(4)), ("mode", json!("x"))]), &[]).unwrap_err();
         assert!(e.to_string().contains("`mode` is \"x\""), "{e}");
         assert!(messages.try_recv().is_err() && hub.programs()[0].assignments.is_empty());
-        assert_eq!(hub.change(99, BTreeMap::new(), &[]), Err(Refused::Gone(99)));
-        hub.leave(id);
-        assert_eq!(hub.export(id), Err(Refused::Gone(id)));
+        assert_eq!(hub.change(99, BTreeMap::new(), &[]), Err(HubError::Gone(99)));
+        hub.unregister(id);
+        assert_eq!(hub.export(id), Err(HubError::Gone(id)));
         assert_eq!((hub.running(), hub.programs().len()), (0, 1));
         for _ in 0..2 * ENDED {
-            let (id, _r) = hub.join(Hello::default());
-            hub.leave(id);
+            let (id, _r) = hub.register(Hello::default());
+            hub.unregister(id);
         }
         assert_eq!(hub.programs().len(), ENDED);
     }
@@ -315,11 +317,14 @@ mod tests {
     #[test]
     fn a_program_that_reads_nothing_and_one_that_says_much_cost_a_fixed_amount() {
         let hub = Hub::default();
-        let (id, _messages) = hub.join(Hello::default());
+        let (id, _messages) = hub.register(Hello::default());
         let results: Vec<_> = (1..100).map(|i| hub.change(id, set(&[("samples", json!(i))]), &[])).collect();
-        assert!(results.contains(&Err(Refused::Busy)));
+        assert!(results.contains(&Err(HubError::Busy)));
         for frame in 0..2000 {
-            hub.hear(id, ToPanel::Frame { stats: Box::new(FrameStats { frame, ..FrameStats::default() }) });
+            hub.handle_message(
+                id,
+                ToPanel::Frame { stats: Box::new(FrameStats { frame, ..FrameStats::default() }) },
+            );
         }
         let history = hub.history(id).unwrap();
         assert_eq!((history.len(), history[HISTORY - 1].frame), (HISTORY, 1999));

@@ -7,7 +7,7 @@
 //! A process that forked leaves the link to its parent. All settings that arrive go through [`crate::host::config::assign()`]: what is
 //! wrong is refused by name, and the rest is taken.
 
-use super::endpoint::{Meeting, same};
+use super::endpoint::{PanelEndpoint, same};
 use super::protocol::{
     FRAMES_PER_SEC, FrameStats, Hello, Lines, MAX_CHANGE_BYTES, MAX_OBJECTS, ObjectInfo, ToPanel, ToProgram,
     VERSION, clipped, line,
@@ -29,7 +29,7 @@ const FRAME_INTERVAL: Duration = Duration::from_millis(1000 / FRAMES_PER_SEC as 
 
 /// What the panel wants.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Wish {
+pub enum PanelCommand {
     /// New settings, complete and checked.
     Settings(Box<Settings>),
     /// The scene as a file; answer with [`Link::exported`].
@@ -47,19 +47,19 @@ struct Connection {
 /// The link. Without a panel it does nothing but look for one now and then.
 ///
 /// ```
-/// use gluray::panel::{Hello, Link, link::Wish};
+/// use gluray::panel::{Hello, Link, link::PanelCommand};
 ///
 /// let mut link = Link::new(Hello { program: "mine".into(), process: std::process::id(), ..Hello::default() });
 /// // Once a frame:
 /// match link.poll() {
-///     Some(Wish::Settings(settings)) => assert!(settings.samples >= 1, "what arrives is checked"),
-///     Some(Wish::Export) => link.exported(Err("this program has no scene")),
+///     Some(PanelCommand::Settings(settings)) => assert!(settings.samples >= 1, "what arrives is checked"),
+///     Some(PanelCommand::Export) => link.exported(Err("this program has no scene")),
 ///     None => {}
 /// }
 /// ```
 pub struct Link {
     hello: Hello,
-    find: Box<dyn Fn() -> Option<Meeting> + Send>,
+    find: Box<dyn Fn() -> Option<PanelEndpoint> + Send>,
     process: u32,
     connection: Option<Connection>,
     next_attempt: Instant,
@@ -81,23 +81,23 @@ impl std::fmt::Debug for Link {
 }
 
 impl Link {
-    /// A link that finds its panel by the environment or the file, see [`Meeting::find`]. Nothing is tried before the first
+    /// A link that finds its panel by the environment or the file, see [`PanelEndpoint::find`]. Nothing is tried before the first
     /// [`Link::poll`].
     pub fn new(hello: Hello) -> Link {
         // Read once: the program may change its environment while we look.
         let names = ["GLURAY_PANEL", "GLURAY_PANEL_SECRET", "XDG_RUNTIME_DIR"];
         let set = names.map(|n| (n, crate::host::folders::variable(n)));
         Link::with(hello, move || {
-            Meeting::find(|name| set.iter().find(|(n, _)| *n == name).and_then(|(_, v)| v.clone()))
+            PanelEndpoint::find(|name| set.iter().find(|(n, _)| *n == name).and_then(|(_, v)| v.clone()))
         })
     }
 
     /// A link to a known panel.
-    pub fn connect(meeting: Meeting, hello: Hello) -> Link {
-        Link::with(hello, move || Some(meeting.clone()))
+    pub fn connect(endpoint: PanelEndpoint, hello: Hello) -> Link {
+        Link::with(hello, move || Some(endpoint.clone()))
     }
 
-    fn with(mut hello: Hello, find: impl Fn() -> Option<Meeting> + Send + 'static) -> Link {
+    fn with(mut hello: Hello, find: impl Fn() -> Option<PanelEndpoint> + Send + 'static) -> Link {
         let now = Instant::now();
         hello.program = clipped(&hello.program);
         let in_force = hello.settings.clone();
@@ -121,13 +121,13 @@ impl Link {
     }
 
     /// Reads what the panel sent and writes what waits. Call once a frame. When the panel goes away its settings go with it.
-    pub fn poll(&mut self) -> Option<Wish> {
+    pub fn poll(&mut self) -> Option<PanelCommand> {
         let now = Instant::now();
         if self.connection.is_none() {
             if now < self.next_attempt {
                 return None;
             }
-            self.attempt(now);
+            self.try_connect(now);
         }
         if self.connection.is_some() && self.process != std::process::id() {
             // A fork's child: the socket is the parent's.
@@ -135,13 +135,13 @@ impl Link {
             self.next_attempt = now + Duration::from_secs(1 << 30);
             return None;
         }
-        match self.talk() {
+        match self.exchange_messages() {
             Ok(wish) => wish,
-            Err(Over) => {
+            Err(Disconnected) => {
                 self.connection = None;
                 self.next_attempt = now + self.retry;
                 let before = std::mem::replace(&mut self.in_force, self.hello.settings.clone());
-                (before != self.in_force).then(|| Wish::Settings(Box::new(self.in_force.clone())))
+                (before != self.in_force).then(|| PanelCommand::Settings(Box::new(self.in_force.clone())))
             }
         }
     }
@@ -178,7 +178,7 @@ impl Link {
         }
     }
 
-    /// Answers [`Wish::Export`]: the file, or why there is none.
+    /// Answers [`PanelCommand::Export`]: the file, or why there is none.
     pub fn exported(&mut self, outcome: Result<&std::path::Path, &str>) {
         self.send(&match outcome {
             Ok(file) => ToPanel::Exported { file: Some(file.display().to_string()), error: None },
@@ -200,16 +200,16 @@ impl Link {
         }
     }
 
-    fn attempt(&mut self, now: Instant) {
+    fn try_connect(&mut self, now: Instant) {
         self.next_attempt = now + self.retry;
-        let Some(meeting) = (self.find)().filter(|m| m.address.ip().is_loopback()) else { return };
-        let Some(stream) = open(meeting.address) else {
+        let Some(endpoint) = (self.find)().filter(|m| m.address.ip().is_loopback()) else { return };
+        let Some(stream) = open(endpoint.address) else {
             // A file that a killed panel left: asked less and less often.
             self.retry = (2 * self.retry).min(RETRY[1]);
             return;
         };
         self.retry = RETRY[0];
-        let secret = meeting.secret;
+        let secret = endpoint.secret;
         let token = secret.token().to_owned();
         self.connection = Some(Connection {
             stream,
@@ -221,7 +221,7 @@ impl Link {
         self.send(&ToPanel::Hello { version: VERSION, token, hello: Box::new(self.hello.clone()) });
     }
 
-    fn talk(&mut self) -> Result<Option<Wish>, Over> {
+    fn exchange_messages(&mut self) -> Result<Option<PanelCommand>, Disconnected> {
         let Some(c) = &mut self.connection else { return Ok(None) };
         read(c)?;
         let mut wish = None;
@@ -229,10 +229,10 @@ impl Link {
         while wish.is_none() {
             let Some(c) = &mut self.connection else { break };
             let Some(message) = c.incoming.next::<ToProgram>(MAX_CHANGE_BYTES) else { break };
-            match message.map_err(|_| Over)? {
+            match message.map_err(|_| Disconnected)? {
                 ToProgram::Welcome { version, answer } => {
                     if version != VERSION || !same(&answer, c.secret.answer()) {
-                        return Err(Over);
+                        return Err(Disconnected);
                     }
                     c.welcome = true;
                     if let Some(bytes) = self.objects.clone() {
@@ -240,9 +240,9 @@ impl Link {
                     }
                 }
                 // Whoever has not proved to be the panel is not listened to.
-                _ if !c.welcome => return Err(Over),
+                _ if !c.welcome => return Err(Disconnected),
                 ToProgram::Change { assignments } => wish = self.change(assignments),
-                ToProgram::Export {} => wish = Some(Wish::Export),
+                ToProgram::Export {} => wish = Some(PanelCommand::Export),
             }
         }
         if let Some(c) = &mut self.connection {
@@ -251,7 +251,7 @@ impl Link {
         Ok(wish)
     }
 
-    fn change(&mut self, assignments: BTreeMap<String, serde_json::Value>) -> Option<Wish> {
+    fn change(&mut self, assignments: BTreeMap<String, serde_json::Value>) -> Option<PanelCommand> {
         let list: Vec<Assignment> =
             assignments.into_iter().map(|(path, value)| Assignment::new("panel", path, value)).collect();
         let (settings, errors) = assign(&self.hello.settings, &list);
@@ -259,12 +259,12 @@ impl Link {
         let changed = settings != self.in_force;
         self.in_force = settings.clone();
         self.send(&ToPanel::InForce { settings: Box::new(settings.clone()), refused });
-        changed.then(|| Wish::Settings(Box::new(settings)))
+        changed.then(|| PanelCommand::Settings(Box::new(settings)))
     }
 }
 
 /// The connection is over.
-struct Over;
+struct Disconnected;
 
 fn open(address: SocketAddr) -> Option<TcpStream> {
     let stream = TcpStream::connect_timeout(&address, CONNECT_PATIENCE).ok()?;
@@ -274,29 +274,29 @@ fn open(address: SocketAddr) -> Option<TcpStream> {
     Some(stream)
 }
 
-fn read(c: &mut Connection) -> Result<(), Over> {
+fn read(c: &mut Connection) -> Result<(), Disconnected> {
     let mut buffer = [0; 16 * 1024];
     // So much at once and no more: a panel gone wild must not hold up a frame.
     for _ in 0..8 {
         match c.stream.read(&mut buffer) {
-            Ok(0) => return Err(Over),
+            Ok(0) => return Err(Disconnected),
             Ok(n) => c.incoming.push(&buffer[..n]),
             Err(e) if e.kind() == ErrorKind::WouldBlock => break,
             Err(e) if e.kind() == ErrorKind::Interrupted => {}
-            Err(_) => return Err(Over),
+            Err(_) => return Err(Disconnected),
         }
     }
     Ok(())
 }
 
-fn write(c: &mut Connection) -> Result<(), Over> {
+fn write(c: &mut Connection) -> Result<(), Disconnected> {
     while !c.outgoing.is_empty() {
         match c.stream.write(&c.outgoing) {
-            Ok(0) => return Err(Over),
+            Ok(0) => return Err(Disconnected),
             Ok(n) => drop(c.outgoing.drain(..n)),
             Err(e) if e.kind() == ErrorKind::WouldBlock => break,
             Err(e) if e.kind() == ErrorKind::Interrupted => {}
-            Err(_) => return Err(Over),
+            Err(_) => return Err(Disconnected),
         }
     }
     Ok(())

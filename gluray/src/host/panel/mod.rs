@@ -22,8 +22,8 @@ mod routes;
 mod server;
 
 #[cfg(feature = "panel")]
-pub use server::{Opened, PanelError, serve};
+pub use server::{PanelAddresses, PanelError, serve};
 
-pub use endpoint::{Meeting, Secret};
+pub use endpoint::{PanelEndpoint, Secret};
 pub use link::Link;
 pub use protocol::{FrameStats, Hello, ObjectInfo};

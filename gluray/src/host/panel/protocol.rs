@@ -162,7 +162,7 @@ pub fn line(message: &impl Serialize) -> Option<Vec<u8>> {
 
 /// Why a connection ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum Broken {
+pub enum ProtocolError {
     /// A line longer than allowed.
     #[error("a line is too long")]
     TooLong,
@@ -186,18 +186,18 @@ impl Lines {
     }
 
     /// The next message, if a whole line is there.
-    pub fn next<T: DeserializeOwned>(&mut self, longest: usize) -> Option<Result<T, Broken>> {
+    pub fn next<T: DeserializeOwned>(&mut self, longest: usize) -> Option<Result<T, ProtocolError>> {
         let end = self.bytes[self.searched..].iter().position(|b| *b == b'\n').map(|at| self.searched + at);
         let Some(end) = end else {
             self.searched = self.bytes.len();
-            return (self.bytes.len() > longest).then_some(Err(Broken::TooLong));
+            return (self.bytes.len() > longest).then_some(Err(ProtocolError::TooLong));
         };
         let line: Vec<u8> = self.bytes.drain(..=end).collect();
         self.searched = 0;
         if end > longest {
-            return Some(Err(Broken::TooLong));
+            return Some(Err(ProtocolError::TooLong));
         }
-        Some(serde_json::from_slice(&line[..end]).map_err(|_| Broken::Nonsense))
+        Some(serde_json::from_slice(&line[..end]).map_err(|_| ProtocolError::Nonsense))
     }
 }
 
@@ -215,7 +215,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn all(lines: &mut Lines, longest: usize) -> Vec<Result<ToProgram, Broken>> {
+    fn all(lines: &mut Lines, longest: usize) -> Vec<Result<ToProgram, ProtocolError>> {
         let mut out = Vec::new();
         while let Some(m) = lines.next(longest) {
             let broken = m.is_err();
@@ -250,11 +250,11 @@ mod tests {
     fn too_long_lines_are_noticed_before_their_end_comes() {
         let mut lines = Lines::default();
         lines.push(&[b' '; 101]);
-        assert_eq!(all(&mut lines, 100), [Err(Broken::TooLong)]);
+        assert_eq!(all(&mut lines, 100), [Err(ProtocolError::TooLong)]);
         let mut lines = Lines::default();
         lines.push(&[b' '; 200]);
         lines.push(b"\n");
-        assert_eq!(all(&mut lines, 100), [Err(Broken::TooLong)]);
+        assert_eq!(all(&mut lines, 100), [Err(ProtocolError::TooLong)]);
     }
 
     proptest! {

@@ -14,7 +14,7 @@
 //! sends one.
 
 use super::endpoint::same;
-use super::hub::{Hub, Refused};
+use super::hub::{Hub, HubError};
 use crate::host::config::FIELDS;
 use axum::Router;
 use axum::body::Bytes;
@@ -51,7 +51,7 @@ const PARTS: [(&str, &str, &str); 6] = [
 ];
 
 #[derive(Clone)]
-struct App {
+struct AppState {
     hub: Arc<Hub>,
     token: Arc<str>,
     hosts: Arc<[String]>,
@@ -60,7 +60,7 @@ struct App {
 /// Everything below `/{token}/`.
 pub(super) fn router(hub: Arc<Hub>, token: &str, address: SocketAddr) -> Router {
     let hosts = [address.to_string(), format!("localhost:{}", address.port())];
-    let app = App { hub, token: token.into(), hosts: hosts.into() };
+    let app = AppState { hub, token: token.into(), hosts: hosts.into() };
     Router::new()
         .route("/{token}/", get(index))
         .route("/{token}/fields", get(fields))
@@ -77,7 +77,7 @@ pub(super) fn router(hub: Arc<Hub>, token: &str, address: SocketAddr) -> Router 
 }
 
 /// What is wrong with a request before it is looked at.
-fn stranger(app: &App, request: &Request) -> Option<&'static str> {
+fn reject_reason(app: &AppState, request: &Request) -> Option<&'static str> {
     let text = |name: header::HeaderName| request.headers().get(name).map(HeaderValue::to_str);
     let ours = |host: &str| app.hosts.iter().any(|h| h.eq_ignore_ascii_case(host));
     if !matches!(text(header::HOST), Some(Ok(host)) if ours(host)) {
@@ -95,8 +95,8 @@ fn stranger(app: &App, request: &Request) -> Option<&'static str> {
     None
 }
 
-async fn guarded(State(app): State<App>, request: Request, next: Next) -> Response {
-    let mut response = match stranger(&app, &request) {
+async fn guarded(State(app): State<AppState>, request: Request, next: Next) -> Response {
+    let mut response = match reject_reason(&app, &request) {
         Some(why) => (StatusCode::FORBIDDEN, why).into_response(),
         None => next.run(request).await,
     };
@@ -120,12 +120,12 @@ fn error(status: StatusCode, text: &str) -> Response {
     (status, axum::Json(json!({ "error": text }))).into_response()
 }
 
-impl IntoResponse for Refused {
+impl IntoResponse for HubError {
     fn into_response(self) -> Response {
         let status = match self {
-            Refused::Gone(_) => StatusCode::NOT_FOUND,
-            Refused::Busy => StatusCode::SERVICE_UNAVAILABLE,
-            Refused::TooMany | Refused::Setting(_) => StatusCode::UNPROCESSABLE_ENTITY,
+            HubError::Gone(_) => StatusCode::NOT_FOUND,
+            HubError::Busy => StatusCode::SERVICE_UNAVAILABLE,
+            HubError::TooMany | HubError::Setting(_) => StatusCode::UNPROCESSABLE_ENTITY,
         };
         error(status, &self.to_string())
     }
@@ -153,39 +153,42 @@ async fn fields() -> Response {
 }
 
 #[derive(Deserialize)]
-struct After {
+struct AfterQuery {
     #[serde(default)]
     after: u64,
 }
 
-async fn state(State(app): State<App>, Query(After { after }): Query<After>) -> Response {
-    let mut news = app.hub.news.subscribe();
+async fn state(State(app): State<AppState>, Query(AfterQuery { after }): Query<AfterQuery>) -> Response {
+    let mut changes = app.hub.changes.subscribe();
     if after > 0 {
         tokio::time::sleep(CALM).await;
-        let other = tokio::time::timeout(PATIENCE, news.wait_for(|n| *n != after)).await;
+        let other = tokio::time::timeout(PATIENCE, changes.wait_for(|n| *n != after)).await;
         if !matches!(other, Ok(Ok(_))) {
             return StatusCode::NO_CONTENT.into_response();
         }
     }
     // The number first: what changes meanwhile is news.
-    let number = *app.hub.news.borrow();
+    let number = *app.hub.changes.borrow();
     axum::Json(json!({ "news": number, "programs": app.hub.programs() })).into_response()
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Which {
+struct ProgramQuery {
     id: u64,
 }
 
-async fn history(State(app): State<App>, Query(Which { id }): Query<Which>) -> Response {
+async fn history(State(app): State<AppState>, Query(ProgramQuery { id }): Query<ProgramQuery>) -> Response {
     match app.hub.history(id) {
         Some(frames) => axum::Json(frames).into_response(),
-        None => Refused::Gone(id).into_response(),
+        None => HubError::Gone(id).into_response(),
     }
 }
 
-async fn settings_file(State(app): State<App>, Query(Which { id }): Query<Which>) -> Response {
+async fn settings_file(
+    State(app): State<AppState>,
+    Query(ProgramQuery { id }): Query<ProgramQuery>,
+) -> Response {
     match app.hub.toml(id) {
         Ok(text) => {
             let mut headers = HeaderMap::new();
@@ -202,7 +205,7 @@ async fn settings_file(State(app): State<App>, Query(Which { id }): Query<Which>
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Change {
+struct ChangeRequest {
     id: u64,
     #[serde(default)]
     set: BTreeMap<String, Value>,
@@ -210,8 +213,8 @@ struct Change {
     reset: Vec<String>,
 }
 
-async fn change(State(app): State<App>, body: Bytes) -> Response {
-    let change: Change = match parsed(&body) {
+async fn change(State(app): State<AppState>, body: Bytes) -> Response {
+    let change: ChangeRequest = match parsed(&body) {
         Ok(change) => change,
         Err(response) => return *response,
     };
@@ -221,8 +224,8 @@ async fn change(State(app): State<App>, body: Bytes) -> Response {
     }
 }
 
-async fn export(State(app): State<App>, body: Bytes) -> Response {
-    let Which { id } = match parsed(&body) {
+async fn export(State(app): State<AppState>, body: Bytes) -> Response {
+    let ProgramQuery { id } = match parsed(&body) {
         Ok(which) => which,
         Err(response) => return *response,
     };

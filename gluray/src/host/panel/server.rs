@@ -1,6 +1,6 @@
 //! Both listeners, and their end.
 
-use super::endpoint::{Meeting, MeetingError, Secret};
+use super::endpoint::{PanelEndpoint, PanelEndpointError, Secret};
 use super::hub::Hub;
 use super::{connections, routes};
 use std::net::{IpAddr, SocketAddr};
@@ -27,7 +27,7 @@ pub enum PanelError {
     },
     /// Programs cannot find us.
     #[error(transparent)]
-    Meeting(#[from] MeetingError),
+    PanelEndpoint(#[from] PanelEndpointError),
     /// The system gives no randomness or event loop.
     #[error("the panel cannot start: {0}")]
     Start(String),
@@ -35,11 +35,11 @@ pub enum PanelError {
 
 /// An open panel.
 #[derive(Debug, Clone)]
-pub struct Opened {
+pub struct PanelAddresses {
     /// Address of the page, with its token.
     pub url: String,
     /// Where programs find us.
-    pub meeting: Meeting,
+    pub endpoint: PanelEndpoint,
 }
 
 /// How often the end of the program is looked for.
@@ -52,7 +52,7 @@ pub fn serve(
     address: SocketAddr,
     folder: Option<PathBuf>,
     cancel: &AtomicBool,
-    ready: impl FnOnce(&Opened),
+    ready: impl FnOnce(&PanelAddresses),
 ) -> Result<(), PanelError> {
     if !address.ip().is_loopback() {
         return Err(PanelError::NotLoopback(address.ip()));
@@ -71,12 +71,12 @@ pub fn serve(
     };
     let (page, page_address) = bind(address)?;
     let (link, link_address) = bind(SocketAddr::new(address.ip(), 0))?;
-    let meeting = Meeting { address: link_address, secret: secret.clone() };
+    let endpoint = PanelEndpoint { address: link_address, secret: secret.clone() };
     let folder = folder
         .or_else(|| crate::host::folders::runtime(crate::host::folders::variable))
-        .ok_or(MeetingError::NoFolder)?;
-    let _published = meeting.publish(&folder)?;
-    ready(&Opened { url: format!("http://{page_address}/{token}/"), meeting });
+        .ok_or(PanelEndpointError::NoFolder)?;
+    let _published = endpoint.publish(&folder)?;
+    ready(&PanelAddresses { url: format!("http://{page_address}/{token}/"), endpoint });
 
     let hub = Arc::new(Hub::default());
     let app = routes::router(hub.clone(), &token, page_address);

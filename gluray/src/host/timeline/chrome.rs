@@ -1,11 +1,11 @@
 //! Chrome's trace event format ("Trace Event Format", Google, complete events), which Perfetto reads, too.
 
-use super::{Span, in_order};
+use super::{Span, in_order_of_appearance};
 use serde_json::{Value, json};
 
 /// The trace: a thread for each track, a complete event for each span, in microseconds.
 pub fn chrome_trace(program: &str, spans: &[Span]) -> Value {
-    let tracks = in_order(spans, |s| &s.track);
+    let tracks = in_order_of_appearance(spans, |s| &s.track);
     let first = spans.iter().filter(|s| s.is_sound()).map(|s| s.start_ms).fold(f64::INFINITY, f64::min);
     let number = |track: &str| tracks.iter().position(|t| *t == track).unwrap_or(0) + 1;
     let mut events =

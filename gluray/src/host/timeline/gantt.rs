@@ -1,6 +1,6 @@
 //! A Gantt chart as SVG: a row for each thread, a box for each span, a line at the end of each frame.
 
-use super::{Span, in_order};
+use super::{Span, in_order_of_appearance};
 use std::fmt::Write as _;
 
 /// What is drawn.
@@ -34,8 +34,8 @@ const NARROWEST: f64 = 0.25;
 /// The chart. Spans outside the window are left out; an empty list gives a chart that says so.
 pub fn gantt_svg(spans: &[Span], options: &GanttOptions) -> String {
     let sound: Vec<&Span> = spans.iter().filter(|s| s.is_sound()).collect();
-    let tracks = in_order(spans, |s| &s.track);
-    let phases = in_order(spans, |s| &s.phase);
+    let tracks = in_order_of_appearance(spans, |s| &s.track);
+    let phases = in_order_of_appearance(spans, |s| &s.phase);
     let all = sound
         .iter()
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], s| [a.min(s.start_ms), b.max(s.end_ms())]);
@@ -170,7 +170,7 @@ pub fn gantt_svg(spans: &[Span], options: &GanttOptions) -> String {
     s
 }
 
-struct Drawn<'a> {
+struct GanttBox<'a> {
     phase: &'a str,
     frame: u64,
     left: f64,
@@ -180,8 +180,8 @@ struct Drawn<'a> {
 }
 
 /// Boxes in pixels; what is too narrow to be seen alone is joined with what follows it closely.
-fn boxes<'a>(own: &[&'a Span], least: f64, most: f64, x: impl Fn(f64) -> f64) -> Vec<Drawn<'a>> {
-    let mut out: Vec<Drawn<'a>> = Vec::new();
+fn boxes<'a>(own: &[&'a Span], least: f64, most: f64, x: impl Fn(f64) -> f64) -> Vec<GanttBox<'a>> {
+    let mut out: Vec<GanttBox<'a>> = Vec::new();
     for s in own {
         let (left, right) = (x(s.start_ms).clamp(least, most), x(s.end_ms()).clamp(least, most));
         let narrow = right - left < NARROWEST;
@@ -193,7 +193,7 @@ fn boxes<'a>(own: &[&'a Span], least: f64, most: f64, x: impl Fn(f64) -> f64) ->
                 l.ms += s.ms;
                 l.count += 1;
             }
-            None => out.push(Drawn { phase: &s.phase, frame: s.frame, left, right, ms: s.ms, count: 1 }),
+            None => out.push(GanttBox { phase: &s.phase, frame: s.frame, left, right, ms: s.ms, count: 1 }),
         }
     }
     out

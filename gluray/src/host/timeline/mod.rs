@@ -1,6 +1,6 @@
 //! When each phase of each frame ran, and on which thread: the chart of figure 4.8, from a real run.
 //!
-//! The library notes spans as they end ([`Recorder`]); they are part of its report. [`gantt`] draws them, [`chrome`] writes them for
+//! The library notes spans as they end ([`SpanRecorder`]); they are part of its report. [`gantt`] draws them, [`chrome`] writes them for
 //! `chrome://tracing` and Perfetto.
 
 pub mod chrome;
@@ -9,7 +9,7 @@ mod span_recorder;
 
 pub use chrome::chrome_trace;
 pub use gantt::{GanttOptions, gantt_svg};
-pub use span_recorder::Recorder;
+pub use span_recorder::SpanRecorder;
 
 use serde::{Deserialize, Serialize};
 
@@ -42,7 +42,7 @@ impl Span {
 }
 
 /// Tracks and phases in the order in which they appear first.
-fn in_order<'a>(spans: &'a [Span], of: impl Fn(&'a Span) -> &'a str) -> Vec<&'a str> {
+fn in_order_of_appearance<'a>(spans: &'a [Span], of: impl Fn(&'a Span) -> &'a str) -> Vec<&'a str> {
     let mut names: Vec<&str> = Vec::new();
     for name in spans.iter().map(of) {
         if !names.contains(&name) {

@@ -6,16 +6,16 @@ use std::time::{Duration, Instant};
 
 /// The newest spans of a process.
 #[derive(Debug)]
-pub struct Recorder {
+pub struct SpanRecorder {
     spans: VecDeque<Span>,
     begin: Option<Instant>,
     most: usize,
 }
 
-impl Recorder {
+impl SpanRecorder {
     /// Keeps `most` spans.
-    pub const fn new(most: usize) -> Recorder {
-        Recorder { spans: VecDeque::new(), begin: None, most }
+    pub const fn new(most: usize) -> SpanRecorder {
+        SpanRecorder { spans: VecDeque::new(), begin: None, most }
     }
 
     /// A phase ended just now that took so long.
@@ -67,7 +67,7 @@ mod tests {
     fn spans_lie_on_one_clock_and_the_oldest_make_room() {
         let now = Instant::now();
         let ms = Duration::from_millis;
-        let mut r = Recorder::new(3);
+        let mut r = SpanRecorder::new(3);
         r.span("program", "capture", 1, now + ms(10), ms(10));
         r.span("build", "fast", 1, now + ms(25), ms(30));
         r.span("program", "trace", 1, now + ms(50), ms(40));

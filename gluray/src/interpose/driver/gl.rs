@@ -296,8 +296,8 @@ pub(crate) fn tex_sub_image(w: i32, h: i32, format: u32, kind: u32, data: &[u8])
     UNPACK.into_iter().zip(before).filter(|(u, b)| u.1 != *b).for_each(|(u, b)| pixel_storei(u.0, b));
 }
 
-/// Proof that texels are read as they are: [`plain_reading`] alone gives it, for the time of its call.
-pub(crate) struct Plainly(());
+/// Proof that texels are read as they are: [`with_raw_pixel_reads`] alone gives it, for the time of its call.
+pub(crate) struct RawPixelTransfer(());
 
 /// Texels of a level of the bound 1-D or 2-D texture: what the driver is going to write, whatever a caller thinks. `None` for other targets and from 2^26 texels on.
 fn texels_of(target: u32, level: i32) -> Option<usize> {
@@ -312,7 +312,7 @@ fn texels_of(target: u32, level: i32) -> Option<usize> {
 }
 
 /// A level of the bound texture as floats, RGBA; empty where it cannot be read.
-pub(crate) fn tex_image_rgba(_: &Plainly, target: u32, level: i32) -> Vec<[f32; 4]> {
+pub(crate) fn tex_image_rgba(_: &RawPixelTransfer, target: u32, level: i32) -> Vec<[f32; 4]> {
     let Some(texels) = texels_of(target, level) else { return Vec::new() };
     let mut out = vec![[0.0_f32; 4]; texels];
     get_tex_image(target, level, 0x1908, 0x1406, out.as_mut_ptr().cast());
@@ -321,7 +321,7 @@ pub(crate) fn tex_image_rgba(_: &Plainly, target: u32, level: i32) -> Vec<[f32; 
 
 /// The same as bytes, in memory that served before.
 pub(crate) fn tex_image_bytes(
-    _: &Plainly,
+    _: &RawPixelTransfer,
     target: u32,
     level: i32,
     mut memory: Vec<[u8; 4]>,
@@ -371,12 +371,12 @@ const TRANSFER: [(u32, f32); 9] = [
 ];
 
 /// Pixels go as they are, without the program's scales and biases, until attributes are popped.
-pub(crate) fn plain_transfer() {
+pub(crate) fn reset_pixel_transfer() {
     TRANSFER.into_iter().for_each(|(what, plain)| pixel_transferf(what, plain));
 }
 
 /// Runs `f` while texels are read as they are: rows that follow one another, into memory and not into a buffer, without the program's scales and biases.
-pub(crate) fn plain_reading<R>(f: impl FnOnce(&Plainly) -> R) -> R {
+pub(crate) fn with_raw_pixel_reads<R>(f: impl FnOnce(&RawPixelTransfer) -> R) -> R {
     // Swapped bytes, row length, skipped rows and pixels, alignment; of volumes nothing is read.
     const PACK: [(u32, i32); 5] = [(0x0d00, 0), (0x0d02, 0), (0x0d03, 0), (0x0d04, 0), (0x0d05, 4)];
     const PIXEL_PACK_BUFFER: u32 = 0x88eb;
@@ -391,7 +391,7 @@ pub(crate) fn plain_reading<R>(f: impl FnOnce(&Plainly) -> R) -> R {
     if buffer != 0 {
         bind_buffer(PIXEL_PACK_BUFFER, 0);
     }
-    let out = f(&Plainly(()));
+    let out = f(&RawPixelTransfer(()));
     if buffer != 0 {
         bind_buffer(PIXEL_PACK_BUFFER, buffer);
     }
@@ -412,7 +412,7 @@ pub(crate) fn buffer_bytes(target: u32, at: usize, bytes: usize) -> Vec<u8> {
 /// Depths of the framebuffer from its lower left corner on, row by row.
 pub(crate) fn depths(w: i32, h: i32) -> Vec<f32> {
     let mut out = vec![1.0_f32; w.max(0) as usize * h.max(0) as usize];
-    plain_reading(|_| read_pixels(0, 0, w.max(0), h.max(0), 0x1902, 0x1406, out.as_mut_ptr().cast()));
+    with_raw_pixel_reads(|_| read_pixels(0, 0, w.max(0), h.max(0), 0x1902, 0x1406, out.as_mut_ptr().cast()));
     out
 }
 

@@ -9,13 +9,13 @@
 //!    name in [`OWNER`] reads what it wrote itself, nobody else has written [`OWNER`] or [`HOT`] since, and [`HOT`] is the address that it put there. A thread that reads
 //!    anything else leaves [`HOT`] alone. What two threads do at the same time therefore does not matter: each transition is one atomic step, and a thread
 //!    that comes second finds another's name and keeps to its slot.
-//! 2. *One at a time.* While a reference is lent, the thread is busy: `OWNER` is `me | 1` where this thread has it, and `Slot::busy` elsewhere. Both ways look, and lend nothing
-//!    then (a driver that we call may call us: its debug callback is the program's). [`step`] needs no mark of its own: what it runs calls nothing but us.
+//! 2. *One at a time.* While a reference is lent, the thread is busy: `OWNER` is `me | 1` where this thread has it, and `ThreadSlot::busy` elsewhere. Both ways look, and lend nothing
+//!    then (a driver that we call may call us: its debug callback is the program's). [`fast_call`] needs no mark of its own: what it runs calls nothing but us.
 //! 3. *Names of threads.* `me` is the address of the thread's control block, which no two threads that live have in common (System V ABI for x86-64, `fs:0`). A thread that
 //!    ends gives its name up with its slot, in the slot's destructor, before another can be made in its place. A child of a fork has one thread; names of threads that only its
 //!    parent has are given up there, because their memory is handed out again ([`after_fork`]).
 
-use crate::capture::immediate_mode::Step;
+use crate::capture::immediate_mode::FastPathResult;
 use crate::interpose::context::Context;
 use core::cell::Cell;
 use core::ptr::null_mut;
@@ -28,16 +28,16 @@ static OWNER: AtomicUsize = AtomicUsize::new(0);
 static HOT: AtomicPtr<Context> = AtomicPtr::new(null_mut());
 
 /// The context of a thread, which it owns.
-struct Slot {
+struct ThreadSlot {
     context: Cell<*mut Context>,
     busy: Cell<bool>,
 }
 
 thread_local! {
-    static SLOT: Slot = const { Slot { context: Cell::new(null_mut()), busy: Cell::new(false) } };
+    static SLOT: ThreadSlot = const { ThreadSlot { context: Cell::new(null_mut()), busy: Cell::new(false) } };
 }
 
-impl Drop for Slot {
+impl Drop for ThreadSlot {
     /// A thread, or the program, ends with its context current.
     fn drop(&mut self) {
         release();
@@ -111,13 +111,13 @@ pub(crate) fn take() -> Option<Box<Context>> {
     (!context.is_null()).then(|| unsafe { Box::from_raw(context) })
 }
 
-/// The short way of a call, with the current context; [`Step::Slow`] when the context has to be looked up, and after a fault.
+/// The short way of a call, with the current context; [`FastPathResult::Slow`] when the context has to be looked up, and after a fault.
 ///
-/// `f` must not be handed on to anything that is not inlined: see [`Step`]. It must not call anything that may call us.
+/// `f` must not be handed on to anything that is not inlined: see [`FastPathResult`]. It must not call anything that may call us.
 #[inline(always)]
-pub(super) fn step(index: usize, f: impl FnOnce(&mut Context) -> Step) -> Step {
+pub(super) fn fast_call(index: usize, f: impl FnOnce(&mut Context) -> FastPathResult) -> FastPathResult {
     if OWNER.load(Relaxed) != me() {
-        return Step::Slow;
+        return FastPathResult::Slow;
     }
     let hot = HOT.load(Relaxed);
     let call = || {
@@ -128,7 +128,7 @@ pub(super) fn step(index: usize, f: impl FnOnce(&mut Context) -> Step) -> Step {
         // SAFETY: this thread owns it and it is not lent, for that is what `OWNER` says (1 and 2 above).
         f(unsafe { &mut *hot })
     };
-    crate::interpose::panic_guard::caught(call).unwrap_or(Step::Slow)
+    crate::interpose::panic_guard::caught(call).unwrap_or(FastPathResult::Slow)
 }
 
 /// The long way of a call: `f` with the current context, whose answer says whether that was all. False also without a context and after a fault: then the
@@ -154,12 +154,12 @@ pub(super) fn with(index: usize, f: impl FnOnce(&mut Context) -> bool) -> bool {
 
 /// The same for what is ours to do after a fault, too: it is tried once more.
 #[inline(always)]
-pub(super) fn with_books(index: usize, f: impl Fn(&mut Context) -> bool) -> bool {
+pub(super) fn with_even_after_fault(index: usize, f: impl Fn(&mut Context) -> bool) -> bool {
     let call = || {
         crate::interpose::panic_guard::inject_at(index);
         with_context(&f)
     };
-    crate::interpose::panic_guard::give_up_here();
+    crate::interpose::panic_guard::hand_over_to_driver();
     crate::interpose::panic_guard::caught(call)
         .or_else(|| crate::interpose::panic_guard::caught(call))
         .flatten()
@@ -167,15 +167,15 @@ pub(super) fn with_books(index: usize, f: impl Fn(&mut Context) -> bool) -> bool
 }
 
 /// A context is not lent any longer when this goes.
-struct LentHot(usize);
+struct LentCurrent(usize);
 
-impl Drop for LentHot {
+impl Drop for LentCurrent {
     fn drop(&mut self) {
         OWNER.store(self.0, Relaxed);
     }
 }
 
-struct LentSlot<'a>(&'a Slot);
+struct LentSlot<'a>(&'a ThreadSlot);
 
 impl Drop for LentSlot<'_> {
     fn drop(&mut self) {
@@ -190,7 +190,7 @@ pub(crate) fn with_context<R>(f: impl FnOnce(&mut Context) -> R) -> Option<R> {
     let owner = OWNER.load(Relaxed);
     if owner == me {
         OWNER.store(me | 1, Relaxed);
-        let _lent = LentHot(me);
+        let _lent = LentCurrent(me);
         // SAFETY: this thread owns it; until `_lent` goes nobody else gets it (1 and 2 above).
         return Some(f(unsafe { &mut *HOT.load(Relaxed) }));
     }
@@ -202,7 +202,7 @@ pub(crate) fn with_context<R>(f: impl FnOnce(&mut Context) -> R) -> Option<R> {
 
 #[inline(never)]
 fn with_slot<R>(f: impl FnOnce(&mut Context) -> R) -> Option<R> {
-    let look_up = |slot: &Slot| {
+    let look_up = |slot: &ThreadSlot| {
         let context = slot.context.get();
         if context.is_null() || slot.busy.replace(true) {
             return None;
@@ -226,9 +226,9 @@ mod tests {
 
     fn by_step() -> Option<usize> {
         let mut seen = None;
-        step(0, |c| {
+        fast_call(0, |c| {
             seen = Some(c.handle());
-            Step::Done
+            FastPathResult::Done
         });
         seen
     }

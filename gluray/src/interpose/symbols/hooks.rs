@@ -6,9 +6,9 @@
 use super::lookup::replaced;
 use super::{at, current_context, with_context};
 use crate::capture::display_lists::names::width;
-use crate::capture::evaluators::Kind;
-use crate::capture::immediate_mode::Step;
-use crate::interpose::client_memory::{self, Call, Named};
+use crate::capture::evaluators::MapKind;
+use crate::capture::immediate_mode::FastPathResult;
+use crate::interpose::client_memory::{self, ActiveCall, DrawArguments};
 use crate::interpose::context;
 use crate::interpose::driver::Int;
 use crate::interpose::panic_guard::caught;
@@ -49,14 +49,14 @@ macro_rules! hot_hooks {
         pub(in crate::interpose::symbols) unsafe extern "C" fn $name($($a: $t),*) {
             #[cold]
             #[inline(never)]
-            unsafe extern "C" fn slowly($($a: $t),*) {
+            unsafe extern "C" fn slow($($a: $t),*) {
                 if !current_context::with(at::$name, |$c| $body) {
                     driver!($name($($a),*): ($($t),*));
                 }
             }
-            if current_context::step(at::$name, |$c| $step) != Step::Done {
+            if current_context::fast_call(at::$name, |$c| $step) != FastPathResult::Done {
                 // SAFETY: the program's own arguments.
-                unsafe { slowly($($a),*) }
+                unsafe { slow($($a),*) }
             }
         }
     )* };
@@ -88,8 +88,8 @@ unsafe fn material_values(what: u32, address: Address, integers: bool) -> [f32; 
 }
 
 hot_hooks! {
-    fn glBegin(mode: u32) => |c| c.begin_step(mode), c.begin(mode);
-    fn glEnd() => |c| c.end_step(), c.end();
+    fn glBegin(mode: u32) => |c| c.begin_fast(mode), c.begin(mode);
+    fn glEnd() => |c| c.end_fast(), c.end();
 }
 
 /// The same for calls that have no short way.
@@ -126,84 +126,84 @@ hooks! {
     fn glRects(x: i16, y: i16, x2: i16, y2: i16) => |c| c.rect([x, y, x2, y2].map(f32::from));
     fn glArrayElement(i: Int) => |c| {
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { Call::new(Named::Element(i)) };
+        let call = unsafe { ActiveCall::new(DrawArguments::Element(i)) };
         c.array_element(&call)
     };
     fn glArrayElementEXT(i: Int) => |c| {
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { Call::new(Named::Element(i)) };
+        let call = unsafe { ActiveCall::new(DrawArguments::Element(i)) };
         c.array_element(&call)
     };
-    fn glMap1f(target: u32, u1: f32, u2: f32, stride: Int, order: Int, points: Address) => |c| c.maps_change();
-    fn glMap1d(target: u32, u1: f64, u2: f64, stride: Int, order: Int, points: Address) => |c| c.maps_change();
-    fn glMap2f(target: u32, u1: f32, u2: f32, ustride: Int, uorder: Int, v1: f32, v2: f32, vstride: Int, vorder: Int, points: Address) => |c| c.maps_change();
-    fn glMap2d(target: u32, u1: f64, u2: f64, ustride: Int, uorder: Int, v1: f64, v2: f64, vstride: Int, vorder: Int, points: Address) => |c| c.maps_change();
-    fn glMapGrid1f(n: Int, u1: f32, u2: f32) => |c| c.maps_change();
-    fn glMapGrid1d(n: Int, u1: f64, u2: f64) => |c| c.maps_change();
-    fn glMapGrid2f(un: Int, u1: f32, u2: f32, vn: Int, v1: f32, v2: f32) => |c| c.maps_change();
-    fn glMapGrid2d(un: Int, u1: f64, u2: f64, vn: Int, v1: f64, v2: f64) => |c| c.maps_change();
-    fn glEvalCoord1f(u: f32) => |c| c.eval_coord(Kind::Curve, [u, 0.0]);
-    fn glEvalCoord1d(u: f64) => |c| c.eval_coord(Kind::Curve, [u as f32, 0.0]);
+    fn glMap1f(target: u32, u1: f32, u2: f32, stride: Int, order: Int, points: Address) => |c| c.invalidate_maps();
+    fn glMap1d(target: u32, u1: f64, u2: f64, stride: Int, order: Int, points: Address) => |c| c.invalidate_maps();
+    fn glMap2f(target: u32, u1: f32, u2: f32, ustride: Int, uorder: Int, v1: f32, v2: f32, vstride: Int, vorder: Int, points: Address) => |c| c.invalidate_maps();
+    fn glMap2d(target: u32, u1: f64, u2: f64, ustride: Int, uorder: Int, v1: f64, v2: f64, vstride: Int, vorder: Int, points: Address) => |c| c.invalidate_maps();
+    fn glMapGrid1f(n: Int, u1: f32, u2: f32) => |c| c.invalidate_maps();
+    fn glMapGrid1d(n: Int, u1: f64, u2: f64) => |c| c.invalidate_maps();
+    fn glMapGrid2f(un: Int, u1: f32, u2: f32, vn: Int, v1: f32, v2: f32) => |c| c.invalidate_maps();
+    fn glMapGrid2d(un: Int, u1: f64, u2: f64, vn: Int, v1: f64, v2: f64) => |c| c.invalidate_maps();
+    fn glEvalCoord1f(u: f32) => |c| c.eval_coord(MapKind::Curve, [u, 0.0]);
+    fn glEvalCoord1d(u: f64) => |c| c.eval_coord(MapKind::Curve, [u as f32, 0.0]);
     fn glEvalCoord1fv(v: Address) => |c| {
         // SAFETY: the call names so many numbers there.
         let at = unsafe { client_memory::floats::<1>(v as usize) };
-        c.eval_coord(Kind::Curve, [at[0], 0.0])
+        c.eval_coord(MapKind::Curve, [at[0], 0.0])
     };
     fn glEvalCoord1dv(v: Address) => |c| {
         // SAFETY: the call names so many numbers there.
         let at = unsafe { client_memory::doubles::<1>(v as usize) };
-        c.eval_coord(Kind::Curve, [at[0] as f32, 0.0])
+        c.eval_coord(MapKind::Curve, [at[0] as f32, 0.0])
     };
-    fn glEvalCoord2f(u: f32, v: f32) => |c| c.eval_coord(Kind::Surface, [u, v]);
-    fn glEvalCoord2d(u: f64, v: f64) => |c| c.eval_coord(Kind::Surface, [u as f32, v as f32]);
+    fn glEvalCoord2f(u: f32, v: f32) => |c| c.eval_coord(MapKind::Surface, [u, v]);
+    fn glEvalCoord2d(u: f64, v: f64) => |c| c.eval_coord(MapKind::Surface, [u as f32, v as f32]);
     fn glEvalCoord2fv(v: Address) => |c| {
         // SAFETY: the call names so many numbers there.
         let at = unsafe { client_memory::floats::<2>(v as usize) };
-        c.eval_coord(Kind::Surface, at)
+        c.eval_coord(MapKind::Surface, at)
     };
     fn glEvalCoord2dv(v: Address) => |c| {
         // SAFETY: the call names so many numbers there.
         let at = unsafe { client_memory::doubles::<2>(v as usize) };
-        c.eval_coord(Kind::Surface, at.map(|x| x as f32))
+        c.eval_coord(MapKind::Surface, at.map(|x| x as f32))
     };
-    fn glEvalPoint1(i: Int) => |c| c.eval_point(Kind::Curve, [i, 0]);
-    fn glEvalPoint2(i: Int, j: Int) => |c| c.eval_point(Kind::Surface, [i, j]);
+    fn glEvalPoint1(i: Int) => |c| c.eval_point(MapKind::Curve, [i, 0]);
+    fn glEvalPoint2(i: Int, j: Int) => |c| c.eval_point(MapKind::Surface, [i, j]);
     fn glEvalMesh1(mode: u32, i1: Int, i2: Int) => |c| c.eval_mesh_1(mode);
     fn glEvalMesh2(mode: u32, i1: Int, i2: Int, j1: Int, j2: Int) => |c| c.eval_mesh_2(mode, [i1, i2, j1, j2]);
     fn glPrimitiveRestartNV() => |c| c.primitive_restart();
     fn glDrawArrays(mode: u32, first: Int, count: Int) => |c| {
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { Call::new(Named::Arrays { first, count }) };
+        let call = unsafe { ActiveCall::new(DrawArguments::Arrays { first, count }) };
         c.draw(mode, &call)
     };
     fn glDrawArraysEXT(mode: u32, first: Int, count: Int) => |c| {
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { Call::new(Named::Arrays { first, count }) };
+        let call = unsafe { ActiveCall::new(DrawArguments::Arrays { first, count }) };
         c.draw(mode, &call)
     };
     fn glDrawElements(mode: u32, count: Int, kind: u32, at: Address) => |c| {
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { Call::new(Named::Elements { count, kind, at: at as usize, base: 0 }) };
+        let call = unsafe { ActiveCall::new(DrawArguments::Elements { count, kind, at: at as usize, base: 0 }) };
         c.draw(mode, &call)
     };
     fn glDrawRangeElements(mode: u32, start: u32, end: u32, count: Int, kind: u32, at: Address) => |c| {
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { Call::new(Named::Elements { count, kind, at: at as usize, base: 0 }) };
+        let call = unsafe { ActiveCall::new(DrawArguments::Elements { count, kind, at: at as usize, base: 0 }) };
         c.draw(mode, &call)
     };
     fn glDrawRangeElementsEXT(mode: u32, start: u32, end: u32, count: Int, kind: u32, at: Address) => |c| {
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { Call::new(Named::Elements { count, kind, at: at as usize, base: 0 }) };
+        let call = unsafe { ActiveCall::new(DrawArguments::Elements { count, kind, at: at as usize, base: 0 }) };
         c.draw(mode, &call)
     };
     fn glDrawElementsBaseVertex(mode: u32, count: Int, kind: u32, at: Address, base: Int) => |c| {
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { Call::new(Named::Elements { count, kind, at: at as usize, base }) };
+        let call = unsafe { ActiveCall::new(DrawArguments::Elements { count, kind, at: at as usize, base }) };
         c.draw(mode, &call)
     };
     fn glDrawRangeElementsBaseVertex(mode: u32, start: u32, end: u32, count: Int, kind: u32, at: Address, base: Int) => |c| {
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { Call::new(Named::Elements { count, kind, at: at as usize, base }) };
+        let call = unsafe { ActiveCall::new(DrawArguments::Elements { count, kind, at: at as usize, base }) };
         c.draw(mode, &call)
     };
     fn glBufferData(target: u32, size: isize, data: Address, usage: u32) => |c| c.buffer_written(target);
@@ -228,7 +228,7 @@ hooks! {
 macro_rules! book_hooks {
     ($(fn $name:ident($($a:ident: $t:ty),*) => |$c:ident| $body:expr;)*) => { $(
         pub(in crate::interpose::symbols) unsafe extern "C" fn $name($($a: $t),*) {
-            if !current_context::with_books(at::$name, |$c| $body) {
+            if !current_context::with_even_after_fault(at::$name, |$c| $body) {
                 driver!($name($($a),*): ($($t),*));
             }
         }
@@ -309,14 +309,14 @@ type Handle = *mut c_void;
 fn making_current(index: usize, context: Handle, real: impl FnOnce() -> u32) -> u32 {
     let leave = || {
         crate::interpose::panic_guard::inject_at(index);
-        context::leave()
+        context::release_current()
     };
     // After a fault once more: whose context is current must be known.
-    let left = caught(leave).or_else(|| caught(leave)).unwrap_or(context::Left::Nothing);
+    let left = caught(leave).or_else(|| caught(leave)).unwrap_or(context::PreviousContext::Nothing);
     let done = real();
     caught(|| match done {
-        0 => context::stay(left),
-        _ => context::enter(context as usize, left),
+        0 => context::restore_current(left),
+        _ => context::make_current(context as usize, left),
     });
     done
 }

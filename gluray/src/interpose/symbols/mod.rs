@@ -1,7 +1,7 @@
 //! The OpenGL library that programs see: one trampoline per entry point, a table of where each goes, and the hooks.
 //!
 //! A trampoline has no prototype: it jumps through [`TABLE`] with all registers as the program left them. Calls that may change
-//! state are *watched*: while [`ATTENTION`] is set we are told before they run (`slow`), at a price of some ten nanoseconds; as soon as
+//! state are *watched*: while [`ARMED`] is set we are told before they run (`slow`), at a price of some ten nanoseconds; as soon as
 //! nobody needs to know, they cost one comparison. This is what lets the driver keep all state: we ask it when a draw comes, and
 //! only again after a watched call.
 //!
@@ -53,41 +53,41 @@ include!(concat!(env!("OUT_DIR"), "/trampolines.rs"));
 static TABLE: [AtomicPtr<()>; COUNT] = [const { AtomicPtr::new(lazy as *mut ()) }; COUNT];
 /// Zero while watched calls need not be reported: exactly one thread has a context, and nobody asked. Bit 0 says that somebody asked; above it are the threads that have
 /// a context, less one. In one word, so that none of the two changes unseen while the other is looked at.
-static ATTENTION: AtomicU32 = AtomicU32::new(0_u32.wrapping_sub(2));
+static ARMED: AtomicU32 = AtomicU32::new(0_u32.wrapping_sub(2));
 /// Watched calls that went straight to the driver.
 static CALLS: AtomicU64 = AtomicU64::new(0);
 
 /// Asks to be told of the next watched call.
 #[inline]
-pub(crate) fn attend() {
-    if ATTENTION.load(Relaxed) & 1 == 0 {
-        ATTENTION.fetch_or(1, Relaxed);
+pub(crate) fn arm() {
+    if ARMED.load(Relaxed) & 1 == 0 {
+        ARMED.fetch_or(1, Relaxed);
     }
 }
 
 /// Lets watched calls pass without a word, unless another thread has a context, too.
-pub(crate) fn relax() {
+pub(crate) fn disarm() {
     // Refused when a second thread has come since somebody looked.
-    ATTENTION.compare_exchange(1, 0, Relaxed, Relaxed).ok();
+    ARMED.compare_exchange(1, 0, Relaxed, Relaxed).ok();
 }
 
 /// One thread alone has a context.
 pub(crate) fn is_alone() -> bool {
-    ATTENTION.load(Relaxed) & !1 == 0
+    ARMED.load(Relaxed) & !1 == 0
 }
 
 /// A thread gets a context. From now on, and until as many have left, all watched calls are reported when it is not the only one.
 pub(crate) fn thread_enters() {
-    ATTENTION.fetch_add(2, Relaxed);
+    ARMED.fetch_add(2, Relaxed);
 }
 
 /// A thread has no context any longer.
 pub(crate) fn thread_leaves() {
-    ATTENTION.fetch_sub(2, Relaxed);
+    ARMED.fetch_sub(2, Relaxed);
 }
 
 /// What stays ours after a fault: books of contexts, addresses, errors that we kept, and lists, since those that we compiled are ours to play.
-fn keeps_books(index: usize) -> bool {
+fn stays_hooked(index: usize) -> bool {
     let name = NAMES[index].to_bytes();
     let kept: [&[u8]; 7] = [
         b"glCallList",
@@ -104,7 +104,7 @@ fn keeps_books(index: usize) -> bool {
 /// After a fault of ours every entry point becomes the driver's, thread by thread: see [`leaving`].
 pub(crate) fn retire() {
     for (i, slot) in TABLE.iter().enumerate() {
-        if HOOKS[i].is_some() && !keeps_books(i) {
+        if HOOKS[i].is_some() && !stays_hooked(i) {
             slot.store(leaving as *mut (), Relaxed);
         }
     }
@@ -123,7 +123,7 @@ fn trampoline(name: &CStr) -> Option<*const ()> {
 /// Has the report brought up to date when the program ends in order.
 pub(crate) fn at_exit() {
     extern "C" fn at_exit() {
-        crate::interpose::panic_guard::guard(crate::host::report::write_the_rest);
+        crate::interpose::panic_guard::guard(crate::host::report::write_final_report);
     }
     // SAFETY: a function of ours, and the library is never unloaded (`-z nodelete`).
     unsafe { libc::atexit(at_exit) };
@@ -132,7 +132,7 @@ pub(crate) fn at_exit() {
 extern "C" fn resolve(index: usize) -> *const () {
     crate::interpose::panic_guard::in_program();
     // Also what is called for the first time after a fault.
-    let hook = HOOKS[index].filter(|_| !crate::interpose::panic_guard::happened() || keeps_books(index));
+    let hook = HOOKS[index].filter(|_| !crate::interpose::panic_guard::happened() || stays_hooked(index));
     let target = crate::interpose::panic_guard::caught(|| match hook {
         Some(hook) => hook.0,
         None => {
@@ -150,15 +150,15 @@ fn forward_plainly(index: usize) -> *const () {
     crate::interpose::panic_guard::caught(|| driver::forward(index)).unwrap_or(hooks::no_context as *const ())
 }
 
-extern "C" fn told(index: usize) {
+extern "C" fn on_state_call(index: usize) {
     if crate::interpose::panic_guard::happened() {
-        crate::interpose::panic_guard::give_up_here();
+        crate::interpose::panic_guard::hand_over_to_driver();
         return;
     }
     let (class, flush) = (CLASSES[index], FLUSHES[index]);
     crate::interpose::panic_guard::caught(|| {
         crate::interpose::panic_guard::inject_at(index);
-        crate::interpose::context::watched(index, class, flush & 1 != 0, flush & 2 != 0);
+        crate::interpose::context::on_watched_call(index, class, flush & 1 != 0, flush & 2 != 0);
     });
 }
 
@@ -170,20 +170,22 @@ extern "C" fn left(index: usize) -> *const () {
 
 /// The same without the call.
 fn leave_at(index: usize) {
-    crate::interpose::panic_guard::give_up_here();
+    crate::interpose::panic_guard::hand_over_to_driver();
     let over = crate::interpose::panic_guard::caught(|| {
-        let given_up = with_context(|c| {
-            if NAMES[index] == c"glEnd" && c.sink == crate::interpose::context::Sink::Pass {
+        let tracing_stopped = with_context(|c| {
+            if NAMES[index] == c"glEnd"
+                && c.immediate_target == crate::interpose::context::ImmediateModeTarget::Pass
+            {
                 // The driver's primitive ends now, and with the next call all is handed over.
-                c.sink = crate::interpose::context::Sink::Outside;
+                c.immediate_target = crate::interpose::context::ImmediateModeTarget::Outside;
             }
-            c.given_up
+            c.tracing_stopped
         });
-        given_up == Some(true) && is_alone()
+        tracing_stopped == Some(true) && is_alone()
     });
     if over == Some(true) && TABLE[index].load(Relaxed) == leaving as *mut () {
         TABLE[index].store(forward_plainly(index).cast_mut(), Relaxed);
-        relax();
+        disarm();
     }
 }
 
@@ -224,12 +226,12 @@ unsafe extern "C" fn slow() {
         "push rbp", "mov rbp, rsp", "push rdi", "push rsi", "push rdx", "push rcx", "push r8", "push r9", "push rax", "push r11",
         "sub rsp, 128", "movdqu [rsp], xmm0", "movdqu [rsp+16], xmm1", "movdqu [rsp+32], xmm2", "movdqu [rsp+48], xmm3",
         "movdqu [rsp+64], xmm4", "movdqu [rsp+80], xmm5", "movdqu [rsp+96], xmm6", "movdqu [rsp+112], xmm7",
-        "mov edi, r11d", "call {told}",
+        "mov edi, r11d", "call {on_state_call}",
         "movdqu xmm0, [rsp]", "movdqu xmm1, [rsp+16]", "movdqu xmm2, [rsp+32]", "movdqu xmm3, [rsp+48]",
         "movdqu xmm4, [rsp+64]", "movdqu xmm5, [rsp+80]", "movdqu xmm6, [rsp+96]", "movdqu xmm7, [rsp+112]",
         "add rsp, 128", "pop r11", "pop rax", "pop r9", "pop r8", "pop rcx", "pop rdx", "pop rsi", "pop rdi", "pop rbp",
         "lea r10, [rip + {table}]", "jmp qword ptr [r10 + 8*r11]",
-        told = sym told, table = sym TABLE
+        on_state_call = sym on_state_call, table = sym TABLE
     )
 }
 

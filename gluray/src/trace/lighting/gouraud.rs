@@ -1,11 +1,11 @@
-//! OpenGL's lighting at the corners of 16 fragments' triangles at a time: [`Setup::vertex`] for many.
+//! OpenGL's lighting at the corners of 16 fragments' triangles at a time: [`LightingSetup::vertex`] for many.
 //!
 //! The order of sums is that of the scalar code. Vectors are written out, because compilers unroll loops over 16 lanes before they see that they are vectors.
 //! Only powers are another function: exact to a millionth for exponents up to OpenGL's 128.
 
-use super::Setup;
+use super::LightingSetup;
 use super::powers::powers;
-use crate::capture::draw::{Attributes, Packed, Values};
+use crate::capture::draw::{Attributes, PackedArray, Values};
 use crate::state::current_attributes::{Material, sides};
 use crate::state::enums::*;
 use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask, f32x16, mask32x16};
@@ -18,7 +18,7 @@ pub(super) const ZERO: F = [0.0; LANES];
 type V<S> = f32x16<S>;
 
 /// Colours of fragments, not yet clamped to bytes.
-pub(crate) struct Colors {
+pub(crate) struct FragmentColors {
     pub(crate) rgba: [F; 4],
 }
 
@@ -38,13 +38,13 @@ struct Surface<S: Simd> {
 
 /// Which side each lane sees.
 #[derive(Clone, Copy)]
-struct Pick<S: Simd> {
+struct SideSelect<S: Simd> {
     back: mask32x16<S>,
     /// Backs have a material of their own.
     two: bool,
 }
 
-impl<S: Simd> Pick<S> {
+impl<S: Simd> SideSelect<S> {
     /// A property of front and back, or the colour where that stands for it.
     #[inline(always)]
     fn of(&self, simd: S, values: [f32; 2], tracked: [bool; 2], color: V<S>) -> V<S> {
@@ -87,7 +87,7 @@ fn normalized<S: Simd>(simd: S, v: [V<S>; 3]) -> [V<S>; 3] {
 }
 
 /// Primary and secondary colours.
-pub(super) type Lit<S> = ([V<S>; 4], [V<S>; 3]);
+pub(super) type LaneColors<S> = ([V<S>; 4], [V<S>; 3]);
 
 /// An attribute of the vertices `corners` picks, lane by lane.
 #[inline(always)]
@@ -155,15 +155,16 @@ fn gather<const N: usize>(values: &Values<N>, vertices: &[usize; LANES], used: u
 
 /// A packed array of floats as rows; empty when it is not aligned, which a `Vec` of bytes may be.
 #[inline(always)]
-fn rows<const N: usize>(p: &Packed) -> &[[f32; N]] {
+fn rows<const N: usize>(p: &PackedArray) -> &[[f32; N]] {
     let floats: &[f32] = bytemuck::try_cast_slice(&p.bytes).unwrap_or(&[]);
     floats.as_chunks().0
 }
 
-impl Setup<'_> {
-    /// True when [`Setup::fragments`] has the colours that the scalar code has.
+impl LightingSetup<'_> {
+    /// True when [`LightingSetup::fragments`] has the colours that the scalar code has.
     pub(crate) fn lights_blocks(&self, a: &Attributes) -> bool {
-        let aligned = |p: &Packed| p.kind != FLOAT || bytemuck::try_cast_slice::<u8, f32>(&p.bytes).is_ok();
+        let aligned =
+            |p: &PackedArray| p.kind != FLOAT || bytemuck::try_cast_slice::<u8, f32>(&p.bytes).is_ok();
         let fits = match &a.normals {
             Values::Packed(p) => aligned(p),
             _ => true,
@@ -188,7 +189,7 @@ impl Setup<'_> {
         weights: &[F; 3],
         back: &[bool; LANES],
         used: u16,
-    ) -> Colors {
+    ) -> FragmentColors {
         let zero = V::splat(simd, 0.0);
         let (mut primary, mut secondary) = ([zero; 4], [zero; 3]);
         let last = [ZERO, ZERO, [1.0; LANES]];
@@ -213,7 +214,7 @@ impl Setup<'_> {
             unit(simd, primary[k] + secondary[k]).store_slice(&mut rgba[k]);
         }
         primary[3].store_slice(&mut rgba[3]);
-        Colors { rgba }
+        FragmentColors { rgba }
     }
 
     /// Primary and secondary colours of the vertices in the lanes of `used`, from the side that `back` says.
@@ -226,7 +227,7 @@ impl Setup<'_> {
         vertices: &[usize; LANES],
         back: &[bool; LANES],
         used: u16,
-    ) -> Lit<S> {
+    ) -> LaneColors<S> {
         let s = self.state;
         let color = match &a.colors {
             Values::Constant(c) => {
@@ -283,7 +284,7 @@ impl Setup<'_> {
         for l in 0..LANES {
             backs |= u64::from(back[l]) << l;
         }
-        let pick = Pick { back: mask32x16::from_bitmask(simd, backs), two: s.two_side && backs != 0 };
+        let pick = SideSelect { back: mask32x16::from_bitmask(simd, backs), two: s.two_side && backs != 0 };
         if pick.two {
             for k in 0..3 {
                 normal[k] = pick.back.select(-normal[k], normal[k]);
@@ -306,7 +307,7 @@ impl Setup<'_> {
         simd: S,
         [front, behind]: &[Material; 2],
         color: [V<S>; 4],
-        pick: Pick<S>,
+        pick: SideSelect<S>,
     ) -> Surface<S> {
         let (faces, what) = self.state.color_material.map_or((&[][..], 0), |(face, w)| (sides(face), w));
         let faces = [faces.contains(&0), faces.contains(&1)];
@@ -340,7 +341,7 @@ impl Setup<'_> {
 
     /// Primary and secondary colours.
     #[inline(always)]
-    fn lit<S: Simd>(&self, simd: S, m: &Surface<S>, eye: [V<S>; 3], normal: [V<S>; 3]) -> Lit<S> {
+    fn lit<S: Simd>(&self, simd: S, m: &Surface<S>, eye: [V<S>; 3], normal: [V<S>; 3]) -> LaneColors<S> {
         let s = self.state;
         let (zero, one) = (V::splat(simd, 0.0), V::splat(simd, 1.0));
         let (mut primary, mut specular) = ([zero; 4], [zero; 3]);
@@ -416,7 +417,7 @@ fn whole(e: f32) -> Option<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::state::current_attributes::Current;
+    use crate::state::current_attributes::CurrentAttributes;
     use crate::state::snapshot::{GlLight, Snapshot};
     use fearless_simd::{Level, dispatch};
     use rt_core::glam::Vec3;
@@ -447,7 +448,7 @@ mod tests {
         let normals =
             (0..48).map(|i| [((i * 5) % 9) as f32 - 4.0, ((i * 7) % 11) as f32 - 5.0, 1.0 + (i % 4) as f32]);
         let colors = (0..48).map(|i| [(i % 3) as f32 * 0.5, 0.25, (i % 2) as f32, 0.5]).collect();
-        let mut a = Attributes::constant(&Current::default());
+        let mut a = Attributes::constant(&CurrentAttributes::default());
         a.materials = vec![[material(1.0), material(0.5)]];
         a.normals = Values::PerVertex(normals.collect());
         a.colors = Values::PerVertex(colors);
@@ -465,7 +466,7 @@ mod tests {
                 lights: vec![light([0.3, 0.2, 1.0, 0.0], 180.0), light([1.0, 2.0, 0.0, 1.0], 40.0)],
                 ..Snapshot::default()
             };
-            let setup = Setup::new(&state);
+            let setup = LightingSetup::new(&state);
             assert!(setup.lights_blocks(&a));
             let triangles: [[u32; 3]; LANES] =
                 std::array::from_fn(|l| [l as u32, l as u32 + 16, l as u32 + 32]);

@@ -1,7 +1,7 @@
-//! All vertices of a small mesh, lit once: [`Setup::vertex`] for 16 at a time.
+//! All vertices of a small mesh, lit once: [`LightingSetup::vertex`] for 16 at a time.
 
 use super::gouraud::{self, F, ZERO};
-use super::{Lit, Setup};
+use super::{LightingSetup, VertexColors};
 use crate::capture::draw::Attributes;
 use fearless_simd::{Level, Simd, SimdBase, dispatch};
 use rayon::prelude::*;
@@ -11,11 +11,11 @@ use rt_core::ray::LANES;
 /// Vertices that a thread takes at once.
 const SHARE: usize = 64 * LANES;
 
-impl Setup<'_> {
-    /// Colours of all vertices; of attributes that [`Setup::lights_blocks`].
-    pub(crate) fn all(&self, a: &Attributes, positions: &[Vec3]) -> Vec<Lit> {
-        let mut out = vec![Lit::default(); positions.len()];
-        let light = |(i, out): (usize, &mut [Lit])| {
+impl LightingSetup<'_> {
+    /// Colours of all vertices; of attributes that [`LightingSetup::lights_blocks`].
+    pub(crate) fn all(&self, a: &Attributes, positions: &[Vec3]) -> Vec<VertexColors> {
+        let mut out = vec![VertexColors::default(); positions.len()];
+        let light = |(i, out): (usize, &mut [VertexColors])| {
             dispatch!(Level::new(), simd => self.some(simd, a, positions, i * SHARE, out));
         };
         match out.len() {
@@ -26,7 +26,14 @@ impl Setup<'_> {
     }
 
     #[inline(always)]
-    fn some<S: Simd>(&self, simd: S, a: &Attributes, positions: &[Vec3], first: usize, out: &mut [Lit]) {
+    fn some<S: Simd>(
+        &self,
+        simd: S,
+        a: &Attributes,
+        positions: &[Vec3],
+        first: usize,
+        out: &mut [VertexColors],
+    ) {
         let two = self.state.lighting && self.state.two_side;
         for (block, out) in out.chunks_mut(LANES).enumerate() {
             let first = first + block * LANES;
@@ -52,7 +59,7 @@ impl Setup<'_> {
 
 /// From registers into memory.
 #[inline(always)]
-fn rows<S: Simd>((primary, secondary): gouraud::Lit<S>) -> ([F; 4], [F; 3]) {
+fn rows<S: Simd>((primary, secondary): gouraud::LaneColors<S>) -> ([F; 4], [F; 3]) {
     let (mut p, mut s) = ([ZERO; 4], [ZERO; 3]);
     for k in 0..4 {
         primary[k].store_slice(&mut p[k]);
@@ -67,7 +74,7 @@ fn rows<S: Simd>((primary, secondary): gouraud::Lit<S>) -> ([F; 4], [F; 3]) {
 mod tests {
     use super::*;
     use crate::capture::draw::Values;
-    use crate::state::current_attributes::{Current, Material};
+    use crate::state::current_attributes::{CurrentAttributes, Material};
     use crate::state::snapshot::{GlLight, Snapshot};
 
     #[test]
@@ -82,7 +89,7 @@ mod tests {
         let positions: Vec<Vec3> =
             (0..n).map(|i| Vec3::new((i % 7) as f32 - 3.0, (i % 5) as f32 - 2.0, -4.0)).collect();
         let normals = (0..n).map(|i| [(i % 9) as f32 - 4.0, (i % 11) as f32 - 5.0, 1.0]).collect();
-        let mut a = Attributes::constant(&Current::default());
+        let mut a = Attributes::constant(&CurrentAttributes::default());
         a.materials = vec![[material(1.0), material(0.5)]];
         a.normals = Values::PerVertex(normals);
         for two_side in [false, true] {
@@ -102,7 +109,7 @@ mod tests {
                 }],
                 ..Snapshot::default()
             };
-            let setup = Setup::new(&state);
+            let setup = LightingSetup::new(&state);
             let all = setup.all(&a, &positions);
             let mut dark = 0;
             for (i, lit) in all.iter().enumerate() {

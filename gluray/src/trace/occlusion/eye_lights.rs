@@ -3,13 +3,13 @@
 
 use super::*;
 use crate::capture::draw::{Attributes, Draw};
-use crate::capture::geometry_cache::{Cache, Structures};
-use crate::cluster::row_share::Share;
-use crate::state::current_attributes::{Current, Material};
+use crate::capture::geometry_cache::{BuildCounts, GeometryCache};
+use crate::cluster::row_share::RowShare;
+use crate::state::current_attributes::{CurrentAttributes, Material};
 use crate::state::enums::LESS;
 use crate::state::snapshot::{GlLight, Snapshot};
-use crate::trace::overrides::Look;
-use crate::trace::path_tracing::Studio;
+use crate::trace::overrides::RayMaterial;
+use crate::trace::path_tracing::PathTracer;
 use crate::trace::view::View;
 use crate::trace::{Rect, nearest};
 use std::sync::Arc;
@@ -49,7 +49,8 @@ fn square_above_floor(light: [f32; 4], projection: DMat4, model_view: DMat4) -> 
         specular: [0.0; 4],
         ..Material::default()
     };
-    let current = Current { normal: [0.0, 0.0, 1.0], materials: [white; 2], ..Current::default() };
+    let current =
+        CurrentAttributes { normal: [0.0, 0.0, 1.0], materials: [white; 2], ..CurrentAttributes::default() };
     let light = GlLight {
         diffuse: [1.0; 4],
         position: light,
@@ -72,7 +73,7 @@ fn square_above_floor(light: [f32; 4], projection: DMat4, model_view: DMat4) -> 
         color_mask: true,
         ..Snapshot::default()
     });
-    let mut cache = Cache::default();
+    let mut cache = GeometryCache::default();
     let mut quad = |[x, y, z]: [f32; 3], r: f32| {
         let corners = [(-r, -r), (r, -r), (r, r), (-r, r)].map(|(u, v)| [x + u, y + v, z]);
         Draw {
@@ -82,14 +83,14 @@ fn square_above_floor(light: [f32; 4], projection: DMat4, model_view: DMat4) -> 
             shading: Shading::Fixed,
             clip_from_object: crate::trace::lighting::product(&state.projection, &state.model_view),
             calls: 1,
-            look: Look::default(),
+            ray_material: RayMaterial::default(),
         }
     };
     vec![quad([0.0; 3], 10.0), quad([1.0, 0.0, 1.0], 0.25)]
 }
 
 fn prepared(draws: &[Draw]) -> Vec<Prepared<'_>> {
-    let ready = |d| Prepared::new(d, None, &mut Structures::default()).expect("seen");
+    let ready = |d| Prepared::new(d, None, &mut BuildCounts::default()).expect("seen");
     draws.iter().map(ready).collect()
 }
 
@@ -102,7 +103,7 @@ fn settings(mode: Mode) -> Settings {
 /// Which pixels are black, row by row, and how many shadow rays that took.
 fn black(light: [f32; 4], projection: DMat4, model_view: DMat4) -> (Vec<bool>, u64) {
     let draws = square_above_floor(light, projection, model_view);
-    let (layer, [shadow, _]) = nearest(&prepared(&draws), &settings(Mode::Rich), Share::WHOLE);
+    let (layer, [shadow, _]) = nearest(&prepared(&draws), &settings(Mode::Rich), RowShare::WHOLE);
     assert_eq!((layer.rect.w, layer.rect.h), (N, N), "the floor fills the picture");
     (layer.color.iter().map(|c| c[0] == 0).collect(), shadow)
 }
@@ -155,7 +156,7 @@ fn by_paths(light: [f32; 4]) -> [f32; 2] {
     let view = View::of(&draws[0]).expect("a view");
     let (ready, settings) = (prepared(&draws), settings(Mode::Path));
     let rect = Rect { x: 0, y: 0, w: N, h: N };
-    let colors = Studio::default().picture(&ready, &view, 0, rect, &settings, 0, Share::WHOLE);
+    let colors = PathTracer::default().picture(&ready, &view, 0, rect, &settings, 0, RowShare::WHOLE);
     assert_eq!(colors.warnings, Vec::<String>::new());
     [true, false].map(|which| {
         let is_of = |k: usize| is_shadowed(k as i32 % N, k as i32 / N) == which;

@@ -10,7 +10,7 @@ pub(super) fn above(mesh: &TriMesh, plane: [f64; 4]) -> TriMesh {
         .iter()
         .map(|p| plane[0] * f64::from(p.x) + plane[1] * f64::from(p.y) + plane[2] * f64::from(p.z) + plane[3])
         .collect();
-    let mut out = Cut { mesh: mesh.clone() };
+    let mut out = ClippedMesh { mesh: mesh.clone() };
     out.mesh.indices.clear();
     let mut from = Vec::new();
     for (number, t) in mesh.indices.iter().enumerate() {
@@ -38,7 +38,7 @@ pub(super) fn above(mesh: &TriMesh, plane: [f64; 4]) -> TriMesh {
     out.mesh
 }
 
-struct Cut {
+struct ClippedMesh {
     mesh: TriMesh,
 }
 
@@ -49,7 +49,7 @@ fn push<T: Copy>(a: &mut Option<Attribute<T>>, p: u32, q: u32, mix: impl Fn(T, T
     }
 }
 
-impl Cut {
+impl ClippedMesh {
     /// A new vertex between two.
     fn between(&mut self, p: u32, q: u32, t: f32) -> u32 {
         let m = &mut self.mesh;

@@ -15,7 +15,7 @@ use rt_core::texture::Texture;
 use std::sync::Arc;
 
 /// One instance of the scene.
-pub(super) struct Part {
+pub(super) struct DrawInstance {
     pub(super) mesh: TriMesh,
     pub(super) material: Material,
     pub(super) world_from_object: DAffine3,
@@ -24,7 +24,7 @@ pub(super) struct Part {
 }
 
 /// What a draw looks like, as far as the path tracer knows it.
-struct Skin {
+struct SurfaceAppearance {
     color: [f32; 3],
     colors: Option<Attribute<[f32; 4]>>,
     texture: Option<(Arc<Texture>, Vec<Vec2>)>,
@@ -53,7 +53,7 @@ pub(super) fn part(
     view: &View,
     settings: &Settings,
     warnings: &mut Vec<String>,
-) -> Option<Part> {
+) -> Option<DrawInstance> {
     let m = eye_from_object(p.draw);
     if m.row(3).truncate().length() > 1e-6 * m.row(3).w.abs() || m.row(3).w == 0.0 || !m.is_finite() {
         warn(warnings, "a draw whose model-view matrix is projective is left out");
@@ -66,10 +66,10 @@ pub(super) fn part(
         return None;
     }
     let s = &*p.draw.state;
-    let skin = match &p.draw.shading {
+    let appearance = match &p.draw.shading {
         Shading::Fixed => fixed(p, warnings),
         Shading::Program(known) => {
-            known.left_out_of_paths().for_each(|what| warn(warnings, &format!("{what} are left out")));
+            known.unsupported_in_path_mode().for_each(|what| warn(warnings, &format!("{what} are left out")));
             program(p)
         }
     };
@@ -78,10 +78,10 @@ pub(super) fn part(
     if (linear.determinant() < 0.0) ^ view.mirrored ^ !s.front_is_ccw {
         mesh.indices.iter_mut().for_each(|t| t.swap(0, 1));
     }
-    let mut material = material(p, &skin, settings);
-    mesh.normals = skin.normals;
-    mesh.colors = skin.colors;
-    if let Some((texture, coordinates)) = skin.texture {
+    let mut material = material(p, &appearance, settings);
+    mesh.normals = appearance.normals;
+    mesh.colors = appearance.colors;
+    if let Some((texture, coordinates)) = appearance.texture {
         mesh.texcoords = Some(coordinates);
         material = material.textured(texture);
     }
@@ -103,35 +103,35 @@ pub(super) fn part(
             .collect::<Vec<u8>>(),
         format!("{:?}", p.clip_planes()).as_bytes(),
     ]);
-    Some(Part { mesh, material, world_from_object: DAffine3::from_mat4(m), key })
+    Some(DrawInstance { mesh, material, world_from_object: DAffine3::from_mat4(m), key })
 }
 
 fn bytemuck_vec(v: &[Vec3]) -> Vec<u8> {
     v.iter().flat_map(|p| p.to_array()).flat_map(f32::to_ne_bytes).collect()
 }
 
-fn material(p: &Prepared<'_>, skin: &Skin, settings: &Settings) -> Material {
-    let (look, e) = (&p.draw.look, &settings.effects);
-    let opacity = if e.transparency { skin.opacity * look.opacity } else { 1.0 };
+fn material(p: &Prepared<'_>, appearance: &SurfaceAppearance, settings: &Settings) -> Material {
+    let (ray_material, e) = (&p.draw.ray_material, &settings.effects);
+    let opacity = if e.transparency { appearance.opacity * ray_material.opacity } else { 1.0 };
     let base = Material {
-        color: skin.color,
+        color: appearance.color,
         color_source: ColorSource::Attribute,
         opacity,
-        emission: skin.emission,
-        sides: skin.sides,
-        flat: skin.normals.is_none(),
-        ..Material::matte(skin.color)
+        emission: appearance.emission,
+        sides: appearance.sides,
+        flat: appearance.normals.is_none(),
+        ..Material::matte(appearance.color)
     };
-    let Some((specular, shininess, highlight)) = skin.lit else {
+    let Some((specular, shininess, highlight)) = appearance.lit else {
         return Material { model: SurfaceModel::Unlit, ..base };
     };
-    let model = match look.surface {
-        Surface::Metal if e.reflections => SurfaceModel::Metal { roughness: look.roughness },
+    let model = match ray_material.surface {
+        Surface::Metal if e.reflections => SurfaceModel::Metal { roughness: ray_material.roughness },
         Surface::Glass if e.refraction => {
-            let model = SurfaceModel::Dielectric { ior: look.ior, absorption: [0.0; 3] };
+            let model = SurfaceModel::Dielectric { ior: ray_material.ior, absorption: [0.0; 3] };
             return Material {
                 model,
-                color: look.tint,
+                color: ray_material.tint,
                 color_source: ColorSource::Constant,
                 opacity: 1.0,
                 ..base
@@ -143,7 +143,7 @@ fn material(p: &Prepared<'_>, skin: &Skin, settings: &Settings) -> Material {
             specular,
             shininess: shininess.max(0.0),
             highlight,
-            mirror: if e.reflections { look.mirror } else { 0.0 },
+            mirror: if e.reflections { ray_material.mirror } else { 0.0 },
         },
     };
     Material { model, ..base }
@@ -157,7 +157,7 @@ fn sides(p: &Prepared<'_>, both: Sides) -> Sides {
     }
 }
 
-fn fixed(p: &Prepared<'_>, warnings: &mut Vec<String>) -> Skin {
+fn fixed(p: &Prepared<'_>, warnings: &mut Vec<String>) -> SurfaceAppearance {
     let (s, a) = (&*p.draw.state, &*p.draw.attributes);
     let n = p.draw.geometry.mesh.positions.len();
     let indices = &p.draw.geometry.mesh.indices;
@@ -192,7 +192,7 @@ fn fixed(p: &Prepared<'_>, warnings: &mut Vec<String>) -> Skin {
         _ => None,
     };
     let first = p.base_of_vertex(indices.first().map_or(0, |t| t[2] as usize));
-    Skin {
+    SurfaceAppearance {
         color: rgb(first),
         colors,
         texture,
@@ -205,7 +205,7 @@ fn fixed(p: &Prepared<'_>, warnings: &mut Vec<String>) -> Skin {
     }
 }
 
-fn program(p: &Prepared<'_>) -> Skin {
+fn program(p: &Prepared<'_>) -> SurfaceAppearance {
     let Shading::Program(program) = &p.draw.shading else { unreachable!("the caller has looked") };
     let (a, mesh) = (&*p.draw.attributes, &*p.draw.geometry.mesh);
     let n = mesh.positions.len();
@@ -221,28 +221,28 @@ fn program(p: &Prepared<'_>) -> Skin {
         };
         Attribute::per_vertex((0..n).map(each).collect())
     });
-    let (colors, texture, color) = match program.skin() {
-        crate::classify::vtk::ProgramSkin::Constant => (None, None, constant),
-        crate::classify::vtk::ProgramSkin::PerVertex(scale) => {
+    let (colors, texture, color) = match program.color_source() {
+        crate::classify::vtk::ProgramColorSource::Constant => (None, None, constant),
+        crate::classify::vtk::ProgramColorSource::PerVertex(scale) => {
             let each = |i: usize| {
                 let [r, g, b, alpha] = a.colors.at(i);
                 [r * scale, g * scale, b * scale, if p.draw.state.blend { alpha } else { 1.0 }]
             };
             (Some(Attribute::per_vertex((0..n).map(each).collect())), None, [1.0; 3])
         }
-        crate::classify::vtk::ProgramSkin::PerCell(image, scale) => {
+        crate::classify::vtk::ProgramColorSource::PerCell(image, scale) => {
             let each = |i: usize| {
                 let [r, g, b, alpha] = image.numbered(i);
                 [r * scale, g * scale, b * scale, if p.draw.state.blend { alpha } else { 1.0 }]
             };
             (Some(Attribute::per_face((0..mesh.indices.len()).map(each).collect())), None, [1.0; 3])
         }
-        crate::classify::vtk::ProgramSkin::Map(image, scale) => {
+        crate::classify::vtk::ProgramColorSource::Map(image, scale) => {
             let each = |i: usize| Vec2::from_array(program.map_coordinates(a, i));
             let texture = image.as_texture().map(|t| (Arc::new(t), (0..n).map(each).collect()));
             (None, texture, [scale; 3])
         }
-        crate::classify::vtk::ProgramSkin::Picture(image) => {
+        crate::classify::vtk::ProgramColorSource::Picture(image) => {
             let each = |i: usize| Vec2::from_array(program.picture_coordinates(a, i));
             let texture = image.as_texture().map(|t| (Arc::new(t), (0..n).map(each).collect()));
             (None, texture, constant)
@@ -251,7 +251,7 @@ fn program(p: &Prepared<'_>) -> Skin {
     let smooth = normals.is_some();
     let highlight = if program.has_headlight() { Highlight::TowardsLight } else { Highlight::Mirrored };
     let constant_ambient = program.ambient_light();
-    Skin {
+    SurfaceAppearance {
         color: color.map(|v| v.max(0.0)),
         emission: if colors.is_none() && texture.is_none() && program.is_lit() {
             constant_ambient.map(|v| v.max(0.0))

@@ -6,7 +6,7 @@ use crate::state::enums::*;
 use crate::state::snapshot::Fog;
 use crate::trace::Layer;
 use crate::trace::view::View;
-use crate::trace::whitted::Colors;
+use crate::trace::whitted::ColorImage;
 use rt_core::glam::{DMat4, DVec4};
 
 /// How much of a surface is left at eye distance `d`.
@@ -20,12 +20,12 @@ pub(crate) fn factor(fog: &Fog, d: f32) -> f32 {
 }
 
 /// Distances from the eye's plane of points of a view's window.
-struct Unprojected {
+struct Unprojection {
     eye_from_clip: DMat4,
     depth_range: [f64; 2],
 }
 
-impl Unprojected {
+impl Unprojection {
     fn distance(&self, ndc: [f64; 2], depth: f32) -> f32 {
         let [n, f] = self.depth_range;
         let z = if n == f { 0.0 } else { (f64::from(depth) - n) / (f - n) * 2.0 - 1.0 };
@@ -36,7 +36,7 @@ impl Unprojected {
 
 /// Fog over what `surfaces`, the draws that have it, cover of a picture in which the nearest surfaces of all draws are at `all`.
 pub(crate) fn over(
-    colors: &mut Colors,
+    colors: &mut ColorImage,
     view: &View,
     fog: &Fog,
     depth_range: [f64; 2],
@@ -47,7 +47,7 @@ pub(crate) fn over(
     if !eye_from_clip.is_finite() {
         return;
     }
-    let eye = Unprojected { eye_from_clip, depth_range };
+    let eye = Unprojection { eye_from_clip, depth_range };
     let rect = colors.rect;
     for (i, c) in colors.rgba.iter_mut().enumerate() {
         let (x, y) = (rect.x + i as i32 % rect.w, rect.y + i as i32 / rect.w);
@@ -68,11 +68,11 @@ fn seen(layer: &Layer, x: i32, y: i32) -> Option<f32> {
         let inside = (0..layer.rect.w).contains(&x) && (0..layer.rect.h).contains(&y);
         inside.then(|| layer.depth[(y * layer.rect.w + x) as usize]).filter(|d| *d < 1.5)
     };
-    let around = || {
+    let ray_scene = || {
         let beside = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (x + dx, y + dy)));
         beside.filter_map(|(x, y)| at(x, y)).reduce(f32::min)
     };
-    at(x, y).or_else(around)
+    at(x, y).or_else(ray_scene)
 }
 
 #[cfg(test)]
@@ -93,7 +93,7 @@ mod tests {
         let all = layer(vec![depth, UNCOVERED, 0.25]);
         let fogged = layer(vec![depth, UNCOVERED, UNCOVERED]);
         let fog = Fog { mode: LINEAR, start: 5.0, end: 25.0, color: [1.0, 0.0, 0.5, 1.0], ..Fog::default() };
-        let mut colors = Colors {
+        let mut colors = ColorImage {
             rect,
             rgba: vec![[0.4, 0.4, 0.4, 1.0], [0.2, 0.2, 0.2, 0.5], [0.4, 0.4, 0.4, 1.0]],
             rays: Vec::new(),

@@ -4,7 +4,7 @@ use crate::capture::draw::Shading;
 use crate::host::config::Settings;
 use crate::state::snapshot::GlLight;
 use crate::trace::Prepared;
-use crate::trace::occlusion::{Eye, Place};
+use crate::trace::occlusion::{Eye, LightPosition};
 use rt_core::glam::DVec3;
 use rt_core::light::{Light, LightKind};
 
@@ -47,7 +47,7 @@ fn of_opengl(l: &GlLight, radius_rad: f64, eye: Eye) -> Option<Light> {
         attenuation: l.attenuation,
         ..Light::directional(DVec3::Z).with_color(color)
     };
-    let place = if w == 0.0 { Place::Far(at) } else { Place::Near(at) };
+    let place = if w == 0.0 { LightPosition::Directional(at) } else { LightPosition::Positional(at) };
     if radius > 0.0 || !place.follows_rays_of(eye) {
         return Some(light);
     }

@@ -9,12 +9,12 @@ pub(crate) mod fog;
 mod lights;
 
 use crate::capture::geometry_cache::hash;
-use crate::cluster::row_share::Share;
+use crate::cluster::row_share::RowShare;
 use crate::host::config::Settings;
 use crate::trace::view::View;
-use crate::trace::whitted::{Colors, lens};
+use crate::trace::whitted::{ColorImage, lens};
 use crate::trace::{Prepared, Rect};
-use draw_instance::Part;
+use draw_instance::DrawInstance;
 use rt_core::accel::{BuildOptions, BuildQuality, Geometry, Instance, World};
 use rt_core::camera::{Camera, ThinLens};
 use rt_core::environment::Environment;
@@ -32,16 +32,16 @@ const MOST_SAMPLES: u32 = 1 << 16;
 
 /// What is kept between frames.
 #[derive(Default)]
-pub(crate) struct Studio {
+pub(crate) struct PathTracer {
     /// The world of each view, whose structures serve the next.
     worlds: HashMap<usize, Arc<World>>,
     /// Meshes with their attributes by content, and whether the present frame has them.
     meshes: HashMap<u128, (Arc<TriMesh>, bool)>,
-    stills: HashMap<usize, Still>,
+    progressive: HashMap<usize, ProgressiveImage>,
 }
 
 /// The mean of a view's pictures since it changed last.
-struct Still {
+struct ProgressiveImage {
     key: u128,
     samples: u32,
     mean: Vec<[f32; 4]>,
@@ -58,7 +58,7 @@ fn stats(r: &RayStats) -> Vec<(&'static str, u64)> {
     ]
 }
 
-impl Studio {
+impl PathTracer {
     /// The picture of view number `number`.
     pub(crate) fn colors(
         &mut self,
@@ -67,11 +67,11 @@ impl Studio {
         number: usize,
         rect: Rect,
         settings: &Settings,
-    ) -> Colors {
+    ) -> ColorImage {
         let rect = rect.and(view.viewport);
         let mut warnings = Vec::new();
         let nothing =
-            |warnings| Colors { rect: Rect::default(), rgba: Vec::new(), rays: Vec::new(), warnings };
+            |warnings| ColorImage { rect: Rect::default(), rgba: Vec::new(), rays: Vec::new(), warnings };
         if rect.is_empty() {
             return nothing(warnings);
         }
@@ -85,11 +85,11 @@ impl Studio {
         let camera = camera(draws, view, settings, &scene, &mut warnings);
         let samples = settings.samples.max(LEAST_SAMPLES);
         let key = hash(&[&key.to_ne_bytes(), format!("{rect:?} {camera:?} {settings:?}").as_bytes()]);
-        let before = self.stills.remove(&number).filter(|s| s.key == key);
+        let before = self.progressive.remove(&number).filter(|s| s.key == key);
         if let Some(still) = before.as_ref().filter(|s| s.samples >= MOST_SAMPLES) {
             let rgba = still.mean.clone();
-            self.stills.extend(before.map(|s| (number, s)));
-            return Colors { rect, rgba, rays: Vec::new(), warnings };
+            self.progressive.extend(before.map(|s| (number, s)));
+            return ColorImage { rect, rgba, rays: Vec::new(), warnings };
         }
         let done = before.as_ref().map_or(0, |s| s.samples);
         // Another seed for every picture of the same, so that their mean gets better.
@@ -106,8 +106,9 @@ impl Studio {
             std::array::from_fn(|k| old[k] + (now[k] - old[k]) * share)
         };
         let mean: Vec<[f32; 4]> = fresh.rgba.iter().enumerate().map(mix).collect();
-        self.stills.insert(number, Still { key, samples: done + samples, mean: mean.clone() });
-        Colors { rect, rgba: mean, rays: fresh.rays, warnings }
+        self.progressive
+            .insert(number, ProgressiveImage { key, samples: done + samples, mean: mean.clone() });
+        ColorImage { rect, rgba: mean, rays: fresh.rays, warnings }
     }
 
     /// The rows of a share of the picture with number `picture` of a view that rests. `rect` is within the viewport.
@@ -120,11 +121,11 @@ impl Studio {
         rect: Rect,
         settings: &Settings,
         picture: u64,
-        share: Share,
-    ) -> Colors {
+        share: RowShare,
+    ) -> ColorImage {
         let mut warnings = Vec::new();
         let nothing =
-            |warnings| Colors { rect: Rect::default(), rgba: Vec::new(), rays: Vec::new(), warnings };
+            |warnings| ColorImage { rect: Rect::default(), rgba: Vec::new(), rays: Vec::new(), warnings };
         let (scene, _) = match self.scene(draws, view, number, settings, &mut warnings) {
             Ok(made) => made,
             Err(why) => return nothing(vec![why]),
@@ -136,8 +137,8 @@ impl Studio {
         let mut rgba = vec![[0.0; 4]; w * h];
         let mut rays: Vec<(&'static str, u64)> = Vec::new();
         // One band of rows after the other; all at once where all are ours.
-        let whole = std::iter::once(0..w * h).filter(|_| share == Share::WHOLE);
-        for part in whole.chain(share.pixels(w, h).filter(|_| share != Share::WHOLE)) {
+        let whole = std::iter::once(0..w * h).filter(|_| share == RowShare::WHOLE);
+        for part in whole.chain(share.pixels(w, h).filter(|_| share != RowShare::WHOLE)) {
             let (first, rows) = (part.start / w, part.len() / w);
             let options = RenderOptions {
                 crop: Some(Crop {
@@ -172,7 +173,7 @@ impl Studio {
                 }
             }
         }
-        Colors { rect, rgba, rays, warnings }
+        ColorImage { rect, rgba, rays, warnings }
     }
 
     fn scene(
@@ -187,7 +188,7 @@ impl Studio {
         let (mut geometries, mut instances) = (Vec::new(), Vec::new());
         let (mut materials, mut appearances) = (Vec::new(), Vec::new());
         for p in draws {
-            let Some(Part { mesh, material, world_from_object, key }) =
+            let Some(DrawInstance { mesh, material, world_from_object, key }) =
                 draw_instance::part(p, view, settings, warnings)
             else {
                 continue;

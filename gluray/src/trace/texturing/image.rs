@@ -1,7 +1,7 @@
 //! Images of textures, read from the driver level by level and kept as it stores them.
 
 use super::sampling::{Filters, Mip};
-use crate::cluster::codec::{Malformed, Reader, Wire, put_pods};
+use crate::cluster::codec::{MalformedMessage, Reader, Wire, put_pods};
 use crate::interpose::driver::gl;
 use crate::state::enums::*;
 use rt_core::texture::{Filter, Texture, Wrap};
@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 /// What a texture's components stand for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Base {
+pub(crate) enum BaseFormat {
     Alpha,
     Luminance,
     LuminanceAlpha,
@@ -58,13 +58,13 @@ pub(crate) struct Level {
 pub(crate) struct Image {
     /// Never empty.
     pub(super) levels: Vec<Level>,
-    pub(super) base: Base,
+    pub(super) base: BaseFormat,
     pub(super) filters: Filters,
     pub(super) wrap: [u32; 2],
     pub(super) border: [f32; 4],
 }
 
-crate::cluster::codec::wire_enum!(Base { Alpha, Luminance, LuminanceAlpha, Intensity, Rgb, Rgba });
+crate::cluster::codec::wire_enum!(BaseFormat { Alpha, Luminance, LuminanceAlpha, Intensity, Rgb, Rgba });
 
 impl Wire for Level {
     fn put(&self, out: &mut Vec<u8>) {
@@ -80,7 +80,7 @@ impl Wire for Level {
             }
         }
     }
-    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
+    fn get(from: &mut Reader<'_>) -> Result<Self, MalformedMessage> {
         let (width, height): (usize, usize) = Wire::get(from)?;
         let texels =
             if Wire::get(from)? { Texels::Floats(from.pods()?) } else { Texels::Bytes(from.pods()?) };
@@ -99,7 +99,7 @@ impl Wire for Image {
         self.wrap.put(out);
         self.border.put(out);
     }
-    fn get(from: &mut Reader<'_>) -> Result<Self, Malformed> {
+    fn get(from: &mut Reader<'_>) -> Result<Self, MalformedMessage> {
         let levels: Vec<Level> = Wire::get(from)?;
         if levels.is_empty() {
             return Err(from.fault("an image without a level".to_owned()));
@@ -111,24 +111,24 @@ impl Wire for Image {
 }
 
 /// What components stand for, from the sizes of red, green, blue, alpha, luminance and intensity: formats are too many to know all by name.
-fn base_of([red, _, _, alpha, luminance, intensity]: [i32; 6]) -> Base {
+fn base_of([red, _, _, alpha, luminance, intensity]: [i32; 6]) -> BaseFormat {
     match (red > 0, alpha > 0, luminance > 0, intensity > 0) {
-        (_, _, _, true) => Base::Intensity,
-        (_, true, true, _) => Base::LuminanceAlpha,
-        (_, false, true, _) => Base::Luminance,
-        (false, true, ..) => Base::Alpha,
-        (_, false, ..) => Base::Rgb,
-        _ => Base::Rgba,
+        (_, _, _, true) => BaseFormat::Intensity,
+        (_, true, true, _) => BaseFormat::LuminanceAlpha,
+        (_, false, true, _) => BaseFormat::Luminance,
+        (false, true, ..) => BaseFormat::Alpha,
+        (_, false, ..) => BaseFormat::Rgb,
+        _ => BaseFormat::Rgba,
     }
 }
 
 /// The version at which a texture was read, and what it was.
-type Versioned = (u64, Option<Arc<Image>>);
+type VersionedImage = (u64, Option<Arc<Image>>);
 
 /// Images by texture name, with the version they were read at.
 #[derive(Default)]
 pub(crate) struct Images {
-    images: HashMap<(u32, u32), Versioned>,
+    images: HashMap<(u32, u32), VersionedImage>,
     /// Memory of an image that has gone: programs that replace a texture in each frame replace it by one of its size.
     spare: Vec<[u8; 4]>,
     /// How many were read from the driver.
@@ -170,7 +170,7 @@ fn read_bound(target: u32, name: u32, spare: &mut Vec<[u8; 4]>) -> Option<Image>
     if bound != name {
         gl::bind_texture(target, name);
     }
-    let image = gl::plain_reading(|plainly| read(plainly, target, spare));
+    let image = gl::with_raw_pixel_reads(|plainly| read(plainly, target, spare));
     if bound != name {
         gl::bind_texture(target, bound);
     }
@@ -184,7 +184,7 @@ const SKIP_DECODE: u32 = 0x8a4a;
 /// Sizes of red, green, blue, alpha, luminance, intensity.
 const COMPONENT_SIZES: [u32; 6] = [0x805c, 0x805d, 0x805e, 0x805f, 0x8060, 0x8061];
 
-fn read(plainly: &gl::Plainly, target: u32, spare: &mut Vec<[u8; 4]>) -> Option<Image> {
+fn read(plainly: &gl::RawPixelTransfer, target: u32, spare: &mut Vec<[u8; 4]>) -> Option<Image> {
     let of_level = |n: i32, what| gl::tex_level_i::<1>(target, n, what)[0];
     let size = |n: i32| [TEXTURE_WIDTH, TEXTURE_HEIGHT].map(|what| of_level(n, what).max(0) as usize);
     let parameter = |what| gl::tex_parameter_i::<1>(target, what)[0].cast_unsigned();
@@ -257,7 +257,7 @@ impl Image {
         let level = Level { width: texels.len(), height: 1, texels };
         Image {
             levels: vec![level],
-            base: Base::Rgba,
+            base: BaseFormat::Rgba,
             filters: Filters::NEAREST,
             wrap: [CLAMP_TO_EDGE; 2],
             border: [0.0; 4],
@@ -282,7 +282,7 @@ impl Image {
 
     /// True when its components are red, green, blue and alpha, or the first of these.
     pub(crate) fn is_of_colors(&self) -> bool {
-        matches!(self.base, Base::Rgb | Base::Rgba)
+        matches!(self.base, BaseFormat::Rgb | BaseFormat::Rgba)
     }
 
     /// True when no texel lets anything through.
@@ -297,12 +297,12 @@ impl Image {
     /// The picture as a texture of rt-core's, with what its components stand for; `None` when it cannot be one.
     pub(crate) fn as_texture(&self) -> Option<Texture> {
         let rgba = |t: [f32; 4]| match self.base {
-            Base::Alpha => [1.0, 1.0, 1.0, t[3]],
-            Base::Luminance => [t[0], t[0], t[0], 1.0],
-            Base::LuminanceAlpha => [t[0], t[0], t[0], t[3]],
-            Base::Intensity => [t[0]; 4],
-            Base::Rgb => [t[0], t[1], t[2], 1.0],
-            Base::Rgba => t,
+            BaseFormat::Alpha => [1.0, 1.0, 1.0, t[3]],
+            BaseFormat::Luminance => [t[0], t[0], t[0], 1.0],
+            BaseFormat::LuminanceAlpha => [t[0], t[0], t[0], t[3]],
+            BaseFormat::Intensity => [t[0]; 4],
+            BaseFormat::Rgb => [t[0], t[1], t[2], 1.0],
+            BaseFormat::Rgba => t,
         };
         let level = &self.levels[0];
         let texels = (0..level.texels.len()).map(|i| rgba(level.texels.at(i))).collect();

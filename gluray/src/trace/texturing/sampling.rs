@@ -170,14 +170,14 @@ impl Image {
 
 #[cfg(test)]
 mod tests {
-    use super::super::image::{Base, Texels};
+    use super::super::image::{BaseFormat, Texels};
     use super::*;
 
     fn image(linear: bool, wrap: u32) -> Image {
         let texels = Texels::Bytes(vec![[0; 4], [255; 4]]);
         Image {
             levels: vec![Level { width: 2, height: 1, texels }],
-            base: Base::Rgba,
+            base: BaseFormat::Rgba,
             filters: Filters {
                 mag_linear: linear,
                 min_linear: linear,

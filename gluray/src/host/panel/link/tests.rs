@@ -9,7 +9,7 @@ use std::net::TcpListener;
 struct Pair {
     link: Link,
     panel: TcpStream,
-    meeting: Meeting,
+    endpoint: PanelEndpoint,
 }
 
 fn hello() -> Hello {
@@ -18,15 +18,15 @@ fn hello() -> Hello {
 
 fn pair() -> Pair {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let meeting = Meeting {
+    let endpoint = PanelEndpoint {
         address: listener.local_addr().unwrap(),
         secret: Secret::of(std::array::from_fn(|i| i as u8)),
     };
-    let mut link = Link::connect(meeting.clone(), hello());
+    let mut link = Link::connect(endpoint.clone(), hello());
     assert_eq!(link.poll(), None);
     let panel = listener.accept().unwrap().0;
     panel.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
-    Pair { link, panel, meeting }
+    Pair { link, panel, endpoint }
 }
 
 impl Pair {
@@ -34,12 +34,12 @@ impl Pair {
         self.panel.write_all(&line(message).unwrap()).unwrap();
     }
     fn welcome(&mut self) {
-        let answer = self.meeting.secret.answer().to_owned();
+        let answer = self.endpoint.secret.answer().to_owned();
         self.say(&ToProgram::Welcome { version: VERSION, answer });
         self.until(|link, _| link.is_connected());
     }
     /// Polls until something holds; what the link wished meanwhile.
-    fn until(&mut self, done: impl Fn(&Link, &[Wish]) -> bool) -> Vec<Wish> {
+    fn until(&mut self, done: impl Fn(&Link, &[PanelCommand]) -> bool) -> Vec<PanelCommand> {
         let end = Instant::now() + Duration::from_secs(20);
         let mut wishes = Vec::new();
         while !done(&self.link, &wishes) {
@@ -67,7 +67,7 @@ fn settings_come_through_and_are_confirmed() {
     let ToPanel::Hello { version, token, hello } = p.heard() else { panic!() };
     assert_eq!(
         (version, token.as_str(), hello.program.as_str()),
-        (VERSION, p.meeting.secret.token(), "test")
+        (VERSION, p.endpoint.secret.token(), "test")
     );
     p.welcome();
     p.say(&change(&[
@@ -76,7 +76,7 @@ fn settings_come_through_and_are_confirmed() {
         ("samples", 0.into()),
     ]));
     let wishes = p.until(|_, w| !w.is_empty());
-    let Wish::Settings(s) = &wishes[0] else { panic!() };
+    let PanelCommand::Settings(s) = &wishes[0] else { panic!() };
     assert_eq!((s.mode, s.effects.ambient_occlusion_samples, s.samples), (Mode::Rich, 32, 1));
     let ToPanel::InForce { settings, refused } = p.heard() else { panic!() };
     assert_eq!(settings, *s);
@@ -85,12 +85,12 @@ fn settings_come_through_and_are_confirmed() {
     // A change replaces the ones before; the same again is no wish; the end of the panel is the end of its settings.
     p.say(&change(&[("mode", "rich".into())]));
     let wishes = p.until(|_, w| !w.is_empty());
-    assert!(matches!(&wishes[0], Wish::Settings(s) if s.effects.ambient_occlusion_samples == 8));
+    assert!(matches!(&wishes[0], PanelCommand::Settings(s) if s.effects.ambient_occlusion_samples == 8));
     p.say(&change(&[("mode", "rich".into())]));
     p.say(&ToProgram::Export {});
-    assert_eq!(p.until(|_, w| !w.is_empty()), [Wish::Export]);
+    assert_eq!(p.until(|_, w| !w.is_empty()), [PanelCommand::Export]);
     p.panel.shutdown(std::net::Shutdown::Both).unwrap();
-    assert_eq!(p.until(|_, w| !w.is_empty()), [Wish::Settings(Box::default())]);
+    assert_eq!(p.until(|_, w| !w.is_empty()), [PanelCommand::Settings(Box::default())]);
 }
 
 #[test]
@@ -158,7 +158,7 @@ fn without_a_panel_frames_cost_a_look_at_the_clock() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
     drop(listener);
-    let mut link = Link::connect(Meeting { address, secret: Secret::of([0; 32]) }, hello());
+    let mut link = Link::connect(PanelEndpoint { address, secret: Secret::of([0; 32]) }, hello());
     let begin = Instant::now();
     for _ in 0..100_000 {
         assert_eq!(link.poll(), None);
@@ -166,7 +166,7 @@ fn without_a_panel_frames_cost_a_look_at_the_clock() {
     }
     assert!(begin.elapsed() < Duration::from_secs(2), "{:?}", begin.elapsed());
     let mut abroad = Link::connect(
-        Meeting { address: "192.0.2.1:80".parse().unwrap(), secret: Secret::of([0; 32]) },
+        PanelEndpoint { address: "192.0.2.1:80".parse().unwrap(), secret: Secret::of([0; 32]) },
         hello(),
     );
     abroad.poll();
@@ -192,7 +192,7 @@ proptest! {
         p.panel.write_all(b"\n").unwrap();
         p.panel.shutdown(std::net::Shutdown::Write).unwrap();
         let wishes = p.until(|link, _| link.connection.is_none());
-        prop_assert!(wishes.is_empty() || wishes == [Wish::Export], "{:?}", wishes);
+        prop_assert!(wishes.is_empty() || wishes == [PanelCommand::Export], "{:?}", wishes);
         prop_assert_eq!(&p.link.in_force, &Settings::default());
     }
 }
