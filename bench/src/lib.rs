@@ -5,13 +5,14 @@
 //! of a [`record::Record`]. Records are written as JSON and CSV; [`report`] makes one HTML page of them, with the
 //! plots of [`plot`].
 //!
-//! Other ray tracers ([`peers`]) are loaded at run time when they are installed and run on the same mesh and the
+//! Other ray tracers ([`baselines`]) are loaded at run time when they are installed and run on the same mesh and the
 //! same [`rays`], in the same process, in turns with ours. What is missing is named in the record, never skipped
 //! silently.
 //!
-//! `unsafe` lives in `peers/embree` alone: a C library cannot be called without it.
+//! `unsafe` lives in `baselines/embree` alone: a C library cannot be called without it.
 #![deny(unsafe_code)]
 
+pub mod baselines;
 mod book;
 pub mod cli;
 pub mod clock;
@@ -21,13 +22,12 @@ pub mod machine;
 pub mod memory;
 pub mod meshes;
 pub mod opengl;
-pub mod ours;
-pub mod peers;
 pub mod picture;
 pub mod plot;
 pub mod quote;
 pub mod rays;
 pub mod record;
 pub mod report;
+pub mod rt_core_tracer;
 pub mod runner;
 pub mod stats;

@@ -26,7 +26,7 @@ const CLOSING: &str = "<!-- end record -->";
 
 /// A file that [`update`] would write.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Quoted {
+pub struct Quotation {
     /// Where, from the root of the repository.
     pub path: PathBuf,
     /// What it has to hold.
@@ -41,7 +41,7 @@ pub struct Quoted {
 /// cannot be read or written.
 pub fn update(root: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let mut written = vec![];
-    for file in stale(root)? {
+    for file in stale_quotations(root)? {
         let path = root.join(&file.path);
         if let Some(folder) = path.parent() {
             std::fs::create_dir_all(folder)
@@ -57,7 +57,7 @@ pub fn update(root: &Path) -> anyhow::Result<Vec<PathBuf>> {
 ///
 /// # Errors
 /// As [`update`].
-pub fn stale(root: &Path) -> anyhow::Result<Vec<Quoted>> {
+pub fn stale_quotations(root: &Path) -> anyhow::Result<Vec<Quotation>> {
     let mut files = vec![];
     for path in documents(&root.join("docs/src"))? {
         let text = read(&path)?;
@@ -94,7 +94,7 @@ fn documents(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
 }
 
 /// The document with its quotations, and the plots beside it.
-fn quotations_filled(root: &Path, path: &Path, text: &str) -> anyhow::Result<Vec<Quoted>> {
+fn quotations_filled(root: &Path, path: &Path, text: &str) -> anyhow::Result<Vec<Quotation>> {
     let mut plots = vec![];
     let mut filled = String::new();
     let mut rest = text;
@@ -113,7 +113,7 @@ fn quotations_filled(root: &Path, path: &Path, text: &str) -> anyhow::Result<Vec
         rest = after;
     }
     filled += rest;
-    plots.push(Quoted { path: path.to_path_buf(), text: filled });
+    plots.push(Quotation { path: path.to_path_buf(), text: filled });
     Ok(plots)
 }
 
@@ -122,7 +122,7 @@ fn first_line(text: &str) -> &str {
 }
 
 /// What stands for `ID: table ...` or `ID: plot ...`, and the file of the plot.
-fn quote(root: &Path, path: &Path, request: &str) -> anyhow::Result<(String, Option<Quoted>)> {
+fn quote(root: &Path, path: &Path, request: &str) -> anyhow::Result<(String, Option<Quotation>)> {
     let (id, what) = request.split_once(':').context("a quotation is `ID: table ...` or `ID: plot ...`")?;
     let (record, folder) = newest(root, id.trim())?;
     let levels = path.components().count().saturating_sub(1);
@@ -145,7 +145,7 @@ fn quote(root: &Path, path: &Path, request: &str) -> anyhow::Result<(String, Opt
         let name = format!("{id}-{}.svg", crate::machine::slug(title.trim()));
         let to_images = "../".repeat(levels.saturating_sub(2));
         let image = format!("\n![{}]({to_images}img/{name})\n\n{source}\n", plot.title);
-        let file = Quoted { path: Path::new("docs/src/img").join(name), text: opaque(plot) };
+        let file = Quotation { path: Path::new("docs/src/img").join(name), text: opaque(plot) };
         return Ok((image, Some(file)));
     }
     bail!("`{what}` is neither `table COLUMNS` nor `plot TITLE`")
@@ -300,7 +300,7 @@ mod tests {
         );
         assert!(text.contains("(../../../bench/runs/2026-01-02-b/speed.csv)"), "{text}");
         assert!(!text.contains("old") && text.starts_with("a\n") && text.ends_with("-->\nb\n"), "{text}");
-        assert_eq!(stale(root.path()).unwrap(), []);
+        assert_eq!(stale_quotations(root.path()).unwrap(), []);
     }
 
     #[test]
@@ -335,7 +335,7 @@ mod tests {
         let path = root.path().join("docs/src/bench/page.md");
         let text = std::fs::read_to_string(&path).unwrap();
         std::fs::write(&path, text.replace("0.123", "0.124")).unwrap();
-        assert_eq!(stale(root.path()).unwrap().len(), 1);
+        assert_eq!(stale_quotations(root.path()).unwrap().len(), 1);
     }
 
     #[test]
@@ -376,7 +376,7 @@ mod tests {
     #[test]
     fn documents_quote_their_records() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
-        let paths: Vec<PathBuf> = stale(root).unwrap().into_iter().map(|f| f.path).collect();
+        let paths: Vec<PathBuf> = stale_quotations(root).unwrap().into_iter().map(|f| f.path).collect();
         assert!(paths.is_empty(), "{paths:?} differ from their records: `cargo xtask book` writes them anew");
     }
 }

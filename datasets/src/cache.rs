@@ -34,7 +34,7 @@ pub struct MeshCache {
 
 /// A mesh from [`MeshCache::mesh`].
 #[derive(Debug, Clone, PartialEq)]
-pub struct Cached {
+pub struct CachedMesh {
     /// The mesh.
     pub mesh: TriMesh,
     /// Where it comes from.
@@ -93,10 +93,10 @@ impl MeshCache {
 
     /// The mesh of `key`: read when it is there and whole, else generated and stored. `key` must name everything that the
     /// mesh depends on (generator, parameters, attributes).
-    pub fn mesh<E>(&self, key: &str, generate: impl FnOnce() -> Result<TriMesh, E>) -> Result<Cached, E> {
+    pub fn mesh<E>(&self, key: &str, generate: impl FnOnce() -> Result<TriMesh, E>) -> Result<CachedMesh, E> {
         let path = self.path(key);
         let origin = match read(&path, key) {
-            Ok(Some(mesh)) => return Ok(Cached { mesh, origin: Origin::Read, not_stored: None }),
+            Ok(Some(mesh)) => return Ok(CachedMesh { mesh, origin: Origin::Read, not_stored: None }),
             Ok(None) => Origin::Generated,
             Err(reason) => Origin::Regenerated(format!("{}: {reason}", path.display())),
         };
@@ -104,7 +104,7 @@ impl MeshCache {
         let stored = std::fs::create_dir_all(&self.directory)
             .and_then(|()| write_atomically(&path, |w| format::write(w, key, &mesh)));
         let not_stored = stored.err().map(|e| format!("{}: {e}", path.display()));
-        Ok(Cached { mesh, origin, not_stored })
+        Ok(CachedMesh { mesh, origin, not_stored })
     }
 }
 
@@ -136,7 +136,7 @@ mod tests {
         m
     }
 
-    fn generate(cache: &MeshCache, mesh: &TriMesh) -> Cached {
+    fn generate(cache: &MeshCache, mesh: &TriMesh) -> CachedMesh {
         cache.mesh("key/with:odd characters", || Ok::<_, ()>(mesh.clone())).unwrap()
     }
 
@@ -149,10 +149,10 @@ mod tests {
             let _ = std::fs::remove_file(&path);
             assert_eq!(
                 generate(&cache, &mesh),
-                Cached { mesh: mesh.clone(), origin: Origin::Generated, not_stored: None }
+                CachedMesh { mesh: mesh.clone(), origin: Origin::Generated, not_stored: None }
             );
             let again = cache.mesh("key/with:odd characters", || Err(())).unwrap();
-            assert_eq!(again, Cached { mesh, origin: Origin::Read, not_stored: None });
+            assert_eq!(again, CachedMesh { mesh, origin: Origin::Read, not_stored: None });
             assert_eq!(
                 std::fs::read_dir(path.parent().unwrap()).unwrap().count(),
                 1,

@@ -11,7 +11,7 @@
 
 pub mod flows;
 
-use crate::cache::{Cached, MeshCache};
+use crate::cache::{CachedMesh, MeshCache};
 use crate::generate::flow::FlowError;
 use crate::generate::impact::Impact;
 use crate::generate::mixing_layer::MixingLayer;
@@ -293,7 +293,7 @@ impl Entry {
         options: Options,
         cache: &MeshCache,
         progress: Progress<'_>,
-    ) -> Result<Cached, CatalogueError> {
+    ) -> Result<CachedMesh, CatalogueError> {
         let found = self.size(size)?;
         if self.is_lines() {
             return Err(CatalogueError::NotAMesh { name: self.name });

@@ -85,7 +85,7 @@ impl CommonArgs {
     ) -> anyhow::Result<()> {
         let mut line = if self.json { serde_json::to_string(value)? } else { text().to_string() };
         line.push('\n');
-        beside_the_bar(|| {
+        above_progress_bar(|| {
             let mut out = io::stdout().lock();
             out.write_all(line.as_bytes())?;
             out.flush()
@@ -119,7 +119,7 @@ impl CommonArgs {
         if visible {
             // The clock goes on during long steps.
             bar.enable_steady_tick(Duration::from_millis(500));
-            if let Ok(mut last) = ON_SCREEN.lock() {
+            if let Ok(mut last) = VISIBLE_BAR.lock() {
                 *last = Some(bar.downgrade());
             }
         }
@@ -272,11 +272,11 @@ impl CompletionsArgs {
 }
 
 /// The bar that may be on the screen.
-static ON_SCREEN: Mutex<Option<WeakProgressBar>> = Mutex::new(None);
+static VISIBLE_BAR: Mutex<Option<WeakProgressBar>> = Mutex::new(None);
 
 /// Prints with the progress bar out of the way.
-fn beside_the_bar<T>(print: impl FnOnce() -> T) -> T {
-    let bar = ON_SCREEN.lock().ok().and_then(|last| last.as_ref()?.upgrade());
+fn above_progress_bar<T>(print: impl FnOnce() -> T) -> T {
+    let bar = VISIBLE_BAR.lock().ok().and_then(|last| last.as_ref()?.upgrade());
     match bar {
         Some(bar) => bar.suspend(print),
         None => print(),
@@ -285,7 +285,7 @@ fn beside_the_bar<T>(print: impl FnOnce() -> T) -> T {
 
 /// Prints a line; a closed stderr is not an error.
 fn to_stderr(line: fmt::Arguments<'_>) {
-    let _ = beside_the_bar(|| writeln!(io::stderr().lock(), "{line}"));
+    let _ = above_progress_bar(|| writeln!(io::stderr().lock(), "{line}"));
 }
 
 #[cfg(test)]

@@ -5,13 +5,13 @@
 //! [`Dataset::to_grid`] (for volumes). What a conversion has to leave out is counted in a [`SurfaceReport`].
 
 pub mod array;
+mod boundary_faces;
 pub mod cells;
 pub mod coloring;
 pub(crate) mod from_core;
 pub mod grid;
 pub mod lines;
 mod merge;
-mod outer_faces;
 pub mod polygon;
 pub mod surface;
 

@@ -4,38 +4,38 @@ mod sample_files;
 
 use datasets::model::{Dataset, ImageData, PolyData, StructuredGrid, Values};
 use datasets::read::plot3d::{self, Plot3dOptions};
-use datasets::read::{AlphaMode, Content, Opened, SceneModel, open};
+use datasets::read::{AlphaMode, Content, LoadedFile, SceneModel, open};
 use datasets::write::{Encoding, VtkOptions, write_obj, write_ply, write_pvd, write_vtk};
 use glam::{DVec3, Vec3};
 use rt_core::mesh::{Attribute, PerElement, TriMesh};
 use std::io::Write as _;
 
-fn opened(name: &str, bytes: &[u8]) -> Opened {
+fn opened(name: &str, bytes: &[u8]) -> LoadedFile {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join(name);
     std::fs::write(&path, bytes).unwrap();
     open(&path).unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn data(o: Opened) -> Dataset {
+fn data(o: LoadedFile) -> Dataset {
     match o.content {
         Content::Data(d) => d,
         Content::Scene(_) => panic!("a scene"),
     }
 }
-fn scene(o: Opened) -> SceneModel {
+fn scene(o: LoadedFile) -> SceneModel {
     match o.content {
         Content::Scene(s) => s,
         Content::Data(_) => panic!("a data set"),
     }
 }
-fn image(o: Opened) -> ImageData {
+fn image(o: LoadedFile) -> ImageData {
     match data(o) {
         Dataset::ImageData(d) => d,
         other => panic!("{}", other.kind()),
     }
 }
-fn poly(o: Opened) -> PolyData {
+fn poly(o: LoadedFile) -> PolyData {
     match data(o) {
         Dataset::PolyData(d) => d,
         other => panic!("{}", other.kind()),
@@ -275,7 +275,7 @@ fn gltf_transforms_turn_mirrored_triangles_back() {
 }
 
 /// A triangle with every kind of picture; `alpha` is what the material says of that.
-fn gltf_with_pictures(dir: &std::path::Path, alpha: serde_json::Value) -> Opened {
+fn gltf_with_pictures(dir: &std::path::Path, alpha: serde_json::Value) -> LoadedFile {
     let mut bytes: Vec<u8> = Vec::new();
     let mut floats = |values: &[f32]| values.iter().for_each(|v| bytes.extend(v.to_le_bytes()));
     floats(&[-1.0, -1.0, 0.0, 1.0, -1.0, 0.0, 1.0, 1.0, 0.0]);

@@ -2,12 +2,12 @@
 
 mod sample_files;
 
-use datasets::read::{Content, Opened, ReadError, open};
+use datasets::read::{Content, LoadedFile, ReadError, open};
 use proptest::prelude::*;
 use std::path::Path;
 
 /// Reads bytes as a file of this name, and makes everything of it that can be made.
-fn read_and_use(name: &str, bytes: &[u8]) -> Result<Opened, ReadError> {
+fn read_and_use(name: &str, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join(name);
     std::fs::write(&path, bytes).unwrap();
@@ -25,7 +25,7 @@ fn read_and_use(name: &str, bytes: &[u8]) -> Result<Opened, ReadError> {
     opened
 }
 
-fn use_all(opened: &Opened) {
+fn use_all(opened: &LoadedFile) {
     // Errors are fine here; panics are not.
     let Content::Data(data) = &opened.content else {
         let _ = opened.to_meshes(None);

@@ -4,7 +4,7 @@ mod peer;
 mod sample_files;
 
 use datasets::model::{DataArray, Dataset, ScalarType};
-use datasets::read::{Content, Opened, ReadError, open};
+use datasets::read::{Content, LoadedFile, ReadError, open};
 use datasets::write::{Encoding, VtkOptions, write_ply, write_vtk};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -40,7 +40,7 @@ fn same_type(kind: ScalarType, vtk: &str) -> bool {
 }
 
 /// Compares a data set with what VTK said about it. `ascii` legacy files round to few digits.
-fn compare(file: &str, opened: &Opened, expected: &Value) {
+fn compare(file: &str, opened: &LoadedFile, expected: &Value) {
     let Content::Data(data) = &opened.content else { panic!("{file}: not a data set") };
     assert_eq!(data.kind(), expected["kind"], "{file}");
     let (points, cells) = data.counts();

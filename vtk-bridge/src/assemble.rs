@@ -1,10 +1,10 @@
 //! The surfaces of a frame as rt-core's lists of geometries, instances, appearances and materials.
 
-use crate::bridge::Drawn;
-use crate::colors::Resolved;
+use crate::bridge::FrameSurface;
+use crate::colors::MeshColors;
 use crate::edges::Edges;
 use crate::input::Property;
-use crate::materials::{Encoding, Setting, material, without_ambient_light};
+use crate::materials::{Encoding, MaterialContext, ambient_as_emission, material};
 use crate::options::{MaterialChoice, Options};
 use rt_core::accel::{Geometry, Instance};
 use rt_core::glam::DAffine3;
@@ -25,11 +25,16 @@ pub(crate) struct Assembled {
 }
 
 /// Puts the lists together.
-pub(crate) fn assemble(drawn: &[Drawn], options: &Options, only_headlight: bool, dark: bool) -> Assembled {
-    let setting = Setting { options, only_headlight, dark };
+pub(crate) fn assemble(
+    surfaces: &[FrameSurface],
+    options: &Options,
+    only_headlight: bool,
+    dark: bool,
+) -> Assembled {
+    let context = MaterialContext { options, only_headlight, dark };
     let mut out = Assembled::default();
     let mut known: HashMap<usize, usize> = HashMap::new();
-    for d in drawn {
+    for d in surfaces {
         let mut parts: Vec<(usize, Geometry, bool, &Property)> = Vec::new();
         if let Some(m) = &d.built.mesh {
             parts.push((std::sync::Arc::as_ptr(&m.mesh) as usize, m.geometry(), true, &d.property));
@@ -40,7 +45,7 @@ pub(crate) fn assemble(drawn: &[Drawn], options: &Options, only_headlight: bool,
         if let Some(s) = &d.built.tubes {
             parts.push((std::sync::Arc::as_ptr(s) as usize, Geometry::Shape(s.clone()), false, &d.property));
         }
-        if let (Some(s), Some(back)) = (&d.built.backs, &d.back) {
+        if let (Some(s), Some(back)) = (&d.built.back_faces, &d.back) {
             parts.push((
                 std::sync::Arc::as_ptr(s).cast::<()>() as usize,
                 Geometry::Shape(s.clone()),
@@ -54,7 +59,7 @@ pub(crate) fn assemble(drawn: &[Drawn], options: &Options, only_headlight: bool,
                 out.geometries.len() - 1
             });
             let first = out.instances.len();
-            out.add(d, property, index, is_mesh, &setting);
+            out.add(d, property, index, is_mesh, &context);
             out.add_edges(d, first, is_mesh, options.edge_reach);
         }
     }
@@ -62,15 +67,16 @@ pub(crate) fn assemble(drawn: &[Drawn], options: &Options, only_headlight: bool,
         out.edges.resize_with(out.instances.len(), || None);
     }
     if options.ao == 0 && !options.path_tracing {
-        out.materials = std::mem::take(&mut out.materials).into_iter().map(without_ambient_light).collect();
+        out.materials = std::mem::take(&mut out.materials).into_iter().map(ambient_as_emission).collect();
     }
     out
 }
 
 impl Assembled {
     /// Edges of the instances from `first` on.
-    fn add_edges(&mut self, d: &Drawn, first: usize, is_mesh: bool, reach: f64) {
-        let Some(mesh) = d.built.mesh.as_ref().filter(|m| d.property.edge_width > 0.0 && m.clipped.is_none())
+    fn add_edges(&mut self, d: &FrameSurface, first: usize, is_mesh: bool, reach: f64) {
+        let Some(mesh) =
+            d.built.mesh.as_ref().filter(|m| d.property.edge_width > 0.0 && m.clip_map.is_none())
         else {
             return;
         };
@@ -80,11 +86,18 @@ impl Assembled {
         }
     }
 
-    fn add(&mut self, d: &Drawn, property: &Property, geometry: usize, is_mesh: bool, setting: &Setting<'_>) {
+    fn add(
+        &mut self,
+        d: &FrameSurface,
+        property: &Property,
+        geometry: usize,
+        is_mesh: bool,
+        context: &MaterialContext<'_>,
+    ) {
         let colors = d.color.as_ref().filter(|_| is_mesh);
-        let (base, encoding) = material(property, colors.is_some(), setting);
+        let (base, encoding) = material(property, colors.is_some(), context);
         let base = match &d.maps {
-            Some(maps) if is_mesh && encoding == Encoding::Pbr => maps.put_on(base),
+            Some(maps) if is_mesh && encoding == Encoding::Pbr => maps.apply_to(base),
             _ => base,
         };
         match &d.glyphs {
@@ -110,10 +123,10 @@ impl Assembled {
         }
     }
 
-    fn dressed(&mut self, base: Material, colors: Option<&Resolved>, d: &Drawn) -> usize {
+    fn dressed(&mut self, base: Material, colors: Option<&MeshColors>, d: &FrameSurface) -> usize {
         let color_source = match (colors, &d.texture) {
-            (Some(Resolved::Values(_)), _) => ColorSource::Attribute,
-            (Some(Resolved::Mapped(_, map)), _) => ColorSource::Scalars(map.clone()),
+            (Some(MeshColors::Values(_)), _) => ColorSource::Attribute,
+            (Some(MeshColors::Mapped(_, map)), _) => ColorSource::Scalars(map.clone()),
             (None, Some(texture)) => ColorSource::Texture(texture.clone()),
             (None, None) => ColorSource::Constant,
         };
@@ -130,13 +143,13 @@ impl Assembled {
         geometry: usize,
         world_from_object: DAffine3,
         material: usize,
-        colors: Option<&Resolved>,
+        colors: Option<&MeshColors>,
         encoding: Encoding,
     ) {
         let appearance = Appearance::new(material);
         self.appearances.push(match colors {
-            Some(Resolved::Values(v)) => appearance.with_colors(v.clone()),
-            Some(Resolved::Mapped(v, _)) => appearance.with_scalars(v.clone()),
+            Some(MeshColors::Values(v)) => appearance.with_colors(v.clone()),
+            Some(MeshColors::Mapped(v, _)) => appearance.with_scalars(v.clone()),
             None => appearance,
         });
         self.instances.push(Instance { geometry, world_from_object });

@@ -5,13 +5,13 @@
 //! nothing changes at all.
 
 use crate::assemble::{Assembled, assemble};
-use crate::colors::{self, Resolved};
-use crate::geometry::{self, Built};
+use crate::colors::{self, MeshColors};
+use crate::geometry::{self, GeometrySet};
 use crate::input::{Color, SceneLight, Surface, View};
 use crate::lights;
 use crate::options::Options;
-use crate::picture::Picture;
-use crate::report::{FrameReport, Passed, Traced};
+use crate::report::{FrameReport, TracedItem, UntracedItem};
+use crate::window_image::WindowImage;
 use rt_core::accel::{BuildOptions, Geometry, World};
 use rt_core::camera::{Camera, ThinLens};
 use rt_core::effects::Effects;
@@ -25,17 +25,17 @@ use std::sync::Arc;
 use std::time::Instant;
 
 /// What is kept between frames, with the frame it was last used in.
-struct Kept<T> {
+struct CacheEntry<T> {
     value: T,
     frame: u64,
 }
 
 /// A surface of this frame, with everything resolved.
-pub(crate) struct Drawn {
-    pub(crate) built: Arc<Built>,
-    pub(crate) color: Option<Resolved>,
+pub(crate) struct FrameSurface {
+    pub(crate) built: Arc<GeometrySet>,
+    pub(crate) color: Option<MeshColors>,
     pub(crate) texture: Option<Arc<Texture>>,
-    pub(crate) maps: Option<crate::materials::Finishes>,
+    pub(crate) maps: Option<crate::materials::PbrTextures>,
     pub(crate) property: crate::input::Property,
     pub(crate) back: Option<crate::input::Property>,
     pub(crate) world_from_data: DAffine3,
@@ -67,7 +67,7 @@ pub enum BridgeError {
 
 /// What [`Bridge::add_surface`] did.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Added {
+pub enum AddOutcome {
     /// It will be traced.
     Traced,
     /// It has nothing that can be traced, for this reason.
@@ -79,18 +79,18 @@ pub enum Added {
 pub struct Bridge {
     options: Options,
     frame: u64,
-    drawn: Vec<Drawn>,
+    surfaces: Vec<FrameSurface>,
     lights: Vec<SceneLight>,
     /// Of everything that was added this frame.
     content: DefaultHasher,
-    geometries: HashMap<u64, Kept<Arc<Built>>>,
-    colors: HashMap<(u64, u64), Kept<Option<Resolved>>>,
-    textures: HashMap<u64, Kept<Option<Arc<Texture>>>>,
-    media: crate::volumes::Media,
+    geometries: HashMap<u64, CacheEntry<Arc<GeometrySet>>>,
+    colors: HashMap<(u64, u64), CacheEntry<Option<MeshColors>>>,
+    textures: HashMap<u64, CacheEntry<Option<Arc<Texture>>>>,
+    volume_cache: crate::volumes::VolumeCache,
     world: Option<(Arc<World>, Vec<rt_core::accel::Instance>, BuildOptions)>,
     renderer: Renderer,
     pool: Option<(usize, rayon::ThreadPool)>,
-    picture: Picture,
+    picture: WindowImage,
     /// What the picture shows, and how many frames it is the mean of.
     shown: Option<(u64, u32)>,
     warned: HashSet<String>,
@@ -113,8 +113,8 @@ impl Bridge {
             (self.options, self.shown) = (options.clone(), None);
         }
         self.frame += 1;
-        self.drawn.clear();
-        self.media.begin();
+        self.surfaces.clear();
+        self.volume_cache.begin();
         self.lights.clear();
         self.content = DefaultHasher::new();
         self.report = FrameReport { frame: self.frame, ..FrameReport::default() };
@@ -126,11 +126,11 @@ impl Bridge {
     }
 
     /// Adds something to draw. What is not a number is repaired or left out, and told.
-    pub fn add_surface(&mut self, surface: &Surface<'_>) -> Added {
+    pub fn add_surface(&mut self, surface: &Surface<'_>) -> AddOutcome {
         let start = Instant::now();
         let Some(place) = affine(surface.world_from_data) else {
             self.warn(format!("{}: its matrix is singular or not affine; it is not drawn", surface.name));
-            return Added::Nothing("singular matrix");
+            return AddOutcome::Nothing("singular matrix");
         };
         let key = surface.shape.key;
         let frame = self.frame;
@@ -143,7 +143,7 @@ impl Bridge {
                 let built = Arc::new(self.in_pool(|| geometry::build(&surface.shape)));
                 self.report.rebuilt += 1;
                 if key != 0 {
-                    self.geometries.insert(key, Kept { value: Arc::clone(&built), frame });
+                    self.geometries.insert(key, CacheEntry { value: Arc::clone(&built), frame });
                 }
                 built
             }
@@ -155,12 +155,14 @@ impl Bridge {
             ));
         }
         if built.mesh.is_none() && built.spheres.is_none() && built.tubes.is_none() {
-            return Added::Nothing("no polygons");
+            return AddOutcome::Nothing("no polygons");
         }
         let color = self.color(surface, &built);
         let texture = self.texture(surface.texture.as_ref());
-        let maps =
-            surface.maps.as_ref().map(|maps| crate::materials::finishes(maps, |image| self.texture(image)));
+        let maps = surface
+            .maps
+            .as_ref()
+            .map(|maps| crate::materials::pbr_textures(maps, |image| self.texture(image)));
         let glyphs = surface.glyphs.as_ref().map(|g| {
             let places = g.matrices.iter().enumerate().filter_map(|(i, m)| {
                 let local = affine(DMat4::from_cols_array(m).transpose())?;
@@ -170,13 +172,13 @@ impl Bridge {
         });
         self.hash_surface(surface);
         let count = glyphs.as_ref().map_or(1, Vec::len);
-        self.report.traced.push(Traced {
+        self.report.traced.push(TracedItem {
             name: surface.name.to_owned(),
             triangles: built.mesh.as_ref().map_or(0, |m| m.mesh.indices.len()) * count,
             cells: 0,
             copies: count,
         });
-        self.drawn.push(Drawn {
+        self.surfaces.push(FrameSurface {
             built,
             color,
             texture,
@@ -187,7 +189,7 @@ impl Bridge {
             glyphs,
         });
         self.report.ms.extract += ms(start);
-        Added::Traced
+        AddOutcome::Traced
     }
 
     /// Adds a volume. What rt-core cannot draw comes back with the reason.
@@ -198,24 +200,24 @@ impl Bridge {
         }
         let place =
             affine(volume.world_from_data).ok_or("a volume whose matrix is singular or not affine")?;
-        let (mut media, mut content) = (std::mem::take(&mut self.media), self.content.clone());
+        let (mut volume_cache, mut content) = (std::mem::take(&mut self.volume_cache), self.content.clone());
         if volume.key == 0 {
             self.frame.hash(&mut content);
         }
-        let added = self.in_pool(|| media.add(volume, place, &mut content));
-        (self.media, self.content) = (media, content);
+        let added = self.in_pool(|| volume_cache.add(volume, place, &mut content));
+        (self.volume_cache, self.content) = (volume_cache, content);
         let (cells, warning) = added?;
         if let Some(warning) = warning {
             self.warn(format!("{}: {warning}", volume.name));
         }
-        self.report.traced.push(Traced { name: volume.name.to_owned(), triangles: 0, cells, copies: 1 });
+        self.report.traced.push(TracedItem { name: volume.name.to_owned(), triangles: 0, cells, copies: 1 });
         self.report.ms.extract += ms(start);
         Ok(())
     }
 
     /// Whether the scalars of this key are kept, so that they need not be given again.
     pub fn has_volume(&self, key: u64) -> bool {
-        self.media.has(key)
+        self.volume_cache.has(key)
     }
 
     /// Whether colours of these keys are kept, so that their arrays need not be given again.
@@ -228,12 +230,12 @@ impl Bridge {
         let kept = self
             .textures
             .entry(image.key)
-            .or_insert_with(|| Kept { value: colors::texture(image).map(Arc::new), frame });
+            .or_insert_with(|| CacheEntry { value: colors::texture(image).map(Arc::new), frame });
         kept.frame = frame;
         kept.value.clone()
     }
 
-    fn color(&mut self, surface: &Surface<'_>, built: &Built) -> Option<Resolved> {
+    fn color(&mut self, surface: &Surface<'_>, built: &GeometrySet) -> Option<MeshColors> {
         let mesh = built.mesh.as_ref()?;
         let key = match surface.color {
             Color::Material => return None,
@@ -249,7 +251,7 @@ impl Bridge {
             self.warn(format!("{}: {fault}", surface.name));
             None
         });
-        self.colors.insert(key, Kept { value: value.clone(), frame });
+        self.colors.insert(key, CacheEntry { value: value.clone(), frame });
         value
     }
 
@@ -284,13 +286,13 @@ impl Bridge {
     }
 
     /// For the report: something that OpenGL draws, and why.
-    pub fn pass(&mut self, name: &str, reason: &str) {
-        self.report.passed.push(Passed { name: name.to_owned(), reason: reason.to_owned() });
+    pub fn report_untraced(&mut self, name: &str, reason: &str) {
+        self.report.passed.push(UntracedItem { name: name.to_owned(), reason: reason.to_owned() });
     }
 
     /// How many surfaces were added this frame.
     pub fn num_surfaces(&self) -> usize {
-        self.drawn.len()
+        self.surfaces.len()
     }
 
     /// Something the user should know, once.
@@ -312,13 +314,13 @@ impl Bridge {
     }
 
     /// Draws what was added. The picture stays valid until the next call.
-    pub fn render(&mut self, view: &View) -> Result<&Picture, BridgeError> {
+    pub fn render(&mut self, view: &View) -> Result<&WindowImage, BridgeError> {
         self.make_pool()?;
         let frame = self.frame;
         self.geometries.retain(|_, k| k.frame == frame);
         self.colors.retain(|_, k| k.frame == frame);
         self.textures.retain(|_, k| k.frame == frame);
-        self.media.forget_unused();
+        self.volume_cache.forget_unused();
 
         // ---- Nothing changed: the picture is there, or gets better.
         format!("{view:?}").hash(&mut self.content);
@@ -345,7 +347,7 @@ impl Bridge {
         let headlight_only = matches!(self.lights.as_slice(), [only] if only.headlight);
         let start = Instant::now();
         let Assembled { geometries, instances, appearances, materials, encodings, edges } =
-            assemble(&self.drawn, &options, headlight_only, self.lights.is_empty());
+            assemble(&self.surfaces, &options, headlight_only, self.lights.is_empty());
         let world = self.world(geometries, instances)?;
         self.report.ms.build += ms(start);
         self.report.bytes = world.report().bytes;
@@ -359,7 +361,7 @@ impl Bridge {
             scene.lights.push(rt_core::light::Light::ambient([1.0; 3]));
         }
         scene.materials = materials;
-        scene.volumes = self.media.placed().to_vec();
+        scene.volumes = self.volume_cache.placed().to_vec();
         if !scene.volumes.is_empty() && encodings.contains(&crate::materials::Encoding::Pbr) {
             self.warn(
                 "volumes in front of physically based surfaces: these encode their colours (power 1/2.2), and what the volume adds there is encoded with them"
@@ -380,7 +382,7 @@ impl Bridge {
         let effects =
             if crate::assemble::wants_reflections(&options) { needed } else { needed.without(mirrors) };
         if effects.intersects(mirrors | Effects::REFRACTION) || options.path_tracing {
-            scene.background = Picture::surroundings(view);
+            scene.background = WindowImage::gradient_background(view);
         }
         let secondary = mirrors | Effects::REFRACTION | Effects::SHADOWS | Effects::AMBIENT_OCCLUSION;
         if effects.intersects(secondary) && crate::report::ranks() > 1 {
@@ -403,7 +405,7 @@ impl Bridge {
         render.max_bounces = options.max_bounces;
         render.seed = options.seed.wrapping_add(u64::from(mean_of) << 32);
         render.effects = Some(effects);
-        let ready = Ready {
+        let inputs = RenderInputs {
             scene: &scene,
             camera: &camera,
             options: render,
@@ -415,7 +417,7 @@ impl Bridge {
         // ---- Rays, and the picture for the window.
         let (mut renderer, mut picture) =
             (std::mem::take(&mut self.renderer), std::mem::take(&mut self.picture));
-        let outcome = self.in_pool(|| picture.draw(&mut renderer, &ready, view, mean_of));
+        let outcome = self.in_pool(|| picture.draw(&mut renderer, &inputs, view, mean_of));
         (self.renderer, self.picture) = (renderer, picture);
         let outcome = outcome?;
         self.report.ms.trace += outcome.trace_ms;
@@ -431,21 +433,21 @@ impl Bridge {
             }
         }
         if self.options.report.is_some() {
-            self.measure_effects(&ready, effects);
+            self.measure_effects(&inputs, effects);
         }
         self.report.ms.frame = self.report.ms.extract + self.report.ms.build + ms(start);
         Ok(())
     }
 
     /// What each effect costs: the same picture without it, once for each set of effects.
-    fn measure_effects(&mut self, ready: &Ready<'_>, effects: Effects) {
+    fn measure_effects(&mut self, inputs: &RenderInputs<'_>, effects: Effects) {
         let names: Vec<&'static str> = effects.names().collect();
         if !self.costs.contains_key(&names) {
             let mut renderer = Renderer::new();
             let mut time = |e: Effects| {
-                let options = RenderOptions { effects: Some(e), ..ready.options.clone() };
+                let options = RenderOptions { effects: Some(e), ..inputs.options.clone() };
                 let start = Instant::now();
-                let ok = self.in_pool(|| renderer.render(ready.scene, ready.camera, &options)).is_ok();
+                let ok = self.in_pool(|| renderer.render(inputs.scene, inputs.camera, &options)).is_ok();
                 ok.then(|| ms(start))
             };
             let whole = time(effects);
@@ -526,7 +528,7 @@ impl Bridge {
 }
 
 /// Everything a picture is made from.
-pub(crate) struct Ready<'a> {
+pub(crate) struct RenderInputs<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) camera: &'a Camera,
     pub(crate) options: RenderOptions,

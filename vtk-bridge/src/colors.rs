@@ -1,6 +1,6 @@
 //! Colours of points and cells as rt-core wants them, kept as long as their key stays the same.
 
-use crate::geometry::BuiltMesh;
+use crate::geometry::PolygonMesh;
 use crate::input::{Color, Image, PerItem};
 use rayon::prelude::*;
 use rt_core::colormap::ColorMap;
@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 /// Colours for one mesh.
 #[derive(Clone)]
-pub enum Resolved {
+pub enum MeshColors {
     /// RGBA of vertices or triangles.
     Values(Arc<Attribute<[f32; 4]>>),
     /// Positions on a map.
@@ -26,7 +26,7 @@ fn float(c: [u8; 4]) -> [f32; 4] {
 }
 
 /// `color` for `built`, or why it cannot be. `points` is the number of points that the colours were made for.
-pub fn resolve(color: &Color<'_>, built: &BuiltMesh, points: usize) -> Result<Option<Resolved>, String> {
+pub fn resolve(color: &Color<'_>, built: &PolygonMesh, points: usize) -> Result<Option<MeshColors>, String> {
     let length = |what, expected: usize, found: usize| {
         format!("{found} colours for {expected} {what}: the property's colour is used")
     };
@@ -38,24 +38,24 @@ pub fn resolve(color: &Color<'_>, built: &BuiltMesh, points: usize) -> Result<Op
             }
             let values: Vec<[f32; 4]> =
                 values[..points].par_iter().with_min_len(CHUNK).map(|c| float(*c)).collect();
-            let values = match &built.clipped {
+            let values = match &built.clip_map {
                 Some(c) => {
                     c.vertex_values(&values, |a, b, t| std::array::from_fn(|k| a[k] + (b[k] - a[k]) * t))
                 }
                 None => values,
             };
-            Ok(Some(Resolved::Values(Arc::new(Attribute::per_vertex(values)))))
+            Ok(Some(MeshColors::Values(Arc::new(Attribute::per_vertex(values)))))
         }
         Color::Values { rgba: PerItem::Cell(values), .. } => {
             let of_triangle = |i: usize| {
-                let before = built.clipped.as_ref().map_or(i, |c| c.triangles[i] as usize);
+                let before = built.clip_map.as_ref().map_or(i, |c| c.triangles[i] as usize);
                 values.get(built.cells.at(before)).map(|c| float(*c))
             };
             let triangles = built.mesh.indices.len();
             let list: Option<Vec<_>> =
                 (0..triangles).into_par_iter().with_min_len(CHUNK).map(of_triangle).collect();
             let list = list.ok_or_else(|| length("cells", triangles, values.len()))?;
-            Ok(Some(Resolved::Values(Arc::new(Attribute::per_face(list)))))
+            Ok(Some(MeshColors::Values(Arc::new(Attribute::per_face(list)))))
         }
         Color::Mapped { coordinates, row, nan, .. } => {
             if coordinates.len() < points || row.is_empty() {
@@ -65,11 +65,14 @@ pub fn resolve(color: &Color<'_>, built: &BuiltMesh, points: usize) -> Result<Op
             let place = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(-1000.0, 1000.0) };
             let of = |c: &[f32; 2]| if c[1] > 0.5 { f32::NAN } else { place(c[0]) };
             let values: Vec<f32> = coordinates[..points].par_iter().with_min_len(CHUNK).map(of).collect();
-            let values = match &built.clipped {
+            let values = match &built.clip_map {
                 Some(c) => c.vertex_values(&values, |a, b, t| a + (b - a) * t),
                 None => values,
             };
-            Ok(Some(Resolved::Mapped(Arc::new(Attribute::per_vertex(values)), Arc::new(stepped(row, *nan)))))
+            Ok(Some(MeshColors::Mapped(
+                Arc::new(Attribute::per_vertex(values)),
+                Arc::new(stepped(row, *nan)),
+            )))
         }
     }
 }
@@ -132,7 +135,7 @@ mod tests {
             nan: [1, 2, 3, 255],
         };
         let resolved = resolve(&color, &built.mesh.expect("a triangle"), 3);
-        let Ok(Some(Resolved::Mapped(values, _))) = resolved else { panic!("a map") };
+        let Ok(Some(MeshColors::Mapped(values, _))) = resolved else { panic!("a map") };
         assert_eq!(values.values[..2], [0.0, 1000.0]);
         assert!(values.values[2].is_nan(), "the value itself is not a number");
     }

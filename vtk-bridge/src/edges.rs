@@ -1,7 +1,7 @@
 //! Edges of polygons on a surface, as VTK 9's shaders draw them: by the distance of a pixel from the projected edges of its polygon, and
 //! a little beyond the outline, because the geometry shader moves the corners of each triangle outwards.
 
-use crate::geometry::BuiltMesh;
+use crate::geometry::PolygonMesh;
 use crate::input::{Property, View};
 use rayon::prelude::*;
 use rt_core::frame::Frame;
@@ -12,12 +12,12 @@ use std::sync::Arc;
 /// Pixels or triangles a task works on.
 const CHUNK: usize = 1 << 14;
 /// Beyond sides that are no edges nothing is drawn from here on, pixels.
-const BEYOND_DIAGONAL: f64 = -0.5;
+const DIAGONAL_CUTOFF_PX: f64 = -0.5;
 
 /// The edges of one instance.
 pub(crate) struct Edges {
     mesh: Arc<TriMesh>,
-    /// As in [`BuiltMesh::edges`].
+    /// As in [`PolygonMesh::edges`].
     sides: Option<Arc<Vec<u8>>>,
     world_from_object: DAffine3,
     color: [f32; 3],
@@ -30,17 +30,17 @@ pub(crate) struct Edges {
 }
 
 /// A triangle in the window; x and y in pixels from the top left.
-struct InWindow {
+struct ProjectedTriangle {
     corners: [DVec2; 3],
     /// Where the geometry shader puts them.
     moved: [DVec2; 3],
     depths: [f64; 3],
     /// Of each side, pointing to the inside, with length 1.
     inward: [DVec2; 3],
-    /// As in [`BuiltMesh::edges`].
+    /// As in [`PolygonMesh::edges`].
     sides: u8,
     /// 1 or −1.
-    turn: f64,
+    winding: f64,
 }
 
 /// A pixel of an edge beside the surface.
@@ -51,7 +51,7 @@ struct Fragment {
 
 impl Edges {
     pub(crate) fn new(
-        mesh: &BuiltMesh,
+        mesh: &PolygonMesh,
         world_from_object: DAffine3,
         property: &Property,
         reach: f64,
@@ -68,7 +68,7 @@ impl Edges {
     }
 
     /// `None` for triangles with a corner behind the eye, which has no place in the window, and for those without an area.
-    fn in_window(&self, primitive: usize, view: &View) -> Option<InWindow> {
+    fn project(&self, primitive: usize, view: &View) -> Option<ProjectedTriangle> {
         let indices = self.mesh.indices.get(primitive)?;
         let sides = self.sides.as_ref().map_or(7, |s| s.get(primitive).copied().unwrap_or(7));
         let size = DVec2::new(view.width.into(), view.height.into());
@@ -84,28 +84,28 @@ impl Edges {
             depths[k] = 0.5 * clip.z / clip.w + 0.5;
         }
         let [a, b, c] = corners;
-        let turn = (b - a).perp_dot(c - a);
-        let inward = [b - a, c - b, a - c].map(|side| turn.signum() * side.perp().normalize_or_zero());
-        if turn == 0.0 || !turn.is_finite() || inward.contains(&DVec2::ZERO) {
+        let winding = (b - a).perp_dot(c - a);
+        let inward = [b - a, c - b, a - c].map(|side| winding.signum() * side.perp().normalize_or_zero());
+        if winding == 0.0 || !winding.is_finite() || inward.contains(&DVec2::ZERO) {
             return None;
         }
         let [p, q, r] = inward;
         let push = |n: DVec2| -self.reach * self.width_px * n.normalize_or_zero();
         let moved = [a + push(r + p), b + push(p + q), c + push(q + r)];
-        Some(InWindow { corners, moved, depths, inward, sides, turn: turn.signum() })
+        Some(ProjectedTriangle { corners, moved, depths, inward, sides, winding: winding.signum() })
     }
 
     /// How much of the edge's colour shows at distances `d` from the sides of a triangle.
-    fn share(&self, t: &InWindow, d: &[f64; 3]) -> f32 {
+    fn coverage(&self, t: &ProjectedTriangle, d: &[f64; 3]) -> f32 {
         let of_edges = (0..3).filter(|&i| t.is_edge(i)).map(|i| d[i]).fold(f64::INFINITY, f64::min);
         (0.5 + 0.5 * self.width_px - of_edges).clamp(0.0, 1.0) as f32
     }
 
     /// Pixels of the edges of triangle `primitive` that lie beside it, in front of `depth`.
-    fn beside(&self, primitive: usize, view: &View, depth: &[f32], out: &mut Vec<Fragment>) {
-        let Some(t) = self.in_window(primitive, view) else { return };
+    fn outline_fragments(&self, primitive: usize, view: &View, depth: &[f32], out: &mut Vec<Fragment>) {
+        let Some(t) = self.project(primitive, view) else { return };
         // OpenGL's front turns to the left with rows from the bottom: to the right with rows from the top.
-        if self.culled[usize::from(t.turn > 0.0)] {
+        if self.culled[usize::from(t.winding > 0.0)] {
             return;
         }
         let low = t.moved.iter().fold(DVec2::INFINITY, |m, p| m.min(*p)).max(DVec2::ZERO);
@@ -118,7 +118,7 @@ impl Edges {
                 let p = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
                 let d = t.distances(p);
                 let outside = (0..3).any(|i| t.is_edge(i) && d[i] < 0.0);
-                let cut = (0..3).any(|i| !t.is_edge(i) && d[i] < BEYOND_DIAGONAL);
+                let cut = (0..3).any(|i| !t.is_edge(i) && d[i] < DIAGONAL_CUTOFF_PX);
                 if outside && !cut && t.covers(p) {
                     let (pixel, z) = (y * width + x, t.depth(p) as f32);
                     if z >= 0.0 && z <= depth[pixel] && z < 1.0 {
@@ -130,7 +130,7 @@ impl Edges {
     }
 }
 
-impl InWindow {
+impl ProjectedTriangle {
     fn is_edge(&self, side: usize) -> bool {
         self.sides >> side & 1 != 0
     }
@@ -174,12 +174,12 @@ pub(crate) fn draw(frame: &mut Frame, first_depth: &[f32], edges: &[Option<Edges
     let seen = frame.color.par_iter_mut().zip(&mut frame.depth).zip(ids).enumerate();
     seen.for_each(|(at, ((color, depth), (&instance, &primitive)))| {
         let Some(Some(e)) = edges.get(instance as usize) else { return };
-        let Some(t) = e.in_window(primitive as usize, view) else { return };
+        let Some(t) = e.project(primitive as usize, view) else { return };
         let p = DVec2::new((at % width) as f64 + 0.5, (at / width) as f64 + 0.5);
-        let share = e.share(&t, &t.distances(p));
+        let coverage = e.coverage(&t, &t.distances(p));
         let alpha = color[3];
         for (c, edge) in color.iter_mut().zip(e.color) {
-            *c += (edge * alpha - *c) * share;
+            *c += (edge * alpha - *c) * coverage;
         }
         if e.reach > 0.0 && *depth < 1.0 {
             *depth = (t.depth(p) as f32).clamp(0.0, 1.0f32.next_down());
@@ -191,7 +191,7 @@ pub(crate) fn draw(frame: &mut Frame, first_depth: &[f32], edges: &[Option<Edges
         let triangles = (0..e.mesh.indices.len()).into_par_iter().with_min_len(CHUNK);
         let depth = &frame.depth;
         let found = triangles.fold(Vec::new, |mut out, primitive| {
-            e.beside(primitive, view, depth, &mut out);
+            e.outline_fragments(primitive, view, depth, &mut out);
             out
         });
         let found: Vec<Vec<Fragment>> = found.collect();
@@ -243,8 +243,8 @@ mod tests {
     #[test]
     fn edges_are_as_wide_as_asked_and_diagonals_do_not_show() {
         let (edges, view) = square();
-        let t = edges.in_window(0, &view).expect("a triangle");
-        let at = |x, y| edges.share(&t, &t.distances(DVec2::new(x, y)));
+        let t = edges.project(0, &view).expect("a triangle");
+        let at = |x, y| edges.coverage(&t, &t.distances(DVec2::new(x, y)));
         // Rows come from the top: the bottom edge is at y = 75.
         assert_eq!([at(50.0, 74.5), at(60.0, 72.0), at(50.0, 50.5)], [1.0, 0.0, 0.0]);
         assert!((at(60.0, 73.0) - 0.5).abs() < 1e-6, "the rim fades");

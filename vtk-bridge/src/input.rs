@@ -149,7 +149,7 @@ pub struct Shape<'a> {
     /// Polygons are drawn as their edges, with tubes of `line_radius`.
     pub edges_only: bool,
     /// The backs of polygons look different ([`Surface::back`]).
-    pub has_backs: bool,
+    pub has_back_faces: bool,
 }
 
 impl<'a> Shape<'a> {
@@ -169,7 +169,7 @@ impl<'a> Shape<'a> {
             point_radius: 0.0,
             line_radius: 0.0,
             edges_only: false,
-            has_backs: false,
+            has_back_faces: false,
         }
     }
 }
@@ -319,7 +319,7 @@ pub struct Surface<'a> {
     pub maps: Option<Maps<'a>>,
     /// Its answer to light.
     pub property: Property,
-    /// Another answer on the backs of its polygons, opaque and of one colour (needs [`Shape::has_backs`]).
+    /// Another answer on the backs of its polygons, opaque and of one colour (needs [`Shape::has_back_faces`]).
     pub back: Option<Property>,
     /// Copies: each is drawn where its own matrix (data of the copy to `world_from_data`'s input) puts it.
     pub glyphs: Option<Glyphs<'a>>,

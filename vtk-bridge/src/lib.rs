@@ -55,7 +55,7 @@ pub mod lights;
 pub mod loader;
 pub mod materials;
 pub mod options;
-pub mod picture;
 pub mod report;
 pub mod setup;
 mod volumes;
+pub mod window_image;

@@ -23,7 +23,7 @@ pub enum Encoding {
 
 /// What decides about all materials of a frame.
 #[derive(Debug, Clone, Copy)]
-pub struct Setting<'a> {
+pub struct MaterialContext<'a> {
     /// The options.
     pub options: &'a Options,
     /// True when one headlight is the only light.
@@ -38,17 +38,17 @@ fn ambient_share(options: &Options) -> f32 {
 }
 
 /// The material of `p`. `from_values` is true where colours of points, cells or a map replace the property's.
-pub fn material(p: &Property, from_values: bool, setting: &Setting<'_>) -> (Material, Encoding) {
-    let options = setting.options;
+pub fn material(p: &Property, from_values: bool, context: &MaterialContext<'_>) -> (Material, Encoding) {
+    let options = context.options;
     let sides = match (p.cull_front, p.cull_back) {
         (false, false) | (true, true) => Sides::Both,
         (true, false) => Sides::BackOnly,
         (false, true) => Sides::FrontOnly,
     };
-    let opacity = sane(p.opacity).min(1.0);
+    let opacity = non_negative(p.opacity).min(1.0);
     let base = Material {
         model: SurfaceModel::Matte,
-        color: p.diffuse_color.map(sane),
+        color: p.diffuse_color.map(non_negative),
         color_source: ColorSource::Attribute,
         opacity,
         emission: [0.0; 3],
@@ -85,12 +85,14 @@ pub fn material(p: &Property, from_values: bool, setting: &Setting<'_>) -> (Mate
     }
     let opacity = if options.material == MaterialChoice::Transparent { 0.5 * opacity } else { opacity };
     let base = Material { opacity, ..base };
-    if !p.lighting || setting.dark {
+    if !p.lighting || context.dark {
         // Complexity 0 of VTK's shader: ambient and diffuse as they are.
         let color = if from_values {
             [p.ambient + p.diffuse; 3]
         } else {
-            std::array::from_fn(|c| sane(p.ambient * p.ambient_color[c] + p.diffuse * p.diffuse_color[c]))
+            std::array::from_fn(|c| {
+                non_negative(p.ambient * p.ambient_color[c] + p.diffuse * p.diffuse_color[c])
+            })
         };
         return (Material { model: SurfaceModel::Unlit, color, ..base }, Encoding::Direct);
     }
@@ -99,27 +101,27 @@ pub fn material(p: &Property, from_values: bool, setting: &Setting<'_>) -> (Mate
     }
     let share = ambient_share(options);
     let same = from_values || p.ambient_color == p.diffuse_color;
-    let specular = p.specular_color.map(|c| sane(c * p.specular));
+    let specular = p.specular_color.map(|c| non_negative(c * p.specular));
     let model = SurfaceModel::Phong {
-        ambient: if same { sane(p.ambient) } else { 0.0 } + sane(p.diffuse) * share,
-        diffuse: sane(p.diffuse) * (1.0 - share),
+        ambient: if same { non_negative(p.ambient) } else { 0.0 } + non_negative(p.diffuse) * share,
+        diffuse: non_negative(p.diffuse) * (1.0 - share),
         specular,
-        shininess: sane(p.specular_power),
-        highlight: if setting.only_headlight { Highlight::TowardsLight } else { Highlight::Mirrored },
+        shininess: non_negative(p.specular_power),
+        highlight: if context.only_headlight { Highlight::TowardsLight } else { Highlight::Mirrored },
         mirror: options.mirror,
     };
-    let emission = if same { [0.0; 3] } else { p.ambient_color.map(|c| sane(c * p.ambient)) };
+    let emission = if same { [0.0; 3] } else { p.ambient_color.map(|c| non_negative(c * p.ambient)) };
     (Material { model, emission, ..base }, Encoding::Direct)
 }
 
 fn pbr(p: &Property, base: Material) -> (Material, Encoding) {
     let f0 = {
         let r = (p.base_ior - 1.0) / (p.base_ior + 1.0);
-        sane(r * r).min(1.0)
+        non_negative(r * r).min(1.0)
     };
     let model = SurfaceModel::Pbr {
-        metallic: sane(p.metallic).min(1.0),
-        roughness: sane(p.roughness).min(1.0),
+        metallic: non_negative(p.metallic).min(1.0),
+        roughness: non_negative(p.roughness).min(1.0),
         specular: f0,
         form: PbrForm::Vtk,
     };
@@ -129,35 +131,35 @@ fn pbr(p: &Property, base: Material) -> (Material, Encoding) {
 
 /// Further textures of a physically based property.
 #[derive(Debug, Clone)]
-pub(crate) struct Finishes {
+pub(crate) struct PbrTextures {
     detail: Arc<dyn Detail>,
     emission: [f32; 3],
 }
 
 /// Those of `maps`, with what `texture` makes of pictures.
-pub(crate) fn finishes(
+pub(crate) fn pbr_textures(
     maps: &Maps<'_>,
     mut texture: impl FnMut(Option<&Image<'_>>) -> Option<Arc<Texture>>,
-) -> Finishes {
+) -> PbrTextures {
     let packed = texture(maps.material.as_ref());
     let detail = SurfaceMaps {
         normal: texture(maps.normal.as_ref()),
         normal_scale: if maps.normal_scale.is_finite() { maps.normal_scale } else { 1.0 },
         metallic_roughness: packed.clone(),
         occlusion: packed,
-        occlusion_strength: sane(maps.occlusion_strength).min(1.0),
+        occlusion_strength: non_negative(maps.occlusion_strength).min(1.0),
         emission: texture(maps.emissive.as_ref()),
         ..SurfaceMaps::new(MapConvention::Vtk)
     };
     // The shader adds emission where the picture is encoded, and there light is over π.
     let factor = if detail.emission.is_some() { PI } else { 0.0 };
-    let emission = maps.emissive_factor.map(|f| sane(f) * factor);
-    Finishes { detail: Arc::new(detail), emission }
+    let emission = maps.emissive_factor.map(|f| non_negative(f) * factor);
+    PbrTextures { detail: Arc::new(detail), emission }
 }
 
-impl Finishes {
+impl PbrTextures {
     /// The material with them.
-    pub(crate) fn put_on(&self, base: Material) -> Material {
+    pub(crate) fn apply_to(&self, base: Material) -> Material {
         let emission = std::array::from_fn(|c| base.emission[c] + self.emission[c]);
         Material { emission, ..base.with_detail(self.detail.clone()) }
     }
@@ -165,7 +167,7 @@ impl Finishes {
 
 /// The ambient part of a surface of one colour as light that it gives off. An ambient light in the scene would show on every surface, also
 /// on physically based ones, whose shader knows no ambient coefficient; so it is left to surfaces whose colour varies, and to ambient occlusion.
-pub fn without_ambient_light(mut m: Material) -> Material {
+pub fn ambient_as_emission(mut m: Material) -> Material {
     if let (ColorSource::Constant, SurfaceModel::Phong { ambient, .. }) = (&m.color_source, &mut m.model) {
         m.emission = std::array::from_fn(|c| m.emission[c] + m.color[c] * *ambient);
         *ambient = 0.0;
@@ -174,7 +176,7 @@ pub fn without_ambient_light(mut m: Material) -> Material {
 }
 
 /// Finite and not negative.
-fn sane(v: f32) -> f32 {
+fn non_negative(v: f32) -> f32 {
     if v.is_finite() { v.max(0.0) } else { 0.0 }
 }
 
@@ -182,14 +184,14 @@ fn sane(v: f32) -> f32 {
 mod tests {
     use super::*;
 
-    fn setting(options: &Options) -> Setting<'_> {
-        Setting { options, only_headlight: false, dark: false }
+    fn context(options: &Options) -> MaterialContext<'_> {
+        MaterialContext { options, only_headlight: false, dark: false }
     }
 
     #[test]
     fn ambient_occlusion_takes_its_light_from_the_lights() {
         let options = Options { ao: 8, ao_strength: 0.25, ..Options::default() };
-        let (m, _) = material(&Property { diffuse: 0.8, ..Property::default() }, false, &setting(&options));
+        let (m, _) = material(&Property { diffuse: 0.8, ..Property::default() }, false, &context(&options));
         let SurfaceModel::Phong { ambient, diffuse, .. } = m.model else { panic!("{m:?}") };
         assert!((ambient - 0.2).abs() < 1e-6 && (diffuse - 0.6).abs() < 1e-6);
     }
@@ -197,9 +199,9 @@ mod tests {
     #[test]
     fn an_ambient_colour_of_its_own_is_given_off() {
         let p = Property { ambient: 0.5, ambient_color: [1.0, 0.0, 0.0], ..Property::default() };
-        let (m, _) = material(&p, false, &setting(&Options::default()));
+        let (m, _) = material(&p, false, &context(&Options::default()));
         assert_eq!(m.emission, [0.5, 0.0, 0.0]);
-        let (m, _) = material(&p, true, &setting(&Options::default()));
+        let (m, _) = material(&p, true, &context(&Options::default()));
         assert_eq!(m.emission, [0.0; 3], "colours of points replace both");
     }
 
@@ -211,19 +213,19 @@ mod tests {
             ambient_color: [1.0, 0.5, 0.0],
             ..Property::default()
         };
-        let (m, _) = material(&p, false, &setting(&Options::default()));
-        let constant = without_ambient_light(Material { color_source: ColorSource::Constant, ..m.clone() });
+        let (m, _) = material(&p, false, &context(&Options::default()));
+        let constant = ambient_as_emission(Material { color_source: ColorSource::Constant, ..m.clone() });
         assert!(matches!(constant.model, SurfaceModel::Phong { ambient: 0.0, .. }), "{constant:?}");
         assert_eq!(constant.emission, [0.3, 0.15, 0.0]);
         let varying = Material { color_source: ColorSource::Attribute, ..m };
-        assert_eq!(without_ambient_light(varying.clone()), varying);
+        assert_eq!(ambient_as_emission(varying.clone()), varying);
     }
 
     #[test]
     fn nan_in_a_property_is_no_error_of_the_scene() {
         let p =
             Property { specular_power: f32::NAN, diffuse: -1.0, opacity: f32::NAN, ..Property::default() };
-        let (m, _) = material(&p, false, &setting(&Options::default()));
+        let (m, _) = material(&p, false, &context(&Options::default()));
         assert!(matches!(m.model, SurfaceModel::Phong { shininess: 0.0, diffuse: 0.0, .. }), "{m:?}");
     }
 }

@@ -8,7 +8,7 @@ use std::sync::Mutex;
 
 /// Something that was traced.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Traced {
+pub struct TracedItem {
     /// Its name.
     pub name: String,
     /// Triangles, all copies together.
@@ -21,7 +21,7 @@ pub struct Traced {
 
 /// Something that OpenGL draws.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Passed {
+pub struct UntracedItem {
     /// Its name.
     pub name: String,
     /// Why it is not traced.
@@ -49,9 +49,9 @@ pub struct FrameReport {
     /// Frames so far.
     pub frame: u64,
     /// What was traced.
-    pub traced: Vec<Traced>,
+    pub traced: Vec<TracedItem>,
     /// What OpenGL draws, and why.
-    pub passed: Vec<Passed>,
+    pub passed: Vec<UntracedItem>,
     /// Effects that ran.
     pub effects: Vec<String>,
     /// What each effect adds to the frame: time with it minus time without it.
@@ -89,7 +89,7 @@ static RENDERERS: Mutex<BTreeMap<u64, FrameReport>> = Mutex::new(BTreeMap::new()
 /// Writes the reports of all renderers that had something to draw. A rank of a parallel program writes its own file.
 pub fn write(renderer: u64, report: &FrameReport, path: &str) -> std::io::Result<()> {
     #[derive(Serialize)]
-    struct Whole<'a> {
+    struct ReportFile<'a> {
         program: &'static str,
         version: &'static str,
         renderers: Vec<&'a FrameReport>,
@@ -97,8 +97,8 @@ pub fn write(renderer: u64, report: &FrameReport, path: &str) -> std::io::Result
     let Ok(mut all) = RENDERERS.lock() else { return Ok(()) };
     all.insert(renderer, report.clone());
     let renderers = all.values().filter(|r| !r.traced.is_empty() || !r.passed.is_empty()).collect();
-    let whole = Whole { program: "vtk-bridge", version: env!("CARGO_PKG_VERSION"), renderers };
-    let text = serde_json::to_string_pretty(&whole).map_err(std::io::Error::other)?;
+    let file = ReportFile { program: "vtk-bridge", version: env!("CARGO_PKG_VERSION"), renderers };
+    let text = serde_json::to_string_pretty(&file).map_err(std::io::Error::other)?;
     let path = of_rank(Path::new(path), |name| std::env::var(name).ok());
     let beside = path.with_extension(format!("tmp{}", std::process::id()));
     std::fs::write(&beside, text + "\n")?;

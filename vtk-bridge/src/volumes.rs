@@ -20,21 +20,21 @@ const MAX_OPACITY: f32 = 0.999_999;
 const CHUNK: usize = 1 << 14;
 
 /// What is kept of one grid.
-struct Medium {
+struct CachedVolume {
     volume: Arc<Volume>,
     /// Of everything but the scalars.
-    look: u64,
+    appearance: u64,
     used: bool,
 }
 
 /// The volumes of a renderer.
 #[derive(Default)]
-pub(crate) struct Media {
-    kept: HashMap<u64, Medium>,
+pub(crate) struct VolumeCache {
+    kept: HashMap<u64, CachedVolume>,
     placed: Vec<PlacedVolume>,
 }
 
-impl Media {
+impl VolumeCache {
     /// A new frame.
     pub(crate) fn begin(&mut self) {
         self.placed.clear();
@@ -65,18 +65,18 @@ impl Media {
     ) -> Result<(u64, Option<String>), String> {
         // Lights are fixed in the volume's axes, so that a turned volume looks different.
         let lights = lights(v, place)?;
-        let look = look_of(v, &lights);
-        (v.key, look).hash(content);
+        let appearance = appearance_hash(v, &lights);
+        (v.key, appearance).hash(content);
         format!("{place:?}").hash(content);
         let kept = self.kept.get_mut(&v.key).filter(|_| v.key != 0);
         let volume = match kept {
-            Some(kept) if kept.look == look => {
+            Some(kept) if kept.appearance == appearance => {
                 kept.used = true;
                 Arc::clone(&kept.volume)
             }
             Some(kept) => {
                 let grid = Arc::clone(kept.volume.grid());
-                *kept = Medium { volume: Arc::new(medium(v, grid, lights)?), look, used: true };
+                *kept = CachedVolume { volume: Arc::new(medium(v, grid, lights)?), appearance, used: true };
                 Arc::clone(&kept.volume)
             }
             None => {
@@ -85,7 +85,7 @@ impl Media {
                 let grid = Grid::new(UVec3::from_array(v.dims), DVec3::ZERO, DVec3::new(x, y, z), values)
                     .map_err(|e| format!("a volume: {e}"))?;
                 let volume = Arc::new(medium(v, Arc::new(grid), lights)?);
-                self.kept.insert(v.key, Medium { volume: Arc::clone(&volume), look, used: true });
+                self.kept.insert(v.key, CachedVolume { volume: Arc::clone(&volume), appearance, used: true });
                 volume
             }
         };
@@ -99,7 +99,7 @@ impl Media {
 }
 
 /// A number for everything but the scalars and the place.
-fn look_of(v: &Input<'_>, lights: &[VolumeLight]) -> u64 {
+fn appearance_hash(v: &Input<'_>, lights: &[VolumeLight]) -> u64 {
     let mut h = DefaultHasher::new();
     let tables = v.colors.iter().flatten().chain(v.opacities).chain(v.gradient_opacities);
     tables.for_each(|x| x.to_bits().hash(&mut h));

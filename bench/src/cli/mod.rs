@@ -98,7 +98,7 @@ struct RenderArgs {
     samples: u32,
     /// Separated by commas: shadows, soft-shadows, ao, reflections, glossy-reflections, refraction, transparency,
     /// depth-of-field, volumes (image data as a glowing medium), path-tracing
-    #[arg(long, default_value = "none", value_name = "LIST", value_parser = crate::picture::look::parse_effects)]
+    #[arg(long, default_value = "none", value_name = "LIST", value_parser = crate::picture::style::parse_effects)]
     effects: Effects,
     /// A camera as TOML or JSON: eye, target, up, vertical_fov_degrees, parallel_height [default: fits the data]
     #[arg(long, value_name = "FILE")]

@@ -1,6 +1,6 @@
 //! `bench peers`.
 
-use crate::peers::embree::{Embree, Version};
+use crate::baselines::embree::{Embree, Version};
 use datasets::cli::CommonArgs;
 use serde::Serialize;
 

@@ -2,9 +2,9 @@
 
 use super::{PictureArgs, RenderArgs};
 use crate::picture::framing::{Framing, read_camera};
-use crate::picture::look::{BACKGROUNDS, Look};
-use crate::picture::subject::{Choices, Subject, VolumeChoice};
-use crate::picture::{Drawn, Watch, Wish, draw, gallery, save};
+use crate::picture::style::{BACKGROUNDS, RenderStyle};
+use crate::picture::subject::{LoadOptions, Subject, VolumeChoice};
+use crate::picture::{RenderControl, RenderRequest, RenderedImage, draw, gallery, save};
 use anyhow::Context as _;
 use datasets::cli::{Cancel, CommonArgs, CureExt as _, Interrupted, UsageError};
 use datasets::colormaps;
@@ -37,14 +37,14 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
     let start = Instant::now();
     common.note(1, format_args!("reading {file}"));
     let opened = datasets::read::open(&args.file)?;
-    let choices = Choices { color_by: args.color_by.clone(), isovalue: args.isovalue, volume };
-    let cure = if choices.volume == VolumeChoice::No {
+    let load_options = LoadOptions { color_by: args.color_by.clone(), isovalue: args.isovalue, volume };
+    let cure = if load_options.volume == VolumeChoice::No {
         "look at the file with the options --color-by and --isovalue in mind, or convert it to .vtp or .vti with ParaView"
     } else {
         "draw it without `volumes`, or make image data of it: in ParaView by Resample To Image, saved as .vti; \
          --volume names one of its arrays"
     };
-    let subject = Subject::from_file(&opened, &choices)
+    let subject = Subject::from_file(&opened, &load_options)
         .with_context(|| format!("{file}: cannot be drawn so"))
         .cure(cure)?;
     let (format, read_secs) = (opened.format, start.elapsed().as_secs_f64());
@@ -55,29 +55,29 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
     let mut warnings = subject.warnings.clone();
 
     common.note(1, format_args!("drawing {}", contents.join(", ")));
-    let look = Look {
+    let style = RenderStyle {
         effects: args.effects.with_if(drawn_as_volume, Effects::VOLUMES),
         opacity: args.opacity.clone().map(|o| o.0),
         colors: args.colors.clone(),
         range: args.range,
         background: args.background,
-        ..Look::default()
+        ..RenderStyle::default()
     };
-    let wish = Wish {
+    let request = RenderRequest {
         size: args.size,
         samples: args.samples,
-        look,
+        style,
         framing,
         build: BuildOptions { quality: args.quality, robustness: args.robustness, simd: None },
         layers: if exr.is_some() { Layers::ALL } else { Layers::COLOR },
     };
     let bar = common.progress(u64::from(args.samples), "drawing");
     let mut told = |samples: u32| bar.set_position(u64::from(samples));
-    let mut watch = Watch { cancel: Some(cancel.flag().clone()), samples_done: Some(&mut told) };
-    let drawn = draw(subject, &wish, &mut watch)?;
+    let mut control = RenderControl { cancel: Some(cancel.flag().clone()), samples_done: Some(&mut told) };
+    let rendered = draw(subject, &request, &mut control)?;
     drop(bar);
-    warnings.extend(drawn.warnings.iter().cloned());
-    write(png, exr, &drawn, &wish, &mut warnings)?;
+    warnings.extend(rendered.warnings.iter().cloned());
+    write(png, exr, &rendered, &request, &mut warnings)?;
     for w in &warnings {
         common.warn(format_args!("{file}: {w}"));
     }
@@ -89,12 +89,12 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
         "triangles": triangles,
         "scalar_range": scalar_range,
         "size": args.size,
-        "samples": drawn.report.samples,
-        "effects": drawn.report.effects.names().collect::<Vec<_>>(),
+        "samples": rendered.report.samples,
+        "effects": rendered.report.effects.names().collect::<Vec<_>>(),
         "robustness": args.robustness.name(),
         "quality": args.quality.name(),
-        "rays": rays(&drawn.report.rays),
-        "seconds": { "read": read_secs, "build": drawn.build_secs, "render": drawn.render_secs },
+        "rays": rays(&rendered.report.rays),
+        "seconds": { "read": read_secs, "build": rendered.build_secs, "render": rendered.render_secs },
         "warnings": warnings,
         "output": png,
         "exr": exr,
@@ -105,12 +105,12 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
             "{}: {}; read {read_secs:.2} s, build {:.2} s, render {:.2} s, {} rays",
             written.join(", "),
             contents.join(", "),
-            drawn.build_secs,
-            drawn.render_secs,
-            drawn.report.rays.total()
+            rendered.build_secs,
+            rendered.render_secs,
+            rendered.report.rays.total()
         )
     })?;
-    ended(&drawn)
+    ended(&rendered)
 }
 
 pub(super) fn picture(common: CommonArgs, args: &PictureArgs) -> anyhow::Result<()> {
@@ -119,11 +119,11 @@ pub(super) fn picture(common: CommonArgs, args: &PictureArgs) -> anyhow::Result<
     let (png, exr) = outputs(args.out.as_deref(), args.exr.as_deref())?;
     let bar = common.progress(u64::from(args.samples), entry.name);
     let mut told = |samples: u32| bar.set_position(u64::from(samples));
-    let mut watch = Watch { cancel: Some(cancel.flag().clone()), samples_done: Some(&mut told) };
-    let p = entry.paint(args.size, args.samples, &mut watch)?;
+    let mut control = RenderControl { cancel: Some(cancel.flag().clone()), samples_done: Some(&mut told) };
+    let p = entry.render(args.size, args.samples, &mut control)?;
     drop(bar);
-    let mut warnings = p.drawn.warnings.clone();
-    write(png, exr, &p.drawn, &p.wish, &mut warnings)?;
+    let mut warnings = p.rendered.warnings.clone();
+    write(png, exr, &p.rendered, &p.request, &mut warnings)?;
     for w in &warnings {
         common.warn(format_args!("{}: {w}", entry.name));
     }
@@ -131,22 +131,25 @@ pub(super) fn picture(common: CommonArgs, args: &PictureArgs) -> anyhow::Result<
         "picture": entry.name,
         "contents": p.contents,
         "size": args.size,
-        "effects": p.drawn.report.effects.names().collect::<Vec<_>>(),
-        "rays": rays(&p.drawn.report.rays),
-        "seconds": { "data": p.data_secs, "build": p.drawn.build_secs, "render": p.drawn.render_secs },
+        "effects": p.rendered.report.effects.names().collect::<Vec<_>>(),
+        "rays": rays(&p.rendered.report.rays),
+        "seconds": { "data": p.data_secs, "build": p.rendered.build_secs, "render": p.rendered.render_secs },
         "warnings": warnings,
         "output": png,
         "exr": exr,
     });
     common.result(&object, || {
-        format!("{}; build {:.2} s, render {:.2} s", p.contents, p.drawn.build_secs, p.drawn.render_secs)
+        format!(
+            "{}; build {:.2} s, render {:.2} s",
+            p.contents, p.rendered.build_secs, p.rendered.render_secs
+        )
     })?;
-    ended(&p.drawn)
+    ended(&p.rendered)
 }
 
 /// After Ctrl-C the picture is there with the samples it got, and the program says so.
-fn ended(drawn: &Drawn) -> anyhow::Result<()> {
-    if drawn.is_interrupted() { Err(Interrupted.into()) } else { Ok(()) }
+fn ended(rendered: &RenderedImage) -> anyhow::Result<()> {
+    if rendered.is_interrupted() { Err(Interrupted.into()) } else { Ok(()) }
 }
 
 /// Checks the names before hours of work are spent on a picture that cannot be written.
@@ -169,23 +172,23 @@ fn outputs<'a>(
 fn write(
     png: Option<&Path>,
     exr: Option<&Path>,
-    drawn: &Drawn,
-    wish: &Wish,
+    rendered: &RenderedImage,
+    request: &RenderRequest,
     warnings: &mut Vec<String>,
 ) -> anyhow::Result<()> {
-    if drawn.is_interrupted() {
-        let (done, all) = (drawn.report.samples, wish.samples);
+    if rendered.is_interrupted() {
+        let (done, all) = (rendered.report.samples, request.samples);
         warnings.push(format!("stopped after {done} of {all} samples per pixel"));
     }
     if let Some(path) = png {
-        let report = save::write_png(path, &drawn.frame)?;
+        let report = save::write_png(path, &rendered.frame)?;
         if report.nan > 0 {
             warnings.push(format!("{} pixels are not a number and drawn magenta", report.nan));
         }
     }
     if let Some(path) = exr {
-        save::write_exr(path, drawn, wish)?;
-        if save::rounds_ids(&drawn.frame) {
+        save::write_exr(path, rendered, request)?;
+        if save::rounds_ids(&rendered.frame) {
             warnings.push("primitive ids above 16777216 are rounded in the OpenEXR file".into());
         }
     }

@@ -3,13 +3,13 @@
 
 use super::Context;
 use super::compare::{self, Contender, Kind};
-use super::lineup::Installed;
+use super::installed_tracers::InstalledBaselines;
+use crate::baselines::embree::{Embree, EmbreeScene, Options, Quality};
 use crate::meshes;
-use crate::ours::{Mode, Ours};
-use crate::peers::embree::{Embree, EmbreeScene, Options, Quality};
 use crate::plot::{Axis, Plot, Point, Series};
 use crate::rays::View;
 use crate::record::{Record, Row};
+use crate::rt_core_tracer::{Mode, RtCoreTracer};
 use crate::runner::{Ratio, Schedule, order};
 use datasets::generate::nested_wavelet::Size;
 use rt_core::accel::{BuildOptions, BuildQuality};
@@ -27,7 +27,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
          triangles between boxes) trace the same rays; ratios to them are theirs divided by ours."
             .into(),
     );
-    let installed = Installed::find();
+    let installed = InstalledBaselines::find();
     record.missing.extend(installed.missing.iter().cloned());
     // One version: the newest there is.
     let embree = installed.embree.last();
@@ -51,13 +51,13 @@ fn scene(
     mesh: &Arc<TriMesh>,
     pixels: u32,
 ) -> anyhow::Result<()> {
-    let mut built: Vec<(BuildQuality, Ours)> = vec![];
+    let mut built: Vec<(BuildQuality, RtCoreTracer)> = vec![];
     let mut fastest_secs = vec![f64::INFINITY; BuildQuality::ALL.len()];
     for round in 0..2 {
         for i in order(fastest_secs.len(), round) {
             let quality = BuildQuality::ALL[i];
-            context.say(format!("{name}: building, {}, round {}", quality.name(), round + 1))?;
-            let ours = Ours::build(mesh, &BuildOptions { quality, ..Default::default() })?;
+            context.report_step(format!("{name}: building, {}, round {}", quality.name(), round + 1))?;
+            let ours = RtCoreTracer::build(mesh, &BuildOptions { quality, ..Default::default() })?;
             fastest_secs[i] = fastest_secs[i].min(ours.cost.wall_secs);
             if round == 1 {
                 built.push((quality, ours));
@@ -76,14 +76,14 @@ fn scene(
         let options = Options { quality, robust, ..Options::default() };
         let kind = if robust { "robust" } else { "fast" };
         let rival = format!("{} {}, {kind}", e.name(), quality.name());
-        context.say(format!("{name}: building {rival}"))?;
+        context.report_step(format!("{name}: building {rival}"))?;
         rivals.push((rival, EmbreeScene::build(e, mesh, &options)?));
     }
     let view = View::orbit(mesh);
     let kinds = [Kind::Primary, Kind::AmbientOcclusion];
     for (kind, rays) in compare::make_rays(mesh, &view, pixels, &kinds, &built[0].1.view(Mode::Coherent)) {
         let rays = if context.quick { rays.thinned(1 << 18) } else { rays };
-        context.say(format!("{name}: {} rays", kind.name()))?;
+        context.report_step(format!("{name}: {} rays", kind.name()))?;
         let mode = if kind.coherent() { Mode::Coherent } else { Mode::Incoherent };
         let mut contenders: Vec<Contender<'_>> = built
             .iter()

@@ -41,10 +41,10 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let strategies = [("radix-k", Strategy::RadixK { k: 8 }), ("direct send", Strategy::DirectSend)];
     let strategies = &strategies[..if context.quick { 1 } else { 2 }];
     for alpha in ALPHAS {
-        context.say(format!("alpha {alpha}"))?;
+        context.report_step(format!("alpha {alpha}"))?;
         measure(record, &Case { alpha, size, frames, strategies, icet: icet.as_deref() })?;
     }
-    record.notes.extend(words(&record.rows));
+    record.notes.extend(describe(&record.rows));
     // A series for each format: what it loses with how faint layers, and at what time.
     let mut by_alpha = Plot::lines(
         "Error of 128 layers",
@@ -81,7 +81,7 @@ struct Case<'a> {
 }
 
 /// What 8 bits lose, ours and IceT's, by the rows.
-fn words(rows: &[Row]) -> Option<String> {
+fn describe(rows: &[Row]) -> Option<String> {
     let error = |format: &str, alpha: f64| {
         let here = |r: &&Row| r.text("format") == Some(format) && r.number("alpha") == Some(alpha);
         rows.iter().find(here)?.number("error")
@@ -89,8 +89,8 @@ fn words(rows: &[Row]) -> Option<String> {
     let each: Vec<String> = ALPHAS
         .iter()
         .filter_map(|&alpha| {
-            let (theirs, ours) = (error(ICET_FORMAT, alpha)?, error("u8", alpha)?);
-            Some(format!("{theirs:.1} and {ours:.1} at alpha {alpha}"))
+            let (icet_compositor, ours) = (error(ICET_FORMAT, alpha)?, error("u8", alpha)?);
+            Some(format!("{icet_compositor:.1} and {ours:.1} at alpha {alpha}"))
         })
         .collect();
     (!each.is_empty())
@@ -126,7 +126,7 @@ trait Contender {
     fn image(&self) -> Option<Vec<[f32; 4]>>;
 }
 
-struct Ours<C: Color>
+struct OurCompositor<C: Color>
 where
     PremultipliedPixel<C>: Composite + PixelFormat<Color = C>,
 {
@@ -136,7 +136,7 @@ where
     image: Option<Image<PremultipliedPixel<C>>>,
 }
 
-impl<C: Color> Contender for Ours<C>
+impl<C: Color> Contender for OurCompositor<C>
 where
     PremultipliedPixel<C>: Composite + PixelFormat<Color = C>,
 {
@@ -154,14 +154,14 @@ where
     }
 }
 
-struct Theirs {
+struct IcetCompositor {
     size: u32,
     layer: Vec<[u8; 4]>,
     icet: Icet,
     image: Option<Vec<[u8; 4]>>,
 }
 
-impl Contender for Theirs {
+impl Contender for IcetCompositor {
     fn composite(&mut self, comm: &mut SimComm) -> anyhow::Result<(f64, Option<u64>)> {
         let whole = Rect { x0: 0, y0: 0, x1: self.size, y1: self.size };
         let image = self.icet.composite(comm, IcetFrame::BlendU8(&self.layer), whole)?;
@@ -179,7 +179,7 @@ impl Contender for Theirs {
 }
 
 /// A contender with what its rows say of it.
-struct Named {
+struct NamedContender {
     format: &'static str,
     bytes_per_pixel: usize,
     strategy: &'static str,
@@ -191,7 +191,7 @@ fn layer<C: Color>(case: &Case<'_>, rank: usize) -> Vec<C> {
     (0..pixels).map(|k| C::from_f32(layer_color(case.alpha, rank, k).map(|v| v as f32))).collect()
 }
 
-fn ours<C: Color + 'static>(all: &mut Vec<Named>, format: &'static str, case: &Case<'_>, rank: usize)
+fn ours<C: Color + 'static>(all: &mut Vec<NamedContender>, format: &'static str, case: &Case<'_>, rank: usize)
 where
     PremultipliedPixel<C>: Composite + PixelFormat<Color = C>,
 {
@@ -204,13 +204,14 @@ where
             confirm: false,
             ..Options::default()
         });
-        let contender = Box::new(Ours { size: case.size, layer: layer.clone(), compositor, image: None });
-        all.push(Named { format, bytes_per_pixel: size_of::<C>(), strategy, contender });
+        let contender =
+            Box::new(OurCompositor { size: case.size, layer: layer.clone(), compositor, image: None });
+        all.push(NamedContender { format, bytes_per_pixel: size_of::<C>(), strategy, contender });
     }
 }
 
 /// All ways to composite on one rank, in the order of the rows.
-fn contenders(comm: &mut SimComm, case: &Case<'_>) -> anyhow::Result<Vec<Named>> {
+fn contenders(comm: &mut SimComm, case: &Case<'_>) -> anyhow::Result<Vec<NamedContender>> {
     let (rank, ranks) = (comm.rank(), comm.size());
     let mut all = Vec::new();
     ours::<[u8; 4]>(&mut all, "u8", case, rank);
@@ -222,15 +223,20 @@ fn contenders(comm: &mut SimComm, case: &Case<'_>) -> anyhow::Result<Vec<Named>>
         let strategy = IcetStrategy::RadixKr;
         icet.set_strategy(strategy);
         icet.set_order(&(0..ranks).collect::<Vec<_>>());
-        let theirs = Theirs { size: case.size, layer: layer(case, rank), icet, image: None };
+        let icet_compositor = IcetCompositor { size: case.size, layer: layer(case, rank), icet, image: None };
         let (format, strategy) = (ICET_FORMAT, strategy.name());
-        all.push(Named { format, bytes_per_pixel: 4, strategy, contender: Box::new(theirs) });
+        all.push(NamedContender {
+            format,
+            bytes_per_pixel: 4,
+            strategy,
+            contender: Box::new(icet_compositor),
+        });
     }
     Ok(all)
 }
 
 /// What a rank has to say of a contender.
-struct OfRank {
+struct RankResult {
     format: &'static str,
     bytes_per_pixel: usize,
     strategy: &'static str,
@@ -257,8 +263,8 @@ fn measure(record: &mut Record, case: &Case<'_>) -> anyhow::Result<()> {
             }
         }
         let each = all.into_iter().zip(secs).zip(sent).map(|((named, secs), sent)| {
-            let Named { format, bytes_per_pixel, strategy, contender } = named;
-            OfRank { format, bytes_per_pixel, strategy, secs, sent, image: contender.image() }
+            let NamedContender { format, bytes_per_pixel, strategy, contender } = named;
+            RankResult { format, bytes_per_pixel, strategy, secs, sent, image: contender.image() }
         });
         Ok(each.collect::<Vec<_>>())
     })?;
@@ -322,8 +328,8 @@ mod tests {
         // 128 layers of 1/255 each sum up to 0.473 of white; whoever rounds every sum down has no more than one of them.
         assert!(of(ICET_FORMAT) > 100.0, "{}", of(ICET_FORMAT));
         assert!(of("u8") < 60.0 && of("u16") < 1.0 && of("f32") < 1e-3, "{:?}", record.rows);
-        let note = words(&record.rows).unwrap();
+        let note = describe(&record.rows).unwrap();
         assert!(note.contains(&format!("{:.1} and {:.1} at", of(ICET_FORMAT), of("u8"))), "{note}");
-        assert_eq!(words(&[]), None, "nothing measured, nothing said");
+        assert_eq!(describe(&[]), None, "nothing measured, nothing said");
     }
 }

@@ -6,15 +6,15 @@
 //! comparison with brute force in the tests.
 
 use super::Context;
-use super::lineup::Installed;
+use super::installed_tracers::InstalledBaselines;
+use crate::baselines::embree::{EmbreeScene, Options};
+use crate::baselines::obvhs::{Obvhs, Preset};
+use crate::baselines::{Tracer, count_hits};
 use crate::meshes::{self, Random};
-use crate::ours::{Mode, Ours};
-use crate::peers::embree::{EmbreeScene, Options};
-use crate::peers::obvhs::{Obvhs, Preset};
-use crate::peers::{Tracer, count_hits};
 use crate::plot::{Axis, Plot, Series};
 use crate::rays::{HitBlock, RaySet};
 use crate::record::{Record, Row};
+use crate::rt_core_tracer::{Mode, RtCoreTracer};
 use crate::runner::order;
 use crate::{clock, rays};
 use glam::DVec3;
@@ -65,7 +65,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("rays", "", "number of rays");
     record.column("leaks", "", "rays that came out");
     record.column("seconds", "s", "CPU time of tracing them, all threads together, without making them");
-    let installed = Installed::find();
+    let installed = InstalledBaselines::find();
     record.missing.extend(installed.missing.iter().cloned());
     // 12 combinations of mesh and aim: 10^8 rays for each of our modes in full.
     let (per_combination, rivals) =
@@ -89,11 +89,11 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     ];
     for case in &cases {
         let base = Row::new().with("mesh", case.name).with("triangles", case.mesh.num_triangles());
-        context.say(format!("{}: building", case.name))?;
+        context.report_step(format!("{}: building", case.name))?;
         let mut ours = vec![];
         for robustness in Robustness::ALL {
             let options = BuildOptions { robustness, ..Default::default() };
-            ours.push((robustness, Ours::build(&case.mesh, &options)?));
+            ours.push((robustness, RtCoreTracer::build(&case.mesh, &options)?));
         }
         let mut embree = vec![];
         for e in &installed.embree {
@@ -106,52 +106,56 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         let row = |tracer: &str, robustness: &str| {
             base.clone().with("tracer", tracer).with("robustness", robustness)
         };
-        let mut shooters = vec![];
+        let mut tracers = vec![];
         for (robustness, ours) in &ours {
-            let ways: [Box<dyn Tracer + '_>; 2] =
+            let modes: [Box<dyn Tracer + '_>; 2] =
                 [Box::new(ours.view(Mode::Single)), Box::new(ours.view(Mode::Coherent))];
-            shooters.push(Shooter { row: row("rt-core", robustness.name()), ways, count: per_combination });
+            tracers.push(TracerUnderTest {
+                row: row("rt-core", robustness.name()),
+                modes,
+                count: per_combination,
+            });
         }
         for (name, robust, scene) in &embree {
-            let ways: [Box<dyn Tracer + '_>; 2] =
+            let modes: [Box<dyn Tracer + '_>; 2] =
                 [Box::new(scene.view(1, false)), Box::new(scene.view(16, true))];
-            shooters.push(Shooter { row: row(name, robust), ways, count: rivals });
+            tracers.push(TracerUnderTest { row: row(name, robust), modes, count: rivals });
         }
-        let ways: [Box<dyn Tracer + '_>; 2] = [Box::new(&obvhs), Box::new(&obvhs)];
-        shooters.push(Shooter { row: row("obvhs", "only"), ways, count: rivals });
-        context.say(format!("{}: {} tracers in turns", case.name, shooters.len()))?;
-        record.rows.extend(shoot(case, &shooters));
+        let modes: [Box<dyn Tracer + '_>; 2] = [Box::new(&obvhs), Box::new(&obvhs)];
+        tracers.push(TracerUnderTest { row: row("obvhs", "only"), modes, count: rivals });
+        context.report_step(format!("{}: {} tracers in turns", case.name, tracers.len()))?;
+        record.rows.extend(count_leaks(case, &tracers));
     }
     record.plots.push(plot(record));
     Ok(())
 }
 
 /// A tracer in one mode.
-struct Shooter<'a> {
+struct TracerUnderTest<'a> {
     /// What its rows begin with.
     row: Row,
     /// Ways into it: for rays alone, and for packets.
-    ways: [Box<dyn Tracer + 'a>; 2],
+    modes: [Box<dyn Tracer + 'a>; 2],
     /// Rays for each aim.
     count: usize,
 }
 
 /// One row per shooter and aim. The shooters take turns batch by batch, on the same rays.
-fn shoot(case: &Case, shooters: &[Shooter<'_>]) -> Vec<Row> {
-    let most = shooters.iter().map(|s| s.count / BATCH).max().unwrap_or(0);
-    let mut by_shooter: Vec<Vec<Row>> = vec![vec![]; shooters.len()];
+fn count_leaks(case: &Case, tracers: &[TracerUnderTest<'_>]) -> Vec<Row> {
+    let most = tracers.iter().map(|s| s.count / BATCH).max().unwrap_or(0);
+    let mut by_tracer: Vec<Vec<Row>> = vec![vec![]; tracers.len()];
     for aim in Aim::ALL {
-        let zero = || vec![(0u64, 0.0f64); shooters.len()];
+        let zero = || vec![(0u64, 0.0f64); tracers.len()];
         let sums = (0..most)
             .into_par_iter()
             .map(|batch| {
-                let rays = aimed(case, aim, batch as u64);
+                let rays = rays_at_target(case, aim, batch as u64);
                 let mut hits = vec![HitBlock::MISS; rays.blocks.len()];
                 let mut found = zero();
-                for i in order(shooters.len(), batch) {
-                    let s = &shooters[i];
+                for i in order(tracers.len(), batch) {
+                    let s = &tracers[i];
                     if batch < s.count / BATCH {
-                        let tracer = &*s.ways[batch % 2];
+                        let tracer = &*s.modes[batch % 2];
                         let ((), time) = clock::measure(|| tracer.closest(&rays.blocks, &mut hits));
                         found[i] = (rays.len as u64 - count_hits(&rays, &hits), time.thread_cpu_secs);
                     }
@@ -159,18 +163,18 @@ fn shoot(case: &Case, shooters: &[Shooter<'_>]) -> Vec<Row> {
                 found
             })
             .reduce(zero, |a, b| a.iter().zip(&b).map(|(a, b)| (a.0 + b.0, a.1 + b.1)).collect());
-        for ((s, (leaks, secs)), rows) in shooters.iter().zip(sums).zip(&mut by_shooter) {
+        for ((s, (leaks, secs)), rows) in tracers.iter().zip(sums).zip(&mut by_tracer) {
             let row = s.row.clone().with("aim", aim.name()).with("rays", s.count / BATCH * BATCH);
             rows.push(row.with("leaks", leaks).with("seconds", secs));
         }
     }
-    by_shooter.concat()
+    by_tracer.concat()
 }
 
 /// A batch of rays from inside, the same for every tracer: even batches from random points at random triangles, odd
 /// ones from one point at triangles in the mesh's order, so that neighbouring rays go the same way and packets are
 /// used. Origins are rounded to f32 first, so that the direction is the difference of the numbers the tracer sees.
-fn aimed(case: &Case, aim: Aim, batch: u64) -> RaySet {
+fn rays_at_target(case: &Case, aim: Aim, batch: u64) -> RaySet {
     let mut random = Random::new(batch << 8 | aim as u64);
     let (mesh, packets) = (&case.mesh, batch % 2 == 1);
     let point = |random: &mut Random| {
@@ -230,8 +234,8 @@ fn plot(record: &Record) -> Plot {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::peers::brute_force::BruteForce;
-    use crate::peers::closest_all;
+    use crate::baselines::brute_force::BruteForce;
+    use crate::baselines::closest_all;
 
     /// The oracle itself must not leak: f64 edge functions from the same numbers.
     #[test]
@@ -240,7 +244,7 @@ mod tests {
         let case = Case { name: "", mesh, center: DVec3::ZERO, radius: 0.4 };
         let exact = BruteForce::new(&case.mesh);
         for aim in Aim::ALL {
-            let mut rays = aimed(&case, aim, 0);
+            let mut rays = rays_at_target(&case, aim, 0);
             rays.blocks.truncate(100);
             rays.len = 1600;
             let mut hits = vec![HitBlock::MISS; rays.blocks.len()];
@@ -253,10 +257,10 @@ mod tests {
     fn watertight_rt_core_does_not_leak_and_the_rows_say_so() {
         let mesh = Arc::new(meshes::crumpled_sphere(3, 0.02, DVec3::ZERO));
         let case = Case { name: "crumpled", mesh, center: DVec3::ZERO, radius: 0.5 };
-        let ours = Ours::build(&case.mesh, &BuildOptions::default()).unwrap();
-        let ways: [Box<dyn Tracer + '_>; 2] =
+        let ours = RtCoreTracer::build(&case.mesh, &BuildOptions::default()).unwrap();
+        let modes: [Box<dyn Tracer + '_>; 2] =
             [Box::new(ours.view(Mode::Single)), Box::new(ours.view(Mode::Coherent))];
-        let rows = shoot(&case, &[Shooter { row: Row::new(), ways, count: 2 * BATCH }]);
+        let rows = count_leaks(&case, &[TracerUnderTest { row: Row::new(), modes, count: 2 * BATCH }]);
         assert_eq!(rows.len(), 3);
         for r in rows {
             assert_eq!(r.number("leaks"), Some(0.0), "{r:?}");

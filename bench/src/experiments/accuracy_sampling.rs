@@ -60,7 +60,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             Axis::log("time", "ms"),
             Axis::log("RMS error", "grey level"),
         );
-        context.say(format!("{}: reference of {reference} samples", quantity.name))?;
+        context.report_step(format!("{}: reference of {reference} samples", quantity.name))?;
         let plain = RenderOptions { cancel: context.cancel.clone(), ..RenderOptions::new(pixels, pixels) };
         let options = RenderOptions { seed: REFERENCE_SEED, ..plain.clone() };
         let (exact, _) = picture(&quantity, &camera, &options, reference)?;
@@ -68,7 +68,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         let counts: Vec<u32> = (0..).map(|k| 1u32 << (2 * k)).take_while(|n| *n <= most).collect();
         let settings: Vec<(Sampling, u32)> =
             Sampling::ALL.into_iter().flat_map(|s| counts.iter().map(move |n| (s, *n))).collect();
-        context.say(format!("{}: {} settings in turns", quantity.name, settings.len()))?;
+        context.report_step(format!("{}: {} settings in turns", quantity.name, settings.len()))?;
         let frames: RefCell<Vec<Option<Frame>>> = RefCell::new(vec![None; settings.len()]);
         let failed: RefCell<Option<anyhow::Error>> = RefCell::new(None);
         let mut variants: Vec<Variant<'_>> = settings

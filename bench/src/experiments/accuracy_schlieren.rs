@@ -5,8 +5,8 @@ use super::Context;
 use super::test_section::{
     blob, blob_deflections, check_cancelled, error_of, fingerprint, oblique, tiles, traced,
 };
+use crate::baselines::thesis_schlieren::ThesisMarch;
 use crate::clock;
-use crate::peers::thesis_schlieren::ThesisMarch;
 use crate::plot::{Axis, Plot, Series};
 use crate::record::{Record, Row};
 use crate::runner::{Schedule, VERDICT_ROUNDS, Variant, interleave};
@@ -66,35 +66,35 @@ struct Rays {
 
 impl Rays {
     /// The same rays for all: a march that takes them.
-    fn setting<'a>(&'a self, paths: Box<dyn LightPaths + 'a>) -> Setting<'a> {
-        Setting { rays: self, paths }
+    fn march_case<'a>(&'a self, paths: Box<dyn LightPaths + 'a>) -> MarchCase<'a> {
+        MarchCase { rays: self, paths }
     }
 }
 
 /// Rays and the way they take.
-struct Setting<'a> {
+struct MarchCase<'a> {
     rays: &'a Rays,
     paths: Box<dyn LightPaths + 'a>,
 }
 
 /// Times in turns on this thread, in ns a ray (median), rms and largest error of each.
-fn measured(quick: bool, settings: &[Setting<'_>]) -> anyhow::Result<Vec<(f64, f64, f64)>> {
+fn measure_cases(quick: bool, cases: &[MarchCase<'_>]) -> anyhow::Result<Vec<(f64, f64, f64)>> {
     // The runs that give the errors warm up.
     let errors: Vec<(f64, f64)> =
-        settings.iter().map(|s| error_of(&traced(&*s.paths, &s.rays.compared), &s.rays.truth)).collect();
-    let mut variants: Vec<Variant<'_>> = settings
+        cases.iter().map(|s| error_of(&traced(&*s.paths, &s.rays.compared), &s.rays.truth)).collect();
+    let mut variants: Vec<Variant<'_>> = cases
         .iter()
         .enumerate()
         .map(|(i, s)| Variant::new(i.to_string(), move || fingerprint(&traced(&*s.paths, &s.rays.timed))))
         .collect();
-    let timings = interleave(&turns(quick), &mut variants)?;
-    let times = timings.variants.iter().zip(settings);
+    let timings = interleave(&rounds_of(quick), &mut variants)?;
+    let times = timings.variants.iter().zip(cases);
     let ns = times.map(|(v, s)| v.summary(timings.clock).median * 1e9 / s.rays.timed.len() as f64);
     Ok(ns.zip(errors).map(|(ns, (rms, largest))| (ns, rms, largest)).collect())
 }
 
 /// Rounds of what is timed here.
-fn turns(quick: bool) -> Schedule {
+fn rounds_of(quick: bool) -> Schedule {
     let rounds = if quick { 3 } else { VERDICT_ROUNDS as u32 };
     Schedule { warmup_rounds: 0, rounds, min_rounds: rounds, ..Schedule::one_thread() }
 }
@@ -106,7 +106,7 @@ fn steps(quick: bool) -> &'static [f64] {
 /// A blob on a lattice, seen obliquely: every march, interpolant and step.
 fn lattice(context: &mut Context<'_>, record: &mut Record, amplitude: f64) -> anyhow::Result<()> {
     let n = if context.quick { 96 } else { 128 };
-    context.say(format!("closed form on a lattice, amplitude {amplitude:e}"))?;
+    context.report_step(format!("closed form on a lattice, amplitude {amplitude:e}"))?;
     let (gaussian, field) = blob(amplitude, n)?;
     let view = oblique()?;
     // All are compared by the same rays. The f64 marches take a ray at a time and ten times as long, so fewer are timed.
@@ -128,17 +128,17 @@ fn lattice(context: &mut Context<'_>, record: &mut Record, amplitude: f64) -> an
     let linear = Trilinear::new(&field);
     let gradients = TrilinearGradient::new(&field);
     let mut named: Vec<(&str, &str, &str, Option<f64>)> = vec![];
-    let mut settings: Vec<Setting<'_>> = vec![];
+    let mut cases: Vec<MarchCase<'_>> = vec![];
     let los = LineOfSight::new(&field, view, Interpolant::BSpline, Wanted::default(), BlankCells::Opaque);
     named.push(("line of sight", "b-spline", "f32", None));
-    settings.push(fast.setting(Box::new(los)));
+    cases.push(fast.march_case(Box::new(los)));
     for (name, interpolant) in INTERPOLANTS {
         for &step_voxels in steps(context.quick) {
             check_cancelled(context)?;
             for (march, scheme) in [("Verlet", Scheme::Verlet), ("Euler", Scheme::Euler)] {
                 let options = Options { scheme, step_voxels, ..Options::default() };
                 named.push((march, name, "f32", Some(step_voxels)));
-                settings.push(fast.setting(Box::new(Deviational::new(&field, view, interpolant, options))));
+                cases.push(fast.march_case(Box::new(Deviational::new(&field, view, interpolant, options))));
             }
             let options = FullOptions { step_voxels, ..FullOptions::default() };
             let full = FullMarches { field: &field, view, options };
@@ -149,16 +149,16 @@ fn lattice(context: &mut Context<'_>, record: &mut Record, amplitude: f64) -> an
             };
             for (march, paths) in all {
                 named.push((march, name, "f64", Some(step_voxels)));
-                settings.push(few.setting(paths));
+                cases.push(few.march_case(paths));
             }
         }
     }
     for &step in steps(context.quick) {
         named.push(("dissertation", "trilinear gradients", "f32", Some(step)));
-        settings.push(few.setting(Box::new(ThesisMarch::new(&field, view, step))));
+        cases.push(few.march_case(Box::new(ThesisMarch::new(&field, view, step))));
     }
-    context.say(format!("amplitude {amplitude:e}: {} settings in turns", settings.len()))?;
-    let results = measured(context.quick, &settings)?;
+    context.report_step(format!("amplitude {amplitude:e}: {} settings in turns", cases.len()))?;
+    let results = measure_cases(context.quick, &cases)?;
 
     let mut curves: Vec<Series> = vec![];
     let mut add = |march: &str, interpolant: &str, precision: &str, step: Option<f64>, m: (f64, f64, f64)| {
@@ -204,12 +204,12 @@ fn lattice(context: &mut Context<'_>, record: &mut Record, amplitude: f64) -> an
     );
     plot.series.extend(SHOWN.iter().filter_map(|s| curves.iter().find(|c| c.name == *s).cloned()));
     record.plots.push(plot);
-    record.notes.push(words_of_lattice(&record.rows, amplitude));
+    record.notes.push(describe_lattice(&record.rows, amplitude));
     Ok(())
 }
 
 /// What decides the error on a lattice: rms errors by interpolant, by integrator, and of the dissertation's march by step.
-fn words_of_lattice(rows: &[Row], amplitude: f64) -> String {
+fn describe_lattice(rows: &[Row], amplitude: f64) -> String {
     let find = |march: &str, interpolant: &str, precision: &str, step: f64| {
         let here = |r: &&Row| {
             r.text("part") == Some("lattice")
@@ -265,7 +265,7 @@ impl<'a> FullMarches<'a> {
 
 /// A Luneburg lens: the integrators without any lattice, in f64, with their orders.
 fn integrators(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
-    context.say("integrators on the Luneburg lens")?;
+    context.report_step("integrators on the Luneburg lens")?;
     record.notes.push(
         "Integrators: 101 rays through a quarter turn of a Luneburg lens, f64, no lattice; the error is that of the place they reach. \
          By theory orders are 1 for Euler, 2 for Verlet, 4 for Sharma, RK4 and PEFRL; the column has what was observed. The adaptive Dormand-Prince is \
@@ -288,7 +288,7 @@ fn integrators(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result
         let march = DormandPrince { tolerance: 10f64.powi(-exponent), longest_step_m: 1.0 };
         let mut samples = 0;
         let m = lens(|b| {
-            let run = march.run(&Luneburg, &entering(b), FRAC_PI_2);
+            let run = march.run(&Luneburg, &entry_ray(b), FRAC_PI_2);
             samples = run.map_or(0, |r| r.samples);
             run.map_or(DVec3::NAN, |r| r.ray.position_m())
         });
@@ -303,7 +303,7 @@ fn integrators(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result
 fn order_curve<G: Integrator>(name: &str, integrator: G, record: &mut Record) -> Series {
     let mut points: Vec<(f64, f64)> = vec![];
     for steps in [8, 16, 32, 64, 128, 256, 512] {
-        let m = lens(|b| integrator.run(&Luneburg, &entering(b), FRAC_PI_2, steps).position_m());
+        let m = lens(|b| integrator.run(&Luneburg, &entry_ray(b), FRAC_PI_2, steps).position_m());
         let samples = f64::from(steps * G::SAMPLES);
         let before = points.last().map(|p| p.1);
         points.push((samples, m.1));
@@ -326,7 +326,7 @@ fn integrator_row(name: &str, samples: f64, (ns, rms, largest): (f64, f64, f64))
 }
 
 /// The ray that enters the lens along z at height `b`.
-fn entering(b: f64) -> Ray {
+fn entry_ray(b: f64) -> Ray {
     let (at, w) = Luneburg::ray(b, 0.0);
     Ray::new(at, w)
 }
@@ -349,7 +349,7 @@ fn lens(mut end: impl FnMut(f64) -> DVec3) -> (f64, f64, f64) {
 }
 
 /// How many plans kept what was asked, and how far bounds lie above what was got.
-fn words_of_tolerances(rows: &[Row]) -> String {
+fn describe_tolerances(rows: &[Row]) -> String {
     let plans: Vec<&Row> = rows.iter().filter(|r| r.text("part") == Some("tolerance")).collect();
     let kept = |r: &&&Row| r.text("kept") == Some("yes");
     let within = |r: &&&Row| r.number("bound").zip(r.number("asked")).is_some_and(|(b, a)| b <= a);
@@ -390,7 +390,7 @@ fn tolerances(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<
     let mut asked_line = vec![];
     for amplitude in [1e-6, 1e-5, 1e-4] {
         check_cancelled(context)?;
-        context.say(format!("plans for an amplitude of {amplitude:e}"))?;
+        context.report_step(format!("plans for an amplitude of {amplitude:e}"))?;
         let (gaussian, field) = blob(amplitude, n)?;
         let truth = blob_deflections(&gaussian, &view, &starts)?;
         let rays = Rays { timed: starts.clone(), compared: starts.clone(), truth: truth.clone() };
@@ -400,8 +400,9 @@ fn tolerances(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<
         let plan_for =
             |e: &i32| Plan::new(&field, Request { tolerance_rad: 10f64.powi(-e), ..Request::default() });
         let plans: Vec<Plan> = exponents.iter().map(plan_for).collect();
-        let settings: Vec<Setting<'_>> = plans.iter().map(|p| rays.setting(p.paths(&field, view))).collect();
-        let results = measured(context.quick, &settings)?;
+        let cases: Vec<MarchCase<'_>> =
+            plans.iter().map(|p| rays.march_case(p.paths(&field, view))).collect();
+        let results = measure_cases(context.quick, &cases)?;
         for ((exponent, plan), (ns, rms, largest)) in exponents.into_iter().zip(&plans).zip(results) {
             let asked = 10f64.powi(-exponent);
             let b = plan.bounds;
@@ -436,7 +437,7 @@ fn tolerances(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<
         plot.series.push(Series::new(format!("amplitude {amplitude:e}"), got_points));
         time.series.push(Series::new(format!("amplitude {amplitude:e}"), time_points));
     }
-    record.notes.push(words_of_tolerances(&record.rows));
+    record.notes.push(describe_tolerances(&record.rows));
     asked_line.truncate(8);
     plot.series.push(Series::new("what was asked", asked_line));
     record.plots.push(plot);

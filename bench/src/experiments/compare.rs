@@ -1,6 +1,6 @@
 //! Timing tracers on the same rays.
 
-use crate::peers::{Tracer, closest_all, count_hits, count_occluded, occluded_all};
+use crate::baselines::{Tracer, closest_all, count_hits, count_occluded, occluded_all};
 use crate::rays::{self, HitBlock, RaySet, View};
 use crate::record::{Record, Row};
 use crate::runner::{Schedule, Timings, Unstable, Variant, interleave};

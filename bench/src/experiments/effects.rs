@@ -52,7 +52,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     ));
 
     let mesh = if context.quick {
-        context.say("making the surface")?;
+        context.report_step("making the surface")?;
         let grid = Wavelet::with_points(101).grid()?;
         let options = isosurface::Options { normals: true, ..Default::default() };
         isosurface::extract(&grid, &Size::M1.isovalues(), options)?.mesh
@@ -62,10 +62,10 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     };
     let pixels = if context.quick { 256 } else { 1024 };
     record.notes.push(format!("{} triangles, {pixels} x {pixels} pixels.", mesh.num_triangles()));
-    context.say(format!("{} triangles: building", mesh.num_triangles()))?;
+    context.report_step(format!("{} triangles: building", mesh.num_triangles()))?;
     let cases = cases(Scene::new(World::from_mesh(mesh, &BuildOptions::default())?), pixels)?;
 
-    context.say(format!("{} pictures in turns", cases.len()))?;
+    context.report_step(format!("{} pictures in turns", cases.len()))?;
     let rays: RefCell<Vec<Option<(RayStats, Effects)>>> = RefCell::new(vec![None; cases.len()]);
     let failed = RefCell::new(None);
     let mut variants: Vec<Variant<'_>> = cases
@@ -125,7 +125,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
                 "the plain scene with every effect allowed sent {} secondary rays; it needs none",
                 r.total() - r.primary
             );
-            record.notes.push(words_of_unused(&ratio));
+            record.notes.push(describe_unused_effects(&ratio));
             record.ratios.push(ratio);
         }
     }
@@ -135,7 +135,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
 }
 
 /// What effects cost that nothing needs, as far as the rounds say.
-fn words_of_unused(ratio: &Ratio) -> String {
+fn describe_unused_effects(ratio: &Ratio) -> String {
     let conclusion = match ratio.verdict() {
         Verdict::Open => "whether unused effects cost time is left open",
         Verdict::Even => "the rounds do not tell the two apart: no cost of unused effects is seen",
@@ -214,7 +214,8 @@ mod tests {
 
     #[test]
     fn the_note_on_unused_effects_follows_the_rounds() {
-        let words = |rounds: &[f64]| words_of_unused(&Ratio::of_rounds(PLAIN, ALL_ALLOWED, rounds).unwrap());
+        let words =
+            |rounds: &[f64]| describe_unused_effects(&Ratio::of_rounds(PLAIN, ALL_ALLOWED, rounds).unwrap());
         assert!(words(&[1.0, 1.01, 0.99, 1.0, 1.0]).contains("no cost of unused effects is seen"));
         let dear = words(&[1.5, 1.6, 1.4, 1.5, 1.5]);
         assert!(

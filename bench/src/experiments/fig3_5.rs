@@ -18,17 +18,17 @@ const TIMEOUT: Duration = Duration::from_secs(600);
 
 /// Who composites.
 #[derive(Clone, Copy)]
-enum Who {
+enum Backend {
     Ours(Strategy),
     Icet(IcetStrategy),
 }
 
-const ALL: [(&str, Who); 5] = [
-    ("direct send", Who::Ours(Strategy::DirectSend)),
-    ("binary swap", Who::Ours(Strategy::BinarySwap)),
-    ("radix-k", Who::Ours(Strategy::RadixK { k: 8 })),
-    ("IceT binary swap", Who::Icet(IcetStrategy::BinarySwap)),
-    ("IceT radix-kr", Who::Icet(IcetStrategy::RadixKr)),
+const ALL: [(&str, Backend); 5] = [
+    ("direct send", Backend::Ours(Strategy::DirectSend)),
+    ("binary swap", Backend::Ours(Strategy::BinarySwap)),
+    ("radix-k", Backend::Ours(Strategy::RadixK { k: 8 })),
+    ("IceT binary swap", Backend::Icet(IcetStrategy::BinarySwap)),
+    ("IceT radix-kr", Backend::Icet(IcetStrategy::RadixKr)),
 ];
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
@@ -74,13 +74,13 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let icet = icet.ok();
     let mut smpi_is_there = true;
     for ranks in powers(2, most) {
-        context.say(format!("{ranks} ranks"))?;
+        context.report_step(format!("{ranks} ranks"))?;
         measure(record, ranks, size, frames, icet.as_deref())?;
         // SimGrid takes minutes for many ranks.
         if smpi_is_there && ranks <= if context.quick { 8 } else { 64 } {
-            context.say(format!("{ranks} ranks under SMPI"))?;
+            context.report_step(format!("{ranks} ranks under SMPI"))?;
             match smpi::compare_ms(ranks, size, frames, context.quick) {
-                Ok(times) => beside_smpi(record, ranks, times),
+                Ok(times) => compare_with_smpi(record, ranks, times),
                 Err(why) => {
                     record.missing.push(format!("times under SMPI: {why}"));
                     smpi_is_there = false;
@@ -108,10 +108,10 @@ fn measure(
     frames: usize,
     icet: Option<&Path>,
 ) -> anyhow::Result<()> {
-    let all: Vec<(&str, Who)> =
-        ALL.into_iter().filter(|(_, w)| icet.is_some() || matches!(w, Who::Ours(_))).collect();
+    let all: Vec<(&str, Backend)> =
+        ALL.into_iter().filter(|(_, w)| icet.is_some() || matches!(w, Backend::Ours(_))).collect();
     let results =
-        simulated(Network::QDR_AS_SMPI, ranks, |mut comm| one_rank(&mut comm, &all, size, frames, icet))?;
+        simulated(Network::QDR_AS_SMPI, ranks, |mut comm| run_rank(&mut comm, &all, size, frames, icet))?;
     // By compositor and frame: the slowest rank.
     let secs = |k: usize, f: usize| results.iter().map(|r| r.secs[k][f]).fold(0.0, f64::max);
     for (k, (name, _)) in all.iter().enumerate() {
@@ -136,7 +136,7 @@ fn measure(
 }
 
 /// Puts SMPI's times of direct send and of the best of IceT beside ours.
-fn beside_smpi(record: &mut Record, ranks: usize, [ours_ms, icet_ms]: [f64; 2]) {
+fn compare_with_smpi(record: &mut Record, ranks: usize, [ours_ms, icet_ms]: [f64; 2]) {
     let is_of = |r: &Row| r.number("ranks") == Some(ranks as f64);
     let icet = record.rows.iter().filter(|r| is_of(r));
     let icet = icet.filter(|r| r.text("compositor").is_some_and(|c| c.starts_with("IceT")));
@@ -158,24 +158,24 @@ fn beside_smpi(record: &mut Record, ranks: usize, [ours_ms, icet_ms]: [f64; 2]) 
 }
 
 /// One rank's times by compositor and frame, and on rank 0 the pixels that differ from the first compositor's.
-struct OneRank {
+struct RankResult {
     secs: Vec<Vec<f64>>,
     differ: Vec<u64>,
 }
 
-fn one_rank(
+fn run_rank(
     comm: &mut SimComm,
-    all: &[(&str, Who)],
+    all: &[(&str, Backend)],
     size: u32,
     frames: usize,
     icet: Option<&Path>,
-) -> anyhow::Result<OneRank> {
+) -> anyhow::Result<RankResult> {
     let (rank, ranks) = (comm.rank(), comm.size());
     let mut drawn = Drawn::new(size, size);
     let mut ours: Vec<Option<Compositor<DepthPixel<[u8; 4]>>>> = all
         .iter()
         .map(|(_, who)| match who {
-            Who::Ours(strategy) => Some(Compositor::new(Options {
+            Backend::Ours(strategy) => Some(Compositor::new(Options {
                 strategy: *strategy,
                 destination: Destination::Rank(0),
                 depth: false,
@@ -183,11 +183,11 @@ fn one_rank(
                 confirm: false,
                 ..Options::default()
             })),
-            Who::Icet(_) => None,
+            Backend::Icet(_) => None,
         })
         .collect();
     let mut theirs = icet.map(|path| Icet::over_comm(path, comm, IcetMode::Depth, size, size)).transpose()?;
-    let mut out = OneRank { secs: vec![Vec::new(); all.len()], differ: vec![0; all.len()] };
+    let mut out = RankResult { secs: vec![Vec::new(); all.len()], differ: vec![0; all.len()] };
     for n in 0..=frames {
         Scene::Discs.draw(n as u64, rank, ranks, &mut drawn);
         let frame = Frame::with_depth(size, size, &drawn.colors, &drawn.depths)?.bounded(drawn.bounds)?;
@@ -198,7 +198,7 @@ fn one_rank(
             comm.barrier(TIMEOUT)?;
             let begin = comm.now();
             images[k] = match who {
-                Who::Ours(_) => {
+                Backend::Ours(_) => {
                     let Some(compositor) = ours[k].as_mut() else { continue };
                     let image = compositor.composite(comm, &frame)?.image;
                     let end = comm.now();
@@ -209,7 +209,7 @@ fn one_rank(
                         colors
                     })
                 }
-                Who::Icet(strategy) => {
+                Backend::Icet(strategy) => {
                     let Some(icet) = theirs.as_mut() else { continue };
                     icet.set_strategy(*strategy);
                     let pixels = IcetFrame::Depth(&drawn.colors, &drawn.depths);

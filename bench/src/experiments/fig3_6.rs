@@ -23,7 +23,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
          lies between them is waiting."
     ));
     for ranks in powers(1, 128) {
-        context.say(format!("{ranks} ranks"))?;
+        context.report_step(format!("{ranks} ranks"))?;
         let mesh = mesh(context, largest, ranks)?;
         let demo = Demo { size_px: [size; 2], global_light: false, ..Demo::default() };
         let triangles = mesh.num_triangles();

@@ -23,13 +23,13 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let (size, pixels, count) = if context.quick { ("1M", 320, 1) } else { ("4M", 1024, 1) };
     let demo =
         Demo { size: Some(size.into()), size_px: [pixels; 2], color_by_rank: false, ..Demo::default() };
-    context.say("data")?;
+    context.report_step("data")?;
     let mut prepared = demo.prepare(1, &mut |_, _| true)?;
     let quick = context.quick;
     for (name, sharing) in [("replicated", Sharing::RayParallel), ("parts", Sharing::SortLast)] {
         let mut alone = None;
         for ranks in powers(1, 128).filter(|r| !quick || matches!(r, 1 | 4 | 16 | 64 | 128)) {
-            context.say(format!("{name}, {ranks} ranks"))?;
+            context.report_step(format!("{name}, {ranks} ranks"))?;
             if matches!(sharing, Sharing::SortLast) {
                 prepared.partition = Partition::new(&prepared.scene, ranks, &Split::Triangles);
             }

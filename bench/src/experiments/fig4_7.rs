@@ -2,15 +2,15 @@
 //! Mesa's rasteriser, which needs no build.
 
 use super::Context;
-use super::lineup::Installed;
+use super::installed_tracers::InstalledBaselines;
+use crate::baselines::BuildCost;
+use crate::baselines::embree::{EmbreeScene, Options, Quality};
+use crate::baselines::obvhs::{Obvhs, Preset};
 use crate::meshes;
 use crate::opengl::{Mesa, MesaFrames};
-use crate::ours::Ours;
-use crate::peers::BuildCost;
-use crate::peers::embree::{EmbreeScene, Options, Quality};
-use crate::peers::obvhs::{Obvhs, Preset};
 use crate::plot::{Axis, Plot, Point, Series};
 use crate::record::{Record, Row};
+use crate::rt_core_tracer::RtCoreTracer;
 use crate::runner::{VERDICT_ROUNDS, order};
 use crate::stats::Summary;
 use datasets::generate::nested_wavelet::Size;
@@ -36,7 +36,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         "B",
         "the most held while building: what Embree reports, what the heap grew by for rt-core",
     );
-    let installed = Installed::find();
+    let installed = InstalledBaselines::find();
     record.missing.extend(installed.missing.iter().cloned());
     let mesa = Mesa::find().map_err(|missing| record.missing.extend(missing)).ok();
     record.notes.push(
@@ -50,7 +50,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
          what a program waits for anyway each time its picture changes, and so the yardstick for a build that is needed once."
             .into(),
     );
-    let with = Beside { installed: &installed, mesa: mesa.as_ref() };
+    let with = Baselines { installed: &installed, mesa: mesa.as_ref() };
     if context.quick {
         for points in [51, 101] {
             let mesh = meshes::coarse_wavelet(points)?;
@@ -73,8 +73,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
 }
 
 /// Whom our builds are set against.
-struct Beside<'a> {
-    installed: &'a Installed,
+struct Baselines<'a> {
+    installed: &'a InstalledBaselines,
     mesa: Option<&'a Mesa>,
 }
 
@@ -82,7 +82,7 @@ struct Beside<'a> {
 fn measure(
     context: &mut Context<'_>,
     record: &mut Record,
-    with: &Beside<'_>,
+    with: &Baselines<'_>,
     mesh: &Arc<TriMesh>,
     rounds: usize,
     slow_too: bool,
@@ -90,13 +90,13 @@ fn measure(
     let n = mesh.num_triangles();
     let builders = builders(mesh, with.installed, slow_too);
     let mut costs: Vec<Vec<BuildCost>> = vec![vec![]; builders.len()];
-    context.say(format!("{n} triangles: a program for llvmpipe"))?;
+    context.report_step(format!("{n} triangles: a program for llvmpipe"))?;
     let mut drawn: Option<MesaFrames> = None;
     if let Some(mesa) = with.mesa {
         drawn = mesa.draw(mesh, 1024).map_err(|e| record.missing.push(format!("{n} triangles: {e:#}"))).ok();
     }
     for round in 0..rounds {
-        context.say(format!("{n} triangles, round {} of {rounds}", round + 1))?;
+        context.report_step(format!("{n} triangles, round {} of {rounds}", round + 1))?;
         for i in order(builders.len() + 1, round) {
             match (builders.get(i), &mut drawn) {
                 (Some((_, build)), _) => costs[i].push(build()?),
@@ -118,14 +118,18 @@ fn measure(
 /// A frame is short beside the builds of its round.
 const FRAMES_A_ROUND: usize = 3;
 
-fn builders<'a>(mesh: &'a Arc<TriMesh>, installed: &'a Installed, slow_too: bool) -> Vec<Builder<'a>> {
+fn builders<'a>(
+    mesh: &'a Arc<TriMesh>,
+    installed: &'a InstalledBaselines,
+    slow_too: bool,
+) -> Vec<Builder<'a>> {
     let mut list: Vec<Builder<'a>> = vec![];
     for quality in BuildQuality::ALL {
         if quality == BuildQuality::Best && !slow_too {
             continue;
         }
         let options = BuildOptions { quality, ..Default::default() };
-        let build = move || Ok(Ours::build(mesh, &options)?.cost);
+        let build = move || Ok(RtCoreTracer::build(mesh, &options)?.cost);
         list.push((format!("rt-core {}", quality.name()), Box::new(build)));
     }
     for e in &installed.embree {

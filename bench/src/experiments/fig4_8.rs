@@ -1,7 +1,7 @@
 //! Figure 4.8: what happens when in frames of ParaView that are traced.
 
 use super::Context;
-use crate::opengl::{Display, Program, Session, Tools, Way, write};
+use crate::opengl::{Backend, Display, Program, Session, Tools, write};
 use crate::record::{Attachment, Record, Row};
 use crate::stats::Summary;
 use anyhow::Context as _;
@@ -38,22 +38,22 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         "pvbatch turns a camera around {} triangles for {frames} frames through `gluray run`; the phases are those that the library wrote down meanwhile.",
         mesh.num_triangles()
     ));
-    context.say("data")?;
+    context.report_step("data")?;
     let dir = tempfile::tempdir()?;
     let data = dir.path().join("surfaces.vtp");
     write(&mesh, paraview.format(), &data)?;
     let display = Display::start(&tools.xvfb)?;
-    context.say("ParaView starts")?;
+    context.report_step("ParaView starts")?;
     let mut session = Session::start(
         paraview,
-        Way::Serial,
+        Backend::Serial,
         Some(&tools.gluray),
         &display,
         &dir.path().join("run"),
         &data,
         1024,
     )?;
-    context.say("frames")?;
+    context.report_step("frames")?;
     session.frames(frames)?;
     let report = session.end()?.context("gluray leaves a report")?;
     let spans = report["timeline"].as_array().map_or(&[][..], Vec::as_slice);
@@ -76,12 +76,12 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
                 .with("time_high", t.high),
         );
     }
-    context.say("charts")?;
+    context.report_step("charts")?;
     let file = |name: &str| dir.path().join(name);
     std::fs::write(file("report.json"), serde_json::to_vec(&report)?)?;
     draw(&tools.gluray, &file("report.json"), &[&file("chart.svg"), &file("trace.json")], None)?;
     // The whole run is mostly one build: some frames in the middle show what a frame is.
-    let (from, to) = middle(spans);
+    let (from, to) = middle_frame(spans);
     draw(&tools.gluray, &file("report.json"), &[&file("frames.svg")], Some((from, to)))?;
     for (name, caption) in [
         ("chart.svg", "The run: builds and frames."),
@@ -95,7 +95,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
 }
 
 /// Some frames at the end of the run, in milliseconds.
-fn middle(spans: &[Value]) -> (f64, f64) {
+fn middle_frame(spans: &[Value]) -> (f64, f64) {
     let frame = |s: &Value| s["frame"].as_u64().unwrap_or(0);
     let last = spans.iter().map(frame).max().unwrap_or(0);
     let shown = |s: &&Value| (last.saturating_sub(5)..last).contains(&frame(s));

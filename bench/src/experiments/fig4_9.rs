@@ -47,13 +47,13 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             measure(context, record, mesa.as_ref(), size, pixels)?;
         }
     }
-    record.notes.extend(words_of_growth(record));
+    record.notes.extend(describe_growth(record));
     record.plots.push(plot(record));
     Ok(())
 }
 
 /// How the time of each view grew from the fewest triangles to the most.
-fn words_of_growth(record: &Record) -> Option<String> {
+fn describe_growth(record: &Record) -> Option<String> {
     let mut words = vec![];
     for series in &plot(record).series {
         let (first, last) = (series.points.first()?, series.points.last()?);
@@ -81,7 +81,7 @@ fn measure(
     pixels: u32,
 ) -> anyhow::Result<()> {
     let mesh = context.wavelet(size)?;
-    context.say(format!("{} triangles: building", mesh.num_triangles()))?;
+    context.report_step(format!("{} triangles: building", mesh.num_triangles()))?;
     let scene = Scene::new(World::from_mesh(mesh.clone(), &BuildOptions::default())?);
     let report = scene.world.report();
     let (build_secs, bytes) = (report.total.as_secs_f64(), report.bytes);
@@ -89,7 +89,7 @@ fn measure(
     let n = mesh.num_triangles();
     let mut drawn: Option<MesaFrames> = None;
     if let Some(mesa) = mesa {
-        context.say(format!("{n} triangles: a program for llvmpipe"))?;
+        context.report_step(format!("{n} triangles: a program for llvmpipe"))?;
         drawn =
             mesa.draw(&mesh, pixels).map_err(|e| record.missing.push(format!("{n} triangles: {e:#}"))).ok();
     }
@@ -97,7 +97,7 @@ fn measure(
     for view in catalogue::find("wavelet")?.views() {
         cameras.push((view.name.clone(), Framing::At(view).of(&scene.world, [pixels, pixels])?));
     }
-    context.say(format!("{n} triangles: frames in turns"))?;
+    context.report_step(format!("{n} triangles: frames in turns"))?;
     let failed: RefCell<Option<anyhow::Error>> = RefCell::new(None);
     let mut variants: Vec<Variant<'_>> = cameras
         .iter()

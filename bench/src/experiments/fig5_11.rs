@@ -1,7 +1,7 @@
 //! Figure 5.11: photons per second by technique, on the combustion jet of 480x720x100, by line of sight and traced.
 
 use super::Context;
-use super::test_section::{GTX_280_PHOTONS_PER_SEC, check_cancelled, flow, paint, picture, scene};
+use super::test_section::{GTX_280_PHOTONS_PER_SEC, check_cancelled, flow, picture, render_picture, scene};
 use crate::clock::Clock;
 use crate::plot::{Axis, Plot, Point, Series};
 use crate::record::{Record, Row};
@@ -76,7 +76,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
          own lattice) stands in the test section of every row; only the row that calls for it walks through it."
     ));
     let (size, dims) = ("thesis", "480x720x100");
-    context.say(format!("combustion jet {dims}"))?;
+    context.report_step(format!("combustion jet {dims}"))?;
     let field = flow("combustion-jet", size)?;
     check_cancelled(context)?;
     let first = scene(TECHNIQUES[0].1)?;
@@ -101,7 +101,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
                 continue;
             }
             check_cancelled(context)?;
-            context.say(format!("preparing {march} for {}", b.name))?;
+            context.report_step(format!("preparing {march} for {}", b.name))?;
             let mut scene = b.scene.clone();
             scene.march.method = Some(method.into());
             scene.march.interpolant = Some("b-spline".into());
@@ -115,7 +115,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             let (section, paths) = (&section, &**paths);
             variants.push(Variant::new(b.name, move || exposed(b, section, paths, passes)));
         }
-        context.say(format!("photons by technique, {march}"))?;
+        context.report_step(format!("photons by technique, {march}"))?;
         let timings = interleave(&context.schedule(Schedule::all_threads(), 8.0), &mut variants)?;
         drop(variants);
         let photons = f64::from(PIXELS * PIXELS * passes);
@@ -187,10 +187,10 @@ fn pictures(context: &mut Context<'_>, record: &mut Record, section: &TestSectio
         list.retain(|(name, _)| name == TECHNIQUES[1].0 || name == "slice");
     }
     for (name, toml) in list {
-        context.say(format!("picture: {name}"))?;
+        context.report_step(format!("picture: {name}"))?;
         let scene = scene(&toml)?;
         let start = std::time::Instant::now();
-        let rendered = paint(context, &scene, section)?;
+        let rendered = render_picture(context, &scene, section)?;
         let secs = start.elapsed().as_secs_f64();
         let march = rendered.report.march.as_str();
         record

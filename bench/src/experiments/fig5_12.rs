@@ -1,7 +1,7 @@
 //! Figure 5.12: the same flow by volume rendering, by line of sight and traced; and how far the latter two are apart, against n − 1.
 
 use super::Context;
-use super::test_section::{blob, check_cancelled, flow, paint, picture, scene};
+use super::test_section::{blob, check_cancelled, flow, picture, render_picture, scene};
 use crate::plot::{Axis, Plot, Series};
 use crate::record::{Picture, Record, Row};
 use schlieren::field::Field;
@@ -46,7 +46,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         let (mut deflection, mut path) = (vec![], vec![]);
         for exponent in [-7, -6, -5, -4, -3, -2] {
             check_cancelled(context)?;
-            context.say(format!("{name}: amplitude 1e{exponent}"))?;
+            context.report_step(format!("{name}: amplitude 1e{exponent}"))?;
             let amplitude = 10f64.powi(exponent);
             let d = difference(&scaled(field, amplitude / own)?, if context.quick { 96 } else { 256 });
             deflection.push((amplitude, d.deflection_rms));
@@ -66,13 +66,13 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         plot.series.push(Series::new(format!("{name}, deflection"), deflection));
         plot.series.push(Series::new(format!("{name}, optical path"), path));
     }
-    record.notes.push(words(&record.rows));
+    record.notes.push(describe(&record.rows));
     record.plots.push(plot);
     Ok(())
 }
 
 /// How far the two are apart in a gas of the laboratory, and how that grows with n - 1.
-fn words(rows: &[Row]) -> String {
+fn describe(rows: &[Row]) -> String {
     let mut flows: Vec<&str> = rows.iter().filter_map(|r| r.text("flow")).collect();
     flows.dedup();
     let each = flows.iter().filter_map(|flow| {
@@ -156,7 +156,7 @@ fn difference(field: &Field, pixels: u32) -> Difference {
 /// The figure itself: the same jet three ways, and the difference of the latter two, brightened.
 fn pictures(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     let (size, pixels) = if context.quick { ("medium", 384) } else { ("thesis", 768) };
-    context.say("combustion jet")?;
+    context.report_step("combustion jet")?;
     let field = flow("combustion-jet", size)?;
     // The jet is half as high again as it is wide.
     let film = format!("[film]\nsize = [{}, {pixels}]\n", pixels * 2 / 3);
@@ -174,9 +174,9 @@ fn pictures(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()
     let section = TestSection::of_fields(&scene(&film)?, vec![field], None)?;
     let mut painted = vec![];
     for (name, toml) in views {
-        context.say(format!("picture: {name}"))?;
+        context.report_step(format!("picture: {name}"))?;
         let start = std::time::Instant::now();
-        let rendered = paint(context, &scene(&toml)?, &section)?;
+        let rendered = render_picture(context, &scene(&toml)?, &section)?;
         let secs = start.elapsed().as_secs_f64();
         record.rows.push(Row::new().with("picture", name).with("time", secs));
         record.pictures.push(picture(

@@ -1,8 +1,8 @@
 //! Figure 5.13: what the techniques show of one flow, and what the filters make of its noise.
 
 use super::Context;
-use super::fig5_14::{FILTERS, Noisy, against};
-use super::test_section::{check_cancelled, flow, paint, picture, scene};
+use super::fig5_14::{FILTERS, NoiseCase, rms_difference};
+use super::test_section::{check_cancelled, flow, picture, render_picture, scene};
 use crate::plot::{Axis, Plot, Series};
 use crate::record::{Record, Row};
 use schlieren::render::TestSection;
@@ -74,7 +74,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
 
 fn gallery(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     let (size, pixels) = if context.quick { ("medium", 360) } else { ("thesis", 768) };
-    context.say("combustion jet")?;
+    context.report_step("combustion jet")?;
     let field = flow("combustion-jet", size)?;
     let width_m = field.size_m().x;
     let fringe = format!("{:.6}", width_m / 24.0);
@@ -86,7 +86,7 @@ fn gallery(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
     ));
     for (name, toml, meaning) in GALLERY {
         check_cancelled(context)?;
-        context.say(format!("picture: {name}"))?;
+        context.report_step(format!("picture: {name}"))?;
         let toml = toml.replace("FRINGE", &fringe);
         // Comparisons follow no light and refuse a march; a shadowgraph of so small a flow is all caustics at the customary 0.5 m.
         let lit = !meaning.starts_with("for comparison");
@@ -105,7 +105,7 @@ fn gallery(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
             section.fields = dispersed(single, &lines)?;
         }
         let start = std::time::Instant::now();
-        let rendered = paint(context, &scene, &section)?;
+        let rendered = render_picture(context, &scene, &section)?;
         let secs = start.elapsed().as_secs_f64();
         if let Some(single) = single {
             section.fields = vec![single];
@@ -154,8 +154,8 @@ fn dispersed(
 }
 
 fn filters(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
-    let noisy = Noisy::knife(context)?;
-    context.say("reference without noise")?;
+    let noisy = NoiseCase::knife(context)?;
+    context.report_step("reference without noise")?;
     let (reference, _) = noisy.reference(context)?;
     let mut plot = Plot::lines(
         "Error against photons by filter (knife, independent photons)",
@@ -167,9 +167,9 @@ fn filters(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
         let mut points = vec![];
         for &samples in counts {
             check_cancelled(context)?;
-            context.say(format!("{name}, {samples} photons"))?;
+            context.report_step(format!("{name}, {samples} photons"))?;
             let (rendered, secs) = noisy.picture(context, Jitter::Random, samples, 0, filter)?;
-            let rms = against(&rendered, &reference);
+            let rms = rms_difference(&rendered, &reference);
             points.push((f64::from(samples), rms));
             record.rows.push(
                 Row::new()

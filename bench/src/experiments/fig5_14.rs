@@ -2,7 +2,7 @@
 //! samples are apart, which is what the dissertation gives numbers for.
 
 use super::Context;
-use super::test_section::{check_cancelled, flow, paint, picture, scene};
+use super::test_section::{check_cancelled, flow, picture, render_picture, scene};
 use crate::plot::{Axis, Plot, Series};
 use crate::record::{Record, Row};
 use schlieren::render::{Rendered, TestSection};
@@ -27,32 +27,32 @@ const THESIS: [(&str, [f64; 3]); 2] = [("none", [7.75, 2.78, 0.91]), ("cone", [0
 const THESIS_SAMPLES: [u32; 3] = [1, 10, 100];
 
 /// A picture that needs many photons, and its test section.
-pub(super) struct Noisy {
+pub(super) struct NoiseCase {
     scene: Scene,
     section: TestSection,
     reference_samples: u32,
 }
 
-impl Noisy {
+impl NoiseCase {
     /// Each photon has its own point of an extended source, and the knife stops it or not: the dissertation's way, and the noisiest.
-    pub(super) fn knife(context: &mut Context<'_>) -> anyhow::Result<Noisy> {
-        Noisy::of(context, "[technique]\nkind = \"schlieren\"\n[light]\nbeams = \"tilted\"\n")
+    pub(super) fn knife(context: &mut Context<'_>) -> anyhow::Result<NoiseCase> {
+        NoiseCase::of(context, "[technique]\nkind = \"schlieren\"\n[light]\nbeams = \"tilted\"\n")
     }
 
     /// Photons move from pixel to pixel; a film 0.5 m behind the flow.
-    fn shadowgraph(context: &mut Context<'_>) -> anyhow::Result<Noisy> {
-        Noisy::of(context, "[technique]\nkind = \"shadowgraph\"\n")
+    fn shadowgraph(context: &mut Context<'_>) -> anyhow::Result<NoiseCase> {
+        NoiseCase::of(context, "[technique]\nkind = \"shadowgraph\"\n")
     }
 
-    fn of(context: &mut Context<'_>, technique: &str) -> anyhow::Result<Noisy> {
+    fn of(context: &mut Context<'_>, technique: &str) -> anyhow::Result<NoiseCase> {
         let (size, pixels, reference_samples) =
             if context.quick { ("small", 96, 2048) } else { ("medium", 192, 16384) };
-        context.say("combustion jet")?;
+        context.report_step("combustion jet")?;
         let text =
             format!("[film]\nsize = [{pixels}, {pixels}]\n[march]\nmethod = \"line-of-sight\"\n{technique}");
         let scene = scene(&text)?;
         let section = TestSection::of_fields(&scene, vec![flow("combustion-jet", size)?], None)?;
-        Ok(Noisy { scene, section, reference_samples })
+        Ok(NoiseCase { scene, section, reference_samples })
     }
 
     /// The picture with so many photons a pixel, and its seconds.
@@ -67,7 +67,7 @@ impl Noisy {
         let sampling = Some(SamplingSpec::Photons { samples, jitter, seed, filter });
         let scene = Scene { sampling, ..self.scene.clone() };
         let start = std::time::Instant::now();
-        let rendered = paint(context, &scene, &self.section)?;
+        let rendered = render_picture(context, &scene, &self.section)?;
         Ok((rendered, start.elapsed().as_secs_f64()))
     }
 
@@ -78,7 +78,7 @@ impl Noisy {
 }
 
 /// Root mean square difference of two pictures, in percent of white.
-pub(super) fn against(a: &Rendered, b: &Rendered) -> f64 {
+pub(super) fn rms_difference(a: &Rendered, b: &Rendered) -> f64 {
     let squares: f64 = a.pixels.iter().zip(&b.pixels).map(|(a, b)| f64::from(a[0] - b[0]).powi(2)).sum();
     100.0 * (squares / a.pixels.len().max(1) as f64).sqrt()
 }
@@ -104,7 +104,9 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("thesis", "%", "the dissertation's difference between pictures of as many samples");
     record.column("time", "s", "wall time of the picture from the field at hand, seen once");
     record.column("order", "", "exponent p of error = c N^-p over the whole curve, in its last row");
-    for (name, noisy) in [(KNIFE, Noisy::knife(context)?), ("shadowgraph", Noisy::shadowgraph(context)?)] {
+    for (name, noisy) in
+        [(KNIFE, NoiseCase::knife(context)?), ("shadowgraph", NoiseCase::shadowgraph(context)?)]
+    {
         errors(context, record, name, &noisy)?;
         if name == KNIFE {
             differences(context, record, name, &noisy)?;
@@ -113,16 +115,21 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let photons = if context.quick { 2048 } else { 16384 };
     record.notes.push(format!(
         "References of `rms_error` have {photons} low-discrepancy photons a pixel with another seed; what they lack shows where a curve flattens. {}",
-        words_of_errors(&record.rows)
+        describe_errors(&record.rows)
     ));
-    record.notes.push(words_of_differences(&record.rows));
+    record.notes.push(describe_differences(&record.rows));
     Ok(())
 }
 
 /// Errors against a reference without visible noise.
-fn errors(context: &mut Context<'_>, record: &mut Record, name: &str, noisy: &Noisy) -> anyhow::Result<()> {
+fn errors(
+    context: &mut Context<'_>,
+    record: &mut Record,
+    name: &str,
+    noisy: &NoiseCase,
+) -> anyhow::Result<()> {
     let most = if context.quick { 256 } else { 1024 };
-    context.say(format!("{name}: reference"))?;
+    context.report_step(format!("{name}: reference"))?;
     let (reference, _) = noisy.reference(context)?;
     let mut plot = Plot::lines(
         &format!("Noise against samples: {name}"),
@@ -134,9 +141,10 @@ fn errors(context: &mut Context<'_>, record: &mut Record, name: &str, noisy: &No
             let mut points: Vec<(f64, f64)> = vec![];
             for samples in (0..).map(|k| 1u32 << (2 * k)).take_while(|n| *n <= most) {
                 check_cancelled(context)?;
-                context.say(format!("{name}: {sampling}, filter {filter_name}, {samples} photons"))?;
+                context
+                    .report_step(format!("{name}: {sampling}, filter {filter_name}, {samples} photons"))?;
                 let (rendered, secs) = noisy.picture(context, jitter, samples, 0, filter)?;
-                let rms = against(&rendered, &reference);
+                let rms = rms_difference(&rendered, &reference);
                 points.push((f64::from(samples), rms));
                 let row = Row::new().with("technique", name).with("sampling", sampling);
                 let row = row.with("filter", filter_name).with("samples", samples);
@@ -162,7 +170,7 @@ fn differences(
     context: &mut Context<'_>,
     record: &mut Record,
     name: &str,
-    noisy: &Noisy,
+    noisy: &NoiseCase,
 ) -> anyhow::Result<()> {
     let mut plot = Plot::lines(
         &format!("Difference between pictures of N and 10 N photons: {name}"),
@@ -177,9 +185,11 @@ fn differences(
             for (samples, percent) in THESIS_SAMPLES.into_iter().zip(thesis) {
                 check_cancelled(context)?;
                 let more = 10 * samples;
-                context.say(format!("{name}: {sampling}, filter {filter_name}, {samples} against {more}"))?;
+                context.report_step(format!(
+                    "{name}: {sampling}, filter {filter_name}, {samples} against {more}"
+                ))?;
                 let after = noisy.picture(context, jitter, more, 0, *filter)?.0;
-                let difference = against(&before, &after);
+                let difference = rms_difference(&before, &after);
                 points.push((f64::from(samples), difference));
                 let row = Row::new().with("technique", name).with("sampling", sampling);
                 let row = row.with("filter", filter_name).with("samples", samples);
@@ -197,7 +207,7 @@ fn differences(
 }
 
 /// What the errors say, in words made of them.
-fn words_of_errors(rows: &[Row]) -> String {
+fn describe_errors(rows: &[Row]) -> String {
     let error = |sampling: &str, filter: &str, samples: f64| {
         let here = |r: &&Row| {
             r.text("technique") == Some(KNIFE)
@@ -235,7 +245,7 @@ fn words_of_errors(rows: &[Row]) -> String {
 }
 
 /// What the differences say beside the dissertation's.
-fn words_of_differences(rows: &[Row]) -> String {
+fn describe_differences(rows: &[Row]) -> String {
     let mut words = String::from(
         "`difference` is the dissertation's quantity: it prints root mean square differences between pictures of 1 and 10, of 10 and 100, and of 100 \
          and 1000 samples, and has no reference. The photons of each of our pictures are the first ones of the next. Of independent photons without a filter each \
@@ -284,11 +294,11 @@ mod tests {
     fn low_discrepancy_photons_have_less_noise_than_independent_ones() {
         let mut silent = |_: &str, _: Option<f64>| Ok(());
         let mut context = Context::new(true, None, &mut silent);
-        let noisy = Noisy { reference_samples: 512, ..Noisy::knife(&mut context).unwrap() };
+        let noisy = NoiseCase { reference_samples: 512, ..NoiseCase::knife(&mut context).unwrap() };
         let (reference, _) = noisy.reference(&context).unwrap();
         let error = |jitter, n| {
             let (r, _) = noisy.picture(&context, jitter, n, 0, FilterSpec::None {}).unwrap();
-            against(&r, &reference)
+            rms_difference(&r, &reference)
         };
         let (random, even) = (error(Jitter::Random, 16), error(Jitter::Sobol, 16));
         assert!(even < 0.8 * random, "{even} {random}");

@@ -106,11 +106,11 @@ pub(super) fn frames(
             Sharing::SortLast => {
                 let part = prepared.partition.part(&prepared.scene, comm.rank(), &BuildOptions::default())?;
                 let mut renderer = DataParallel::new(&mut comm, part, options)?;
-                counted(&mut comm, frames, |comm| {
+                measure_frames(&mut comm, frames, |comm| {
                     Ok(renderer.frame(comm, &prepared.camera, &prepared.options)?)
                 })
             }
-            Sharing::RayParallel => counted(&mut comm, frames, |comm| {
+            Sharing::RayParallel => measure_frames(&mut comm, frames, |comm| {
                 let Prepared { scene, camera, options: render, .. } = prepared;
                 Ok(ray_parallel(comm, scene, camera, render, &options)?)
             }),
@@ -127,7 +127,7 @@ pub(super) fn frames(
 }
 
 /// The reports of the counted frames. All ranks begin each frame together.
-fn counted(
+fn measure_frames(
     comm: &mut SimComm,
     frames: usize,
     mut frame: impl FnMut(&mut SimComm) -> anyhow::Result<FrameOutput>,

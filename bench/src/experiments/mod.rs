@@ -5,6 +5,9 @@ mod accuracy_composite;
 mod accuracy_robust;
 mod accuracy_sampling;
 mod accuracy_schlieren;
+mod baselines;
+mod baselines_schlieren;
+mod call_overhead;
 mod compare;
 mod effects;
 mod fig3_5;
@@ -17,13 +20,10 @@ mod fig5_11;
 mod fig5_12;
 mod fig5_13;
 mod fig5_14;
-mod lineup;
+mod installed_tracers;
 mod many_ranks;
 mod paraview;
 mod partition_view;
-mod passing;
-mod peers;
-mod peers_schlieren;
 mod pictures;
 mod program_ranks;
 mod shock_angles;
@@ -117,7 +117,7 @@ pub const ALL: &[Experiment] = &[
         id: "passing",
         chapter: 4,
         title: "Nanoseconds per OpenGL call that gluray passes to the driver",
-        run: passing::run,
+        run: call_overhead::run,
     },
     Experiment {
         id: "fig4.7",
@@ -171,7 +171,7 @@ pub const ALL: &[Experiment] = &[
         id: "peers",
         chapter: 4,
         title: "Rays per second, builds and memory against Embree 3, Embree 4 and obvhs",
-        run: peers::run,
+        run: baselines::run,
     },
     Experiment {
         id: "pictures",
@@ -225,7 +225,7 @@ pub const ALL: &[Experiment] = &[
         id: "peers-schlieren",
         chapter: 5,
         title: "Time at equal error against the dissertation’s method",
-        run: peers_schlieren::run,
+        run: baselines_schlieren::run,
     },
     Experiment {
         id: "speed-schlieren",
@@ -261,12 +261,12 @@ impl<'a> Context<'a> {
         Context { quick, progress, cancel, wavelets: BTreeMap::new() }
     }
 
-    fn say(&mut self, what: impl AsRef<str>) -> anyhow::Result<()> {
+    fn report_step(&mut self, what: impl AsRef<str>) -> anyhow::Result<()> {
         (self.progress)(what.as_ref(), None)
     }
 
-    /// As [`Context::say`], with the share of the experiment that is done.
-    fn say_share(&mut self, what: impl AsRef<str>, done: f64) -> anyhow::Result<()> {
+    /// As [`Context::report_step`], with the share of the experiment that is done.
+    fn report_share(&mut self, what: impl AsRef<str>, done: f64) -> anyhow::Result<()> {
         (self.progress)(what.as_ref(), Some(done))
     }
 
@@ -275,7 +275,7 @@ impl<'a> Context<'a> {
         if let Some(m) = self.wavelets.get(&size) {
             return Ok(m.clone());
         }
-        self.say(format!("making the wavelet surfaces of {} triangles", size.name()))?;
+        self.report_step(format!("making the wavelet surfaces of {} triangles", size.name()))?;
         let mesh = meshes::wavelet(size)?;
         if size <= Size::M4 {
             self.wavelets.insert(size, mesh.clone());

@@ -55,14 +55,14 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let folder = Folder::new()?;
     for subject in subjects {
         let name = format!("{} {}", subject.data, subject.size);
-        context.say(format!("{name}: data"))?;
+        context.report_step(format!("{name}: data"))?;
         let order = order(subject, pixels, context.quick, &folder.0)?;
         let mut rounds = Vec::new();
         for round in 0..subject.rounds {
             let mut pair = vec![Value::Null; PROGRAMS.len()];
             for p in runner::order(PROGRAMS.len(), round) {
                 let program = PROGRAMS[p];
-                context.say(format!("{name}: {program}, round {}", round + 1))?;
+                context.report_step(format!("{name}: {program}, round {}", round + 1))?;
                 pair[p] = host.frames(program, &order, &folder.0)?;
             }
             rounds.push(pair);

@@ -37,12 +37,12 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             color_by_rank: false,
             ..Demo::default()
         };
-        context.say(format!("{data} {view}: data"))?;
+        context.report_step(format!("{data} {view}: data"))?;
         let mut prepared = demo.prepare(1, &mut |_, _| true)?;
         for ranks in powers(4, 64).filter(|r| !quick || matches!(r, 8 | 64)) {
             let by_view = Split::View { camera: Box::new(prepared.camera), size_px: [pixels; 2] };
             for (name, split) in [("triangles", Split::Triangles), ("view", by_view)] {
-                context.say(format!("{data} {view}: {ranks} ranks by {name}"))?;
+                context.report_step(format!("{data} {view}: {ranks} ranks by {name}"))?;
                 prepared.partition = Partition::new(&prepared.scene, ranks, &split);
                 let measured = frames(&prepared, ranks, count, Sharing::SortLast, &FrameOptions::default())?;
                 let cost = measured.median();
@@ -56,7 +56,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             }
         }
     }
-    record.notes.push(words(&record.rows));
+    record.notes.push(describe(&record.rows));
     let mut plot =
         Plot::lines("Partitions", Axis::log("ranks", ""), Axis::log("slowest rank’s render", "ms"));
     for (data, view, _) in cases {
@@ -75,7 +75,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
 }
 
 /// The slowest rank's time with parts of as many triangles by that with parts of as much work, view by view.
-fn words(rows: &[Row]) -> String {
+fn describe(rows: &[Row]) -> String {
     let mut views: Vec<&str> = rows.iter().filter_map(|r| r.text("view")).collect();
     views.dedup();
     let most = rows.iter().filter_map(|r| r.number("ranks")).fold(0.0, f64::max);

@@ -1,7 +1,7 @@
 //! Pictures of the dissertation's data sets, each with its command and what it took.
 
 use super::Context;
-use crate::picture::{Watch, gallery, save};
+use crate::picture::{RenderControl, gallery, save};
 use crate::record::{Picture, Record, Row};
 use datasets::cli::Interrupted;
 
@@ -17,25 +17,25 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let all = gallery::ALL.len() as f64;
     for (n, entry) in gallery::ALL.iter().enumerate() {
         let share = |samples_done: u32| (n as f64 + f64::from(samples_done) / f64::from(samples)) / all;
-        context.say_share(format!("{}: data", entry.name), share(0))?;
+        context.report_share(format!("{}: data", entry.name), share(0))?;
         let cancel = context.cancel.clone();
         let mut told = |done: u32| {
             // The flag stops the picture; nothing is lost when the account of it is not heard.
-            let _ = context.say_share(format!("{}: sample {done} of {samples}", entry.name), share(done));
+            let _ = context.report_share(format!("{}: sample {done} of {samples}", entry.name), share(done));
         };
-        let mut watch = Watch { cancel, samples_done: Some(&mut told) };
-        let p = entry.paint(size, samples, &mut watch)?;
-        if p.drawn.is_interrupted() {
+        let mut control = RenderControl { cancel, samples_done: Some(&mut told) };
+        let p = entry.render(size, samples, &mut control)?;
+        if p.rendered.is_interrupted() {
             return Err(Interrupted.into());
         }
         let command = entry.command(size, samples);
-        let (build, render) = (p.drawn.build_secs, p.drawn.render_secs);
+        let (build, render) = (p.rendered.build_secs, p.rendered.render_secs);
         let caption = format!(
             "{} {}. {command}: {:.1} s to generate, {build:.1} s to build, {render:.1} s to draw.",
             entry.caption, p.contents, p.data_secs
         );
-        record.notes.extend(p.drawn.warnings.iter().map(|w| format!("{}: {w}", entry.name)));
-        let png = save::png_bytes(&p.drawn.frame)?;
+        record.notes.extend(p.rendered.warnings.iter().map(|w| format!("{}: {w}", entry.name)));
+        let png = save::png_bytes(&p.rendered.frame)?;
         record.pictures.push(Picture { name: entry.name.into(), caption, png });
         record.rows.push(
             Row::new()
@@ -44,7 +44,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
                 .with("data", p.data_secs)
                 .with("build", build)
                 .with("render", render)
-                .with("rays", p.drawn.report.rays.total() as f64 / 1e6)
+                .with("rays", p.rendered.report.rays.total() as f64 / 1e6)
                 .with("command", command),
         );
     }

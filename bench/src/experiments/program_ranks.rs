@@ -1,7 +1,7 @@
 //! Ranks of `gluray run --ranks N`: processes that make one picture of an unmodified OpenGL program together.
 
 use super::Context;
-use crate::opengl::{Display, Program, Session, Tools, Way, write};
+use crate::opengl::{Backend, Display, Program, Session, Tools, write};
 use crate::record::{Record, Row};
 use crate::runner::order;
 use crate::stats::Summary;
@@ -46,16 +46,17 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     // ---- All numbers of ranks at once, taking turns ----
     let mut sessions = Vec::new();
     for &ranks in counts {
-        context.say(format!("{}, {ranks} ranks: starting", PROGRAM.name()))?;
+        context.report_step(format!("{}, {ranks} ranks: starting", PROGRAM.name()))?;
         let own = dir.path().join(format!("ranks{ranks}"));
-        let way = Way::Ranks(ranks);
-        let mut session = Session::start(PROGRAM, way, Some(&tools.gluray), &display, &own, &data, SIZE_PX)?;
+        let backend = Backend::Ranks(ranks);
+        let mut session =
+            Session::start(PROGRAM, backend, Some(&tools.gluray), &display, &own, &data, SIZE_PX)?;
         session.frames(3)?;
         sessions.push(session);
     }
     let mut times = vec![Vec::new(); counts.len()];
     for round in 0..groups {
-        context.say(format!("{}: group {} of {groups}", PROGRAM.name(), round + 1))?;
+        context.report_step(format!("{}: group {} of {groups}", PROGRAM.name(), round + 1))?;
         for i in order(counts.len(), round as usize) {
             times[i].push(sessions[i].frames(frames)?.wall_secs / f64::from(frames));
         }

@@ -1,7 +1,7 @@
 //! Shocks whose angle is known exactly, photographed and measured with a ruler: wedges and cones, and how fine a lattice that takes.
 
 use super::Context;
-use super::test_section::{check_cancelled, paint_with, picture, scene};
+use super::test_section::{check_cancelled, picture, render_picture_with, scene};
 use crate::plot::{Axis, Plot, Series};
 use crate::record::{Record, Row};
 use datasets::generate::cone_shock::Cone;
@@ -51,7 +51,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         let mut points = vec![];
         for &nodes in sizes {
             check_cancelled(context)?;
-            context.say(format!("{name}, {nodes} nodes"))?;
+            context.report_step(format!("{name}, {nodes} nodes"))?;
             let (flow, exact_rad) = flow(body, mach, half_deg, nodes)?;
             let start = std::time::Instant::now();
             let rendered = photographed(context, flow, width)?;
@@ -113,7 +113,7 @@ fn photographed(context: &Context<'_>, flow: Flow, width: u32) -> anyhow::Result
     let options = Options { wavelength_nm: 633.0, ..Options::new(Medium::density("density")) };
     let field = from_dataset(&flow.into_dataset(), &options)?.field;
     let section = TestSection::of_fields(&scene, vec![field], None)?;
-    paint_with(context, &scene, &section, Layers { map: true, ..Layers::NONE })
+    render_picture_with(context, &scene, &section, Layers { map: true, ..Layers::NONE })
 }
 
 /// The shock above the body, without the third of the picture around the tip.

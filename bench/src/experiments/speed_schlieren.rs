@@ -71,7 +71,7 @@ fn rows(record: &mut Record, timings: &Timings, counts: &[(f64, &str, Option<f64
 
 fn marches(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     let n = 256;
-    context.say("a field of 256³ nodes")?;
+    context.report_step("a field of 256³ nodes")?;
     let blob = |p: DVec3| 1e-5 * (-p.length_squared() / (2.0 * 0.0144)).exp();
     let field = Field::from_fn([n; 3], [1.0 / (n - 1) as f64; 3], DVec3::splat(-0.5), 1.0, blob)?;
     let views = [("along an axis", View::along(ViewAxis::Z, DVec3::ZERO)), ("at 0.6 rad", oblique()?)];
@@ -85,7 +85,7 @@ fn marches(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
             ("trilinear gradients", Interpolant::TrilinearGradient, None),
             ("b-spline", Interpolant::BSpline, Some(6e7)),
         ] {
-            context.say(format!("{name}, {view_name}"))?;
+            context.report_step(format!("{name}, {view_name}"))?;
             let march = Deviational::new(&field, view, interpolant, Options { wanted, ..Options::default() });
             marches.push((format!("{name}, {view_name}"), march, bar));
         }
@@ -102,7 +102,7 @@ fn marches(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
             marches.iter().map(|(name, march, _)| tracing(name, march, &rays)).collect();
         let los_name = format!("line of sight, {view_name}");
         variants.push(tracing(&los_name, &los, &photons));
-        context.say(format!("tracing, {view_name}"))?;
+        context.report_step(format!("tracing, {view_name}"))?;
         let timings = interleave(&context.schedule(Schedule::all_threads(), 6.0), &mut variants)?;
         rows(record, &timings, &counts);
     }
@@ -122,7 +122,7 @@ fn tracing<'a>(name: &str, paths: &'a dyn LightPaths, starts: &'a [Start]) -> Va
 
 /// A frame of 512² pixels with 10 photons each, of the combustion jet, by line of sight: figure 5.11's 13 frames a second.
 fn jet(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
-    context.say("combustion jet 480x720x100")?;
+    context.report_step("combustion jet 480x720x100")?;
     let field = flow("combustion-jet", "thesis")?;
     check_cancelled(context)?;
     let scene = scene("[technique]\nkind = \"schlieren\"")?;
@@ -154,7 +154,7 @@ fn jet(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
         Variant::new("jet frame, view held", || frame(&held).1),
         Variant::new("jet frame, new view every frame", || frame(&los(field)).1),
     ];
-    context.say("frames of the jet")?;
+    context.report_step("frames of the jet")?;
     let timings = interleave(&context.schedule(Schedule::all_threads(), 6.0), &mut variants)?;
     let bar = Some(GTX_280_PHOTONS_PER_SEC);
     rows(record, &timings, &[(photons, "photons", bar), (photons, "photons", bar)]);

@@ -87,14 +87,14 @@ fn run(
     };
     let cases = [(HEADLIGHT, false, true), (NOT_STREAMED, false, false), (LAMP, true, true)];
     for (light, global_light, stream) in cases {
-        context.say(format!("{data} {size}, {light}: data"))?;
+        context.report_step(format!("{data} {size}, {light}: data"))?;
         let demo = Demo { global_light, ..demo.clone() };
         let mut prepared = demo.prepare(1, &mut |_, _| true)?;
         let mut alone = None;
         // Every other number of ranks is enough to see what streaming gains.
         let some = quick || !stream;
         for ranks in powers(1, 128).filter(|r| !some || matches!(r, 1 | 2 | 8 | 32 | 128)) {
-            context.say(format!("{data} {size}, {light}: {ranks} ranks"))?;
+            context.report_step(format!("{data} {size}, {light}: {ranks} ranks"))?;
             prepared.partition = Partition::new(&prepared.scene, ranks, &Split::Triangles);
             let count = if global_light { 1 } else { count };
             let options = FrameOptions { stream, ..FrameOptions::default() };
@@ -110,7 +110,7 @@ fn run(
             );
         }
     }
-    context.say(format!("{data} {size}: picture"))?;
+    context.report_step(format!("{data} {size}: picture"))?;
     record.pictures.push(picture(&demo)?);
     record.notes.push(streaming(record));
     let mut plot = Plot::lines("Strong scaling", Axis::log("ranks", ""), Axis::log("time of a frame", "ms"));

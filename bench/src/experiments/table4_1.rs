@@ -2,7 +2,7 @@
 
 use super::Context;
 use super::fig4_7::fits_in_memory;
-use crate::opengl::{Cost, Display, Program, Session, Tools, Way, write};
+use crate::opengl::{Backend, Cost, Display, Program, Session, Tools, write};
 use crate::plot::{Axis, Plot, Series};
 use crate::record::{Record, Row};
 use crate::runner::{Ratio, order};
@@ -15,14 +15,14 @@ use std::sync::Arc;
 
 /// The side of the programs' windows.
 const SIZE_PX: u32 = 1024;
-const WAYS: [Way; 3] = [Way::Llvmpipe, Way::Serial, Way::Asynchronous];
+const BACKENDS: [Backend; 3] = [Backend::Llvmpipe, Backend::Serial, Backend::Asynchronous];
 
 /// The ways that differ for a program: ParaView and VTK draw into framebuffer objects, which are never late. What being late changes is seen at
 /// one million triangles.
-fn ways(program: Program, triangles: usize) -> &'static [Way] {
+fn backends(program: Program, triangles: usize) -> &'static [Backend] {
     match program {
-        Program::Gmsh | Program::Geomview if triangles < 2_000_000 => &WAYS,
-        _ => &WAYS[..2],
+        Program::Gmsh | Program::Geomview if triangles < 2_000_000 => &BACKENDS,
+        _ => &BACKENDS[..2],
     }
 }
 
@@ -71,15 +71,15 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             Some(_) => continue,
         };
         for &program in &programs {
-            let place = Place { tools: &tools, display: &display, dir: dir.path() };
-            measure(context, record, &place, program, &mesh)?;
+            let setup = ProgramSetup { tools: &tools, display: &display, dir: dir.path() };
+            measure(context, record, &setup, program, &mesh)?;
         }
     }
     record.plots.push(plot(record));
     Ok(())
 }
 
-struct Place<'a> {
+struct ProgramSetup<'a> {
     tools: &'a Tools,
     display: &'a Display,
     dir: &'a Path,
@@ -87,7 +87,7 @@ struct Place<'a> {
 
 /// What was measured of one way.
 #[derive(Default)]
-struct Measured {
+struct Measurement {
     first_secs: f64,
     groups: Vec<Cost>,
     peak_bytes: Option<u64>,
@@ -96,13 +96,13 @@ struct Measured {
 fn measure(
     context: &mut Context<'_>,
     record: &mut Record,
-    place: &Place<'_>,
+    setup: &ProgramSetup<'_>,
     program: Program,
     mesh: &Arc<TriMesh>,
 ) -> anyhow::Result<()> {
     let n = mesh.num_triangles();
-    let data = place.dir.join(format!("{n}")).with_extension(program.format().extension());
-    context.say(format!("{}, {n} triangles: data", program.name()))?;
+    let data = setup.dir.join(format!("{n}")).with_extension(program.format().extension());
+    context.report_step(format!("{}, {n} triangles: data", program.name()))?;
     write(mesh, program.format(), &data)?;
     // CPU time is told in hundredths of a second: groups of frames are long against that.
     let (groups, frames) = match (context.quick, n) {
@@ -114,16 +114,16 @@ fn measure(
     // The best hierarchy comes in the background after some frames: what is measured is what stays.
     let settle = if context.quick { 4 } else { 6 };
     let together = n < 8_000_000;
-    let ways = ways(program, n);
-    let mut all: Vec<Measured> = ways.iter().map(|_| Measured::default()).collect();
-    let start = |way: Way, measured: &mut Measured| -> anyhow::Result<Session> {
-        let dir = place.dir.join(format!("{}-{way:?}-{n}", program.name().replace(' ', "-")));
+    let backends = backends(program, n);
+    let mut all: Vec<Measurement> = backends.iter().map(|_| Measurement::default()).collect();
+    let start = |backend: Backend, measurement: &mut Measurement| -> anyhow::Result<Session> {
+        let dir = setup.dir.join(format!("{}-{backend:?}-{n}", program.name().replace(' ', "-")));
         let begun = std::time::Instant::now();
         let mut s =
-            Session::start(program, way, Some(&place.tools.gluray), place.display, &dir, &data, SIZE_PX)?;
-        measured.first_secs = begun.elapsed().as_secs_f64();
-        s.frames(if way == Way::Llvmpipe { 1 } else { settle })?;
-        if way != Way::Llvmpipe && !is_built_once(n) {
+            Session::start(program, backend, Some(&setup.tools.gluray), setup.display, &dir, &data, SIZE_PX)?;
+        measurement.first_secs = begun.elapsed().as_secs_f64();
+        s.frames(if backend == Backend::Llvmpipe { 1 } else { settle })?;
+        if backend != Backend::Llvmpipe && !is_built_once(n) {
             // Builds of the best hierarchy go on beside the frames; they take about a second per million triangles and core.
             std::thread::sleep(std::time::Duration::from_secs_f64(2.0 + n as f64 / 4e5));
         }
@@ -131,36 +131,40 @@ fn measure(
     };
     if together {
         let mut sessions = Vec::new();
-        for (way, m) in ways.iter().copied().zip(&mut all) {
-            context.say(format!("{}, {n} triangles: starting {}", program.name(), way.name()))?;
-            sessions.push(start(way, m)?);
+        for (backend, m) in backends.iter().copied().zip(&mut all) {
+            context.report_step(format!("{}, {n} triangles: starting {}", program.name(), backend.name()))?;
+            sessions.push(start(backend, m)?);
         }
         for round in 0..groups {
-            context.say(format!("{}, {n} triangles: group {} of {groups}", program.name(), round + 1))?;
-            for i in order(ways.len(), round) {
+            context.report_step(format!(
+                "{}, {n} triangles: group {} of {groups}",
+                program.name(),
+                round + 1
+            ))?;
+            for i in order(backends.len(), round) {
                 all[i].groups.push(per_frame(sessions[i].frames(frames)?, frames));
             }
         }
-        for ((way, s), m) in ways.iter().copied().zip(sessions).zip(&mut all) {
+        for ((backend, s), m) in backends.iter().copied().zip(sessions).zip(&mut all) {
             m.peak_bytes = s.peak_bytes();
-            check(program, way, s.end()?)?;
+            check(program, backend, s.end()?)?;
         }
     } else {
-        for (way, m) in ways.iter().copied().zip(&mut all) {
-            context.say(format!("{}, {n} triangles: {}", program.name(), way.name()))?;
-            let mut s = start(way, m)?;
+        for (backend, m) in backends.iter().copied().zip(&mut all) {
+            context.report_step(format!("{}, {n} triangles: {}", program.name(), backend.name()))?;
+            let mut s = start(backend, m)?;
             for _ in 0..groups {
                 m.groups.push(per_frame(s.frames(frames)?, frames));
             }
             m.peak_bytes = s.peak_bytes();
-            check(program, way, s.end()?)?;
+            check(program, backend, s.end()?)?;
         }
     }
     std::fs::remove_file(&data)?;
-    for (i, way) in ways.iter().copied().enumerate() {
-        record.rows.push(row(program, n, way, &all[0], &all[i]));
+    for (i, backend) in backends.iter().copied().enumerate() {
+        record.rows.push(row(program, n, backend, &all[0], &all[i]));
         if i > 0 {
-            record.ratios.extend(ratio(program, n, way, (&all[0], &all[i]), together));
+            record.ratios.extend(ratio(program, n, backend, (&all[0], &all[i]), together));
         }
     }
     Ok(())
@@ -176,8 +180,8 @@ fn per_frame(c: Cost, frames: u32) -> Cost {
 }
 
 /// Frames that the driver drew would be no frames of ours.
-fn check(program: Program, way: Way, report: Option<serde_json::Value>) -> anyhow::Result<()> {
-    if way == Way::Llvmpipe {
+fn check(program: Program, backend: Backend, report: Option<serde_json::Value>) -> anyhow::Result<()> {
+    if backend == Backend::Llvmpipe {
         return Ok(());
     }
     let report = report.unwrap_or_default();
@@ -192,13 +196,13 @@ fn check(program: Program, way: Way, report: Option<serde_json::Value>) -> anyho
     Ok(())
 }
 
-fn each(native: &Measured, ours: &Measured, of: impl Fn(&Cost) -> f64) -> Vec<f64> {
+fn each(native: &Measurement, ours: &Measurement, of: impl Fn(&Cost) -> f64) -> Vec<f64> {
     native.groups.iter().zip(&ours.groups).map(|(n, o)| of(n) / of(o)).collect()
 }
 
-fn row(program: Program, n: usize, way: Way, native: &Measured, m: &Measured) -> Row {
+fn row(program: Program, n: usize, backend: Backend, native: &Measurement, m: &Measurement) -> Row {
     let of = |f: &dyn Fn(&Cost) -> f64| Summary::of(&m.groups.iter().map(f).collect::<Vec<_>>());
-    let row = Row::new().with("program", program.name()).with("triangles", n).with("way", way.name());
+    let row = Row::new().with("program", program.name()).with("triangles", n).with("way", backend.name());
     let (Some(wall), Some(cpu)) = (of(&|c| c.wall_secs), of(&|c| c.cpu_secs)) else { return row };
     let median = |of: &dyn Fn(&Cost) -> f64| Summary::of(&each(native, m, of)).map(|s| s.median);
     row.with("fps", 1.0 / wall.median)
@@ -216,12 +220,12 @@ fn row(program: Program, n: usize, way: Way, native: &Measured, m: &Measured) ->
 fn ratio(
     program: Program,
     n: usize,
-    way: Way,
-    (native, ours): (&Measured, &Measured),
+    backend: Backend,
+    (native, ours): (&Measurement, &Measurement),
     in_turns: bool,
 ) -> Option<Ratio> {
-    let name = format!("{}, {n} triangles, {}", program.name(), way.name());
-    let ratio = Ratio::of_rounds(name, Way::Llvmpipe.name(), &each(native, ours, |c| c.wall_secs))?;
+    let name = format!("{}, {n} triangles, {}", program.name(), backend.name());
+    let ratio = Ratio::of_rounds(name, Backend::Llvmpipe.name(), &each(native, ours, |c| c.wall_secs))?;
     Some(Ratio { in_turns, ..ratio })
 }
 
@@ -229,15 +233,14 @@ fn plot(record: &Record) -> Plot {
     let mut plot =
         Plot::lines("Frames of programs", Axis::log("triangles", ""), Axis::log("frames a second", "1/s"));
     for program in Program::ALL {
-        for way in WAYS {
-            let of = record
-                .rows
-                .iter()
-                .filter(|r| r.text("program") == Some(program.name()) && r.text("way") == Some(way.name()));
+        for backend in BACKENDS {
+            let of = record.rows.iter().filter(|r| {
+                r.text("program") == Some(program.name()) && r.text("way") == Some(backend.name())
+            });
             let points: Vec<(f64, f64)> =
                 of.filter_map(|r| r.number("triangles").zip(r.number("fps"))).collect();
             if !points.is_empty() {
-                plot.series.push(Series::new(format!("{}, {}", program.name(), way.name()), points));
+                plot.series.push(Series::new(format!("{}, {}", program.name(), backend.name()), points));
             }
         }
     }

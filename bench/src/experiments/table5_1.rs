@@ -81,7 +81,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         let h = 1.0 / (longest - 1) as f64;
         for (march, &(label, interpolant, skip_rad)) in marches.iter().enumerate() {
             check_cancelled(context)?;
-            context.say_share(
+            context.report_share(
                 format!("{name}, {label}"),
                 (n as f64 + march as f64 / marches.len() as f64) / 5.0,
             )?;

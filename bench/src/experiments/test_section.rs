@@ -40,12 +40,16 @@ pub(super) fn scene(rest: &str) -> anyhow::Result<Scene> {
 }
 
 /// Renders; a cancelled picture is an interrupted experiment.
-pub(super) fn paint(context: &Context<'_>, scene: &Scene, section: &TestSection) -> anyhow::Result<Rendered> {
-    paint_with(context, scene, section, Layers::NONE)
+pub(super) fn render_picture(
+    context: &Context<'_>,
+    scene: &Scene,
+    section: &TestSection,
+) -> anyhow::Result<Rendered> {
+    render_picture_with(context, scene, section, Layers::NONE)
 }
 
-/// [`paint`], with what is wanted beside the picture.
-pub(super) fn paint_with(
+/// [`render_picture`], with what is wanted beside the picture.
+pub(super) fn render_picture_with(
     context: &Context<'_>,
     scene: &Scene,
     section: &TestSection,

@@ -1,7 +1,7 @@
 //! Frames of a mesh by Mesa's software rasteriser alone: what a build or a traced frame is set against (figures 4.7 and 4.9).
 
 use super::programs::find;
-use super::{Cost, Display, Program, Session, Way, write};
+use super::{Backend, Cost, Display, Program, Session, write};
 use crate::clock::Sample;
 use crate::record::Row;
 use crate::stats::Summary;
@@ -44,7 +44,8 @@ impl Mesa {
             let data = self.dir.path().join("mesh").with_extension(program.format().extension());
             write(mesh, program.format(), &data)?;
             let dir = self.dir.path().join(program.name().replace(' ', "-"));
-            let started = Session::start(program, Way::Llvmpipe, None, &self.display, &dir, &data, size_px);
+            let started =
+                Session::start(program, Backend::Llvmpipe, None, &self.display, &dir, &data, size_px);
             std::fs::remove_file(&data)?;
             match started {
                 Ok(mut session) => {

@@ -10,4 +10,4 @@ pub use data::{Format, write};
 pub use display::Display;
 pub use mesa::{Mesa, MesaFrames};
 pub use programs::{Program, find};
-pub use session::{Cost, Session, Tools, Way};
+pub use session::{Backend, Cost, Session, Tools};

@@ -47,7 +47,7 @@ impl Tools {
 
 /// By what a program draws.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Way {
+pub enum Backend {
     /// By Mesa's llvmpipe.
     Llvmpipe,
     /// Through us, each frame when it is asked for.
@@ -58,14 +58,14 @@ pub enum Way {
     Ranks(u32),
 }
 
-impl Way {
+impl Backend {
     /// Its name in tables.
     pub fn name(self) -> &'static str {
         match self {
-            Way::Llvmpipe => "llvmpipe",
-            Way::Serial => "gluray",
-            Way::Asynchronous => "gluray, one frame late",
-            Way::Ranks(_) => "gluray, several processes",
+            Backend::Llvmpipe => "llvmpipe",
+            Backend::Serial => "gluray",
+            Backend::Asynchronous => "gluray, one frame late",
+            Backend::Ranks(_) => "gluray, several processes",
         }
     }
 }
@@ -92,14 +92,14 @@ pub struct Session {
 }
 
 /// Programs that do not answer for that long are given up.
-const PATIENCE: Duration = Duration::from_secs(600);
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(600);
 
 impl Session {
-    /// Starts `program` with `data`. Scripts, logs and the report go into `dir`, which is its own. Ways that are not the driver's need
+    /// Starts `program` with `data`. Scripts, logs and the report go into `dir`, which is its own. Backends that are not the driver's need
     /// `gluray`.
     pub fn start(
         program: Program,
-        way: Way,
+        backend: Backend,
         gluray: Option<&Path>,
         display: &Display,
         dir: &Path,
@@ -109,17 +109,17 @@ impl Session {
         std::fs::create_dir_all(dir)?;
         let executable = program.find().map_err(anyhow::Error::msg)?;
         let arguments = program.arguments(dir, data, size_px)?;
-        let report = (way != Way::Llvmpipe).then(|| dir.join("report.json"));
+        let report = (backend != Backend::Llvmpipe).then(|| dir.join("report.json"));
         let mut command = match &report {
             None => Command::new(&executable),
             Some(report) => {
-                let gluray = gluray.with_context(|| format!("{} needs gluray", way.name()))?;
+                let gluray = gluray.with_context(|| format!("{} needs gluray", backend.name()))?;
                 let mut c = Command::new(gluray);
                 c.args(["--quiet", "run", "--mode", "match", "--report"]).arg(report);
-                if let Way::Ranks(ranks) = way {
+                if let Backend::Ranks(ranks) = backend {
                     c.args(["--ranks", &ranks.to_string()]);
                 }
-                let late = if way == Way::Asynchronous { "on" } else { "off" };
+                let late = if backend == Backend::Asynchronous { "on" } else { "off" };
                 c.args(["--set", &format!("asynchronous={late}"), "--"]).arg(&executable);
                 c
             }
@@ -163,7 +163,7 @@ impl Session {
 
     fn wait_for(&mut self, word: &str) -> anyhow::Result<()> {
         loop {
-            match self.lines.recv_timeout(PATIENCE) {
+            match self.lines.recv_timeout(ANSWER_TIMEOUT) {
                 Ok(line) if line.trim().ends_with(word) => return Ok(()),
                 Ok(_) => {}
                 Err(e) => {

@@ -26,7 +26,7 @@ pub enum Framing {
 
 /// A camera and the distance that is in focus.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Placed {
+pub(super) struct FramedCamera {
     pub(super) camera: Camera,
     pub(super) focus_distance: f64,
 }
@@ -81,7 +81,7 @@ impl Framing {
         lo: DVec3,
         hi: DVec3,
         size: [u32; 2],
-    ) -> anyhow::Result<Placed> {
+    ) -> anyhow::Result<FramedCamera> {
         let aspect = f64::from(size[0]) / f64::from(size[1].max(1));
         let (view, height) = match self {
             Framing::Fitted | Framing::FittedFrom(_) => {
@@ -103,7 +103,7 @@ impl Framing {
                 Camera::perspective(eye, target, view.up, fov, aspect, [near, far.max(2.0 * near)])?
             }
         };
-        Ok(Placed { camera, focus_distance })
+        Ok(FramedCamera { camera, focus_distance })
     }
 }
 
@@ -266,8 +266,8 @@ mod tests {
                     let corners = corners_of_box(lo, hi);
                     let outline = |point: &mut dyn FnMut(DVec3)| corners.into_iter().for_each(point);
                     let view = framing.fitted(&outline, up, size);
-                    let placed = framing.camera(view.as_ref(), lo, hi, size).unwrap();
-                    let seen = corners.map(|p| ndc(&placed.camera, p));
+                    let framed = framing.camera(view.as_ref(), lo, hi, size).unwrap();
+                    let seen = corners.map(|p| ndc(&framed.camera, p));
                     let [most_x, most_y] =
                         [0, 1].map(|a| seen.iter().map(|c| c[a].abs()).fold(0.0, f64::max));
                     let most = most_x.max(most_y);

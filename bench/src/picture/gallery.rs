@@ -1,9 +1,9 @@
 //! The pictures of the report and of the README: the dissertation's data sets, each with the command that draws it.
 
 use super::framing::Framing;
-use super::look::{BACKGROUNDS, Look};
-use super::subject::{Paint, Subject, color_by_height};
-use super::{Drawn, Watch, Wish, draw};
+use super::style::{BACKGROUNDS, RenderStyle};
+use super::subject::{PartColoring, Subject, color_by_height};
+use super::{RenderControl, RenderRequest, RenderedImage, draw};
 use anyhow::Context as _;
 use datasets::catalogue::{self, Data};
 use datasets::isosurface::Options;
@@ -159,11 +159,11 @@ pub fn find(name: &str) -> Result<&'static Entry, String> {
 }
 
 /// A picture with what it took.
-pub struct Painted {
+pub struct GalleryImage {
     /// The picture.
-    pub drawn: Drawn,
+    pub rendered: RenderedImage,
     /// How it was wished.
-    pub wish: Wish,
+    pub request: RenderRequest,
     /// What is in it, in words.
     pub contents: String,
     /// Wall time of generating the data.
@@ -172,14 +172,19 @@ pub struct Painted {
 
 impl Entry {
     /// Generates the data and draws them, see [`draw`].
-    pub fn paint(&self, size: [u32; 2], samples: u32, watch: &mut Watch<'_>) -> anyhow::Result<Painted> {
+    pub fn render(
+        &self,
+        size: [u32; 2],
+        samples: u32,
+        control: &mut RenderControl<'_>,
+    ) -> anyhow::Result<GalleryImage> {
         let start = std::time::Instant::now();
         let mut subject = Subject::empty(DVec3::Z);
         for &(name, size, coloring) in self.data {
             let entry = catalogue::find(name)?;
             let options = Options { normals: true, scalars: coloring == Coloring::Scalars };
-            let generated = entry.generate(size, options, &mut |_, _| watch.check().is_ok());
-            watch.check()?;
+            let generated = entry.generate(size, options, &mut |_, _| control.check().is_ok());
+            control.check()?;
             let mut data = generated?;
             if let (Data::Mesh(mesh), Coloring::Height) = (&mut data, coloring) {
                 color_by_height(mesh, Vec3::Z);
@@ -190,33 +195,39 @@ impl Entry {
             let plain = if let Coloring::Plain(c) = coloring { c } else { [0.8; 3] };
             subject.add_generated(data, plain)?;
             if let (Coloring::Glass(c), Some(part)) = (coloring, subject.parts.last_mut()) {
-                part.paint = Paint::Glass(c);
+                part.coloring = PartColoring::Glass(c);
             }
         }
         let framing = match self.from {
             Viewpoint::Direction(backward) => Framing::FittedFrom(backward.into()),
             Viewpoint::Eye(eye, target) => Framing::At(View::new(self.name, eye.into(), target.into())),
-            Viewpoint::View(wish) => {
+            Viewpoint::View(name) => {
                 let views = catalogue::find(self.data[0].0)?.views();
-                let view = views.into_iter().find(|v| v.name == wish);
-                Framing::At(view.with_context(|| format!("{} has no view `{wish}`", self.data[0].0))?)
+                let view = views.into_iter().find(|v| v.name == name);
+                Framing::At(view.with_context(|| format!("{} has no view `{name}`", self.data[0].0))?)
             }
         };
         let data_secs = start.elapsed().as_secs_f64();
         let contents = subject.contents.join(", ");
-        let look = Look {
+        let style = RenderStyle {
             effects: self.effects,
             colors: self.colors.into(),
             range: self.range,
             glass_parts_only: true,
             occlusion_radii: self.occlusion_radii,
             background: BACKGROUNDS.iter().find(|b| b.0 == self.background).map_or(BACKGROUNDS[0].1, |b| b.1),
-            ..Look::default()
+            ..RenderStyle::default()
         };
-        let wish =
-            Wish { size, samples, look, framing, build: BuildOptions::default(), layers: Layers::COLOR };
-        let drawn = draw(subject, &wish, watch)?;
-        Ok(Painted { drawn, wish, contents, data_secs })
+        let request = RenderRequest {
+            size,
+            samples,
+            style,
+            framing,
+            build: BuildOptions::default(),
+            layers: Layers::COLOR,
+        };
+        let rendered = draw(subject, &request, control)?;
+        Ok(GalleryImage { rendered, request, contents, data_secs })
     }
 
     /// The command that draws it.
@@ -234,13 +245,13 @@ mod tests {
     fn every_picture_shows_its_data_and_uses_its_effects() {
         for e in ALL.iter().filter(|e| e.name != "wavelet") {
             // Large enough for the star's thin tubes.
-            let p = e.paint([144, 96], 1, &mut Watch::default()).unwrap();
+            let p = e.render([144, 96], 1, &mut RenderControl::default()).unwrap();
             // Paths inside glass may be cut; the renderer says so.
             let expected = |w: &String| e.name == "glass" && w.contains("max_bounces");
-            assert!(p.drawn.warnings.iter().all(expected), "{}: {:?}", e.name, p.drawn.warnings);
-            assert!(p.drawn.report.effects.contains(e.effects.without(Effects::SHADOWS)), "{}", e.name);
+            assert!(p.rendered.warnings.iter().all(expected), "{}: {:?}", e.name, p.rendered.warnings);
+            assert!(p.rendered.report.effects.contains(e.effects.without(Effects::SHADOWS)), "{}", e.name);
             let colors: std::collections::BTreeSet<[u32; 4]> =
-                p.drawn.frame.color.iter().map(|c| c.map(f32::to_bits)).collect();
+                p.rendered.frame.color.iter().map(|c| c.map(f32::to_bits)).collect();
             assert!(colors.len() > 200, "{}: {} colours", e.name, colors.len());
         }
     }

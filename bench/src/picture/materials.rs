@@ -15,20 +15,20 @@ enum Role {
     /// sRGB, alpha not used.
     Opaque,
     /// sRGB, seen where alpha is at least this many 255ths.
-    Cut(u8),
+    AlphaMask(u8),
     /// Numbers.
     Linear,
 }
 
 /// The materials of a scene, with their pictures shared.
-pub(super) struct Looks<'a> {
+pub(super) struct SceneMaterials<'a> {
     model: &'a SceneModel,
     made: HashMap<(usize, Role), Arc<Texture>>,
 }
 
-impl<'a> Looks<'a> {
-    pub(super) fn of(model: &'a SceneModel) -> Looks<'a> {
-        Looks { model, made: HashMap::new() }
+impl<'a> SceneMaterials<'a> {
+    pub(super) fn of(model: &'a SceneModel) -> SceneMaterials<'a> {
+        SceneMaterials { model, made: HashMap::new() }
     }
 
     /// A picture in a role; `None` for a material that has none.
@@ -48,7 +48,7 @@ impl<'a> Looks<'a> {
             t[3] = match role {
                 Role::Color | Role::Linear => t[3],
                 Role::Opaque => 255,
-                Role::Cut(least) => 255 * u8::from(t[3] >= least),
+                Role::AlphaMask(least) => 255 * u8::from(t[3] >= least),
             };
         }
         let (width, height) = (picture.width as usize, picture.height as usize);
@@ -83,7 +83,11 @@ impl<'a> Looks<'a> {
             // factor * texel >= cutoff
             AlphaMode::Mask(cutoff) if m.base_color_texture.is_some() => {
                 let least = (255.0 * cutoff / factor).ceil();
-                if least <= 255.0 { (1.0, Role::Cut(least.max(0.0) as u8)) } else { (0.0, Role::Opaque) }
+                if least <= 255.0 {
+                    (1.0, Role::AlphaMask(least.max(0.0) as u8))
+                } else {
+                    (0.0, Role::Opaque)
+                }
             }
             AlphaMode::Mask(cutoff) => (f32::from(u8::from(factor >= cutoff)), Role::Opaque),
         };

@@ -1,19 +1,18 @@
 //! Pictures of files and of the generated data sets.
 //!
 //! A [`subject::Subject`] is what is drawn, without lights: out of any file that [`datasets::read`] knows, or out of the
-//! catalogue. [`look`] adds materials and lights for the wished effects, [`framing`] finds a camera, [`draw`] does the
+//! catalogue. [`style`] adds materials and lights for the wished effects, [`framing`] finds a camera, [`draw`] does the
 //! work and keeps the account, [`save`] writes PNG and OpenEXR. [`gallery`] holds the pictures of the report.
 
 pub mod framing;
 pub mod gallery;
-pub mod look;
 mod materials;
 pub mod save;
+pub mod style;
 pub mod subject;
 
 use datasets::cli::Interrupted;
 use framing::Framing;
-use look::Look;
 use rt_core::accel::BuildOptions;
 use rt_core::effects::Effects;
 use rt_core::frame::{Frame, Layers};
@@ -21,17 +20,18 @@ use rt_core::render::{Progressive, RenderOptions, RenderReport, StopReason};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
+use style::RenderStyle;
 use subject::Subject;
 
 /// How a subject is drawn.
 #[derive(Debug, Clone)]
-pub struct Wish {
+pub struct RenderRequest {
     /// Pixels per row and rows.
     pub size: [u32; 2],
     /// Samples per pixel.
     pub samples: u32,
     /// Materials, lights and effects.
-    pub look: Look,
+    pub style: RenderStyle,
     /// Where it is seen from.
     pub framing: Framing,
     /// How the acceleration structure is built.
@@ -42,7 +42,7 @@ pub struct Wish {
 
 /// A picture and how it came about.
 #[derive(Debug, Clone)]
-pub struct Drawn {
+pub struct RenderedImage {
     /// The picture.
     pub frame: Frame,
     /// Rays by kind, effects, warnings.
@@ -57,14 +57,14 @@ pub struct Drawn {
 
 /// How drawing is stopped and watched; the default is neither.
 #[derive(Default)]
-pub struct Watch<'a> {
+pub struct RenderControl<'a> {
     /// Set to true to stop as soon as the tiles in work are done.
     pub cancel: Option<Arc<AtomicBool>>,
     /// Told after every sample of all pixels how many are done.
     pub samples_done: Option<&'a mut dyn FnMut(u32)>,
 }
 
-impl Watch<'_> {
+impl RenderControl<'_> {
     /// [`Interrupted`] once the flag is set.
     fn check(&self) -> Result<(), Interrupted> {
         let is_set = self.cancel.as_ref().is_some_and(|c| c.load(Ordering::Relaxed));
@@ -72,7 +72,7 @@ impl Watch<'_> {
     }
 }
 
-impl Drawn {
+impl RenderedImage {
     /// Whether the work was stopped before all samples were done.
     pub fn is_interrupted(&self) -> bool {
         self.report.stopped == StopReason::Cancelled
@@ -80,11 +80,15 @@ impl Drawn {
 }
 
 /// Draws a subject. When stopped after the first sample of every pixel, gives the picture so far
-/// ([`Drawn::is_interrupted`]); before, [`Interrupted`].
-pub fn draw(subject: Subject, wish: &Wish, watch: &mut Watch<'_>) -> anyhow::Result<Drawn> {
-    let view = wish.framing.fitted(&|point| subject.outline(point), subject.up, wish.size);
+/// ([`RenderedImage::is_interrupted`]); before, [`Interrupted`].
+pub fn draw(
+    subject: Subject,
+    request: &RenderRequest,
+    control: &mut RenderControl<'_>,
+) -> anyhow::Result<RenderedImage> {
+    let view = request.framing.fitted(&|point| subject.outline(point), subject.up, request.size);
     let start = Instant::now();
-    let mut scene = wish.look.scene(subject, &wish.build)?;
+    let mut scene = request.style.scene(subject, &request.build)?;
     let build_secs = start.elapsed().as_secs_f64();
     let mut warnings = vec![];
     let skipped = scene.world.report().skipped;
@@ -93,33 +97,33 @@ pub fn draw(subject: Subject, wish: &Wish, watch: &mut Watch<'_>) -> anyhow::Res
             .push(format!("{skipped} primitives left out: their coordinates are not finite or out of range"));
     }
 
-    watch.check()?;
+    control.check()?;
     let (lo, hi) = framing::bounds(&scene)?;
-    let placed = wish.framing.camera(view.as_ref(), lo, hi, wish.size)?;
-    wish.look.adapt(&mut scene, (hi - lo).length() * 0.5);
-    let camera = wish.look.lens(placed.camera, placed.focus_distance)?;
+    let framed = request.framing.camera(view.as_ref(), lo, hi, request.size)?;
+    request.style.scale_to_subject(&mut scene, (hi - lo).length() * 0.5);
+    let camera = request.style.lens(framed.camera, framed.focus_distance)?;
 
     // Glass needs more bounces before what is cut off stops to matter.
-    let wished = wish.look.effects;
-    let glass = wished.contains(Effects::REFRACTION);
-    let path = wished.contains(Effects::PATH_TRACING);
+    let requested = request.style.effects;
+    let glass = requested.contains(Effects::REFRACTION);
+    let path = requested.contains(Effects::PATH_TRACING);
     // What was wished is asked for by name, so that the report says what of it changes no pixel.
     let needed = Effects::required_by(&scene) | Effects::required_by_camera(&camera);
     let options = RenderOptions {
-        effects: Some(needed | wished),
+        effects: Some(needed | requested),
         // Paths are ended by chance.
         max_bounces: (!path).then_some(if glass { 16 } else { 8 }),
-        samples: wish.samples,
-        layers: Layers::COLOR | wish.layers,
+        samples: request.samples,
+        layers: Layers::COLOR | request.layers,
         path_tracing: path,
-        cancel: watch.cancel.clone(),
-        ..RenderOptions::new(wish.size[0], wish.size[1])
+        cancel: control.cancel.clone(),
+        ..RenderOptions::new(request.size[0], request.size[1])
     };
     let start = Instant::now();
     let mut progressive = Progressive::new(&scene, &camera, &options)?;
     loop {
         let more = progressive.step()?;
-        if let Some(told) = &mut watch.samples_done {
+        if let Some(told) = &mut control.samples_done {
             told(progressive.report().samples);
         }
         if !more {
@@ -132,13 +136,13 @@ pub fn draw(subject: Subject, wish: &Wish, watch: &mut Watch<'_>) -> anyhow::Res
     }
     let frame = progressive.frame();
     let render_secs = start.elapsed().as_secs_f64();
-    warnings.extend(report.warnings.iter().filter(|w| !about_another_effect(w, wished)).cloned());
-    Ok(Drawn { frame, report, warnings, build_secs, render_secs })
+    warnings.extend(report.warnings.iter().filter(|w| !is_about_unrequested_effect(w, requested)).cloned());
+    Ok(RenderedImage { frame, report, warnings, build_secs, render_secs })
 }
 
 /// Whether a warning says that an effect changed nothing which the scene has by itself and nobody wished for.
-fn about_another_effect(warning: &str, wished: Effects) -> bool {
-    let mut others = Effects::ALL.into_iter().filter(|(e, _)| !wished.contains(*e));
+fn is_about_unrequested_effect(warning: &str, requested: Effects) -> bool {
+    let mut others = Effects::ALL.into_iter().filter(|(e, _)| !requested.contains(*e));
     others.any(|(_, name)| {
         warning.strip_prefix(name).is_some_and(|rest| rest.starts_with(" changed no pixel of this picture"))
     })

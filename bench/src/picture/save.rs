@@ -1,6 +1,6 @@
 //! Pictures into files: PNG for eyes, OpenEXR with every layer, its unit and how it was made.
 
-use super::{Drawn, Wish};
+use super::{RenderRequest, RenderedImage};
 use datasets::image_io::{self, Metadata, Picture, PngDepth, keys};
 use rt_core::frame::{Frame, PlaneValues};
 use std::path::Path;
@@ -31,16 +31,16 @@ pub fn rounds_ids(frame: &Frame) -> bool {
 }
 
 /// What the file says about its making.
-pub fn metadata(drawn: &Drawn, wish: &Wish) -> Metadata {
+pub fn metadata(rendered: &RenderedImage, request: &RenderRequest) -> Metadata {
     let mut m = image_io::metadata_of_this_run("bench", env!("CARGO_PKG_VERSION"));
     let names = |n: &mut dyn Iterator<Item = &'static str>| n.collect::<Vec<_>>().join(", ");
-    m.insert(keys::ELAPSED_SECS.into(), drawn.render_secs.into());
-    m.insert(keys::SAMPLES_PER_PIXEL.into(), f64::from(drawn.report.samples).into());
+    m.insert(keys::ELAPSED_SECS.into(), rendered.render_secs.into());
+    m.insert(keys::SAMPLES_PER_PIXEL.into(), f64::from(rendered.report.samples).into());
     m.insert(keys::SEED.into(), "0".into());
-    m.insert("effects".into(), names(&mut drawn.report.effects.names()).into());
-    m.insert("robustness".into(), wish.build.robustness.name().into());
-    m.insert("build_quality".into(), wish.build.quality.name().into());
-    m.insert("rays".into(), (drawn.report.rays.total() as f64).into());
+    m.insert("effects".into(), names(&mut rendered.report.effects.names()).into());
+    m.insert("robustness".into(), request.build.robustness.name().into());
+    m.insert("build_quality".into(), request.build.quality.name().into());
+    m.insert("rays".into(), (rendered.report.rays.total() as f64).into());
     m
 }
 
@@ -55,9 +55,9 @@ pub fn write_png(path: &Path, frame: &Frame) -> anyhow::Result<image_io::PngRepo
 }
 
 /// Writes every layer as OpenEXR.
-pub fn write_exr(path: &Path, drawn: &Drawn, wish: &Wish) -> anyhow::Result<()> {
-    let mut p = picture(&drawn.frame)?;
-    p.metadata = metadata(drawn, wish);
+pub fn write_exr(path: &Path, rendered: &RenderedImage, request: &RenderRequest) -> anyhow::Result<()> {
+    let mut p = picture(&rendered.frame)?;
+    p.metadata = metadata(rendered, request);
     Ok(image_io::write_exr(path, &p)?)
 }
 

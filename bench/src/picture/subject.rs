@@ -1,11 +1,11 @@
 //! What is drawn: geometry with its own colours, out of a file or out of the catalogue.
 
 use super::framing::corners_of_box;
-use super::materials::Looks;
+use super::materials::SceneMaterials;
 use anyhow::Context as _;
 use datasets::catalogue::Data;
 use datasets::model::{ColorBy, Dataset};
-use datasets::read::{Content, Opened, SceneModel};
+use datasets::read::{Content, LoadedFile, SceneModel};
 use glam::{DVec3, Vec3};
 use rt_core::accel::Geometry;
 use rt_core::grid::Grid;
@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 /// Where a part's colour comes from.
 #[derive(Debug, Clone)]
-pub enum Paint {
+pub enum PartColoring {
     /// The geometry's scalars through the colour map.
     Scalars,
     /// The geometry's own colours, else this one (linear RGB).
@@ -24,7 +24,7 @@ pub enum Paint {
     /// Glass that lets this much of white light through over the subject's radius (linear RGB).
     Glass([f32; 3]),
     /// A material out of the file.
-    OfTheFile(Material),
+    FileMaterial(Material),
 }
 
 /// One geometry.
@@ -33,18 +33,18 @@ pub struct Part {
     /// Triangles or a shape.
     pub geometry: Geometry,
     /// Its colour.
-    pub paint: Paint,
+    pub coloring: PartColoring,
     /// World points that a shape lies between; a mesh has its vertices.
     outline: Vec<DVec3>,
 }
 
 impl Part {
-    fn mesh(mesh: Arc<TriMesh>, paint: Paint) -> Part {
-        Part { geometry: Geometry::Mesh(mesh), paint, outline: vec![] }
+    fn mesh(mesh: Arc<TriMesh>, coloring: PartColoring) -> Part {
+        Part { geometry: Geometry::Mesh(mesh), coloring, outline: vec![] }
     }
 
-    fn shape(shape: Arc<dyn Shape>, paint: Paint, outline: Vec<DVec3>) -> Part {
-        Part { geometry: Geometry::Shape(shape), paint, outline }
+    fn shape(shape: Arc<dyn Shape>, coloring: PartColoring, outline: Vec<DVec3>) -> Part {
+        Part { geometry: Geometry::Shape(shape), coloring, outline }
     }
 }
 
@@ -76,7 +76,7 @@ pub struct Subject {
 
 /// How a file is turned into a subject.
 #[derive(Debug, Clone, Default)]
-pub struct Choices {
+pub struct LoadOptions {
     /// The array to colour by; `None` for the one that the file marks, if it does.
     pub color_by: Option<String>,
     /// Isovalue for image data; `None` for the middle of the range, and for no isosurface inside a volume.
@@ -98,7 +98,7 @@ pub enum VolumeChoice {
 }
 
 /// Colour of things without one, linear.
-const CLAY: [f32; 3] = [0.62, 0.60, 0.56];
+const DEFAULT_COLOR: [f32; 3] = [0.62, 0.60, 0.56];
 /// Radius of tubes and points, as a share of the diagonal.
 const TUBE_RADIUS: f64 = 0.002;
 const POINT_RADIUS: f64 = 0.004;
@@ -136,15 +136,15 @@ impl Subject {
 
     /// Adds triangles; their scalars, if any, are mapped to colours.
     pub fn add_mesh(&mut self, mesh: TriMesh, otherwise: [f32; 3]) {
-        let paint = match &mesh.scalars {
+        let coloring = match &mesh.scalars {
             Some(s) => {
-                self.widen(&s.values);
-                Paint::Scalars
+                self.extend_scalar_range(&s.values);
+                PartColoring::Scalars
             }
-            None => Paint::Color(otherwise),
+            None => PartColoring::Color(otherwise),
         };
         self.contents.push(format!("{} triangles", mesh.num_triangles()));
-        self.parts.push(Part::mesh(Arc::new(mesh), paint));
+        self.parts.push(Part::mesh(Arc::new(mesh), coloring));
     }
 
     /// Adds a generated data set. Lines become tubes with their own radii.
@@ -153,22 +153,22 @@ impl Subject {
             Data::Mesh(mesh) => self.add_mesh(mesh, otherwise),
             Data::Lines(lines) => {
                 self.contents.push(format!("{} tube segments", lines.num_segments()));
-                self.widen(&lines.scalars);
+                self.extend_scalar_range(&lines.scalars);
                 let outline = lines.points.iter().map(|p| p.as_dvec3()).collect();
-                self.parts.push(Part::shape(Arc::new(lines.into_tubes()?), Paint::Scalars, outline));
+                self.parts.push(Part::shape(Arc::new(lines.into_tubes()?), PartColoring::Scalars, outline));
             }
         }
         Ok(())
     }
 
     /// Everything visible in a file.
-    pub fn from_file(opened: &Opened, choices: &Choices) -> anyhow::Result<Subject> {
+    pub fn from_file(opened: &LoadedFile, load_options: &LoadOptions) -> anyhow::Result<Subject> {
         let mut subject = match &opened.content {
-            Content::Scene(_) if choices.volume != VolumeChoice::No => {
+            Content::Scene(_) if load_options.volume != VolumeChoice::No => {
                 anyhow::bail!("{} files hold meshes; a volume needs a uniform grid", opened.format)
             }
-            Content::Scene(model) => from_scene(model, choices)?,
-            Content::Data(data) => from_data(data, choices)?,
+            Content::Scene(model) => from_scene(model, load_options)?,
+            Content::Data(data) => from_data(data, load_options)?,
         };
         let own = std::mem::take(&mut subject.warnings);
         subject.warnings = opened.warnings.iter().cloned().chain(own).collect();
@@ -182,7 +182,7 @@ impl Subject {
         Ok(subject)
     }
 
-    fn widen(&mut self, scalars: &[f32]) {
+    fn extend_scalar_range(&mut self, scalars: &[f32]) {
         for &v in scalars.iter().filter(|v| v.is_finite()) {
             let [lo, hi] = self.scalar_range.unwrap_or([v, v]);
             self.scalar_range = Some([lo.min(v), hi.max(v)]);
@@ -192,29 +192,29 @@ impl Subject {
 
 // ---- data sets ------------------------------------------------------------------------------------------------
 
-fn from_data(data: &Dataset, choices: &Choices) -> anyhow::Result<Subject> {
+fn from_data(data: &Dataset, load_options: &LoadOptions) -> anyhow::Result<Subject> {
     let mut subject = Subject::empty(DVec3::Z);
     let marked = || {
         let a = data.leaves().into_iter().find_map(|d| d.attributes())?;
         a.point_scalars.clone().or_else(|| a.cell_scalars.clone())
     };
-    let color = choices.color_by.clone().or_else(marked);
-    if let Some(wish) = &choices.color_by {
-        ColorBy::find(data, wish)?;
+    let color = load_options.color_by.clone().or_else(marked);
+    if let Some(request) = &load_options.color_by {
+        ColorBy::find(data, request)?;
     }
-    if choices.volume != VolumeChoice::No {
-        add_volume(&mut subject, data, &color, choices)?;
-        if choices.isovalue.is_none() {
+    if load_options.volume != VolumeChoice::No {
+        add_volume(&mut subject, data, &color, load_options)?;
+        if load_options.isovalue.is_none() {
             return Ok(subject);
         }
     }
     if let Some(grid) = lattice(data, &color, &mut subject)? {
-        return isosurface(subject, data, grid, choices);
+        return isosurface(subject, data, grid, load_options);
     }
     let (mesh, report) = data.to_trimesh(color.as_deref())?;
     subject.warnings.extend(report.warnings());
     if mesh.num_triangles() > 0 {
-        subject.add_mesh(mesh, CLAY);
+        subject.add_mesh(mesh, DEFAULT_COLOR);
     }
     let (lines, dropped) = data.to_lines(color.as_deref())?;
     if dropped > 0 {
@@ -235,9 +235,9 @@ fn add_volume(
     subject: &mut Subject,
     data: &Dataset,
     color: &Option<String>,
-    choices: &Choices,
+    load_options: &LoadOptions,
 ) -> anyhow::Result<()> {
-    let array = match &choices.volume {
+    let array = match &load_options.volume {
         VolumeChoice::Named(name) => Some(name.clone()),
         _ => color.clone().or_else(|| first_array(data)),
     };
@@ -251,17 +251,17 @@ fn add_volume(
     let Some((lo, hi)) = grid.range() else {
         anyhow::bail!("`{array}` has no finite value: as a volume it would be empty");
     };
-    if choices.isovalue.is_none()
-        && let Some(wish) = choices.color_by.as_ref().filter(|wish| **wish != array)
+    if load_options.isovalue.is_none()
+        && let Some(request) = load_options.color_by.as_ref().filter(|request| **request != array)
     {
         subject.warnings.push(format!(
-            "`{wish}` colours nothing: a volume has the colours of its own scalars, and there is no isosurface without --isovalue"
+            "`{request}` colours nothing: a volume has the colours of its own scalars, and there is no isosurface without --isovalue"
         ));
     }
     subject
         .contents
         .push(format!("`{array}` as a volume of {} points", grid.dims.as_u64vec3().element_product()));
-    subject.widen(&[lo, hi]);
+    subject.extend_scalar_range(&[lo, hi]);
     subject.volume = Some(VolumeField { grid: Arc::new(grid), range: [lo, hi] });
     Ok(())
 }
@@ -298,20 +298,20 @@ fn isosurface(
     mut subject: Subject,
     data: &Dataset,
     colors: Arc<Grid>,
-    choices: &Choices,
+    load_options: &LoadOptions,
 ) -> anyhow::Result<Subject> {
     // The surface belongs to the field that the file marks; another array colours it.
     let marked = data.leaves()[0].attributes().and_then(|a| {
         a.point_scalars.clone().or_else(|| a.point.iter().find(|p| p.components == 1).map(|p| p.name.clone()))
     });
-    let field = match (&choices.color_by, marked) {
-        (Some(wish), Some(marked)) if *wish != marked => Arc::new(data.leaves()[0].to_grid(&marked)?),
+    let field = match (&load_options.color_by, marked) {
+        (Some(request), Some(marked)) if *request != marked => Arc::new(data.leaves()[0].to_grid(&marked)?),
         _ => colors.clone(),
     };
     let Some((lo, hi)) = field.range() else {
         anyhow::bail!("the field has no finite value: there is no isosurface to draw");
     };
-    let iso = choices.isovalue.unwrap_or(0.5 * lo + 0.5 * hi);
+    let iso = load_options.isovalue.unwrap_or(0.5 * lo + 0.5 * hi);
     anyhow::ensure!(
         lo < iso && iso <= hi,
         "no isosurface at {iso}: the field ranges from {lo} to {hi}; choose --isovalue in between"
@@ -324,20 +324,20 @@ fn isosurface(
             .warnings
             .push(format!("{missing} cells have a value that is not finite: the surface has holes there"));
     }
-    let paint = if Arc::ptr_eq(&field, &colors) {
-        Paint::Color(CLAY)
+    let coloring = if Arc::ptr_eq(&field, &colors) {
+        PartColoring::Color(DEFAULT_COLOR)
     } else {
         if let Some((lo, hi)) = colors.range() {
-            subject.widen(&[lo, hi]);
+            subject.extend_scalar_range(&[lo, hi]);
         }
         surface = surface.with_color_by(colors);
-        Paint::Scalars
+        PartColoring::Scalars
     };
     subject
         .contents
         .push(format!("isosurface at {iso} of {} points", field.dims.as_u64vec3().element_product()));
     let outline = corners_of_box(field.origin, field.max_corner()).to_vec();
-    subject.parts.push(Part::shape(Arc::new(surface), paint, outline));
+    subject.parts.push(Part::shape(Arc::new(surface), coloring, outline));
     Ok(subject)
 }
 
@@ -356,15 +356,15 @@ fn add_tubes(subject: &mut Subject, lines: &[datasets::model::Polyline]) -> anyh
     }
     let radius = (TUBE_RADIUS * diagonal(points.iter().copied())) as f32;
     let mut tubes = Tubes::from_f64_points(&points, &offsets, Radii::Common(radius))?;
-    let mut paint = Paint::Color(CLAY);
+    let mut coloring = PartColoring::Color(DEFAULT_COLOR);
     if lines.iter().all(|l| l.scalars.is_some()) {
         let scalars: Vec<f32> = lines.iter().filter_map(|l| l.scalars.as_ref()).flatten().copied().collect();
-        subject.widen(&scalars);
+        subject.extend_scalar_range(&scalars);
         tubes = tubes.with_scalars(scalars)?;
-        paint = Paint::Scalars;
+        coloring = PartColoring::Scalars;
     }
     subject.contents.push(format!("{} lines as tubes", lines.len()));
-    subject.parts.push(Part::shape(Arc::new(tubes), paint, points));
+    subject.parts.push(Part::shape(Arc::new(tubes), coloring, points));
     Ok(())
 }
 
@@ -372,36 +372,36 @@ fn add_points(subject: &mut Subject, data: &Dataset, color: Option<&str>) -> any
     let set = data.to_points(color)?;
     let radius = (POINT_RADIUS * diagonal(set.points.iter().copied())) as f32;
     let mut spheres = Spheres::from_f64_centers(&set.points, Radii::Common(radius))?;
-    let mut paint = Paint::Color(CLAY);
+    let mut coloring = PartColoring::Color(DEFAULT_COLOR);
     if let Some(scalars) = set.scalars {
-        subject.widen(&scalars);
+        subject.extend_scalar_range(&scalars);
         spheres = spheres.with_scalars(scalars)?;
-        paint = Paint::Scalars;
+        coloring = PartColoring::Scalars;
     }
     subject.contents.push(format!("{} points as spheres", set.points.len()));
-    subject.parts.push(Part::shape(Arc::new(spheres), paint, set.points));
+    subject.parts.push(Part::shape(Arc::new(spheres), coloring, set.points));
     Ok(())
 }
 
 // ---- meshes with materials ------------------------------------------------------------------------------------
 
 /// Scenes have y up, as glTF demands and most OBJ files do.
-fn from_scene(model: &SceneModel, choices: &Choices) -> anyhow::Result<Subject> {
+fn from_scene(model: &SceneModel, load_options: &LoadOptions) -> anyhow::Result<Subject> {
     let mut subject = Subject::empty(DVec3::Y);
-    if let Some(wish) = &choices.color_by {
+    if let Some(request) = &load_options.color_by {
         subject
             .warnings
-            .push(format!("`{wish}` is not used: the file holds meshes with materials and no arrays"));
+            .push(format!("`{request}` is not used: the file holds meshes with materials and no arrays"));
     }
-    let mut looks = Looks::of(model);
+    let mut scene_materials = SceneMaterials::of(model);
     let materials: Vec<Material> =
-        model.materials.iter().map(|m| looks.material(m)).collect::<anyhow::Result<_>>()?;
+        model.materials.iter().map(|m| scene_materials.material(m)).collect::<anyhow::Result<_>>()?;
     for m in &model.meshes {
-        let paint = match m.material {
-            Some(i) => Paint::OfTheFile(materials[i].clone()),
-            None => Paint::Color(CLAY),
+        let coloring = match m.material {
+            Some(i) => PartColoring::FileMaterial(materials[i].clone()),
+            None => PartColoring::Color(DEFAULT_COLOR),
         };
-        subject.parts.push(Part::mesh(Arc::new(m.mesh.clone()), paint));
+        subject.parts.push(Part::mesh(Arc::new(m.mesh.clone()), coloring));
     }
     subject.contents.push(format!("{} meshes, {} triangles", model.meshes.len(), model.num_triangles()));
     Ok(subject)

@@ -20,7 +20,7 @@ pub(crate) const UNSAFE_ROOMS: &[(&str, &str)] = &[
         "composite/src/rival",
         "calls into IceT, found at run time; a measurement against a rival is a call into it",
     ),
-    ("bench/src/peers", "calls into C libraries that we measure against"),
+    ("bench/src/baselines", "calls into C libraries that we measure against"),
 ];
 
 /// Longest file, in lines, without its module of unit tests.

@@ -18,7 +18,7 @@ pub(super) const VERSION: u32 = 1;
 const MAGIC: [u8; 8] = *b"RTSVMESH";
 const BYTE_ORDER: u32 = 0x0102_0304;
 /// Bytes handled between two checksum updates.
-const PIECE: usize = 1 << 20;
+const CHUNK_BYTES: usize = 1 << 20;
 
 const POSITIONS: u32 = 1;
 const INDICES: u32 = 2;
@@ -28,7 +28,7 @@ const SCALARS: u32 = 5;
 const TEXCOORDS: u32 = 6;
 
 pub(super) fn write(out: &mut dyn Write, key: &str, mesh: &TriMesh) -> io::Result<()> {
-    let mut w = Summing { inner: out, crc: flate2::Crc::new() };
+    let mut w = ChecksumStream { inner: out, crc: flate2::Crc::new() };
     w.put(&MAGIC)?;
     w.put(bytes_of(&[VERSION, BYTE_ORDER, key.len() as u32]))?;
     w.put(key.as_bytes())?;
@@ -58,7 +58,7 @@ pub(super) fn write(out: &mut dyn Write, key: &str, mesh: &TriMesh) -> io::Resul
 
 /// `length` is the file's: arrays that would not fit into it are refused before memory is asked for.
 pub(super) fn read(input: impl Read, length: u64, key: &str) -> Result<TriMesh, String> {
-    let mut r = Summing { inner: input, crc: flate2::Crc::new() };
+    let mut r = ChecksumStream { inner: input, crc: flate2::Crc::new() };
     let mut magic = [0u8; 8];
     r.get(&mut magic)?;
     if magic != MAGIC {
@@ -107,16 +107,16 @@ pub(super) fn read(input: impl Read, length: u64, key: &str) -> Result<TriMesh, 
 }
 
 /// A reader or writer that sums what passes.
-struct Summing<T> {
+struct ChecksumStream<T> {
     inner: T,
     crc: flate2::Crc,
 }
 
-impl Summing<&mut dyn Write> {
+impl ChecksumStream<&mut dyn Write> {
     fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
-        for piece in bytes.chunks(PIECE) {
-            self.crc.update(piece);
-            self.inner.write_all(piece)?;
+        for chunk in bytes.chunks(CHUNK_BYTES) {
+            self.crc.update(chunk);
+            self.inner.write_all(chunk)?;
         }
         Ok(())
     }
@@ -129,14 +129,14 @@ impl Summing<&mut dyn Write> {
     }
 }
 
-impl<R: Read> Summing<R> {
+impl<R: Read> ChecksumStream<R> {
     fn get(&mut self, bytes: &mut [u8]) -> Result<(), String> {
-        for piece in bytes.chunks_mut(PIECE) {
-            self.inner.read_exact(piece).map_err(|e| match e.kind() {
+        for chunk in bytes.chunks_mut(CHUNK_BYTES) {
+            self.inner.read_exact(chunk).map_err(|e| match e.kind() {
                 io::ErrorKind::UnexpectedEof => "the file ends too early".to_string(),
                 _ => e.to_string(),
             })?;
-            self.crc.update(piece);
+            self.crc.update(chunk);
         }
         Ok(())
     }

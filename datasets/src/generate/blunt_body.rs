@@ -17,7 +17,7 @@
 //! 61 K, 0.031 kg/m³).
 //! The densities are from 0.05 (wake) to 6 times the free stream's.
 
-use super::cell_average::Layered;
+use super::cell_average::LayeredFlow;
 use super::flow::{Fields, Flow, FlowError};
 use super::gas_dynamics::bow_shock::{BowShock, Nose};
 use super::gas_dynamics::normal_shock::{jump, pitot_pressure, stagnation_density};
@@ -193,7 +193,7 @@ fn smooth(t: f64) -> f64 {
     t * t * (3.0 - 2.0 * t)
 }
 
-impl Layered for Layers {
+impl LayeredFlow for Layers {
     const QUANTITIES: usize = 3;
 
     fn r_m(&self, y_m: f64, z_m: f64) -> f64 {

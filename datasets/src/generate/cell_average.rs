@@ -13,7 +13,7 @@ const SUBDIVISIONS: usize = 8;
 const GAUSS: [f64; 2] = [-0.577_350_269_189_625_8, 0.577_350_269_189_625_8];
 
 /// A flow about a body that is either plane (`r` = y) or revolved about x (`r` = distance to the x axis).
-pub(crate) trait Layered: Sync {
+pub(crate) trait LayeredFlow: Sync {
     /// Quantities per point.
     const QUANTITIES: usize;
     /// The distance that the flow depends on.
@@ -26,7 +26,7 @@ pub(crate) trait Layered: Sync {
 
 /// Means over the boxes of a row, and the share of each box that is gas. `sums` has `QUANTITIES + 1` rows; the last is the
 /// gas fraction. Means of boxes without gas are NaN.
-pub(crate) fn average_row<F: Layered>(
+pub(crate) fn average_row<F: LayeredFlow>(
     flow: &F,
     first_m: DVec3,
     spacing_m: DVec3,
@@ -99,7 +99,15 @@ fn midpoints() -> [f64; SUBDIVISIONS] {
 }
 
 /// Adds the integrals along x, box by box, of the line at `r`.
-fn add_line<F: Layered>(flow: &F, r: f64, first: f64, spacing: f64, n: usize, fine: bool, s: &mut Scratch) {
+fn add_line<F: LayeredFlow>(
+    flow: &F,
+    r: f64,
+    first: f64,
+    spacing: f64,
+    n: usize,
+    fine: bool,
+    s: &mut Scratch,
+) {
     let q = F::QUANTITIES;
     let jumps = flow.jumps_m(r);
     for i in (0..n).filter(|&i| s.fine[i] == fine) {
@@ -128,7 +136,7 @@ mod tests {
 
     /// Density 2 within a ball, 1 outside; solid within half its radius.
     struct Ball;
-    impl Layered for Ball {
+    impl LayeredFlow for Ball {
         const QUANTITIES: usize = 1;
         fn r_m(&self, y: f64, z: f64) -> f64 {
             y.hypot(z)

@@ -2,7 +2,7 @@
 //!
 //! The apex is the origin, the axis x. The flow is exact up to the end of the cone, where the lattice ends.
 
-use super::cell_average::Layered;
+use super::cell_average::LayeredFlow;
 use super::flow::{Fields, Flow, FlowError};
 use super::gas_dynamics::taylor_maccoll::{ConeFlow, cone_flow};
 use super::gas_dynamics::{FreeStream, GAMMA_AIR};
@@ -57,7 +57,7 @@ struct Layers {
     cone: ConeFlow,
 }
 
-impl Layered for Layers {
+impl LayeredFlow for Layers {
     const QUANTITIES: usize = 3;
 
     fn r_m(&self, y_m: f64, z_m: f64) -> f64 {

@@ -6,7 +6,7 @@
 //! Prandtl and Meyer. The lattice ends before the fan reaches the shock and bends it, so all of it is exact; values are
 //! means over boxes.
 
-use super::cell_average::{Layered, Scratch, average_row};
+use super::cell_average::{LayeredFlow, Scratch, average_row};
 use super::flow::{Fields, Flow, FlowError, names};
 use super::gas_dynamics::theta_beta_m::{Branch, ObliqueShock, oblique_shock};
 use super::gas_dynamics::{FreeStream, GAMMA_AIR, isentropic, prandtl_meyer};
@@ -81,7 +81,7 @@ impl Wedge {
 }
 
 /// Density, and with [`Fields::All`] temperature, pressure and gas fraction, as means over boxes.
-pub(crate) fn fill_gas<F: Layered>(flow: &mut Flow, layers: &F, fields: Fields) {
+pub(crate) fn fill_gas<F: LayeredFlow>(flow: &mut Flow, layers: &F, fields: Fields) {
     let (origin, spacing, n) = (flow.origin_m, flow.spacing_m, flow.dims.x as usize);
     let all = [
         (names::DENSITY, "kg/m³"),
@@ -173,7 +173,7 @@ fn ratios_at(mach: f64) -> [f64; 3] {
     [isentropic::density, isentropic::temperature, isentropic::pressure].map(|f| f(GAMMA_AIR, mach))
 }
 
-impl Layered for Wave {
+impl LayeredFlow for Wave {
     const QUANTITIES: usize = 3;
 
     fn r_m(&self, y_m: f64, _: f64) -> f64 {

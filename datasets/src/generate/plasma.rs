@@ -9,7 +9,7 @@
 use super::noise::{Noise, RowScratch};
 use super::polylines::{Line, Polylines};
 use super::random::Random;
-use super::streamline::{Tracing, trace};
+use super::streamline::{StreamlineOptions, trace};
 use crate::isosurface::{IsosurfaceError, Isosurfaces, Options, PlaneSource, extract_streamed};
 use crate::view::View;
 use glam::{DVec2, DVec3, UVec3};
@@ -92,7 +92,7 @@ impl Plasma {
             let (low, high) = (DVec3::new(0.0, 0.0, -0.5), DVec3::new(2.0, 1.0, 0.5));
             let step = |p: DVec3| (p.cmpge(low).all() && p.cmple(high).all()).then_some(0.006);
             let follow = |sign: f64| {
-                let tracing = Tracing { max_points: 400, sign, min_speed: 1e-9 };
+                let tracing = StreamlineOptions { max_points: 400, sign, min_speed: 1e-9 };
                 trace(|p| self.magnetic_field(p), seed, step, tracing)
             };
             let mut points = follow(-1.0);

@@ -6,7 +6,7 @@
 
 use super::polylines::{Line, Polylines};
 use super::random::{Random, fibonacci_direction};
-use super::streamline::{Tracing, trace};
+use super::streamline::{StreamlineOptions, trace};
 use crate::view::View;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -59,7 +59,7 @@ impl StarField {
     pub fn lines(&self, count: usize) -> Polylines {
         let line = |i: usize| -> Line {
             let seed = fibonacci_direction(i, count);
-            let tracing = Tracing {
+            let tracing = StreamlineOptions {
                 max_points: 5000,
                 sign: if self.at(seed).dot(seed) < 0.0 { -1.0 } else { 1.0 },
                 min_speed: 1e-12,

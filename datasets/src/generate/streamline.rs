@@ -7,7 +7,7 @@ use glam::DVec3;
 
 /// How to follow a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tracing {
+pub struct StreamlineOptions {
     /// Most points of a line.
     pub max_points: usize,
     /// Along the field (1) or against it (-1).
@@ -22,7 +22,7 @@ pub fn trace(
     field: impl Fn(DVec3) -> DVec3,
     seed: DVec3,
     step: impl Fn(DVec3) -> Option<f64>,
-    tracing: Tracing,
+    tracing: StreamlineOptions,
 ) -> Vec<DVec3> {
     let direction = |p: DVec3| -> Option<DVec3> {
         let v = field(p) * tracing.sign;
@@ -57,13 +57,15 @@ mod tests {
         DVec3::new(-p.y, p.x, 0.0) * 17.0
     }
 
-    const FORWARD: Tracing = Tracing { max_points: usize::MAX, sign: 1.0, min_speed: 1e-9 };
+    const FORWARD: StreamlineOptions =
+        StreamlineOptions { max_points: usize::MAX, sign: 1.0, min_speed: 1e-9 };
 
     #[test]
     fn error_on_a_circle_falls_with_the_fourth_power_of_the_step() {
         let error = |n: usize| {
             let h = std::f64::consts::TAU / n as f64;
-            let line = trace(rotation, DVec3::X, |_| Some(h), Tracing { max_points: n + 1, ..FORWARD });
+            let line =
+                trace(rotation, DVec3::X, |_| Some(h), StreamlineOptions { max_points: n + 1, ..FORWARD });
             line[n].distance(DVec3::X)
         };
         // With fewer steps two error terms of opposite sign hide the order.
@@ -74,15 +76,16 @@ mod tests {
 
     #[test]
     fn backward_undoes_forward() {
-        let there = trace(rotation, DVec3::X, |_| Some(0.01), Tracing { max_points: 101, ..FORWARD });
-        let back = Tracing { max_points: 101, sign: -1.0, ..FORWARD };
+        let there =
+            trace(rotation, DVec3::X, |_| Some(0.01), StreamlineOptions { max_points: 101, ..FORWARD });
+        let back = StreamlineOptions { max_points: 101, sign: -1.0, ..FORWARD };
         assert!(trace(rotation, there[100], |_| Some(0.01), back)[100].distance(DVec3::X) < 1e-10);
     }
 
     #[test]
     fn lines_end_at_stagnation_nan_and_border() {
         let sink = |p: DVec3| -p;
-        let line = trace(sink, DVec3::X, |_| Some(0.09), Tracing { min_speed: 0.2, ..FORWARD });
+        let line = trace(sink, DVec3::X, |_| Some(0.09), StreamlineOptions { min_speed: 0.2, ..FORWARD });
         assert!((5..12).contains(&line.len()), "{}", line.len());
         assert_eq!(trace(|_| DVec3::NAN, DVec3::X, |_| Some(0.1), FORWARD), [DVec3::X]);
         let inside = |p: DVec3| (p.x < 2.0).then_some(0.25);

@@ -102,10 +102,10 @@ pub fn extract(grid: &Grid, isos: &[f64], options: Options) -> Result<Isosurface
     arrays.allocate(vertices, triangles)?;
 
     // Second pass.
-    let mut rest = arrays.unfilled(0, 0);
+    let mut rest = arrays.remaining_output(0, 0);
     let mut jobs = Vec::new();
     for ((cut, counts), first) in cuts.iter().zip(&counts).zip(&first_vertices) {
-        for range in jobs_of(0..planes) {
+        for range in split_planes(0..planes) {
             let out = rest.take(&counts[range.clone()]);
             jobs.push((cut, first[range.start..=range.end].to_vec(), range, out));
         }
@@ -187,13 +187,13 @@ fn cuts(isos: &[f64], placement: &Placement) -> Result<Vec<Cut>, IsosurfaceError
 
 /// Splits planes into jobs. Every job computes the bits of one extra plane, so jobs are as long as balance allows; the
 /// result does not depend on the split.
-fn jobs_of(planes: Range<usize>) -> Vec<Range<usize>> {
+fn split_planes(planes: Range<usize>) -> Vec<Range<usize>> {
     let length = (planes.len() / (4 * rayon::current_num_threads())).clamp(1, 16);
     planes.clone().step_by(length).map(|a| a..(a + length).min(planes.end)).collect()
 }
 
 fn count_planes(block: &Block<'_>, cut: &Cut, planes: Range<usize>) -> Vec<PlaneCount> {
-    jobs_of(planes).into_par_iter().flat_map_iter(|range| slab::count(block, cut, range)).collect()
+    split_planes(planes).into_par_iter().flat_map_iter(|range| slab::count(block, cut, range)).collect()
 }
 
 /// Ids of every plane's first vertex, and one after the last plane; `next` goes on counting. Ids past u32 wrap here:
@@ -217,7 +217,7 @@ struct Arrays {
 }
 
 /// The part of the result that no job has yet.
-struct Unfilled<'a> {
+struct RemainingOutput<'a> {
     positions: &'a mut [Vec3],
     normals: Option<&'a mut [Vec3]>,
     triangles: &'a mut [[u32; 3]],
@@ -249,8 +249,8 @@ impl Arrays {
         Ok(())
     }
 
-    fn unfilled(&mut self, first_vertex: usize, first_triangle: usize) -> Unfilled<'_> {
-        Unfilled {
+    fn remaining_output(&mut self, first_vertex: usize, first_triangle: usize) -> RemainingOutput<'_> {
+        RemainingOutput {
             positions: &mut self.positions[first_vertex..],
             normals: self.normals.as_mut().map(|n| &mut n[first_vertex..]),
             triangles: &mut self.triangles[first_triangle..],
@@ -265,7 +265,7 @@ impl Arrays {
     }
 }
 
-impl<'a> Unfilled<'a> {
+impl<'a> RemainingOutput<'a> {
     /// Takes the part that planes with these counts fill.
     fn take(&mut self, counts: &[PlaneCount]) -> Output<'a> {
         let vertices = counts.iter().map(|c| c.vertices as usize).sum();

@@ -3,7 +3,7 @@
 
 use super::inside_bits::Block;
 use super::{
-    Arrays, IsosurfaceError, Isosurfaces, Options, Placement, count_planes, cuts, jobs_of, prefix, slab,
+    Arrays, IsosurfaceError, Isosurfaces, Options, Placement, count_planes, cuts, prefix, slab, split_planes,
 };
 use glam::{DVec3, UVec3};
 use rayon::prelude::*;
@@ -82,8 +82,8 @@ pub fn extract_streamed(
         result.skipped_cells += counts.iter().map(|c| c.skipped_cells as u64).sum::<u64>();
         arrays.allocate(vertices, triangles)?;
 
-        let mut rest = arrays.unfilled(old_vertices, old_triangles);
-        let jobs: Vec<_> = jobs_of(range.clone())
+        let mut rest = arrays.remaining_output(old_vertices, old_triangles);
+        let jobs: Vec<_> = split_planes(range.clone())
             .into_iter()
             .map(|r| (rest.take(&counts[r.start - start..r.end - start]), r))
             .collect();

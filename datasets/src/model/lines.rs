@@ -1,6 +1,6 @@
 //! Polylines for tubes and points for spheres.
 
-use super::surface::Hidden;
+use super::surface::GhostFlags;
 use super::{Attributes, CellType, ColorBy, Dataset, ModelError, Points};
 use glam::DVec3;
 
@@ -31,7 +31,7 @@ impl Dataset {
         let (mut lines, mut dropped) = (Vec::new(), 0);
         for leaf in self.leaves() {
             let mut add = |points: &Points, attributes: &Attributes, cell: usize, ids: &[u32]| {
-                if Hidden::new(attributes).cell(cell) {
+                if GhostFlags::new(attributes).cell(cell) {
                     return;
                 }
                 if ids.len() < 2 || ids.iter().any(|&k| k as usize >= points.len()) {

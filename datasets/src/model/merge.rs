@@ -64,7 +64,7 @@ fn join_arrays(
     out
 }
 
-fn one_after_the_other(arrays: &[&DataArray]) -> Option<DataArray> {
+fn concatenate_arrays(arrays: &[&DataArray]) -> Option<DataArray> {
     let mut out = arrays[0].clone();
     arrays[1..].iter().for_each(|a| out.values.append(&a.values));
     Some(out)
@@ -79,16 +79,16 @@ fn with_arrays(all: &[&Attributes], point: Vec<DataArray>, cell: Vec<DataArray>)
     Attributes { point, cell, ..all[0].clone() }
 }
 
-fn points_in_a_row(pieces: &[Dataset], warnings: &mut Vec<String>) -> Vec<DataArray> {
+fn concatenate_points(pieces: &[Dataset], warnings: &mut Vec<String>) -> Vec<DataArray> {
     let all = attributes_of(pieces);
     let lists: Vec<&[DataArray]> = all.iter().map(|a| a.point.as_slice()).collect();
-    join_arrays(&lists, "point", warnings, one_after_the_other)
+    join_arrays(&lists, "point", warnings, concatenate_arrays)
 }
 
 fn merge_poly(pieces: &[Dataset], warnings: &mut Vec<String>) -> Dataset {
     let parts: Vec<&PolyData> =
         pieces.iter().filter_map(|p| if let Dataset::PolyData(d) = p { Some(d) } else { None }).collect();
-    let point = points_in_a_row(pieces, warnings);
+    let point = concatenate_points(pieces, warnings);
     let mut out = PolyData { points: parts[0].points.clone(), ..Default::default() };
     let mut shift = 0;
     for (i, d) in parts.iter().enumerate() {
@@ -146,8 +146,8 @@ fn merge_unstructured(pieces: &[Dataset], warnings: &mut Vec<String>) -> Dataset
     }
     let all = attributes_of(pieces);
     let lists: Vec<&[DataArray]> = all.iter().map(|a| a.cell.as_slice()).collect();
-    let cell = join_arrays(&lists, "cell", warnings, one_after_the_other);
-    let point = points_in_a_row(pieces, warnings);
+    let cell = join_arrays(&lists, "cell", warnings, concatenate_arrays);
+    let point = concatenate_points(pieces, warnings);
     out.attributes = with_arrays(&all, point, cell);
     Dataset::UnstructuredGrid(out)
 }
@@ -201,7 +201,7 @@ fn merge_lattices(mut pieces: Vec<Dataset>, warnings: &mut Vec<String>) -> Resul
     let all = attributes_of(&pieces);
     let gather = |map: &[(u32, usize)], arrays: &[&DataArray]| -> Option<DataArray> {
         // Piece by piece into one array first, so that the types agree; then the values in their order.
-        let joined = one_after_the_other(arrays)?;
+        let joined = concatenate_arrays(arrays)?;
         let starts: Vec<usize> = arrays
             .iter()
             .scan(0, |n, a| {

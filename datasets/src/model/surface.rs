@@ -1,6 +1,6 @@
 //! The outer surface of any data set as one triangle mesh.
 
-use super::outer_faces::{Faces, OuterFaces};
+use super::boundary_faces::{BoundaryFaces, Faces};
 use super::polygon::{Division, triangulate};
 use super::{
     Attributes, CellType, Cells, ColorBy, DataArray, Dataset, ModelError, PolyData, UnstructuredGrid,
@@ -240,7 +240,7 @@ impl Builder {
         let from = self.source(&d.attributes);
         let n = d.points.len();
         self.vertex_of_point.resize(n, Cells::NO_POINT);
-        let hidden = Hidden::new(&d.attributes);
+        let hidden = GhostFlags::new(&d.attributes);
         let at = |i: usize| d.points.get(i);
         let first_poly = d.verts.len() + d.lines.len();
         self.report.line_and_point_cells += first_poly;
@@ -264,10 +264,10 @@ impl Builder {
         let from = self.source(&d.attributes);
         let n = d.points.len();
         self.vertex_of_point.resize(n, Cells::NO_POINT);
-        let hidden = Hidden::new(&d.attributes);
+        let hidden = GhostFlags::new(&d.attributes);
         let at = |i: usize| d.points.get(i);
 
-        let outside = OuterFaces::find(d, &hidden);
+        let outside = BoundaryFaces::find(d, &hidden);
         let mut outer: Vec<Vec<u32>> = Vec::new();
         for cell in 0..d.cells.len() {
             let ids = d.cells.get(cell);
@@ -321,7 +321,7 @@ impl Builder {
         at: impl Fn(usize, usize, usize) -> DVec3,
     ) {
         let from = self.source(attributes);
-        let hidden = Hidden::new(attributes);
+        let hidden = GhostFlags::new(attributes);
         let Some((points, cells)) = lattice_counts(dims) else { return };
         if points == 0 {
             return;
@@ -350,7 +350,7 @@ impl Builder {
     fn lattice_faces(
         &mut self,
         dims: [usize; 3],
-        hidden: &Hidden<'_>,
+        hidden: &GhostFlags<'_>,
         at: &dyn Fn(usize) -> DVec3,
         from: &Source<'_>,
     ) {
@@ -358,7 +358,7 @@ impl Builder {
         let stride = [1, dims[0], dims[0] * dims[1]];
         let cell_stride = [1, cells[0], cells[0] * cells[1]];
         let blank = |cell: usize, low: usize| {
-            hidden.blanked(cell)
+            hidden.is_blanked(cell)
                 || hidden.any_points()
                     && (0..8).any(|c: usize| {
                         let step = (0..3)
@@ -445,14 +445,14 @@ impl Builder {
 const MAX_BARE_LATTICE_POINTS: u64 = 1 << 20;
 
 /// The points and cells that `vtkGhostType` hides.
-pub(super) struct Hidden<'a> {
+pub(super) struct GhostFlags<'a> {
     cells: Option<&'a DataArray>,
     points: Option<&'a DataArray>,
 }
 
-impl<'a> Hidden<'a> {
+impl<'a> GhostFlags<'a> {
     pub(super) fn new(a: &'a Attributes) -> Self {
-        Hidden { cells: a.cell_array("vtkGhostType"), points: a.point_array("vtkGhostType") }
+        GhostFlags { cells: a.cell_array("vtkGhostType"), points: a.point_array("vtkGhostType") }
     }
     fn none(&self) -> bool {
         self.cells.is_none() && self.points.is_none()
@@ -465,7 +465,7 @@ impl<'a> Hidden<'a> {
         self.has(i, HIDDEN_CELL | COPIED_CELL)
     }
     /// Hidden: as if it were not there.
-    pub(super) fn blanked(&self, i: usize) -> bool {
+    pub(super) fn is_blanked(&self, i: usize) -> bool {
         self.has(i, HIDDEN_CELL)
     }
     fn has(&self, i: usize, bits: u8) -> bool {

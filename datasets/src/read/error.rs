@@ -169,7 +169,7 @@ pub(crate) fn io_error(path: &Path, source: std::io::Error) -> ReadError {
 
 /// A file that another file names, as a path beside it. A name that is absolute or climbs out of the directory is allowed:
 /// the formats allow it and the user opened the file.
-pub(crate) fn beside(path: &Path, name: &str) -> PathBuf {
+pub(crate) fn sibling_path(path: &Path, name: &str) -> PathBuf {
     path.parent().unwrap_or(Path::new("")).join(name.trim())
 }
 

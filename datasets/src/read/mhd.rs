@@ -2,9 +2,9 @@
 //!
 //! Source: the MetaIO documentation at itk.org/Wiki/MetaIO/Documentation.
 
-use super::error::{At, BROKEN, Cursor, Fault, beside, read_bytes};
+use super::error::{At, BROKEN, Cursor, Fault, read_bytes, sibling_path};
 use super::volume::{Packing, Volume};
-use super::{Content, Opened, ReadError};
+use super::{Content, LoadedFile, ReadError};
 use crate::model::{Endian, ScalarType};
 use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;
@@ -13,12 +13,12 @@ use std::path::Path;
 pub(crate) const FORMAT: &str = "MetaImage";
 
 /// Reads a `.mha` file, or a `.mhd` header with its data file.
-pub fn read(path: &Path) -> Result<Opened, ReadError> {
+pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     read_from_bytes(path, &read_bytes(path)?)
 }
 
 /// Reads the content of a file; the data file is looked for beside `path`.
-pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
+pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     let fault = |f: Fault| f.in_file(path, FORMAT);
     let mut warnings = Vec::new();
     let (header, body) = Header::parse(bytes).map_err(fault)?;
@@ -37,10 +37,10 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
         let cure = "write it again as one file";
         return Err(fault(Fault::unsupported(At::Field("ElementDataFile".into()), what, cure)));
     } else {
-        let file = beside(path, name);
+        let file = sibling_path(path, name);
         read(&read_bytes(&file)?, &mut warnings).map_err(|f| f.in_file(&file, FORMAT))?
     };
-    Ok(Opened { format: FORMAT, content: Content::Data(data), warnings, time_steps: Vec::new() })
+    Ok(LoadedFile { format: FORMAT, content: Content::Data(data), warnings, time_steps: Vec::new() })
 }
 
 struct Header {

@@ -1,7 +1,7 @@
 //! Readers for the files that users have. [`open`] finds the format by the name and by the content.
 //!
 //! Rules all readers keep: input never makes them panic; memory is taken only for sizes that the bytes of the file can
-//! justify; what is left out is named in [`Opened::warnings`]; every error names the file, the place and the cure.
+//! justify; what is left out is named in [`LoadedFile::warnings`]; every error names the file, the place and the cure.
 
 pub(crate) mod base64;
 pub mod csv;
@@ -32,7 +32,7 @@ use std::path::PathBuf;
 
 /// What a file held.
 #[derive(Debug, Clone)]
-pub struct Opened {
+pub struct LoadedFile {
     /// Name of the format, for messages.
     pub format: &'static str,
     /// The data.
@@ -64,7 +64,7 @@ pub struct TimeStep {
     pub path: PathBuf,
 }
 
-impl Opened {
+impl LoadedFile {
     /// The data set; an error for a scene, which has meshes only.
     pub fn dataset(&self) -> Result<&Dataset, ModelError> {
         match &self.content {

@@ -2,9 +2,9 @@
 //!
 //! Source: the definition of the format at teem.sourceforge.net/nrrd/format.html.
 
-use super::error::{At, BROKEN, Cursor, Fault, beside, read_bytes};
+use super::error::{At, BROKEN, Cursor, Fault, read_bytes, sibling_path};
 use super::volume::{Packing, Volume};
-use super::{Content, Opened, ReadError};
+use super::{Content, LoadedFile, ReadError};
 use crate::model::{Endian, ScalarType};
 use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;
@@ -13,12 +13,12 @@ use std::path::Path;
 pub(crate) const FORMAT: &str = "NRRD";
 
 /// Reads a `.nrrd` file, or a `.nhdr` header with the data file it names.
-pub fn read(path: &Path) -> Result<Opened, ReadError> {
+pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     read_from_bytes(path, &read_bytes(path)?)
 }
 
 /// Reads the content of a file; a detached data file is looked for beside `path`.
-pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
+pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     let fault = |f: Fault| f.in_file(path, FORMAT);
     let mut warnings = Vec::new();
     let (header, body) = Header::parse(bytes).map_err(fault)?;
@@ -36,7 +36,7 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
                 let cure = "join them into one file, for example with `unu join` or `unu save`";
                 return Err(fault(Fault::unsupported(At::Field("data file".into()), what, cure)));
             }
-            let file = beside(path, name);
+            let file = sibling_path(path, name);
             let bytes = read_bytes(&file)?;
             let read = header
                 .skip(&bytes, &volume, packing)
@@ -44,7 +44,7 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
             read.map_err(|f| f.in_file(&file, FORMAT))?
         }
     };
-    Ok(Opened { format: FORMAT, content: Content::Data(data), warnings, time_steps: Vec::new() })
+    Ok(LoadedFile { format: FORMAT, content: Content::Data(data), warnings, time_steps: Vec::new() })
 }
 
 struct Header {

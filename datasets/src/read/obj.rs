@@ -1,8 +1,8 @@
 //! Wavefront OBJ with its materials (MTL), by way of the crate `tobj`.
 
-use super::error::{At, BROKEN, Fault, beside, read_bytes};
+use super::error::{At, BROKEN, Fault, read_bytes, sibling_path};
 use super::scene::{SceneMesh, SceneModel, SurfaceMaterial, decode_texture};
-use super::{Content, Opened, ReadError};
+use super::{Content, LoadedFile, ReadError};
 use crate::model::polygon::{Division, triangulate};
 use glam::{DVec3, Vec2, Vec3};
 use rt_core::mesh::{Attribute, TriMesh};
@@ -12,12 +12,12 @@ use std::path::Path;
 pub(crate) const FORMAT: &str = "OBJ";
 
 /// Reads a `.obj` file, the material files it names and the pictures those name.
-pub fn read(path: &Path) -> Result<Opened, ReadError> {
+pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     read_from_bytes(path, &read_bytes(path)?)
 }
 
 /// Reads the content of an `.obj` file; other files are looked for beside `path`.
-pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
+pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     let warnings = RefCell::new(Vec::new());
     let options = tobj::LoadOptions {
         single_index: true,
@@ -26,7 +26,7 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
         ..Default::default()
     };
     let load_material = |name: &Path| {
-        let file = beside(path, &name.to_string_lossy());
+        let file = sibling_path(path, &name.to_string_lossy());
         match std::fs::read(&file) {
             Ok(text) => tobj::load_mtl_buf(&mut text.as_slice()),
             Err(e) => {
@@ -70,7 +70,7 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
     if fanned > 0 {
         warnings.push(format!("{fanned} faces cross themselves or are too large, and were divided as a fan"));
     }
-    Ok(Opened { format: FORMAT, content: Content::Scene(scene), warnings, time_steps: Vec::new() })
+    Ok(LoadedFile { format: FORMAT, content: Content::Scene(scene), warnings, time_steps: Vec::new() })
 }
 
 /// The first number of a face with more digits than 32 bits have, and its line. `tobj` 4.0.5 (`add_vertex`) multiplies
@@ -150,7 +150,7 @@ fn add_material(m: &tobj::Material, path: &Path, scene: &mut SceneModel, warning
     };
     if let Some(name) = &m.diffuse_texture {
         // Options such as `-s 1 1 1` may come before the name.
-        let file = beside(path, name.split_whitespace().next_back().unwrap_or(name));
+        let file = sibling_path(path, name.split_whitespace().next_back().unwrap_or(name));
         let picture =
             std::fs::read(&file).map_err(|e| e.to_string()).and_then(|b| decode_texture(name, &b, true));
         match picture {

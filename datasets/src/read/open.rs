@@ -1,7 +1,7 @@
 //! Finding out what a file is: by its first bytes, else by the ending of its name.
 
 use super::error::{io_error, read_bytes};
-use super::{Opened, ReadError, gltf, mhd, nrrd, obj, plot3d, ply, raw, stl, vtk_legacy, vtk_xml};
+use super::{LoadedFile, ReadError, gltf, mhd, nrrd, obj, plot3d, ply, raw, stl, vtk_legacy, vtk_xml};
 use std::io::Read;
 use std::path::Path;
 
@@ -39,7 +39,7 @@ enum Format {
 /// assert_eq!((opened.format, mesh.num_triangles(), report.dropped()), ("STL", 1, 0));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn open(path: impl AsRef<Path>) -> Result<Opened, ReadError> {
+pub fn open(path: impl AsRef<Path>) -> Result<LoadedFile, ReadError> {
     let path = path.as_ref();
     let mut head = Vec::new();
     let file = std::fs::File::open(path).map_err(|e| io_error(path, e))?;

@@ -3,22 +3,22 @@
 //! Source: Greg Turk's description of the format (1994).
 
 use super::error::{At, BROKEN, Cursor, Fault, TRUNCATED, fits, read_bytes};
-use super::{Content, Opened, ReadError};
+use super::{Content, LoadedFile, ReadError};
 use crate::model::{Cells, DataArray, Dataset, Endian, Points, PolyData, ScalarType, Values};
 use std::path::Path;
 
 pub(crate) const FORMAT: &str = "PLY";
 
 /// Reads a `.ply` file.
-pub fn read(path: &Path) -> Result<Opened, ReadError> {
+pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     read_from_bytes(path, &read_bytes(path)?)
 }
 
 /// Reads the content of a `.ply` file; `path` is for messages only.
-pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
+pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     let mut warnings = Vec::new();
     let data = parse(bytes, &mut warnings).map_err(|f| f.in_file(path, FORMAT))?;
-    Ok(Opened {
+    Ok(LoadedFile {
         format: FORMAT,
         content: Content::Data(Dataset::PolyData(data)),
         warnings,

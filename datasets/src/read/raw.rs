@@ -16,7 +16,7 @@
 
 use super::error::{At, BROKEN, Fault, io_error, read_bytes};
 use super::volume::Volume;
-use super::{Content, Opened, ReadError};
+use super::{Content, LoadedFile, ReadError};
 use crate::model::{Endian, ScalarType};
 use glam::{DMat3, DVec3};
 use serde::Deserialize;
@@ -74,9 +74,9 @@ fn one_component() -> u64 {
 }
 
 /// Reads a raw volume; `path` is the file with the numbers or its description.
-pub fn read(path: &Path) -> Result<Opened, ReadError> {
+pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     let is_description = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
-    let description_path = if is_description { Some(path.to_path_buf()) } else { description_beside(path) };
+    let description_path = if is_description { Some(path.to_path_buf()) } else { sibling_description(path) };
     let Some(description_path) = description_path else {
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let Some(description) = from_file_name(&name) else {
@@ -97,7 +97,7 @@ pub fn read(path: &Path) -> Result<Opened, ReadError> {
     let text = String::from_utf8_lossy(&read_bytes(&description_path)?).into_owned();
     let description = parse_description(&text).map_err(|f| f.in_file(&description_path, FORMAT))?;
     let file = match &description.file {
-        Some(f) => super::error::beside(&description_path, &f.to_string_lossy()),
+        Some(f) => super::error::sibling_path(&description_path, &f.to_string_lossy()),
         None if is_description => path.with_extension("raw"),
         None => path.to_path_buf(),
     };
@@ -116,7 +116,7 @@ pub(crate) fn parse_description(text: &str) -> Result<RawDescription, Fault> {
     })
 }
 
-fn description_beside(path: &Path) -> Option<PathBuf> {
+fn sibling_description(path: &Path) -> Option<PathBuf> {
     let mut long = path.as_os_str().to_owned();
     long.push(".toml");
     [path.with_extension("toml"), PathBuf::from(long)].into_iter().find(|p| p.is_file())
@@ -144,7 +144,7 @@ pub fn from_file_name(name: &str) -> Option<RawDescription> {
     })
 }
 
-fn read_values(path: &Path, d: &RawDescription) -> Result<Opened, ReadError> {
+fn read_values(path: &Path, d: &RawDescription) -> Result<LoadedFile, ReadError> {
     let fault = |f: Fault| f.in_file(path, FORMAT);
     let Some(kind) = scalar_type(&d.scalar_type) else {
         let what = format!("`{}`", d.scalar_type);
@@ -178,7 +178,7 @@ fn read_values(path: &Path, d: &RawDescription) -> Result<Opened, ReadError> {
         ));
     }
     let data = volume.read_stream(file, available).map_err(fault)?;
-    Ok(Opened { format: FORMAT, content: Content::Data(data), warnings, time_steps: Vec::new() })
+    Ok(LoadedFile { format: FORMAT, content: Content::Data(data), warnings, time_steps: Vec::new() })
 }
 
 fn scalar_type(name: &str) -> Option<ScalarType> {

@@ -3,7 +3,7 @@
 //! The format repeats every corner for each triangle; without welding no normal could be smooth and no edge shared.
 
 use super::error::{At, BROKEN, Cursor, Fault, TRUNCATED, read_bytes};
-use super::{Content, Opened, ReadError};
+use super::{Content, LoadedFile, ReadError};
 use crate::model::{Cells, DataArray, Dataset, Points, PolyData, Values};
 use std::collections::HashMap;
 use std::path::Path;
@@ -15,18 +15,18 @@ const HEADER_BYTES: usize = 80;
 const TRIANGLE_BYTES: usize = 50;
 
 /// Reads a `.stl` file.
-pub fn read(path: &Path) -> Result<Opened, ReadError> {
+pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     read_from_bytes(path, &read_bytes(path)?)
 }
 
 /// Reads the content of a `.stl` file; `path` is for messages only.
-pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
+pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     let mut warnings = Vec::new();
     // Binary files may begin with `solid` too, so the size decides.
     let text = bytes.trim_ascii_start().starts_with(b"solid") && !has_binary_size(bytes);
     let data = if text { text_triangles(bytes) } else { binary_triangles(bytes, &mut warnings) };
     let data = data.map_err(|f| f.in_file(path, FORMAT))?;
-    Ok(Opened {
+    Ok(LoadedFile {
         format: FORMAT,
         content: Content::Data(Dataset::PolyData(data)),
         warnings,

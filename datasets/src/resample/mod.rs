@@ -16,7 +16,7 @@ mod shape;
 mod smooth;
 
 pub use mesh::{Mesh, Plane};
-pub use report::{Report, SampleBack};
+pub use report::{Report, ResamplingError};
 pub use revolve::{revolve, revolved_bounds};
 pub use smooth::smooth;
 
@@ -201,7 +201,7 @@ impl Default for Options {
 
 /// Values on a lattice.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Resampled {
+pub struct ResampledField {
     /// Where.
     pub lattice: Lattice,
     /// Values at the nodes, x fastest; NaN where the mark is not [`Mark::Inside`].
@@ -239,7 +239,7 @@ pub fn resample(
     samples: Samples<'_>,
     lattice: &Lattice,
     options: &Options,
-) -> Result<Resampled, ResampleError> {
+) -> Result<ResampledField, ResampleError> {
     if !(1..=MAX_SAMPLES).contains(&options.samples_per_axis) {
         return Err(ResampleError::Option {
             option: "samples per axis",
@@ -268,9 +268,9 @@ pub fn resample(
     };
     let (values, marks, counts) =
         rasterize::rasterize(mesh, points, cells, lattice, options.samples_per_axis);
-    let back = report::sample_back(mesh, samples, lattice, &values);
+    let back = report::resampling_error(mesh, samples, lattice, &values);
     let report = Report::new(mesh, &marks, counts, back);
-    Ok(Resampled { lattice: *lattice, values, marks, report })
+    Ok(ResampledField { lattice: *lattice, values, marks, report })
 }
 
 #[cfg(test)]

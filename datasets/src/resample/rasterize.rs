@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// A point this far outside, in units of the cell, is inside: rounding in the inversion, with 1e3 to spare.
-pub(super) const INSIDE: f64 = 1e-9;
+pub(super) const INSIDE_TOLERANCE: f64 = 1e-9;
 /// A point this far outside may lie in a gap between faces that do not match.
 const NEAR: f64 = 1e-3;
 
@@ -50,12 +50,12 @@ fn rank(mark: Mark) -> u8 {
 }
 
 /// The samples of a lattice with `n` per axis and node: index `i` stands at `(i + 0.5)/n − 0.5` nodes from the first node.
-struct Fine<'a> {
+struct FineLattice<'a> {
     lattice: &'a Lattice,
     n: usize,
 }
 
-impl Fine<'_> {
+impl FineLattice<'_> {
     fn coordinate(&self, axis: usize, i: usize) -> f64 {
         let nodes = if self.n == 1 { i as f64 } else { (i as f64 + 0.5) / self.n as f64 - 0.5 };
         self.lattice.origin[axis] + self.lattice.spacing[axis] * nodes
@@ -87,7 +87,7 @@ pub(super) fn rasterize(
     lattice: &Lattice,
     samples_per_axis: usize,
 ) -> (Vec<f32>, Vec<Mark>, Counts) {
-    let fine = Fine { lattice, n: samples_per_axis };
+    let fine = FineLattice { lattice, n: samples_per_axis };
 
     // Which layers each cell reaches into.
     let reach: Vec<Option<(u32, u32)>> = (0..mesh.num_cells())
@@ -143,7 +143,7 @@ pub(super) fn rasterize(
                     folded[cell].store(true, Ordering::Relaxed);
                 }
             }
-            let gaps = samples.iter().filter(|s| s.outside > INSIDE && s.outside <= NEAR).count();
+            let gaps = samples.iter().filter(|s| s.outside > INSIDE_TOLERANCE && s.outside <= NEAR).count();
             in_gaps.fetch_add(gaps, Ordering::Relaxed);
             reduce(&fine, k, &samples, values, marks);
         },
@@ -190,7 +190,7 @@ impl CellData<'_> {
     /// Fills in the samples of layer `k` that lie in the cell; whether any does, and whether the cell folds.
     fn visit(
         &self,
-        fine: &Fine<'_>,
+        fine: &FineLattice<'_>,
         k: usize,
         samples: &mut [Sample],
         scratch: &mut Scratch,
@@ -233,7 +233,7 @@ impl CellData<'_> {
                     } else {
                         own_mark
                     };
-                    let outside = if place.outside <= INSIDE { 0.0 } else { place.outside };
+                    let outside = if place.outside <= INSIDE_TOLERANCE { 0.0 } else { place.outside };
                     // Inside beats near; then what says more; then nearer; then the cell that came first.
                     let key = |outside: f64, mark: Mark| (outside == 0.0, rank(mark));
                     let (new, old) = (key(outside, mark), key(slot.outside, slot.mark));
@@ -249,7 +249,7 @@ impl CellData<'_> {
 
 /// Nodes of layer `k` from their samples: the mean of those with values when they are at least half, else what most of
 /// the others are.
-fn reduce(fine: &Fine<'_>, k: usize, samples: &[Sample], values: &mut [f32], marks: &mut [Mark]) {
+fn reduce(fine: &FineLattice<'_>, k: usize, samples: &[Sample], values: &mut [f32], marks: &mut [Mark]) {
     let n = fine.n;
     let width = fine.count(0);
     for (node, (value, mark)) in values.iter_mut().zip(marks).enumerate() {

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 /// Differences between the lattice, interpolated linearly, and the values the mesh has at its points (or cell centres).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct SampleBack {
+pub struct ResamplingError {
     /// Root mean square, in the unit of the values.
     pub rms: f64,
     /// Largest, in the unit of the values.
@@ -47,11 +47,11 @@ pub struct Report {
     /// Cells of higher order taken with their straight corners.
     pub straightened_cells: usize,
     /// The error.
-    pub back: SampleBack,
+    pub back: ResamplingError,
 }
 
 impl Report {
-    pub(super) fn new(mesh: &Mesh, marks: &[Mark], counts: Counts, back: SampleBack) -> Self {
+    pub(super) fn new(mesh: &Mesh, marks: &[Mark], counts: Counts, back: ResamplingError) -> Self {
         let of = |m: Mark| marks.par_iter().filter(|x| **x == m).count();
         Report {
             inside: of(Mark::Inside),
@@ -96,12 +96,12 @@ impl Report {
 /// Places compared in one task; fixed, so that sums do not depend on the number of threads.
 const CHUNK: usize = 1 << 14;
 
-pub(super) fn sample_back(
+pub(super) fn resampling_error(
     mesh: &Mesh,
     samples: Samples<'_>,
     lattice: &Lattice,
     values: &[f32],
-) -> SampleBack {
+) -> ResamplingError {
     let of_mesh = match samples {
         Samples::Points(v) | Samples::Cells(v) => v,
     };
@@ -144,7 +144,7 @@ pub(super) fn sample_back(
     let low = parts.iter().fold(f64::INFINITY, |a, p| a.min(p.range.0));
     let high = parts.iter().fold(f64::NEG_INFINITY, |a, p| a.max(p.range.1));
     let worst = parts.iter().fold((0.0, DVec3::ZERO), |a, p| if p.worst.0 > a.0 { p.worst } else { a });
-    SampleBack {
+    ResamplingError {
         rms: (squares / compared.max(1) as f64).sqrt(),
         max: worst.0,
         max_at: worst.1,

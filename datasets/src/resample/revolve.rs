@@ -5,7 +5,7 @@
 
 use super::mesh::Mesh;
 use super::report::{self, Report};
-use super::{Lattice, Mark, Options, ResampleError, Resampled, Samples, resample};
+use super::{Lattice, Mark, Options, ResampleError, ResampledField, Samples, resample};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -34,7 +34,7 @@ pub fn revolve(
     samples: Samples<'_>,
     lattice: &Lattice,
     options: &Options,
-) -> Result<Resampled, ResampleError> {
+) -> Result<ResampledField, ResampleError> {
     revolved_bounds(mesh)?;
     let (low, high) = mesh.bounds();
 
@@ -62,7 +62,7 @@ pub fn revolve(
             }
         },
     );
-    let back = report::sample_back(mesh, samples, lattice, &values);
+    let back = report::resampling_error(mesh, samples, lattice, &values);
     let of = |m: Mark| marks.iter().filter(|x| **x == m).count();
     let report = Report {
         inside: of(Mark::Inside),
@@ -72,11 +72,11 @@ pub fn revolve(
         back,
         ..flat.report
     };
-    Ok(Resampled { lattice: *lattice, values, marks, report })
+    Ok(ResampledField { lattice: *lattice, values, marks, report })
 }
 
 /// Bilinear in the image where all four samples have values, else what the nearest of them is.
-fn look_up(flat: &Resampled, x: f64, r: f64) -> (f32, Mark) {
+fn look_up(flat: &ResampledField, x: f64, r: f64) -> (f32, Mark) {
     let Lattice { dims, origin, spacing } = &flat.lattice;
     let (u, v) = ((x - origin.x) / spacing.x, (r - origin.y) / spacing.y);
     let last = [dims[0] - 1, dims[1] - 1].map(|d| d as f64);

@@ -10,7 +10,7 @@ use glam::{DMat3, DVec3};
 
 /// How a point lies in a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Place {
+pub(super) struct CellSample {
     /// Interpolated value.
     pub(super) value: f64,
     /// How far outside the cell the point is, in units of the cell; 0 inside.
@@ -28,12 +28,12 @@ pub(super) struct Cell<'a> {
     size: f64,
 }
 
-/// Newton has converged when the step is this small, in units of the cell: far below [`super::rasterize::INSIDE`].
+/// Newton has converged when the step is this small, in units of the cell: far below [`super::rasterize::INSIDE_TOLERANCE`].
 const CONVERGED: f64 = 1e-12;
 /// From the centre of a convex cell it takes three to five steps; distorted ones need more.
 const MAX_STEPS: usize = 25;
 /// Ratio of the smallest to the largest Jacobian among corners below which a cell counts as folded or collapsed.
-const FOLDED: f64 = 1e-6;
+const MIN_JACOBIAN_RATIO: f64 = 1e-6;
 
 /// Shape functions and their derivatives along the three parameters.
 type Basis = ([f64; 8], [DVec3; 8]);
@@ -135,7 +135,7 @@ impl<'a> Cell<'a> {
             let (low, high) =
                 jacobians.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), j| (l.min(j), h.max(j)));
             let (small, large) = if low + high >= 0.0 { (low, high) } else { (-high, -low) };
-            cell.folded = small.is_nan() || small <= FOLDED * large;
+            cell.folded = small.is_nan() || small <= MIN_JACOBIAN_RATIO * large;
         }
         cell
     }
@@ -164,12 +164,12 @@ impl<'a> Cell<'a> {
     }
 
     /// Where `p` lies.
-    pub(super) fn place(&self, p: DVec3) -> Option<Place> {
+    pub(super) fn place(&self, p: DVec3) -> Option<CellSample> {
         match self.shape {
             Shape::Tetra => {
                 let c = self.corners;
                 let weights = barycentric(c[0], c[1], c[2], c[3], p, self.size)?;
-                Some(place_of(&weights, self.values.iter().copied()))
+                Some(cell_sample(&weights, self.values.iter().copied()))
             }
             Shape::Faces(_) => self.in_fan(p),
             _ if self.folded => self.in_fan(p),
@@ -177,7 +177,7 @@ impl<'a> Cell<'a> {
         }
     }
 
-    fn by_newton(&self, p: DVec3) -> Option<Place> {
+    fn by_newton(&self, p: DVec3) -> Option<CellSample> {
         let target = p - self.corners[0];
         let third = DVec3::new(1.0 / 3.0, 1.0 / 3.0, 0.5);
         let mut q = if *self.shape == Shape::Wedge { third } else { DVec3::splat(0.5) };
@@ -201,22 +201,23 @@ impl<'a> Cell<'a> {
                     q - DVec3::ONE
                 };
                 let outside = below.max(above).max_element().max(0.0);
-                return Some(Place { value, outside });
+                return Some(CellSample { value, outside });
             }
         }
         None
     }
 
     /// The best of the tetrahedra between the centre, the centres of faces and edges.
-    fn in_fan(&self, p: DVec3) -> Option<Place> {
+    fn in_fan(&self, p: DVec3) -> Option<CellSample> {
         let centre = mean(self.corners.iter().copied());
         let centre_value = self.values.iter().sum::<f64>() / self.values.len() as f64;
-        let mut best: Option<Place> = None;
+        let mut best: Option<CellSample> = None;
         let mut consider = |face: DVec3, face_value: f64, a: u32, b: u32| {
             let (a, b) = (a as usize, b as usize);
             let (pa, pb) = (self.corners[a], self.corners[b]);
             let Some(w) = barycentric(centre, face, pa, pb, p, self.size) else { return };
-            let place = place_of(&w, [centre_value, face_value, self.values[a], self.values[b]].into_iter());
+            let place =
+                cell_sample(&w, [centre_value, face_value, self.values[a], self.values[b]].into_iter());
             if best.is_none_or(|b| place.outside < b.outside) {
                 best = Some(place);
             }
@@ -264,10 +265,10 @@ fn barycentric(a: DVec3, b: DVec3, c: DVec3, d: DVec3, p: DVec3, size: f64) -> O
     Some([1.0 - w.x - w.y - w.z, w.x, w.y, w.z])
 }
 
-fn place_of(weights: &[f64; 4], values: impl Iterator<Item = f64>) -> Place {
+fn cell_sample(weights: &[f64; 4], values: impl Iterator<Item = f64>) -> CellSample {
     let value = weights.iter().zip(values).map(|(w, v)| if *w == 0.0 { 0.0 } else { w * v }).sum();
     let outside = weights.iter().fold(0.0f64, |o, w| o.max(-w));
-    Place { value, outside }
+    CellSample { value, outside }
 }
 
 #[cfg(test)]

@@ -36,7 +36,7 @@ fn lattice_of(mesh: &Mesh, resolution: Resolution) -> Lattice {
 }
 
 /// All nodes inside have the value of `f` to `tolerance`.
-fn assert_field(r: &Resampled, tolerance: f64, f: impl Fn(DVec3) -> f64) {
+fn assert_field(r: &ResampledField, tolerance: f64, f: impl Fn(DVec3) -> f64) {
     let [nx, ny, _] = r.lattice.dims;
     for (n, (&v, &m)) in r.values.iter().zip(&r.marks).enumerate() {
         let p = r.lattice.node(n % nx, n / nx % ny, n / nx / ny);

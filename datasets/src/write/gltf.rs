@@ -38,7 +38,7 @@ const UNIT_LENGTH_SQUARED: f32 = 1e-5;
 pub fn write_glb(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<(), WriteError> {
     let path = path.as_ref();
     let refused = |what: String, cure: &str| Err(WriteError::refused(path, what, cure));
-    if let Some((what, cure)) = misfit(mesh) {
+    if let Some((what, cure)) = unsupported_content(mesh) {
         return refused(what, cure);
     }
 
@@ -112,7 +112,7 @@ pub fn write_glb(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<(), WriteErro
 }
 
 /// Why a mesh cannot be written, and the cure.
-fn misfit(mesh: &TriMesh) -> Option<(String, &'static str)> {
+fn unsupported_content(mesh: &TriMesh) -> Option<(String, &'static str)> {
     if let Err(e) = mesh.check() {
         return Some((e.to_string(), "make the attributes as long as the mesh"));
     }

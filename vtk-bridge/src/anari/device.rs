@@ -7,8 +7,8 @@ use super::array::{Array, Storage, byte_size};
 use super::data_type::DataType;
 use super::frame::{self, Accumulated, FrameState};
 use super::object::{Extra, Handle, Object, Value};
-use super::scene::Notes;
-use super::scene::world::{Compiled, WorldCache};
+use super::scene::Diagnostics;
+use super::scene::world::{CompiledWorld, WorldCache};
 use super::schema;
 use super::status::{Code, Listener, Message, Severity, Status, lock};
 use std::collections::HashMap;
@@ -425,9 +425,9 @@ impl Device {
         let object = self.find(handle, "anariGetProperty")?;
         match (object.kind, name) {
             (DataType::WORLD | DataType::GROUP | DataType::INSTANCE, "bounds") => {
-                let mut notes = Notes::default();
-                let bounds = Compiled::of(&object, &mut notes).bounds;
-                self.tell_notes(notes);
+                let mut diagnostics = Diagnostics::default();
+                let bounds = CompiledWorld::of(&object, &mut diagnostics).bounds;
+                self.report_diagnostics(diagnostics);
                 let [lo, hi] = bounds?;
                 Some(Property::Floats(
                     [lo.to_array(), hi.to_array()].concat().into_iter().map(|v| v as f32).collect(),
@@ -449,8 +449,8 @@ impl Device {
         }
     }
 
-    fn tell_notes(&self, notes: Notes) {
-        notes.0.iter().for_each(|m| self.status.tell_once(m));
+    fn report_diagnostics(&self, diagnostics: Diagnostics) {
+        diagnostics.0.iter().for_each(|m| self.status.tell_once(m));
     }
 
     /// Number of objects that the program has not released.

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 /// A finished frame.
 #[derive(Default)]
-pub struct Picture {
+pub struct FrameImage {
     /// Pixels per row, and rows.
     pub size: [u32; 2],
     /// By name, `channel.color` and so on.
@@ -36,9 +36,9 @@ pub(crate) struct Accumulated {
 #[derive(Default)]
 pub struct FrameState {
     pub(crate) job: Option<Arc<Job>>,
-    latest: Option<Arc<Picture>>,
+    latest: Option<Arc<FrameImage>>,
     /// Pictures of which the program holds addresses.
-    mapped: BTreeMap<String, Arc<Picture>>,
+    mapped: BTreeMap<String, Arc<FrameImage>>,
 }
 
 /// Gives the frame's state to `f`; `None` for objects that are no frames.
@@ -59,7 +59,7 @@ pub(crate) fn set_job(frame: &Object, job: Arc<Job>) {
 }
 
 /// Waits for the frame and gives its picture; `None` when it was never drawn.
-pub fn finish(frame: &Object) -> Option<Arc<Picture>> {
+pub fn finish(frame: &Object) -> Option<Arc<FrameImage>> {
     // Waiting with the lock held would stop `discard`.
     let picture = current_job(frame).map(|job| job.wait());
     with_state(frame, |s| {
@@ -72,7 +72,7 @@ pub fn finish(frame: &Object) -> Option<Arc<Picture>> {
 }
 
 /// Keeps the picture alive until the channel is unmapped.
-pub(crate) fn hold(frame: &Object, channel: &str, picture: Arc<Picture>) {
+pub(crate) fn hold(frame: &Object, channel: &str, picture: Arc<FrameImage>) {
     with_state(frame, |s| s.mapped.insert(channel.to_owned(), picture));
 }
 

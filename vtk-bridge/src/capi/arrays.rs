@@ -136,7 +136,7 @@ pub(super) unsafe fn surface<'a>(s: &RtvSurface, name: &'a str) -> Result<Surfac
             point_radius: s.point_radius,
             line_radius: s.line_radius,
             edges_only: s.edges_only != 0,
-            has_backs: s.has_back != 0,
+            has_back_faces: s.has_back != 0,
         };
         let key = s.color_key;
         let color = match s.color_source {

@@ -11,12 +11,12 @@ mod types;
 
 pub use types::*;
 
-use crate::bridge::Added;
+use crate::bridge::AddOutcome;
 use crate::input::View;
 use crate::options::Options;
 use rt_core::glam::DMat4;
 pub(crate) use state::guarded;
-use state::{Handle, set_option, with};
+use state::{BridgeState, set_option, with};
 use std::ffi::CStr;
 use std::os::raw::c_char;
 
@@ -37,7 +37,7 @@ pub extern "C" fn rtv_abi() -> u32 {
 /// A new bridge; free it with `rtv_free`. Null only when that is impossible.
 #[unsafe(no_mangle)]
 pub extern "C" fn rtv_new() -> *mut RtvBridge {
-    guarded(std::ptr::null_mut(), || Box::into_raw(Box::new(Handle::new())).cast())
+    guarded(std::ptr::null_mut(), || Box::into_raw(Box::new(BridgeState::new())).cast())
 }
 
 /// Frees a bridge; null is allowed.
@@ -48,7 +48,7 @@ pub extern "C" fn rtv_new() -> *mut RtvBridge {
 pub unsafe extern "C" fn rtv_free(bridge: *mut RtvBridge) {
     if !bridge.is_null() {
         // SAFETY: made by `rtv_new` from a box of this type, and given back once (the caller's promise).
-        guarded((), || drop(unsafe { Box::from_raw(bridge.cast::<Handle>()) }));
+        guarded((), || drop(unsafe { Box::from_raw(bridge.cast::<BridgeState>()) }));
     }
 }
 
@@ -151,7 +151,7 @@ pub unsafe extern "C" fn rtv_surfaces(
                     }
                 }
             }
-            read.iter().filter(|s| h.bridge.add_surface(s) == Added::Traced).count() as i32
+            read.iter().filter(|s| h.bridge.add_surface(s) == AddOutcome::Traced).count() as i32
         })
     }
 }
@@ -216,7 +216,7 @@ pub unsafe extern "C" fn rtv_light(bridge: *mut RtvBridge, light: *const RtvLigh
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rtv_pass(bridge: *mut RtvBridge, name: *const c_char, reason: *const c_char) {
     // SAFETY: as above.
-    unsafe { with(bridge, (), |h| h.bridge.pass(&text(name), &text(reason))) }
+    unsafe { with(bridge, (), |h| h.bridge.report_untraced(&text(name), &text(reason))) }
 }
 
 /// Warns the user, once for each text.

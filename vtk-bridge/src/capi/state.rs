@@ -13,27 +13,27 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Behind an [`RtvBridge`].
-pub(super) struct Handle {
+pub(super) struct BridgeState {
     pub(super) bridge: Bridge,
     number: u64,
     poisoned: bool,
     /// The text that the last call gave away.
     answer: CString,
     /// Options set for this bridge alone, over all others.
-    own: Named,
-    in_force: InForce,
+    own: OptionValues,
+    effective_options: EffectiveOptions,
     /// Between `rtv_begin` and `rtv_end`: options stay what they are.
     in_frame: bool,
 }
 
 /// Values of options by name, as they were set.
-type Named = BTreeMap<String, String>;
+type OptionValues = BTreeMap<String, String>;
 
 /// Options set by the program for all bridges, over those of the environment.
-static SET: Mutex<Named> = Mutex::new(BTreeMap::new());
+static PROGRAM_OPTIONS: Mutex<OptionValues> = Mutex::new(BTreeMap::new());
 
 /// The options of the process, for those who ask without a bridge.
-static OF_PROCESS: Mutex<InForce> = Mutex::new(InForce::NONE);
+static PROCESS_OPTIONS: Mutex<EffectiveOptions> = Mutex::new(EffectiveOptions::NONE);
 
 /// VTK's version, as told by [`set_host`]: major in the upper half; 0 when nobody has said.
 static HOST: AtomicU64 = AtomicU64::new(0);
@@ -43,28 +43,28 @@ pub(super) fn set_host(major: u32, minor: u32) {
 }
 
 /// Options that follow VTK's version. Shaders of versions after 9.2 draw edges on their surfaces alone.
-fn of_host(host: u64) -> Option<(String, String)> {
+fn host_options(host: u64) -> Option<(String, String)> {
     ((host >> 32, host & 0xffff_ffff) > (9, 2)).then(|| ("RTV_EDGES".to_owned(), "0".to_owned()))
 }
 
 /// Everything that options are made from; what comes later goes over what comes before.
 #[derive(PartialEq)]
-struct Sources {
+struct OptionSources {
     host: u64,
     environment: Vec<(OsString, OsString)>,
-    process: Named,
-    own: Named,
+    process: OptionValues,
+    own: OptionValues,
 }
 
-impl Sources {
+impl OptionSources {
     /// As they are now. The environment is read anew each time, because programs change it (a
     /// script's `os.environ`).
-    fn now(own: &Named) -> Sources {
+    fn now(own: &OptionValues) -> OptionSources {
         let is_ours = |name: &OsString| name.as_encoded_bytes().starts_with(b"RTV_");
-        Sources {
+        OptionSources {
             host: HOST.load(Ordering::Relaxed),
             environment: std::env::vars_os().filter(|(name, _)| is_ours(name)).collect(),
-            process: SET.lock().map(|s| s.clone()).unwrap_or_default(),
+            process: PROGRAM_OPTIONS.lock().map(|s| s.clone()).unwrap_or_default(),
             own: own.clone(),
         }
     }
@@ -73,20 +73,20 @@ impl Sources {
     fn parse(&self) -> (Options, Vec<String>) {
         let (environment, unreadable) = readable(&self.environment);
         let set = self.process.iter().chain(&self.own).map(|(n, v)| (n.clone(), v.clone()));
-        let pairs = of_host(self.host).into_iter().chain(environment).chain(set);
+        let pairs = host_options(self.host).into_iter().chain(environment).chain(set);
         let (options, faults) = Options::parse(pairs);
         (options, [unreadable, faults].concat())
     }
 }
 
 /// Options with what they were made from, so that they are parsed once per change.
-struct InForce(Option<(Sources, Options, Vec<String>)>);
+struct EffectiveOptions(Option<(OptionSources, Options, Vec<String>)>);
 
-impl InForce {
-    const NONE: InForce = InForce(None);
+impl EffectiveOptions {
+    const NONE: EffectiveOptions = EffectiveOptions(None);
 
     /// The options for `sources`, and what in them was not understood.
-    fn of(&mut self, sources: Sources) -> (&Options, &[String]) {
+    fn of(&mut self, sources: OptionSources) -> (&Options, &[String]) {
         if self.0.as_ref().is_some_and(|(from, ..)| *from != sources) {
             self.0 = None;
         }
@@ -100,8 +100,8 @@ impl InForce {
 
 /// The options of the process: those of a bridge that has none of its own.
 pub(super) fn options() -> Options {
-    let sources = Sources::now(&Named::new());
-    match OF_PROCESS.lock() {
+    let sources = OptionSources::now(&OptionValues::new());
+    match PROCESS_OPTIONS.lock() {
         Ok(mut kept) => kept.of(sources).0.clone(),
         // A panic while another thread held them; they can be made anew.
         Err(_) => sources.parse().0,
@@ -109,7 +109,7 @@ pub(super) fn options() -> Options {
 }
 
 /// Sets an option among `named`; an empty value takes it back. False when it is not understood.
-fn set(named: &mut Named, name: &str, value: &str) -> bool {
+fn set(named: &mut OptionValues, name: &str, value: &str) -> bool {
     if value.is_empty() {
         named.remove(name);
         return true;
@@ -122,7 +122,7 @@ fn set(named: &mut Named, name: &str, value: &str) -> bool {
 }
 
 pub(super) fn set_option(name: &str, value: &str) -> bool {
-    SET.lock().is_ok_and(|mut all| set(&mut all, name, value))
+    PROGRAM_OPTIONS.lock().is_ok_and(|mut all| set(&mut all, name, value))
 }
 
 /// An option as a number, for the callers in C; -1 for those they need not know.
@@ -135,16 +135,16 @@ pub(super) fn number(options: &Options, name: &str) -> f64 {
     }
 }
 
-impl Handle {
-    pub(super) fn new() -> Handle {
+impl BridgeState {
+    pub(super) fn new() -> BridgeState {
         static NUMBER: AtomicU64 = AtomicU64::new(1);
-        Handle {
+        BridgeState {
             bridge: Bridge::new(),
             number: NUMBER.fetch_add(1, Ordering::Relaxed),
             poisoned: false,
             answer: CString::default(),
-            own: Named::new(),
-            in_force: InForce::NONE,
+            own: OptionValues::new(),
+            effective_options: EffectiveOptions::NONE,
             in_frame: false,
         }
     }
@@ -158,7 +158,7 @@ impl Handle {
         if self.in_frame {
             return number(self.bridge.options(), name);
         }
-        number(self.in_force.of(Sources::now(&self.own)).0, name)
+        number(self.effective_options.of(OptionSources::now(&self.own)).0, name)
     }
 
     /// `text` for the caller, until the next call.
@@ -168,7 +168,7 @@ impl Handle {
     }
 
     pub(super) fn begin(&mut self) -> i32 {
-        let (options, faults) = self.in_force.of(Sources::now(&self.own));
+        let (options, faults) = self.effective_options.of(OptionSources::now(&self.own));
         self.bridge.begin(options);
         for fault in faults {
             self.bridge.warn(fault.clone());
@@ -202,27 +202,27 @@ impl Handle {
         let options = self.bridge.options();
         if !options.quiet {
             for w in warnings {
-                to_user_once(&w);
+                warn_user_once(&w);
             }
         }
         if let Some(path) = &options.report
             && let Err(e) = report::write(self.number, self.bridge.report(), path)
         {
-            to_user_once(&format!("RTV_REPORT={path} cannot be written: {e}"));
+            warn_user_once(&format!("RTV_REPORT={path} cannot be written: {e}"));
         }
     }
 }
 
-impl Drop for Handle {
+impl Drop for BridgeState {
     fn drop(&mut self) {
         report::forget(self.number);
     }
 }
 
 /// A line for the user of the foreign program, each text once in the process. There is nobody else to tell: we are a guest.
-fn to_user_once(text: &str) {
-    static TOLD: Mutex<BTreeMap<String, ()>> = Mutex::new(BTreeMap::new());
-    let first = TOLD.lock().map(|mut t| t.insert(text.to_owned(), ()).is_none()).unwrap_or(false);
+fn warn_user_once(text: &str) {
+    static SHOWN_WARNINGS: Mutex<BTreeMap<String, ()>> = Mutex::new(BTreeMap::new());
+    let first = SHOWN_WARNINGS.lock().map(|mut t| t.insert(text.to_owned(), ()).is_none()).unwrap_or(false);
     if first {
         use std::io::Write;
         let _ = writeln!(std::io::stderr().lock(), "vtk-bridge: {text}");
@@ -234,9 +234,13 @@ fn to_user_once(text: &str) {
 ///
 /// # Safety
 /// `bridge` is null or came from `rtv_new`, and no other thread uses it.
-pub(super) unsafe fn with<T>(bridge: *mut RtvBridge, otherwise: T, work: impl FnOnce(&mut Handle) -> T) -> T {
-    // SAFETY: `rtv_new` made it from a `Handle`; the caller promises that it is alive and not in use.
-    let Some(handle) = (unsafe { bridge.cast::<Handle>().as_mut() }) else { return otherwise };
+pub(super) unsafe fn with<T>(
+    bridge: *mut RtvBridge,
+    otherwise: T,
+    work: impl FnOnce(&mut BridgeState) -> T,
+) -> T {
+    // SAFETY: `rtv_new` made it from a `BridgeState`; the caller promises that it is alive and not in use.
+    let Some(handle) = (unsafe { bridge.cast::<BridgeState>().as_mut() }) else { return otherwise };
     if handle.poisoned {
         return otherwise;
     }
@@ -254,7 +258,7 @@ pub(crate) fn guarded<T>(otherwise: T, work: impl FnOnce() -> T) -> T {
             .map(|s| (*s).to_owned())
             .or_else(|| panic.downcast_ref::<String>().cloned())
             .unwrap_or_default();
-        to_user_once(&format!(
+        warn_user_once(&format!(
             "internal error, the program draws without us from now on; please report it: {message}"
         ));
         otherwise
@@ -268,7 +272,7 @@ mod tests {
     #[test]
     fn edges_follow_the_version_of_vtk_unless_told_otherwise() {
         let of = |major: u64, minor: u64| {
-            of_host(major << 32 | minor).map(|(name, value)| format!("{name}={value}"))
+            host_options(major << 32 | minor).map(|(name, value)| format!("{name}={value}"))
         };
         for (major, minor) in [(0, 0), (9, 0), (9, 1), (9, 2)] {
             assert_eq!(of(major, minor), None, "{major}.{minor}");
@@ -277,6 +281,6 @@ mod tests {
             assert_eq!(of(major, minor).as_deref(), Some("RTV_EDGES=0"), "{major}.{minor}");
         }
         let said = ("RTV_EDGES".to_owned(), "0.5".to_owned());
-        assert_eq!(Options::parse(of_host(9 << 32 | 5).into_iter().chain([said])).0.edge_reach, 0.5);
+        assert_eq!(Options::parse(host_options(9 << 32 | 5).into_iter().chain([said])).0.edge_reach, 0.5);
     }
 }

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 
 /// Where a vertex of a clipped mesh comes from: `(1 - t) a + t b` of two vertices of the mesh before.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Origin {
+pub struct ClipVertex {
     /// First vertex.
     pub a: u32,
     /// Second vertex.
@@ -20,14 +20,14 @@ pub struct Origin {
 
 /// How a clipped mesh relates to the one before, by plane.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Clipped {
+pub struct ClipMap {
     /// For each plane: origins of all vertices in the mesh before that plane.
-    pub steps: Vec<Vec<Origin>>,
+    pub steps: Vec<Vec<ClipVertex>>,
     /// Triangle of the unclipped mesh by triangle of the clipped one.
     pub triangles: Vec<u32>,
 }
 
-impl Clipped {
+impl ClipMap {
     /// Values of the unclipped mesh's vertices carried over.
     pub fn vertex_values<T: Copy>(&self, values: &[T], mix: impl Fn(T, T, f32) -> T) -> Vec<T> {
         let mut values = values.to_vec();
@@ -45,8 +45,8 @@ impl Clipped {
 }
 
 /// The part of `mesh` on the positive side of every plane.
-pub(super) fn clip(mesh: &TriMesh, planes: &[[f64; 4]]) -> (TriMesh, Clipped) {
-    let mut clipped = Clipped { triangles: (0..mesh.indices.len() as u32).collect(), ..Clipped::default() };
+pub(super) fn clip(mesh: &TriMesh, planes: &[[f64; 4]]) -> (TriMesh, ClipMap) {
+    let mut clip_map = ClipMap { triangles: (0..mesh.indices.len() as u32).collect(), ..ClipMap::default() };
     let mut positions = mesh.positions.clone();
     let mut indices = mesh.indices.clone();
     for plane in planes {
@@ -60,21 +60,21 @@ pub(super) fn clip(mesh: &TriMesh, planes: &[[f64; 4]]) -> (TriMesh, Clipped) {
             })
             .collect();
         indices = new_indices;
-        clipped.triangles = parents.iter().map(|&p| clipped.triangles[p as usize]).collect();
-        clipped.steps.push(origins);
+        clip_map.triangles = parents.iter().map(|&p| clip_map.triangles[p as usize]).collect();
+        clip_map.steps.push(origins);
     }
     let normals = mesh.normals.as_ref().map(|n| match n.per {
         PerElement::Vertex => {
-            Attribute::per_vertex(clipped.vertex_values(&n.values, |a: Vec3, b, t| a.lerp(b, t)))
+            Attribute::per_vertex(clip_map.vertex_values(&n.values, |a: Vec3, b, t| a.lerp(b, t)))
         }
         PerElement::Face => {
-            Attribute::per_face(clipped.triangles.iter().map(|&i| n.values[i as usize]).collect())
+            Attribute::per_face(clip_map.triangles.iter().map(|&i| n.values[i as usize]).collect())
         }
     });
-    let texcoords = mesh.texcoords.as_ref().map(|v| clipped.vertex_values(v, |a: Vec2, b, t| a.lerp(b, t)));
-    let tangents = mesh.tangents.as_ref().map(|v| clipped.vertex_values(v, |a: Vec4, b, t| a.lerp(b, t)));
+    let texcoords = mesh.texcoords.as_ref().map(|v| clip_map.vertex_values(v, |a: Vec2, b, t| a.lerp(b, t)));
+    let tangents = mesh.tangents.as_ref().map(|v| clip_map.vertex_values(v, |a: Vec4, b, t| a.lerp(b, t)));
     let origin = mesh.origin;
-    (TriMesh { origin, positions, indices, normals, texcoords, tangents, ..TriMesh::default() }, clipped)
+    (TriMesh { origin, positions, indices, normals, texcoords, tangents, ..TriMesh::default() }, clip_map)
 }
 
 /// One plane: origins of the vertices that remain or are new, triangles, and the triangle each comes from.
@@ -83,7 +83,7 @@ fn cut(
     positions: &[Vec3],
     indices: &[[u32; 3]],
     &[a, b, c, d]: &[f64; 4],
-) -> (Vec<Origin>, Vec<[u32; 3]>, Vec<u32>) {
+) -> (Vec<ClipVertex>, Vec<[u32; 3]>, Vec<u32>) {
     let normal = DVec3::new(a, b, c);
     let offset = normal.dot(origin) + d;
     let distance: Vec<f64> = positions.iter().map(|p| normal.dot(p.as_dvec3()) + offset).collect();
@@ -103,7 +103,7 @@ fn cut(
                 let slot = &mut kept[v as usize];
                 if *slot == u32::MAX {
                     *slot = origins.len() as u32;
-                    origins.push(Origin { a: v, b: v, t: 0.0 });
+                    origins.push(ClipVertex { a: v, b: v, t: 0.0 });
                 }
                 polygon.push(*slot);
             }
@@ -112,7 +112,7 @@ fn cut(
                 let edge = (v.min(w), v.max(w));
                 let vertex = *on_edges.entry(edge).or_insert_with(|| {
                     let (da, db) = (distance[edge.0 as usize], distance[edge.1 as usize]);
-                    origins.push(Origin { a: edge.0, b: edge.1, t: (da / (da - db)) as f32 });
+                    origins.push(ClipVertex { a: edge.0, b: edge.1, t: (da / (da - db)) as f32 });
                     origins.len() as u32 - 1
                 });
                 polygon.push(vertex);
@@ -146,15 +146,15 @@ mod tests {
             vec![[0, 1, 2], [0, 2, 3]],
         );
         mesh.texcoords = Some(corners.iter().map(|c| Vec2::new(c.0, c.1)).collect());
-        let (out, clipped) = clip(&mesh, &[[1.0, 0.0, 0.0, -0.25], [0.0, -1.0, 0.0, 0.5]]);
+        let (out, clip_map) = clip(&mesh, &[[1.0, 0.0, 0.0, -0.25], [0.0, -1.0, 0.0, 0.5]]);
         assert!((area(&out) - 0.75 * 0.5).abs() < 1e-6, "{}", area(&out));
         for (p, t) in out.positions.iter().zip(out.texcoords.as_ref().expect("carried over")) {
             assert!((p.truncate() - *t).length() < 1e-6, "{p} {t}");
         }
         let x: Vec<f32> = corners.iter().map(|c| c.0).collect();
-        let carried = clipped.vertex_values(&x, |a, b, t| a + (b - a) * t);
+        let carried = clip_map.vertex_values(&x, |a, b, t| a + (b - a) * t);
         assert!(carried.iter().zip(&out.positions).all(|(x, p)| (x - p.x).abs() < 1e-6));
-        assert!(clipped.triangles.iter().all(|t| *t < 2));
+        assert!(clip_map.triangles.iter().all(|t| *t < 2));
     }
 
     #[test]

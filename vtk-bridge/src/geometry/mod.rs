@@ -1,6 +1,6 @@
 //! From points and cells to what rays can meet, and what is needed to put colours on it later.
 
-mod backs;
+mod back_faces;
 mod clip;
 mod points_and_lines;
 mod triangulate;
@@ -13,26 +13,26 @@ use rt_core::mesh::{Attribute, TriMesh};
 use std::ops::Range;
 use std::sync::Arc;
 
-pub use clip::{Clipped, Origin};
+pub use clip::{ClipMap, ClipVertex};
 
 /// What became of one [`Shape`]; colours are put on it by [`crate::colors`].
 #[derive(Clone)]
-pub struct Built {
+pub struct GeometrySet {
     /// Triangles of polygons and strips, if there are any.
-    pub mesh: Option<BuiltMesh>,
+    pub mesh: Option<PolygonMesh>,
     /// Spheres of vertices.
     pub spheres: Option<Arc<rt_core::shapes::Spheres>>,
     /// Tubes of lines or edges.
     pub tubes: Option<Arc<rt_core::shapes::Tubes>>,
     /// Backs of the triangles, where they look different.
-    pub backs: Option<Arc<dyn rt_core::shapes::Shape>>,
+    pub back_faces: Option<Arc<dyn rt_core::shapes::Shape>>,
     /// Triangles that cannot be drawn (a NaN point, a point number that does not exist).
     pub skipped: usize,
 }
 
 /// Triangles, and where each comes from.
 #[derive(Clone)]
-pub struct BuiltMesh {
+pub struct PolygonMesh {
     /// The mesh, without colours.
     pub mesh: Arc<TriMesh>,
     /// Cell number of each triangle.
@@ -40,10 +40,10 @@ pub struct BuiltMesh {
     /// Which sides of each triangle are edges of its polygon (bit i: from corner i to the next); `None` when all are.
     pub edges: Option<Arc<Vec<u8>>>,
     /// Set when clipping planes made new vertices and triangles.
-    pub clipped: Option<Arc<Clipped>>,
+    pub clip_map: Option<Arc<ClipMap>>,
 }
 
-impl BuiltMesh {
+impl PolygonMesh {
     /// As rt-core wants it.
     pub fn geometry(&self) -> Geometry {
         Geometry::Mesh(Arc::clone(&self.mesh))
@@ -84,9 +84,9 @@ fn cell_numbers(shape: &Shape<'_>) -> [Range<usize>; 4] {
 }
 
 /// Builds everything that `shape` asks for.
-pub fn build(shape: &Shape<'_>) -> Built {
+pub fn build(shape: &Shape<'_>) -> GeometrySet {
     let [_, _, polys, strips] = cell_numbers(shape);
-    let mut built = Built { mesh: None, spheres: None, tubes: None, backs: None, skipped: 0 };
+    let mut built = GeometrySet { mesh: None, spheres: None, tubes: None, back_faces: None, skipped: 0 };
     points_and_lines::add(shape, &mut built);
     if shape.edges_only {
         return built;
@@ -109,11 +109,11 @@ pub fn build(shape: &Shape<'_>) -> Built {
         shape.texcoords.filter(|t| t.len() == points).map(|t| t.iter().map(|v| Vec2::from(*v)).collect());
     let tangent = |t: &[f32; 3]| Vec3::from(*t).extend(1.0);
     mesh.tangents = shape.tangents.filter(|t| t.len() == points).map(|t| t.iter().map(tangent).collect());
-    let (mesh, clipped) = if shape.clip_planes.is_empty() {
+    let (mesh, clip_map) = if shape.clip_planes.is_empty() {
         (mesh, None)
     } else {
-        let (mesh, clipped) = clip::clip(&mesh, shape.clip_planes);
-        (mesh, Some(Arc::new(clipped)))
+        let (mesh, clip_map) = clip::clip(&mesh, shape.clip_planes);
+        (mesh, Some(Arc::new(clip_map)))
     };
     built.skipped = (0..mesh.indices.len()).filter(|&i| !mesh.is_renderable(i)).count();
     let edges = match cells {
@@ -121,7 +121,8 @@ pub fn build(shape: &Shape<'_>) -> Built {
         CellOfTriangle::List(_) => Some(Arc::new(triangulate::edges(shape))),
     };
     let mesh = Arc::new(mesh);
-    built.backs = shape.has_backs.then(|| Arc::new(backs::Backs::of(Arc::clone(&mesh))) as Arc<_>);
-    built.mesh = Some(BuiltMesh { mesh, cells, edges, clipped });
+    built.back_faces =
+        shape.has_back_faces.then(|| Arc::new(back_faces::BackFaces::of(Arc::clone(&mesh))) as Arc<_>);
+    built.mesh = Some(PolygonMesh { mesh, cells, edges, clip_map });
     built
 }

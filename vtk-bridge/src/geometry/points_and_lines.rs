@@ -1,6 +1,6 @@
 //! Vertices as spheres, lines and edges as tubes.
 
-use super::Built;
+use super::GeometrySet;
 use crate::input::{Cells, Shape};
 use rt_core::glam::DVec3;
 use rt_core::shapes::{Radii, Spheres, Tubes};
@@ -8,7 +8,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 /// Adds spheres and tubes where `shape` gives radii.
-pub(super) fn add(shape: &Shape<'_>, built: &mut Built) {
+pub(super) fn add(shape: &Shape<'_>, built: &mut GeometrySet) {
     if shape.point_radius > 0.0 && !shape.verts.is_empty() {
         let centers = points_of(shape, &shape.verts);
         built.spheres =

@@ -7,11 +7,11 @@ use rt_core::texture::{Filter, Wrap};
 use std::path::Path;
 
 /// Textures of the file that have been asked for: their number in the scene, or nothing where they cannot be read.
-type Kept = Vec<Option<Option<usize>>>;
+type TextureSlots = Vec<Option<Option<usize>>>;
 
 impl Reader {
     pub(super) fn materials(&mut self, path: &Path, gltf: &gltf::Gltf) {
-        let mut kept: Kept = vec![None; gltf.textures().len()];
+        let mut slots: TextureSlots = vec![None; gltf.textures().len()];
         for m in gltf.materials() {
             let pbr = m.pbr_metallic_roughness();
             let strength = m.emissive_strength().unwrap_or(1.0);
@@ -23,7 +23,7 @@ impl Reader {
                     ));
                     return None;
                 }
-                *kept[texture.index()].get_or_insert_with(|| self.texture(path, gltf, &texture))
+                *slots[texture.index()].get_or_insert_with(|| self.texture(path, gltf, &texture))
             };
             let color =
                 pbr.base_color_texture().and_then(|t| find(t.texture(), t.tex_coord(), "base colour"));

@@ -7,10 +7,10 @@
 mod materials;
 
 use super::base64::Decoder;
-use super::error::{At, BROKEN, Fault, TRUNCATED, beside, fits, read_bytes};
+use super::error::{At, BROKEN, Fault, TRUNCATED, fits, read_bytes, sibling_path};
 use super::percent::decoded;
 use super::scene::{SceneMesh, SceneModel};
-use super::{Content, Opened, ReadError};
+use super::{Content, LoadedFile, ReadError};
 use glam::{DMat3, DMat4, DVec3, Vec2, Vec3, Vec4};
 use gltf::accessor::{DataType, Dimensions};
 use gltf::mesh::{Mode, Semantic};
@@ -29,12 +29,12 @@ const EXTENSIONS: [&str; 2] = ["KHR_materials_ior", "KHR_materials_emissive_stre
 const MAX_TRIANGLES: usize = 1 << 28;
 
 /// Reads a `.gltf` or `.glb` file with the files it names.
-pub fn read(path: &Path) -> Result<Opened, ReadError> {
+pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     read_from_bytes(path, &read_bytes(path)?)
 }
 
 /// Reads the content of a file; other files are looked for beside `path`.
-pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
+pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     let fault = |f: Fault| f.in_file(path, FORMAT);
     let gltf = checked(bytes).map_err(fault)?;
     let buffers = buffers(path, &gltf)?;
@@ -91,7 +91,7 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
         reader.warnings.push(format!("extensions that are not read: {}", not_read.join(", ")));
     }
     let Reader { scene, warnings, .. } = reader;
-    Ok(Opened { format: FORMAT, content: Content::Scene(scene), warnings, time_steps: Vec::new() })
+    Ok(LoadedFile { format: FORMAT, content: Content::Scene(scene), warnings, time_steps: Vec::new() })
 }
 
 /// The scene after the crate's own checks. Those index the accessors of primitives before they are checked (gltf-json
@@ -141,7 +141,7 @@ fn resource(path: &Path, uri: &str) -> Result<Vec<u8>, ReadError> {
             Err(bad) => Err(fault(&format!("byte {:#04x} is not base64", bad.byte))),
         };
     }
-    read_bytes(&beside(path, &decoded(uri)))
+    read_bytes(&sibling_path(path, &decoded(uri)))
 }
 
 struct Reader {

@@ -4,7 +4,7 @@
 mod layout;
 
 use super::error::{At, BROKEN, Cursor, Fault, TRUNCATED, fits, read_bytes};
-use super::{Content, Opened, ReadError};
+use super::{Content, LoadedFile, ReadError};
 use crate::model::{
     Attributes, Block, DataArray, Dataset, Endian, Points, ScalarType, StructuredGrid, Values,
 };
@@ -34,17 +34,18 @@ pub struct Plot3dOptions {
 }
 
 /// Reads a grid and the solution that belongs to it.
-pub fn read(path: &Path, options: &Plot3dOptions) -> Result<Opened, ReadError> {
+pub fn read(path: &Path, options: &Plot3dOptions) -> Result<LoadedFile, ReadError> {
     let mut warnings = Vec::new();
     let mut path = path.to_path_buf();
     let mut solution = options.solution.clone();
     if solution.is_none() {
-        if let Some(grid) = partner(&path, &[("q", "xyz")], &["q", "sol"], &["xyz", "x", "g", "grid", "p3d"])
+        if let Some(grid) =
+            companion_file(&path, &[("q", "xyz")], &["q", "sol"], &["xyz", "x", "g", "grid", "p3d"])
         {
             // The user named the solution; its grid is needed first.
             solution = Some(std::mem::replace(&mut path, grid));
         } else {
-            solution = partner(
+            solution = companion_file(
                 &path,
                 &[("xyz", "q"), ("grid", "q")],
                 &["xyz", "x", "g", "grid", "p3d"],
@@ -77,7 +78,7 @@ pub fn read_from_bytes(
     grid: &[u8],
     solution: Option<&[u8]>,
     options: &Plot3dOptions,
-) -> Result<Opened, ReadError> {
+) -> Result<LoadedFile, ReadError> {
     let fault = |f: Fault| f.in_file(path, FORMAT);
     let mut blocks = grid_blocks(grid, options).map_err(fault)?;
     if let Some(q) = solution {
@@ -86,7 +87,7 @@ pub fn read_from_bytes(
     Ok(opened(blocks, Vec::new()))
 }
 
-fn opened(mut blocks: Vec<StructuredGrid>, warnings: Vec<String>) -> Opened {
+fn opened(mut blocks: Vec<StructuredGrid>, warnings: Vec<String>) -> LoadedFile {
     let data = if blocks.len() == 1 {
         Dataset::StructuredGrid(blocks.remove(0))
     } else {
@@ -97,7 +98,7 @@ fn opened(mut blocks: Vec<StructuredGrid>, warnings: Vec<String>) -> Opened {
                 .collect(),
         )
     };
-    Opened { format: FORMAT, content: Content::Data(data), warnings, time_steps: Vec::new() }
+    LoadedFile { format: FORMAT, content: Content::Data(data), warnings, time_steps: Vec::new() }
 }
 
 /// True when `bytes` have the size of a binary PLOT3D grid or solution.
@@ -106,7 +107,12 @@ pub(crate) fn looks_like_plot3d(bytes: &[u8]) -> bool {
 }
 
 /// The existing file beside `path` whose name follows from it: by the end of the stem, or by the extension.
-pub(crate) fn partner(path: &Path, stems: &[(&str, &str)], from: &[&str], to: &[&str]) -> Option<PathBuf> {
+pub(crate) fn companion_file(
+    path: &Path,
+    stems: &[(&str, &str)],
+    from: &[&str],
+    to: &[&str],
+) -> Option<PathBuf> {
     let stem = path.file_stem()?.to_str()?;
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
     for (old, new) in stems {

@@ -7,7 +7,7 @@ mod arrays;
 mod cells;
 
 use super::error::{At, BROKEN, Fault, read_bytes};
-use super::{Content, Opened, ReadError};
+use super::{Content, LoadedFile, ReadError};
 use crate::model::{
     Attributes, DataArray, Dataset, ImageData, Points, PolyData, RectilinearGrid, StructuredGrid,
     UnstructuredGrid,
@@ -19,15 +19,15 @@ use std::path::Path;
 pub(crate) const FORMAT: &str = "VTK legacy";
 
 /// Reads a `.vtk` file.
-pub fn read(path: &Path) -> Result<Opened, ReadError> {
+pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     read_from_bytes(path, &read_bytes(path)?)
 }
 
 /// Reads the content of a `.vtk` file; `path` is for messages only.
-pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
+pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     let mut warnings = Vec::new();
     let data = parse(bytes, &mut warnings).map_err(|f| f.in_file(path, FORMAT))?;
-    Ok(Opened { format: FORMAT, content: Content::Data(data), warnings, time_steps: Vec::new() })
+    Ok(LoadedFile { format: FORMAT, content: Content::Data(data), warnings, time_steps: Vec::new() })
 }
 
 /// What the keywords read so far have said.

@@ -28,7 +28,7 @@ pub(crate) struct Encoding {
 
 /// The bytes of an array where the file has them.
 #[derive(Clone, Copy)]
-pub(crate) enum Stored<'a> {
+pub(crate) enum EncodedBytes<'a> {
     Base64(&'a [u8]),
     Raw(&'a [u8]),
 }
@@ -37,7 +37,7 @@ pub(crate) enum Stored<'a> {
 const MAX_RATIO: u64 = 1040;
 
 /// The bytes of the array `name`, uncompressed.
-pub(crate) fn decode(stored: Stored<'_>, e: Encoding, name: &str) -> Result<Vec<u8>, Fault> {
+pub(crate) fn decode(stored: EncodedBytes<'_>, e: Encoding, name: &str) -> Result<Vec<u8>, Fault> {
     let mut source = Source::new(stored, name);
     let w = e.header_bytes;
     let number = |bytes: &[u8]| -> u64 {
@@ -140,21 +140,21 @@ fn inflate(block: &[u8], target: &mut [u8]) -> Result<usize, String> {
 /// Bytes out of raw or base64 text, in order.
 #[derive(Clone)]
 struct Source<'a> {
-    stored: Stored<'a>,
+    stored: EncodedBytes<'a>,
     pos: usize,
     name: &'a str,
 }
 
 impl<'a> Source<'a> {
-    fn new(stored: Stored<'a>, name: &'a str) -> Self {
+    fn new(stored: EncodedBytes<'a>, name: &'a str) -> Self {
         Source { stored, pos: 0, name }
     }
 
     /// An upper bound on the bytes still to come.
     fn most_bytes_left(&self) -> usize {
         match self.stored {
-            Stored::Raw(b) => b.len() - self.pos,
-            Stored::Base64(t) => (t.len() - self.pos) / 4 * 3,
+            EncodedBytes::Raw(b) => b.len() - self.pos,
+            EncodedBytes::Base64(t) => (t.len() - self.pos) / 4 * 3,
         }
     }
 
@@ -164,12 +164,12 @@ impl<'a> Source<'a> {
             return Ok(());
         }
         match self.stored {
-            Stored::Raw(b) => {
+            EncodedBytes::Raw(b) => {
                 let n = (len - out.len()).min(b.len() - self.pos);
                 out.extend_from_slice(&b[self.pos..self.pos + n]);
                 self.pos += n;
             }
-            Stored::Base64(t) => {
+            EncodedBytes::Base64(t) => {
                 out.reserve((len - out.len()).min(self.most_bytes_left()));
                 let mut decoder = Decoder::new(&t[self.pos..]);
                 let result = decoder.fill(out, len);

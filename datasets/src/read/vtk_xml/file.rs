@@ -1,12 +1,12 @@
 //! A VTK XML file as an element tree plus the bytes appended to it.
 
-use super::blocks::{Compressor, Encoding, Stored, decode};
+use super::blocks::{Compressor, EncodedBytes, Encoding, decode};
 use crate::model::{DataArray, Endian, ScalarType, Values};
 use crate::read::error::{At, BROKEN, Fault};
 use roxmltree::Node;
 
 /// The two halves of a file: text that is XML, and bytes after `_` that need not be.
-pub(crate) struct Split<'a> {
+pub(crate) struct XmlWithAppendedData<'a> {
     /// The XML, with an empty `AppendedData` element.
     pub(crate) head: String,
     /// Everything after the underscore; the closing tags are still there.
@@ -14,7 +14,7 @@ pub(crate) struct Split<'a> {
 }
 
 /// Cuts the file at the appended data, which may be raw bytes that no XML parser accepts.
-pub(crate) fn split(bytes: &[u8]) -> Result<Split<'_>, Fault> {
+pub(crate) fn split(bytes: &[u8]) -> Result<XmlWithAppendedData<'_>, Fault> {
     const TAG: &[u8] = b"<AppendedData";
     let find = |what: &[u8], from: usize| {
         bytes[from..].windows(what.len()).position(|w| w == what).map(|i| i + from)
@@ -42,7 +42,7 @@ pub(crate) fn split(bytes: &[u8]) -> Result<Split<'_>, Fault> {
     if head.len() < bytes.len() {
         text.push_str("</VTKFile>");
     }
-    Ok(Split { head: text, appended })
+    Ok(XmlWithAppendedData { head: text, appended })
 }
 
 /// A parsed file.
@@ -134,7 +134,7 @@ impl<'a> XmlFile<'a> {
             }
             "binary" => {
                 let e = self.encoding.clone()?;
-                let bytes = decode(Stored::Base64(node.text().unwrap_or("").as_bytes()), e, &name)?;
+                let bytes = decode(EncodedBytes::Base64(node.text().unwrap_or("").as_bytes()), e, &name)?;
                 self.typed(kind, bytes, e, &name)?
             }
             "appended" => {
@@ -146,7 +146,8 @@ impl<'a> XmlFile<'a> {
                     return Err(bad_attribute(node, "offset", text, &allowed));
                 };
                 let rest = &self.appended[offset..];
-                let stored = if self.appended_is_raw { Stored::Raw(rest) } else { Stored::Base64(rest) };
+                let stored =
+                    if self.appended_is_raw { EncodedBytes::Raw(rest) } else { EncodedBytes::Base64(rest) };
                 self.typed(kind, decode(stored, e, &name)?, e, &name)?
             }
             other => return Err(bad_attribute(node, "format", other, "ascii, binary or appended")),
@@ -184,15 +185,18 @@ impl<'a> XmlFile<'a> {
                     }
                 }
             }
-            "binary" => {
-                decode(Stored::Base64(node.text().unwrap_or("").as_bytes()), self.encoding.clone()?, name)?
-            }
+            "binary" => decode(
+                EncodedBytes::Base64(node.text().unwrap_or("").as_bytes()),
+                self.encoding.clone()?,
+                name,
+            )?,
             _ => {
                 let offset = node.attribute("offset").and_then(|t| t.trim().parse::<usize>().ok());
                 let Some(rest) = offset.and_then(|o| self.appended.get(o..)) else {
                     return Err(Fault::field(format!("array `{name}`"), "its offset is outside the file"));
                 };
-                let stored = if self.appended_is_raw { Stored::Raw(rest) } else { Stored::Base64(rest) };
+                let stored =
+                    if self.appended_is_raw { EncodedBytes::Raw(rest) } else { EncodedBytes::Base64(rest) };
                 decode(stored, self.encoding.clone()?, name)?
             }
         };

@@ -9,7 +9,7 @@ mod file;
 mod parallel;
 pub(crate) mod pieces;
 
-use super::{Content, Opened, ReadError, TimeStep};
+use super::{Content, LoadedFile, ReadError, TimeStep};
 use crate::model::Dataset;
 use crate::read::error::{At, Fault, read_bytes};
 use file::{XmlFile, parse_tree, split};
@@ -21,20 +21,20 @@ pub(crate) const FORMAT: &str = "VTK XML";
 const MAX_NESTING: usize = 8;
 
 /// Reads a VTK XML file of any kind, with the files it names.
-pub fn read(path: &Path) -> Result<Opened, ReadError> {
+pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     read_nested(path, 0)
 }
 
 /// Reads one file's content; for files that name others, `path` tells where those are.
-pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<Opened, ReadError> {
+pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     from_bytes(path, bytes, 0)
 }
 
-fn read_nested(path: &Path, depth: usize) -> Result<Opened, ReadError> {
+fn read_nested(path: &Path, depth: usize) -> Result<LoadedFile, ReadError> {
     from_bytes(path, &read_bytes(path)?, depth)
 }
 
-fn from_bytes(path: &Path, bytes: &[u8], depth: usize) -> Result<Opened, ReadError> {
+fn from_bytes(path: &Path, bytes: &[u8], depth: usize) -> Result<LoadedFile, ReadError> {
     let fault = |f: Fault| f.in_file(path, FORMAT);
     if depth > MAX_NESTING {
         let what = format!("files name each other more than {MAX_NESTING} deep");
@@ -74,7 +74,7 @@ fn from_bytes(path: &Path, bytes: &[u8], depth: usize) -> Result<Opened, ReadErr
             format!("{known}; convert it to one of them"),
         )));
     };
-    Ok(Opened { format: FORMAT, content: Content::Data(data), warnings, time_steps: steps })
+    Ok(LoadedFile { format: FORMAT, content: Content::Data(data), warnings, time_steps: steps })
 }
 
 /// Pieces as one data set of kind `kind`, even when there are none.

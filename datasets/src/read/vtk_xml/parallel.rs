@@ -3,7 +3,7 @@
 use super::file::bad_attribute;
 use super::{FORMAT, merged, read_nested};
 use crate::model::{Block, Dataset, extent_dims};
-use crate::read::error::{BROKEN, Fault, beside};
+use crate::read::error::{BROKEN, Fault, sibling_path};
 use crate::read::{Content, ReadError, TimeStep};
 use roxmltree::Node;
 use std::path::Path;
@@ -21,7 +21,7 @@ pub(super) fn pieces(
         let Some(source) = piece.attribute("Source") else {
             return Err(Fault::field("Piece", "it has no Source").in_file(path, FORMAT));
         };
-        let data = nested(path, &beside(path, source), depth, warnings)?;
+        let data = nested(path, &sibling_path(path, source), depth, warnings)?;
         if data.kind() != serial {
             let what = format!("piece {source} is {}, not {serial}", data.kind());
             return Err(Fault::field("Piece", what).in_file(path, FORMAT));
@@ -81,7 +81,7 @@ pub(super) fn time_steps(path: &Path, set: Node<'_, '_>) -> Result<Vec<TimeStep>
             ));
         };
         let part = node.attribute("part").and_then(|p| p.trim().parse().ok()).unwrap_or(0);
-        steps.push(TimeStep { time, part, path: beside(path, name) });
+        steps.push(TimeStep { time, part, path: sibling_path(path, name) });
     }
     steps.sort_by(|a, b| a.time.total_cmp(&b.time).then(a.part.cmp(&b.part)));
     Ok(steps)
@@ -129,7 +129,7 @@ pub(super) fn multi_block(
         let name = node.attribute("name").map_or_else(number, str::to_string);
         let data = match node.tag_name().name() {
             "DataSet" | "Piece" => match node.attribute("file") {
-                Some(file) => nested(path, &beside(path, file), depth, warnings)?,
+                Some(file) => nested(path, &sibling_path(path, file), depth, warnings)?,
                 None => continue, // an empty slot
             },
             "Block" | "Partitions" => multi_block(path, node, depth, level + 1, warnings)?,

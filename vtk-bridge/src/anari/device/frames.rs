@@ -4,8 +4,8 @@ use super::Device;
 use crate::anari::data_type::DataType;
 use crate::anari::frame::{self, Order, start};
 use crate::anari::object::{Handle, Object, Value};
-use crate::anari::scene::world::{Compiled, fingerprint};
-use crate::anari::scene::{Notes, camera_of, view_of};
+use crate::anari::scene::world::{CompiledWorld, fingerprint};
+use crate::anari::scene::{Diagnostics, camera_of, renderer_settings};
 use crate::anari::schema;
 use crate::anari::status::{Code, Message, Severity, lock};
 use std::collections::BTreeMap;
@@ -58,11 +58,11 @@ impl Device {
             );
             return;
         }
-        let mut notes = Notes::default();
-        let compiled = Compiled::of(&world, &mut notes);
-        let view = view_of(&renderer, size, &mut notes);
-        let camera_made = camera_of(&camera, size, compiled.bounds, &mut notes);
-        self.tell_notes(notes);
+        let mut diagnostics = Diagnostics::default();
+        let compiled = CompiledWorld::of(&world, &mut diagnostics);
+        let view = renderer_settings(&renderer, size, &mut diagnostics);
+        let camera_made = camera_of(&camera, size, compiled.bounds, &mut diagnostics);
+        self.report_diagnostics(diagnostics);
         let made = match camera_made {
             Ok(made) => made,
             Err(e) => return self.about(&camera, Severity::Error, format!("the frame is not drawn: {e}")),

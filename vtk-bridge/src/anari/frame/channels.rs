@@ -1,7 +1,7 @@
 //! From the renderer's layers to channels: rows from the bottom, packed as the program asked.
 
 use crate::anari::data_type::DataType;
-use crate::anari::scene::Backdrop;
+use crate::anari::scene::FrameBackground;
 use crate::anari::scene::world::Ids;
 use rt_core::colormap::linear_to_srgb;
 use rt_core::frame::Frame;
@@ -48,7 +48,11 @@ fn byte(v: f32) -> u8 {
 }
 
 /// Colours over the backdrop, linear, rows from the bottom.
-pub(super) fn over(color: &[[f32; 4]], [width, height]: [u32; 2], backdrop: &Backdrop) -> Vec<[f32; 4]> {
+pub(super) fn over(
+    color: &[[f32; 4]],
+    [width, height]: [u32; 2],
+    backdrop: &FrameBackground,
+) -> Vec<[f32; 4]> {
     let place = |i: usize, n: u32| (i as f32 + 0.5) / n as f32;
     upright(color, width)
         .enumerate()

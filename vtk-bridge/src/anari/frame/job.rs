@@ -1,10 +1,10 @@
 //! One drawing of a frame, on a thread of its own.
 
 use super::channels::{albedo, blank, color, depth, normal, numbers, over};
-use super::{Accumulated, Picture};
+use super::{Accumulated, FrameImage};
 use crate::anari::data_type::DataType;
-use crate::anari::scene::View;
-use crate::anari::scene::world::Compiled;
+use crate::anari::scene::RendererSettings;
+use crate::anari::scene::world::CompiledWorld;
 use crate::anari::status::lock;
 use rt_core::accel::{BuildOptions, Geometry, World};
 use rt_core::camera::{Camera, ThinLens};
@@ -22,9 +22,9 @@ use std::time::Instant;
 
 /// Everything a drawing needs; it refers to no object of the program.
 pub(crate) struct Order {
-    pub(crate) compiled: Compiled,
+    pub(crate) compiled: CompiledWorld,
     pub(crate) camera: Camera,
-    pub(crate) view: View,
+    pub(crate) view: RendererSettings,
     pub(crate) channels: BTreeMap<&'static str, DataType>,
     /// Key of what is drawn, when frames are to be added up.
     pub(crate) accumulate: Option<Vec<u64>>,
@@ -38,7 +38,7 @@ pub(crate) struct Order {
 
 /// A drawing in work or done.
 pub(crate) struct Job {
-    picture: Mutex<Option<Arc<Picture>>>,
+    picture: Mutex<Option<Arc<FrameImage>>>,
     done: Condvar,
     cancel: Arc<AtomicBool>,
     thread: Mutex<Option<ThreadId>>,
@@ -66,7 +66,7 @@ impl Job {
     }
 
     /// Waits for the picture. Called from the drawing itself, as a completion callback may do, it does not wait.
-    pub(crate) fn wait(&self) -> Arc<Picture> {
+    pub(crate) fn wait(&self) -> Arc<FrameImage> {
         let mut picture = lock(&self.picture);
         loop {
             if let Some(p) = &*picture {
@@ -120,7 +120,7 @@ fn run(order: Order, job: &Job) {
         Err(why) => {
             let pixels = size[0] as usize * size[1] as usize;
             let channels = order.channels.iter().map(|(name, t)| (*name, blank(*t, pixels))).collect();
-            (Picture { channels, ..Picture::default() }, Err(why))
+            (FrameImage { channels, ..FrameImage::default() }, Err(why))
         }
     };
     picture.size = size;
@@ -136,7 +136,7 @@ fn run(order: Order, job: &Job) {
 }
 
 /// The world with its acceleration structures: that of the last frame when nothing of it has changed.
-fn build(compiled: &Compiled) -> Result<Arc<World>, String> {
+fn build(compiled: &CompiledWorld) -> Result<Arc<World>, String> {
     let mut built = lock(&compiled.built);
     if let Some(old) = &*built {
         let same = |(a, b): (&Geometry, &Geometry)| match (a, b) {
@@ -157,7 +157,7 @@ fn build(compiled: &Compiled) -> Result<Arc<World>, String> {
     Ok(world)
 }
 
-fn draw(order: &Order, job: &Job) -> Result<(Picture, Vec<String>), String> {
+fn draw(order: &Order, job: &Job) -> Result<(FrameImage, Vec<String>), String> {
     let Order { compiled, camera, view, channels, .. } = order;
     let world = build(compiled)?;
 
@@ -167,11 +167,14 @@ fn draw(order: &Order, job: &Job) -> Result<(Picture, Vec<String>), String> {
     scene.materials.clone_from(&compiled.materials);
     scene.lights =
         compiled.lights.iter().copied().map(|l| if view.shadows { l } else { l.without_shadows() }).collect();
-    scene.environment.clone_from(&compiled.sky);
-    scene.background = if compiled.sky.is_some() { Background::Environment } else { Background::Transparent };
+    scene.environment.clone_from(&compiled.environment);
+    scene.background =
+        if compiled.environment.is_some() { Background::Environment } else { Background::Transparent };
     // Ambient light comes from everywhere, so mirrors see it; next to a picture of the sky it only adds to what is diffuse.
     match view.ambient {
-        Some(color) if compiled.sky.is_none() => scene.environment = Some(Environment::Constant(color)),
+        Some(color) if compiled.environment.is_none() => {
+            scene.environment = Some(Environment::Constant(color))
+        }
         Some(color) => scene.lights.push(Light::ambient(color)),
         None => {}
     }
@@ -206,7 +209,7 @@ fn draw(order: &Order, job: &Job) -> Result<(Picture, Vec<String>), String> {
     }
     let fail = |e: RenderError| e.to_string();
     let size = [options.width, options.height];
-    let mut picture = Picture { samples: options.samples, ..Picture::default() };
+    let mut picture = FrameImage { samples: options.samples, ..FrameImage::default() };
     let Some(layers) = layers.or(has("channel.albedo").then_some(Layers::DISTANCE)) else {
         return Ok((picture, warnings));
     };

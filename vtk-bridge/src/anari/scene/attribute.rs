@@ -76,7 +76,7 @@ impl Topology {
 }
 
 /// A point on a geometry, as far as attributes need it.
-pub(crate) struct Place<'a> {
+pub(crate) struct HitPoint<'a> {
     pub(crate) topology: &'a Topology,
     /// The renderer's primitive.
     pub(crate) primitive: u32,
@@ -123,7 +123,7 @@ impl Source {
     }
 
     /// The value at a place; elements past the end of an array are (0, 0, 0, 1).
-    pub(crate) fn at(&self, p: &Place<'_>) -> [f32; 4] {
+    pub(crate) fn at(&self, p: &HitPoint<'_>) -> [f32; 4] {
         let get = |v: &[[f32; 4]], i: u32| v.get(i as usize).copied().unwrap_or([0.0, 0.0, 0.0, 1.0]);
         let mix = |v: &[[f32; 4]], ids: &[[u32; 3]]| {
             let Some(ids) = ids.get(p.primitive as usize) else { return [0.0, 0.0, 0.0, 1.0] };

@@ -1,6 +1,6 @@
 //! Cameras.
 
-use super::Notes;
+use super::Diagnostics;
 use crate::anari::object::Object;
 use rt_core::camera::{Camera, CameraError, ThinLens};
 use rt_core::glam::{DMat4, DVec3, DVec4};
@@ -10,7 +10,7 @@ pub(crate) fn camera_of(
     camera: &Object,
     size: [u32; 2],
     bounds: Option<[DVec3; 2]>,
-    notes: &mut Notes,
+    diagnostics: &mut Diagnostics,
 ) -> Result<Camera, CameraError> {
     let point = |name: &str, default: [f64; 3]| DVec3::from_array(camera.vector(name, default));
     let (eye, direction) = (point("position", [0.0; 3]), point("direction", [0.0, 0.0, -1.0]));
@@ -53,7 +53,7 @@ pub(crate) fn camera_of(
         return Ok(crop);
     }
     if orthographic {
-        notes.warn(camera, "`apertureRadius` is left out: a parallel projection has no lens");
+        diagnostics.warn(camera, "`apertureRadius` is left out: a parallel projection has no lens");
         return Ok(crop);
     }
     crop.with_lens(ThinLens { aperture_radius, focus_distance })

@@ -1,8 +1,8 @@
 //! Geometries: from arrays to the renderer's meshes and shapes, with how their primitives belong to vertices.
 
-use super::Notes;
+use super::Diagnostics;
 use super::attribute::{Numbers, Topology};
-use super::paint::{TriangleShape, Weights};
+use super::surface_color::{TriangleShape, Weights};
 use super::volume::{grid_of, is_nearest};
 use crate::anari::object::{Object, Value};
 use rt_core::accel::Geometry;
@@ -27,7 +27,7 @@ pub(crate) enum Body {
 
 /// What a geometry object consists of.
 #[derive(Default)]
-pub(crate) struct Prepared {
+pub(crate) struct CompiledGeometry {
     /// Usually one; an isosurface has one per isovalue.
     pub(crate) parts: Vec<Part>,
     /// In object space.
@@ -63,24 +63,24 @@ impl Part {
     }
 }
 
-/// Parameters that do not change the shape: what depends on them is made in [`super::dress`].
-pub(crate) fn is_look(name: &str) -> bool {
+/// Parameters that do not change the shape: what depends on them is made in [`super::surface`].
+pub(crate) fn is_appearance_parameter(name: &str) -> bool {
     let last = name.rsplit('.').next().unwrap_or(name);
     name == "name" || last == "color" || last.starts_with("attribute")
 }
 
 /// Makes what the renderer needs. Faults become notes, and what is unusable is left out.
-pub(crate) fn prepare(geometry: &Object, notes: &mut Notes) -> Prepared {
+pub(crate) fn compile_geometry(geometry: &Object, diagnostics: &mut Diagnostics) -> CompiledGeometry {
     let part = match geometry.subtype.as_str() {
-        "triangle" => polygons::<3>(geometry, notes),
-        "quad" => polygons::<4>(geometry, notes),
-        "sphere" => spheres(geometry, notes),
-        "cylinder" | "cone" => cylinders(geometry, notes),
-        "curve" => curve(geometry, notes),
-        "isosurface" => return isosurfaces(geometry, notes),
+        "triangle" => polygons::<3>(geometry, diagnostics),
+        "quad" => polygons::<4>(geometry, diagnostics),
+        "sphere" => spheres(geometry, diagnostics),
+        "cylinder" | "cone" => cylinders(geometry, diagnostics),
+        "curve" => curve(geometry, diagnostics),
+        "isosurface" => return isosurfaces(geometry, diagnostics),
         _ => None,
     };
-    let Some(part) = part else { return Prepared::default() };
+    let Some(part) = part else { return CompiledGeometry::default() };
     let bounds = match &part.body {
         Body::Mesh(m) => {
             let b = m.bounds();
@@ -88,7 +88,7 @@ pub(crate) fn prepare(geometry: &Object, notes: &mut Notes) -> Prepared {
         }
         Body::Shape(s, _) => shape_bounds(s.as_ref()),
     };
-    Prepared { parts: vec![part], bounds }
+    CompiledGeometry { parts: vec![part], bounds }
 }
 
 fn shape_bounds(shape: &dyn Shape) -> Option<[DVec3; 2]> {
@@ -101,10 +101,10 @@ fn shape_bounds(shape: &dyn Shape) -> Option<[DVec3; 2]> {
 
 // ---- Arrays ---------------------------------------------------------------------------------------------------------
 
-fn positions(geometry: &Object, notes: &mut Notes) -> Option<Vec<Vec3>> {
+fn positions(geometry: &Object, diagnostics: &mut Diagnostics) -> Option<Vec<Vec3>> {
     let found = geometry.object("vertex.position").and_then(|a| a.with_array(|a| a.vectors()));
     if found.is_none() {
-        notes.error(
+        diagnostics.error(
             geometry,
             "`vertex.position` is not set, so it has no shape; set it to an array of FLOAT32_VEC3 and commit",
         );
@@ -112,7 +112,7 @@ fn positions(geometry: &Object, notes: &mut Notes) -> Option<Vec<Vec3>> {
     let points: Vec<Vec3> = found?.into_iter().map(Vec3::from).collect();
     let bad = points.iter().filter(|p| !p.is_finite()).count();
     if bad > 0 {
-        notes.warn(
+        diagnostics.warn(
             geometry,
             format!("{bad} of {} vertices are NaN or infinite; what uses them is left out", points.len()),
         );
@@ -124,7 +124,7 @@ fn positions(geometry: &Object, notes: &mut Notes) -> Option<Vec<Vec3>> {
 fn elements<const N: usize>(
     geometry: &Object,
     vertices: usize,
-    notes: &mut Notes,
+    diagnostics: &mut Diagnostics,
 ) -> (Vec<[u32; N]>, Numbers) {
     let listed = geometry.object("primitive.index").and_then(|a| a.with_array(|a| a.indices::<N>()));
     let all = listed.unwrap_or_else(|| {
@@ -137,7 +137,7 @@ fn elements<const N: usize>(
     }
     let total = all.len();
     let kept: Vec<(u32, [u32; N])> = (0..).zip(all).filter(|(_, e)| fits(e)).collect();
-    notes.warn(geometry, format!("{} of {total} primitives name vertices past the last one ({vertices} vertices); they are left out", total - kept.len()));
+    diagnostics.warn(geometry, format!("{} of {total} primitives name vertices past the last one ({vertices} vertices); they are left out", total - kept.len()));
     let (numbers, elements) = kept.into_iter().unzip();
     (elements, Numbers::Listed(numbers))
 }
@@ -151,9 +151,9 @@ fn radii(geometry: &Object, array: &str, default: f32) -> impl Fn(u32) -> f32 + 
 
 // ---- Triangles and quads --------------------------------------------------------------------------------------------
 
-fn polygons<const N: usize>(geometry: &Object, notes: &mut Notes) -> Option<Part> {
-    let points = positions(geometry, notes)?;
-    let (faces, numbers) = elements::<N>(geometry, points.len(), notes);
+fn polygons<const N: usize>(geometry: &Object, diagnostics: &mut Diagnostics) -> Option<Part> {
+    let points = positions(geometry, diagnostics)?;
+    let (faces, numbers) = elements::<N>(geometry, points.len(), diagnostics);
     let number = |i: usize| match &numbers {
         Numbers::Listed(l) => l[i],
         _ => i as u32,
@@ -194,7 +194,7 @@ fn polygons<const N: usize>(geometry: &Object, notes: &mut Notes) -> Option<Part
         [("faceVarying.normal", &of_corners, faces.len() * N), ("vertex.normal", &of_vertices, points.len())]
     {
         if let Some(list) = list.as_ref().filter(|l| l.len() < needed) {
-            notes.warn(
+            diagnostics.warn(
                 geometry,
                 format!(
                     "`{name}` has {} elements, {needed} are needed; without the others faces are flat",
@@ -239,32 +239,32 @@ fn shape_part(
     shape: Result<Arc<dyn Shape>, rt_core::shapes::ShapeError>,
     weights: Weights,
     topology: Topology,
-    notes: &mut Notes,
+    diagnostics: &mut Diagnostics,
 ) -> Option<Part> {
     match shape {
         Ok(shape) => Some(Part::new(Body::Shape(shape, weights), topology)),
         Err(e) => {
-            notes.error(geometry, e);
+            diagnostics.error(geometry, e);
             None
         }
     }
 }
 
-fn spheres(geometry: &Object, notes: &mut Notes) -> Option<Part> {
-    let points = positions(geometry, notes)?;
-    let (spheres, numbers) = elements::<1>(geometry, points.len(), notes);
+fn spheres(geometry: &Object, diagnostics: &mut Diagnostics) -> Option<Part> {
+    let points = positions(geometry, diagnostics)?;
+    let (spheres, numbers) = elements::<1>(geometry, points.len(), diagnostics);
     let radius = radii(geometry, "vertex.radius", geometry.f32("radius", 1.0));
     let centers = spheres.iter().map(|[v]| points[*v as usize]).collect();
     let each = spheres.iter().map(|[v]| radius(*v)).collect();
     let topology =
         Topology { vertices: spheres.iter().map(|[v]| [*v; 3]).collect(), numbers, ..Topology::default() };
     let shape = Spheres::new(centers, Radii::Each(each)).map(|s| Arc::new(s) as Arc<dyn Shape>);
-    shape_part(geometry, shape, Weights::First, topology, notes)
+    shape_part(geometry, shape, Weights::First, topology, diagnostics)
 }
 
-fn cylinders(geometry: &Object, notes: &mut Notes) -> Option<Part> {
-    let points = positions(geometry, notes)?;
-    let (pairs, numbers) = elements::<2>(geometry, points.len(), notes);
+fn cylinders(geometry: &Object, diagnostics: &mut Diagnostics) -> Option<Part> {
+    let points = positions(geometry, diagnostics)?;
+    let (pairs, numbers) = elements::<2>(geometry, points.len(), diagnostics);
     let common = geometry.f32("radius", 1.0);
     let ends: Vec<[f32; 2]> = if geometry.subtype == "cone" {
         let radius = radii(geometry, "vertex.radius", 1.0);
@@ -296,7 +296,7 @@ fn cylinders(geometry: &Object, notes: &mut Notes) -> Option<Part> {
     });
     let vertices = pairs.iter().map(|[a, b]| [*a, *b, *b]).collect();
     let topology = Topology { vertices, numbers, ..Topology::default() };
-    shape_part(geometry, shape, Weights::Along, topology, notes)
+    shape_part(geometry, shape, Weights::Along, topology, diagnostics)
 }
 
 /// Cylinders of which some ends are open: hits on the missing caps are passed over.
@@ -334,8 +334,8 @@ impl Shape for HalfOpen {
     }
 }
 
-fn curve(geometry: &Object, notes: &mut Notes) -> Option<Part> {
-    let points = positions(geometry, notes)?;
+fn curve(geometry: &Object, diagnostics: &mut Diagnostics) -> Option<Part> {
+    let points = positions(geometry, diagnostics)?;
     let radius = radii(geometry, "vertex.radius", geometry.f32("radius", 1.0));
     let listed = geometry.object("primitive.index").and_then(|a| a.with_array(|a| a.indices::<1>()));
     let total = listed.as_ref().map_or(points.len().saturating_sub(1), Vec::len);
@@ -347,7 +347,7 @@ fn curve(geometry: &Object, notes: &mut Notes) -> Option<Part> {
         .filter(|(v, _)| (*v as usize) + 1 < points.len())
         .collect();
     if segments.len() < total {
-        notes.warn(
+        diagnostics.warn(
             geometry,
             format!(
                 "{} of {total} segments name vertices past the last one ({} vertices); they are left out",
@@ -379,18 +379,18 @@ fn curve(geometry: &Object, notes: &mut Notes) -> Option<Part> {
     }
     let topology = Topology { vertices, numbers: Numbers::Listed(numbers), ..Topology::default() };
     let shape = Tubes::new(chain, &offsets, Radii::Each(each)).map(|s| Arc::new(s) as Arc<dyn Shape>);
-    shape_part(geometry, shape, Weights::Along, topology, notes)
+    shape_part(geometry, shape, Weights::Along, topology, diagnostics)
 }
 
-fn isosurfaces(geometry: &Object, notes: &mut Notes) -> Prepared {
-    let mut out = Prepared::default();
+fn isosurfaces(geometry: &Object, diagnostics: &mut Diagnostics) -> CompiledGeometry {
+    let mut out = CompiledGeometry::default();
     let Some(field) = geometry.object("field") else {
-        notes.error(geometry, "`field` is not set, so it has no shape");
+        diagnostics.error(geometry, "`field` is not set, so it has no shape");
         return out;
     };
-    let Some(grid) = grid_of(&field, notes) else { return out };
+    let Some(grid) = grid_of(&field, diagnostics) else { return out };
     if is_nearest(&field) {
-        notes.warn(
+        diagnostics.warn(
             geometry,
             "its field's `filter` is \"nearest\", which has no isosurfaces: it is interpolated linearly",
         );
@@ -399,7 +399,7 @@ fn isosurfaces(geometry: &Object, notes: &mut Notes) -> Prepared {
         Some(Value::Object(a)) => a.with_array(|a| a.scalars()).unwrap_or_default(),
         Some(Value::Bytes(t, b)) => vec![t.attribute(b)[0]],
         _ => {
-            notes.error(geometry, "`isovalue` is not set, so it has no shape");
+            diagnostics.error(geometry, "`isovalue` is not set, so it has no shape");
             return out;
         }
     };
@@ -407,7 +407,7 @@ fn isosurfaces(geometry: &Object, notes: &mut Notes) -> Prepared {
         match Isosurface::new(grid.clone(), &[isovalue], &Default::default()) {
             Ok(shape) => {
                 if shape.report().isovalues_out_of_range > 0 {
-                    notes.warn(
+                    diagnostics.warn(
                         geometry,
                         format!(
                             "isovalue {isovalue} is outside of the field's range {:?}: nothing to draw",
@@ -419,7 +419,7 @@ fn isosurfaces(geometry: &Object, notes: &mut Notes) -> Prepared {
                 out.bounds = union(out.bounds, shape_bounds(&shape));
                 out.parts.push(Part::new(Body::Shape(Arc::new(shape), Weights::First), topology));
             }
-            Err(e) => notes.error(geometry, e),
+            Err(e) => diagnostics.error(geometry, e),
         }
     }
     out

@@ -1,6 +1,6 @@
 //! Lights. ANARI gives radiometric quantities, the renderer what a white surface becomes: irradiance over π.
 
-use super::Notes;
+use super::Diagnostics;
 use crate::anari::object::Object;
 use rt_core::environment::Environment;
 use rt_core::glam::{DAffine3, DVec3};
@@ -10,34 +10,38 @@ use rt_core::texture::{Texture, Wrap};
 use std::f64::consts::PI;
 
 /// What a light object gives.
-pub(crate) enum Made {
-    Lamp(Light),
-    Sky(Environment),
+pub(crate) enum CompiledLight {
+    Light(Light),
+    Environment(Environment),
 }
 
 /// `None`, with a note, when it cannot be used.
-pub(crate) fn light_of(light: &Object, place: &DAffine3, notes: &mut Notes) -> Option<Made> {
+pub(crate) fn light_of(
+    light: &Object,
+    place: &DAffine3,
+    diagnostics: &mut Diagnostics,
+) -> Option<CompiledLight> {
     if !light.known {
         return None;
     }
     let color = light.vector("color", [1.0; 3]);
     if !color.iter().all(|c| c.is_finite() && *c >= 0.0) {
-        notes.error(
+        diagnostics.error(
             light,
             format!("`color` is {color:?}; it must be finite and not negative: it gives no light"),
         );
         return None;
     }
     if light.subtype == "hdri" {
-        return sky(light, color, place, notes);
+        return environment(light, color, place, diagnostics);
     }
     if light.subtype == "quad" {
-        return quad(light, color, place, notes);
+        return quad(light, color, place, diagnostics);
     }
     let position = place.transform_point3(DVec3::from_array(light.vector("position", [0.0; 3])));
     let direction = place.transform_vector3(DVec3::from_array(light.vector("direction", [0.0, 0.0, -1.0])));
     if !(position.is_finite() && direction.is_finite() && direction != DVec3::ZERO) {
-        notes.error(
+        diagnostics.error(
             light,
             format!("its place {position} or direction {direction} is not finite or zero: it gives no light"),
         );
@@ -51,7 +55,7 @@ pub(crate) fn light_of(light: &Object, place: &DAffine3, notes: &mut Notes) -> O
         // NaN fails the comparison too.
         let any = outer > 0.0 && inner >= 0.0;
         if !any {
-            notes.warn(light, "`openingAngle` or `falloffAngle` leaves no cone: it gives no light");
+            diagnostics.warn(light, "`openingAngle` or `falloffAngle` leaves no cone: it gives no light");
         }
         any.then_some((inner, outer))
     };
@@ -80,7 +84,7 @@ pub(crate) fn light_of(light: &Object, place: &DAffine3, notes: &mut Notes) -> O
             let kind = if radius > 0.0 {
                 let inner_radius = number("innerRadius").unwrap_or(0.0);
                 if !(0.0..radius).contains(&inner_radius) {
-                    notes.error(
+                    diagnostics.error(
                         light,
                         format!("`innerRadius` is {inner_radius}; it must be from 0 to below the radius {radius}: it gives no light"),
                     );
@@ -88,7 +92,8 @@ pub(crate) fn light_of(light: &Object, place: &DAffine3, notes: &mut Notes) -> O
                 }
                 LightKind::Ring { position, direction, inner_radius, radius, inner_rad, outer_rad }
             } else {
-                notes.warn(light, "`radius` is 0: it shines from a point, into the half space before it");
+                diagnostics
+                    .warn(light, "`radius` is 0: it shines from a point, into the half space before it");
                 LightKind::Cone { position, direction, inner_rad, outer_rad }
             };
             (kind, sized.unwrap_or(ahead), [0.0, 0.0, 1.0])
@@ -99,25 +104,30 @@ pub(crate) fn light_of(light: &Object, place: &DAffine3, notes: &mut Notes) -> O
         }
     };
     if !(strength.is_finite() && strength >= 0.0) {
-        notes.error(
+        diagnostics.error(
             light,
             format!("its strength is {strength}; it must be finite and not negative: it gives no light"),
         );
         return None;
     }
     let lamp = Light { kind, attenuation, ..Light::directional(DVec3::Z) };
-    Some(Made::Lamp(lamp.with_color(color.map(|c| (c * strength / PI) as f32))))
+    Some(CompiledLight::Light(lamp.with_color(color.map(|c| (c * strength / PI) as f32))))
 }
 
 /// A parallelogram; its strength straight ahead is radiance times area.
-fn quad(light: &Object, color: [f64; 3], place: &DAffine3, notes: &mut Notes) -> Option<Made> {
+fn quad(
+    light: &Object,
+    color: [f64; 3],
+    place: &DAffine3,
+    diagnostics: &mut Diagnostics,
+) -> Option<CompiledLight> {
     let vector = |name: &str, default: [f64; 3]| DVec3::from_array(light.vector(name, default));
     let corner = place.transform_point3(vector("position", [0.0; 3]));
     let [a, b] = [("edge1", [1.0, 0.0, 0.0]), ("edge2", [0.0, 1.0, 0.0])]
         .map(|(name, default)| place.transform_vector3(vector(name, default)));
     let area = a.cross(b).length();
     if !(corner.is_finite() && area.is_finite() && area > 0.0) {
-        notes.error(
+        diagnostics.error(
             light,
             format!(
                 "its corner {corner} is not finite, or its edges {a} and {b} span no area: it gives no light"
@@ -136,7 +146,7 @@ fn quad(light: &Object, color: [f64; 3], place: &DAffine3, notes: &mut Notes) ->
         .or(number("intensity"))
         .unwrap_or(1.0);
     if !(strength.is_finite() && strength >= 0.0) {
-        notes.error(
+        diagnostics.error(
             light,
             format!("its strength is {strength}; it must be finite and not negative: it gives no light"),
         );
@@ -146,14 +156,19 @@ fn quad(light: &Object, color: [f64; 3], place: &DAffine3, notes: &mut Notes) ->
     let edges = if side == "back" { [b, a] } else { [a, b] };
     let kind = LightKind::Quad { corner, edges, both_sides };
     let lamp = Light { kind, ..Light::quad(corner, edges) };
-    Some(Made::Lamp(lamp.with_color(color.map(|c| (c * strength / PI) as f32))))
+    Some(CompiledLight::Light(lamp.with_color(color.map(|c| (c * strength / PI) as f32))))
 }
 
 /// The picture turned so that the renderer, which knows only which way is up, has its middle in the right direction.
-fn sky(light: &Object, color: [f64; 3], place: &DAffine3, notes: &mut Notes) -> Option<Made> {
+fn environment(
+    light: &Object,
+    color: [f64; 3],
+    place: &DAffine3,
+    diagnostics: &mut Diagnostics,
+) -> Option<CompiledLight> {
     let picture = light.object("radiance").and_then(|a| a.with_array(|a| (a.dims, a.vectors())));
     let Some(([width, height, _], texels)) = picture.filter(|(_, t)| !t.is_empty()) else {
-        notes.error(light, "`radiance` is not set or has no texels: it gives no light");
+        diagnostics.error(light, "`radiance` is not set or has no texels: it gives no light");
         return None;
     };
     let up =
@@ -161,7 +176,7 @@ fn sky(light: &Object, color: [f64; 3], place: &DAffine3, notes: &mut Notes) -> 
     let forward = place.transform_vector3(DVec3::from_array(light.vector("direction", [1.0, 0.0, 0.0])));
     let forward = (forward - up * up.dot(forward)).normalize_or_zero();
     if up == DVec3::ZERO || forward == DVec3::ZERO {
-        notes.error(light, "`up` and `direction` are zero or parallel: it gives no light");
+        diagnostics.error(light, "`up` and `direction` are zero or parallel: it gives no light");
         return None;
     }
     let right = forward.cross(up);
@@ -185,18 +200,18 @@ fn sky(light: &Object, color: [f64; 3], place: &DAffine3, notes: &mut Notes) -> 
     let mut image = match Texture::from_linear(width, height, turned) {
         Ok(image) => image,
         Err(e) => {
-            notes.error(light, e);
+            diagnostics.error(light, e);
             return None;
         }
     };
     image.wrap = [Wrap::Repeat, Wrap::Clamp];
     let scale = light.f32("scale", 1.0);
     if !(scale.is_finite() && scale >= 0.0) {
-        notes.error(
+        diagnostics.error(
             light,
             format!("`scale` is {scale}; it must be finite and not negative: it gives no light"),
         );
         return None;
     }
-    Some(Made::Sky(Environment::Image { image: image.into(), up: up.as_vec3(), scale }))
+    Some(CompiledLight::Environment(Environment::Image { image: image.into(), up: up.as_vec3(), scale }))
 }

@@ -1,15 +1,15 @@
 //! Materials: from ANARI's to the renderer's model, and where colour and opacity come from.
 
-use super::Notes;
+use super::Diagnostics;
 use super::attribute::{NAMES, Source};
-use super::grain::Grain;
-use super::paint::{AlphaMode, Input, Paint};
+use super::material_inputs::MaterialInputs;
 use super::sampler::Sampler;
+use super::surface_color::{AlphaMode, Input, SurfaceColor};
 use crate::anari::object::{Object, Value};
 use rt_core::material::{Material, PbrForm, SurfaceModel};
 
 /// A material without its colour: model and emission.
-pub(crate) fn model_of(material: &Object, notes: &mut Notes) -> Material {
+pub(crate) fn model_of(material: &Object, diagnostics: &mut Diagnostics) -> Material {
     let mut out = Material::matte([1.0; 3]);
     if material.subtype != "physicallyBased" {
         return out;
@@ -21,17 +21,17 @@ pub(crate) fn model_of(material: &Object, notes: &mut Notes) -> Material {
         if (0.0..=1.0).contains(&v) {
             return v;
         }
-        notes.warn(material, format!("`{name}` is {v}; it must be between 0 and 1"));
+        diagnostics.warn(material, format!("`{name}` is {v}; it must be between 0 and 1"));
         if v > 1.0 { 1.0 } else { 0.0 }
     };
     let (metallic, roughness) = (unit("metallic", 1.0), unit("roughness", 1.0));
     let (strength, transmission) = (unit("specular", 0.0), unit("transmission", 0.0));
     let ior = ior_of(material).unwrap_or_else(|ior| {
-        notes.warn(material, format!("`ior` is {ior}; it must be finite and at least 1: 1.5 is used"));
+        diagnostics.warn(material, format!("`ior` is {ior}; it must be finite and at least 1: 1.5 is used"));
         1.5
     });
     if transmission > 0.0 && transmission < 1.0 {
-        notes.warn(material, format!("`transmission` is {transmission}; there is nothing between 0 (opaque) and 1 (glass): the nearer is used"));
+        diagnostics.warn(material, format!("`transmission` is {transmission}; there is nothing between 0 (opaque) and 1 (glass): the nearer is used"));
     }
     out.model = if transmission >= 0.5 {
         // Beer and Lambert: white light has the attenuation colour after the attenuation distance.
@@ -53,7 +53,7 @@ pub(crate) fn model_of(material: &Object, notes: &mut Notes) -> Material {
     if emission.iter().all(|v| v.is_finite() && *v >= 0.0) {
         out.emission = emission;
     } else {
-        notes.warn(
+        diagnostics.warn(
             material,
             format!("`emissive` is {emission:?}; it must be finite and not negative: it gives off no light"),
         );
@@ -77,36 +77,36 @@ fn varying(
     name: &str,
     geometry: &Object,
     instance: Option<&Object>,
-    notes: &mut Notes,
+    diagnostics: &mut Diagnostics,
 ) -> Option<Input> {
     match material.parameters().get(name)? {
         Value::Text(attribute) => {
             let source = Source::of(attribute, geometry, instance);
             if source.is_none() {
-                notes.error(
+                diagnostics.error(
                     material,
                     format!("`{name}` is \"{attribute}\", which is no attribute; use one of {NAMES:?}"),
                 );
             }
             source.map(Input::Attribute)
         }
-        Value::Object(sampler) => Sampler::of(sampler, geometry, instance, notes).map(Input::Sampler),
+        Value::Object(sampler) => Sampler::of(sampler, geometry, instance, diagnostics).map(Input::Sampler),
         Value::Bytes(..) | Value::Pointer(..) => None,
     }
 }
 
 /// What varies besides colour and opacity on `geometry` in `instance`; `None` for nothing.
-pub(crate) fn grain_of(
+pub(crate) fn material_inputs_of(
     material: &Object,
     geometry: &Object,
     instance: Option<&Object>,
-    notes: &mut Notes,
-) -> Option<Grain> {
+    diagnostics: &mut Diagnostics,
+) -> Option<MaterialInputs> {
     if material.subtype != "physicallyBased" {
         return None;
     }
-    let mut input = |name: &str| varying(material, name, geometry, instance, notes);
-    let grain = Grain {
+    let mut input = |name: &str| varying(material, name, geometry, instance, diagnostics);
+    let material_inputs = MaterialInputs {
         metallic: input("metallic"),
         roughness: input("roughness"),
         specular: input("specular"),
@@ -118,23 +118,23 @@ pub(crate) fn grain_of(
         },
         normal_reflectance: normal_reflectance(ior_of(material).unwrap_or(1.5)),
     };
-    grain.varies().then_some(grain)
+    material_inputs.varies().then_some(material_inputs)
 }
 
 /// Where colour and opacity come from on `geometry` in `instance`.
-pub(crate) fn paint_of(
+pub(crate) fn surface_color_of(
     material: &Object,
     geometry: &Object,
     instance: Option<&Object>,
-    notes: &mut Notes,
-) -> Paint {
+    diagnostics: &mut Diagnostics,
+) -> SurfaceColor {
     let name = if material.subtype == "physicallyBased" { "baseColor" } else { "color" };
     let default = if material.subtype == "physicallyBased" { [1.0; 4] } else { [0.8, 0.8, 0.8, 1.0] };
     let mut input = |name: &str, default: [f32; 4]| {
         if let Some(Value::Bytes(t, b)) = material.parameters().get(name) {
             return Input::Constant(t.attribute(b));
         }
-        varying(material, name, geometry, instance, notes).unwrap_or(Input::Constant(default))
+        varying(material, name, geometry, instance, diagnostics).unwrap_or(Input::Constant(default))
     };
     let (color, opacity) = (input(name, default), input("opacity", [1.0; 4]));
     let mode = match material.text("alphaMode").as_deref() {
@@ -142,11 +142,11 @@ pub(crate) fn paint_of(
         Some("mask") => AlphaMode::Mask { cutoff: material.f32("alphaCutoff", 0.5) },
         _ => AlphaMode::Opaque,
     };
-    Paint { color, opacity, mode }
+    SurfaceColor { color, opacity, mode }
 }
 
 /// Whether the look depends on where the instance is.
-pub(crate) fn names_the_world(material: &Object) -> bool {
+pub(crate) fn uses_world_space(material: &Object) -> bool {
     material.parameters().values().any(|v| match v {
         Value::Text(t) => t.starts_with("world"),
         Value::Object(sampler) => sampler.text("inAttribute").is_some_and(|t| t.starts_with("world")),

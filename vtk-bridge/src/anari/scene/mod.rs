@@ -2,28 +2,28 @@
 
 pub mod attribute;
 mod camera;
-mod dress;
 mod geometry;
-mod grain;
 mod light;
 mod material;
-mod paint;
+mod material_inputs;
+mod renderer;
 mod sampler;
-mod view;
+mod surface;
+mod surface_color;
 mod volume;
 pub mod world;
 
 pub(crate) use camera::camera_of;
-pub(crate) use view::{Backdrop, View, view_of};
+pub(crate) use renderer::{FrameBackground, RendererSettings, renderer_settings};
 
 use super::object::Object;
 use super::status::{Code, Message, Severity};
 
 /// Faults found while looking at objects, for the program.
 #[derive(Default)]
-pub(crate) struct Notes(pub(crate) Vec<Message>);
+pub(crate) struct Diagnostics(pub(crate) Vec<Message>);
 
-impl Notes {
+impl Diagnostics {
     pub(crate) fn add(&mut self, about: &Object, severity: Severity, text: impl std::fmt::Display) {
         let code = if severity <= Severity::Warning { Code::InvalidArgument } else { Code::Ok };
         let text = format!("{}: {text}", about.title());

@@ -1,7 +1,7 @@
 //! Samplers: from an attribute to a value, by a picture, a list or a matrix.
 
-use super::Notes;
-use super::attribute::{Domain, Place, Source};
+use super::Diagnostics;
+use super::attribute::{Domain, HitPoint, Source};
 use crate::anari::object::Object;
 use rt_core::glam::{DMat4, DVec4, Vec2};
 use rt_core::texture::{Filter, Texture, Wrap};
@@ -53,7 +53,7 @@ impl Sampler {
         sampler: &Object,
         geometry: &Object,
         instance: Option<&Object>,
-        notes: &mut Notes,
+        diagnostics: &mut Diagnostics,
     ) -> Option<Sampler> {
         if !sampler.known {
             return None;
@@ -64,7 +64,7 @@ impl Sampler {
         } else {
             let input = Source::of(&name, geometry, instance);
             if input.is_none() {
-                notes.error(
+                diagnostics.error(
                     sampler,
                     format!(
                         "`inAttribute` is \"{name}\", which is no attribute; use one of {:?}",
@@ -79,20 +79,20 @@ impl Sampler {
             "primitive" => {
                 let values = sampler.object("array").and_then(|a| a.with_array(|a| a.attributes()));
                 let Some(values) = values else {
-                    notes.error(sampler, "`array` is not set, so there is nothing to sample");
+                    diagnostics.error(sampler, "`array` is not set, so there is nothing to sample");
                     return None;
                 };
                 let offset = sampler.numbers("inOffset").map_or(0, |v| v[0] as u64);
                 Step::Primitive { values: values.into(), offset }
             }
-            _ => Step::Image(Arc::new(image(sampler, notes)?)),
+            _ => Step::Image(Arc::new(image(sampler, diagnostics)?)),
         };
         let (out_transform, out_offset) =
             (matrix(sampler, "outTransform"), DVec4::from_array(sampler.vector("outOffset", [0.0; 4])));
         Some(Sampler { input, step, out_transform, out_offset })
     }
 
-    pub(crate) fn at(&self, p: &Place<'_>) -> [f32; 4] {
+    pub(crate) fn at(&self, p: &HitPoint<'_>) -> [f32; 4] {
         let value = match &self.step {
             Step::Nothing => self.input.at(p),
             Step::Primitive { values, offset } => {
@@ -121,7 +121,7 @@ impl Sampler {
     }
 
     /// The attribute that it looks at.
-    pub(crate) fn attribute(&self, p: &Place<'_>) -> [f32; 4] {
+    pub(crate) fn attribute(&self, p: &HitPoint<'_>) -> [f32; 4] {
         self.input.at(p)
     }
 
@@ -136,7 +136,7 @@ impl Sampler {
     }
 
     /// Texture coordinates at a vertex.
-    pub(crate) fn coordinate(&self, p: &Place<'_>) -> Vec2 {
+    pub(crate) fn coordinate(&self, p: &HitPoint<'_>) -> Vec2 {
         match &self.step {
             Step::Image(image) => {
                 let c = image.coordinate(self.input.at(p));
@@ -147,7 +147,7 @@ impl Sampler {
     }
 }
 
-fn image(sampler: &Object, notes: &mut Notes) -> Option<Image> {
+fn image(sampler: &Object, diagnostics: &mut Diagnostics) -> Option<Image> {
     let dimensions = match sampler.subtype.as_str() {
         "image1D" => 1,
         "image2D" => 2,
@@ -160,7 +160,7 @@ fn image(sampler: &Object, notes: &mut Notes) -> Option<Image> {
         })
     });
     let Some((dims, texels)) = read.filter(|(_, t)| !t.is_empty()) else {
-        notes.error(sampler, "`image` is not set or has no texels, so there is nothing to sample");
+        diagnostics.error(sampler, "`image` is not set or has no texels, so there is nothing to sample");
         return None;
     };
     let names: &[&str] =

@@ -1,6 +1,6 @@
 //! Fields and volumes.
 
-use super::Notes;
+use super::Diagnostics;
 use crate::anari::data_type::DataType;
 use crate::anari::object::{Object, Value};
 use rt_core::colormap::ColorMap;
@@ -11,13 +11,13 @@ use rt_core::volume::{Interpolation, Volume, VolumeOptions};
 use std::sync::Arc;
 
 /// The field's grid; `None`, with a note, when it cannot be used.
-pub(crate) fn grid_of(field: &Object, notes: &mut Notes) -> Option<Arc<Grid>> {
+pub(crate) fn grid_of(field: &Object, diagnostics: &mut Diagnostics) -> Option<Arc<Grid>> {
     if !field.known {
         return None;
     }
     let data = field.object("data").and_then(|a| a.with_array(|a| (a.dims, a.scalars())));
     let Some((dims, values)) = data else {
-        notes.error(field, "`data` is not set; set it to a three-dimensional array and commit");
+        diagnostics.error(field, "`data` is not set; set it to a three-dimensional array and commit");
         return None;
     };
     let origin = DVec3::from_array(field.vector("origin", [0.0; 3]));
@@ -25,7 +25,7 @@ pub(crate) fn grid_of(field: &Object, notes: &mut Notes) -> Option<Arc<Grid>> {
     match Grid::new(UVec3::from_array(dims.map(|d| d as u32)), origin, spacing, values) {
         Ok(grid) => Some(Arc::new(grid)),
         Err(e) => {
-            notes.error(field, e);
+            diagnostics.error(field, e);
             None
         }
     }
@@ -37,15 +37,15 @@ pub(crate) fn is_nearest(field: &Object) -> bool {
 }
 
 /// The volume's medium; `None`, with a note, when it cannot be used.
-pub(crate) fn volume_of(volume: &Object, notes: &mut Notes) -> Option<Arc<Volume>> {
+pub(crate) fn volume_of(volume: &Object, diagnostics: &mut Diagnostics) -> Option<Arc<Volume>> {
     if !volume.known || !volume.bool("visible", true) {
         return None;
     }
     let Some(field) = volume.object("value") else {
-        notes.error(volume, "`value` is not set; set it to a spatial field and commit");
+        diagnostics.error(volume, "`value` is not set; set it to a spatial field and commit");
         return None;
     };
-    let grid = grid_of(&field, notes)?;
+    let grid = grid_of(&field, diagnostics)?;
     let [low, high] = volume.vector("valueRange", [0.0, 1.0]).map(|v| v as f32);
     let parameters = volume.parameters();
     let colors = match parameters.get("color") {
@@ -66,7 +66,7 @@ pub(crate) fn volume_of(volume: &Object, notes: &mut Notes) -> Option<Arc<Volume
         *v = 0.0;
     }
     if bad > 0 {
-        notes.warn(
+        diagnostics.warn(
             volume,
             format!("{bad} components of `color` are NaN, infinite or negative; they count as 0"),
         );
@@ -90,7 +90,7 @@ pub(crate) fn volume_of(volume: &Object, notes: &mut Notes) -> Option<Arc<Volume
     match made {
         Ok(volume) => Some(Arc::new(volume)),
         Err(e) => {
-            notes.error(volume, e);
+            diagnostics.error(volume, e);
             None
         }
     }

@@ -3,12 +3,12 @@
 //! What is kept has a fingerprint of the values it was made from, with a count of changes for arrays: a new colour makes new colours, a new matrix moves
 //! an instance, and only new arrays of a geometry's shape make a new acceleration structure.
 
-use super::Notes;
+use super::Diagnostics;
 use super::attribute::{SLOTS, Topology};
-use super::dress::{Dressed, dress};
-use super::geometry::{Part, Prepared, is_look, prepare, union};
-use super::light::{Made, light_of};
-use super::material::{grain_of, model_of, names_the_world, paint_of};
+use super::geometry::{CompiledGeometry, Part, compile_geometry, is_appearance_parameter, union};
+use super::light::{CompiledLight, light_of};
+use super::material::{material_inputs_of, model_of, surface_color_of, uses_world_space};
+use super::surface::{CompiledSurface, compile_surface};
 use super::volume::volume_of;
 use crate::anari::data_type::DataType;
 use crate::anari::object::{Extra, Object, Value};
@@ -23,27 +23,27 @@ use rt_core::volume::Volume;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
-type Kept<T> = HashMap<Vec<u64>, Arc<T>>;
+type FrameCache<T> = HashMap<Vec<u64>, Arc<T>>;
 
 /// What a world object keeps.
 #[derive(Default)]
 pub struct WorldCache {
-    prepared: Kept<Prepared>,
-    dressed: Kept<Vec<Dressed>>,
-    volumes: Kept<Option<Arc<Volume>>>,
+    geometries: FrameCache<CompiledGeometry>,
+    surfaces: FrameCache<Vec<CompiledSurface>>,
+    volumes: FrameCache<Option<Arc<Volume>>>,
     /// The acceleration structures of the last frame.
     pub(crate) built: Arc<Mutex<Option<Arc<World>>>>,
 }
 
 /// Everything of a world, in the renderer's terms.
 #[derive(Default)]
-pub(crate) struct Compiled {
+pub(crate) struct CompiledWorld {
     pub(crate) geometries: Vec<Geometry>,
     pub(crate) instances: Vec<Instance>,
     pub(crate) appearances: Vec<Appearance>,
     pub(crate) materials: Vec<Material>,
     pub(crate) lights: Vec<Light>,
-    pub(crate) sky: Option<Environment>,
+    pub(crate) environment: Option<Environment>,
     pub(crate) volumes: Vec<PlacedVolume>,
     pub(crate) ids: Vec<Ids>,
     pub(crate) bounds: Option<[DVec3; 2]>,
@@ -74,7 +74,12 @@ pub(crate) fn fingerprint(object: &Object, keep: &dyn Fn(&str) -> bool, out: &mu
 }
 
 /// Finds or makes, and keeps for the next frame.
-fn kept<T>(old: &Kept<T>, new: &mut Kept<T>, key: Vec<u64>, make: impl FnOnce() -> T) -> Arc<T> {
+fn cached<T>(
+    old: &FrameCache<T>,
+    new: &mut FrameCache<T>,
+    key: Vec<u64>,
+    make: impl FnOnce() -> T,
+) -> Arc<T> {
     if let Some(found) = new.get(&key) {
         return found.clone();
     }
@@ -85,15 +90,15 @@ fn kept<T>(old: &Kept<T>, new: &mut Kept<T>, key: Vec<u64>, make: impl FnOnce() 
 
 /// A place in the world, with what the instance says of its content.
 #[derive(Clone, Copy)]
-struct Spot<'a> {
+struct Placement<'a> {
     world_from_object: DAffine3,
     instance: Option<&'a Object>,
     id: u32,
 }
 
-impl Compiled {
+impl CompiledWorld {
     /// Everything in `world` (or a group or instance, for bounds). Faults become notes.
-    pub(crate) fn of(world: &Object, notes: &mut Notes) -> Compiled {
+    pub(crate) fn of(world: &Object, diagnostics: &mut Diagnostics) -> CompiledWorld {
         let mut guard = lock(&world.extra);
         let mut none = WorldCache::default();
         let cache = match &mut *guard {
@@ -102,50 +107,50 @@ impl Compiled {
         };
         let old = std::mem::take(cache);
         cache.built = old.built.clone();
-        let mut making = Making {
+        let mut compiler = WorldCompiler {
             old: &old,
             cache,
-            out: Compiled::default(),
+            out: CompiledWorld::default(),
             known: HashMap::new(),
             materials: HashMap::new(),
-            notes,
+            diagnostics,
         };
-        making.out.built = old.built.clone();
-        let here = Spot { world_from_object: DAffine3::IDENTITY, instance: None, id: u32::MAX };
+        compiler.out.built = old.built.clone();
+        let here = Placement { world_from_object: DAffine3::IDENTITY, instance: None, id: u32::MAX };
         match world.kind {
-            DataType::INSTANCE => making.instance(world),
+            DataType::INSTANCE => compiler.instance(world),
             _ => {
                 for instance in world.objects("instance") {
-                    making.instance(&instance);
+                    compiler.instance(&instance);
                 }
-                making.content(world, here);
+                compiler.content(world, here);
             }
         }
-        let out = making.out;
+        let out = compiler.out;
         drop(guard);
         drop(old);
         out
     }
 }
 
-struct Making<'a> {
+struct WorldCompiler<'a> {
     old: &'a WorldCache,
     cache: &'a mut WorldCache,
-    out: Compiled,
+    out: CompiledWorld,
     /// Index of each geometry by its address.
     known: HashMap<usize, usize>,
     /// Index of each look's material by the look's address.
     materials: HashMap<usize, usize>,
-    notes: &'a mut Notes,
+    diagnostics: &'a mut Diagnostics,
 }
 
-impl Making<'_> {
+impl WorldCompiler<'_> {
     fn instance(&mut self, instance: &Object) {
         if !instance.known {
             return;
         }
         let Some(group) = instance.object("group") else {
-            self.notes.error(instance, "`group` is not set, so there is nothing to place");
+            self.diagnostics.error(instance, "`group` is not set, so there is nothing to place");
             return;
         };
         let parameters = instance.parameters();
@@ -167,10 +172,10 @@ impl Making<'_> {
                 continue;
             }
             let id = ids.get(i).map_or(common, |[id]| *id);
-            self.content(&group, Spot { world_from_object, instance: Some(instance), id });
+            self.content(&group, Placement { world_from_object, instance: Some(instance), id });
         }
         if singular > 0 {
-            self.notes.warn(
+            self.diagnostics.warn(
                 instance,
                 format!(
                     "{singular} of {} matrices are singular or not finite; they place nothing",
@@ -181,74 +186,79 @@ impl Making<'_> {
     }
 
     /// Surfaces, volumes and lights of a group or world.
-    fn content(&mut self, group: &Object, spot: Spot<'_>) {
+    fn content(&mut self, group: &Object, placement: Placement<'_>) {
         for surface in group.objects("surface") {
-            self.surface(&surface, spot);
+            self.surface(&surface, placement);
         }
         for volume in group.objects("volume") {
             let mut key = Vec::new();
             fingerprint(&volume, &|_| true, &mut key);
-            let notes = &mut *self.notes;
-            let made = kept(&self.old.volumes, &mut self.cache.volumes, key, || volume_of(&volume, notes));
+            let diagnostics = &mut *self.diagnostics;
+            let made =
+                cached(&self.old.volumes, &mut self.cache.volumes, key, || volume_of(&volume, diagnostics));
             let Some(medium) = made.as_ref() else { continue };
             let grid = medium.grid();
-            self.grow(Some([grid.origin, grid.max_corner()]), &spot.world_from_object);
-            self.out
-                .volumes
-                .push(PlacedVolume { volume: medium.clone(), world_from_object: spot.world_from_object });
+            self.grow(Some([grid.origin, grid.max_corner()]), &placement.world_from_object);
+            self.out.volumes.push(PlacedVolume {
+                volume: medium.clone(),
+                world_from_object: placement.world_from_object,
+            });
         }
         for light in group.objects("light") {
-            match light_of(&light, &spot.world_from_object, self.notes) {
-                Some(Made::Lamp(lamp)) => self.out.lights.push(lamp),
-                Some(Made::Sky(_)) if self.out.sky.is_some() => {
-                    self.notes.warn(&light, "a world can have one picture around it; this one is left out");
+            match light_of(&light, &placement.world_from_object, self.diagnostics) {
+                Some(CompiledLight::Light(lamp)) => self.out.lights.push(lamp),
+                Some(CompiledLight::Environment(_)) if self.out.environment.is_some() => {
+                    self.diagnostics
+                        .warn(&light, "a world can have one picture around it; this one is left out");
                 }
-                Some(Made::Sky(sky)) => self.out.sky = Some(sky),
+                Some(CompiledLight::Environment(environment)) => self.out.environment = Some(environment),
                 None => {}
             }
         }
     }
 
-    fn surface(&mut self, surface: &Object, spot: Spot<'_>) {
+    fn surface(&mut self, surface: &Object, placement: Placement<'_>) {
         if !surface.bool("visible", true) {
             return;
         }
         let (Some(geometry), Some(material)) = (surface.object("geometry"), surface.object("material"))
         else {
-            self.notes.error(surface, "`geometry` or `material` is not set, so it is not drawn");
+            self.diagnostics.error(surface, "`geometry` or `material` is not set, so it is not drawn");
             return;
         };
         if !geometry.known || !material.known {
             let which = if geometry.known { &material } else { &geometry };
-            self.notes.error(surface, format!("it is not drawn: this device has no {}", which.title()));
+            self.diagnostics.error(surface, format!("it is not drawn: this device has no {}", which.title()));
             return;
         }
         let mut key = Vec::new();
-        fingerprint(&geometry, &|name| !is_look(name), &mut key);
-        let notes = &mut *self.notes;
-        let prepared =
-            kept(&self.old.prepared, &mut self.cache.prepared, key.clone(), || prepare(&geometry, notes));
-        self.grow(prepared.bounds, &spot.world_from_object);
-        let notes = &mut *self.notes;
+        fingerprint(&geometry, &|name| !is_appearance_parameter(name), &mut key);
+        let diagnostics = &mut *self.diagnostics;
+        let compiled = cached(&self.old.geometries, &mut self.cache.geometries, key.clone(), || {
+            compile_geometry(&geometry, diagnostics)
+        });
+        self.grow(compiled.bounds, &placement.world_from_object);
+        let diagnostics = &mut *self.diagnostics;
 
-        fingerprint(&geometry, &is_look, &mut key);
+        fingerprint(&geometry, &is_appearance_parameter, &mut key);
         fingerprint(&material, &|_| true, &mut key);
-        if let Some(instance) = spot.instance {
+        if let Some(instance) = placement.instance {
             let replaced = instance.parameters().keys().any(|k| SLOTS.contains(&k.as_str()));
             if replaced {
                 fingerprint(instance, &|name| SLOTS.contains(&name), &mut key);
             }
         }
-        if names_the_world(&material) {
-            key.extend(spot.world_from_object.to_cols_array().map(f64::to_bits));
+        if uses_world_space(&material) {
+            key.extend(placement.world_from_object.to_cols_array().map(f64::to_bits));
         }
-        let dressed = kept(&self.old.dressed, &mut self.cache.dressed, key, || {
-            let model = model_of(&material, notes);
-            let paint = paint_of(&material, &geometry, spot.instance, notes);
-            let grain = grain_of(&material, &geometry, spot.instance, notes);
-            if grain.as_ref().is_some_and(|g| g.normal.is_some()) && !prepared.parts.iter().all(Part::is_mesh)
+        let surfaces = cached(&self.old.surfaces, &mut self.cache.surfaces, key, || {
+            let model = model_of(&material, diagnostics);
+            let surface_color = surface_color_of(&material, &geometry, placement.instance, diagnostics);
+            let material_inputs = material_inputs_of(&material, &geometry, placement.instance, diagnostics);
+            if material_inputs.as_ref().is_some_and(|g| g.normal.is_some())
+                && !compiled.parts.iter().all(Part::is_mesh)
             {
-                notes.warn(
+                diagnostics.warn(
                     &material,
                     format!(
                         "`normal` is left out on {}: only triangles and quads have tangents",
@@ -256,11 +266,15 @@ impl Making<'_> {
                     ),
                 );
             }
-            let place = &spot.world_from_object;
-            prepared.parts.iter().map(|part| dress(part, &model, &paint, grain.as_ref(), place)).collect()
+            let place = &placement.world_from_object;
+            compiled
+                .parts
+                .iter()
+                .map(|part| compile_surface(part, &model, &surface_color, material_inputs.as_ref(), place))
+                .collect()
         });
         let object = surface.u32("id", u32::MAX);
-        for d in dressed.iter() {
+        for d in surfaces.iter() {
             let address = match &d.geometry {
                 Geometry::Mesh(m) => Arc::as_ptr(m) as usize,
                 Geometry::Shape(s) => Arc::as_ptr(s) as *const () as usize,
@@ -270,7 +284,7 @@ impl Making<'_> {
                 out.geometries.push(d.geometry.clone());
                 out.geometries.len() - 1
             });
-            out.instances.push(Instance { geometry: index, world_from_object: spot.world_from_object });
+            out.instances.push(Instance { geometry: index, world_from_object: placement.world_from_object });
             let material = *self.materials.entry(std::ptr::from_ref(d) as usize).or_insert_with(|| {
                 out.materials.push(d.material.clone());
                 out.materials.len() - 1
@@ -278,7 +292,7 @@ impl Making<'_> {
             let mut appearance = d.appearance.clone();
             appearance.material = material;
             out.appearances.push(appearance);
-            out.ids.push(Ids { object, instance: spot.id, topology: d.topology.clone() });
+            out.ids.push(Ids { object, instance: placement.id, topology: d.topology.clone() });
         }
     }
 

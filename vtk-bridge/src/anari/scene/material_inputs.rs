@@ -1,8 +1,8 @@
 //! What varies over a surface besides colour and opacity, looked up at the hits: numbers, emission, bent normals.
 
-use super::attribute::{Place, Topology};
-use super::paint::{Input, Weights};
+use super::attribute::{HitPoint, Topology};
 use super::sampler::Sampler;
+use super::surface_color::{Input, Weights};
 use rt_core::detail::{Detail, DetailPlace, Finish};
 use rt_core::glam::{DAffine3, Vec2, Vec3};
 use rt_core::mesh::TriMesh;
@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 /// Inputs of a physically based material that are no numbers.
 #[derive(Clone)]
-pub(crate) struct Grain {
+pub(crate) struct MaterialInputs {
     pub(crate) metallic: Option<Input>,
     pub(crate) roughness: Option<Input>,
     pub(crate) specular: Option<Input>,
@@ -21,7 +21,7 @@ pub(crate) struct Grain {
     pub(crate) normal_reflectance: f32,
 }
 
-impl Grain {
+impl MaterialInputs {
     pub(crate) fn varies(&self) -> bool {
         let inputs = [&self.metallic, &self.roughness, &self.specular, &self.emissive, &self.occlusion];
         inputs.into_iter().any(Option::is_some) || self.normal.is_some()
@@ -29,8 +29,8 @@ impl Grain {
 }
 
 /// The grain of a geometry.
-pub(crate) struct Grained {
-    pub(crate) grain: Grain,
+pub(crate) struct BoundMaterialInputs {
+    pub(crate) material_inputs: MaterialInputs,
     pub(crate) topology: Arc<Topology>,
     pub(crate) weights: Weights,
     /// The triangles, also where they are drawn as a shape.
@@ -38,15 +38,15 @@ pub(crate) struct Grained {
     pub(crate) world_from_object: DAffine3,
 }
 
-impl std::fmt::Debug for Grained {
+impl std::fmt::Debug for BoundMaterialInputs {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Grained").field("weights", &self.weights).finish_non_exhaustive()
+        f.debug_struct("BoundMaterialInputs").field("weights", &self.weights).finish_non_exhaustive()
     }
 }
 
-impl Detail for Grained {
+impl Detail for BoundMaterialInputs {
     fn finish(&self, base: Finish, place: &DetailPlace<'_>) -> Finish {
-        let here = Place {
+        let here = HitPoint {
             topology: &self.topology,
             primitive: place.primitive,
             weights: self.weights.of(place.uv),
@@ -54,7 +54,7 @@ impl Detail for Grained {
             normal: place.object_normal.as_dvec3(),
             world_from_object: &self.world_from_object,
         };
-        let g = &self.grain;
+        let g = &self.material_inputs;
         let first = |input: &Option<Input>, other: f32| input.as_ref().map_or(other, |i| i.at(&here)[0]);
         let mut out = Finish {
             metallic: first(&g.metallic, base.metallic),
@@ -67,16 +67,16 @@ impl Detail for Grained {
             let [r, g, b, _] = emissive.at(&here);
             out.emission = Vec3::new(r, g, b);
         }
-        if let Some(normal) = g.normal.as_ref().and_then(|s| self.bent(s, &here, place)) {
+        if let Some(normal) = g.normal.as_ref().and_then(|s| self.mapped_normal(s, &here, place)) {
             out.normal = normal;
         }
         out
     }
 }
 
-impl Grained {
+impl BoundMaterialInputs {
     /// The frame is that of the mesh's tangents, else that in which the sampler's attribute grows along the triangle.
-    fn bent(&self, sampler: &Sampler, here: &Place<'_>, place: &DetailPlace<'_>) -> Option<Vec3> {
+    fn mapped_normal(&self, sampler: &Sampler, here: &HitPoint<'_>, place: &DetailPlace<'_>) -> Option<Vec3> {
         let mesh = self.mesh.as_ref()?;
         let place = place.on(mesh);
         let frame = if mesh.tangents.is_some() {
@@ -85,7 +85,7 @@ impl Grained {
             let corner = |k: usize| {
                 let mut weights = [0.0; 3];
                 weights[k] = 1.0;
-                let [u, v, ..] = sampler.attribute(&Place { weights, ..*here });
+                let [u, v, ..] = sampler.attribute(&HitPoint { weights, ..*here });
                 Vec2::new(u, v)
             };
             place.tangent_of([corner(0), corner(1), corner(2)])?

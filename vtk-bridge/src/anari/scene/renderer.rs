@@ -1,35 +1,35 @@
 //! Renderers: options of a frame, and what is behind the scene.
 
-use super::Notes;
+use super::Diagnostics;
 use crate::anari::object::{Object, Value};
 use rt_core::render::RenderOptions;
 use rt_core::scene::AmbientOcclusion;
 use rt_core::volume::VolumeQuality;
 
 /// How a frame is drawn.
-pub(crate) struct View {
+pub(crate) struct RendererSettings {
     pub(crate) options: RenderOptions,
     /// Radiance from everywhere.
     pub(crate) ambient: Option<[f32; 3]>,
     pub(crate) occlusion: Option<AmbientOcclusion>,
     pub(crate) shadows: bool,
-    pub(crate) backdrop: Backdrop,
+    pub(crate) backdrop: FrameBackground,
 }
 
 /// What fills the pixels behind everything.
-pub(crate) enum Backdrop {
+pub(crate) enum FrameBackground {
     /// Linear, not premultiplied.
     Color([f32; 4]),
     /// Spread over the frame; rows from the bottom.
     Picture { size: [usize; 2], texels: Vec<[f32; 4]> },
 }
 
-impl Backdrop {
+impl FrameBackground {
     /// At `x`, `y` in 0..1, y upwards; linear between texels.
     pub(crate) fn at(&self, x: f32, y: f32) -> [f32; 4] {
         let (size, texels) = match self {
-            Backdrop::Color(c) => return *c,
-            Backdrop::Picture { size, texels } => (size, texels),
+            FrameBackground::Color(c) => return *c,
+            FrameBackground::Picture { size, texels } => (size, texels),
         };
         let split = |v: f32, n: usize| {
             let p = (v * n as f32 - 0.5).clamp(0.0, (n - 1) as f32);
@@ -44,13 +44,18 @@ impl Backdrop {
 }
 
 /// The options that `renderer` asks for.
-pub(crate) fn view_of(renderer: &Object, size: [u32; 2], notes: &mut Notes) -> View {
+pub(crate) fn renderer_settings(
+    renderer: &Object,
+    size: [u32; 2],
+    diagnostics: &mut Diagnostics,
+) -> RendererSettings {
     let mut options = RenderOptions::new(size[0], size[1]);
     let mut count = |name: &str, default: u32, least: u32, most: u32| {
         let Some(v) = renderer.numbers(name).map(|v| v[0]) else { return default };
         let used = v.clamp(f64::from(least), f64::from(most)) as u32;
         if f64::from(used) != v {
-            notes.warn(renderer, format!("`{name}` is {v}; it must be {least} to {most}: {used} is used"));
+            diagnostics
+                .warn(renderer, format!("`{name}` is {v}; it must be {least} to {most}: {used} is used"));
         }
         used
     };
@@ -68,7 +73,8 @@ pub(crate) fn view_of(renderer: &Object, size: [u32; 2], notes: &mut Notes) -> V
     let color = renderer.vector("ambientColor", [1.0; 3]).map(|c| c as f32 * radiance);
     let usable = color.iter().all(|c| c.is_finite() && *c >= 0.0);
     if !usable {
-        notes.warn(renderer, format!("the ambient light {color:?} is not finite or negative: there is none"));
+        diagnostics
+            .warn(renderer, format!("the ambient light {color:?} is not finite or negative: there is none"));
     }
     let ambient = (usable && color != [0.0; 3]).then_some(color);
     let distance = f64::from(renderer.f32("ambientOcclusionDistance", f32::INFINITY));
@@ -77,7 +83,7 @@ pub(crate) fn view_of(renderer: &Object, size: [u32; 2], notes: &mut Notes) -> V
     } else if distance > 0.0 {
         Some(AmbientOcclusion { distance, rays })
     } else {
-        notes.warn(
+        diagnostics.warn(
             renderer,
             format!(
                 "`ambientOcclusionDistance` is {distance}; it must be positive: ambient light is not dimmed"
@@ -87,16 +93,15 @@ pub(crate) fn view_of(renderer: &Object, size: [u32; 2], notes: &mut Notes) -> V
     };
 
     let backdrop = match renderer.parameters().get("background") {
-        Some(Value::Bytes(t, b)) => Backdrop::Color(t.attribute(b)),
+        Some(Value::Bytes(t, b)) => FrameBackground::Color(t.attribute(b)),
         Some(Value::Object(a)) => {
             let picture =
                 a.with_array(|a| ([a.dims[0], a.dims[1]], a.attributes())).filter(|(_, t)| !t.is_empty());
-            picture.map_or(Backdrop::Color([0.0, 0.0, 0.0, 1.0]), |(size, texels)| Backdrop::Picture {
-                size,
-                texels,
+            picture.map_or(FrameBackground::Color([0.0, 0.0, 0.0, 1.0]), |(size, texels)| {
+                FrameBackground::Picture { size, texels }
             })
         }
-        _ => Backdrop::Color([0.0, 0.0, 0.0, 1.0]),
+        _ => FrameBackground::Color([0.0, 0.0, 0.0, 1.0]),
     };
-    View { options, ambient, occlusion, shadows: renderer.bool("shadows", true), backdrop }
+    RendererSettings { options, ambient, occlusion, shadows: renderer.bool("shadows", true), backdrop }
 }

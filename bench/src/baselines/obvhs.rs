@@ -4,7 +4,7 @@
 //! no barycentric coordinates, and none are computed here: that is in its favour. Its vector width is fixed when the
 //! program is compiled (SSE in a default build), unlike Embree's and ours, which are chosen at run time.
 
-use super::{BuildCost, PeerError, Tracer, require_clean};
+use super::{BaselineError, BuildCost, Tracer, require_clean};
 use crate::clock;
 use crate::rays::{HitBlock, LANES, NO_HIT, RayBlock};
 use glam::Vec3A;
@@ -73,7 +73,7 @@ pub struct Obvhs {
 
 impl Obvhs {
     /// Builds on rayon's current pool.
-    pub fn build(mesh: &TriMesh, preset: Preset) -> Result<Obvhs, PeerError> {
+    pub fn build(mesh: &TriMesh, preset: Preset) -> Result<Obvhs, BaselineError> {
         require_clean(mesh)?;
         let corners = |i: usize| {
             let [v0, v1, v2] = mesh.triangle(i).map(Vec3A::from);
@@ -139,7 +139,7 @@ impl Tracer for Obvhs {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::peers::testing;
+    use crate::baselines::testing;
     use glam::Vec3;
 
     #[test]
@@ -155,6 +155,6 @@ mod tests {
     #[test]
     fn a_mesh_with_a_nan_vertex_is_refused() {
         let mesh = TriMesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::NAN], vec![[0, 1, 2]]);
-        assert_eq!(Obvhs::build(&mesh, Preset::Fast).err(), Some(PeerError::Mesh { count: 1 }));
+        assert_eq!(Obvhs::build(&mesh, Preset::Fast).err(), Some(BaselineError::Mesh { count: 1 }));
     }
 }

@@ -5,7 +5,7 @@
 
 use super::Context;
 use super::compare::{self, Kind};
-use super::lineup::{Installed, Isa, Lineup};
+use super::installed_tracers::{InstalledBaselines, Isa, TracerSet};
 use crate::meshes;
 use crate::plot::{Axis, Plot, Point, Series};
 use crate::rays::View;
@@ -28,7 +28,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         "B",
         "the most held while building: what Embree reports, what the heap grew by for rt-core",
     );
-    let installed = Installed::find();
+    let installed = InstalledBaselines::find();
     record.missing.extend(installed.missing.iter().cloned());
     record.notes.push(
         "One thread traces; every tracer gets the same rays in the same order, in turns within one process. A rival's \
@@ -62,17 +62,18 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
 fn scene(
     context: &mut Context<'_>,
     record: &mut Record,
-    installed: &Installed,
+    installed: &InstalledBaselines,
     name: &str,
     mesh: &Arc<TriMesh>,
     isa: Isa,
 ) -> anyhow::Result<()> {
     let full_name = if isa == Isa::Best { name.to_string() } else { format!("{name}, {}", isa.name()) };
-    let lineup = Lineup::build(mesh, installed, isa, &mut |s| context.say(format!("{full_name}: {s}")))?;
+    let tracers =
+        TracerSet::build(mesh, installed, isa, &mut |s| context.report_step(format!("{full_name}: {s}")))?;
     let base = Row::new().with("mesh", name).with("triangles", mesh.num_triangles()).with("simd", isa.name());
 
     // ---- Builds. Each was built once; fig4.7 measures build times in turns.
-    for (tracer, cost) in lineup.costs() {
+    for (tracer, cost) in tracers.costs() {
         let per_triangle = |bytes: u64| bytes as f64 / mesh.num_triangles() as f64;
         let row = base.clone().with("tracer", tracer).with("build", cost.wall_secs);
         let row = row.with("build_cpu", cost.cpu_secs).with("bytes_per_triangle", per_triangle(cost.bytes));
@@ -89,21 +90,21 @@ fn scene(
         } else {
             &Kind::ALL
         };
-        let watertight = lineup.ours[0].1.view(crate::ours::Mode::Coherent);
+        let watertight = tracers.ours[0].1.view(crate::rt_core_tracer::Mode::Coherent);
         for (kind, rays) in compare::make_rays(mesh, view, size, kinds, &watertight) {
             // Eight ambient-occlusion rays per pixel: runs of blocks from all over the picture are enough.
             let rays = rays.thinned(if context.quick { 1 << 18 } else { 1 << 21 });
             if rays.len == 0 {
                 continue;
             }
-            context.say(format!("{full_name}, {}: {} rays", view.name, kind.name()))?;
-            let contenders = lineup.contenders(kind, !context.quick);
+            context.report_step(format!("{full_name}, {}: {} rays", view.name, kind.name()))?;
+            let contenders = tracers.contenders(kind, !context.quick);
             let schedule = context.schedule(Schedule::one_thread(), 2.5);
             let timings = compare::time(&schedule, kind, &rays, &contenders)?;
             let base = base.clone().with("view", view.name);
             record.rows.extend(compare::rows(&base, kind, &rays, &contenders, &timings));
             let what = format!("{full_name}, {}, {}", view.name, kind.name());
-            for rival in lineup.rivals() {
+            for rival in tracers.baseline_names() {
                 let Some(best) = compare::best_mode(rival, &contenders, &timings) else { continue };
                 let ours: &[&str] = if rival.ends_with("robust") { &[OURS] } else { &[OURS, OURS_FAST] };
                 for tracer in ours {

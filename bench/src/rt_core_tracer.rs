@@ -1,6 +1,6 @@
 //! rt-core behind the interface of the peers.
 
-use crate::peers::{BuildCost, Tracer};
+use crate::baselines::{BuildCost, Tracer};
 use crate::{clock, memory, rays};
 use glam::Vec3;
 use rays::{HitBlock, LANES, RayBlock};
@@ -31,7 +31,7 @@ impl Mode {
 }
 
 /// A built world.
-pub struct Ours {
+pub struct RtCoreTracer {
     /// The world.
     pub world: World,
     options: BuildOptions,
@@ -41,9 +41,9 @@ pub struct Ours {
     shift: Vec3,
 }
 
-impl Ours {
+impl RtCoreTracer {
     /// Builds on rayon's current pool.
-    pub fn build(mesh: &Arc<TriMesh>, options: &BuildOptions) -> Result<Ours, BuildError> {
+    pub fn build(mesh: &Arc<TriMesh>, options: &BuildOptions) -> Result<RtCoreTracer, BuildError> {
         let ((world, time), peak_bytes) =
             memory::peak(|| clock::measure(|| World::from_mesh(mesh.clone(), options)));
         let world = world?;
@@ -54,7 +54,7 @@ impl Ours {
             peak_bytes: Some(peak_bytes),
         };
         let shift = (mesh.origin - world.origin()).as_vec3();
-        Ok(Ours { world, options: *options, cost, shift })
+        Ok(RtCoreTracer { world, options: *options, cost, shift })
     }
 
     /// A way to send rays.
@@ -72,7 +72,7 @@ impl Ours {
 
 /// A world with an entry point.
 pub struct View<'a> {
-    ours: &'a Ours,
+    ours: &'a RtCoreTracer,
     mode: Mode,
 }
 
@@ -133,7 +133,7 @@ impl Tracer for View<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::peers::testing;
+    use crate::baselines::testing;
     use rt_core::accel::{BuildQuality, Robustness};
     use rt_core::simd::SimdLevel;
 
@@ -144,7 +144,7 @@ mod tests {
         for simd in levels {
             for robustness in Robustness::ALL {
                 let options = BuildOptions { robustness, simd, ..Default::default() };
-                let ours = Ours::build(&mesh, &options).unwrap();
+                let ours = RtCoreTracer::build(&mesh, &options).unwrap();
                 for mode in [Mode::Single, Mode::Coherent, Mode::Incoherent] {
                     testing::agrees_with_brute_force(&ours.view(mode));
                 }
@@ -156,7 +156,7 @@ mod tests {
     fn every_quality_agrees_with_brute_force() {
         let mesh = Arc::new(testing::mesh());
         for quality in BuildQuality::ALL {
-            let ours = Ours::build(&mesh, &BuildOptions { quality, ..Default::default() }).unwrap();
+            let ours = RtCoreTracer::build(&mesh, &BuildOptions { quality, ..Default::default() }).unwrap();
             assert!(ours.cost.bytes > 0 && ours.cost.wall_secs > 0.0);
             testing::agrees_with_brute_force(&ours.view(Mode::Coherent));
         }

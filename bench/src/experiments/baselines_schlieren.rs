@@ -8,7 +8,7 @@ use super::Context;
 use super::test_section::{
     blob, blob_deflections, check_cancelled, error_of, fingerprint, oblique, tiles, traced,
 };
-use crate::peers::thesis_schlieren::ThesisMarch;
+use crate::baselines::thesis_schlieren::ThesisMarch;
 use crate::plot::{Axis, Plot, Point, Series};
 use crate::record::{Record, Row};
 use crate::runner::{Ratio, Schedule, Variant, interleave};
@@ -21,7 +21,7 @@ use schlieren::view::{Axis as ViewAxis, View};
 use std::cell::RefCell;
 
 /// A setting of ours, by rising cost.
-struct Ours<'a> {
+struct OurMarch<'a> {
     name: String,
     paths: Box<dyn LightPaths + 'a>,
     error: f64,
@@ -57,19 +57,19 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         let (gaussian, field) = blob(1e-4, n)?;
         for (view_name, view) in views {
             check_cancelled(context)?;
-            context.say(format!("{n}³ nodes, {view_name}"))?;
+            context.report_step(format!("{n}³ nodes, {view_name}"))?;
             let starts = tiles(if context.quick { 64 } else { 128 }, 0.5);
             let truth = blob_deflections(&gaussian, &view, &starts)?;
             compare(context, record, &field, (view_name, view), &starts, &truth)?;
         }
     }
-    record.notes.push(words(&record.rows));
+    record.notes.push(describe(&record.rows));
     plot(record);
     Ok(())
 }
 
 /// What shorter steps gain the rival.
-fn words(rows: &[Row]) -> String {
+fn describe(rows: &[Row]) -> String {
     let rival = "dissertation's scheme in our kernel";
     let of = || rows.iter().filter(|r| r.text("march") == Some(rival));
     let mut each = vec![];
@@ -161,7 +161,7 @@ fn compare(
 }
 
 /// Traced settings of ours.
-fn ours(field: &Field, view: View) -> Vec<Ours<'_>> {
+fn ours(field: &Field, view: View) -> Vec<OurMarch<'_>> {
     let mut list = vec![];
     for (name, interpolant) in [
         ("Verlet, b-spline", Interpolant::BSpline),
@@ -171,7 +171,7 @@ fn ours(field: &Field, view: View) -> Vec<Ours<'_>> {
         for step_voxels in [16.0, 8.0, 4.0, 2.0, 1.0, 0.5] {
             let options = Options { step_voxels, ..Options::default() };
             let paths = Box::new(Deviational::new(field, view, interpolant, options));
-            list.push(Ours {
+            list.push(OurMarch {
                 name: format!("{name}, step {step_voxels}"),
                 paths,
                 error: f64::INFINITY,
@@ -183,7 +183,7 @@ fn ours(field: &Field, view: View) -> Vec<Ours<'_>> {
 }
 
 /// Errors of all settings, and their times of a trial in turns.
-fn trial(ours: &mut [Ours<'_>], starts: &[Start], truth: &[[f64; 2]]) -> anyhow::Result<()> {
+fn trial(ours: &mut [OurMarch<'_>], starts: &[Start], truth: &[[f64; 2]]) -> anyhow::Result<()> {
     // The runs that give the errors warm up.
     let schedule = Schedule { warmup_rounds: 0, rounds: 2, min_rounds: 2, ..Schedule::one_thread() };
     for o in ours.iter_mut() {

@@ -11,16 +11,16 @@ use rt_core::shapes::{Shape, ShapeHit, ShapeSurface};
 use std::sync::Arc;
 
 /// How much nearer than the surface, as a part of the ray's parameter: some roundings of f32.
-const BEFORE: f64 = 1.0 - 1e-6;
+const DEPTH_BIAS: f64 = 1.0 - 1e-6;
 
 /// See the module's text.
-pub(super) struct Backs {
+pub(super) struct BackFaces {
     mesh: Arc<TriMesh>,
 }
 
-impl Backs {
-    pub(super) fn of(mesh: Arc<TriMesh>) -> Backs {
-        Backs { mesh }
+impl BackFaces {
+    pub(super) fn of(mesh: Arc<TriMesh>) -> BackFaces {
+        BackFaces { mesh }
     }
 
     fn corners(&self, prim: u32) -> Option<[DVec3; 3]> {
@@ -29,7 +29,7 @@ impl Backs {
     }
 }
 
-impl Shape for Backs {
+impl Shape for BackFaces {
     fn num_primitives(&self) -> usize {
         self.mesh.indices.len()
     }
@@ -69,7 +69,7 @@ impl Shape for Backs {
         if u < 0.0 || v < 0.0 || u + v > 1.0 {
             return None;
         }
-        let t = (e2.dot(q) / det * BEFORE) as f32;
+        let t = (e2.dot(q) / det * DEPTH_BIAS) as f32;
         (t >= ray.t_min && t < ray.t_max).then_some(ShapeHit { t, u: u as f32, v: v as f32 })
     }
 
@@ -103,13 +103,13 @@ mod tests {
     #[test]
     fn backs_are_met_from_behind_only_and_before_the_surface() {
         let mesh = TriMesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
-        let backs = Backs::of(Arc::new(mesh));
+        let back_faces = BackFaces::of(Arc::new(mesh));
         // The normal is +z.
         let from = |z: f32| Ray::new(Vec3::new(0.25, 0.25, z), Vec3::new(0.0, 0.0, -z.signum()));
-        assert_eq!(backs.closest(0, &from(2.0)), None);
-        let hit = backs.closest(0, &from(-2.0)).expect("the back");
+        assert_eq!(back_faces.closest(0, &from(2.0)), None);
+        let hit = back_faces.closest(0, &from(-2.0)).expect("the back");
         assert!(hit.t < 2.0 && hit.t > 1.9999, "{hit:?}");
-        let s = backs.surface(0, &hit, &from(-2.0));
+        let s = back_faces.surface(0, &hit, &from(-2.0));
         assert_eq!((s.normal, s.point.z), (Vec3::Z, 0.0));
     }
 }

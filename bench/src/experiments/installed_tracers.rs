@@ -1,10 +1,10 @@
 //! Every tracer there is, built for one mesh.
 
 use super::compare::{Contender, Kind};
-use crate::ours::{Mode, Ours};
-use crate::peers::BuildCost;
-use crate::peers::embree::{Embree, EmbreeScene, Options, Version};
-use crate::peers::obvhs::{Obvhs, Preset};
+use crate::baselines::BuildCost;
+use crate::baselines::embree::{Embree, EmbreeScene, Options, Version};
+use crate::baselines::obvhs::{Obvhs, Preset};
+use crate::rt_core_tracer::{Mode, RtCoreTracer};
 use rt_core::accel::{BuildOptions, Robustness};
 use rt_core::mesh::TriMesh;
 use rt_core::simd::SimdLevel;
@@ -54,22 +54,22 @@ impl Isa {
 }
 
 /// All tracers of one mesh.
-pub(super) struct Lineup {
+pub(super) struct TracerSet {
     isa: Isa,
-    pub(super) ours: Vec<(String, Ours)>,
+    pub(super) ours: Vec<(String, RtCoreTracer)>,
     embree: Vec<(String, EmbreeScene)>,
     obvhs: Option<(String, Obvhs)>,
 }
 
 /// The peers that are installed, and what to say about those that are not.
-pub(super) struct Installed {
+pub(super) struct InstalledBaselines {
     pub(super) embree: Vec<Embree>,
     pub(super) missing: Vec<String>,
 }
 
-impl Installed {
-    pub(super) fn find() -> Installed {
-        let mut found = Installed { embree: vec![], missing: vec![] };
+impl InstalledBaselines {
+    pub(super) fn find() -> InstalledBaselines {
+        let mut found = InstalledBaselines { embree: vec![], missing: vec![] };
         for version in [Version::V3, Version::V4] {
             match Embree::load(version) {
                 Ok(e) => found.embree.push(e),
@@ -80,34 +80,36 @@ impl Installed {
     }
 }
 
-impl Lineup {
+impl TracerSet {
     /// Builds each tracer, fast and watertight or robust. obvhs, whose instructions are chosen by the compiler,
     /// takes part at the best level only.
     pub(super) fn build(
         mesh: &Arc<TriMesh>,
-        installed: &Installed,
+        installed: &InstalledBaselines,
         isa: Isa,
-        say: &mut dyn FnMut(&str) -> anyhow::Result<()>,
-    ) -> anyhow::Result<Lineup> {
-        let mut lineup = Lineup { isa, ours: vec![], embree: vec![], obvhs: None };
+        report_step: &mut dyn FnMut(&str) -> anyhow::Result<()>,
+    ) -> anyhow::Result<TracerSet> {
+        let mut tracers = TracerSet { isa, ours: vec![], embree: vec![], obvhs: None };
         for robustness in [Robustness::Watertight, Robustness::Fast] {
-            say("building rt-core")?;
+            report_step("building rt-core")?;
             let options = BuildOptions { robustness, simd: isa.ours(), ..Default::default() };
-            lineup.ours.push((format!("rt-core {}", robustness.name()), Ours::build(mesh, &options)?));
+            tracers
+                .ours
+                .push((format!("rt-core {}", robustness.name()), RtCoreTracer::build(mesh, &options)?));
         }
         for e in &installed.embree {
-            say(&format!("building {}", e.name()))?;
+            report_step(&format!("building {}", e.name()))?;
             for robust in [true, false] {
                 let options = Options { robust, max_isa: isa.embree(), ..Options::default() };
                 let kind = if robust { "robust" } else { "fast" };
-                lineup.embree.push((format!("{} {kind}", e.name()), EmbreeScene::build(e, mesh, &options)?));
+                tracers.embree.push((format!("{} {kind}", e.name()), EmbreeScene::build(e, mesh, &options)?));
             }
         }
         if isa == Isa::Best {
-            say("building obvhs")?;
-            lineup.obvhs = Some(("obvhs CWBVH".into(), Obvhs::build(mesh, Preset::Medium)?));
+            report_step("building obvhs")?;
+            tracers.obvhs = Some(("obvhs CWBVH".into(), Obvhs::build(mesh, Preset::Medium)?));
         }
-        Ok(lineup)
+        Ok(tracers)
     }
 
     /// Everyone in the modes that suit the rays. `all_modes` adds those that usually do not win.
@@ -154,7 +156,7 @@ impl Lineup {
     }
 
     /// The names of the rivals.
-    pub(super) fn rivals(&self) -> Vec<&str> {
+    pub(super) fn baseline_names(&self) -> Vec<&str> {
         self.costs().into_iter().map(|(n, _)| n).filter(|n| !n.starts_with("rt-core")).collect()
     }
 }

@@ -4,8 +4,8 @@
 
 use super::abi::{self, Arguments4, Context3, Handle, HitN, Queries, RayHitN, RayN, Valid};
 use super::library::Embree;
+use crate::baselines::{BaselineError, BuildCost, Tracer, require_clean};
 use crate::clock;
-use crate::peers::{BuildCost, PeerError, Tracer, require_clean};
 use crate::rays::{HitBlock, LANES, NO_HIT, RayBlock};
 use core::ffi::{c_int, c_void};
 use rt_core::mesh::TriMesh;
@@ -102,10 +102,10 @@ unsafe impl Sync for EmbreeScene {}
 
 impl EmbreeScene {
     /// Builds a mesh.
-    pub fn build(embree: &Embree, mesh: &TriMesh, options: &Options) -> Result<EmbreeScene, PeerError> {
+    pub fn build(embree: &Embree, mesh: &TriMesh, options: &Options) -> Result<EmbreeScene, BaselineError> {
         require_clean(mesh)?;
         let calls = embree.calls;
-        let failed = |code: c_int, doing: &'static str| PeerError::Failed {
+        let failed = |code: c_int, doing: &'static str| BaselineError::Failed {
             name: embree.name(),
             error: abi::error_name(code),
             doing,
@@ -377,8 +377,8 @@ impl Tracer for View<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::peers::embree::Version;
-    use crate::peers::testing;
+    use crate::baselines::embree::Version;
+    use crate::baselines::testing;
     use std::io::Write as _;
 
     /// Runs a check with each version that is installed. Says which are not, in a way that libtest does not swallow in
@@ -444,7 +444,7 @@ mod tests {
         mesh.indices[7][1] = 1_000_000;
         with_each(|embree| {
             let e = EmbreeScene::build(embree, &mesh, &Options::default()).err().unwrap();
-            assert_eq!(e, PeerError::Mesh { count: 1 });
+            assert_eq!(e, BaselineError::Mesh { count: 1 });
         });
     }
 

@@ -3,7 +3,7 @@
 //! The key light stands above the viewer's right shoulder, a weak headlight fills the shadows, ambient light is a quarter
 //! of white. All lights move with the camera: nothing that can be seen lies in the dark.
 
-use super::subject::{Paint, Subject, VolumeField};
+use super::subject::{PartColoring, Subject, VolumeField};
 use anyhow::Context as _;
 use datasets::colormaps;
 use glam::{DVec3, Vec3};
@@ -20,7 +20,7 @@ use rt_core::volume::{Volume, VolumeOptions};
 
 /// What is drawn around and upon the subject.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Look {
+pub struct RenderStyle {
     /// The effects to show. What a file asks for by itself (opacity, glass) is shown in any case.
     pub effects: Effects,
     /// Colour map of scalars: one of [`colormaps::NAMES`].
@@ -29,7 +29,7 @@ pub struct Look {
     pub range: Option<[f32; 2]>,
     /// What fills uncovered pixels.
     pub background: Background,
-    /// Refraction belongs to the parts that are [`Paint::Glass`]; otherwise it makes glass of everything.
+    /// Refraction belongs to the parts that are [`PartColoring::Glass`]; otherwise it makes glass of everything.
     pub glass_parts_only: bool,
     /// How far ambient occlusion looks, in radii of the subject.
     pub occlusion_radii: f64,
@@ -38,9 +38,9 @@ pub struct Look {
     pub opacity: Option<Vec<[f32; 2]>>,
 }
 
-impl Default for Look {
-    fn default() -> Look {
-        Look {
+impl Default for RenderStyle {
+    fn default() -> RenderStyle {
+        RenderStyle {
             effects: Effects::NONE,
             colors: colormaps::NAMES[0].into(),
             range: None,
@@ -90,26 +90,26 @@ const NAMES: [(Effects, &[&str]); 10] = [
 /// A list of effects, separated by commas; `none` and nothing at all are the empty set.
 ///
 /// ```
-/// use bench::picture::look::parse_effects;
+/// use bench::picture::style::parse_effects;
 /// use rt_core::effects::Effects;
 /// assert_eq!(parse_effects("shadows, ao"), Ok(Effects::SHADOWS | Effects::AMBIENT_OCCLUSION));
 /// assert!(parse_effects("shadow,caustics").unwrap_err().contains("path-tracing"));
 /// ```
 pub fn parse_effects(list: &str) -> Result<Effects, String> {
     let mut all = Effects::NONE;
-    for wish in list.split(',').map(str::trim).filter(|w| !w.is_empty() && *w != "none") {
-        let simple = wish.to_ascii_lowercase().replace([' ', '_'], "-");
+    for name in list.split(',').map(str::trim).filter(|w| !w.is_empty() && *w != "none") {
+        let simple = name.to_ascii_lowercase().replace([' ', '_'], "-");
         let found = NAMES.iter().find(|(_, names)| names.contains(&simple.as_str()));
         let Some((effect, _)) = found else {
             let known: Vec<&str> = NAMES.iter().map(|(_, n)| n[0]).collect();
-            return Err(format!("there is no effect `{wish}`; there are: {}, none", known.join(", ")));
+            return Err(format!("there is no effect `{name}`; there are: {}, none", known.join(", ")));
         };
         all = all | *effect;
     }
     Ok(all)
 }
 
-impl Look {
+impl RenderStyle {
     fn has(&self, effects: Effects) -> bool {
         self.effects.intersects(effects)
     }
@@ -123,14 +123,16 @@ impl Look {
             builder.volume(self.volume(field)?);
         }
         for part in subject.parts {
-            let material = match part.paint {
-                Paint::Glass(c) => glass(c),
-                Paint::Scalars => self.wished(plain([0.8; 3])).colored_by_scalars(self.color_map(range)?),
-                Paint::Color(c) => self.wished(plain(c)),
-                Paint::OfTheFile(m) if self.has(MATERIAL_EFFECTS) => {
-                    Material { color_source: m.color_source.clone(), ..self.wished(plain(m.color)) }
+            let material = match part.coloring {
+                PartColoring::Glass(c) => glass(c),
+                PartColoring::Scalars => {
+                    self.with_effects(plain([0.8; 3])).colored_by_scalars(self.color_map(range)?)
                 }
-                Paint::OfTheFile(m) => m,
+                PartColoring::Color(c) => self.with_effects(plain(c)),
+                PartColoring::FileMaterial(m) if self.has(MATERIAL_EFFECTS) => {
+                    Material { color_source: m.color_source.clone(), ..self.with_effects(plain(m.color)) }
+                }
+                PartColoring::FileMaterial(m) => m,
             };
             let material = builder.material(material);
             let geometry = builder.geometry(part.geometry);
@@ -182,7 +184,7 @@ impl Look {
     }
 
     /// A material with the wished effects on it.
-    fn wished(&self, mut m: Material) -> Material {
+    fn with_effects(&self, mut m: Material) -> Material {
         if self.has(Effects::REFRACTION) && !self.glass_parts_only {
             m = glass(m.color);
         } else if self.has(Effects::GLOSSY_REFLECTION) {
@@ -200,7 +202,7 @@ impl Look {
     }
 
     /// Lengths that depend on the subject's radius (half the diagonal of its bounds, world units).
-    pub(super) fn adapt(&self, scene: &mut Scene, radius: f64) {
+    pub(super) fn scale_to_subject(&self, scene: &mut Scene, radius: f64) {
         if self.has(Effects::AMBIENT_OCCLUSION) {
             let distance = (self.occlusion_radii * radius).max(f64::MIN_POSITIVE);
             scene.ambient_occlusion = Some(AmbientOcclusion { distance, rays: 4 });

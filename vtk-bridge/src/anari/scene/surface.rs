@@ -1,12 +1,12 @@
 //! A geometry with its look: the cheapest way of the renderer that shows the material's colour exactly.
 //!
 //! Constant colours go into the material, values per face and per vertex into the appearance, pictures become textures (all three need no
-//! new acceleration structure on meshes, pictures one when they come and go). Everything else is computed at the hits: see [`super::paint`].
+//! new acceleration structure on meshes, pictures one when they come and go). Everything else is computed at the hits: see [`super::surface_color`].
 
-use super::attribute::{Domain, Place, Topology};
+use super::attribute::{Domain, HitPoint, Topology};
 use super::geometry::{Body, Part};
-use super::grain::{Grain, Grained};
-use super::paint::{AlphaMode, Input, Paint, Painted, Weights};
+use super::material_inputs::{BoundMaterialInputs, MaterialInputs};
+use super::surface_color::{AlphaMode, ColoredShape, Input, SurfaceColor, Weights};
 use rt_core::accel::Geometry;
 use rt_core::detail::Detail;
 use rt_core::glam::{DAffine3, DVec3};
@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 /// Ready to be placed.
 #[derive(Clone)]
-pub(crate) struct Dressed {
+pub(crate) struct CompiledSurface {
     pub(crate) geometry: Geometry,
     pub(crate) material: Material,
     /// Its material's index is not set yet.
@@ -26,34 +26,40 @@ pub(crate) struct Dressed {
 }
 
 /// Puts the paint on a part.
-pub(crate) fn dress(
+pub(crate) fn compile_surface(
     part: &Part,
     model: &Material,
-    paint: &Paint,
-    grain: Option<&Grain>,
+    surface_color: &SurfaceColor,
+    material_inputs: Option<&MaterialInputs>,
     world_from_object: &DAffine3,
-) -> Dressed {
+) -> CompiledSurface {
     let topology = part.topology.clone();
-    let model = &match grain {
+    let model = &match material_inputs {
         None => model.clone(),
-        Some(grain) => {
+        Some(material_inputs) => {
             let (mesh, weights) = match &part.body {
                 Body::Mesh(mesh) => (Some(mesh.clone()), Weights::Corners),
                 Body::Shape(_, weights) => (None, *weights),
             };
             let world_from_object = *world_from_object;
             let topology = topology.clone();
-            let grained = Grained { grain: grain.clone(), topology, weights, mesh, world_from_object };
-            model.clone().with_detail(Arc::new(grained) as Arc<dyn Detail>)
+            let bound_inputs = BoundMaterialInputs {
+                material_inputs: material_inputs.clone(),
+                topology,
+                weights,
+                mesh,
+                world_from_object,
+            };
+            model.clone().with_detail(Arc::new(bound_inputs) as Arc<dyn Detail>)
         }
     };
-    let bare = |material, appearance| Dressed {
+    let bare = |material, appearance| CompiledSurface {
         geometry: part.geometry(),
         material,
         appearance,
         topology: topology.clone(),
     };
-    let no_place = Place {
+    let no_hit = HitPoint {
         topology: &topology,
         primitive: 0,
         weights: [1.0, 0.0, 0.0],
@@ -61,61 +67,68 @@ pub(crate) fn dress(
         normal: DVec3::Z,
         world_from_object,
     };
-    let domain = domain_of(paint);
+    let domain = domain_of(surface_color);
     if domain == Domain::Constant {
-        let [r, g, b, a] = paint.at(&no_place);
+        let [r, g, b, a] = surface_color.at(&no_hit);
         let material = Material { color: [r, g, b], opacity: a, ..model.clone() };
         return bare(material, Appearance::default());
     }
-    let Body::Mesh(mesh) = &part.body else { return painted(part, model, paint, world_from_object) };
+    let Body::Mesh(mesh) = &part.body else {
+        return colored_shape(part, model, surface_color, world_from_object);
+    };
     match domain {
         Domain::Face => {
-            let of = |t: usize| paint.at(&Place { primitive: t as u32, ..no_place });
+            let of = |t: usize| surface_color.at(&HitPoint { primitive: t as u32, ..no_hit });
             let colors = Attribute::per_face((0..mesh.indices.len()).map(of).collect());
             bare(model.clone(), Appearance::new(0).with_colors(colors))
         }
         Domain::Linear => {
             let mut colors = vec![[0.0, 0.0, 0.0, 1.0]; mesh.positions.len()];
-            at_vertices(mesh, &no_place, |v, place| colors[v] = paint.at(place));
+            at_vertices(mesh, &no_hit, |v, place| colors[v] = surface_color.at(place));
             bare(model.clone(), Appearance::new(0).with_colors(Attribute::per_vertex(colors)))
         }
         Domain::Texture => {
-            let Input::Sampler(sampler) = &paint.color else {
-                return painted(part, model, paint, world_from_object);
+            let Input::Sampler(sampler) = &surface_color.color else {
+                return colored_shape(part, model, surface_color, world_from_object);
             };
-            let opacity = paint.opacity.at(&no_place)[0];
-            let Some(texture) = sampler.texture(|texel| paint.finish(texel, || opacity)) else {
-                return painted(part, model, paint, world_from_object);
+            let opacity = surface_color.opacity.at(&no_hit)[0];
+            let Some(texture) = sampler.texture(|texel| surface_color.finish(texel, || opacity)) else {
+                return colored_shape(part, model, surface_color, world_from_object);
             };
             let mut coordinates = vec![Default::default(); mesh.positions.len()];
-            at_vertices(mesh, &no_place, |v, place| coordinates[v] = sampler.coordinate(place));
+            at_vertices(mesh, &no_hit, |v, place| coordinates[v] = sampler.coordinate(place));
             let mesh = TriMesh { texcoords: Some(coordinates), ..TriMesh::clone(mesh) };
             let material = Material {
                 color_source: ColorSource::Texture(texture.into()),
                 color: [1.0; 3],
                 ..model.clone()
             };
-            Dressed {
+            CompiledSurface {
                 geometry: Geometry::Mesh(mesh.into()),
                 material,
                 appearance: Appearance::default(),
                 topology: topology.clone(),
             }
         }
-        _ => painted(part, model, paint, world_from_object),
+        _ => colored_shape(part, model, surface_color, world_from_object),
     }
 }
 
-fn painted(part: &Part, model: &Material, paint: &Paint, world_from_object: &DAffine3) -> Dressed {
+fn colored_shape(
+    part: &Part,
+    model: &Material,
+    surface_color: &SurfaceColor,
+    world_from_object: &DAffine3,
+) -> CompiledSurface {
     let (shape, weights) = part.as_shape();
-    let shape = Painted {
+    let shape = ColoredShape {
         shape,
         weights,
         topology: part.topology.clone(),
-        paint: paint.clone(),
+        surface_color: surface_color.clone(),
         world_from_object: *world_from_object,
     };
-    Dressed {
+    CompiledSurface {
         geometry: Geometry::Shape(Arc::new(shape)),
         material: model.clone(),
         appearance: Appearance::default(),
@@ -123,17 +136,17 @@ fn painted(part: &Part, model: &Material, paint: &Paint, world_from_object: &DAf
     }
 }
 
-fn domain_of(paint: &Paint) -> Domain {
+fn domain_of(surface_color: &SurfaceColor) -> Domain {
     let of = |input: &Input| match input {
         Input::Constant(_) => Domain::Constant,
         Input::Attribute(source) => source.domain(),
         Input::Sampler(sampler) => sampler.domain(),
     };
     let (color, opacity) = (
-        of(&paint.color),
-        if paint.mode == AlphaMode::Opaque { Domain::Constant } else { of(&paint.opacity) },
+        of(&surface_color.color),
+        if surface_color.mode == AlphaMode::Opaque { Domain::Constant } else { of(&surface_color.opacity) },
     );
-    let steps = matches!(paint.mode, AlphaMode::Mask { .. });
+    let steps = matches!(surface_color.mode, AlphaMode::Mask { .. });
     match color.max(opacity) {
         // A threshold between vertices, or a product of two values that both change, is not linear.
         Domain::Linear | Domain::Texture if steps || color.min(opacity) > Domain::Constant => Domain::Hit,
@@ -144,7 +157,7 @@ fn domain_of(paint: &Paint) -> Domain {
 }
 
 /// Calls `f` for every vertex of the mesh that a triangle uses, with its place.
-fn at_vertices(mesh: &TriMesh, base: &Place<'_>, mut f: impl FnMut(usize, &Place<'_>)) {
+fn at_vertices(mesh: &TriMesh, base: &HitPoint<'_>, mut f: impl FnMut(usize, &HitPoint<'_>)) {
     let mut seen = vec![false; mesh.positions.len()];
     for (t, triangle) in mesh.indices.iter().enumerate() {
         for k in 0..3 {
@@ -155,7 +168,7 @@ fn at_vertices(mesh: &TriMesh, base: &Place<'_>, mut f: impl FnMut(usize, &Place
             let mut weights = [0.0; 3];
             weights[k] = 1.0;
             let point = mesh.origin + mesh.positions[v].as_dvec3();
-            f(v, &Place { primitive: t as u32, weights, point, ..*base });
+            f(v, &HitPoint { primitive: t as u32, weights, point, ..*base });
         }
     }
 }

@@ -7,7 +7,7 @@
 #![expect(unsafe_code, reason = "a C library cannot be loaded and its symbols cannot be typed without it")]
 
 use super::abi::{self, Calls, Queries, Widths};
-use crate::peers::PeerError;
+use crate::baselines::BaselineError;
 use std::path::{Path, PathBuf};
 
 /// Which interface.
@@ -55,7 +55,7 @@ pub struct Embree {
 
 impl Embree {
     /// Loads the first library found that works.
-    pub fn load(version: Version) -> Result<Embree, PeerError> {
+    pub fn load(version: Version) -> Result<Embree, BaselineError> {
         let mut unusable = None;
         for candidate in candidates(version) {
             match Embree::open(version, &candidate) {
@@ -65,7 +65,7 @@ impl Embree {
                 Err(_) => {}
             }
         }
-        Err(unusable.unwrap_or_else(|| PeerError::NotFound {
+        Err(unusable.unwrap_or_else(|| BaselineError::NotFound {
             name: format!("Embree {}", version.number()),
             looked_in: format!(
                 "{}, target/peers, the Python environment, the system's libraries",
@@ -76,9 +76,9 @@ impl Embree {
     }
 
     /// Loads one file.
-    pub fn open(version: Version, path: &Path) -> Result<Embree, PeerError> {
+    pub fn open(version: Version, path: &Path) -> Result<Embree, BaselineError> {
         let shown = path.display().to_string();
-        let unusable = |reason: String| PeerError::Unusable { path: shown.clone(), reason };
+        let unusable = |reason: String| BaselineError::Unusable { path: shown.clone(), reason };
         // The loader's own words (missing file, wrong format) are in the cause.
         let because = |e: libloading::Error| {
             let cause = std::error::Error::source(&e).map_or(String::new(), |c| format!(": {c}"));
@@ -258,8 +258,11 @@ mod tests {
 
     #[test]
     fn not_found_says_where_and_how_to_get_it() {
-        let e =
-            PeerError::NotFound { name: "Embree 4".into(), looked_in: "x".into(), cure: Version::V4.cure() };
+        let e = BaselineError::NotFound {
+            name: "Embree 4".into(),
+            looked_in: "x".into(),
+            cure: Version::V4.cure(),
+        };
         let text = e.to_string();
         assert!(text.contains("pip install embreex") && text.contains("RTSV_EMBREE4"), "{text}");
     }

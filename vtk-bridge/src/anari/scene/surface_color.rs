@@ -1,6 +1,6 @@
 //! The colour of a surface at a hit, where it is more than the renderer's meshes can hold: on shapes, and for blocks of texels, thresholds and products.
 
-use super::attribute::{Place, Source, Topology};
+use super::attribute::{HitPoint, Source, Topology};
 use super::sampler::Sampler;
 use rt_core::glam::{DAffine3, DVec3, Vec3};
 use rt_core::math::Aabb;
@@ -18,7 +18,7 @@ pub(crate) enum Input {
 }
 
 impl Input {
-    pub(crate) fn at(&self, p: &Place<'_>) -> [f32; 4] {
+    pub(crate) fn at(&self, p: &HitPoint<'_>) -> [f32; 4] {
         match self {
             Input::Constant(v) => *v,
             Input::Attribute(source) => source.at(p),
@@ -37,14 +37,14 @@ pub(crate) enum AlphaMode {
 
 /// Colour and opacity of a material.
 #[derive(Clone)]
-pub(crate) struct Paint {
+pub(crate) struct SurfaceColor {
     pub(crate) color: Input,
     pub(crate) opacity: Input,
     pub(crate) mode: AlphaMode,
 }
 
-impl Paint {
-    pub(crate) fn at(&self, p: &Place<'_>) -> [f32; 4] {
+impl SurfaceColor {
+    pub(crate) fn at(&self, p: &HitPoint<'_>) -> [f32; 4] {
         let color = self.color.at(p);
         self.finish(color, || self.opacity.at(p)[0])
     }
@@ -90,15 +90,15 @@ impl Weights {
 }
 
 /// A shape with painted hits.
-pub(crate) struct Painted {
+pub(crate) struct ColoredShape {
     pub(crate) shape: Arc<dyn Shape>,
     pub(crate) weights: Weights,
     pub(crate) topology: Arc<Topology>,
-    pub(crate) paint: Paint,
+    pub(crate) surface_color: SurfaceColor,
     pub(crate) world_from_object: DAffine3,
 }
 
-impl Shape for Painted {
+impl Shape for ColoredShape {
     fn num_primitives(&self) -> usize {
         self.shape.num_primitives()
     }
@@ -122,7 +122,7 @@ impl Shape for Painted {
     fn surface(&self, prim: u32, hit: &ShapeHit, ray: &Ray) -> ShapeSurface {
         let surface = self.shape.surface(prim, hit, ray);
         let weights = self.weights.of([hit.u, hit.v]);
-        let place = Place {
+        let place = HitPoint {
             topology: &self.topology,
             primitive: prim,
             weights,
@@ -130,11 +130,11 @@ impl Shape for Painted {
             normal: surface.normal.as_dvec3(),
             world_from_object: &self.world_from_object,
         };
-        ShapeSurface { color: Some(self.paint.at(&place)), ..surface }
+        ShapeSurface { color: Some(self.surface_color.at(&place)), ..surface }
     }
 
     fn has_transparency(&self) -> bool {
-        self.paint.mode != AlphaMode::Opaque
+        self.surface_color.mode != AlphaMode::Opaque
     }
 
     fn tree_of(&self) -> Option<Arc<dyn Shape>> {

@@ -52,7 +52,7 @@ pub struct BuildCost {
 
 /// Why a peer cannot be measured.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum PeerError {
+pub enum BaselineError {
     /// It is not installed.
     #[error("{name} is not installed (looked in {looked_in}); {cure}")]
     NotFound {
@@ -91,23 +91,23 @@ pub enum PeerError {
     },
 }
 
-impl PeerError {
+impl BaselineError {
     /// The message as records keep it, for everyone to read: files by their name alone, without this machine's folders.
     pub fn for_a_record(&self) -> String {
-        let PeerError::Unusable { path, reason } = self else { return self.to_string() };
+        let BaselineError::Unusable { path, reason } = self else { return self.to_string() };
         let file = std::path::Path::new(path);
         let name = file.file_name().map_or(path.clone(), |n| n.to_string_lossy().into_owned());
         let folder = file.parent().map(|p| format!("{}/", p.display())).filter(|f| f.len() > 1);
         let reason = folder.map_or(reason.clone(), |f| reason.replace(&f, ""));
-        PeerError::Unusable { path: name, reason }.to_string()
+        BaselineError::Unusable { path: name, reason }.to_string()
     }
 }
 
 /// Refuses meshes that would make a peer read outside its arrays.
-pub(crate) fn require_clean(mesh: &TriMesh) -> Result<(), PeerError> {
+pub(crate) fn require_clean(mesh: &TriMesh) -> Result<(), BaselineError> {
     match mesh.validate().skipped() {
         0 => Ok(()),
-        count => Err(PeerError::Mesh { count }),
+        count => Err(BaselineError::Mesh { count }),
     }
 }
 
@@ -153,13 +153,13 @@ mod tests {
     fn records_name_files_without_their_folders() {
         let path = "/opt/somebody/lib/libembree4.so".to_string();
         let reason = format!("{path}: invalid ELF header; see /opt/somebody/lib/readme");
-        let e = PeerError::Unusable { path, reason };
+        let e = BaselineError::Unusable { path, reason };
         assert!(e.to_string().contains("/opt/somebody"));
         assert_eq!(
             e.for_a_record(),
             "libembree4.so cannot be used: libembree4.so: invalid ELF header; see readme"
         );
-        let e = PeerError::Mesh { count: 3 };
+        let e = BaselineError::Mesh { count: 3 };
         assert_eq!(e.for_a_record(), e.to_string());
     }
 }

@@ -12,7 +12,7 @@ use std::path::Path;
 use std::process::Command;
 
 /// The ways a program's calls can go.
-const WAYS: [(&str, &[&str]); 3] = [
+const BACKENDS: [(&str, &[&str]); 3] = [
     ("native", &[]),
     ("vendor library", &["run", "--via", "vendor", "--"]),
     ("LD_PRELOAD", &["run", "--via", "preload", "--"]),
@@ -28,18 +28,18 @@ fn calls_of(source: &str) -> Vec<&str> {
 }
 
 /// Refuses a run that does not tell each call once: there is nothing to compare the others with.
-fn all_told(way: &str, calls: &[&str], told: &[(String, f64)]) -> anyhow::Result<()> {
-    let missing: Vec<&str> = calls.iter().copied().filter(|c| told.iter().all(|(t, _)| t != c)).collect();
+fn check_complete(backend: &str, calls: &[&str], reported: &[(String, f64)]) -> anyhow::Result<()> {
+    let missing: Vec<&str> = calls.iter().copied().filter(|c| reported.iter().all(|(t, _)| t != c)).collect();
     anyhow::ensure!(
         missing.is_empty(),
-        "{way}: the program of calls ended well, but told no time of {}; is the gluray beside bench as new as \
+        "{backend}: the program of calls ended well, but told no time of {}; is the gluray beside bench as new as \
          bench? `cargo build --workspace` builds both",
         missing.join(", ")
     );
     anyhow::ensure!(
-        told.len() == calls.len(),
-        "{way}: the program of calls told {} times of {} calls",
-        told.len(),
+        reported.len() == calls.len(),
+        "{backend}: the program of calls told {} times of {} calls",
+        reported.len(),
         calls.len()
     );
     Ok(())
@@ -84,18 +84,18 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let mut times: BTreeMap<(String, usize), Vec<f64>> = BTreeMap::new();
     let calls = calls_of(CALLS);
     for n in 0..runs {
-        context.say(format!("run {} of {runs}", n + 1))?;
-        for way in runner::order(WAYS.len(), n) {
-            let told = measure(tools, &display, &program, WAYS[way].1)?;
-            all_told(WAYS[way].0, &calls, &told)?;
-            for (call, ns) in told {
-                times.entry((call, way)).or_default().push(ns);
+        context.report_step(format!("run {} of {runs}", n + 1))?;
+        for backend in runner::order(BACKENDS.len(), n) {
+            let reported = measure(tools, &display, &program, BACKENDS[backend].1)?;
+            check_complete(BACKENDS[backend].0, &calls, &reported)?;
+            for (call, ns) in reported {
+                times.entry((call, backend)).or_default().push(ns);
             }
         }
     }
     for call in calls {
-        for (way, (name, _)) in WAYS.iter().enumerate() {
-            let (own, native) = (&times[&(call.to_string(), way)], &times[&(call.to_string(), 0)]);
+        for (backend, (name, _)) in BACKENDS.iter().enumerate() {
+            let (own, native) = (&times[&(call.to_string(), backend)], &times[&(call.to_string(), 0)]);
             let more: Vec<f64> = own.iter().zip(native).map(|(o, n)| o - n).collect();
             let Some(t) = Summary::of(own) else { continue };
             let row = Row::new().with("call", call).with("way", *name).with("time", t.median);
@@ -128,8 +128,8 @@ fn measure(
         .env("XDG_STATE_HOME", place)
         .output()
         .context("cannot start the program of calls")?;
-    let told = String::from_utf8_lossy(&output.stderr);
-    anyhow::ensure!(output.status.success(), "the program of calls: {told}");
+    let reported = String::from_utf8_lossy(&output.stderr);
+    anyhow::ensure!(output.status.success(), "the program of calls: {reported}");
     let text = String::from_utf8_lossy(&output.stdout);
     text.lines()
         .map(|l| {
@@ -144,13 +144,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_run_that_leaves_a_call_out_is_refused_with_its_way_and_the_call() {
+    fn a_run_that_leaves_a_call_out_is_refused_with_its_backend_and_the_call() {
         let calls = calls_of(CALLS);
         assert_eq!(calls.len(), 8, "{calls:?}");
-        let mut told: Vec<(String, f64)> = calls.iter().map(|c| (c.to_string(), 1.0)).collect();
-        all_told("native", &calls, &told).expect("all are told");
-        told.retain(|(call, _)| call != "glEnable");
-        let why = all_told("LD_PRELOAD", &calls, &told).expect_err("one is missing").to_string();
+        let mut reported: Vec<(String, f64)> = calls.iter().map(|c| (c.to_string(), 1.0)).collect();
+        check_complete("native", &calls, &reported).expect("all are told");
+        reported.retain(|(call, _)| call != "glEnable");
+        let why = check_complete("LD_PRELOAD", &calls, &reported).expect_err("one is missing").to_string();
         assert!(
             why.contains("LD_PRELOAD") && why.contains("glEnable") && !why.contains("glColor3f"),
             "{why}"

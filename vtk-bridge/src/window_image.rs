@@ -1,6 +1,6 @@
 //! rt-core's frame as the window wants it: 8-bit colour where everything is opaque, premultiplied floating point elsewhere, and OpenGL's depth.
 
-use crate::bridge::{BridgeError, Ready, ms};
+use crate::bridge::{BridgeError, RenderInputs, ms};
 use crate::input::View;
 use crate::materials::Encoding;
 use rayon::prelude::*;
@@ -14,23 +14,23 @@ use std::time::Instant;
 
 /// A picture; rows from the top.
 #[derive(Debug, Clone, Default)]
-pub struct Picture {
+pub struct WindowImage {
     /// Pixels per row.
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// RGBA: alpha 255 where something is hit, else 0. Empty when [`Picture::blended`] is not.
+    /// RGBA: alpha 255 where something is hit, else 0. Empty when [`WindowImage::blended`] is not.
     pub opaque: Vec<[u8; 4]>,
     /// Premultiplied RGBA, when some of it lets the window's contents through; else empty.
     pub blended: Vec<[f32; 4]>,
     /// Window depth of the first opaque surface, 1 where there is none.
     pub depth: Vec<f32>,
-    /// Window depth of the first surface, opaque or not; only with [`Picture::blended`].
+    /// Window depth of the first surface, opaque or not; only with [`WindowImage::blended`].
     pub first_depth: Vec<f32>,
 }
 
 /// What drawing came to.
-pub(crate) struct Outcome {
+pub(crate) struct DrawResult {
     pub(crate) rays: RayStats,
     pub(crate) warnings: Vec<String>,
     pub(crate) trace_ms: f64,
@@ -40,9 +40,9 @@ pub(crate) struct Outcome {
 /// Pixels a task works on.
 const CHUNK: usize = 1 << 14;
 
-impl Picture {
+impl WindowImage {
     /// What mirrors and glass see where nothing is.
-    pub(crate) fn surroundings(view: &View) -> Background {
+    pub(crate) fn gradient_background(view: &View) -> Background {
         let [bottom, top] = view.background;
         Background::Gradient { bottom, top }
     }
@@ -51,29 +51,29 @@ impl Picture {
     pub(crate) fn draw(
         &mut self,
         renderer: &mut Renderer,
-        ready: &Ready<'_>,
+        inputs: &RenderInputs<'_>,
         view: &View,
         mean_of: u32,
-    ) -> Result<Outcome, BridgeError> {
+    ) -> Result<DrawResult, BridgeError> {
         let start = Instant::now();
-        let mixed = ready.encodings.windows(2).any(|e| e[0] != e[1]);
-        let effects = ready.options.effects.unwrap_or(Effects::NONE);
-        let soft_edges = ready.options.samples > 1 || effects.contains(Effects::DEPTH_OF_FIELD);
+        let mixed = inputs.encodings.windows(2).any(|e| e[0] != e[1]);
+        let effects = inputs.options.effects.unwrap_or(Effects::NONE);
+        let soft_edges = inputs.options.samples > 1 || effects.contains(Effects::DEPTH_OF_FIELD);
         let see_through = Effects::TRANSPARENCY | Effects::VOLUMES;
-        let blend = effects.intersects(see_through) || soft_edges || ready.averaged;
+        let blend = effects.intersects(see_through) || soft_edges || inputs.averaged;
         let layers = Layers::COLOR | Layers::DEPTH;
         let options = RenderOptions {
-            layers: if mixed || !ready.edges.is_empty() { layers | Layers::IDS } else { layers },
+            layers: if mixed || !inputs.edges.is_empty() { layers | Layers::IDS } else { layers },
             // Interpolated colours of opacity 1 come a rounding below it; what is 255 of 255 is opaque.
             depth_min_opacity: if effects.contains(Effects::TRANSPARENCY) { 1.0 - 1.0 / 512.0 } else { 0.0 },
-            ..ready.options.clone()
+            ..inputs.options.clone()
         };
-        let output = renderer.render(ready.scene, ready.camera, &options)?;
+        let output = renderer.render(inputs.scene, inputs.camera, &options)?;
         let mut frame = output.frame;
-        let opaque_background = !matches!(ready.scene.background, Background::Transparent);
+        let opaque_background = !matches!(inputs.scene.background, Background::Transparent);
         let mut first_depth = if effects.contains(Effects::TRANSPARENCY) || opaque_background {
-            let depth_only = RenderOptions { layers: Layers::DEPTH, samples: 1, ..ready.options.clone() };
-            renderer.render(ready.scene, ready.camera, &depth_only)?.frame.depth
+            let depth_only = RenderOptions { layers: Layers::DEPTH, samples: 1, ..inputs.options.clone() };
+            renderer.render(inputs.scene, inputs.camera, &depth_only)?.frame.depth
         } else {
             Vec::new()
         };
@@ -81,16 +81,16 @@ impl Picture {
             if first_depth.is_empty() {
                 first_depth.clone_from(&frame.depth);
             }
-            crate::volumes::place_in_depth(&ready.scene.volumes, view, &mut first_depth);
+            crate::volumes::place_in_depth(&inputs.scene.volumes, view, &mut first_depth);
         }
         let trace_ms = ms(start);
 
         let start = Instant::now();
         if opaque_background {
-            uncover(&mut frame, &first_depth);
+            clear_background(&mut frame, &first_depth);
         }
-        encode(&mut frame, ready.encodings, mixed);
-        crate::edges::draw(&mut frame, &first_depth, ready.edges, view);
+        encode(&mut frame, inputs.encodings, mixed);
+        crate::edges::draw(&mut frame, &first_depth, inputs.edges, view);
         (self.width, self.height) = (view.width, view.height);
         std::mem::swap(&mut self.depth, &mut frame.depth);
         if blend {
@@ -104,7 +104,7 @@ impl Picture {
             } else {
                 std::mem::swap(&mut self.blended, &mut frame.color);
             }
-            if !ready.edges.is_empty() {
+            if !inputs.edges.is_empty() {
                 first_depth.iter_mut().zip(&self.depth).for_each(|(first, own)| *first = first.min(*own));
             }
             self.first_depth = if first_depth.is_empty() { self.depth.clone() } else { first_depth };
@@ -117,12 +117,12 @@ impl Picture {
         }
         let warnings = output.report.warnings;
         renderer.recycle(frame);
-        Ok(Outcome { rays: output.report.rays, warnings, trace_ms, convert_ms: ms(start) })
+        Ok(DrawResult { rays: output.report.rays, warnings, trace_ms, convert_ms: ms(start) })
     }
 }
 
 /// Takes the background away again that mirrors and glass needed: pixels where nothing is are the window's.
-fn uncover(frame: &mut Frame, first_depth: &[f32]) {
+fn clear_background(frame: &mut Frame, first_depth: &[f32]) {
     let clear = |(c, d): (&mut [f32; 4], &f32)| {
         if *d >= 1.0 {
             *c = [0.0; 4];
