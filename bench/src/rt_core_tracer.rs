@@ -4,7 +4,7 @@ use crate::baselines::{BuildCost, Tracer};
 use crate::{clock, memory, rays};
 use glam::Vec3;
 use rays::{HitBlock, LANES, RayBlock};
-use rt_core::accel::{BuildError, BuildOptions, World};
+use rt_core::bvh::{BuildError, BuildOptions, World};
 use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 
@@ -134,7 +134,7 @@ impl Tracer for View<'_> {
 mod tests {
     use super::*;
     use crate::baselines::testing;
-    use rt_core::accel::{BuildQuality, Robustness};
+    use rt_core::bvh::{BuildQuality, Robustness};
     use rt_core::simd::SimdLevel;
 
     #[test]

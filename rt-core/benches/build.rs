@@ -5,7 +5,7 @@
 mod common;
 
 use criterion::{Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
-use rt_core::accel::{BuildOptions, BuildQuality, Geometry, Instance, World};
+use rt_core::bvh::{BuildOptions, BuildQuality, Geometry, Instance, World};
 use rt_core::glam::DAffine3;
 use rt_core::mesh::TriMesh;
 use std::hint::black_box;

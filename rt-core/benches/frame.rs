@@ -3,7 +3,7 @@
 mod common;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use rt_core::accel::{BuildOptions, Geometry, World};
+use rt_core::bvh::{BuildOptions, Geometry, World};
 use rt_core::colormap::ColorMap;
 use rt_core::effects::Effects;
 use rt_core::frame::Layers;

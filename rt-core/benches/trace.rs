@@ -3,7 +3,7 @@
 mod common;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use rt_core::accel::{BuildOptions, Robustness, World};
+use rt_core::bvh::{BuildOptions, Robustness, World};
 use rt_core::glam::Vec3;
 use rt_core::math::orthonormal_basis;
 use rt_core::ray::{HitBlock, LANES, Ray, RayBlock};

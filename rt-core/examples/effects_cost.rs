@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release -p rt-core --example effects_cost -- [pixels per side, default 512] [rounds, default 3]`
 
-use rt_core::accel::{BuildOptions, World};
+use rt_core::bvh::{BuildOptions, World};
 use rt_core::camera::Camera;
 use rt_core::effects::Effects;
 use rt_core::frame::Layers;

@@ -168,13 +168,13 @@ pub enum Background {
 /// Hanrahan, "An Efficient Representation for Irradiance Environment Maps", 2001): exact for constant and gradient environments,
 /// within a few per cent of the mean for pictures.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct MeanRadiance {
+pub(crate) struct IrradianceCoefficients {
     pub(crate) coefficients: [Vec3; 9],
 }
 
-impl MeanRadiance {
+impl IrradianceCoefficients {
     /// Projects `environment`, adding the isotropic radiance `ambient`. `None` when both are black.
-    pub(crate) fn new(environment: Option<&Environment>, ambient: Vec3) -> Option<MeanRadiance> {
+    pub(crate) fn new(environment: Option<&Environment>, ambient: Vec3) -> Option<IrradianceCoefficients> {
         let mut c = [Vec3::ZERO; 9];
         match environment {
             Some(Environment::Constant(v)) => c[0] = (*v).into(),
@@ -191,7 +191,7 @@ impl MeanRadiance {
             None => {}
         }
         c[0] += ambient;
-        (c.iter().any(|v| *v != Vec3::ZERO)).then_some(MeanRadiance { coefficients: c })
+        (c.iter().any(|v| *v != Vec3::ZERO)).then_some(IrradianceCoefficients { coefficients: c })
     }
 
     /// Mean radiance for normal `n`.
@@ -249,8 +249,8 @@ mod tests {
     fn projection_reproduces_the_closed_form_of_a_gradient() {
         let up = Vec3::new(0.36, 0.48, 0.8);
         let g = Environment::Gradient { bottom: [0.1, 0.2, 0.3], top: [1.0, 0.8, 0.6], up };
-        let exact = MeanRadiance::new(Some(&g), Vec3::ZERO).unwrap();
-        let numeric = MeanRadiance { coefficients: project(&g) };
+        let exact = IrradianceCoefficients::new(Some(&g), Vec3::ZERO).unwrap();
+        let numeric = IrradianceCoefficients { coefficients: project(&g) };
         for n in [Vec3::X, -Vec3::X, Vec3::Y, Vec3::Z, up, -up] {
             let (a, b) = (exact.for_normal(n), numeric.for_normal(n));
             assert!((a - b).abs().max_element() < 2e-3, "{n}: {a} {b}");
@@ -268,7 +268,7 @@ mod tests {
             .collect();
         let image = Arc::new(Texture::from_linear(1, 256, rows).unwrap());
         let e = Environment::Image { image, up: Vec3::Z, scale: 1.0 };
-        let m = MeanRadiance::new(Some(&e), Vec3::ZERO).unwrap();
+        let m = IrradianceCoefficients::new(Some(&e), Vec3::ZERO).unwrap();
         assert!((m.for_normal(Vec3::Z).x - 0.5).abs() < 2e-3, "{}", m.for_normal(Vec3::Z).x);
         assert!((m.for_normal(Vec3::X).x - 0.25).abs() < 2e-3, "{}", m.for_normal(Vec3::X).x);
     }

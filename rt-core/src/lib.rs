@@ -1,18 +1,17 @@
 //! Ray tracing for scientific visualization on the CPU.
 #![deny(unsafe_code)]
 
-pub mod accel;
+pub mod bvh;
 pub mod camera;
 pub mod colormap;
-pub mod detail;
 pub mod effects;
 pub mod environment;
 pub mod frame;
 pub mod grid;
 mod grid_walk;
-mod intersect;
 pub mod light;
 pub mod material;
+pub mod material_maps;
 pub mod math;
 pub mod mesh;
 pub mod ray;
@@ -31,8 +30,7 @@ mod surface;
 pub(crate) mod test_shapes;
 pub mod texture;
 pub mod transfer_function;
-mod traverse;
 pub mod volume;
 
 pub use glam;
-pub use shade::waves;
+pub use shade::distributed;

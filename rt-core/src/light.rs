@@ -118,7 +118,7 @@ pub struct Light {
 
 /// Why a light cannot be given a size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum NoSize {
+pub enum LightSizeError {
     /// It comes from everywhere.
     #[error("ambient light has no size: it comes from everywhere; leave the size out")]
     Ambient,
@@ -194,7 +194,7 @@ impl Light {
     ///
     /// # Errors
     /// Ambient light and cones have no size, and a quadrangle without edges has none that could grow.
-    pub fn with_size(mut self, size: f64) -> Result<Light, NoSize> {
+    pub fn with_size(mut self, size: f64) -> Result<Light, LightSizeError> {
         match &mut self.kind {
             LightKind::Directional { angular_radius_rad: r, .. }
             | LightKind::Point { radius: r, .. }
@@ -207,14 +207,14 @@ impl Light {
             LightKind::Quad { corner, edges, .. } => {
                 let longer = edges[0].length().max(edges[1].length());
                 if !(longer > 0.0 && longer.is_finite()) {
-                    return Err(NoSize::Quad);
+                    return Err(LightSizeError::Quad);
                 }
                 let middle = *corner + 0.5 * (edges[0] + edges[1]);
                 *edges = edges.map(|e| e * (2.0 * size / longer));
                 *corner = middle - 0.5 * (edges[0] + edges[1]);
             }
-            LightKind::Ambient => return Err(NoSize::Ambient),
-            LightKind::Cone { .. } => return Err(NoSize::Cone),
+            LightKind::Ambient => return Err(LightSizeError::Ambient),
+            LightKind::Cone { .. } => return Err(LightSizeError::Cone),
         }
         Ok(self)
     }
@@ -301,8 +301,8 @@ pub(crate) fn cone_share(cos: f32, cos_inner: f32, cos_outer: f32) -> f32 {
 
 /// A light in render space, ready for shading.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct PlacedLight {
-    pub(crate) kind: PlacedKind,
+pub(crate) struct ResolvedLight {
+    pub(crate) kind: ResolvedLightKind,
     pub(crate) color: Vec3,
     pub(crate) highlight: Vec3,
     pub(crate) attenuation: Option<[f32; 3]>,
@@ -313,7 +313,7 @@ pub(crate) struct PlacedLight {
 }
 
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum PlacedKind {
+pub(crate) enum ResolvedLightKind {
     Directional {
         to_light: Vec3,
     },
@@ -353,10 +353,10 @@ pub(crate) enum PlacedKind {
     },
 }
 
-impl PlacedLight {
+impl ResolvedLight {
     /// `light` for `camera`, whose rays go through a lens or a pinhole, in a render space with
     /// origin `origin`. `None` for ambient light, which has no place.
-    pub(crate) fn new(light: &Light, camera: &Camera, lens: bool, origin: DVec3) -> Option<PlacedLight> {
+    pub(crate) fn new(light: &Light, camera: &Camera, lens: bool, origin: DVec3) -> Option<ResolvedLight> {
         let world_from_view: DMat3 = camera.world_from_view();
         let eye = camera.eye().unwrap_or_else(|| camera.world_ray([0.0, 0.0]).0);
         let vector = |v: DVec3| {
@@ -369,25 +369,27 @@ impl PlacedLight {
         };
         let kind = match light.kind {
             LightKind::Ambient => return None,
-            LightKind::Directional { to_light, .. } => PlacedKind::Directional { to_light: vector(to_light) },
-            LightKind::Point { position, .. } => PlacedKind::Point { position: point(position) },
-            LightKind::Spot { position, direction, cutoff_rad, exponent, .. } => PlacedKind::Spot {
+            LightKind::Directional { to_light, .. } => {
+                ResolvedLightKind::Directional { to_light: vector(to_light) }
+            }
+            LightKind::Point { position, .. } => ResolvedLightKind::Point { position: point(position) },
+            LightKind::Spot { position, direction, cutoff_rad, exponent, .. } => ResolvedLightKind::Spot {
                 position: point(position),
                 direction: vector(direction),
                 cos_cutoff: cutoff_rad.cos() as f32,
                 exponent: exponent as f32,
             },
-            LightKind::Cone { position, direction, inner_rad, outer_rad } => PlacedKind::Cone {
+            LightKind::Cone { position, direction, inner_rad, outer_rad } => ResolvedLightKind::Cone {
                 position: point(position),
                 direction: vector(direction),
                 cos_inner: inner_rad.cos() as f32,
                 cos_outer: outer_rad.cos() as f32,
             },
             LightKind::Disk { position, direction, .. } => {
-                PlacedKind::Disk { position: point(position), direction: vector(direction) }
+                ResolvedLightKind::Disk { position: point(position), direction: vector(direction) }
             }
             LightKind::Ring { position, direction, inner_radius, radius, inner_rad, outer_rad } => {
-                PlacedKind::Ring {
+                ResolvedLightKind::Ring {
                     position: point(position),
                     direction: vector(direction),
                     hole: if radius > 0.0 { (inner_radius / radius) as f32 } else { 0.0 },
@@ -398,7 +400,7 @@ impl PlacedLight {
             LightKind::Quad { corner, edges: [a, b], both_sides } => {
                 let turned =
                     |v: DVec3| if light.frame == LightFrame::Camera { world_from_view * v } else { v };
-                PlacedKind::Quad {
+                ResolvedLightKind::Quad {
                     position: point(corner + 0.5 * (a + b)),
                     edges: [a, b].map(|e| (0.5 * turned(e)).as_vec3()),
                     // Scaled first: the product of two short edges may vanish.
@@ -407,8 +409,8 @@ impl PlacedLight {
                 }
             }
         };
-        let directional = matches!(kind, PlacedKind::Directional { .. });
-        Some(PlacedLight {
+        let directional = matches!(kind, ResolvedLightKind::Directional { .. });
+        Some(ResolvedLight {
             kind,
             color: light.color.into(),
             highlight: light.highlight_color.unwrap_or(light.color).into(),

@@ -1,8 +1,8 @@
 //! How surfaces look.
 
 use crate::colormap::ColorMap;
-use crate::detail::Detail;
 use crate::environment::texels;
+use crate::material_maps::MaterialMaps;
 use crate::texture::Texture;
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ pub enum ColorSource {
 
 /// Highlight of [`SurfaceModel::Phong`].
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Highlight {
+pub enum PhongForm {
     /// (N·H)^s with the half vector H: fixed-function OpenGL (Blinn 1977).
     #[default]
     HalfVector,
@@ -62,7 +62,7 @@ pub enum SurfaceModel {
         /// Exponent of the highlight.
         shininess: f32,
         /// Form of the highlight.
-        highlight: Highlight,
+        highlight: PhongForm,
         /// Share of mirror reflection added, 0..=1; 0 sends no rays.
         mirror: f32,
     },
@@ -125,13 +125,13 @@ pub struct Material {
     /// Use the geometric normal even where shading normals exist (GL_FLAT).
     pub flat: bool,
     /// What varies besides the colour; `None` for nothing.
-    pub detail: Option<Arc<dyn Detail>>,
+    pub maps: Option<Arc<dyn MaterialMaps>>,
 }
 
 /// Details are equal when they are the same one.
 impl PartialEq for Material {
     fn eq(&self, o: &Material) -> bool {
-        let same = match (&self.detail, &o.detail) {
+        let same = match (&self.maps, &o.maps) {
             (Some(a), Some(b)) => Arc::ptr_eq(a, b),
             (a, b) => a.is_none() && b.is_none(),
         };
@@ -150,7 +150,7 @@ impl Material {
             emission: [0.0; 3],
             sides: Sides::Both,
             flat: false,
-            detail: None,
+            maps: None,
         }
     }
 
@@ -171,7 +171,7 @@ impl Material {
             diffuse: 1.0,
             specular: [specular; 3],
             shininess,
-            highlight: Highlight::HalfVector,
+            highlight: PhongForm::HalfVector,
             mirror: 0.0,
         };
         Material::new(model, color)
@@ -224,8 +224,8 @@ impl Material {
 
     /// The same material with detail.
     #[must_use]
-    pub fn with_detail(self, detail: impl Into<Arc<dyn Detail>>) -> Material {
-        Material { detail: Some(detail.into()), ..self }
+    pub fn with_maps(self, maps: impl Into<Arc<dyn MaterialMaps>>) -> Material {
+        Material { maps: Some(maps.into()), ..self }
     }
 
     /// Whether one side is culled.

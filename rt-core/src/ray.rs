@@ -1,6 +1,6 @@
 //! Rays, hits, and their blocks of 16.
 //!
-//! All coordinates here are in *render space*: world coordinates minus [`crate::accel::World::origin`], in f32.
+//! All coordinates here are in *render space*: world coordinates minus [`crate::bvh::World::origin`], in f32.
 
 use glam::Vec3;
 

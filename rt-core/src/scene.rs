@@ -16,13 +16,13 @@
 //! ```
 
 mod check;
-mod needs;
 mod part;
+mod required_effects;
 
-pub(crate) use needs::{lets_light_through, requirements};
 pub(crate) use part::attribute_part;
+pub(crate) use required_effects::{requirements, transmits_light};
 
-use crate::accel::{BuildError, BuildOptions, Geometry, Instance, World};
+use crate::bvh::{BuildError, BuildOptions, Geometry, Instance, World};
 use crate::environment::{Background, Environment};
 use crate::light::{Light, LightKind};
 use crate::material::{ColorSource, Material};
@@ -39,7 +39,7 @@ pub struct Appearance {
     /// Index into [`Scene::materials`].
     pub material: usize,
     colors: Option<Arc<Attribute<[f32; 4]>>>,
-    color_facts: ColorFacts,
+    color_summary: ColorSummary,
     scalars: Option<Arc<Attribute<f32>>>,
 }
 
@@ -53,7 +53,7 @@ impl Appearance {
     #[must_use]
     pub fn with_colors(mut self, colors: impl Into<Arc<Attribute<[f32; 4]>>>) -> Appearance {
         let colors = colors.into();
-        self.color_facts = ColorFacts::of(&colors);
+        self.color_summary = ColorSummary::of(&colors);
         self.colors = Some(colors);
         self
     }
@@ -87,7 +87,7 @@ pub struct AmbientOcclusion {
 
 /// A volume placed in the world. Where volumes overlap, their media mix.
 #[derive(Clone)]
-pub struct PlacedVolume {
+pub struct VolumeInstance {
     /// The medium.
     pub volume: Arc<Volume>,
     /// Object to world. Extinction is per object-space length: a volume scaled up is thicker, not denser.
@@ -96,27 +96,27 @@ pub struct PlacedVolume {
 
 /// What is asked of all colours of an attribute in every frame.
 #[derive(Debug, Clone, Copy, Default)]
-struct ColorFacts {
+struct ColorSummary {
     /// One lets light through.
     transparent: bool,
     /// The first that is NaN or infinite in a channel.
     unusable: Option<usize>,
 }
 
-impl ColorFacts {
-    fn of(colors: &Attribute<[f32; 4]>) -> ColorFacts {
+impl ColorSummary {
+    fn of(colors: &Attribute<[f32; 4]>) -> ColorSummary {
         let part = |(k, part): (usize, &[[f32; 4]])| {
             let unusable = part.iter().position(|c| !c.iter().all(|v| v.is_finite()));
-            ColorFacts {
+            ColorSummary {
                 transparent: part.iter().any(|c| c[3] < 1.0),
                 unusable: unusable.map(|i| (k << 16) + i),
             }
         };
-        let join = |a: ColorFacts, b: ColorFacts| ColorFacts {
+        let join = |a: ColorSummary, b: ColorSummary| ColorSummary {
             transparent: a.transparent || b.transparent,
             unusable: a.unusable.or(b.unusable),
         };
-        colors.values.par_chunks(1 << 16).enumerate().map(part).reduce(ColorFacts::default, join)
+        colors.values.par_chunks(1 << 16).enumerate().map(part).reduce(ColorSummary::default, join)
     }
 }
 
@@ -138,8 +138,8 @@ pub struct Scene {
     /// Ambient occlusion; `None` for none.
     pub ambient_occlusion: Option<AmbientOcclusion>,
     /// Direct volume rendering, in front of, between and behind surfaces. Volumes cast no shadows and have no depth.
-    pub volumes: Vec<PlacedVolume>,
-    geometry_colors: Vec<ColorFacts>,
+    pub volumes: Vec<VolumeInstance>,
+    geometry_colors: Vec<ColorSummary>,
 }
 
 /// Why a scene cannot be drawn.
@@ -213,8 +213,8 @@ impl Scene {
             .geometries()
             .par_iter()
             .map(|g| match g {
-                Geometry::Mesh(m) => m.colors.as_ref().map_or_else(ColorFacts::default, ColorFacts::of),
-                Geometry::Shape(s) => ColorFacts { transparent: s.has_transparency(), unusable: None },
+                Geometry::Mesh(m) => m.colors.as_ref().map_or_else(ColorSummary::default, ColorSummary::of),
+                Geometry::Shape(s) => ColorSummary { transparent: s.has_transparency(), unusable: None },
             })
             .collect();
         Scene {
@@ -287,9 +287,9 @@ fn unused(
     // Whether a shape has scalars shows only at its hits.
     let no_scalars = mesh.is_some_and(|m| m.scalars.is_none() && look.scalars.is_none());
     let no_coordinates = mesh.is_none_or(|m| m.texcoords.is_none());
-    let no_maps = material.detail.as_ref().and_then(|d| match mesh {
-        Some(mesh) => d.lacks(mesh),
-        None => d.lacks(&TriMesh::default()),
+    let no_maps = material.maps.as_ref().and_then(|d| match mesh {
+        Some(mesh) => d.missing_attribute(mesh),
+        None => d.missing_attribute(&TriMesh::default()),
     });
     let of_its_own = |what: &str| format!("has {what} of its own: they are not looked at");
     let by_attribute = material.color_source == ColorSource::Attribute;
@@ -311,7 +311,7 @@ pub struct SceneBuilder {
     appearances: Vec<Appearance>,
     materials: Vec<Material>,
     lights: Vec<Light>,
-    volumes: Vec<PlacedVolume>,
+    volumes: Vec<VolumeInstance>,
     /// Light from infinitely far.
     pub environment: Option<Environment>,
     /// What fills uncovered pixels.
@@ -371,7 +371,7 @@ impl SceneBuilder {
 
     /// Adds a volume at its place.
     pub fn volume(&mut self, volume: impl Into<Arc<Volume>>) {
-        self.volumes.push(PlacedVolume { volume: volume.into(), world_from_object: DAffine3::IDENTITY });
+        self.volumes.push(VolumeInstance { volume: volume.into(), world_from_object: DAffine3::IDENTITY });
     }
 
     /// Builds the world and checks everything.

@@ -2,7 +2,7 @@
 
 /// What is counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Work {
+pub enum Counter {
     /// Nodes whose eight boxes were tested.
     Nodes,
     /// Leaves entered.
@@ -25,14 +25,14 @@ thread_local! {
 
 /// Adds to a counter of this thread.
 #[inline(always)]
-pub(crate) fn count(what: Work, n: u64) {
+pub(crate) fn count(what: Counter, n: u64) {
     #[cfg(feature = "stats")]
     COUNTERS.with(|c| c[what as usize].set(c[what as usize].get() + n));
     #[cfg(not(feature = "stats"))]
     let _ = (what, n);
 }
 
-/// Takes this thread's counters and sets them to zero, in the order of [`Work`]. All zero without the feature `stats`.
+/// Takes this thread's counters and sets them to zero, in the order of [`Counter`]. All zero without the feature `stats`.
 pub fn take() -> [u64; KINDS] {
     #[cfg(feature = "stats")]
     return COUNTERS.with(|c| std::array::from_fn(|i| c[i].take()));

@@ -5,11 +5,11 @@ use glam::Vec3;
 use std::collections::HashMap;
 
 /// A repeatable sequence (SplitMix64, Steele et al. 2014).
-pub(crate) struct Random(u64);
+pub(crate) struct SplitMix64(u64);
 
-impl Random {
+impl SplitMix64 {
     pub(crate) fn new(seed: u64) -> Self {
-        Random(seed)
+        SplitMix64(seed)
     }
 
     pub(crate) fn bits(&mut self) -> u64 {
@@ -36,7 +36,7 @@ impl Random {
 
 /// Triangles of many sizes at random places in the unit ball.
 pub(crate) fn noise_soup(n: usize, seed: u64) -> TriMesh {
-    let mut r = Random::new(seed);
+    let mut r = SplitMix64::new(seed);
     let mut mesh = TriMesh::default();
     for i in 0..n as u32 {
         let center = r.direction() * r.unit();

@@ -31,7 +31,7 @@ pub struct Texture {
     width: usize,
     height: usize,
     texels: Vec<[f32; 4]>,
-    facts: Facts,
+    summary: TexelSummary,
     /// Horizontal and vertical behaviour outside 0..=1.
     pub wrap: [Wrap; 2],
     /// How texels are combined.
@@ -40,7 +40,7 @@ pub struct Texture {
 
 /// What is asked of all texels in every frame; they never change, so it is found out once.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Facts {
+struct TexelSummary {
     transparent: bool,
     black: bool,
     /// The first texel that no picture can have, and the first that no light can have.
@@ -54,22 +54,22 @@ thread_local! {
     static SCANS: std::cell::Cell<usize> = const { std::cell::Cell::new(0) };
 }
 
-impl Facts {
-    fn of(texels: &[[f32; 4]]) -> Facts {
+impl TexelSummary {
+    fn of(texels: &[[f32; 4]]) -> TexelSummary {
         #[cfg(test)]
         SCANS.set(SCANS.get() + 1);
-        let mut facts = Facts { transparent: false, black: true, unusable: None, negative: None };
+        let mut summary = TexelSummary { transparent: false, black: true, unusable: None, negative: None };
         for (i, t) in texels.iter().enumerate() {
-            facts.transparent |= t[3] < 1.0;
-            facts.black &= t[..3] == [0.0; 3];
-            if facts.unusable.is_none() && !t.iter().all(|v| v.is_finite()) {
-                facts.unusable = Some(i);
+            summary.transparent |= t[3] < 1.0;
+            summary.black &= t[..3] == [0.0; 3];
+            if summary.unusable.is_none() && !t.iter().all(|v| v.is_finite()) {
+                summary.unusable = Some(i);
             }
-            if facts.negative.is_none() && t[..3].iter().any(|v| *v < 0.0) {
-                facts.negative = Some(i);
+            if summary.negative.is_none() && t[..3].iter().any(|v| *v < 0.0) {
+                summary.negative = Some(i);
             }
         }
-        facts
+        summary
     }
 }
 
@@ -99,8 +99,8 @@ impl Texture {
             let (expected, found) = (width.saturating_mul(height).saturating_mul(4), texels.len() * 4);
             return Err(TextureError::Length { width, height, expected, found });
         }
-        let facts = Facts::of(&texels);
-        Ok(Texture { width, height, texels, facts, wrap: [Wrap::Repeat; 2], filter: Filter::Bilinear })
+        let summary = TexelSummary::of(&texels);
+        Ok(Texture { width, height, texels, summary, wrap: [Wrap::Repeat; 2], filter: Filter::Bilinear })
     }
 
     /// From sRGB-encoded 8-bit RGBA, row 0 at v = 0; alpha is linear.
@@ -131,22 +131,22 @@ impl Texture {
 
     /// True when a texel lets light through.
     pub fn has_transparency(&self) -> bool {
-        self.facts.transparent
+        self.summary.transparent
     }
 
     /// True when every texel is black.
     pub fn is_black(&self) -> bool {
-        self.facts.black
+        self.summary.black
     }
 
     /// Column and row of the first texel that is NaN or infinite in a channel.
     pub fn unusable_texel(&self) -> Option<[usize; 2]> {
-        self.facts.unusable.map(|i| [i % self.width, i / self.width])
+        self.summary.unusable.map(|i| [i % self.width, i / self.width])
     }
 
     /// Column and row of the first texel with a negative colour.
     pub fn negative_texel(&self) -> Option<[usize; 2]> {
-        self.facts.negative.map(|i| [i % self.width, i / self.width])
+        self.summary.negative.map(|i| [i % self.width, i / self.width])
     }
 
     /// How often texels of a texture were all looked at on this thread.

@@ -12,7 +12,7 @@ use crate::colormap::ColorMap;
 pub struct TransferFunction {
     colors: ColorMap,
     extinction: Vec<[f32; 2]>,
-    pieces: Vec<Piece>,
+    intervals: Vec<Interval>,
     /// For evenly spaced scalars from `buckets.lo`: the piece to begin looking at, and how many buckets before this one have
     /// any extinction.
     buckets: Buckets,
@@ -54,7 +54,7 @@ pub enum TransferFunctionError {
 
 /// A stretch of scalars from `s` on where extinction and extinction times colour are polynomials.
 #[derive(Debug, Clone, Copy)]
-struct Piece {
+struct Interval {
     s: f64,
     /// Extinction at `s`, and its slope.
     sigma: [f64; 2],
@@ -95,9 +95,9 @@ impl TransferFunction {
         if !range_ok {
             return Err(TransferFunctionError::ColorRange(colors.range));
         }
-        let pieces = pieces(&colors, &extinction);
-        let buckets = buckets(&pieces);
-        Ok(TransferFunction { colors, extinction, pieces, buckets })
+        let intervals = intervals(&colors, &extinction);
+        let buckets = buckets(&intervals);
+        Ok(TransferFunction { colors, extinction, intervals, buckets })
     }
 
     /// `opacity` holds [scalar, opacity of a slab `unit_distance` thick], 0..=1, linear between, as ParaView's and VTK's opacity functions with
@@ -147,7 +147,7 @@ impl TransferFunction {
     /// ∫σ, ∫σr, ∫σg, ∫σb over the scalars up to `s`, from some fixed scalar on.
     #[inline]
     pub(crate) fn integral(&self, s: f64) -> [f64; 4] {
-        let p = self.piece(s);
+        let p = self.interval(s);
         let x = s - p.s;
         let [e0, e1] = p.sigma;
         let mut r = p.sums;
@@ -163,7 +163,7 @@ impl TransferFunction {
     /// Extinction and colour at `s`.
     #[inline]
     pub(crate) fn sample(&self, s: f64) -> (f64, [f64; 3]) {
-        let p = self.piece(s);
+        let p = self.interval(s);
         let x = s - p.s;
         (p.sigma[0] + p.sigma[1] * x, p.color.map(|c| c[0] + c[1] * x))
     }
@@ -176,23 +176,23 @@ impl TransferFunction {
 
     /// Whether colour or extinction bend or jump between two scalars.
     #[inline]
-    pub(crate) fn bends_between(&self, lo: f64, hi: f64) -> bool {
-        self.piece(lo).s != self.piece(hi).s
+    pub(crate) fn has_knot_between(&self, lo: f64, hi: f64) -> bool {
+        self.interval(lo).s != self.interval(hi).s
     }
 
     /// Heights of the steps of extinction between two scalars, added up.
     #[inline]
     pub(crate) fn steps_between(&self, lo: f64, hi: f64) -> f64 {
-        self.piece(hi).steps - self.piece(lo).steps
+        self.interval(hi).steps - self.interval(lo).steps
     }
 
     #[inline]
-    fn piece(&self, s: f64) -> &Piece {
+    fn interval(&self, s: f64) -> &Interval {
         let mut i = self.buckets.first_piece[self.buckets.index(s)] as usize;
-        while i + 1 < self.pieces.len() && self.pieces[i + 1].s <= s {
+        while i + 1 < self.intervals.len() && self.intervals[i + 1].s <= s {
             i += 1;
         }
-        &self.pieces[i]
+        &self.intervals[i]
     }
 }
 
@@ -239,7 +239,7 @@ fn extinction_at(points: &[[f32; 2]], s: f64) -> f64 {
 }
 
 /// Cuts the scalars at every knot of extinction and colour.
-fn pieces(colors: &ColorMap, extinction: &[[f32; 2]]) -> Vec<Piece> {
+fn intervals(colors: &ColorMap, extinction: &[[f32; 2]]) -> Vec<Interval> {
     // Where the colour bends.
     let [lo, hi] = colors.range.map(f64::from);
     let intervals = (colors.colors.len() - 1) * if colors.log { CURVED_PARTS } else { 1 };
@@ -270,7 +270,7 @@ fn pieces(colors: &ColorMap, extinction: &[[f32; 2]]) -> Vec<Piece> {
             (None, None) => 0.0,
         }
     };
-    let mut pieces: Vec<Piece> = Vec::with_capacity(all.len());
+    let mut intervals: Vec<Interval> = Vec::with_capacity(all.len());
     let (mut sums, mut steps, mut sigma_before) = ([0.0; 4], 0.0, None);
     for (i, &s) in all.iter().enumerate() {
         let end = all.get(i + 1).copied();
@@ -284,7 +284,7 @@ fn pieces(colors: &ColorMap, extinction: &[[f32; 2]]) -> Vec<Piece> {
         let color0 = if i == 0 { color1 } else { None }.unwrap_or_else(|| color_at((s as f32).next_up()));
         let color1 = color1.unwrap_or(color0);
         let width = end.map_or(1.0, |e| e - s);
-        let piece = Piece {
+        let interval = Interval {
             s,
             sigma: [sigma0, (sigma1 - sigma0) / width],
             color: std::array::from_fn(|c| [color0[c], (color1[c] - color0[c]) / width]),
@@ -303,29 +303,30 @@ fn pieces(colors: &ColorMap, extinction: &[[f32; 2]]) -> Vec<Piece> {
                 sums[c + 1] += width / 6.0 * (sigma0 * color0[c] + 4.0 * mid + sigma1 * color1[c]);
             }
         }
-        pieces.push(piece);
+        intervals.push(interval);
     }
-    pieces
+    intervals
 }
 
-fn buckets(pieces: &[Piece]) -> Buckets {
-    let (first, last) = (pieces[0].s, pieces[pieces.len() - 1].s);
+fn buckets(intervals: &[Interval]) -> Buckets {
+    let (first, last) = (intervals[0].s, intervals[intervals.len() - 1].s);
     let lo = first;
     let per_scalar = BUCKETS as f64 / (1.25 * (last - first));
     let mut b = Buckets { lo, per_scalar, first_piece: Vec::new(), occupied_before: vec![0] };
-    let mut piece = 0;
+    let mut interval = 0;
     for i in 0..BUCKETS {
         let (from, to) = (lo + i as f64 / per_scalar, lo + (i + 1) as f64 / per_scalar);
         // One piece early: rounding in `index` may put a scalar of the bucket before into this one.
-        while piece + 1 < pieces.len() && pieces[piece + 1].s < from - 0.5 / per_scalar {
-            piece += 1;
+        while interval + 1 < intervals.len() && intervals[interval + 1].s < from - 0.5 / per_scalar {
+            interval += 1;
         }
-        b.first_piece.push(piece as u32);
-        let occupied = (piece..pieces.len()).take_while(|&k| pieces[k].s <= to + 0.5 / per_scalar).any(|k| {
-            let p = &pieces[k];
-            let end = pieces.get(k + 1).map_or(p.s, |n| n.s);
-            p.sigma[0] > 0.0 || p.sigma[0] + p.sigma[1] * (end - p.s) > 0.0
-        });
+        b.first_piece.push(interval as u32);
+        let occupied =
+            (interval..intervals.len()).take_while(|&k| intervals[k].s <= to + 0.5 / per_scalar).any(|k| {
+                let p = &intervals[k];
+                let end = intervals.get(k + 1).map_or(p.s, |n| n.s);
+                p.sigma[0] > 0.0 || p.sigma[0] + p.sigma[1] * (end - p.s) > 0.0
+            });
         b.occupied_before.push(b.occupied_before[i] + u32::from(occupied));
     }
     b

@@ -2,12 +2,12 @@
 
 mod scenes_common;
 use rt_core::camera::Camera;
-use rt_core::detail::{Detail, DetailPlace, Finish, MapConvention, SurfaceMaps};
 use rt_core::effects::Effects;
 use rt_core::frame::Layers;
 use rt_core::glam::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
 use rt_core::light::Light;
 use rt_core::material::{Material, Sides, SurfaceModel};
+use rt_core::material_maps::{BsdfParameters, MapConvention, MaterialEvalContext, MaterialMaps, TextureMaps};
 use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::render::RenderOptions;
 use rt_core::scene::{Appearance, SceneBuilder};
@@ -64,16 +64,17 @@ fn normal_maps_bend_along_the_texture_coordinates() {
     let n = Vec3::new(0.48, 0.36, 0.8);
     let to_light = Vec3::new(0.5, -0.3, 0.9).normalize();
     let light = [Light::directional(to_light.as_dvec3())];
-    let maps = SurfaceMaps { normal: bend(n), ..SurfaceMaps::new(MapConvention::Gltf) };
-    let m = Material::matte([1.0; 3]).with_sides(Sides::Both).with_detail(Arc::new(maps) as Arc<dyn Detail>);
+    let maps = TextureMaps { normal: bend(n), ..TextureMaps::new(MapConvention::Gltf) };
+    let m =
+        Material::matte([1.0; 3]).with_sides(Sides::Both).with_maps(Arc::new(maps) as Arc<dyn MaterialMaps>);
     let (right_handed, left_handed) = (sheet(1.0), sheet(-1.0));
     close(middle(&right_handed, &m, &light, 5.0)[0], n.dot(to_light), "u along x, v along y");
     let mirrored = Vec3::new(n.x, -n.y, n.z);
     close(middle(&left_handed, &m, &light, 5.0)[0], mirrored.dot(to_light), "v against y");
     // Files of glTF count v downwards, and mean by green the upper edge of the picture all the same.
     let from_top =
-        SurfaceMaps { normal: bend(n), rows_from_top: true, ..SurfaceMaps::new(MapConvention::Gltf) };
-    let down = Material::matte([1.0; 3]).with_detail(Arc::new(from_top) as Arc<dyn Detail>);
+        TextureMaps { normal: bend(n), rows_from_top: true, ..TextureMaps::new(MapConvention::Gltf) };
+    let down = Material::matte([1.0; 3]).with_maps(Arc::new(from_top) as Arc<dyn MaterialMaps>);
     close(middle(&left_handed, &down, &light, 5.0)[0], n.dot(to_light), "v against y, rows from the top");
     let own = tangents(sheet(-1.0), Vec4::new(1.0, 0.0, 0.0, 1.0));
     close(middle(&own, &down, &light, 5.0)[0], n.dot(to_light), "tangents say it themselves");
@@ -90,8 +91,8 @@ fn normal_maps_bend_along_the_texture_coordinates() {
 #[test]
 fn vtk_turns_the_normal_before_it_bends_it_and_needs_tangents() {
     let n = Vec3::new(0.48, 0.36, 0.8);
-    let maps = SurfaceMaps { normal: bend(n), ..SurfaceMaps::new(MapConvention::Vtk) };
-    let m = Material::matte([1.0; 3]).with_detail(Arc::new(maps) as Arc<dyn Detail>);
+    let maps = TextureMaps { normal: bend(n), ..TextureMaps::new(MapConvention::Vtk) };
+    let m = Material::matte([1.0; 3]).with_maps(Arc::new(maps) as Arc<dyn MaterialMaps>);
     let below = Vec3::new(0.2, 0.1, -0.9).normalize();
     let light = [Light::directional(below.as_dvec3())];
     let mesh = tangents(sheet(1.0), Vec4::new(1.0, 0.0, 0.0, 1.0));
@@ -108,10 +109,10 @@ fn vtk_turns_the_normal_before_it_bends_it_and_needs_tangents() {
 #[test]
 fn steep_normal_maps_leave_no_black_points() {
     let n = Vec3::new(0.8, 0.0, 0.6);
-    let maps = SurfaceMaps { normal: bend(n), ..SurfaceMaps::new(MapConvention::Gltf) };
+    let maps = TextureMaps { normal: bend(n), ..TextureMaps::new(MapConvention::Gltf) };
     for roughness in [0.0, 0.3] {
-        let m =
-            Material::pbr([1.0; 3], 1.0, roughness).with_detail(Arc::new(maps.clone()) as Arc<dyn Detail>);
+        let m = Material::pbr([1.0; 3], 1.0, roughness)
+            .with_maps(Arc::new(maps.clone()) as Arc<dyn MaterialMaps>);
         let mut b = SceneBuilder::new();
         b.mesh(sheet(1.0), m);
         b.environment = Some(rt_core::environment::Environment::Constant([0.5; 3]));
@@ -128,8 +129,8 @@ fn scale_flattens_or_steepens_a_normal_map() {
     let n = Vec3::new(0.6, 0.0, 0.8);
     // Steeper ones are bent less: see `steep_normal_maps_leave_no_black_points`.
     for normal_scale in [0.0, 0.5, 1.2] {
-        let maps = SurfaceMaps { normal: bend(n), normal_scale, ..SurfaceMaps::new(MapConvention::Gltf) };
-        let m = Material::matte([1.0; 3]).with_detail(Arc::new(maps) as Arc<dyn Detail>);
+        let maps = TextureMaps { normal: bend(n), normal_scale, ..TextureMaps::new(MapConvention::Gltf) };
+        let m = Material::matte([1.0; 3]).with_maps(Arc::new(maps) as Arc<dyn MaterialMaps>);
         let expected = Vec3::new(0.6 * normal_scale, 0.0, 0.8).normalize().z;
         close(middle(&sheet(1.0), &m, &[Light::directional(DVec3::Z)], 5.0)[0], expected, "scaled");
     }
@@ -138,11 +139,11 @@ fn scale_flattens_or_steepens_a_normal_map() {
 #[test]
 fn bent_normals_turn_with_their_instance() {
     let n = Vec3::new(0.6, 0.0, 0.8);
-    let maps: Arc<dyn Detail> =
-        Arc::new(SurfaceMaps { normal: bend(n), ..SurfaceMaps::new(MapConvention::Gltf) });
+    let maps: Arc<dyn MaterialMaps> =
+        Arc::new(TextureMaps { normal: bend(n), ..TextureMaps::new(MapConvention::Gltf) });
     let mut b = SceneBuilder::new();
-    let g = b.geometry(rt_core::accel::Geometry::Mesh(Arc::new(sheet(1.0))));
-    let m = b.material(Material::matte([1.0; 3]).with_detail(maps));
+    let g = b.geometry(rt_core::bvh::Geometry::Mesh(Arc::new(sheet(1.0))));
+    let m = b.material(Material::matte([1.0; 3]).with_maps(maps));
     // A quarter turn about z: u now grows along y.
     let quarter = DAffine3::from_mat3(DMat3::from_rotation_z(std::f64::consts::FRAC_PI_2) * 3.0);
     b.instance(g, quarter, Appearance::new(m));
@@ -161,9 +162,9 @@ fn bent_normals_turn_with_their_instance() {
 fn roughness_and_metalness_maps_are_the_material_with_those_numbers() {
     let lights = [Light::directional(DVec3::new(0.3, 0.2, 1.0)), Light::ambient([0.4; 3])];
     let maps =
-        SurfaceMaps { metallic_roughness: texel([0.9, 0.5, 0.25]), ..SurfaceMaps::new(MapConvention::Gltf) };
+        TextureMaps { metallic_roughness: texel([0.9, 0.5, 0.25]), ..TextureMaps::new(MapConvention::Gltf) };
     let base = Material::pbr([0.8, 0.4, 0.2], 0.8, 0.6);
-    let mapped = base.clone().with_detail(Arc::new(maps) as Arc<dyn Detail>);
+    let mapped = base.clone().with_maps(Arc::new(maps) as Arc<dyn MaterialMaps>);
     let plain = Material::pbr([0.8, 0.4, 0.2], 0.8 * 0.25, 0.6 * 0.5);
     let mesh = sheet(1.0);
     let camera = camera(DVec3::new(1.0, 1.5, 2.0), 0.8);
@@ -186,14 +187,15 @@ fn occlusion_dims_ambient_light_for_gltf_and_lamps_too_for_vtk() {
     for (convention, expected) in
         [(MapConvention::Gltf, 0.5 + 0.25 * 0.6), (MapConvention::Vtk, (0.5 + 0.25) * 0.6)]
     {
-        let maps = SurfaceMaps {
+        let maps = TextureMaps {
             occlusion: texel([0.2, 1.0, 1.0]),
             occlusion_strength: 0.5,
             emission: texel([0.5, 1.0, 1.0]),
-            ..SurfaceMaps::new(convention)
+            ..TextureMaps::new(convention)
         };
-        let m =
-            Material::matte([1.0; 3]).with_emission([0.2; 3]).with_detail(Arc::new(maps) as Arc<dyn Detail>);
+        let m = Material::matte([1.0; 3])
+            .with_emission([0.2; 3])
+            .with_maps(Arc::new(maps) as Arc<dyn MaterialMaps>);
         close(middle(&sheet(1.0), &m, &lights, 5.0)[0], expected + 0.1, &format!("{convention:?}"));
     }
 }
@@ -204,8 +206,8 @@ fn a_map_that_makes_part_of_a_surface_a_mirror_sends_mirror_rays_there() {
     let mut texture = Texture::from_linear(2, 1, vec![[1.0, 0.0, 1.0, 1.0], [1.0; 4]]).unwrap();
     texture.filter = Filter::Nearest;
     let maps =
-        SurfaceMaps { metallic_roughness: Some(texture.into()), ..SurfaceMaps::new(MapConvention::Gltf) };
-    let m = Material::pbr([1.0; 3], 1.0, 0.8).with_detail(Arc::new(maps) as Arc<dyn Detail>);
+        TextureMaps { metallic_roughness: Some(texture.into()), ..TextureMaps::new(MapConvention::Gltf) };
+    let m = Material::pbr([1.0; 3], 1.0, 0.8).with_maps(Arc::new(maps) as Arc<dyn MaterialMaps>);
     let s = scene(vec![(sheet(1.0), m), (floor(2.0, 3.0), Material::unlit([0.25, 0.5, 1.0]))], vec![]);
     assert!(Effects::required_by(&s).contains(Effects::REFLECTION.union(Effects::GLOSSY_REFLECTION)));
     let eye = Camera::orthographic(DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0, 1.0, [0.0, 3.0]).unwrap();
@@ -219,13 +221,13 @@ fn a_map_that_makes_part_of_a_surface_a_mirror_sends_mirror_rays_there() {
 #[derive(Debug)]
 struct Checked;
 
-impl Detail for Checked {
-    fn finish(&self, base: Finish, place: &DetailPlace<'_>) -> Finish {
+impl MaterialMaps for Checked {
+    fn evaluate(&self, base: BsdfParameters, place: &MaterialEvalContext<'_>) -> BsdfParameters {
         let sphere = place.mesh.is_none();
         let expected = if sphere { place.point.as_vec3().normalize() } else { Vec3::Z };
-        let right = (place.object_normal - expected).length() < 1e-5 && !place.turned;
+        let right = (place.object_normal - expected).length() < 1e-5 && !place.flipped;
         let emission = if right { Vec3::new(0.25, f32::NAN, -1.0) } else { Vec3::splat(9.0) };
-        Finish { emission, roughness: f32::NAN, normal: Vec3::ZERO, ..base }
+        BsdfParameters { emission, roughness: f32::NAN, normal: Vec3::ZERO, ..base }
     }
 }
 
@@ -235,13 +237,13 @@ fn detail_of_a_program_s_own_cannot_put_nan_into_a_picture() {
     let m =
         b.material(Material { model: SurfaceModel::Metal { roughness: 0.5 }, ..Material::matte([0.5; 3]) });
     let detailed =
-        b.material(Material::pbr([0.5; 3], 0.5, 0.5).with_detail(Arc::new(Checked) as Arc<dyn Detail>));
+        b.material(Material::pbr([0.5; 3], 0.5, 0.5).with_maps(Arc::new(Checked) as Arc<dyn MaterialMaps>));
     let spheres =
         rt_core::shapes::Spheres::new(vec![Vec3::ZERO], rt_core::shapes::Radii::Common(0.4)).unwrap();
-    let g = b.geometry(rt_core::accel::Geometry::Shape(Arc::new(spheres)));
+    let g = b.geometry(rt_core::bvh::Geometry::Shape(Arc::new(spheres)));
     b.instance(g, DAffine3::IDENTITY, Appearance::new(detailed));
     let normals = Some(Attribute::per_face(vec![Vec3::Z; 2]));
-    let plate = b.geometry(rt_core::accel::Geometry::Mesh(Arc::new(TriMesh { normals, ..floor(-0.5, 2.0) })));
+    let plate = b.geometry(rt_core::bvh::Geometry::Mesh(Arc::new(TriMesh { normals, ..floor(-0.5, 2.0) })));
     b.instance(plate, DAffine3::IDENTITY, Appearance::new(detailed));
     b.instance(g, DAffine3::from_translation(DVec3::new(3.0, 0.0, 0.0)), Appearance::new(m));
     let s = b.build().unwrap();

@@ -1,13 +1,13 @@
 //! Materials, lights and colour sources against the formulas of OpenGL, VTK and glTF.
 
 mod scenes_common;
-use rt_core::accel::Geometry;
+use rt_core::bvh::Geometry;
 use rt_core::colormap::ColorMap;
 use rt_core::environment::{Background, Environment};
 use rt_core::frame::Layers;
 use rt_core::glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 use rt_core::light::Light;
-use rt_core::material::{ColorSource, Highlight, Material, Sides, SurfaceModel};
+use rt_core::material::{ColorSource, Material, PhongForm, Sides, SurfaceModel};
 use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::render::RenderOptions;
 use rt_core::scene::{Appearance, SceneBuilder};
@@ -34,7 +34,7 @@ fn phong_highlights_are_opengl_s_and_vtk_s() {
     // View is +z. Half vector of view and light; mirrored light against view.
     let half = (to_light + DVec3::Z).normalize().z as f32;
     let mirrored = cos;
-    for (highlight, base) in [(Highlight::HalfVector, half), (Highlight::Mirrored, mirrored)] {
+    for (highlight, base) in [(PhongForm::HalfVector, half), (PhongForm::Mirrored, mirrored)] {
         for shininess in [0.0, 1.0, 7.0, 12.5, 128.0] {
             let model = SurfaceModel::Phong {
                 ambient: 0.3,

@@ -2,7 +2,7 @@
 //! light, whatever it stands on.
 
 mod scenes_common;
-use rt_core::accel::BuildOptions;
+use rt_core::bvh::BuildOptions;
 use rt_core::camera::Camera;
 use rt_core::glam::{DMat3, DVec3, Vec3};
 use rt_core::light::{Light, LightKind};

@@ -8,7 +8,9 @@ use rt_core::glam::{DMat4, DVec3, DVec4, Vec3};
 use rt_core::light::Light;
 use rt_core::material::Material;
 use rt_core::mesh::TriMesh;
-use rt_core::render::{AsyncRenderer, Crop, Progressive, RenderError, RenderOptions, StopReason, render};
+use rt_core::render::{
+    AsyncRenderer, Crop, ProgressiveRenderer, RenderError, RenderOptions, StopReason, render,
+};
 use rt_core::scene::{AmbientOcclusion, Scene, SceneBuilder};
 use scenes_common::*;
 use std::sync::Arc;
@@ -353,7 +355,7 @@ fn progressive_steps_equal_one_render_and_the_error_falls() {
     let s = busy_scene();
     let c = camera(DVec3::new(6.0, 1.0, 2.0), 0.6);
     let options = RenderOptions { samples: 16, ..RenderOptions::new(40, 40) };
-    let mut p = Progressive::new(&s, &c, &options).unwrap();
+    let mut p = ProgressiveRenderer::new(&s, &c, &options).unwrap();
     let (mut steps, mut errors) = (1, Vec::new());
     while p.step().unwrap() {
         steps += 1;

@@ -1,12 +1,12 @@
 //! What cannot be drawn is refused, and what changes nothing is said, by name, with the value and a cure.
 
-use rt_core::accel::{BuildError, BuildOptions, Geometry, World};
+use rt_core::bvh::{BuildError, BuildOptions, Geometry, World};
 use rt_core::camera::Camera;
 use rt_core::colormap::ColorMap;
 use rt_core::effects::Effects;
 use rt_core::environment::{Background, Environment};
 use rt_core::glam::{DVec3, Vec3};
-use rt_core::light::{Light, LightKind, NoSize};
+use rt_core::light::{Light, LightKind, LightSizeError};
 use rt_core::material::Material;
 use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::render::{RenderOptions, render};
@@ -226,10 +226,10 @@ fn a_size_that_a_light_cannot_have_is_refused() {
     let (place, down) = (DVec3::new(1.0, 2.0, 3.0), DVec3::NEG_Z);
     let kind = LightKind::Cone { position: place, direction: down, inner_rad: 0.1, outer_rad: 0.3 };
     let cone = Light { kind, ..Light::directional(DVec3::Z) };
-    assert_eq!(cone.with_size(0.5), Err(NoSize::Cone));
-    assert_eq!(Light::ambient([1.0; 3]).with_size(0.5), Err(NoSize::Ambient));
-    assert!(NoSize::Cone.to_string().contains("Ring"), "{}", NoSize::Cone);
-    assert_eq!(Light::quad(place, [DVec3::ZERO; 2]).with_size(0.5), Err(NoSize::Quad));
+    assert_eq!(cone.with_size(0.5), Err(LightSizeError::Cone));
+    assert_eq!(Light::ambient([1.0; 3]).with_size(0.5), Err(LightSizeError::Ambient));
+    assert!(LightSizeError::Cone.to_string().contains("Ring"), "{}", LightSizeError::Cone);
+    assert_eq!(Light::quad(place, [DVec3::ZERO; 2]).with_size(0.5), Err(LightSizeError::Quad));
     // All others get the size that was asked for.
     let quad = Light::quad(place, [DVec3::X * 2.0, DVec3::Y * 0.5]);
     let ring = LightKind::Ring {

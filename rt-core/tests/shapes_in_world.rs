@@ -3,7 +3,7 @@
 mod shapes_common;
 
 use glam::{DAffine3, DVec3, UVec3, Vec3};
-use rt_core::accel::{BuildOptions, BuildQuality, Geometry, Instance, World};
+use rt_core::bvh::{BuildOptions, BuildQuality, Geometry, Instance, World};
 use rt_core::grid::Grid;
 use rt_core::ray::Ray;
 use rt_core::shapes::{Isosurface, Radii, Shape, Spheres, Tubes};

@@ -5,7 +5,8 @@ use rt_core::grid::Grid;
 use rt_core::ray::Ray;
 use rt_core::transfer_function::TransferFunction;
 use rt_core::volume::{
-    Brick, Course, Interpolation, Marched, Volume, VolumeOptions, VolumeQuality, VolumeSample, VolumeShading,
+    Brick, Interpolation, PartialIntegral, RaySegments, Volume, VolumeOptions, VolumeQuality, VolumeSample,
+    VolumeShading,
 };
 
 const DIMS: UVec3 = UVec3::new(41, 37, 29);
@@ -89,20 +90,20 @@ fn rays_through_bricks_have_the_bits_of_rays_through_the_whole() {
                     let expected = whole.integrate(&ray, 0.0, t1, &quality);
                     // Which brick holds which spans.
                     let mut order: Vec<(usize, usize)> = Vec::new();
-                    Course::new(vec![(&whole, ray)], 0.0, t1).spans(|k, here| {
+                    RaySegments::new(vec![(&whole, ray)], 0.0, t1).spans(|k, here| {
                         let brick = bricks.iter().position(|b| b.contains(here[0].1)).unwrap();
                         if order.last().map(|o| o.0) != Some(brick) {
                             assert!(order.iter().all(|o| o.0 != brick), "a brick is convex");
                             order.push((brick, k));
                         }
                     });
-                    let mut carried = Marched::default();
+                    let mut carried = PartialIntegral::default();
                     for (k, (brick, first)) in order.iter().enumerate() {
                         let end = order.get(k + 1).map_or(usize::MAX, |next| next.1);
                         // As it would come out of a message.
-                        let m = Marched::from_words(&carried.to_words());
-                        let course = Course::new(vec![(&parts[*brick], ray)], 0.0, t1);
-                        carried = course.carry_on(*first..end, &quality, m);
+                        let m = PartialIntegral::from_words(&carried.to_words());
+                        let segments = RaySegments::new(vec![(&parts[*brick], ray)], 0.0, t1);
+                        carried = segments.integrate_spans(*first..end, &quality, m);
                     }
                     let what = format!("{interpolation:?} {quality:?}, ray {n}, bricks {order:?}");
                     assert_eq!(bits(&carried.sample()), bits(&expected), "{what}");

@@ -1,7 +1,10 @@
 //! Frames whose rays are answered by several holders of parts of the scene have the bits of frames in one piece.
 
-use rt_core::accel::{BuildOptions, World};
+use rt_core::bvh::{BuildOptions, World};
 use rt_core::camera::{Camera, ThinLens};
+use rt_core::distributed::{
+    CameraHits, DistributedFrame, LightPoint, OcclusionScratch, Pass, ShadingHit, TileState,
+};
 use rt_core::effects::Effects;
 use rt_core::environment::{Background, Environment};
 use rt_core::frame::{Frame, Layers};
@@ -12,7 +15,6 @@ use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::render::{RenderOptions, render};
 use rt_core::scene::{AmbientOcclusion, Scene, SceneBuilder};
 use rt_core::shapes::{Radii, Spheres};
-use rt_core::waves::{CameraHits, LightBits, LightPoint, Met, Pass, TileInWork, WaveFrame};
 use std::sync::Arc;
 
 /// A bumpy plate with colours and smooth normals, `shift` away from the origin.
@@ -64,7 +66,7 @@ fn scene(shift: DVec3, plate_is: Material, balls_are: Material, lights: &[Light]
     let mut b = SceneBuilder::new();
     b.mesh(plate(shift, 40), plate_is);
     let m = b.material(balls_are);
-    let g = b.geometry(rt_core::accel::Geometry::Shape(Arc::new(spheres())));
+    let g = b.geometry(rt_core::bvh::Geometry::Shape(Arc::new(spheres())));
     for k in 0..2 {
         let turned = DAffine3::from_rotation_z(1.0 + 2.0 * k as f64);
         b.instance(g, DAffine3::from_translation(shift) * turned, rt_core::scene::Appearance::new(m));
@@ -151,7 +153,7 @@ fn cases() -> Vec<Case> {
 
 /// Deals primitives to `parts` at random; with more parts than primitives some are empty.
 fn deal(scene: &Scene, parts: usize, seed: u32) -> Vec<Vec<Vec<u32>>> {
-    use rt_core::accel::Geometry;
+    use rt_core::bvh::Geometry;
     let mut out = vec![vec![vec![]; scene.world.geometries().len()]; parts];
     for (g, geometry) in scene.world.geometries().iter().enumerate() {
         let count = match geometry {
@@ -169,20 +171,20 @@ fn deal(scene: &Scene, parts: usize, seed: u32) -> Vec<Vec<Vec<u32>>> {
 }
 
 struct Holder<'a> {
-    frame: WaveFrame<'a>,
+    frame: DistributedFrame<'a>,
     kept: &'a [Vec<u32>],
 }
 
 impl Holder<'_> {
-    fn in_whole(&self, scene: &Scene, mut met: Met) -> Met {
+    fn in_whole(&self, scene: &Scene, mut met: ShadingHit) -> ShadingHit {
         let geometry = scene.world.instances()[met.instance as usize].geometry;
         met.primitive = self.kept[geometry][met.primitive as usize];
         // What travels is words.
-        Met::from_words(&met.to_words())
+        ShadingHit::from_words(&met.to_words())
     }
 }
 
-fn nearer(best: &mut Option<Met>, met: Option<Met>) {
+fn nearer(best: &mut Option<ShadingHit>, met: Option<ShadingHit>) {
     if let Some(m) = met
         && best.as_ref().is_none_or(|b| m.is_before(b))
     {
@@ -191,15 +193,15 @@ fn nearer(best: &mut Option<Met>, met: Option<Met>) {
 }
 
 /// What light rays meet: no holder is asked where something opaque is.
-fn light_met(holders: &[Holder<'_>], scene: &Scene, rays: &[rt_core::ray::Ray]) -> Vec<Option<Met>> {
+fn light_hits(holders: &[Holder<'_>], scene: &Scene, rays: &[rt_core::ray::Ray]) -> Vec<Option<ShadingHit>> {
     let mut best = vec![None; rays.len()];
     let mut met = Vec::new();
     for h in holders {
-        h.frame.light_met(rays, &mut met);
+        h.frame.light_hits(rays, &mut met);
         for (b, m) in best.iter_mut().zip(&met) {
             // What is blocked has no primitive.
-            let in_whole = |m: Met| {
-                if m.is_blocked() { Met::from_words(&m.to_words()) } else { h.in_whole(scene, m) }
+            let in_whole = |m: ShadingHit| {
+                if m.is_blocked() { ShadingHit::from_words(&m.to_words()) } else { h.in_whole(scene, m) }
             };
             nearer(b, m.map(in_whole));
         }
@@ -212,7 +214,7 @@ fn closest(
     scene: &Scene,
     rays: &[rt_core::ray::Ray],
     pixels: Option<&[(u32, u16)]>,
-) -> Vec<Option<Met>> {
+) -> Vec<Option<ShadingHit>> {
     let mut best = vec![None; rays.len()];
     let mut met = Vec::new();
     for h in holders {
@@ -233,54 +235,54 @@ fn in_parts(case: &Case, parts: usize, seed: u32) -> Frame {
         .iter()
         .zip(&kept)
         .map(|(s, kept)| Holder {
-            frame: WaveFrame::new(s, needed, &case.camera, &case.options).unwrap(),
+            frame: DistributedFrame::new(s, needed, &case.camera, &case.options).unwrap(),
             kept,
         })
         .collect();
     let owner = &holders[0].frame;
-    let mut picture = owner.blank();
+    let mut picture = owner.blank_frame();
     for t in 0..owner.num_tiles() {
         let mut tile = owner.tile(t);
         for pass in owner.passes() {
             one_pass(case, &holders, &mut tile, pass);
         }
-        assert!(owner.place(&mut picture, t, &tile.words(owner)));
+        assert!(owner.decode_tile(&mut picture, t, &tile.encode(owner)));
     }
     picture
 }
 
-fn one_pass(case: &Case, holders: &[Holder<'_>], tile: &mut TileInWork, pass: Pass) {
+fn one_pass(case: &Case, holders: &[Holder<'_>], tile: &mut TileState, pass: Pass) {
     let owner = &holders[0].frame;
     tile.begin(owner, pass);
     // ---- Camera rays.
     let mut best = vec![None; tile.num_rays()];
     let mut colors = vec![None; tile.num_rays()];
     let mut hits = CameraHits::default();
-    let local = owner.local_light_suffices() && pass != Pass::Geometry;
+    let local = owner.needs_only_local_light() && pass != Pass::Geometry;
     for h in holders {
-        if !h.frame.tiles_of(h.frame.own_bounds())[tile.number()] {
+        if !h.frame.tiles_overlapping(h.frame.own_bounds())[tile.number()] {
             continue;
         }
         h.frame.camera_hits(tile.number(), pass, &mut hits);
         let of_hits = if local { hits.colors(&h.frame).to_vec() } else { vec![[0.0; 4]; 1024] };
         for slot in 0..1024 {
-            let met = hits.met(&h.frame, slot).map(|m| h.in_whole(&case.scene, m));
+            let met = hits.shading_hit(&h.frame, slot).map(|m| h.in_whole(&case.scene, m));
             if let Some(m) = met
-                && best[slot].as_ref().is_none_or(|b: &Met| m.is_before(b))
+                && best[slot].as_ref().is_none_or(|b: &ShadingHit| m.is_before(b))
             {
                 (best[slot], colors[slot]) = (Some(m), Some(of_hits[slot]));
             }
         }
     }
     if local {
-        tile.choose(owner, &colors).unwrap();
+        tile.select_colors(owner, &colors).unwrap();
         if owner.records_geometry(pass) {
-            tile.record(&best);
+            tile.record_geometry(&best);
         }
         return;
     }
     // ---- Waves.
-    tile.meet(owner, &best).unwrap();
+    tile.process_hits(owner, &best).unwrap();
     loop {
         if owner.light_passes_surfaces() {
             loop {
@@ -288,7 +290,7 @@ fn one_pass(case: &Case, holders: &[Holder<'_>], tile: &mut TileInWork, pass: Pa
                 if rays.is_empty() {
                     break;
                 }
-                tile.meet_light(owner, &light_met(holders, &case.scene, &rays)).unwrap();
+                tile.process_light_hits(owner, &light_hits(holders, &case.scene, &rays)).unwrap();
             }
         } else if !tile.light_points().is_empty() {
             let mut words = Vec::new();
@@ -300,15 +302,15 @@ fn one_pass(case: &Case, holders: &[Holder<'_>], tile: &mut TileInWork, pass: Pa
                 rest = r;
             }
             assert_eq!(points, tile.light_points());
-            let (mut all, mut bits, mut work) = (vec![], vec![], LightBits::default());
+            let (mut all, mut bits, mut work) = (vec![], vec![], OcclusionScratch::default());
             for h in holders {
-                h.frame.blocked(&points, pass, &mut work, &mut bits);
+                h.frame.occlusion_bits(&points, pass, &mut work, &mut bits);
                 all.resize(bits.len(), 0u64);
                 all.iter_mut().zip(&bits).for_each(|(a, b)| *a |= b);
             }
-            tile.arrive(owner, &all).unwrap();
+            tile.apply_occlusion(owner, &all).unwrap();
         }
-        if !tile.go_on(owner) {
+        if !tile.advance(owner) {
             return;
         }
         let waiting: Vec<_> = tile.rays().collect();
@@ -319,7 +321,7 @@ fn one_pass(case: &Case, holders: &[Holder<'_>], tile: &mut TileInWork, pass: Pa
         for ((i, ..), met) in waiting.iter().zip(closest(holders, &case.scene, &rays, recorded)) {
             answers[*i] = met;
         }
-        tile.meet(owner, &answers).unwrap();
+        tile.process_hits(owner, &answers).unwrap();
     }
 }
 
@@ -362,11 +364,11 @@ fn a_part_alone_without_the_choices_of_the_whole_would_be_noticed() {
     let kept: Vec<u32> = (0..moved.indices.len() as u32).filter(|k| k % 48 < 8).collect();
     let (some, _) = moved.part(&kept);
     let alone = World::from_mesh(some.clone(), &BuildOptions::default()).unwrap();
-    let geometry = rt_core::accel::Geometry::Mesh(Arc::new(some));
+    let geometry = rt_core::bvh::Geometry::Mesh(Arc::new(some));
     let part = World::build_part(
         vec![geometry],
         whole.instances().to_vec(),
-        &whole.whole(),
+        &whole.global_layout(),
         &BuildOptions::default(),
     )
     .unwrap();

@@ -10,7 +10,7 @@ use crate::path::Start;
 use crate::view::View;
 use datasets::model::ModelError;
 use datasets::read::ReadError;
-use rt_core::accel::{BuildError, BuildOptions, Geometry, Instance, World};
+use rt_core::bvh::{BuildError, BuildOptions, Geometry, Instance, World};
 use rt_core::ray::Ray;
 use std::path::Path;
 use std::sync::Arc;

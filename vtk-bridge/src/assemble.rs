@@ -6,7 +6,7 @@ use crate::edges::Edges;
 use crate::input::Property;
 use crate::materials::{Encoding, MaterialContext, ambient_as_emission, material};
 use crate::options::{MaterialChoice, Options};
-use rt_core::accel::{Geometry, Instance};
+use rt_core::bvh::{Geometry, Instance};
 use rt_core::glam::DAffine3;
 use rt_core::material::{ColorSource, Material, SurfaceModel};
 use rt_core::scene::Appearance;

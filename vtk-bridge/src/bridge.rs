@@ -12,7 +12,7 @@ use crate::lights;
 use crate::options::Options;
 use crate::report::{FrameReport, TracedItem, UntracedItem};
 use crate::window_image::WindowImage;
-use rt_core::accel::{BuildOptions, Geometry, World};
+use rt_core::bvh::{BuildOptions, Geometry, World};
 use rt_core::camera::{Camera, ThinLens};
 use rt_core::effects::Effects;
 use rt_core::glam::{DAffine3, DMat4};
@@ -54,7 +54,7 @@ pub enum BridgeError {
     Camera(#[from] rt_core::camera::CameraError),
     /// The acceleration structure could not be built.
     #[error(transparent)]
-    Build(#[from] rt_core::accel::BuildError),
+    Build(#[from] rt_core::bvh::BuildError),
     /// The pool of threads could not be made.
     #[error("RTV_THREADS={threads}: the threads could not be started: {reason}; ask for fewer")]
     Threads {
@@ -87,7 +87,7 @@ pub struct Bridge {
     colors: HashMap<(u64, u64), CacheEntry<Option<MeshColors>>>,
     textures: HashMap<u64, CacheEntry<Option<Arc<Texture>>>>,
     volume_cache: crate::volumes::VolumeCache,
-    world: Option<(Arc<World>, Vec<rt_core::accel::Instance>, BuildOptions)>,
+    world: Option<(Arc<World>, Vec<rt_core::bvh::Instance>, BuildOptions)>,
     renderer: Renderer,
     pool: Option<(usize, rayon::ThreadPool)>,
     picture: WindowImage,
@@ -482,7 +482,7 @@ impl Bridge {
     fn world(
         &mut self,
         geometries: Vec<Geometry>,
-        instances: Vec<rt_core::accel::Instance>,
+        instances: Vec<rt_core::bvh::Instance>,
     ) -> Result<Arc<World>, BridgeError> {
         let build =
             BuildOptions { quality: self.options.build, robustness: self.options.robustness, simd: None };

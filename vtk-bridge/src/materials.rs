@@ -6,8 +6,8 @@
 
 use crate::input::{Image, Maps, Property};
 use crate::options::{MaterialChoice, Options};
-use rt_core::detail::{Detail, MapConvention, SurfaceMaps};
-use rt_core::material::{ColorSource, Highlight, Material, PbrForm, Sides, SurfaceModel};
+use rt_core::material::{ColorSource, Material, PbrForm, PhongForm, Sides, SurfaceModel};
+use rt_core::material_maps::{MapConvention, MaterialMaps, TextureMaps};
 use rt_core::texture::Texture;
 use std::f32::consts::PI;
 use std::sync::Arc;
@@ -54,7 +54,7 @@ pub fn material(p: &Property, from_values: bool, context: &MaterialContext<'_>) 
         emission: [0.0; 3],
         sides,
         flat: p.flat,
-        detail: None,
+        maps: None,
     };
     match options.material {
         MaterialChoice::Matte => {
@@ -64,7 +64,7 @@ pub fn material(p: &Property, from_values: bool, context: &MaterialContext<'_>) 
                 diffuse: 1.0 - share,
                 specular: [0.0; 3],
                 shininess: 1.0,
-                highlight: Highlight::Mirrored,
+                highlight: PhongForm::Mirrored,
                 mirror: options.mirror,
             };
             return (Material { model, ..base }, Encoding::Direct);
@@ -107,7 +107,7 @@ pub fn material(p: &Property, from_values: bool, context: &MaterialContext<'_>) 
         diffuse: non_negative(p.diffuse) * (1.0 - share),
         specular,
         shininess: non_negative(p.specular_power),
-        highlight: if context.only_headlight { Highlight::TowardsLight } else { Highlight::Mirrored },
+        highlight: if context.only_headlight { PhongForm::TowardsLight } else { PhongForm::Mirrored },
         mirror: options.mirror,
     };
     let emission = if same { [0.0; 3] } else { p.ambient_color.map(|c| non_negative(c * p.ambient)) };
@@ -132,7 +132,7 @@ fn pbr(p: &Property, base: Material) -> (Material, Encoding) {
 /// Further textures of a physically based property.
 #[derive(Debug, Clone)]
 pub(crate) struct PbrTextures {
-    detail: Arc<dyn Detail>,
+    detail: Arc<dyn MaterialMaps>,
     emission: [f32; 3],
 }
 
@@ -142,14 +142,14 @@ pub(crate) fn pbr_textures(
     mut texture: impl FnMut(Option<&Image<'_>>) -> Option<Arc<Texture>>,
 ) -> PbrTextures {
     let packed = texture(maps.material.as_ref());
-    let detail = SurfaceMaps {
+    let detail = TextureMaps {
         normal: texture(maps.normal.as_ref()),
         normal_scale: if maps.normal_scale.is_finite() { maps.normal_scale } else { 1.0 },
         metallic_roughness: packed.clone(),
         occlusion: packed,
         occlusion_strength: non_negative(maps.occlusion_strength).min(1.0),
         emission: texture(maps.emissive.as_ref()),
-        ..SurfaceMaps::new(MapConvention::Vtk)
+        ..TextureMaps::new(MapConvention::Vtk)
     };
     // The shader adds emission where the picture is encoded, and there light is over π.
     let factor = if detail.emission.is_some() { PI } else { 0.0 };
@@ -161,7 +161,7 @@ impl PbrTextures {
     /// The material with them.
     pub(crate) fn apply_to(&self, base: Material) -> Material {
         let emission = std::array::from_fn(|c| base.emission[c] + self.emission[c]);
-        Material { emission, ..base.with_detail(self.detail.clone()) }
+        Material { emission, ..base.with_maps(self.detail.clone()) }
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! What is not understood is not silently dropped: [`Options::parse`] names the variable, the value and the rule.
 
-use rt_core::accel::{BuildQuality, Robustness};
+use rt_core::bvh::{BuildQuality, Robustness};
 use std::ffi::OsString;
 
 /// What all surfaces are made of.

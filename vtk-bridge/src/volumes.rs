@@ -5,10 +5,10 @@ use rayon::prelude::*;
 use rt_core::colormap::ColorMap;
 use rt_core::glam::{DAffine3, DMat3, DVec3, UVec3, Vec3};
 use rt_core::grid::Grid;
-use rt_core::scene::PlacedVolume;
+use rt_core::scene::VolumeInstance;
 use rt_core::transfer_function::TransferFunction;
 use rt_core::volume::{
-    Blend, GradientOpacity, Highlight, Interpolation, Volume, VolumeLight, VolumeOptions, VolumeShading,
+    Blend, GradientOpacity, Interpolation, Volume, VolumeHighlight, VolumeLight, VolumeOptions, VolumeShading,
 };
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -31,7 +31,7 @@ struct CachedVolume {
 #[derive(Default)]
 pub(crate) struct VolumeCache {
     kept: HashMap<u64, CachedVolume>,
-    placed: Vec<PlacedVolume>,
+    placed: Vec<VolumeInstance>,
 }
 
 impl VolumeCache {
@@ -47,7 +47,7 @@ impl VolumeCache {
     }
 
     /// The volumes of this frame.
-    pub(crate) fn placed(&self) -> &[PlacedVolume] {
+    pub(crate) fn placed(&self) -> &[VolumeInstance] {
         &self.placed
     }
 
@@ -93,7 +93,7 @@ impl VolumeCache {
         let bad = report.cells_non_finite;
         let warning = (bad > 0)
             .then(|| format!("{bad} cells have a corner that is not a number; nothing is drawn in them"));
-        self.placed.push(PlacedVolume { volume, world_from_object: place });
+        self.placed.push(VolumeInstance { volume, world_from_object: place });
         Ok((report.cells, warning))
     }
 }
@@ -171,7 +171,7 @@ fn medium(v: &Input<'_>, grid: Arc<Grid>, lights: Vec<VolumeLight>) -> Result<Vo
         diffuse: unit(s.diffuse),
         specular: finite(s.specular),
         shininess: finite(s.specular_power),
-        highlight: if s.mirrored { Highlight::Mirrored } else { Highlight::Halfway },
+        highlight: if s.mirrored { VolumeHighlight::Mirrored } else { VolumeHighlight::Halfway },
         ..VolumeShading::default()
     });
     let interpolation = if v.nearest { Interpolation::Nearest } else { Interpolation::Linear };
@@ -212,7 +212,7 @@ fn straight(points: Vec<[f32; 2]>) -> Vec<[f32; 2]> {
 
 /// Window depth for pixels that show a volume: the middle of the ray's way through it, where that is in front of `depth`. What OpenGL draws before that is in
 /// front of the volume, what it draws behind is seen through it.
-pub(crate) fn place_in_depth(volumes: &[PlacedVolume], view: &View, depth: &mut [f32]) {
+pub(crate) fn place_in_depth(volumes: &[VolumeInstance], view: &View, depth: &mut [f32]) {
     let world_from_clip = view.clip_from_world.inverse();
     let boxes: Vec<(DAffine3, Vec3, Vec3)> = volumes
         .iter()
@@ -268,7 +268,7 @@ mod tests {
         let transfer =
             TransferFunction::new(ColorMap::new(vec![[1.0; 4]], [0.0, 1.0]), vec![[0.0, 1.0]]).unwrap();
         let volume = Arc::new(Volume::new(Arc::new(grid), transfer, VolumeOptions::default()).unwrap());
-        let placed = PlacedVolume {
+        let placed = VolumeInstance {
             volume,
             world_from_object: DAffine3::from_translation(DVec3::new(-0.5, -0.5, -5.0)),
         };

@@ -9,7 +9,7 @@ mod run;
 
 use clap::{Args, Parser, Subcommand};
 use datasets::cli::{CommonArgs, CompletionsArgs, run_main};
-use rt_core::accel::{BuildQuality, Robustness};
+use rt_core::bvh::{BuildQuality, Robustness};
 use rt_core::effects::Effects;
 use rt_core::environment::Background;
 use std::path::PathBuf;

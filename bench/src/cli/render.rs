@@ -8,7 +8,7 @@ use crate::picture::{RenderControl, RenderRequest, RenderedImage, draw, gallery,
 use anyhow::Context as _;
 use datasets::cli::{Cancel, CommonArgs, CureExt as _, Interrupted, UsageError};
 use datasets::colormaps;
-use rt_core::accel::{BuildOptions, BuildQuality, Robustness, UnknownQuality};
+use rt_core::bvh::{BuildOptions, BuildQuality, Robustness, UnknownQuality};
 use rt_core::effects::Effects;
 use rt_core::environment::Background;
 use rt_core::frame::Layers;

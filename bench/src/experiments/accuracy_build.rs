@@ -12,7 +12,7 @@ use crate::record::{Record, Row};
 use crate::rt_core_tracer::{Mode, RtCoreTracer};
 use crate::runner::{Ratio, Schedule, order};
 use datasets::generate::nested_wavelet::Size;
-use rt_core::accel::{BuildOptions, BuildQuality};
+use rt_core::bvh::{BuildOptions, BuildQuality};
 use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 

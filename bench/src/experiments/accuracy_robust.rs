@@ -19,7 +19,7 @@ use crate::runner::order;
 use crate::{clock, rays};
 use glam::DVec3;
 use rayon::prelude::*;
-use rt_core::accel::{BuildOptions, Robustness};
+use rt_core::bvh::{BuildOptions, Robustness};
 use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 

@@ -9,7 +9,7 @@ use crate::record::{Record, Row};
 use crate::runner::{Schedule, Variant, interleave};
 use datasets::cli::Interrupted;
 use glam::DVec3;
-use rt_core::accel::{BuildOptions, World};
+use rt_core::bvh::{BuildOptions, World};
 use rt_core::camera::Camera;
 use rt_core::frame::Frame;
 use rt_core::light::Light;

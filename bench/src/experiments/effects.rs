@@ -9,7 +9,7 @@ use datasets::generate::nested_wavelet::Size;
 use datasets::generate::wavelet::Wavelet;
 use datasets::isosurface;
 use glam::DVec3;
-use rt_core::accel::{BuildOptions, World};
+use rt_core::bvh::{BuildOptions, World};
 use rt_core::camera::{Camera, ThinLens};
 use rt_core::effects::Effects;
 use rt_core::environment::Environment;

@@ -14,7 +14,7 @@ use crate::rt_core_tracer::RtCoreTracer;
 use crate::runner::{VERDICT_ROUNDS, order};
 use crate::stats::Summary;
 use datasets::generate::nested_wavelet::Size;
-use rt_core::accel::{BuildOptions, BuildQuality};
+use rt_core::bvh::{BuildOptions, BuildQuality};
 use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 

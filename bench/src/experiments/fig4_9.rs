@@ -10,7 +10,7 @@ use crate::record::{Record, Row};
 use crate::runner::{Schedule, Variant, interleave};
 use datasets::catalogue;
 use datasets::generate::nested_wavelet::Size;
-use rt_core::accel::{BuildOptions, World};
+use rt_core::bvh::{BuildOptions, World};
 use rt_core::camera::Camera;
 use rt_core::render::{RenderOptions, render};
 use rt_core::scene::Scene;

@@ -5,7 +5,7 @@ use crate::baselines::BuildCost;
 use crate::baselines::embree::{Embree, EmbreeScene, Options, Version};
 use crate::baselines::obvhs::{Obvhs, Preset};
 use crate::rt_core_tracer::{Mode, RtCoreTracer};
-use rt_core::accel::{BuildOptions, Robustness};
+use rt_core::bvh::{BuildOptions, Robustness};
 use rt_core::mesh::TriMesh;
 use rt_core::simd::SimdLevel;
 use std::sync::Arc;

@@ -7,7 +7,7 @@ use composite::comm::CommError;
 use composite::comm::sim::{Compute, Network, SimComm, run_on};
 use composite::render::demo::Prepared;
 use composite::render::{Activity, DataParallel, FrameOptions, FrameOutput, RankReport, ray_parallel};
-use rt_core::accel::BuildOptions;
+use rt_core::bvh::BuildOptions;
 use std::time::Duration;
 
 /// What stands beside every figure of many ranks.

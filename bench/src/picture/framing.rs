@@ -4,7 +4,7 @@ use anyhow::Context as _;
 use datasets::cli::CureExt as _;
 use datasets::view::View;
 use glam::DVec3;
-use rt_core::accel::World;
+use rt_core::bvh::World;
 use rt_core::camera::Camera;
 use rt_core::scene::Scene;
 use serde::Deserialize;

@@ -9,7 +9,7 @@ use datasets::catalogue::{self, Data};
 use datasets::isosurface::Options;
 use datasets::view::View;
 use glam::{DVec3, Vec3};
-use rt_core::accel::BuildOptions;
+use rt_core::bvh::BuildOptions;
 use rt_core::effects::Effects;
 use rt_core::frame::Layers;
 

@@ -1,8 +1,8 @@
 //! Materials of scene files (glTF, OBJ) as rt-core's.
 
 use datasets::read::{AlphaMode, SceneModel, SurfaceMaterial};
-use rt_core::detail::{Detail, MapConvention, SurfaceMaps};
 use rt_core::material::{Material, Sides, SurfaceModel};
+use rt_core::material_maps::{MapConvention, MaterialMaps, TextureMaps};
 use rt_core::texture::Texture;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -98,7 +98,7 @@ impl<'a> SceneMaterials<'a> {
         if let Some(t) = self.texture(m.base_color_texture, role)? {
             out = out.textured(t);
         }
-        let maps = SurfaceMaps {
+        let maps = TextureMaps {
             normal: self.texture(m.normal_texture, Role::Linear)?,
             normal_scale: m.normal_scale,
             metallic_roughness: self.texture(m.metallic_roughness_texture, Role::Linear)?,
@@ -106,11 +106,11 @@ impl<'a> SceneMaterials<'a> {
             occlusion_strength: m.occlusion_strength,
             emission: self.texture(m.emissive_texture, Role::Opaque)?,
             rows_from_top: [m.normal_texture].into_iter().flatten().any(|i| !self.model.textures[i].v_up),
-            ..SurfaceMaps::new(MapConvention::Gltf)
+            ..TextureMaps::new(MapConvention::Gltf)
         };
         let any = [&maps.normal, &maps.metallic_roughness, &maps.occlusion, &maps.emission];
         if any.iter().any(|t| t.is_some()) {
-            out = out.with_detail(Arc::new(maps) as Arc<dyn Detail>);
+            out = out.with_maps(Arc::new(maps) as Arc<dyn MaterialMaps>);
         }
         Ok(out)
     }

@@ -13,10 +13,10 @@ pub mod subject;
 
 use datasets::cli::Interrupted;
 use framing::Framing;
-use rt_core::accel::BuildOptions;
+use rt_core::bvh::BuildOptions;
 use rt_core::effects::Effects;
 use rt_core::frame::{Frame, Layers};
-use rt_core::render::{Progressive, RenderOptions, RenderReport, StopReason};
+use rt_core::render::{ProgressiveRenderer, RenderOptions, RenderReport, StopReason};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -120,7 +120,7 @@ pub fn draw(
         ..RenderOptions::new(request.size[0], request.size[1])
     };
     let start = Instant::now();
-    let mut progressive = Progressive::new(&scene, &camera, &options)?;
+    let mut progressive = ProgressiveRenderer::new(&scene, &camera, &options)?;
     loop {
         let more = progressive.step()?;
         if let Some(told) = &mut control.samples_done {

@@ -7,7 +7,7 @@ use super::subject::{PartColoring, Subject, VolumeField};
 use anyhow::Context as _;
 use datasets::colormaps;
 use glam::{DVec3, Vec3};
-use rt_core::accel::BuildOptions;
+use rt_core::bvh::BuildOptions;
 use rt_core::camera::{Camera, ThinLens};
 use rt_core::colormap::ColorMap;
 use rt_core::effects::Effects;

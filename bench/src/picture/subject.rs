@@ -7,7 +7,7 @@ use datasets::catalogue::Data;
 use datasets::model::{ColorBy, Dataset};
 use datasets::read::{Content, LoadedFile, SceneModel};
 use glam::{DVec3, Vec3};
-use rt_core::accel::Geometry;
+use rt_core::bvh::Geometry;
 use rt_core::grid::Grid;
 use rt_core::material::Material;
 use rt_core::mesh::{Attribute, TriMesh};

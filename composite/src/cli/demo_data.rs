@@ -7,7 +7,7 @@ use crate::render::{Activity, DataParallel, FrameOptions, Light, RankReport, Spa
 use anyhow::Context as _;
 use datasets::cli::{CommonArgs, Status, UsageError};
 use datasets::image_io::{Picture, PngDepth, write_png};
-use rt_core::accel::BuildOptions;
+use rt_core::bvh::BuildOptions;
 use serde::{Deserialize, Serialize};
 use std::ffi::OsString;
 use std::path::PathBuf;

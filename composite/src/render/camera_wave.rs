@@ -9,7 +9,7 @@ use super::owners::Owners;
 use super::sort_last::Side;
 use super::{Activity, FrameError};
 use rayon::prelude::*;
-use rt_core::waves::{CameraHits, Met, Pass, WaveFrame};
+use rt_core::distributed::{CameraHits, DistributedFrame, Pass, ShadingHit};
 use std::sync::atomic::Ordering;
 
 /// Chunks of an owner's tiles at most, one after the other by all ranks. With more, less is left to send at the end, in more messages.
@@ -55,7 +55,7 @@ impl Nearest {
 pub(super) struct TileAnswer {
     nearest: Vec<Nearest>,
     /// Everything about the hits, where it was asked for.
-    pub(super) met: Vec<Option<Met>>,
+    pub(super) met: Vec<Option<ShadingHit>>,
 }
 
 impl TileAnswer {
@@ -295,7 +295,7 @@ impl CameraWave<'_, '_> {
     }
 }
 
-fn words_per_hit(frame: &WaveFrame<'_>, colors: bool) -> usize {
+fn words_per_hit(frame: &DistributedFrame<'_>, colors: bool) -> usize {
     2 + (frame.num_instances() > 1) as usize + if colors { 4 } else { 0 }
 }
 
@@ -420,7 +420,7 @@ fn fetch_whole_hits(
         let mut out = Vec::new();
         for (&tile, mask) in tiles.iter().zip(masks.chunks_exact(MASK_WORDS)) {
             for slot in slots(mask) {
-                let mut met = own[tile].as_ref()?.met(side.frame, slot)?;
+                let mut met = own[tile].as_ref()?.shading_hit(side.frame, slot)?;
                 met.primitive = side.in_whole(met.instance, met.primitive);
                 out.extend(met.to_words());
             }
@@ -428,8 +428,8 @@ fn fetch_whole_hits(
         Some(out)
     };
     let mut put = |from: usize, words: &[u32]| {
-        let (mets, rest) = words.as_chunks::<{ Met::WORDS }>();
-        let mut mets = mets.iter().map(Met::from_words);
+        let (mets, rest) = words.as_chunks::<{ ShadingHit::WORDS }>();
+        let mut mets = mets.iter().map(ShadingHit::from_words);
         for (&tile, mask) in seen_by[from].iter().zip(won[from].chunks_exact(MASK_WORDS)) {
             for slot in slots(mask) {
                 answers[tile - first].met[slot] = Some(mets.next()?);
@@ -457,7 +457,7 @@ fn fetch_whole_hits(
     })?;
     let wins = |from: usize| won[from].iter().map(|w| w.count_ones() as usize).sum::<usize>();
     let sources = (0..size).filter(|&from| from != rank && owners.talks(from, rank, WHOLE));
-    let sources: Vec<_> = sources.map(|from| (from, wins(from) * Met::WORDS)).collect();
+    let sources: Vec<_> = sources.map(|from| (from, wins(from) * ShadingHit::WORDS)).collect();
     talk.receive(Tag::Answer, "whole hits", sources, |talk, from, words| {
         put(from, &words).ok_or_else(|| talk.wrong(from, "whole hits", words.len()))?;
         talk.spent(Activity::Composite);

@@ -5,14 +5,14 @@ use super::owners::Owners;
 use super::sort_last::{Side, each};
 use super::{Activity, FrameError};
 use crate::comm::CommError;
+use rt_core::distributed::{DistributedFrame, Pass, TileState};
 use rt_core::frame::Frame;
-use rt_core::waves::{Pass, TileInWork, WaveFrame};
 use std::ops::Range;
 
 /// One rank's part in bringing the picture to the root.
 pub(super) struct Collect<'a> {
     side: &'a Side<'a>,
-    tiles: &'a mut [TileInWork],
+    tiles: &'a mut [TileState],
     /// Number of the first of `tiles`.
     first: usize,
     root: Option<usize>,
@@ -28,14 +28,14 @@ impl<'a> Collect<'a> {
         talk: &Talk<'_>,
         side: &'a Side<'a>,
         owners: &Owners,
-        tiles: &'a mut [TileInWork],
+        tiles: &'a mut [TileState],
         root: Option<usize>,
     ) -> Result<Collect<'a>, FrameError> {
         let (rank, size) = (talk.rank(), talk.size());
         if let Some(peer) = root.filter(|&r| r >= size) {
             return Err(FrameError::Comm(CommError::NoSuchRank { peer, size }));
         }
-        let picture = (root == Some(rank)).then(|| side.frame.blank());
+        let picture = (root == Some(rank)).then(|| side.frame.blank_frame());
         let next = owners.tiles.iter().map(|t| t.start).collect();
         Ok(Collect { side, tiles, first: owners.tiles[rank].start, root, picture, next })
     }
@@ -79,7 +79,7 @@ impl<'a> Collect<'a> {
             self.tiles[places.clone()].iter_mut().zip(&answers[places]).map(|w| (w, None)).collect();
         each(talk, self.side.parallel, &mut work, |_, ((tile, answer), error)| {
             tile.begin(frame, pass);
-            *error = tile.choose(frame, &answer.colors()).err();
+            *error = tile.select_colors(frame, &answer.colors()).err();
         });
         failed.extend(work.into_iter().filter_map(|(_, error)| error));
         if let Some(source) = failed.into_iter().next() {
@@ -94,7 +94,7 @@ impl<'a> Collect<'a> {
         let (rank, frame) = (talk.rank(), self.side.frame);
         let Some(root) = self.root.filter(|_| !range.is_empty()) else { return Ok(()) };
         let tiles = &self.tiles[range.start - self.first..range.end - self.first];
-        let words: Vec<u32> = tiles.iter().flat_map(|t| t.words(frame)).collect();
+        let words: Vec<u32> = tiles.iter().flat_map(|t| t.encode(frame)).collect();
         if rank == root {
             self.put(range, &words).ok_or_else(|| talk.wrong(rank, "tiles", words.len()))?;
         } else {
@@ -110,7 +110,7 @@ impl<'a> Collect<'a> {
         for tile in range {
             let (own, rest) = words.split_at_checked(words_of(frame, tile))?;
             words = rest;
-            frame.place(picture, tile, own).then_some(())?;
+            frame.decode_tile(picture, tile, own).then_some(())?;
         }
         words.is_empty().then_some(())
     }
@@ -153,7 +153,7 @@ impl<'a> Collect<'a> {
 }
 
 /// Words of a tile.
-fn words_of(frame: &WaveFrame<'_>, tile: usize) -> usize {
+fn words_of(frame: &DistributedFrame<'_>, tile: usize) -> usize {
     let area = frame.tile_area(tile);
     (area.width * area.height) as usize * frame.words_per_pixel()
 }

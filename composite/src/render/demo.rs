@@ -5,7 +5,7 @@ use crate::comm::Communicator;
 use datasets::catalogue::{self, CatalogueError};
 use datasets::model::ModelError;
 use datasets::read::ReadError;
-use rt_core::accel::BuildOptions;
+use rt_core::bvh::BuildOptions;
 use rt_core::camera::{Camera, CameraError};
 use rt_core::environment::Background;
 use rt_core::glam::DVec3;

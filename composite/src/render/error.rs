@@ -1,8 +1,8 @@
 //! What can go wrong in a frame of many ranks.
 use crate::comm::CommError;
+use rt_core::distributed::ProtocolError;
 use rt_core::render::RenderError;
 use rt_core::scene::SceneError;
-use rt_core::waves::WrongAnswer;
 
 /// Why a frame could not be made. After an error no rank gets a picture: the communicator is aborted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -36,7 +36,7 @@ pub enum FrameError {
         /// The receiver.
         rank: usize,
         /// What does not fit.
-        source: WrongAnswer,
+        source: ProtocolError,
     },
     /// The partition and the group do not match.
     #[error("the scene was cut into {parts} parts, but there are {ranks} ranks: cut it into as many")]

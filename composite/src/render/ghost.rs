@@ -5,7 +5,7 @@ use super::ask::{Tag, Talk};
 use super::boxes::Boxes;
 use super::sort_last::{FrameOptions, Light};
 use super::{FrameError, Part};
-use rt_core::accel::{Geometry, World};
+use rt_core::bvh::{Geometry, World};
 use rt_core::glam::Vec3;
 use rt_core::math::Aabb;
 use rt_core::mesh::TriMesh;
@@ -193,7 +193,7 @@ fn fetch(
     }
     let geometries = merged.into_iter().map(|m| Geometry::Mesh(Arc::new(m))).collect();
     let instances = part.scene.world.instances().to_vec();
-    let whole = part.scene.world.whole();
+    let whole = part.scene.world.global_layout();
     let build = |e| FrameError::Render(RenderError::Scene(SceneError::Build(e)));
     let world = World::build_part(geometries, instances, &whole, &options.build).map_err(build)?;
     let appearances = part.scene.appearances.iter().map(|a| Appearance::new(a.material)).collect();

@@ -7,13 +7,13 @@
 //! [`ray_parallel()`] is the other way (sections 3.2.2 and 4.2.3): every rank holds everything and renders some tiles.
 //!
 //! The picture has the bits of [`rt_core::render::render`] of the whole scene, for any number of ranks and any partition: parts take over the whole's
-//! local spaces ([`rt_core::accel::World::build_part`]), hits are joined by parameter and then by number, light bits by *or*, and
-//! everything else is done by the functions that one node would use ([`rt_core::waves`]).
+//! local spaces ([`rt_core::bvh::World::build_part`]), hits are joined by parameter and then by number, light bits by *or*, and
+//! everything else is done by the functions that one node would use ([`rt_core::distributed`]).
 //!
 //! ```
 //! use composite::render::{DataParallel, FrameOptions, Partition, Split};
 //! use composite::{Communicator, threads};
-//! use rt_core::{accel::{BuildOptions, World}, camera::Camera, glam::{DVec3, Vec3}, mesh::TriMesh};
+//! use rt_core::{bvh::{BuildOptions, World}, camera::Camera, glam::{DVec3, Vec3}, mesh::TriMesh};
 //! use rt_core::{render::{RenderOptions, render}, scene::Scene};
 //!
 //! let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::new(1.0, 1.0, 0.5)];

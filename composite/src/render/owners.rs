@@ -1,6 +1,6 @@
 //! Who owns which tiles. All ranks know all bounds, so all find the same owners without a message.
+use rt_core::distributed::DistributedFrame;
 use rt_core::math::Aabb;
-use rt_core::waves::WaveFrame;
 use std::ops::Range;
 
 /// Tiles of each rank, and which ranks have something to say about which tile.
@@ -13,8 +13,8 @@ pub(super) struct Owners {
 
 impl Owners {
     /// Tiles in `bounds.len()` runs of about the same work: a tile counts once, and once more for each part that may be seen in it.
-    pub(super) fn new(frame: &WaveFrame<'_>, bounds: &[Aabb]) -> Owners {
-        let touched: Vec<Vec<bool>> = bounds.iter().map(|b| frame.tiles_of(*b)).collect();
+    pub(super) fn new(frame: &DistributedFrame<'_>, bounds: &[Aabb]) -> Owners {
+        let touched: Vec<Vec<bool>> = bounds.iter().map(|b| frame.tiles_overlapping(*b)).collect();
         let work = |tile: usize| {
             let parts = touched.iter().filter(|t| t[tile]).count() as u64;
             // Uncovered tiles are filled with background; covered ones are shaded as well, whatever number of parts is there.

@@ -1,7 +1,7 @@
 //! Data to ranks: bricks of space by k-d splits, with about the same number of primitives, or the same work for a view.
 use super::FrameError;
 use super::pieces::{self, Held, Pieces};
-use rt_core::accel::{BuildOptions, Geometry};
+use rt_core::bvh::{BuildOptions, Geometry};
 use rt_core::camera::Camera;
 use rt_core::effects::Effects;
 use rt_core::glam::swizzles::Vec4Swizzles;
@@ -268,7 +268,7 @@ fn split_items(items: &mut [Item], first_rank: usize, ranks: usize, give: &mut i
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rt_core::accel::World;
+    use rt_core::bvh::World;
     use rt_core::glam::Vec3;
     use rt_core::mesh::TriMesh;
 

@@ -5,7 +5,7 @@
 //! volume that was turned against a coarse one.)
 use super::FrameError;
 use rt_core::glam::{DAffine3, DMat3, DVec3, UVec3};
-use rt_core::scene::{PlacedVolume, Scene};
+use rt_core::scene::{Scene, VolumeInstance};
 use rt_core::volume::{Brick, MACROCELL, Volume};
 use std::sync::Arc;
 
@@ -164,7 +164,7 @@ impl Held {
 }
 
 /// From the space relative to the volume's origin.
-fn world_from_object(placed: &PlacedVolume) -> DAffine3 {
+fn world_from_object(placed: &VolumeInstance) -> DAffine3 {
     placed.world_from_object * DAffine3::from_translation(placed.volume.origin())
 }
 
@@ -202,7 +202,7 @@ fn blocks_around(volume: &Volume, there: DAffine3, lo: DVec3, hi: DVec3) -> Bric
 
 /// Of each volume how many have more cells to a length of the world; of those with as many, the first in the scene counts as finer.
 fn finer(scene: &Scene) -> Vec<usize> {
-    let cell = |placed: &PlacedVolume| {
+    let cell = |placed: &VolumeInstance| {
         let size = DMat3::from_diagonal(placed.volume.grid().spacing);
         (placed.world_from_object.matrix3 * size).determinant().abs()
     };
@@ -214,7 +214,7 @@ fn finer(scene: &Scene) -> Vec<usize> {
 /// Of a block of a volume whether a finer medium is all around it, so that it is never the finest.
 fn covered_by(scene: &Scene, finer: &[usize], volume: usize) -> impl Fn(UVec3) -> bool {
     let here = &scene.volumes[volume];
-    let others: Vec<(&PlacedVolume, DAffine3)> = scene
+    let others: Vec<(&VolumeInstance, DAffine3)> = scene
         .volumes
         .iter()
         .zip(finer)

@@ -7,11 +7,11 @@ use super::{Activity, FrameError, Part, RankReport, camera_wave, ghost, waves};
 use crate::comm::Communicator;
 use rayon::prelude::*;
 use rt_core::camera::Camera;
+use rt_core::distributed::{DistributedFrame, Pass, TileState};
 use rt_core::frame::Frame;
 use rt_core::glam::Vec3;
 use rt_core::math::Aabb;
 use rt_core::render::RenderOptions;
-use rt_core::waves::{Pass, TileInWork, WaveFrame};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
@@ -47,7 +47,7 @@ pub struct FrameOptions {
     /// Use rayon's threads within a rank. Off, a rank is one thread: for many ranks in one process.
     pub parallel: bool,
     /// How boxes are built where a rank needs another structure (ghost zones).
-    pub build: rt_core::accel::BuildOptions,
+    pub build: rt_core::bvh::BuildOptions,
 }
 
 impl Default for FrameOptions {
@@ -58,7 +58,7 @@ impl Default for FrameOptions {
             light: Light::default(),
             stream: true,
             parallel: false,
-            build: rt_core::accel::BuildOptions::default(),
+            build: rt_core::bvh::BuildOptions::default(),
         }
     }
 }
@@ -83,7 +83,7 @@ pub struct DataParallel {
 
 /// One rank's view of the frame in work.
 pub(super) struct Side<'a> {
-    pub(super) frame: &'a WaveFrame<'a>,
+    pub(super) frame: &'a DistributedFrame<'a>,
     pub(super) part: &'a Part,
     pub(super) parallel: bool,
 }
@@ -159,10 +159,12 @@ impl DataParallel {
     ) -> Result<Option<Frame>, FrameError> {
         let way = self.way_of_light(talk, camera, options)?;
         let part = &self.part;
-        let frame = WaveFrame::new(&part.scene, part.needed, camera, options)?;
+        let frame = DistributedFrame::new(&part.scene, part.needed, camera, options)?;
         let side = Side { frame: &frame, part, parallel: self.options.parallel };
         let rim = match (&part.rim, way) {
-            (Some((_, scene)), Light::Ghost) => Some(WaveFrame::new(scene, part.needed, camera, options)?),
+            (Some((_, scene)), Light::Ghost) => {
+                Some(DistributedFrame::new(scene, part.needed, camera, options)?)
+            }
             _ => None,
         };
         talk.report.effects = frame.effects();
@@ -174,12 +176,12 @@ impl DataParallel {
         }
         let owners = Owners::new(&frame, &self.boxes.bounds);
         let mine = owners.tiles[talk.rank()].clone();
-        let mut tiles: Vec<TileInWork> = mine.map(|t| frame.tile(t)).collect();
+        let mut tiles: Vec<TileState> = mine.map(|t| frame.tile(t)).collect();
         talk.spent(Activity::Render);
 
         let passes = frame.passes();
         for (number, &pass) in passes.iter().enumerate() {
-            let local = frame.local_light_suffices() && pass != Pass::Geometry;
+            let local = frame.needs_only_local_light() && pass != Pass::Geometry;
             let record = frame.records_geometry(pass);
             let stream = self.options.stream;
             let wanted = camera_wave::Wanted { pass, colors: local, whole_hits: record || !local, stream };
@@ -199,9 +201,9 @@ impl DataParallel {
             each(talk, side.parallel, &mut tiles, |_, tile| tile.begin(&frame, pass));
             if local {
                 for (tile, answer) in tiles.iter_mut().zip(&answers) {
-                    tile.choose(&frame, &answer.colors()).map_err(fits)?;
+                    tile.select_colors(&frame, &answer.colors()).map_err(fits)?;
                     if record {
-                        tile.record(&answer.met);
+                        tile.record_geometry(&answer.met);
                     }
                 }
                 talk.spent(Activity::Shade);
@@ -225,9 +227,9 @@ impl DataParallel {
         camera: &Camera,
         options: &RenderOptions,
     ) -> Result<Light, FrameError> {
-        let probe = WaveFrame::new(&self.part.scene, self.part.needed, camera, options)?;
-        let distance = probe.only_ambient_occlusion_within().filter(|d| d.is_finite());
-        let secondary = !probe.local_light_suffices();
+        let probe = DistributedFrame::new(&self.part.scene, self.part.needed, camera, options)?;
+        let distance = probe.ambient_occlusion_only_distance().filter(|d| d.is_finite());
+        let secondary = !probe.needs_only_local_light();
         drop(probe);
         let Some(distance) = distance.filter(|_| self.options.light != Light::LocalOnly) else {
             let (way, words) = match self.options.light {

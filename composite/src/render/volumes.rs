@@ -6,14 +6,14 @@ use super::ask::Talk;
 use super::sort_last::Side;
 use super::{Activity, FrameError, RankReport};
 use rayon::prelude::*;
+use rt_core::distributed::{ShadingHit, TileState, VolumeRay};
 use rt_core::ray::Ray;
-use rt_core::volume::{Marched, VolumeSample};
-use rt_core::waves::{Met, TileInWork, VolumeRay};
+use rt_core::volume::{PartialIntegral, VolumeSample};
 
 /// Words that say which piece, and which spans of a ray.
 const HEAD: usize = 3;
 /// Those, a ray and what it has collected.
-const WORDS: usize = HEAD + 8 + Marched::WORDS;
+const WORDS: usize = HEAD + 8 + PartialIntegral::WORDS;
 
 /// Spans of a ray that are in the same piece.
 struct Stretch {
@@ -28,15 +28,15 @@ struct Journey {
     ray: VolumeRay,
     /// The next one last.
     to_come: Vec<Stretch>,
-    collected: Marched,
+    collected: PartialIntegral,
 }
 
 impl Journey {
     fn new(talk: &Talk<'_>, side: &Side<'_>, tile: usize, ray: VolumeRay) -> Result<Journey, FrameError> {
         let pieces = &side.part.pieces;
-        let course = side.frame.course(&ray.ray, ray.t_end, |_| None);
+        let segments = side.frame.ray_segments(&ray.ray, ray.t_end, |_| None);
         let (mut to_come, mut held): (Vec<Stretch>, bool) = (Vec::new(), true);
-        course.spans(|number, here| {
+        segments.spans(|number, here| {
             if !here.iter().any(|(v, block)| pieces.is_occupied(*v, *block)) {
                 return;
             }
@@ -51,7 +51,7 @@ impl Journey {
             return Err(talk.wrong(talk.rank(), "a block that nobody holds", 0));
         }
         to_come.reverse();
-        Ok(Journey { tile, ray, to_come, collected: Marched::default() })
+        Ok(Journey { tile, ray, to_come, collected: PartialIntegral::default() })
     }
 }
 
@@ -59,8 +59,8 @@ impl Journey {
 pub(super) fn cross(
     talk: &mut Talk<'_>,
     side: &Side<'_>,
-    tiles: &mut [TileInWork],
-    met: &[Vec<Option<Met>>],
+    tiles: &mut [TileState],
+    met: &[Vec<Option<ShadingHit>>],
 ) -> Result<(), FrameError> {
     let (rank, size, frame) = (talk.rank(), talk.size(), side.frame);
     let quality = frame.volume_quality();
@@ -100,15 +100,15 @@ pub(super) fn cross(
             };
             all.filter(|_| rest.is_empty()).map(|all| all.into_flattened())
         };
-        let longest = |q: &[u32]| q.len() / WORDS * Marched::WORDS;
+        let longest = |q: &[u32]| q.len() / WORDS * PartialIntegral::WORDS;
         let any = talk.ask("rays through a volume", &questions, longest, &mut answer, |from, reply| {
-            let (collected, rest) = reply.as_chunks::<{ Marched::WORDS }>();
+            let (collected, rest) = reply.as_chunks::<{ PartialIntegral::WORDS }>();
             if !rest.is_empty() || collected.len() != asked[from].len() {
                 let what = "what rays collect in a volume";
                 return Err(FrameError::Message { rank, from, what, words: reply.len() });
             }
             for (&k, words) in asked[from].iter().zip(collected) {
-                journeys[k].collected = Marched::from_words(words);
+                journeys[k].collected = PartialIntegral::from_words(words);
             }
             Ok(())
         })?;
@@ -121,25 +121,25 @@ pub(super) fn cross(
         tiles.iter().map(|t| vec![VolumeSample::CLEAR; t.num_rays()]).collect();
     for j in &journeys {
         let mixed = j.collected.sample();
-        samples[j.tile][j.ray.place] = frame.among_projections(&j.ray.ray, j.ray.t_end, mixed);
+        samples[j.tile][j.ray.place] = frame.composite_projections(&j.ray.ray, j.ray.t_end, mixed);
     }
     for (tile, samples) in tiles.iter_mut().zip(samples) {
-        tile.cross(samples).map_err(|source| FrameError::Answer { rank, source })?;
+        tile.set_volume_samples(samples).map_err(|source| FrameError::Answer { rank, source })?;
     }
     talk.spent(Activity::Shade);
     Ok(())
 }
 
 /// The answer to one question; `None` for a question that is not for this rank.
-fn carry_on(side: &Side<'_>, words: &[u32; WORDS]) -> Option<[u32; Marched::WORDS]> {
+fn carry_on(side: &Side<'_>, words: &[u32; WORDS]) -> Option<[u32; PartialIntegral::WORDS]> {
     let ([piece, first, end], words) = words.split_first_chunk::<HEAD>()?;
-    let (ray, collected) = words.split_last_chunk::<{ Marched::WORDS }>()?;
+    let (ray, collected) = words.split_last_chunk::<{ PartialIntegral::WORDS }>()?;
     let held = side.part.held.get(*piece as usize)?.as_ref()?;
     let (ray, spans) = (super::waves::read_ray(ray), *first as usize..*end as usize);
-    let course = side.frame.course(&ray, ray.t_max, |volume| held.volume(volume));
-    if !course.is_within(spans.clone(), |volume, block| held.has(volume, block)) {
+    let segments = side.frame.ray_segments(&ray, ray.t_max, |volume| held.volume(volume));
+    if !segments.is_within(spans.clone(), |volume, block| held.has(volume, block)) {
         return None;
     }
-    let collected = Marched::from_words(collected);
-    Some(course.carry_on(spans, side.frame.volume_quality(), collected).to_words())
+    let collected = PartialIntegral::from_words(collected);
+    Some(segments.integrate_spans(spans, side.frame.volume_quality(), collected).to_words())
 }

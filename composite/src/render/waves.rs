@@ -4,15 +4,15 @@ use super::boxes::{Boxes, ranks_in};
 use super::camera_wave::TileAnswer;
 use super::sort_last::{Light, Side, each};
 use super::{Activity, FrameError, RankReport, volumes};
+use rt_core::distributed::{DistributedFrame, LightPoint, OcclusionScratch, Pass, ShadingHit, TileState};
 use rt_core::glam::Vec3;
 use rt_core::ray::Ray;
-use rt_core::waves::{LightBits, LightPoint, Met, Pass, TileInWork, WaveFrame};
 
 /// Words of a ray in a message.
 const RAY_WORDS: usize = 8;
 
 /// By tile and ray.
-type FirstHits = Vec<Vec<Option<Met>>>;
+type FirstHits = Vec<Vec<Option<ShadingHit>>>;
 
 /// One pass beyond its camera rays.
 pub(super) struct Wave<'a> {
@@ -20,7 +20,7 @@ pub(super) struct Wave<'a> {
     pub(super) boxes: &'a Boxes,
     pub(super) way: Light,
     /// This rank's part with a rim, for ghost zones.
-    pub(super) rim: Option<&'a WaveFrame<'a>>,
+    pub(super) rim: Option<&'a DistributedFrame<'a>>,
     /// Whether there are media, which are held in bricks.
     pub(super) media: bool,
     pub(super) pass: Pass,
@@ -31,7 +31,7 @@ impl Wave<'_> {
     pub(super) fn run(
         &mut self,
         talk: &mut Talk<'_>,
-        tiles: &mut [TileInWork],
+        tiles: &mut [TileState],
         camera: Vec<TileAnswer>,
     ) -> Result<(), FrameError> {
         let (rank, frame) = (talk.rank(), self.side.frame);
@@ -43,7 +43,7 @@ impl Wave<'_> {
             volumes::cross(talk, self.side, tiles, &met)?;
         }
         for (tile, answer) in tiles.iter_mut().zip(&camera) {
-            tile.meet(frame, &answer.met).map_err(fits)?;
+            tile.process_hits(frame, &answer.met).map_err(fits)?;
             hit_ranks.push(Some((0..answer.met.len()).map(|slot| answer.winner(slot)).collect()));
         }
         drop(camera);
@@ -55,8 +55,10 @@ impl Wave<'_> {
             } else if self.pass != Pass::Geometry && frame.light_rays_per_point() > 0 {
                 self.light_bits(talk, tiles, &live, &hit_ranks)?;
             }
-            let mut work: Vec<(&mut bool, &mut TileInWork)> = live.iter_mut().zip(tiles.iter_mut()).collect();
-            each(talk, self.side.parallel, &mut work, |_, (live, tile)| **live = **live && tile.go_on(frame));
+            let mut work: Vec<(&mut bool, &mut TileState)> = live.iter_mut().zip(tiles.iter_mut()).collect();
+            each(talk, self.side.parallel, &mut work, |_, (live, tile)| {
+                **live = **live && tile.advance(frame)
+            });
             talk.spent(Activity::Shade);
             hit_ranks.iter_mut().for_each(|h| *h = None);
             if !self.later_rays(talk, tiles, &live)? {
@@ -70,7 +72,7 @@ impl Wave<'_> {
     fn light_bits(
         &self,
         talk: &mut Talk<'_>,
-        tiles: &mut [TileInWork],
+        tiles: &mut [TileState],
         live: &[bool],
         hit_ranks: &[Option<Vec<u32>>],
     ) -> Result<(), FrameError> {
@@ -106,7 +108,7 @@ impl Wave<'_> {
         talk.spent(Activity::Shade);
         // ---- Answers, joined by or: exact, and in any order.
         let tracer = self.rim.unwrap_or(frame);
-        let mut work = LightBits::default();
+        let mut work = OcclusionScratch::default();
         let mut answer = |report: &mut RankReport, question: &[u32]| {
             let mut points = Vec::new();
             let mut rest = question;
@@ -120,7 +122,7 @@ impl Wave<'_> {
                 blocked_in_parallel(tracer, &points, pass, &mut work)
             } else {
                 let mut out = Vec::new();
-                tracer.blocked(&points, pass, &mut work, &mut out);
+                tracer.occlusion_bits(&points, pass, &mut work, &mut out);
                 out
             };
             report.answered_rays += work.traced - before;
@@ -144,7 +146,7 @@ impl Wave<'_> {
         let mut failed = None;
         for (t, tile) in tiles.iter_mut().enumerate().filter(|(t, _)| live[*t]) {
             if !bits[t].is_empty() {
-                failed = tile.arrive(frame, &bits[t]).err().or(failed);
+                failed = tile.apply_occlusion(frame, &bits[t]).err().or(failed);
             }
         }
         talk.spent(Activity::Shade);
@@ -157,7 +159,7 @@ impl Wave<'_> {
     fn light_through_surfaces(
         &self,
         talk: &mut Talk<'_>,
-        tiles: &mut [TileInWork],
+        tiles: &mut [TileState],
         live: &[bool],
     ) -> Result<bool, FrameError> {
         let rays: Vec<Vec<Ray>> =
@@ -165,7 +167,8 @@ impl Wave<'_> {
         let (any, met) = self.first_hits(talk, &rays, Wanted::Light)?;
         let rank = talk.rank();
         for (tile, met) in tiles.iter_mut().zip(&met).filter(|(_, met)| !met.is_empty()) {
-            tile.meet_light(self.side.frame, met).map_err(|source| FrameError::Answer { rank, source })?;
+            tile.process_light_hits(self.side.frame, met)
+                .map_err(|source| FrameError::Answer { rank, source })?;
         }
         talk.spent(Activity::Shade);
         Ok(any)
@@ -175,16 +178,16 @@ impl Wave<'_> {
     fn later_rays(
         &self,
         talk: &mut Talk<'_>,
-        tiles: &mut [TileInWork],
+        tiles: &mut [TileState],
         live: &[bool],
     ) -> Result<bool, FrameError> {
-        let of = |t: &TileInWork, live: bool| if live { t.rays().collect() } else { Vec::new() };
+        let of = |t: &TileState, live: bool| if live { t.rays().collect() } else { Vec::new() };
         let waiting: Vec<Vec<(usize, u16, Ray)>> = tiles.iter().zip(live).map(|(t, &l)| of(t, l)).collect();
         let rays: Vec<Vec<Ray>> = waiting.iter().map(|w| w.iter().map(|(.., ray)| *ray).collect()).collect();
         let record = self.side.frame.records_geometry(self.pass);
-        let pixel = |tile: &TileInWork, slot: u16| (tile.number() as u32) << 10 | u32::from(slot);
+        let pixel = |tile: &TileState, slot: u16| (tile.number() as u32) << 10 | u32::from(slot);
         let pixels: Option<Vec<Vec<u32>>> = record.then(|| {
-            let of = |(t, w): (&TileInWork, &Vec<(usize, u16, Ray)>)| {
+            let of = |(t, w): (&TileState, &Vec<(usize, u16, Ray)>)| {
                 w.iter().map(|(_, s, _)| pixel(t, *s)).collect()
             };
             tiles.iter().zip(&waiting).map(of).collect()
@@ -192,7 +195,8 @@ impl Wave<'_> {
         let wanted = Wanted::Closest { pixels: pixels.as_deref() };
         let (any, met) = self.first_hits(talk, &rays, wanted)?;
         let rank = talk.rank();
-        let mut answers: Vec<Vec<Option<Met>>> = tiles.iter().map(|t| vec![None; t.num_rays()]).collect();
+        let mut answers: Vec<Vec<Option<ShadingHit>>> =
+            tiles.iter().map(|t| vec![None; t.num_rays()]).collect();
         for (t, answers) in answers.iter_mut().enumerate() {
             for ((place, ..), m) in waiting[t].iter().zip(&met[t]) {
                 answers[*place] = *m;
@@ -202,7 +206,8 @@ impl Wave<'_> {
             volumes::cross(talk, self.side, tiles, &answers)?;
         }
         for (t, tile) in tiles.iter_mut().enumerate().filter(|(t, _)| live[*t]) {
-            tile.meet(self.side.frame, &answers[t]).map_err(|source| FrameError::Answer { rank, source })?;
+            tile.process_hits(self.side.frame, &answers[t])
+                .map_err(|source| FrameError::Answer { rank, source })?;
         }
         talk.spent(Activity::Shade);
         // A wave of which every ray waits for nothing is still a wave of its tile; tiles agree with the others only on questions.
@@ -260,7 +265,7 @@ impl Wave<'_> {
             report.answered_rays += rays.len() as u64;
             let mut met = Vec::new();
             if light {
-                side.frame.light_met(&rays, &mut met);
+                side.frame.light_hits(&rays, &mut met);
             } else {
                 side.frame.closest(&rays, places.as_deref(), &mut met);
             }
@@ -277,19 +282,19 @@ impl Wave<'_> {
             }
             Some(out)
         };
-        let longest = |q: &[u32]| (q.len() / words).div_ceil(32) + q.len() / words * Met::WORDS;
+        let longest = |q: &[u32]| (q.len() / words).div_ceil(32) + q.len() / words * ShadingHit::WORDS;
         let wrong = |from: usize, n: usize| FrameError::Message { rank, from, what: "first hits", words: n };
         let any = talk.ask("rays", &questions, longest, &mut answer, |from, reply| {
             let (mask, rest) = reply
                 .split_at_checked(asked[from].len().div_ceil(32))
                 .ok_or_else(|| wrong(from, reply.len()))?;
-            let (words, rest) = rest.as_chunks::<{ Met::WORDS }>();
+            let (words, rest) = rest.as_chunks::<{ ShadingHit::WORDS }>();
             let mut words = words.iter();
             for (i, &(t, ray)) in asked[from].iter().enumerate() {
                 if mask[i / 32] >> (i % 32) & 1 == 0 {
                     continue;
                 }
-                let m = Met::from_words(words.next().ok_or_else(|| wrong(from, reply.len()))?);
+                let m = ShadingHit::from_words(words.next().ok_or_else(|| wrong(from, reply.len()))?);
                 let best = &mut met[t as usize][ray as usize];
                 if best.as_ref().is_none_or(|b| m.is_before(b)) {
                     *best = Some(m);
@@ -311,7 +316,7 @@ enum Wanted<'a> {
 }
 
 /// Of each point of the tile a bit for each rank into whose bounds one of its light rays comes.
-fn whom_to_ask(boxes: &Boxes, tile: &TileInWork) -> Vec<u16> {
+fn whom_to_ask(boxes: &Boxes, tile: &TileState) -> Vec<u16> {
     let words = boxes.bit_words();
     let mut bits = vec![0; words * tile.light_points().len()];
     for (point, ray) in tile.light_rays_of_points() {
@@ -321,7 +326,7 @@ fn whom_to_ask(boxes: &Boxes, tile: &TileInWork) -> Vec<u16> {
 }
 
 /// The same with the rank that was hit alone.
-fn only_hit_ranks(boxes: &Boxes, tile: &TileInWork, hit: &[u32]) -> Vec<u16> {
+fn only_hit_ranks(boxes: &Boxes, tile: &TileState, hit: &[u32]) -> Vec<u16> {
     let words = boxes.bit_words();
     let mut bits = vec![0; words * tile.light_points().len()];
     for (p, slot) in tile.slots_of_points().enumerate() {
@@ -334,17 +339,17 @@ fn only_hit_ranks(boxes: &Boxes, tile: &TileInWork, hit: &[u32]) -> Vec<u16> {
 }
 
 fn blocked_in_parallel(
-    frame: &WaveFrame<'_>,
+    frame: &DistributedFrame<'_>,
     points: &[LightPoint],
     pass: Pass,
-    work: &mut LightBits,
+    work: &mut OcclusionScratch,
 ) -> Vec<u64> {
     use rayon::prelude::*;
     let pieces: Vec<(Vec<u64>, u64)> = points
         .par_chunks(512)
         .map(|points| {
-            let (mut own, mut out) = (LightBits::default(), Vec::new());
-            frame.blocked(points, pass, &mut own, &mut out);
+            let (mut own, mut out) = (OcclusionScratch::default(), Vec::new());
+            frame.occlusion_bits(points, pass, &mut own, &mut out);
             (out, own.traced)
         })
         .collect();

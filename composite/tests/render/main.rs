@@ -7,7 +7,7 @@ use composite::render::{
     Activity, DataParallel, FrameError, FrameOptions, FrameOutput, Light, Partition, Split, ray_parallel,
 };
 use composite::{Communicator, threads};
-use rt_core::accel::BuildOptions;
+use rt_core::bvh::BuildOptions;
 use rt_core::frame::{Frame, Layers};
 use rt_core::glam::DVec3;
 use rt_core::render::render;

@@ -1,5 +1,5 @@
 //! Scenes that have light across borders of parts.
-use rt_core::accel::Geometry;
+use rt_core::bvh::Geometry;
 use rt_core::camera::Camera;
 use rt_core::colormap::ColorMap;
 use rt_core::environment::Background;
@@ -10,7 +10,7 @@ use rt_core::light::Light;
 use rt_core::material::{ColorSource, Material};
 use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::render::RenderOptions;
-use rt_core::scene::{AmbientOcclusion, Appearance, PlacedVolume, Scene, SceneBuilder};
+use rt_core::scene::{AmbientOcclusion, Appearance, Scene, SceneBuilder, VolumeInstance};
 use rt_core::shapes::{Cylinders, Radii, Spheres, Tubes};
 use rt_core::transfer_function::TransferFunction;
 use rt_core::volume::{Interpolation, Volume, VolumeOptions, VolumeShading};
@@ -163,7 +163,7 @@ pub(crate) fn volumes() -> Vec<Case> {
         ("volume around layers", Some(matte().with_opacity(0.4)), volume(None, Interpolation::Nearest)),
     ] {
         let mut scene = scene(DVec3::ZERO, matte(), balls, &[sun, Light::ambient(AMBIENT)], Some(0.5));
-        scene.volumes.push(PlacedVolume { volume: volume.into(), world_from_object: DAffine3::IDENTITY });
+        scene.volumes.push(VolumeInstance { volume: volume.into(), world_from_object: DAffine3::IDENTITY });
         out.push(Case { name, scene, camera, options: RenderOptions { samples: 2, ..options() } });
     }
     let mut b = SceneBuilder::new();

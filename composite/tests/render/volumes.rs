@@ -9,7 +9,7 @@ use rt_core::grid::Grid;
 use rt_core::light::Light;
 use rt_core::material::Material;
 use rt_core::render::{RenderOptions, render};
-use rt_core::scene::{PlacedVolume, SceneBuilder};
+use rt_core::scene::{SceneBuilder, VolumeInstance};
 use rt_core::transfer_function::TransferFunction;
 use rt_core::volume::{
     Blend, GradientOpacity, Interpolation, Volume, VolumeOptions, VolumeQuality, VolumeShading,
@@ -57,7 +57,7 @@ fn shaded() -> VolumeOptions {
 }
 
 /// Three media: a coarse one, a fine one turned and stretched across it, and one that is wholly inside the first.
-fn three() -> Vec<PlacedVolume> {
+fn three() -> Vec<VolumeInstance> {
     let coarse =
         waves([21, 26, 19], DVec3::new(-1.9, -1.7, -0.6), DVec3::new(3.4, 3.2, 2.2), BLUE, 0.5, shaded());
     let nearest = VolumeOptions { interpolation: Interpolation::Nearest, ..VolumeOptions::default() };
@@ -71,13 +71,13 @@ fn three() -> Vec<PlacedVolume> {
         * DAffine3::from_rotation_x(0.3)
         * DAffine3::from_scale(DVec3::new(1.2, 0.9, 1.1));
     vec![
-        PlacedVolume { volume: coarse.into(), world_from_object: DAffine3::IDENTITY },
-        PlacedVolume { volume: fine.into(), world_from_object: turned },
-        PlacedVolume { volume: inside.into(), world_from_object: DAffine3::IDENTITY },
+        VolumeInstance { volume: coarse.into(), world_from_object: DAffine3::IDENTITY },
+        VolumeInstance { volume: fine.into(), world_from_object: turned },
+        VolumeInstance { volume: inside.into(), world_from_object: DAffine3::IDENTITY },
     ]
 }
 
-fn case(name: &'static str, balls: Option<Material>, volumes: Vec<PlacedVolume>) -> Case {
+fn case(name: &'static str, balls: Option<Material>, volumes: Vec<VolumeInstance>) -> Case {
     let sun = Light::directional(DVec3::new(0.4, -0.3, 1.0));
     let lights = [sun, Light::ambient(AMBIENT)];
     let mut scene = scenes::scene(DVec3::ZERO, matte(), balls, &lights, Some(0.5));
@@ -87,7 +87,7 @@ fn case(name: &'static str, balls: Option<Material>, volumes: Vec<PlacedVolume>)
 }
 
 /// Volumes alone, with nothing behind them.
-fn alone(volumes: Vec<PlacedVolume>) -> Case {
+fn alone(volumes: Vec<VolumeInstance>) -> Case {
     let mut scene = SceneBuilder::new().build().unwrap();
     scene.volumes = volumes;
     let options = RenderOptions { width: 100, height: 81, layers: Layers::COLOR, ..options() };
@@ -164,7 +164,7 @@ fn bricks_of_several_volumes_are_small_and_little_is_held_twice() {
     let [low, size] = [DVec3::splat(-1.0), DVec3::splat(2.0)];
     let coarse = waves([65; 3], low, size, BLUE, 0.5, VolumeOptions::default());
     let fine = waves([129; 3], 0.4 * low, 0.4 * size, RED, 0.5, VolumeOptions::default());
-    let place = |volume: Volume, turn: f64| PlacedVolume {
+    let place = |volume: Volume, turn: f64| VolumeInstance {
         volume: volume.into(),
         world_from_object: DAffine3::from_rotation_z(turn),
     };
@@ -189,7 +189,7 @@ fn projections_are_seen_whole_and_have_the_bits_of_one_node() {
             0.6,
             projection,
         );
-        let projection = PlacedVolume { volume: projection.into(), world_from_object: DAffine3::IDENTITY };
+        let projection = VolumeInstance { volume: projection.into(), world_from_object: DAffine3::IDENTITY };
         let one = case("a projection", None, vec![projection.clone()]);
         let among = case("a projection among media", None, {
             let mut volumes = three();
@@ -212,7 +212,7 @@ fn deals_that_cannot_be_are_refused_by_name() {
     let mut volumes = three();
     let maximum = VolumeOptions { blend: Blend::Maximum, ..VolumeOptions::default() };
     let projection = waves([9, 9, 9], DVec3::ZERO, DVec3::ONE, GREEN, 0.6, maximum);
-    volumes.push(PlacedVolume { volume: projection.into(), world_from_object: DAffine3::IDENTITY });
+    volumes.push(VolumeInstance { volume: projection.into(), world_from_object: DAffine3::IDENTITY });
     let case = alone(volumes);
     let refused = |volume: usize, holders: &[Vec<usize>]| {
         let partition = Partition::new(&case.scene, 4, &Split::Triangles);

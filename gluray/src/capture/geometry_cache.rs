@@ -5,7 +5,7 @@ mod refit;
 
 use crate::capture::draw::PrimitiveRun;
 use crate::capture::primitives::{QuadSplit, triangulate};
-use rt_core::accel::{BuildOptions, BuildQuality, World};
+use rt_core::bvh::{BuildOptions, BuildQuality, World};
 use rt_core::glam::Vec3;
 use rt_core::math::Aabb;
 use rt_core::mesh::TriMesh;

@@ -32,7 +32,7 @@ use crate::trace::texturing::Image;
 pub(crate) use nearest::nearest;
 pub(crate) use primitive_order::ordered_layers;
 use rayon::prelude::*;
-use rt_core::accel::World;
+use rt_core::bvh::World;
 use rt_core::camera::Camera;
 use rt_core::glam::{DMat4, DVec3};
 use rt_core::ray::Ray;

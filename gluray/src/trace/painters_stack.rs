@@ -6,7 +6,7 @@
 
 use super::{Prepared, Rect, slot};
 use crate::trace::raster::snapped;
-use rt_core::accel::{BuildOptions, BuildQuality, World};
+use rt_core::bvh::{BuildOptions, BuildQuality, World};
 use rt_core::glam::{DVec3, Vec3};
 use rt_core::mesh::TriMesh;
 use rt_core::ray::{HitBlock, RayBlock};

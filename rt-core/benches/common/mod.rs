@@ -1,7 +1,7 @@
 //! What the benchmarks share: a mesh, a camera, and rays in the order that tiles make them.
 #![allow(dead_code, unreachable_pub, reason = "each benchmark uses its own part")]
 
-use rt_core::accel::World;
+use rt_core::bvh::World;
 use rt_core::camera::Camera;
 use rt_core::glam::{DVec3, Vec3};
 use rt_core::mesh::{Attribute, TriMesh};

@@ -45,7 +45,7 @@ pub(super) fn tiles(options: &RenderOptions, camera: &Camera, old: Vec<Tile>) ->
 pub(super) fn assemble(options: &RenderOptions, tiles: &[Tile], old: Frame) -> Frame {
     let crop = options.area();
     let (width, height) = (crop.width as usize, crop.height as usize);
-    let grid = Grid { width, tiles_across: width.div_ceil(TILE as usize), tiles };
+    let grid = TileGrid { width, tiles_across: width.div_ceil(TILE as usize), tiles };
     let mean = |t: &Tile, i: usize| {
         if t.samples == 0 {
             return [0.0; 4];
@@ -71,13 +71,13 @@ pub(super) fn assemble(options: &RenderOptions, tiles: &[Tile], old: Frame) -> F
     }
 }
 
-struct Grid<'a> {
+struct TileGrid<'a> {
     width: usize,
     tiles_across: usize,
     tiles: &'a [Tile],
 }
 
-impl Grid<'_> {
+impl TileGrid<'_> {
     /// One layer in row order: each row of tiles fills its band of rows.
     fn plane<T: Copy + Send + Sync>(
         &self,
@@ -134,7 +134,7 @@ pub(super) fn blank_frame(options: &RenderOptions, camera: &Camera, old: Frame) 
 }
 
 /// The pixels of a picture that belong to one row of tiles, or to one tile: of each layer the rows' pieces.
-pub(super) struct Pieces<'a> {
+pub(super) struct FrameSlices<'a> {
     pub(super) area: TileArea,
     color: Vec<&'a mut [[f32; 4]]>,
     depth: Vec<&'a mut [f32]>,
@@ -146,7 +146,7 @@ pub(super) struct Pieces<'a> {
 }
 
 /// Rows of tiles, each with its pixels.
-pub(super) fn bands<'a>(options: &RenderOptions, frame: &'a mut Frame) -> Vec<Pieces<'a>> {
+pub(super) fn bands<'a>(options: &RenderOptions, frame: &'a mut Frame) -> Vec<FrameSlices<'a>> {
     let crop = options.area();
     let size = crop.width as usize * TILE as usize;
     // A layer that was not asked for has no bands.
@@ -159,7 +159,7 @@ pub(super) fn bands<'a>(options: &RenderOptions, frame: &'a mut Frame) -> Vec<Pi
     let mut cost = frame.cost.chunks_mut(size);
     (0..crop.height)
         .step_by(TILE as usize)
-        .map(|y| Pieces {
+        .map(|y| FrameSlices {
             area: TileArea {
                 x: crop.x,
                 y: crop.y + y,
@@ -178,13 +178,13 @@ pub(super) fn bands<'a>(options: &RenderOptions, frame: &'a mut Frame) -> Vec<Pi
         .collect()
 }
 
-impl<'a> Pieces<'a> {
+impl<'a> FrameSlices<'a> {
     /// A row of tiles cut into its tiles.
-    pub(super) fn tiles(self) -> Vec<Pieces<'a>> {
-        let Pieces { area, color, depth, distance, normal, instance, primitive, cost } = self;
-        let mut tiles: Vec<Pieces<'a>> = (0..area.width)
+    pub(super) fn tiles(self) -> Vec<FrameSlices<'a>> {
+        let FrameSlices { area, color, depth, distance, normal, instance, primitive, cost } = self;
+        let mut tiles: Vec<FrameSlices<'a>> = (0..area.width)
             .step_by(TILE as usize)
-            .map(|x| Pieces {
+            .map(|x| FrameSlices {
                 area: TileArea { x: area.x + x, width: TILE.min(area.width - x), ..area },
                 color: Vec::new(),
                 depth: Vec::new(),
@@ -195,7 +195,7 @@ impl<'a> Pieces<'a> {
                 cost: Vec::new(),
             })
             .collect();
-        fn deal<'a, T>(band: Vec<&'a mut [T]>, width: u32, mut give: impl FnMut(usize, &'a mut [T])) {
+        fn distribute<'a, T>(band: Vec<&'a mut [T]>, width: u32, mut give: impl FnMut(usize, &'a mut [T])) {
             for rows in band {
                 for row in rows.chunks_mut(width as usize) {
                     row.chunks_mut(TILE as usize).enumerate().for_each(|(k, piece)| give(k, piece));
@@ -203,13 +203,13 @@ impl<'a> Pieces<'a> {
             }
         }
         let w = area.width;
-        deal(color, w, |k, piece| tiles[k].color.push(piece));
-        deal(depth, w, |k, piece| tiles[k].depth.push(piece));
-        deal(distance, w, |k, piece| tiles[k].distance.push(piece));
-        deal(normal, w, |k, piece| tiles[k].normal.push(piece));
-        deal(instance, w, |k, piece| tiles[k].instance.push(piece));
-        deal(primitive, w, |k, piece| tiles[k].primitive.push(piece));
-        deal(cost, w, |k, piece| tiles[k].cost.push(piece));
+        distribute(color, w, |k, piece| tiles[k].color.push(piece));
+        distribute(depth, w, |k, piece| tiles[k].depth.push(piece));
+        distribute(distance, w, |k, piece| tiles[k].distance.push(piece));
+        distribute(normal, w, |k, piece| tiles[k].normal.push(piece));
+        distribute(instance, w, |k, piece| tiles[k].instance.push(piece));
+        distribute(primitive, w, |k, piece| tiles[k].primitive.push(piece));
+        distribute(cost, w, |k, piece| tiles[k].cost.push(piece));
         tiles
     }
 

@@ -1,6 +1,6 @@
 //! Scene and camera in, picture and report out.
 //!
-//! [`render`] draws one frame, a [`Renderer`] many in the same memory. [`Progressive`] gives a picture after every sample per pixel. [`AsyncRenderer`] draws frame N while
+//! [`render`] draws one frame, a [`Renderer`] many in the same memory. [`ProgressiveRenderer`] gives a picture after every sample per pixel. [`AsyncRenderer`] draws frame N while
 //! the program prepares frame N+1 (thesis section 4.1.2).
 
 mod assemble;
@@ -15,7 +15,7 @@ pub use asynchronous::AsyncRenderer;
 pub use error::RenderError;
 pub use options::{Crop, RenderOptions};
 pub(crate) use plan::plan_for;
-pub use progressive::{Progressive, RenderReport, StopReason};
+pub use progressive::{ProgressiveRenderer, RenderReport, StopReason};
 pub use renderer::Renderer;
 
 use crate::camera::Camera;

@@ -1,6 +1,6 @@
 //! Sample after sample, with a picture after each.
 
-use super::assemble::{Pieces, Tile, assemble, bands, blank_frame, tiles};
+use super::assemble::{FrameSlices, Tile, assemble, bands, blank_frame, tiles};
 use super::plan::{plan, warn_without_effect};
 use super::{RenderError, RenderOptions, RenderOutput};
 use crate::camera::Camera;
@@ -8,7 +8,7 @@ use crate::effects::Effects;
 use crate::frame::{Frame, Layers};
 use crate::ray_stats::RayStats;
 use crate::scene::Scene;
-use crate::shade::{Stage, TileArea, TileLayers, Workspace, render_tile};
+use crate::shade::{FrameContext, TileArea, TileLayers, Workspace, render_tile};
 use rayon::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
@@ -56,27 +56,27 @@ pub struct RenderReport {
 #[derive(Default)]
 pub(super) struct Buffers {
     tiles: Vec<Tile>,
-    spare: Vec<Desk>,
+    spare: Vec<ThreadScratch>,
     /// A picture nobody needs any more.
     pub(super) frame: Frame,
 }
 
 /// What a thread works with.
 #[derive(Default)]
-struct Desk {
+struct ThreadScratch {
     work: Workspace,
     /// The tile in work, in pictures of one sample; else tiles have their own.
     layers: Option<TileLayers>,
 }
 
 /// A picture in the making.
-pub struct Progressive<'a> {
-    stage: Stage<'a>,
+pub struct ProgressiveRenderer<'a> {
+    context: FrameContext<'a>,
     /// Tiles that collect samples. Pictures of one sample have none: each tile goes to its place while it is still in the cache, which saves writing and
     /// reading 32 bytes per pixel of main memory (measured: 5 of 50 ms at 1024 x 1024).
     tiles: Vec<Tile>,
     /// Buffers of threads that are not rendering now.
-    spare: Mutex<Vec<Desk>>,
+    spare: Mutex<Vec<ThreadScratch>>,
     /// Memory for the picture; in pictures of one sample, after the first step, the picture.
     old_frame: Frame,
     rays: RayStats,
@@ -89,27 +89,27 @@ pub struct Progressive<'a> {
     pub(super) also_cancel: Option<&'a AtomicBool>,
 }
 
-impl<'a> Progressive<'a> {
+impl<'a> ProgressiveRenderer<'a> {
     /// Checks everything and sets up the frame; traces nothing yet.
     pub fn new(
         scene: &'a Scene,
         camera: &Camera,
         options: &'a RenderOptions,
-    ) -> Result<Progressive<'a>, RenderError> {
-        Progressive::with_buffers(scene, camera, options, Buffers::default())
+    ) -> Result<ProgressiveRenderer<'a>, RenderError> {
+        ProgressiveRenderer::with_buffers(scene, camera, options, Buffers::default())
     }
 
-    /// As [`Progressive::new`], in memory of an earlier frame.
+    /// As [`ProgressiveRenderer::new`], in memory of an earlier frame.
     pub(super) fn with_buffers(
         scene: &'a Scene,
         camera: &Camera,
         options: &'a RenderOptions,
         buffers: Buffers,
-    ) -> Result<Progressive<'a>, RenderError> {
+    ) -> Result<ProgressiveRenderer<'a>, RenderError> {
         let started = Instant::now();
         let plan = plan(scene, camera, options)?;
-        Ok(Progressive {
-            stage: Stage::new(scene, camera, options, plan.effects),
+        Ok(ProgressiveRenderer {
+            context: FrameContext::new(scene, camera, options, plan.effects),
             tiles: if one_pass(options) { buffers.tiles } else { tiles(options, camera, buffers.tiles) },
             spare: Mutex::new(buffers.spare),
             old_frame: buffers.frame,
@@ -129,9 +129,9 @@ impl<'a> Progressive<'a> {
             return Ok(false);
         }
         let sample = self.samples;
-        let (stage, spare, started) = (&self.stage, &self.spare, self.started);
+        let (context, spare, started) = (&self.context, &self.spare, self.started);
         let also_cancel = self.also_cancel;
-        let options = stage.options;
+        let options = context.options;
         // A pass may be cut short between tiles: at once when cancelled, for lack of time only after the first pass.
         let cut = || {
             let is_set = |f: &AtomicBool| f.load(Ordering::Relaxed);
@@ -146,8 +146,8 @@ impl<'a> Progressive<'a> {
         let one_pass = one_pass(options);
         // Rays of the tiles that were drawn, and how many were not.
         let draw = |area: &TileArea, layers: &mut TileLayers, work: &mut Workspace| {
-            catch_unwind(AssertUnwindSafe(|| render_tile(stage, area, layers, work, sample)))
-                .map_err(|panic| locate_panic(stage, *area, sample, message_of(&*panic)))
+            catch_unwind(AssertUnwindSafe(|| render_tile(context, area, layers, work, sample)))
+                .map_err(|panic| locate_panic(context, *area, sample, message_of(&*panic)))
         };
         let add = |mut a: (RayStats, u32), b: (RayStats, u32)| {
             a.0 += b.0;
@@ -156,22 +156,22 @@ impl<'a> Progressive<'a> {
         let none = || (RayStats::default(), 0);
         let (rays, missing) = if one_pass {
             let old = std::mem::take(&mut self.old_frame);
-            self.old_frame = blank_frame(options, &stage.camera, old);
+            self.old_frame = blank_frame(options, &context.camera, old);
             let frame = &mut self.old_frame;
             let pieces = bands(options, frame).into_par_iter().flat_map(|b| b.tiles().into_par_iter());
-            let draw_piece = |mut piece: Pieces<'_>| {
-                let mut desk = take(spare);
-                let mut layers = ready_layers(stage, desk.layers.take());
+            let draw_piece = |mut piece: FrameSlices<'_>| {
+                let mut scratch = take_scratch(spare);
+                let mut layers = ready_layers(context, scratch.layers.take());
                 let cut = cut().is_some();
                 let stats = if cut {
                     layers.clear_color();
                     RayStats::default()
                 } else {
-                    draw(&piece.area, &mut layers, &mut desk.work)?
+                    draw(&piece.area, &mut layers, &mut scratch.work)?
                 };
                 piece.write(&layers);
-                desk.layers = Some(layers);
-                give_back(spare, desk);
+                scratch.layers = Some(layers);
+                return_scratch(spare, scratch);
                 Ok::<_, RenderError>((stats, cut as u32))
             };
             pieces.map(draw_piece).try_reduce(none, add)?
@@ -180,10 +180,10 @@ impl<'a> Progressive<'a> {
                 if cut().is_some() {
                     return Ok::<_, RenderError>((RayStats::default(), 1));
                 }
-                let mut desk = take(spare);
-                let stats = draw(&tile.area, &mut tile.layers, &mut desk.work)?;
+                let mut scratch = take_scratch(spare);
+                let stats = draw(&tile.area, &mut tile.layers, &mut scratch.work)?;
                 tile.samples += 1;
-                give_back(spare, desk);
+                return_scratch(spare, scratch);
                 Ok((stats, 0))
             };
             self.tiles.par_iter_mut().map(draw_tile).try_reduce(none, add)?
@@ -209,30 +209,30 @@ impl<'a> Progressive<'a> {
     }
 
     fn time_is_up(&self) -> bool {
-        self.stage.options.time_limit.is_some_and(|l| self.started.elapsed() >= l)
+        self.context.options.time_limit.is_some_and(|l| self.started.elapsed() >= l)
     }
 
     /// Estimated standard error, see [`RenderReport::error_levels`].
     pub fn error_levels(&self) -> Option<f32> {
         let usable = self.samples >= 2
-            && !one_pass(self.stage.options)
+            && !one_pass(self.context.options)
             && self.tiles.iter().all(|t| !t.layers.luminance_sq.is_empty());
         usable.then(|| {
             let sum: f64 = self.tiles.iter().map(|t| t.layers.squared_error(&t.area, t.samples)).sum();
-            let area = self.stage.options.area();
+            let area = self.context.options.area();
             (255.0 * (sum / (area.width as f64 * area.height as f64)).sqrt()) as f32
         })
     }
 
     /// The picture so far.
     pub fn frame(&self) -> Frame {
-        let options = self.stage.options;
+        let options = self.context.options;
         if !one_pass(options) {
             return assemble(options, &self.tiles, Frame::default());
         }
         // Before the first step, `old_frame` is some other picture.
         if self.stopped == StopReason::Running {
-            blank_frame(options, &self.stage.camera, Frame::default())
+            blank_frame(options, &self.context.camera, Frame::default())
         } else {
             self.old_frame.clone()
         }
@@ -241,8 +241,8 @@ impl<'a> Progressive<'a> {
     /// The finished picture, its account, and the memory for the next.
     pub(super) fn finish(mut self) -> (RenderOutput, Buffers) {
         let mut frame = std::mem::take(&mut self.old_frame);
-        if !one_pass(self.stage.options) {
-            frame = assemble(self.stage.options, &self.tiles, frame);
+        if !one_pass(self.context.options) {
+            frame = assemble(self.context.options, &self.tiles, frame);
         }
         let report = self.report();
         let spare = self.spare.into_inner().unwrap_or_default();
@@ -252,11 +252,11 @@ impl<'a> Progressive<'a> {
     /// The account so far.
     pub fn report(&self) -> RenderReport {
         let mut warnings = self.warnings.clone();
-        let options = self.stage.options;
+        let options = self.context.options;
         if self.samples > 0 {
             warn_without_effect(
                 options.effects,
-                self.stage.effects,
+                self.context.effects,
                 self.left_out,
                 &self.rays,
                 &mut warnings,
@@ -264,7 +264,7 @@ impl<'a> Progressive<'a> {
         }
         RenderReport {
             rays: self.rays,
-            effects: self.stage.effects,
+            effects: self.context.effects,
             left_out: self.left_out,
             warnings,
             samples: self.samples,
@@ -281,31 +281,31 @@ fn one_pass(options: &RenderOptions) -> bool {
 }
 
 /// Layers of a tile without anything in them, in the memory of `old` ones where they fit.
-fn ready_layers(stage: &Stage<'_>, old: Option<TileLayers>) -> TileLayers {
-    let background_depth = stage.camera.background_depth() as f32;
-    let layers = stage.options.layers;
+fn ready_layers(context: &FrameContext<'_>, old: Option<TileLayers>) -> TileLayers {
+    let background_depth = context.camera.background_depth() as f32;
+    let layers = context.options.layers;
     let used = old.and_then(|mut l| l.reset(layers, background_depth, false).then_some(l));
     used.unwrap_or_else(|| TileLayers::new(layers, background_depth, false))
 }
 
-fn take(spare: &Mutex<Vec<Desk>>) -> Desk {
+fn take_scratch(spare: &Mutex<Vec<ThreadScratch>>) -> ThreadScratch {
     spare.lock().map(|mut s| s.pop()).ok().flatten().unwrap_or_default()
 }
 
-fn give_back(spare: &Mutex<Vec<Desk>>, desk: Desk) {
+fn return_scratch(spare: &Mutex<Vec<ThreadScratch>>, scratch: ThreadScratch) {
     if let Ok(mut s) = spare.lock() {
-        s.push(desk);
+        s.push(scratch);
     }
 }
 
 /// Renders the tile's pixels one by one until one panics again.
-fn locate_panic(stage: &Stage<'_>, tile: TileArea, sample: u32, message: String) -> RenderError {
+fn locate_panic(context: &FrameContext<'_>, tile: TileArea, sample: u32, message: String) -> RenderError {
     for y in tile.y..tile.y + tile.height {
         for x in tile.x..tile.x + tile.width {
             let area = TileArea { x, y, width: 1, height: 1, sample };
             let again = catch_unwind(AssertUnwindSafe(|| {
-                let mut layers = TileLayers::new(stage.options.layers, 0.0, false);
-                render_tile(stage, &area, &mut layers, &mut Workspace::default(), sample)
+                let mut layers = TileLayers::new(context.options.layers, 0.0, false);
+                render_tile(context, &area, &mut layers, &mut Workspace::default(), sample)
             }));
             if let Err(panic) = again {
                 return RenderError::Panicked { x, y, sample, message: message_of(&*panic) };

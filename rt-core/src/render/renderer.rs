@@ -1,7 +1,7 @@
 //! Frame after frame in the same memory.
 
 use super::progressive::Buffers;
-use super::{Progressive, RenderError, RenderOptions, RenderOutput};
+use super::{ProgressiveRenderer, RenderError, RenderOptions, RenderOutput};
 use crate::camera::Camera;
 use crate::frame::Frame;
 use crate::scene::Scene;
@@ -44,7 +44,7 @@ impl Renderer {
         cancel: Option<&AtomicBool>,
     ) -> Result<RenderOutput, RenderError> {
         let buffers = std::mem::take(&mut self.buffers);
-        let mut progressive = Progressive::with_buffers(scene, camera, options, buffers)?;
+        let mut progressive = ProgressiveRenderer::with_buffers(scene, camera, options, buffers)?;
         progressive.also_cancel = cancel;
         while progressive.step()? {}
         let (output, buffers) = progressive.finish();

@@ -4,8 +4,8 @@
 //! there: exactly at vertices and edges, beside edges by a few roundings, and from close to the surface, where a triangle is large against
 //! its distance.
 
-use super::Random;
-use crate::accel::{Among, Coherence, World};
+use super::SplitMix64;
+use crate::bvh::{Coherence, InstanceFilter, World};
 use crate::mesh::TriMesh;
 use crate::ray::{HitBlock, NO_HIT, Ray, RayBlock};
 use glam::{DVec3, Vec3};
@@ -13,35 +13,36 @@ use rayon::prelude::*;
 
 /// What a ray is aimed at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Aim {
+pub enum RayTarget {
     /// A vertex.
     Vertex,
     /// A point on an edge, rounded to f32.
     Edge,
     /// A point beside an edge, off by up to 10⁻⁶ of its length: there the edge test and the box test may disagree.
-    BesideEdge,
+    NearEdge,
     /// Any point of a triangle.
     Anywhere,
 }
 
-impl Aim {
+impl RayTarget {
     /// Every aim.
-    pub const ALL: [Aim; 4] = [Aim::Vertex, Aim::Edge, Aim::BesideEdge, Aim::Anywhere];
+    pub const ALL: [RayTarget; 4] =
+        [RayTarget::Vertex, RayTarget::Edge, RayTarget::NearEdge, RayTarget::Anywhere];
 
     /// The name used in records.
     pub fn name(self) -> &'static str {
         match self {
-            Aim::Vertex => "vertices",
-            Aim::Edge => "edges",
-            Aim::BesideEdge => "beside edges",
-            Aim::Anywhere => "anywhere",
+            RayTarget::Vertex => "vertices",
+            RayTarget::Edge => "edges",
+            RayTarget::NearEdge => "beside edges",
+            RayTarget::Anywhere => "anywhere",
         }
     }
 }
 
 /// Where rays start.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Start {
+pub enum RayOrigins {
     /// In a ball inside the surface, world coordinates.
     Ball {
         /// Its centre.
@@ -60,7 +61,7 @@ pub enum Start {
 
 /// Which of the world's queries answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Query {
+pub enum QueryKind {
     /// [`World::closest`] and [`World::occluded`].
     Single,
     /// [`World::closest_coherent`] and [`World::occluded_coherent`].
@@ -69,9 +70,9 @@ pub enum Query {
     Incoherent,
 }
 
-impl Query {
+impl QueryKind {
     /// Every query.
-    pub const ALL: [Query; 3] = [Query::Single, Query::Coherent, Query::Incoherent];
+    pub const ALL: [QueryKind; 3] = [QueryKind::Single, QueryKind::Coherent, QueryKind::Incoherent];
 }
 
 /// What became of the rays.
@@ -88,10 +89,10 @@ pub struct LeakCount {
 /// A closed mesh, alone in its world, and the rays to test it with.
 ///
 /// ```
-/// use rt_core::accel::{BuildOptions, World};
+/// use rt_core::bvh::{BuildOptions, World};
 /// use rt_core::glam::{DVec3, Vec3};
 /// use rt_core::mesh::TriMesh;
-/// use rt_core::robustness::{Aim, LeakTest, Query, Start};
+/// use rt_core::robustness::{RayTarget, LeakTest, QueryKind, RayOrigins};
 ///
 /// // A tetrahedron, and the same with one side left out.
 /// let corners = vec![Vec3::ONE, Vec3::new(1.0, -1.0, -1.0), Vec3::new(-1.0, 1.0, -1.0), Vec3::new(-1.0, -1.0, 1.0)];
@@ -99,8 +100,8 @@ pub struct LeakCount {
 /// let open = TriMesh { indices: closed.indices[..3].to_vec(), ..closed.clone() };
 /// let leaks = |mesh: &TriMesh| {
 ///     let world = World::from_mesh(mesh.clone(), &BuildOptions::default()).unwrap();
-///     let start = Start::Ball { center: DVec3::ZERO, radius: 0.3 };
-///     LeakTest { world: &world, mesh: &closed, start, aim: Aim::Edge, seed: 1 }.count(Query::Coherent, 10_000).leaks
+///     let start = RayOrigins::Ball { center: DVec3::ZERO, radius: 0.3 };
+///     LeakTest { world: &world, mesh: &closed, start, aim: RayTarget::Edge, seed: 1 }.count(QueryKind::Coherent, 10_000).leaks
 /// };
 /// assert_eq!(leaks(&closed), 0);
 /// assert!(leaks(&open) > 0);
@@ -112,9 +113,9 @@ pub struct LeakTest<'a> {
     /// The mesh that its first instance shows.
     pub mesh: &'a TriMesh,
     /// Where rays start.
-    pub start: Start,
+    pub start: RayOrigins,
     /// What they are aimed at.
-    pub aim: Aim,
+    pub aim: RayTarget,
     /// Seed of the rays: the same seed gives the same rays on any number of threads.
     pub seed: u64,
 }
@@ -126,7 +127,7 @@ const TILE: usize = 256;
 
 impl LeakTest<'_> {
     /// Traces `rays` rays (rounded up to a multiple of 4096) and counts those that get through.
-    pub fn count(&self, query: Query, rays: usize) -> LeakCount {
+    pub fn count(&self, query: QueryKind, rays: usize) -> LeakCount {
         (0..rays.div_ceil(BATCH)).into_par_iter().map(|b| self.count_batch(query, b as u64)).reduce(
             LeakCount::default,
             |a, b| LeakCount {
@@ -137,21 +138,21 @@ impl LeakTest<'_> {
         )
     }
 
-    fn count_batch(&self, query: Query, batch: u64) -> LeakCount {
+    fn count_batch(&self, query: QueryKind, batch: u64) -> LeakCount {
         let rays = self.rays(batch);
         let n = rays.len();
         let (hits, blocked) = match query {
-            Query::Single => (
+            QueryKind::Single => (
                 rays.iter().filter(|r| self.world.closest(r).is_some()).count(),
                 rays.iter().filter(|r| self.world.occluded(r)).count(),
             ),
-            Query::Coherent | Query::Incoherent => {
+            QueryKind::Coherent | QueryKind::Incoherent => {
                 let blocks = RayBlock::from_rays(&rays);
                 let (mut hits, mut any) = (vec![HitBlock::MISS; blocks.len()], vec![0u16; blocks.len()]);
-                let alike = query == Query::Coherent;
-                let coherence = if alike { Coherence::Alike } else { Coherence::Scattered };
-                self.world.closest_stream(&blocks, &mut hits, coherence, Among::All);
-                self.world.occluded_stream(&blocks, &mut any, coherence, Among::All);
+                let alike = query == QueryKind::Coherent;
+                let coherence = if alike { Coherence::Coherent } else { Coherence::Incoherent };
+                self.world.closest_stream(&blocks, &mut hits, coherence, InstanceFilter::All);
+                self.world.occluded_stream(&blocks, &mut any, coherence, InstanceFilter::All);
                 let found = hits.iter().map(|h| h.prim.iter().filter(|&&p| p != NO_HIT).count()).sum();
                 (found, any.iter().map(|a| a.count_ones() as usize).sum())
             }
@@ -161,7 +162,7 @@ impl LeakTest<'_> {
 
     /// The rays of batch `batch`, in render space: 4096, each starting inside.
     pub fn rays(&self, batch: u64) -> Vec<Ray> {
-        let mut random = Random::for_batch(self.seed, batch);
+        let mut random = SplitMix64::for_batch(self.seed, batch);
         let n = self.mesh.num_triangles();
         if n == 0 {
             return vec![Ray::new(Vec3::ZERO, Vec3::ZERO); BATCH];
@@ -188,28 +189,28 @@ impl LeakTest<'_> {
     }
 
     /// A point of the triangle, and the point aimed at: the same or next to it.
-    fn target(&self, corners: [DVec3; 3], random: &mut Random) -> (DVec3, Vec3) {
+    fn target(&self, corners: [DVec3; 3], random: &mut SplitMix64) -> (DVec3, Vec3) {
         let k = random.below(3);
         let (a, b, c) = (corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]);
         let (on, off) = match self.aim {
-            Aim::Vertex => (a, DVec3::ZERO),
-            Aim::Edge => (a.lerp(b, random.unit()), DVec3::ZERO),
-            Aim::BesideEdge => {
+            RayTarget::Vertex => (a, DVec3::ZERO),
+            RayTarget::Edge => (a.lerp(b, random.unit()), DVec3::ZERO),
+            RayTarget::NearEdge => {
                 let off = 1e-6 * (a - b).length() * (10f64).powf(-3.0 * random.unit());
                 (a.lerp(b, random.unit()), random.direction() * off)
             }
-            Aim::Anywhere => (a.lerp(b, random.unit()).lerp(c, random.unit()), DVec3::ZERO),
+            RayTarget::Anywhere => (a.lerp(b, random.unit()).lerp(c, random.unit()), DVec3::ZERO),
         };
         (on, (on + off).as_vec3())
     }
 
-    fn origin(&self, corners: [DVec3; 3], near: DVec3, random: &mut Random) -> Vec3 {
+    fn origin(&self, corners: [DVec3; 3], near: DVec3, random: &mut SplitMix64) -> Vec3 {
         match self.start {
-            Start::Ball { center, radius } => {
+            RayOrigins::Ball { center, radius } => {
                 let inside = random.direction() * random.unit().cbrt() * radius;
                 (center + inside - self.world.origin()).as_vec3()
             }
-            Start::NearSurface { center } => {
+            RayOrigins::NearSurface { center } => {
                 let on = corners[0].lerp(corners[1], random.unit()).lerp(corners[2], random.unit());
                 let on = near.lerp(on, (10f64).powf(-4.0 * random.unit()));
                 // At least eight f32 steps deep, so that rounding cannot put the start outside.

@@ -6,17 +6,17 @@
 mod leaks;
 mod self_shadow;
 
-pub use leaks::{Aim, LeakCount, LeakTest, Query, Start};
+pub use leaks::{LeakCount, LeakTest, QueryKind, RayOrigins, RayTarget};
 pub use self_shadow::{SelfShadowCount, SelfShadowTest};
 
 use glam::DVec3;
 
 /// A repeatable sequence (SplitMix64, Steele, Lea and Flood 2014).
-struct Random(u64);
+struct SplitMix64(u64);
 
-impl Random {
-    fn for_batch(seed: u64, batch: u64) -> Random {
-        Random(seed ^ (batch + 1).wrapping_mul(0xd134_2543_de82_ef95))
+impl SplitMix64 {
+    fn for_batch(seed: u64, batch: u64) -> SplitMix64 {
+        SplitMix64(seed ^ (batch + 1).wrapping_mul(0xd134_2543_de82_ef95))
     }
 
     fn bits(&mut self) -> u64 {

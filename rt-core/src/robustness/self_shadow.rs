@@ -1,10 +1,10 @@
 //! Secondary rays that meet the surface they start from.
 
-use super::Random;
+use super::SplitMix64;
 use crate::math::orthonormal_basis;
 use crate::ray::Ray;
 use crate::scene::Scene;
-use crate::surface::Placed;
+use crate::surface::ResolvedInstance;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -46,15 +46,15 @@ impl SelfShadowTest<'_> {
         if world.instances().is_empty() || world.bounds().is_empty() {
             return count;
         }
-        let mut random = Random::for_batch(self.seed, batch);
-        let placed = Placed::new(self.scene, 0);
+        let mut random = SplitMix64::for_batch(self.seed, batch);
+        let resolved = ResolvedInstance::new(self.scene, 0);
         let (center, radius) = (world.bounds().center().as_dvec3(), world.bounds().radius() as f64);
         for _ in 0..BATCH {
             let eye = (center + random.direction() * radius * self.camera_radii as f64).as_vec3();
             let target = (center + random.direction() * radius * 0.6 * random.unit()).as_vec3();
             let ray = Ray::new(eye, (target - eye).normalize_or_zero());
             let Some(hit) = world.closest(&ray).filter(|h| h.instance == 0) else { continue };
-            let s = placed.surface(&ray, &hit);
+            let s = resolved.surface(&ray, &hit);
             let dir = cosine_direction(s.face_normal, &mut random);
             count.rays += 1;
             count.blocked += world.occluded(&Ray::new(s.ray_origin(dir), dir)) as u64;
@@ -64,7 +64,7 @@ impl SelfShadowTest<'_> {
 }
 
 /// A direction in the half space of `n`, with density proportional to the cosine.
-fn cosine_direction(n: Vec3, random: &mut Random) -> Vec3 {
+fn cosine_direction(n: Vec3, random: &mut SplitMix64) -> Vec3 {
     let (t, b) = orthonormal_basis(n);
     let (r2, phi) = (random.unit(), std::f64::consts::TAU * random.unit());
     let d = DVec3::new(r2.sqrt() * phi.cos(), r2.sqrt() * phi.sin(), (1.0 - r2).sqrt()).as_vec3();

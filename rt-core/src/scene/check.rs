@@ -1,7 +1,7 @@
 //! Whether a scene can be drawn: every index and every number of it.
 
 use super::{Scene, SceneError};
-use crate::accel::Geometry;
+use crate::bvh::Geometry;
 use crate::light::Light;
 use crate::mesh::PerElement;
 
@@ -86,7 +86,7 @@ impl Scene {
                     return Err(SceneError::AttributeLength { appearance, field, expected, found });
                 }
             }
-            if let (Some(c), Some(i)) = (&a.colors, a.color_facts.unusable) {
+            if let (Some(c), Some(i)) = (&a.colors, a.color_summary.unusable) {
                 return Err(unusable_color("appearance", appearance, i, c.values[i]));
             }
         }

@@ -1,7 +1,7 @@
 //! Scenes with some of the primitives of a larger one.
 
 use super::{Appearance, Scene, SceneError};
-use crate::accel::{BuildOptions, Geometry, ShapePart, World};
+use crate::bvh::{BuildOptions, Geometry, ShapePart, World};
 use crate::mesh::{Attribute, PerElement};
 use std::sync::Arc;
 
@@ -40,7 +40,7 @@ impl Scene {
         }
         // A list too few is the builder's error to tell.
         let instances = self.world.instances().to_vec();
-        let world = World::build_part(geometries, instances, &self.world.whole(), options)?;
+        let world = World::build_part(geometries, instances, &self.world.global_layout(), options)?;
         let appearances = self
             .appearances
             .iter()

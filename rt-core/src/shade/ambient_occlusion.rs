@@ -1,14 +1,14 @@
 //! Ambient and environment light, dimmed by what is near: cosine-weighted rays over the hemisphere, limited in length.
 
+use super::frame_context::FrameContext;
 use super::lobes::ambient_albedo;
 use super::shadow::trace_light_rays;
-use super::stage::Stage;
-use super::wave::{LightRays, RayState};
-use super::{Dimension, Point, TileArea};
-use crate::accel::Coherence;
-use crate::detail::Varied;
+use super::wavefront::{LightRays, RayState};
+use super::{Point, SampleDimension, TileArea};
+use crate::bvh::Coherence;
 use crate::effects::Effects;
-use crate::environment::MeanRadiance;
+use crate::environment::IrradianceCoefficients;
+use crate::material_maps::SurfaceParameters;
 use crate::math::orthonormal_basis;
 use crate::ray::{LANES, Ray};
 use crate::ray_stats::RayStats;
@@ -23,21 +23,21 @@ const BATCH_RAYS: usize = 4096;
 
 /// Adds ambient and environment light to `points`.
 pub(crate) fn add_ambient_light(
-    stage: &Stage<'_>,
+    context: &FrameContext<'_>,
     area: &TileArea,
     points: &mut [Point],
-    varied: &[Varied],
+    parameters: &[SurfaceParameters],
     states: &[RayState],
     rays: &mut LightRays,
-    OcclusionBuffers { open, domes }: &mut OcclusionBuffers,
+    OcclusionBuffers { open, hemisphere_samples }: &mut OcclusionBuffers,
     stats: &mut RayStats,
     mut cost: Option<&mut [f32]>,
 ) {
-    let Some(mean) = &stage.mean_radiance else { return };
-    let ambient = if varied.is_empty() { ambient_at::<false> } else { ambient_at::<true> };
-    let ambient = |p: &Point| ambient(stage, mean, varied, p);
+    let Some(mean) = &context.irradiance else { return };
+    let ambient = if parameters.is_empty() { ambient_at::<false> } else { ambient_at::<true> };
+    let ambient = |p: &Point| ambient(context, mean, parameters, p);
     let occlusion =
-        stage.scene.ambient_occlusion.filter(|_| stage.effects.contains(Effects::AMBIENT_OCCLUSION));
+        context.scene.ambient_occlusion.filter(|_| context.effects.contains(Effects::AMBIENT_OCCLUSION));
     let Some(occlusion) = occlusion else {
         for p in points.iter_mut().filter(|p| p.lit) {
             p.radiance += ambient(p);
@@ -58,12 +58,12 @@ pub(crate) fn add_ambient_light(
                 continue;
             }
             let state = &states[p.lane as usize];
-            let sampler = area.sampler(stage, state.slot);
-            let dimension = state.stream.wrapping_add(Dimension::AMBIENT_OCCLUSION);
-            open.push(OpenPoint { index: i as u32, light, sampler, dimension });
+            let sampler = area.sampler(context, state.slot);
+            let dimension = state.stream.wrapping_add(SampleDimension::AMBIENT_OCCLUSION);
+            open.push(OcclusionPoint { index: i as u32, light, sampler, dimension });
         }
         // ---- Directions over +z, sixteen at a time across points.
-        dispatch!(stage.level, simd => directions(simd, stage, open, count, domes));
+        dispatch!(context.level, simd => directions(simd, context, open, count, hemisphere_samples));
         // ---- Rays.
         rays.clear();
         rays.first_point = start as u32;
@@ -73,8 +73,8 @@ pub(crate) fn add_ambient_light(
             let p = &points[start + o.index as usize];
             let over = Hemisphere::new(&p.surface);
             for k in 0..count {
-                if let Some(ray) = over.ray(domes, sample, occlusion.distance) {
-                    rays.push(&ray, o.index, o.light, stage.sky_number + k);
+                if let Some(ray) = over.ray(hemisphere_samples, sample, occlusion.distance) {
+                    rays.push(&ray, o.index, o.light, context.sky_number + k);
                 }
                 sample += 1;
             }
@@ -87,7 +87,7 @@ pub(crate) fn add_ambient_light(
             }
         }
         let batch = &mut points[start..end];
-        let counts = trace_light_rays(stage, rays, Coherence::Scattered, |i, light| {
+        let counts = trace_light_rays(context, rays, Coherence::Incoherent, |i, light| {
             batch[i as usize].radiance += light
         });
         stats.ambient_occlusion += counts.rays;
@@ -97,16 +97,16 @@ pub(crate) fn add_ambient_light(
     }
 }
 
-/// Ambient light that a point sends to the eye. `DETAIL`: some point has a finish of its own.
-fn ambient_at<const DETAIL: bool>(
-    stage: &Stage<'_>,
-    mean: &MeanRadiance,
-    varied: &[Varied],
+/// Ambient light that a point sends to the eye. `MAPS`: some point has a finish of its own.
+fn ambient_at<const MAPS: bool>(
+    context: &FrameContext<'_>,
+    mean: &IrradianceCoefficients,
+    parameters: &[SurfaceParameters],
     p: &Point,
 ) -> Vec3 {
-    let albedo = ambient_albedo(p.model::<DETAIL>(stage, varied), p.surface.color, stage.effects);
+    let albedo = ambient_albedo(p.model::<MAPS>(context, parameters), p.surface.color, context.effects);
     let light = albedo * mean.for_normal(p.surface.normal);
-    p.varied::<DETAIL>(varied).map_or(light, |v| light * v.ambient)
+    p.parameters::<MAPS>(parameters).map_or(light, |v| light * v.ambient)
 }
 
 /// Where the rays of a point go.
@@ -127,10 +127,15 @@ impl Hemisphere {
         Hemisphere { axes: [x, y, normal], origin, face_normal: s.face_normal }
     }
 
-    /// The ray in direction `sample` of `domes`.
+    /// The ray in direction `sample` of `hemisphere_samples`.
     #[inline]
-    pub(super) fn ray(&self, domes: &[Dome], sample: usize, distance: f64) -> Option<Ray> {
-        let [dx, dy, dz] = &domes[sample / LANES];
+    pub(super) fn ray(
+        &self,
+        hemisphere_samples: &[HemisphereSamples],
+        sample: usize,
+        distance: f64,
+    ) -> Option<Ray> {
+        let [dx, dy, dz] = &hemisphere_samples[sample / LANES];
         let lane = sample % LANES;
         let [x, y, normal] = self.axes;
         let dir = x * dx[lane] + y * dy[lane] + normal * dz[lane];
@@ -140,17 +145,17 @@ impl Hemisphere {
 }
 
 /// Sixteen directions, a row per component.
-pub(super) type Dome = [Row; 3];
+pub(super) type HemisphereSamples = [Row; 3];
 
 /// Buffers of one thread.
 #[derive(Default)]
 pub(crate) struct OcclusionBuffers {
-    open: Vec<OpenPoint>,
-    domes: Vec<Dome>,
+    open: Vec<OcclusionPoint>,
+    hemisphere_samples: Vec<HemisphereSamples>,
 }
 
 /// A point that sends rays.
-pub(super) struct OpenPoint {
+pub(super) struct OcclusionPoint {
     pub(super) index: u32,
     pub(super) light: Vec3,
     pub(super) sampler: Sampler,
@@ -160,13 +165,13 @@ pub(super) struct OpenPoint {
 /// `count` directions for each point, one after the other.
 pub(super) fn directions<S: Simd>(
     simd: S,
-    stage: &Stage<'_>,
-    open: &[OpenPoint],
+    context: &FrameContext<'_>,
+    open: &[OcclusionPoint],
     count: u32,
-    out: &mut Vec<Dome>,
+    out: &mut Vec<HemisphereSamples>,
 ) {
     out.clear();
-    let mut block = SamplerBlock::new(stage.options.sampling);
+    let mut block = SamplerBlock::new(context.options.sampling);
     let mut lane = 0;
     for o in open {
         for k in 0..count {

@@ -24,13 +24,13 @@ pub(crate) struct CameraRays {
     dir_y: DVec3,
     /// Parameter at which rays start: `world t = start + t`.
     start: f64,
-    limits: Limits,
+    clip_range: ClipRange,
     /// Lens axes scaled by the aperture's radius, and the ray parameter of the plane in focus.
     lens: Option<(DVec3, DVec3, f64)>,
 }
 
 /// Where the near and the far plane cut the rays.
-enum Limits {
+enum ClipRange {
     /// At the same parameter everywhere: every usual matrix.
     Same([f64; 2]),
     /// Somewhere else for each ray (oblique near planes); panoramas, whose rays have nothing in common.
@@ -68,16 +68,16 @@ impl CameraRays {
             !bounds.is_empty() && nearest.is_finite() && (parallel || (far_away && nearest - margin > 0.0));
         let start = if move_start { nearest - margin } else { 0.0 };
 
-        let limits = {
+        let clip_range = {
             let [a, b, c, e] = [(0.0, 0.0), (1.0, 1.0), (-1.0, 1.0), (1.0, -1.0)].map(|(x, y)| {
                 let (o, d) = ray(x, y);
                 camera.near_far(o, d)
             });
             let close = |p: f64, q: f64| p == q || (p - q).abs() <= 1e-7 * p.abs();
             if !panorama && [b, c, e].iter().all(|l| close(a[0], l[0]) && close(a[1], l[1])) {
-                Limits::Same(a)
+                ClipRange::Same(a)
             } else {
-                Limits::PerRay(Box::new((*camera, world_origin)))
+                ClipRange::PerRay(Box::new((*camera, world_origin)))
             }
         };
         let lens = camera.lens().filter(|l| with_lens && l.aperture_radius > 0.0).map(|l| {
@@ -95,7 +95,7 @@ impl CameraRays {
             dir_x: dx - d,
             dir_y: dy - d,
             start,
-            limits,
+            clip_range,
             lens,
         }
     }
@@ -104,7 +104,7 @@ impl CameraRays {
     /// ray's range.
     #[inline]
     pub(crate) fn ray(&self, x: f64, y: f64, lens: [f32; 2]) -> Ray {
-        if let Limits::PerRay(c) = &self.limits
+        if let ClipRange::PerRay(c) = &self.clip_range
             && c.0.is_omnidirectional()
         {
             return Ray::new(self.origin.as_vec3(), c.0.world_ray([x, y]).1.as_vec3());
@@ -114,9 +114,9 @@ impl CameraRays {
         if self.parallel {
             origin += self.origin_x * x + self.origin_y * y;
         }
-        let [near, far] = match &self.limits {
-            Limits::Same(l) => *l,
-            Limits::PerRay(c) => c.0.near_far(origin + c.1, dir),
+        let [near, far] = match &self.clip_range {
+            ClipRange::Same(l) => *l,
+            ClipRange::PerRay(c) => c.0.near_far(origin + c.1, dir),
         };
         if let Some((right, up, focus)) = self.lens {
             let offset = right * lens[0] as f64 + up * lens[1] as f64;
@@ -144,7 +144,7 @@ impl CameraRays {
         y: &[f64; LANES],
         out: &mut RayBlock,
     ) -> bool {
-        let Limits::Same([near, far]) = self.limits else { return false };
+        let ClipRange::Same([near, far]) = self.clip_range else { return false };
         simd.vectorize(
             #[inline(always)]
             || {

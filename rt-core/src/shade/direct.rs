@@ -1,14 +1,14 @@
 //! Light straight from the scene's lights, with or without shadow rays.
 
+use super::frame_context::FrameContext;
 use super::lobes::response;
 use super::shadow::trace_light_rays;
-use super::stage::Stage;
-use super::wave::{LightRays, RayState};
-use super::{Dimension, Point, TileArea};
-use crate::accel::Coherence;
-use crate::detail::Varied;
+use super::wavefront::{LightRays, RayState};
+use super::{Point, SampleDimension, TileArea};
+use crate::bvh::Coherence;
 use crate::effects::Effects;
-use crate::light::{PlacedKind, PlacedLight, cone_share};
+use crate::light::{ResolvedLight, ResolvedLightKind, cone_share};
+use crate::material_maps::SurfaceParameters;
 use crate::math::{max_abs, orthonormal_basis};
 use crate::ray::Ray;
 use crate::ray_stats::RayStats;
@@ -32,7 +32,7 @@ pub(super) struct Incident {
 
 /// The rays that every point sends to one light.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Sending {
+pub(crate) struct LightSampling {
     /// Whether there are shadow rays at all.
     pub(crate) traced: bool,
     /// Whether they go to different points of the light.
@@ -43,19 +43,23 @@ pub(crate) struct Sending {
     pub(crate) first_number: u32,
 }
 
-impl Sending {
+impl LightSampling {
     /// One for each of `lights`, and the number of rays to them all.
-    pub(crate) fn of(lights: &[PlacedLight], effects: Effects, light_rays: u32) -> (Vec<Sending>, u32) {
+    pub(crate) fn of(
+        lights: &[ResolvedLight],
+        effects: Effects,
+        light_rays: u32,
+    ) -> (Vec<LightSampling>, u32) {
         let shadows = effects.contains(Effects::SHADOWS);
         let soft = effects.contains(Effects::SOFT_SHADOWS);
         let mut first_number = 0;
-        let of_light = |light: &PlacedLight| {
+        let of_light = |light: &ResolvedLight| {
             let traced = shadows && light.shadows;
             let spread = soft && light.size > 0.0 && traced;
             let count = if spread { light_rays } else { 1 };
-            let sending = Sending { traced, spread, count, first_number };
+            let light_sampling = LightSampling { traced, spread, count, first_number };
             first_number += if traced { count } else { 0 };
-            sending
+            light_sampling
         };
         (lights.iter().map(of_light).collect(), first_number)
     }
@@ -64,41 +68,41 @@ impl Sending {
 /// Point of the unit square that ray `k` of `count` to light `number` belongs to; round lights spread it over their disk.
 #[inline]
 pub(super) fn light_point(sampler: &Sampler, stream: u32, number: usize, k: u32, count: u32) -> [f32; 2] {
-    sampler.square_of(stream.wrapping_add(Dimension::LIGHTS + number as u32), k, count)
+    sampler.square_of(stream.wrapping_add(SampleDimension::LIGHTS + number as u32), k, count)
 }
 
 /// Adds the light of every lamp to `points`.
 pub(crate) fn add_direct_light(
-    stage: &Stage<'_>,
+    context: &FrameContext<'_>,
     area: &TileArea,
     points: &mut [Point],
-    varied: &[Varied],
+    parameters: &[SurfaceParameters],
     states: &[RayState],
     rays: &mut LightRays,
     stats: &mut RayStats,
     cost: Option<&mut [f32]>,
 ) {
-    if varied.is_empty() {
-        shine::<false>(stage, area, points, varied, states, rays, stats, cost);
+    if parameters.is_empty() {
+        direct_lighting::<false>(context, area, points, parameters, states, rays, stats, cost);
     } else {
-        shine::<true>(stage, area, points, varied, states, rays, stats, cost);
+        direct_lighting::<true>(context, area, points, parameters, states, rays, stats, cost);
     }
 }
 
-/// As [`add_direct_light`]. `DETAIL`: some point has a finish of its own.
-fn shine<const DETAIL: bool>(
-    stage: &Stage<'_>,
+/// As [`add_direct_light`]. `MAPS`: some point has a finish of its own.
+fn direct_lighting<const MAPS: bool>(
+    context: &FrameContext<'_>,
     area: &TileArea,
     points: &mut [Point],
-    varied: &[Varied],
+    parameters: &[SurfaceParameters],
     states: &[RayState],
     rays: &mut LightRays,
     stats: &mut RayStats,
     mut cost: Option<&mut [f32]>,
 ) {
-    for (number, light) in stage.lights.iter().enumerate() {
+    for (number, light) in context.lights.iter().enumerate() {
         rays.clear();
-        let Sending { traced, spread, count, first_number } = stage.sending[number];
+        let LightSampling { traced, spread, count, first_number } = context.light_sampling[number];
         for (i, p) in points.iter_mut().enumerate() {
             if !p.lit {
                 continue;
@@ -106,11 +110,11 @@ fn shine<const DETAIL: bool>(
             let state = &states[p.lane as usize];
             // What lies along the light's own way to this point would have hidden it from the eye.
             let traced = traced && !(light.follows_camera_rays && state.first);
-            let model = p.model::<DETAIL>(stage, varied);
-            let arriving = p.varied::<DETAIL>(varied).map_or(1.0, |v| v.direct);
+            let model = p.model::<MAPS>(context, parameters);
+            let arriving = p.parameters::<MAPS>(parameters).map_or(1.0, |v| v.direct);
             for k in 0..count {
                 let at = spread
-                    .then(|| light_point(&area.sampler(stage, state.slot), state.stream, number, k, count));
+                    .then(|| light_point(&area.sampler(context, state.slot), state.stream, number, k, count));
                 let incident = incident_from(light, p.surface.point, at);
                 if incident.strength <= 0.0 {
                     continue;
@@ -118,13 +122,13 @@ fn shine<const DETAIL: bool>(
                 let (normal, color) = (p.surface.normal, p.surface.color);
                 let answer =
                     response(model, normal, color, p.view, incident.dir, light.color, light.highlight);
-                let strength = if DETAIL { arriving * incident.strength } else { incident.strength };
+                let strength = if MAPS { arriving * incident.strength } else { incident.strength };
                 let radiance = answer * (strength / count as f32);
                 if radiance == Vec3::ZERO {
                     continue;
                 }
                 if traced {
-                    let common = !spread && !stage.light_passes_surfaces();
+                    let common = !spread && !context.light_passes_surfaces();
                     let ray = shadow_ray(&p.surface, &incident, common);
                     rays.push(&ray, i as u32, radiance, first_number + k);
                 } else {
@@ -140,8 +144,9 @@ fn shine<const DETAIL: bool>(
                 cost[states[points[i as usize].lane as usize].slot as usize] += 1.0;
             }
         }
-        let counts =
-            trace_light_rays(stage, rays, Coherence::Alike, |i, light| points[i as usize].radiance += light);
+        let counts = trace_light_rays(context, rays, Coherence::Coherent, |i, light| {
+            points[i as usize].radiance += light
+        });
         stats.shadow += counts.rays;
         stats.shadow_blocked += counts.blocked;
         counts.add_to(stats);
@@ -153,9 +158,9 @@ fn shine<const DETAIL: bool>(
 /// Parallel light without size, which nearly every scene has, is decided in the caller; the rest is a call. As one function it is
 /// too long to be inlined, and untextured frames with shadows took 1.8 % more instructions.
 #[inline(always)]
-pub(super) fn incident_from(light: &PlacedLight, p: Vec3, at: Option<[f32; 2]>) -> Incident {
+pub(super) fn incident_from(light: &ResolvedLight, p: Vec3, at: Option<[f32; 2]>) -> Incident {
     match (light.kind, at) {
-        (PlacedKind::Directional { to_light }, None) => {
+        (ResolvedLightKind::Directional { to_light }, None) => {
             Incident { dir: to_light, from: None, lift: Vec3::ZERO, strength: 1.0 }
         }
         _ => incident_from_place(light, p, at),
@@ -163,9 +168,9 @@ pub(super) fn incident_from(light: &PlacedLight, p: Vec3, at: Option<[f32; 2]>) 
 }
 
 #[inline(never)]
-fn incident_from_place(light: &PlacedLight, p: Vec3, at: Option<[f32; 2]>) -> Incident {
+fn incident_from_place(light: &ResolvedLight, p: Vec3, at: Option<[f32; 2]>) -> Incident {
     let (center, normal) = match light.kind {
-        PlacedKind::Directional { to_light } => {
+        ResolvedLightKind::Directional { to_light } => {
             let dir = if let Some(at) = at {
                 let [x, y] = unit_disk(at);
                 // Uniform over the disk that the light covers in the sky.
@@ -176,15 +181,17 @@ fn incident_from_place(light: &PlacedLight, p: Vec3, at: Option<[f32; 2]>) -> In
             };
             return Incident { dir, from: None, lift: Vec3::ZERO, strength: 1.0 };
         }
-        PlacedKind::Point { position } => (position, (p - position).as_dvec3().normalize_or_zero().as_vec3()),
-        PlacedKind::Spot { position, direction, .. }
-        | PlacedKind::Cone { position, direction, .. }
-        | PlacedKind::Ring { position, direction, .. }
-        | PlacedKind::Quad { position, direction, .. }
-        | PlacedKind::Disk { position, direction } => (position, direction),
+        ResolvedLightKind::Point { position } => {
+            (position, (p - position).as_dvec3().normalize_or_zero().as_vec3())
+        }
+        ResolvedLightKind::Spot { position, direction, .. }
+        | ResolvedLightKind::Cone { position, direction, .. }
+        | ResolvedLightKind::Ring { position, direction, .. }
+        | ResolvedLightKind::Quad { position, direction, .. }
+        | ResolvedLightKind::Disk { position, direction } => (position, direction),
     };
     let from = match (at, light.kind) {
-        (Some([x, y]), PlacedKind::Quad { edges: [a, b], .. }) => {
+        (Some([x, y]), ResolvedLightKind::Quad { edges: [a, b], .. }) => {
             center + a * (2.0 * x - 1.0) + b * (2.0 * y - 1.0)
         }
         (Some(at), kind) if normal != Vec3::ZERO => {
@@ -205,7 +212,7 @@ fn incident_from_place(light: &PlacedLight, p: Vec3, at: Option<[f32; 2]>) -> In
         None => 1.0,
     };
     match light.kind {
-        PlacedKind::Spot { direction, cos_cutoff, exponent, .. } => {
+        ResolvedLightKind::Spot { direction, cos_cutoff, exponent, .. } => {
             let cos = -dir.dot(direction);
             strength *= if cos < cos_cutoff {
                 0.0
@@ -215,25 +222,25 @@ fn incident_from_place(light: &PlacedLight, p: Vec3, at: Option<[f32; 2]>) -> In
                 cos.max(0.0).powf(exponent)
             };
         }
-        PlacedKind::Cone { direction, cos_inner, cos_outer, .. } => {
+        ResolvedLightKind::Cone { direction, cos_inner, cos_outer, .. } => {
             strength *= cone_share(-dir.dot(direction), cos_inner, cos_outer);
         }
-        PlacedKind::Disk { direction, .. } => strength *= (-dir.dot(direction)).max(0.0),
-        PlacedKind::Ring { direction, cos_inner, cos_outer, .. } => {
+        ResolvedLightKind::Disk { direction, .. } => strength *= (-dir.dot(direction)).max(0.0),
+        ResolvedLightKind::Ring { direction, cos_inner, cos_outer, .. } => {
             let cos = -dir.dot(direction);
             strength *= cone_share(cos, cos_inner, cos_outer) * cos.max(0.0);
         }
-        PlacedKind::Quad { direction, both_sides, .. } => {
+        ResolvedLightKind::Quad { direction, both_sides, .. } => {
             let cos = -dir.dot(direction);
             strength *= if both_sides { cos.abs() } else { cos.max(0.0) };
         }
-        PlacedKind::Directional { .. } | PlacedKind::Point { .. } => {}
+        ResolvedLightKind::Directional { .. } | ResolvedLightKind::Point { .. } => {}
     }
     let lift = match light.kind {
-        PlacedKind::Disk { direction, .. } | PlacedKind::Ring { direction, .. } => {
+        ResolvedLightKind::Disk { direction, .. } | ResolvedLightKind::Ring { direction, .. } => {
             off_plane(direction, dir, max_abs(center) + light.size)
         }
-        PlacedKind::Quad { direction, edges: [a, b], .. } => {
+        ResolvedLightKind::Quad { direction, edges: [a, b], .. } => {
             off_plane(direction, dir, max_abs(center) + max_abs(a) + max_abs(b))
         }
         _ => Vec3::ZERO,
@@ -250,8 +257,8 @@ fn off_plane(normal: Vec3, to_light: Vec3, reach: f32) -> Vec3 {
 
 /// A point of the unit disk spread over the ring that is left around a light's hole, with the same density everywhere.
 #[inline]
-fn in_ring(at: [f32; 2], kind: PlacedKind) -> [f32; 2] {
-    let PlacedKind::Ring { hole, .. } = kind else { return at };
+fn in_ring(at: [f32; 2], kind: ResolvedLightKind) -> [f32; 2] {
+    let ResolvedLightKind::Ring { hole, .. } = kind else { return at };
     let squared = at[0] * at[0] + at[1] * at[1];
     if hole <= 0.0 || squared == 0.0 {
         return at;

@@ -1,6 +1,6 @@
 //! Depth, distance and ids of sixteen hits at once: [`TileLayers::record`] in loops over plain f64 arrays, which become vector code. Same functions, same bits.
 
-use super::stage::{Stage, point_on_ray};
+use super::frame_context::{FrameContext, point_on_ray};
 use super::tile::{TileArea, TileLayers, block_place, lane_pixel};
 use crate::ray::{HitBlock, LANES, NO_HIT, RayBlock};
 use crate::surface::Planes;
@@ -10,7 +10,7 @@ use glam::DVec3;
 /// Fills depth, distance and ids of block `b` where it was hit. The rays go through the pixels' centres; normals are left to the caller.
 pub(super) fn record_block<S: Simd>(
     simd: S,
-    stage: &Stage<'_>,
+    context: &FrameContext<'_>,
     area: &TileArea,
     b: usize,
     rays: &RayBlock,
@@ -32,8 +32,8 @@ pub(super) fn record_block<S: Simd>(
     if out.depth.is_empty() && out.distance.is_empty() {
         return;
     }
-    if stage.camera.is_omnidirectional() {
-        return panorama(stage, area, b, rays, hits, out);
+    if context.camera.is_omnidirectional() {
+        return panorama(context, area, b, rays, hits, out);
     }
     let mut planes = Planes::new();
     let mut left = hit;
@@ -42,9 +42,16 @@ pub(super) fn record_block<S: Simd>(
         let same = (0..LANES).fold(0u16, |m, l| m | ((hits.instance[l] == instance) as u16) << l);
         let lanes = left & same;
         left &= !lanes;
-        stage.instances[instance as usize].plane_block(simd, lanes, rays, hits, stage.origin, &mut planes);
+        context.instances[instance as usize].plane_block(
+            simd,
+            lanes,
+            rays,
+            hits,
+            context.origin,
+            &mut planes,
+        );
     }
-    let (depth, distance) = depth_and_distance(simd, stage, area, b, &planes);
+    let (depth, distance) = depth_and_distance(simd, context, area, b, &planes);
     for (layer, values) in [(&mut out.depth, &depth), (&mut out.distance, &distance)] {
         if let Some(layer) = layer.get_mut(slots.clone()) {
             for lane in 0..LANES {
@@ -57,7 +64,7 @@ pub(super) fn record_block<S: Simd>(
 /// Depth and distance of panoramas, pixel by pixel.
 #[cold]
 fn panorama(
-    stage: &Stage<'_>,
+    context: &FrameContext<'_>,
     area: &TileArea,
     b: usize,
     rays: &RayBlock,
@@ -67,7 +74,8 @@ fn panorama(
     for lane in 0..LANES {
         let slot = b * LANES + lane;
         let (Some(hit), Some([x, y])) = (hits.get(lane), area.pixel(slot as u16)) else { continue };
-        let (depth, distance) = stage.depth_and_distance(stage.ndc(x, y, [0.5; 2]), &rays.get(lane), &hit);
+        let (depth, distance) =
+            context.depth_and_distance(context.ndc(x, y, [0.5; 2]), &rays.get(lane), &hit);
         for (layer, value) in [(&mut out.depth, depth), (&mut out.distance, distance)] {
             if let Some(v) = layer.get_mut(slot) {
                 *v = value;
@@ -79,7 +87,7 @@ fn panorama(
 #[inline(never)]
 fn depth_and_distance<S: Simd>(
     simd: S,
-    stage: &Stage<'_>,
+    context: &FrameContext<'_>,
     area: &TileArea,
     b: usize,
     planes: &Planes,
@@ -88,10 +96,10 @@ fn depth_and_distance<S: Simd>(
     let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
     for lane in 0..LANES {
         let [i, j] = lane_pixel(lane);
-        [x[lane], y[lane]] = stage.ndc(area.x + (column + i) as u32, area.y + (row + j) as u32, [0.5; 2]);
+        [x[lane], y[lane]] = context.ndc(area.x + (column + i) as u32, area.y + (row + j) as u32, [0.5; 2]);
     }
     // A copy whose fields no store can change.
-    let camera = stage.camera;
+    let camera = context.camera;
     simd.vectorize(
         #[inline(always)]
         || {

@@ -3,7 +3,7 @@
 use super::microfacet::{ggx, schlick};
 use super::specular::reflection_of;
 use crate::effects::Effects;
-use crate::material::{Highlight, PbrForm, SurfaceModel};
+use crate::material::{PbrForm, PhongForm, SurfaceModel};
 use glam::Vec3;
 use std::f32::consts::PI;
 
@@ -38,9 +38,9 @@ pub(crate) fn response(
                 return matte;
             }
             let base = match form {
-                Highlight::HalfVector => normal.dot((l + view).normalize_or_zero()),
-                Highlight::Mirrored => (normal * (2.0 * cos) - l).dot(view),
-                Highlight::TowardsLight => cos,
+                PhongForm::HalfVector => normal.dot((l + view).normalize_or_zero()),
+                PhongForm::Mirrored => (normal * (2.0 * cos) - l).dot(view),
+                PhongForm::TowardsLight => cos,
             };
             // 0^0 is 1 in OpenGL: shininess 0 lights the whole side.
             matte + specular * highlight * power(base.max(0.0), shininess)

@@ -8,6 +8,8 @@
 mod ambient_occlusion;
 mod camera_rays;
 mod direct;
+pub mod distributed;
+mod frame_context;
 mod layers;
 mod lobes;
 mod local;
@@ -16,39 +18,37 @@ mod path;
 mod point;
 mod shadow;
 mod specular;
-mod stage;
 mod tile;
 mod volumes;
-mod wave;
-pub mod waves;
+mod wavefront;
 
+pub(crate) use frame_context::FrameContext;
 pub(crate) use point::Point;
 pub(crate) use specular::reflection_of;
-pub(crate) use stage::Stage;
 pub(crate) use tile::{TILE, TileArea, TileLayers};
 
-use crate::accel::{Among, Coherence};
-use crate::detail::Varied;
+use crate::bvh::{Coherence, InstanceFilter};
 use crate::effects::Effects;
 use crate::frame::Layers;
 use crate::material::SurfaceModel;
+use crate::material_maps::SurfaceParameters;
 use crate::ray::{HitBlock, LANES, NO_HIT, Ray, RayBlock};
 use crate::ray_stats::RayStats;
 use crate::sampler::SamplerBlock;
-use crate::surface::{Placed, SurfacePoint};
+use crate::surface::{ResolvedInstance, SurfacePoint};
 use fearless_simd::{Simd, dispatch};
 use glam::Vec3;
-use point::AS_MATERIAL;
+use point::NO_PARAMETERS;
 use tile::{PIXELS, block_place, lane_pixel};
-use wave::{LightRays, RayKind, RayState, Wave};
+use wavefront::{LightRays, RayKind, RayState, Wavefront};
 
 /// Opacity from which on a surface is opaque: corners of alpha 1 come out some roundings below 1 between them.
 const OPAQUE: f32 = 1.0 - 8.0 * f32::EPSILON;
 
 /// Sampler dimensions, counted from a ray's own stream.
-pub(crate) struct Dimension;
+pub(crate) struct SampleDimension;
 
-impl Dimension {
+impl SampleDimension {
     const PIXEL: u32 = 0;
     const LENS: u32 = 1;
     const CHOICE: u32 = 2;
@@ -61,52 +61,59 @@ impl Dimension {
 /// Buffers of one thread, kept from tile to tile.
 #[derive(Default)]
 pub(crate) struct Workspace {
-    current: Wave,
-    behind: Wave,
-    scattered: Wave,
+    current: Wavefront,
+    behind: Wavefront,
+    scattered: Wavefront,
     hits: Vec<HitBlock>,
     /// Of each ray the surface at its hit, where somebody else has looked at it; empty where this scene's world is asked.
     surfaces: Vec<SurfacePoint>,
     points: Vec<Point>,
     /// Finishes of points whose material has detail.
-    varied: Vec<Varied>,
+    parameters: Vec<SurfaceParameters>,
     light_rays: LightRays,
     occlusion: ambient_occlusion::OcclusionBuffers,
     /// Of each ray what it collects in the volume up to its hit, where others hold the volume's bricks; empty where it is whole here.
-    crossed: Vec<crate::volume::VolumeSample>,
+    volume_samples: Vec<crate::volume::VolumeSample>,
     /// One ray in the object spaces of all volumes.
-    along: Vec<Ray>,
+    object_rays: Vec<Ray>,
     /// Premultiplied RGBA of this sample.
     pixels: Vec<[f32; 4]>,
 }
 
 /// Adds sample number `sample` to every pixel of the tile.
 pub(crate) fn render_tile(
-    stage: &Stage<'_>,
+    context: &FrameContext<'_>,
     area: &TileArea,
     out: &mut TileLayers,
     work: &mut Workspace,
     sample: u32,
 ) -> RayStats {
     let mut stats = RayStats::default();
-    let layers = stage.options.layers;
-    let centered = stage.options.samples <= 1 && !stage.effects.contains(Effects::DEPTH_OF_FIELD);
+    let layers = context.options.layers;
+    let centered = context.options.samples <= 1 && !context.effects.contains(Effects::DEPTH_OF_FIELD);
     let wants_geometry = layers.intersects(Layers::GEOMETRY) && sample == 0;
 
     // Depth, normals and ids belong to the pixel centre: rays of their own unless the colour's rays go there anyway.
     if wants_geometry && !(centered && layers.contains(Layers::COLOR)) {
-        trace_geometry_layers(stage, area, out, work, &mut stats);
+        trace_geometry_layers(context, area, out, work, &mut stats);
     }
     if !layers.contains(Layers::COLOR) {
         return stats;
     }
     let record = wants_geometry && centered;
-    if local::suffices(stage) {
+    if local::is_sufficient(context) {
         let jittered = (!centered).then_some(sample);
-        local::render_tile(stage, area, out, work, jittered, record, &mut stats);
+        local::render_tile(context, area, out, work, jittered, record, &mut stats);
         return stats;
     }
-    camera_wave(stage, area, &mut work.current, (!centered).then_some(sample), &mut stats, out.cost_mut());
+    generate_camera_wavefront(
+        context,
+        area,
+        &mut work.current,
+        (!centered).then_some(sample),
+        &mut stats,
+        out.cost_mut(),
+    );
     if sample == 0 {
         work.pixels = std::mem::take(&mut out.color);
     }
@@ -118,15 +125,15 @@ pub(crate) fn render_tile(
     let mut coherent = true;
     let mut area_sample = *area;
     area_sample.sample = sample;
-    let mut record_all = record && !stage.effects.contains(Effects::TRANSPARENCY);
+    let mut record_all = record && !context.effects.contains(Effects::TRANSPARENCY);
     loop {
-        trace(stage, work, coherent);
+        trace(context, work, coherent);
         if std::mem::take(&mut record_all) {
-            record_camera_hits(stage, &area_sample, out, work);
+            record_camera_hits(context, &area_sample, out, work);
         }
-        meet_surfaces(stage, &area_sample, out, work, record, &mut stats);
-        light_points(stage, &area_sample, out, work, &mut stats);
-        send_rays(stage, &area_sample, out, work, &mut stats);
+        process_hits(context, &area_sample, out, work, record, &mut stats);
+        shade_points(context, &area_sample, out, work, &mut stats);
+        spawn_rays(context, &area_sample, out, work, &mut stats);
         coherent = !work.behind.is_empty();
         let next = if coherent { &mut work.behind } else { &mut work.scattered };
         if next.is_empty() {
@@ -143,11 +150,11 @@ pub(crate) fn render_tile(
     stats
 }
 
-/// Rays of every pixel of the tile with their states, see [`camera_blocks`].
-fn camera_wave(
-    stage: &Stage<'_>,
+/// Rays of every pixel of the tile with their states, see [`generate_camera_rays`].
+fn generate_camera_wavefront(
+    context: &FrameContext<'_>,
     area: &TileArea,
-    wave: &mut Wave,
+    wave: &mut Wavefront,
     sample: Option<u32>,
     stats: &mut RayStats,
     cost: Option<&mut [f32]>,
@@ -163,13 +170,13 @@ fn camera_wave(
         kind: RayKind::Camera,
         first: true,
     }));
-    camera_blocks(stage, area, &mut wave.blocks, sample, stats, cost);
+    generate_camera_rays(context, area, &mut wave.blocks, sample, stats, cost);
 }
 
 /// Rays of every pixel of the tile, in Morton order; lanes outside the picture are inactive. `sample` of `None` aims at pixel
 /// centres through the middle of the lens.
-fn camera_blocks(
-    stage: &Stage<'_>,
+fn generate_camera_rays(
+    context: &FrameContext<'_>,
     area: &TileArea,
     blocks: &mut Vec<RayBlock>,
     sample: Option<u32>,
@@ -180,10 +187,12 @@ fn camera_blocks(
     if let Some(cost) = cost {
         cost.iter_mut().for_each(|c| *c += 1.0);
     }
-    let through_lens = stage.effects.contains(Effects::DEPTH_OF_FIELD) && sample.is_some();
+    let through_lens = context.effects.contains(Effects::DEPTH_OF_FIELD) && sample.is_some();
     blocks.resize(PIXELS / LANES, RayBlock::INACTIVE);
-    if through_lens || !dispatch!(stage.level, simd => pinhole_blocks(simd, stage, area, blocks, sample)) {
-        single_rays(stage, area, blocks, sample, through_lens);
+    if through_lens
+        || !dispatch!(context.level, simd => generate_pinhole_rays(simd, context, area, blocks, sample))
+    {
+        generate_single_rays(context, area, blocks, sample, through_lens);
     }
     // The picture's edge cuts tiles.
     if area.width < TILE || area.height < TILE {
@@ -194,10 +203,10 @@ fn camera_blocks(
     }
 }
 
-/// Camera rays sixteen at a time; false where they need the arithmetic of [`single_rays`].
-fn pinhole_blocks<S: Simd>(
+/// Camera rays sixteen at a time; false where they need the arithmetic of [`generate_single_rays`].
+fn generate_pinhole_rays<S: Simd>(
     simd: S,
-    stage: &Stage<'_>,
+    context: &FrameContext<'_>,
     area: &TileArea,
     blocks: &mut [RayBlock],
     sample: Option<u32>,
@@ -207,12 +216,12 @@ fn pinhole_blocks<S: Simd>(
     for k in 0..TILE as usize / 4 {
         for lane in 0..LANES {
             let [i, j] = lane_pixel(lane);
-            let [x, y] = stage.ndc(area.x + (4 * k + i) as u32, area.y + (4 * k + j) as u32, [0.5; 2]);
+            let [x, y] = context.ndc(area.x + (4 * k + i) as u32, area.y + (4 * k + j) as u32, [0.5; 2]);
             (centres[0][k][lane], centres[1][k][lane]) = (x, y);
         }
     }
-    let spread = stage.options.samples > 1;
-    let mut sampler = SamplerBlock::new(stage.options.sampling);
+    let spread = context.options.samples > 1;
+    let mut sampler = SamplerBlock::new(context.options.sampling);
     for (b, block) in blocks.iter_mut().enumerate() {
         let [column, row] = block_place(b);
         let filled = match sample {
@@ -222,15 +231,15 @@ fn pinhole_blocks<S: Simd>(
                     let [i, j] = lane_pixel(lane);
                     (px[lane], py[lane]) = (area.x + (4 * column + i) as u32, area.y + (4 * row + j) as u32);
                 }
-                sampler.set_pixels(simd, stage.options.seed, (&px, &py), sample, Dimension::PIXEL);
+                sampler.set_pixels(simd, context.options.seed, (&px, &py), sample, SampleDimension::PIXEL);
                 let at = sampler.squares(simd);
                 let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
                 for lane in 0..LANES {
-                    [x[lane], y[lane]] = stage.ndc(px[lane], py[lane], [at[0][lane], at[1][lane]]);
+                    [x[lane], y[lane]] = context.ndc(px[lane], py[lane], [at[0][lane], at[1][lane]]);
                 }
-                stage.camera_rays.fill_block(simd, &x, &y, block)
+                context.camera_rays.fill_block(simd, &x, &y, block)
             }
-            _ => stage.camera_rays.fill_block(simd, &centres[0][column], &centres[1][row], block),
+            _ => context.camera_rays.fill_block(simd, &centres[0][column], &centres[1][row], block),
         };
         if !filled {
             return false;
@@ -240,8 +249,8 @@ fn pinhole_blocks<S: Simd>(
 }
 
 /// Camera rays one by one, for lenses and near planes that cut every ray elsewhere.
-fn single_rays(
-    stage: &Stage<'_>,
+fn generate_single_rays(
+    context: &FrameContext<'_>,
     area: &TileArea,
     blocks: &mut [RayBlock],
     sample: Option<u32>,
@@ -251,66 +260,66 @@ fn single_rays(
         let Some([x, y]) = area.pixel(slot) else { continue };
         let (mut at, mut lens) = ([0.5; 2], [0.0; 2]);
         if let Some(sample) = sample {
-            let sampler = stage.sampler(x, y, sample);
-            if stage.options.samples > 1 {
-                at = sampler.square(Dimension::PIXEL);
+            let sampler = context.sampler(x, y, sample);
+            if context.options.samples > 1 {
+                at = sampler.square(SampleDimension::PIXEL);
             }
             if through_lens {
-                lens = crate::sampler::unit_disk(sampler.square(Dimension::LENS));
+                lens = crate::sampler::unit_disk(sampler.square(SampleDimension::LENS));
             }
         }
-        let [nx, ny] = stage.ndc(x, y, at);
-        let ray = stage.camera_rays.ray(nx, ny, lens);
+        let [nx, ny] = context.ndc(x, y, at);
+        let ray = context.camera_rays.ray(nx, ny, lens);
         blocks[slot as usize / LANES].set(slot as usize % LANES, &ray);
     }
 }
 
-fn trace(stage: &Stage<'_>, work: &mut Workspace, coherent: bool) {
+fn trace(context: &FrameContext<'_>, work: &mut Workspace, coherent: bool) {
     // What is in it does not matter: tracing starts with misses everywhere.
     work.hits.resize(work.current.blocks.len(), HitBlock::MISS);
-    let coherence = if coherent { Coherence::Alike } else { Coherence::Scattered };
-    let world = &stage.scene.world;
-    world.closest_stream(&work.current.blocks, &mut work.hits, coherence, Among::All);
-    prefetch_surfaces(stage, &work.hits);
+    let coherence = if coherent { Coherence::Coherent } else { Coherence::Incoherent };
+    let world = &context.scene.world;
+    world.closest_stream(&work.current.blocks, &mut work.hits, coherence, InstanceFilter::All);
+    prefetch_surfaces(context, &work.hits);
 }
 
 /// Asks for everything that looking at the hits will read, first the triangles and then what they name: one after the other, these waits were
 /// half of the time of shading (measured on a million triangles).
-fn prefetch_surfaces(stage: &Stage<'_>, hits: &[HitBlock]) {
-    fn each(stage: &Stage<'_>, hits: &[HitBlock], f: impl Fn(&Placed<'_>, u32)) {
+fn prefetch_surfaces(context: &FrameContext<'_>, hits: &[HitBlock]) {
+    fn each(context: &FrameContext<'_>, hits: &[HitBlock], f: impl Fn(&ResolvedInstance<'_>, u32)) {
         for h in hits {
             for lane in (0..LANES).filter(|l| h.prim[*l] != NO_HIT) {
-                f(&stage.instances[h.instance[lane] as usize], h.prim[lane]);
+                f(&context.instances[h.instance[lane] as usize], h.prim[lane]);
             }
         }
     }
-    each(stage, hits, |placed, prim| placed.prefetch_triangle(prim));
-    each(stage, hits, |placed, prim| placed.prefetch_vertices(prim));
+    each(context, hits, |resolved, prim| resolved.prefetch_triangle(prim));
+    each(context, hits, |resolved, prim| resolved.prefetch_vertices(prim));
 }
 
 /// Depth, distance, normal and ids of the first surface of at least `depth_min_opacity`.
 fn trace_geometry_layers(
-    stage: &Stage<'_>,
+    context: &FrameContext<'_>,
     area: &TileArea,
     out: &mut TileLayers,
     work: &mut Workspace,
     stats: &mut RayStats,
 ) {
-    camera_wave(stage, area, &mut work.current, None, stats, out.cost_mut());
-    if !stage.effects.contains(Effects::TRANSPARENCY) {
-        trace(stage, work, true);
-        record_camera_hits(stage, area, out, work);
+    generate_camera_wavefront(context, area, &mut work.current, None, stats, out.cost_mut());
+    if !context.effects.contains(Effects::TRANSPARENCY) {
+        trace(context, work, true);
+        record_camera_hits(context, area, out, work);
         return;
     }
     loop {
-        trace(stage, work, true);
+        trace(context, work, true);
         work.behind.clear();
         for i in 0..work.current.states.len() {
             let Some(hit) = work.hits[i / LANES].get(i % LANES) else { continue };
             let (ray, state) = (work.current.ray(i), work.current.states[i]);
-            let s = stage.surface(&ray, &hit);
-            if s.opacity > 0.0 && s.opacity >= stage.options.depth_min_opacity {
-                out.record(stage, area, state.slot, &ray, &hit, || s.normal);
+            let s = context.surface(&ray, &hit);
+            if s.opacity > 0.0 && s.opacity >= context.options.depth_min_opacity {
+                out.record(context, area, state.slot, &ray, &hit, || s.normal);
             } else {
                 let ray = Ray { t_min: s.t_behind(&ray, hit.t), ..ray };
                 if ray.is_valid() {
@@ -327,20 +336,20 @@ fn trace_geometry_layers(
 }
 
 /// Geometry layers of the first surfaces of all pixels, opaque or not.
-fn record_camera_hits(stage: &Stage<'_>, area: &TileArea, out: &mut TileLayers, work: &Workspace) {
+fn record_camera_hits(context: &FrameContext<'_>, area: &TileArea, out: &mut TileLayers, work: &Workspace) {
     for (b, (rays, hits)) in work.current.blocks.iter().zip(&work.hits).enumerate() {
-        dispatch!(stage.level, simd => layers::record_block(simd, stage, area, b, rays, hits, out));
-        if stage.options.layers.contains(Layers::NORMAL) {
+        dispatch!(context.level, simd => layers::record_block(simd, context, area, b, rays, hits, out));
+        if context.options.layers.contains(Layers::NORMAL) {
             let hit = (0..LANES).fold(0u16, |m, l| m | ((hits.prim[l] != NO_HIT) as u16) << l);
-            let normal = |l| hits.get(l).map_or(Vec3::ZERO, |h| stage.surface(&rays.get(l), &h).normal);
+            let normal = |l| hits.get(l).map_or(Vec3::ZERO, |h| context.surface(&rays.get(l), &h).normal);
             out.record_normals(b, hit, normal);
         }
     }
 }
 
 /// Hits become points to shade; misses add the background or the surroundings.
-fn meet_surfaces(
-    stage: &Stage<'_>,
+fn process_hits(
+    context: &FrameContext<'_>,
     area: &TileArea,
     out: &mut TileLayers,
     work: &mut Workspace,
@@ -348,26 +357,26 @@ fn meet_surfaces(
     stats: &mut RayStats,
 ) {
     // Where somebody else has looked at the hits, their finishes did not travel.
-    if stage.has_detail && work.surfaces.is_empty() {
-        meet::<true>(stage, area, out, work, record, stats);
+    if context.has_maps && work.surfaces.is_empty() {
+        process_hits_with::<true>(context, area, out, work, record, stats);
     } else {
-        meet::<false>(stage, area, out, work, record, stats);
+        process_hits_with::<false>(context, area, out, work, record, stats);
     }
 }
 
-/// As [`meet_surfaces`]. `DETAIL`: some material has detail.
-fn meet<const DETAIL: bool>(
-    stage: &Stage<'_>,
+/// As [`process_hits`]. `MAPS`: some material has detail.
+fn process_hits_with<const MAPS: bool>(
+    context: &FrameContext<'_>,
     area: &TileArea,
     out: &mut TileLayers,
     work: &mut Workspace,
     record: bool,
     stats: &mut RayStats,
 ) {
-    let transparent = stage.effects.contains(Effects::TRANSPARENCY);
-    let refraction = stage.effects.intersects(Effects::REFRACTION | Effects::PATH_TRACING);
+    let transparent = context.effects.contains(Effects::TRANSPARENCY);
+    let refraction = context.effects.intersects(Effects::REFRACTION | Effects::PATH_TRACING);
     work.points.clear();
-    work.varied.clear();
+    work.parameters.clear();
     for i in 0..work.current.states.len() {
         let (block, lane) = (&work.current.blocks[i / LANES], i % LANES);
         if block.t_max[lane] < block.t_min[lane] {
@@ -375,24 +384,24 @@ fn meet<const DETAIL: bool>(
         }
         let ray = block.get(lane);
         let hit = work.hits[i / LANES].get(lane);
-        if !stage.volumes.is_empty() {
+        if !context.volumes.is_empty() {
             let t_end = hit.map_or(ray.t_max, |h| h.t);
-            let sample = match work.crossed.get(i) {
+            let sample = match work.volume_samples.get(i) {
                 Some(collected_elsewhere) => *collected_elsewhere,
-                None => volumes::collected(stage, &ray, t_end, &mut work.along),
+                None => volumes::integrate_volumes(context, &ray, t_end, &mut work.object_rays),
             };
-            volumes::cross(&sample, &mut work.current.states[i], &mut work.pixels, stats);
+            volumes::composite_volume(&sample, &mut work.current.states[i], &mut work.pixels, stats);
         }
         let Some(hit) = hit else {
-            add_miss(stage, area, &work.current.states[i], ray.dir, &mut work.pixels);
+            add_miss(context, area, &work.current.states[i], ray.dir, &mut work.pixels);
             continue;
         };
-        let placed = stage.placed(&hit);
+        let resolved = context.instance_at(&hit);
         let mut surface = match work.surfaces.get(i) {
             Some(seen_elsewhere) => *seen_elsewhere,
-            None => placed.surface(&ray, &hit),
+            None => resolved.surface(&ray, &hit),
         };
-        let varied = if DETAIL { placed.varied(&ray, &hit, &mut surface.normal) } else { None };
+        let parameters = if MAPS { resolved.parameters(&ray, &hit, &mut surface.normal) } else { None };
         if !transparent {
             stats.opacity_ignored += (surface.opacity < OPAQUE) as u64;
             surface.opacity = 1.0;
@@ -404,12 +413,12 @@ fn meet<const DETAIL: bool>(
             state.throughput *= (-state.absorption * ((hit.t - ray.t_min) * length)).exp();
         }
         if record && transparent && state.kind == RayKind::Camera {
-            let shown = surface.opacity > 0.0 && surface.opacity >= stage.options.depth_min_opacity;
+            let shown = surface.opacity > 0.0 && surface.opacity >= context.options.depth_min_opacity;
             if shown && !out.is_recorded(state.slot) {
-                out.record(stage, area, state.slot, &ray, &hit, || surface.normal);
+                out.record(context, area, state.slot, &ray, &hit, || surface.normal);
             }
         }
-        let (lit, radiance) = match placed.material.model {
+        let (lit, radiance) = match resolved.material.model {
             SurfaceModel::Unlit => (false, surface.color),
             SurfaceModel::Dielectric { .. } if refraction => (false, Vec3::ZERO),
             _ => (surface.opacity > 0.0, Vec3::ZERO),
@@ -417,32 +426,38 @@ fn meet<const DETAIL: bool>(
         work.points.push(Point {
             surface,
             view: ray.dir * (-1.0 / length),
-            radiance: radiance + varied.map_or(placed.material.emission.into(), |v| v.emission),
+            radiance: radiance + parameters.map_or(resolved.material.emission.into(), |v| v.emission),
             t: hit.t,
             lane: i as u32,
             instance: hit.instance,
             lit,
-            varied: varied.map_or(AS_MATERIAL, |v| {
-                work.varied.push(v);
-                work.varied.len() as u32 - 1
+            parameters: parameters.map_or(NO_PARAMETERS, |v| {
+                work.parameters.push(v);
+                work.parameters.len() as u32 - 1
             }),
         });
     }
 }
 
-fn add_miss(stage: &Stage<'_>, area: &TileArea, state: &RayState, dir: Vec3, pixels: &mut [[f32; 4]]) {
+fn add_miss(
+    context: &FrameContext<'_>,
+    area: &TileArea,
+    state: &RayState,
+    dir: Vec3,
+    pixels: &mut [[f32; 4]],
+) {
     let pixel = &mut pixels[state.slot as usize];
     let radiance = match state.kind {
         RayKind::Camera => {
             let [_, y] = area.pixel(state.slot).unwrap_or_default();
-            let [r, g, b, a] = stage.background(y, dir);
+            let [r, g, b, a] = context.background(y, dir);
             pixel[3] += state.coverage * a;
             Vec3::new(r, g, b) * a
         }
-        RayKind::Reflected | RayKind::Refracted => stage.surroundings(dir),
+        RayKind::Reflected | RayKind::Refracted => context.surroundings(dir),
         RayKind::Diffuse => {
-            let environment = stage.scene.environment.as_ref();
-            stage.ambient + environment.map_or(Vec3::ZERO, |e| e.radiance(dir.normalize_or_zero()))
+            let environment = context.scene.environment.as_ref();
+            context.ambient + environment.map_or(Vec3::ZERO, |e| e.radiance(dir.normalize_or_zero()))
         }
     };
     let added = state.throughput * radiance;
@@ -451,36 +466,36 @@ fn add_miss(stage: &Stage<'_>, area: &TileArea, state: &RayState, dir: Vec3, pix
     }
 }
 
-fn light_points(
-    stage: &Stage<'_>,
+fn shade_points(
+    context: &FrameContext<'_>,
     area: &TileArea,
     out: &mut TileLayers,
     work: &mut Workspace,
     stats: &mut RayStats,
 ) {
-    add_light(stage, area, work, stats, out.cost_mut());
-    add_up(stage, area, work);
+    add_light(context, area, work, stats, out.cost_mut());
+    accumulate_radiance(context, area, work);
 }
 
 /// Light that falls onto the wave's points.
 fn add_light(
-    stage: &Stage<'_>,
+    context: &FrameContext<'_>,
     area: &TileArea,
     work: &mut Workspace,
     stats: &mut RayStats,
     mut cost: Option<&mut [f32]>,
 ) {
-    let Workspace { current, points, varied, light_rays, occlusion, .. } = work;
-    if !stage.lights.is_empty() {
+    let Workspace { current, points, parameters, light_rays, occlusion, .. } = work;
+    if !context.lights.is_empty() {
         let cost = cost.as_deref_mut();
-        direct::add_direct_light(stage, area, points, varied, &current.states, light_rays, stats, cost);
+        direct::add_direct_light(context, area, points, parameters, &current.states, light_rays, stats, cost);
     }
-    if stage.mean_radiance.is_some() && !stage.effects.contains(Effects::PATH_TRACING) {
+    if context.irradiance.is_some() && !context.effects.contains(Effects::PATH_TRACING) {
         ambient_occlusion::add_ambient_light(
-            stage,
+            context,
             area,
             points,
-            varied,
+            parameters,
             &current.states,
             light_rays,
             occlusion,
@@ -491,10 +506,10 @@ fn add_light(
 }
 
 /// What the wave's points send to the eye, into the pixels.
-fn add_up(stage: &Stage<'_>, area: &TileArea, work: &mut Workspace) {
+fn accumulate_radiance(context: &FrameContext<'_>, area: &TileArea, work: &mut Workspace) {
     let Workspace { current, points, pixels, .. } = work;
     // The path tracer chooses between surface and what is behind by chance, with the same mean.
-    let split = !stage.effects.contains(Effects::PATH_TRACING);
+    let split = !context.effects.contains(Effects::PATH_TRACING);
     for p in points.iter() {
         let state = &current.states[p.lane as usize];
         let opacity = p.surface.opacity;
@@ -505,7 +520,7 @@ fn add_up(stage: &Stage<'_>, area: &TileArea, work: &mut Workspace) {
                 pixel[c] += added[c];
             }
             pixel[3] += state.coverage * opacity;
-        } else if path::scatters(stage, area, state, p) {
+        } else if path::scatters(context, area, state, p) {
             let added = state.throughput * p.radiance;
             for c in 0..3 {
                 pixel[c] += added[c];
@@ -516,23 +531,23 @@ fn add_up(stage: &Stage<'_>, area: &TileArea, work: &mut Workspace) {
 }
 
 /// Rays that go on from the wave's points.
-fn send_rays(
-    stage: &Stage<'_>,
+fn spawn_rays(
+    context: &FrameContext<'_>,
     area: &TileArea,
     out: &mut TileLayers,
     work: &mut Workspace,
     stats: &mut RayStats,
 ) {
-    let e = stage.effects;
+    let e = context.effects;
     let (before_behind, before_scattered) = (work.behind.states.len(), work.scattered.states.len());
     if e.contains(Effects::PATH_TRACING) {
-        path::continue_paths(stage, area, work, stats);
+        path::continue_paths(context, area, work, stats);
     } else {
         if e.intersects(Effects::REFLECTION | Effects::GLOSSY_REFLECTION | Effects::REFRACTION) {
-            specular::send_specular_rays(stage, area, work, stats);
+            specular::spawn_specular_rays(context, area, work, stats);
         }
         if e.contains(Effects::TRANSPARENCY) {
-            send_behind(stage, work, stats);
+            spawn_transparent_rays(context, work, stats);
         }
     }
     if let Some(cost) = out.cost_mut() {
@@ -544,7 +559,7 @@ fn send_rays(
 }
 
 /// Continues rays behind transparent surfaces: the same ray with a later start, so that packets stay packets.
-fn send_behind(stage: &Stage<'_>, work: &mut Workspace, stats: &mut RayStats) {
+fn spawn_transparent_rays(context: &FrameContext<'_>, work: &mut Workspace, stats: &mut RayStats) {
     for p in work.points.iter().filter(|p| p.surface.opacity < 1.0) {
         let state = work.current.states[p.lane as usize];
         let left = 1.0 - p.surface.opacity;
@@ -554,7 +569,7 @@ fn send_behind(stage: &Stage<'_>, work: &mut Workspace, stats: &mut RayStats) {
         if !ray.is_valid() {
             continue;
         }
-        if throughput.max_element() < stage.options.min_contribution {
+        if throughput.max_element() < context.options.min_contribution {
             stats.cut_at_min_contribution += 1;
             continue;
         }

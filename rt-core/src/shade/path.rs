@@ -1,12 +1,12 @@
 //! Path tracing (Kajiya 1986): one continued ray per point, chosen with the probabilities of the material's lobes; lamps by shadow
 //! rays at every point, environment and emission by hitting them. No light is counted twice: lamps have no surface to be hit.
 
+use super::frame_context::FrameContext;
 use super::lobes::pbr_transmitted;
 use super::microfacet::schlick;
 use super::specular::{MIRROR_ROUGHNESS, facing, interface, mirrored, push_scattered, sample_lobe};
-use super::stage::Stage;
-use super::wave::{RayKind, RayState};
-use super::{Dimension, Point, TileArea, Workspace};
+use super::wavefront::{RayKind, RayState};
+use super::{Point, SampleDimension, TileArea, Workspace};
 use crate::material::SurfaceModel;
 use crate::math::orthonormal_basis;
 use crate::ray::Ray;
@@ -24,19 +24,24 @@ const MOST_SURVIVAL: f32 = 1.0 - 1.0 / 1024.0;
 
 /// Whether the path scatters at `p` rather than passing through it: by chance, with the surface's opacity.
 #[inline]
-pub(super) fn scatters(stage: &Stage<'_>, area: &TileArea, state: &RayState, p: &Point) -> bool {
-    p.surface.opacity >= 1.0 || choice(stage, area, state)[0] < p.surface.opacity
+pub(super) fn scatters(context: &FrameContext<'_>, area: &TileArea, state: &RayState, p: &Point) -> bool {
+    p.surface.opacity >= 1.0 || choice(context, area, state)[0] < p.surface.opacity
 }
 
 #[inline]
-fn choice(stage: &Stage<'_>, area: &TileArea, state: &RayState) -> [f32; 2] {
-    area.sampler(stage, state.slot).square(state.stream.wrapping_add(Dimension::CHOICE))
+fn choice(context: &FrameContext<'_>, area: &TileArea, state: &RayState) -> [f32; 2] {
+    area.sampler(context, state.slot).square(state.stream.wrapping_add(SampleDimension::CHOICE))
 }
 
-pub(super) fn continue_paths(stage: &Stage<'_>, area: &TileArea, work: &mut Workspace, stats: &mut RayStats) {
+pub(super) fn continue_paths(
+    context: &FrameContext<'_>,
+    area: &TileArea,
+    work: &mut Workspace,
+    stats: &mut RayStats,
+) {
     for p in &work.points {
         let state = work.current.states[p.lane as usize];
-        if !scatters(stage, area, &state, p) {
+        if !scatters(context, area, &state, p) {
             let ray = work.current.ray(p.lane as usize);
             let ray = Ray { t_min: p.surface.t_behind(&ray, p.t), ..ray };
             if ray.is_valid() {
@@ -46,12 +51,12 @@ pub(super) fn continue_paths(stage: &Stage<'_>, area: &TileArea, work: &mut Work
             }
             continue;
         }
-        let model = p.model::<true>(stage, &work.varied);
-        let Some((dir, weight, mut next)) = scatter(stage, area, p, model, &state) else { continue };
+        let model = p.model::<true>(context, &work.parameters);
+        let Some((dir, weight, mut next)) = scatter(context, area, p, model, &state) else { continue };
         let mut throughput = state.throughput * weight;
         if state.bounce >= ROULETTE_FROM {
             let survive = throughput.max_element().min(MOST_SURVIVAL);
-            let [_, u] = choice(stage, area, &RayState { stream: state.stream ^ 0x2545_f491, ..state });
+            let [_, u] = choice(context, area, &RayState { stream: state.stream ^ 0x2545_f491, ..state });
             if u >= survive {
                 continue;
             }
@@ -60,7 +65,7 @@ pub(super) fn continue_paths(stage: &Stage<'_>, area: &TileArea, work: &mut Work
         next.throughput = throughput;
         // Roulette alone ends paths, unless the options limit them: dropping faint ones would make
         // the picture too dark.
-        if let Some(most) = stage.options.max_bounces
+        if let Some(most) = context.options.max_bounces
             && u32::from(state.bounce) >= most
         {
             stats.cut_at_max_bounces += 1;
@@ -73,17 +78,17 @@ pub(super) fn continue_paths(stage: &Stage<'_>, area: &TileArea, work: &mut Work
 
 /// Direction and weight (BRDF · cosine / density) of the continued path.
 fn scatter(
-    stage: &Stage<'_>,
+    context: &FrameContext<'_>,
     area: &TileArea,
     p: &Point,
     model: &SurfaceModel,
     state: &RayState,
 ) -> Option<(Vec3, Vec3, RayState)> {
-    let sampler = area.sampler(stage, state.slot);
-    let u = sampler.square(state.stream.wrapping_add(Dimension::SCATTER));
+    let sampler = area.sampler(context, state.slot);
+    let u = sampler.square(state.stream.wrapping_add(SampleDimension::SCATTER));
     // The first number of this pair decided about opacity; stretch what is left of it to a fresh one.
-    let [_, lobe] = choice(stage, area, state);
-    let material = stage.instances[p.instance as usize].material;
+    let [_, lobe] = choice(context, area, state);
+    let material = context.instances[p.instance as usize].material;
     let color = p.surface.color;
     let n = facing(p);
     let kind = |kind| RayState { kind, ..*state };

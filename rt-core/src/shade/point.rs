@@ -1,8 +1,8 @@
 //! Points of surfaces that wait for light, and what differs from their material there.
 
-use super::stage::Stage;
-use crate::detail::Varied;
+use super::frame_context::FrameContext;
 use crate::material::SurfaceModel;
+use crate::material_maps::SurfaceParameters;
 use crate::surface::SurfacePoint;
 use glam::Vec3;
 
@@ -19,29 +19,36 @@ pub(crate) struct Point {
     pub(crate) instance: u32,
     /// False where lights change nothing.
     pub(crate) lit: bool,
-    /// Index into [`super::Workspace`]'s list, or [`AS_MATERIAL`].
-    pub(super) varied: u32,
+    /// Index into [`super::Workspace`]'s list, or [`NO_PARAMETERS`].
+    pub(super) parameters: u32,
 }
 
 /// In the place of an index: the point's finish is its material's.
-pub(super) const AS_MATERIAL: u32 = u32::MAX;
+pub(super) const NO_PARAMETERS: u32 = u32::MAX;
 
 impl Point {
-    /// What differs from the material here. `DETAIL`: whether anything in the wave does; code for waves in which nothing does is made without the question.
+    /// What differs from the material here. `MAPS`: whether anything in the wave does; code for waves in which nothing does is made without the question.
     #[inline(always)]
-    pub(super) fn varied<'v, const DETAIL: bool>(&self, varied: &'v [Varied]) -> Option<&'v Varied> {
-        if !DETAIL || self.varied == AS_MATERIAL { None } else { varied.get(self.varied as usize) }
+    pub(super) fn parameters<'v, const MAPS: bool>(
+        &self,
+        parameters: &'v [SurfaceParameters],
+    ) -> Option<&'v SurfaceParameters> {
+        if !MAPS || self.parameters == NO_PARAMETERS {
+            None
+        } else {
+            parameters.get(self.parameters as usize)
+        }
     }
 
     /// How it answers light.
     #[inline(always)]
-    pub(super) fn model<'v, const DETAIL: bool>(
+    pub(super) fn model<'v, const MAPS: bool>(
         &self,
-        stage: &'v Stage<'_>,
-        varied: &'v [Varied],
+        context: &'v FrameContext<'_>,
+        parameters: &'v [SurfaceParameters],
     ) -> &'v SurfaceModel {
-        match self.varied::<DETAIL>(varied) {
-            None => &stage.instances[self.instance as usize].material.model,
+        match self.parameters::<MAPS>(parameters) {
+            None => &context.instances[self.instance as usize].material.model,
             Some(v) => &v.model,
         }
     }

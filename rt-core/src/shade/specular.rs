@@ -1,9 +1,9 @@
 //! Mirror, gloss and glass: the rays of Whitted (1980), with microfacet directions for gloss (Cook, Porter and Carpenter 1984).
 
+use super::frame_context::FrameContext;
 use super::microfacet::{fresnel_dielectric, masking_ratio, refract, sample_visible_normal, schlick};
-use super::stage::Stage;
-use super::wave::{RayKind, RayState, Wave};
-use super::{Dimension, Point, TileArea, Workspace};
+use super::wavefront::{RayKind, RayState, Wavefront};
+use super::{Point, SampleDimension, TileArea, Workspace};
 use crate::effects::Effects;
 use crate::material::SurfaceModel;
 use crate::math::orthonormal_basis;
@@ -30,35 +30,35 @@ pub(super) fn child_stream(state: &RayState, branch: u32) -> u32 {
     hash(state.stream.wrapping_mul(4).wrapping_add(branch).wrapping_add(0x9e37_79b9))
 }
 
-pub(super) fn send_specular_rays(
-    stage: &Stage<'_>,
+pub(super) fn spawn_specular_rays(
+    context: &FrameContext<'_>,
     area: &TileArea,
     work: &mut Workspace,
     stats: &mut RayStats,
 ) {
-    let e = stage.effects;
+    let e = context.effects;
     let mirror = e.contains(Effects::REFLECTION);
     let sent = |roughness| e.contains(reflection_of(roughness));
     for p in &work.points {
         let state = work.current.states[p.lane as usize];
         let mut weight = state.throughput * p.surface.opacity;
-        if let Some(v) = p.varied::<true>(&work.varied) {
+        if let Some(v) = p.parameters::<true>(&work.parameters) {
             weight *= v.ambient;
         }
-        match *p.model::<true>(stage, &work.varied) {
+        match *p.model::<true>(context, &work.parameters) {
             SurfaceModel::Phong { mirror: share, .. } if share > 0.0 && mirror => {
-                reflect_at(stage, p, facing(p), weight * share, &state, &mut work.scattered, stats);
+                reflect_at(context, p, facing(p), weight * share, &state, &mut work.scattered, stats);
             }
             SurfaceModel::Metal { roughness } => {
                 let f0 = p.surface.color;
                 if sent(roughness) {
-                    reflect_lobe(stage, area, p, f0, roughness, weight, &state, &mut work.scattered, stats);
+                    reflect_lobe(context, area, p, f0, roughness, weight, &state, &mut work.scattered, stats);
                 }
             }
             SurfaceModel::Pbr { metallic, roughness, specular, .. } if metallic > 0.0 || specular > 0.0 => {
                 let f0 = Vec3::splat(specular).lerp(p.surface.color, metallic);
                 if sent(roughness) {
-                    reflect_lobe(stage, area, p, f0, roughness, weight, &state, &mut work.scattered, stats);
+                    reflect_lobe(context, area, p, f0, roughness, weight, &state, &mut work.scattered, stats);
                 }
             }
             SurfaceModel::Dielectric { ior, absorption } if e.contains(Effects::REFRACTION) => {
@@ -67,12 +67,12 @@ pub(super) fn send_specular_rays(
                     let next = RayState { absorption: t.medium, kind: RayKind::Refracted, ..state };
                     let throughput = weight * p.surface.color * t.share;
                     stats.refraction +=
-                        send(stage, p, t.dir, throughput, next, 2, &mut work.scattered, stats);
+                        spawn_ray(context, p, t.dir, throughput, next, 2, &mut work.scattered, stats);
                 }
                 // Total internal reflection belongs to refraction: without it, glass would leak light.
                 if mirror || reflected == 1.0 {
                     let n = facing(p);
-                    reflect_at(stage, p, n, weight * reflected, &state, &mut work.scattered, stats);
+                    reflect_at(context, p, n, weight * reflected, &state, &mut work.scattered, stats);
                 }
             }
             _ => {}
@@ -87,7 +87,7 @@ pub(super) fn facing(p: &Point) -> Vec3 {
 }
 
 /// The refracted ray at an interface.
-pub(super) struct Through {
+pub(super) struct RefractedRay {
     pub(super) dir: Vec3,
     /// Absorption of the medium it enters.
     pub(super) medium: Vec3,
@@ -97,12 +97,12 @@ pub(super) struct Through {
 
 /// Reflected share and refracted ray; no ray at total internal reflection.
 #[inline]
-pub(super) fn interface(p: &Point, ior: f32, absorption: Vec3) -> (f32, Option<Through>) {
+pub(super) fn interface(p: &Point, ior: f32, absorption: Vec3) -> (f32, Option<RefractedRay>) {
     let n = facing(p);
     let eta = if p.surface.outside { 1.0 / ior } else { ior };
     let reflected = fresnel_dielectric(n.dot(p.view), eta);
     let medium = if p.surface.outside { absorption } else { Vec3::ZERO };
-    let through = refract(-p.view, n, eta).filter(|_| reflected < 1.0).map(|dir| Through {
+    let through = refract(-p.view, n, eta).filter(|_| reflected < 1.0).map(|dir| RefractedRay {
         dir,
         medium,
         share: 1.0 - reflected,
@@ -119,37 +119,37 @@ pub(super) fn mirrored(p: &Point, n: Vec3) -> Vec3 {
 }
 
 fn reflect_at(
-    stage: &Stage<'_>,
+    context: &FrameContext<'_>,
     p: &Point,
     n: Vec3,
     weight: Vec3,
     state: &RayState,
-    wave: &mut Wave,
+    wave: &mut Wavefront,
     stats: &mut RayStats,
 ) {
     let next = RayState { kind: RayKind::Reflected, ..*state };
-    stats.reflection += send(stage, p, mirrored(p, n), weight, next, 1, wave, stats);
+    stats.reflection += spawn_ray(context, p, mirrored(p, n), weight, next, 1, wave, stats);
 }
 
 fn reflect_lobe(
-    stage: &Stage<'_>,
+    context: &FrameContext<'_>,
     area: &TileArea,
     p: &Point,
     f0: Vec3,
     roughness: f32,
     weight: Vec3,
     state: &RayState,
-    wave: &mut Wave,
+    wave: &mut Wavefront,
     stats: &mut RayStats,
 ) {
     let n = facing(p);
     if roughness <= MIRROR_ROUGHNESS {
-        return reflect_at(stage, p, n, weight * schlick(f0, n.dot(p.view)), state, wave, stats);
+        return reflect_at(context, p, n, weight * schlick(f0, n.dot(p.view)), state, wave, stats);
     }
-    let u = area.sampler(stage, state.slot).square(state.stream.wrapping_add(Dimension::SCATTER));
+    let u = area.sampler(context, state.slot).square(state.stream.wrapping_add(SampleDimension::SCATTER));
     if let Some((dir, share)) = sample_lobe(p, n, f0, roughness, u) {
         let next = RayState { kind: RayKind::Reflected, ..*state };
-        stats.reflection += send(stage, p, dir, weight * share, next, 1, wave, stats);
+        stats.reflection += spawn_ray(context, p, dir, weight * share, next, 1, wave, stats);
     }
 }
 
@@ -168,21 +168,21 @@ pub(super) fn sample_lobe(p: &Point, n: Vec3, f0: Vec3, roughness: f32, u: [f32;
 
 /// Sends a ray of Whitted's tree unless it is worth too little or has bounced too often: two
 /// deterministic approximations, bounded by the options and counted. Returns how many were sent.
-pub(super) fn send(
-    stage: &Stage<'_>,
+pub(super) fn spawn_ray(
+    context: &FrameContext<'_>,
     p: &Point,
     dir: Vec3,
     throughput: Vec3,
     state: RayState,
     branch: u32,
-    wave: &mut Wave,
+    wave: &mut Wavefront,
     stats: &mut RayStats,
 ) -> u64 {
-    if throughput.max_element() < stage.options.min_contribution {
+    if throughput.max_element() < context.options.min_contribution {
         stats.cut_at_min_contribution += (throughput != Vec3::ZERO) as u64;
         return 0;
     }
-    if u32::from(state.bounce) >= stage.options.max_bounces.unwrap_or(MIRROR_BOUNCES) {
+    if u32::from(state.bounce) >= context.options.max_bounces.unwrap_or(MIRROR_BOUNCES) {
         stats.cut_at_max_bounces += 1;
         return 0;
     }
@@ -197,7 +197,7 @@ pub(super) fn push_scattered(
     throughput: Vec3,
     state: RayState,
     branch: u32,
-    wave: &mut Wave,
+    wave: &mut Wavefront,
 ) {
     let ray = Ray::new(p.surface.ray_origin(dir), dir);
     // Paths without a limit may be longer than the counter reaches; it is only compared with limits

@@ -1,6 +1,6 @@
 //! A square of pixels: the unit of work, with the layers it fills.
 
-use super::stage::Stage;
+use super::frame_context::FrameContext;
 use crate::frame::Layers;
 use crate::ray::{Hit, LANES, Ray};
 use crate::sampler::Sampler;
@@ -47,9 +47,9 @@ impl TileArea {
 
     /// Sample points of a slot for the current sample.
     #[inline]
-    pub(crate) fn sampler(&self, stage: &Stage<'_>, slot: u16) -> Sampler {
+    pub(crate) fn sampler(&self, context: &FrameContext<'_>, slot: u16) -> Sampler {
         let (x, y) = (even_bits(slot), even_bits(slot >> 1));
-        stage.sampler(self.x + x, self.y + y, self.sample)
+        context.sampler(self.x + x, self.y + y, self.sample)
     }
 }
 
@@ -142,7 +142,7 @@ impl TileLayers {
     /// Fills the geometry layers of a pixel. `normal` is looked at only when that layer is wanted.
     pub(crate) fn record(
         &mut self,
-        stage: &Stage<'_>,
+        context: &FrameContext<'_>,
         area: &TileArea,
         slot: u16,
         ray: &Ray,
@@ -153,7 +153,7 @@ impl TileLayers {
         self.recorded[i] = true;
         if !self.depth.is_empty() || !self.distance.is_empty() {
             let [x, y] = area.pixel(slot).unwrap_or_default();
-            let (depth, distance) = stage.depth_and_distance(stage.ndc(x, y, [0.5; 2]), ray, hit);
+            let (depth, distance) = context.depth_and_distance(context.ndc(x, y, [0.5; 2]), ray, hit);
             if let Some(d) = self.depth.get_mut(i) {
                 *d = depth;
             }

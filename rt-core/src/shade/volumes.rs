@@ -1,7 +1,7 @@
 //! Media between a ray's start and the surface it meets.
 
-use super::stage::Stage;
-use super::wave::RayState;
+use super::frame_context::FrameContext;
+use super::wavefront::RayState;
 use crate::ray::Ray;
 use crate::ray_stats::RayStats;
 use crate::volume::{VolumeSample, integrate_overlapping};
@@ -17,22 +17,29 @@ pub(super) fn in_object_space(ray: &Ray, object_from_render: &DAffine3) -> Ray {
     }
 }
 
-/// What `ray` collects in the stage's volumes up to `t_end`. `along` is a buffer.
-pub(super) fn collected(stage: &Stage<'_>, ray: &Ray, t_end: f32, along: &mut Vec<Ray>) -> VolumeSample {
-    along.clear();
-    along
-        .extend(stage.volumes.iter().map(|(_, object_from_render)| in_object_space(ray, object_from_render)));
-    let quality = &stage.options.volume_quality;
-    if let [(volume, _)] = stage.volumes[..] {
-        volume.integrate(&along[0], ray.t_min, t_end, quality)
+/// What `ray` collects in the stage's volumes up to `t_end`. `object_rays` is a buffer.
+pub(super) fn integrate_volumes(
+    context: &FrameContext<'_>,
+    ray: &Ray,
+    t_end: f32,
+    object_rays: &mut Vec<Ray>,
+) -> VolumeSample {
+    object_rays.clear();
+    object_rays.extend(
+        context.volumes.iter().map(|(_, object_from_render)| in_object_space(ray, object_from_render)),
+    );
+    let quality = &context.options.volume_quality;
+    if let [(volume, _)] = context.volumes[..] {
+        volume.integrate(&object_rays[0], ray.t_min, t_end, quality)
     } else {
-        let pairs: Vec<_> = stage.volumes.iter().zip(along.iter()).map(|((v, _), r)| (*v, *r)).collect();
+        let pairs: Vec<_> =
+            context.volumes.iter().zip(object_rays.iter()).map(|((v, _), r)| (*v, *r)).collect();
         integrate_overlapping(&pairs, ray.t_min, t_end, quality)
     }
 }
 
 /// Adds what a ray has collected, and dims what comes behind.
-pub(super) fn cross(
+pub(super) fn composite_volume(
     sample: &VolumeSample,
     state: &mut RayState,
     pixels: &mut [[f32; 4]],

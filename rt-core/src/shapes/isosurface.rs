@@ -53,7 +53,7 @@ pub struct IsosurfaceReport {
     /// Cells that some surface passes.
     pub cells_active: u64,
     /// Bricks of the grid.
-    pub bricks: u64,
+    pub blocks: u64,
     /// Bricks that some surface passes: the primitives.
     pub bricks_active: u64,
     /// Isovalues outside the range of the data: their surfaces are empty.
@@ -75,7 +75,7 @@ pub struct IsosurfaceReport {
 pub struct Isosurface {
     grid: Arc<Grid>,
     isovalues: Vec<f32>,
-    bricks: Vec<Brick>,
+    blocks: Vec<CellBlock>,
     normals: IsosurfaceNormals,
     color_by: Option<Arc<Grid>>,
     report: IsosurfaceReport,
@@ -83,15 +83,15 @@ pub struct Isosurface {
 
 /// A box of cells around the active cells of a brick.
 #[derive(Debug, Clone, Copy)]
-struct Brick {
+struct CellBlock {
     lo: [u32; 3],
     size: [u8; 3],
 }
 
 /// What one brick found while looking at its cells.
 #[derive(Default)]
-struct BrickScan {
-    brick: Option<Brick>,
+struct BlockScan {
+    block: Option<CellBlock>,
     active: u64,
     non_finite: u64,
 }
@@ -136,27 +136,27 @@ impl Isosurface {
         let (lo, hi) = grid.range().unwrap_or((f32::INFINITY, f32::NEG_INFINITY));
         let mut report = IsosurfaceReport {
             cells: cells.as_u64vec3().element_product(),
-            bricks: count,
+            blocks: count,
             isovalues_out_of_range: isovalues.iter().filter(|v| !(lo < **v && **v <= hi)).count(),
             ..Default::default()
         };
-        let scans: Vec<BrickScan> = (0..count)
+        let scans: Vec<BlockScan> = (0..count)
             .into_par_iter()
             .map(|n| scan(&grid, isovalues, at(n), (at(n) + options.brick_cells).min(cells)))
-            .filter(|s| s.brick.is_some() || s.non_finite > 0)
+            .filter(|s| s.block.is_some() || s.non_finite > 0)
             .collect();
-        let mut bricks = Vec::new();
+        let mut blocks = Vec::new();
         for s in scans {
             report.cells_active += s.active;
             report.cells_non_finite += s.non_finite;
-            bricks.extend(s.brick);
+            blocks.extend(s.block);
         }
-        report.bricks_active = bricks.len() as u64;
-        super::error::check_count(SHAPE, bricks.len())?;
+        report.bricks_active = blocks.len() as u64;
+        super::error::check_count(SHAPE, blocks.len())?;
         Ok(Isosurface {
             grid,
             isovalues: isovalues.to_vec(),
-            bricks,
+            blocks,
             normals: options.normals,
             color_by: None,
             report,
@@ -187,9 +187,9 @@ impl Isosurface {
     #[inline]
     fn first(&self, prim: u32, ray: &Ray) -> Option<Root> {
         let index_ray = self.index_ray(ray);
-        let brick = &self.bricks[prim as usize];
-        let lo = brick.lo.map(i64::from);
-        let hi = std::array::from_fn(|a| lo[a] + i64::from(brick.size[a]));
+        let block = &self.blocks[prim as usize];
+        let lo = block.lo.map(i64::from);
+        let hi = std::array::from_fn(|a| lo[a] + i64::from(block.size[a]));
         let last = (self.grid.dims - UVec3::ONE).to_array().map(i64::from);
         let mut found = None;
         index_ray.walk(lo, hi, last, 1, f64::from(ray.t_min), f64::from(ray.t_max), |crossing| {
@@ -233,8 +233,8 @@ fn min_max(v: &[f32; 8]) -> (f32, f32) {
 }
 
 /// Looks at the cells `lo..hi`.
-fn scan(grid: &Grid, isovalues: &[f32], lo: UVec3, hi: UVec3) -> BrickScan {
-    let mut s = BrickScan::default();
+fn scan(grid: &Grid, isovalues: &[f32], lo: UVec3, hi: UVec3) -> BlockScan {
+    let mut s = BlockScan::default();
     let (mut first, mut last) = (hi, lo);
     for k in lo.z..hi.z {
         for j in lo.y..hi.y {
@@ -254,7 +254,7 @@ fn scan(grid: &Grid, isovalues: &[f32], lo: UVec3, hi: UVec3) -> BrickScan {
         }
     }
     if s.active > 0 {
-        s.brick = Some(Brick { lo: first.to_array(), size: (last - first).to_array().map(|n| n as u8) });
+        s.block = Some(CellBlock { lo: first.to_array(), size: (last - first).to_array().map(|n| n as u8) });
     }
     s
 }
@@ -288,7 +288,7 @@ pub(crate) fn smooth_gradient(grid: &Grid, p: Vec3) -> Vec3 {
 
 impl Shape for Isosurface {
     fn num_primitives(&self) -> usize {
-        self.bricks.len()
+        self.blocks.len()
     }
 
     /// The grid's origin.
@@ -297,7 +297,7 @@ impl Shape for Isosurface {
     }
 
     fn bounds(&self, prim: u32) -> Aabb {
-        let b = &self.bricks[prim as usize];
+        let b = &self.blocks[prim as usize];
         let (lo, size) = (UVec3::from_array(b.lo), UVec3::from_array(b.size.map(u32::from)));
         outward_box(lo.as_dvec3() * self.grid.spacing, (lo + size).as_dvec3() * self.grid.spacing)
     }

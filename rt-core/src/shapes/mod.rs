@@ -86,7 +86,7 @@ pub trait Shape: Send + Sync {
     }
 
     /// For a shape that only gives another one's hits a new look: that other shape. Its primitives, bounds and hits must be the same; then a world made
-    /// from one that has it ([`crate::accel::World::build_sharing`]) takes over its tree.
+    /// from one that has it ([`crate::bvh::World::build_sharing`]) takes over its tree.
     fn tree_of(&self) -> Option<Arc<dyn Shape>> {
         None
     }

@@ -12,7 +12,7 @@ use super::{
     Radii, Shape, ShapeError, ShapeHit, ShapeReport, ShapeSurface, any_alpha, in_range, outward_box, picked,
     rounded_point,
 };
-use crate::accel::ShapePart;
+use crate::bvh::ShapePart;
 use crate::math::Aabb;
 use crate::ray::Ray;
 use glam::{DVec3, Vec3};

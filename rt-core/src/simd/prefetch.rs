@@ -1,6 +1,6 @@
 //! Asking for memory before it is needed.
 
-use crate::accel::Unit;
+use crate::bvh::Unit;
 
 /// Starts loading `bytes` from `units[first]` on; out-of-range places are ignored by the processor.
 #[inline(always)]

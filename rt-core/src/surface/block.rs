@@ -1,10 +1,10 @@
 //! What local lighting needs of sixteen hits at once.
 //!
 //! Memory is the larger part of it: a hit names a triangle, the triangle three vertices, each of them a position and its attributes. The values of sixteen hits are read
-//! into rows first, so that sixteen waits overlap, and then the arithmetic of [`Placed::look`] runs on all lanes, with the same bits. Lanes that need f64 (tiny or
-//! huge triangles, normals that cannot be normalised) are left to `look` itself.
+//! into rows first, so that sixteen waits overlap, and then the arithmetic of [`ResolvedInstance::shading_point`] runs on all lanes, with the same bits. Lanes that need f64 (tiny or
+//! huge triangles, normals that cannot be normalised) are left to `shading_point` itself.
 
-use super::{Look, ORDINARY_NORMAL_SQUARED, Placed, Source, plane_of};
+use super::{ORDINARY_NORMAL_SQUARED, ResolvedInstance, ShadingPoint, Source, plane_of};
 use crate::material::{ColorSource, Sides};
 use crate::mesh::{Attribute, PerElement, TriMesh};
 use crate::ray::{HitBlock, LANES, RayBlock};
@@ -13,22 +13,27 @@ use crate::simd::vectors::{Row, Rows3, Vec3x16};
 use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask, f32x16, mask32x16};
 use glam::{DVec3, Vec3};
 
-/// Sixteen [`Look`]s, a row per number.
+/// Sixteen [`ShadingPoint`]s, a row per number.
 #[repr(C, align(64))]
-pub(crate) struct Looks {
+pub(crate) struct ShadingPointBlock {
     pub(crate) point: Rows3,
     pub(crate) normal: Rows3,
     pub(crate) color: Rows3,
     pub(crate) opacity: Row,
 }
 
-impl Looks {
-    pub(crate) fn new() -> Looks {
-        Looks { point: Rows3::ZERO, normal: Rows3::ZERO, color: Rows3::ZERO, opacity: [0.0; LANES] }
+impl ShadingPointBlock {
+    pub(crate) fn new() -> ShadingPointBlock {
+        ShadingPointBlock {
+            point: Rows3::ZERO,
+            normal: Rows3::ZERO,
+            color: Rows3::ZERO,
+            opacity: [0.0; LANES],
+        }
     }
 
-    pub(crate) fn get(&self, lane: usize) -> Look {
-        Look {
+    pub(crate) fn get(&self, lane: usize) -> ShadingPoint {
+        ShadingPoint {
             point: self.point.get(lane),
             normal: self.normal.get(lane),
             color: self.color.get(lane),
@@ -36,15 +41,15 @@ impl Looks {
         }
     }
 
-    fn set(&mut self, lane: usize, look: &Look) {
-        self.point.set(lane, look.point);
-        self.normal.set(lane, look.normal);
-        self.color.set(lane, look.color);
-        self.opacity[lane] = look.opacity;
+    fn set(&mut self, lane: usize, shading_point: &ShadingPoint) {
+        self.point.set(lane, shading_point.point);
+        self.normal.set(lane, shading_point.normal);
+        self.color.set(lane, shading_point.color);
+        self.opacity[lane] = shading_point.opacity;
     }
 }
 
-/// World-space planes through sixteen hits, see [`Placed::plane`].
+/// World-space planes through sixteen hits, see [`ResolvedInstance::plane`].
 #[repr(C, align(64))]
 pub(crate) struct Planes {
     pub(crate) point: [[f64; LANES]; 3],
@@ -60,7 +65,7 @@ impl Planes {
 /// Vertex numbers of sixteen triangles, a row per corner.
 type Corners = [[u32; LANES]; 3];
 
-impl Placed<'_> {
+impl ResolvedInstance<'_> {
     /// Starts loading the triangle `prim`'s vertex numbers.
     #[inline]
     pub(crate) fn prefetch_triangle(&self, prim: u32) {
@@ -69,7 +74,7 @@ impl Placed<'_> {
         }
     }
 
-    /// Starts loading what [`Placed::look_block`] will read of the triangle `prim`'s vertices.
+    /// Starts loading what [`ResolvedInstance::shading_point_block`] will read of the triangle `prim`'s vertices.
     #[inline]
     pub(crate) fn prefetch_vertices(&self, prim: u32) {
         if let Source::Mesh(mesh) = self.source {
@@ -87,14 +92,14 @@ impl Placed<'_> {
         }
     }
 
-    /// [`Placed::look`] for the hits whose bits are set in `lanes`, all of them on this instance; other lanes of `out` hold anything.
-    pub(crate) fn look_block<S: Simd, const POINT: bool>(
+    /// [`ResolvedInstance::shading_point`] for the hits whose bits are set in `lanes`, all of them on this instance; other lanes of `out` hold anything.
+    pub(crate) fn shading_point_block<S: Simd, const POINT: bool>(
         &self,
         simd: S,
         lanes: u16,
         rays: &RayBlock,
         hits: &HitBlock,
-        out: &mut Looks,
+        out: &mut ShadingPointBlock,
     ) {
         let done = match self.source {
             Source::Mesh(mesh) => self.mesh_block::<S, POINT>(simd, mesh, lanes, rays, hits, out),
@@ -105,12 +110,12 @@ impl Placed<'_> {
             let lane = left.trailing_zeros() as usize;
             left &= left - 1;
             if let Some(hit) = hits.get(lane) {
-                out.set(lane, &self.look::<POINT>(&rays.get(lane), &hit));
+                out.set(lane, &self.shading_point::<POINT>(&rays.get(lane), &hit));
             }
         }
     }
 
-    /// [`Placed::plane`] for the hits whose bits are set in `lanes`, all of them on this instance.
+    /// [`ResolvedInstance::plane`] for the hits whose bits are set in `lanes`, all of them on this instance.
     pub(crate) fn plane_block<S: Simd>(
         &self,
         simd: S,
@@ -184,7 +189,7 @@ impl Placed<'_> {
         lanes: u16,
         rays: &RayBlock,
         hits: &HitBlock,
-        out: &mut Looks,
+        out: &mut ShadingPointBlock,
     ) -> u16 {
         simd.vectorize(
             #[inline(always)]
@@ -200,7 +205,7 @@ impl Placed<'_> {
         lanes: u16,
         rays: &RayBlock,
         hits: &HitBlock,
-        out: &mut Looks,
+        out: &mut ShadingPointBlock,
     ) -> u16 {
         let v = |x: f32| f32x16::splat(simd, x);
         // Lanes without a hit repeat one that has: nothing below needs to ask again.

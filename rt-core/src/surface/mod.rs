@@ -6,11 +6,11 @@
 //! 0.1-0.4 % of false self-shadows, 2 ulp 1e-6, 4 ulp none. There is no global epsilon.
 
 mod block;
-mod varied;
+mod parameters;
 
-pub(crate) use block::{Looks, Planes};
+pub(crate) use block::{Planes, ShadingPointBlock};
 
-use crate::accel::Geometry;
+use crate::bvh::Geometry;
 use crate::material::{ColorSource, Material, Sides};
 use crate::math::max_abs;
 use crate::mesh::{Attribute, PerElement, TriMesh};
@@ -26,7 +26,7 @@ pub(crate) fn length(v: Vec3) -> f32 {
 }
 
 /// One instance with everything shading needs, resolved once per frame.
-pub(crate) struct Placed<'a> {
+pub(crate) struct ResolvedInstance<'a> {
     source: Source<'a>,
     pub(crate) material: &'a Material,
     colors: Option<&'a Attribute<[f32; 4]>>,
@@ -68,7 +68,7 @@ pub(crate) struct SurfacePoint {
 
 /// As much of a surface as lights without shadows need, in render space.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Look {
+pub(crate) struct ShadingPoint {
     /// Zero when it was not asked for.
     pub(crate) point: Vec3,
     /// Unit shading normal, turned as the material's sides say.
@@ -103,9 +103,9 @@ impl SurfacePoint {
     }
 }
 
-impl<'a> Placed<'a> {
+impl<'a> ResolvedInstance<'a> {
     /// Instance `index` of `scene`.
-    pub(crate) fn new(scene: &'a Scene, index: usize) -> Placed<'a> {
+    pub(crate) fn new(scene: &'a Scene, index: usize) -> ResolvedInstance<'a> {
         let instance = &scene.world.instances()[index];
         let appearance = &scene.appearances[index];
         let (source, origin, colors, scalars) = match &scene.world.geometries()[instance.geometry] {
@@ -125,7 +125,7 @@ impl<'a> Placed<'a> {
         let columns = [linear.x_axis, linear.y_axis, linear.z_axis];
         // Frobenius norm: never below the largest singular value.
         let stretch = columns.iter().map(|c| c.length_squared()).sum::<f64>().sqrt() as f32;
-        Placed {
+        ResolvedInstance {
             source,
             material: &scene.materials[appearance.material],
             colors,
@@ -154,19 +154,19 @@ impl<'a> Placed<'a> {
     }
 
     /// What local lighting needs of the point that `ray` met, where no other ray will start: on meshes in f32 wherever the triangle's
-    /// size allows it, and without `POINT` the point is left out. [`Placed::look_block`] does the same for sixteen rays.
+    /// size allows it, and without `POINT` the point is left out. [`ResolvedInstance::shading_point_block`] does the same for sixteen rays.
     #[inline]
-    pub(crate) fn look<const POINT: bool>(&self, ray: &Ray, hit: &Hit) -> Look {
+    pub(crate) fn shading_point<const POINT: bool>(&self, ray: &Ray, hit: &Hit) -> ShadingPoint {
         match self.source {
-            Source::Mesh(mesh) => self.mesh_look::<POINT>(mesh, ray, hit),
+            Source::Mesh(mesh) => self.mesh_shading_point::<POINT>(mesh, ray, hit),
             Source::Shape(shape) => {
                 let s = self.shape_surface(shape, ray, hit);
-                Look { point: s.point, normal: s.normal, color: s.color, opacity: s.opacity }
+                ShadingPoint { point: s.point, normal: s.normal, color: s.color, opacity: s.opacity }
             }
         }
     }
 
-    fn mesh_look<const POINT: bool>(&self, mesh: &TriMesh, ray: &Ray, hit: &Hit) -> Look {
+    fn mesh_shading_point<const POINT: bool>(&self, mesh: &TriMesh, ray: &Ray, hit: &Hit) -> ShadingPoint {
         let corner = mesh.indices[hit.prim as usize].map(|k| k as usize);
         let [a, b, c] = corner.map(|k| mesh.positions[k]);
         let (u, v) = (hit.u, hit.v);
@@ -190,7 +190,7 @@ impl<'a> Placed<'a> {
         let (_, normal, drawn) = self.turned(outward, shading, ray.dir);
         let [r, g, b, alpha] = self.mesh_color(mesh, corner, hit.prim, weights);
         let opacity = if drawn { self.material.opacity * alpha } else { 0.0 };
-        Look { point, normal, color: Vec3::new(r, g, b), opacity }
+        ShadingPoint { point, normal, color: Vec3::new(r, g, b), opacity }
     }
 
     /// Out of the way of the usual case.

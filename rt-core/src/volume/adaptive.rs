@@ -9,8 +9,8 @@
 //! 4. colours are mixed, not put one behind the other: seen as a difference too, but only when both parts have some thickness.
 
 use super::Volume;
-use super::layer::{Layer, March};
-use super::shading::LitStretch;
+use super::layer::{Layer, MarchState};
+use super::shading::ShadingCurve;
 use crate::grid_walk::Crossing;
 use crate::ray_cubic;
 
@@ -18,17 +18,17 @@ use crate::ray_cubic;
 const SPLIT: f64 = 0.375;
 /// A layer is off by the cube of its length (curvature, order of colours): two parts have a quarter of the error of one, a third of the
 /// difference between them.
-const REMAINS: f64 = 3.0;
+const REFINEMENT_GAIN: f64 = 3.0;
 /// Cuts of a cell's stretch at most: to less than 2⁻⁸ of a cell.
 const MAX_SPLITS: usize = 12;
 /// Cuts for the sake of something that no sample shows.
 const MAX_BLIND_SPLITS: u32 = 6;
 /// A part with less of the optical thickness than this, relative to the other, shows nothing about the order of colours.
-const TELLING: f64 = 0.1;
+const MIN_ORDER_THICKNESS: f64 = 0.1;
 
 /// A stretch of a cell that waits to be agreed on.
 #[derive(Clone, Copy)]
-struct Stretch {
+struct CubicSegment {
     ta: f64,
     tb: f64,
     /// The scalar along it.
@@ -43,11 +43,11 @@ impl Volume {
     /// Adds the cell `c`, along which the scalar is the cubic `b`.
     pub(super) fn march_adaptive(
         &self,
-        lit: Option<&LitStretch<'_>>,
+        lit: Option<&ShadingCurve<'_>>,
         per_t: f64,
         c: &Crossing,
         b: &[f64; 4],
-        m: &mut March,
+        m: &mut MarchState,
     ) {
         let ends = [self.transfer.integral(b[0]), self.transfer.integral(b[3])];
         let layer = self.layer(lit, per_t, c.t0, c.t1, b, &ends);
@@ -55,11 +55,11 @@ impl Volume {
         // What is wrong in one place of a cell, not all along it, may use half of the cell's share of the tolerance.
         let local_share = 0.5 * m.error_per_length * (c.t1 - c.t0) * per_t;
         // Depth first with the near part on top: the stack holds one far part per level.
-        let mut stack = [Stretch { ta: c.t0, tb: c.t1, b: *b, ends, layer, splits: 0 }; MAX_SPLITS + 1];
+        let mut stack = [CubicSegment { ta: c.t0, tb: c.t1, b: *b, ends, layer, splits: 0 }; MAX_SPLITS + 1];
         let mut height = 1;
         while height > 0 && !m.is_opaque() {
             height -= 1;
-            let Stretch { ta, tb, b, ends: [i0, i1], layer: one, splits } = stack[height];
+            let CubicSegment { ta, tb, b, ends: [i0, i1], layer: one, splits } = stack[height];
             let mid = ta + SPLIT * (tb - ta);
             let (near, far) = ray_cubic::split(&b, SPLIT);
             let im = self.transfer.integral(far[0]);
@@ -69,7 +69,8 @@ impl Volume {
             let length = (tb - ta) * per_t;
             let t = m.transmittance;
             let done = splits as usize == MAX_SPLITS
-                || (t * one.difference(&first.then(&second)) <= REMAINS * m.error_per_length * length
+                || (t * one.difference(&first.then(&second))
+                    <= REFINEMENT_GAIN * m.error_per_length * length
                     && !(splits < MAX_BLIND_SPLITS && self.may_hide_something(&b))
                     && t * self.step_error(&b, length) <= local_share
                     && t * self.order_error(&first, &near, &second, &far) <= local_share);
@@ -78,8 +79,9 @@ impl Volume {
                 m.add(mid, tb, &second);
             } else {
                 let splits = splits + 1;
-                stack[height] = Stretch { ta: mid, tb, b: far, ends: [im, i1], layer: second, splits };
-                stack[height + 1] = Stretch { ta, tb: mid, b: near, ends: [i0, im], layer: first, splits };
+                stack[height] = CubicSegment { ta: mid, tb, b: far, ends: [im, i1], layer: second, splits };
+                stack[height + 1] =
+                    CubicSegment { ta, tb: mid, b: near, ends: [i0, im], layer: first, splits };
                 height += 2;
             }
         }
@@ -89,7 +91,7 @@ impl Volume {
     #[inline]
     fn layer(
         &self,
-        lit: Option<&LitStretch<'_>>,
+        lit: Option<&ShadingCurve<'_>>,
         per_t: f64,
         ta: f64,
         tb: f64,
@@ -113,7 +115,8 @@ impl Volume {
     fn may_hide_something(&self, b: &[f64; 4]) -> bool {
         let (s0, s1) = (b[0].min(b[3]), b[0].max(b[3]));
         let (lo, hi) = (b[1].min(b[2]), b[1].max(b[2]));
-        (lo < s0 && self.transfer.bends_between(lo, s0)) || (hi > s1 && self.transfer.bends_between(s1, hi))
+        (lo < s0 && self.transfer.has_knot_between(lo, s0))
+            || (hi > s1 && self.transfer.has_knot_between(s1, hi))
     }
 
     /// Error 3: optical thickness that steps of the transfer function can be wrong by.
@@ -136,11 +139,11 @@ impl Volume {
     fn order_error(&self, first: &Layer, near: &[f64; 4], second: &Layer, far: &[f64; 4]) -> f64 {
         let (small, big, b) =
             if first.tau < second.tau { (first, second, far) } else { (second, first, near) };
-        if small.tau >= TELLING * big.tau {
+        if small.tau >= MIN_ORDER_THICKNESS * big.tau {
             return 0.0;
         }
         let a = big.opacity();
-        let difference = if self.transfer.bends_between(b[0].min(b[3]), b[0].max(b[3])) {
+        let difference = if self.transfer.has_knot_between(b[0].min(b[3]), b[0].max(b[3])) {
             1.0
         } else {
             let (x, y) = (self.transfer.sample(b[0]).1, self.transfer.sample(b[3]).1);

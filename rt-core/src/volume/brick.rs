@@ -1,9 +1,9 @@
 //! Volumes in bricks: what several holders of one volume need so that together they see what one would.
 //!
 //! A ray meets the blocks of a grid in an order that depends on the ray alone, and what a block adds depends only on what was collected in front of it. So a ray may be
-//! carried from brick to brick together with what it has collected ([`Marched`]): the result has the bits of one march through the whole.
+//! carried from brick to brick together with what it has collected ([`PartialIntegral`]): the result has the bits of one march through the whole.
 
-use super::layer::March;
+use super::layer::MarchState;
 use super::{MACROCELL, Volume, VolumeQuality, VolumeReport, VolumeSample, scan};
 use crate::grid::Grid;
 use glam::UVec3;
@@ -36,28 +36,28 @@ impl Brick {
 
 /// What a ray has collected so far, on its way from brick to brick.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Marched {
+pub struct PartialIntegral {
     color: [f64; 3],
     transmittance: f64,
     depth: f64,
     samples: u32,
 }
 
-impl Default for Marched {
+impl Default for PartialIntegral {
     /// Nothing yet.
     fn default() -> Self {
-        Marched { color: [0.0; 3], transmittance: 1.0, depth: f64::INFINITY, samples: 0 }
+        PartialIntegral { color: [0.0; 3], transmittance: 1.0, depth: f64::INFINITY, samples: 0 }
     }
 }
 
-impl Marched {
-    /// Words of [`Marched::to_words`].
+impl PartialIntegral {
+    /// Words of [`PartialIntegral::to_words`].
     pub const WORDS: usize = 11;
 
     /// For a message.
-    pub fn to_words(&self) -> [u32; Marched::WORDS] {
+    pub fn to_words(&self) -> [u32; PartialIntegral::WORDS] {
         let [r, g, b] = self.color;
-        let mut words = [0; Marched::WORDS];
+        let mut words = [0; PartialIntegral::WORDS];
         for (pair, number) in words.chunks_exact_mut(2).zip([r, g, b, self.transmittance, self.depth]) {
             let bits = number.to_bits();
             pair.copy_from_slice(&[bits as u32, (bits >> 32) as u32]);
@@ -66,10 +66,10 @@ impl Marched {
         words
     }
 
-    /// What [`Marched::to_words`] has made.
-    pub fn from_words(words: &[u32; Marched::WORDS]) -> Marched {
+    /// What [`PartialIntegral::to_words`] has made.
+    pub fn from_words(words: &[u32; PartialIntegral::WORDS]) -> PartialIntegral {
         let number = |i: usize| f64::from_bits(u64::from(words[2 * i]) | u64::from(words[2 * i + 1]) << 32);
-        Marched {
+        PartialIntegral {
             color: [0, 1, 2].map(number),
             transmittance: number(3),
             depth: number(4),
@@ -92,17 +92,17 @@ impl Marched {
         self.samples > 0 && self.march(*quality, 1.0).is_opaque()
     }
 
-    pub(super) fn march(&self, quality: VolumeQuality, path: f64) -> March {
-        let mut m = March::new(quality, path);
+    pub(super) fn march(&self, quality: VolumeQuality, path: f64) -> MarchState {
+        let mut m = MarchState::new(quality, path);
         (m.color, m.transmittance) = (self.color, self.transmittance);
         (m.depth, m.samples) = (self.depth, self.samples);
         m
     }
 }
 
-impl From<March> for Marched {
-    fn from(m: March) -> Marched {
-        Marched { color: m.color, transmittance: m.transmittance, depth: m.depth, samples: m.samples }
+impl From<MarchState> for PartialIntegral {
+    fn from(m: MarchState) -> PartialIntegral {
+        PartialIntegral { color: m.color, transmittance: m.transmittance, depth: m.depth, samples: m.samples }
     }
 }
 
@@ -123,7 +123,7 @@ impl Volume {
     }
 
     /// What a holder of `brick` needs: the values of its cells with two layers of points around them, for gradients. The rest of the whole is
-    /// clear here. See [`Course`](super::Course) for an example.
+    /// clear here. See [`RaySegments`](super::RaySegments) for an example.
     pub fn part(&self, brick: Brick) -> Volume {
         let cells = self.cells();
         let (mut ranges, mut report) =

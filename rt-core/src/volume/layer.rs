@@ -40,7 +40,7 @@ impl Layer {
 }
 
 /// A ray on its way.
-pub(super) struct March {
+pub(super) struct MarchState {
     pub(super) color: [f64; 3],
     pub(super) transmittance: f64,
     pub(super) depth: f64,
@@ -50,7 +50,7 @@ pub(super) struct March {
     opaque_below: f64,
 }
 
-impl March {
+impl MarchState {
     pub(super) fn new(quality: VolumeQuality, path: f64) -> Self {
         let levels = match quality {
             VolumeQuality::Tolerance { levels } => f64::from(levels.max(1e-6)),
@@ -58,7 +58,7 @@ impl March {
         };
         // NaN `levels` became 10⁻⁶ by `max`.
         let budget = 0.5 * levels / 255.0;
-        March {
+        MarchState {
             color: [0.0; 3],
             transmittance: 1.0,
             depth: f64::INFINITY,

@@ -11,16 +11,17 @@ mod adaptive;
 mod brick;
 mod layer;
 mod options;
-mod overlap;
 mod projection;
+mod ray_segments;
 mod reference;
 mod shading;
 
-pub use brick::{Brick, Marched};
+pub use brick::{Brick, PartialIntegral};
 pub use options::{
-    Blend, GradientOpacity, Highlight, Interpolation, VolumeError, VolumeLight, VolumeOptions, VolumeShading,
+    Blend, GradientOpacity, Interpolation, VolumeError, VolumeHighlight, VolumeLight, VolumeOptions,
+    VolumeShading,
 };
-pub use overlap::{Course, among_projections, integrate_overlapping};
+pub use ray_segments::{RaySegments, composite_projections, integrate_overlapping};
 pub use reference::integrate_reference;
 
 use crate::grid::Grid;
@@ -31,7 +32,7 @@ use crate::ray_cubic;
 use crate::shapes::outward_box;
 use crate::transfer_function::TransferFunction;
 use glam::{DVec3, UVec3};
-use layer::{Layer, March};
+use layer::{Layer, MarchState};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -219,7 +220,7 @@ impl Volume {
         if !self.is_medium() {
             return self.project(ray, t0, t1, quality);
         }
-        Marched::from(self.march(ray, t0, t1, quality, &Marched::default())).sample()
+        PartialIntegral::from(self.march(ray, t0, t1, quality, &PartialIntegral::default())).sample()
     }
 
     /// Whether cells are boxes around the points of the grid, and not between them.
@@ -249,7 +250,14 @@ impl Volume {
     }
 
     /// [`Volume::integrate`] of a medium, in f64, behind what was collected `before`.
-    fn march(&self, ray: &Ray, t0: f64, t1: f64, quality: &VolumeQuality, before: &Marched) -> March {
+    fn march(
+        &self,
+        ray: &Ray,
+        t0: f64,
+        t1: f64,
+        quality: &VolumeQuality,
+        before: &PartialIntegral,
+    ) -> MarchState {
         let per_t = ray.dir.as_dvec3().length();
         let (index_ray, cells, t0, t1) = self.index_ray(ray, t0, t1);
         let cells = cells.to_array().map(i64::from);
@@ -283,7 +291,7 @@ impl Volume {
         anchor: f64,
         block: UVec3,
         [ta, tb]: [f64; 2],
-        m: &mut March,
+        m: &mut MarchState,
     ) {
         if !(self.occupied[self.block_index(block)] && tb > ta) {
             return;
@@ -299,7 +307,7 @@ impl Volume {
     }
 
     #[inline]
-    fn march_cell(&self, ray: &IndexRay, per_t: f64, anchor: f64, c: &Crossing, m: &mut March) {
+    fn march_cell(&self, ray: &IndexRay, per_t: f64, anchor: f64, c: &Crossing, m: &mut MarchState) {
         if c.t1 <= c.t0 {
             return;
         }

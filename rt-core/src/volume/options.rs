@@ -26,7 +26,7 @@ pub enum VolumeError {
 
 /// How a highlight falls off around the mirrored light.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Highlight {
+pub enum VolumeHighlight {
     /// By the angle between the normal and the direction halfway between light and viewer (Blinn 1977).
     #[default]
     Halfway,
@@ -49,7 +49,7 @@ pub struct VolumeShading {
     /// Exponent of the highlight.
     pub shininess: f32,
     /// Its form.
-    pub highlight: Highlight,
+    pub highlight: VolumeHighlight,
     /// Gradient, in value per world unit, at which the shading has half its effect. With 0 it has all of it everywhere, and only `ambient` where
     /// there is no gradient (VTK).
     pub half_gradient: f32,
@@ -64,7 +64,7 @@ impl Default for VolumeShading {
             light: None,
             specular: 0.0,
             shininess: 1.0,
-            highlight: Highlight::Halfway,
+            highlight: VolumeHighlight::Halfway,
             half_gradient: 0.0,
         }
     }

@@ -1,6 +1,6 @@
 //! Volumes that are no medium: the largest or smallest scalar along a ray, means and sums, surfaces of given values.
 
-use super::layer::{Layer, March};
+use super::layer::{Layer, MarchState};
 use super::{Blend, MACROCELL, Volume, VolumeQuality, VolumeSample};
 use crate::grid_walk::{Crossing, IndexRay};
 use crate::ray::Ray;
@@ -9,7 +9,7 @@ use glam::UVec3;
 use std::ops::ControlFlow;
 
 /// The part of a ray in one cell, and the scalar along it as a Bézier cubic.
-struct Stretch<'a> {
+struct CellSegment<'a> {
     crossing: &'a Crossing,
     stored: UVec3,
     b: [f64; 4],
@@ -35,13 +35,13 @@ impl Volume {
 
     /// Visits what the ray crosses, in order. `wanted` says by the range of its values whether a block or a cell counts. Cells with a value that is
     /// not a number are left out.
-    fn cross(
+    fn visit_cells(
         &self,
         ray: &Ray,
         t0: f64,
         t1: f64,
         mut wanted: impl FnMut(f64, f64) -> bool,
-        mut visit: impl FnMut(&IndexRay, &Stretch<'_>) -> ControlFlow<()>,
+        mut visit: impl FnMut(&IndexRay, &CellSegment<'_>) -> ControlFlow<()>,
     ) {
         let (index_ray, cells, t0, t1) = self.index_ray(ray, t0, t1);
         if t0 >= t1 {
@@ -72,7 +72,7 @@ impl Volume {
                     ray_cubic::along(&corners, &p, &q)
                 };
                 if crossing.t1 > crossing.t0 && b.iter().all(|v| v.is_finite()) {
-                    going = visit(&index_ray, &Stretch { crossing, stored, b }).is_continue();
+                    going = visit(&index_ray, &CellSegment { crossing, stored, b }).is_continue();
                 }
                 going
             });
@@ -85,7 +85,7 @@ impl Volume {
         let best = std::cell::Cell::new((f64::NEG_INFINITY, f64::INFINITY));
         let mut samples = 0;
         let more = |low: f64, high: f64| (sign * low).max(sign * high) > best.get().0;
-        self.cross(ray, t0, t1, more, |_, s| {
+        self.visit_cells(ray, t0, t1, more, |_, s| {
             samples += 1;
             let c = s.crossing;
             let (places, count) = turns(&s.b);
@@ -119,7 +119,7 @@ impl Volume {
         };
         let path = if mean { 1.0 } else { self.bounds().extent().as_dvec3().length() };
         let error_per_length = levels / 255.0 / path;
-        self.cross(
+        self.visit_cells(
             ray,
             t0,
             t1,
@@ -171,10 +171,10 @@ impl Volume {
 
     /// The surfaces on which the scalar has one of `values`, one behind the other.
     fn surfaces(&self, ray: &Ray, t0: f64, t1: f64, values: &[f32]) -> VolumeSample {
-        let mut m = March::new(VolumeQuality::default(), 1.0);
+        let mut m = MarchState::new(VolumeQuality::default(), 1.0);
         let any = |low: f64, high: f64| values.iter().any(|v| (low..=high).contains(&f64::from(*v)));
         let mut found: Vec<(f64, f64)> = Vec::new();
-        self.cross(ray, t0, t1, any, |index_ray, s| {
+        self.visit_cells(ray, t0, t1, any, |index_ray, s| {
             found.clear();
             for &value in values {
                 crossings(&s.b, value.into(), |u| found.push((u, value.into())));

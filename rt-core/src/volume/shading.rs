@@ -1,13 +1,13 @@
 //! Gradients of a cell, and what lights make of them.
 
-use super::{GradientOpacity, Highlight, Volume, VolumeShading};
+use super::{GradientOpacity, Volume, VolumeHighlight, VolumeShading};
 use crate::grid::Grid;
 use crate::grid_walk::IndexRay;
 use glam::{DVec3, UVec3, Vec3};
 
 /// What light makes of a colour, and how steep the scalar is there.
 #[derive(Debug, Clone, Copy)]
-struct Lit {
+struct ShadingSample {
     factor: [f64; 3],
     highlight: f64,
     steepness: f64,
@@ -15,14 +15,14 @@ struct Lit {
 
 /// Light along a ray's way through a cell: the parabola through its values at both ends and in the middle. Gradients cost as much as everything else of
 /// a sample, and between grid points they bend no more than that.
-pub(super) struct LitStretch<'a> {
+pub(super) struct ShadingCurve<'a> {
     t0: f64,
     per_t: f64,
-    ends: [Lit; 3],
+    ends: [ShadingSample; 3],
     opacity: Option<&'a GradientOpacity>,
 }
 
-impl LitStretch<'_> {
+impl ShadingCurve<'_> {
     /// Extinction and colour at `t`, of those that the transfer function says.
     #[inline]
     pub(super) fn on(&self, t: f64, sigma: f64, color: [f64; 3]) -> (f64, [f64; 3]) {
@@ -52,7 +52,7 @@ impl Volume {
         [t0, t1]: [f64; 2],
         p: &[f64; 3],
         q: &[f64; 3],
-    ) -> Option<LitStretch<'_>> {
+    ) -> Option<ShadingCurve<'_>> {
         if !self.has_light() {
             return None;
         }
@@ -66,7 +66,7 @@ impl Volume {
             [p, 0.5 * (p + q), q].map(|at| self.lit(between(&corners, at).as_dvec3(), dir))
         };
         let opacity = self.options.gradient_opacity.as_ref();
-        Some(LitStretch { t0, per_t: 1.0 / (t1 - t0), ends, opacity })
+        Some(ShadingCurve { t0, per_t: 1.0 / (t1 - t0), ends, opacity })
     }
 
     /// A colour under the lights at one place of a stored cell.
@@ -78,15 +78,19 @@ impl Volume {
     }
 
     /// What lights make of the gradient `g` for a ray along `dir`.
-    fn lit(&self, g: DVec3, dir: DVec3) -> Lit {
+    fn lit(&self, g: DVec3, dir: DVec3) -> ShadingSample {
         let steepness = g.length();
         let flat = !(steepness > 0.0 && steepness.is_finite());
         let Some(s) = &self.options.shading else {
-            return Lit { factor: [1.0; 3], highlight: 0.0, steepness: if flat { 0.0 } else { steepness } };
+            return ShadingSample {
+                factor: [1.0; 3],
+                highlight: 0.0,
+                steepness: if flat { 0.0 } else { steepness },
+            };
         };
         if flat {
             let factor = if s.half_gradient > 0.0 { 1.0 } else { f64::from(s.ambient) };
-            return Lit { factor: [factor; 3], highlight: 0.0, steepness: 0.0 };
+            return ShadingSample { factor: [factor; 3], highlight: 0.0, steepness: 0.0 };
         }
         let normal = g / steepness;
         let cos = |l: DVec3| (normal.dot(l) / l.length()).abs();
@@ -96,14 +100,18 @@ impl Volume {
             let light = s.light.map_or(dir, |l| l.as_dvec3());
             let factor = 1.0 + weight * (ambient + diffuse * cos(light) - 1.0);
             let highlight = weight * highlight(s, normal, light, dir);
-            return Lit { factor: [factor; 3], highlight, steepness };
+            return ShadingSample { factor: [factor; 3], highlight, steepness };
         }
         let mut sum = [0.0; 3];
         for light in &self.options.lights {
             let cos = cos(light.direction.map_or(dir, |l| l.as_dvec3()));
             sum.iter_mut().zip(light.color).for_each(|(s, c)| *s += f64::from(c) * cos);
         }
-        Lit { factor: sum.map(|s| 1.0 + weight * (ambient + diffuse * s - 1.0)), highlight: 0.0, steepness }
+        ShadingSample {
+            factor: sum.map(|s| 1.0 + weight * (ambient + diffuse * s - 1.0)),
+            highlight: 0.0,
+            steepness,
+        }
     }
 }
 
@@ -115,8 +123,10 @@ fn highlight(s: &VolumeShading, normal: DVec3, light: DVec3, dir: DVec3) -> f64 
     let viewer = if s.light.is_some() { -dir } else { dir }.normalize_or_zero();
     let light = light.normalize_or_zero();
     let base = match s.highlight {
-        Highlight::Halfway => (normal.dot(light + viewer) / (light + viewer).length()).abs(),
-        Highlight::Mirrored => (2.0 * normal.dot(light) * normal.dot(viewer) - light.dot(viewer)).max(0.0),
+        VolumeHighlight::Halfway => (normal.dot(light + viewer) / (light + viewer).length()).abs(),
+        VolumeHighlight::Mirrored => {
+            (2.0 * normal.dot(light) * normal.dot(viewer) - light.dot(viewer)).max(0.0)
+        }
     };
     // Two opposite directions have no half vector.
     if base.is_finite() { f64::from(s.specular) * base.powf(s.shininess.into()) } else { 0.0 }

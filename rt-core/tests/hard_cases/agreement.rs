@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use crate::oracle::{self, check};
-use rt_core::accel::{BuildOptions, BuildQuality, Geometry, Instance, Robustness, World};
+use rt_core::bvh::{BuildOptions, BuildQuality, Geometry, Instance, Robustness, World};
 use rt_core::glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use rt_core::mesh::TriMesh;
 use rt_core::ray::Ray;

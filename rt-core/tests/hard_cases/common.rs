@@ -1,7 +1,7 @@
 //! Meshes, rays and the slow oracle that the tests share.
 
 use glam::{DVec3, Vec3};
-use rt_core::accel::{BuildOptions, BuildQuality, Robustness, World};
+use rt_core::bvh::{BuildOptions, BuildQuality, Robustness, World};
 use rt_core::glam;
 use rt_core::mesh::TriMesh;
 use rt_core::ray::{Hit, HitBlock, LANES, Ray, RayBlock};

@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use crate::oracle::check;
-use rt_core::accel::{BuildError, BuildOptions, Geometry, Instance, Robustness, StreamError, World};
+use rt_core::bvh::{BuildError, BuildOptions, Geometry, Instance, Robustness, StreamError, World};
 use rt_core::glam::{DAffine3, DMat3, DVec3, Vec3};
 use rt_core::mesh::TriMesh;
 use rt_core::ray::{HitBlock, NO_HIT, Ray, RayBlock};

@@ -95,7 +95,7 @@ fn rays_in_box_planes_do_not_leak() {
     for options in some_options() {
         let w = world(&mesh, &options);
         let hits = hits_all_ways(&w, &rays, &format!("{options:?}"));
-        let exact = options.robustness == rt_core::accel::Robustness::Watertight;
+        let exact = options.robustness == rt_core::bvh::Robustness::Watertight;
         let lost = hits.iter().filter(|h| h.is_none()).count();
         assert!(!exact || lost == 0, "{options:?}: {lost} of {} rays lost", rays.len());
         for (r, h) in rays.iter().zip(hits).step_by(13).filter(|(_, h)| h.is_some()) {

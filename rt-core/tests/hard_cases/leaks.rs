@@ -1,17 +1,17 @@
 //! Rays that slip between triangles of closed meshes.
 
 use crate::common::{cube, sphere, torus};
-use rt_core::accel::{BuildOptions, BuildQuality, Robustness, World};
+use rt_core::bvh::{BuildOptions, BuildQuality, Robustness, World};
 use rt_core::glam::DVec3;
 use rt_core::mesh::TriMesh;
-use rt_core::robustness::{Aim, LeakTest, Query, Start};
+use rt_core::robustness::{LeakTest, QueryKind, RayOrigins, RayTarget};
 use rt_core::simd::SimdLevel;
 
 /// Closed meshes and where rays start in them: curved and flat, at zero and far from it, finely and coarsely cut.
-fn cases() -> Vec<(&'static str, TriMesh, Start)> {
+fn cases() -> Vec<(&'static str, TriMesh, RayOrigins)> {
     let far = DVec3::new(1000.0, 700.0, -1300.0);
-    let ball = |center, radius| Start::Ball { center, radius };
-    let near = |center| Start::NearSurface { center };
+    let ball = |center, radius| RayOrigins::Ball { center, radius };
+    let near = |center| RayOrigins::NearSurface { center };
     vec![
         ("sphere", sphere(5, 1.0, DVec3::ZERO), ball(DVec3::ZERO, 0.7)),
         ("far sphere", sphere(5, 1.0, far), ball(far, 0.7)),
@@ -35,7 +35,7 @@ fn rays_wanted() -> usize {
 /// Rays traced and lost in one mode; every combination of case, aim and query, with presets and instruction sets in turn.
 fn shoot(robustness: Robustness, wanted: usize) -> (u64, u64, Vec<String>) {
     let (cases, levels) = (cases(), SimdLevel::available());
-    let each = wanted / (cases.len() * Aim::ALL.len() * Query::ALL.len());
+    let each = wanted / (cases.len() * RayTarget::ALL.len() * QueryKind::ALL.len());
     let (mut rays, mut lost, mut lines) = (0, 0, Vec::new());
     let mut turn = 0;
     for (name, mesh, start) in &cases {
@@ -46,8 +46,8 @@ fn shoot(robustness: Robustness, wanted: usize) -> (u64, u64, Vec<String>) {
             })
             .map(|o| (o, World::from_mesh(mesh.clone(), &o).expect("a closed mesh")))
             .collect();
-        for aim in Aim::ALL {
-            for query in Query::ALL {
+        for aim in RayTarget::ALL {
+            for query in QueryKind::ALL {
                 turn += 7;
                 let (options, world) = &worlds[turn % worlds.len()];
                 let test = LeakTest { world, mesh, start: *start, aim, seed: turn as u64 };

@@ -2,7 +2,7 @@
 
 use crate::agreement::placements;
 use crate::common::*;
-use rt_core::accel::{Geometry, Instance, World};
+use rt_core::bvh::{Geometry, Instance, World};
 use rt_core::glam::DVec3;
 use rt_core::ray::Ray;
 use std::sync::Arc;

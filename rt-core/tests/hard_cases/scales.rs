@@ -3,11 +3,11 @@
 use crate::agreement::placements;
 use crate::common::*;
 use crate::oracle::check;
-use rt_core::accel::{BuildOptions, Geometry, Instance, Robustness, World};
+use rt_core::bvh::{BuildOptions, Geometry, Instance, Robustness, World};
 use rt_core::glam::{DAffine3, DVec3, Vec3};
 use rt_core::mesh::TriMesh;
 use rt_core::ray::Ray;
-use rt_core::robustness::{Aim, LeakTest, Query, Start};
+use rt_core::robustness::{LeakTest, QueryKind, RayOrigins, RayTarget};
 use std::sync::Arc;
 
 fn scaled(mesh: &TriMesh, k: f32) -> TriMesh {
@@ -51,9 +51,9 @@ fn meshes_of_any_size_are_watertight() {
             let center = DVec3::new(1.0, 0.7, -1.3) * radius * offset;
             let mesh = sphere(3, radius, center);
             let w = World::from_mesh(mesh.clone(), &BuildOptions::default()).expect("closed");
-            for aim in Aim::ALL {
-                for query in Query::ALL {
-                    let start = Start::Ball { center, radius: 0.6 * radius };
+            for aim in RayTarget::ALL {
+                for query in QueryKind::ALL {
+                    let start = RayOrigins::Ball { center, radius: 0.6 * radius };
                     let c = LeakTest { world: &w, mesh: &mesh, start, aim, seed: 3 }.count(query, 4096);
                     assert_eq!(
                         (c.leaks, c.occlusion_leaks),

@@ -1,7 +1,7 @@
 //! Secondary rays must not meet the surface they start from, at any scale and from any camera.
 
 use crate::common::*;
-use rt_core::accel::{Geometry, Instance, World};
+use rt_core::bvh::{Geometry, Instance, World};
 use rt_core::glam::{DAffine3, DMat3, DQuat, DVec3};
 use rt_core::robustness::SelfShadowTest;
 use rt_core::scene::Scene;

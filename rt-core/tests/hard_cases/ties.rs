@@ -1,7 +1,7 @@
 //! Surfaces in the same place: the lowest instance, then the lowest primitive wins, whoever asks and in whatever order the tree is walked.
 
 use crate::common::*;
-use rt_core::accel::{Geometry, Instance, World};
+use rt_core::bvh::{Geometry, Instance, World};
 use rt_core::glam::{DAffine3, DQuat, DVec3, Vec3};
 use rt_core::mesh::TriMesh;
 use rt_core::ray::Ray;

@@ -3,7 +3,7 @@ use crate::field::Field;
 use crate::media::{Media, Property, Volume};
 use crate::solids::Solids;
 use glam::{DVec3, Vec3};
-use rt_core::accel::{BuildOptions, World};
+use rt_core::bvh::{BuildOptions, World};
 use rt_core::mesh::TriMesh;
 
 const HALF: f64 = 48e-3;

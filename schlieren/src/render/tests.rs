@@ -2,7 +2,7 @@ use super::*;
 use crate::field::{Field, Node};
 use crate::solids::Solids;
 use glam::{DVec3, Vec3};
-use rt_core::accel::{BuildOptions, World};
+use rt_core::bvh::{BuildOptions, World};
 use rt_core::mesh::TriMesh;
 
 const SIGMA: f64 = 12e-3;

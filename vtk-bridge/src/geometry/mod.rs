@@ -7,7 +7,7 @@ mod triangulate;
 mod vertices;
 
 use crate::input::{PerItem, Shape};
-use rt_core::accel::Geometry;
+use rt_core::bvh::Geometry;
 use rt_core::glam::{Vec2, Vec3};
 use rt_core::mesh::{Attribute, TriMesh};
 use std::ops::Range;

@@ -2,7 +2,7 @@
 //! with boxes made anew (a sixth of a build, with the copy), as long as that leaves rays nearly as fast.
 
 use super::Geometry;
-use rt_core::accel::{self, BuildOptions, Instance, World};
+use rt_core::bvh::{self, BuildOptions, Instance, World};
 use rt_core::glam::DAffine3;
 use rt_core::mesh::TriMesh;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ pub(super) fn structure(before: &Geometry, mesh: &Arc<TriMesh>) -> Option<Arc<Wo
     let old = before.structure_now()?;
     let start = Instant::now();
     // The program may draw what was before again: it keeps its own.
-    let geometry = accel::Geometry::Mesh(before.mesh.clone());
+    let geometry = bvh::Geometry::Mesh(before.mesh.clone());
     let instance = Instance { geometry: 0, world_from_object: DAffine3::IDENTITY };
     let mut world =
         World::build_sharing(vec![geometry], vec![instance], &BuildOptions::default(), Some(&old)).ok()?;

@@ -9,7 +9,7 @@ use crate::trace::Prepared;
 use crate::trace::occlusion::eye_from_object;
 use crate::trace::view::View;
 use rt_core::glam::{DAffine3, DMat3, Vec2, Vec3};
-use rt_core::material::{ColorSource, Highlight, Material, Sides, SurfaceModel};
+use rt_core::material::{ColorSource, Material, PhongForm, Sides, SurfaceModel};
 use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::texture::Texture;
 use std::sync::Arc;
@@ -32,7 +32,7 @@ struct SurfaceAppearance {
     emission: [f32; 3],
     opacity: f32,
     /// Highlight colour, exponent, form; `None` for what no light changes.
-    lit: Option<([f32; 3], f32, Highlight)>,
+    lit: Option<([f32; 3], f32, PhongForm)>,
     sides: Sides,
 }
 
@@ -200,7 +200,7 @@ fn fixed(p: &Prepared<'_>, warnings: &mut Vec<String>) -> SurfaceAppearance {
             .then(|| Attribute::per_vertex((0..n).map(|i| Vec3::from_array(a.normals.at(i))).collect())),
         emission: if s.lighting { rgb(m.emission) } else { [0.0; 3] },
         opacity: if s.blend && !varies { first[3] } else { 1.0 },
-        lit: s.lighting.then_some((rgb(m.specular), m.shininess, Highlight::HalfVector)),
+        lit: s.lighting.then_some((rgb(m.specular), m.shininess, PhongForm::HalfVector)),
         sides: sides(p, if s.two_side { Sides::Both } else { Sides::LitOutside }),
     }
 }
@@ -249,7 +249,7 @@ fn program(p: &Prepared<'_>) -> SurfaceAppearance {
         }
     };
     let smooth = normals.is_some();
-    let highlight = if program.has_headlight() { Highlight::TowardsLight } else { Highlight::Mirrored };
+    let highlight = if program.has_headlight() { PhongForm::TowardsLight } else { PhongForm::Mirrored };
     let constant_ambient = program.ambient_light();
     SurfaceAppearance {
         color: color.map(|v| v.max(0.0)),

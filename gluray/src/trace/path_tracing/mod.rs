@@ -15,7 +15,7 @@ use crate::trace::view::View;
 use crate::trace::whitted::{ColorImage, lens};
 use crate::trace::{Prepared, Rect};
 use draw_instance::DrawInstance;
-use rt_core::accel::{BuildOptions, BuildQuality, Geometry, Instance, World};
+use rt_core::bvh::{BuildOptions, BuildQuality, Geometry, Instance, World};
 use rt_core::camera::{Camera, ThinLens};
 use rt_core::environment::Environment;
 use rt_core::mesh::TriMesh;

@@ -1,14 +1,14 @@
 //! Light on sixteen surfaces of one material: the lobes and lights of [`super::radiance`], lane by lane the same bits.
 
-use super::Stage;
+use super::FrameContext;
 use crate::effects::Effects;
-use crate::environment::MeanRadiance;
-use crate::light::{PlacedKind, PlacedLight, cone_share};
-use crate::material::{Highlight, Material, SurfaceModel};
+use crate::environment::IrradianceCoefficients;
+use crate::light::{ResolvedLight, ResolvedLightKind, cone_share};
+use crate::material::{Material, PhongForm, SurfaceModel};
 use crate::ray::{LANES, RayBlock};
 use crate::shade::lobes::power;
 use crate::simd::vectors::{Row, Rows3, Vec3x16};
-use crate::surface::Looks;
+use crate::surface::ShadingPointBlock;
 use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdNarrow, SimdWiden, f32x16, mask32x16};
 use glam::Vec3;
 
@@ -16,11 +16,11 @@ use glam::Vec3;
 #[derive(Clone, Copy)]
 enum Lobe {
     Matte,
-    Phong { diffuse: f32, specular: Vec3, shininess: f32, highlight: Highlight },
+    Phong { diffuse: f32, specular: Vec3, shininess: f32, highlight: PhongForm },
 }
 
 /// Microfacets are left to the scalar code: their many special cases are worth it only where a scene is made of them.
-pub(super) fn knows(model: &SurfaceModel) -> bool {
+pub(super) fn supports(model: &SurfaceModel) -> bool {
     !matches!(model, SurfaceModel::Metal { .. } | SurfaceModel::Pbr { .. })
 }
 
@@ -28,28 +28,28 @@ pub(super) fn knows(model: &SurfaceModel) -> bool {
 #[inline(never)]
 pub(super) fn radiance_block<S: Simd>(
     simd: S,
-    stage: &Stage<'_>,
+    context: &FrameContext<'_>,
     material: &Material,
-    looks: &Looks,
+    shading_points: &ShadingPointBlock,
     rays: &RayBlock,
     out: &mut Rows3,
 ) {
     simd.vectorize(
         #[inline(always)]
-        || body(simd, stage, material, looks, rays, out),
+        || body(simd, context, material, shading_points, rays, out),
     );
 }
 
 #[inline(always)]
 fn body<S: Simd>(
     simd: S,
-    stage: &Stage<'_>,
+    context: &FrameContext<'_>,
     material: &Material,
-    looks: &Looks,
+    shading_points: &ShadingPointBlock,
     rays: &RayBlock,
     out: &mut Rows3,
 ) {
-    let color = Vec3x16::load(simd, &looks.color);
+    let color = Vec3x16::load(simd, &shading_points.color);
     let mut sum = Vec3x16::splat(simd, Vec3::from(material.emission));
     let (lobe, ambient) = match material.model {
         SurfaceModel::Unlit => {
@@ -62,26 +62,26 @@ fn body<S: Simd>(
         }
         _ => (Lobe::Matte, 1.0),
     };
-    let normal = Vec3x16::load(simd, &looks.normal);
+    let normal = Vec3x16::load(simd, &shading_points.normal);
     let dir = Vec3x16::load_rows(simd, [&rays.dx, &rays.dy, &rays.dz]);
     let zero = Vec3x16::splat(simd, Vec3::ZERO);
     let (unit, ok) = dir.try_normalize(simd);
     let view = unit.or_else(ok, zero).neg();
 
-    for light in &stage.lights {
-        let (l, strength) = incident(simd, light, &looks.point);
+    for light in &context.lights {
+        let (l, strength) = incident(simd, light, &shading_points.point);
         let answer = respond(simd, lobe, color, normal, view, l, light);
         sum = sum.add(answer.scale(strength));
     }
-    if let Some(mean) = &stage.mean_radiance {
+    if let Some(mean) = &context.irradiance {
         let dielectric = matches!(material.model, SurfaceModel::Dielectric { .. });
-        let dark = dielectric && stage.effects.contains(Effects::REFRACTION);
+        let dark = dielectric && context.effects.contains(Effects::REFRACTION);
         let albedo = match lobe {
             Lobe::Phong { .. } => color.scale(f32x16::splat(simd, ambient)),
             Lobe::Matte if dark => zero,
             Lobe::Matte => color,
         };
-        sum = sum.add(albedo.mul(mean_radiance(simd, mean, normal)));
+        sum = sum.add(albedo.mul(irradiance(simd, mean, normal)));
     }
     sum.store(out);
 }
@@ -95,7 +95,7 @@ fn respond<S: Simd>(
     normal: Vec3x16<S>,
     view: Vec3x16<S>,
     l: Vec3x16<S>,
-    light: &PlacedLight,
+    light: &ResolvedLight,
 ) -> Vec3x16<S> {
     let v = |x: f32| f32x16::splat(simd, x);
     let cos = normal.dot(l);
@@ -109,15 +109,15 @@ fn respond<S: Simd>(
                 matte
             } else {
                 let base = match highlight {
-                    Highlight::HalfVector => {
+                    PhongForm::HalfVector => {
                         let (h, ok) = l.add(view).try_normalize(simd);
                         normal.dot(h.or_else(ok, Vec3x16::splat(simd, Vec3::ZERO)))
                     }
-                    Highlight::Mirrored => normal.scale(v(2.0) * cos).sub(l).dot(view),
-                    Highlight::TowardsLight => cos,
+                    PhongForm::Mirrored => normal.scale(v(2.0) * cos).sub(l).dot(view),
+                    PhongForm::TowardsLight => cos,
                 };
-                let shine = power_block(simd, base.max(v(0.0)), shininess);
-                matte.add(Vec3x16::splat(simd, specular * light.highlight).scale(shine))
+                let direct_lighting = power_block(simd, base.max(v(0.0)), shininess);
+                matte.add(Vec3x16::splat(simd, specular * light.highlight).scale(direct_lighting))
             }
         }
     };
@@ -147,17 +147,17 @@ fn power_block<S: Simd>(simd: S, x: f32x16<S>, n: f32) -> f32x16<S> {
 
 /// Direction to a light without size and the share of it that arrives, as [`crate::shade::direct::incident_from`].
 #[inline(always)]
-fn incident<S: Simd>(simd: S, light: &PlacedLight, points: &Rows3) -> (Vec3x16<S>, f32x16<S>) {
+fn incident<S: Simd>(simd: S, light: &ResolvedLight, points: &Rows3) -> (Vec3x16<S>, f32x16<S>) {
     let v = |x: f32| f32x16::splat(simd, x);
     let (one, zero) = (v(1.0), v(0.0));
     let from = match light.kind {
-        PlacedKind::Directional { to_light } => return (Vec3x16::splat(simd, to_light), one),
-        PlacedKind::Point { position }
-        | PlacedKind::Spot { position, .. }
-        | PlacedKind::Cone { position, .. }
-        | PlacedKind::Ring { position, .. }
-        | PlacedKind::Quad { position, .. }
-        | PlacedKind::Disk { position, .. } => position,
+        ResolvedLightKind::Directional { to_light } => return (Vec3x16::splat(simd, to_light), one),
+        ResolvedLightKind::Point { position }
+        | ResolvedLightKind::Spot { position, .. }
+        | ResolvedLightKind::Cone { position, .. }
+        | ResolvedLightKind::Ring { position, .. }
+        | ResolvedLightKind::Quad { position, .. }
+        | ResolvedLightKind::Disk { position, .. } => position,
     };
     let to_light = Vec3x16::splat(simd, from).sub(Vec3x16::load(simd, points));
     let distance = length(to_light);
@@ -168,7 +168,7 @@ fn incident<S: Simd>(simd: S, light: &PlacedLight, points: &Rows3) -> (Vec3x16<S
         None => one,
     };
     match light.kind {
-        PlacedKind::Spot { direction, cos_cutoff, exponent, .. } => {
+        ResolvedLightKind::Spot { direction, cos_cutoff, exponent, .. } => {
             let cos = -dir.dot(Vec3x16::splat(simd, direction));
             let falloff = if exponent == 0.0 {
                 one
@@ -181,7 +181,7 @@ fn incident<S: Simd>(simd: S, light: &PlacedLight, points: &Rows3) -> (Vec3x16<S
             };
             strength *= cos.simd_lt(v(cos_cutoff)).select(zero, falloff);
         }
-        PlacedKind::Cone { direction, cos_inner, cos_outer, .. } => {
+        ResolvedLightKind::Cone { direction, cos_inner, cos_outer, .. } => {
             let cos = -dir.dot(Vec3x16::splat(simd, direction));
             let mut row: Row = [0.0; LANES];
             for lane in 0..LANES {
@@ -189,10 +189,10 @@ fn incident<S: Simd>(simd: S, light: &PlacedLight, points: &Rows3) -> (Vec3x16<S
             }
             strength *= f32x16::from_slice(simd, &row);
         }
-        PlacedKind::Disk { direction, .. } => {
+        ResolvedLightKind::Disk { direction, .. } => {
             strength *= (-dir.dot(Vec3x16::splat(simd, direction))).max(zero);
         }
-        PlacedKind::Ring { direction, cos_inner, cos_outer, .. } => {
+        ResolvedLightKind::Ring { direction, cos_inner, cos_outer, .. } => {
             let cos = -dir.dot(Vec3x16::splat(simd, direction));
             let mut row: Row = [0.0; LANES];
             for lane in 0..LANES {
@@ -200,11 +200,11 @@ fn incident<S: Simd>(simd: S, light: &PlacedLight, points: &Rows3) -> (Vec3x16<S
             }
             strength *= f32x16::from_slice(simd, &row);
         }
-        PlacedKind::Quad { direction, both_sides, .. } => {
+        ResolvedLightKind::Quad { direction, both_sides, .. } => {
             let cos = -dir.dot(Vec3x16::splat(simd, direction));
             strength *= if both_sides { cos.abs() } else { cos.max(zero) };
         }
-        PlacedKind::Directional { .. } | PlacedKind::Point { .. } => {}
+        ResolvedLightKind::Directional { .. } | ResolvedLightKind::Point { .. } => {}
     }
     (dir, nowhere.select(zero, strength))
 }
@@ -218,9 +218,9 @@ fn length<S: Simd>(d: Vec3x16<S>) -> f32x16<S> {
     low.narrow(high)
 }
 
-/// As [`MeanRadiance::for_normal`].
+/// As [`IrradianceCoefficients::for_normal`].
 #[inline(always)]
-fn mean_radiance<S: Simd>(simd: S, mean: &MeanRadiance, n: Vec3x16<S>) -> Vec3x16<S> {
+fn irradiance<S: Simd>(simd: S, mean: &IrradianceCoefficients, n: Vec3x16<S>) -> Vec3x16<S> {
     let v = |x: f32| f32x16::splat(simd, x);
     let c = |k: usize| Vec3x16::splat(simd, mean.coefficients[k]);
     let linear = c(0).add(c(1).scale(n.y)).add(c(2).scale(n.z)).add(c(3).scale(n.x));

@@ -4,19 +4,19 @@ use crate::colormap::ColorMap;
 use crate::environment::Environment;
 use crate::frame::Layers;
 use crate::light::{Light, LightKind};
-use crate::material::{ColorSource, Highlight, Sides, SurfaceModel};
+use crate::material::{ColorSource, PhongForm, Sides, SurfaceModel};
 use crate::mesh::{Attribute, TriMesh};
 use crate::render::RenderOptions;
 use crate::scene::{Appearance, Scene, SceneBuilder};
 use crate::shade::TILE;
 use crate::shapes::{Radii, Spheres};
 use crate::simd::SimdLevel;
-use crate::test_shapes::{Random, noise_soup};
+use crate::test_shapes::{SplitMix64, noise_soup};
 use glam::{DAffine3, DMat3, DVec3};
 use std::sync::Arc;
 
 /// Triangles with attributes of every kind; `face` for one value per triangle.
-fn dressed(mesh: TriMesh, face: bool, r: &mut Random) -> TriMesh {
+fn dressed(mesh: TriMesh, face: bool, r: &mut SplitMix64) -> TriMesh {
     fn attribute<T>(face: bool, values: Vec<T>) -> Option<Attribute<T>> {
         Some(if face { Attribute::per_face(values) } else { Attribute::per_vertex(values) })
     }
@@ -35,14 +35,14 @@ fn dressed(mesh: TriMesh, face: bool, r: &mut Random) -> TriMesh {
 
 fn towards_light(mut m: Material) -> Material {
     if let SurfaceModel::Phong { highlight, .. } = &mut m.model {
-        *highlight = Highlight::TowardsLight;
+        *highlight = PhongForm::TowardsLight;
     }
     m
 }
 
 /// Every path through look-up and lighting, in pieces small enough for blocks to see several of them.
 fn mixed_scene() -> Scene {
-    let mut r = Random::new(11);
+    let mut r = SplitMix64::new(11);
     let mut b = SceneBuilder::new();
     let map = |log| {
         let colors = vec![[0.1, 0.2, 0.9, 1.0], [1.0, 0.8, 0.3, 1.0], [0.9, 0.1, 0.0, 1.0]];
@@ -67,7 +67,7 @@ fn mixed_scene() -> Scene {
     ];
     for (k, material) in materials.into_iter().enumerate() {
         let mesh = dressed(noise_soup(60, k as u64), k % 2 == 1, &mut r);
-        let (g, m) = (b.geometry(crate::accel::Geometry::Mesh(Arc::new(mesh))), b.material(material));
+        let (g, m) = (b.geometry(crate::bvh::Geometry::Mesh(Arc::new(mesh))), b.material(material));
         let place = DVec3::new(r.unit() as f64 - 0.5, r.unit() as f64 - 0.5, r.unit() as f64 - 0.5);
         b.instance(g, DAffine3 { matrix3: linear[k % 3], translation: place }, Appearance::new(m));
     }
@@ -75,7 +75,7 @@ fn mixed_scene() -> Scene {
     let mut tiny = noise_soup(40, 99);
     tiny.positions.iter_mut().for_each(|p| *p *= 1e-12);
     let (g, m) =
-        (b.geometry(crate::accel::Geometry::Mesh(Arc::new(tiny))), b.material(Material::matte([1.0; 3])));
+        (b.geometry(crate::bvh::Geometry::Mesh(Arc::new(tiny))), b.material(Material::matte([1.0; 3])));
     let large = DAffine3::from_scale(DVec3::splat(0.6e12));
     b.instance(g, large, Appearance::new(m));
     let balls = Spheres::new((0..20).map(|_| r.direction()).collect(), Radii::Common(0.1)).unwrap();
@@ -111,8 +111,8 @@ fn sixteen_at_a_time_have_the_bits_of_one_at_every_level() {
     let options = RenderOptions::new(3 * TILE, 3 * TILE);
     let (mut met, mut levels) = (vec![0; scene.appearances.len()], 0);
     for level in SimdLevel::available().into_iter().map(Some).chain([None]) {
-        let mut stage = Stage::new(&scene, &camera, &options, Effects::NONE);
-        stage.level = SimdLevel::resolve(level).expect("a level of this machine");
+        let mut context = FrameContext::new(&scene, &camera, &options, Effects::NONE);
+        context.level = SimdLevel::resolve(level).expect("a level of this machine");
         levels += 1;
         for tile in 0..9 {
             let (x, y) = (tile % 3 * TILE, tile / 3 * TILE);
@@ -122,21 +122,23 @@ fn sixteen_at_a_time_have_the_bits_of_one_at_every_level() {
             let mut out = TileLayers::new(Layers::ALL, 1.0, false);
             let mut one = TileLayers::new(Layers::ALL, 1.0, false);
             let (mut work, mut stats) = (Workspace::default(), RayStats::default());
-            render_tile(&stage, &area, &mut out, &mut work, None, true, &mut stats);
+            render_tile(&context, &area, &mut out, &mut work, None, true, &mut stats);
             for slot in 0..PIXELS {
                 let Some([px, py]) = area.pixel(slot as u16) else { continue };
-                let [nx, ny] = stage.ndc(px, py, [0.5; 2]);
-                let ray = stage.camera_rays.ray(nx, ny, [0.0; 2]);
+                let [nx, ny] = context.ndc(px, py, [0.5; 2]);
+                let ray = context.camera_rays.ray(nx, ny, [0.0; 2]);
                 let expected = match scene.world.closest(&ray) {
                     Some(hit) => {
                         met[hit.instance as usize] += 1;
-                        let placed = stage.placed(&hit);
-                        let look = placed.look::<true>(&ray, &hit);
-                        one.record(&stage, &area, slot as u16, &ray, &hit, || look.normal);
-                        radiance(&stage, placed.material, None, &look, ray.dir).extend(1.0).to_array()
+                        let resolved = context.instance_at(&hit);
+                        let shading_point = resolved.shading_point::<true>(&ray, &hit);
+                        one.record(&context, &area, slot as u16, &ray, &hit, || shading_point.normal);
+                        radiance(&context, resolved.material, None, &shading_point, ray.dir)
+                            .extend(1.0)
+                            .to_array()
                     }
                     None => {
-                        let [r, g, b, a] = stage.background(py, ray.dir);
+                        let [r, g, b, a] = context.background(py, ray.dir);
                         [r * a, g * a, b * a, a]
                     }
                 };

@@ -1,6 +1,6 @@
 //! Light through layers: which rays need to know what comes next, and that the picture is that of rays which all do.
 
-use crate::accel::{BuildOptions, Geometry};
+use crate::bvh::{BuildOptions, Geometry};
 use crate::camera::Camera;
 use crate::effects::Effects;
 use crate::frame::Layers;
@@ -10,7 +10,7 @@ use crate::mesh::{Attribute, TriMesh};
 use crate::ray_stats::RayStats;
 use crate::render::RenderOptions;
 use crate::scene::{AmbientOcclusion, Appearance, Scene, SceneBuilder};
-use crate::shade::{Stage, TILE, TileArea, TileLayers, Workspace, render_tile};
+use crate::shade::{FrameContext, TILE, TileArea, TileLayers, Workspace, render_tile};
 use crate::shapes::{Radii, Spheres};
 use crate::simd::SimdLevel;
 use crate::test_shapes::sphere;
@@ -78,9 +78,9 @@ fn draw(scene: &Scene, options: &RenderOptions, marked: bool) -> (Vec<[u32; 4]>,
     if options.path_tracing {
         effects = effects.without(Effects::AMBIENT_OCCLUSION) | Effects::PATH_TRACING;
     }
-    let mut stage = Stage::new(scene, &camera(), options, effects);
+    let mut context = FrameContext::new(scene, &camera(), options, effects);
     if marked {
-        stage.see_through.fill(true);
+        context.transmissive.fill(true);
     }
     let (mut colors, mut stats) = (Vec::new(), RayStats::default());
     for tile in 0..4 {
@@ -89,7 +89,7 @@ fn draw(scene: &Scene, options: &RenderOptions, marked: bool) -> (Vec<[u32; 4]>,
         let mut out = TileLayers::new(Layers::COLOR, 1.0, options.samples > 1);
         let mut work = Workspace::default();
         for sample in 0..options.samples {
-            stats += render_tile(&stage, &area, &mut out, &mut work, sample);
+            stats += render_tile(&context, &area, &mut out, &mut work, sample);
         }
         colors.extend(out.color.iter().map(|c| c.map(f32::to_bits)));
     }

@@ -197,7 +197,7 @@ mod tests {
     use crate::anari::device::{Hooks, Raw};
     use crate::anari::object::Extra;
     use crate::anari::status::Listener;
-    use rt_core::accel::World;
+    use rt_core::bvh::World;
 
     struct Silent;
 
@@ -279,8 +279,8 @@ mod tests {
         let moved = draw();
         assert!(!Arc::ptr_eq(&first, &moved), "a matrix moves the instance");
         let shape = |w: &World| match &w.geometries()[0] {
-            rt_core::accel::Geometry::Shape(s) => Arc::as_ptr(s).cast::<()>(),
-            rt_core::accel::Geometry::Mesh(m) => Arc::as_ptr(m).cast::<()>(),
+            rt_core::bvh::Geometry::Shape(s) => Arc::as_ptr(s).cast::<()>(),
+            rt_core::bvh::Geometry::Mesh(m) => Arc::as_ptr(m).cast::<()>(),
         };
         assert_eq!(shape(&first), shape(&moved), "and keeps the geometry with its tree");
         put(ball, "radius", DataType::FLOAT32, floats(&[0.5]));

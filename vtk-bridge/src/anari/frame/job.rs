@@ -6,7 +6,7 @@ use crate::anari::data_type::DataType;
 use crate::anari::scene::RendererSettings;
 use crate::anari::scene::world::CompiledWorld;
 use crate::anari::status::lock;
-use rt_core::accel::{BuildOptions, Geometry, World};
+use rt_core::bvh::{BuildOptions, Geometry, World};
 use rt_core::camera::{Camera, ThinLens};
 use rt_core::environment::{Background, Environment};
 use rt_core::frame::Layers;
@@ -250,7 +250,7 @@ fn draw(order: &Order, job: &Job) -> Result<(FrameImage, Vec<String>), String> {
                 flat.materials.iter_mut().for_each(|m| {
                     m.model = SurfaceModel::Unlit;
                     m.emission = [0.0; 3];
-                    m.detail = None;
+                    m.maps = None;
                 });
                 flat.lights.clear();
                 flat.volumes.clear();

@@ -5,7 +5,7 @@ use super::attribute::{Numbers, Topology};
 use super::surface_color::{TriangleShape, Weights};
 use super::volume::{grid_of, is_nearest};
 use crate::anari::object::{Object, Value};
-use rt_core::accel::Geometry;
+use rt_core::bvh::Geometry;
 use rt_core::glam::{DVec3, Vec3, Vec4};
 use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::ray::Ray;

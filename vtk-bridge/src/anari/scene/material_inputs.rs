@@ -3,8 +3,8 @@
 use super::attribute::{HitPoint, Topology};
 use super::sampler::Sampler;
 use super::surface_color::{Input, Weights};
-use rt_core::detail::{Detail, DetailPlace, Finish};
 use rt_core::glam::{DAffine3, Vec2, Vec3};
+use rt_core::material_maps::{BsdfParameters, MaterialEvalContext, MaterialMaps};
 use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 
@@ -44,8 +44,8 @@ impl std::fmt::Debug for BoundMaterialInputs {
     }
 }
 
-impl Detail for BoundMaterialInputs {
-    fn finish(&self, base: Finish, place: &DetailPlace<'_>) -> Finish {
+impl MaterialMaps for BoundMaterialInputs {
+    fn evaluate(&self, base: BsdfParameters, place: &MaterialEvalContext<'_>) -> BsdfParameters {
         let here = HitPoint {
             topology: &self.topology,
             primitive: place.primitive,
@@ -56,7 +56,7 @@ impl Detail for BoundMaterialInputs {
         };
         let g = &self.material_inputs;
         let first = |input: &Option<Input>, other: f32| input.as_ref().map_or(other, |i| i.at(&here)[0]);
-        let mut out = Finish {
+        let mut out = BsdfParameters {
             metallic: first(&g.metallic, base.metallic),
             roughness: first(&g.roughness, base.roughness),
             specular: g.specular.as_ref().map_or(base.specular, |i| i.at(&here)[0] * g.normal_reflectance),
@@ -76,9 +76,14 @@ impl Detail for BoundMaterialInputs {
 
 impl BoundMaterialInputs {
     /// The frame is that of the mesh's tangents, else that in which the sampler's attribute grows along the triangle.
-    fn mapped_normal(&self, sampler: &Sampler, here: &HitPoint<'_>, place: &DetailPlace<'_>) -> Option<Vec3> {
+    fn mapped_normal(
+        &self,
+        sampler: &Sampler,
+        here: &HitPoint<'_>,
+        place: &MaterialEvalContext<'_>,
+    ) -> Option<Vec3> {
         let mesh = self.mesh.as_ref()?;
-        let place = place.on(mesh);
+        let place = place.with_mesh(mesh);
         let frame = if mesh.tangents.is_some() {
             place.tangent()?
         } else {
@@ -91,6 +96,6 @@ impl BoundMaterialInputs {
             place.tangent_of([corner(0), corner(1), corner(2)])?
         };
         let [r, g, b, _] = sampler.at(here);
-        place.bent(frame, (Vec3::new(r, g, b) * 2.0 - 1.0).try_normalize()?)
+        place.perturbed_normal(frame, (Vec3::new(r, g, b) * 2.0 - 1.0).try_normalize()?)
     }
 }

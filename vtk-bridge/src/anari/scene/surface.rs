@@ -7,10 +7,10 @@ use super::attribute::{Domain, HitPoint, Topology};
 use super::geometry::{Body, Part};
 use super::material_inputs::{BoundMaterialInputs, MaterialInputs};
 use super::surface_color::{AlphaMode, ColoredShape, Input, SurfaceColor, Weights};
-use rt_core::accel::Geometry;
-use rt_core::detail::Detail;
+use rt_core::bvh::Geometry;
 use rt_core::glam::{DAffine3, DVec3};
 use rt_core::material::{ColorSource, Material};
+use rt_core::material_maps::MaterialMaps;
 use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::scene::Appearance;
 use std::sync::Arc;
@@ -50,7 +50,7 @@ pub(crate) fn compile_surface(
                 mesh,
                 world_from_object,
             };
-            model.clone().with_detail(Arc::new(bound_inputs) as Arc<dyn Detail>)
+            model.clone().with_maps(Arc::new(bound_inputs) as Arc<dyn MaterialMaps>)
         }
     };
     let bare = |material, appearance| CompiledSurface {

@@ -13,12 +13,12 @@ use super::volume::volume_of;
 use crate::anari::data_type::DataType;
 use crate::anari::object::{Extra, Object, Value};
 use crate::anari::status::lock;
-use rt_core::accel::{Geometry, Instance, World};
+use rt_core::bvh::{Geometry, Instance, World};
 use rt_core::environment::Environment;
 use rt_core::glam::{DAffine3, DMat4, DVec3};
 use rt_core::light::Light;
 use rt_core::material::Material;
-use rt_core::scene::{Appearance, PlacedVolume};
+use rt_core::scene::{Appearance, VolumeInstance};
 use rt_core::volume::Volume;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
@@ -44,7 +44,7 @@ pub(crate) struct CompiledWorld {
     pub(crate) materials: Vec<Material>,
     pub(crate) lights: Vec<Light>,
     pub(crate) environment: Option<Environment>,
-    pub(crate) volumes: Vec<PlacedVolume>,
+    pub(crate) volumes: Vec<VolumeInstance>,
     pub(crate) ids: Vec<Ids>,
     pub(crate) bounds: Option<[DVec3; 2]>,
     pub(crate) built: Arc<Mutex<Option<Arc<World>>>>,
@@ -199,7 +199,7 @@ impl WorldCompiler<'_> {
             let Some(medium) = made.as_ref() else { continue };
             let grid = medium.grid();
             self.grow(Some([grid.origin, grid.max_corner()]), &placement.world_from_object);
-            self.out.volumes.push(PlacedVolume {
+            self.out.volumes.push(VolumeInstance {
                 volume: medium.clone(),
                 world_from_object: placement.world_from_object,
             });

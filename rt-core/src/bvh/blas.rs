@@ -1,0 +1,195 @@
+//! The structure of one geometry, in coordinates chosen for precision.
+//!
+//! Local space is object space moved to the geometry's centre when it lies far from zero, and scaled by a power of two when it is tiny or huge.
+//! Both are exact for the data: f32 positions near one another differ exactly, and a power of two changes only exponents. What is gained: rays
+//! that start near the geometry have small coordinates, and products of three lengths in the triangle test neither overflow nor underflow.
+
+use super::build::{PrimRef, build_wide};
+use super::layout::local_frame::LocalFrame;
+use super::layout::triangles::widened;
+use super::layout::wide::{ChildRef, LeafWriter, Unit, WideBvh, write_id_leaf};
+use super::options::BuildOptions;
+use super::traverse::triangle_leaf::ClosestTri;
+use super::triangle_bvh::TriBvh;
+use crate::bvh::traverse::single::{LeafTest, RaySetup, inflate_t, traverse};
+use crate::math::Aabb;
+use crate::mesh::TriMesh;
+use crate::ray::Ray;
+use crate::shapes::Shape;
+use fearless_simd::Simd;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// What the leaves hold.
+#[derive(Clone)]
+pub(crate) enum Content {
+    Triangles(TriBvh),
+    Shape { bvh: WideBvh, shape: Arc<dyn Shape> },
+}
+
+/// One geometry's structure.
+#[derive(Clone)]
+pub(crate) struct Blas {
+    pub(crate) frame: LocalFrame,
+    /// Local bounds of the geometry that this is a part of.
+    whole: Option<Aabb>,
+    pub(crate) content: Content,
+    pub(crate) primitives: usize,
+    pub(crate) skipped: usize,
+    /// Expected work per ray relative to the tree as built: refits make it grow.
+    pub(crate) cost_growth: f64,
+    /// For [`super::BuildReport::notes`].
+    pub(crate) notes: Vec<String>,
+}
+
+pub(crate) struct IdWriter;
+
+impl LeafWriter for IdWriter {
+    const UNITS: usize = 1;
+    fn write(&self, prims: &[u32], out: &mut [Unit]) {
+        write_id_leaf(out, prims.iter().copied());
+    }
+}
+
+/// The numbers in an id leaf.
+#[inline(always)]
+pub(crate) fn leaf_primitive_ids(units: &[Unit], leaf: ChildRef) -> &[u32] {
+    &units[leaf.unit()].bits()[..leaf.count()]
+}
+
+impl Blas {
+    /// `given`: local space and bounds there of the geometry that this is a part of.
+    pub(crate) fn for_mesh(
+        mesh: &TriMesh,
+        options: &BuildOptions,
+        given: Option<(LocalFrame, Aabb)>,
+    ) -> Blas {
+        let frame = given.map_or_else(|| LocalFrame::choose(mesh.origin, mesh.bounds()), |(frame, _)| frame);
+        let whole = given.map(|(_, bounds)| bounds);
+        let mut tris = TriBvh::build(mesh, &frame, options.quality);
+        let (skipped, notes) = (tris.skipped, std::mem::take(&mut tris.notes));
+        let primitives = mesh.indices.len() - skipped;
+        Blas { frame, whole, primitives, skipped, cost_growth: 1.0, notes, content: Content::Triangles(tris) }
+    }
+
+    pub(crate) fn for_shape(
+        shape: Arc<dyn Shape>,
+        options: &BuildOptions,
+        given: Option<(LocalFrame, Aabb)>,
+    ) -> Blas {
+        let n = shape.num_primitives();
+        let refs: Vec<PrimRef> = (0..n as u32)
+            .into_par_iter()
+            .with_min_len(1 << 12)
+            .filter_map(|i| {
+                let b = shape.bounds(i);
+                (!b.is_empty() && b.min.is_finite() && b.max.is_finite()).then(|| PrimRef::new(widened(b), i))
+            })
+            .collect();
+        let primitives = refs.len();
+        let mut notes = Vec::new();
+        let bvh = build_wide(refs, &IdWriter, options.quality.config(), &mut notes);
+        let frame = LocalFrame { center: shape.origin(), scale: 1.0 };
+        Blas {
+            frame,
+            whole: given.map(|(_, bounds)| bounds),
+            primitives,
+            skipped: n - primitives,
+            cost_growth: 1.0,
+            notes,
+            content: Content::Shape { bvh, shape },
+        }
+    }
+
+    /// The tree of a shape that has the same primitives, bounds and hits: shared when it is the same shape, else copied.
+    pub(crate) fn with_shape(this: &Arc<Blas>, shape: &Arc<dyn Shape>) -> Arc<Blas> {
+        match &this.content {
+            Content::Shape { bvh, shape: old } if !Arc::ptr_eq(old, shape) => {
+                let content = Content::Shape { bvh: bvh.clone(), shape: Arc::clone(shape) };
+                Arc::new(Blas { content, notes: this.notes.clone(), ..**this })
+            }
+            _ => Arc::clone(this),
+        }
+    }
+
+    pub(crate) fn bvh(&self) -> &WideBvh {
+        match &self.content {
+            Content::Triangles(t) => &t.bvh,
+            Content::Shape { bvh, .. } => bvh,
+        }
+    }
+
+    /// Bounds that decide how rays come into local space: those of the whole geometry.
+    pub(crate) fn reach(&self) -> Aabb {
+        self.whole.unwrap_or(self.bvh().bounds)
+    }
+
+    pub(crate) fn is_part(&self) -> bool {
+        self.whole.is_some()
+    }
+
+    /// The closest hit of a local-space ray.
+    #[inline]
+    pub(crate) fn closest<S: Simd, const EXACT: bool>(&self, simd: S, ray: &Ray) -> ClosestTri {
+        match &self.content {
+            Content::Triangles(tris) => tris.closest::<S, EXACT>(simd, ray),
+            Content::Shape { bvh, shape } => {
+                let (setup, t_max) = (RaySetup::new(ray), ray.t_max);
+                let best = ClosestTri { t: t_max, u: 0.0, v: 0.0, prim: 0, found: false };
+                let mut leaves = ShapeLeaf { shape: &**shape, ray: *ray, best };
+                traverse::<S, _, true>(simd, bvh, &setup, t_max, &mut leaves);
+                leaves.best
+            }
+        }
+    }
+
+    /// Whether anything blocks a local-space ray.
+    #[inline]
+    pub(crate) fn occluded<S: Simd, const EXACT: bool>(&self, simd: S, ray: &Ray) -> bool {
+        match &self.content {
+            Content::Triangles(tris) => tris.occluded::<S, EXACT>(simd, ray),
+            Content::Shape { bvh, shape } => {
+                let mut leaves = ShapeAny { shape: &**shape, ray: *ray, found: false };
+                traverse::<S, _, false>(simd, bvh, &RaySetup::new(ray), ray.t_max, &mut leaves);
+                leaves.found
+            }
+        }
+    }
+}
+
+struct ShapeLeaf<'a> {
+    shape: &'a dyn Shape,
+    ray: Ray,
+    best: ClosestTri,
+}
+
+impl<S: Simd> LeafTest<S> for ShapeLeaf<'_> {
+    #[inline(always)]
+    fn test(&mut self, _: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool {
+        for &prim in leaf_primitive_ids(units, leaf) {
+            // Up to and including the best so far: a tie goes to the lower number, as with triangles.
+            let ray = Ray { t_max: self.best.t.next_up(), ..self.ray };
+            let Some(h) = self.shape.closest(prim, &ray) else { continue };
+            let b = &mut self.best;
+            if h.t < b.t || (h.t == b.t && prim < b.prim) {
+                *b = ClosestTri { t: h.t, u: h.u, v: h.v, prim, found: true };
+                *skip_t = inflate_t(h.t);
+            }
+        }
+        false
+    }
+}
+
+struct ShapeAny<'a> {
+    shape: &'a dyn Shape,
+    ray: Ray,
+    found: bool,
+}
+
+impl<S: Simd> LeafTest<S> for ShapeAny<'_> {
+    #[inline(always)]
+    fn test(&mut self, _: S, units: &[Unit], leaf: ChildRef, _: &mut f32) -> bool {
+        self.found = leaf_primitive_ids(units, leaf).iter().any(|&prim| self.shape.occluded(prim, &self.ray));
+        self.found
+    }
+}

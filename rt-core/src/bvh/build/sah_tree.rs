@@ -1,0 +1,185 @@
+//! A fragment's binary tree by the surface area heuristic, top down: bins for large sets, every cut of the sorted order for small ones.
+
+use super::binary_tree::BinaryTree;
+use super::binned_sah::{SahConfig, SearchSpace, halve, leaf_tests, split_into};
+use super::prim_ref::{Box4, PrimRef, SetBounds};
+use crate::bvh::layout::wide::LEAF_SIZE;
+use fearless_simd::{Level, Simd, dispatch};
+use glam::Vec4;
+use std::ops::Range;
+
+/// Sets up to this size are cut by trying every place along each axis.
+const SWEEP: usize = 8;
+/// Below this depth sets are halved instead of cut by cost. Cost-driven cuts of adversarial input (sizes that grow like 2^k) can
+/// peel off one primitive at a time; halving bounds the depth by this plus log2 of the count, and with it the traversal stack.
+pub(super) const MAX_COST_DEPTH: usize = 36;
+
+/// The tree over `refs` (at least one), whose order is lost; `spare` is as long.
+pub(crate) fn sah_tree(
+    refs: &mut [PrimRef],
+    spare: &mut [PrimRef],
+    bounds: &SetBounds,
+    sah: SahConfig,
+    level: Level,
+) -> BinaryTree {
+    let tree = BinaryTree::with_room_for(refs.len());
+    let mut builder = SahTree { tree, space: SearchSpace::new(level), level, sah };
+    builder.tree.add_root();
+    builder.build(0, refs, spare, bounds, 0, 1);
+    builder.tree
+}
+
+struct SahTree {
+    tree: BinaryTree,
+    space: Box<SearchSpace>,
+    level: Level,
+    sah: SahConfig,
+}
+
+impl SahTree {
+    /// Fills `node` with `refs`, which are the fragment's primitives from place `first` on; `spare` is as long.
+    fn build(
+        &mut self,
+        node: usize,
+        refs: &mut [PrimRef],
+        spare: &mut [PrimRef],
+        bounds: &SetBounds,
+        first: usize,
+        depth: usize,
+    ) {
+        self.tree.nodes[node].bounds = bounds.aabb();
+        self.tree.depth = self.tree.depth.max(depth);
+        let n = refs.len();
+        if n <= LEAF_SIZE {
+            self.tree.make_leaf(node, first, refs.iter().map(PrimRef::id));
+            return;
+        }
+        let child = self.tree.open(node);
+        let by_cost = depth <= MAX_COST_DEPTH;
+        if by_cost && n <= SWEEP {
+            // Both sides are leaves or one is left to sweep: no need for the boxes of the centres.
+            let axes = if self.sah.longest_axis_only { longest_axis(bounds) } else { 0..3 };
+            let (at, bounds) = dispatch!(self.level, simd => sweep(simd, refs, axes));
+            let (left, right) = refs.split_at_mut(at);
+            self.build(child, left, spare, &bounds[0], first, depth + 1);
+            self.build(child + 1, right, spare, &bounds[1], first + at, depth + 1);
+            return;
+        }
+        let cut = by_cost.then(|| split_into(refs, spare, bounds, self.sah, &mut self.space)).flatten();
+        // The cut moved everything to `spare`; halves stay where they are.
+        let (s, spare) = match cut {
+            Some(s) => (s, refs),
+            None => (halve(refs), spare),
+        };
+        let at = s.left.len();
+        let (spare_left, spare_right) = spare.split_at_mut(at);
+        self.build(child, s.left, spare_left, &s.left_bounds, first, depth + 1);
+        self.build(child + 1, s.right, spare_right, &s.right_bounds, first + at, depth + 1);
+    }
+}
+
+fn longest_axis(bounds: &SetBounds) -> Range<usize> {
+    let e = bounds.aabb().extent();
+    let axis = if e.x >= e.y && e.x >= e.z { 0 } else { 1 + (e.z > e.y) as usize };
+    axis..axis + 1
+}
+
+/// Sorts `refs` (two to eight) along the axis with the cheapest cut; returns how many go left and the boxes of both sides.
+#[inline(always)]
+fn sweep<S: Simd>(simd: S, refs: &mut [PrimRef], axes: Range<usize>) -> (usize, [SetBounds; 2]) {
+    simd.vectorize(
+        #[inline(always)]
+        || sweep_body(simd, refs, axes),
+    )
+}
+
+#[inline(always)]
+fn sweep_body<S: Simd>(simd: S, refs: &mut [PrimRef], axes: Range<usize>) -> (usize, [SetBounds; 2]) {
+    let n = refs.len();
+    let mut copy = [refs[0]; SWEEP];
+    copy[..n].copy_from_slice(refs);
+    let sorted = orders(&copy, n);
+    let mut best = (f32::INFINITY, n / 2, axes.start);
+    for axis in axes {
+        let at = |i: usize| &copy[sorted[i][axis] as usize & (SWEEP - 1)];
+        let mut right_cost = [0f32; SWEEP];
+        let mut acc = Box4::EMPTY;
+        for i in (1..n).rev() {
+            acc.grow(simd, at(i));
+            right_cost[i] = acc.half_area() * leaf_tests(n - i);
+        }
+        let mut acc = Box4::EMPTY;
+        for i in 1..n {
+            acc.grow(simd, at(i - 1));
+            let cost = acc.half_area() * leaf_tests(i) + right_cost[i];
+            if cost < best.0 {
+                best = (cost, i, axis);
+            }
+        }
+    }
+    let (_, at, axis) = best;
+    for (p, o) in refs.iter_mut().zip(sorted) {
+        *p = copy[o[axis] as usize & (SWEEP - 1)];
+    }
+    let (left, right) = refs.split_at(at);
+    (at, [left, right].map(SetBounds::of))
+}
+
+/// The places of the first `n` primitives sorted by centre, in the low three bits: `[i][axis]` is the i-th along an axis.
+///
+/// Keys are the centres with their last three bits replaced by the place, so they differ, and a sorting network (19 exchanges, Knuth vol. 3,
+/// section 5.3.4) sorts all axes at once without a branch.
+#[inline(always)]
+fn orders(refs: &[PrimRef; SWEEP], n: usize) -> [[u32; 4]; SWEEP] {
+    // Finite even where the sum of two coordinates overflows: NaN would break the network.
+    let limit = Vec4::splat(0.5 * f32::MAX);
+    let mut keys: [Vec4; SWEEP] = std::array::from_fn(|i| {
+        let c = if i < n { refs[i].center2().clamp(-limit, limit) } else { Vec4::MAX };
+        Vec4::from_array(c.to_array().map(|x| f32::from_bits(x.to_bits() & !7 | i as u32)))
+    });
+    #[rustfmt::skip]
+    const NETWORK: [(usize, usize); 19] = [
+        (0, 2), (1, 3), (4, 6), (5, 7), (0, 4), (1, 5), (2, 6), (3, 7), (0, 1), (2, 3),
+        (4, 5), (6, 7), (2, 4), (3, 5), (1, 4), (3, 6), (1, 2), (3, 4), (5, 6),
+    ];
+    for (a, b) in NETWORK {
+        (keys[a], keys[b]) = (keys[a].min(keys[b]), keys[a].max(keys[b]));
+    }
+    keys.map(|k| k.to_array().map(f32::to_bits))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Aabb;
+    use crate::test_shapes::SplitMix64;
+    use glam::Vec3;
+
+    #[test]
+    fn orders_sort_every_axis_and_lose_nobody_even_at_the_ends_of_the_range() {
+        let mut r = SplitMix64::new(5);
+        for case in 0..2000 {
+            let n = 2 + case % (SWEEP - 1);
+            let huge = if case % 3 == 0 { f32::MAX } else { 1.0 };
+            let refs: [PrimRef; SWEEP] = std::array::from_fn(|i| {
+                let p = r.direction() * r.unit();
+                // Some equal, some at zero.
+                let p = if r.unit() < 0.2 { Vec3::ZERO } else { p * huge };
+                PrimRef::new(Aabb::new(p, p), i as u32)
+            });
+            let sorted = orders(&refs, n);
+            for axis in 0..3 {
+                let places: Vec<usize> = sorted.iter().map(|o| o[axis] as usize & 7).collect();
+                let mut all = places[..n].to_vec();
+                all.sort_unstable();
+                assert_eq!(all, (0..n).collect::<Vec<_>>(), "case {case} axis {axis}");
+                for w in places[..n].windows(2) {
+                    // Twice the centre, as far as it can be told from a larger one.
+                    let center2 = |i: usize| (2.0 * refs[i].bounds().min[axis]).clamp(-1.7e38, 1.7e38);
+                    let [a, b] = [w[0], w[1]].map(center2);
+                    assert!(a <= b + 1e-6 * b.abs().max(a.abs()), "case {case}: {a} before {b}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! How to build an acceleration structure, and what came of it.
+
+use super::build::{BuilderConfig, Method, SahConfig};
+use std::time::Duration;
+
+/// What the build spends to make rays faster (thesis section 4.1.2: approximate builds for changing geometry, full builds for
+/// exploring). The measured trade-off is bench's experiment `accuracy-build`.
+///
+/// For nested isosurfaces of 1 M and 4 M triangles, as guidance: CPU time of the build relative to `Balanced`, time of single primary rays
+/// likewise, bytes a triangle. Coherent packets differ by 0 to 8 %.
+///
+/// | | build | single rays | bytes |
+/// |---|---|---|---|
+/// | `Fast` | 0.82–0.86 | 1.02–1.05 | 59 |
+/// | `Balanced` | 1 | 1 | 56 |
+/// | `Best` | 1.9–2.2 | 0.96–1.00 | 56 |
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum BuildQuality {
+    /// SAH with 8 bins along the longest axis: for geometry that changes every frame.
+    Fast,
+    /// SAH with up to 16 bins along all three axes.
+    #[default]
+    Balanced,
+    /// Balanced, then obvhs' reinsertion optimiser: for geometry that is explored for long, and single rays.
+    Best,
+}
+
+impl BuildQuality {
+    /// Every preset, from fast to good: tests and benchmarks loop over it.
+    pub const ALL: [BuildQuality; 3] = [BuildQuality::Fast, BuildQuality::Balanced, BuildQuality::Best];
+
+    /// What the builders do for this preset.
+    pub(crate) fn config(self) -> BuilderConfig {
+        let quick = SahConfig { bins: 8, longest_axis_only: true };
+        let thorough = SahConfig { bins: 16, longest_axis_only: false };
+        match self {
+            BuildQuality::Fast => BuilderConfig { method: Method::Sah, sah: quick },
+            BuildQuality::Balanced => BuilderConfig { method: Method::Sah, sah: thorough },
+            BuildQuality::Best => BuilderConfig { method: Method::Reinsertion, sah: thorough },
+        }
+    }
+
+    /// The name used on command lines and in records.
+    pub fn name(self) -> &'static str {
+        match self {
+            BuildQuality::Fast => "fast",
+            BuildQuality::Balanced => "balanced",
+            BuildQuality::Best => "best",
+        }
+    }
+}
+
+impl std::str::FromStr for BuildQuality {
+    type Err = UnknownQuality;
+
+    /// By [`BuildQuality::name`], in letters of either case.
+    fn from_str(text: &str) -> Result<BuildQuality, UnknownQuality> {
+        let found = BuildQuality::ALL.into_iter().find(|q| q.name().eq_ignore_ascii_case(text));
+        found.ok_or_else(|| UnknownQuality { found: text.into() })
+    }
+}
+
+/// A name that no preset has.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub struct UnknownQuality {
+    /// The name given.
+    pub found: String,
+}
+
+impl std::fmt::Display for UnknownQuality {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let names = BuildQuality::ALL.map(BuildQuality::name).join(", ");
+        write!(f, "there is no build quality `{}`; there are: {names}", self.found)?;
+        if self.found.eq_ignore_ascii_case("fastest") {
+            f.write_str(" (`fastest` is gone: give `fast`, which builds and traces faster)")?;
+        }
+        Ok(())
+    }
+}
+
+/// What happens to rays through shared edges and vertices.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum Robustness {
+    /// Edge functions in f32 alone, zeros count as inside. Of 2.5·10⁷ rays aimed at vertices and edges of closed meshes none slipped through, but
+    /// nothing rules it out: a triangle whose edge functions all round to zero is missed. The other way round, a triangle 10⁷ times smaller than its
+    /// distance from the ray may be hit falsely when a large one shares its leaf.
+    Fast,
+    /// No ray passes between two triangles that share an edge or a vertex (Woop, Benthin and Wald 2013, with conservative boxes
+    /// after Ize 2013).
+    #[default]
+    Watertight,
+}
+
+impl Robustness {
+    /// Both modes.
+    pub const ALL: [Robustness; 2] = [Robustness::Fast, Robustness::Watertight];
+
+    /// The name used on command lines and in records.
+    pub fn name(self) -> &'static str {
+        match self {
+            Robustness::Fast => "fast",
+            Robustness::Watertight => "watertight",
+        }
+    }
+}
+
+/// Options of [`crate::bvh::World::build`].
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct BuildOptions {
+    /// Build time against ray time.
+    pub quality: BuildQuality,
+    /// Edge and vertex behaviour.
+    pub robustness: Robustness,
+    /// Instruction set of the traversal kernels; `None` for the best this machine has.
+    pub simd: Option<crate::simd::SimdLevel>,
+}
+
+/// What a build did: phases, sizes, and what it had to leave out.
+#[derive(Debug, Clone, Default)]
+pub struct BuildReport {
+    /// Time from input to traversable structure.
+    pub total: Duration,
+    /// Named phases in order.
+    pub phases: Vec<(&'static str, Duration)>,
+    /// Primitives that can be hit.
+    pub primitives: usize,
+    /// Primitives left out because of NaN, infinite or out-of-range input.
+    pub skipped: usize,
+    /// Bytes of nodes and leaves.
+    pub bytes: usize,
+    /// Most nodes on the way from a geometry's root to a leaf.
+    pub depth: usize,
+    /// What was done in another way than asked for, and why; empty as a rule.
+    pub notes: Vec<String>,
+}

@@ -1,0 +1,132 @@
+//! Worlds that hold a part of a larger world's primitives and answer for them as the larger world would.
+//!
+//! What a ray's hit is, to the last bit, depends on more than the primitive: rays are moved to the geometry's local space, those from far away
+//! are first moved along themselves, and render space has an origin. All of that is chosen from bounds. A part therefore takes
+//! over the choices of the whole ([`GlobalLayout`]), and the nearest of the hits of all parts, ties to the lowest id, is the whole's hit.
+
+use super::blas::Blas;
+use super::layout::local_frame::LocalFrame;
+use super::options::BuildOptions;
+use super::world::{BuildError, Geometry, Instance, World};
+use crate::math::Aabb;
+use crate::ray::Ray;
+use crate::shapes::{Shape, ShapeHit, ShapeSurface};
+use glam::DVec3;
+use std::sync::Arc;
+
+/// What a world has chosen from the bounds of everything in it; see [`World::build_part`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct GlobalLayout {
+    pub(super) origin: DVec3,
+    pub(super) bounds: Aabb,
+    /// Local space of each geometry, and its bounds there.
+    pub(super) geometries: Vec<(LocalFrame, Aabb)>,
+}
+
+impl World {
+    /// What parts of this world need to know about it.
+    pub fn global_layout(&self) -> GlobalLayout {
+        GlobalLayout {
+            origin: self.origin(),
+            bounds: self.bounds(),
+            geometries: self.blas.iter().map(|b| (b.frame, b.reach())).collect(),
+        }
+    }
+
+    /// Bounds in render space of what this world holds itself: less than [`World::bounds`] for a part.
+    pub fn own_bounds(&self) -> Aabb {
+        self.tlas.bounds
+    }
+
+    /// A world of some of another world's primitives. `geometries` and `instances` are in number and order those of the whole (a geometry may
+    /// have no primitive left), meshes have the origin they have there, and primitives keep their order. Then for every ray
+    /// [`World::closest`] of the whole is the nearest of those of any parts that together have all primitives, ties to the lowest
+    /// instance and then the lowest primitive of the whole, in the same bits.
+    ///
+    /// ```
+    /// # use rt_core::{bvh::*, mesh::TriMesh, ray::Ray, glam::{DAffine3, Vec3}};
+    /// let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::new(0.0, 0.0, 1.0)];
+    /// let whole = World::from_mesh(TriMesh::new(corners.clone(), vec![[0, 1, 2], [0, 1, 3]]), &BuildOptions::default())?;
+    /// let second = TriMesh::new(vec![corners[0], corners[1], corners[3]], vec![[0, 1, 2]]);
+    /// let part = World::build_part(
+    ///     vec![Geometry::Mesh(second.into())], whole.instances().to_vec(), &whole.global_layout(), &BuildOptions::default())?;
+    /// let ray = Ray::new(Vec3::new(0.2, 9.0, 0.2), -Vec3::Y);
+    /// assert_eq!(part.closest(&ray).map(|h| h.t), whole.closest(&ray).map(|h| h.t));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`World::build`], and [`BuildError::NotAPart`] when the numbers of geometries differ.
+    pub fn build_part(
+        geometries: Vec<Geometry>,
+        instances: Vec<Instance>,
+        whole: &GlobalLayout,
+        options: &BuildOptions,
+    ) -> Result<World, BuildError> {
+        if geometries.len() != whole.geometries.len() {
+            return Err(BuildError::NotAPart { expected: whole.geometries.len(), found: geometries.len() });
+        }
+        World::build_in_layout(geometries, instances, options, Some(whole), None)
+    }
+}
+
+/// The structure of geometry `index`, which was checked, in its own local space or in that of the
+/// whole.
+pub(super) fn blas_of(
+    index: usize,
+    geometry: &Geometry,
+    options: &BuildOptions,
+    whole: Option<&GlobalLayout>,
+) -> Blas {
+    let given = whole.map(|w| w.geometries[index]);
+    match geometry {
+        Geometry::Mesh(m) => Blas::for_mesh(m, options, given),
+        Geometry::Shape(s) => Blas::for_shape(s.clone(), options, given),
+    }
+}
+
+/// Some primitives of a shape, in the order of their numbers there. The shape's data stay where they are and are shared.
+#[derive(Clone)]
+pub struct ShapePart {
+    shape: Arc<dyn Shape>,
+    primitives: Vec<u32>,
+}
+
+impl ShapePart {
+    /// The primitives of `shape` whose numbers are in `primitives`; numbers that it does not have are left out.
+    pub fn new(shape: Arc<dyn Shape>, mut primitives: Vec<u32>) -> ShapePart {
+        let count = shape.num_primitives();
+        primitives.retain(|&p| (p as usize) < count);
+        ShapePart { shape, primitives }
+    }
+}
+
+impl Shape for ShapePart {
+    fn num_primitives(&self) -> usize {
+        self.primitives.len()
+    }
+
+    fn origin(&self) -> DVec3 {
+        self.shape.origin()
+    }
+
+    fn bounds(&self, prim: u32) -> Aabb {
+        self.shape.bounds(self.primitives[prim as usize])
+    }
+
+    fn closest(&self, prim: u32, ray: &Ray) -> Option<ShapeHit> {
+        self.shape.closest(self.primitives[prim as usize], ray)
+    }
+
+    fn occluded(&self, prim: u32, ray: &Ray) -> bool {
+        self.shape.occluded(self.primitives[prim as usize], ray)
+    }
+
+    fn surface(&self, prim: u32, hit: &ShapeHit, ray: &Ray) -> ShapeSurface {
+        self.shape.surface(self.primitives[prim as usize], hit, ray)
+    }
+
+    fn has_transparency(&self) -> bool {
+        self.shape.has_transparency()
+    }
+}

@@ -1,0 +1,242 @@
+//! Moving the vertices of a mesh without building its tree anew.
+//!
+//! Leaves get the new vertices and boxes are recomputed from the bottom up; which triangles share a leaf stays. A time step of a deforming mesh
+//! then costs a seventh of a build (42 ms of CPU against 290 for 1 M triangles), and rays become slower the further the vertices move from
+//! where the tree was built: the report says how much to expect.
+
+use super::blas::{Blas, Content};
+use super::layout::local_frame::LocalFrame;
+use super::layout::triangles::{TRI_LEAF_UNITS, TriWriter, leaf_floats, leaf_triangle_ids};
+use super::layout::wide::{CHILD_ROW, ChildRef, LeafWriter, NODE_UNITS, Unit, WIDTH, get_box, set_box};
+use super::world::{Geometry, World};
+use crate::math::Aabb;
+use crate::mesh::{MeshError, TriMesh};
+use rayon::prelude::*;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// What [`World::refit`] did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RefitReport {
+    /// Time from the new vertices to a traversable structure.
+    pub elapsed: Duration,
+    /// Triangles that cannot be hit because a vertex is NaN or infinite now. They return when their vertices become finite again.
+    pub unusable: usize,
+    /// Triangles that could be hit, but were left out when the tree was built. Only a new build brings them in.
+    pub absent: usize,
+    /// Expected box and leaf tests of a ray that meets the mesh (the surface area heuristic's cost), relative to when the tree was built.
+    /// Predicts single rays well: 1 M triangles twisted until this was 1.14, 1.32, 1.57, 1.89 took 1.15, 1.33, 1.47, 1.69 times as long as in
+    /// a new tree, coherent packets 1.04, 1.16, 1.26, 1.37 times.
+    pub cost_growth: f64,
+}
+
+/// Why [`World::refit`] refused. The world is as it was before.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum RefitError {
+    /// There is no such geometry.
+    #[error("there is no geometry {geometry}: the world has {count}")]
+    NoSuchGeometry {
+        /// The index given.
+        geometry: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// Only meshes can be refitted.
+    #[error("geometry {geometry} is not a triangle mesh; build a new world instead")]
+    NotAMesh {
+        /// The index given.
+        geometry: usize,
+    },
+    /// The world is a part of another one, whose bounds would have to be chosen anew as well.
+    #[error(
+        "geometry {geometry} is a part of a larger one; move the vertices of the whole, and build its parts again"
+    )]
+    OfAPart {
+        /// The index given.
+        geometry: usize,
+    },
+    /// The new mesh is unusable.
+    #[error("geometry {geometry}: {source}")]
+    Mesh {
+        /// The index given.
+        geometry: usize,
+        /// What is wrong with it.
+        source: MeshError,
+    },
+    /// The new mesh has other triangles.
+    #[error(
+        "geometry {geometry}: the new mesh has {found} {what}, the tree was built for {expected}; refit only moves vertices, build a new world"
+    )]
+    Topology {
+        /// The index given.
+        geometry: usize,
+        /// "vertices" or "triangles".
+        what: &'static str,
+        /// How many the tree was built for.
+        expected: usize,
+        /// How many there are.
+        found: usize,
+    },
+    /// The new mesh joins its vertices differently.
+    #[error(
+        "geometry {geometry}: triangle {triangle} has other vertex indices than when the tree was built; refit only moves vertices, build a new world"
+    )]
+    Indices {
+        /// The index given.
+        geometry: usize,
+        /// The first triangle that differs.
+        triangle: usize,
+    },
+}
+
+impl World {
+    /// Replaces the vertices (and attributes) of a mesh that has the same triangles as before. All instances of it follow. Hits are those of a
+    /// new build; the origin of render space is chosen anew as there, so convert points again afterwards.
+    ///
+    /// ```
+    /// # use rt_core::{bvh::*, mesh::TriMesh, ray::Ray, glam::Vec3};
+    /// # use std::sync::Arc;
+    /// let mut mesh = TriMesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
+    /// let mut world = World::from_mesh(mesh.clone(), &BuildOptions::default())?;
+    /// mesh.positions.iter_mut().for_each(|p| p.z += 1.0);
+    /// let report = world.refit(0, Arc::new(mesh))?;
+    /// assert_eq!(report.unusable, 0);
+    /// let hit = world.closest(&Ray::new(Vec3::new(0.2, 0.2, 3.0), -Vec3::Z)).expect("in the way");
+    /// assert!((hit.t - 2.0).abs() < 1e-6);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn refit(&mut self, geometry: usize, mesh: Arc<TriMesh>) -> Result<RefitReport, RefitError> {
+        let start = Instant::now();
+        let count = self.geometries.len();
+        let old = match self.geometries.get(geometry) {
+            None => return Err(RefitError::NoSuchGeometry { geometry, count }),
+            Some(Geometry::Shape(_)) => return Err(RefitError::NotAMesh { geometry }),
+            Some(Geometry::Mesh(_)) if self.blas[geometry].is_part() => {
+                return Err(RefitError::OfAPart { geometry });
+            }
+            Some(Geometry::Mesh(old)) => old,
+        };
+        mesh.check().map_err(|source| RefitError::Mesh { geometry, source })?;
+        for (what, expected, found) in [
+            ("vertices", old.positions.len(), mesh.positions.len()),
+            ("triangles", old.indices.len(), mesh.indices.len()),
+        ] {
+            if expected != found {
+                return Err(RefitError::Topology { geometry, what, expected, found });
+            }
+        }
+        if old.indices != mesh.indices {
+            let differs = old.indices.iter().zip(&mesh.indices).position(|(a, b)| a != b);
+            return Err(RefitError::Indices { geometry, triangle: differs.unwrap_or(0) });
+        }
+
+        // A tree that another world uses too is copied first.
+        let blas = Arc::make_mut(&mut self.blas[geometry]);
+        let absent = refit_blas(blas, &mesh);
+        let (unusable, cost_growth) = (blas.skipped - absent, blas.cost_growth);
+        self.geometries[geometry] = Geometry::Mesh(mesh);
+        self.rebuild_top_level();
+        Ok(RefitReport { elapsed: start.elapsed(), unusable, absent, cost_growth })
+    }
+}
+
+/// Moves the vertices in the tree; returns how many usable triangles are not in it.
+fn refit_blas(blas: &mut Blas, mesh: &TriMesh) -> usize {
+    let Content::Triangles(tris) = &mut blas.content else { return 0 };
+    let frame = LocalFrame::choose(mesh.origin, mesh.bounds());
+    let writer = TriWriter::new(mesh, &frame);
+    let before = tris.bvh.bounds.half_area() as f64;
+    let root = refit_node(&mut tris.bvh.units, 0, &writer);
+    tris.bvh.bounds = root.bounds;
+    let after = root.bounds.half_area() as f64;
+
+    // Both sums per area of the whole: the ratio of expected tests per ray.
+    let growth = (root.new_area / after) / (root.old_area / before);
+    blas.cost_growth *= if growth.is_finite() && growth > 0.0 { growth } else { 1.0 };
+    let usable =
+        (0..mesh.indices.len()).into_par_iter().with_min_len(1 << 14).filter(|&i| mesh.is_renderable(i));
+    let absent = usable.count() - root.usable;
+    blas.frame = frame;
+    blas.primitives = root.usable;
+    blas.skipped = mesh.indices.len() - root.usable;
+    absent
+}
+
+/// What became of a subtree.
+#[derive(Clone, Copy)]
+struct RefitTotals {
+    bounds: Aabb,
+    /// Summed half areas of all boxes in it, before and after.
+    old_area: f64,
+    new_area: f64,
+    /// Triangles that can be hit.
+    usable: usize,
+}
+
+impl RefitTotals {
+    const NOTHING: RefitTotals = RefitTotals { bounds: Aabb::EMPTY, old_area: 0.0, new_area: 0.0, usable: 0 };
+}
+
+/// Subtrees of at least this many units are tasks of their own.
+const PARALLEL_UNITS: usize = 1 << 14;
+
+/// Refits the subtree that `units` is, whose first unit has the number `base` in the arena. A subtree is one piece of the arena: its node, then
+/// its children's pieces one after the other.
+fn refit_node(units: &mut [Unit], base: usize, writer: &TriWriter<'_>) -> RefitTotals {
+    let children = *units[CHILD_ROW].bits();
+    let (node, mut rest) = units.split_at_mut(NODE_UNITS);
+
+    // ---- The children's pieces, in the arena's order.
+    let mut slots: [usize; WIDTH] = std::array::from_fn(|i| i);
+    let used = children.iter().filter(|&&c| ChildRef(c) != ChildRef::NONE).count();
+    // Unused slots have the largest number.
+    slots.sort_unstable_by_key(|&s| {
+        if ChildRef(children[s]) == ChildRef::NONE { usize::MAX } else { ChildRef(children[s]).unit() }
+    });
+    let whole = rest.len();
+    let mut at = base + NODE_UNITS;
+    let mut pieces: Vec<(usize, ChildRef, usize, &mut [Unit])> = Vec::with_capacity(WIDTH);
+    for (k, &slot) in slots[..used].iter().enumerate() {
+        let child = ChildRef(children[slot]);
+        let end =
+            slots[..used].get(k + 1).map_or(base + NODE_UNITS + whole, |&s| ChildRef(children[s]).unit());
+        let (mine, others) = rest.split_at_mut(end - at);
+        pieces.push((slot, child, at, mine));
+        (at, rest) = (end, others);
+    }
+
+    let refit_child = |(slot, child, at, mine): (usize, ChildRef, usize, &mut [Unit])| {
+        let r = if child.is_leaf() { refit_leaf(mine, child, writer) } else { refit_node(mine, at, writer) };
+        (slot, r)
+    };
+    let done: Vec<(usize, RefitTotals)> = if whole >= PARALLEL_UNITS {
+        pieces.into_par_iter().map(refit_child).collect()
+    } else {
+        pieces.into_iter().map(refit_child).collect()
+    };
+    let mut sum = RefitTotals::NOTHING;
+    for (slot, r) in done {
+        sum.old_area += r.old_area + get_box(node, slot).half_area() as f64;
+        sum.new_area += r.new_area + r.bounds.half_area() as f64;
+        sum.usable += r.usable;
+        sum.bounds = sum.bounds.union(r.bounds);
+        set_box(node, slot, r.bounds);
+    }
+    sum
+}
+
+fn refit_leaf(units: &mut [Unit], leaf: ChildRef, writer: &TriWriter<'_>) -> RefitTotals {
+    debug_assert_eq!(units.len(), TRI_LEAF_UNITS, "a leaf's piece is the leaf");
+    let ids = leaf_triangle_ids(leaf_floats(units, ChildRef::leaf(0, leaf.count())));
+    let ids = &ids[..leaf.count()];
+    let mut r = RefitTotals::NOTHING;
+    for b in ids.iter().map(|&i| writer.bounds(i)).filter(|b| !b.is_empty()) {
+        r.usable += 1;
+        r.bounds = r.bounds.union(b);
+    }
+    writer.write(ids, units);
+    r
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,243 @@
+//! The traversal against the brute-force reference, on every preset, instruction set and robustness mode.
+
+use super::*;
+use crate::mesh::TriMesh;
+use crate::ray::{HitBlock, LANES, NO_HIT, Ray, RayBlock};
+use crate::simd::SimdLevel;
+use crate::test_shapes::{SplitMix64, noise_soup, sphere};
+use glam::Vec3;
+use std::sync::Arc;
+
+/// Every combination of options.
+pub(crate) fn all_options() -> Vec<BuildOptions> {
+    let mut all = Vec::new();
+    for quality in BuildQuality::ALL {
+        for robustness in Robustness::ALL {
+            for simd in SimdLevel::available() {
+                all.push(BuildOptions { quality, robustness, simd: Some(simd) });
+            }
+        }
+    }
+    all
+}
+
+fn random_rays(n: usize, seed: u64, spread: f32) -> Vec<Ray> {
+    let mut r = SplitMix64::new(seed);
+    (0..n)
+        .map(|_| {
+            let o = r.direction() * 3.0;
+            let target = r.direction() * spread * r.unit();
+            Ray::new(o, target - o)
+        })
+        .collect()
+}
+
+#[test]
+fn closest_hits_equal_brute_force() {
+    let mesh = noise_soup(600, 7);
+    let rays = random_rays(1500, 3, 1.0);
+    let expected: Vec<_> = rays.iter().map(|r| brute_force::closest(&mesh, r)).collect();
+    assert!(expected.iter().filter(|e| e.is_some()).count() > 200, "the rays must hit something");
+    for options in all_options() {
+        let world = World::from_mesh(mesh.clone(), &options).expect("a valid mesh");
+        for (ray, e) in rays.iter().zip(&expected) {
+            match (world.closest(ray), e) {
+                (None, None) => {}
+                (Some(h), Some((t, prim))) => {
+                    assert!((h.t as f64 - t).abs() <= 4e-6 * t, "{options:?} {ray:?}: t {} is not {t}", h.t);
+                    assert_eq!(h.prim, *prim, "{options:?} {ray:?}");
+                    // The hit point from the barycentrics is the point on the ray.
+                    let [a, b, c] = mesh.triangle(h.prim as usize);
+                    let p = a + (b - a) * h.u + (c - a) * h.v;
+                    assert!((p - ray.at(h.t)).length() < 1e-4, "{options:?}: {p} is not {}", ray.at(h.t));
+                }
+                (found, _) => panic!("{options:?} {ray:?}: found {found:?}, expected {e:?}"),
+            }
+            assert_eq!(world.occluded(ray), e.is_some(), "{options:?} {ray:?}");
+        }
+    }
+}
+
+/// Tiles of a camera (one origin), the same rays reversed (many origins), and rays in all directions.
+fn ray_sets() -> Vec<(&'static str, Vec<Ray>)> {
+    let eye = Vec3::new(0.3, -2.0, 2.9);
+    let mut camera = Vec::new();
+    for tile in 0..16 {
+        for i in 0..256 {
+            let (x, y) = ((tile % 4) * 16 + i % 16, (tile / 4) * 16 + i / 16);
+            let target = Vec3::new(x as f32 / 32.0 - 1.0, y as f32 / 32.0 - 1.0, 0.1);
+            camera.push(Ray::new(eye, target - eye));
+        }
+    }
+    let reversed =
+        camera.iter().map(|r| Ray { origin: r.at(1.9), dir: -r.dir, t_min: 0.01, t_max: 1.9 }).collect();
+    vec![("camera", camera), ("reversed", reversed), ("all directions", random_rays(2000, 11, 1.2))]
+}
+
+#[test]
+fn packets_equal_single_rays_bit_for_bit_at_every_level() {
+    let mesh = sphere(4);
+    for (name, rays) in ray_sets() {
+        let blocks = RayBlock::from_rays(&rays);
+        let mut reference: Option<Vec<HitBlock>> = None;
+        for simd in SimdLevel::available() {
+            let options = BuildOptions { simd: Some(simd), ..Default::default() };
+            let world = World::from_mesh(mesh.clone(), &options).expect("a valid mesh");
+            let mut coherent = vec![HitBlock::MISS; blocks.len()];
+            let mut sorted = coherent.clone();
+            let mut single = coherent.clone();
+            world.closest_coherent(&blocks, &mut coherent).expect("one each");
+            world.closest_incoherent(&blocks, &mut sorted).expect("one each");
+            for (i, r) in rays.iter().enumerate() {
+                single[i / LANES].set(i % LANES, world.closest(r));
+            }
+            for (what, found) in [("packet", &coherent), ("sorted", &sorted)] {
+                for (i, r) in rays.iter().enumerate() {
+                    let (a, b) = (single[i / LANES].get(i % LANES), found[i / LANES].get(i % LANES));
+                    assert_eq!(
+                        a, b,
+                        "{name} {simd:?}: single ray (left) and {what} (right) differ for ray {i}, {r:?}"
+                    );
+                }
+            }
+            match &reference {
+                None => reference = Some(single.clone()),
+                Some(r) => assert!(*r == single, "{name}: {simd:?} differs from the first level"),
+            }
+            let (mut a, mut b) = (vec![0u16; blocks.len()], vec![0u16; blocks.len()]);
+            world.occluded_coherent(&blocks, &mut a).expect("one each");
+            world.occluded_incoherent(&blocks, &mut b).expect("one each");
+            for (i, h) in single.iter().enumerate() {
+                let expected = (0..LANES).fold(0, |m, l| m | ((h.prim[l] != NO_HIT) as u16) << l);
+                assert_eq!((a[i], b[i]), (expected, expected), "{name} {simd:?}: occlusion of block {i}");
+            }
+        }
+    }
+}
+
+#[test]
+fn empty_worlds_and_missing_rays() {
+    for options in all_options() {
+        let empty = World::build(Vec::new(), Vec::new(), &options).expect("nothing is allowed");
+        let ray = Ray::new(Vec3::ZERO, Vec3::Z);
+        assert_eq!(empty.closest(&ray), None);
+        let no_triangles = World::from_mesh(TriMesh::default(), &options).expect("no triangles are allowed");
+        assert_eq!(no_triangles.closest(&ray), None);
+        let mut hits = [HitBlock::MISS; 3];
+        no_triangles.closest_coherent(&RayBlock::from_rays(&[ray; 40]), &mut hits).expect("one each");
+        assert!(hits.iter().all(|h| h.prim == [NO_HIT; LANES]));
+    }
+}
+
+#[test]
+fn worlds_share_the_trees_of_geometries_they_have_in_common() {
+    let mesh = |seed| Geometry::Mesh(Arc::new(noise_soup(300, seed)));
+    let (kept, changed, new) = (mesh(1), mesh(2), mesh(3));
+    let at = |geometry, x: f64| Instance {
+        geometry,
+        world_from_object: glam::DAffine3::from_translation(glam::DVec3::X * x),
+    };
+    let options = BuildOptions::default();
+    let build = |g: Vec<Geometry>, i, p| World::build_sharing(g, i, &options, p).expect("valid meshes");
+    let mut first = build(vec![changed, kept.clone()], vec![at(0, 0.0), at(1, 1.0)], None);
+    let geometries = vec![kept, new];
+    let instances = vec![at(1, 0.25), at(0, -0.5)];
+    let second = build(geometries.clone(), instances.clone(), Some(&first));
+    assert!(
+        Arc::ptr_eq(&first.blas[1], &second.blas[0]),
+        "the kept geometry has another index, but the same tree"
+    );
+    let fresh = build(geometries.clone(), instances.clone(), None);
+    let hits = |w: &World| random_rays(800, 5, 1.0).iter().map(|r| w.closest(r)).collect::<Vec<_>>();
+    let expected = hits(&fresh);
+    assert!(expected.iter().flatten().count() > 100, "the rays must hit something");
+    assert_eq!(hits(&second), expected);
+
+    // A refit of one world is none of the other's business.
+    first.refit(1, Arc::new(noise_soup(300, 1))).expect("the same triangles");
+    assert!(!Arc::ptr_eq(&first.blas[1], &second.blas[0]));
+    assert_eq!(hits(&second), expected);
+
+    // Other options: nothing of the old tree fits.
+    let other = BuildOptions { quality: BuildQuality::Fast, ..options };
+    let third = World::build_sharing(geometries, instances, &other, Some(&second)).expect("valid meshes");
+    assert!(!Arc::ptr_eq(&third.blas[0], &second.blas[0]));
+}
+
+// ---- Some of the instances
+
+/// Few instances are traced in packets, many one by one; all sides of a mesh, a mirrored one, and a shape.
+fn many_places(n: usize) -> (Vec<Geometry>, Vec<Instance>) {
+    use crate::shapes::{Radii, Spheres};
+    use glam::{DAffine3, DVec3};
+    let balls = Spheres::new(vec![Vec3::ZERO, Vec3::X * 0.3], Radii::Common(0.2)).expect("balls");
+    let geometries = vec![
+        Geometry::Mesh(Arc::new(noise_soup(60, 5))),
+        Geometry::Mesh(Arc::new(sphere(2))),
+        Geometry::Shape(Arc::new(balls)),
+    ];
+    let mut r = SplitMix64::new(n as u64);
+    let instances = (0..n)
+        .map(|i| {
+            let place = (r.direction() * r.unit()).as_dvec3();
+            let scale = DVec3::new(if i % 4 == 0 { -0.4 } else { 0.4 }, 0.3, 0.5);
+            let world_from_object = DAffine3::from_scale_rotation_translation(
+                scale,
+                glam::DQuat::from_rotation_y(i as f64),
+                place,
+            );
+            Instance { geometry: i % 3, world_from_object }
+        })
+        .collect();
+    (geometries, instances)
+}
+
+#[test]
+fn rays_among_some_instances_meet_what_is_met_when_all_others_are_gone() {
+    for n in [1, 2, 7, 60] {
+        let (geometries, instances) = many_places(n);
+        for simd in SimdLevel::available() {
+            let options = BuildOptions { simd: Some(simd), ..BuildOptions::default() };
+            let world = World::build(geometries.clone(), instances.clone(), &options).expect("sound");
+            for marks in [0u64, u64::MAX, 0x5555_5555_5555_5555, 0x0f0f_3c3c_0f0f_3c3c] {
+                let marked: Vec<bool> = (0..n).map(|i| marks >> i & 1 != 0).collect();
+                for (name, rays) in ray_sets() {
+                    check_among(&world, &marked, &rays[..600], &format!("{n} instances, {name}, {simd:?}"));
+                }
+            }
+        }
+    }
+}
+
+/// Each ray is taken through all instances, hit after hit, until it meets one of those that count.
+fn check_among(world: &World, marked: &[bool], rays: &[Ray], what: &str) {
+    let blocks = RayBlock::from_rays(rays);
+    let first_of = |ray: &Ray, wanted: bool| {
+        let level = world.level;
+        let found = (0..marked.len()).filter(|&i| marked[i] == wanted).filter_map(|i| {
+            let only: Vec<bool> = (0..marked.len()).map(|k| k == i).collect();
+            let filter = InstanceFilter::Marked(&only);
+            if marked.len() == 1 {
+                return world.closest(ray);
+            }
+            fearless_simd::dispatch!(level, simd => world.closest_in::<_, true>(simd, ray, filter))
+        });
+        found.min_by(|a, b| a.t.total_cmp(&b.t).then(a.instance.cmp(&b.instance)))
+    };
+    for (wanted, filter) in
+        [(true, InstanceFilter::Marked(marked)), (false, InstanceFilter::Unmarked(marked))]
+    {
+        let expected: Vec<_> = rays.iter().map(|r| first_of(r, wanted)).collect();
+        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+            let mut hits = vec![HitBlock::MISS; blocks.len()];
+            let mut any = vec![0u16; blocks.len()];
+            world.closest_stream(&blocks, &mut hits, coherence, filter);
+            world.occluded_stream(&blocks, &mut any, coherence, filter);
+            for (i, e) in expected.iter().enumerate() {
+                let (b, lane) = (i / LANES, i % LANES);
+                assert_eq!(hits[b].get(lane), *e, "{what}, {coherence:?}, ray {i}");
+                assert_eq!(any[b] >> lane & 1 != 0, e.is_some(), "{what}, {coherence:?}, ray {i}");
+            }
+        }
+    }
+}

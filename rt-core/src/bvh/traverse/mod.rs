@@ -1,0 +1,29 @@
+//! Traversal of the 8-wide hierarchy.
+
+pub(crate) mod hybrid;
+pub(crate) mod packet;
+pub(crate) mod pair;
+pub(crate) mod single;
+pub(crate) mod triangle_leaf;
+
+/// `[f(0), f(1), f(2)]` written out. Closures handed to library functions such as `array::from_fn` are compiled without the instruction set of
+/// the function around them, and every vector operation in them becomes a call (measured: half the speed).
+macro_rules! three {
+    (|$i:ident| $e:expr) => {{
+        [
+            {
+                let $i = 0usize;
+                $e
+            },
+            {
+                let $i = 1usize;
+                $e
+            },
+            {
+                let $i = 2usize;
+                $e
+            },
+        ]
+    }};
+}
+pub(crate) use three;

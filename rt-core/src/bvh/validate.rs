@@ -1,0 +1,181 @@
+//! Checks of finished trees, for tests and for hunting faults: slow, and not needed by correct programs.
+
+use super::blas::{Blas, Content, leaf_primitive_ids};
+use super::layout::triangles::{TriWriter, leaf_floats, leaf_triangle_ids};
+use super::layout::wide::{CHILD_ROW, ChildRef, MAX_DEPTH, NODE_UNITS, Unit, WIDTH, WideBvh, get_box};
+use super::world::{Geometry, World};
+use crate::math::Aabb;
+
+/// What [`World::validate`] counted over all geometries' trees.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct TreeStats {
+    /// 8-wide nodes.
+    pub nodes: usize,
+    /// Children of these.
+    pub children: usize,
+    /// Leaves.
+    pub leaves: usize,
+    /// Primitives in leaves.
+    pub primitives: usize,
+    /// Nodes on the longest path of any tree.
+    pub depth: usize,
+}
+
+/// A broken tree: a defect of this crate, please report it.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{tree}: {fault}")]
+pub struct InvalidTree {
+    /// "geometry 3" or "instances".
+    pub tree: String,
+    /// What is wrong, and where.
+    pub fault: String,
+}
+
+impl World {
+    /// Checks that every box contains what is below it, that every primitive is in exactly one leaf, and that no tree is deeper than
+    /// traversal allows.
+    pub fn validate(&self) -> Result<TreeStats, InvalidTree> {
+        let mut stats = TreeStats::default();
+        for (i, (blas, geometry)) in self.blas.iter().zip(&self.geometries).enumerate() {
+            let fail = |fault| InvalidTree { tree: format!("geometry {i}"), fault };
+            stats = stats.and(validate_blas(blas, geometry).map_err(fail)?);
+        }
+        let mut seen = vec![false; self.placements.len()];
+        let instances = TreeWalker { bvh: &self.tlas, leaf_units: 1 };
+        instances
+            .run(|leaf| {
+                let ids = leaf_primitive_ids(&self.tlas.units, leaf).to_vec();
+                mark(&mut seen, &ids)?;
+                Ok(ids.iter().map(|&i| self.placements[i as usize].bounds).collect())
+            })
+            .map_err(|fault| InvalidTree { tree: "instances".into(), fault })?;
+        Ok(stats)
+    }
+}
+
+impl TreeStats {
+    fn and(self, o: TreeStats) -> TreeStats {
+        TreeStats {
+            nodes: self.nodes + o.nodes,
+            children: self.children + o.children,
+            leaves: self.leaves + o.leaves,
+            primitives: self.primitives + o.primitives,
+            depth: self.depth.max(o.depth),
+        }
+    }
+}
+
+fn validate_blas(blas: &Blas, geometry: &Geometry) -> Result<TreeStats, String> {
+    let stats = match (&blas.content, geometry) {
+        (Content::Triangles(tris), Geometry::Mesh(mesh)) => {
+            let writer = TriWriter::new(mesh, &blas.frame);
+            let mut seen = vec![false; mesh.indices.len()];
+            let stats = TreeWalker { bvh: &tris.bvh, leaf_units: super::layout::triangles::TRI_LEAF_UNITS }
+                .run(|leaf| {
+                let ids = &leaf_triangle_ids(leaf_floats(&tris.bvh.units, leaf))[..leaf.count()];
+                mark(&mut seen, ids)?;
+                Ok(ids.iter().map(|&i| writer.bounds(i)).collect())
+            })?;
+            let lost = (0..seen.len()).find(|&i| !seen[i] && mesh.is_renderable(i));
+            // A refit can make a triangle usable that the build had to leave out; it counts as skipped.
+            if let Some(i) = lost
+                && blas.skipped == 0
+            {
+                return Err(format!("triangle {i} is in no leaf"));
+            }
+            stats
+        }
+        (Content::Shape { bvh, shape }, _) => {
+            let mut seen = vec![false; shape.num_primitives()];
+            TreeWalker { bvh, leaf_units: 1 }.run(|leaf| {
+                let ids = leaf_primitive_ids(&bvh.units, leaf).to_vec();
+                mark(&mut seen, &ids)?;
+                Ok(ids.iter().map(|&i| shape.bounds(i)).collect())
+            })?
+        }
+        (Content::Triangles(_), Geometry::Shape(_)) => return Err("a tree of triangles for a shape".into()),
+    };
+    if stats.primitives < blas.primitives {
+        return Err(format!("{} primitives in leaves, {} expected", stats.primitives, blas.primitives));
+    }
+    Ok(stats)
+}
+
+fn mark(seen: &mut [bool], ids: &[u32]) -> Result<(), String> {
+    for &i in ids {
+        match seen.get_mut(i as usize) {
+            None => return Err(format!("a leaf holds primitive {i} of {}", seen.len())),
+            Some(true) => return Err(format!("primitive {i} is in two leaves")),
+            Some(s) => *s = true,
+        }
+    }
+    Ok(())
+}
+
+struct TreeWalker<'b> {
+    bvh: &'b WideBvh,
+    leaf_units: usize,
+}
+
+impl TreeWalker<'_> {
+    /// Visits every leaf; `contents` gives the boxes of its primitives (empty boxes for those that cannot be hit).
+    fn run(
+        &self,
+        mut contents: impl FnMut(ChildRef) -> Result<Vec<Aabb>, String>,
+    ) -> Result<TreeStats, String> {
+        let units: &[Unit] = &self.bvh.units;
+        let mut stats = TreeStats::default();
+        let mut used = 0;
+        let mut todo = vec![(ChildRef::node(0), self.bvh.bounds, 1)];
+        while let Some((child, bounds, depth)) = todo.pop() {
+            let at = child.unit();
+            let inside = |b: Aabb| b.is_empty() || bounds.union(b) == bounds;
+            if child.is_leaf() {
+                stats.leaves += 1;
+                stats.primitives += child.count();
+                used += self.leaf_units;
+                if at + self.leaf_units > units.len() {
+                    return Err(format!("leaf {at} beyond the end"));
+                }
+                if let Some(b) = contents(child)?.into_iter().find(|b| !inside(*b)) {
+                    return Err(format!("leaf {at}: {b:?} sticks out of {bounds:?}"));
+                }
+                continue;
+            }
+            stats.nodes += 1;
+            stats.depth = stats.depth.max(depth);
+            used += NODE_UNITS;
+            let Some(node) = units.get(at..at + NODE_UNITS) else {
+                return Err(format!("node {at} beyond the end"));
+            };
+            for slot in 0..WIDTH {
+                let c = ChildRef(node[CHILD_ROW].bits()[slot]);
+                let b = get_box(node, slot);
+                if c == ChildRef::NONE {
+                    if !b.is_empty() {
+                        return Err(format!("node {at}: unused slot {slot} has the box {b:?}"));
+                    }
+                    continue;
+                }
+                if !inside(b) {
+                    return Err(format!("node {at}: child {slot}, {b:?}, sticks out of {bounds:?}"));
+                }
+                if c.unit() <= at {
+                    return Err(format!("node {at}: child {slot} at {} lies before it", c.unit()));
+                }
+                stats.children += 1;
+                todo.push((c, b, depth + 1));
+            }
+        }
+        if stats.depth > MAX_DEPTH || stats.depth != self.bvh.depth {
+            return Err(format!(
+                "depth {}, recorded {}, at most {MAX_DEPTH} allowed",
+                stats.depth, self.bvh.depth
+            ));
+        }
+        if used != units.len() {
+            return Err(format!("{used} units in use of {}", units.len()));
+        }
+        Ok(stats)
+    }
+}

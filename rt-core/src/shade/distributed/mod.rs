@@ -1,0 +1,351 @@
+//! Frames whose rays are answered by whoever calls.
+//!
+//! [`crate::render::render`] asks one world for every hit. Here the caller stands in between, so that a scene may be larger than what one
+//! process holds: those who hold parts of it (see [`crate::bvh::World::build_part`]) say what rays meet, and those who own a part of the picture
+//! do everything else. Rays go in waves: all that a tile can send before it needs an answer. The same functions do the same arithmetic in the
+//! same order as in a frame of one piece, so the picture has the same bits.
+//!
+//! Of a tile, its owner asks in turn:
+//! 1. [`TileState::begin`], then for [`TileState::rays`] what each meets first; the answers go to [`TileState::process_hits`].
+//! 2. If there is light to be asked for: either [`TileState::light_points`], answered with one bit per ray
+//!    ([`TileState::apply_occlusion`]), or, where light passes through surfaces, [`TileState::light_rays`] layer by layer
+//!    ([`TileState::process_light_hits`]).
+//! 3. [`TileState::advance`] shades and says whether there is another wave.
+//!
+//! Holders answer with [`DistributedFrame::camera_hits`], [`DistributedFrame::closest`], [`DistributedFrame::occlusion_bits`] and [`DistributedFrame::light_hits`].
+
+mod data_server;
+mod messages;
+mod tile_owner;
+
+pub use data_server::{CameraHits, OcclusionScratch};
+pub use messages::{LightPoint, ShadingHit};
+pub use tile_owner::{ProtocolError, TileState, VolumeRay};
+
+use super::frame_context::FrameContext;
+use super::tile::{TILE, TileArea};
+use super::{Layers, local, volumes};
+use crate::camera::Camera;
+use crate::effects::Effects;
+use crate::frame::Frame;
+use crate::math::Aabb;
+use crate::ray::Ray;
+use crate::render::{Crop, RenderError, RenderOptions, plan_for};
+use crate::scene::Scene;
+use crate::volume::{RaySegments, Volume, VolumeQuality, VolumeSample, composite_projections};
+use glam::{DAffine3, DVec3};
+
+/// Pixels along the side of a tile.
+pub const TILE_SIDE: u32 = TILE;
+
+/// One walk of rays over the whole picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pass {
+    /// Rays through the pixels' centres, for depth, normals and ids.
+    Geometry,
+    /// Colour of this sample.
+    Color(u32),
+}
+
+/// A scene, or a part of one, made ready for one frame.
+pub struct DistributedFrame<'a> {
+    context: FrameContext<'a>,
+    tiles: Vec<TileArea>,
+    warnings: Vec<String>,
+}
+
+impl<'a> DistributedFrame<'a> {
+    /// Checks everything. `needed` are the effects that the whole scene needs ([`Effects::required_by`]): a part may seem to need less.
+    ///
+    /// # Errors
+    /// As [`crate::render::render`]; and [`RenderError::Unsupported`] for options that stop a frame early, which nobody alone can decide here.
+    pub fn new(
+        scene: &'a Scene,
+        needed: Effects,
+        camera: &Camera,
+        options: &'a RenderOptions,
+    ) -> Result<DistributedFrame<'a>, RenderError> {
+        let mut plan = plan_for(scene, needed, camera, options)?;
+        if scene.materials.iter().any(|m| m.maps.is_some())
+            && !plan.effects.without(Effects::DEPTH_OF_FIELD).is_empty()
+        {
+            plan.warnings.push(
+                "maps of roughness, metalness, emission and occlusion are left out where several render a frame with shadows or reflections: only bent \
+                 normals travel"
+                    .into(),
+            );
+        }
+        if options.time_limit.is_some() || options.max_error_levels.is_some() || options.cancel.is_some() {
+            return Err(RenderError::Unsupported {
+                what: "stopping early (time_limit, max_error_levels, cancel)",
+                with: "in a frame that several render together",
+                cure: "leave these options out and give the number of samples",
+            });
+        }
+        if camera.is_omnidirectional() {
+            return Err(RenderError::Unsupported {
+                what: "a panorama (omnidirectional camera)",
+                with: "in a frame that several render together",
+                cure: "render it in one process, or with six perspective cameras",
+            });
+        }
+        let Crop { x: left, y: top, width, height } = options.area();
+        let mut tiles = Vec::new();
+        for y in (0..height).step_by(TILE as usize) {
+            for x in (0..width).step_by(TILE as usize) {
+                let (width, height) = (TILE.min(width - x), TILE.min(height - y));
+                tiles.push(TileArea { x: left + x, y: top + y, width, height, sample: 0 });
+            }
+        }
+        Ok(DistributedFrame {
+            context: FrameContext::new(scene, camera, options, plan.effects),
+            tiles,
+            warnings: plan.warnings,
+        })
+    }
+
+    /// Effects that run.
+    pub fn effects(&self) -> Effects {
+        self.context.effects
+    }
+
+    /// Requests that change nothing, in words.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// Of each volume of the frame whether it is a medium. Those may be held in bricks; projections see whole volumes.
+    pub fn media(&self) -> Vec<bool> {
+        self.context.volumes.iter().map(|(volume, _)| volume.is_medium()).collect()
+    }
+
+    /// The way of a ray, in render space, through the volumes up to `t_end`. `held` may give a part in place of what the scene has as a volume.
+    pub fn ray_segments<'v>(
+        &'v self,
+        ray: &Ray,
+        t_end: f32,
+        held: impl Fn(usize) -> Option<&'v Volume>,
+    ) -> RaySegments<'v> {
+        let place = |(i, (volume, object_from_render)): (usize, &(&'v Volume, DAffine3))| {
+            (held(i).unwrap_or(volume), volumes::in_object_space(ray, object_from_render))
+        };
+        RaySegments::new(self.context.volumes.iter().enumerate().map(place).collect(), ray.t_min, t_end)
+    }
+
+    /// What a ray shows that collects `mixed` in the media: the same where the scene has no projections, which must be here whole.
+    pub fn composite_projections(&self, ray: &Ray, t_end: f32, mixed: VolumeSample) -> VolumeSample {
+        if self.context.volumes.iter().all(|(volume, _)| volume.is_medium()) {
+            return mixed;
+        }
+        let place = |(volume, object_from_render): &(&'a Volume, DAffine3)| {
+            (*volume, volumes::in_object_space(ray, object_from_render))
+        };
+        let resolved: Vec<_> = self.context.volumes.iter().map(place).collect();
+        match resolved[..] {
+            [(volume, ray)] => volume.integrate(&ray, ray.t_min, t_end, self.volume_quality()),
+            _ => composite_projections(&resolved, ray.t_min, t_end, self.volume_quality(), mixed),
+        }
+    }
+
+    /// What accuracy volumes are integrated to.
+    pub fn volume_quality(&self) -> &VolumeQuality {
+        &self.context.options.volume_quality
+    }
+
+    /// Instances of the scene, the same in every part.
+    pub fn num_instances(&self) -> usize {
+        self.context.instances.len()
+    }
+
+    /// Number of tiles, which go row by row from the top left.
+    pub fn num_tiles(&self) -> usize {
+        self.tiles.len()
+    }
+
+    /// Pixels of tile `tile`.
+    pub fn tile_area(&self, tile: usize) -> Crop {
+        let TileArea { x, y, width, height, .. } = self.tiles[tile];
+        Crop { x, y, width, height }
+    }
+
+    /// The passes of this frame, in order.
+    pub fn passes(&self) -> Vec<Pass> {
+        let options = self.context.options;
+        let colors = if options.layers.contains(Layers::COLOR) { options.samples } else { 0 };
+        let geometry = self.wants_geometry() && !self.recorded_with_color();
+        geometry.then_some(Pass::Geometry).into_iter().chain((0..colors).map(Pass::Color)).collect()
+    }
+
+    /// True when colours need nothing but camera rays: holders then know the colours of their own hits
+    /// ([`CameraHits::colors`]), and owners only choose among them ([`TileState::select_colors`]).
+    pub fn needs_only_local_light(&self) -> bool {
+        local::is_sufficient(&self.context)
+    }
+
+    /// True when [`Pass::Color`] also fills the geometry layers, from what [`TileState::record_geometry`] is given or `process_hits` meets.
+    pub fn records_geometry(&self, pass: Pass) -> bool {
+        match pass {
+            Pass::Geometry => true,
+            Pass::Color(sample) => sample == 0 && self.wants_geometry() && self.recorded_with_color(),
+        }
+    }
+
+    /// True when light rays pass through surfaces, so that they are followed layer by layer.
+    pub fn light_passes_surfaces(&self) -> bool {
+        self.context.light_passes_surfaces()
+    }
+
+    /// Rays that a point may send towards light: bits that [`DistributedFrame::occlusion_bits`] gives for each point.
+    pub fn light_rays_per_point(&self) -> u32 {
+        self.context.sky_number + self.sky_rays()
+    }
+
+    /// How far ambient occlusion looks, when it is the only reason for rays that leave a camera ray's hit.
+    pub fn ambient_occlusion_only_distance(&self) -> Option<f64> {
+        let alone = self.context.effects.without(Effects::DEPTH_OF_FIELD) == Effects::AMBIENT_OCCLUSION;
+        self.context.scene.ambient_occlusion.filter(|_| alone).map(|ao| ao.distance)
+    }
+
+    fn sky_rays(&self) -> u32 {
+        let ao = self.context.scene.ambient_occlusion;
+        let traced = self.context.effects.contains(Effects::AMBIENT_OCCLUSION);
+        ao.filter(|_| traced).map_or(0, |ao| ao.rays)
+    }
+
+    fn centered(&self) -> bool {
+        self.context.options.samples <= 1 && !self.context.effects.contains(Effects::DEPTH_OF_FIELD)
+    }
+
+    fn wants_geometry(&self) -> bool {
+        self.context.options.layers.intersects(Layers::GEOMETRY)
+    }
+
+    fn recorded_with_color(&self) -> bool {
+        self.centered() && self.context.options.layers.contains(Layers::COLOR)
+    }
+
+    /// Of the sample that a pass aims at, its number; `None` for the pixels' centres.
+    fn sample_of(&self, pass: Pass) -> Option<u32> {
+        match pass {
+            Pass::Color(sample) if !self.centered() => Some(sample),
+            _ => None,
+        }
+    }
+
+    /// Bounds of this scene's or part's own geometry, render space.
+    pub fn own_bounds(&self) -> Aabb {
+        self.context.scene.world.own_bounds()
+    }
+
+    /// Of each tile, whether a camera ray of it can meet `bounds` (render space).
+    pub fn tiles_overlapping(&self, bounds: Aabb) -> Vec<bool> {
+        if bounds.is_empty() {
+            return vec![false; self.tiles.len()];
+        }
+        let everywhere = vec![true; self.tiles.len()];
+        if self.context.effects.contains(Effects::DEPTH_OF_FIELD) {
+            return everywhere;
+        }
+        let matrix = self.context.camera.clip_from_world();
+        let (mut lo, mut hi) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for corner in bounds.corners() {
+            let world = self.context.origin + corner.as_dvec3();
+            let row = |r: usize| matrix.row(r).truncate().dot(world) + matrix.row(r).w;
+            let (x, y, w) = (row(0), row(1), row(3));
+            // A corner beside or behind the eye has no place in the picture.
+            let reach = (world - self.eye()).length();
+            let in_front = w.is_finite() && (w > 1e-6 * reach || self.context.camera.eye().is_none());
+            if !in_front {
+                return everywhere;
+            }
+            let size = [self.context.options.width, self.context.options.height].map(f64::from);
+            let pixel = [(x / w + 1.0) * 0.5 * size[0], (1.0 - y / w) * 0.5 * size[1]];
+            for a in 0..2 {
+                (lo[a], hi[a]) = (lo[a].min(pixel[a]), hi[a].max(pixel[a]));
+            }
+        }
+        // Rays are anywhere in their pixels, and f32.
+        let margin = 1.0 + 1e-4 * f64::from(self.context.options.width.max(self.context.options.height));
+        let meets = |t: &TileArea| {
+            let (x, y) = (f64::from(t.x), f64::from(t.y));
+            let right = x + f64::from(t.width) + margin;
+            let below = y + f64::from(t.height) + margin;
+            hi[0] >= x - margin && lo[0] <= right && hi[1] >= y - margin && lo[1] <= below
+        };
+        self.tiles.iter().map(meets).collect()
+    }
+
+    fn eye(&self) -> DVec3 {
+        self.context.camera.eye().unwrap_or(self.context.origin)
+    }
+
+    // ---- The finished picture -----------------------------------------------------------------------------------
+
+    /// A picture without any tile.
+    pub fn blank_frame(&self) -> Frame {
+        let area = self.context.options.area();
+        let n = area.width as usize * area.height as usize;
+        let has = |l| if self.context.options.layers.contains(l) { n } else { 0 };
+        Frame {
+            width: area.width,
+            height: area.height,
+            color: vec![[0.0; 4]; has(Layers::COLOR)],
+            depth: vec![self.context.camera.background_depth() as f32; has(Layers::DEPTH)],
+            distance: vec![f32::INFINITY; has(Layers::DISTANCE)],
+            normal: vec![[0.0; 3]; has(Layers::NORMAL)],
+            instance: vec![u32::MAX; has(Layers::IDS)],
+            primitive: vec![u32::MAX; has(Layers::IDS)],
+            cost: vec![0.0; has(Layers::COST)],
+        }
+    }
+
+    /// Words that a pixel has in [`TileState::encode`].
+    pub fn words_per_pixel(&self) -> usize {
+        let sizes = [
+            (Layers::COLOR, 4),
+            (Layers::DEPTH, 1),
+            (Layers::DISTANCE, 1),
+            (Layers::NORMAL, 3),
+            (Layers::IDS, 2),
+            (Layers::COST, 1),
+        ];
+        sizes.iter().filter(|(l, _)| self.context.options.layers.contains(*l)).map(|(_, n)| n).sum()
+    }
+
+    /// Puts what [`TileState::encode`] gave for tile `tile` into the picture. False when it is no tile of this frame or of another length.
+    #[must_use]
+    pub fn decode_tile(&self, frame: &mut Frame, tile: usize, words: &[u32]) -> bool {
+        let Some(t) = self.tiles.get(tile) else { return false };
+        if words.len() != (t.width * t.height) as usize * self.words_per_pixel() {
+            return false;
+        }
+        let area = self.context.options.area();
+        let mut words = words.iter().copied();
+        let mut next = || words.next().unwrap_or_default();
+        for y in 0..t.height {
+            for x in 0..t.width {
+                let i = (t.y - area.y + y) as usize * area.width as usize + (t.x - area.x + x) as usize;
+                if let Some(c) = frame.color.get_mut(i) {
+                    *c = std::array::from_fn(|_| f32::from_bits(next()));
+                }
+                for layer in [&mut frame.depth, &mut frame.distance] {
+                    if let Some(v) = layer.get_mut(i) {
+                        *v = f32::from_bits(next());
+                    }
+                }
+                if let Some(n) = frame.normal.get_mut(i) {
+                    *n = std::array::from_fn(|_| f32::from_bits(next()));
+                }
+                for layer in [&mut frame.instance, &mut frame.primitive] {
+                    if let Some(v) = layer.get_mut(i) {
+                        *v = next();
+                    }
+                }
+                if let Some(c) = frame.cost.get_mut(i) {
+                    *c = f32::from_bits(next());
+                }
+            }
+        }
+        true
+    }
+}

@@ -1,0 +1,487 @@
+//! What the owner of a tile does with the answers.
+
+use super::super::shadow::LightRayState;
+use super::super::tile::{PIXELS, TileArea, TileLayers};
+use super::super::wavefront::{LightRayResult, OcclusionSource, RayKind, RecordedRay};
+use super::super::{
+    Workspace, accumulate_radiance, add_light, generate_camera_wavefront, local, process_hits, spawn_rays,
+};
+use super::{DistributedFrame, LightPoint, Pass, ShadingHit};
+use crate::effects::Effects;
+use crate::frame::Layers;
+use crate::ray::{Hit, HitBlock, LANES, Ray};
+use crate::ray_stats::RayStats;
+use crate::surface::SurfacePoint;
+use crate::volume::VolumeSample;
+use glam::Vec3;
+
+/// A tile on its way to be finished. Its pixels have slots (0..1024) along a Morton curve.
+pub struct TileState {
+    tile: usize,
+    area: TileArea,
+    layers: TileLayers,
+    work: Workspace,
+    stats: RayStats,
+    pass: Pass,
+    /// Light rays of the current wave.
+    waiting: Vec<RecordedRay>,
+    points: Vec<LightPoint>,
+    /// Of each point of the wave its place in `points`; `u32::MAX` for none.
+    place: Vec<u32>,
+    light_ray_states: Vec<LightRayState>,
+    /// Whether the wave's points have their light.
+    lit: bool,
+}
+
+/// A ray on its way through volumes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VolumeRay {
+    /// Its place among the answers of its wave.
+    pub place: usize,
+    /// In render space.
+    pub ray: Ray,
+    /// Where it meets a surface, or its own end.
+    pub t_end: f32,
+}
+
+/// An answer that no holder of this scene can have given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("an answer of tile {tile} does not fit its question: {what} {found}, expected {expected}")]
+pub struct ProtocolError {
+    /// The tile.
+    pub tile: usize,
+    /// What does not fit.
+    pub what: &'static str,
+    /// The number found.
+    pub found: u64,
+    /// The number expected, or the bound that it must be below.
+    pub expected: u64,
+}
+
+impl DistributedFrame<'_> {
+    /// Tile `tile`, with nothing in it.
+    pub fn tile(&self, tile: usize) -> TileState {
+        let background_depth = self.context.camera.background_depth() as f32;
+        TileState {
+            tile,
+            area: self.tiles[tile],
+            layers: TileLayers::new(self.context.options.layers, background_depth, false),
+            work: Workspace::default(),
+            stats: RayStats::default(),
+            pass: Pass::Geometry,
+            waiting: Vec::new(),
+            points: Vec::new(),
+            place: Vec::new(),
+            light_ray_states: Vec::new(),
+            lit: false,
+        }
+    }
+}
+
+impl TileState {
+    /// Number of the tile.
+    pub fn number(&self) -> usize {
+        self.tile
+    }
+
+    /// Rays of this tile so far, by kind.
+    pub fn stats(&self) -> RayStats {
+        self.stats
+    }
+
+    /// Sends camera rays.
+    pub fn begin(&mut self, frame: &DistributedFrame<'_>, pass: Pass) {
+        self.pass = pass;
+        let first = matches!(pass, Pass::Color(0));
+        self.area.sample = if let Pass::Color(sample) = pass { sample } else { 0 };
+        let (work, sample) = (&mut self.work, frame.sample_of(pass));
+        generate_camera_wavefront(
+            &frame.context,
+            &self.area,
+            &mut work.current,
+            sample,
+            &mut self.stats,
+            self.layers.cost_mut(),
+        );
+        if first {
+            work.pixels = std::mem::take(&mut self.layers.color);
+        }
+        work.pixels.clear();
+        work.pixels.resize(PIXELS, [0.0; 4]);
+        work.behind.clear();
+        work.scattered.clear();
+    }
+
+    /// Number of answers that [`TileState::process_hits`] wants: one per ray of the wave, waiting or not.
+    pub fn num_rays(&self) -> usize {
+        self.work.current.states.len()
+    }
+
+    /// Rays that wait for an answer, with their place in it and the slot of their pixel. The first wave of a pass has the rays of
+    /// [`DistributedFrame::camera_hits`], ray k in slot k.
+    pub fn rays(&self) -> impl Iterator<Item = (usize, u16, Ray)> + '_ {
+        let wave = &self.work.current;
+        wave.states.iter().enumerate().filter_map(|(i, state)| {
+            let ray = wave.ray(i);
+            (ray.t_max >= ray.t_min).then_some((i, state.slot, ray))
+        })
+    }
+
+    /// In frames where [`DistributedFrame::needs_only_local_light`]: the colours of the nearest hits, slot by slot; `None` for the background. Ends
+    /// the pass.
+    ///
+    /// # Errors
+    /// When there are not as many colours as slots.
+    pub fn select_colors(
+        &mut self,
+        frame: &DistributedFrame<'_>,
+        colors: &[Option<[f32; 4]>],
+    ) -> Result<(), ProtocolError> {
+        self.expect("number of colours", colors.len(), PIXELS)?;
+        let work = &mut self.work;
+        work.hits.clear();
+        work.hits.resize(PIXELS / LANES, HitBlock::MISS);
+        let mut pixels = std::mem::take(&mut work.pixels);
+        let mut no_stats = RayStats::default();
+        local::light(&frame.context, &self.area, &mut self.layers, work, &mut pixels, false, &mut no_stats);
+        for (pixel, color) in pixels.iter_mut().zip(colors) {
+            *pixel = color.unwrap_or(*pixel);
+        }
+        work.pixels = pixels;
+        self.end_pass();
+        Ok(())
+    }
+
+    /// Fills the geometry layers from what the pixels' camera rays met, slot by slot: for frames of [`TileState::select_colors`].
+    pub fn record_geometry(&mut self, hits: &[Option<ShadingHit>]) {
+        for (slot, hits) in hits.iter().enumerate().take(PIXELS) {
+            if let Some(m) = hits {
+                self.layers.record_given(
+                    slot as u16,
+                    [m.depth, m.distance],
+                    m.surface.normal,
+                    [m.instance, m.primitive],
+                );
+            }
+        }
+    }
+
+    /// Where volumes are held in bricks: the rays that wait, which end where `hits` has something. What they collect on their way goes to [`TileState::set_volume_samples`].
+    pub fn volume_rays(&self, hits: &[Option<ShadingHit>]) -> Vec<VolumeRay> {
+        let end = |i: usize, ray: &Ray| hits.get(i).and_then(|m| m.as_ref()).map_or(ray.t_max, |m| m.t);
+        let way = |(place, _, ray): (usize, u16, Ray)| VolumeRay { place, ray, t_end: end(place, &ray) };
+        if self.pass == Pass::Geometry { Vec::new() } else { self.rays().map(way).collect() }
+    }
+
+    /// Takes what each ray of the wave collects in the volumes, before [`TileState::process_hits`].
+    ///
+    /// # Errors
+    /// When there are not as many answers as rays.
+    pub fn set_volume_samples(&mut self, collected: Vec<VolumeSample>) -> Result<(), ProtocolError> {
+        self.expect("number of crossings", collected.len(), self.num_rays())?;
+        self.work.volume_samples = collected;
+        Ok(())
+    }
+
+    /// Takes what each ray of the wave met first.
+    ///
+    /// # Errors
+    /// When the answers do not fit the wave.
+    pub fn process_hits(
+        &mut self,
+        frame: &DistributedFrame<'_>,
+        hits: &[Option<ShadingHit>],
+    ) -> Result<(), ProtocolError> {
+        self.expect("number of answers", hits.len(), self.num_rays())?;
+        let instances = frame.context.instances.len();
+        self.work.hits.clear();
+        self.work.hits.resize(hits.len().div_ceil(LANES), HitBlock::MISS);
+        self.work.surfaces.clear();
+        for (i, m) in hits.iter().enumerate() {
+            let Some(m) = m else {
+                self.work.surfaces.push(NO_SURFACE);
+                continue;
+            };
+            if m.instance as usize >= instances {
+                return Err(self.wrong("an instance", m.instance as u64, instances as u64));
+            }
+            let hit = Hit { t: m.t, u: 0.0, v: 0.0, prim: m.primitive, instance: m.instance };
+            self.work.hits[i / LANES].set(i % LANES, Some(hit));
+            self.work.surfaces.push(m.surface);
+        }
+        if frame.records_geometry(self.pass) {
+            self.record_wave(frame, hits);
+        }
+        if self.pass == Pass::Geometry {
+            return Ok(());
+        }
+        let stats = &mut self.stats;
+        process_hits(&frame.context, &self.area, &mut self.layers, &mut self.work, false, stats);
+        self.work.volume_samples.clear();
+        self.find_light_rays(frame);
+        Ok(())
+    }
+
+    /// Geometry layers of first surfaces; in a pass of its own, rays go on behind surfaces that are too transparent.
+    fn record_wave(&mut self, frame: &DistributedFrame<'_>, hits: &[Option<ShadingHit>]) {
+        let transparent = frame.context.effects.contains(Effects::TRANSPARENCY);
+        for (i, m) in hits.iter().enumerate() {
+            let state = self.work.current.states[i];
+            let Some(m) = m.as_ref().filter(|_| state.kind == RayKind::Camera) else { continue };
+            let s = &m.surface;
+            let shown = s.opacity > 0.0 && s.opacity >= frame.context.options.depth_min_opacity;
+            if !transparent || shown {
+                if !self.layers.is_recorded(state.slot) {
+                    self.layers.record_given(
+                        state.slot,
+                        [m.depth, m.distance],
+                        s.normal,
+                        [m.instance, m.primitive],
+                    );
+                }
+            } else if self.pass == Pass::Geometry {
+                let ray = self.work.current.ray(i);
+                let ray = Ray { t_min: s.t_behind(&ray, m.t), ..ray };
+                if ray.is_valid() {
+                    self.work.behind.push(&ray, state);
+                    self.stats.transparency += 1;
+                }
+            }
+        }
+    }
+
+    // ---- Light --------------------------------------------------------------------------------------------------
+
+    /// Runs the lights once to see which rays they would send.
+    fn find_light_rays(&mut self, frame: &DistributedFrame<'_>) {
+        let before: Vec<Vec3> = self.work.points.iter().map(|p| p.radiance).collect();
+        self.work.light_rays.source = OcclusionSource::Recording(std::mem::take(&mut self.waiting));
+        let mut no_stats = RayStats::default();
+        add_light(&frame.context, &self.area, &mut self.work, &mut no_stats, None);
+        for (p, radiance) in self.work.points.iter_mut().zip(before) {
+            p.radiance = radiance;
+        }
+        if let OcclusionSource::Recording(list) = std::mem::take(&mut self.work.light_rays.source) {
+            self.waiting = list;
+        }
+        self.points.clear();
+        self.light_ray_states.clear();
+        self.lit = false;
+        if frame.light_passes_surfaces() {
+            let start = |r: &RecordedRay| LightRayState::new(&frame.context, r.radiance);
+            self.light_ray_states.extend(self.waiting.iter().map(start));
+            return;
+        }
+        self.place.clear();
+        self.place.resize(self.work.points.len(), u32::MAX);
+        for r in &self.waiting {
+            let place = &mut self.place[r.point as usize];
+            if *place == u32::MAX {
+                *place = self.points.len() as u32;
+                let p = &self.work.points[r.point as usize];
+                let state = &self.work.current.states[p.lane as usize];
+                let s = &p.surface;
+                self.points.push(LightPoint {
+                    pixel: self.area.pixel(state.slot).unwrap_or_default(),
+                    lamps: false,
+                    sky: false,
+                    stream: state.stream,
+                    point: s.point,
+                    point_error: s.point_error,
+                    face_normal: s.face_normal,
+                    normal: s.normal,
+                });
+            }
+            let p = &mut self.points[*place as usize];
+            let sky = r.number >= frame.context.sky_number;
+            (p.lamps, p.sky) = (p.lamps | !sky, p.sky | sky);
+        }
+    }
+
+    /// Points that light is asked for, where light does not pass through surfaces.
+    pub fn light_points(&self) -> &[LightPoint] {
+        &self.points
+    }
+
+    /// Of each of [`TileState::light_points`] the slot of its pixel.
+    pub fn slots_of_points(&self) -> impl Iterator<Item = u16> + '_ {
+        let slot = |p: &LightPoint| TileArea::slot(p.pixel[0] - self.area.x, p.pixel[1] - self.area.y) as u16;
+        self.points.iter().map(slot)
+    }
+
+    /// Of each light ray that matters, its point among [`TileState::light_points`] and the ray: to find out whom to ask.
+    pub fn light_rays_of_points(&self) -> impl Iterator<Item = (usize, Ray)> + '_ {
+        self.waiting.iter().map(|r| (self.place[r.point as usize] as usize, r.ray))
+    }
+
+    /// Takes the bits of [`DistributedFrame::occlusion_bits`] for all [`TileState::light_points`]; those of several holders are joined by *or*.
+    ///
+    /// # Errors
+    /// When there is another number of words.
+    pub fn apply_occlusion(
+        &mut self,
+        frame: &DistributedFrame<'_>,
+        bits: &[u64],
+    ) -> Result<(), ProtocolError> {
+        let words = (frame.light_rays_per_point() as usize).div_ceil(64);
+        self.expect("words of light bits", bits.len(), words * self.points.len())?;
+        let passage = |r: &RecordedRay| {
+            let first = self.place[r.point as usize] as usize * words;
+            let hit = bits[first + r.number as usize / 64] >> (r.number % 64) & 1 != 0;
+            LightRayResult { transmittance: if hit { Vec3::ZERO } else { Vec3::ONE }, hit, continued: 0 }
+        };
+        let given: Vec<LightRayResult> = self.waiting.iter().map(passage).collect();
+        self.add_light(frame, given);
+        Ok(())
+    }
+
+    /// Light rays that wait for the next surface in their way, where light passes through surfaces.
+    pub fn light_rays(&self) -> impl Iterator<Item = Ray> + '_ {
+        self.waiting.iter().map(|r| r.ray).filter(|r| r.t_max >= r.t_min)
+    }
+
+    /// Takes what [`DistributedFrame::light_hits`] says of each of [`TileState::light_rays`]: of several holders, the answer that
+    /// [`ShadingHit::is_before`] the others.
+    ///
+    /// # Errors
+    /// When the answers do not fit the rays.
+    pub fn process_light_hits(
+        &mut self,
+        frame: &DistributedFrame<'_>,
+        hits: &[Option<ShadingHit>],
+    ) -> Result<(), ProtocolError> {
+        self.expect("number of answers", hits.len(), self.light_rays().count())?;
+        let mut answers = hits.iter();
+        for (r, f) in self.waiting.iter_mut().zip(&mut self.light_ray_states) {
+            if r.ray.t_max < r.ray.t_min {
+                continue;
+            }
+            let behind = match answers.next() {
+                Some(Some(m)) => {
+                    let Some(resolved) = frame.context.instances.get(m.instance as usize) else {
+                        let (found, expected) = (m.instance as u64, frame.context.instances.len() as u64);
+                        return Err(ProtocolError { tile: self.tile, what: "an instance", found, expected });
+                    };
+                    self.stats.light_closest += u64::from(!m.is_blocked());
+                    self.stats.light_lookups += u64::from(!m.is_blocked());
+                    if m.is_blocked() {
+                        *f = LightRayState::BLOCKED;
+                        None
+                    } else {
+                        f.pass(&frame.context, resolved.material, &m.surface, &r.ray, m.t)
+                    }
+                }
+                _ => {
+                    self.stats.light_closest += 1;
+                    None
+                }
+            };
+            match behind {
+                Some(t_min) => r.ray.t_min = t_min,
+                None => (r.ray.t_min, r.ray.t_max) = (0.0, -1.0),
+            }
+        }
+        Ok(())
+    }
+
+    fn add_light(&mut self, frame: &DistributedFrame<'_>, given: Vec<LightRayResult>) {
+        self.waiting.clear();
+        self.work.light_rays.source = OcclusionSource::Given(given.into_iter());
+        let cost = self.layers.cost_mut();
+        add_light(&frame.context, &self.area, &mut self.work, &mut self.stats, cost);
+        self.work.light_rays.source = OcclusionSource::World;
+        self.points.clear();
+        self.light_ray_states.clear();
+        self.lit = true;
+    }
+
+    /// Shades the wave. True when there is another one; else the pass is done.
+    pub fn advance(&mut self, frame: &DistributedFrame<'_>) -> bool {
+        if self.pass == Pass::Geometry {
+            self.work.surfaces.clear();
+            std::mem::swap(&mut self.work.current, &mut self.work.behind);
+            self.work.behind.clear();
+            return !self.work.current.is_empty();
+        }
+        if !self.lit {
+            let given = self.light_ray_states.iter().map(LightRayState::result).collect();
+            self.add_light(frame, given);
+        }
+        let (context, work, stats) = (&frame.context, &mut self.work, &mut self.stats);
+        accumulate_radiance(context, &self.area, work);
+        spawn_rays(context, &self.area, &mut self.layers, work, stats);
+        work.surfaces.clear();
+        let next = if work.behind.is_empty() { &mut work.scattered } else { &mut work.behind };
+        if next.is_empty() {
+            self.end_pass();
+            return false;
+        }
+        std::mem::swap(&mut work.current, next);
+        next.clear();
+        true
+    }
+
+    fn end_pass(&mut self) {
+        self.work.current.clear();
+        if self.pass == Pass::Color(0) {
+            self.layers.start_samples(std::mem::take(&mut self.work.pixels));
+        } else {
+            self.layers.add_sample(&self.work.pixels);
+        }
+    }
+
+    // ---- The result ---------------------------------------------------------------------------------------------
+
+    /// The finished tile, pixel by pixel and row by row: colour, depth, distance, normal, ids, cost, as far as wanted. See
+    /// [`DistributedFrame::decode_tile`].
+    pub fn encode(&self, frame: &DistributedFrame<'_>) -> Vec<u32> {
+        let options = frame.context.options;
+        let has = |l| options.layers.contains(l);
+        let scale = 1.0 / options.samples as f32;
+        let mut out = Vec::with_capacity(PIXELS * frame.words_per_pixel());
+        for y in 0..self.area.height {
+            for x in 0..self.area.width {
+                let slot = TileArea::slot(x, y);
+                let l = &self.layers;
+                if has(Layers::COLOR) {
+                    out.extend(l.color[slot].map(|v| (v * scale).to_bits()));
+                }
+                if has(Layers::DEPTH) {
+                    out.push(l.depth[slot].to_bits());
+                }
+                if has(Layers::DISTANCE) {
+                    out.push(l.distance[slot].to_bits());
+                }
+                if has(Layers::NORMAL) {
+                    out.extend(l.normal[slot].map(f32::to_bits));
+                }
+                if has(Layers::IDS) {
+                    out.extend([l.instance[slot], l.primitive[slot]]);
+                }
+                if has(Layers::COST) {
+                    out.push(l.cost[slot].to_bits());
+                }
+            }
+        }
+        out
+    }
+
+    fn wrong(&self, what: &'static str, found: u64, expected: u64) -> ProtocolError {
+        ProtocolError { tile: self.tile, what, found, expected }
+    }
+
+    fn expect(&self, what: &'static str, found: usize, expected: usize) -> Result<(), ProtocolError> {
+        if found == expected { Ok(()) } else { Err(self.wrong(what, found as u64, expected as u64)) }
+    }
+}
+
+/// In the place of a surface where nothing was met.
+const NO_SURFACE: SurfacePoint = SurfacePoint {
+    point: Vec3::ZERO,
+    point_error: 0.0,
+    face_normal: Vec3::Z,
+    normal: Vec3::Z,
+    outside: true,
+    color: Vec3::ZERO,
+    opacity: 0.0,
+};
