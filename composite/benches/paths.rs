@@ -6,7 +6,7 @@
 //! `cargo bench -p composite --bench paths -- [SIZE] [RANKS…] [WORDS…]`
 use composite::{
     Communicator, CompositeError, Compositor, DepthPixel, Frame, Image, Options, PremultipliedPixel, Rect,
-    Report, SimdLevel, Strategy, composite_shared, seats, threads,
+    Report, SimdLevel, Strategy, composite_shared, shared_memory_group, threads,
 };
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex};
@@ -79,14 +79,14 @@ fn median(mut times: Vec<f64>) -> f64 {
 }
 
 fn z_frame(size: u32, picture: &Picture) -> Result<Frame<'_, DepthPixel<[u8; 4]>>, CompositeError> {
-    Frame::with_depth(size, size, &picture.colors, &picture.depths)?.bounded(picture.bounds)
+    Frame::with_depth(size, size, &picture.colors, &picture.depths)?.with_bounds(picture.bounds)
 }
 
 fn f32_frame(
     size: u32,
     picture: &Picture,
 ) -> Result<Frame<'_, PremultipliedPixel<[f32; 4]>>, CompositeError> {
-    Frame::premultiplied(size, size, &picture.floats)?.bounded(picture.bounds)
+    Frame::premultiplied(size, size, &picture.floats)?.with_bounds(picture.bounds)
 }
 
 /// The line in which one call merges all frames in shared memory, while the ranks wait.
@@ -141,7 +141,10 @@ fn main() {
             }
             let pictures: Vec<Picture> = (0..ranks).map(|rank| picture(scene, rank, ranks, size)).collect();
             let times = Mutex::new(vec![Vec::<(f64, f64, Report)>::new(); variants.len()]);
-            let places: Vec<_> = seats(ranks).into_iter().map(|seat| Mutex::new(Some(seat))).collect();
+            let members: Vec<_> = shared_memory_group(ranks)
+                .into_iter()
+                .map(|shared_rank| Mutex::new(Some(shared_rank)))
+                .collect();
             let images: Vec<Arc<Image<DepthPixel<[u8; 4]>>>> = pictures
                 .iter()
                 .map(|p| {
@@ -149,7 +152,7 @@ fn main() {
                 })
                 .collect();
             let results = threads::run(ranks, |mut comm| {
-                let mut own_seat = None;
+                let mut own_shared_rank = None;
                 let rank = comm.rank();
                 let picture = &pictures[rank];
                 let (z, f) = (z_frame(size, picture)?, f32_frame(size, picture)?);
@@ -181,11 +184,12 @@ fn main() {
                             }
                             Report::default()
                         } else if name == "z table" {
-                            let seat =
-                                own_seat.get_or_insert_with(|| places[rank].lock().unwrap().take().unwrap());
-                            let done = seat.composite(&mut comm, &images[rank], picture.bounds, options)?;
+                            let shared_rank = own_shared_rank
+                                .get_or_insert_with(|| members[rank].lock().unwrap().take().unwrap());
+                            let done =
+                                shared_rank.composite(&mut comm, &images[rank], picture.bounds, options)?;
                             if let Some(image) = done.image {
-                                seat.recycle(image);
+                                shared_rank.recycle(image);
                             }
                             done.report
                         } else if *blend {

@@ -2,14 +2,14 @@
 //!
 //! Pieces travel as sparse messages, so background costs a bit a pixel, and depth only where it is asked for. All ranks know from
 //! the beginning which pieces there will be, so their receives are posted before anything else is done.
+use crate::codec;
 use crate::error::CompositeError;
 use crate::frame::{Image, Piece};
-use crate::join::Scratch;
+use crate::frame_exchange::{FrameExchange, Tag};
 use crate::layer::Layer;
+use crate::merge::Scratch;
 use crate::pixel::Composite;
 use crate::rect::Rect;
-use crate::session::{Session, Tag};
-use crate::wire;
 
 /// The image at the root; elsewhere nothing, or this rank's piece where there is no root.
 pub(crate) type Outcome<P> = (Option<Image<P>>, Option<Piece<P>>);
@@ -29,7 +29,7 @@ pub(crate) struct Collector<P: Composite> {
 impl<P: Composite> Collector<P> {
     /// `pieces` are all that will be handed in, by place; `spare` is an image of this size that may be written over.
     pub(crate) fn new(
-        session: &mut Session<'_>,
+        exchange: &mut FrameExchange<'_>,
         size_px: (u32, u32),
         root: Option<usize>,
         depths: bool,
@@ -39,28 +39,28 @@ impl<P: Composite> Collector<P> {
         let depths = depths && P::HAS_DEPTH;
         let mut collector =
             Self { root, depths, outstanding: Vec::new(), image: None, kept: Vec::new(), wide: Vec::new() };
-        if root != Some(session.place) {
+        if root != Some(exchange.order_index) {
             return Ok(collector);
         }
-        for &(place, rect) in pieces.iter().filter(|piece| piece.0 != session.place) {
-            collector.outstanding.push((place, rect));
+        for &(order_index, rect) in pieces.iter().filter(|piece| piece.0 != exchange.order_index) {
+            collector.outstanding.push((order_index, rect));
         }
-        for &(place, _) in &collector.outstanding {
+        for &(order_index, _) in &collector.outstanding {
             // Pieces of one place come in any order, so each receive has room for the largest.
-            let of_place = collector.outstanding.iter().filter(|piece| piece.0 == place);
-            let largest = of_place.map(|piece| piece.1).max_by_key(wire::longest::<P>);
-            session.post::<P>(place, Tag::Collect, &largest.unwrap_or(Rect::EMPTY))?;
+            let from_sender = collector.outstanding.iter().filter(|piece| piece.0 == order_index);
+            let largest = from_sender.map(|piece| piece.1).max_by_key(codec::longest::<P>);
+            exchange.post::<P>(order_index, Tag::Collect, &largest.unwrap_or(Rect::EMPTY))?;
         }
-        let begin = session.comm.working_secs();
+        let begin = exchange.comm.working_secs();
         collector.image = Some(blank(size_px, depths, pieces, spare));
-        session.report.collect_secs += session.comm.working_secs() - begin;
+        exchange.report.collect_secs += exchange.comm.working_secs() - begin;
         Ok(collector)
     }
 
     /// Takes a piece that this rank has finished.
-    pub(crate) fn hand_in(
+    pub(crate) fn submit(
         &mut self,
-        session: &mut Session<'_>,
+        exchange: &mut FrameExchange<'_>,
         layer: Layer<P>,
         scratch: &mut Scratch<P>,
     ) -> Result<(), CompositeError> {
@@ -69,7 +69,7 @@ impl<P: Composite> Collector<P> {
             return Ok(());
         };
         if let Some(image) = &mut self.image {
-            let begin = session.comm.working_secs();
+            let begin = exchange.comm.working_secs();
             let width = image.width_px as usize;
             let bounds = layer.bounds;
             for y in bounds.y0..bounds.y1 {
@@ -80,9 +80,9 @@ impl<P: Composite> Collector<P> {
                     image.depths[start..start + depths.len()].copy_from_slice(depths);
                 }
             }
-            session.report.collect_secs += session.comm.working_secs() - begin;
+            exchange.report.collect_secs += exchange.comm.working_secs() - begin;
         } else {
-            session.send(root, Tag::Collect, &layer.view(), layer.bounds, self.depths)?;
+            exchange.send(root, Tag::Collect, &layer.view(), layer.bounds, self.depths)?;
         }
         scratch.layers.push(layer);
         Ok(())
@@ -91,50 +91,50 @@ impl<P: Composite> Collector<P> {
     /// Puts the piece of another rank in its place.
     pub(crate) fn take(
         &mut self,
-        session: &mut Session<'_>,
-        place: usize,
+        exchange: &mut FrameExchange<'_>,
+        order_index: usize,
         bytes: Vec<u8>,
     ) -> Result<(), CompositeError> {
-        let begin = session.comm.working_secs();
+        let begin = exchange.comm.working_secs();
         // A rank finishes its pieces in any order, so the message itself says which one it is, if it is one of those expected.
-        let said = wire::rect_of(&bytes);
-        let mut of_place = self.outstanding.iter().enumerate().filter(|(_, piece)| piece.0 == place);
-        let first = of_place.next();
-        let index = of_place.find(|(_, piece)| Some(piece.1) == said).map(|(index, _)| index);
+        let said = codec::rect_of(&bytes);
+        let mut from_sender = self.outstanding.iter().enumerate().filter(|(_, piece)| piece.0 == order_index);
+        let first = from_sender.next();
+        let index = from_sender.find(|(_, piece)| Some(piece.1) == said).map(|(index, _)| index);
         let index = match first {
             Some((at, piece)) if Some(piece.1) == said => Some(at),
             Some((at, _)) => index.or(Some(at)),
             None => None,
         };
         let expected = index.map_or(Rect::EMPTY, |index| self.outstanding.swap_remove(index).1);
-        let part = session.codec.decode::<P>(&bytes, expected, self.depths);
-        let part = part.map_err(|reason| session.unusable(place, reason))?;
+        let part = exchange.codec.decode::<P>(&bytes, expected, self.depths);
+        let part = part.map_err(|reason| exchange.unusable(order_index, reason))?;
         if let Some(image) = &mut self.image {
-            part.place::<P>(
-                session.codec.kernels,
+            part.copy_to_planes::<P>(
+                exchange.codec.kernels,
                 image.width_px as usize,
                 &mut image.colors,
                 &mut image.depths,
                 &mut self.wide,
             );
         }
-        session.comm.recycle(bytes);
-        session.report.collect_secs += session.comm.working_secs() - begin;
+        exchange.comm.recycle(bytes);
+        exchange.report.collect_secs += exchange.comm.working_secs() - begin;
         Ok(())
     }
 
     /// Waits for what has not come; the image at the root, this rank's piece where there is no root.
-    pub(crate) fn finish(mut self, session: &mut Session<'_>) -> Result<Outcome<P>, CompositeError> {
-        while session.is_waiting() {
-            if let Some((place, _, bytes)) = session.next(true)? {
-                self.take(session, place, bytes)?;
+    pub(crate) fn finish(mut self, exchange: &mut FrameExchange<'_>) -> Result<Outcome<P>, CompositeError> {
+        while exchange.is_receiving() {
+            if let Some((order_index, _, bytes)) = exchange.next(true)? {
+                self.take(exchange, order_index, bytes)?;
             }
         }
-        session.comm.recycle(self.wide);
+        exchange.comm.recycle(self.wide);
         if self.root.is_some() {
             return Ok((self.image, None));
         }
-        Ok((None, Some(in_one_piece(self.kept))))
+        Ok((None, Some(stack_layers(self.kept))))
     }
 }
 
@@ -181,7 +181,7 @@ fn blank<P: Composite>(
 }
 
 /// Slices of one tile, one above the other, as a single piece.
-fn in_one_piece<P: Composite>(mut layers: Vec<Layer<P>>) -> Piece<P> {
+fn stack_layers<P: Composite>(mut layers: Vec<Layer<P>>) -> Piece<P> {
     layers.retain(|layer| !layer.bounds.is_empty());
     layers.sort_by_key(|layer| layer.bounds.y0);
     let mut layers = layers.into_iter();

@@ -100,8 +100,8 @@ impl Color for [f16; 4] {
 
     #[inline(always)]
     fn over(front: Self, back: Self) -> Self {
-        let joined = <[f32; 4]>::over(front.map(f16::to_f32), back.map(f16::to_f32));
-        joined.map(f16::from_f32)
+        let merged = <[f32; 4]>::over(front.map(f16::to_f32), back.map(f16::to_f32));
+        merged.map(f16::from_f32)
     }
 
     fn to_f32(self) -> [f32; 4] {

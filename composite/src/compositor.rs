@@ -1,18 +1,19 @@
 //! The entry point: one call on every rank composites one frame.
+use crate::codec::{Codec, mix};
 use crate::collect::Collector;
 use crate::comm::{CommError, Communicator};
 use crate::error::CompositeError;
 use crate::frame::{Frame, Image, Piece};
+use crate::frame_exchange::FrameExchange;
 use crate::in_memory;
-use crate::join::Scratch;
-use crate::network::Network;
+use crate::merge::Scratch;
+use crate::network_costs::NetworkCosts;
 use crate::pixel::{Composite, PixelFormat};
 use crate::rect::Rect;
 use crate::report::Report;
-use crate::session::Session;
 use crate::simd::{Kernels, SimdLevel};
 use crate::strategies::Strategy;
-use crate::wire::{Codec, mix};
+use crate::tiles::SLICE_BYTES;
 use std::time::Duration;
 
 /// Where the finished image goes.
@@ -25,7 +26,7 @@ pub enum Destination {
 }
 
 /// How to composite; the same on every rank (but for `simd` and `timeout`). Ranks that differ get
-/// [`WireError::Fingerprint`](crate::WireError::Fingerprint).
+/// [`MessageError::Fingerprint`](crate::MessageError::Fingerprint).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
     /// Which way the pixels take; changes the time, never the image.
@@ -53,7 +54,7 @@ pub struct Options {
     pub timeout: Duration,
     /// Whether all ranks meet at the end, so that success on one rank means success on all. Without it a rank that has sent its
     /// part returns at once and hears of a fault of others only with its next frame.
-    pub confirm: bool,
+    pub final_barrier: bool,
 }
 
 impl Default for Options {
@@ -69,14 +70,14 @@ impl Default for Options {
             in_memory: true,
             simd: None,
             timeout: Duration::from_secs(60),
-            confirm: true,
+            final_barrier: true,
         }
     }
 }
 
 /// What one rank gets.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Composited<P: PixelFormat> {
+pub struct CompositeOutput<P: PixelFormat> {
     /// The whole image, on the rank it was to go to.
     pub image: Option<Image<P>>,
     /// The piece this rank holds, with [`Destination::Distributed`].
@@ -98,7 +99,7 @@ pub fn composite<P: Composite>(
     comm: &mut dyn Communicator,
     frame: &Frame<'_, P>,
     options: &Options,
-) -> Result<Composited<P>, CompositeError> {
+) -> Result<CompositeOutput<P>, CompositeError> {
     Compositor::new(options.clone()).composite(comm, frame)
 }
 
@@ -108,7 +109,7 @@ pub struct Compositor<P: Composite> {
     pub(crate) options: Options,
     pub(crate) scratch: Scratch<P>,
     pub(crate) spare: Option<Image<P>>,
-    network: Option<Network>,
+    network: Option<NetworkCosts>,
     /// Where the frames of one node are merged.
     pub(crate) node_image: Option<Image<P>>,
 }
@@ -121,7 +122,7 @@ impl<P: Composite> Compositor<P> {
     }
 
     /// The same with a network that is known, so that [`Strategy::Automatic`] need not measure it; the same on every rank.
-    pub fn with_network(self, network: Network) -> Self {
+    pub fn with_network(self, network: NetworkCosts) -> Self {
         Self { network: Some(network), ..self }
     }
 
@@ -148,10 +149,10 @@ impl<P: Composite> Compositor<P> {
         &mut self,
         comm: &mut dyn Communicator,
         frame: &Frame<'_, P>,
-    ) -> Result<Composited<P>, CompositeError> {
+    ) -> Result<CompositeOutput<P>, CompositeError> {
         let result = self.composite_or_fail(comm, frame);
         if let Err(error) = &result {
-            give_up(comm, error);
+            abort_group(comm, error);
         }
         result
     }
@@ -160,91 +161,95 @@ impl<P: Composite> Compositor<P> {
         &mut self,
         comm: &mut dyn Communicator,
         frame: &Frame<'_, P>,
-    ) -> Result<Composited<P>, CompositeError> {
+    ) -> Result<CompositeOutput<P>, CompositeError> {
         let begin = comm.now();
         let options = &self.options;
 
         // Options that can be refused before any message.
-        let places = Places::new(comm, options)?;
+        let order = CompositingOrder::new(comm, options)?;
         options.strategy.check()?;
         let size_px = (frame.width_px(), frame.height_px());
         let may_share = options.in_memory
-            && places.root.is_some()
+            && order.root_index.is_some()
             && matches!(options.strategy, Strategy::DirectSend | Strategy::Automatic);
-        let shares = may_share && comm.node_memory().is_some();
+        let shares = may_share && comm.shared_segments().is_some();
         if options.strategy == Strategy::Automatic && self.network.is_none() && !shares {
-            self.network = Some(Network::measure(comm, options.timeout)?);
+            self.network = Some(NetworkCosts::measure(comm, options.timeout)?);
         }
 
         // Where this rank drew, unless the renderer has said so.
         let kernels = self.scratch.kernels;
-        let fingerprint = fingerprint::<P>(size_px, options, &places, self.network.as_ref());
+        let fingerprint = fingerprint::<P>(size_px, options, &order, self.network.as_ref());
         let codec = Codec { kernels, fingerprint, verify: options.verify };
-        let mut session = Session::new(comm, places.order.clone(), places.own, codec, options.timeout);
-        session.counts_nan = frame.is_bounded();
-        let drawn = if frame.is_bounded() {
+        let mut exchange =
+            FrameExchange::new(comm, order.ranks.clone(), order.own_index, codec, options.timeout);
+        exchange.counts_nan = frame.has_bounds();
+        let drawn = if frame.has_bounds() {
             frame.bounds()
         } else {
             let (rect, counts) = frame.drawn(kernels);
-            session.report.nan_depths = counts.nan;
+            exchange.report.nan_depths = counts.nan;
             rect
         };
-        session.report.compress_secs += session.now() - begin;
-        let ranges = session.meet(size_px, drawn, frame.depth_range().unwrap_or([f32::NAN; 2]))?;
+        exchange.report.compress_secs += exchange.now() - begin;
+        let ranges = exchange.handshake(size_px, drawn, frame.depth_range().unwrap_or([f32::NAN; 2]))?;
         if !P::HAS_DEPTH {
-            check_order(&session.drawn, &ranges, &places.order)?;
+            check_order(&exchange.drawn, &ranges, &order.ranks)?;
         }
 
         // Ranks of one machine.
         if let Some(root) =
-            places.root.filter(|_| shares && in_memory::is_possible::<P>(&mut session, size_px))
+            order.root_index.filter(|_| shares && in_memory::is_possible::<P>(&mut exchange, size_px))
         {
             let spare = self.spare.take();
             let view = frame.view(drawn);
-            let done = in_memory::run(&mut session, &view, size_px, root, options.depth, spare, kernels)?;
+            let done = in_memory::run(&mut exchange, &view, size_px, root, options.depth, spare, kernels)?;
             if let Some(image) = done {
                 let report = Report {
                     strategy: Strategy::DirectSend,
                     in_memory: true,
-                    total_secs: session.now() - begin,
-                    ..session.report
+                    total_secs: exchange.now() - begin,
+                    ..exchange.report
                 };
-                return Ok(Composited { image, piece: None, report });
+                return Ok(CompositeOutput { image, piece: None, report });
             }
         }
 
         // The strategy, and what it hands in.
-        let slice_px = options.slice_px.unwrap_or_else(|| slice_px::<P>(session.comm));
+        let slice_px = options.slice_px.unwrap_or_else(|| slice_px::<P>(exchange.comm));
         let strategy = match (options.strategy, &self.network) {
             (Strategy::Automatic, Some(network)) => {
-                network.choose::<P>(&session.drawn, places.root.is_some())
+                network.choose::<P>(&exchange.drawn, order.root_index.is_some())
             }
             (strategy, _) => strategy,
         };
-        let plan =
-            strategy.plan::<P>(&session.drawn, slice_px, places.root.filter(|_| !session.comm.is_one_node()));
-        let pieces = plan.pieces(&session.drawn);
+        let plan = strategy.plan::<P>(
+            &exchange.drawn,
+            slice_px,
+            order.root_index.filter(|_| !exchange.comm.is_one_node()),
+        );
+        let pieces = plan.pieces(&exchange.drawn);
         let spare = self.spare.take();
         let mut collector =
-            Collector::new(&mut session, size_px, places.root, options.depth, &pieces, spare)?;
-        let span = session.begin_span();
-        plan.run(&mut session, &frame.view(drawn), &mut collector, &mut self.scratch)?;
-        session.end_span(span, |report| &mut report.exchange_secs);
-        let span = session.begin_span();
-        let (image, piece) = collector.finish(&mut session)?;
-        session.end_span(span, |report| &mut report.collect_secs);
-        if options.confirm {
-            session.barrier()?;
+            Collector::new(&mut exchange, size_px, order.root_index, options.depth, &pieces, spare)?;
+        let span = exchange.begin_span();
+        plan.run(&mut exchange, &frame.view(drawn), &mut collector, &mut self.scratch)?;
+        exchange.end_span(span, |report| &mut report.exchange_secs);
+        let span = exchange.begin_span();
+        let (image, piece) = collector.finish(&mut exchange)?;
+        exchange.end_span(span, |report| &mut report.collect_secs);
+        if options.final_barrier {
+            exchange.barrier()?;
         }
-        let mut report = session.report;
+        let mut report = exchange.report;
         report.strategy = strategy;
-        report.total_secs = session.now() - begin;
-        Ok(Composited { image, piece, report })
+        report.total_secs = exchange.now() - begin;
+        Ok(CompositeOutput { image, piece, report })
     }
 }
 
 /// Ends the group, unless somebody else has.
-pub(crate) fn give_up(comm: &mut dyn Communicator, error: &CompositeError) {
+pub(crate) fn abort_group(comm: &mut dyn Communicator, error: &CompositeError) {
     if !matches!(error, CompositeError::Comm(CommError::Aborted { .. })) {
         comm.abort(&error.to_string());
     }
@@ -256,31 +261,28 @@ pub(crate) fn slice_px<P: PixelFormat>(comm: &dyn Communicator) -> usize {
     (if comm.is_one_node() { 4 * SLICE_BYTES } else { SLICE_BYTES }) / P::BYTES
 }
 
-/// Bytes of a slice between nodes.
-pub(crate) const SLICE_BYTES: usize = 1 << 18;
-
 /// Ranks in the order of compositing.
-pub(crate) struct Places {
-    pub(crate) order: Vec<usize>,
-    pub(crate) own: usize,
-    pub(crate) root: Option<usize>,
+pub(crate) struct CompositingOrder {
+    pub(crate) ranks: Vec<usize>,
+    pub(crate) own_index: usize,
+    pub(crate) root_index: Option<usize>,
 }
 
-impl Places {
+impl CompositingOrder {
     pub(crate) fn new(comm: &dyn Communicator, options: &Options) -> Result<Self, CompositeError> {
         let size = comm.size();
         let order = front_to_back(options.order.as_deref(), size)?;
-        let place_of = |rank: usize| order.iter().position(|&other| other == rank);
-        let own = place_of(comm.rank()).ok_or(CommError::NoSuchRank { peer: comm.rank(), size })?;
+        let order_index_of = |rank: usize| order.iter().position(|&other| other == rank);
+        let own = order_index_of(comm.rank()).ok_or(CommError::NoSuchRank { peer: comm.rank(), size })?;
         let root = match options.destination {
             Destination::Distributed => None,
-            Destination::Rank(rank) => Some(place_of(rank).ok_or_else(|| {
+            Destination::Rank(rank) => Some(order_index_of(rank).ok_or_else(|| {
                 CompositeError::Options(format!(
                     "the image is to go to rank {rank} of a group of {size} ranks"
                 ))
             })?),
         };
-        Ok(Self { order, own, root })
+        Ok(Self { ranks: order, own_index: own, root_index: root })
     }
 }
 
@@ -320,22 +322,22 @@ fn check_order(drawn: &[Rect], ranges: &[[f32; 2]], order: &[usize]) -> Result<(
 pub(crate) fn fingerprint<P: PixelFormat>(
     size_px: (u32, u32),
     options: &Options,
-    places: &Places,
-    network: Option<&Network>,
+    order: &CompositingOrder,
+    network: Option<&NetworkCosts>,
 ) -> u64 {
     let fixed = [
         u64::from(P::CODE),
         u64::from(size_px.0),
         u64::from(size_px.1),
         options.strategy.code(),
-        places.root.map_or(u64::MAX, |root| root as u64),
+        order.root_index.map_or(u64::MAX, |root| root as u64),
         u64::from(options.depth),
         u64::from(options.in_memory),
         u64::from(options.verify),
-        u64::from(options.confirm),
+        u64::from(options.final_barrier),
         options.slice_px.map_or(u64::MAX, |pixels| pixels as u64),
-        network.map_or(0, Network::code),
+        network.map_or(0, NetworkCosts::code),
     ];
-    let all = fixed.into_iter().chain(places.order.iter().map(|&rank| rank as u64));
-    all.fold(places.order.len() as u64, mix)
+    let all = fixed.into_iter().chain(order.ranks.iter().map(|&rank| rank as u64));
+    all.fold(order.ranks.len() as u64, mix)
 }

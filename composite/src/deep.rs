@@ -1,23 +1,23 @@
 //! Ranks that reach into each other: every pixel is a list of transparent fragments with depths, and at most one opaque surface.
 //!
-//! `over` in rank order is right only where ranks are one behind the other ([`Frame::reaching`](crate::Frame::reaching) checks
+//! `over` in rank order is right only where ranks are one behind the other ([`Frame::with_depth_range`](crate::Frame::with_depth_range) checks
 //! that). Here the owner of a tile gets the fragments of all ranks, keeps those in front of the nearest opaque surface, sorts them by
 //! depth and lays them over each other once, in `f64`: opaque geometry and transparent layers of all ranks in one pass (IceT takes
 //! either depth or blending), and the same bits for every partition of the same fragments among ranks.
+use crate::codec::{Codec, MessageError, checksum};
 use crate::collect::Collector;
 use crate::comm::Communicator;
-use crate::compositor::{Composited, Options, Places, fingerprint, give_up};
+use crate::compositor::{CompositeOutput, CompositingOrder, Options, abort_group, fingerprint};
 use crate::error::CompositeError;
-use crate::join::Scratch;
+use crate::frame_exchange::{FrameExchange, Tag};
 use crate::layer::Layer;
+use crate::merge::Scratch;
 use crate::pixel::PremultipliedPixel;
 use crate::rect::Rect;
-use crate::session::{Session, Tag};
 use crate::simd::Kernels;
 use crate::tiles::balanced;
-use crate::wire::{Codec, WireError, checksum};
 
-type Blended = PremultipliedPixel<[f32; 4]>;
+type BlendedPixel = PremultipliedPixel<[f32; 4]>;
 
 /// A transparent layer at one pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -127,10 +127,10 @@ pub fn composite_deep(
     comm: &mut dyn Communicator,
     frame: &DeepFrame<'_>,
     options: &Options,
-) -> Result<Composited<Blended>, CompositeError> {
+) -> Result<CompositeOutput<BlendedPixel>, CompositeError> {
     let result = composite_or_fail(comm, frame, options);
     if let Err(error) = &result {
-        give_up(comm, error);
+        abort_group(comm, error);
     }
     result
 }
@@ -139,92 +139,101 @@ fn composite_or_fail(
     comm: &mut dyn Communicator,
     frame: &DeepFrame<'_>,
     options: &Options,
-) -> Result<Composited<Blended>, CompositeError> {
+) -> Result<CompositeOutput<BlendedPixel>, CompositeError> {
     let begin = comm.now();
-    let places = Places::new(comm, options)?;
+    let order = CompositingOrder::new(comm, options)?;
     let size_px = (frame.width_px, frame.height_px);
     let kernels = Kernels::new(options.simd);
     let fingerprint =
-        fingerprint::<Blended>(size_px, options, &places, None) ^ u64::from_le_bytes(*b"DEEP____");
+        fingerprint::<BlendedPixel>(size_px, options, &order, None) ^ u64::from_le_bytes(*b"DEEP____");
     let codec = Codec { kernels, fingerprint, verify: options.verify };
-    let mut session = Session::new(comm, places.order.clone(), places.own, codec, options.timeout);
+    let mut exchange = FrameExchange::new(comm, order.ranks.clone(), order.own_index, codec, options.timeout);
     let (drawn, nan) = frame.drawn();
-    session.report.nan_depths = nan;
-    session.meet(size_px, drawn, [f32::NAN; 2])?;
-    let totals = session.tell_all(frame.fragments.len() as u64)?;
-    for (place, &found) in totals.iter().enumerate() {
-        let most = (session.drawn[place].pixels() as u64).saturating_mul(MOST_FRAGMENTS);
+    exchange.report.nan_depths = nan;
+    exchange.handshake(size_px, drawn, [f32::NAN; 2])?;
+    let totals = exchange.all_gather_number(frame.fragments.len() as u64)?;
+    for (order_index, &found) in totals.iter().enumerate() {
+        let most = (exchange.drawn[order_index].pixels() as u64).saturating_mul(MOST_FRAGMENTS);
         if found > most {
-            return Err(session.unusable(place, WireError::Fragments { found, most }));
+            return Err(exchange.unusable(order_index, MessageError::Fragments { found, most }));
         }
     }
 
     // Who owns what, and what will come.
-    let tiles = balanced(&session.drawn);
-    let of_place = |place: usize, rects: &[Rect]| rects[place].intersection(&tiles[places.own]);
-    let everything = session.drawn.clone();
+    let tiles = balanced(&exchange.drawn);
+    let part_of =
+        |order_index: usize, rects: &[Rect]| rects[order_index].intersection(&tiles[order.own_index]);
+    let everything = exchange.drawn.clone();
     let pieces: Vec<(usize, Rect)> =
         tiles.iter().copied().enumerate().filter(|(_, tile)| !tile.is_empty()).collect();
-    let mut collector = Collector::<Blended>::new(&mut session, size_px, places.root, false, &pieces, None)?;
-    for place in (0..session.places()).filter(|&place| place != places.own) {
-        let part = of_place(place, &everything);
+    let mut collector =
+        Collector::<BlendedPixel>::new(&mut exchange, size_px, order.root_index, false, &pieces, None)?;
+    for order_index in (0..exchange.num_ranks()).filter(|&order_index| order_index != order.own_index) {
+        let part = part_of(order_index, &everything);
         if !part.is_empty() {
-            let most = totals[place].saturating_add(part.pixels() as u64).saturating_mul(RECORD_BYTES as u64);
+            let most =
+                totals[order_index].saturating_add(part.pixels() as u64).saturating_mul(RECORD_BYTES as u64);
             let capacity = most.saturating_add((HEADER_BYTES + 4 * part.pixels()) as u64);
-            session.post_bytes(place, Tag::Exchange, usize::try_from(capacity).unwrap_or(usize::MAX))?;
+            exchange.post_bytes(
+                order_index,
+                Tag::Exchange,
+                usize::try_from(capacity).unwrap_or(usize::MAX),
+            )?;
         }
     }
 
     // Send, in the order of direct send.
-    for step in 1..session.places() {
-        let owner = (places.own + step) % session.places();
+    for step in 1..exchange.num_ranks() {
+        let owner = (order.own_index + step) % exchange.num_ranks();
         let part = drawn.intersection(&tiles[owner]);
         if !part.is_empty() {
-            let at = session.now();
+            let at = exchange.now();
             let message = encode(frame, part, fingerprint);
-            session.report.compress_secs += session.now() - at;
-            session.send_bytes(owner, Tag::Exchange, message)?;
+            exchange.report.compress_secs += exchange.now() - at;
+            exchange.send_bytes(owner, Tag::Exchange, message)?;
         }
     }
 
     // Receive, and join when all is there.
-    let mut parts: Vec<Option<Vec<u8>>> = vec![None; session.places()];
-    let own_part = of_place(places.own, &everything);
+    let mut parts: Vec<Option<Vec<u8>>> = vec![None; exchange.num_ranks()];
+    let own_part = part_of(order.own_index, &everything);
     if !own_part.is_empty() {
-        parts[places.own] = Some(encode(frame, own_part, fingerprint));
+        parts[order.own_index] = Some(encode(frame, own_part, fingerprint));
     }
-    let span = session.begin_span();
-    while session.is_waiting_for(Tag::Exchange) {
-        match session.next(true)? {
-            Some((place, true, bytes)) => collector.take(&mut session, place, bytes)?,
-            Some((place, false, bytes)) => {
-                let checked = check(&bytes, of_place(place, &everything), fingerprint);
-                checked.map_err(|reason| session.unusable(place, reason))?;
-                parts[place] = Some(bytes);
+    let span = exchange.begin_span();
+    while exchange.is_receiving_for(Tag::Exchange) {
+        match exchange.next(true)? {
+            Some((order_index, true, bytes)) => collector.take(&mut exchange, order_index, bytes)?,
+            Some((order_index, false, bytes)) => {
+                let checked = check(&bytes, part_of(order_index, &everything), fingerprint);
+                checked.map_err(|reason| exchange.unusable(order_index, reason))?;
+                parts[order_index] = Some(bytes);
             }
             None => {}
         }
     }
-    session.end_span(span, |report| &mut report.exchange_secs);
-    let tile = tiles[places.own];
+    exchange.end_span(span, |report| &mut report.exchange_secs);
+    let tile = tiles[order.own_index];
     if !tile.is_empty() {
-        let at = session.now();
-        let readers: Vec<Reader<'_>> = (0..session.places())
-            .filter_map(|place| Some(Reader::new(parts[place].as_deref()?, of_place(place, &everything))))
+        let at = exchange.now();
+        let readers: Vec<Reader<'_>> = (0..exchange.num_ranks())
+            .filter_map(|order_index| {
+                Some(Reader::new(parts[order_index].as_deref()?, part_of(order_index, &everything)))
+            })
             .collect();
-        let layer = join(tile, readers);
-        session.report.blend_secs += session.now() - at;
-        collector.hand_in(&mut session, layer, &mut Scratch::new(kernels))?;
+        let layer = merge(tile, readers);
+        exchange.report.blend_secs += exchange.now() - at;
+        collector.submit(&mut exchange, layer, &mut Scratch::new(kernels))?;
     }
-    let span = session.begin_span();
-    let (image, piece) = collector.finish(&mut session)?;
-    session.end_span(span, |report| &mut report.collect_secs);
-    if options.confirm {
-        session.barrier()?;
+    let span = exchange.begin_span();
+    let (image, piece) = collector.finish(&mut exchange)?;
+    exchange.end_span(span, |report| &mut report.collect_secs);
+    if options.final_barrier {
+        exchange.barrier()?;
     }
-    let mut report = session.report;
-    report.total_secs = session.now() - begin;
-    Ok(Composited { image, piece, report })
+    let mut report = exchange.report;
+    report.total_secs = exchange.now() - begin;
+    Ok(CompositeOutput { image, piece, report })
 }
 
 // ---- Messages -----------------------------------------------------------------------------------------------------
@@ -284,34 +293,34 @@ fn encode(frame: &DeepFrame<'_>, part: Rect, fingerprint: u64) -> Vec<u8> {
 }
 
 /// Whether a message holds `part` and can be read without a further check.
-fn check(bytes: &[u8], part: Rect, fingerprint: u64) -> Result<(), WireError> {
+fn check(bytes: &[u8], part: Rect, fingerprint: u64) -> Result<(), MessageError> {
     let found = bytes.len() as u64;
     if bytes.len() < HEADER_BYTES {
-        return Err(WireError::Length { expected: HEADER_BYTES as u64, found });
+        return Err(MessageError::Length { expected: HEADER_BYTES as u64, found });
     }
     let number = |slot: usize| bytemuck::pod_read_unaligned::<u64>(&bytes[8 * slot..8 * slot + 8]);
     if number(0) != MAGIC {
-        return Err(WireError::Magic);
+        return Err(MessageError::Magic);
     }
     let sum = checksum(&bytes[16..]);
     if sum != number(1) {
-        return Err(WireError::Checksum { expected: number(1), found: sum });
+        return Err(MessageError::Checksum { expected: number(1), found: sum });
     }
     if number(2) != fingerprint {
-        return Err(WireError::Fingerprint);
+        return Err(MessageError::Fingerprint);
     }
     let half = |slot: usize, shift: u32| (number(slot) >> shift) as u32;
     let rect = Rect { x0: half(3, 0), y0: half(3, 32), x1: half(4, 0), y1: half(4, 32) };
     if rect != part {
-        return Err(WireError::Part { found: rect, expected: part });
+        return Err(MessageError::Part { found: rect, expected: part });
     }
     let records =
         number(5).checked_add(number(6)).and_then(|records| records.checked_mul(RECORD_BYTES as u64));
     let pixels = part.pixels() as u64;
     let expected = records.and_then(|bytes| bytes.checked_add(HEADER_BYTES as u64 + 4 * pixels));
-    let expected = expected.ok_or(WireError::Mask)?;
+    let expected = expected.ok_or(MessageError::Mask)?;
     if expected != found {
-        return Err(WireError::Length { expected, found });
+        return Err(MessageError::Length { expected, found });
     }
     let (mut fragments, mut surfaces) = (0_u64, 0_u64);
     for count in bytes[HEADER_BYTES..HEADER_BYTES + 4 * part.pixels()].as_chunks::<4>().0 {
@@ -319,7 +328,7 @@ fn check(bytes: &[u8], part: Rect, fingerprint: u64) -> Result<(), WireError> {
         fragments += u64::from(count & !HAS_SURFACE);
         surfaces += u64::from(count & HAS_SURFACE != 0);
     }
-    if (fragments, surfaces) == (number(5), number(6)) { Ok(()) } else { Err(WireError::Mask) }
+    if (fragments, surfaces) == (number(5), number(6)) { Ok(()) } else { Err(MessageError::Mask) }
 }
 
 /// Goes through the pixels of a checked message in order.
@@ -358,7 +367,7 @@ fn fragment(bytes: &[u8; RECORD_BYTES]) -> Fragment {
 
 // ---- Joining ------------------------------------------------------------------------------------------------------
 
-fn join(tile: Rect, mut readers: Vec<Reader<'_>>) -> Layer<Blended> {
+fn merge(tile: Rect, mut readers: Vec<Reader<'_>>) -> Layer<BlendedPixel> {
     let mut layer = Layer::empty(tile, None);
     let (mut pixel, mut fragments) = (0, Vec::new());
     for y in tile.y0..tile.y1 {
@@ -449,7 +458,7 @@ mod tests {
         // One of the three fragments is behind the surface of its pixel.
         assert_eq!(good.len(), HEADER_BYTES + 4 * 4 + 2 * RECORD_BYTES + 2 * RECORD_BYTES);
         check(&good, part, 7).unwrap();
-        assert_eq!(check(&good, part, 8), Err(WireError::Fingerprint));
+        assert_eq!(check(&good, part, 8), Err(MessageError::Fingerprint));
         for bit in 0..8 * good.len() {
             let mut bad = good.clone();
             bad[bit / 8] ^= 1 << (bit % 8);
@@ -471,7 +480,7 @@ mod tests {
             let sum = checksum(&bad[16..]);
             bad[8..16].copy_from_slice(&sum.to_le_bytes());
             if check(&bad, part, 7).is_ok() {
-                join(part, vec![Reader::new(&bad, part)]);
+                merge(part, vec![Reader::new(&bad, part)]);
             }
         }
     }

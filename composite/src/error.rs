@@ -1,6 +1,6 @@
 //! What can go wrong, by name.
+use crate::codec::MessageError;
 use crate::comm::CommError;
-use crate::wire::WireError;
 
 /// Why a composited image could not be made. After an error no rank gets an image: the communicator is aborted.
 #[derive(Debug, thiserror::Error, Clone, PartialEq, Eq)]
@@ -48,7 +48,7 @@ pub enum CompositeError {
         /// The sender.
         from: usize,
         /// What is wrong with it.
-        reason: WireError,
+        reason: MessageError,
     },
     /// Ranks of a blended image are not one behind the other.
     #[error(

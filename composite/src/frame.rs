@@ -66,13 +66,26 @@ fn check_length(
     }
 }
 
+impl Rect {
+    /// An error that names both if `bounds` is not within this image.
+    pub(crate) fn must_contain(&self, bounds: &Self) -> Result<(), CompositeError> {
+        if self.contains(bounds) {
+            return Ok(());
+        }
+        Err(CompositeError::Options(format!(
+            "bounds of columns {}..{} and rows {}..{} reach beyond an image of {}x{}: clip them to the image",
+            bounds.x0, bounds.x1, bounds.y0, bounds.y1, self.x1, self.y1
+        )))
+    }
+}
+
 impl<'a, P: PixelFormat> Frame<'a, P> {
     /// The same frame, of which only the pixels in `bounds` count: what the renderer knows of where it drew, so that nobody has
     /// to look. What lies outside is background, whatever the slices hold there.
     ///
     /// # Errors
     /// [`CompositeError::Options`] if `bounds` reaches beyond the image.
-    pub fn bounded(self, bounds: Rect) -> Result<Self, CompositeError> {
+    pub fn with_bounds(self, bounds: Rect) -> Result<Self, CompositeError> {
         Rect::of_size(self.width_px, self.height_px).must_contain(&bounds)?;
         Ok(Self { bounds: Some(if bounds.is_empty() { Rect::EMPTY } else { bounds }), ..self })
     }
@@ -80,7 +93,7 @@ impl<'a, P: PixelFormat> Frame<'a, P> {
     /// The same frame, with the nearest and farthest depth of what this rank drew, in any unit that all ranks share. Blended frames
     /// that say so are checked: a rank that reaches behind the nearest of one that comes after it, where their rectangles meet, is
     /// [`CompositeError::Order`] and not a wrong picture.
-    pub fn reaching(self, near_to_far: [f32; 2]) -> Self {
+    pub fn with_depth_range(self, near_to_far: [f32; 2]) -> Self {
         Self { depth_range: Some(near_to_far), ..self }
     }
 
@@ -121,11 +134,11 @@ impl<'a, P: PixelFormat> Frame<'a, P> {
     }
 
     /// Whether the renderer has said where it drew.
-    pub(crate) fn is_bounded(&self) -> bool {
+    pub(crate) fn has_bounds(&self) -> bool {
         self.bounds.is_some()
     }
 
-    /// All pixels that count: the whole image, or less if the frame is [`bounded`](Self::bounded).
+    /// All pixels that count: the whole image, or less if the frame is [`with_bounds`](Self::with_bounds).
     pub fn bounds(&self) -> Rect {
         self.bounds.unwrap_or(Rect::of_size(self.width_px, self.height_px))
     }
@@ -339,7 +352,7 @@ mod tests {
             };
             for kernels in [Kernels::new(None), Kernels(None)] {
                 assert_eq!(frame.drawn(kernels).0, expected);
-                assert_eq!(frame.bounded(Rect::EMPTY).unwrap().drawn(kernels).0, Rect::EMPTY);
+                assert_eq!(frame.with_bounds(Rect::EMPTY).unwrap().drawn(kernels).0, Rect::EMPTY);
             }
         }
     }
@@ -348,10 +361,10 @@ mod tests {
     fn bounds_beyond_the_image_are_refused() {
         let color = [[1_u8; 4]; 6];
         let frame = Frame::premultiplied(3, 2, &color).unwrap();
-        let error = frame.bounded(Rect { x0: 1, y0: 0, x1: 4, y1: 1 }).unwrap_err().to_string();
+        let error = frame.with_bounds(Rect { x0: 1, y0: 0, x1: 4, y1: 1 }).unwrap_err().to_string();
         assert!(error.contains("columns 1..4 and rows 0..1 reach beyond an image of 3x2"), "{error}");
-        let bounded = frame.bounded(Rect { x0: 1, y0: 0, x1: 2, y1: 1 }).unwrap();
-        assert_eq!(bounded.pixel(1).color, [1; 4]);
-        assert_eq!(bounded.pixel(2).color, [0; 4]);
+        let with_bounds = frame.with_bounds(Rect { x0: 1, y0: 0, x1: 2, y1: 1 }).unwrap();
+        assert_eq!(with_bounds.pixel(1).color, [1; 4]);
+        assert_eq!(with_bounds.pixel(2).color, [0; 4]);
     }
 }

@@ -3,16 +3,16 @@
 //! Each rank lays what it drew into a room of shared memory, all meet, and then take bands of rows of the image, as long as there are any, and
 //! merge them straight from the rooms. The bands of other ranks are read by the one that collects. A pixel is copied twice, where a message is read,
 //! packed, copied by the system, read again, joined, packed and sent once more; and whoever has a processor works, wherever pixels are.
-use crate::comm::NodeMemory;
+use crate::codec::MessageError;
+use crate::comm::SharedSegments;
 use crate::error::CompositeError;
 use crate::frame::Image;
+use crate::frame_exchange::FrameExchange;
 use crate::layer::View;
 use crate::pixel::Composite;
 use crate::rect::Rect;
-use crate::session::Session;
 use crate::shared::{BAND_ROWS, Rows, merge_band};
 use crate::simd::Kernels;
-use crate::wire::WireError;
 use std::ops::Range;
 
 /// What rooms hold together at most: beyond it pictures travel, piece by piece.
@@ -55,13 +55,13 @@ impl Bands {
     }
 
     /// Begin, and bytes.
-    fn place(&self, band: usize) -> (usize, usize) {
+    fn offset_and_len(&self, band: usize) -> (usize, usize) {
         let begin = self.first + band * (BAND_ROWS * self.row_bytes).next_multiple_of(ALIGNMENT);
         (begin, self.rows(band).len() * self.row_bytes)
     }
 
     fn end(&self) -> usize {
-        self.place(self.count()).0
+        self.offset_and_len(self.count()).0
     }
 
     /// Colours and depths of a band.
@@ -78,17 +78,17 @@ impl Bands {
 
 /// Whether this frame can be merged in shared memory; the same on all ranks. They have met.
 pub(crate) fn is_possible<P: Composite>(
-    session: &mut Session<'_>,
+    exchange: &mut FrameExchange<'_>,
     (width_px, height_px): (u32, u32),
 ) -> bool {
-    let laid: usize = session.drawn.iter().map(|rect| rect.pixels() * P::BYTES).sum();
+    let laid: usize = exchange.drawn.iter().map(|rect| rect.pixels() * P::BYTES).sum();
     let image = Rect::of_size(width_px, height_px).pixels() * P::BYTES;
-    laid.saturating_add(image) <= MOST_BYTES && session.comm.node_memory().is_some()
+    laid.saturating_add(image) <= MOST_BYTES && exchange.comm.shared_segments().is_some()
 }
 
 /// The image at the root, after which all have met; or nothing, if there was not enough memory, which all find alike.
 pub(crate) fn run<P: Composite>(
-    session: &mut Session<'_>,
+    exchange: &mut FrameExchange<'_>,
     view: &View<'_, P>,
     (width_px, height_px): (u32, u32),
     root: usize,
@@ -99,44 +99,45 @@ pub(crate) fn run<P: Composite>(
     let (width, height) = (width_px as usize, height_px as usize);
     let depths = depths && P::HAS_DEPTH;
     let row_bytes = width * (size_of::<P::Color>() + if depths { 4 } else { 0 });
-    let of_root = Planes::of::<P>(&session.drawn[root]).depths.end.next_multiple_of(ALIGNMENT);
+    let of_root = Planes::of::<P>(&exchange.drawn[root]).depths.end.next_multiple_of(ALIGNMENT);
     let bands = Bands { width, height, first: of_root, depths, row_bytes };
 
     // What this rank drew.
-    let begin = session.comm.working_secs();
-    session.count_nan(view, view.bounds);
+    let begin = exchange.comm.working_secs();
+    exchange.count_nan(view, view.bounds);
     let own = Planes::of::<P>(&view.bounds);
-    let bytes = if session.place == root { bands.end() } else { own.depths.end };
-    if let Some(memory) = session.comm.node_memory() {
-        memory.lay(bytes, own.depths.end, &mut |room| copy_rows(view, &own, room));
+    let bytes = if exchange.order_index == root { bands.end() } else { own.depths.end };
+    if let Some(memory) = exchange.comm.shared_segments() {
+        memory.publish(bytes, own.depths.end, &mut |segment| copy_rows(view, &own, segment));
     }
-    session.report.compress_secs += session.comm.working_secs() - begin;
-    let span = session.begin_span();
-    session.barrier()?;
-    session.end_span(span, |report| &mut report.exchange_secs);
+    exchange.report.compress_secs += exchange.comm.working_secs() - begin;
+    let span = exchange.begin_span();
+    exchange.barrier()?;
+    exchange.end_span(span, |report| &mut report.exchange_secs);
 
     // Bands, as long as there are any.
-    let begin = session.comm.working_secs();
-    let (drawn, ranks): (Vec<Rect>, Vec<usize>) =
-        (0..session.places()).map(|place| (session.drawn[place], session.rank_of(place))).unzip();
-    let own_place = session.place;
-    let is_root = own_place == root;
+    let begin = exchange.comm.working_secs();
+    let (drawn, ranks): (Vec<Rect>, Vec<usize>) = (0..exchange.num_ranks())
+        .map(|order_index| (exchange.drawn[order_index], exchange.rank_of(order_index)))
+        .unzip();
+    let own_index = exchange.order_index;
+    let is_root = own_index == root;
     let mut image = is_root.then(|| blank(width_px, height_px, depths, spare));
     let mut own_bands = vec![false; if is_root { bands.count() } else { 0 }];
-    let Some(memory) = session.comm.node_memory() else { return Ok(None) };
-    match memory.open() {
+    let Some(memory) = exchange.comm.shared_segments() else { return Ok(None) };
+    match memory.attach() {
         Ok(true) => {}
         Ok(false) => return Ok(None),
-        Err(error) => return Err(session.comm.reason(error).into()),
+        Err(error) => return Err(exchange.comm.root_cause(error).into()),
     }
-    let Some(memory) = session.comm.node_memory() else { return Ok(None) };
-    let memory: &dyn NodeMemory = memory;
+    let Some(memory) = exchange.comm.shared_segments() else { return Ok(None) };
+    let memory: &dyn SharedSegments = memory;
     let mut views: Vec<View<'_, P>> = Vec::with_capacity(ranks.len());
-    for (place, (rect, rank)) in drawn.iter().zip(&ranks).enumerate() {
-        match laid_view(memory, *rank, rect) {
+    for (order_index, (rect, rank)) in drawn.iter().zip(&ranks).enumerate() {
+        match published_view(memory, *rank, rect) {
             Ok(view) => views.push(view),
             Err(reason) => {
-                let (rank, from) = (ranks[own_place], ranks[place]);
+                let (rank, from) = (ranks[own_index], ranks[order_index]);
                 return Err(CompositeError::Message { rank, from, reason });
             }
         }
@@ -153,23 +154,23 @@ pub(crate) fn run<P: Composite>(
             merge_band(kernels, &mut rows, &views, first as u32, colors, depths);
             own_bands[band] = true;
         } else {
-            let (from, bytes) = bands.place(band);
+            let (from, bytes) = bands.offset_and_len(band);
             memory.write_band(ranks[root], from, bytes, &mut |bytes| {
                 let (colors, depths) = bands.split::<P>(band, bytes);
                 merge_band(kernels, &mut rows, &views, first as u32, colors, depths);
             });
         }
     }
-    session.report.blend_secs += session.comm.working_secs() - begin;
-    let span = session.begin_span();
-    session.barrier()?;
-    session.end_span(span, |report| &mut report.exchange_secs);
+    exchange.report.blend_secs += exchange.comm.working_secs() - begin;
+    let span = exchange.begin_span();
+    exchange.barrier()?;
+    exchange.end_span(span, |report| &mut report.exchange_secs);
 
     // The bands of the others.
-    let begin = session.comm.working_secs();
-    if let (Some(image), Some(memory)) = (&mut image, session.comm.node_memory()) {
+    let begin = exchange.comm.working_secs();
+    if let (Some(image), Some(memory)) = (&mut image, exchange.comm.shared_segments()) {
         for band in (0..bands.count()).filter(|&band| !own_bands[band]) {
-            let (from, bytes) = bands.place(band);
+            let (from, bytes) = bands.offset_and_len(band);
             let bytes = memory.band(ranks[root], from, bytes);
             let (colors, depths) = band_of(image, &bands, band);
             let (merged_colors, merged_depths) = bytes.split_at(size_of_val(colors));
@@ -177,16 +178,16 @@ pub(crate) fn run<P: Composite>(
             bytemuck::cast_slice_mut(depths).copy_from_slice(merged_depths);
         }
     }
-    session.report.collect_secs += session.comm.working_secs() - begin;
+    exchange.report.collect_secs += exchange.comm.working_secs() - begin;
     Ok(Some(image))
 }
 
-fn copy_rows<P: Composite>(view: &View<'_, P>, planes: &Planes, room: &mut [u8]) {
+fn copy_rows<P: Composite>(view: &View<'_, P>, planes: &Planes, segment: &mut [u8]) {
     let rect = view.bounds;
     if rect.is_empty() {
         return;
     }
-    let (colors, rest) = room.split_at_mut(planes.colors);
+    let (colors, rest) = segment.split_at_mut(planes.colors);
     let row_bytes = rect.width() * size_of::<P::Color>();
     let depths = &mut rest[planes.depths.start - planes.colors..];
     for (y, to) in (rect.y0..rect.y1).zip(colors.chunks_exact_mut(row_bytes)) {
@@ -199,22 +200,22 @@ fn copy_rows<P: Composite>(view: &View<'_, P>, planes: &Planes, room: &mut [u8])
     }
 }
 
-fn laid_view<'a, P: Composite>(
-    memory: &'a dyn NodeMemory,
+fn published_view<'a, P: Composite>(
+    memory: &'a dyn SharedSegments,
     rank: usize,
     rect: &Rect,
-) -> Result<View<'a, P>, WireError> {
+) -> Result<View<'a, P>, MessageError> {
     let planes = Planes::of::<P>(rect);
-    let room = memory.room(rank, planes.depths.end);
-    if room.len() < planes.depths.end {
-        return Err(WireError::Length { expected: planes.depths.end as u64, found: room.len() as u64 });
+    let segment = memory.segment(rank, planes.depths.end);
+    if segment.len() < planes.depths.end {
+        return Err(MessageError::Length { expected: planes.depths.end as u64, found: segment.len() as u64 });
     }
     Ok(View {
         bounds: *rect,
         origin: (rect.x0, rect.y0),
         stride: rect.width(),
-        colors: bytemuck::cast_slice(&room[..planes.colors]),
-        depths: bytemuck::cast_slice(&room[planes.depths]),
+        colors: bytemuck::cast_slice(&segment[..planes.colors]),
+        depths: bytemuck::cast_slice(&segment[planes.depths]),
     })
 }
 

@@ -1,7 +1,7 @@
 //! Planes of pixels inside this crate: borrowed from a frame ([`View`]) or held while they are joined ([`Layer`]).
 use crate::pixel::{Composite, PixelFormat};
 use crate::rect::Rect;
-use crate::simd::expand::{Side, clean_run, clean_run_scalar, join_run, join_run_scalar};
+use crate::simd::expand::{Side, clean_run, clean_run_scalar, merge_run, merge_run_scalar};
 use crate::simd::{Kernels, at_level};
 use fearless_simd::Simd;
 
@@ -99,14 +99,14 @@ impl<P: Composite> Layer<P> {
     }
 
     /// Joins what `view` has within these bounds.
-    pub(crate) fn join_view(&mut self, kernels: Kernels, view: &View<'_, P>, side: Side) {
+    pub(crate) fn merge_view(&mut self, kernels: Kernels, view: &View<'_, P>, side: Side) {
         let both = self.bounds.intersection(&view.bounds);
-        at_level!(kernels, simd => join_rows(simd, self, view, both, side), {
+        at_level!(kernels, simd => merge_rows(simd, self, view, both, side), {
             for y in both.y0..both.y1 {
                 let (colors, depths) = view.row(y, both.x0, both.x1);
                 let (held_colors, held_depths) = self.row_mut(y, both.x0, both.x1);
                 let (colors, depths) = (bytemuck::cast_slice(colors), bytemuck::cast_slice(depths));
-                join_run_scalar::<P>(colors, depths, held_colors, held_depths, side);
+                merge_run_scalar::<P>(colors, depths, held_colors, held_depths, side);
             }
         });
     }
@@ -129,7 +129,7 @@ impl<P: Composite> Layer<P> {
 }
 
 #[inline(always)]
-fn join_rows<P: Composite, S: Simd>(
+fn merge_rows<P: Composite, S: Simd>(
     simd: S,
     layer: &mut Layer<P>,
     view: &View<'_, P>,
@@ -140,6 +140,6 @@ fn join_rows<P: Composite, S: Simd>(
         let (colors, depths) = view.row(y, both.x0, both.x1);
         let (held_colors, held_depths) = layer.row_mut(y, both.x0, both.x1);
         let (colors, depths) = (bytemuck::cast_slice(colors), bytemuck::cast_slice(depths));
-        join_run::<P, S>(simd, colors, depths, held_colors, held_depths, side);
+        merge_run::<P, S>(simd, colors, depths, held_colors, held_depths, side);
     }
 }

@@ -27,8 +27,8 @@
 //! |---|---|---|
 //! | none | strategies, streaming, merging in shared memory, deep frames; ranks as threads, over MPI, or simulated | five small crates; no MPI, no C |
 //! | `render` | module `render`: frames of a scene that ranks hold parts of | rt-core, datasets |
-//! | `rival` | module `rival`: IceT over the same ranks | nothing |
-//! | `cli` (the default) | module `cli`, the program `composite` | `render`, `rival`, clap |
+//! | `icet` | module `icet`: IceT over the same ranks | nothing |
+//! | `cli` (the default) | module `cli`, the program `composite` | `render`, `icet`, clap |
 //!
 //! A program that embeds the compositor wants `composite = { version = "0.1", default-features = false }`.
 #![deny(unsafe_code)]
@@ -36,51 +36,52 @@
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod comm;
+#[cfg(feature = "icet")]
+pub mod icet;
 pub mod rank_order;
 #[cfg(feature = "render")]
 pub mod render;
-#[cfg(feature = "rival")]
-pub mod rival;
-pub mod scenes;
+pub mod workload;
 
+mod codec;
 mod collect;
 mod color;
 mod compositor;
 mod deep;
 mod error;
 mod frame;
+mod frame_exchange;
 mod in_memory;
-mod join;
 mod layer;
-mod network;
+mod merge;
+mod network_costs;
+mod node;
 mod pixel;
 mod rect;
 mod reference;
 mod report;
-mod seats;
-mod session;
 mod shared;
+mod shared_memory_group;
 mod simd;
 mod strategies;
 mod stream;
 mod tiles;
-mod wire;
 
+pub use codec::MessageError;
 pub use color::Color;
 pub use comm::{CommError, Communicator, threads};
-pub use compositor::{Composited, Compositor, Destination, Options, composite};
+pub use compositor::{CompositeOutput, Compositor, Destination, Options, composite};
 pub use deep::{DeepFrame, Fragment, composite_deep, composite_deep_serial};
 pub use error::CompositeError;
 pub use frame::{Frame, Image, Piece};
 pub use half::f16;
-pub use network::Network;
+pub use network_costs::NetworkCosts;
 pub use pixel::{Composite, DepthPixel, PixelFormat, PremultipliedPixel, combine};
 pub use rect::Rect;
 pub use reference::composite_serial;
 pub use report::Report;
-pub use seats::{Seat, seats};
 pub use shared::composite_shared;
+pub use shared_memory_group::{SharedMemoryRank, shared_memory_group};
 pub use simd::SimdLevel;
 pub use strategies::Strategy;
 pub use stream::Stream;
-pub use wire::WireError;

@@ -187,10 +187,10 @@ mod tests {
     #[test]
     fn inactive_pixels_change_no_bit_even_where_arithmetic_would() {
         let infinite = PremultipliedPixel { color: [f32::INFINITY, -0.0, 0.0, 1.0] };
-        for joined in
+        for merged in
             [combine(infinite, PremultipliedPixel::EMPTY), combine(PremultipliedPixel::EMPTY, infinite)]
         {
-            assert_eq!(joined.color.map(f32::to_bits), infinite.color.map(f32::to_bits));
+            assert_eq!(merged.color.map(f32::to_bits), infinite.color.map(f32::to_bits));
         }
     }
 

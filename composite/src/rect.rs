@@ -1,5 +1,4 @@
 //! Rectangles of pixels, half open: what a rank drew, the tile it owns, the part a message speaks of.
-use crate::error::CompositeError;
 
 /// Pixels with `x0 <= x < x1` and `y0 <= y < y1`; empty where an end is not beyond its beginning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Hash)]
@@ -67,17 +66,6 @@ impl Rect {
                 y1: self.y1.max(other.y1),
             },
         }
-    }
-
-    /// An error that names both if `bounds` is not within this image.
-    pub(crate) fn must_contain(&self, bounds: &Self) -> Result<(), CompositeError> {
-        if self.contains(bounds) {
-            return Ok(());
-        }
-        Err(CompositeError::Options(format!(
-            "bounds of columns {}..{} and rows {}..{} reach beyond an image of {}x{}: clip them to the image",
-            bounds.x0, bounds.x1, bounds.y0, bounds.y1, self.x1, self.y1
-        )))
     }
 
     /// Whether every pixel of `other` is in this one.

@@ -4,13 +4,10 @@
 //! so this costs what reading the frames costs. Messages cost that and several times more: on a node, use this; between nodes,
 //! messages ([`Compositor::composite_node`]). TOD-Tree (A. V. P. Grosset, M. Prasad, C. Christensen, A. Knoll, C. Hansen, PGV15)
 //! found the same for its mixture of OpenMP and MPI.
-use crate::comm::Communicator;
-use crate::compositor::{Composited, Compositor};
 use crate::error::CompositeError;
 use crate::frame::{Frame, Image};
 use crate::layer::View;
 use crate::pixel::Composite;
-use crate::rect::Rect;
 use crate::reference::check_sizes;
 use crate::simd::Kernels;
 use std::num::NonZeroUsize;
@@ -20,9 +17,9 @@ mod blended;
 mod columns;
 mod nearest;
 
-use blended::Blended;
+use blended::BlendedRows;
 use columns::Columns;
-use nearest::Nearest;
+use nearest::NearestRows;
 
 /// Rows that a thread takes at a time.
 pub(crate) const BAND_ROWS: usize = 16;
@@ -43,41 +40,8 @@ pub fn composite_shared<P: Composite>(
     Ok(merge(frames, threads, depth, spare, Kernels::new(None))?.image)
 }
 
-impl<P: Composite> Compositor<P> {
-    /// Composites the frames of all ranks of this node with each other, in one memory and with `threads` threads, and the result
-    /// with those of the other nodes, by messages. Ranks of `comm` are nodes here; every node calls this once a frame.
-    ///
-    /// The ranks of node 0 come first, then those of node 1, and so on. Images with depth have the bits of the serial reference
-    /// over all ranks. For blended formats nodes are the outer grouping: the bits are those of the reference over the nodes'
-    /// references, which are also those over all ranks where nodes are equally large and all numbers are powers of two.
-    ///
-    /// # Errors
-    /// As [`Compositor::composite`], and as [`composite_shared`].
-    pub fn composite_node(
-        &mut self,
-        comm: &mut dyn Communicator,
-        frames: &[Frame<'_, P>],
-        threads: NonZeroUsize,
-    ) -> Result<Composited<P>, CompositeError> {
-        let begin = comm.now();
-        let spare = self.node_image.take();
-        let merged = merge(frames, threads, true, spare, Kernels::new(self.options().simd));
-        let merged = merged.inspect_err(|error| crate::compositor::give_up(comm, error))?;
-        let (merged, nan) = (merged.image, merged.nan_depths.iter().sum());
-        let merge_secs = comm.now() - begin;
-        let bounds = frames.iter().fold(Rect::EMPTY, |all, frame| all.around(&frame.bounds()));
-        let frame = Frame::of_image(&merged).bounded(bounds)?;
-        let mut composited = self.composite(comm, &frame)?;
-        composited.report.nan_depths = nan;
-        composited.report.blend_secs += merge_secs;
-        composited.report.total_secs += merge_secs;
-        self.node_image = Some(merged);
-        Ok(composited)
-    }
-}
-
 /// What frames have given.
-pub(crate) struct Merged<P: Composite> {
+pub(crate) struct MergeResult<P: Composite> {
     pub(crate) image: Image<P>,
     /// Of each frame, depths that are not a number.
     pub(crate) nan_depths: Vec<u64>,
@@ -89,7 +53,7 @@ pub(crate) fn merge<P: Composite>(
     depth: bool,
     spare: Option<Image<P>>,
     kernels: Kernels,
-) -> Result<Merged<P>, CompositeError> {
+) -> Result<MergeResult<P>, CompositeError> {
     let (width_px, height_px) = check_sizes(frames)?;
     let (width, pixels) = (width_px as usize, frames[0].len());
     let depth = depth && P::HAS_DEPTH;
@@ -129,7 +93,7 @@ pub(crate) fn merge<P: Composite>(
         work();
     });
     let nan_depths = nan_depths.into_inner().unwrap_or_else(PoisonError::into_inner);
-    Ok(Merged { image: Image { width_px, height_px, colors, depths }, nan_depths })
+    Ok(MergeResult { image: Image { width_px, height_px, colors, depths }, nan_depths })
 }
 
 /// Rows `first_row…` of all views into `colors` and, if it is not empty, `depths`.
@@ -169,8 +133,8 @@ pub(crate) struct Rows<P: Composite> {
     width: usize,
     columns: Columns<{ nearest::BLOCK }>,
     wide_columns: Columns<{ blended::BLOCK }>,
-    nearest: Nearest<P>,
-    blended: Blended<P>,
+    nearest: NearestRows<P>,
+    blended: BlendedRows<P>,
 }
 
 impl<P: Composite> Rows<P> {
@@ -179,8 +143,8 @@ impl<P: Composite> Rows<P> {
             width,
             columns: Columns::default(),
             wide_columns: Columns::default(),
-            nearest: Nearest::new(),
-            blended: Blended::new(),
+            nearest: NearestRows::new(),
+            blended: BlendedRows::new(),
         }
     }
 }

@@ -5,36 +5,36 @@
 //! J. Amstutz, J. Günther, C. Brownlee, V. Pascucci, "Scalable Ray Tracing Using the Distributed FrameBuffer", CGF 38(3), 2019)
 //! does it with tiles of fixed size. Here the slices of direct send's tiles are the unit, known from the rectangles in which ranks
 //! are going to draw, and the image has the same bits as without streaming.
+use crate::codec::Codec;
 use crate::collect::Collector;
 use crate::comm::Communicator;
-use crate::compositor::{Composited, Compositor, Places, fingerprint, give_up, slice_px};
+use crate::compositor::{CompositeOutput, CompositingOrder, Compositor, abort_group, fingerprint, slice_px};
 use crate::error::CompositeError;
 use crate::frame::Frame;
-use crate::join::{Item, Scratch};
+use crate::frame_exchange::{FrameExchange, Tag};
 use crate::layer::{Layer, View};
+use crate::merge::{MergeInput, Scratch};
 use crate::pixel::Composite;
 use crate::rect::Rect;
-use crate::session::{Session, Tag};
 use crate::strategies::Strategy;
-use crate::strategies::direct_send::{Exchange, Plan};
-use crate::wire::Codec;
+use crate::strategies::direct_send::{Plan, TileExchange};
 
 /// A frame that is being composited while it is rendered; made by [`Compositor::stream`].
 ///
 /// Dropping it before [`finish`](Self::finish) ends the group, because other ranks wait for what will not come.
 pub struct Stream<'a, P: Composite> {
-    running: Option<Running<'a, P>>,
+    state: Option<StreamState<'a, P>>,
 }
 
-struct Running<'a, P: Composite> {
-    session: Session<'a>,
+struct StreamState<'a, P: Composite> {
+    exchange: FrameExchange<'a>,
     scratch: &'a mut Scratch<P>,
     collector: Collector<P>,
-    exchange: Exchange<'static, P>,
+    tile_exchange: TileExchange<'static, P>,
     size_px: (u32, u32),
     /// Parts of the own frame that have not been handed on.
     pending: Vec<Pending>,
-    confirm: bool,
+    final_barrier: bool,
     begin_secs: f64,
 }
 
@@ -64,26 +64,34 @@ impl<P: Composite> Compositor<P> {
         let begun = self.begin_stream(comm, size_px, bounds);
         // What the session borrows comes back if it could not begin.
         match begun {
-            Ok((places, codec)) => {
+            Ok((order, codec)) => {
                 let options = self.options.clone();
                 let spare = self.spare.take();
-                let mut session = Session::new(comm, places.order, places.own, codec, options.timeout);
-                session.counts_nan = true;
+                let mut exchange =
+                    FrameExchange::new(comm, order.ranks, order.own_index, codec, options.timeout);
+                exchange.counts_nan = true;
                 let drawn = if bounds.is_empty() { Rect::EMPTY } else { bounds };
                 let begun = (|| {
-                    session.meet(size_px, drawn, [f32::NAN; 2])?;
+                    exchange.handshake(size_px, drawn, [f32::NAN; 2])?;
                     let plan = Plan::new::<P>(
-                        &session.drawn,
-                        options.slice_px.unwrap_or_else(|| slice_px::<P>(session.comm)),
-                        places.root,
+                        &exchange.drawn,
+                        options.slice_px.unwrap_or_else(|| slice_px::<P>(exchange.comm)),
+                        order.root_index,
                     );
-                    let pieces = plan.pieces(&session.drawn);
-                    let collector =
-                        Collector::new(&mut session, size_px, places.root, options.depth, &pieces, spare)?;
-                    let exchange = Exchange::new(&plan, &mut session)?;
-                    Ok((plan, collector, exchange))
+                    let pieces = plan.pieces(&exchange.drawn);
+                    let collector = Collector::new(
+                        &mut exchange,
+                        size_px,
+                        order.root_index,
+                        options.depth,
+                        &pieces,
+                        spare,
+                    )?;
+                    let tile_exchange = TileExchange::new(&plan, &mut exchange)?;
+                    Ok((plan, collector, tile_exchange))
                 })();
-                let (plan, collector, exchange) = begun.inspect_err(|error| give_up(session.comm, error))?;
+                let (plan, collector, tile_exchange) =
+                    begun.inspect_err(|error| abort_group(exchange.comm, error))?;
                 let mut pending = Vec::new();
                 for (owner, slices) in plan.slices.iter().enumerate() {
                     for (index, slice) in slices.iter().enumerate() {
@@ -94,13 +102,21 @@ impl<P: Composite> Compositor<P> {
                     }
                 }
                 let scratch = &mut self.scratch;
-                let confirm = options.confirm;
-                let running =
-                    Running { session, scratch, collector, exchange, size_px, pending, confirm, begin_secs };
-                Ok(Stream { running: Some(running) })
+                let final_barrier = options.final_barrier;
+                let state = StreamState {
+                    exchange,
+                    scratch,
+                    collector,
+                    tile_exchange,
+                    size_px,
+                    pending,
+                    final_barrier,
+                    begin_secs,
+                };
+                Ok(Stream { state: Some(state) })
             }
             Err(error) => {
-                give_up(comm, &error);
+                abort_group(comm, &error);
                 Err(error)
             }
         }
@@ -112,9 +128,9 @@ impl<P: Composite> Compositor<P> {
         comm: &dyn Communicator,
         size_px: (u32, u32),
         bounds: Rect,
-    ) -> Result<(Places, Codec), CompositeError> {
+    ) -> Result<(CompositingOrder, Codec), CompositeError> {
         let options = &self.options;
-        let places = Places::new(comm, options)?;
+        let order = CompositingOrder::new(comm, options)?;
         if !matches!(options.strategy, Strategy::DirectSend | Strategy::Automatic) {
             return Err(CompositeError::Options(format!(
                 "streaming with {:?}: that strategy works on whole images; use Strategy::DirectSend",
@@ -123,10 +139,9 @@ impl<P: Composite> Compositor<P> {
         }
         Rect::of_size(size_px.0, size_px.1).must_contain(&bounds)?;
         // Another number than without streaming: ranks that stream and ranks that do not would wait for each other.
-        let fingerprint =
-            fingerprint::<P>(size_px, options, &places, None) ^ u64::from_le_bytes(*b"STREAM__");
+        let fingerprint = fingerprint::<P>(size_px, options, &order, None) ^ u64::from_le_bytes(*b"STREAM__");
         let codec = Codec { kernels: self.scratch.kernels, fingerprint, verify: options.verify };
-        Ok((places, codec))
+        Ok((order, codec))
     }
 }
 
@@ -137,7 +152,7 @@ impl<P: Composite> Stream<'_, P> {
     /// # Errors
     /// As [`Compositor::composite`], and [`CompositeError::Stream`] for pixels handed in twice or a frame of another size.
     pub fn tile_done(&mut self, frame: &Frame<'_, P>, tile: Rect) -> Result<(), CompositeError> {
-        self.running(|running| running.tile_done(frame, tile))
+        self.state(|state| state.tile_done(frame, tile))
     }
 
     /// Joins whatever has come from other ranks, without waiting; returns how many slices of this rank's tile are complete.
@@ -145,34 +160,34 @@ impl<P: Composite> Stream<'_, P> {
     /// # Errors
     /// As [`Compositor::composite`].
     pub fn progress(&mut self) -> Result<usize, CompositeError> {
-        self.running(|running| running.progress())
+        self.state(|state| state.progress())
     }
 
     /// Hands in all that has not been, and waits for the other ranks.
     ///
     /// # Errors
     /// As [`Compositor::composite`].
-    pub fn finish(mut self, frame: &Frame<'_, P>) -> Result<Composited<P>, CompositeError> {
-        self.running(|running| running.hand_in_rest(frame))?;
-        let Some(running) = self.running.take() else { return Err(ended()) };
-        running.finish()
+    pub fn finish(mut self, frame: &Frame<'_, P>) -> Result<CompositeOutput<P>, CompositeError> {
+        self.state(|state| state.submit_rest(frame))?;
+        let Some(state) = self.state.take() else { return Err(stream_ended()) };
+        state.finish()
     }
 
-    fn running<T>(
+    fn state<T>(
         &mut self,
-        work: impl FnOnce(&mut Running<'_, P>) -> Result<T, CompositeError>,
+        work: impl FnOnce(&mut StreamState<'_, P>) -> Result<T, CompositeError>,
     ) -> Result<T, CompositeError> {
-        let Some(running) = &mut self.running else { return Err(ended()) };
-        let result = work(running);
+        let Some(state) = &mut self.state else { return Err(stream_ended()) };
+        let result = work(state);
         if let Err(error) = &result {
-            give_up(running.session.comm, error);
-            self.running = None;
+            abort_group(state.exchange.comm, error);
+            self.state = None;
         }
         result
     }
 }
 
-fn ended() -> CompositeError {
+fn stream_ended() -> CompositeError {
     CompositeError::Stream(
         "this stream has ended with an error before: begin another frame with another group".into(),
     )
@@ -180,13 +195,13 @@ fn ended() -> CompositeError {
 
 impl<P: Composite> Drop for Stream<'_, P> {
     fn drop(&mut self) {
-        if let Some(running) = &mut self.running {
-            running.session.comm.abort("a stream was dropped before it was finished");
+        if let Some(state) = &mut self.state {
+            state.exchange.comm.abort("a stream was dropped before it was finished");
         }
     }
 }
 
-impl<P: Composite> Running<'_, P> {
+impl<P: Composite> StreamState<'_, P> {
     fn check_size(&self, frame: &Frame<'_, P>) -> Result<(), CompositeError> {
         if (frame.width_px(), frame.height_px()) == self.size_px {
             return Ok(());
@@ -202,14 +217,14 @@ impl<P: Composite> Running<'_, P> {
 
     fn tile_done(&mut self, frame: &Frame<'_, P>, tile: Rect) -> Result<(), CompositeError> {
         self.check_size(frame)?;
-        self.session.comm.alive()?;
+        self.exchange.comm.alive()?;
         let mut finished = Vec::new();
-        let mut outside = tile.intersection(&self.session.drawn[self.session.place]).pixels();
+        let mut outside = tile.intersection(&self.exchange.drawn[self.exchange.order_index]).pixels();
         for (position, pending) in self.pending.iter_mut().enumerate() {
             let pixels = pending.part.intersection(&tile).pixels();
             outside -= pixels.min(outside);
             let Some(missing) = pending.missing.checked_sub(pixels) else {
-                return Err(twice(&tile));
+                return Err(submitted_twice(&tile));
             };
             pending.missing = missing;
             if missing == 0 {
@@ -218,73 +233,73 @@ impl<P: Composite> Running<'_, P> {
         }
         if outside > 0 {
             // Of a part that has been handed on already.
-            return Err(twice(&tile));
+            return Err(submitted_twice(&tile));
         }
         for position in finished.into_iter().rev() {
             let pending = self.pending.swap_remove(position);
-            self.hand_on(frame, &pending)?;
+            self.submit_part(frame, &pending)?;
         }
         self.progress().map(|_| ())
     }
 
     fn progress(&mut self) -> Result<usize, CompositeError> {
-        self.exchange.take_what_has_come(&mut self.session, &mut self.collector, self.scratch)?;
-        Ok(self.exchange.complete())
+        self.tile_exchange.take_arrived(&mut self.exchange, &mut self.collector, self.scratch)?;
+        Ok(self.tile_exchange.complete())
     }
 
-    fn hand_in_rest(&mut self, frame: &Frame<'_, P>) -> Result<(), CompositeError> {
+    fn submit_rest(&mut self, frame: &Frame<'_, P>) -> Result<(), CompositeError> {
         self.check_size(frame)?;
         // Others' parts first: they travel while the own ones are joined.
-        let own = self.session.place;
+        let own = self.exchange.order_index;
         let mut rest = std::mem::take(&mut self.pending);
         rest.sort_by_key(|pending| pending.owner == own);
-        rest.iter().try_for_each(|pending| self.hand_on(frame, pending))
+        rest.iter().try_for_each(|pending| self.submit_part(frame, pending))
     }
 
     /// Sends a finished part, or joins it if it is of the own tile: copied, because the renderer goes on drawing beside it.
-    fn hand_on(&mut self, frame: &Frame<'_, P>, pending: &Pending) -> Result<(), CompositeError> {
+    fn submit_part(&mut self, frame: &Frame<'_, P>, pending: &Pending) -> Result<(), CompositeError> {
         let view: View<'_, P> = frame.view(pending.part);
-        if pending.owner != self.session.place {
-            return self.session.send(pending.owner, Tag::Exchange, &view, pending.part, true);
+        if pending.owner != self.exchange.order_index {
+            return self.exchange.send(pending.owner, Tag::Exchange, &view, pending.part, true);
         }
-        let begin = self.session.now();
-        self.session.count_nan(&view, pending.part);
+        let begin = self.exchange.now();
+        self.exchange.count_nan(&view, pending.part);
         let spare = self.scratch.layers.pop();
         let copy = Layer::copied(pending.part, &view, self.scratch.kernels, spare);
-        self.session.report.blend_secs += self.session.now() - begin;
-        let place = self.session.place;
-        self.exchange.put(
+        self.exchange.report.blend_secs += self.exchange.now() - begin;
+        let order_index = self.exchange.order_index;
+        self.tile_exchange.put(
             pending.index,
-            place,
-            Item::Layer(copy),
-            &mut self.session,
+            order_index,
+            MergeInput::Layer(copy),
+            &mut self.exchange,
             &mut self.collector,
             self.scratch,
         )
     }
 
-    fn finish(mut self) -> Result<Composited<P>, CompositeError> {
-        let span = self.session.begin_span();
-        let waited = self.exchange.finish(&mut self.session, &mut self.collector, self.scratch);
-        let (mut session, collector) = (self.session, self.collector);
-        session.end_span(span, |report| &mut report.exchange_secs);
-        let span = session.begin_span();
-        let finished = waited.and_then(|()| collector.finish(&mut session));
-        session.end_span(span, |report| &mut report.collect_secs);
+    fn finish(mut self) -> Result<CompositeOutput<P>, CompositeError> {
+        let span = self.exchange.begin_span();
+        let waited = self.tile_exchange.finish(&mut self.exchange, &mut self.collector, self.scratch);
+        let (mut exchange, collector) = (self.exchange, self.collector);
+        exchange.end_span(span, |report| &mut report.exchange_secs);
+        let span = exchange.begin_span();
+        let finished = waited.and_then(|()| collector.finish(&mut exchange));
+        exchange.end_span(span, |report| &mut report.collect_secs);
         let finished = finished.and_then(|images| {
-            if self.confirm {
-                session.barrier()?;
+            if self.final_barrier {
+                exchange.barrier()?;
             }
             Ok(images)
         });
-        let (image, piece) = finished.inspect_err(|error| give_up(session.comm, error))?;
-        let mut report = session.report;
-        report.total_secs = session.now() - self.begin_secs;
-        Ok(Composited { image, piece, report })
+        let (image, piece) = finished.inspect_err(|error| abort_group(exchange.comm, error))?;
+        let mut report = exchange.report;
+        report.total_secs = exchange.now() - self.begin_secs;
+        Ok(CompositeOutput { image, piece, report })
     }
 }
 
-fn twice(tile: &Rect) -> CompositeError {
+fn submitted_twice(tile: &Rect) -> CompositeError {
     CompositeError::Stream(format!(
         "pixels of the tile of columns {}..{} and rows {}..{} were handed in twice: a pixel is final only once",
         tile.x0, tile.x1, tile.y0, tile.y1

@@ -12,22 +12,23 @@ const DRAWN_WEIGHT: u64 = 2;
 /// Cells of a region at most in which its work is added up: cuts are as fine as this part of it.
 const CELLS: usize = 128;
 
-/// One tile for every place; `drawn[place]` is the rectangle that it drew in. Tiles are disjoint and cover every `drawn`, and
+/// One tile for every place; `drawn[order_index]` is the rectangle that it drew in. Tiles are disjoint and cover every `drawn`, and
 /// some may be empty.
 pub(crate) fn balanced(drawn: &[Rect]) -> Vec<Rect> {
-    let mut owners: Vec<Owner> = (0..drawn.len()).map(|place| Owner { place, share: 1 }).collect();
-    shared_out(drawn, &mut owners)
+    let mut owners: Vec<Owner> =
+        (0..drawn.len()).map(|order_index| Owner { order_index, share: 1 }).collect();
+    balanced_among(drawn, &mut owners)
 }
 
 /// A place that gets a tile, as large as its share of all owners' shares.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Owner {
-    pub(crate) place: usize,
+    pub(crate) order_index: usize,
     pub(crate) share: u64,
 }
 
 /// As [`balanced`], among `owners` only; other places have empty tiles.
-pub(crate) fn shared_out(drawn: &[Rect], owners: &mut [Owner]) -> Vec<Rect> {
+pub(crate) fn balanced_among(drawn: &[Rect], owners: &mut [Owner]) -> Vec<Rect> {
     let whole = drawn.iter().fold(Rect::EMPTY, |all, rect| all.around(rect));
     let mut tiles = vec![Rect::EMPTY; drawn.len()];
     let present: Vec<Rect> = drawn.iter().copied().filter(|rect| !rect.is_empty()).collect();
@@ -40,7 +41,7 @@ pub(crate) fn shared_out(drawn: &[Rect], owners: &mut [Owner]) -> Vec<Rect> {
 /// Divides `region` among `owners`; `present` are the rectangles that meet it.
 fn divide(region: Rect, owners: &mut [Owner], present: &[Rect], drawn: &[Rect], tiles: &mut [Rect]) {
     if let [owner] = *owners {
-        tiles[owner.place] = region;
+        tiles[owner.order_index] = region;
         return;
     }
     if region.is_empty() || owners.is_empty() {
@@ -51,9 +52,9 @@ fn divide(region: Rect, owners: &mut [Owner], present: &[Rect], drawn: &[Rect], 
     // Ranks by the centre of what they drew; those that drew nothing work in the middle, where they fill up.
     let sort = |across_columns: bool, owners: &mut [Owner]| {
         owners.sort_unstable_by_key(|owner| {
-            let rect = if drawn[owner.place].is_empty() { region } else { drawn[owner.place] };
+            let rect = if drawn[owner.order_index].is_empty() { region } else { drawn[owner.order_index] };
             let (from, to) = if across_columns { (rect.x0, rect.x1) } else { (rect.y0, rect.y1) };
-            (u64::from(from) + u64::from(to), owner.place)
+            (u64::from(from) + u64::from(to), owner.order_index)
         });
     };
     let split = |across_columns: bool, owners: &mut [Owner]| {
@@ -86,7 +87,7 @@ fn divide(region: Rect, owners: &mut [Owner], present: &[Rect], drawn: &[Rect], 
     }
     for (part, its_owners) in [(before, first), (behind, second)] {
         if let [owner] = *its_owners {
-            tiles[owner.place] = part;
+            tiles[owner.order_index] = part;
             continue;
         }
         let meeting: Vec<Rect> =
@@ -135,6 +136,9 @@ fn cut(region: Rect, across_columns: bool, present: &[Rect], share: u64, shares:
     }
     end
 }
+
+/// Bytes of a slice between nodes.
+pub(crate) const SLICE_BYTES: usize = 1 << 18;
 
 /// `tile` in slices of rows, of about `pixels` each.
 pub(crate) fn slices(tile: Rect, pixels: usize) -> Vec<Rect> {

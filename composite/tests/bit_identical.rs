@@ -1,7 +1,7 @@
 //! Every strategy gives the bits of the serial reference: all rank counts to 17, odd sizes, depth and ordered blending.
 use composite::{
-    Communicator, Composite, CompositeError, Composited, Destination, Frame, Image, Options, PixelFormat,
-    Strategy, composite_serial, threads,
+    Communicator, Composite, CompositeError, CompositeOutput, Destination, Frame, Image, Options,
+    PixelFormat, Strategy, composite_serial, threads,
 };
 
 const STRATEGIES: [Strategy; 7] = [
@@ -32,15 +32,15 @@ impl Random {
 }
 
 /// What one rank drew: about half of the image in runs, depths from a few values so that ties are common.
-struct Drawn {
+struct TestFrame {
     bytes: Vec<[u8; 4]>,
     floats: Vec<[f32; 4]>,
     depth: Vec<f32>,
 }
 
-fn draw(rank: usize, size_px: (u32, u32)) -> Drawn {
+fn draw(rank: usize, size_px: (u32, u32)) -> TestFrame {
     let mut random = Random(1 + rank as u64 * 7919 + u64::from(size_px.0) * 31 + u64::from(size_px.1));
-    let mut drawn = Drawn { bytes: Vec::new(), floats: Vec::new(), depth: Vec::new() };
+    let mut drawn = TestFrame { bytes: Vec::new(), floats: Vec::new(), depth: Vec::new() };
     let mut active = random.next().is_multiple_of(2);
     let empty_rank = rank % 5 == 3;
     for _ in 0..size_px.0 * size_px.1 {
@@ -64,7 +64,7 @@ fn draw(rank: usize, size_px: (u32, u32)) -> Drawn {
 
 /// Composites over threads; the whole image, put together from pieces if it was left distributed.
 fn over_threads<P: Composite>(frames: &[Frame<'_, P>], options: &Options) -> Image<P> {
-    let results: Vec<Composited<P>> = threads::run(frames.len(), |mut comm| {
+    let results: Vec<CompositeOutput<P>> = threads::run(frames.len(), |mut comm| {
         let frame = &frames[comm.rank()];
         composite::composite(&mut comm, frame, options)
     })
@@ -127,7 +127,7 @@ fn check_all<P: Composite>(frames: &[Frame<'_, P>]) {
 fn check_rank_counts(counts: std::ops::RangeInclusive<usize>) {
     for ranks in counts {
         for (w, h) in SIZES {
-            let drawn: Vec<Drawn> = (0..ranks).map(|rank| draw(rank, (w, h))).collect();
+            let drawn: Vec<TestFrame> = (0..ranks).map(|rank| draw(rank, (w, h))).collect();
             let frames: Result<Vec<_>, CompositeError> =
                 drawn.iter().map(|d| Frame::with_depth(w, h, &d.bytes, &d.depth)).collect();
             check_all(&frames.unwrap());
@@ -164,7 +164,7 @@ fn fourteen_to_seventeen_ranks_give_the_bits_of_the_serial_reference() {
 /// Guards the tests above against being vacuous: another grouping does give other bits.
 #[test]
 fn a_chain_instead_of_the_canonical_grouping_would_be_noticed() {
-    let drawn: Vec<Drawn> = (0..9).map(|rank| draw(rank, (64, 33))).collect();
+    let drawn: Vec<TestFrame> = (0..9).map(|rank| draw(rank, (64, 33))).collect();
     let frames: Vec<_> = drawn.iter().map(|d| Frame::premultiplied(64, 33, &d.floats).unwrap()).collect();
     let expected = composite_serial(&frames).unwrap();
     let expected_pixels: Vec<_> = (0..expected.colors().len()).map(|index| expected.pixel(index)).collect();
@@ -190,7 +190,7 @@ fn equal_depths_everywhere_give_the_highest_rank_a_thousand_times() {
     for strategy in STRATEGIES {
         let results = threads::run(ranks, |mut comm| {
             let rank = comm.rank();
-            let options = Options { strategy, confirm: false, ..Options::default() };
+            let options = Options { strategy, final_barrier: false, ..Options::default() };
             (0..1000)
                 .filter_map(|_| composite::composite(&mut comm, &frames[rank], &options).unwrap().image)
                 .filter(|image| image.colors() == [[5; 4]; 6])
@@ -203,7 +203,7 @@ fn equal_depths_everywhere_give_the_highest_rank_a_thousand_times() {
 #[test]
 fn the_order_of_ranks_is_the_order_of_layers() {
     let order = vec![3, 0, 4, 1, 2];
-    let drawn: Vec<Drawn> = (0..5).map(|rank| draw(rank + 20, (31, 5))).collect();
+    let drawn: Vec<TestFrame> = (0..5).map(|rank| draw(rank + 20, (31, 5))).collect();
     let frames: Vec<_> = drawn.iter().map(|d| Frame::premultiplied(31, 5, &d.floats).unwrap()).collect();
     let sorted: Vec<_> = order.iter().map(|&rank| frames[rank]).collect();
     let expected = composite_serial(&sorted).unwrap().to_bytes();

@@ -1,7 +1,7 @@
 //! Faults end in a named error on every rank, for every strategy, and never in a hang.
 use composite::comm::{Arrival, Receive};
 use composite::{
-    CommError, Communicator, CompositeError, Destination, Frame, Options, Strategy, WireError, threads,
+    CommError, Communicator, CompositeError, Destination, Frame, MessageError, Options, Strategy, threads,
 };
 use std::time::{Duration, Instant};
 
@@ -113,8 +113,8 @@ fn short_long_empty_and_corrupt_messages_are_named_by_the_receiver_and_end_the_f
                         receivers += 1;
                         assert_eq!((*receiver, *from), (rank, CULPRIT));
                         let fits = match reason {
-                            WireError::Checksum { .. } => fault != Fault::Empty,
-                            WireError::Length { .. } => fault != Fault::FlippedBit,
+                            MessageError::Checksum { .. } => fault != Fault::Empty,
+                            MessageError::Length { .. } => fault != Fault::FlippedBit,
                             _ => false,
                         };
                         assert!(fits, "{fault:?} gave {reason:?}");

@@ -1,8 +1,8 @@
 //! Hard cases by name: sizes, rank counts, formats, order. All strategies, over threads.
 use composite::{
     Communicator, Composite, CompositeError, Compositor, DeepFrame, DepthPixel, Destination, Fragment, Frame,
-    Network, Options, PixelFormat, PremultipliedPixel, Rect, Strategy, composite_deep, composite_deep_serial,
-    composite_serial, f16, threads,
+    NetworkCosts, Options, PixelFormat, PremultipliedPixel, Rect, Strategy, composite_deep,
+    composite_deep_serial, composite_serial, f16, threads,
 };
 
 const STRATEGIES: [Strategy; 4] =
@@ -39,7 +39,9 @@ fn check_many<P: Composite + Send>(
     let results = threads::run(ranks, |mut comm| {
         let mut compositors: Vec<Compositor<P>> = STRATEGIES
             .iter()
-            .map(|&strategy| Compositor::new(Options { strategy, confirm: false, ..Options::default() }))
+            .map(|&strategy| {
+                Compositor::new(Options { strategy, final_barrier: false, ..Options::default() })
+            })
             .collect();
         for &(w, h) in sizes {
             let (colors, depths) = frame(comm.rank(), w, h);
@@ -121,7 +123,7 @@ fn nan_depths_are_counted_once_with_and_without_bounds_and_by_every_strategy() {
     let inside = Rect { x0: 3, y0: 2, x1: 37, y1: 28 };
     let frame = Frame::with_depth(w, h, &colors, &depths).unwrap();
     for (frame, expected) in
-        [(frame, 172), (frame.bounded(inside).unwrap(), frame.bounded(inside).unwrap().nan_depths())]
+        [(frame, 172), (frame.with_bounds(inside).unwrap(), frame.with_bounds(inside).unwrap().nan_depths())]
     {
         assert_eq!(frame.nan_depths(), expected);
         for strategy in STRATEGIES {
@@ -147,7 +149,7 @@ fn ranks_with_different_strategies_or_options_hear_of_it_at_once() {
         Options { depth: false, ..Options::default() },
         Options { order: Some(vec![2, 1, 0]), ..Options::default() },
         // Those who confirm would wait for those who do not.
-        Options { confirm: false, ..Options::default() },
+        Options { final_barrier: false, ..Options::default() },
         Options { verify: true, ..Options::default() },
     ];
     for other in options {
@@ -165,9 +167,9 @@ fn ranks_with_different_strategies_or_options_hear_of_it_at_once() {
 
 #[test]
 fn the_automatic_strategy_is_the_same_on_every_rank_and_follows_a_given_network() {
-    let slow_messages = Network { latency_secs: 2e-3, overhead_secs: 1e-3, byte_secs: 1e-12 };
+    let slow_messages = NetworkCosts { latency_secs: 2e-3, overhead_secs: 1e-3, byte_secs: 1e-12 };
     let colors = vec![[9_u8; 4]; 64 * 64];
-    for network in [None, Some(Network::QDR), Some(slow_messages)] {
+    for network in [None, Some(NetworkCosts::QDR), Some(slow_messages)] {
         let chosen = threads::run(8, |mut comm| {
             let frame = Frame::premultiplied(64, 64, &colors).unwrap();
             let compositor = Compositor::new(Options { strategy: Strategy::Automatic, ..Options::default() });
@@ -369,8 +371,9 @@ fn ranks_that_reach_behind_those_after_them_are_refused_where_they_meet() {
     let run = |bounds: [Rect; 2], ranges: [[f32; 2]; 2]| {
         threads::run(2, |mut comm| {
             let rank = comm.rank();
-            let frame = Frame::premultiplied(10, 10, &colors).unwrap().bounded(bounds[rank]).unwrap();
-            composite::composite(&mut comm, &frame.reaching(ranges[rank]), &Options::default()).map(|_| ())
+            let frame = Frame::premultiplied(10, 10, &colors).unwrap().with_bounds(bounds[rank]).unwrap();
+            composite::composite(&mut comm, &frame.with_depth_range(ranges[rank]), &Options::default())
+                .map(|_| ())
         })
     };
     let whole = Rect::of_size(10, 10);

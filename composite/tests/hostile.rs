@@ -2,7 +2,7 @@
 use composite::comm::{Arrival, Receive};
 use composite::{
     CommError, Communicator, CompositeError, Compositor, DeepFrame, DepthPixel, Destination, Fragment, Frame,
-    Options, PremultipliedPixel, Rect, Strategy, WireError, composite_deep, threads,
+    MessageError, Options, PremultipliedPixel, Rect, Strategy, composite_deep, threads,
 };
 use proptest::prelude::*;
 use std::time::Duration;
@@ -214,7 +214,11 @@ fn the_error_of_a_rectangle_beyond_the_image_is_a_named_one() {
     let named = |result: &Result<(), CompositeError>| {
         matches!(
             result,
-            Err(CompositeError::Message { from: LIAR, reason: WireError::Drawn { width_px: WIDTH, .. }, .. })
+            Err(CompositeError::Message {
+                from: LIAR,
+                reason: MessageError::OutsideImage { width_px: WIDTH, .. },
+                ..
+            })
         )
     };
     assert!(ends.iter().any(|(result, _)| named(result)), "{ends:?}");

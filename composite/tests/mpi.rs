@@ -21,7 +21,7 @@ fn peer(variable: &str) -> Option<PathBuf> {
     found
 }
 
-struct Ran {
+struct ProgramOutput {
     code: Option<i32>,
     stdout: String,
     /// With stderr.
@@ -30,7 +30,7 @@ struct Ran {
 }
 
 /// Runs the program; fails the test if it does not end in time.
-fn run(arguments: &[&str], variables: &[(&str, &Path)]) -> Ran {
+fn run(arguments: &[&str], variables: &[(&str, &Path)]) -> ProgramOutput {
     let begin = Instant::now();
     let mut command = Command::new("timeout");
     command.args(["--kill-after=5", &BOUND.as_secs().to_string()]);
@@ -46,7 +46,7 @@ fn run(arguments: &[&str], variables: &[(&str, &Path)]) -> Ran {
     let text = stdout.clone() + &String::from_utf8_lossy(&stderr);
     let took = begin.elapsed();
     assert!(took < BOUND, "{arguments:?} did not end:\n{text}");
-    Ran { code: status.code(), stdout, text, took }
+    ProgramOutput { code: status.code(), stdout, text, took }
 }
 
 /// `composite check` in groups of `counts` ranks, all in one launch of as many as the largest needs: every strategy, scene and size, with depth and
@@ -310,7 +310,7 @@ fn launched(
     count: &[&str],
     environment: &[&str],
     of_check: &[&str],
-) -> Ran {
+) -> ProgramOutput {
     let begin = Instant::now();
     let mut command = Command::new("timeout");
     command.args(["--kill-after=5", &BOUND.as_secs().to_string()]).arg(mpirun);
@@ -342,11 +342,11 @@ fn launched(
     let text = stdout.clone() + &String::from_utf8_lossy(&stderr);
     let took = begin.elapsed();
     assert!(took < BOUND, "{of_launcher:?} {environment:?} did not end:\n{text}");
-    Ran { code: status.code(), stdout, text, took }
+    ProgramOutput { code: status.code(), stdout, text, took }
 }
 
 /// Machines that the ranks found, and images that were composited, all of which must be right.
-fn nodes_and_images(ran: &Ran) -> (u64, u64) {
+fn nodes_and_images(ran: &ProgramOutput) -> (u64, u64) {
     assert_eq!(ran.code, Some(0), "{}", ran.text);
     let checked: serde_json::Value = serde_json::from_str(ran.stdout.trim()).expect("one line of JSON");
     assert_eq!(checked["images_differ"].as_u64(), Some(0), "{checked}");

@@ -1,7 +1,8 @@
 //! Frames of one memory, merged without messages, and nodes of several ranks: the bits of the serial reference.
 use composite::{
     Color, Communicator, Composite, CompositeError, Compositor, DepthPixel, Destination, Frame, Image,
-    Options, PremultipliedPixel, Rect, SimdLevel, composite_serial, composite_shared, f16, seats, threads,
+    Options, PremultipliedPixel, Rect, SimdLevel, composite_serial, composite_shared, f16,
+    shared_memory_group, threads,
 };
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex};
@@ -9,14 +10,14 @@ use std::sync::{Arc, Mutex};
 const SIZE: (u32, u32) = (70, 37);
 
 /// One rank's planes, and a rectangle around what it drew (odd ranks only; others leave it to be found).
-struct Drawn {
+struct TestFrame {
     bytes: Vec<[u8; 4]>,
     floats: Vec<[f32; 4]>,
     depth: Vec<f32>,
     bounds: Option<Rect>,
 }
 
-fn draw(rank: usize) -> Drawn {
+fn draw(rank: usize) -> TestFrame {
     let mut seed = 1 + rank as u64 * 977;
     let mut random = move || {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -25,7 +26,7 @@ fn draw(rank: usize) -> Drawn {
     let (x0, y0) = (random() % 40, random() % 20);
     let bounds = Rect { x0, y0, x1: x0 + random() % 31, y1: y0 + random() % 18 };
     let mut drawn =
-        Drawn { bytes: vec![], floats: vec![], depth: vec![], bounds: (rank % 2 == 1).then_some(bounds) };
+        TestFrame { bytes: vec![], floats: vec![], depth: vec![], bounds: (rank % 2 == 1).then_some(bounds) };
     for y in 0..SIZE.1 {
         for x in 0..SIZE.0 {
             let inside = bounds.x0 <= x && x < bounds.x1 && bounds.y0 <= y && y < bounds.y1;
@@ -45,14 +46,14 @@ fn draw(rank: usize) -> Drawn {
     drawn
 }
 
-fn z(drawn: &Drawn) -> Frame<'_, DepthPixel<[u8; 4]>> {
+fn z(drawn: &TestFrame) -> Frame<'_, DepthPixel<[u8; 4]>> {
     let frame = Frame::with_depth(SIZE.0, SIZE.1, &drawn.bytes, &drawn.depth).unwrap();
-    drawn.bounds.map_or(frame, |bounds| frame.bounded(bounds).unwrap())
+    drawn.bounds.map_or(frame, |bounds| frame.with_bounds(bounds).unwrap())
 }
 
-fn blended(drawn: &Drawn) -> Frame<'_, PremultipliedPixel<[f32; 4]>> {
+fn blended(drawn: &TestFrame) -> Frame<'_, PremultipliedPixel<[f32; 4]>> {
     let frame = Frame::premultiplied(SIZE.0, SIZE.1, &drawn.floats).unwrap();
-    drawn.bounds.map_or(frame, |bounds| frame.bounded(bounds).unwrap())
+    drawn.bounds.map_or(frame, |bounds| frame.with_bounds(bounds).unwrap())
 }
 
 fn check_shared<P: Composite>(frames: &[Frame<'_, P>]) {
@@ -71,7 +72,7 @@ fn check_shared<P: Composite>(frames: &[Frame<'_, P>]) {
 #[test]
 fn merging_in_one_memory_gives_the_bits_of_the_serial_reference() {
     for ranks in (1..=17).chain([64]) {
-        let drawn: Vec<Drawn> = (0..ranks).map(draw).collect();
+        let drawn: Vec<TestFrame> = (0..ranks).map(draw).collect();
         check_shared(&drawn.iter().map(z).collect::<Vec<_>>());
         check_shared(&drawn.iter().map(blended).collect::<Vec<_>>());
     }
@@ -94,7 +95,7 @@ fn over_nodes<P: Composite>(nodes: &[&[Frame<'_, P>]]) -> Vec<u8> {
 #[test]
 fn nodes_of_several_ranks_give_the_bits_of_all_ranks() {
     for sizes in [vec![4], vec![2, 2], vec![1, 3, 2], vec![5, 1], vec![2; 4], vec![1; 5], vec![3, 3, 3]] {
-        let drawn: Vec<Drawn> = (0..sizes.iter().sum()).map(draw).collect();
+        let drawn: Vec<TestFrame> = (0..sizes.iter().sum()).map(draw).collect();
         let (z, blended): (Vec<_>, Vec<_>) = drawn.iter().map(|d| (z(d), blended(d))).unzip();
         let (mut z_nodes, mut blended_nodes, mut first) = (Vec::new(), Vec::new(), 0);
         for size in &sizes {
@@ -124,7 +125,7 @@ fn nodes_of_several_ranks_give_the_bits_of_all_ranks() {
 
 #[test]
 fn nan_depths_of_all_ranks_of_a_node_are_counted() {
-    let drawn: Vec<Drawn> = (0..4).map(draw).collect();
+    let drawn: Vec<TestFrame> = (0..4).map(draw).collect();
     let frames: Vec<_> = drawn.iter().map(z).collect();
     let nan: u64 = frames.iter().map(Frame::nan_depths).sum();
     assert!(nan > 0);
@@ -137,17 +138,18 @@ fn nan_depths_of_all_ranks_of_a_node_are_counted() {
 #[test]
 fn ranks_at_a_table_give_the_bits_of_the_serial_reference_frame_after_frame() {
     for ranks in [1, 2, 5, 8] {
-        let drawn: Vec<Drawn> = (0..ranks).map(draw).collect();
+        let drawn: Vec<TestFrame> = (0..ranks).map(draw).collect();
         let frames: Vec<_> = drawn.iter().map(z).collect();
         let images: Vec<Arc<Image<DepthPixel<[u8; 4]>>>> = drawn
             .iter()
             .map(|d| Arc::new(Image::from_planes(SIZE.0, SIZE.1, d.bytes.clone(), d.depth.clone()).unwrap()))
             .collect();
         let expected = composite_serial(&frames).unwrap();
-        let places: Vec<_> = seats(ranks).into_iter().map(|seat| Mutex::new(Some(seat))).collect();
+        let members: Vec<_> =
+            shared_memory_group(ranks).into_iter().map(|shared_rank| Mutex::new(Some(shared_rank))).collect();
         let results = threads::run(ranks, |mut comm| {
             let rank = comm.rank();
-            let mut seat = places[rank].lock().unwrap().take().unwrap();
+            let mut shared_rank = members[rank].lock().unwrap().take().unwrap();
             for repeat in 0..4 {
                 // With depths and without, to the first rank and to the last.
                 let root = if repeat < 2 { 0 } else { ranks - 1 };
@@ -157,13 +159,13 @@ fn ranks_at_a_table_give_the_bits_of_the_serial_reference_frame_after_frame() {
                     ..Options::default()
                 };
                 let bounds = frames[rank].bounds();
-                let done = seat.composite(&mut comm, &images[rank], bounds, &options).unwrap();
+                let done = shared_rank.composite(&mut comm, &images[rank], bounds, &options).unwrap();
                 assert_eq!(done.report.nan_depths, frames[rank].nan_depths());
                 assert_eq!(done.image.is_some(), rank == root);
                 if let Some(image) = done.image {
                     assert!(image.colors() == expected.colors());
                     assert!(image.depths() == if options.depth { expected.depths() } else { &[] });
-                    seat.recycle(image);
+                    shared_rank.recycle(image);
                 }
             }
         });
@@ -175,20 +177,21 @@ fn ranks_at_a_table_give_the_bits_of_the_serial_reference_frame_after_frame() {
 fn a_table_names_what_it_cannot_do_and_who_did_not_come() {
     let image =
         Arc::new(Image::<PremultipliedPixel<[u8; 4]>>::from_planes(1, 1, vec![[1; 4]], vec![]).unwrap());
-    let places: Vec<_> = seats(2).into_iter().map(|seat| Mutex::new(Some(seat))).collect();
+    let members: Vec<_> =
+        shared_memory_group(2).into_iter().map(|shared_rank| Mutex::new(Some(shared_rank))).collect();
     let results = threads::run(2, |mut comm| {
-        let mut seat = places[comm.rank()].lock().unwrap().take().unwrap();
+        let mut shared_rank = members[comm.rank()].lock().unwrap().take().unwrap();
         if comm.rank() == 1 {
             return Ok(());
         }
         let options = Options { timeout: std::time::Duration::from_secs(20), ..Options::default() };
-        seat.composite(&mut comm, &image, Rect::of_size(1, 1), &options).map(|_| ())
+        shared_rank.composite(&mut comm, &image, Rect::of_size(1, 1), &options).map(|_| ())
     });
     assert!(results[0].as_ref().unwrap().as_ref().unwrap_err().to_string().contains("rank 1"));
     let mut comm = threads::group(1).remove(0);
-    let mut seat = seats(1).remove(0);
+    let mut shared_rank = shared_memory_group(1).remove(0);
     let options = Options { destination: Destination::Distributed, ..Options::default() };
-    let error = seat.composite(&mut comm, &image, Rect::of_size(1, 1), &options).unwrap_err();
+    let error = shared_rank.composite(&mut comm, &image, Rect::of_size(1, 1), &options).unwrap_err();
     assert!(matches!(error, CompositeError::Options(_)));
 }
 
@@ -247,20 +250,22 @@ fn check_levels<P: Composite>(frame: impl for<'a> Fn(&'a Image<P>) -> Frame<'a, 
         let order: Vec<usize> = (0..ranks).map(|place| (place * 2 + 1) % ranks).collect();
         let order = if ranks % 2 == 1 { order } else { (0..ranks).rev().collect() };
         let in_order: Vec<Frame<'_, P>> =
-            order.iter().map(|&rank| frame(&images[rank].0).bounded(images[rank].1).unwrap()).collect();
+            order.iter().map(|&rank| frame(&images[rank].0).with_bounds(images[rank].1).unwrap()).collect();
         let expected = composite_serial(&in_order).unwrap();
-        let places: Vec<_> = seats(ranks).into_iter().map(|seat| Mutex::new(Some(seat))).collect();
+        let members: Vec<_> =
+            shared_memory_group(ranks).into_iter().map(|shared_rank| Mutex::new(Some(shared_rank))).collect();
         let results = threads::run(ranks, |mut comm| {
             let rank = comm.rank();
-            let mut seat = places[rank].lock().unwrap().take().unwrap();
+            let mut shared_rank = members[rank].lock().unwrap().take().unwrap();
             for level in SimdLevel::available() {
                 let options = Options { order: Some(order.clone()), simd: Some(level), ..Options::default() };
-                let done = seat.composite(&mut comm, &images[rank].0, images[rank].1, &options).unwrap();
-                let nan = frame(&images[rank].0).bounded(images[rank].1).unwrap().nan_depths();
+                let done =
+                    shared_rank.composite(&mut comm, &images[rank].0, images[rank].1, &options).unwrap();
+                let nan = frame(&images[rank].0).with_bounds(images[rank].1).unwrap().nan_depths();
                 assert_eq!(done.report.nan_depths, nan, "{level:?}, rank {rank} of {ranks}");
                 if let Some(image) = done.image {
                     assert!(image.to_bytes() == expected.to_bytes(), "{}, {level:?}, {ranks} ranks", P::NAME);
-                    seat.recycle(image);
+                    shared_rank.recycle(image);
                 }
             }
         });

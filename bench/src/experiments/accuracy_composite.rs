@@ -7,7 +7,7 @@ use crate::record::{Record, Row};
 use crate::runner::{VERDICT_ROUNDS, order};
 use crate::stats::Summary;
 use composite::comm::sim::SimComm;
-use composite::rival::{self, Icet, IcetFrame, IcetImage, IcetMode, IcetStrategy};
+use composite::icet::{self, Icet, IcetFrame, IcetImage, IcetMode, IcetStrategy};
 use composite::{
     Color, Communicator, Composite, Compositor, Destination, Frame, Image, Options, PixelFormat,
     PremultipliedPixel, Rect, Strategy, f16,
@@ -36,7 +36,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
          pixel. Formats, strategies and IceT take turns on the same ranks, in another order for every frame."
     ));
     record.notes.push(CAVEAT.into());
-    let icet = rival::find().map_err(|why| record.missing.push(format!("IceT's 8-bit blending: {why}"))).ok();
+    let icet = icet::find().map_err(|why| record.missing.push(format!("IceT's 8-bit blending: {why}"))).ok();
     // The strategies give the same bits: the one with fewer messages will do for the short form.
     let strategies = [("radix-k", Strategy::RadixK { k: 8 }), ("direct send", Strategy::DirectSend)];
     let strategies = &strategies[..if context.quick { 1 } else { 2 }];
@@ -201,7 +201,7 @@ where
             strategy: how,
             destination: Destination::Rank(0),
             timeout: TIMEOUT,
-            confirm: false,
+            final_barrier: false,
             ..Options::default()
         });
         let contender =
@@ -309,7 +309,7 @@ mod tests {
 
     #[test]
     fn icet_s_eight_bits_are_measured_and_the_note_says_what_was_found() {
-        let icet = match rival::find() {
+        let icet = match icet::find() {
             Ok(path) => path,
             Err(why) => {
                 assert!(std::env::var_os("RTSV_REQUIRE_PEERS").is_none_or(|v| v != "1"), "{why}");

@@ -8,8 +8,8 @@ use crate::record::{Record, Row};
 use crate::runner::{Ratio, order};
 use crate::stats::Summary;
 use composite::comm::sim::{Network, SimComm};
-use composite::rival::{self, Icet, IcetFrame, IcetMode, IcetStrategy};
-use composite::scenes::{Drawn, Scene};
+use composite::icet::{self, Icet, IcetFrame, IcetMode, IcetStrategy};
+use composite::workload::{SyntheticFrame, Workload};
 use composite::{Communicator, Compositor, DepthPixel, Destination, Frame, Options, Strategy};
 use std::path::Path;
 use std::time::Duration;
@@ -67,7 +67,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
                 .into(),
         );
     }
-    let icet = rival::find();
+    let icet = icet::find();
     if let Err(why) = &icet {
         record.missing.push(why.to_string());
     }
@@ -171,7 +171,7 @@ fn run_rank(
     icet: Option<&Path>,
 ) -> anyhow::Result<RankResult> {
     let (rank, ranks) = (comm.rank(), comm.size());
-    let mut drawn = Drawn::new(size, size);
+    let mut drawn = SyntheticFrame::new(size, size);
     let mut ours: Vec<Option<Compositor<DepthPixel<[u8; 4]>>>> = all
         .iter()
         .map(|(_, who)| match who {
@@ -180,7 +180,7 @@ fn run_rank(
                 destination: Destination::Rank(0),
                 depth: false,
                 timeout: TIMEOUT,
-                confirm: false,
+                final_barrier: false,
                 ..Options::default()
             })),
             Backend::Icet(_) => None,
@@ -189,8 +189,8 @@ fn run_rank(
     let mut theirs = icet.map(|path| Icet::over_comm(path, comm, IcetMode::Depth, size, size)).transpose()?;
     let mut out = RankResult { secs: vec![Vec::new(); all.len()], differ: vec![0; all.len()] };
     for n in 0..=frames {
-        Scene::Discs.draw(n as u64, rank, ranks, &mut drawn);
-        let frame = Frame::with_depth(size, size, &drawn.colors, &drawn.depths)?.bounded(drawn.bounds)?;
+        Workload::Discs.draw(n as u64, rank, ranks, &mut drawn);
+        let frame = Frame::with_depth(size, size, &drawn.colors, &drawn.depths)?.with_bounds(drawn.bounds)?;
         // In turns, in another order for every frame, which is the same on all ranks.
         let mut images: Vec<Option<Vec<[u8; 4]>>> = vec![None; all.len()];
         for k in order(all.len(), n) {
@@ -217,8 +217,8 @@ fn run_rank(
                     let end = comm.now();
                     out.secs[k].push(end - begin);
                     image.and_then(|i| match i {
-                        rival::IcetImage::Rgba8(colors) => Some(colors.to_vec()),
-                        rival::IcetImage::RgbaF32(_) => None,
+                        icet::IcetImage::Rgba8(colors) => Some(colors.to_vec()),
+                        icet::IcetImage::RgbaF32(_) => None,
                     })
                 }
             };

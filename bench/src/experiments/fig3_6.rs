@@ -5,7 +5,7 @@ use super::many_ranks::{Sharing, cost_columns, frames, powers, with_cost};
 use crate::meshes;
 use crate::plot::{Axis, Plot, Series};
 use crate::record::{Record, Row};
-use composite::render::demo::{Demo, Prepared};
+use composite::render::demo::{Demo, PreparedDemo};
 use composite::render::{FrameOptions, Partition, Split};
 use datasets::generate::nested_wavelet::Size;
 use rt_core::mesh::TriMesh;
@@ -29,7 +29,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         let triangles = mesh.num_triangles();
         let (scene, camera) = demo.scene_of(mesh)?;
         let partition = Partition::new(&scene, ranks, &Split::Triangles);
-        let prepared = Prepared { scene, camera, options: RenderOptions::new(size, size), partition };
+        let prepared = PreparedDemo { scene, camera, options: RenderOptions::new(size, size), partition };
         let measured = frames(&prepared, ranks, count, Sharing::SortLast, &FrameOptions::default())?;
         record.rows.push(
             with_cost(Row::new(), ranks, &measured)

@@ -5,7 +5,7 @@ use crate::stats::Summary;
 use composite::Communicator;
 use composite::comm::CommError;
 use composite::comm::sim::{Compute, Network, SimComm, run_on};
-use composite::render::demo::Prepared;
+use composite::render::demo::PreparedDemo;
 use composite::render::{Activity, DataParallel, FrameOptions, FrameOutput, RankReport, ray_parallel};
 use rt_core::bvh::BuildOptions;
 use std::time::Duration;
@@ -94,7 +94,7 @@ pub(super) enum Sharing {
 
 /// Renders one frame to warm up and then `frames` counted ones on `ranks` simulated ranks.
 pub(super) fn frames(
-    prepared: &Prepared,
+    prepared: &PreparedDemo,
     ranks: usize,
     frames: usize,
     sharing: Sharing,
@@ -111,7 +111,7 @@ pub(super) fn frames(
                 })
             }
             Sharing::RayParallel => measure_frames(&mut comm, frames, |comm| {
-                let Prepared { scene, camera, options: render, .. } = prepared;
+                let PreparedDemo { scene, camera, options: render, .. } = prepared;
                 Ok(ray_parallel(comm, scene, camera, render, &options)?)
             }),
         }

@@ -106,7 +106,7 @@ fn run(
                     .with("light", light)
                     .with("speedup", alone / cost.frame_secs)
                     .with("rounds", cost.rounds)
-                    .with("choice", measured.last.first().map(|r| r.light.clone())),
+                    .with("choice", measured.last.first().map(|r| r.secondary_rays.clone())),
             );
         }
     }

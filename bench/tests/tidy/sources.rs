@@ -17,7 +17,7 @@ pub(crate) const UNSAFE_ROOMS: &[(&str, &str)] = &[
     ),
     ("composite/src/comm/mpi", "calls into an MPI library found at run time"),
     (
-        "composite/src/rival",
+        "composite/src/icet",
         "calls into IceT, found at run time; a measurement against a rival is a call into it",
     ),
     ("bench/src/baselines", "calls into C libraries that we measure against"),

@@ -8,8 +8,8 @@ use crate::compositor::{Options, composite};
 use crate::frame::Frame;
 use crate::pixel::{Composite, DepthPixel, PremultipliedPixel};
 use crate::reference::composite_serial;
-use crate::scenes::{Drawn, Scene};
 use crate::strategies::Strategy;
+use crate::workload::{SyntheticFrame, Workload};
 use datasets::cli::{CommonArgs, Status, UsageError};
 use serde::Serialize;
 use std::ffi::OsString;
@@ -69,7 +69,7 @@ const STRATEGIES: [Strategy; 5] = [
 ];
 
 #[derive(Debug, Serialize)]
-struct Checked {
+struct CheckReport {
     ranks: usize,
     transport: String,
     /// Machines that the ranks are on.
@@ -107,7 +107,7 @@ pub(super) fn check(common: CommonArgs, args: &CheckArgs, arguments: &[OsString]
                     comm.comm().barrier(timeout)?;
                 }
                 let Some(mut group) = FirstRanks::new(comm.comm(), count) else { continue };
-                for scene in Scene::ALL {
+                for scene in Workload::ALL {
                     for size_px in SIZES_PX {
                         for strategy in STRATEGIES {
                             for same in one_frame(&mut group, scene, size_px, strategy, true, timeout)? {
@@ -115,7 +115,7 @@ pub(super) fn check(common: CommonArgs, args: &CheckArgs, arguments: &[OsString]
                                 images_differ += u64::from(!same);
                             }
                         }
-                        if group.node_memory().is_some() {
+                        if group.shared_segments().is_some() {
                             for same in one_frame(&mut group, scene, size_px, Strategy::DirectSend, false, timeout)? {
                                 images += 1;
                                 images_differ += u64::from(!same);
@@ -129,7 +129,7 @@ pub(super) fn check(common: CommonArgs, args: &CheckArgs, arguments: &[OsString]
                     let [all, differ] =
                         hard_cases::run(&mut group, &STRATEGIES, true, most, args.repeats, timeout)?;
                     hard = [hard[0] + all, hard[1] + differ];
-                    if group.node_memory().is_some() {
+                    if group.shared_segments().is_some() {
                         let direct = [Strategy::DirectSend];
                         let [all, differ] = hard_cases::run(&mut group, &direct, false, most, 1, timeout)?;
                         hard = [hard[0] + all, hard[1] + differ];
@@ -139,11 +139,11 @@ pub(super) fn check(common: CommonArgs, args: &CheckArgs, arguments: &[OsString]
             // Nobody leaves while others still composite.
             comm.comm().barrier(timeout)?;
             let [hard_images, hard_images_differ] = hard;
-            Ok(Checked { ranks: size, transport, nodes, counts, images, images_differ, hard_images, hard_images_differ })
+            Ok(CheckReport { ranks: size, transport, nodes, counts, images, images_differ, hard_images, hard_images_differ })
         },
         |checked| {
             common.result(&checked, || {
-                let Checked { ranks, transport, images, images_differ, hard_images, hard_images_differ, .. } = &checked;
+                let CheckReport { ranks, transport, images, images_differ, hard_images, hard_images_differ, .. } = &checked;
                 let mut text = format!(
                     "{ranks} ranks over {transport}: {images} images, {images_differ} differ from the serial reference"
                 );
@@ -160,7 +160,7 @@ pub(super) fn check(common: CommonArgs, args: &CheckArgs, arguments: &[OsString]
 /// Composites one scene with depth and blended, in shared memory if wanted and possible; on rank 0, whether each image has the bits of the reference.
 fn one_frame(
     comm: &mut dyn Communicator,
-    scene: Scene,
+    scene: Workload,
     (width_px, height_px): (u32, u32),
     strategy: Strategy,
     in_memory: bool,
@@ -168,7 +168,7 @@ fn one_frame(
 ) -> anyhow::Result<Vec<bool>> {
     let (rank, ranks) = (comm.rank(), comm.size());
     let draw = |rank: usize| {
-        let mut drawn = Drawn::new(width_px, height_px);
+        let mut drawn = SyntheticFrame::new(width_px, height_px);
         scene.draw(1, rank, ranks, &mut drawn);
         let mut glass = Vec::new();
         drawn.premultiplied(&mut glass);

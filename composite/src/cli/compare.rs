@@ -4,12 +4,12 @@ mod measure;
 mod table;
 
 use super::ranks::{RankArgs, RankComm};
-use crate::rival;
-use crate::scenes::Scene;
+use crate::icet;
 use crate::simd::SimdLevel;
 use crate::strategies::Strategy;
+use crate::workload::Workload;
 use datasets::cli::{CommonArgs, Status, UsageError};
-use measure::{Bench, Setting, Tables};
+use measure::{Bench, Groups, Setting};
 use std::ffi::OsString;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -30,8 +30,8 @@ pub(super) struct CompareArgs {
     #[arg(long, default_value = "1024", value_name = "PIXELS", value_delimiter = ',')]
     size: Vec<u32>,
     /// Which frames: discs, dense, frag, several of them or all
-    #[arg(long, default_value = "all", value_name = "SCENE", value_delimiter = ',', value_parser = scene_named)]
-    scene: Vec<Scenes>,
+    #[arg(long, default_value = "all", value_name = "SCENE", value_delimiter = ',', value_parser = workload_named)]
+    scene: Vec<Workloads>,
     /// What is composited: RGBA8 with depth (depth), premultiplied RGBA f32 in order (blend), or both as depth,blend
     #[arg(long, default_value = "depth", value_delimiter = ',')]
     pixels: Vec<Pixels>,
@@ -50,7 +50,7 @@ pub(super) struct CompareArgs {
 }
 
 /// What a word of `--scene` stands for.
-type Scenes = &'static [Scene];
+type Workloads = &'static [Workload];
 
 pub(super) fn compare(
     common: CommonArgs,
@@ -61,16 +61,16 @@ pub(super) fn compare(
         return Err(UsageError(format!("an image of {size}x{size}: give 1 to 32768")).into());
     }
     // Before any rank is started: without the rival there is nothing to compare with.
-    let icet = rival::find().map_err(|error| UsageError(error.to_string()))?;
+    let icet = icet::find().map_err(|error| UsageError(error.to_string()))?;
     let counts = args.ranks.counts();
     if args.ranks.is_rank() || counts.len() < 2 {
         let is_table = !args.messages && matches!(args.strategy, Strategy::DirectSend | Strategy::Automatic);
         let threads = if is_table && args.ranks.are_threads() { args.ranks.count()? } else { 0 };
-        let tables = Tables::new(threads);
+        let groups = Groups::new(threads);
         return args.ranks.run(
             common,
             arguments,
-            |comm| one_job(comm, args, &icet, &tables),
+            |comm| one_job(comm, args, &icet, &groups),
             |comparison| {
                 common.result(&comparison, || &comparison)?;
                 Ok(Status::Success)
@@ -105,9 +105,9 @@ fn one_job(
     comm: &mut RankComm,
     args: &CompareArgs,
     icet: &Path,
-    tables: &Tables,
+    groups: &Groups,
 ) -> anyhow::Result<Comparison> {
-    let mut seats = tables.seats_of(comm.comm().rank());
+    let mut members = groups.members_of(comm.comm().rank());
     let machine = Machine {
         processors: std::thread::available_parallelism().map_or(1, usize::from),
         transport: comm.transport(),
@@ -126,7 +126,7 @@ fn one_job(
                 let setting = Setting { size_px, pixels, strategy, in_memory, simd, frames, timeout };
                 let mut bench = Bench::new(comm, icet, setting)?;
                 for &scene in args.scene.iter().copied().flatten() {
-                    rows.push(bench.measure(scene, seats.as_mut())?);
+                    rows.push(bench.measure(scene, members.as_mut())?);
                 }
             }
         }
@@ -166,13 +166,13 @@ fn of_one_count(ranks: usize, arguments: &[OsString]) -> Vec<OsString> {
     changed
 }
 
-fn scene_named(name: &str) -> Result<Scenes, String> {
+fn workload_named(name: &str) -> Result<Workloads, String> {
     if name == "all" {
-        return Ok(&Scene::ALL);
+        return Ok(&Workload::ALL);
     }
-    let scene: Scene = name.parse().map_err(|error: String| format!("{error}, or all"))?;
-    let found = Scene::ALL.iter().position(|other| *other == scene).unwrap_or(0);
-    Ok(&Scene::ALL[found..=found])
+    let scene: Workload = name.parse().map_err(|error: String| format!("{error}, or all"))?;
+    let found = Workload::ALL.iter().position(|other| *other == scene).unwrap_or(0);
+    Ok(&Workload::ALL[found..=found])
 }
 
 fn strategy_named(name: &str) -> Result<Strategy, String> {
@@ -211,8 +211,8 @@ mod tests {
 
     #[test]
     fn scenes_are_known_by_name_and_all_is_all_of_them() {
-        assert_eq!(scene_named("all"), Ok(Scene::ALL.as_slice()));
-        assert_eq!(scene_named("frag"), Ok([Scene::Frag].as_slice()));
-        assert!(scene_named("fog").is_err());
+        assert_eq!(workload_named("all"), Ok(Workload::ALL.as_slice()));
+        assert_eq!(workload_named("frag"), Ok([Workload::Frag].as_slice()));
+        assert!(workload_named("fog").is_err());
     }
 }

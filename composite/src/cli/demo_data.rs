@@ -1,67 +1,21 @@
 //! `composite demo` of a data set: generated, cut into parts, rendered by all ranks.
-use super::demo::DemoArgs;
+use super::demo_args::DemoArgs;
+use super::rank_records::RankRecord;
 use super::ranks::RankComm;
 use super::timeline;
-use crate::render::demo::{Demo, Prepared};
-use crate::render::{Activity, DataParallel, FrameOptions, Light, RankReport, Span};
+use crate::render::demo::{Demo, PreparedDemo};
+use crate::render::{DataParallel, FrameOptions, RankReport, SecondaryRayPolicy};
 use anyhow::Context as _;
 use datasets::cli::{CommonArgs, Status, UsageError};
 use datasets::image_io::{Picture, PngDepth, write_png};
 use rt_core::bvh::BuildOptions;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// What one rank did in the frame that is shown.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub(super) struct RankLine {
-    pub(super) rank: usize,
-    pub(super) triangles: usize,
-    /// Milliseconds by activity, in the order of [`Activity::ALL`].
-    pub(super) render_ms: f64,
-    pub(super) composite_ms: f64,
-    pub(super) shade_ms: f64,
-    pub(super) answer_ms: f64,
-    pub(super) exchange_ms: f64,
-    pub(super) collect_ms: f64,
-    pub(super) total_ms: f64,
-    pub(super) camera_rays: u64,
-    pub(super) answered_rays: u64,
-    pub(super) rounds: u32,
-    pub(super) bytes_sent: u64,
-    /// Activity (place in [`Activity::ALL`]), begin and end in milliseconds.
-    pub(super) spans: Vec<(usize, f64, f64)>,
-}
-
-impl RankLine {
-    fn new(rank: usize, triangles: usize, report: &RankReport) -> Self {
-        let ms = |activity| 1e3 * report.secs(activity);
-        let span = |s: &Span| {
-            let place = Activity::ALL.iter().position(|a| *a == s.activity).unwrap_or(0);
-            (place, 1e3 * s.begin_secs, 1e3 * s.end_secs)
-        };
-        Self {
-            rank,
-            triangles,
-            render_ms: ms(Activity::Render),
-            composite_ms: ms(Activity::Composite),
-            shade_ms: ms(Activity::Shade),
-            answer_ms: ms(Activity::Answer),
-            exchange_ms: ms(Activity::Exchange),
-            collect_ms: ms(Activity::Collect),
-            total_ms: 1e3 * report.total_secs(),
-            camera_rays: report.camera_rays,
-            answered_rays: report.answered_rays,
-            rounds: report.rounds,
-            bytes_sent: report.bytes_sent,
-            spans: report.spans.iter().map(span).collect(),
-        }
-    }
-}
-
 #[derive(Debug, Serialize)]
-struct Shown {
+struct DemoReport {
     transport: String,
     data: String,
     size_px: u32,
@@ -71,16 +25,16 @@ struct Shown {
     unusable: usize,
     picture: PathBuf,
     plot: PathBuf,
-    ranks: Vec<RankLine>,
+    ranks: Vec<RankRecord>,
 }
 
 /// The frame that is shown, on rank 0.
-struct Finished {
+struct FinishedDemo {
     transport: String,
     light: String,
     unusable: usize,
     colors: Vec<[f32; 4]>,
-    lines: Vec<RankLine>,
+    lines: Vec<RankRecord>,
 }
 
 pub(super) fn demo(common: CommonArgs, args: &DemoArgs, arguments: &[OsString]) -> anyhow::Result<Status> {
@@ -95,7 +49,7 @@ pub(super) fn demo(common: CommonArgs, args: &DemoArgs, arguments: &[OsString]) 
         ..Demo::default()
     };
     // Ranks that are threads share what is made before the frame.
-    let shared: Mutex<Option<Arc<Prepared>>> = Mutex::new(None);
+    let shared: Mutex<Option<Arc<PreparedDemo>>> = Mutex::new(None);
     args.ranks.run(
         common,
         arguments,
@@ -117,11 +71,11 @@ pub(super) fn demo(common: CommonArgs, args: &DemoArgs, arguments: &[OsString]) 
             };
             frames(comm, args, &prepared)
         },
-        |f: Finished| finish(common, args, f),
+        |f: FinishedDemo| finish(common, args, f),
     )
 }
 
-fn finish(common: CommonArgs, args: &DemoArgs, f: Finished) -> anyhow::Result<Status> {
+fn finish(common: CommonArgs, args: &DemoArgs, f: FinishedDemo) -> anyhow::Result<Status> {
     std::fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
     let (picture, plot) = (args.out.join("composite_demo.png"), args.out.join("composite_demo.svg"));
     let mut png = Picture::new(args.size, args.size);
@@ -137,7 +91,7 @@ fn finish(common: CommonArgs, args: &DemoArgs, f: Finished) -> anyhow::Result<St
         args.size
     );
     std::fs::write(&plot, timeline::svg(&title, &f.lines)).with_context(|| plot.display().to_string())?;
-    let shown = Shown {
+    let shown = DemoReport {
         transport: f.transport,
         data: args.data.clone(),
         size_px: args.size,
@@ -169,13 +123,17 @@ fn finish(common: CommonArgs, args: &DemoArgs, f: Finished) -> anyhow::Result<St
 /// What a rank may tell of its frame: some hundred thousand spans.
 const MOST_LINE_BYTES: usize = 1 << 24;
 
-fn frames(comm: &mut RankComm, args: &DemoArgs, prepared: &Prepared) -> anyhow::Result<Finished> {
+fn frames(comm: &mut RankComm, args: &DemoArgs, prepared: &PreparedDemo) -> anyhow::Result<FinishedDemo> {
     let (timeout, transport) = (args.ranks.timeout(), comm.transport());
     let comm = comm.comm();
     let rank = comm.rank();
     let part = prepared.partition.part(&prepared.scene, rank, &BuildOptions::default())?;
     let triangles = part.primitives();
-    let options = FrameOptions { timeout, light: Light::Auto { frames: 100 }, ..FrameOptions::default() };
+    let options = FrameOptions {
+        timeout,
+        secondary_rays: SecondaryRayPolicy::Auto { frames: 100 },
+        ..FrameOptions::default()
+    };
     let mut renderer = DataParallel::new(comm, part, options)?;
     let (mut colors, mut report) = (Vec::new(), RankReport::default());
     for _ in 0..args.frames {
@@ -185,16 +143,16 @@ fn frames(comm: &mut RankComm, args: &DemoArgs, prepared: &Prepared) -> anyhow::
         report = done.report;
     }
     // Lengths first: how many spans a rank has is its own affair.
-    let mine = serde_json::to_vec(&RankLine::new(rank, triangles, &report))?;
+    let mine = serde_json::to_vec(&RankRecord::new(rank, triangles, &report))?;
     let lengths = comm.all_gather(&(mine.len() as u64).to_le_bytes(), 8, timeout)?;
     let length = |bytes: &Vec<u8>| bytes.as_slice().try_into().map_or(0, u64::from_le_bytes) as usize;
     let longest = lengths.iter().map(length).max().unwrap_or(0);
     anyhow::ensure!(longest <= MOST_LINE_BYTES, "a rank announces {longest} bytes about its frame");
     let all = comm.all_gather(&mine, longest, timeout)?;
     let lines = all.iter().map(|bytes| serde_json::from_slice(bytes)).collect::<Result<_, _>>()?;
-    Ok(Finished {
+    Ok(FinishedDemo {
         transport,
-        light: report.light,
+        light: report.secondary_rays,
         unusable: prepared.scene.world.report().skipped,
         colors,
         lines,

@@ -1,7 +1,7 @@
 //! `composite doctor`: what there is on this machine, and what to do about what is not.
 use super::mpirun;
 use crate::comm::mpi::{inspect, launcher};
-use crate::rival;
+use crate::icet;
 use crate::simd::SimdLevel;
 use datasets::cli::{CommonArgs, Status};
 use serde::Serialize;
@@ -120,7 +120,7 @@ fn smpi() -> Finding {
 
 fn icet() -> Finding {
     let what = "IceT";
-    match rival::find() {
+    match icet::find() {
         Ok(path) => Finding { what, usable: true, found: path.display().to_string(), cure: None },
         Err(error) => Finding {
             what,

@@ -1,6 +1,8 @@
 //! The first ranks of a group as a group of their own, so that one launch checks several numbers of ranks; and a rank whose messages
 //! are damaged, for tests.
-use crate::comm::{Arrival, CommError, Communicator, FIRST_RESERVED_TAG, NodeMemory, Receive, collective};
+use crate::comm::{
+    Arrival, CommError, Communicator, FIRST_RESERVED_TAG, Receive, SharedSegments, collective,
+};
 use std::time::Duration;
 
 /// The first `size` ranks of a group.
@@ -46,12 +48,12 @@ impl Communicator for FirstRanks<'_> {
         self.inner.is_one_node()
     }
 
-    fn reason(&mut self, error: CommError) -> CommError {
-        self.inner.reason(error)
+    fn root_cause(&mut self, error: CommError) -> CommError {
+        self.inner.root_cause(error)
     }
 
-    fn node_memory(&mut self) -> Option<&mut dyn NodeMemory> {
-        if self.size == self.inner.size() { self.inner.node_memory() } else { None }
+    fn shared_segments(&mut self) -> Option<&mut dyn SharedSegments> {
+        if self.size == self.inner.size() { self.inner.shared_segments() } else { None }
     }
 
     fn send(&mut self, destination: usize, tag: u32, mut message: Vec<u8>) -> Result<(), CommError> {

@@ -1,5 +1,5 @@
 //! What each rank did in a frame, as a plot (SVG) and as a table with IceT's columns.
-use super::demo::Line;
+use super::rank_records::RankTimes;
 use std::fmt::Write as _;
 
 const LEFT: f64 = 70.0;
@@ -8,7 +8,7 @@ const ROW: f64 = 22.0;
 const TOP: f64 = 64.0;
 
 /// Name, colour, and seconds of a rank.
-type Phase = (&'static str, &'static str, fn(&Line) -> f64);
+type Phase = (&'static str, &'static str, fn(&RankTimes) -> f64);
 
 /// The phases in the order in which they begin; the colours are Okabe and Ito's, which the colour-blind can tell apart.
 const PHASES: [Phase; 5] = [
@@ -20,7 +20,7 @@ const PHASES: [Phase; 5] = [
 ];
 
 /// One bar for each rank. Phases of a frame alternate many times; a bar shows their sums one after the other.
-pub(super) fn svg(title: &str, lines: &[Line]) -> String {
+pub(super) fn svg(title: &str, lines: &[RankTimes]) -> String {
     let longest = lines.iter().map(|line| line.total_secs).fold(1e-9, f64::max);
     let step = nice_step(1e3 * longest / 6.0);
     let end_ms = (1e3 * longest / step).ceil() * step;
@@ -92,7 +92,7 @@ pub(super) fn svg(title: &str, lines: &[Line]) -> String {
 }
 
 /// The same as a table.
-pub(super) fn table(lines: &[Line]) -> String {
+pub(super) fn table(lines: &[RankTimes]) -> String {
     let mut text = format!(
         "{:>4} {:>10} {:>12} {:>9} {:>8} {:>11} {:>9} {:>12}",
         "rank", "render ms", "compress ms", "blend ms", "send ms", "collect ms", "total ms", "bytes sent"
@@ -133,8 +133,8 @@ fn escape(text: &str) -> String {
 mod tests {
     use super::*;
 
-    fn line(rank: usize) -> Line {
-        Line {
+    fn line(rank: usize) -> RankTimes {
+        RankTimes {
             rank,
             render_secs: 0.004,
             compress_secs: 0.001,

@@ -88,7 +88,8 @@ pub(super) fn run(
 ) -> anyhow::Result<[u64; 2]> {
     let mut count = [0, 0];
     let cases = [Case::EqualDepths, Case::StrangeDepths, Case::Sizes, Case::EmptyRanks, Case::AllEmpty];
-    let options = |strategy| Options { strategy, in_memory, timeout, confirm: false, ..Options::default() };
+    let options =
+        |strategy| Options { strategy, in_memory, timeout, final_barrier: false, ..Options::default() };
     for strategy in strategies {
         let mut depth = Compositor::<DepthPixel<[u8; 4]>>::new(options(*strategy));
         let mut blend = Compositor::<PremultipliedPixel<[f32; 4]>>::new(options(*strategy));

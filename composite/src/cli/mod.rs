@@ -3,12 +3,14 @@
 mod check;
 mod compare;
 mod demo;
+mod demo_args;
 mod demo_data;
 mod doctor;
 mod first_ranks;
 mod gantt;
 mod hard_cases;
 mod mpirun;
+mod rank_records;
 mod ranks;
 mod smpirun;
 mod timeline;
@@ -34,7 +36,7 @@ enum Command {
     /// Measures against IceT, on the same ranks and frames
     Compare(compare::CompareArgs),
     /// Composites partitioned frames and shows what each rank did when
-    Demo(demo::DemoArgs),
+    Demo(demo_args::DemoArgs),
     /// Checks every strategy against the serial reference on the ranks it is run on
     Check(check::CheckArgs),
     /// Tells which MPI, SimGrid and IceT there are, and what to do about those that are not

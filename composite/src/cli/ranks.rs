@@ -85,7 +85,7 @@ impl RankComm {
         }
     }
 
-    fn place(&self) -> String {
+    fn location(&self) -> String {
         match self {
             Self::Thread(comm) => format!("rank {}", comm.rank()),
             Self::Mpi(comm) => format!("rank {} on {}", comm.rank(), comm.processor_name()),
@@ -207,7 +207,7 @@ impl RankArgs {
         let mut comm = Box::new(MpiComm::with_chunks(self.chunk_bytes)?);
         #[cfg(target_os = "linux")]
         if comm.rank() + 1 < comm.size() {
-            comm.linger(Duration::from_millis(self.linger_ms));
+            comm.delay_after_collectives(Duration::from_millis(self.linger_ms));
         }
         let mut comm = RankComm::Mpi(comm);
         let size = comm.comm().size();
@@ -227,7 +227,7 @@ impl RankArgs {
             }
             Err(error) => {
                 // In one piece: all ranks write here, and what they write piece by piece is mixed.
-                let line = format!("error: {}: {error:#}\n", comm.place());
+                let line = format!("error: {}: {error:#}\n", comm.location());
                 let _ = std::io::stderr().write_all(line.as_bytes());
                 comm.comm().abort(&format!("{error:#}"));
                 let status = if error.is::<UsageError>() { Status::Usage } else { Status::Failure };

@@ -1,5 +1,5 @@
 //! When each rank of a data-parallel frame did what: a Gantt plot (SVG) and a table.
-use super::demo_data::RankLine;
+use super::rank_records::RankRecord;
 use crate::render::Activity;
 use std::fmt::Write as _;
 
@@ -12,7 +12,7 @@ const TOP: f64 = 64.0;
 const COLORS: [&str; 6] = ["#009e73", "#0072b2", "#f0e442", "#56b4e9", "#dddddd", "#cc79a7"];
 
 /// A row for each rank, a bar for each span.
-pub(super) fn svg(title: &str, lines: &[RankLine]) -> String {
+pub(super) fn svg(title: &str, lines: &[RankRecord]) -> String {
     let longest_ms = lines.iter().map(|line| line.total_ms).fold(1e-6, f64::max);
     let x = |ms: f64| LEFT + PLOT_WIDTH * ms / longest_ms;
     let bottom = TOP + ROW * lines.len() as f64;
@@ -75,7 +75,7 @@ pub(super) fn svg(title: &str, lines: &[RankLine]) -> String {
 }
 
 /// A line for each rank, milliseconds.
-pub(super) fn table(lines: &[RankLine]) -> String {
+pub(super) fn table(lines: &[RankRecord]) -> String {
     let mut text = format!("{:>5} {:>10}", "rank", "triangles");
     for activity in Activity::ALL {
         let _ = write!(text, " {:>9}", activity.name());

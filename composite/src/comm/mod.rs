@@ -2,7 +2,7 @@
 pub mod collective;
 #[cfg(all(unix, target_pointer_width = "64", target_endian = "little"))]
 #[cfg_attr(
-    not(feature = "rival"),
+    not(feature = "icet"),
     allow(dead_code, reason = "functions of MPI that carry IceT's messages only")
 )]
 pub mod mpi;
@@ -45,25 +45,25 @@ pub struct Arrival {
     pub message: Vec<u8>,
 }
 
-/// Memory of one machine that the ranks of a group share: a room for each of them. See [`Communicator::node_memory`].
+/// Memory of one machine that the ranks of a group share: a room for each of them. See [`Communicator::shared_segments`].
 ///
-/// A frame: all meet ([`all_gather`](Communicator::all_gather)), each [`lay`](Self::lay)s its pixels down, all meet at a
-/// [barrier](Communicator::barrier) and [`open`](Self::open) the rooms of the others, take bands until there are none left, and meet at
+/// A frame: all meet ([`all_gather`](Communicator::all_gather)), each [`publish`](Self::publish)s its pixels down, all meet at a
+/// [barrier](Communicator::barrier) and [`attach`](Self::attach) the rooms of the others, take bands until there are none left, and meet at
 /// a barrier again. In any other order what is read may be half written.
-pub trait NodeMemory {
-    /// Makes this rank's room `bytes` long and has the first `used` of them written. If there is not enough memory, [`open`](Self::open)
+pub trait SharedSegments {
+    /// Makes this rank's room `bytes` long and has the first `used` of them written. If there is not enough memory, [`attach`](Self::attach)
     /// says so to all.
-    fn lay(&mut self, bytes: usize, used: usize, fill: &mut dyn FnMut(&mut [u8]));
+    fn publish(&mut self, bytes: usize, used: usize, fill: &mut dyn FnMut(&mut [u8]));
 
     /// Opens the rooms of all; false, on all ranks, if there is one that could not be made.
     ///
     /// # Errors
     /// [`CommError::Transport`] if a room that was made cannot be opened here, or a rank has laid down nothing for this frame;
     /// [`CommError::PeerLost`] if its process has ended.
-    fn open(&mut self) -> Result<bool, CommError>;
+    fn attach(&mut self) -> Result<bool, CommError>;
 
     /// The first `bytes` of the room of `rank`, as it has laid them down; fewer if it is smaller.
-    fn room(&self, rank: usize, bytes: usize) -> &[u8];
+    fn segment(&self, rank: usize, bytes: usize) -> &[u8];
 
     /// The next band that nobody has taken, from 0 on.
     fn next_band(&self) -> usize;
@@ -107,13 +107,13 @@ pub trait Communicator {
     }
 
     /// Memory that all ranks share though they are processes, if there is such and all of them have it: then pictures need not travel.
-    fn node_memory(&mut self) -> Option<&mut dyn NodeMemory> {
+    fn shared_segments(&mut self) -> Option<&mut dyn SharedSegments> {
         None
     }
 
     /// What ended the group, if another rank has given up and this one hears of it only now; else `error`, which this rank came upon by
     /// itself and which may be no more than what the other's end has left.
-    fn reason(&mut self, error: CommError) -> CommError {
+    fn root_cause(&mut self, error: CommError) -> CommError {
         error
     }
 
@@ -153,7 +153,7 @@ pub trait Communicator {
 
     /// Lets messages with this `tag` leave until at most `most` of them are on their way: where all share a wire, the first ones arrive no sooner
     /// than the last. A hint, with which a transport whose messages leave at once need do nothing; after `patience` it has an end anyway.
-    fn let_leave(&mut self, _tag: u32, _most: usize, _patience: Duration) {}
+    fn throttle_sends(&mut self, _tag: u32, _most: usize, _patience: Duration) {}
 
     /// Ends the group: all waiting and later calls on every rank give [`CommError::Aborted`] with this rank and `reason`.
     /// Only the first call counts.

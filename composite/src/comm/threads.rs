@@ -17,15 +17,15 @@ struct State {
     at_barrier: Vec<bool>,
     barriers_done: u64,
     /// When each rank has last sent anything or said that it is at work.
-    signs: Vec<Instant>,
+    heartbeats: Vec<Instant>,
     /// For whom each rank waits: the sources of its receives. At a barrier these are all who are not there.
     waits_for: Vec<Vec<usize>>,
 }
 
 impl State {
     /// The last sign of life of those for whom `rank` waits, and of those they wait for in turn, but not of `rank` itself.
-    fn last_sign(&self, rank: usize) -> Option<Instant> {
-        let ranks = 0..self.signs.len();
+    fn last_heartbeat(&self, rank: usize) -> Option<Instant> {
+        let ranks = 0..self.heartbeats.len();
         let mut seen = vec![false; ranks.len()];
         seen[rank] = true;
         let (mut last, mut to_do) = (None, vec![rank]);
@@ -33,7 +33,7 @@ impl State {
             let absent = ranks.clone().filter(|&other| self.at_barrier[waiting] && !self.at_barrier[other]);
             for next in self.waits_for[waiting].iter().copied().chain(absent) {
                 if !std::mem::replace(&mut seen[next], true) {
-                    last = last.max(Some(self.signs[next]));
+                    last = last.max(Some(self.heartbeats[next]));
                     to_do.push(next);
                 }
             }
@@ -85,7 +85,7 @@ pub fn group(size: usize) -> Vec<ThreadComm> {
         aborted: None,
         at_barrier: vec![false; size],
         barriers_done: 0,
-        signs: vec![Instant::now(); size],
+        heartbeats: vec![Instant::now(); size],
         waits_for: vec![Vec::new(); size],
     };
     let wake = (0..size).map(|_| Condvar::new()).collect();
@@ -128,7 +128,7 @@ pub(super) fn run_group<C: Communicator + Send, T: Send>(
             .into_iter()
             .map(|(rank, thread)| match thread {
                 Ok(thread) => {
-                    thread.join().map_err(|panic| CommError::Panicked { rank, message: words(&*panic) })
+                    thread.join().map_err(|panic| CommError::Panicked { rank, message: panic_text(&*panic) })
                 }
                 Err(error) => Err(CommError::NoThread { rank, reason: error.to_string() }),
             })
@@ -136,7 +136,7 @@ pub(super) fn run_group<C: Communicator + Send, T: Send>(
     })
 }
 
-fn words(panic: &(dyn std::any::Any + Send)) -> String {
+fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().map(ToString::to_string);
     text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no message".to_string())
 }
@@ -176,7 +176,7 @@ impl Group {
                 sources(&mut state.waits_for[rank]);
             }
             if since.elapsed() >= timeout {
-                since = state.last_sign(rank).map_or(since, |sign| since.max(sign));
+                since = state.last_heartbeat(rank).map_or(since, |sign| since.max(sign));
             }
             let Some(left) = timeout.checked_sub(since.elapsed()).filter(|left| !left.is_zero()) else {
                 break Ok(None);
@@ -218,7 +218,7 @@ impl Communicator for ThreadComm {
             return Err(CommError::PeerLost { rank: self.rank, peer: destination });
         }
         state.mail[destination][self.rank].push_back((tag, message));
-        state.signs[self.rank] = Instant::now();
+        state.heartbeats[self.rank] = Instant::now();
         self.group.wake[destination].notify_all();
         Ok(())
     }
@@ -276,7 +276,7 @@ impl Communicator for ThreadComm {
         let before = {
             let mut state = self.group.lock();
             state.at_barrier[rank] = true;
-            state.signs[rank] = Instant::now();
+            state.heartbeats[rank] = Instant::now();
             let before = state.barriers_done;
             if state.at_barrier.iter().all(|&here| here) {
                 state.at_barrier.fill(false);
@@ -313,7 +313,7 @@ impl Communicator for ThreadComm {
 
     fn alive(&mut self) -> Result<(), CommError> {
         let mut state = self.group.lock();
-        state.signs[self.rank] = Instant::now();
+        state.heartbeats[self.rank] = Instant::now();
         match &state.aborted {
             Some((by, reason)) => Err(CommError::Aborted { by: *by, reason: reason.clone() }),
             None => Ok(()),

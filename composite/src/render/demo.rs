@@ -1,20 +1,18 @@
 //! A data set of the catalogue, partitioned and rendered by all ranks: what `composite demo` shows.
-use super::subject::{Body, Subject, middle_and_radius};
+pub use super::demo_error::DemoError;
+use super::demo_model::{DemoModel, DemoShape, middle_and_radius};
 use super::{DataParallel, FrameError, FrameOptions, FrameOutput, Partition, Split};
 use crate::comm::Communicator;
-use datasets::catalogue::{self, CatalogueError};
-use datasets::model::ModelError;
-use datasets::read::ReadError;
+use datasets::catalogue;
 use rt_core::bvh::BuildOptions;
-use rt_core::camera::{Camera, CameraError};
+use rt_core::camera::Camera;
 use rt_core::environment::Background;
 use rt_core::glam::DVec3;
 use rt_core::light::Light as Lamp;
 use rt_core::material::Material;
 use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::render::RenderOptions;
-use rt_core::scene::{AmbientOcclusion, Scene, SceneBuilder, SceneError};
-use rt_core::shapes::ShapeError;
+use rt_core::scene::{AmbientOcclusion, Scene, SceneBuilder};
 
 /// What is shown.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,66 +51,8 @@ impl Default for Demo {
     }
 }
 
-/// Why there is nothing to show.
-#[derive(Debug, thiserror::Error)]
-pub enum DemoError {
-    /// No such data set or size, or it cannot be made.
-    #[error(transparent)]
-    Data(#[from] CatalogueError),
-    /// It has no such view.
-    #[error("{data} has no view `{view}`; it has: {known}")]
-    View {
-        /// The data set.
-        data: String,
-        /// The view asked for.
-        view: String,
-        /// All its views.
-        known: String,
-    },
-    /// A file that cannot be read.
-    #[error(transparent)]
-    File(#[from] ReadError),
-    /// A file whose data have no surface.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    /// A file without a triangle.
-    #[error("{file} has no surface to show: it holds no triangle")]
-    NoSurface {
-        /// The file.
-        file: String,
-    },
-    /// What looks like a file's name, and is none.
-    #[error("there is no file {file}, and {unknown}")]
-    NoFile {
-        /// The name.
-        file: String,
-        /// What the catalogue says of it.
-        unknown: CatalogueError,
-    },
-    /// A file has one size.
-    #[error("{file} is a file and has no size `{size}`: leave the size out")]
-    SizeOfFile {
-        /// The file.
-        file: String,
-        /// The size asked for.
-        size: String,
-    },
-    /// Tubes.
-    #[error(transparent)]
-    Shape(#[from] ShapeError),
-    /// The camera.
-    #[error(transparent)]
-    Camera(#[from] CameraError),
-    /// The scene.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// The frame.
-    #[error(transparent)]
-    Frame(#[from] FrameError),
-}
-
 /// Everything but the ranks. Every rank of a group makes the same one.
-pub struct Prepared {
+pub struct PreparedDemo {
     /// The whole scene.
     pub scene: Scene,
     /// The view.
@@ -133,8 +73,8 @@ impl Demo {
         &self,
         ranks: usize,
         progress: &mut dyn FnMut(usize, usize) -> bool,
-    ) -> Result<Prepared, DemoError> {
-        let (scene, camera) = self.scene(Subject::load(&self.data, self.size.as_deref(), progress)?)?;
+    ) -> Result<PreparedDemo, DemoError> {
+        let (scene, camera) = self.scene(DemoModel::load(&self.data, self.size.as_deref(), progress)?)?;
         let split = if self.cut_by_view {
             Split::View { camera: Box::new(camera), size_px: self.size_px }
         } else {
@@ -144,7 +84,7 @@ impl Demo {
         let scene = if self.color_by_rank { colored(&scene, &partition) } else { scene };
         let options =
             RenderOptions { samples: self.samples, ..RenderOptions::new(self.size_px[0], self.size_px[1]) };
-        Ok(Prepared { scene, camera, options, partition })
+        Ok(PreparedDemo { scene, camera, options, partition })
     }
 
     /// The scene and the view of a mesh of this data set.
@@ -153,11 +93,11 @@ impl Demo {
     /// [`DemoError::View`] for a view that the data set does not have.
     pub fn scene_of(&self, mesh: impl Into<std::sync::Arc<TriMesh>>) -> Result<(Scene, Camera), DemoError> {
         let views = catalogue::find(&self.data)?.views();
-        self.scene(Subject { bodies: vec![Body::Mesh(mesh.into())], views })
+        self.scene(DemoModel { bodies: vec![DemoShape::Mesh(mesh.into())], views })
     }
 
-    fn scene(&self, subject: Subject) -> Result<(Scene, Camera), DemoError> {
-        let Subject { bodies, views } = subject;
+    fn scene(&self, model: DemoModel) -> Result<(Scene, Camera), DemoError> {
+        let DemoModel { bodies, views } = model;
         let view = match &self.view {
             None => &views[0],
             Some(name) => {
@@ -197,7 +137,7 @@ impl Demo {
     }
 }
 
-impl Prepared {
+impl PreparedDemo {
     /// One rank's share of one frame: builds its part and renders it with the others.
     ///
     /// # Errors

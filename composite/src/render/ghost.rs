@@ -1,9 +1,9 @@
 //! Ghost zones: every rank also holds what lies within the distance of ambient occlusion around its part, and then answers for its
 //! own hits alone. Exact, because no such ray leaves the zone. They cost memory and a build once, and nothing per frame; asking costs messages and
 //! repeated rays every frame. `choose` estimates both.
-use super::ask::{Tag, Talk};
-use super::boxes::Boxes;
-use super::sort_last::{FrameOptions, Light};
+use super::options::{FrameOptions, SecondaryRayPolicy};
+use super::rank_bounds::RankBounds;
+use super::request_reply::{RankChannel, Tag};
 use super::{FrameError, Part};
 use rt_core::bvh::{Geometry, World};
 use rt_core::glam::Vec3;
@@ -15,15 +15,15 @@ use std::sync::Arc;
 
 /// What was decided.
 #[derive(Debug, Clone)]
-pub(super) struct Choice {
+pub(super) struct Decision {
     pub(super) distance: f64,
-    pub(super) way: Light,
-    pub(super) words: String,
+    pub(super) policy: SecondaryRayPolicy,
+    pub(super) reason: String,
 }
 
 /// Prices of the estimate, for one thread of a 2020s server core and a network of 3 GB/s. Only their order of size matters: near the point where
 /// both cost the same, either will do.
-pub mod price {
+pub mod cost_model {
     /// Seconds for a secondary ray, with the work of making it.
     pub const RAY_SECS: f64 = 150e-9;
     /// Seconds for a byte on the network.
@@ -43,9 +43,9 @@ pub mod price {
 /// Of a triangle, its boxes in render space, one for each instance.
 fn placed_boxes(scene: &Scene, geometry: usize, mesh: &TriMesh) -> Vec<Aabb> {
     let origin = scene.world.origin();
-    let mut boxes = vec![Aabb::EMPTY; mesh.indices.len()];
+    let mut triangle_boxes = vec![Aabb::EMPTY; mesh.indices.len()];
     for instance in scene.world.instances().iter().filter(|i| i.geometry == geometry) {
-        for (b, corners) in boxes.iter_mut().zip(&mesh.indices) {
+        for (b, corners) in triangle_boxes.iter_mut().zip(&mesh.indices) {
             for &k in corners {
                 let Some(p) = mesh.positions.get(k as usize) else { continue };
                 let world = instance.world_from_object.transform_point3(mesh.origin + p.as_dvec3());
@@ -53,60 +53,64 @@ fn placed_boxes(scene: &Scene, geometry: usize, mesh: &TriMesh) -> Vec<Aabb> {
             }
         }
     }
-    boxes
+    triangle_boxes
 }
 
-fn apart(a: &Aabb, b: &Aabb) -> bool {
+fn are_disjoint(a: &Aabb, b: &Aabb) -> bool {
     (0..3).any(|axis| a.min[axis] > b.max[axis] || b.min[axis] > a.max[axis])
 }
 
 /// `bounds` with everything that a ray of length `distance` from inside may meet.
 fn zone(bounds: &Aabb, distance: f64, whole: Aabb) -> Aabb {
     let size = whole.min.abs().max(whole.max.abs()).max_element();
-    let rim = Vec3::splat((distance * 1.0001) as f32 + 1e-4 * size);
-    if bounds.is_empty() { Aabb::EMPTY } else { Aabb::new(bounds.min - rim, bounds.max + rim) }
+    let ghost_layer = Vec3::splat((distance * 1.0001) as f32 + 1e-4 * size);
+    if bounds.is_empty() {
+        Aabb::EMPTY
+    } else {
+        Aabb::new(bounds.min - ghost_layer, bounds.max + ghost_layer)
+    }
 }
 
 /// Decides between asking and ghost zones, the same on all ranks, and builds the zones where they win.
 pub(super) fn choose(
-    talk: &mut Talk<'_>,
+    channel: &mut RankChannel<'_>,
     part: &mut Part,
-    boxes: &Boxes,
+    rank_bounds: &RankBounds,
     options: &FrameOptions,
     render: &RenderOptions,
     distance: f64,
-) -> Result<Choice, FrameError> {
-    let ask = |words: String| Choice { distance, way: Light::Ask, words };
-    if options.light == Light::Ask {
-        return Ok(ask("asked of the ranks in whose bounds rays come".into()));
+) -> Result<Decision, FrameError> {
+    let forward = |reason: String| Decision { distance, policy: SecondaryRayPolicy::Forward, reason };
+    if options.secondary_rays == SecondaryRayPolicy::Forward {
+        return Ok(forward("asked of the ranks in whose bounds rays come".into()));
     }
     let mut meshes = Vec::new();
     for geometry in part.scene.world.geometries() {
         match geometry {
             Geometry::Mesh(mesh) => meshes.push(mesh.clone()),
             Geometry::Shape(_) => {
-                return Ok(ask(
+                return Ok(forward(
                     "asked of the ranks in whose bounds rays come: ghost zones are made of triangles only, and the scene has other shapes"
                         .into(),
                 ));
             }
         }
     }
-    let (rank, size) = (talk.rank(), talk.size());
+    let (rank, size) = (channel.rank(), channel.size());
     let whole = part.scene.world.bounds();
-    let zones: Vec<Aabb> = boxes.bounds.iter().map(|b| zone(b, distance, whole)).collect();
+    let zones: Vec<Aabb> = rank_bounds.bounds.iter().map(|b| zone(b, distance, whole)).collect();
     let placed: Vec<Vec<Aabb>> =
         meshes.iter().enumerate().map(|(g, mesh)| placed_boxes(&part.scene, g, mesh)).collect();
 
     // ---- Triangles for each other rank's zone, and how many other parts are near a triangle of this one.
-    let others = || (0..size).filter(|&r| r != rank && !apart(&zones[r], &boxes.bounds[rank]));
+    let others = || (0..size).filter(|&r| r != rank && !are_disjoint(&zones[r], &rank_bounds.bounds[rank]));
     let mut wanted: Vec<Vec<Vec<u32>>> = vec![vec![Vec::new(); meshes.len()]; size];
     let (mut near_parts, mut triangles) = (0u64, 0u64);
     for (g, placed) in placed.iter().enumerate() {
         triangles += placed.len() as u64;
         for (t, b) in placed.iter().enumerate() {
             for r in others() {
-                if !apart(b, &zones[r]) {
+                if !are_disjoint(b, &zones[r]) {
                     wanted[r][g].push(t as u32);
                     near_parts += 1;
                 }
@@ -116,7 +120,7 @@ pub(super) fn choose(
     let give: Vec<u32> = wanted.iter().map(|w| w.iter().map(Vec::len).sum::<usize>() as u32).collect();
     let mut numbers = give;
     numbers.extend([triangles as u32, near_parts.min(u64::from(u32::MAX)) as u32]);
-    let all = talk.all_gather(&numbers)?;
+    let all = channel.all_gather(&numbers)?;
 
     // ---- Both costs, for the rank that has most to do.
     let sum = |f: &dyn Fn(&[u32]) -> f64| all.iter().map(|n| f(n)).sum::<f64>();
@@ -124,43 +128,49 @@ pub(super) fn choose(
     let near = sum(&|n| f64::from(n[size + 1])) / total;
     let area = render.area();
     let pixels = f64::from(area.width) * f64::from(area.height) * f64::from(render.samples);
-    let points = price::COVERED * pixels / size as f64;
+    let points = cost_model::COVERED * pixels / size as f64;
     let rays = f64::from(part.scene.ambient_occlusion.map_or(0, |ao| ao.rays));
-    let ask_secs = 2.0 * price::ROUND_SECS
-        + points * near * (rays * price::RAY_SECS + price::POINT_BYTES * price::BYTE_SECS);
-    let frames = if let Light::Auto { frames } = options.light { frames.max(1) } else { 1 };
+    let ask_secs = 2.0 * cost_model::ROUND_SECS
+        + points * near * (rays * cost_model::RAY_SECS + cost_model::POINT_BYTES * cost_model::BYTE_SECS);
+    let frames =
+        if let SecondaryRayPolicy::Auto { frames } = options.secondary_rays { frames.max(1) } else { 1 };
     let zone_secs = (0..size)
         .map(|r| {
-            let rim: f64 = all.iter().map(|n| f64::from(n[r])).sum();
+            let ghost_layer: f64 = all.iter().map(|n| f64::from(n[r])).sum();
             let own = f64::from(all[r][size]);
-            rim * price::TRIANGLE_BYTES * price::BYTE_SECS + (own + rim) * price::BUILD_SECS
+            ghost_layer * cost_model::TRIANGLE_BYTES * cost_model::BYTE_SECS
+                + (own + ghost_layer) * cost_model::BUILD_SECS
         })
         .fold(0.0, f64::max)
         / f64::from(frames);
-    let rim_share = sum(&|n| n[..size].iter().map(|&v| f64::from(v)).sum()) / total;
+    let ghost_share = sum(&|n| n[..size].iter().map(|&v| f64::from(v)).sum()) / total;
     let estimate = format!(
         "estimated {:.2} ms a frame to ask ({near:.2} other parts near a triangle), {:.2} ms for ghost zones ({:.2}x the geometry, {frames} frames)",
         ask_secs * 1e3,
         zone_secs * 1e3,
-        1.0 + rim_share
+        1.0 + ghost_share
     );
-    if options.light != Light::Ghost && ask_secs <= zone_secs {
-        return Ok(ask(format!("asked of the ranks in whose bounds rays come: {estimate}")));
+    if options.secondary_rays != SecondaryRayPolicy::GhostZones && ask_secs <= zone_secs {
+        return Ok(forward(format!("asked of the ranks in whose bounds rays come: {estimate}")));
     }
-    part.rim = Some((distance, fetch(talk, part, &meshes, &wanted, &all, options)?));
-    Ok(Choice { distance, way: Light::Ghost, words: format!("ghost zones: {estimate}") })
+    part.ghost_layer = Some((distance, fetch(channel, part, &meshes, &wanted, &all, options)?));
+    Ok(Decision {
+        distance,
+        policy: SecondaryRayPolicy::GhostZones,
+        reason: format!("ghost zones: {estimate}"),
+    })
 }
 
 /// Exchanges the triangles and builds this rank's part with its rim.
 fn fetch(
-    talk: &mut Talk<'_>,
+    channel: &mut RankChannel<'_>,
     part: &Part,
     meshes: &[Arc<TriMesh>],
     wanted: &[Vec<Vec<u32>>],
     all: &[Vec<u32>],
     options: &FrameOptions,
 ) -> Result<Scene, FrameError> {
-    let (rank, size) = (talk.rank(), talk.size());
+    let (rank, size) = (channel.rank(), channel.size());
     for step in 1..size {
         let to = (rank + step) % size;
         if all[rank][to] == 0 {
@@ -173,7 +183,7 @@ fn fetch(
             words.extend(some.positions.iter().flat_map(|p| p.to_array().map(f32::to_bits)));
             words.extend(some.indices.as_flattened());
         }
-        talk.send(to, Tag::Hits, &words)?;
+        channel.send(to, Tag::Hits, &words)?;
     }
     // Light needs no attributes.
     let mut merged: Vec<TriMesh> = meshes
@@ -184,12 +194,13 @@ fn fetch(
     let sources: Vec<_> =
         (0..size).filter(|&r| r != rank && all[r][rank] > 0).map(|from| (from, most(from))).collect();
     let mut came: Vec<(usize, Vec<u32>)> = Vec::new();
-    talk.receive(Tag::Hits, "ghost triangles", sources, |_, from, words| {
+    channel.receive(Tag::Hits, "ghost triangles", sources, |_, from, words| {
         came.push((from, words));
         Ok(())
     })?;
     for (from, words) in came {
-        add_triangles(&mut merged, &words).ok_or_else(|| talk.wrong(from, "ghost triangles", words.len()))?;
+        add_triangles(&mut merged, &words)
+            .ok_or_else(|| channel.message_error(from, "ghost triangles", words.len()))?;
     }
     let geometries = merged.into_iter().map(|m| Geometry::Mesh(Arc::new(m))).collect();
     let instances = part.scene.world.instances().to_vec();

@@ -32,26 +32,32 @@
 //! assert_eq!(picture.color, render(&scene, &camera, &options).unwrap().frame.color);
 //! ```
 
-mod ask;
-mod boxes;
-mod camera_wave;
-mod collect;
 pub mod demo;
+mod demo_error;
+mod demo_model;
 mod error;
 pub mod ghost;
-mod owners;
+mod message_codec;
+mod options;
 mod partition;
-mod pieces;
+mod primary_rays;
+mod rank_bounds;
+mod rank_frame;
+mod ray_codec;
 mod ray_parallel;
 mod report;
+mod request_reply;
+mod secondary_rays;
 mod sort_last;
-mod subject;
+mod tile_collector;
+mod tile_hits;
+mod tile_owners;
+mod volume_bricks;
 mod volumes;
-mod waves;
-mod words;
 
 pub use error::FrameError;
+pub use options::{FrameOptions, FrameOutput, SecondaryRayPolicy};
 pub use partition::{Part, Partition, Split};
 pub use ray_parallel::ray_parallel;
 pub use report::{Activity, RankReport, Span};
-pub use sort_last::{DataParallel, FrameOptions, FrameOutput, Light};
+pub use sort_last::DataParallel;

@@ -1,6 +1,6 @@
 //! Data to ranks: bricks of space by k-d splits, with about the same number of primitives, or the same work for a view.
 use super::FrameError;
-use super::pieces::{self, Held, Pieces};
+use super::volume_bricks::{self, BrickData, VolumeBricks};
 use rt_core::bvh::{BuildOptions, Geometry};
 use rt_core::camera::Camera;
 use rt_core::effects::Effects;
@@ -34,9 +34,9 @@ pub enum Split {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Partition {
     /// By rank and geometry, in ascending order.
-    kept: Vec<Vec<Vec<u32>>>,
+    primitive_ids: Vec<Vec<Vec<u32>>>,
     /// Bricks of volumes.
-    pieces: Arc<Pieces>,
+    volume_bricks: Arc<VolumeBricks>,
 }
 
 /// What one rank holds.
@@ -49,28 +49,28 @@ pub struct Part {
     /// Number of parts.
     pub parts: usize,
     /// Of each geometry, the numbers in the whole of the primitives here.
-    pub(super) kept: Vec<Vec<u32>>,
+    pub(super) primitive_ids: Vec<Vec<u32>>,
     /// What the whole scene needs.
     pub(super) needed: Effects,
     /// Who holds which bricks of volumes.
-    pub(super) pieces: Arc<Pieces>,
+    pub(super) volume_bricks: Arc<VolumeBricks>,
     /// What of them is here, by their numbers.
-    pub(super) held: Vec<Option<Held>>,
+    pub(super) brick_data: Vec<Option<BrickData>>,
     /// This part with a rim, see [`super::ghost`].
-    pub(super) rim: Option<(f64, Scene)>,
+    pub(super) ghost_layer: Option<(f64, Scene)>,
 }
 
 impl Part {
     /// Primitives here.
     pub fn primitives(&self) -> usize {
-        self.kept.iter().map(Vec::len).sum()
+        self.primitive_ids.iter().map(Vec::len).sum()
     }
 
     /// Values of volumes' grids here, with the layers around bricks.
     pub fn volume_values(&self) -> usize {
         let whole = self.scene.volumes.iter().filter(|v| !v.volume.is_medium());
         let whole: usize = whole.map(|v| v.volume.grid().values.len()).sum();
-        whole + self.held.iter().flatten().map(Held::num_values).sum::<usize>()
+        whole + self.brick_data.iter().flatten().map(BrickData::num_values).sum::<usize>()
     }
 }
 
@@ -87,28 +87,28 @@ impl Partition {
     pub fn new(scene: &Scene, parts: usize, split: &Split) -> Partition {
         let parts = parts.max(1);
         let geometries = scene.world.geometries().len();
-        let mut kept = vec![vec![Vec::new(); geometries]; parts];
-        let pieces = Arc::new(Pieces::one_each(scene, parts));
+        let mut primitive_ids = vec![vec![Vec::new(); geometries]; parts];
+        let volume_bricks = Arc::new(VolumeBricks::one_per_rank(scene, parts));
         if let Split::Random { seed } = split {
             for (g, geometry) in scene.world.geometries().iter().enumerate() {
                 for p in 0..count(geometry) as u32 {
                     let rank = mixed(*seed ^ (g as u64) << 40 ^ u64::from(p)) % parts as u64;
-                    kept[rank as usize][g].push(p);
+                    primitive_ids[rank as usize][g].push(p);
                 }
             }
-            return Partition { kept, pieces };
+            return Partition { primitive_ids, volume_bricks };
         }
         let mut items = items(scene, split);
         let mut give = |rank: usize, items: &[Item]| {
             for i in items {
-                kept[rank][i.geometry as usize].push(i.primitive);
+                primitive_ids[rank][i.geometry as usize].push(i.primitive);
             }
         };
         split_items(&mut items, 0, parts, &mut give);
-        for list in kept.iter_mut().flatten() {
+        for list in primitive_ids.iter_mut().flatten() {
             list.sort_unstable();
         }
-        Partition { kept, pieces }
+        Partition { primitive_ids, volume_bricks }
     }
 
     /// Deals a volume of `scene` otherwise: it is cut into as many bricks as `holders` has lists, and all ranks of a list hold its brick. One list with all ranks
@@ -116,30 +116,30 @@ impl Partition {
     ///
     /// # Errors
     /// [`FrameError::Holders`] for volumes and ranks that do not exist, bricks without a holder, and projections, which see whole volumes.
-    pub fn hold_volume(
+    pub fn distribute_volume(
         mut self,
         scene: &Scene,
         volume: usize,
         holders: &[Vec<usize>],
     ) -> Result<Partition, FrameError> {
-        let holders = pieces::checked(scene, volume, holders, self.parts())?;
-        Arc::make_mut(&mut self.pieces).cut(scene, volume, &holders);
+        let holders = volume_bricks::checked(scene, volume, holders, self.parts())?;
+        Arc::make_mut(&mut self.volume_bricks).cut(scene, volume, &holders);
         Ok(self)
     }
 
     /// Number of parts.
     pub fn parts(&self) -> usize {
-        self.kept.len()
+        self.primitive_ids.len()
     }
 
     /// Primitives of each part.
     pub fn sizes(&self) -> Vec<usize> {
-        self.kept.iter().map(|part| part.iter().map(Vec::len).sum()).collect()
+        self.primitive_ids.iter().map(|part| part.iter().map(Vec::len).sum()).collect()
     }
 
     /// Of each geometry, the primitives of part `rank`.
     pub fn primitives(&self, rank: usize) -> &[Vec<u32>] {
-        &self.kept[rank]
+        &self.primitive_ids[rank]
     }
 
     /// Builds part `rank` of `scene`, the scene that was cut.
@@ -148,16 +148,26 @@ impl Partition {
     /// [`FrameError::Ranks`] when there is no such part, [`FrameError::Scene`] when it cannot be built.
     pub fn part(&self, scene: &Scene, rank: usize, options: &BuildOptions) -> Result<Part, FrameError> {
         let parts = self.parts();
-        let kept = self.kept.get(rank).ok_or(FrameError::Ranks { parts, ranks: rank + 1 })?.clone();
-        let mut part = scene.part(&kept, options)?;
+        let primitive_ids =
+            self.primitive_ids.get(rank).ok_or(FrameError::Ranks { parts, ranks: rank + 1 })?.clone();
+        let mut part = scene.part(&primitive_ids, options)?;
         // Of media the sizes and places remain here, and the bricks apart.
         for placed in part.volumes.iter_mut().filter(|placed| placed.volume.is_medium()) {
             let nothing = Brick { first: UVec3::ZERO, end: UVec3::ZERO };
             placed.volume = Arc::new(placed.volume.part(nothing));
         }
-        let (needed, pieces) = (Effects::required_by(scene), self.pieces.clone());
-        let held = pieces.held(scene, rank);
-        Ok(Part { scene: part, rank, parts, kept, needed, pieces, held, rim: None })
+        let (needed, volume_bricks) = (Effects::required_by(scene), self.volume_bricks.clone());
+        let brick_data = volume_bricks.brick_data(scene, rank);
+        Ok(Part {
+            scene: part,
+            rank,
+            parts,
+            primitive_ids,
+            needed,
+            volume_bricks,
+            brick_data,
+            ghost_layer: None,
+        })
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Pieces are small and dealt along a lattice, so that every rank gets a little of everything: what is costly in a picture lies together. Bands of
 //! whole rows, tried first, stop scaling when there are as many ranks as bands (32 for 1024 rows).
-use super::ask::{Tag, Talk};
+use super::request_reply::{RankChannel, Tag};
 use super::{Activity, FrameError, FrameOptions, FrameOutput};
 use crate::comm::Communicator;
 use rt_core::camera::Camera;
@@ -30,23 +30,23 @@ pub fn ray_parallel(
     options: &RenderOptions,
     frame_options: &FrameOptions,
 ) -> Result<FrameOutput, FrameError> {
-    let mut talk = Talk::new(comm, frame_options.timeout);
-    let result = render(&mut talk, scene, camera, options, frame_options);
+    let mut channel = RankChannel::new(comm, frame_options.timeout);
+    let result = render(&mut channel, scene, camera, options, frame_options);
     if let Err(error) = &result {
-        talk.abort(&error.to_string());
+        channel.abort(&error.to_string());
     }
     let frame = result?;
-    Ok(FrameOutput { frame, report: talk.report })
+    Ok(FrameOutput { frame, report: channel.report })
 }
 
 fn render(
-    talk: &mut Talk<'_>,
+    channel: &mut RankChannel<'_>,
     scene: &Scene,
     camera: &Camera,
     options: &RenderOptions,
     frame_options: &FrameOptions,
 ) -> Result<Option<Frame>, FrameError> {
-    let (rank, size) = (talk.rank(), talk.size());
+    let (rank, size) = (channel.rank(), channel.size());
     let area = options.area();
     let mut renderer = Renderer::new();
     let mut mine = Vec::new();
@@ -56,39 +56,39 @@ fn render(
         let mut draw = || renderer.render(scene, camera, &cropped);
         // One thread a rank where ranks share a machine.
         let output = if frame_options.parallel { draw()? } else { alone(&mut draw)? };
-        talk.report.rays += output.report.rays;
-        talk.report.effects = output.report.effects;
+        channel.report.rays += output.report.rays;
+        channel.report.effects = output.report.effects;
         to_words(&output.frame, &mut mine);
         renderer.recycle(output.frame);
-        talk.alive();
+        channel.alive();
     }
-    talk.report.camera_rays = talk.report.rays.primary;
-    talk.report.light = "every rank holds the whole scene".into();
-    talk.spent(Activity::Render);
+    channel.report.camera_rays = channel.report.rays.primary;
+    channel.report.secondary_rays = "every rank holds the whole scene".into();
+    channel.record_span(Activity::Render);
     let Some(root) = frame_options.root else { return Ok(None) };
     if root >= size {
         return Err(FrameError::Comm(crate::comm::CommError::NoSuchRank { peer: root, size }));
     }
     if rank != root {
         if !mine.is_empty() {
-            talk.send(root, Tag::Tiles, &mine)?;
+            channel.send(root, Tag::Tiles, &mine)?;
         }
-        talk.spent(Activity::Collect);
+        channel.record_span(Activity::Collect);
         return Ok(None);
     }
     let mut picture = blank(area, options.layers, camera);
     let per_pixel = words_per_pixel(options.layers);
     put(&mut picture, pieces(area, rank, size), &mine)
-        .ok_or_else(|| talk.wrong(rank, "pieces", mine.len()))?;
+        .ok_or_else(|| channel.message_error(rank, "pieces", mine.len()))?;
     let pixels = |from: usize| pieces(area, from, size).map(|c| (c.width * c.height) as usize).sum::<usize>();
     let sources = (0..size).filter(|&from| from != rank).map(|from| (from, pixels(from) * per_pixel));
     let sources: Vec<_> = sources.filter(|(_, words)| *words > 0).collect();
-    talk.receive(Tag::Tiles, "pieces", sources, |talk, from, words| {
+    channel.receive(Tag::Tiles, "pieces", sources, |channel, from, words| {
         let fits = put(&mut picture, pieces(area, from, size), &words);
-        talk.spent(Activity::Collect);
-        fits.ok_or_else(|| talk.wrong(from, "pieces", words.len()))
+        channel.record_span(Activity::Collect);
+        fits.ok_or_else(|| channel.message_error(from, "pieces", words.len()))
     })?;
-    talk.spent(Activity::Collect);
+    channel.record_span(Activity::Collect);
     Ok(Some(picture))
 }
 

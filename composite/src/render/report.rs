@@ -82,7 +82,7 @@ pub struct RankReport {
     /// Bytes received.
     pub bytes_received: u64,
     /// How light came across the borders of parts, and why so.
-    pub light: String,
+    pub secondary_rays: String,
     /// Requests that changed nothing, in words.
     pub warnings: Vec<String>,
 }
@@ -101,7 +101,7 @@ impl RankReport {
     }
 
     /// Everything since the last span was `activity`.
-    pub(super) fn spent(&mut self, activity: Activity, now_secs: f64) {
+    pub(super) fn record_span(&mut self, activity: Activity, now_secs: f64) {
         let (begin_secs, end_secs) = (self.total_secs(), now_secs - self.begin_at_secs);
         if end_secs <= begin_secs {
             return;

@@ -1,9 +1,9 @@
 //! Volumes in bricks: rays are carried through them, from near to far, with what they have collected.
 //!
-//! The owner of a pixel knows which bricks a ray meets in which order ([`super::pieces`]). It asks a holder of the first one, takes back what the ray has collected there, and asks
+//! The owner of a pixel knows which bricks a ray meets in which order ([`super::bricks`]). It asks a holder of the first one, takes back what the ray has collected there, and asks
 //! the next: one round of questions per brick along a ray. Sums are made in the order in which one node makes them, so they have the same bits.
-use super::ask::Talk;
-use super::sort_last::Side;
+use super::rank_frame::RankFrame;
+use super::request_reply::RankChannel;
 use super::{Activity, FrameError, RankReport};
 use rayon::prelude::*;
 use rt_core::distributed::{ShadingHit, TileState, VolumeRay};
@@ -16,83 +16,89 @@ const HEAD: usize = 3;
 const WORDS: usize = HEAD + 8 + PartialIntegral::WORDS;
 
 /// Spans of a ray that are in the same piece.
-struct Stretch {
-    piece: usize,
+struct BrickSpan {
+    brick: usize,
     first: usize,
     end: usize,
 }
 
 /// A ray on its way through the bricks.
-struct Journey {
+struct BrickTraversal {
     tile: usize,
     ray: VolumeRay,
     /// The next one last.
-    to_come: Vec<Stretch>,
+    remaining: Vec<BrickSpan>,
     collected: PartialIntegral,
 }
 
-impl Journey {
-    fn new(talk: &Talk<'_>, side: &Side<'_>, tile: usize, ray: VolumeRay) -> Result<Journey, FrameError> {
-        let pieces = &side.part.pieces;
+impl BrickTraversal {
+    fn new(
+        channel: &RankChannel<'_>,
+        side: &RankFrame<'_>,
+        tile: usize,
+        ray: VolumeRay,
+    ) -> Result<BrickTraversal, FrameError> {
+        let bricks = &side.part.volume_bricks;
         let segments = side.frame.ray_segments(&ray.ray, ray.t_end, |_| None);
-        let (mut to_come, mut held): (Vec<Stretch>, bool) = (Vec::new(), true);
+        let (mut remaining, mut held): (Vec<BrickSpan>, bool) = (Vec::new(), true);
         segments.spans(|number, here| {
-            if !here.iter().any(|(v, block)| pieces.is_occupied(*v, *block)) {
+            if !here.iter().any(|(v, block)| bricks.is_occupied(*v, *block)) {
                 return;
             }
-            let last = to_come.last_mut();
-            match (pieces.find(here, last.as_ref().map(|s| s.piece)), last) {
-                (Some(piece), Some(last)) if last.piece == piece => last.end = number + 1,
-                (Some(piece), _) => to_come.push(Stretch { piece, first: number, end: number + 1 }),
+            let last = remaining.last_mut();
+            match (bricks.find(here, last.as_ref().map(|s| s.brick)), last) {
+                (Some(brick), Some(last)) if last.brick == brick => last.end = number + 1,
+                (Some(brick), _) => remaining.push(BrickSpan { brick, first: number, end: number + 1 }),
                 (None, _) => held = false,
             }
         });
         if !held {
-            return Err(talk.wrong(talk.rank(), "a block that nobody holds", 0));
+            return Err(channel.message_error(channel.rank(), "a block that nobody holds", 0));
         }
-        to_come.reverse();
-        Ok(Journey { tile, ray, to_come, collected: PartialIntegral::default() })
+        remaining.reverse();
+        Ok(BrickTraversal { tile, ray, remaining, collected: PartialIntegral::default() })
     }
 }
 
 /// Carries the rays of `tiles`, which end where they `met` something, through all ranks' bricks, and gives the tiles what they collect.
-pub(super) fn cross(
-    talk: &mut Talk<'_>,
-    side: &Side<'_>,
+pub(super) fn composite_volumes(
+    channel: &mut RankChannel<'_>,
+    side: &RankFrame<'_>,
     tiles: &mut [TileState],
     met: &[Vec<Option<ShadingHit>>],
 ) -> Result<(), FrameError> {
-    let (rank, size, frame) = (talk.rank(), talk.size(), side.frame);
+    let (rank, size, frame) = (channel.rank(), channel.size(), side.frame);
     let quality = frame.volume_quality();
     let mut journeys = Vec::new();
     for (t, (tile, met)) in tiles.iter().zip(met).enumerate() {
         for ray in tile.volume_rays(met) {
-            journeys.push(Journey::new(talk, side, t, ray)?);
+            journeys.push(BrickTraversal::new(channel, side, t, ray)?);
         }
     }
-    talk.spent(Activity::Shade);
+    channel.record_span(Activity::Shade);
     loop {
         // ---- To the next brick.
-        let mut questions: Vec<Vec<u32>> = vec![Vec::new(); size];
+        let mut requests: Vec<Vec<u32>> = vec![Vec::new(); size];
         let mut asked: Vec<Vec<usize>> = vec![Vec::new(); size];
         for (k, j) in journeys.iter_mut().enumerate() {
             if j.collected.is_opaque(quality) {
-                j.to_come.clear();
+                j.remaining.clear();
             }
-            let Some(next) = j.to_come.pop() else { continue };
-            let holder = side.part.pieces.holder(next.piece, rank);
-            let question = &mut questions[holder];
-            question.extend([next.piece as u32, next.first as u32, next.end as u32]);
-            super::waves::write_ray(&Ray { t_max: j.ray.t_end, ..j.ray.ray }, None, question);
-            question.extend(j.collected.to_words());
+            let Some(next) = j.remaining.pop() else { continue };
+            let holder = side.part.volume_bricks.holder(next.brick, rank);
+            let request = &mut requests[holder];
+            request.extend([next.brick as u32, next.first as u32, next.end as u32]);
+            super::ray_codec::write_ray(&Ray { t_max: j.ray.t_end, ..j.ray.ray }, None, request);
+            request.extend(j.collected.to_words());
             asked[holder].push(k);
         }
-        talk.report.rays_sent += (0..size).filter(|&r| r != rank).map(|r| asked[r].len() as u64).sum::<u64>();
-        talk.spent(Activity::Shade);
-        let mut answer = |report: &mut RankReport, question: &[u32]| {
-            let (rays, rest) = question.as_chunks::<WORDS>();
+        channel.report.rays_sent +=
+            (0..size).filter(|&r| r != rank).map(|r| asked[r].len() as u64).sum::<u64>();
+        channel.record_span(Activity::Shade);
+        let mut answer = |report: &mut RankReport, request: &[u32]| {
+            let (rays, rest) = request.as_chunks::<WORDS>();
             report.answered_rays += rays.len() as u64;
-            let one = |words: &[u32; WORDS]| carry_on(side, words);
+            let one = |words: &[u32; WORDS]| continue_ray(side, words);
             let all: Option<Vec<_>> = if side.parallel {
                 rays.par_iter().map(one).collect()
             } else {
@@ -101,17 +107,23 @@ pub(super) fn cross(
             all.filter(|_| rest.is_empty()).map(|all| all.into_flattened())
         };
         let longest = |q: &[u32]| q.len() / WORDS * PartialIntegral::WORDS;
-        let any = talk.ask("rays through a volume", &questions, longest, &mut answer, |from, reply| {
-            let (collected, rest) = reply.as_chunks::<{ PartialIntegral::WORDS }>();
-            if !rest.is_empty() || collected.len() != asked[from].len() {
-                let what = "what rays collect in a volume";
-                return Err(FrameError::Message { rank, from, what, words: reply.len() });
-            }
-            for (&k, words) in asked[from].iter().zip(collected) {
-                journeys[k].collected = PartialIntegral::from_words(words);
-            }
-            Ok(())
-        })?;
+        let any = channel.request_reply(
+            "rays through a volume",
+            &requests,
+            longest,
+            &mut answer,
+            |from, reply| {
+                let (collected, rest) = reply.as_chunks::<{ PartialIntegral::WORDS }>();
+                if !rest.is_empty() || collected.len() != asked[from].len() {
+                    let what = "what rays collect in a volume";
+                    return Err(FrameError::Message { rank, from, what, words: reply.len() });
+                }
+                for (&k, words) in asked[from].iter().zip(collected) {
+                    journeys[k].collected = PartialIntegral::from_words(words);
+                }
+                Ok(())
+            },
+        )?;
         if !any {
             break;
         }
@@ -126,16 +138,16 @@ pub(super) fn cross(
     for (tile, samples) in tiles.iter_mut().zip(samples) {
         tile.set_volume_samples(samples).map_err(|source| FrameError::Answer { rank, source })?;
     }
-    talk.spent(Activity::Shade);
+    channel.record_span(Activity::Shade);
     Ok(())
 }
 
 /// The answer to one question; `None` for a question that is not for this rank.
-fn carry_on(side: &Side<'_>, words: &[u32; WORDS]) -> Option<[u32; PartialIntegral::WORDS]> {
-    let ([piece, first, end], words) = words.split_first_chunk::<HEAD>()?;
+fn continue_ray(side: &RankFrame<'_>, words: &[u32; WORDS]) -> Option<[u32; PartialIntegral::WORDS]> {
+    let ([brick, first, end], words) = words.split_first_chunk::<HEAD>()?;
     let (ray, collected) = words.split_last_chunk::<{ PartialIntegral::WORDS }>()?;
-    let held = side.part.held.get(*piece as usize)?.as_ref()?;
-    let (ray, spans) = (super::waves::read_ray(ray), *first as usize..*end as usize);
+    let held = side.part.brick_data.get(*brick as usize)?.as_ref()?;
+    let (ray, spans) = (super::ray_codec::read_ray(ray), *first as usize..*end as usize);
     let segments = side.frame.ray_segments(&ray, ray.t_max, |volume| held.volume(volume));
     if !segments.is_within(spans.clone(), |volume, block| held.has(volume, block)) {
         return None;

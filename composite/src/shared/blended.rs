@@ -12,7 +12,7 @@ use std::ops::Range;
 pub(super) const BLOCK: usize = 256;
 
 /// What a thread needs to merge rows.
-pub(super) struct Blended<P: Composite> {
+pub(super) struct BlendedRows<P: Composite> {
     /// Groups that wait for what is behind them: the first is in the image, each other one here.
     waiting: Vec<[P::Color; BLOCK]>,
     /// The slot of the last frame of each group.
@@ -20,9 +20,9 @@ pub(super) struct Blended<P: Composite> {
 }
 
 /// The pixels of a frame, and which of the block those are.
-type Alone<'a, C> = (&'a [C], Range<usize>);
+type SingleGroup<'a, C> = (&'a [C], Range<usize>);
 
-impl<P: Composite> Blended<P> {
+impl<P: Composite> BlendedRows<P> {
     pub(super) fn new() -> Self {
         Self { waiting: Vec::new(), slots: Vec::new() }
     }
@@ -82,13 +82,13 @@ impl<P: Composite> Blended<P> {
     ) {
         self.slots.clear();
         // The last group, as long as it is one frame: its pixels stay where they are.
-        let mut alone: Option<Alone<'_, P::Color>> = None;
+        let mut alone: Option<SingleGroup<'_, P::Color>> = None;
         for &index in drawn {
             let slot = folding.slot(index);
             while let [.., before, last] = self.slots[..]
-                && meet_at(before, last) <= meet_at(last, slot)
+                && merge_level(before, last) <= merge_level(last, slot)
             {
-                self.join_last(target, alone.take(), put_behind);
+                self.merge_last(target, alone.take(), put_behind);
             }
             if let Some(alone) = alone.take() {
                 self.hold(target, &alone);
@@ -100,7 +100,7 @@ impl<P: Composite> Blended<P> {
             self.slots.push(slot);
         }
         while self.slots.len() > 1 {
-            self.join_last(target, alone.take(), put_behind);
+            self.merge_last(target, alone.take(), put_behind);
         }
         if let Some(alone) = alone {
             self.hold(target, &alone);
@@ -109,7 +109,7 @@ impl<P: Composite> Blended<P> {
 
     /// Copies the last group to where it waits.
     #[inline(always)]
-    fn hold(&mut self, target: &mut [P::Color], (colors, pixels): &Alone<'_, P::Color>) {
+    fn hold(&mut self, target: &mut [P::Color], (colors, pixels): &SingleGroup<'_, P::Color>) {
         let held = match self.slots.len() {
             0 | 1 => target,
             groups => {
@@ -126,10 +126,10 @@ impl<P: Composite> Blended<P> {
 
     /// Lays the last group behind the one before it.
     #[inline(always)]
-    fn join_last(
+    fn merge_last(
         &mut self,
         target: &mut [P::Color],
-        alone: Option<Alone<'_, P::Color>>,
+        alone: Option<SingleGroup<'_, P::Color>>,
         put_behind: &impl Fn(&[u8], &mut [P::Color]),
     ) {
         let groups = self.slots.len();
@@ -156,6 +156,6 @@ impl<P: Composite> Blended<P> {
 }
 
 /// How far up in the balanced tree two slots meet.
-fn meet_at(one: usize, other: usize) -> u32 {
+fn merge_level(one: usize, other: usize) -> u32 {
     usize::BITS - (one ^ other).leading_zeros()
 }

@@ -38,7 +38,7 @@ struct Block<'a, C> {
 }
 
 /// A block of the image.
-struct Held<'a, C> {
+struct BlockResult<'a, C> {
     colors: &'a mut [C; BLOCK],
     depths: [f32; BLOCK],
     /// Pixels where nobody has drawn: their colours and depths are not set.
@@ -48,14 +48,14 @@ struct Held<'a, C> {
 }
 
 /// What a thread needs to merge rows.
-pub(super) struct Nearest<P: Composite> {
+pub(super) struct NearestRows<P: Composite> {
     /// Depths that are not a number, of each frame.
     pub(super) nan: Vec<u64>,
     /// Blocks that reach beyond the planes of a frame, filled up.
     edges: Vec<([P::Color; BLOCK], [f32; BLOCK])>,
 }
 
-impl<P: Composite> Nearest<P> {
+impl<P: Composite> NearestRows<P> {
     pub(super) fn new() -> Self {
         Self { nan: Vec::new(), edges: Vec::new() }
     }
@@ -88,7 +88,7 @@ impl<P: Composite> Nearest<P> {
         (first_row, width): (u32, usize),
         colors: &mut [P::Color],
         depths: &mut [f32],
-        take_nearest: impl Fn(&[Block<'_, P::Color>], usize, &mut Held<'_, P::Color>),
+        take_nearest: impl Fn(&[Block<'_, P::Color>], usize, &mut BlockResult<'_, P::Color>),
     ) {
         let nothing = ([P::EMPTY.color(); BLOCK], [1.0; BLOCK]);
         // The last block of a row may have fewer pixels.
@@ -112,7 +112,8 @@ impl<P: Composite> Nearest<P> {
                 };
                 let depths_before = [FARTHEST; BLOCK];
                 let background = [u64::MAX; WORDS];
-                let mut held = Held { colors: target, depths: depths_before, background, has_nan: false };
+                let mut held =
+                    BlockResult { colors: target, depths: depths_before, background, has_nan: false };
                 for some in drawn.chunks(TOGETHER) {
                     self.edges.clear();
                     for &index in some {
@@ -213,7 +214,12 @@ fn fill_up<P: Composite>(
 
 /// Takes from each pixel of a word of `blocks` and `held` the nearest, and of equally near ones the last.
 #[inline(always)]
-fn take_nearest<C: Color, S: Simd>(simd: S, blocks: &[Block<'_, C>], word: usize, held: &mut Held<'_, C>) {
+fn take_nearest<C: Color, S: Simd>(
+    simd: S,
+    blocks: &[Block<'_, C>],
+    word: usize,
+    held: &mut BlockResult<'_, C>,
+) {
     let first = WORD * word;
     let load = |quarter: usize, depths: &[f32; BLOCK]| {
         f32x16::from_slice(simd, &depths[first + 16 * quarter..first + 16 * quarter + 16])
@@ -251,27 +257,27 @@ fn take_nearest<C: Color, S: Simd>(simd: S, blocks: &[Block<'_, C>], word: usize
     let winners = blocks.iter().zip(&wins).rev();
     if C::BYTES == 4 {
         let held_bytes: &mut [u8] = cast_slice_mut(&mut held.colors[first..first + WORD]);
-        let mut joined = [u32x16::splat(simd, 0); 4];
+        let mut merged = [u32x16::splat(simd, 0); 4];
         // Colours are only held if somebody before has drawn here.
         if held.background[word] != u64::MAX {
             for quarter in 0..4 {
-                joined[quarter] = colors_16(simd, &held_bytes[64 * quarter..64 * quarter + 64]);
+                merged[quarter] = colors_16(simd, &held_bytes[64 * quarter..64 * quarter + 64]);
             }
         }
         for_winners(winners, any, |block, seen| {
             let bytes: &[u8] = cast_slice(&block.colors[first..first + WORD]);
             for quarter in 0..4 {
                 let colors = colors_16(simd, &bytes[64 * quarter..64 * quarter + 64]);
-                joined[quarter] = if seen == u64::MAX {
+                merged[quarter] = if seen == u64::MAX {
                     colors
                 } else {
                     mask32x16::from_bitmask(simd, seen >> (16 * quarter) & 0xffff)
-                        .select(colors, joined[quarter])
+                        .select(colors, merged[quarter])
                 };
             }
         });
         for quarter in 0..4 {
-            joined[quarter]
+            merged[quarter]
                 .bitcast::<u8x64<S>>()
                 .store_slice(&mut held_bytes[64 * quarter..64 * quarter + 64]);
         }
@@ -282,7 +288,7 @@ fn take_nearest<C: Color, S: Simd>(simd: S, blocks: &[Block<'_, C>], word: usize
 }
 
 /// [`take_nearest`] without vector types: loops over flags and numbers, which compilers turn into the vectors that every machine has.
-fn take_nearest_scalar<C: Color>(blocks: &[Block<'_, C>], word: usize, held: &mut Held<'_, C>) {
+fn take_nearest_scalar<C: Color>(blocks: &[Block<'_, C>], word: usize, held: &mut BlockResult<'_, C>) {
     let pixels = WORD * word..WORD * (word + 1);
     let mut wins = [0_u64; TOGETHER];
     let mut any = 0;
@@ -313,7 +319,7 @@ fn take_runs<'a, 'b: 'a, C: Color>(
     winners: impl Iterator<Item = (&'a Block<'b, C>, &'a u64)>,
     any: u64,
     word: usize,
-    held: &mut Held<'_, C>,
+    held: &mut BlockResult<'_, C>,
 ) {
     let all = WORD * word..WORD * (word + 1);
     if held.background[word] == u64::MAX && any != u64::MAX {

@@ -31,7 +31,7 @@ pub(crate) enum Side {
 
 /// Joins consecutive pixels, active or not, to those held.
 #[inline(always)]
-pub(crate) fn join_run<P: Composite, S: Simd>(
+pub(crate) fn merge_run<P: Composite, S: Simd>(
     simd: S,
     colors: &[u8],
     depths: &[u8],
@@ -46,8 +46,8 @@ pub(crate) fn join_run<P: Composite, S: Simd>(
     }
 }
 
-/// [`join_run`] without vector types.
-pub(crate) fn join_run_scalar<P: Composite>(
+/// [`merge_run`] without vector types.
+pub(crate) fn merge_run_scalar<P: Composite>(
     colors: &[u8],
     depths: &[u8],
     held_colors: &mut [P::Color],
@@ -93,7 +93,7 @@ pub(crate) fn clean_run_scalar<P: Composite>(colors: &mut [P::Color], depths: &m
 
 /// Joins a row of a message to the row held.
 #[inline(always)]
-pub(crate) fn join_row<P: Composite, S: Simd>(
+pub(crate) fn merge_row<P: Composite, S: Simd>(
     simd: S,
     row: SparseRow<'_>,
     held_colors: &mut [P::Color],
@@ -101,7 +101,7 @@ pub(crate) fn join_row<P: Composite, S: Simd>(
     side: Side,
 ) {
     if row.mask.is_empty() {
-        join_run::<P, S>(simd, row.colors, row.depths, held_colors, held_depths, side);
+        merge_run::<P, S>(simd, row.colors, row.depths, held_colors, held_depths, side);
         return;
     }
     let mut taken = 0;
@@ -114,7 +114,7 @@ pub(crate) fn join_row<P: Composite, S: Simd>(
         let mut word = word;
         if word != u64::MAX {
             let lanes =
-                join_by_vectors::<P, S>(simd, row, taken, word, first, held_colors, held_depths, side);
+                merge_by_vectors::<P, S>(simd, row, taken, word, first, held_colors, held_depths, side);
             let done = if lanes == 64 { word } else { word & !(u64::MAX << lanes) };
             taken += done.count_ones() as usize;
             word ^= done;
@@ -123,21 +123,21 @@ pub(crate) fn join_row<P: Composite, S: Simd>(
             let (colors, depths) = taken_run::<P>(row, taken, length);
             let at = first + start;
             let held_depths = if P::HAS_DEPTH { &mut held_depths[at..at + length] } else { &mut [] };
-            join_run::<P, S>(simd, colors, depths, &mut held_colors[at..at + length], held_depths, side);
+            merge_run::<P, S>(simd, colors, depths, &mut held_colors[at..at + length], held_depths, side);
             taken += length;
         });
     }
 }
 
-/// [`join_row`] without vector types: run by run.
-pub(crate) fn join_row_scalar<P: Composite>(
+/// [`merge_row`] without vector types: run by run.
+pub(crate) fn merge_row_scalar<P: Composite>(
     row: SparseRow<'_>,
     held_colors: &mut [P::Color],
     held_depths: &mut [f32],
     side: Side,
 ) {
     if row.mask.is_empty() {
-        join_run_scalar::<P>(row.colors, row.depths, held_colors, held_depths, side);
+        merge_run_scalar::<P>(row.colors, row.depths, held_colors, held_depths, side);
         return;
     }
     let mut taken = 0;
@@ -146,7 +146,7 @@ pub(crate) fn join_row_scalar<P: Composite>(
             let (colors, depths) = taken_run::<P>(row, taken, length);
             let at = 64 * index + start;
             let held_depths = if P::HAS_DEPTH { &mut held_depths[at..at + length] } else { &mut [] };
-            join_run_scalar::<P>(colors, depths, &mut held_colors[at..at + length], held_depths, side);
+            merge_run_scalar::<P>(colors, depths, &mut held_colors[at..at + length], held_depths, side);
             taken += length;
         });
     }
@@ -155,37 +155,33 @@ pub(crate) fn join_row_scalar<P: Composite>(
 /// Writes a row of a message over `colors` and, if it is not empty, `depths`: the background too. A message for rows with depths
 /// must bring depths.
 #[inline(always)]
-pub(crate) fn place_row<P: Composite, S: Simd>(
+pub(crate) fn copy_row<P: Composite, S: Simd>(
     simd: S,
     row: SparseRow<'_>,
     colors: &mut [P::Color],
     depths: &mut [f32],
 ) {
-    place_words::<P>(
+    copy_words::<P>(
         row,
         colors,
         depths,
         #[inline(always)]
-        |taken, word, held| place_by_vectors::<P, S>(simd, row, taken, word, held),
+        |taken, word, held| copy_by_vectors::<P, S>(simd, row, taken, word, held),
     );
 }
 
-/// [`place_row`] run by run.
-pub(crate) fn place_row_scalar<P: Composite>(
-    row: SparseRow<'_>,
-    colors: &mut [P::Color],
-    depths: &mut [f32],
-) {
-    place_words::<P>(row, colors, depths, |_, _, _| false);
+/// [`copy_row`] run by run.
+pub(crate) fn copy_row_scalar<P: Composite>(row: SparseRow<'_>, colors: &mut [P::Color], depths: &mut [f32]) {
+    copy_words::<P>(row, colors, depths, |_, _, _| false);
 }
 
 /// `place` may write the colours of a word of 64 pixels, of which so many were taken before, and say that it has.
 #[inline(always)]
-fn place_words<P: Composite>(
+fn copy_words<P: Composite>(
     row: SparseRow<'_>,
     colors: &mut [P::Color],
     depths: &mut [f32],
-    place: impl Fn(usize, u64, &mut [P::Color]) -> bool,
+    copy: impl Fn(usize, u64, &mut [P::Color]) -> bool,
 ) {
     let with_depths = !depths.is_empty();
     if row.mask.is_empty() {
@@ -206,7 +202,7 @@ fn place_words<P: Composite>(
             }
             continue;
         }
-        if !with_depths && word != u64::MAX && place(taken, word, &mut colors[first..last]) {
+        if !with_depths && word != u64::MAX && copy(taken, word, &mut colors[first..last]) {
             taken += word.count_ones() as usize;
             continue;
         }
@@ -244,7 +240,7 @@ fn words(mask: &[u8]) -> impl Iterator<Item = u64> {
 /// Joins as many of the 64 pixels of a word as there are vectors for: none, or all whole sixteens of a depth format with colours of four
 /// bytes. Says how many pixels those are.
 #[inline(always)]
-fn join_by_vectors<P: Composite, S: Simd>(
+fn merge_by_vectors<P: Composite, S: Simd>(
     simd: S,
     row: SparseRow<'_>,
     taken: usize,
@@ -298,7 +294,7 @@ fn join_by_vectors<P: Composite, S: Simd>(
 
 /// Writes up to 64 pixels with colours of four bytes, background where `word` has no bit. Whether there is an instruction for it.
 #[inline(always)]
-fn place_by_vectors<P: Composite, S: Simd>(
+fn copy_by_vectors<P: Composite, S: Simd>(
     simd: S,
     row: SparseRow<'_>,
     taken: usize,

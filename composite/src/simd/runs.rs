@@ -74,14 +74,14 @@ pub(crate) fn nearest_run_scalar<C: Color>(
                 continue;
             }
             let color: [u32; 16] = bytemuck::cast(*color);
-            let mut joined: [u32; 16] = bytemuck::cast(*held_color);
+            let mut merged: [u32; 16] = bytemuck::cast(*held_color);
             for (((held, color), win), (held_depth, depth)) in
-                joined.iter_mut().zip(&color).zip(&wins).zip(held_depth.iter_mut().zip(&depth))
+                merged.iter_mut().zip(&color).zip(&wins).zip(held_depth.iter_mut().zip(&depth))
             {
                 *held = color & win | *held & !win;
                 *held_depth = f32::from_bits(depth.to_bits() & win | held_depth.to_bits() & !win);
             }
-            *held_color = bytemuck::cast(joined);
+            *held_color = bytemuck::cast(merged);
         }
     }
     let done = if C::BYTES == 4 { held_depths.len() / 16 * 16 } else { 0 };
@@ -133,8 +133,8 @@ pub(crate) fn take_nearer<S: Simd>(
     // Most blocks of a picture are taken whole or not at all.
     if wins.any_true() {
         wins.select(depth, held).store_slice(held_depth);
-        let joined = wins.select(color(), colors_16(simd, held_color));
-        joined.bitcast::<u8x64<S>>().store_slice(held_color);
+        let merged = wins.select(color(), colors_16(simd, held_color));
+        merged.bitcast::<u8x64<S>>().store_slice(held_color);
     }
 }
 
@@ -201,13 +201,13 @@ pub(crate) fn over_f32<S: Simd>(simd: S, others: &[u8], held: &mut [[f32; 4]], o
         let (front, back) = if others_in_front { (theirs, ours) } else { (ours, theirs) };
         let alpha: f32x16<S> = front.bitcast::<u8x64<S>>().swizzle_dyn_within_blocks(alpha_of).bitcast();
         let (front, back): (f32x16<S>, f32x16<S>) = (front.bitcast(), back.bitcast());
-        let joined: f32x16<S> = front + (f32x16::splat(simd, 1.0) - alpha) * back;
-        let mut joined: u32x16<S> = joined.bitcast();
+        let merged: f32x16<S> = front + (f32x16::splat(simd, 1.0) - alpha) * back;
+        let mut merged: u32x16<S> = merged.bitcast();
         if empty_theirs | empty_ours != 0 {
-            joined = mask32x16::from_bitmask(simd, empty_theirs).select(ours, joined);
-            joined = mask32x16::from_bitmask(simd, empty_ours).select(theirs, joined);
+            merged = mask32x16::from_bitmask(simd, empty_theirs).select(ours, merged);
+            merged = mask32x16::from_bitmask(simd, empty_ours).select(theirs, merged);
         }
-        joined.bitcast::<f32x16<S>>().store_slice(cast_slice_mut(four));
+        merged.bitcast::<f32x16<S>>().store_slice(cast_slice_mut(four));
     }
     over_one_by_one(&others[64 * blocks..], &mut held[4 * blocks..], others_in_front);
 }

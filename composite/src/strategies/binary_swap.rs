@@ -7,21 +7,21 @@
 use super::radix_k;
 use crate::collect::Collector;
 use crate::error::CompositeError;
-use crate::join::Scratch;
+use crate::frame_exchange::FrameExchange;
 use crate::layer::View;
+use crate::merge::Scratch;
 use crate::pixel::Composite;
 use crate::rect::Rect;
-use crate::session::Session;
 
 pub(crate) fn pieces(drawn: &[Rect]) -> Vec<(usize, Rect)> {
     radix_k::pieces(drawn, 2)
 }
 
 pub(crate) fn run<P: Composite>(
-    session: &mut Session<'_>,
+    exchange: &mut FrameExchange<'_>,
     frame: &View<'_, P>,
     collector: &mut Collector<P>,
     scratch: &mut Scratch<P>,
 ) -> Result<(), CompositeError> {
-    radix_k::run(session, frame, 2, collector, scratch)
+    radix_k::run(exchange, frame, 2, collector, scratch)
 }

@@ -4,15 +4,15 @@
 //! will come, so nobody waits for a rank that has nothing to give, and every receive is posted before the first message is made.
 //! Tiles are cut in slices: while one slice travels the next is compressed, and a slice that is complete goes to the collecting
 //! rank while others are still being joined. [`crate::stream`] hands slices in while the frame is still being rendered.
+use crate::codec;
 use crate::collect::Collector;
 use crate::error::CompositeError;
-use crate::join::{Item, Join, Scratch};
+use crate::frame_exchange::{FrameExchange, Tag};
 use crate::layer::View;
+use crate::merge::{Merge, MergeInput, Scratch};
 use crate::pixel::Composite;
 use crate::rect::Rect;
-use crate::session::{Session, Tag};
-use crate::tiles::{Owner, shared_out, slices};
-use crate::wire;
+use crate::tiles::{Owner, balanced_among, slices};
 
 /// Slices of every place's tile, in the order in which they are sent.
 #[derive(Clone, Debug)]
@@ -25,16 +25,16 @@ impl Plan {
     pub(crate) fn new<P: Composite>(drawn: &[Rect], slice_pixels: usize, root: Option<usize>) -> Self {
         let cut = |tile: Rect| if tile.is_empty() { Vec::new() } else { slices(tile, slice_pixels) };
         let mut owners = owners::<P>(drawn, root);
-        Self { slices: shared_out(drawn, &mut owners).into_iter().map(cut).collect() }
+        Self { slices: balanced_among(drawn, &mut owners).into_iter().map(cut).collect() }
     }
 
     /// What each place holds in the end. Where nobody drew anything nothing is held.
     pub(crate) fn pieces(&self, drawn: &[Rect]) -> Vec<(usize, Rect)> {
         let mut pieces = Vec::new();
-        for (place, slices) in self.slices.iter().enumerate() {
+        for (order_index, slices) in self.slices.iter().enumerate() {
             for slice in slices {
                 if drawn.iter().any(|rect| !rect.intersection(slice).is_empty()) {
-                    pieces.push((place, *slice));
+                    pieces.push((order_index, *slice));
                 }
             }
         }
@@ -54,28 +54,32 @@ const FULL_SHARE: u64 = 256;
 /// `x = (e / (p - 1) - g) / (e p / (p - 1) - g)`, which is nothing from a handful of ranks on. Two ranks share alike: there what one does not
 /// join the other must, and both work all the time. So do ranks of one memory, where every byte costs the same processors.
 fn owners<P: Composite>(drawn: &[Rect], root: Option<usize>) -> Vec<Owner> {
-    let places = drawn.len();
+    let num_ranks = drawn.len();
     let whole = drawn.iter().fold(Rect::EMPTY, |all, rect| all.around(rect)).pixels();
     let layers: usize = drawn.iter().map(Rect::pixels).sum();
     // As many as there are tiles worth a message, and enough that what comes to each is no more than what comes to the root.
     let (drawn_bytes, image_bytes) = (layers * P::BYTES, whole * size_of::<P::Color>());
-    let wanted = (whole / OWNER_PX).max(drawn_bytes.div_ceil(image_bytes.max(1))).clamp(1, places);
+    let wanted = (whole / OWNER_PX).max(drawn_bytes.div_ceil(image_bytes.max(1))).clamp(1, num_ranks);
 
     let share = match root {
-        Some(_) if places > 2 => {
-            let others = (places - 1) as f64;
-            let exchange = drawn_bytes as f64 * others / places as f64;
+        Some(_) if num_ranks > 2 => {
+            let others = (num_ranks - 1) as f64;
+            let exchange_bytes = drawn_bytes as f64 * others / num_ranks as f64;
             let image = image_bytes as f64;
-            let x = (exchange / others - image) / (exchange * places as f64 / others - image).max(1.0);
+            let x = (exchange_bytes / others - image)
+                / (exchange_bytes * num_ranks as f64 / others - image).max(1.0);
             // Of shares that are FULL_SHARE for each of the others.
-            let x = x.clamp(0.0, 1.0 / places as f64);
+            let x = x.clamp(0.0, 1.0 / num_ranks as f64);
             (x / (1.0 - x) * others * FULL_SHARE as f64) as u64
         }
         _ => FULL_SHARE,
     };
     // Evenly among all, so that owners are near to what they drew.
-    let candidates: Vec<Owner> = (0..places)
-        .map(|place| Owner { place, share: if root == Some(place) { share } else { FULL_SHARE } })
+    let candidates: Vec<Owner> = (0..num_ranks)
+        .map(|order_index| Owner {
+            order_index,
+            share: if root == Some(order_index) { share } else { FULL_SHARE },
+        })
         .filter(|owner| owner.share > 0)
         .collect();
     let wanted = wanted.min(candidates.len());
@@ -84,13 +88,13 @@ fn owners<P: Composite>(drawn: &[Rect], root: Option<usize>) -> Vec<Owner> {
 
 pub(crate) fn run<P: Composite>(
     plan: &Plan,
-    session: &mut Session<'_>,
+    exchange: &mut FrameExchange<'_>,
     view: &View<'_, P>,
     collector: &mut Collector<P>,
     scratch: &mut Scratch<P>,
 ) -> Result<(), CompositeError> {
-    let (place, places) = (session.place, session.places());
-    let mut exchange = Exchange::new(plan, session)?;
+    let (order_index, num_ranks) = (exchange.order_index, exchange.num_ranks());
+    let mut tile_exchange = TileExchange::new(plan, exchange)?;
 
     // Everybody's first slices, then everybody's second …; the next place first, so that no rank gets all first messages. No more than two
     // rounds are on their way: messages share the wire, and with all of them under way at once the first slices would be complete, and begin
@@ -99,49 +103,49 @@ pub(crate) fn run<P: Composite>(
     let mut last_round = 0;
     for index in 0..most {
         if most > 3 && index > 1 {
-            session.let_leave(last_round);
+            exchange.throttle_sends(last_round);
         }
         last_round = 0;
-        for step in 1..places {
-            let owner = (place + step) % places;
+        for step in 1..num_ranks {
+            let owner = (order_index + step) % num_ranks;
             if let Some(slice) = plan.slices[owner].get(index) {
                 let part = view.bounds.intersection(slice);
                 if !part.is_empty() {
-                    session.send(owner, Tag::Exchange, view, part, true)?;
+                    exchange.send(owner, Tag::Exchange, view, part, true)?;
                     last_round += 1;
                 }
             }
         }
         // Own pixels, and what has come meanwhile.
-        if let Some(slice) = plan.slices[place].get(index) {
+        if let Some(slice) = plan.slices[order_index].get(index) {
             let part = view.bounds.intersection(slice);
             if !part.is_empty() {
-                session.count_nan(view, part);
-                let item = Item::View(View { bounds: part, ..*view });
-                exchange.put(index, place, item, session, collector, scratch)?;
+                exchange.count_nan(view, part);
+                let item = MergeInput::View(View { bounds: part, ..*view });
+                tile_exchange.put(index, order_index, item, exchange, collector, scratch)?;
             }
         }
-        exchange.take_what_has_come(session, collector, scratch)?;
+        tile_exchange.take_arrived(exchange, collector, scratch)?;
     }
-    exchange.finish(session, collector, scratch)
+    tile_exchange.finish(exchange, collector, scratch)
 }
 
 /// The slices of this place and how far they are.
-pub(crate) struct Exchange<'a, P: Composite> {
+pub(crate) struct TileExchange<'a, P: Composite> {
     own: Vec<Rect>,
-    joins: Vec<Option<Join<'a, P>>>,
+    merges: Vec<Option<Merge<'a, P>>>,
     /// For every place the parts of own slices that have not come from it.
     outstanding: Vec<Vec<(usize, Rect)>>,
 }
 
-impl<'a, P: Composite> Exchange<'a, P> {
+impl<'a, P: Composite> TileExchange<'a, P> {
     /// Posts the receives of this place.
-    pub(crate) fn new(plan: &Plan, session: &mut Session<'_>) -> Result<Self, CompositeError> {
-        let (place, places) = (session.place, session.places());
-        let own = plan.slices[place].clone();
-        let drawn = session.drawn.clone();
-        let mut outstanding = vec![Vec::new(); places];
-        for (from, parts) in outstanding.iter_mut().enumerate().filter(|(from, _)| *from != place) {
+    pub(crate) fn new(plan: &Plan, exchange: &mut FrameExchange<'_>) -> Result<Self, CompositeError> {
+        let (order_index, num_ranks) = (exchange.order_index, exchange.num_ranks());
+        let own = plan.slices[order_index].clone();
+        let drawn = exchange.drawn.clone();
+        let mut outstanding = vec![Vec::new(); num_ranks];
+        for (from, parts) in outstanding.iter_mut().enumerate().filter(|(from, _)| *from != order_index) {
             for (index, slice) in own.iter().enumerate() {
                 let part = drawn[from].intersection(slice);
                 if !part.is_empty() {
@@ -149,16 +153,16 @@ impl<'a, P: Composite> Exchange<'a, P> {
                 }
             }
             // A renderer hands slices in in any order, so each receive has room for the largest.
-            let largest = parts.iter().map(|part| part.1).max_by_key(wire::longest::<P>);
+            let largest = parts.iter().map(|part| part.1).max_by_key(codec::longest::<P>);
             for _ in 0..parts.len() {
-                session.post::<P>(from, Tag::Exchange, &largest.unwrap_or(Rect::EMPTY))?;
+                exchange.post::<P>(from, Tag::Exchange, &largest.unwrap_or(Rect::EMPTY))?;
             }
         }
-        let join = |slice: &Rect| {
-            Some(Join::new(*slice, places, |from| !drawn[from].intersection(slice).is_empty()))
+        let merge = |slice: &Rect| {
+            Some(Merge::new(*slice, num_ranks, |from| !drawn[from].intersection(slice).is_empty()))
         };
-        let joins = own.iter().map(join).collect();
-        Ok(Self { own, joins, outstanding })
+        let merges = own.iter().map(merge).collect();
+        Ok(Self { own, merges, outstanding })
     }
 
     /// Takes what `from` has in the own slice `index`, and hands the slice in if it is complete.
@@ -166,39 +170,39 @@ impl<'a, P: Composite> Exchange<'a, P> {
         &mut self,
         index: usize,
         from: usize,
-        item: Item<'a, P>,
-        session: &mut Session<'_>,
+        item: MergeInput<'a, P>,
+        exchange: &mut FrameExchange<'_>,
         collector: &mut Collector<P>,
         scratch: &mut Scratch<P>,
     ) -> Result<(), CompositeError> {
-        let begin = session.comm.working_secs();
-        if let Some(join) = &mut self.joins[index] {
-            join.put(from, item, scratch);
+        let begin = exchange.comm.working_secs();
+        if let Some(merge) = &mut self.merges[index] {
+            merge.put(from, item, scratch);
         }
         for read in scratch.read.drain(..) {
-            session.comm.recycle(read);
+            exchange.comm.recycle(read);
         }
-        session.report.blend_secs += session.comm.working_secs() - begin;
-        let complete = self.joins[index].take_if(|join| join.is_complete());
-        match complete.and_then(|join| join.finish(scratch)) {
-            Some(layer) => collector.hand_in(session, layer, scratch),
+        exchange.report.blend_secs += exchange.comm.working_secs() - begin;
+        let complete = self.merges[index].take_if(|merge| merge.is_complete());
+        match complete.and_then(|merge| merge.finish(scratch)) {
+            Some(layer) => collector.submit(exchange, layer, scratch),
             None => Ok(()),
         }
     }
 
     /// Slices that are complete.
     pub(crate) fn complete(&self) -> usize {
-        self.joins.iter().filter(|join| join.is_none()).count()
+        self.merges.iter().filter(|merge| merge.is_none()).count()
     }
 
-    pub(crate) fn take_what_has_come(
+    pub(crate) fn take_arrived(
         &mut self,
-        session: &mut Session<'_>,
+        exchange: &mut FrameExchange<'_>,
         collector: &mut Collector<P>,
         scratch: &mut Scratch<P>,
     ) -> Result<(), CompositeError> {
-        while let Some(arrival) = session.next(false)? {
-            self.take(arrival, session, collector, scratch)?;
+        while let Some(arrival) = exchange.next(false)? {
+            self.take(arrival, exchange, collector, scratch)?;
         }
         Ok(())
     }
@@ -206,13 +210,13 @@ impl<'a, P: Composite> Exchange<'a, P> {
     /// Waits for all messages of other places.
     pub(crate) fn finish(
         &mut self,
-        session: &mut Session<'_>,
+        exchange: &mut FrameExchange<'_>,
         collector: &mut Collector<P>,
         scratch: &mut Scratch<P>,
     ) -> Result<(), CompositeError> {
-        while session.is_waiting_for(Tag::Exchange) {
-            if let Some(arrival) = session.next(true)? {
-                self.take(arrival, session, collector, scratch)?;
+        while exchange.is_receiving_for(Tag::Exchange) {
+            if let Some(arrival) = exchange.next(true)? {
+                self.take(arrival, exchange, collector, scratch)?;
             }
         }
         Ok(())
@@ -221,23 +225,23 @@ impl<'a, P: Composite> Exchange<'a, P> {
     fn take(
         &mut self,
         (from, is_collect, bytes): (usize, bool, Vec<u8>),
-        session: &mut Session<'_>,
+        exchange: &mut FrameExchange<'_>,
         collector: &mut Collector<P>,
         scratch: &mut Scratch<P>,
     ) -> Result<(), CompositeError> {
         if is_collect {
-            return collector.take(session, from, bytes);
+            return collector.take(exchange, from, bytes);
         }
         // The message itself says which slice it is for, if it is one of those expected.
-        let said = wire::rect_of(&bytes);
+        let said = codec::rect_of(&bytes);
         let parts = &mut self.outstanding[from];
         let position = parts.iter().position(|part| Some(part.1) == said).unwrap_or(0);
         let (index, part) = if parts.is_empty() { (0, Rect::EMPTY) } else { parts.remove(position) };
-        let begin = session.comm.working_secs();
-        let message = session.check::<P>(from, bytes, part, true)?;
-        session.report.blend_secs += session.comm.working_secs() - begin;
+        let begin = exchange.comm.working_secs();
+        let message = exchange.check::<P>(from, bytes, part, true)?;
+        exchange.report.blend_secs += exchange.comm.working_secs() - begin;
         if index < self.own.len() {
-            self.put(index, from, Item::Message(message), session, collector, scratch)?;
+            self.put(index, from, MergeInput::Message(message), exchange, collector, scratch)?;
         }
         Ok(())
     }

@@ -3,30 +3,30 @@
 //! Ranks beyond a power of two hand their image to a neighbour first; each pair is one slot.
 use crate::collect::Collector;
 use crate::error::CompositeError;
-use crate::join::{Item, Join, Scratch};
+use crate::frame_exchange::{FrameExchange, Tag};
 use crate::layer::{Layer, View};
+use crate::merge::{Merge, MergeInput, Scratch};
 use crate::pixel::Composite;
 use crate::rank_order::Folding;
 use crate::rect::Rect;
-use crate::session::{Session, Tag};
 
 /// What a slot holds between rounds.
-pub(crate) enum Held<'a, P: Composite> {
+pub(crate) enum SlotImage<'a, P: Composite> {
     /// The rendered frame, as long as nothing has been joined to it.
     Frame(View<'a, P>),
-    Joined(Layer<P>),
+    Merged(Layer<P>),
 }
 
-impl<P: Composite> Held<'_, P> {
+impl<P: Composite> SlotImage<'_, P> {
     pub(crate) fn view(&self) -> View<'_, P> {
         match self {
             Self::Frame(view) => *view,
-            Self::Joined(layer) => layer.view(),
+            Self::Merged(layer) => layer.view(),
         }
     }
 
     pub(crate) fn recycle(self, scratch: &mut Scratch<P>) {
-        if let Self::Joined(layer) = self {
+        if let Self::Merged(layer) = self {
             scratch.layers.push(layer);
         }
     }
@@ -34,11 +34,11 @@ impl<P: Composite> Held<'_, P> {
     /// As a layer of exactly `bounds`, to be handed in.
     pub(crate) fn into_layer(self, bounds: Rect, scratch: &mut Scratch<P>) -> Layer<P> {
         match self {
-            Self::Joined(layer) if layer.bounds == bounds => layer,
+            Self::Merged(layer) if layer.bounds == bounds => layer,
             other => {
-                let mut join = Join::new(bounds, 1, |_| true);
-                join.put(0, Item::View(other.view()), scratch);
-                let layer = join.finish(scratch);
+                let mut merge = Merge::new(bounds, 1, |_| true);
+                merge.put(0, MergeInput::View(other.view()), scratch);
+                let layer = merge.finish(scratch);
                 layer.unwrap_or_else(|| Layer::empty(bounds, None))
             }
         }
@@ -46,7 +46,7 @@ impl<P: Composite> Held<'_, P> {
 }
 
 /// The rectangle around all that the slots `first..first + count` have drawn.
-pub(crate) fn reach(drawn: &[Rect], folding: &Folding, first: usize, count: usize) -> Rect {
+pub(crate) fn bounds_of_slots(drawn: &[Rect], folding: &Folding, first: usize, count: usize) -> Rect {
     // Slots keep the order of places, so a block of slots is a block of places.
     let last = folding.leader(first + count - 1);
     let end = folding.partner(last).unwrap_or(last) + 1;
@@ -55,39 +55,39 @@ pub(crate) fn reach(drawn: &[Rect], folding: &Folding, first: usize, count: usiz
 
 /// Pairs are joined; returns the slot and what it holds on leaders, `None` on ranks that have handed theirs over.
 pub(crate) fn fold<'a, P: Composite>(
-    session: &mut Session<'_>,
+    exchange: &mut FrameExchange<'_>,
     frame: &View<'a, P>,
     collector: &mut Collector<P>,
     scratch: &mut Scratch<P>,
-) -> Result<Option<(usize, Held<'a, P>)>, CompositeError> {
-    let folding = Folding::new(session.places());
-    let slot = folding.slot(session.place);
+) -> Result<Option<(usize, SlotImage<'a, P>)>, CompositeError> {
+    let folding = Folding::new(exchange.num_ranks());
+    let slot = folding.slot(exchange.order_index);
     let leader = folding.leader(slot);
-    if session.place != leader {
+    if exchange.order_index != leader {
         if !frame.bounds.is_empty() {
-            session.send(leader, Tag::Fold, frame, frame.bounds, true)?;
+            exchange.send(leader, Tag::Fold, frame, frame.bounds, true)?;
         }
         return Ok(None);
     }
-    let held = Held::Frame(*frame);
+    let held = SlotImage::Frame(*frame);
     let Some(partner) = folding.partner(leader) else { return Ok(Some((slot, held))) };
-    let theirs = session.drawn[partner];
+    let theirs = exchange.drawn[partner];
     if theirs.is_empty() {
         return Ok(Some((slot, held)));
     }
-    session.post::<P>(partner, Tag::Fold, &theirs)?;
+    exchange.post::<P>(partner, Tag::Fold, &theirs)?;
     let members = [leader, partner];
     let rects = [frame.bounds, theirs];
     let bounds = frame.bounds.around(&theirs);
-    let layer = join_members(session, &held, 0, &members, bounds, |i| rects[i], collector, scratch)?;
-    Ok(Some((slot, Held::Joined(layer))))
+    let layer = merge_members(exchange, &held, 0, &members, bounds, |i| rects[i], collector, scratch)?;
+    Ok(Some((slot, SlotImage::Merged(layer))))
 }
 
 /// Joins what `members` (places) have in `bounds`, as it comes; their receives are posted. `own` is the number of this rank, and
 /// `rect_of` says what each member brings.
-pub(crate) fn join_members<P: Composite>(
-    session: &mut Session<'_>,
-    held: &Held<'_, P>,
+pub(crate) fn merge_members<P: Composite>(
+    exchange: &mut FrameExchange<'_>,
+    held: &SlotImage<'_, P>,
     own: usize,
     members: &[usize],
     bounds: Rect,
@@ -96,30 +96,30 @@ pub(crate) fn join_members<P: Composite>(
     scratch: &mut Scratch<P>,
 ) -> Result<Layer<P>, CompositeError> {
     let view = held.view();
-    let mut join = Join::new(bounds, members.len(), |member| !rect_of(member).is_empty());
-    let begin = session.comm.working_secs();
+    let mut merge = Merge::new(bounds, members.len(), |member| !rect_of(member).is_empty());
+    let begin = exchange.comm.working_secs();
     let mine = rect_of(own);
     if !mine.is_empty() {
-        if matches!(held, Held::Frame(_)) {
-            session.count_nan(&view, mine);
+        if matches!(held, SlotImage::Frame(_)) {
+            exchange.count_nan(&view, mine);
         }
-        join.put(own, Item::View(View { bounds: mine, ..view }), scratch);
+        merge.put(own, MergeInput::View(View { bounds: mine, ..view }), scratch);
     }
-    session.report.blend_secs += session.comm.working_secs() - begin;
-    while !join.is_complete() {
-        let Some((place, is_collect, bytes)) = session.next(true)? else { continue };
-        let member = members.iter().position(|&member| member == place);
+    exchange.report.blend_secs += exchange.comm.working_secs() - begin;
+    while !merge.is_complete() {
+        let Some((order_index, is_collect, bytes)) = exchange.next(true)? else { continue };
+        let member = members.iter().position(|&member| member == order_index);
         let (false, Some(member)) = (is_collect, member) else {
-            collector.take(session, place, bytes)?;
+            collector.take(exchange, order_index, bytes)?;
             continue;
         };
-        let begin = session.comm.working_secs();
-        let message = session.check::<P>(place, bytes, rect_of(member), true)?;
-        join.put(member, Item::Message(message), scratch);
+        let begin = exchange.comm.working_secs();
+        let message = exchange.check::<P>(order_index, bytes, rect_of(member), true)?;
+        merge.put(member, MergeInput::Message(message), scratch);
         for read in scratch.read.drain(..) {
-            session.comm.recycle(read);
+            exchange.comm.recycle(read);
         }
-        session.report.blend_secs += session.comm.working_secs() - begin;
+        exchange.report.blend_secs += exchange.comm.working_secs() - begin;
     }
-    Ok(join.finish(scratch).unwrap_or_else(|| Layer::empty(bounds, scratch.layers.pop())))
+    Ok(merge.finish(scratch).unwrap_or_else(|| Layer::empty(bounds, scratch.layers.pop())))
 }

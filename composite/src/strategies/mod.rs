@@ -1,5 +1,5 @@
 //! Ways to bring the pixels of all ranks together, one a file, all with the signature
-//! `fn run<P>(&mut Session, &View<P>, &mut Collector<P>, &mut Scratch<P>)` (direct send takes its plan, radix-k its k as well) and
+//! `fn run<P>(&mut FrameExchange, &View<P>, &mut Collector<P>, &mut Scratch<P>)` (direct send takes its plan, radix-k its k as well) and
 //! all with the same bits as [`composite_serial`](crate::composite_serial).
 //!
 //! Each hands the pieces of the finished image that the rank holds to the [collector](crate::collect), as soon as they are
@@ -12,11 +12,11 @@ pub(crate) mod tree;
 
 use crate::collect::Collector;
 use crate::error::CompositeError;
-use crate::join::Scratch;
+use crate::frame_exchange::FrameExchange;
 use crate::layer::View;
+use crate::merge::Scratch;
 use crate::pixel::Composite;
 use crate::rect::Rect;
-use crate::session::Session;
 
 /// Which way the pixels take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -96,16 +96,16 @@ impl Plan {
 
     pub(crate) fn run<P: Composite>(
         &self,
-        session: &mut Session<'_>,
+        exchange: &mut FrameExchange<'_>,
         frame: &View<'_, P>,
         collector: &mut Collector<P>,
         scratch: &mut Scratch<P>,
     ) -> Result<(), CompositeError> {
         match self {
-            Self::DirectSend(plan) => direct_send::run(plan, session, frame, collector, scratch),
-            Self::Tree => tree::run(session, frame, collector, scratch),
-            Self::BinarySwap => binary_swap::run(session, frame, collector, scratch),
-            Self::RadixK { k } => radix_k::run(session, frame, *k, collector, scratch),
+            Self::DirectSend(plan) => direct_send::run(plan, exchange, frame, collector, scratch),
+            Self::Tree => tree::run(exchange, frame, collector, scratch),
+            Self::BinarySwap => binary_swap::run(exchange, frame, collector, scratch),
+            Self::RadixK { k } => radix_k::run(exchange, frame, *k, collector, scratch),
         }
     }
 }

@@ -4,15 +4,15 @@
 //!
 //! Fewer rounds than binary swap, more messages in each. Here group sizes are powers of two and the members of a group are
 //! joined as a balanced tree, so that the grouping is that of [`crate::rank_order`] for every k.
-use super::folding::{Held, fold, join_members, reach};
+use super::folding::{SlotImage, bounds_of_slots, fold, merge_members};
 use crate::collect::Collector;
 use crate::error::CompositeError;
-use crate::join::Scratch;
+use crate::frame_exchange::{FrameExchange, Tag};
 use crate::layer::View;
+use crate::merge::Scratch;
 use crate::pixel::Composite;
 use crate::rank_order::Folding;
 use crate::rect::Rect;
-use crate::session::{Session, Tag};
 
 /// What each leader holds after the last round.
 pub(crate) fn pieces(drawn: &[Rect], k: usize) -> Vec<(usize, Rect)> {
@@ -35,15 +35,15 @@ pub(crate) fn pieces(drawn: &[Rect], k: usize) -> Vec<(usize, Rect)> {
 }
 
 pub(crate) fn run<P: Composite>(
-    session: &mut Session<'_>,
+    exchange: &mut FrameExchange<'_>,
     frame: &View<'_, P>,
     k: usize,
     collector: &mut Collector<P>,
     scratch: &mut Scratch<P>,
 ) -> Result<(), CompositeError> {
-    let folding = Folding::new(session.places());
-    let drawn = session.drawn.clone();
-    let Some((slot, mut held)) = fold(session, frame, collector, scratch)? else {
+    let folding = Folding::new(exchange.num_ranks());
+    let drawn = exchange.drawn.clone();
+    let Some((slot, mut held)) = fold(exchange, frame, collector, scratch)? else {
         return Ok(());
     };
     let mut part = drawn.iter().fold(Rect::EMPTY, |all, rect| all.around(rect));
@@ -52,17 +52,19 @@ pub(crate) fn run<P: Composite>(
         let members = k.min(folding.slots / stride);
         let digit = (slot / stride) % members;
         let first = slot - digit * stride;
-        let places: Vec<usize> = (0..members).map(|member| folding.leader(first + member * stride)).collect();
+        let order_indices: Vec<usize> =
+            (0..members).map(|member| folding.leader(first + member * stride)).collect();
         // What the slots that a member has joined so far can have drawn.
         let base = slot / (stride * members) * (stride * members);
-        let reaches: Vec<Rect> =
-            (0..members).map(|member| reach(&drawn, &folding, base + member * stride, stride)).collect();
+        let reaches: Vec<Rect> = (0..members)
+            .map(|member| bounds_of_slots(&drawn, &folding, base + member * stride, stride))
+            .collect();
 
         let keep = share(&part, digit, members);
-        for (member, reach) in reaches.iter().enumerate() {
-            let theirs = reach.intersection(&keep);
+        for (member, bounds_of_slots) in reaches.iter().enumerate() {
+            let theirs = bounds_of_slots.intersection(&keep);
             if member != digit && !theirs.is_empty() {
-                session.post::<P>(places[member], Tag::Exchange, &theirs)?;
+                exchange.post::<P>(order_indices[member], Tag::Exchange, &theirs)?;
             }
         }
 
@@ -71,15 +73,16 @@ pub(crate) fn run<P: Composite>(
             let member = (digit + step) % members;
             let give = reaches[digit].intersection(&share(&part, member, members));
             if !give.is_empty() {
-                session.send(places[member], Tag::Exchange, &held.view(), give, true)?;
+                exchange.send(order_indices[member], Tag::Exchange, &held.view(), give, true)?;
             }
         }
 
         // Join the own share of all members.
         let bounds = reaches.iter().fold(Rect::EMPTY, |all, rect| all.around(rect)).intersection(&keep);
         let brings = |member: usize| reaches[member].intersection(&keep);
-        let layer = join_members(session, &held, digit, &places, bounds, brings, collector, scratch)?;
-        std::mem::replace(&mut held, Held::Joined(layer)).recycle(scratch);
+        let layer =
+            merge_members(exchange, &held, digit, &order_indices, bounds, brings, collector, scratch)?;
+        std::mem::replace(&mut held, SlotImage::Merged(layer)).recycle(scratch);
         part = keep;
         stride *= members;
     }
@@ -87,7 +90,7 @@ pub(crate) fn run<P: Composite>(
         return Ok(());
     }
     let layer = held.into_layer(part, scratch);
-    collector.hand_in(session, layer, scratch)
+    collector.submit(exchange, layer, scratch)
 }
 
 /// Share number `member` of `part`, cut into `members` shares of rows that differ by at most one row.

@@ -4,7 +4,8 @@ mod volumes;
 
 use composite::comm::sim;
 use composite::render::{
-    Activity, DataParallel, FrameError, FrameOptions, FrameOutput, Light, Partition, Split, ray_parallel,
+    Activity, DataParallel, FrameError, FrameOptions, FrameOutput, Partition, SecondaryRayPolicy, Split,
+    ray_parallel,
 };
 use composite::{Communicator, threads};
 use rt_core::bvh::BuildOptions;
@@ -18,16 +19,16 @@ fn one_node(case: &Case) -> Frame {
     render(&case.scene, &case.camera, &case.options).unwrap().frame
 }
 
-fn frame_options(light: Light) -> FrameOptions {
-    FrameOptions { light, timeout: Duration::from_secs(120), ..FrameOptions::default() }
+fn frame_options(light: SecondaryRayPolicy) -> FrameOptions {
+    FrameOptions { secondary_rays: light, timeout: Duration::from_secs(120), ..FrameOptions::default() }
 }
 
 /// All ranks' outputs; the picture is that of the last rank.
-fn many(case: &Case, ranks: usize, split: &Split, light: Light) -> Vec<FrameOutput> {
+fn many(case: &Case, ranks: usize, split: &Split, light: SecondaryRayPolicy) -> Vec<FrameOutput> {
     dealt(case, &Partition::new(&case.scene, ranks, split), light)
 }
 
-fn dealt(case: &Case, partition: &Partition, light: Light) -> Vec<FrameOutput> {
+fn dealt(case: &Case, partition: &Partition, light: SecondaryRayPolicy) -> Vec<FrameOutput> {
     let ranks = partition.parts();
     let outputs = threads::run(ranks, |mut comm| {
         let part = partition.part(&case.scene, comm.rank(), &BuildOptions::default())?;
@@ -68,7 +69,7 @@ fn shadows_area_lights_and_occlusion_of_1_to_128_ranks_have_the_bits_of_one_node
     let case = scenes::shadows_and_occlusion(DVec3::ZERO);
     let expected = one_node(&case);
     for ranks in [1, 2, 3, 5, 8, 64, 128] {
-        let outputs = many(&case, ranks, &Split::Triangles, Light::Ask);
+        let outputs = many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::Forward);
         assert_same(&expected, &outputs, &format!("{ranks} ranks"));
         if ranks > 1 {
             assert!(
@@ -90,7 +91,7 @@ fn random_and_view_dependent_partitions_have_the_bits_of_one_node() {
         (64, Split::Random { seed: 3 }),
         (7, view),
     ] {
-        let outputs = many(&case, ranks, &split, Light::Ask);
+        let outputs = many(&case, ranks, &split, SecondaryRayPolicy::Forward);
         assert_same(&expected, &outputs, &format!("{ranks} ranks, {split:?}"));
     }
 }
@@ -100,7 +101,7 @@ fn local_geometry_alone_gives_another_picture() {
     let case = scenes::shadows_and_occlusion(DVec3::ZERO);
     let expected = one_node(&case);
     for ranks in [8, 64] {
-        let outputs = many(&case, ranks, &Split::Triangles, Light::LocalOnly);
+        let outputs = many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::LocalOnly);
         let differ = differing_pixels(&expected, outputs.last().unwrap().frame.as_ref().unwrap());
         assert!(
             differ > 500,
@@ -115,12 +116,12 @@ fn frames_without_secondary_rays_send_none_and_have_the_bits_of_one_node() {
         let case = scenes::headlight(samples);
         let expected = one_node(&case);
         for ranks in [2, 5, 32] {
-            let outputs = many(&case, ranks, &Split::Triangles, Light::Auto { frames: 1 });
+            let outputs = many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::Auto { frames: 1 });
             assert_same(&expected, &outputs, &format!("{samples} samples, {ranks} ranks"));
             for o in &outputs {
                 // Later rays of the geometry pass are answered by nobody, because there are none.
                 assert_eq!((o.report.points_sent, o.report.rays_sent, o.report.answered_rays), (0, 0, 0));
-                assert_eq!(o.report.light, "no light crosses borders");
+                assert_eq!(o.report.secondary_rays, "no light crosses borders");
             }
         }
     }
@@ -146,7 +147,11 @@ fn streamed_frames_have_the_bits_of_one_node_and_send_tiles_while_rays_are_trace
             for stream in [true, false] {
                 let outputs = sim::run(ranks, sim::Network::FREE, sim::Compute::Measured(1.0), |mut comm| {
                     let part = partition.part(&case.scene, comm.rank(), &BuildOptions::default())?;
-                    let options = FrameOptions { root: Some(ranks - 1), stream, ..frame_options(Light::Ask) };
+                    let options = FrameOptions {
+                        root: Some(ranks - 1),
+                        stream,
+                        ..frame_options(SecondaryRayPolicy::Forward)
+                    };
                     let mut renderer = DataParallel::new(&mut comm, part, options)?;
                     renderer.frame(&mut comm, &case.camera, &case.options)
                 });
@@ -180,7 +185,7 @@ fn mirrors_glass_layers_and_paths_have_the_bits_of_one_node() {
         let expected = one_node(&case);
         for (ranks, split) in [(3, Split::Triangles), (8, Split::Random { seed: 9 }), (16, Split::Triangles)]
         {
-            let outputs = many(&case, ranks, &split, Light::Ask);
+            let outputs = many(&case, ranks, &split, SecondaryRayPolicy::Forward);
             assert_same(&expected, &outputs, &format!("{}, {ranks} ranks", case.name));
             assert!(outputs.iter().any(|o| o.report.rounds > 2), "{}", case.name);
         }
@@ -193,7 +198,7 @@ fn a_volume_in_bricks_has_the_bits_of_one_node() {
         let expected = one_node(&case);
         for (ranks, split) in [(2, Split::Triangles), (7, Split::Random { seed: 5 }), (64, Split::Triangles)]
         {
-            let outputs = many(&case, ranks, &split, Light::Ask);
+            let outputs = many(&case, ranks, &split, SecondaryRayPolicy::Forward);
             assert_same(&expected, &outputs, &format!("{}, {ranks} ranks", case.name));
             assert!(outputs[0].report.warnings.iter().all(|w| !w.contains("whole")));
         }
@@ -215,7 +220,7 @@ fn parts_of_tubes_cylinders_and_spheres_hold_their_own_and_have_the_bits_of_one_
     let case = scenes::arrays_of_shapes();
     let expected = one_node(&case);
     for (ranks, split) in [(2, Split::Triangles), (7, Split::Random { seed: 5 }), (32, Split::Triangles)] {
-        let outputs = many(&case, ranks, &split, Light::Ask);
+        let outputs = many(&case, ranks, &split, SecondaryRayPolicy::Forward);
         assert_same(&expected, &outputs, &format!("{}, {ranks} ranks", case.name));
     }
 }
@@ -225,22 +230,30 @@ fn ghost_zones_have_the_bits_of_one_node_and_the_cheaper_way_is_taken() {
     let case = scenes::occlusion_alone();
     let expected = one_node(&case);
     for ranks in [2, 8, 27] {
-        let ghost = many(&case, ranks, &Split::Triangles, Light::Ghost);
+        let ghost = many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::GhostZones);
         assert_same(&expected, &ghost, &format!("ghost zones, {ranks} ranks"));
-        assert!(ghost[0].report.light.starts_with("ghost zones"), "{}", ghost[0].report.light);
-        let asked = many(&case, ranks, &Split::Triangles, Light::Ask);
+        assert!(
+            ghost[0].report.secondary_rays.starts_with("ghost zones"),
+            "{}",
+            ghost[0].report.secondary_rays
+        );
+        let asked = many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::Forward);
         assert_same(&expected, &asked, &format!("asking, {ranks} ranks"));
         // Few points are asked of others with ghost zones: those whose hit is another rank's, once each.
         let traced = |o: &[FrameOutput]| o.iter().map(|o| o.report.answered_rays).sum::<u64>();
         assert!(traced(&ghost) < traced(&asked), "{} {}", traced(&ghost), traced(&asked));
         // Built for one frame zones are dear, for thousands cheap: see the words.
-        let once = many(&case, ranks, &Split::Triangles, Light::Auto { frames: 1 });
-        let often = many(&case, ranks, &Split::Triangles, Light::Auto { frames: 100_000 });
+        let once = many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::Auto { frames: 1 });
+        let often = many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::Auto { frames: 100_000 });
         assert_same(&expected, &often, "many frames");
-        assert!(once[0].report.light.contains("estimated"), "{}", once[0].report.light);
-        assert!(often[0].report.light.starts_with("ghost zones"), "{}", often[0].report.light);
-        assert!(once.iter().chain(&often).all(|o| !o.report.light.is_empty()));
-        let local = many(&case, ranks, &Split::Triangles, Light::LocalOnly);
+        assert!(once[0].report.secondary_rays.contains("estimated"), "{}", once[0].report.secondary_rays);
+        assert!(
+            often[0].report.secondary_rays.starts_with("ghost zones"),
+            "{}",
+            often[0].report.secondary_rays
+        );
+        assert!(once.iter().chain(&often).all(|o| !o.report.secondary_rays.is_empty()));
+        let local = many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::LocalOnly);
         let differ = differing_pixels(&expected, local.last().unwrap().frame.as_ref().unwrap());
         assert!(differ > 0, "{ranks} ranks: the scene does not test ghost zones");
     }
@@ -252,7 +265,8 @@ fn replicated_data_have_the_bits_of_one_node() {
         let expected = one_node(&case);
         for ranks in [1, 3, 6] {
             let outputs = threads::run(ranks, |mut comm| {
-                let options = FrameOptions { root: Some(ranks - 1), ..frame_options(Light::Ask) };
+                let options =
+                    FrameOptions { root: Some(ranks - 1), ..frame_options(SecondaryRayPolicy::Forward) };
                 ray_parallel(&mut comm, &case.scene, &case.camera, &case.options, &options).unwrap()
             });
             let outputs: Vec<_> = outputs.into_iter().map(Result::unwrap).collect();
@@ -264,7 +278,7 @@ fn replicated_data_have_the_bits_of_one_node() {
 #[test]
 fn spans_cover_a_frame_without_gaps_and_bytes_add_up() {
     let case = scenes::shadows_and_occlusion(DVec3::ZERO);
-    let outputs = many(&case, 5, &Split::Triangles, Light::Ask);
+    let outputs = many(&case, 5, &Split::Triangles, SecondaryRayPolicy::Forward);
     for o in &outputs {
         let spans = &o.report.spans;
         assert!(spans.windows(2).all(|w| w[0].end_secs == w[1].begin_secs) && spans[0].begin_secs == 0.0);

@@ -1,7 +1,7 @@
 //! Several volumes, each in bricks or whole on some ranks, that share space with each other and with surfaces.
 use super::scenes::{self, AMBIENT, Case, camera, matte, options};
 use super::{assert_same, dealt, differing_pixels, many, one_node, values_held};
-use composite::render::{FrameError, Light as Way, Partition, Split};
+use composite::render::{FrameError, Partition, SecondaryRayPolicy, Split};
 use rt_core::colormap::ColorMap;
 use rt_core::frame::Layers;
 use rt_core::glam::{DAffine3, DVec3, UVec3, Vec3};
@@ -116,7 +116,7 @@ fn several_volumes_that_overlap_have_the_bits_of_one_node() {
             // More than the blocks of the coarse volume.
             (64, Split::Triangles),
         ] {
-            let outputs = many(&case, ranks, &split, Way::Ask);
+            let outputs = many(&case, ranks, &split, SecondaryRayPolicy::Forward);
             assert_same(&expected, &outputs, &format!("{}, {ranks} ranks", case.name));
             assert!(outputs[0].report.warnings.iter().all(|w| !w.contains("whole")));
         }
@@ -140,9 +140,9 @@ fn volumes_whole_on_some_ranks_and_cut_over_others_have_the_bits_of_one_node() {
     for (name, deal) in deals {
         let mut partition = Partition::new(&case.scene, 5, &Split::Triangles);
         for (volume, holders) in deal.iter().enumerate() {
-            partition = partition.hold_volume(&case.scene, volume, holders).unwrap();
+            partition = partition.distribute_volume(&case.scene, volume, holders).unwrap();
         }
-        let outputs = dealt(&case, &partition, Way::Ask);
+        let outputs = dealt(&case, &partition, SecondaryRayPolicy::Forward);
         assert_same(&expected, &outputs, name);
         let held = values_held(&case, &partition);
         match name {
@@ -199,7 +199,7 @@ fn projections_are_seen_whole_and_have_the_bits_of_one_node() {
         for case in [one, among] {
             let expected = one_node(&case);
             for ranks in [2, 6] {
-                let outputs = many(&case, ranks, &Split::Triangles, Way::Ask);
+                let outputs = many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::Forward);
                 assert_same(&expected, &outputs, &format!("{} {blend:?}, {ranks} ranks", case.name));
                 assert!(outputs[0].report.warnings.iter().any(|w| w.contains("every rank holds them whole")));
             }
@@ -216,7 +216,7 @@ fn deals_that_cannot_be_are_refused_by_name() {
     let case = alone(volumes);
     let refused = |volume: usize, holders: &[Vec<usize>]| {
         let partition = Partition::new(&case.scene, 4, &Split::Triangles);
-        match partition.hold_volume(&case.scene, volume, holders) {
+        match partition.distribute_volume(&case.scene, volume, holders) {
             Err(FrameError::Holders { volume: v, reason }) if v == volume => reason,
             other => panic!("{other:?}"),
         }

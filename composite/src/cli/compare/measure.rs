@@ -3,12 +3,12 @@ use super::table::{Pixels, Row};
 use crate::cli::ranks::RankComm;
 use crate::compositor::{Compositor, Options};
 use crate::frame::{Frame, Image};
+use crate::icet::{Icet, IcetFrame, IcetImage, IcetMode, IcetStrategy};
 use crate::pixel::{DepthPixel, PremultipliedPixel};
-use crate::rival::{Icet, IcetFrame, IcetImage, IcetMode, IcetStrategy};
-use crate::scenes::{Drawn, Scene};
-use crate::seats::{Seat, seats};
+use crate::shared_memory_group::{SharedMemoryRank, shared_memory_group};
 use crate::simd::SimdLevel;
 use crate::strategies::Strategy;
+use crate::workload::{SyntheticFrame, Workload};
 use anyhow::Context as _;
 use datasets::cli::UsageError;
 use std::path::Path;
@@ -40,27 +40,27 @@ pub(super) struct Bench<'a> {
     icet: Icet,
     depth: Compositor<DepthPixel<[u8; 4]>>,
     blend: Compositor<PremultipliedPixel<[f32; 4]>>,
-    drawn: Drawn,
+    drawn: SyntheticFrame,
     glass: Vec<[f32; 4]>,
 }
 
 /// The places of one rank that is a thread at tables that it shares with the others.
-pub(super) struct Seats {
-    depth: Seat<DepthPixel<[u8; 4]>>,
-    blend: Seat<PremultipliedPixel<[f32; 4]>>,
+pub(super) struct GroupMembers {
+    depth: SharedMemoryRank<DepthPixel<[u8; 4]>>,
+    blend: SharedMemoryRank<PremultipliedPixel<[f32; 4]>>,
 }
 
 /// Places for all ranks, until they come.
-pub(super) struct Tables(Vec<Mutex<Option<Seats>>>);
+pub(super) struct Groups(Vec<Mutex<Option<GroupMembers>>>);
 
-impl Tables {
+impl Groups {
     /// For ranks that are threads; 0 if they are not, or are to send messages.
     pub(super) fn new(ranks: usize) -> Self {
-        let places = seats(ranks).into_iter().zip(seats(ranks));
-        Self(places.map(|(depth, blend)| Mutex::new(Some(Seats { depth, blend }))).collect())
+        let members = shared_memory_group(ranks).into_iter().zip(shared_memory_group(ranks));
+        Self(members.map(|(depth, blend)| Mutex::new(Some(GroupMembers { depth, blend }))).collect())
     }
 
-    pub(super) fn seats_of(&self, rank: usize) -> Option<Seats> {
+    pub(super) fn members_of(&self, rank: usize) -> Option<GroupMembers> {
         self.0.get(rank)?.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 }
@@ -83,7 +83,7 @@ impl<'a> Bench<'a> {
             in_memory,
             simd,
             depth: false,
-            confirm: false,
+            final_barrier: false,
             timeout,
             ..Options::default()
         };
@@ -93,13 +93,13 @@ impl<'a> Bench<'a> {
             icet: icet.map_err(|error| UsageError(error.to_string()))?,
             depth: Compositor::new(options.clone()),
             blend: Compositor::new(options),
-            drawn: Drawn::new(size, size),
+            drawn: SyntheticFrame::new(size, size),
             glass: Vec::new(),
         })
     }
 
     fn shared(&self) -> anyhow::Result<Shared> {
-        let Drawn { width_px, height_px, colors, depths, .. } = &self.drawn;
+        let SyntheticFrame { width_px, height_px, colors, depths, .. } = &self.drawn;
         Ok(match self.setting.pixels {
             Pixels::Depth => {
                 let image = Image::from_planes(*width_px, *height_px, colors.clone(), depths.clone())?;
@@ -113,7 +113,7 @@ impl<'a> Bench<'a> {
     }
 
     /// The frame at hand by IceT's strategy of this number, and what `look` makes of the image where it is.
-    fn theirs<T>(
+    fn run_icet<T>(
         &mut self,
         strategy: usize,
         timed: bool,
@@ -139,7 +139,11 @@ impl<'a> Bench<'a> {
     }
 
     /// Frames of one scene.
-    pub(super) fn measure(&mut self, scene: Scene, mut seats: Option<&mut Seats>) -> anyhow::Result<Row> {
+    pub(super) fn measure(
+        &mut self,
+        scene: Workload,
+        mut members: Option<&mut GroupMembers>,
+    ) -> anyhow::Result<Row> {
         let (rank, ranks) = (self.comm.comm().rank(), self.comm.comm().size());
         let Setting { size_px, pixels, strategy, simd, frames, timeout, .. } = self.setting;
         let mut ours_ms = Vec::new();
@@ -156,42 +160,45 @@ impl<'a> Bench<'a> {
             let timed = moment >= WARM_UP;
 
             // Renderers of one process draw into images that they can share.
-            let shared = seats.is_some().then(|| self.shared()).transpose()?;
-            let turns = turns(1 + IcetStrategy::ALL.len(), moment);
+            let shared = members.is_some().then(|| self.shared()).transpose()?;
+            let turns = rotated_order(1 + IcetStrategy::ALL.len(), moment);
             let ours_at = turns.iter().position(|turn| *turn == 0).unwrap_or(0);
             let mut copies = Vec::new();
             for turn in &turns[..ours_at] {
-                copies.extend(self.theirs(turn - 1, timed, &mut rivals_ms, |image| Theirs::copied(&image))?);
+                copies.extend(
+                    self.run_icet(turn - 1, timed, &mut rivals_ms, |image| IcetPixels::copied(&image))?,
+                );
             }
 
             // Ours.
             self.comm.comm().barrier(timeout)?;
             let begin = self.comm.comm().now();
-            let (image, report) = match (&shared, &mut seats) {
-                (Some(Shared::Depth(image)), Some(seats)) => {
+            let (image, report) = match (&shared, &mut members) {
+                (Some(Shared::Depth(image)), Some(members)) => {
                     let (comm, bounds) = (self.comm.comm(), self.drawn.bounds);
-                    let done = seats.depth.composite(comm, image, bounds, self.depth.options())?;
-                    (done.image.map(Ours::Depth), done.report)
+                    let done = members.depth.composite(comm, image, bounds, self.depth.options())?;
+                    (done.image.map(CompositeImage::Depth), done.report)
                 }
-                (Some(Shared::Blend(image)), Some(seats)) => {
+                (Some(Shared::Blend(image)), Some(members)) => {
                     self.blend.set_order(Some(order));
                     let (comm, bounds) = (self.comm.comm(), self.drawn.bounds);
-                    let done = seats.blend.composite(comm, image, bounds, self.blend.options())?;
-                    (done.image.map(Ours::Blend), done.report)
+                    let done = members.blend.composite(comm, image, bounds, self.blend.options())?;
+                    (done.image.map(CompositeImage::Blend), done.report)
                 }
                 _ if pixels == Pixels::Depth => {
                     let drawn = &self.drawn;
                     let frame =
                         Frame::with_depth(drawn.width_px, drawn.height_px, &drawn.colors, &drawn.depths)?;
-                    let done = self.depth.composite(self.comm.comm(), &frame.bounded(drawn.bounds)?)?;
-                    (done.image.map(Ours::Depth), done.report)
+                    let done = self.depth.composite(self.comm.comm(), &frame.with_bounds(drawn.bounds)?)?;
+                    (done.image.map(CompositeImage::Depth), done.report)
                 }
                 _ => {
                     // The order changes from frame to frame; buffers stay.
                     self.blend.set_order(Some(order));
                     let frame = Frame::premultiplied(self.drawn.width_px, self.drawn.height_px, &self.glass)?;
-                    let done = self.blend.composite(self.comm.comm(), &frame.bounded(self.drawn.bounds)?)?;
-                    (done.image.map(Ours::Blend), done.report)
+                    let done =
+                        self.blend.composite(self.comm.comm(), &frame.with_bounds(self.drawn.bounds)?)?;
+                    (done.image.map(CompositeImage::Blend), done.report)
                 }
             };
             self.comm.comm().barrier(timeout)?;
@@ -203,20 +210,21 @@ impl<'a> Bench<'a> {
 
             // IceT's strategies whose turn was before ours, and those whose turn is now.
             if let Some(ours) = &image {
-                pixels_differ += copies.iter().map(|theirs| differing(ours, theirs.image())).sum::<u64>();
+                pixels_differ +=
+                    copies.iter().map(|theirs| count_differing(ours, theirs.image())).sum::<u64>();
             }
             drop(copies);
             for turn in &turns[ours_at + 1..] {
-                let differ = self.theirs(turn - 1, timed, &mut rivals_ms, |theirs| {
-                    image.as_ref().map_or(0, |ours| differing(ours, theirs))
+                let differ = self.run_icet(turn - 1, timed, &mut rivals_ms, |theirs| {
+                    image.as_ref().map_or(0, |ours| count_differing(ours, theirs))
                 })?;
                 pixels_differ += differ.unwrap_or(0);
             }
-            match (image, &mut seats) {
-                (Some(Ours::Depth(image)), Some(seats)) => seats.depth.recycle(image),
-                (Some(Ours::Blend(image)), Some(seats)) => seats.blend.recycle(image),
-                (Some(Ours::Depth(image)), None) => self.depth.recycle(image),
-                (Some(Ours::Blend(image)), None) => self.blend.recycle(image),
+            match (image, &mut members) {
+                (Some(CompositeImage::Depth(image)), Some(members)) => members.depth.recycle(image),
+                (Some(CompositeImage::Blend(image)), Some(members)) => members.blend.recycle(image),
+                (Some(CompositeImage::Depth(image)), None) => self.depth.recycle(image),
+                (Some(CompositeImage::Blend(image)), None) => self.blend.recycle(image),
                 (None, _) => {}
             }
         }
@@ -270,7 +278,7 @@ impl<'a> Bench<'a> {
 /// The order of a frame's turns, the same on all ranks: rotated from frame to frame, and reversed in every second one, so
 /// that each is first, last and behind each neighbour equally often. As in `runner` of the member bench, which may use
 /// composite and may not be used by it.
-fn turns(count: usize, frame: u64) -> Vec<usize> {
+fn rotated_order(count: usize, frame: u64) -> Vec<usize> {
     let mut turns: Vec<usize> = (0..count).map(|i| (i + frame as usize / 2) % count.max(1)).collect();
     if frame % 2 == 1 {
         turns.reverse();
@@ -279,23 +287,23 @@ fn turns(count: usize, frame: u64) -> Vec<usize> {
 }
 
 /// IceT's image, which it keeps only until its next frame.
-enum Theirs {
+enum IcetPixels {
     Rgba8(Vec<[u8; 4]>),
     RgbaF32(Vec<[f32; 4]>),
 }
 
-impl Theirs {
-    fn copied(image: &IcetImage<'_>) -> Theirs {
+impl IcetPixels {
+    fn copied(image: &IcetImage<'_>) -> IcetPixels {
         match image {
-            IcetImage::Rgba8(colors) => Theirs::Rgba8(colors.to_vec()),
-            IcetImage::RgbaF32(colors) => Theirs::RgbaF32(colors.to_vec()),
+            IcetImage::Rgba8(colors) => IcetPixels::Rgba8(colors.to_vec()),
+            IcetImage::RgbaF32(colors) => IcetPixels::RgbaF32(colors.to_vec()),
         }
     }
 
     fn image(&self) -> IcetImage<'_> {
         match self {
-            Theirs::Rgba8(colors) => IcetImage::Rgba8(colors),
-            Theirs::RgbaF32(colors) => IcetImage::RgbaF32(colors),
+            IcetPixels::Rgba8(colors) => IcetImage::Rgba8(colors),
+            IcetPixels::RgbaF32(colors) => IcetImage::RgbaF32(colors),
         }
     }
 }
@@ -306,17 +314,17 @@ enum Shared {
     Blend(Arc<Image<PremultipliedPixel<[f32; 4]>>>),
 }
 
-enum Ours {
+enum CompositeImage {
     Depth(Image<DepthPixel<[u8; 4]>>),
     Blend(Image<PremultipliedPixel<[f32; 4]>>),
 }
 
-fn differing(ours: &Ours, theirs: IcetImage<'_>) -> u64 {
+fn count_differing(ours: &CompositeImage, theirs: IcetImage<'_>) -> u64 {
     let count = match (ours, theirs) {
-        (Ours::Depth(ours), IcetImage::Rgba8(theirs)) => {
+        (CompositeImage::Depth(ours), IcetImage::Rgba8(theirs)) => {
             ours.colors().iter().zip(theirs).filter(|(a, b)| a != b).count()
         }
-        (Ours::Blend(ours), IcetImage::RgbaF32(theirs)) => {
+        (CompositeImage::Blend(ours), IcetImage::RgbaF32(theirs)) => {
             let differ = |(a, b): &(&[f32; 4], &[f32; 4])| {
                 // Not "any is farther", so that NaN differs.
                 !a.iter().zip(*b).all(|(a, b)| (a - b).abs() <= BLEND_TOLERANCE)
@@ -347,7 +355,8 @@ mod tests {
         let count = 1 + IcetStrategy::ALL.len();
         for place in 0..count {
             for contender in 0..count {
-                let here = (0..2 * count as u64).filter(|frame| turns(count, *frame)[place] == contender);
+                let here =
+                    (0..2 * count as u64).filter(|frame| rotated_order(count, *frame)[place] == contender);
                 assert_eq!(here.count(), 2, "contender {contender} at place {place}");
             }
         }

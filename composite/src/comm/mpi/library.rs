@@ -173,7 +173,7 @@ impl Mpi {
     }
 
     /// The library's words for an error code.
-    pub(crate) fn words(&self, code: c_int) -> String {
+    pub(crate) fn error_text(&self, code: c_int) -> String {
         let mut text = vec![0_u8; 8192];
         let mut length = 0;
         // SAFETY: the buffer is longer than MPI_MAX_ERROR_STRING of every ABI here (512 at most).
@@ -184,7 +184,7 @@ impl Mpi {
     }
 
     /// `MPI_IN_PLACE`.
-    #[cfg(feature = "rival")]
+    #[cfg(feature = "icet")]
     pub(crate) fn in_place(&self) -> *const c_void {
         self.constants.in_place as *const c_void
     }

@@ -11,15 +11,15 @@
 mod abi;
 mod clock;
 mod error;
+mod heartbeat;
 pub mod launcher;
 mod library;
-#[cfg(target_os = "linux")]
-mod meeting;
-#[cfg(target_os = "linux")]
-mod node;
 mod notice;
-mod places;
-mod signs;
+#[cfg(target_os = "linux")]
+mod shared_collectives;
+#[cfg(target_os = "linux")]
+mod shared_memory;
+mod topology;
 mod transfer;
 
 pub use abi::Abi;
@@ -28,11 +28,11 @@ pub use library::inspect;
 pub(crate) use library::{Handle, Mpi};
 
 #[cfg(target_os = "linux")]
-use super::NodeMemory;
+use super::SharedSegments;
 use super::{Arrival, CommError, Communicator, Receive, collective};
 use clock::Clock;
+use heartbeat::{HeartbeatTimeout, Heartbeats};
 use notice::{Notice, Notices};
-use signs::{Patience, Signs};
 use std::ffi::c_int;
 use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -45,9 +45,9 @@ const CHUNK_BYTES: usize = 1 << 26;
 /// `MPI_THREAD_FUNNELED` in all three ABIs: there may be other threads, but this one calls.
 const FUNNELED: c_int = 1;
 /// How long a message of a rank that has left may still be on its way.
-const LAST_MESSAGES: Duration = Duration::from_millis(200);
+const LATE_MESSAGE_TIMEOUT: Duration = Duration::from_millis(200);
 /// How long a rank that leaves waits for its messages to be taken.
-const PARTING: Duration = Duration::from_secs(2);
+const DRAIN_TIMEOUT: Duration = Duration::from_secs(2);
 /// Messages on their way from which on a sender looks which of them have left, if it has not needed their buffers before.
 const REAP_AT: usize = 512;
 /// Polls before the processor is offered to others, where every rank has its own.
@@ -55,9 +55,9 @@ const SPINS: u32 = 2000;
 /// Offers of the processor before a rank sleeps, where ranks share processors.
 const YIELDS: u32 = 100;
 /// How long it sleeps then.
-const NAP: Duration = Duration::from_micros(20);
+const POLL_SLEEP: Duration = Duration::from_micros(20);
 /// Longest wait for the other ranks when the group is made.
-const START: Duration = Duration::from_secs(300);
+const STARTUP_TIMEOUT: Duration = Duration::from_secs(300);
 /// How often a waiting rank looks for notices.
 const NOTICE_INTERVAL: Duration = Duration::from_millis(1);
 
@@ -71,7 +71,7 @@ pub struct MpiComm {
     clock: Clock,
     transfers: Transfers,
     notices: Notices,
-    signs: Signs,
+    heartbeats: Heartbeats,
     /// When notices were last looked for beside work.
     looked: Instant,
     left: Vec<bool>,
@@ -81,12 +81,12 @@ pub struct MpiComm {
     /// The machine of every rank, numbered in the order of their first ranks; the same on all ranks.
     nodes: Vec<usize>,
     finalize: bool,
-    /// See [`linger`](Self::linger).
+    /// See [`delay_after_collectives`](Self::delay_after_collectives).
     #[cfg(target_os = "linux")]
-    linger: Duration,
+    delay_after_collectives: Duration,
     /// What ranks of one machine share, if all of them could open it.
     #[cfg(target_os = "linux")]
-    node: Option<node::Node>,
+    shared: Option<shared_memory::SharedMemory>,
 }
 
 static STARTED: AtomicBool = AtomicBool::new(false);
@@ -116,7 +116,7 @@ impl MpiComm {
         let mut initialized: c_int = 0;
         let check = |mpi: &Mpi, call: &str, code: c_int| match code {
             0 => Ok(()),
-            _ => Err(MpiError::Call { call: call.to_string(), reason: mpi.words(code) }),
+            _ => Err(MpiError::Call { call: call.to_string(), reason: mpi.error_text(code) }),
         };
         // SAFETY: MPI_Initialized may be called at any time.
         check(&mpi, "MPI_Initialized", unsafe { (mpi.functions.initialized)(&raw mut initialized) })?;
@@ -165,7 +165,7 @@ impl MpiComm {
             clock: Clock::new(mpi.abi),
             transfers: Transfers::new(rank, messages, chunk_bytes),
             notices: Notices::new(notices),
-            signs: Signs::new(rank, size),
+            heartbeats: Heartbeats::new(rank, size),
             looked: Instant::now(),
             left: vec![false; size],
             aborted: None,
@@ -174,9 +174,9 @@ impl MpiComm {
             finalize: initialized == 0,
             mpi: Rc::new(mpi),
             #[cfg(target_os = "linux")]
-            linger: Duration::ZERO,
+            delay_after_collectives: Duration::ZERO,
             #[cfg(target_os = "linux")]
-            node: None,
+            shared: None,
         };
         let failed = |error: CommError| MpiError::Call {
             call: "the first all-gather".to_string(),
@@ -218,7 +218,7 @@ impl MpiComm {
     /// what went wrong before. Gives the others a moment to say it as well.
     pub fn end_job(mut self, code: i32) {
         let begin = Instant::now();
-        while begin.elapsed() < LAST_MESSAGES && self.mpi.abi != Abi::Smpi {
+        while begin.elapsed() < LATE_MESSAGE_TIMEOUT && self.mpi.abi != Abi::Smpi {
             self.notices.delivered(&self.mpi);
             std::thread::sleep(Duration::from_millis(10));
         }
@@ -243,13 +243,13 @@ impl MpiComm {
         (0..self.size).filter(move |&other| other != rank)
     }
 
-    fn hear(&mut self) -> Result<(), CommError> {
-        while let Some(notice) = self.notices.heard(&self.mpi) {
+    fn process_notices(&mut self) -> Result<(), CommError> {
+        while let Some(notice) = self.notices.receive(&self.mpi) {
             match notice {
                 Notice::Left { rank } if rank < self.size => self.left[rank] = true,
                 Notice::Left { .. } => {}
-                Notice::Asks { rank } => self.signs.asked_by(rank),
-                Notice::Lives { rank, sign } => self.signs.heard(rank, sign),
+                Notice::HeartbeatRequest { rank } => self.heartbeats.requested_by(rank),
+                Notice::Heartbeat { rank, heartbeat } => self.heartbeats.record(rank, heartbeat),
                 Notice::Aborted { by, reason } => {
                     self.aborted.get_or_insert((by, reason));
                 }
@@ -262,29 +262,29 @@ impl MpiComm {
     }
 
     /// Answers whoever has asked for a sign of life of this rank, as far as it has done anything.
-    fn answer(&mut self) {
-        let signs = self.signs.own();
-        self.notices.tell_signs(&self.mpi, signs);
+    fn answer_heartbeat_requests(&mut self) {
+        let heartbeats = self.heartbeats.take_replies();
+        self.notices.send_heartbeats(&self.mpi, heartbeats);
     }
 
-    /// To be called while waiting, behind [`hear`](Self::hear): gives and takes signs of life.
-    fn keep_patience(&mut self, patience: &mut Patience, sources: &[usize], now: Instant) {
+    /// To be called while waiting, behind [`process_notices`](Self::process_notices): gives and takes signs of life.
+    fn update_timeout(&mut self, patience: &mut HeartbeatTimeout, sources: &[usize], now: Instant) {
         if self.mpi.abi == Abi::Smpi {
             return;
         }
-        self.answer();
-        let (any, to_hand_on) = self.signs.of(|from| sources.contains(&from));
+        self.answer_heartbeat_requests();
+        let (any, to_hand_on) = self.heartbeats.take_new(|from| sources.contains(&from));
         if any {
             patience.renew(now);
-            self.notices.tell_signs(&self.mpi, to_hand_on);
+            self.notices.send_heartbeats(&self.mpi, to_hand_on);
         }
-        if patience.asks(now) {
+        if patience.is_request_due(now) {
             let mut asked = sources.to_vec();
             asked.sort_unstable();
             asked.dedup();
             let left = &self.left;
             asked.retain(|&source| source != self.rank && !left[source]);
-            self.notices.ask(&self.mpi, asked.into_iter());
+            self.notices.request_heartbeats(&self.mpi, asked.into_iter());
         }
     }
 
@@ -293,7 +293,7 @@ impl MpiComm {
         let position_of = |id| posted.iter().position(|receive| receive.id == id);
         let (position, message) = self.transfers.take(position_of)?;
         let Receive { source, tag, .. } = posted.remove(position);
-        self.signs.step();
+        self.heartbeats.step();
         Some(Arrival { source, tag, message })
     }
 }
@@ -317,11 +317,11 @@ impl Communicator for MpiComm {
 
     /// Never of simulated ranks, whose messages take simulated time on one machine too.
     fn is_one_node(&self) -> bool {
-        self.mpi.abi != Abi::Smpi && self.nodes.iter().all(|&node| node == 0)
+        self.mpi.abi != Abi::Smpi && self.nodes.iter().all(|&shared| shared == 0)
     }
 
-    fn reason(&mut self, error: CommError) -> CommError {
-        self.hear().err().unwrap_or(error)
+    fn root_cause(&mut self, error: CommError) -> CommError {
+        self.process_notices().err().unwrap_or(error)
     }
 
     fn send(&mut self, destination: usize, tag: u32, message: Vec<u8>) -> Result<(), CommError> {
@@ -329,14 +329,14 @@ impl Communicator for MpiComm {
         if self.left[destination] {
             return Err(CommError::PeerLost { rank: self.rank, peer: destination });
         }
-        self.signs.step();
-        self.answer();
+        self.heartbeats.step();
+        self.answer_heartbeat_requests();
         let Self { transfers, mpi, clock, .. } = self;
         clock.around(|| {
             transfers.send(mpi, destination, tag, message)?;
             // Asking costs as much as sending a small message, so not for every one.
             if transfers.outgoing() >= REAP_AT {
-                transfers.reap(mpi);
+                transfers.reclaim_buffers(mpi);
             }
             Ok(())
         })
@@ -362,8 +362,8 @@ impl Communicator for MpiComm {
         // Simulated time does not pass while polling, so SMPI has to block.
         let block = self.mpi.abi == Abi::Smpi && !timeout.is_zero();
         let begin = Instant::now();
-        let mut patience = Patience::new(timeout, begin);
-        let mut heard = begin;
+        let mut patience = HeartbeatTimeout::new(timeout, begin);
+        let mut received = begin;
         let mut lost_since: Option<Instant> = None;
         let mut polls = 0_u32;
         if let Some(arrival) = self.complete(posted) {
@@ -382,12 +382,12 @@ impl Communicator for MpiComm {
             if patience.is_over(now) {
                 // Whoever gave up first knows better what is wrong.
                 if self.mpi.abi != Abi::Smpi {
-                    self.hear()?;
+                    self.process_notices()?;
                 }
                 // A sign may have come while this rank had no processor.
                 if !timeout.is_zero() {
                     let sources: Vec<usize> = posted.iter().map(|receive| receive.source).collect();
-                    self.keep_patience(&mut patience, &sources, now);
+                    self.update_timeout(&mut patience, &sources, now);
                 }
                 if patience.is_over(now) {
                     return Err(silent);
@@ -396,19 +396,19 @@ impl Communicator for MpiComm {
             polls += 1;
             if self.oversubscribed && polls > YIELDS {
                 // Whoever only yields uses up its share of the processor and is served last when its message has come.
-                std::thread::sleep(NAP);
+                std::thread::sleep(POLL_SLEEP);
             } else if self.oversubscribed || polls > SPINS {
                 std::thread::yield_now();
             }
-            if now.duration_since(heard) >= NOTICE_INTERVAL {
-                heard = now;
-                self.hear()?;
-                self.transfers.reap(&self.mpi);
+            if now.duration_since(received) >= NOTICE_INTERVAL {
+                received = now;
+                self.process_notices()?;
+                self.transfers.reclaim_buffers(&self.mpi);
                 let sources: Vec<usize> = posted.iter().map(|receive| receive.source).collect();
-                self.keep_patience(&mut patience, &sources, now);
+                self.update_timeout(&mut patience, &sources, now);
                 if let Some(lost) = posted.iter().find(|receive| self.left[receive.source]) {
                     let since = *lost_since.get_or_insert(now);
-                    if now.duration_since(since) >= LAST_MESSAGES {
+                    if now.duration_since(since) >= LATE_MESSAGE_TIMEOUT {
                         return Err(CommError::PeerLost { rank, peer: lost.source });
                     }
                 }
@@ -417,19 +417,19 @@ impl Communicator for MpiComm {
     }
 
     fn alive(&mut self) -> Result<(), CommError> {
-        self.signs.step();
+        self.heartbeats.step();
         let now = Instant::now();
         // Simulated ranks wait without a timeout.
         if self.mpi.abi == Abi::Smpi || now.duration_since(self.looked) < NOTICE_INTERVAL {
             return Ok(());
         }
         self.looked = now;
-        self.hear()?;
-        self.answer();
+        self.process_notices()?;
+        self.answer_heartbeat_requests();
         Ok(())
     }
 
-    fn let_leave(&mut self, tag: u32, most: usize, patience: Duration) {
+    fn throttle_sends(&mut self, tag: u32, most: usize, patience: Duration) {
         // Where no message travels by itself, waiting for it only holds up the others.
         if self.is_one_node() {
             return;
@@ -444,9 +444,9 @@ impl Communicator for MpiComm {
         }
         let begin = Instant::now();
         while transfers.outgoing_of(tag) > most && begin.elapsed() < patience {
-            transfers.reap(mpi);
+            transfers.reclaim_buffers(mpi);
             if oversubscribed {
-                std::thread::sleep(NAP);
+                std::thread::sleep(POLL_SLEEP);
             } else {
                 std::hint::spin_loop();
             }
@@ -457,18 +457,18 @@ impl Communicator for MpiComm {
         if self.aborted.is_none() {
             self.aborted = Some((self.rank, reason.to_string()));
             let others = self.others();
-            self.notices.tell_aborted(&self.mpi, others, reason);
+            self.notices.send_aborted(&self.mpi, others, reason);
         }
     }
 
     #[cfg(target_os = "linux")]
-    fn node_memory(&mut self) -> Option<&mut dyn NodeMemory> {
-        self.node.as_mut().map(|node| node as &mut dyn NodeMemory)
+    fn shared_segments(&mut self) -> Option<&mut dyn SharedSegments> {
+        self.shared.as_mut().map(|shared| shared as &mut dyn SharedSegments)
     }
 
     fn barrier(&mut self, timeout: Duration) -> Result<(), CommError> {
         #[cfg(target_os = "linux")]
-        if let Some(met) = self.meet_in_memory(None, timeout) {
+        if let Some(met) = self.collective_in_memory(None, timeout) {
             return met.map(|_| ());
         }
         if self.mpi.abi != Abi::Smpi {
@@ -488,11 +488,11 @@ impl Communicator for MpiComm {
         timeout: Duration,
     ) -> Result<Vec<Vec<u8>>, CommError> {
         #[cfg(target_os = "linux")]
-        if longest <= node::LONGEST
+        if longest <= shared_memory::LONGEST
             && mine.len() <= longest
-            && let Some(said) = self.meet_in_memory(Some(mine), timeout)
+            && let Some(gathered) = self.collective_in_memory(Some(mine), timeout)
         {
-            return said;
+            return gathered;
         }
         let block = 8 + longest;
         let bytes = c_int::try_from(block);
@@ -564,16 +564,16 @@ impl Drop for MpiComm {
 
         // What was sent shall arrive before the news that this rank has left.
         let begin = Instant::now();
-        self.transfers.reap(&self.mpi);
-        while self.transfers.outgoing() > 0 && begin.elapsed() < PARTING && self.aborted.is_none() {
+        self.transfers.reclaim_buffers(&self.mpi);
+        while self.transfers.outgoing() > 0 && begin.elapsed() < DRAIN_TIMEOUT && self.aborted.is_none() {
             std::thread::yield_now();
-            self.transfers.reap(&self.mpi);
+            self.transfers.reclaim_buffers(&self.mpi);
         }
         if self.aborted.is_none() {
             let others = self.others();
-            self.notices.tell_left(&self.mpi, others);
+            self.notices.send_left(&self.mpi, others);
         }
-        while !self.notices.delivered(&self.mpi) && begin.elapsed() < PARTING {
+        while !self.notices.delivered(&self.mpi) && begin.elapsed() < DRAIN_TIMEOUT {
             std::thread::yield_now();
         }
 
@@ -581,10 +581,10 @@ impl Drop for MpiComm {
         // still works may yet report one.
         if self.finalize && self.aborted.is_none() {
             while self.others().any(|other| !self.left[other]) {
-                if self.hear().is_err() {
+                if self.process_notices().is_err() {
                     return;
                 }
-                self.transfers.reap(&self.mpi);
+                self.transfers.reclaim_buffers(&self.mpi);
                 std::thread::sleep(Duration::from_micros(100));
             }
             // SAFETY: called once, by the object that started MPI.

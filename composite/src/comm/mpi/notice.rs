@@ -1,14 +1,14 @@
 //! News about the group itself: a rank gives up, has left, asks for a sign of life or gives one. They go beside the messages, on a communicator of their own, and
 //! are looked for while waiting.
+use super::heartbeat::Heartbeat;
 use super::library::{Handle, Mpi, Status};
-use super::signs::Sign;
 use std::ffi::c_int;
 
 const TAG: c_int = 1;
 const LEFT: u8 = 0;
 const ABORTED: u8 = 1;
-const ASKS: u8 = 2;
-const LIVES: u8 = 3;
+const HEARTBEAT_REQUEST: u8 = 2;
+const HEARTBEAT: u8 = 3;
 /// Longer reasons are cut; a notice must be small enough to travel without its receiver's help.
 const LONGEST: usize = 2000;
 
@@ -23,13 +23,13 @@ pub(super) enum Notice {
         reason: String,
     },
     /// It wants a sign of life.
-    Asks {
+    HeartbeatRequest {
         rank: usize,
     },
     /// It, or one it waits for, has made so many steps.
-    Lives {
+    Heartbeat {
         rank: usize,
-        sign: Sign,
+        heartbeat: Heartbeat,
     },
 }
 
@@ -44,32 +44,32 @@ impl Notices {
         Self { comm, sent: Vec::new() }
     }
 
-    pub(super) fn tell_left(&mut self, mpi: &Mpi, others: impl Iterator<Item = usize>) {
-        self.tell(mpi, others, vec![LEFT]);
+    pub(super) fn send_left(&mut self, mpi: &Mpi, others: impl Iterator<Item = usize>) {
+        self.send(mpi, others, vec![LEFT]);
     }
 
-    pub(super) fn tell_aborted(&mut self, mpi: &Mpi, others: impl Iterator<Item = usize>, reason: &str) {
+    pub(super) fn send_aborted(&mut self, mpi: &Mpi, others: impl Iterator<Item = usize>, reason: &str) {
         let mut end = reason.len().min(LONGEST);
         while !reason.is_char_boundary(end) {
             end -= 1;
         }
-        self.tell(mpi, others, [&[ABORTED], &reason.as_bytes()[..end]].concat());
+        self.send(mpi, others, [&[ABORTED], &reason.as_bytes()[..end]].concat());
     }
 
-    pub(super) fn ask(&mut self, mpi: &Mpi, others: impl Iterator<Item = usize>) {
-        self.tell(mpi, others, vec![ASKS]);
+    pub(super) fn request_heartbeats(&mut self, mpi: &Mpi, others: impl Iterator<Item = usize>) {
+        self.send(mpi, others, vec![HEARTBEAT_REQUEST]);
     }
 
-    pub(super) fn tell_signs(&mut self, mpi: &Mpi, signs: Vec<(usize, Sign)>) {
-        for (rank, Sign { origin, steps }) in signs {
-            let mut message = vec![LIVES];
+    pub(super) fn send_heartbeats(&mut self, mpi: &Mpi, heartbeats: Vec<(usize, Heartbeat)>) {
+        for (rank, Heartbeat { origin, steps }) in heartbeats {
+            let mut message = vec![HEARTBEAT];
             message.extend_from_slice(&(origin as u32).to_le_bytes());
             message.extend_from_slice(&steps.to_le_bytes());
-            self.tell(mpi, std::iter::once(rank), message);
+            self.send(mpi, std::iter::once(rank), message);
         }
     }
 
-    fn tell(&mut self, mpi: &Mpi, others: impl Iterator<Item = usize>, message: Vec<u8>) {
+    fn send(&mut self, mpi: &Mpi, others: impl Iterator<Item = usize>, message: Vec<u8>) {
         self.delivered(mpi);
         for rank in others {
             let message = message.clone();
@@ -105,7 +105,7 @@ impl Notices {
     }
 
     /// The next notice that has come.
-    pub(super) fn heard(&mut self, mpi: &Mpi) -> Option<Notice> {
+    pub(super) fn receive(&mut self, mpi: &Mpi) -> Option<Notice> {
         let mut status: Status = [0; 8];
         let mut flag: c_int = 0;
         // SAFETY: looks for a message on this object's communicator; a status is at most as large as `Status`.
@@ -139,12 +139,15 @@ impl Notices {
             Some((&ABORTED, reason)) => {
                 Some(Notice::Aborted { by: rank, reason: String::from_utf8_lossy(reason).into_owned() })
             }
-            Some((&ASKS, _)) => Some(Notice::Asks { rank }),
-            Some((&LIVES, rest)) => {
+            Some((&HEARTBEAT_REQUEST, _)) => Some(Notice::HeartbeatRequest { rank }),
+            Some((&HEARTBEAT, rest)) => {
                 let (origin, steps) = rest.split_first_chunk::<4>()?;
                 let (steps, _) = steps.split_first_chunk::<8>()?;
                 let origin = u32::from_le_bytes(*origin) as usize;
-                Some(Notice::Lives { rank, sign: Sign { origin, steps: u64::from_le_bytes(*steps) } })
+                Some(Notice::Heartbeat {
+                    rank,
+                    heartbeat: Heartbeat { origin, steps: u64::from_le_bytes(*steps) },
+                })
             }
             _ => Some(Notice::Left { rank }),
         }

@@ -115,12 +115,12 @@ impl Transfers {
         if let Some(buffer) = self.pool.fitting(capacity) {
             return buffer;
         }
-        self.reap(mpi);
+        self.reclaim_buffers(mpi);
         self.pool.take(capacity)
     }
 
     /// Takes back the buffers of messages that have left, in one call for all.
-    pub(super) fn reap(&mut self, mpi: &Mpi) {
+    pub(super) fn reclaim_buffers(&mut self, mpi: &Mpi) {
         let requests: Vec<Handle> =
             self.outgoing.iter().flat_map(|message| message.requests.iter().copied()).collect();
         if requests.is_empty() {
@@ -309,7 +309,7 @@ impl Transfers {
         this.request = mpi.request_null;
         let too_long = CommError::TooLong { rank, peer: this.source, tag: this.tag, capacity: this.capacity };
         if code != 0 {
-            let words = mpi.words(code);
+            let words = mpi.error_text(code);
             // The class's number differs between libraries, its name does not.
             return Err(if words.to_lowercase().contains("truncat") {
                 too_long
@@ -347,7 +347,7 @@ impl Transfers {
 }
 
 pub(super) fn failed(mpi: &Mpi, rank: usize, call: &str, code: c_int) -> CommError {
-    CommError::Transport { rank, call: call.to_string(), reason: mpi.words(code) }
+    CommError::Transport { rank, call: call.to_string(), reason: mpi.error_text(code) }
 }
 
 impl Drop for Transfers {

@@ -44,7 +44,7 @@ impl Flows {
 
     /// Begins a message that would take `secs` alone; what ended before must have been [`end`](Self::end_next)ed. Returns its number.
     pub(super) fn begin(&mut self, (from, to): (usize, usize), tag: u32, now_secs: f64, secs: f64) -> u64 {
-        self.go_on(now_secs);
+        self.advance(now_secs);
         let number = self.next;
         self.next += 1;
         self.active.push(Flow { number, tag, from, to, left_secs: secs, rate: 0.0 });
@@ -63,7 +63,7 @@ impl Flows {
         let through: Vec<u64> = ending().map(|flow| flow.number).collect();
         let reached: Vec<usize> = ending().map(|flow| flow.to).collect();
         self.reached.extend(reached);
-        self.go_on(next_secs);
+        self.advance(next_secs);
         self.active.retain(|flow| !through.contains(&flow.number));
         self.through_secs.extend(through.into_iter().map(|number| (number, next_secs)));
         self.share();
@@ -102,7 +102,7 @@ impl Flows {
         self.through_secs.remove(&number);
     }
 
-    fn go_on(&mut self, now_secs: f64) {
+    fn advance(&mut self, now_secs: f64) {
         let passed_secs = (now_secs - self.since_secs).max(0.0);
         for flow in &mut self.active {
             flow.left_secs = (flow.left_secs - passed_secs * flow.rate).max(0.0);

@@ -27,7 +27,7 @@ mod schedule;
 pub use network::Network;
 
 use super::{Arrival, CommError, Communicator, Receive};
-use schedule::{Schedule, State, Wanted};
+use schedule::{PostedReceive, Schedule, State};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -126,7 +126,7 @@ impl SimComm {
     pub fn compute(&mut self, secs: f64) {
         let group = Arc::clone(&self.group);
         let mut schedule = group.lock();
-        self.book(&mut schedule);
+        self.charge_compute(&mut schedule);
         schedule.ranks[self.rank].clock_secs += secs.max(0.0);
         group.dispatch(&mut schedule);
         drop(schedule);
@@ -134,7 +134,7 @@ impl SimComm {
     }
 
     /// Computing since the last call, onto the clock.
-    fn book(&mut self, schedule: &mut Schedule) {
+    fn charge_compute(&mut self, schedule: &mut Schedule) {
         if let Compute::Measured(scale) = self.compute {
             schedule.ranks[self.rank].clock_secs += (cpu_secs() - self.since_secs).max(0.0) * scale;
         }
@@ -198,7 +198,7 @@ impl Communicator for SimComm {
         self.check_rank(destination)?;
         let (rank, group) = (self.rank, Arc::clone(&self.group));
         let mut schedule = group.lock();
-        self.book(&mut schedule);
+        self.charge_compute(&mut schedule);
         schedule.ranks[rank].state = State::Acting;
         let mut schedule = self.until_granted(&group, schedule)?;
         let result = if matches!(schedule.ranks[destination].state, State::Gone) {
@@ -206,7 +206,7 @@ impl Communicator for SimComm {
         } else {
             let s = &mut *schedule;
             s.ranks[rank].clock_secs += s.network.overhead_secs;
-            s.ranks[rank].sign_secs = s.ranks[rank].clock_secs;
+            s.ranks[rank].heartbeat_secs = s.ranks[rank].clock_secs;
             s.send(rank, destination, tag, message);
             Ok(())
         };
@@ -226,17 +226,17 @@ impl Communicator for SimComm {
         let rank = self.rank;
         let first = posted.first().ok_or(CommError::NothingPosted { rank })?;
         let (peer, tag) = (first.source, first.tag);
-        let wanted: Vec<Wanted> = posted
+        let wanted: Vec<PostedReceive> = posted
             .iter()
             .map(|r| {
                 let queue = self.posted.get(&(r.source, r.tag));
-                let place = queue.and_then(|q| q.iter().position(|id| *id == r.id));
-                Wanted { source: r.source, tag: r.tag, place: place.unwrap_or(usize::MAX) }
+                let index = queue.and_then(|q| q.iter().position(|id| *id == r.id));
+                PostedReceive { source: r.source, tag: r.tag, index: index.unwrap_or(usize::MAX) }
             })
             .collect();
         let group = Arc::clone(&self.group);
         let mut schedule = group.lock();
-        self.book(&mut schedule);
+        self.charge_compute(&mut schedule);
         let mut deadline_secs = schedule.ranks[rank].clock_secs + timeout.as_secs_f64();
         let (found, mut schedule) = loop {
             schedule.wait(rank, wanted.clone(), deadline_secs);
@@ -251,8 +251,8 @@ impl Communicator for SimComm {
             let found = found.filter(|f| f.2 <= deadline_secs.max(now_secs));
             // Who is at work may yet send, or whom it lets wait.
             let others = schedule.ranks.iter().enumerate().filter(|(other, _)| *other != rank);
-            let sign_secs = others.map(|(_, other)| other.sign_secs).fold(0.0, f64::max);
-            let later_secs = sign_secs + timeout.as_secs_f64();
+            let heartbeat_secs = others.map(|(_, other)| other.heartbeat_secs).fold(0.0, f64::max);
+            let later_secs = heartbeat_secs + timeout.as_secs_f64();
             let lost = wanted.iter().any(|w| schedule.is_lost(rank, w));
             if found.is_some() || lost || timeout.is_zero() || later_secs <= deadline_secs {
                 break (found, schedule);
@@ -292,9 +292,9 @@ impl Communicator for SimComm {
     fn alive(&mut self) -> Result<(), CommError> {
         let group = Arc::clone(&self.group);
         let mut schedule = group.lock();
-        self.book(&mut schedule);
+        self.charge_compute(&mut schedule);
         let own = &mut schedule.ranks[self.rank];
-        own.sign_secs = own.clock_secs;
+        own.heartbeat_secs = own.clock_secs;
         self.since_secs = cpu_secs();
         match &schedule.aborted {
             Some((by, reason)) => Err(CommError::Aborted { by: *by, reason: reason.clone() }),
@@ -302,10 +302,10 @@ impl Communicator for SimComm {
         }
     }
 
-    fn let_leave(&mut self, tag: u32, most: usize, patience: Duration) {
+    fn throttle_sends(&mut self, tag: u32, most: usize, patience: Duration) {
         let group = Arc::clone(&self.group);
         let mut schedule = group.lock();
-        self.book(&mut schedule);
+        self.charge_compute(&mut schedule);
         let end_secs = schedule.ranks[self.rank].clock_secs + patience.as_secs_f64();
         loop {
             let now_secs = schedule.ranks[self.rank].clock_secs;
@@ -344,7 +344,7 @@ impl Drop for SimComm {
         let mut schedule = group.lock();
         schedule.ranks[self.rank].state = State::Gone;
         for rank in 0..schedule.ranks.len() {
-            schedule.look_again(rank);
+            schedule.reevaluate(rank);
         }
         group.dispatch(&mut schedule);
     }

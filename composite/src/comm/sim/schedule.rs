@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 
 /// When a message arrives.
 #[derive(Clone, Copy)]
-pub(super) enum Travel {
+pub(super) enum Delivery {
     /// It is too short to be in anybody's way.
     Until(f64),
     /// With the last byte of this flow, and the latency after it.
@@ -16,18 +16,18 @@ pub(super) enum Travel {
 }
 
 /// A message under way or arrived.
-pub(super) struct Mail {
+pub(super) struct QueuedMessage {
     pub(super) tag: u32,
-    pub(super) travel: Travel,
+    pub(super) delivery: Delivery,
     pub(super) message: Vec<u8>,
 }
 
-/// What a waiting rank would take: the `place`-th message from `source` with `tag`.
+/// What a waiting rank would take: the `index`-th message from `source` with `tag`.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Wanted {
+pub(super) struct PostedReceive {
     pub(super) source: usize,
     pub(super) tag: u32,
-    pub(super) place: usize,
+    pub(super) index: usize,
 }
 
 /// What a rank is doing.
@@ -40,7 +40,7 @@ pub(super) enum State {
     /// In a call that takes effect at its clock.
     Acting,
     /// In a call that takes effect when one of these is there, or at the deadline: at `earliest_secs`, as far as is known.
-    Waiting { wanted: Vec<Wanted>, deadline_secs: f64, earliest_secs: f64 },
+    Waiting { wanted: Vec<PostedReceive>, deadline_secs: f64, earliest_secs: f64 },
     /// Its call may take effect.
     Granted,
     /// It has left.
@@ -50,10 +50,10 @@ pub(super) enum State {
 pub(super) struct Rank {
     pub(super) clock_secs: f64,
     /// When it last said that it is at work, or sent anything.
-    pub(super) sign_secs: f64,
+    pub(super) heartbeat_secs: f64,
     pub(super) state: State,
     /// By sender.
-    pub(super) mail: Vec<VecDeque<Mail>>,
+    pub(super) mail: Vec<VecDeque<QueuedMessage>>,
 }
 
 pub(super) struct Schedule {
@@ -68,7 +68,7 @@ impl Schedule {
     pub(super) fn new(size: usize, network: Network, cores: usize) -> Schedule {
         let rank = || Rank {
             clock_secs: 0.0,
-            sign_secs: 0.0,
+            heartbeat_secs: 0.0,
             state: State::Ready,
             mail: (0..size).map(|_| VecDeque::new()).collect(),
         };
@@ -82,12 +82,12 @@ impl Schedule {
     }
 
     /// The message a rank wants, if it has been sent.
-    pub(super) fn find(&self, rank: usize, wanted: &Wanted) -> Option<(usize, f64)> {
+    pub(super) fn find(&self, rank: usize, wanted: &PostedReceive) -> Option<(usize, f64)> {
         let mail = self.ranks[rank].mail[wanted.source].iter().enumerate();
-        let (at, mail) = mail.filter(|(_, m)| m.tag == wanted.tag).nth(wanted.place)?;
-        let arrival_secs = match mail.travel {
-            Travel::Until(secs) => secs,
-            Travel::With(flow, latency_secs) => self.flows.end_secs(flow) + latency_secs,
+        let (at, mail) = mail.filter(|(_, m)| m.tag == wanted.tag).nth(wanted.index)?;
+        let arrival_secs = match mail.delivery {
+            Delivery::Until(secs) => secs,
+            Delivery::With(flow, latency_secs) => self.flows.end_secs(flow) + latency_secs,
         };
         Some((at, arrival_secs))
     }
@@ -99,24 +99,24 @@ impl Schedule {
         let (latency_factor, byte_factor) = self.network.factors(message.len());
         let latency_secs = self.network.latency_secs * latency_factor;
         let busy_secs = message.len() as f64 * byte_secs * byte_factor;
-        let travel = if from == to {
-            Travel::Until(now_secs)
+        let delivery = if from == to {
+            Delivery::Until(now_secs)
         } else if busy_secs <= gap_secs {
-            Travel::Until(now_secs + gap_secs + latency_secs)
+            Delivery::Until(now_secs + gap_secs + latency_secs)
         } else {
             while self.flows.end_next(now_secs) {}
-            Travel::With(self.flows.begin((from, to), tag, now_secs, busy_secs), latency_secs)
+            Delivery::With(self.flows.begin((from, to), tag, now_secs, busy_secs), latency_secs)
         };
-        self.ranks[to].mail[from].push_back(Mail { tag, travel, message });
-        self.look_again(to);
+        self.ranks[to].mail[from].push_back(QueuedMessage { tag, delivery, message });
+        self.reevaluate(to);
         // What is under way may have become slower.
-        self.receivers_look_again();
+        self.reevaluate_receivers();
     }
 
     /// Takes a message out of its queue.
     pub(super) fn take(&mut self, rank: usize, source: usize, at: usize) -> Vec<u8> {
         let Some(mail) = self.ranks[rank].mail[source].remove(at) else { return Vec::new() };
-        if let Travel::With(flow, _) = mail.travel {
+        if let Delivery::With(flow, _) = mail.delivery {
             self.flows.forget(flow);
         }
         mail.message
@@ -124,25 +124,25 @@ impl Schedule {
 
     /// The share of a message has changed: only for those it goes to does that change anything. (When all ranks looked, at
     /// 128 ranks that was three quarters of all computing.)
-    fn receivers_look_again(&mut self) {
+    fn reevaluate_receivers(&mut self) {
         for rank in self.flows.take_receivers() {
-            self.look_again(rank);
+            self.reevaluate(rank);
         }
     }
 
     /// Whether a wanted message will never come.
-    pub(super) fn is_lost(&self, rank: usize, wanted: &Wanted) -> bool {
+    pub(super) fn is_lost(&self, rank: usize, wanted: &PostedReceive) -> bool {
         matches!(self.ranks[wanted.source].state, State::Gone) && self.find(rank, wanted).is_none()
     }
 
     /// Makes a rank wait.
-    pub(super) fn wait(&mut self, rank: usize, wanted: Vec<Wanted>, deadline_secs: f64) {
+    pub(super) fn wait(&mut self, rank: usize, wanted: Vec<PostedReceive>, deadline_secs: f64) {
         self.ranks[rank].state = State::Waiting { wanted, deadline_secs, earliest_secs: deadline_secs };
-        self.look_again(rank);
+        self.reevaluate(rank);
     }
 
     /// To be called when something has changed for a rank that may wait: a message was sent to it, or another rank has gone.
-    pub(super) fn look_again(&mut self, rank: usize) {
+    pub(super) fn reevaluate(&mut self, rank: usize) {
         let r = &self.ranks[rank];
         let State::Waiting { wanted, deadline_secs, .. } = &r.state else { return };
         let time = if wanted.iter().any(|w| self.is_lost(rank, w)) {
@@ -185,7 +185,7 @@ impl Schedule {
             if !until_secs.is_finite() || !self.flows.end_next(until_secs) {
                 break next;
             }
-            self.receivers_look_again();
+            self.reevaluate_receivers();
         };
         if let Some((_, rank)) = next
             && matches!(self.ranks[rank].state, State::Acting | State::Waiting { .. })
@@ -205,7 +205,7 @@ mod tests {
     fn known_and_found(schedule: &mut Schedule) -> [Vec<f64>; 2] {
         let times = |s: &Schedule| (0..s.ranks.len()).map(|rank| s.earliest_secs(rank)).collect();
         let known = times(schedule);
-        (0..schedule.ranks.len()).for_each(|rank| schedule.look_again(rank));
+        (0..schedule.ranks.len()).for_each(|rank| schedule.reevaluate(rank));
         [known, times(schedule)]
     }
 
@@ -220,7 +220,7 @@ mod tests {
         };
         // Every rank but the first waits for the oldest message of each of the others.
         for rank in 1..RANKS {
-            let wanted = (0..RANKS).map(|source| Wanted { source, tag: 3, place: 0 }).collect();
+            let wanted = (0..RANKS).map(|source| PostedReceive { source, tag: 3, index: 0 }).collect();
             schedule.wait(rank, wanted, 1.0 + rank as f64);
         }
         let mut now_secs = 0.0;
@@ -229,7 +229,7 @@ mod tests {
             let (from, to) = (random(RANKS), random(RANKS));
             schedule.ranks[from].clock_secs = now_secs;
             // Whoever really sends does not wait. A rank that waits here has another clock now.
-            schedule.look_again(from);
+            schedule.reevaluate(from);
             // Some too short to share an interface, some long enough to meet many others there.
             let message = vec![0; [8, 4096, 65_536][random(3)]];
             schedule.send(from, to, 3, message);
@@ -244,7 +244,8 @@ mod tests {
                                 schedule.take(rank, source, 0);
                             }
                         }
-                        let wanted = (0..RANKS).map(|source| Wanted { source, tag: 3, place: 0 }).collect();
+                        let wanted =
+                            (0..RANKS).map(|source| PostedReceive { source, tag: 3, index: 0 }).collect();
                         schedule.wait(rank, wanted, now_secs + 1.0);
                     }
                 }

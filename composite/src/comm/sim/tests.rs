@@ -37,7 +37,7 @@ fn who_lets_messages_leave_waits_for_as_many_as_it_must() {
             comm.send(1, 3, vec![0; 8]).unwrap();
             comm.send(1, 3, vec![0; 8]).unwrap();
             for (tag, most) in [(4, 0), (3, 2), (3, 1), (3, 0)] {
-                comm.let_leave(tag, most, LONG);
+                comm.throttle_sends(tag, most, LONG);
                 ends.push(comm.now());
             }
         } else {

@@ -1,5 +1,5 @@
 //! Questions to other ranks and their answers, all at once: the shape of every exchange of a frame.
-use super::words::{from_message, message_bytes, to_message};
+use super::message_codec::{decode_message, encode_message, message_bytes};
 use super::{Activity, FrameError, RankReport};
 use crate::comm::{Communicator, Receive};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -9,9 +9,9 @@ use std::time::Duration;
 const LOOK: Duration = Duration::from_millis(20);
 
 /// Calls a function when it is dropped.
-struct OnDrop<F: FnMut()>(F);
+struct CallOnDrop<F: FnMut()>(F);
 
-impl<F: FnMut()> Drop for OnDrop<F> {
+impl<F: FnMut()> Drop for CallOnDrop<F> {
     fn drop(&mut self) {
         (self.0)();
     }
@@ -21,9 +21,9 @@ impl<F: FnMut()> Drop for OnDrop<F> {
 #[derive(Clone, Copy)]
 pub(super) enum Tag {
     Hits = 100,
-    Won = 101,
-    Question = 102,
-    Answer = 103,
+    Winners = 101,
+    Request = 102,
+    Reply = 103,
     Tiles = 104,
 }
 
@@ -41,16 +41,16 @@ pub(super) struct Incoming {
 }
 
 /// One frame's conversation of one rank, with its costs counted.
-pub(super) struct Talk<'a> {
+pub(super) struct RankChannel<'a> {
     comm: &'a mut dyn Communicator,
     timeout: Duration,
     pub(super) report: RankReport,
 }
 
-impl<'a> Talk<'a> {
-    pub(super) fn new(comm: &'a mut dyn Communicator, timeout: Duration) -> Talk<'a> {
+impl<'a> RankChannel<'a> {
+    pub(super) fn new(comm: &'a mut dyn Communicator, timeout: Duration) -> RankChannel<'a> {
         let report = RankReport { begin_at_secs: comm.now(), ..RankReport::default() };
-        Talk { comm, timeout, report }
+        RankChannel { comm, timeout, report }
     }
 
     pub(super) fn rank(&self) -> usize {
@@ -67,7 +67,7 @@ impl<'a> Talk<'a> {
     }
 
     /// Does `work` on other threads and says meanwhile that this rank is at work, as far as the number of steps grows.
-    pub(super) fn beside<T: Send>(&mut self, work: impl FnOnce(&AtomicUsize) -> T + Send) -> T {
+    pub(super) fn in_background<T: Send>(&mut self, work: impl FnOnce(&AtomicUsize) -> T + Send) -> T {
         let steps = AtomicUsize::new(0);
         // A thread of the pool works itself: if it waited, there might be no other.
         if rayon::current_thread_index().is_some() {
@@ -80,7 +80,7 @@ impl<'a> Talk<'a> {
         rayon::in_place_scope(|scope| {
             scope.spawn(|_| {
                 // The scope ends with its work, whether that ends or panics.
-                let _end = OnDrop(|| {
+                let _end = CallOnDrop(|| {
                     done.store(true, Ordering::Release);
                     waiting.unpark();
                 });
@@ -104,17 +104,17 @@ impl<'a> Talk<'a> {
     }
 
     /// Books the time since the last booking.
-    pub(super) fn spent(&mut self, activity: Activity) {
-        self.report.spent(activity, self.comm.now());
+    pub(super) fn record_span(&mut self, activity: Activity) {
+        self.report.record_span(activity, self.comm.now());
     }
 
-    pub(super) fn wrong(&self, from: usize, what: &'static str, words: usize) -> FrameError {
+    pub(super) fn message_error(&self, from: usize, what: &'static str, words: usize) -> FrameError {
         FrameError::Message { rank: self.rank(), from, what, words }
     }
 
     pub(super) fn send(&mut self, to: usize, tag: Tag, words: &[u32]) -> Result<(), FrameError> {
         let buffer = self.comm.buffer(message_bytes(words.len()));
-        let message = to_message(words, buffer);
+        let message = encode_message(words, buffer);
         self.report.messages_sent += 1;
         self.report.bytes_sent += message.len() as u64;
         self.comm.send(to, tag as u32, message)?;
@@ -136,9 +136,10 @@ impl<'a> Talk<'a> {
         while !posted.is_empty() {
             let arrival = self.comm.wait_any(&mut posted, self.timeout)?;
             self.report.bytes_received += arrival.message.len() as u64;
-            self.spent(Activity::Exchange);
-            let words = from_message(&arrival.message);
-            let words = words.ok_or_else(|| self.wrong(arrival.source, what, arrival.message.len() / 4))?;
+            self.record_span(Activity::Exchange);
+            let words = decode_message(&arrival.message);
+            let words =
+                words.ok_or_else(|| self.message_error(arrival.source, what, arrival.message.len() / 4))?;
             self.comm.recycle(arrival.message);
             take(self, arrival.source, words)?;
         }
@@ -167,44 +168,44 @@ impl<'a> Talk<'a> {
         } else {
             self.comm.test_any(&mut inbox.posted)?
         };
-        self.spent(Activity::Exchange);
+        self.record_span(Activity::Exchange);
         let Some(arrival) = arrival else { return Ok(None) };
         self.report.bytes_received += arrival.message.len() as u64;
-        let words = from_message(&arrival.message);
-        let words =
-            words.ok_or_else(|| self.wrong(arrival.source, "hits or tiles", arrival.message.len() / 4))?;
+        let words = decode_message(&arrival.message);
+        let words = words
+            .ok_or_else(|| self.message_error(arrival.source, "hits or tiles", arrival.message.len() / 4))?;
         self.comm.recycle(arrival.message);
         Ok(Some(Incoming { from: arrival.source, tag: arrival.tag, words }))
     }
 
     /// Gives numbers of every rank to every rank.
     pub(super) fn all_gather(&mut self, mine: &[u32]) -> Result<Vec<Vec<u32>>, FrameError> {
-        let message = to_message(mine, Vec::new());
+        let message = encode_message(mine, Vec::new());
         self.report.bytes_sent += (message.len() * self.size().saturating_sub(1)) as u64;
         let all = self.comm.all_gather(&message, message.len(), self.timeout)?;
         let mut out = Vec::with_capacity(all.len());
         for (from, message) in all.iter().enumerate() {
-            let words = from_message(message).filter(|w| w.len() == mine.len());
-            out.push(words.ok_or_else(|| self.wrong(from, "numbers for all", message.len() / 4))?);
+            let words = decode_message(message).filter(|w| w.len() == mine.len());
+            out.push(words.ok_or_else(|| self.message_error(from, "numbers for all", message.len() / 4))?);
         }
         Ok(out)
     }
 
-    /// Asks `questions[r]` of each rank r (nothing where it is empty) and answers what others ask. `answer` turns a question into an answer;
+    /// Asks `requests[r]` of each rank r (nothing where it is empty) and answers what others ask. `answer` turns a question into an answer;
     /// `longest` bounds the words of the answer to a question; `take` gets the answers in any order. False when no rank had a question.
-    pub(super) fn ask(
+    pub(super) fn request_reply(
         &mut self,
         what: &'static str,
-        questions: &[Vec<u32>],
+        requests: &[Vec<u32>],
         longest: impl Fn(&[u32]) -> usize,
         mut answer: impl FnMut(&mut RankReport, &[u32]) -> Option<Vec<u32>>,
         mut take: impl FnMut(usize, Vec<u32>) -> Result<(), FrameError>,
     ) -> Result<bool, FrameError> {
         let (rank, size) = (self.rank(), self.size());
         // ---- Who asks whom, and how much.
-        let lengths: Vec<u32> = questions.iter().map(|q| q.len() as u32).collect();
+        let lengths: Vec<u32> = requests.iter().map(|q| q.len() as u32).collect();
         let lengths = if size > 1 { self.all_gather(&lengths)? } else { vec![lengths] };
-        self.spent(Activity::Exchange);
+        self.record_span(Activity::Exchange);
         if lengths.iter().flatten().all(|&l| l == 0) {
             return Ok(false);
         }
@@ -212,35 +213,35 @@ impl<'a> Talk<'a> {
         // ---- Questions, to the next rank first, so that nobody gets all at once.
         for step in 1..size {
             let to = (rank + step) % size;
-            if !questions[to].is_empty() {
-                self.send(to, Tag::Question, &questions[to])?;
+            if !requests[to].is_empty() {
+                self.send(to, Tag::Request, &requests[to])?;
             }
         }
-        self.spent(Activity::Exchange);
+        self.record_span(Activity::Exchange);
         // ---- One's own question first: others' are on their way meanwhile.
-        if !questions[rank].is_empty() {
-            let own = answer(&mut self.report, &questions[rank]);
-            self.spent(Activity::Answer);
-            let own = own.ok_or_else(|| self.wrong(rank, what, questions[rank].len()))?;
+        if !requests[rank].is_empty() {
+            let own = answer(&mut self.report, &requests[rank]);
+            self.record_span(Activity::Answer);
+            let own = own.ok_or_else(|| self.message_error(rank, what, requests[rank].len()))?;
             take(rank, own)?;
-            self.spent(Activity::Shade);
+            self.record_span(Activity::Shade);
         }
         let asked_by = (0..size).filter(|&from| from != rank && lengths[from][rank] > 0);
         let sources: Vec<(usize, usize)> =
             asked_by.map(|from| (from, lengths[from][rank] as usize)).collect();
-        self.receive(Tag::Question, what, sources, |talk, from, question| {
-            let reply = answer(&mut talk.report, &question);
-            talk.spent(Activity::Answer);
-            let reply = reply.ok_or_else(|| talk.wrong(from, what, question.len()))?;
-            talk.send(from, Tag::Answer, &reply)?;
-            talk.spent(Activity::Exchange);
+        self.receive(Tag::Request, what, sources, |channel, from, request| {
+            let reply = answer(&mut channel.report, &request);
+            channel.record_span(Activity::Answer);
+            let reply = reply.ok_or_else(|| channel.message_error(from, what, request.len()))?;
+            channel.send(from, Tag::Reply, &reply)?;
+            channel.record_span(Activity::Exchange);
             Ok(())
         })?;
-        let asked = (0..size).filter(|&to| to != rank && !questions[to].is_empty());
-        let sources: Vec<(usize, usize)> = asked.map(|to| (to, longest(&questions[to]))).collect();
-        self.receive(Tag::Answer, what, sources, |talk, from, reply| {
+        let asked = (0..size).filter(|&to| to != rank && !requests[to].is_empty());
+        let sources: Vec<(usize, usize)> = asked.map(|to| (to, longest(&requests[to]))).collect();
+        self.receive(Tag::Reply, what, sources, |channel, from, reply| {
             take(from, reply)?;
-            talk.spent(Activity::Shade);
+            channel.record_span(Activity::Shade);
             Ok(())
         })?;
         Ok(true)

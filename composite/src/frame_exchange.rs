@@ -1,11 +1,11 @@
 //! One frame on one rank: the communicator in rank order, with costs counted and messages checked.
+use crate::codec::{self, Codec, DecodedMessage, MessageError};
 use crate::comm::{Communicator, Receive};
 use crate::error::CompositeError;
 use crate::layer::View;
 use crate::pixel::Composite;
 use crate::rect::Rect;
 use crate::report::Report;
-use crate::wire::{self, Codec, Part, WireError};
 use std::time::Duration;
 
 /// Which messages belong together; the order within a tag is kept by every communicator.
@@ -24,20 +24,20 @@ pub(crate) struct Message {
     depths: bool,
 }
 
-/// Longest string of [`Session::meet`]: fingerprint, rectangle, interval of depths.
-const GREETING_BYTES: usize = 8 + 16 + 8;
+/// Longest string of [`FrameExchange::handshake`]: fingerprint, rectangle, interval of depths.
+const HANDSHAKE_BYTES: usize = 8 + 16 + 8;
 
-/// See [`Session::begin_span`].
+/// See [`FrameExchange::begin_span`].
 pub(crate) struct Span {
     begin: f64,
     counted: f64,
 }
 
 /// Ranks in here are *places* in the order of compositing, not ranks of the communicator.
-pub(crate) struct Session<'a> {
+pub(crate) struct FrameExchange<'a> {
     pub(crate) comm: &'a mut dyn Communicator,
     order: Vec<usize>,
-    pub(crate) place: usize,
+    pub(crate) order_index: usize,
     pub(crate) codec: Codec,
     timeout: Duration,
     /// What every place drew.
@@ -49,18 +49,18 @@ pub(crate) struct Session<'a> {
     posted: Vec<Receive>,
 }
 
-impl<'a> Session<'a> {
+impl<'a> FrameExchange<'a> {
     pub(crate) fn new(
         comm: &'a mut dyn Communicator,
         order: Vec<usize>,
-        place: usize,
+        order_index: usize,
         codec: Codec,
         timeout: Duration,
     ) -> Self {
         Self {
             comm,
             order,
-            place,
+            order_index,
             codec,
             timeout,
             drawn: Vec::new(),
@@ -75,47 +75,49 @@ impl<'a> Session<'a> {
         self.comm.now()
     }
 
-    pub(crate) fn places(&self) -> usize {
+    pub(crate) fn num_ranks(&self) -> usize {
         self.order.len()
     }
 
-    pub(crate) fn rank_of(&self, place: usize) -> usize {
-        self.order[place]
+    pub(crate) fn rank_of(&self, order_index: usize) -> usize {
+        self.order[order_index]
     }
 
-    fn place_of(&self, rank: usize) -> usize {
+    fn order_index_of(&self, rank: usize) -> usize {
         // The order is a permutation, so every rank is in it.
         self.order.iter().position(|&other| other == rank).unwrap_or(rank)
     }
 
     /// Tells all places what each drew of an image of this size, and how near and far, and finds out whether all are doing the same
     /// thing. What is [`drawn`](Self::drawn) behind it lies within the image.
-    pub(crate) fn meet(
+    pub(crate) fn handshake(
         &mut self,
         (width_px, height_px): (u32, u32),
         drawn: Rect,
         depths: [f32; 2],
     ) -> Result<Vec<[f32; 2]>, CompositeError> {
         let begin = self.now();
-        let mut greeting = self.codec.fingerprint.to_le_bytes().to_vec();
-        greeting.extend_from_slice(bytemuck::cast_slice(&[drawn.x0, drawn.y0, drawn.x1, drawn.y1]));
-        greeting.extend_from_slice(bytemuck::cast_slice(&depths));
-        let answers = self.comm.all_gather(&greeting, GREETING_BYTES, self.timeout)?;
-        let mut intervals = Vec::with_capacity(self.places());
+        let mut handshake = self.codec.fingerprint.to_le_bytes().to_vec();
+        handshake.extend_from_slice(bytemuck::cast_slice(&[drawn.x0, drawn.y0, drawn.x1, drawn.y1]));
+        handshake.extend_from_slice(bytemuck::cast_slice(&depths));
+        let answers = self.comm.all_gather(&handshake, HANDSHAKE_BYTES, self.timeout)?;
+        let mut intervals = Vec::with_capacity(self.num_ranks());
         self.drawn.clear();
-        for place in 0..self.places() {
-            let answer = &answers[self.order[place]];
-            let Ok(answer) = <&[u8; GREETING_BYTES]>::try_from(answer.as_slice()) else {
-                let (expected, found) = (GREETING_BYTES as u64, answer.len() as u64);
-                return Err(self.unusable(place, WireError::Length { expected, found }));
+        for order_index in 0..self.num_ranks() {
+            let answer = &answers[self.order[order_index]];
+            let Ok(answer) = <&[u8; HANDSHAKE_BYTES]>::try_from(answer.as_slice()) else {
+                let (expected, found) = (HANDSHAKE_BYTES as u64, answer.len() as u64);
+                return Err(self.unusable(order_index, MessageError::Length { expected, found }));
             };
             if answer[..8] != self.codec.fingerprint.to_le_bytes() {
-                return Err(self.unusable(place, WireError::Fingerprint));
+                return Err(self.unusable(order_index, MessageError::Fingerprint));
             }
             let corner = |i: usize| bytemuck::pod_read_unaligned::<u32>(&answer[8 + 4 * i..12 + 4 * i]);
             let found = Rect { x0: corner(0), y0: corner(1), x1: corner(2), y1: corner(3) };
             if !Rect::of_size(width_px, height_px).contains(&found) {
-                return Err(self.unusable(place, WireError::Drawn { found, width_px, height_px }));
+                return Err(
+                    self.unusable(order_index, MessageError::OutsideImage { found, width_px, height_px })
+                );
             }
             self.drawn.push(if found.is_empty() { Rect::EMPTY } else { found });
             intervals.push(bytemuck::pod_read_unaligned(&answer[24..32]));
@@ -127,14 +129,14 @@ impl<'a> Session<'a> {
     /// Sends what `view` has in `rect`, which must be within its bounds.
     pub(crate) fn send<P: Composite>(
         &mut self,
-        place: usize,
+        order_index: usize,
         tag: Tag,
         view: &View<'_, P>,
         rect: Rect,
         depths: bool,
     ) -> Result<(), CompositeError> {
         let begin = self.comm.working_secs();
-        let mut message = self.comm.buffer(wire::longest::<P>(&rect));
+        let mut message = self.comm.buffer(codec::longest::<P>(&rect));
         let counts = self.codec.encode(view, rect, depths, &mut message);
         if self.counts_nan {
             // Joined pixels hold no NaN, so only those of the frame are counted here.
@@ -143,7 +145,7 @@ impl<'a> Session<'a> {
         let encoded = self.comm.working_secs();
         self.report.messages_sent += 1;
         self.report.bytes_sent += message.len() as u64;
-        self.comm.send(self.order[place], tag as u32, message)?;
+        self.comm.send(self.order[order_index], tag as u32, message)?;
         let sent = self.comm.working_secs();
         if tag == Tag::Collect {
             self.report.collect_secs += sent - begin;
@@ -155,8 +157,8 @@ impl<'a> Session<'a> {
     }
 
     /// Lets messages of the exchange leave until at most `most` of them are on their way.
-    pub(crate) fn let_leave(&mut self, most: usize) {
-        self.comm.let_leave(Tag::Exchange as u32, most, self.timeout);
+    pub(crate) fn throttle_sends(&mut self, most: usize) {
+        self.comm.throttle_sends(Tag::Exchange as u32, most, self.timeout);
     }
 
     /// Counts depths of the frame in `part` that are not numbers; those of parts sent to others are counted when they are
@@ -177,15 +179,15 @@ impl<'a> Session<'a> {
     }
 
     /// One number of every place, at every place.
-    pub(crate) fn tell_all(&mut self, number: u64) -> Result<Vec<u64>, CompositeError> {
+    pub(crate) fn all_gather_number(&mut self, number: u64) -> Result<Vec<u64>, CompositeError> {
         let answers = self.comm.all_gather(&number.to_le_bytes(), 8, self.timeout)?;
-        let mut numbers = Vec::with_capacity(self.places());
-        for place in 0..self.places() {
-            let answer = &answers[self.order[place]];
+        let mut numbers = Vec::with_capacity(self.num_ranks());
+        for order_index in 0..self.num_ranks() {
+            let answer = &answers[self.order[order_index]];
             let found = answer.len() as u64;
             let bytes = answer.as_slice().try_into();
             numbers.push(u64::from_le_bytes(
-                bytes.map_err(|_| self.unusable(place, WireError::Length { expected: 8, found }))?,
+                bytes.map_err(|_| self.unusable(order_index, MessageError::Length { expected: 8, found }))?,
             ));
         }
         Ok(numbers)
@@ -194,14 +196,14 @@ impl<'a> Session<'a> {
     /// Sends a message that is not made of rows of pixels.
     pub(crate) fn send_bytes(
         &mut self,
-        place: usize,
+        order_index: usize,
         tag: Tag,
         message: Vec<u8>,
     ) -> Result<(), CompositeError> {
         let begin = self.comm.working_secs();
         self.report.messages_sent += 1;
         self.report.bytes_sent += message.len() as u64;
-        self.comm.send(self.order[place], tag as u32, message)?;
+        self.comm.send(self.order[order_index], tag as u32, message)?;
         self.report.exchange_secs += self.comm.working_secs() - begin;
         Ok(())
     }
@@ -209,11 +211,11 @@ impl<'a> Session<'a> {
     /// Announces a message of at most `capacity` bytes.
     pub(crate) fn post_bytes(
         &mut self,
-        place: usize,
+        order_index: usize,
         tag: Tag,
         capacity: usize,
     ) -> Result<(), CompositeError> {
-        let receive = self.comm.post_recv(self.order[place], tag as u32, capacity)?;
+        let receive = self.comm.post_recv(self.order[order_index], tag as u32, capacity)?;
         self.posted.push(receive);
         Ok(())
     }
@@ -221,21 +223,21 @@ impl<'a> Session<'a> {
     /// Announces a message with the pixels of `rect`.
     pub(crate) fn post<P: Composite>(
         &mut self,
-        place: usize,
+        order_index: usize,
         tag: Tag,
         rect: &Rect,
     ) -> Result<(), CompositeError> {
         // A little more than the longest honest message: one that is too long shall reach the decoder, which says what is wrong.
-        self.post_bytes(place, tag, wire::longest::<P>(rect) + 64)
+        self.post_bytes(order_index, tag, codec::longest::<P>(rect) + 64)
     }
 
     /// Whether messages that were announced have not yet come.
-    pub(crate) fn is_waiting(&self) -> bool {
+    pub(crate) fn is_receiving(&self) -> bool {
         !self.posted.is_empty()
     }
 
     /// Whether a message announced with `tag` has not yet come.
-    pub(crate) fn is_waiting_for(&self, tag: Tag) -> bool {
+    pub(crate) fn is_receiving_for(&self, tag: Tag) -> bool {
         self.posted.iter().any(|receive| receive.tag == tag as u32)
     }
 
@@ -252,7 +254,7 @@ impl<'a> Session<'a> {
         let Some(arrival) = arrival else { return Ok(None) };
         let is_collect = arrival.tag == Tag::Collect as u32;
         self.report.bytes_received += arrival.message.len() as u64;
-        Ok(Some((self.place_of(arrival.source), is_collect, arrival.message)))
+        Ok(Some((self.order_index_of(arrival.source), is_collect, arrival.message)))
     }
 
     /// Begins a span of which [`end_span`](Self::end_span) gives what is in no other column to `column`: waits are measured
@@ -269,19 +271,19 @@ impl<'a> Session<'a> {
     /// Checks a message of the strategy.
     pub(crate) fn check<P: Composite>(
         &self,
-        place: usize,
+        order_index: usize,
         bytes: Vec<u8>,
         expected: Rect,
         depths: bool,
     ) -> Result<Message, CompositeError> {
         match self.codec.decode::<P>(&bytes, expected, depths) {
             Ok(_) => Ok(Message { bytes, rect: expected, depths }),
-            Err(reason) => Err(self.unusable(place, reason)),
+            Err(reason) => Err(self.unusable(order_index, reason)),
         }
     }
 
-    pub(crate) fn unusable(&self, place: usize, reason: WireError) -> CompositeError {
-        CompositeError::Message { rank: self.order[self.place], from: self.order[place], reason }
+    pub(crate) fn unusable(&self, order_index: usize, reason: MessageError) -> CompositeError {
+        CompositeError::Message { rank: self.order[self.order_index], from: self.order[order_index], reason }
     }
 }
 
@@ -291,7 +293,7 @@ impl Message {
     }
 
     /// The message as its pixels; it has been checked when it came.
-    pub(crate) fn part<P: Composite>(&self) -> Part<'_> {
-        Part::reopen::<P>(&self.bytes, self.rect, self.depths)
+    pub(crate) fn part<P: Composite>(&self) -> DecodedMessage<'_> {
+        DecodedMessage::reopen::<P>(&self.bytes, self.rect, self.depths)
     }
 }

@@ -1,67 +1,65 @@
 //! What leaves the hits of camera rays: light asked for by points, and rays of later waves.
-use super::ask::Talk;
-use super::boxes::{Boxes, ranks_in};
-use super::camera_wave::TileAnswer;
-use super::sort_last::{Light, Side, each};
+use super::options::SecondaryRayPolicy;
+use super::rank_bounds::{RankBounds, ranks_in};
+use super::rank_frame::{RankFrame, each};
+use super::ray_codec::{RAY_WORDS, read_ray, write_ray};
+use super::request_reply::RankChannel;
+use super::tile_hits::TileHits;
 use super::{Activity, FrameError, RankReport, volumes};
 use rt_core::distributed::{DistributedFrame, LightPoint, OcclusionScratch, Pass, ShadingHit, TileState};
-use rt_core::glam::Vec3;
 use rt_core::ray::Ray;
 
-/// Words of a ray in a message.
-const RAY_WORDS: usize = 8;
-
 /// By tile and ray.
-type FirstHits = Vec<Vec<Option<ShadingHit>>>;
+type ClosestHits = Vec<Vec<Option<ShadingHit>>>;
 
 /// One pass beyond its camera rays.
-pub(super) struct Wave<'a> {
-    pub(super) side: &'a Side<'a>,
-    pub(super) boxes: &'a Boxes,
-    pub(super) way: Light,
+pub(super) struct SecondaryRays<'a> {
+    pub(super) side: &'a RankFrame<'a>,
+    pub(super) rank_bounds: &'a RankBounds,
+    pub(super) policy: SecondaryRayPolicy,
     /// This rank's part with a rim, for ghost zones.
-    pub(super) rim: Option<&'a DistributedFrame<'a>>,
+    pub(super) ghost_layer: Option<&'a DistributedFrame<'a>>,
     /// Whether there are media, which are held in bricks.
     pub(super) media: bool,
     pub(super) pass: Pass,
 }
 
-impl Wave<'_> {
+impl SecondaryRays<'_> {
     /// Until no ray is left in any tile of any rank.
     pub(super) fn run(
         &mut self,
-        talk: &mut Talk<'_>,
+        channel: &mut RankChannel<'_>,
         tiles: &mut [TileState],
-        camera: Vec<TileAnswer>,
+        camera: Vec<TileHits>,
     ) -> Result<(), FrameError> {
-        let (rank, frame) = (talk.rank(), self.side.frame);
+        let (rank, frame) = (channel.rank(), self.side.frame);
         let fits = |source| FrameError::Answer { rank, source };
         // Ranks that were hit by camera rays, for light that stays there.
         let mut hit_ranks: Vec<Option<Vec<u32>>> = Vec::new();
         if self.media {
-            let met: Vec<_> = camera.iter().map(|answer| answer.met.clone()).collect();
-            volumes::cross(talk, self.side, tiles, &met)?;
+            let met: Vec<_> = camera.iter().map(|answer| answer.hits.clone()).collect();
+            volumes::composite_volumes(channel, self.side, tiles, &met)?;
         }
         for (tile, answer) in tiles.iter_mut().zip(&camera) {
-            tile.process_hits(frame, &answer.met).map_err(fits)?;
-            hit_ranks.push(Some((0..answer.met.len()).map(|slot| answer.winner(slot)).collect()));
+            tile.process_hits(frame, &answer.hits).map_err(fits)?;
+            hit_ranks.push(Some((0..answer.hits.len()).map(|slot| answer.winner(slot)).collect()));
         }
         drop(camera);
-        talk.spent(Activity::Shade);
+        channel.record_span(Activity::Shade);
         let mut live: Vec<bool> = vec![true; tiles.len()];
         loop {
             if frame.light_passes_surfaces() {
-                while self.light_through_surfaces(talk, tiles, &live)? {}
+                while self.transmitted_light(channel, tiles, &live)? {}
             } else if self.pass != Pass::Geometry && frame.light_rays_per_point() > 0 {
-                self.light_bits(talk, tiles, &live, &hit_ranks)?;
+                self.exchange_occlusion(channel, tiles, &live, &hit_ranks)?;
             }
             let mut work: Vec<(&mut bool, &mut TileState)> = live.iter_mut().zip(tiles.iter_mut()).collect();
-            each(talk, self.side.parallel, &mut work, |_, (live, tile)| {
+            each(channel, self.side.parallel, &mut work, |_, (live, tile)| {
                 **live = **live && tile.advance(frame)
             });
-            talk.spent(Activity::Shade);
+            channel.record_span(Activity::Shade);
             hit_ranks.iter_mut().for_each(|h| *h = None);
-            if !self.later_rays(talk, tiles, &live)? {
+            if !self.next_bounce(channel, tiles, &live)? {
                 return Ok(());
             }
         }
@@ -69,17 +67,17 @@ impl Wave<'_> {
 
     // ---- Light that nothing passes through: points out, bits back ----------------------------------------------
 
-    fn light_bits(
+    fn exchange_occlusion(
         &self,
-        talk: &mut Talk<'_>,
+        channel: &mut RankChannel<'_>,
         tiles: &mut [TileState],
         live: &[bool],
         hit_ranks: &[Option<Vec<u32>>],
     ) -> Result<(), FrameError> {
-        let (frame, pass, size) = (self.side.frame, self.pass, talk.size());
+        let (frame, pass, size) = (self.side.frame, self.pass, channel.size());
         let words = (frame.light_rays_per_point() as usize).div_ceil(64);
         // ---- Whom to ask.
-        let mut questions: Vec<Vec<u32>> = vec![Vec::new(); size];
+        let mut requests: Vec<Vec<u32>> = vec![Vec::new(); size];
         // Of each rank, the tiles and points asked of it.
         let mut asked: Vec<Vec<(u32, u32)>> = vec![Vec::new(); size];
         let mut bits: Vec<Vec<u64>> = Vec::with_capacity(tiles.len());
@@ -89,29 +87,30 @@ impl Wave<'_> {
             if points.is_empty() {
                 continue;
             }
-            let stays = matches!(self.way, Light::LocalOnly | Light::Ghost);
+            let stays = matches!(self.policy, SecondaryRayPolicy::LocalOnly | SecondaryRayPolicy::GhostZones);
             let targets = match &hit_ranks[t] {
-                Some(hit) if stays => only_hit_ranks(self.boxes, tile, hit),
-                _ => whom_to_ask(self.boxes, tile),
+                Some(hit) if stays => rank_that_was_hit(self.rank_bounds, tile, hit),
+                _ => ranks_to_ask(self.rank_bounds, tile),
             };
-            for (p, (point, targets)) in points.iter().zip(targets.chunks(self.boxes.bit_words())).enumerate()
+            for (p, (point, targets)) in
+                points.iter().zip(targets.chunks(self.rank_bounds.bit_words())).enumerate()
             {
                 for r in ranks_in(targets).filter(|&r| r < size) {
-                    point.write(&mut questions[r]);
+                    point.write(&mut requests[r]);
                     asked[r].push((t as u32, p as u32));
                 }
             }
         }
-        let rank = talk.rank();
-        talk.report.points_sent +=
+        let rank = channel.rank();
+        channel.report.points_sent +=
             (0..size).filter(|&r| r != rank).map(|r| asked[r].len() as u64).sum::<u64>();
-        talk.spent(Activity::Shade);
+        channel.record_span(Activity::Shade);
         // ---- Answers, joined by or: exact, and in any order.
-        let tracer = self.rim.unwrap_or(frame);
+        let tracer = self.ghost_layer.unwrap_or(frame);
         let mut work = OcclusionScratch::default();
-        let mut answer = |report: &mut RankReport, question: &[u32]| {
+        let mut answer = |report: &mut RankReport, request: &[u32]| {
             let mut points = Vec::new();
-            let mut rest = question;
+            let mut rest = request;
             while !rest.is_empty() {
                 let (point, r) = LightPoint::read(rest)?;
                 points.push(point);
@@ -129,11 +128,12 @@ impl Wave<'_> {
             Some(out.iter().flat_map(|b| [*b as u32, (*b >> 32) as u32]).collect())
         };
         // At least nine words a point.
-        let longest = |question: &[u32]| question.len() / 9 * words * 2;
-        let wrong = |from: usize, n: usize| FrameError::Message { rank, from, what: "light bits", words: n };
-        talk.ask("points to light", &questions, longest, &mut answer, |from, reply| {
+        let longest = |request: &[u32]| request.len() / 9 * words * 2;
+        let message_error =
+            |from: usize, n: usize| FrameError::Message { rank, from, what: "light bits", words: n };
+        channel.request_reply("points to light", &requests, longest, &mut answer, |from, reply| {
             if reply.len() != asked[from].len() * words * 2 {
-                return Err(wrong(from, reply.len()));
+                return Err(message_error(from, reply.len()));
             }
             for (&(t, p), answer) in asked[from].iter().zip(reply.chunks_exact(2 * words)) {
                 let first = p as usize * words;
@@ -149,35 +149,35 @@ impl Wave<'_> {
                 failed = tile.apply_occlusion(frame, &bits[t]).err().or(failed);
             }
         }
-        talk.spent(Activity::Shade);
+        channel.record_span(Activity::Shade);
         failed.map_or(Ok(()), |source| Err(FrameError::Answer { rank, source }))
     }
 
     // ---- Rays that want what they meet first --------------------------------------------------------------------
 
     /// One layer of surfaces in the way of light. False when no light ray is under way anywhere.
-    fn light_through_surfaces(
+    fn transmitted_light(
         &self,
-        talk: &mut Talk<'_>,
+        channel: &mut RankChannel<'_>,
         tiles: &mut [TileState],
         live: &[bool],
     ) -> Result<bool, FrameError> {
         let rays: Vec<Vec<Ray>> =
             tiles.iter().zip(live).map(|(t, &l)| if l { t.light_rays().collect() } else { vec![] }).collect();
-        let (any, met) = self.first_hits(talk, &rays, Wanted::Light)?;
-        let rank = talk.rank();
+        let (any, met) = self.closest_hits(channel, &rays, RayQuery::Light)?;
+        let rank = channel.rank();
         for (tile, met) in tiles.iter_mut().zip(&met).filter(|(_, met)| !met.is_empty()) {
             tile.process_light_hits(self.side.frame, met)
                 .map_err(|source| FrameError::Answer { rank, source })?;
         }
-        talk.spent(Activity::Shade);
+        channel.record_span(Activity::Shade);
         Ok(any)
     }
 
     /// The next wave. False when there is none anywhere.
-    fn later_rays(
+    fn next_bounce(
         &self,
-        talk: &mut Talk<'_>,
+        channel: &mut RankChannel<'_>,
         tiles: &mut [TileState],
         live: &[bool],
     ) -> Result<bool, FrameError> {
@@ -192,9 +192,9 @@ impl Wave<'_> {
             };
             tiles.iter().zip(&waiting).map(of).collect()
         });
-        let wanted = Wanted::Closest { pixels: pixels.as_deref() };
-        let (any, met) = self.first_hits(talk, &rays, wanted)?;
-        let rank = talk.rank();
+        let wanted = RayQuery::Closest { pixels: pixels.as_deref() };
+        let (any, met) = self.closest_hits(channel, &rays, wanted)?;
+        let rank = channel.rank();
         let mut answers: Vec<Vec<Option<ShadingHit>>> =
             tiles.iter().map(|t| vec![None; t.num_rays()]).collect();
         for (t, answers) in answers.iter_mut().enumerate() {
@@ -203,61 +203,62 @@ impl Wave<'_> {
             }
         }
         if self.media {
-            volumes::cross(talk, self.side, tiles, &answers)?;
+            volumes::composite_volumes(channel, self.side, tiles, &answers)?;
         }
         for (t, tile) in tiles.iter_mut().enumerate().filter(|(t, _)| live[*t]) {
             tile.process_hits(self.side.frame, &answers[t])
                 .map_err(|source| FrameError::Answer { rank, source })?;
         }
-        talk.spent(Activity::Shade);
+        channel.record_span(Activity::Shade);
         // A wave of which every ray waits for nothing is still a wave of its tile; tiles agree with the others only on questions.
         Ok(any)
     }
 
     /// Of each ray of each tile the nearest of what all ranks in whose bounds it comes say it meets, ties to the lowest number. False when no
     /// rank had a ray.
-    fn first_hits(
+    fn closest_hits(
         &self,
-        talk: &mut Talk<'_>,
+        channel: &mut RankChannel<'_>,
         rays: &[Vec<Ray>],
-        wanted: Wanted<'_>,
-    ) -> Result<(bool, FirstHits), FrameError> {
+        wanted: RayQuery<'_>,
+    ) -> Result<(bool, ClosestHits), FrameError> {
         let (pixels, light) = match wanted {
-            Wanted::Closest { pixels } => (pixels, false),
-            Wanted::Light => (None, true),
+            RayQuery::Closest { pixels } => (pixels, false),
+            RayQuery::Light => (None, true),
         };
-        let (rank, size, side) = (talk.rank(), talk.size(), self.side);
-        let mut met: FirstHits = rays.iter().map(|r| vec![None; r.len()]).collect();
-        let mut questions: Vec<Vec<u32>> = vec![Vec::new(); size];
+        let (rank, size, side) = (channel.rank(), channel.size(), self.side);
+        let mut met: ClosestHits = rays.iter().map(|r| vec![None; r.len()]).collect();
+        let mut requests: Vec<Vec<u32>> = vec![Vec::new(); size];
         let mut asked: Vec<Vec<(u32, u32)>> = vec![Vec::new(); size];
-        let mut bits = vec![0; self.boxes.bit_words()];
+        let mut bits = vec![0; self.rank_bounds.bit_words()];
         for (t, rays) in rays.iter().enumerate() {
             for (i, ray) in rays.iter().enumerate() {
                 bits.fill(0);
-                self.boxes.add_met(ray, &mut bits);
+                self.rank_bounds.add_hit_ranks(ray, &mut bits);
                 // A ray that meets no part is still asked, of this rank: nobody may end while others have rays.
                 let mut nobody = true;
                 for r in ranks_in(&bits).filter(|&r| r < size) {
                     nobody = false;
-                    write_ray(ray, pixels.map(|p| p[t][i]), &mut questions[r]);
+                    write_ray(ray, pixels.map(|p| p[t][i]), &mut requests[r]);
                     asked[r].push((t as u32, i as u32));
                 }
                 if nobody {
-                    write_ray(ray, pixels.map(|p| p[t][i]), &mut questions[rank]);
+                    write_ray(ray, pixels.map(|p| p[t][i]), &mut requests[rank]);
                     asked[rank].push((t as u32, i as u32));
                 }
             }
         }
-        talk.report.rays_sent += (0..size).filter(|&r| r != rank).map(|r| asked[r].len() as u64).sum::<u64>();
-        talk.spent(Activity::Shade);
+        channel.report.rays_sent +=
+            (0..size).filter(|&r| r != rank).map(|r| asked[r].len() as u64).sum::<u64>();
+        channel.record_span(Activity::Shade);
         let words = RAY_WORDS + pixels.is_some() as usize;
-        let mut answer = |report: &mut RankReport, question: &[u32]| {
-            if !question.len().is_multiple_of(words) {
+        let mut answer = |report: &mut RankReport, request: &[u32]| {
+            if !request.len().is_multiple_of(words) {
                 return None;
             }
-            let rays: Vec<Ray> = question.chunks_exact(words).map(read_ray).collect();
+            let rays: Vec<Ray> = request.chunks_exact(words).map(read_ray).collect();
             let places: Option<Vec<(u32, u16)>> = (words > RAY_WORDS).then(|| {
-                question
+                request
                     .chunks_exact(words)
                     .map(|w| (w[RAY_WORDS] >> 10, (w[RAY_WORDS] & 0x3ff) as u16))
                     .collect()
@@ -274,7 +275,7 @@ impl Wave<'_> {
             for (i, m) in met.into_iter().enumerate() {
                 if let Some(mut m) = m {
                     if !m.is_blocked() {
-                        m.primitive = side.in_whole(m.instance, m.primitive);
+                        m.primitive = side.global_primitive(m.instance, m.primitive);
                     }
                     out[i / 32] |= 1 << (i % 32);
                     out.extend(m.to_words());
@@ -283,24 +284,29 @@ impl Wave<'_> {
             Some(out)
         };
         let longest = |q: &[u32]| (q.len() / words).div_ceil(32) + q.len() / words * ShadingHit::WORDS;
-        let wrong = |from: usize, n: usize| FrameError::Message { rank, from, what: "first hits", words: n };
-        let any = talk.ask("rays", &questions, longest, &mut answer, |from, reply| {
+        let message_error =
+            |from: usize, n: usize| FrameError::Message { rank, from, what: "first hits", words: n };
+        let any = channel.request_reply("rays", &requests, longest, &mut answer, |from, reply| {
             let (mask, rest) = reply
                 .split_at_checked(asked[from].len().div_ceil(32))
-                .ok_or_else(|| wrong(from, reply.len()))?;
+                .ok_or_else(|| message_error(from, reply.len()))?;
             let (words, rest) = rest.as_chunks::<{ ShadingHit::WORDS }>();
             let mut words = words.iter();
             for (i, &(t, ray)) in asked[from].iter().enumerate() {
                 if mask[i / 32] >> (i % 32) & 1 == 0 {
                     continue;
                 }
-                let m = ShadingHit::from_words(words.next().ok_or_else(|| wrong(from, reply.len()))?);
+                let m = ShadingHit::from_words(words.next().ok_or_else(|| message_error(from, reply.len()))?);
                 let best = &mut met[t as usize][ray as usize];
                 if best.as_ref().is_none_or(|b| m.is_before(b)) {
                     *best = Some(m);
                 }
             }
-            if rest.is_empty() && words.next().is_none() { Ok(()) } else { Err(wrong(from, reply.len())) }
+            if rest.is_empty() && words.next().is_none() {
+                Ok(())
+            } else {
+                Err(message_error(from, reply.len()))
+            }
         })?;
         Ok((any, met))
     }
@@ -308,7 +314,7 @@ impl Wave<'_> {
 
 /// What is asked of rays; the same on all ranks.
 #[derive(Clone, Copy)]
-enum Wanted<'a> {
+enum RayQuery<'a> {
     /// What they meet first; with pixels, depth and distance as well.
     Closest { pixels: Option<&'a [Vec<u32>]> },
     /// Of rays to light: what they meet that may let it through, or that something opaque is in the way.
@@ -316,18 +322,18 @@ enum Wanted<'a> {
 }
 
 /// Of each point of the tile a bit for each rank into whose bounds one of its light rays comes.
-fn whom_to_ask(boxes: &Boxes, tile: &TileState) -> Vec<u16> {
-    let words = boxes.bit_words();
+fn ranks_to_ask(rank_bounds: &RankBounds, tile: &TileState) -> Vec<u16> {
+    let words = rank_bounds.bit_words();
     let mut bits = vec![0; words * tile.light_points().len()];
     for (point, ray) in tile.light_rays_of_points() {
-        boxes.add_met(&ray, &mut bits[point * words..(point + 1) * words]);
+        rank_bounds.add_hit_ranks(&ray, &mut bits[point * words..(point + 1) * words]);
     }
     bits
 }
 
 /// The same with the rank that was hit alone.
-fn only_hit_ranks(boxes: &Boxes, tile: &TileState, hit: &[u32]) -> Vec<u16> {
-    let words = boxes.bit_words();
+fn rank_that_was_hit(rank_bounds: &RankBounds, tile: &TileState, hit: &[u32]) -> Vec<u16> {
+    let words = rank_bounds.bit_words();
     let mut bits = vec![0; words * tile.light_points().len()];
     for (p, slot) in tile.slots_of_points().enumerate() {
         let rank = hit[slot as usize] as usize;
@@ -355,16 +361,4 @@ fn blocked_in_parallel(
         .collect();
     work.traced += pieces.iter().map(|(_, traced)| traced).sum::<u64>();
     pieces.into_iter().flat_map(|(bits, _)| bits).collect()
-}
-
-pub(super) fn write_ray(ray: &Ray, pixel: Option<u32>, out: &mut Vec<u32>) {
-    out.extend(ray.origin.to_array().map(f32::to_bits));
-    out.extend(ray.dir.to_array().map(f32::to_bits));
-    out.extend([ray.t_min.to_bits(), ray.t_max.to_bits()]);
-    out.extend(pixel);
-}
-
-pub(super) fn read_ray(words: &[u32]) -> Ray {
-    let f = |i: usize| f32::from_bits(words[i]);
-    Ray { origin: Vec3::new(f(0), f(1), f(2)), dir: Vec3::new(f(3), f(4), f(5)), t_min: f(6), t_max: f(7) }
 }

@@ -1,13 +1,16 @@
 //! Ranks of one machine in the memory that they share: how it is made, and their meetings in it.
 
-use super::signs::Patience;
-use super::{CommError, Communicator, MpiComm, NAP, NOTICE_INTERVAL, SPINS, START, collective, node};
+use super::heartbeat::HeartbeatTimeout;
+use super::{
+    CommError, Communicator, MpiComm, NOTICE_INTERVAL, POLL_SLEEP, SPINS, STARTUP_TIMEOUT, collective,
+    shared_memory,
+};
 use std::time::{Duration, Instant};
 
 impl MpiComm {
     /// For tests: has this rank wait so long behind each meeting in shared memory, as one does to whom the system gives no processor.
-    pub fn linger(&mut self, behind_meetings: Duration) {
-        self.linger = behind_meetings;
+    pub fn delay_after_collectives(&mut self, behind_meetings: Duration) {
+        self.delay_after_collectives = behind_meetings;
     }
 
     /// Makes what the ranks of one machine share, if they are all of one machine and all of them can.
@@ -15,43 +18,43 @@ impl MpiComm {
         if self.size < 2 || !self.is_one_node() {
             return Ok(());
         }
-        let made = if self.rank == 0 { node::Node::make(self.size).ok() } else { None };
+        let made = if self.rank == 0 { shared_memory::SharedMemory::make(self.size).ok() } else { None };
         let address = made.as_ref().map_or([0; 3], |made| made.1);
         let mine: &[u8] = bytemuck::cast_slice(&address);
-        let said = collective::all_gather(self, mine, mine.len(), START)?;
-        let address: node::Address = match said[0].as_slice().try_into() {
+        let gathered = collective::all_gather(self, mine, mine.len(), STARTUP_TIMEOUT)?;
+        let address: shared_memory::Address = match gathered[0].as_slice().try_into() {
             Ok(bytes) => bytemuck::cast::<[u8; 12], _>(bytes),
             Err(_) => [0; 3],
         };
-        let node = match made {
-            Some((node, _)) => Some(node),
-            None if address != [0; 3] => node::Node::join(self.rank, self.size, address).ok(),
+        let shared = match made {
+            Some((shared, _)) => Some(shared),
+            None if address != [0; 3] => shared_memory::SharedMemory::map(self.rank, self.size, address).ok(),
             None => None,
         };
-        let said = collective::all_gather(self, &[u8::from(node.is_some())], 1, START)?;
-        self.node = node.filter(|_| said.iter().all(|one| one == &[1]));
+        let gathered = collective::all_gather(self, &[u8::from(shared.is_some())], 1, STARTUP_TIMEOUT)?;
+        self.shared = shared.filter(|_| gathered.iter().all(|one| one == &[1]));
         Ok(())
     }
 
     /// A barrier of ranks that share memory, or an all-gather of strings, which it gives.
-    pub(super) fn meet_in_memory(
+    pub(super) fn collective_in_memory(
         &mut self,
         string: Option<&[u8]>,
         timeout: Duration,
     ) -> Option<Result<Vec<Vec<u8>>, CommError>> {
-        let node = self.node.take()?;
-        let met = self.wait_in_memory(&node, string, timeout);
-        if !self.linger.is_zero() {
-            std::thread::sleep(self.linger);
+        let shared = self.shared.take()?;
+        let met = self.wait_in_memory(&shared, string, timeout);
+        if !self.delay_after_collectives.is_zero() {
+            std::thread::sleep(self.delay_after_collectives);
         }
-        let said = met.and_then(|()| node.said());
-        self.node = Some(node);
-        Some(said)
+        let gathered = met.and_then(|()| shared.gathered());
+        self.shared = Some(shared);
+        Some(gathered)
     }
 
     fn wait_in_memory(
         &mut self,
-        node: &node::Node,
+        shared: &shared_memory::SharedMemory,
         string: Option<&[u8]>,
         timeout: Duration,
     ) -> Result<(), CommError> {
@@ -59,41 +62,41 @@ impl MpiComm {
         if let Some((by, reason)) = &self.aborted {
             return Err(CommError::Aborted { by: *by, reason: reason.clone() });
         }
-        node.arrive(string);
+        shared.arrive(string);
         for _ in 0..if self.oversubscribed { 1 } else { SPINS } {
-            if node.passed() {
+            if shared.passed() {
                 return Ok(());
             }
             std::hint::spin_loop();
         }
         let begin = Instant::now();
-        let mut patience = Patience::new(timeout, begin);
-        let mut heard = begin;
+        let mut patience = HeartbeatTimeout::new(timeout, begin);
+        let mut received = begin;
         loop {
             // What was sent before may need this rank's help to arrive.
             let helps = self.transfers.outgoing() > 0;
-            node.sleep(if helps { NAP } else { NOTICE_INTERVAL });
-            if node.passed() {
+            shared.sleep(if helps { POLL_SLEEP } else { NOTICE_INTERVAL });
+            if shared.passed() {
                 return Ok(());
             }
             let now = Instant::now();
             if helps {
-                self.transfers.reap(&self.mpi);
+                self.transfers.reclaim_buffers(&self.mpi);
             }
-            if now.duration_since(heard) >= NOTICE_INTERVAL {
-                heard = now;
-                self.hear()?;
-                let missing: Vec<usize> = node.missing().collect();
+            if now.duration_since(received) >= NOTICE_INTERVAL {
+                received = now;
+                self.process_notices()?;
+                let missing: Vec<usize> = shared.missing().collect();
                 if let Some(&peer) = missing.iter().find(|&&peer| self.left[peer]) {
                     return Err(CommError::PeerLost { rank, peer });
                 }
-                self.keep_patience(&mut patience, &missing, now);
+                self.update_timeout(&mut patience, &missing, now);
             }
             if patience.is_over(now) {
-                self.hear()?;
+                self.process_notices()?;
                 // A sign may have come while this rank had no processor.
-                let missing: Vec<usize> = node.missing().collect();
-                self.keep_patience(&mut patience, &missing, now);
+                let missing: Vec<usize> = shared.missing().collect();
+                self.update_timeout(&mut patience, &missing, now);
                 if !patience.is_over(now) {
                     continue;
                 }

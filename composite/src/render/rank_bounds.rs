@@ -13,14 +13,14 @@ struct Block {
 }
 
 /// Boxes of all ranks, a little too large: a ray that meets anything in a box is never said to miss it.
-pub(super) struct Boxes {
+pub(super) struct RankBounds {
     blocks: Vec<Block>,
     pub(super) bounds: Vec<Aabb>,
 }
 
-impl Boxes {
+impl RankBounds {
     /// `whole` bounds everything in render space: the rounding of rays is a share of its size.
-    pub(super) fn new(bounds: Vec<Aabb>, whole: Aabb) -> Boxes {
+    pub(super) fn new(bounds: Vec<Aabb>, whole: Aabb) -> RankBounds {
         let size = whole.min.abs().max(whole.max.abs()).max_element();
         let margin = if size.is_finite() { size * 1e-4 } else { 0.0 };
         let mut blocks =
@@ -35,11 +35,11 @@ impl Boxes {
                 block.high[axis][lane] = b.max[axis] + margin;
             }
         }
-        Boxes { blocks, bounds }
+        RankBounds { blocks, bounds }
     }
 
     /// Sets the bits of the ranks into whose boxes the ray comes between its limits.
-    pub(super) fn add_met(&self, ray: &Ray, bits: &mut [u16]) {
+    pub(super) fn add_hit_ranks(&self, ray: &Ray, bits: &mut [u16]) {
         // Directions of 0 become tiny: a distance is then huge, but never NaN.
         let inverse = ray.dir.to_array().map(|d| 1.0 / d.abs().max(1e-30).copysign(d));
         let origin = ray.origin.to_array();
@@ -87,10 +87,10 @@ mod tests {
         let mut bounds: Vec<Aabb> = (0..20).map(|k| cube(2.0 * k as f32)).collect();
         bounds[3] = Aabb::EMPTY;
         let whole = Aabb::new(Vec3::ZERO, Vec3::new(39.0, 1.0, 1.0));
-        let boxes = Boxes::new(bounds, whole);
+        let rank_bounds = RankBounds::new(bounds, whole);
         let met = |ray: Ray| {
-            let mut bits = vec![0; boxes.bit_words()];
-            boxes.add_met(&ray, &mut bits);
+            let mut bits = vec![0; rank_bounds.bit_words()];
+            rank_bounds.add_hit_ranks(&ray, &mut bits);
             ranks_in(&bits).collect::<Vec<_>>()
         };
         let all: Vec<usize> = (0..20).filter(|k| *k != 3).collect();

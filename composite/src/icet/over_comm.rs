@@ -27,14 +27,14 @@ pub(super) struct OverComm {
 }
 
 /// Takes the communicator back when it goes.
-pub(super) struct Lent<'a> {
+pub(super) struct CommGuard<'a> {
     over: *mut OverComm,
     _comm: PhantomData<&'a mut dyn Communicator>,
 }
 
-impl Drop for Lent<'_> {
+impl Drop for CommGuard<'_> {
     fn drop(&mut self) {
-        // SAFETY: made by `lend` from a box that outlives the call into IceT during which this exists.
+        // SAFETY: made by `with_comm` from a box that outlives the call into IceT during which this exists.
         unsafe { (*self.over).comm = None };
     }
 }
@@ -45,11 +45,11 @@ impl OverComm {
     }
 
     /// Lets IceT use `comm` until the result is dropped.
-    pub(super) fn lend<'a>(&mut self, comm: &'a mut dyn Communicator) -> Lent<'a> {
-        // SAFETY: only the lifetime changes; `Lent` keeps the borrow and takes the pointer back.
+    pub(super) fn with_comm<'a>(&mut self, comm: &'a mut dyn Communicator) -> CommGuard<'a> {
+        // SAFETY: only the lifetime changes; `CommGuard` keeps the borrow and takes the pointer back.
         let comm: &'static mut dyn Communicator = unsafe { std::mem::transmute(comm) };
         self.comm = Some(comm);
-        Lent { over: self, _comm: PhantomData }
+        CommGuard { over: self, _comm: PhantomData }
     }
 
     fn comm(&mut self) -> &mut dyn Communicator {
@@ -60,12 +60,12 @@ impl OverComm {
 
     fn post(&mut self, to: *mut u8, count: usize, source: c_int, tag: c_int) -> Pending {
         let receive = self.comm().post_recv(source as usize, FIRST_TAG + tag as u32, count);
-        Pending { receive: or_end(receive), to }
+        Pending { receive: or_abort(receive), to }
     }
 
     fn finish(&mut self, pending: Pending) {
         let comm = self.comm();
-        let arrival = or_end(comm.wait_any(&mut vec![pending.receive], TIMEOUT));
+        let arrival = or_abort(comm.wait_any(&mut vec![pending.receive], TIMEOUT));
         // SAFETY: IceT's buffer holds the count it posted, and the communicator lets no longer message through.
         unsafe { pending.to.copy_from_nonoverlapping(arrival.message.as_ptr(), arrival.message.len()) };
         comm.recycle(arrival.message);
@@ -73,7 +73,7 @@ impl OverComm {
 }
 
 /// IceT cannot be told of an error.
-fn or_end<T>(result: Result<T, CommError>) -> T {
+fn or_abort<T>(result: Result<T, CommError>) -> T {
     result.unwrap_or_else(|error| panic!("IceT's messages cannot go on: {error}"))
 }
 
@@ -87,7 +87,7 @@ impl Transport for OverComm {
     }
 
     fn barrier(&mut self) {
-        or_end(self.comm().barrier(TIMEOUT));
+        or_abort(self.comm().barrier(TIMEOUT));
     }
 
     fn send(&mut self, bytes: *const u8, count: usize, destination: c_int, tag: c_int) {
@@ -96,7 +96,7 @@ impl Transport for OverComm {
             // SAFETY: IceT passes `count` bytes.
             message.extend_from_slice(unsafe { std::slice::from_raw_parts(bytes, count) });
         }
-        or_end(self.comm().send(destination as usize, FIRST_TAG + tag as u32, message));
+        or_abort(self.comm().send(destination as usize, FIRST_TAG + tag as u32, message));
     }
 
     fn recv(&mut self, bytes: *mut u8, count: usize, source: c_int, tag: c_int) {
@@ -159,7 +159,7 @@ impl Transport for OverComm {
         let mine = if send.is_null() { unsafe { recv.add(self.rank * count).cast_const() } } else { send };
         // SAFETY: IceT passes `count` bytes.
         let mine = unsafe { std::slice::from_raw_parts(mine, count) }.to_vec();
-        let all = or_end(self.comm().all_gather(&mine, count, TIMEOUT));
+        let all = or_abort(self.comm().all_gather(&mine, count, TIMEOUT));
         for (rank, part) in all.iter().enumerate() {
             // SAFETY: room for `count` bytes of each rank.
             unsafe { recv.add(rank * count).copy_from_nonoverlapping(part.as_ptr(), part.len().min(count)) };
@@ -217,7 +217,7 @@ impl Transport for OverComm {
                 posted.push(pending.receive);
             }
         }
-        let arrival = or_end(self.comm().wait_any(&mut posted, TIMEOUT));
+        let arrival = or_abort(self.comm().wait_any(&mut posted, TIMEOUT));
         let mut done = 0;
         let mut left = posted.into_iter().peekable();
         for (id, position, request, to) in owners {

@@ -4,16 +4,16 @@ use rt_core::math::Aabb;
 use std::ops::Range;
 
 /// Tiles of each rank, and which ranks have something to say about which tile.
-pub(super) struct Owners {
+pub(super) struct TileOwners {
     /// Consecutive tiles of each rank.
     pub(super) tiles: Vec<Range<usize>>,
     /// Of each rank, whether a camera ray of a tile can meet its part.
     touched: Vec<Vec<bool>>,
 }
 
-impl Owners {
+impl TileOwners {
     /// Tiles in `bounds.len()` runs of about the same work: a tile counts once, and once more for each part that may be seen in it.
-    pub(super) fn new(frame: &DistributedFrame<'_>, bounds: &[Aabb]) -> Owners {
+    pub(super) fn new(frame: &DistributedFrame<'_>, bounds: &[Aabb]) -> TileOwners {
         let touched: Vec<Vec<bool>> = bounds.iter().map(|b| frame.tiles_overlapping(*b)).collect();
         let work = |tile: usize| {
             let parts = touched.iter().filter(|t| t[tile]).count() as u64;
@@ -21,7 +21,7 @@ impl Owners {
             if parts == 0 { 1 } else { 8 + parts }
         };
         let work: Vec<u64> = (0..frame.num_tiles()).map(work).collect();
-        Owners { tiles: cut(&work, bounds.len()), touched }
+        TileOwners { tiles: cut(&work, bounds.len()), touched }
     }
 
     /// Tiles of chunk `chunk` of `chunks` of `owner`'s: what travels together.
@@ -42,7 +42,7 @@ impl Owners {
     }
 
     /// Whether `from` has anything to say to `owner` about a chunk.
-    pub(super) fn talks(&self, from: usize, owner: usize, chunk: (usize, usize)) -> bool {
+    pub(super) fn has_messages(&self, from: usize, owner: usize, chunk: (usize, usize)) -> bool {
         self.shared(from, owner, chunk).next().is_some()
     }
 }

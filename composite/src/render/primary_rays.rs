@@ -3,10 +3,11 @@
 //! Streamed, hits leave for the owner of their tiles as soon as a few tiles are traced, and what has come meanwhile is joined: messages travel while
 //! rays are traced. Where local light suffices, finished tiles go on to the collecting rank at once. So a frame costs the longer of rendering and
 //! compositing and not their sum: what sections 3.3.2 and 6.1 of the thesis wish for.
-use super::ask::{Inbox, Incoming, Tag, Talk};
-use super::collect::Collect;
-use super::owners::Owners;
-use super::sort_last::Side;
+use super::rank_frame::RankFrame;
+use super::request_reply::{Inbox, Incoming, RankChannel, Tag};
+use super::tile_collector::TileCollector;
+use super::tile_hits::{Nearest, SLOTS, TileHits};
+use super::tile_owners::TileOwners;
 use super::{Activity, FrameError};
 use rayon::prelude::*;
 use rt_core::distributed::{CameraHits, DistributedFrame, Pass, ShadingHit};
@@ -20,138 +21,87 @@ const CHUNK_TILES: usize = 8;
 /// Tiles traced between two looks for messages.
 const TILES_PER_LOOK: usize = 4;
 
-/// Slots of a tile.
-pub(super) const SLOTS: usize = 1024;
 /// Words of a mask with a bit for each slot.
 const MASK_WORDS: usize = SLOTS / 32;
-
-/// The nearest hit of a pixel so far.
-#[derive(Clone, Copy)]
-struct Nearest {
-    t: f32,
-    instance: u32,
-    primitive: u32,
-    rank: u32,
-    color: [f32; 4],
-}
-
-impl Nearest {
-    const NOTHING: Nearest = Nearest {
-        t: f32::INFINITY,
-        instance: u32::MAX,
-        primitive: u32::MAX,
-        rank: u32::MAX,
-        color: [0.0; 4],
-    };
-
-    fn is_before(&self, other: &Nearest) -> bool {
-        let key = |n: &Nearest| (n.instance, n.primitive);
-        // Nothing has t infinite and the highest numbers: every hit comes before it.
-        self.t < other.t || (self.t == other.t && key(self) < key(other))
-    }
-}
-
-/// What the camera rays of one owned tile meet.
-pub(super) struct TileAnswer {
-    nearest: Vec<Nearest>,
-    /// Everything about the hits, where it was asked for.
-    pub(super) met: Vec<Option<ShadingHit>>,
-}
-
-impl TileAnswer {
-    fn new() -> TileAnswer {
-        TileAnswer { nearest: vec![Nearest::NOTHING; SLOTS], met: Vec::new() }
-    }
-
-    /// Colours of the nearest hits.
-    pub(super) fn colors(&self) -> Vec<Option<[f32; 4]>> {
-        self.nearest.iter().map(|n| (n.rank != u32::MAX).then_some(n.color)).collect()
-    }
-
-    /// The rank whose hit is the nearest, of each slot; `u32::MAX` for none.
-    pub(super) fn winner(&self, slot: usize) -> u32 {
-        self.nearest[slot].rank
-    }
-}
 
 /// Own hits, by tile; tiles without any are left out.
 type OwnHits = Vec<Option<CameraHits>>;
 
 /// What a pass of camera rays is for.
 #[derive(Clone, Copy)]
-pub(super) struct Wanted {
+pub(super) struct PrimaryPass {
     pub(super) pass: Pass,
     /// Hits come with their colours.
     pub(super) colors: bool,
     /// Owners get everything about the nearest hits.
-    pub(super) whole_hits: bool,
+    pub(super) hit_details: bool,
     /// Messages travel while rays are traced.
     pub(super) stream: bool,
 }
 
 /// One pass of camera rays. With `collect`, colours of hits make finished tiles, which go to the collecting rank.
 pub(super) fn run(
-    talk: &mut Talk<'_>,
-    side: &Side<'_>,
-    owners: &Owners,
-    wanted: Wanted,
-    collect: Option<&mut Collect<'_>>,
-) -> Result<Vec<TileAnswer>, FrameError> {
-    let (rank, size) = (talk.rank(), talk.size());
+    channel: &mut RankChannel<'_>,
+    side: &RankFrame<'_>,
+    owners: &TileOwners,
+    wanted: PrimaryPass,
+    collect: Option<&mut TileCollector<'_>>,
+) -> Result<Vec<TileHits>, FrameError> {
+    let (rank, size) = (channel.rank(), channel.size());
     let tiles_per_owner = side.frame.num_tiles() / size;
     let chunks = if wanted.stream { (tiles_per_owner / CHUNK_TILES).clamp(1, CHUNKS) } else { 1 };
-    let mut wave = CameraWave {
+    let mut wave = PrimaryRays {
         side,
         owners,
         wanted,
         chunks,
         own: Vec::new(),
-        answers: owners.tiles[rank].clone().map(|_| TileAnswer::new()).collect(),
+        answers: owners.tiles[rank].clone().map(|_| TileHits::new()).collect(),
         seen_by: vec![Vec::new(); size],
-        joined: vec![0; size],
+        merged: vec![0; size],
         missing: Vec::new(),
         finished: 0,
         inbox: Inbox::default(),
         collect,
     };
     wave.own.resize_with(side.frame.num_tiles(), || None);
-    wave.announce(talk)?;
+    wave.post_receives(channel)?;
     // ---- Rays, and hits to the owners of their tiles: to the next rank first, so that nobody gets all at once, and one's own last.
     let to = |step: usize| (rank + 1 + step) % size;
     let mut traced = 0;
     for chunk in 0..chunks {
         if side.parallel {
             let all = (0..size).flat_map(|owner| owners.shared(rank, owner, (chunk, chunks)));
-            wave.trace(talk, all.collect());
+            wave.trace(channel, all.collect());
         }
         for owner in (0..size).map(to) {
             if !side.parallel {
                 let tiles: Vec<usize> = owners.shared(rank, owner, (chunk, chunks)).collect();
                 traced += tiles.len();
-                wave.trace(talk, tiles);
+                wave.trace(channel, tiles);
             }
             if wanted.stream {
-                wave.hand_over(talk, owner, chunk)?;
+                wave.send_hits(channel, owner, chunk)?;
             }
             if wanted.stream && (side.parallel || traced >= TILES_PER_LOOK) {
                 traced = 0;
-                while let Some(incoming) = talk.next(&mut wave.inbox, false)? {
-                    wave.take(talk, incoming)?;
+                while let Some(incoming) = channel.next(&mut wave.inbox, false)? {
+                    wave.take(channel, incoming)?;
                 }
             }
         }
     }
     if !wanted.stream {
         for owner in (0..size).map(to) {
-            wave.hand_over(talk, owner, 0)?;
+            wave.send_hits(channel, owner, 0)?;
         }
     }
-    while let Some(incoming) = talk.next(&mut wave.inbox, true)? {
-        wave.take(talk, incoming)?;
+    while let Some(incoming) = channel.next(&mut wave.inbox, true)? {
+        wave.take(channel, incoming)?;
     }
-    let CameraWave { own, seen_by, mut answers, .. } = wave;
-    if wanted.whole_hits {
-        fetch_whole_hits(talk, side, owners, &own, &seen_by, &mut answers)?;
+    let PrimaryRays { own, seen_by, mut answers, .. } = wave;
+    if wanted.hit_details {
+        fetch_hit_details(channel, side, owners, &own, &seen_by, &mut answers)?;
     }
     Ok(answers)
 }
@@ -160,29 +110,29 @@ pub(super) fn run(
 const WHOLE: (usize, usize) = (0, 1);
 
 /// One rank's camera rays of one pass.
-struct CameraWave<'a, 'c> {
-    side: &'a Side<'a>,
-    owners: &'a Owners,
-    wanted: Wanted,
+struct PrimaryRays<'a, 'c> {
+    side: &'a RankFrame<'a>,
+    owners: &'a TileOwners,
+    wanted: PrimaryPass,
     chunks: usize,
     own: OwnHits,
-    answers: Vec<TileAnswer>,
+    answers: Vec<TileHits>,
     /// Of each rank, its tiles in which it has hits.
     seen_by: Vec<Vec<usize>>,
     /// Of each rank, how many chunks of its hits have been joined (or passed, having nothing).
-    joined: Vec<usize>,
+    merged: Vec<usize>,
     /// Of each of the own chunks, how many ranks have not yet said what they see there.
     missing: Vec<usize>,
     /// Own chunks that have gone on to the root.
     finished: usize,
     inbox: Inbox,
-    collect: Option<&'a mut Collect<'c>>,
+    collect: Option<&'a mut TileCollector<'c>>,
 }
 
-impl CameraWave<'_, '_> {
+impl PrimaryRays<'_, '_> {
     /// Posts all receives of the pass.
-    fn announce(&mut self, talk: &mut Talk<'_>) -> Result<(), FrameError> {
-        let (rank, size) = (talk.rank(), talk.size());
+    fn post_receives(&mut self, channel: &mut RankChannel<'_>) -> Result<(), FrameError> {
+        let (rank, size) = (channel.rank(), channel.size());
         let per_pixel = words_per_hit(self.side.frame, self.wanted.colors);
         for chunk in (0..self.chunks).map(|c| (c, self.chunks)) {
             let mut missing = 1;
@@ -190,20 +140,20 @@ impl CameraWave<'_, '_> {
                 let tiles = self.owners.shared(from, rank, chunk).count();
                 if tiles > 0 {
                     let most = tiles * (1 + MASK_WORDS + SLOTS * per_pixel);
-                    talk.expect(&mut self.inbox, from, Tag::Hits, most)?;
+                    channel.expect(&mut self.inbox, from, Tag::Hits, most)?;
                     missing += 1;
                 }
             }
             self.missing.push(missing);
         }
         match &mut self.collect {
-            Some(collect) => collect.announce(talk, &mut self.inbox, self.owners, self.chunks),
+            Some(collect) => collect.post_receives(channel, &mut self.inbox, self.owners, self.chunks),
             None => Ok(()),
         }
     }
 
     /// Traces some of the tiles in which this rank's part may be seen.
-    fn trace(&mut self, talk: &mut Talk<'_>, tiles: Vec<usize>) {
+    fn trace(&mut self, channel: &mut RankChannel<'_>, tiles: Vec<usize>) {
         let side = self.side;
         let one = |&tile: &usize| {
             let mut hits = CameraHits::default();
@@ -212,7 +162,7 @@ impl CameraWave<'_, '_> {
             (tile, any, hits)
         };
         let traced: Vec<_> = if side.parallel {
-            talk.beside(|steps| {
+            channel.in_background(|steps| {
                 let count = |hits| {
                     steps.fetch_add(1, Ordering::Relaxed);
                     hits
@@ -222,74 +172,79 @@ impl CameraWave<'_, '_> {
         } else {
             let mut with_sign = |tile| {
                 let hits = one(tile);
-                talk.alive();
+                channel.alive();
                 hits
             };
             tiles.iter().map(&mut with_sign).collect()
         };
         for (tile, any, hits) in traced {
-            talk.report.camera_rays += hits.rays();
+            channel.report.camera_rays += hits.rays();
             if any {
                 self.own[tile] = Some(hits);
             }
         }
-        talk.spent(Activity::Render);
+        channel.record_span(Activity::Render);
     }
 
     /// The own hits in a chunk to the owner of its tiles.
-    fn hand_over(&mut self, talk: &mut Talk<'_>, owner: usize, chunk: usize) -> Result<(), FrameError> {
-        let (rank, place) = (talk.rank(), (chunk, self.chunks));
-        if owner != rank && !self.owners.talks(rank, owner, place) {
+    fn send_hits(
+        &mut self,
+        channel: &mut RankChannel<'_>,
+        owner: usize,
+        chunk: usize,
+    ) -> Result<(), FrameError> {
+        let (rank, chunk_of) = (channel.rank(), (chunk, self.chunks));
+        if owner != rank && !self.owners.has_messages(rank, owner, chunk_of) {
             return Ok(());
         }
-        let tiles = self.owners.shared(rank, owner, place);
+        let tiles = self.owners.shared(rank, owner, chunk_of);
         let words = encode_hits(self.side, tiles, &mut self.own, self.wanted.colors);
-        talk.spent(Activity::Render);
+        channel.record_span(Activity::Render);
         if owner == rank {
-            return self.join(talk, rank, chunk, &words);
+            return self.merge_hits(channel, rank, chunk, &words);
         }
-        talk.send(owner, Tag::Hits, &words)?;
-        talk.spent(Activity::Exchange);
+        channel.send(owner, Tag::Hits, &words)?;
+        channel.record_span(Activity::Exchange);
         Ok(())
     }
 
-    fn take(&mut self, talk: &mut Talk<'_>, incoming: Incoming) -> Result<(), FrameError> {
+    fn take(&mut self, channel: &mut RankChannel<'_>, incoming: Incoming) -> Result<(), FrameError> {
         let Incoming { from, tag, words } = incoming;
         if tag == Tag::Tiles as u32 {
             return match &mut self.collect {
-                Some(collect) => collect.place(talk, self.owners, from, self.chunks, &words),
-                None => Err(talk.wrong(from, "tiles", words.len())),
+                Some(collect) => collect.put_chunk(channel, self.owners, from, self.chunks, &words),
+                None => Err(channel.message_error(from, "tiles", words.len())),
             };
         }
         // Messages of one rank come in order; chunks of which it sees nothing are not sent.
-        let (rank, chunks) = (talk.rank(), self.chunks);
-        let next = (self.joined[from]..chunks).find(|&c| self.owners.talks(from, rank, (c, chunks)));
-        let chunk = next.ok_or_else(|| talk.wrong(from, "hits", words.len()))?;
-        self.joined[from] = chunk + 1;
-        self.join(talk, from, chunk, &words)
+        let (rank, chunks) = (channel.rank(), self.chunks);
+        let next = (self.merged[from]..chunks).find(|&c| self.owners.has_messages(from, rank, (c, chunks)));
+        let chunk = next.ok_or_else(|| channel.message_error(from, "hits", words.len()))?;
+        self.merged[from] = chunk + 1;
+        self.merge_hits(channel, from, chunk, &words)
     }
 
     /// What rank `from` sees in an own chunk.
-    fn join(
+    fn merge_hits(
         &mut self,
-        talk: &mut Talk<'_>,
+        channel: &mut RankChannel<'_>,
         from: usize,
         chunk: usize,
         words: &[u32],
     ) -> Result<(), FrameError> {
-        let (rank, place) = (talk.rank(), (chunk, self.chunks));
-        let (tiles, first) = (self.owners.shared(from, rank, place), self.owners.tiles[rank].start);
+        let (rank, chunk_of) = (channel.rank(), (chunk, self.chunks));
+        let (tiles, first) = (self.owners.shared(from, rank, chunk_of), self.owners.tiles[rank].start);
         let (answers, seen) = (&mut self.answers, &mut self.seen_by[from]);
         decode_hits(self.side, tiles, first, from, words, self.wanted.colors, answers, seen)
-            .ok_or_else(|| talk.wrong(from, "hits", words.len()))?;
-        talk.spent(Activity::Composite);
+            .ok_or_else(|| channel.message_error(from, "hits", words.len()))?;
+        channel.record_span(Activity::Composite);
         self.missing[chunk] -= 1;
         // In the order of chunks, which the root relies on: a chunk that few ranks see may be complete before the one in front of it.
         let Some(collect) = &mut self.collect else { return Ok(()) };
         while self.missing.get(self.finished) == Some(&0) {
             let tiles = self.owners.chunk(rank, (self.finished, self.chunks));
             self.finished += 1;
-            collect.finish(talk, tiles, self.wanted.pass, &self.answers)?;
+            collect.finish(channel, tiles, self.wanted.pass, &self.answers)?;
         }
         Ok(())
     }
@@ -301,7 +256,7 @@ fn words_per_hit(frame: &DistributedFrame<'_>, colors: bool) -> usize {
 
 /// Hits in `tiles`: of each tile whether there are any, then a mask of slots and the hits in order.
 fn encode_hits(
-    side: &Side<'_>,
+    side: &RankFrame<'_>,
     tiles: impl Iterator<Item = usize>,
     own: &mut OwnHits,
     colors: bool,
@@ -324,7 +279,7 @@ fn encode_hits(
             if several {
                 out.push(hit.instance);
             }
-            out.push(side.in_whole(hit.instance, hit.prim));
+            out.push(side.global_primitive(hit.instance, hit.prim));
             if colors {
                 out.extend(palette[slot].map(f32::to_bits));
             }
@@ -335,13 +290,13 @@ fn encode_hits(
 
 /// Joins what [`encode_hits`] of rank `from` made to the nearest hits of this rank's tiles, which begin at `first`.
 fn decode_hits(
-    side: &Side<'_>,
+    side: &RankFrame<'_>,
     tiles: impl Iterator<Item = usize>,
     first: usize,
     from: usize,
     mut words: &[u32],
     colors: bool,
-    answers: &mut [TileAnswer],
+    answers: &mut [TileHits],
     seen: &mut Vec<usize>,
 ) -> Option<()> {
     let several = side.frame.num_instances() > 1;
@@ -391,28 +346,29 @@ fn slots(mask: &[u32]) -> impl Iterator<Item = usize> + '_ {
 }
 
 /// Asks the ranks whose hits are the nearest for everything about them.
-fn fetch_whole_hits(
-    talk: &mut Talk<'_>,
-    side: &Side<'_>,
-    owners: &Owners,
+fn fetch_hit_details(
+    channel: &mut RankChannel<'_>,
+    side: &RankFrame<'_>,
+    owners: &TileOwners,
     own: &OwnHits,
     seen_by: &[Vec<usize>],
-    answers: &mut [TileAnswer],
+    answers: &mut [TileHits],
 ) -> Result<(), FrameError> {
-    let (rank, size) = (talk.rank(), talk.size());
+    let (rank, size) = (channel.rank(), channel.size());
     let first = owners.tiles[rank].start;
     for a in answers.iter_mut() {
-        a.met = vec![None; SLOTS];
+        a.hits = vec![None; SLOTS];
     }
     // ---- To everyone who has sent hits: a mask of those that won.
-    let won: Vec<Vec<u32>> = (0..size).map(|from| won_masks(from, &seen_by[from], first, answers)).collect();
+    let won: Vec<Vec<u32>> =
+        (0..size).map(|from| winner_masks(from, &seen_by[from], first, answers)).collect();
     for step in 1..size {
         let to = (rank + step) % size;
-        if owners.talks(to, rank, WHOLE) {
-            talk.send(to, Tag::Won, &won[to])?;
+        if owners.has_messages(to, rank, WHOLE) {
+            channel.send(to, Tag::Winners, &won[to])?;
         }
     }
-    talk.spent(Activity::Exchange);
+    channel.record_span(Activity::Exchange);
     // ---- Everything about this rank's hits that won.
     let with_hits =
         |owner: usize| owners.shared(rank, owner, WHOLE).filter(|&t| own[t].is_some()).collect::<Vec<_>>();
@@ -421,7 +377,7 @@ fn fetch_whole_hits(
         for (&tile, mask) in tiles.iter().zip(masks.chunks_exact(MASK_WORDS)) {
             for slot in slots(mask) {
                 let mut met = own[tile].as_ref()?.shading_hit(side.frame, slot)?;
-                met.primitive = side.in_whole(met.instance, met.primitive);
+                met.primitive = side.global_primitive(met.instance, met.primitive);
                 out.extend(met.to_words());
             }
         }
@@ -432,41 +388,42 @@ fn fetch_whole_hits(
         let mut mets = mets.iter().map(ShadingHit::from_words);
         for (&tile, mask) in seen_by[from].iter().zip(won[from].chunks_exact(MASK_WORDS)) {
             for slot in slots(mask) {
-                answers[tile - first].met[slot] = Some(mets.next()?);
+                answers[tile - first].hits[slot] = Some(mets.next()?);
             }
         }
         (rest.is_empty() && mets.next().is_none()).then_some(())
     };
     let own_words =
-        reply(&with_hits(rank), &won[rank]).ok_or_else(|| talk.wrong(rank, "hits that won", 0))?;
-    put(rank, &own_words).ok_or_else(|| talk.wrong(rank, "whole hits", own_words.len()))?;
-    talk.spent(Activity::Composite);
-    let askers = (0..size).filter(|&owner| owner != rank && owners.talks(rank, owner, WHOLE));
+        reply(&with_hits(rank), &won[rank]).ok_or_else(|| channel.message_error(rank, "hits that won", 0))?;
+    put(rank, &own_words).ok_or_else(|| channel.message_error(rank, "whole hits", own_words.len()))?;
+    channel.record_span(Activity::Composite);
+    let askers = (0..size).filter(|&owner| owner != rank && owners.has_messages(rank, owner, WHOLE));
     let sources: Vec<_> = askers.map(|owner| (owner, with_hits(owner).len() * MASK_WORDS)).collect();
-    talk.receive(Tag::Won, "hits that won", sources, |talk, owner, masks| {
+    channel.receive(Tag::Winners, "hits that won", sources, |channel, owner, masks| {
         let tiles = with_hits(owner);
-        let wrong = |talk: &Talk<'_>| talk.wrong(owner, "hits that won", masks.len());
+        let message_error =
+            |channel: &RankChannel<'_>| channel.message_error(owner, "hits that won", masks.len());
         if masks.len() != tiles.len() * MASK_WORDS {
-            return Err(wrong(talk));
+            return Err(message_error(channel));
         }
-        let words = reply(&tiles, &masks).ok_or_else(|| wrong(talk))?;
-        talk.spent(Activity::Composite);
-        talk.send(owner, Tag::Answer, &words)?;
-        talk.spent(Activity::Exchange);
+        let words = reply(&tiles, &masks).ok_or_else(|| message_error(channel))?;
+        channel.record_span(Activity::Composite);
+        channel.send(owner, Tag::Reply, &words)?;
+        channel.record_span(Activity::Exchange);
         Ok(())
     })?;
     let wins = |from: usize| won[from].iter().map(|w| w.count_ones() as usize).sum::<usize>();
-    let sources = (0..size).filter(|&from| from != rank && owners.talks(from, rank, WHOLE));
+    let sources = (0..size).filter(|&from| from != rank && owners.has_messages(from, rank, WHOLE));
     let sources: Vec<_> = sources.map(|from| (from, wins(from) * ShadingHit::WORDS)).collect();
-    talk.receive(Tag::Answer, "whole hits", sources, |talk, from, words| {
-        put(from, &words).ok_or_else(|| talk.wrong(from, "whole hits", words.len()))?;
-        talk.spent(Activity::Composite);
+    channel.receive(Tag::Reply, "whole hits", sources, |channel, from, words| {
+        put(from, &words).ok_or_else(|| channel.message_error(from, "whole hits", words.len()))?;
+        channel.record_span(Activity::Composite);
         Ok(())
     })
 }
 
 /// Of each of `tiles`, a mask of the slots where the hit of rank `from` is the nearest.
-fn won_masks(from: usize, tiles: &[usize], first: usize, answers: &[TileAnswer]) -> Vec<u32> {
+fn winner_masks(from: usize, tiles: &[usize], first: usize, answers: &[TileHits]) -> Vec<u32> {
     let mut out = Vec::with_capacity(tiles.len() * MASK_WORDS);
     for &tile in tiles {
         let nearest = &answers[tile - first].nearest;

@@ -4,7 +4,7 @@
 //! whatever happens to a process. Ranks wait on a word of the table (`futex`): they sleep until they are woken, which matters where ranks
 //! share processors. There, whoever polls for messages takes the processor from those it waits for, and Linux (6.18) moves a process
 //! that yields behind all others, so that it is served last when its message has come.
-use crate::comm::{CommError, NodeMemory};
+use crate::comm::{CommError, SharedSegments};
 use rustix::fs::{FallocateFlags, MemfdFlags, fallocate, memfd_create};
 use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
 use rustix::thread::futex;
@@ -16,7 +16,7 @@ use std::time::Duration;
 
 /// Words of 32 bits for a rank's entry: one line of the cache.
 const ENTRY: usize = 16;
-/// Words of what a rank says at a meeting ([`Node::slot`]): the meeting's number, what it came for, and 248 bytes.
+/// Words of what a rank says at a meeting ([`SharedMemory::slot`]): the meeting's number, what it came for, and 248 bytes.
 const STRING: usize = 64;
 /// What stands in place of a length where a rank came to a barrier.
 const BARRIER: u32 = u32::MAX;
@@ -29,14 +29,14 @@ const ARRIVED: usize = 1;
 const NEXT_BAND: usize = 2;
 const NONCE: usize = 3;
 // A rank's entry.
-const CAME: usize = 0;
+const ARRIVALS: usize = 0;
 const PROCESS: usize = 1;
 const FILE: usize = 2;
 const GENERATION: usize = 3;
 const KIB: usize = 4;
 const REFUSED: usize = 5;
 /// Behind which meeting its room was written last.
-const LAID: usize = 6;
+const PUBLISHED: usize = 6;
 
 /// Where the table is: process and file of rank 0, and what stands in it, so that the process of that number in another container is not
 /// taken for it.
@@ -110,31 +110,31 @@ fn is_alive(process: u32) -> bool {
 }
 
 /// A rank's room, as it is mapped here.
-struct Room {
+struct Segment {
     generation: u32,
     mapping: Mapping,
 }
 
 /// See the module.
-pub(super) struct Node {
+pub(super) struct SharedMemory {
     rank: usize,
     size: usize,
     table: Mapping,
     /// Kept open, so that others can open it.
     own_file: Option<File>,
     _table_file: Option<File>,
-    rooms: Vec<Option<Room>>,
+    segments: Vec<Option<Segment>>,
     /// How often this rank has come to a meeting: to a barrier or an all-gather.
-    came: Cell<u32>,
+    arrivals: Cell<u32>,
     /// Behind which meeting it has laid its pixels down.
-    laid: Cell<u32>,
+    published: Cell<u32>,
 }
 
 fn table_bytes(size: usize) -> usize {
     (4 * (ENTRY * (size + 1) + 2 * STRING * size)).next_multiple_of(4096)
 }
 
-impl Node {
+impl SharedMemory {
     /// The table that this rank makes for all, and where it is.
     pub(super) fn make(size: usize) -> std::io::Result<(Self, Address)> {
         let file = nameless_file(table_bytes(size))?;
@@ -147,7 +147,7 @@ impl Node {
     }
 
     /// The table that rank 0 has made.
-    pub(super) fn join(rank: usize, size: usize, [process, file, nonce]: Address) -> std::io::Result<Self> {
+    pub(super) fn map(rank: usize, size: usize, [process, file, nonce]: Address) -> std::io::Result<Self> {
         let node = Self::of(rank, size, file_of(process, file)?)?;
         let same = node.table.word(NONCE).load(Ordering::Acquire) == nonce;
         if same { Ok(node) } else { Err(std::io::ErrorKind::NotFound.into()) }
@@ -160,9 +160,9 @@ impl Node {
             table: Mapping::of(&file, table_bytes(size), true)?,
             own_file: None,
             _table_file: (rank == 0).then_some(file),
-            rooms: (0..size).map(|_| None).collect(),
-            came: Cell::new(0),
-            laid: Cell::new(0),
+            segments: (0..size).map(|_| None).collect(),
+            arrivals: Cell::new(0),
+            published: Cell::new(0),
         })
     }
 
@@ -176,8 +176,8 @@ impl Node {
     /// The string can be read behind the meeting. There are two sets of them, and a rank is at most one meeting ahead of another, so
     /// nobody writes what another still reads: a rank that runs ahead is not mistaken for one that came for the same reason.
     pub(super) fn arrive(&self, string: Option<&[u8]>) {
-        let number = self.came.get().wrapping_add(1);
-        self.came.set(number);
+        let number = self.arrivals.get().wrapping_add(1);
+        self.arrivals.set(number);
         let first = self.slot(self.rank);
         self.table.word(first).store(number, Ordering::Relaxed);
         let length = string.map_or(BARRIER, |string| string.len() as u32);
@@ -187,7 +187,7 @@ impl Node {
             word[..four.len()].copy_from_slice(four);
             self.table.word(first + 2 + index).store(u32::from_ne_bytes(word), Ordering::Relaxed);
         }
-        self.entry(self.rank, CAME).store(number, Ordering::Release);
+        self.entry(self.rank, ARRIVALS).store(number, Ordering::Release);
         if self.table.word(ARRIVED).fetch_add(1, Ordering::AcqRel) + 1 == self.size as u32 {
             self.table.word(ARRIVED).store(0, Ordering::Relaxed);
             self.table.word(EPOCH).store(number, Ordering::Release);
@@ -197,27 +197,27 @@ impl Node {
 
     /// Whether all have come to the meeting at which this rank is.
     pub(super) fn passed(&self) -> bool {
-        self.table.word(EPOCH).load(Ordering::Acquire) == self.came.get()
+        self.table.word(EPOCH).load(Ordering::Acquire) == self.arrivals.get()
     }
 
     /// Sleeps until all have come or the time has passed, or for no reason.
     pub(super) fn sleep(&self, most: Duration) {
-        let before = self.came.get().wrapping_sub(1);
+        let before = self.arrivals.get().wrapping_sub(1);
         let most = futex::Timespec { tv_sec: most.as_secs() as i64, tv_nsec: i64::from(most.subsec_nanos()) };
         let _ = futex::wait(self.table.word(EPOCH), futex::Flags::empty(), before, Some(&most));
     }
 
     /// Ranks that have not come.
     pub(super) fn missing(&self) -> impl Iterator<Item = usize> {
-        let here = self.came.get();
-        (0..self.size).filter(move |&rank| self.entry(rank, CAME).load(Ordering::Acquire) != here)
+        let here = self.arrivals.get();
+        (0..self.size).filter(move |&rank| self.entry(rank, ARRIVALS).load(Ordering::Acquire) != here)
     }
 
     /// What all have said at the meeting that has passed; nothing if it was a barrier.
     ///
     /// # Errors
     /// [`CommError::OutOfStep`] if some came to a barrier and others to an all-gather.
-    pub(super) fn said(&self) -> Result<Vec<Vec<u8>>, CommError> {
+    pub(super) fn gathered(&self) -> Result<Vec<Vec<u8>>, CommError> {
         let length = |rank| self.table.word(self.slot(rank) + 1).load(Ordering::Relaxed);
         let (waiting, gathering): (Vec<usize>, Vec<usize>) =
             (0..self.size).partition(|&rank| length(rank) == BARRIER);
@@ -241,13 +241,13 @@ impl Node {
 
     /// First word of what `rank` says at the meeting at which this rank is.
     fn slot(&self, rank: usize) -> usize {
-        let set = self.came.get() as usize % 2;
+        let set = self.arrivals.get() as usize % 2;
         ENTRY * (self.size + 1) + STRING * (set * self.size + rank)
     }
 
     /// A room of at least so many bytes for this rank.
-    fn make_room(&mut self, bytes: usize) -> std::io::Result<()> {
-        if self.rooms[self.rank].as_ref().is_some_and(|room| room.mapping.bytes >= bytes) {
+    fn make_segment(&mut self, bytes: usize) -> std::io::Result<()> {
+        if self.segments[self.rank].as_ref().is_some_and(|segment| segment.mapping.bytes >= bytes) {
             return Ok(());
         }
         // A little more than needed: frames are alike but not equal.
@@ -263,36 +263,37 @@ impl Node {
         ] {
             self.entry(self.rank, word).store(value, Ordering::Relaxed);
         }
-        self.rooms[self.rank] = Some(Room { generation, mapping });
+        self.segments[self.rank] = Some(Segment { generation, mapping });
         self.own_file = Some(file);
         Ok(())
     }
 }
 
-impl NodeMemory for Node {
-    fn lay(&mut self, bytes: usize, used: usize, fill: &mut dyn FnMut(&mut [u8])) {
-        let made = self.make_room(bytes.max(1));
+impl SharedSegments for SharedMemory {
+    fn publish(&mut self, bytes: usize, used: usize, fill: &mut dyn FnMut(&mut [u8])) {
+        let made = self.make_segment(bytes.max(1));
         self.entry(self.rank, REFUSED).store(u32::from(made.is_err()), Ordering::Relaxed);
-        self.laid.set(self.came.get());
-        self.entry(self.rank, LAID).store(self.came.get(), Ordering::Relaxed);
+        self.published.set(self.arrivals.get());
+        self.entry(self.rank, PUBLISHED).store(self.arrivals.get(), Ordering::Relaxed);
         if self.rank == 0 {
             // Whoever took bands of the last frame has come to a barrier since, and nobody takes one before the next.
             self.table.word(NEXT_BAND).store(0, Ordering::Relaxed);
         }
-        if let (Ok(()), Some(room)) = (made, &self.rooms[self.rank]) {
+        if let (Ok(()), Some(segment)) = (made, &self.segments[self.rank]) {
             // SAFETY: between the meeting of a frame and its barrier only its owner uses a room.
-            fill(unsafe { room.mapping.write(0, used) });
+            fill(unsafe { segment.mapping.write(0, used) });
         }
     }
 
-    fn open(&mut self) -> Result<bool, CommError> {
+    fn attach(&mut self) -> Result<bool, CommError> {
         let failed = |rank: usize, reason: String| CommError::Transport {
             rank: self.rank,
             call: format!("opening the memory of rank {rank}"),
             reason,
         };
-        let late = |rank: &usize| self.entry(*rank, LAID).load(Ordering::Relaxed) != self.laid.get();
-        if let Some(rank) = (0..self.size).find(late) {
+        let unpublished =
+            |rank: &usize| self.entry(*rank, PUBLISHED).load(Ordering::Relaxed) != self.published.get();
+        if let Some(rank) = (0..self.size).find(unpublished) {
             let reason = "it has laid down nothing for this frame: do all ranks make the same calls?";
             return Err(failed(rank, reason.to_string()));
         }
@@ -302,7 +303,7 @@ impl NodeMemory for Node {
         }
         for rank in 0..self.size {
             let generation = self.entry(rank, GENERATION).load(Ordering::Relaxed);
-            if self.rooms[rank].as_ref().is_some_and(|room| room.generation == generation) {
+            if self.segments[rank].as_ref().is_some_and(|segment| segment.generation == generation) {
                 continue;
             }
             let [process, file, kib] =
@@ -317,16 +318,16 @@ impl NodeMemory for Node {
                 }
                 Err(error) => return Err(failed(rank, error.to_string())),
             };
-            self.rooms[rank] = Some(Room { generation, mapping });
+            self.segments[rank] = Some(Segment { generation, mapping });
         }
         Ok(true)
     }
 
-    fn room(&self, rank: usize, bytes: usize) -> &[u8] {
-        let Some(room) = self.rooms[rank].as_ref() else { return &[] };
-        let bytes = bytes.min(room.mapping.bytes);
-        // SAFETY: behind the barrier that follows `lay` nobody writes what was laid until all have met again.
-        unsafe { room.mapping.read(0, bytes) }
+    fn segment(&self, rank: usize, bytes: usize) -> &[u8] {
+        let Some(segment) = self.segments[rank].as_ref() else { return &[] };
+        let bytes = bytes.min(segment.mapping.bytes);
+        // SAFETY: behind the barrier that follows `publish` nobody writes what was laid until all have met again.
+        unsafe { segment.mapping.read(0, bytes) }
     }
 
     fn next_band(&self) -> usize {
@@ -334,16 +335,16 @@ impl NodeMemory for Node {
     }
 
     fn write_band(&self, rank: usize, from: usize, bytes: usize, write: &mut dyn FnMut(&mut [u8])) {
-        if let Some(room) = &self.rooms[rank] {
+        if let Some(segment) = &self.segments[rank] {
             // SAFETY: who has taken a band is the only one to write it, and it is read behind the next barrier.
-            write(unsafe { room.mapping.write(from, bytes) });
+            write(unsafe { segment.mapping.write(from, bytes) });
         }
     }
 
     fn band(&self, rank: usize, from: usize, bytes: usize) -> &[u8] {
-        let Some(room) = &self.rooms[rank] else { return &[] };
+        let Some(segment) = &self.segments[rank] else { return &[] };
         // SAFETY: behind the barrier that follows the bands nobody writes them.
-        unsafe { room.mapping.read(from, bytes) }
+        unsafe { segment.mapping.read(from, bytes) }
     }
 }
 
@@ -352,9 +353,9 @@ mod tests {
     use super::*;
 
     /// Three ranks in one process, which finds its own files as others would.
-    fn three() -> [Node; 3] {
-        let (first, address) = Node::make(3).unwrap();
-        [first, Node::join(1, 3, address).unwrap(), Node::join(2, 3, address).unwrap()]
+    fn three() -> [SharedMemory; 3] {
+        let (first, address) = SharedMemory::make(3).unwrap();
+        [first, SharedMemory::map(1, 3, address).unwrap(), SharedMemory::map(2, 3, address).unwrap()]
     }
 
     #[test]
@@ -363,15 +364,15 @@ mod tests {
         for node in &nodes {
             node.arrive((node.rank < 2).then_some(&b"drawn"[..]));
         }
-        assert!(nodes.iter().all(Node::passed));
+        assert!(nodes.iter().all(SharedMemory::passed));
         // Rank 2 is quick: before the others have read a word, it says what they expect.
         let expected = |rank| Err(CommError::OutOfStep { rank, gathering: vec![0, 1], waiting: vec![2] });
-        assert_eq!(nodes[2].said(), expected(2));
+        assert_eq!(nodes[2].gathered(), expected(2));
         nodes[2].arrive(Some(b"drawn"));
         for rank in [0, 1] {
-            assert_eq!(nodes[rank].said(), expected(rank));
+            assert_eq!(nodes[rank].gathered(), expected(rank));
         }
-        let text = nodes[0].said().unwrap_err().to_string();
+        let text = nodes[0].gathered().unwrap_err().to_string();
         assert!(text.contains("ranks 0, 1 came to an all-gather and rank 2 to a barrier"), "{text}");
     }
 
@@ -383,14 +384,14 @@ mod tests {
                 node.arrive(Some(&[number, node.rank as u8]));
             }
             let expected = (0..3).map(|rank| vec![number, rank]).collect::<Vec<_>>();
-            assert_eq!(nodes[1].said().as_ref(), Ok(&expected));
-            assert_eq!(nodes[2].said().as_ref(), Ok(&expected));
+            assert_eq!(nodes[1].gathered().as_ref(), Ok(&expected));
+            assert_eq!(nodes[2].gathered().as_ref(), Ok(&expected));
             // Two go on to a barrier before the first rank reads.
             nodes[1].arrive(None);
             nodes[2].arrive(None);
-            assert_eq!(nodes[0].said().as_ref(), Ok(&expected));
+            assert_eq!(nodes[0].gathered().as_ref(), Ok(&expected));
             nodes[0].arrive(None);
-            assert!(nodes.iter().all(|node| node.passed() && node.said() == Ok(Vec::new())));
+            assert!(nodes.iter().all(|node| node.passed() && node.gathered() == Ok(Vec::new())));
         }
     }
 
@@ -401,12 +402,12 @@ mod tests {
         nodes[1].arrive(Some(&[]));
         nodes[2].arrive(Some(&[]));
         for node in &mut nodes[..2] {
-            node.lay(8, 8, &mut |room| room.fill(7));
+            node.publish(8, 8, &mut |segment| segment.fill(7));
         }
-        let text = nodes[0].open().unwrap_err().to_string();
+        let text = nodes[0].attach().unwrap_err().to_string();
         assert!(text.contains("rank 2 failed: it has laid down nothing for this frame"), "{text}");
-        nodes[2].lay(8, 8, &mut |room| room.fill(9));
-        assert_eq!(nodes[0].open(), Ok(true));
-        assert_eq!(nodes[0].room(2, 8), [9; 8]);
+        nodes[2].publish(8, 8, &mut |segment| segment.fill(9));
+        assert_eq!(nodes[0].attach(), Ok(true));
+        assert_eq!(nodes[0].segment(2, 8), [9; 8]);
     }
 }

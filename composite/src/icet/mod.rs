@@ -25,7 +25,7 @@ use table::Table;
 
 /// Why IceT could not be used.
 #[derive(Debug, thiserror::Error, Clone, PartialEq, Eq)]
-pub enum RivalError {
+pub enum IcetError {
     /// Not on this machine.
     #[error(
         "IceT was not found (looked for {looked_for}): install the Debian package `paraview`, \
@@ -129,7 +129,7 @@ pub enum IcetImage<'a> {
 }
 
 /// How IceT's messages travel. Boxes have a fixed address, which IceT keeps.
-enum Carrier {
+enum MessageLayer {
     /// Its own layer for Open MPI.
     Own,
     /// MPI functions, called directly.
@@ -141,7 +141,7 @@ enum Carrier {
 /// One rank's IceT.
 pub struct Icet {
     library: Library,
-    carrier: Carrier,
+    message_layer: MessageLayer,
     mode: IcetMode,
     pixels: usize,
     rank: usize,
@@ -151,21 +151,21 @@ impl Icet {
     /// IceT over MPI, set up for images of this size that go to rank 0.
     ///
     /// # Errors
-    /// [`RivalError`].
+    /// [`IcetError`].
     pub fn over_mpi(
         path: &Path,
         comm: &MpiComm,
         mode: IcetMode,
         width_px: u32,
         height_px: u32,
-    ) -> Result<Self, RivalError> {
+    ) -> Result<Self, IcetError> {
         // SMPI runs all ranks in one process, so each needs its own globals.
         let library = Library::open(path, comm.abi() == Abi::Smpi)?;
         if comm.abi() == Abi::OpenMpi {
             let own = library.own_mpi_layer(path, comm.library().world)?;
             // SAFETY: a communicator that IceT's MPI layer has just made.
             unsafe { (library.functions.create_context)(own) };
-            return Self::set_up(library, Carrier::Own, mode, width_px, height_px, comm.rank());
+            return Self::set_up(library, MessageLayer::Own, mode, width_px, height_px, comm.rank());
         }
         let mut over = Box::new(OverMpi::new(comm.library(), comm.rank(), comm.size()));
         let mut table = Box::new(table::of::<OverMpi>((&raw mut *over).cast()));
@@ -173,7 +173,7 @@ impl Icet {
         unsafe { (library.functions.create_context)((&raw mut *table).cast()) };
         Self::set_up(
             library,
-            Carrier::Mpi { _over: over, _table: table },
+            MessageLayer::Mpi { _over: over, _table: table },
             mode,
             width_px,
             height_px,
@@ -185,33 +185,33 @@ impl Icet {
     /// passed again with every frame.
     ///
     /// # Errors
-    /// [`RivalError`].
+    /// [`IcetError`].
     pub fn over_comm(
         path: &Path,
         comm: &mut dyn Communicator,
         mode: IcetMode,
         width_px: u32,
         height_px: u32,
-    ) -> Result<Self, RivalError> {
+    ) -> Result<Self, IcetError> {
         let library = Library::open(path, true)?;
         let rank = comm.rank();
         let mut over = Box::new(OverComm::new(rank, comm.size()));
         let mut table = Box::new(table::of::<OverComm>((&raw mut *over).cast()));
-        let lent = over.lend(comm);
+        let lent = over.with_comm(comm);
         // SAFETY: as in `over_mpi`; the communicator is lent for this call.
         unsafe { (library.functions.create_context)((&raw mut *table).cast()) };
         drop(lent);
-        Self::set_up(library, Carrier::Comm { over, _table: table }, mode, width_px, height_px, rank)
+        Self::set_up(library, MessageLayer::Comm { over, _table: table }, mode, width_px, height_px, rank)
     }
 
     fn set_up(
         library: Library,
-        carrier: Carrier,
+        message_layer: MessageLayer,
         mode: IcetMode,
         width_px: u32,
         height_px: u32,
         rank: usize,
-    ) -> Result<Self, RivalError> {
+    ) -> Result<Self, IcetError> {
         // Numbers are those of IceT.h.
         let (composite_mode, color, depth) = match mode {
             IcetMode::Depth => (0x0301, 0xC001, 0xD001),
@@ -235,15 +235,15 @@ impl Icet {
             }
         }
         let pixels = width_px as usize * height_px as usize;
-        let this = Self { library, carrier, mode, pixels, rank };
+        let this = Self { library, message_layer, mode, pixels, rank };
         this.check().map(|()| this)
     }
 
-    fn check(&self) -> Result<(), RivalError> {
+    fn check(&self) -> Result<(), IcetError> {
         // SAFETY: a query.
         match unsafe { (self.library.functions.get_error)() } {
             0 => Ok(()),
-            code => Err(RivalError::Reported { code }),
+            code => Err(IcetError::Reported { code }),
         }
     }
 
@@ -264,13 +264,13 @@ impl Icet {
     /// [`over_comm`](Self::over_comm) and not used over MPI. Rank 0 gets the image.
     ///
     /// # Errors
-    /// [`RivalError::FrameSize`], [`RivalError::Reported`].
+    /// [`IcetError::FrameSize`], [`IcetError::Reported`].
     pub fn composite(
         &mut self,
         comm: &mut dyn Communicator,
         frame: IcetFrame<'_>,
         bounds: Rect,
-    ) -> Result<Option<IcetImage<'_>>, RivalError> {
+    ) -> Result<Option<IcetImage<'_>>, IcetError> {
         let (colors, depths): (*const c_void, *const c_void) = match frame {
             IcetFrame::Depth(colors, depths) => {
                 self.fits(colors.len())?;
@@ -289,9 +289,9 @@ impl Icet {
         let viewport =
             [bounds.x0, bounds.y0, bounds.width() as u32, bounds.height() as u32].map(|n| n as c_int);
         let background = [0.0_f32; 4];
-        let lent = match &mut self.carrier {
-            Carrier::Comm { over, .. } => Some(over.lend(comm)),
-            Carrier::Own | Carrier::Mpi { .. } => None,
+        let lent = match &mut self.message_layer {
+            MessageLayer::Comm { over, .. } => Some(over.with_comm(comm)),
+            MessageLayer::Own | MessageLayer::Mpi { .. } => None,
         };
         // SAFETY: buffers of the size of the tile in the formats of `set_up`, four numbers, no matrices (allowed: there is no bounding
         // box to project), four channels.
@@ -326,16 +326,12 @@ impl Icet {
         }))
     }
 
-    fn fits(&self, found: usize) -> Result<(), RivalError> {
-        if found == self.pixels {
-            Ok(())
-        } else {
-            Err(RivalError::FrameSize { expected: self.pixels, found })
-        }
+    fn fits(&self, found: usize) -> Result<(), IcetError> {
+        if found == self.pixels { Ok(()) } else { Err(IcetError::FrameSize { expected: self.pixels, found }) }
     }
 
     /// Whether its messages go over its own MPI layer.
     pub fn uses_own_layer(&self) -> bool {
-        matches!(self.carrier, Carrier::Own)
+        matches!(self.message_layer, MessageLayer::Own)
     }
 }

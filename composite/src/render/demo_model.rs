@@ -1,5 +1,5 @@
 //! What a demo shows: meshes and lines of the catalogue, or the surfaces of a file.
-use super::demo::DemoError;
+use super::demo_error::DemoError;
 use datasets::catalogue::{self, Data};
 use datasets::isosurface::Options as SurfaceOptions;
 use datasets::read;
@@ -14,23 +14,23 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Things to show, with their views.
-pub(super) struct Subject {
-    pub(super) bodies: Vec<Body>,
+pub(super) struct DemoModel {
+    pub(super) bodies: Vec<DemoShape>,
     pub(super) views: Vec<View>,
 }
 
 /// One of them.
-pub(super) enum Body {
+pub(super) enum DemoShape {
     Mesh(Arc<TriMesh>),
     Tubes(Arc<Tubes>),
 }
 
-impl Body {
+impl DemoShape {
     /// World bounds.
     fn bounds(&self) -> [DVec3; 2] {
         let (origin, b) = match self {
-            Body::Mesh(mesh) => (mesh.origin, mesh.bounds()),
-            Body::Tubes(tubes) => {
+            DemoShape::Mesh(mesh) => (mesh.origin, mesh.bounds()),
+            DemoShape::Tubes(tubes) => {
                 let all = (0..tubes.num_primitives() as u32).map(|p| tubes.bounds(p));
                 (tubes.origin(), all.fold(Aabb::EMPTY, |a, b| a.union(b)))
             }
@@ -40,41 +40,42 @@ impl Body {
 
     pub(super) fn add_to(self, builder: &mut SceneBuilder, material: Material) {
         match self {
-            Body::Mesh(mesh) => builder.mesh(mesh, material),
-            Body::Tubes(tubes) => builder.shape(tubes, material),
+            DemoShape::Mesh(mesh) => builder.mesh(mesh, material),
+            DemoShape::Tubes(tubes) => builder.shape(tubes, material),
         };
     }
 }
 
-impl Subject {
+impl DemoModel {
     /// `name` is a data set of the catalogue, or else a file.
     pub(super) fn load(
         name: &str,
         size: Option<&str>,
         progress: &mut dyn FnMut(usize, usize) -> bool,
-    ) -> Result<Subject, DemoError> {
+    ) -> Result<DemoModel, DemoError> {
         let path = Path::new(name);
         match catalogue::find(name) {
             Ok(entry) => {
                 let size = size.unwrap_or(entry.sizes[0].name);
                 let normals = SurfaceOptions { normals: true, ..SurfaceOptions::default() };
                 let body = match entry.generate(size, normals, progress)? {
-                    Data::Mesh(mesh) => Body::Mesh(mesh.into()),
-                    Data::Lines(lines) => Body::Tubes(Arc::new(lines.into_tubes()?)),
+                    Data::Mesh(mesh) => DemoShape::Mesh(mesh.into()),
+                    Data::Lines(lines) => DemoShape::Tubes(Arc::new(lines.into_tubes()?)),
                 };
-                Ok(Subject { bodies: vec![body], views: entry.views() })
+                Ok(DemoModel { bodies: vec![body], views: entry.views() })
             }
             Err(_) if path.is_file() => {
                 if let Some(size) = size {
                     return Err(DemoError::SizeOfFile { file: name.into(), size: size.into() });
                 }
                 let (model, _) = read::open(path)?.to_meshes(None)?;
-                let bodies: Vec<Body> = model.meshes.into_iter().map(|m| Body::Mesh(m.mesh.into())).collect();
+                let bodies: Vec<DemoShape> =
+                    model.meshes.into_iter().map(|m| DemoShape::Mesh(m.mesh.into())).collect();
                 if model_is_empty(&bodies) {
                     return Err(DemoError::NoSurface { file: name.into() });
                 }
                 let views = vec![whole(middle_and_radius(&bodies))];
-                Ok(Subject { bodies, views })
+                Ok(DemoModel { bodies, views })
             }
             Err(unknown) if path.extension().is_some() || path.components().count() > 1 => {
                 Err(DemoError::NoFile { file: name.into(), unknown })
@@ -84,14 +85,14 @@ impl Subject {
     }
 }
 
-fn model_is_empty(bodies: &[Body]) -> bool {
-    !bodies.iter().any(|b| matches!(b, Body::Mesh(m) if m.num_triangles() > 0))
+fn model_is_empty(bodies: &[DemoShape]) -> bool {
+    !bodies.iter().any(|b| matches!(b, DemoShape::Mesh(m) if m.num_triangles() > 0))
 }
 
 /// Middle of all bodies' box, and the radius of the ball about it.
-pub(super) fn middle_and_radius(bodies: &[Body]) -> (DVec3, f64) {
+pub(super) fn middle_and_radius(bodies: &[DemoShape]) -> (DVec3, f64) {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for [lo, hi] in bodies.iter().map(Body::bounds) {
+    for [lo, hi] in bodies.iter().map(DemoShape::bounds) {
         (low, high) = (low.min(lo), high.max(hi));
     }
     if low.is_finite() && high.is_finite() {

@@ -19,7 +19,7 @@ use crate::layer::{Layer, View};
 use crate::pixel::Composite;
 use crate::rect::Rect;
 use crate::simd::compress::{append_active, append_active_scalar};
-use crate::simd::expand::{Side, SparseRow, join_row, join_row_scalar, place_row, place_row_scalar};
+use crate::simd::expand::{Side, SparseRow, copy_row, copy_row_scalar, merge_row, merge_row_scalar};
 use crate::simd::mask::{Counts, row_words, row_words_scalar};
 use crate::simd::opaque::{drop_full_alpha, drop_full_alpha_scalar, give_full_alpha, give_full_alpha_scalar};
 use crate::simd::{Kernels, at_level};
@@ -43,7 +43,7 @@ const OPAQUE_BYTES: usize = 3;
 
 /// What is wrong with a message.
 #[derive(Debug, thiserror::Error, Clone, PartialEq, Eq)]
-pub enum WireError {
+pub enum MessageError {
     /// Fewer or more bytes than its header announces.
     #[error("{found} bytes where {expected} were expected")]
     Length {
@@ -85,7 +85,7 @@ pub enum WireError {
         "it speaks of columns {}..{} and rows {}..{} of an image of {width_px}x{height_px}",
         found.x0, found.x1, found.y0, found.y1
     )]
-    Drawn {
+    OutsideImage {
         /// Where the sender says it drew.
         found: Rect,
         /// Width of the image.
@@ -173,8 +173,8 @@ impl Codec {
         while !rect.is_empty() {
             let encoded = at_level!(
                 self.kernels,
-                simd => encode_rows(Vectors(simd), view, rect, depths, opaque, out),
-                encode_rows(NoVectors, view, rect, depths, opaque, out)
+                simd => encode_rows(SimdKernels(simd), view, rect, depths, opaque, out),
+                encode_rows(ScalarKernels, view, rect, depths, opaque, out)
             );
             if let Some(encoded) = encoded {
                 counts = encoded;
@@ -214,50 +214,50 @@ impl Codec {
     /// Checks a message that must hold exactly `expected`, and `depths` or none.
     ///
     /// # Errors
-    /// [`WireError`], for any input that [`encode`](Self::encode) would not have made.
+    /// [`MessageError`], for any input that [`encode`](Self::encode) would not have made.
     pub(crate) fn decode<'a, P: Composite>(
         &self,
         bytes: &'a [u8],
         expected: Rect,
         depths: bool,
-    ) -> Result<Part<'a>, WireError> {
+    ) -> Result<DecodedMessage<'a>, MessageError> {
         let found = bytes.len() as u64;
         if bytes.len() < HEADER_BYTES {
-            return Err(WireError::Length { expected: HEADER_BYTES as u64, found });
+            return Err(MessageError::Length { expected: HEADER_BYTES as u64, found });
         }
         let number = |slot: usize| bytemuck::pod_read_unaligned::<u64>(&bytes[8 * slot..8 * slot + 8]);
         if number(0) != MAGIC {
-            return Err(WireError::Magic);
+            return Err(MessageError::Magic);
         }
         let flags = number(3);
         let end = if flags & IS_SUMMED != 0 { bytes.len() } else { HEADER_BYTES };
         let sum = checksum(&bytes[16..end]);
         if sum != number(1) {
-            return Err(WireError::Checksum { expected: number(1), found: sum });
+            return Err(MessageError::Checksum { expected: number(1), found: sum });
         }
         if number(2) != self.fingerprint {
-            return Err(WireError::Fingerprint);
+            return Err(MessageError::Fingerprint);
         }
 
         // The rectangle is the expected one.
         let rect = rect_of(bytes).unwrap_or(Rect::EMPTY);
         if rect != expected {
-            return Err(WireError::Part { found: rect, expected });
+            return Err(MessageError::Part { found: rect, expected });
         }
 
         // Flags and count fit the rectangle, and the length fits them.
         let (pixels, active) = (rect.pixels() as u64, number(6));
         let sparse = active > 0 && active < pixels;
         if flags > ALL_FLAGS || number(7) != 0 || active > pixels || (flags & HAS_MASK != 0) != sparse {
-            return Err(WireError::Mask);
+            return Err(MessageError::Mask);
         }
         let has_depths = flags & HAS_DEPTHS != 0;
         if has_depths != (depths && P::HAS_DEPTH) {
-            return Err(WireError::Mask);
+            return Err(MessageError::Mask);
         }
         let is_opaque = flags & IS_OPAQUE != 0;
         if is_opaque && (active == 0 || !may_be_opaque::<P>(depths)) {
-            return Err(WireError::Mask);
+            return Err(MessageError::Mask);
         }
         let words_per_row = rect.width().div_ceil(64) as u64;
         let mask_bytes = if sparse { 8 * words_per_row * rect.height() as u64 } else { 0 };
@@ -266,11 +266,11 @@ impl Codec {
         let needed = active
             .checked_mul(pixel_bytes)
             .and_then(|bytes| bytes.checked_add(mask_bytes + HEADER_BYTES as u64))
-            .ok_or(WireError::Mask)?;
+            .ok_or(MessageError::Mask)?;
         if needed != found {
-            return Err(WireError::Length { expected: needed, found });
+            return Err(MessageError::Length { expected: needed, found });
         }
-        let part = Part::open(bytes, rect, active as usize, has_depths, color_bytes);
+        let part = DecodedMessage::open(bytes, rect, active as usize, has_depths, color_bytes);
         if sparse { part.check_mask().map(|()| part) } else { Ok(part) }
     }
 }
@@ -289,9 +289,9 @@ trait RowKernels: Copy {
 }
 
 #[derive(Clone, Copy)]
-struct Vectors<S>(S);
+struct SimdKernels<S>(S);
 
-impl<S: Simd> RowKernels for Vectors<S> {
+impl<S: Simd> RowKernels for SimdKernels<S> {
     #[inline(always)]
     fn row_words<P: Composite>(
         self,
@@ -315,9 +315,9 @@ impl<S: Simd> RowKernels for Vectors<S> {
 }
 
 #[derive(Clone, Copy)]
-struct NoVectors;
+struct ScalarKernels;
 
-impl RowKernels for NoVectors {
+impl RowKernels for ScalarKernels {
     fn row_words<P: Composite>(
         self,
         colors: &[P::Color],
@@ -408,7 +408,7 @@ fn encode_rows<P: Composite>(
 
 /// A message whose every number has been checked.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Part<'a> {
+pub(crate) struct DecodedMessage<'a> {
     pub(crate) rect: Rect,
     pub(crate) active: usize,
     has_depths: bool,
@@ -417,7 +417,7 @@ pub(crate) struct Part<'a> {
     pixels: &'a [u8],
 }
 
-impl<'a> Part<'a> {
+impl<'a> DecodedMessage<'a> {
     /// A message that [`Codec::decode`] has accepted, from its own number of active pixels.
     pub(crate) fn reopen<P: Composite>(bytes: &'a [u8], rect: Rect, depths: bool) -> Self {
         let active = bytes.get(48..56).map_or(0, bytemuck::pod_read_unaligned::<u64>);
@@ -434,7 +434,7 @@ impl<'a> Part<'a> {
     }
 
     /// The mask has as many ones as announced, and none behind the end of a row.
-    fn check_mask(&self) -> Result<(), WireError> {
+    fn check_mask(&self) -> Result<(), MessageError> {
         let width = self.rect.width();
         let outside = if width.is_multiple_of(64) { 0 } else { u64::MAX << (width % 64) };
         let row_bytes = 8 * width.div_ceil(64);
@@ -446,10 +446,10 @@ impl<'a> Part<'a> {
                 ones += last.count_ones() as usize;
             }
             if last & outside != 0 {
-                return Err(WireError::Mask);
+                return Err(MessageError::Mask);
             }
         }
-        if ones == self.active { Ok(()) } else { Err(WireError::Mask) }
+        if ones == self.active { Ok(()) } else { Err(MessageError::Mask) }
     }
 
     /// Calls `visit` with every row, top to bottom, that may have active pixels.
@@ -492,25 +492,25 @@ impl<'a> Part<'a> {
     }
 
     /// Joins its pixels to `layer`, whose bounds must hold the rectangle.
-    pub(crate) fn join_to<P: Composite>(&self, kernels: Kernels, layer: &mut Layer<P>, side: Side) {
+    pub(crate) fn merge_into<P: Composite>(&self, kernels: Kernels, layer: &mut Layer<P>, side: Side) {
         at_level!(
             kernels,
             simd => self.for_each_row(
                 #[inline(always)]
                 |y, row| {
                     let (colors, depths) = layer.row_mut(y, self.rect.x0, self.rect.x1);
-                    join_row::<P, _>(simd, row, colors, depths, side);
+                    merge_row::<P, _>(simd, row, colors, depths, side);
                 }
             ),
             self.for_each_row(|y, row| {
                 let (colors, depths) = layer.row_mut(y, self.rect.x0, self.rect.x1);
-                join_row_scalar::<P>(row, colors, depths, side);
+                merge_row_scalar::<P>(row, colors, depths, side);
             })
         );
     }
 
     /// Writes its rectangle over `layer`, whose bounds must hold it. Not for messages without depths where `layer` has some.
-    pub(crate) fn place_in<P: Composite>(&self, kernels: Kernels, layer: &mut Layer<P>) {
+    pub(crate) fn copy_to_layer<P: Composite>(&self, kernels: Kernels, layer: &mut Layer<P>) {
         let (x0, x1) = (self.rect.x0, self.rect.x1);
         at_level!(
             kernels,
@@ -518,18 +518,18 @@ impl<'a> Part<'a> {
                 #[inline(always)]
                 |y, row| {
                     let (colors, depths) = layer.row_mut(y, x0, x1);
-                    place_row::<P, _>(simd, row, colors, depths);
+                    copy_row::<P, _>(simd, row, colors, depths);
                 }
             ),
             self.for_each_row(|y, row| {
                 let (colors, depths) = layer.row_mut(y, x0, x1);
-                place_row_scalar::<P>(row, colors, depths);
+                copy_row_scalar::<P>(row, colors, depths);
             })
         );
     }
 
     /// Writes its rectangle into planes of `width` columns; `depths` may be empty. `wide` is room to work in.
-    pub(crate) fn place<P: Composite>(
+    pub(crate) fn copy_to_planes<P: Composite>(
         &self,
         kernels: Kernels,
         width: usize,
@@ -558,7 +558,7 @@ impl<'a> Part<'a> {
                 simd => give_full_alpha(simd, self.pixels, wide),
                 give_full_alpha_scalar(self.pixels, wide)
             );
-            part = Part { pixels: wide, color_bytes: P::Color::BYTES, ..*self };
+            part = DecodedMessage { pixels: wide, color_bytes: P::Color::BYTES, ..*self };
         }
         at_level!(
             kernels,
@@ -566,12 +566,12 @@ impl<'a> Part<'a> {
                 #[inline(always)]
                 |y, row| {
                     let to_depths = if depths.is_empty() { &mut [] } else { &mut depths[range(y)] };
-                    place_row::<P, _>(simd, row, &mut colors[range(y)], to_depths);
+                    copy_row::<P, _>(simd, row, &mut colors[range(y)], to_depths);
                 }
             ),
             part.for_each_row(|y, row| {
                 let to_depths = if depths.is_empty() { &mut [] } else { &mut depths[range(y)] };
-                place_row_scalar::<P>(row, &mut colors[range(y)], to_depths);
+                copy_row_scalar::<P>(row, &mut colors[range(y)], to_depths);
             })
         );
     }

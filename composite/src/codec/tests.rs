@@ -46,16 +46,16 @@ fn pattern(kind: u32, x: u32, y: u32) -> bool {
 }
 
 /// Joins one pixel by the operator itself.
-fn join_one<F: Composite>(held: &mut Layer<F>, layer: &Layer<F>, x: u32, y: u32, side: Side) {
+fn merge_one<F: Composite>(held: &mut Layer<F>, layer: &Layer<F>, x: u32, y: u32, side: Side) {
     let pixel = |view: View<'_, F>| {
         let (color, depth) = view.row(y, x, x + 1);
         F::from_parts(color[0], depth.first().copied().unwrap_or(1.0))
     };
     let (ours, theirs) = (pixel(held.view()), pixel(layer.view()));
-    let joined = if side == Side::Higher { combine(ours, theirs) } else { combine(theirs, ours) };
+    let merged = if side == Side::Higher { combine(ours, theirs) } else { combine(theirs, ours) };
     let (colors, depths) = held.row_mut(y, x, x + 1);
-    colors[0] = joined.color();
-    depths.iter_mut().for_each(|depth| *depth = joined.depth());
+    colors[0] = merged.color();
+    depths.iter_mut().for_each(|depth| *depth = merged.depth());
 }
 
 /// Encoding and every way of reading, at every level, against the scalar one.
@@ -86,7 +86,7 @@ fn check_format<F: Composite>() {
                     let mut placed = planes::<F>(150, 5, |_, _| true);
                     let (colors, placed_depths) = (&mut placed.colors, &mut placed.depths);
                     let placed_depths: &mut [f32] = if depths { placed_depths } else { &mut [] };
-                    part.place::<F>(kernels, 150, colors, placed_depths, &mut Vec::new());
+                    part.copy_to_planes::<F>(kernels, 150, colors, placed_depths, &mut Vec::new());
                     for y in rect.y0..rect.y1 {
                         let (color, depth) = placed.view().row(y, rect.x0, rect.x1);
                         assert_eq!(color, layer.view().row(y, rect.x0, rect.x1).0);
@@ -101,15 +101,15 @@ fn check_format<F: Composite>() {
                         let mut one_by_one = held.clone();
                         for y in rect.y0..rect.y1 {
                             for x in rect.x0..rect.x1 {
-                                join_one(&mut one_by_one, &layer, x, y, side);
+                                merge_one(&mut one_by_one, &layer, x, y, side);
                             }
                         }
-                        let mut joined = held.clone();
-                        part.join_to(kernels, &mut joined, side);
-                        assert!(joined.colors == one_by_one.colors && joined.depths == one_by_one.depths);
+                        let mut merged = held.clone();
+                        part.merge_into(kernels, &mut merged, side);
+                        assert!(merged.colors == one_by_one.colors && merged.depths == one_by_one.depths);
                         let mut viewed = held.clone();
                         let view = View { bounds: rect, ..layer.view() };
-                        viewed.join_view(kernels, &view, side);
+                        viewed.merge_view(kernels, &view, side);
                         assert!(viewed.colors == one_by_one.colors && viewed.depths == one_by_one.depths);
                     }
                 }
@@ -148,10 +148,10 @@ fn all_levels_blend_every_pair_of_bytes_alike() {
                 ..layer.clone()
             };
             let mut scalar = back.clone();
-            scalar.join_view(Kernels(None), &layer.view(), Side::Lower);
-            let mut joined = back;
-            joined.join_view(kernels, &layer.view(), Side::Lower);
-            assert_eq!(joined.colors, scalar.colors);
+            scalar.merge_view(Kernels(None), &layer.view(), Side::Lower);
+            let mut merged = back;
+            merged.merge_view(kernels, &layer.view(), Side::Lower);
+            assert_eq!(merged.colors, scalar.colors);
         }
     }
 }
@@ -204,10 +204,10 @@ fn without_checksums_of_pixels_headers_and_masks_are_still_covered() {
 fn another_fingerprint_or_part_is_named() {
     let (codec, rect, good) = good(false);
     let other = Codec { fingerprint: 4, ..codec };
-    assert_eq!(other.decode::<P>(&good, rect, true).unwrap_err(), WireError::Fingerprint);
+    assert_eq!(other.decode::<P>(&good, rect, true).unwrap_err(), MessageError::Fingerprint);
     let error = codec.decode::<P>(&good, Rect::of_size(9, 9), true).unwrap_err();
     assert_eq!(error.to_string(), "it holds columns 2..68 and rows 1..4 instead of 0..9 and 0..9");
-    assert_eq!(codec.decode::<P>(&good, rect, false).unwrap_err(), WireError::Mask);
+    assert_eq!(codec.decode::<P>(&good, rect, false).unwrap_err(), MessageError::Mask);
 }
 
 #[test]
@@ -227,7 +227,7 @@ fn lengths_beyond_two_to_the_31_bytes_are_counted_right() {
     let sum = checksum(&message[16..]);
     message[8..16].copy_from_slice(&sum.to_le_bytes());
     let error = codec.decode::<P>(&message, rect, true).unwrap_err();
-    assert_eq!(error, WireError::Length { expected: 64 + 8 * active, found: 64 });
+    assert_eq!(error, MessageError::Length { expected: 64 + 8 * active, found: 64 });
 }
 
 proptest! {
@@ -258,11 +258,11 @@ proptest! {
         if let Ok(part) = codec.decode::<P>(&bad, rect, true) {
             for kernels in all_kernels() {
                 let mut layer = planes::<P>(70, 5, |x, y| pattern(6, x, y));
-                part.join_to(kernels, &mut layer, Side::Higher);
-                part.join_to(kernels, &mut layer, Side::Lower);
+                part.merge_into(kernels, &mut layer, Side::Higher);
+                part.merge_into(kernels, &mut layer, Side::Lower);
             }
             let mut image = planes::<P>(70, 5, |_, _| false);
-            part.place::<P>(Kernels::new(None), 70, &mut image.colors, &mut image.depths, &mut Vec::new());
+            part.copy_to_planes::<P>(Kernels::new(None), 70, &mut image.colors, &mut image.depths, &mut Vec::new());
         }
     }
 }

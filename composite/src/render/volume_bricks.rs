@@ -14,7 +14,7 @@ const CLEAR_WORK: f64 = 0.02;
 
 /// A brick of a volume, and who holds it.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Piece {
+pub(super) struct VolumeBrick {
     pub(super) volume: usize,
     pub(super) brick: Brick,
     pub(super) holders: Vec<u16>,
@@ -22,8 +22,8 @@ pub(super) struct Piece {
 
 /// All bricks of all volumes that are media. Projections see whole volumes: every rank holds those.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Pieces {
-    pub(super) all: Vec<Piece>,
+pub(super) struct VolumeBricks {
+    pub(super) all: Vec<VolumeBrick>,
     /// Of each volume whether a block has any extinction, x fastest.
     occupied: Vec<Vec<bool>>,
     /// Of each volume its blocks per axis.
@@ -32,32 +32,35 @@ pub(super) struct Pieces {
     finer: Vec<usize>,
 }
 
-impl Pieces {
+impl VolumeBricks {
     /// Every medium in one brick for each of `ranks` ranks.
-    pub(super) fn one_each(scene: &Scene, ranks: usize) -> Pieces {
-        let mut pieces = Pieces { finer: finer(scene), ..Pieces::default() };
+    pub(super) fn one_per_rank(scene: &Scene, ranks: usize) -> VolumeBricks {
+        let mut volume_bricks = VolumeBricks { finer: finer(scene), ..VolumeBricks::default() };
         for placed in &scene.volumes {
-            pieces.blocks.push(placed.volume.blocks());
+            volume_bricks.blocks.push(placed.volume.blocks());
             let whole = Brick { first: UVec3::ZERO, end: placed.volume.blocks() };
-            pieces.occupied.push(blocks_of(whole).map(|block| placed.volume.is_occupied(block)).collect());
+            volume_bricks
+                .occupied
+                .push(blocks_of(whole).map(|block| placed.volume.is_occupied(block)).collect());
         }
         let each: Vec<Vec<u16>> = (0..ranks).map(|rank| vec![rank as u16]).collect();
         for volume in 0..scene.volumes.len() {
-            pieces.cut(scene, volume, &each);
+            volume_bricks.cut(scene, volume, &each);
         }
-        pieces
+        volume_bricks
     }
 
     /// Cuts a volume anew: a brick for each list of ranks, which hold it.
     pub(super) fn cut(&mut self, scene: &Scene, volume: usize, holders: &[Vec<u16>]) {
-        self.all.retain(|piece| piece.volume != volume);
+        self.all.retain(|volume_brick| volume_brick.volume != volume);
         let placed = &scene.volumes[volume];
         if !placed.volume.is_medium() {
             return;
         }
         let bricks = bricks(&placed.volume, holders.len(), &covered_by(scene, &self.finer, volume));
-        let piece = |(brick, holders): (Brick, &Vec<u16>)| Piece { volume, brick, holders: holders.clone() };
-        self.all.extend(bricks.into_iter().zip(holders).map(piece));
+        let volume_brick =
+            |(brick, holders): (Brick, &Vec<u16>)| VolumeBrick { volume, brick, holders: holders.clone() };
+        self.all.extend(bricks.into_iter().zip(holders).map(volume_brick));
     }
 
     pub(super) fn is_occupied(&self, volume: usize, block: UVec3) -> bool {
@@ -68,13 +71,13 @@ impl Pieces {
     /// The piece whose holder has the blocks of all volumes that are `here`; `likely` is looked at first.
     pub(super) fn find(&self, here: &[(usize, UVec3)], likely: Option<usize>) -> Option<usize> {
         let (volume, block) = *here.iter().min_by_key(|(v, _)| self.finer[*v])?;
-        let has = |p: &Piece| p.volume == volume && p.brick.contains(block);
+        let has = |p: &VolumeBrick| p.volume == volume && p.brick.contains(block);
         likely.filter(|p| has(&self.all[*p])).or_else(|| self.all.iter().position(has))
     }
 
     /// Whom `rank` asks about a piece: itself if it can, and else not everybody the same.
-    pub(super) fn holder(&self, piece: usize, rank: usize) -> usize {
-        let holders = &self.all[piece].holders;
+    pub(super) fn holder(&self, volume_brick: usize, rank: usize) -> usize {
+        let holders = &self.all[volume_brick].holders;
         match holders.iter().find(|h| usize::from(**h) == rank) {
             Some(_) => rank,
             None => usize::from(holders[rank % holders.len()]),
@@ -82,9 +85,10 @@ impl Pieces {
     }
 
     /// What `rank` holds, by the pieces' numbers.
-    pub(super) fn held(&self, scene: &Scene, rank: usize) -> Vec<Option<Held>> {
-        let holds = |p: &Piece| p.holders.iter().any(|h| usize::from(*h) == rank) && !p.brick.is_empty();
-        self.all.iter().map(|p| holds(p).then(|| Held::new(scene, &self.finer, p))).collect()
+    pub(super) fn brick_data(&self, scene: &Scene, rank: usize) -> Vec<Option<BrickData>> {
+        let holds =
+            |p: &VolumeBrick| p.holders.iter().any(|h| usize::from(*h) == rank) && !p.brick.is_empty();
+        self.all.iter().map(|p| holds(p).then(|| BrickData::new(scene, &self.finer, p))).collect()
     }
 }
 
@@ -124,19 +128,20 @@ pub(super) fn checked(
 
 /// What a rank holds for one piece: its brick, and what coarser volumes have there.
 #[derive(Clone)]
-pub(super) struct Held {
+pub(super) struct BrickData {
     /// By volume.
     parts: Vec<Option<(Brick, Arc<Volume>)>>,
 }
 
-impl Held {
-    fn new(scene: &Scene, finer: &[usize], piece: &Piece) -> Held {
-        let here = &scene.volumes[piece.volume];
-        let [lo, hi] = corners(&here.volume, piece.brick);
+impl BrickData {
+    fn new(scene: &Scene, finer: &[usize], volume_brick: &VolumeBrick) -> BrickData {
+        let here = &scene.volumes[volume_brick.volume];
+        let [lo, hi] = corners(&here.volume, volume_brick.brick);
         let mut parts = vec![None; scene.volumes.len()];
-        parts[piece.volume] = Some((piece.brick, Arc::new(here.volume.part(piece.brick))));
+        parts[volume_brick.volume] =
+            Some((volume_brick.brick, Arc::new(here.volume.part(volume_brick.brick))));
         for (v, other) in scene.volumes.iter().enumerate() {
-            if !other.volume.is_medium() || finer[v] <= finer[piece.volume] {
+            if !other.volume.is_medium() || finer[v] <= finer[volume_brick.volume] {
                 continue;
             }
             let there = world_from_object(other).inverse() * world_from_object(here);
@@ -145,7 +150,7 @@ impl Held {
                 parts[v] = Some((brick, Arc::new(other.volume.part(brick))));
             }
         }
-        Held { parts }
+        BrickData { parts }
     }
 
     /// The part of a volume that is here.

@@ -1,5 +1,5 @@
 //! Finding IceT and its functions.
-use super::RivalError;
+use super::IcetError;
 use libloading::os::unix::{Library as Dynamic, RTLD_GLOBAL, RTLD_LOCAL, RTLD_NOW};
 use std::ffi::{c_int, c_void};
 use std::mem::ManuallyDrop;
@@ -21,13 +21,13 @@ fn folders() -> Vec<PathBuf> {
 /// IceT's core library on this machine.
 ///
 /// # Errors
-/// [`RivalError::Missing`].
-pub fn find() -> Result<PathBuf, RivalError> {
+/// [`IcetError::Missing`].
+pub fn find() -> Result<PathBuf, IcetError> {
     if let Some(path) = std::env::var_os(VARIABLE).filter(|path| !path.is_empty()).map(PathBuf::from) {
         return if path.is_file() {
             Ok(path)
         } else {
-            Err(RivalError::Missing { looked_for: format!("{VARIABLE}={}", path.display()) })
+            Err(IcetError::Missing { looked_for: format!("{VARIABLE}={}", path.display()) })
         };
     }
     for folder in folders() {
@@ -49,9 +49,9 @@ pub fn find() -> Result<PathBuf, RivalError> {
 }
 
 /// The error that says that there is none.
-pub fn missing() -> RivalError {
+pub fn missing() -> IcetError {
     let folders: Vec<String> = folders().iter().map(|folder| folder.display().to_string()).collect();
-    RivalError::Missing { looked_for: format!("{} in {}", NAMES.join(", "), folders.join(", ")) }
+    IcetError::Missing { looked_for: format!("{} in {}", NAMES.join(", "), folders.join(", ")) }
 }
 
 macro_rules! functions {
@@ -62,14 +62,14 @@ macro_rules! functions {
         }
 
         impl Functions {
-            fn of(library: &Dynamic, path: &Path) -> Result<Self, RivalError> {
+            fn of(library: &Dynamic, path: &Path) -> Result<Self, IcetError> {
                 Ok(Self {
                     $($field: {
                         // SAFETY: arguments as in IceT.h of version 2.2, which has not changed them since 2.0.
                         let symbol = unsafe {
                             library.get::<unsafe extern "C" fn($($argument),*) $(-> $result)?>($symbol.as_bytes())
                         };
-                        *symbol.map_err(|_| RivalError::Unusable {
+                        *symbol.map_err(|_| IcetError::Unusable {
                             path: path.to_path_buf(),
                             reason: format!("it has no function {}", $symbol),
                         })?
@@ -107,8 +107,8 @@ pub(super) struct Library {
 
 impl Library {
     /// Loads IceT; `private` from a copy of the file, so that its global variables are this rank's own.
-    pub(super) fn open(path: &Path, private: bool) -> Result<Self, RivalError> {
-        let unusable = |reason: String| RivalError::Unusable { path: path.to_path_buf(), reason };
+    pub(super) fn open(path: &Path, private: bool) -> Result<Self, IcetError> {
+        let unusable = |reason: String| IcetError::Unusable { path: path.to_path_buf(), reason };
         let dynamic = if private {
             static COPIES: AtomicU64 = AtomicU64::new(0);
             let number = COPIES.fetch_add(1, Ordering::Relaxed);
@@ -133,10 +133,10 @@ impl Library {
     }
 
     /// A communicator of IceT's own MPI layer, from the library beside the core.
-    pub(super) fn own_mpi_layer(&self, core: &Path, world: usize) -> Result<*mut c_void, RivalError> {
+    pub(super) fn own_mpi_layer(&self, core: &Path, world: usize) -> Result<*mut c_void, IcetError> {
         let name = core.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         let path = core.with_file_name(name.replace("IceTCore", "IceTMPI"));
-        let unusable = |reason: String| RivalError::Unusable { path: path.clone(), reason };
+        let unusable = |reason: String| IcetError::Unusable { path: path.clone(), reason };
         // SAFETY: it needs IceT's core and the MPI that this process uses, and both are loaded.
         let layer = unsafe { Dynamic::open(Some(&path), RTLD_NOW | RTLD_GLOBAL) };
         let layer = ManuallyDrop::new(layer.map_err(|error| unusable(error.to_string()))?);

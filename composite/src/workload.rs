@@ -9,7 +9,7 @@ use std::str::FromStr;
 
 /// How the pixels of the ranks are spread.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scene {
+pub enum Workload {
     /// Every rank's brick as one solid, shaded ellipse; neighbours overlap. 1 to 4 layers where anything is drawn.
     Discs,
     /// Every pixel of every rank is drawn, as a tilted plane each; planes cross.
@@ -18,7 +18,7 @@ pub enum Scene {
     Frag,
 }
 
-impl Scene {
+impl Workload {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Discs, Self::Dense, Self::Frag];
 
@@ -32,24 +32,24 @@ impl Scene {
     }
 }
 
-impl fmt::Display for Scene {
+impl fmt::Display for Workload {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
     }
 }
 
-impl FromStr for Scene {
+impl FromStr for Workload {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Self, String> {
-        let found = Self::ALL.into_iter().find(|scene| scene.name() == name);
+        let found = Self::ALL.into_iter().find(|workload| workload.name() == name);
         found.ok_or_else(|| format!("there is no scene `{name}`: use discs, dense or frag"))
     }
 }
 
 /// What one rank has drawn.
 #[derive(Clone, Debug)]
-pub struct Drawn {
+pub struct SyntheticFrame {
     /// Width of the image.
     pub width_px: u32,
     /// Height of the image.
@@ -62,7 +62,7 @@ pub struct Drawn {
     pub bounds: Rect,
 }
 
-impl Drawn {
+impl SyntheticFrame {
     /// An empty image.
     pub fn new(width_px: u32, height_px: u32) -> Self {
         let pixels = width_px as usize * height_px as usize;
@@ -96,7 +96,7 @@ impl Drawn {
 }
 
 /// A brick, projected: centre and radii in pixels, depth of its centre.
-struct Projected {
+struct ProjectedBrick {
     center_px: (f32, f32),
     radii_px: (f32, f32),
     depth: f32,
@@ -123,14 +123,14 @@ fn grid(ranks: usize) -> [usize; 3] {
 }
 
 /// Brick `rank` of `ranks`, seen by a camera that goes around the cube.
-fn project(moment: u64, rank: usize, ranks: usize, width_px: f32, height_px: f32) -> Projected {
+fn project(moment: u64, rank: usize, ranks: usize, width_px: f32, height_px: f32) -> ProjectedBrick {
     let [nx, ny, nz] = grid(ranks);
     let middle = |i: usize, n: usize| (i as f32 + 0.5) / n as f32 - 0.5;
     let (x, y, z) = (middle(rank % nx, nx), middle((rank / nx) % ny, ny), middle(rank / (nx * ny), nz));
     let (sin, cos) = (0.3 + 0.37 * moment as f32).sin_cos();
     let (across, into) = (x * cos - z * sin, x * sin + z * cos);
     let widest = nx.max(nz) as f32;
-    Projected {
+    ProjectedBrick {
         center_px: ((0.5 + 0.75 * across) * width_px, (0.5 + 0.75 * (0.9 * y - 0.3 * into)) * height_px),
         radii_px: ((0.54 * width_px / widest).max(8.0), (0.54 * height_px / ny as f32).max(8.0)),
         depth: 0.5 + 0.35 * (0.9 * into + 0.3 * y),
@@ -145,9 +145,9 @@ fn scatter(number: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-impl Scene {
+impl Workload {
     /// Draws what `rank` of `ranks` sees at `moment` (the number of a frame) into `target`, over what was there.
-    pub fn draw(self, moment: u64, rank: usize, ranks: usize, target: &mut Drawn) {
+    pub fn draw(self, moment: u64, rank: usize, ranks: usize, target: &mut SyntheticFrame) {
         target.colors.fill([0; 4]);
         target.depths.fill(1.0);
         let tint = scatter(rank as u64 + 7).to_le_bytes();
@@ -171,7 +171,7 @@ impl Scene {
     }
 }
 
-fn draw_plane(moment: u64, rank: usize, ranks: usize, tint: [u8; 8], target: &mut Drawn) {
+fn draw_plane(moment: u64, rank: usize, ranks: usize, tint: [u8; 8], target: &mut SyntheticFrame) {
     let tilt = scatter(1000 * moment + rank as u64).to_le_bytes();
     let (tilt_x, tilt_y) = (f32::from(tilt[0]) / 255.0 - 0.5, f32::from(tilt[1]) / 255.0 - 0.5);
     let (width, height) = (target.width_px as f32, target.height_px as f32);
@@ -194,11 +194,11 @@ fn draw_disc(
     rank: usize,
     ranks: usize,
     tint: [u8; 8],
-    target: &mut Drawn,
+    target: &mut SyntheticFrame,
     keep: impl Fn(u64) -> bool,
 ) {
     let (width, height) = (target.width_px as f32, target.height_px as f32);
-    let Projected { center_px: (cx, cy), radii_px: (rx, ry), depth } =
+    let ProjectedBrick { center_px: (cx, cy), radii_px: (rx, ry), depth } =
         project(moment, rank, ranks, width, height);
     let clip = |from: f32, to: f32, end: u32| (from.max(0.0) as u32, (to.ceil().max(0.0) as u32).min(end));
     let (x0, x1) = clip(cx - rx, cx + rx, target.width_px);
@@ -233,16 +233,16 @@ mod tests {
         for ranks in [1, 2, 7, 8, 127] {
             for rank in [0, ranks - 1] {
                 let mut active = Vec::new();
-                for scene in Scene::ALL {
-                    let mut drawn = Drawn::new(130, 70);
-                    scene.draw(3, rank, ranks, &mut drawn);
+                for workload in Workload::ALL {
+                    let mut drawn = SyntheticFrame::new(130, 70);
+                    workload.draw(3, rank, ranks, &mut drawn);
                     for (index, depth) in drawn.depths.iter().enumerate() {
                         let (x, y) = (index as u32 % 130, index as u32 / 130);
                         let inside = x >= drawn.bounds.x0
                             && x < drawn.bounds.x1
                             && y >= drawn.bounds.y0
                             && y < drawn.bounds.y1;
-                        assert!(*depth == 1.0 || inside, "{scene} rank {rank} of {ranks}: {x} {y}");
+                        assert!(*depth == 1.0 || inside, "{workload} rank {rank} of {ranks}: {x} {y}");
                         assert_eq!(*depth < 1.0, drawn.colors[index][3] == 255);
                     }
                     active.push(drawn.active());
@@ -255,8 +255,8 @@ mod tests {
 
     #[test]
     fn the_order_names_every_rank_once_and_changes_with_the_view() {
-        let mut sorted = Scene::Discs.front_to_back(0, 27);
-        assert_ne!(sorted, Scene::Discs.front_to_back(8, 27));
+        let mut sorted = Workload::Discs.front_to_back(0, 27);
+        assert_ne!(sorted, Workload::Discs.front_to_back(8, 27));
         sorted.sort_unstable();
         assert_eq!(sorted, (0..27).collect::<Vec<_>>());
     }

@@ -1,19 +1,19 @@
 //! What a message costs: the LogGP model of A. Alexandrov, M. Ionescu, K. Schauser, C. Scheiman (SPAA 1995), measured once over the
 //! communicator itself, and what follows from it for each strategy.
 use crate::comm::{CommError, Communicator};
-use crate::compositor::SLICE_BYTES;
 use crate::pixel::Composite;
 use crate::rank_order::Folding;
 use crate::rect::Rect;
 use crate::strategies::Strategy;
 use crate::strategies::direct_send;
-use crate::strategies::folding::reach;
+use crate::strategies::folding::bounds_of_slots;
 use crate::strategies::radix_k::share;
+use crate::tiles::SLICE_BYTES;
 use std::time::Duration;
 
 /// Costs of messages between two ranks, in seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Network {
+pub struct NetworkCosts {
     /// From the beginning of a send until a short message has been received (LogGP: L + 2o).
     pub latency_secs: f64,
     /// Time a rank is busy with one message, on either side (LogGP: o, with the gap g).
@@ -31,7 +31,7 @@ const LOCAL_BYTE_SECS: f64 = 1.5e-10;
 /// simulated ranks dense frames by direct send take 15 µs more for each rank, which is one message more to send, to receive and to collect.
 const LOCAL_MESSAGE_SECS: f64 = 5e-6;
 
-impl Network {
+impl NetworkCosts {
     /// InfiniBand QDR as in the thesis' cluster: 3.2 GB/s, about a microsecond.
     pub const QDR: Self = Self { latency_secs: 1.5e-6, overhead_secs: 0.5e-6, byte_secs: 1.0 / 3.2e9 };
 
@@ -86,7 +86,7 @@ impl Network {
     /// A number for fingerprints.
     pub(crate) fn code(&self) -> u64 {
         let numbers = [self.latency_secs, self.overhead_secs, self.byte_secs];
-        numbers.into_iter().map(f64::to_bits).fold(3, crate::wire::mix)
+        numbers.into_iter().map(f64::to_bits).fold(3, crate::codec::mix)
     }
 
     /// Seconds that a frame will take about, from the rectangles that ranks drew in, as if these were dense. `root` collects.
@@ -136,7 +136,7 @@ impl Network {
                 let mut total = self.fold_secs::<P>(&folding, drawn);
                 let mut stride = 1;
                 while stride < folding.slots {
-                    let of_slot = |slot| bytes(&reach(drawn, &folding, slot, stride));
+                    let of_slot = |slot| bytes(&bounds_of_slots(drawn, &folding, slot, stride));
                     let most = (stride..folding.slots).step_by(2 * stride).map(of_slot).fold(0.0, f64::max);
                     total += self.exchange_secs(1.0, most, most);
                     stride *= 2;
@@ -155,7 +155,10 @@ impl Network {
                         let part = share(&whole, index, parts * members);
                         for base in (0..folding.slots).step_by(stride * members) {
                             let of = |m: usize| {
-                                bytes(&reach(drawn, &folding, base + m * stride, stride).intersection(&part))
+                                bytes(
+                                    &bounds_of_slots(drawn, &folding, base + m * stride, stride)
+                                        .intersection(&part),
+                                )
                             };
                             most = most.max((1..members).map(of).sum());
                         }
@@ -219,9 +222,10 @@ mod tests {
     #[test]
     fn all_ranks_measure_the_same_network_and_it_is_one() {
         for size in [1, 2, 5] {
-            let found =
-                threads::run(size, |mut comm| Network::measure(&mut comm, Duration::from_secs(20)).unwrap());
-            let found: Vec<Network> = found.into_iter().map(|network| network.unwrap()).collect();
+            let found = threads::run(size, |mut comm| {
+                NetworkCosts::measure(&mut comm, Duration::from_secs(20)).unwrap()
+            });
+            let found: Vec<NetworkCosts> = found.into_iter().map(|network| network.unwrap()).collect();
             assert!(found.iter().all(|network| *network == found[0]), "{found:?}");
             if size > 1 {
                 assert!(
@@ -235,24 +239,24 @@ mod tests {
     fn the_choice_follows_the_network() {
         let dense = vec![Rect::of_size(1024, 1024); 64];
         // Bandwidth counts: every byte once.
-        assert_eq!(Network::QDR.choose::<P>(&dense[..8], true), Strategy::DirectSend);
+        assert_eq!(NetworkCosts::QDR.choose::<P>(&dense[..8], true), Strategy::DirectSend);
         // Measured 8.1 ms against 12.6 by radix-k, which collects only when all is joined.
-        let blended = Network::QDR.choose::<PremultipliedPixel<[f32; 4]>>(&dense[..8], true);
+        let blended = NetworkCosts::QDR.choose::<PremultipliedPixel<[f32; 4]>>(&dense[..8], true);
         assert_eq!(blended, Strategy::DirectSend);
         // 127 messages to each of 128 ranks cost more than sending a seventh of the bytes again: measured 7.6 ms against 5.9.
         let many = vec![Rect::of_size(1024, 1024); 128];
-        assert!(matches!(Network::QDR.choose::<P>(&many, true), Strategy::RadixK { .. }));
+        assert!(matches!(NetworkCosts::QDR.choose::<P>(&many, true), Strategy::RadixK { .. }));
         // Messages count: few of them.
-        let slow_messages = Network { overhead_secs: 1e-3, latency_secs: 2e-3, byte_secs: 1e-12 };
+        let slow_messages = NetworkCosts { overhead_secs: 1e-3, latency_secs: 2e-3, byte_secs: 1e-12 };
         assert!(matches!(slow_messages.choose::<P>(&dense, true), Strategy::Tree));
         // Messages count, but so do bytes: groups.
-        let both = Network { overhead_secs: 2e-4, latency_secs: 4e-4, byte_secs: 3e-9 };
+        let both = NetworkCosts { overhead_secs: 2e-4, latency_secs: 4e-4, byte_secs: 3e-9 };
         assert!(matches!(both.choose::<P>(&dense, true), Strategy::RadixK { .. } | Strategy::BinarySwap));
     }
 
     #[test]
     fn estimates_grow_with_bytes_and_are_zero_without_partners() {
-        let network = Network::QDR;
+        let network = NetworkCosts::QDR;
         let small = vec![Rect::of_size(100, 100); 8];
         let large = vec![Rect::of_size(1000, 1000); 8];
         for strategy in

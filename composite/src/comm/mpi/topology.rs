@@ -17,13 +17,13 @@ const BYTES: usize = 12;
 const UNKNOWN: u32 = u32::MAX;
 
 /// What this rank says of its machine: equal bytes, one machine.
-pub(super) fn of_this_rank(mpi: &Mpi, comm: Handle, rank: usize, name: &str) -> [u8; BYTES] {
+pub(super) fn id_of_this_rank(mpi: &Mpi, comm: Handle, rank: usize, name: &str) -> [u8; BYTES] {
     let boot = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").ok();
     let node = std::env::var_os(NODE_VARIABLE);
-    words(lowest_in_memory(mpi, comm, rank), boot.as_deref(), name, node.as_deref(), rank)
+    machine_id(lowest_in_memory(mpi, comm, rank), boot.as_deref(), name, node.as_deref(), rank)
 }
 
-fn words(
+fn machine_id(
     lowest: Option<u32>,
     boot: Option<&str>,
     name: &str,
@@ -77,9 +77,9 @@ fn lowest_in_memory(mpi: &Mpi, comm: Handle, rank: usize) -> Option<u32> {
 }
 
 /// Numbers of machines, in the order of their first ranks.
-pub(super) fn numbered(said: &[Vec<u8>]) -> Vec<usize> {
+pub(super) fn numbered_nodes(ids: &[Vec<u8>]) -> Vec<usize> {
     let mut found: Vec<&[u8]> = Vec::new();
-    said.iter()
+    ids.iter()
         .map(|one| {
             found.iter().position(|known| known == one).unwrap_or_else(|| {
                 found.push(one);
@@ -92,9 +92,9 @@ pub(super) fn numbered(said: &[Vec<u8>]) -> Vec<usize> {
 impl super::MpiComm {
     /// Finds out which ranks share a machine.
     pub(super) fn find_nodes(&mut self) -> Result<(), super::CommError> {
-        let mine = of_this_rank(&self.mpi, self.transfers.comm(), self.rank, &self.processor_name());
-        let all = self.all_gather(&mine, mine.len(), super::START)?;
-        self.nodes = numbered(&all);
+        let mine = id_of_this_rank(&self.mpi, self.transfers.comm(), self.rank, &self.processor_name());
+        let all = self.all_gather(&mine, mine.len(), super::STARTUP_TIMEOUT)?;
+        self.nodes = numbered_nodes(&all);
         // More ranks than processors: a rank that spins takes the processor from the one it waits for.
         let here = self.nodes.iter().filter(|&&node| node == self.nodes[self.rank]).count();
         self.oversubscribed = here > super::launcher::processors_here();
@@ -110,9 +110,9 @@ mod tests {
     #[test]
     fn ranks_share_a_machine_only_if_something_says_so() {
         let of = |lowest, boot, name, node: Option<&str>, rank| {
-            words(lowest, boot, name, node.map(OsStr::new), rank).to_vec()
+            machine_id(lowest, boot, name, node.map(OsStr::new), rank).to_vec()
         };
-        let same = |a: &Vec<u8>, b: &Vec<u8>| numbered(&[a.clone(), b.clone()]) == [0, 0];
+        let same = |a: &Vec<u8>, b: &Vec<u8>| numbered_nodes(&[a.clone(), b.clone()]) == [0, 0];
         let first = of(Some(0), Some("b0"), "host", None, 0);
         assert!(same(&first, &of(Some(0), Some("b0"), "host", None, 1)));
         for other in [
@@ -135,8 +135,8 @@ mod tests {
 
     #[test]
     fn machines_are_numbered_in_the_order_of_their_first_ranks() {
-        let said = ["b", "a", "b", "c", "a"].map(|one| one.as_bytes().to_vec());
-        assert_eq!(numbered(&said), [0, 1, 0, 2, 1]);
-        assert_eq!(numbered(&[]), [0_usize; 0]);
+        let ids = ["b", "a", "b", "c", "a"].map(|one| one.as_bytes().to_vec());
+        assert_eq!(numbered_nodes(&ids), [0, 1, 0, 2, 1]);
+        assert_eq!(numbered_nodes(&[]), [0_usize; 0]);
     }
 }

@@ -1,8 +1,8 @@
 //! Messages of 32-bit words, little-endian, with a length and a checksum in front.
-use crate::wire::checksum;
+use crate::codec::checksum;
 
 /// The message for `words`.
-pub(super) fn to_message(words: &[u32], mut buffer: Vec<u8>) -> Vec<u8> {
+pub(super) fn encode_message(words: &[u32], mut buffer: Vec<u8>) -> Vec<u8> {
     buffer.clear();
     buffer.reserve(8 + 4 * words.len());
     buffer.extend_from_slice(&[0; 8]);
@@ -15,7 +15,7 @@ pub(super) fn to_message(words: &[u32], mut buffer: Vec<u8>) -> Vec<u8> {
 }
 
 /// The words of a message; `None` when it is damaged.
-pub(super) fn from_message(message: &[u8]) -> Option<Vec<u32>> {
+pub(super) fn decode_message(message: &[u8]) -> Option<Vec<u32>> {
     let (head, body) = message.split_first_chunk::<8>()?;
     if !body.len().is_multiple_of(4) || checksum(body) != u64::from_le_bytes(*head) {
         return None;
@@ -35,14 +35,14 @@ mod tests {
     #[test]
     fn words_survive_and_damage_is_noticed() {
         let words = [1, u32::MAX, 0, 0x8000_0001];
-        let message = to_message(&words, Vec::new());
+        let message = encode_message(&words, Vec::new());
         assert_eq!(message.len(), message_bytes(4));
-        assert_eq!(from_message(&message).as_deref(), Some(&words[..]));
+        assert_eq!(decode_message(&message).as_deref(), Some(&words[..]));
         for i in 0..message.len() {
             let mut damaged = message.clone();
             damaged[i] ^= 4;
-            assert_eq!(from_message(&damaged), None, "byte {i}");
-            assert_eq!(from_message(&message[..i]), None, "cut at {i}");
+            assert_eq!(decode_message(&damaged), None, "byte {i}");
+            assert_eq!(decode_message(&message[..i]), None, "cut at {i}");
         }
     }
 }

@@ -1,8 +1,8 @@
 //! Finished tiles to one rank.
-use super::ask::{Inbox, Tag, Talk};
-use super::camera_wave::TileAnswer;
-use super::owners::Owners;
-use super::sort_last::{Side, each};
+use super::rank_frame::{RankFrame, each};
+use super::request_reply::{Inbox, RankChannel, Tag};
+use super::tile_hits::TileHits;
+use super::tile_owners::TileOwners;
 use super::{Activity, FrameError};
 use crate::comm::CommError;
 use rt_core::distributed::{DistributedFrame, Pass, TileState};
@@ -10,8 +10,8 @@ use rt_core::frame::Frame;
 use std::ops::Range;
 
 /// One rank's part in bringing the picture to the root.
-pub(super) struct Collect<'a> {
-    side: &'a Side<'a>,
+pub(super) struct TileCollector<'a> {
+    side: &'a RankFrame<'a>,
     tiles: &'a mut [TileState],
     /// Number of the first of `tiles`.
     first: usize,
@@ -22,33 +22,33 @@ pub(super) struct Collect<'a> {
     next: Vec<usize>,
 }
 
-impl<'a> Collect<'a> {
+impl<'a> TileCollector<'a> {
     /// Nothing has come yet. `tiles` are this rank's.
     pub(super) fn new(
-        talk: &Talk<'_>,
-        side: &'a Side<'a>,
-        owners: &Owners,
+        channel: &RankChannel<'_>,
+        side: &'a RankFrame<'a>,
+        owners: &TileOwners,
         tiles: &'a mut [TileState],
         root: Option<usize>,
-    ) -> Result<Collect<'a>, FrameError> {
-        let (rank, size) = (talk.rank(), talk.size());
+    ) -> Result<TileCollector<'a>, FrameError> {
+        let (rank, size) = (channel.rank(), channel.size());
         if let Some(peer) = root.filter(|&r| r >= size) {
             return Err(FrameError::Comm(CommError::NoSuchRank { peer, size }));
         }
         let picture = (root == Some(rank)).then(|| side.frame.blank_frame());
         let next = owners.tiles.iter().map(|t| t.start).collect();
-        Ok(Collect { side, tiles, first: owners.tiles[rank].start, root, picture, next })
+        Ok(TileCollector { side, tiles, first: owners.tiles[rank].start, root, picture, next })
     }
 
     /// Posts the receives of all tiles, which come in `chunks` from each rank.
-    pub(super) fn announce(
+    pub(super) fn post_receives(
         &self,
-        talk: &mut Talk<'_>,
+        channel: &mut RankChannel<'_>,
         inbox: &mut Inbox,
-        owners: &Owners,
+        owners: &TileOwners,
         chunks: usize,
     ) -> Result<(), FrameError> {
-        let (rank, size) = (talk.rank(), talk.size());
+        let (rank, size) = (channel.rank(), channel.size());
         if self.root != Some(rank) {
             return Ok(());
         }
@@ -57,7 +57,7 @@ impl<'a> Collect<'a> {
                 let tiles = owners.chunk(from, (chunk, chunks));
                 if !tiles.is_empty() {
                     let words = tiles.map(|t| words_of(self.side.frame, t)).sum();
-                    talk.expect(inbox, from, Tag::Tiles, words)?;
+                    channel.expect(inbox, from, Tag::Tiles, words)?;
                 }
             }
         }
@@ -67,17 +67,17 @@ impl<'a> Collect<'a> {
     /// Gives the tiles in `range` the colours of their nearest hits, and sends them on.
     pub(super) fn finish(
         &mut self,
-        talk: &mut Talk<'_>,
+        channel: &mut RankChannel<'_>,
         range: Range<usize>,
         pass: Pass,
-        answers: &[TileAnswer],
+        answers: &[TileHits],
     ) -> Result<(), FrameError> {
-        let (rank, frame) = (talk.rank(), self.side.frame);
+        let (rank, frame) = (channel.rank(), self.side.frame);
         let places = range.start - self.first..range.end - self.first;
         let mut failed = Vec::new();
         let mut work: Vec<_> =
             self.tiles[places.clone()].iter_mut().zip(&answers[places]).map(|w| (w, None)).collect();
-        each(talk, self.side.parallel, &mut work, |_, ((tile, answer), error)| {
+        each(channel, self.side.parallel, &mut work, |_, ((tile, answer), error)| {
             tile.begin(frame, pass);
             *error = tile.select_colors(frame, &answer.colors()).err();
         });
@@ -85,22 +85,22 @@ impl<'a> Collect<'a> {
         if let Some(source) = failed.into_iter().next() {
             return Err(FrameError::Answer { rank, source });
         }
-        talk.spent(Activity::Shade);
-        self.send(talk, range)
+        channel.record_span(Activity::Shade);
+        self.send(channel, range)
     }
 
     /// Sends finished tiles to the root; on the root, puts them in their places.
-    fn send(&mut self, talk: &mut Talk<'_>, range: Range<usize>) -> Result<(), FrameError> {
-        let (rank, frame) = (talk.rank(), self.side.frame);
+    fn send(&mut self, channel: &mut RankChannel<'_>, range: Range<usize>) -> Result<(), FrameError> {
+        let (rank, frame) = (channel.rank(), self.side.frame);
         let Some(root) = self.root.filter(|_| !range.is_empty()) else { return Ok(()) };
         let tiles = &self.tiles[range.start - self.first..range.end - self.first];
         let words: Vec<u32> = tiles.iter().flat_map(|t| t.encode(frame)).collect();
         if rank == root {
-            self.put(range, &words).ok_or_else(|| talk.wrong(rank, "tiles", words.len()))?;
+            self.put(range, &words).ok_or_else(|| channel.message_error(rank, "tiles", words.len()))?;
         } else {
-            talk.send(root, Tag::Tiles, &words)?;
+            channel.send(root, Tag::Tiles, &words)?;
         }
-        talk.spent(Activity::Collect);
+        channel.record_span(Activity::Collect);
         Ok(())
     }
 
@@ -116,10 +116,10 @@ impl<'a> Collect<'a> {
     }
 
     /// The next chunk of tiles of rank `from`.
-    pub(super) fn place(
+    pub(super) fn put_chunk(
         &mut self,
-        talk: &mut Talk<'_>,
-        owners: &Owners,
+        channel: &mut RankChannel<'_>,
+        owners: &TileOwners,
         from: usize,
         chunks: usize,
         words: &[u32],
@@ -131,17 +131,21 @@ impl<'a> Collect<'a> {
             self.next[from] = range.end;
             self.put(range, words)
         });
-        talk.spent(Activity::Collect);
-        placed.ok_or_else(|| talk.wrong(from, "tiles", words.len()))
+        channel.record_span(Activity::Collect);
+        placed.ok_or_else(|| channel.message_error(from, "tiles", words.len()))
     }
 
     /// All tiles at once, at the end of a frame.
-    pub(super) fn all(mut self, talk: &mut Talk<'_>, owners: &Owners) -> Result<Option<Frame>, FrameError> {
+    pub(super) fn all(
+        mut self,
+        channel: &mut RankChannel<'_>,
+        owners: &TileOwners,
+    ) -> Result<Option<Frame>, FrameError> {
         let mut inbox = Inbox::default();
-        self.announce(talk, &mut inbox, owners, 1)?;
-        self.send(talk, owners.tiles[talk.rank()].clone())?;
-        while let Some(incoming) = talk.next(&mut inbox, true)? {
-            self.place(talk, owners, incoming.from, 1, &incoming.words)?;
+        self.post_receives(channel, &mut inbox, owners, 1)?;
+        self.send(channel, owners.tiles[channel.rank()].clone())?;
+        while let Some(incoming) = channel.next(&mut inbox, true)? {
+            self.put_chunk(channel, owners, incoming.from, 1, &incoming.words)?;
         }
         Ok(self.picture)
     }

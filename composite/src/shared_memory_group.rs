@@ -3,8 +3,9 @@
 //! Every rank lays its image on the table (an `Arc`: nothing is copied), and all wait for each other. Whoever comes last merges all of them
 //! straight from their planes, on as many threads as there are processors and no more, while the others sleep: to wake eight ranks for bands of
 //! rows on two processors cost as much as merging. The communicator is only used to wait, so lost and stalled ranks are named as with messages.
+use crate::codec::MessageError;
 use crate::comm::Communicator;
-use crate::compositor::{Composited, Destination, Options, Places, fingerprint, give_up};
+use crate::compositor::{CompositeOutput, CompositingOrder, Destination, Options, abort_group, fingerprint};
 use crate::error::CompositeError;
 use crate::frame::{Frame, Image};
 use crate::pixel::Composite;
@@ -12,7 +13,6 @@ use crate::rect::Rect;
 use crate::report::Report;
 use crate::shared::merge;
 use crate::simd::Kernels;
-use crate::wire::WireError;
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -20,14 +20,14 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 const WORTH_A_THREAD_BYTES: usize = 8 << 20;
 
 /// What one rank has laid down: its image, where it drew, and a number of its options.
-type Laid<P> = (Arc<Image<P>>, Rect, u64);
+type PublishedFrame<P> = (Arc<Image<P>>, Rect, u64);
 
-struct Table<P: Composite> {
-    laid: Vec<Option<Laid<P>>>,
+struct GroupState<P: Composite> {
+    published_frames: Vec<Option<PublishedFrame<P>>>,
     /// An image to write over, of the rank that collects.
     spare: Option<Image<P>>,
     /// Frames that somebody has begun to merge.
-    begun: u64,
+    merges_begun: u64,
     /// The last of them, until it is collected.
     image: Option<Image<P>>,
     /// Its depths that are not a number, by rank.
@@ -35,9 +35,9 @@ struct Table<P: Composite> {
 }
 
 /// The place of one rank at a table that it shares with the other ranks of its process.
-pub struct Seat<P: Composite> {
+pub struct SharedMemoryRank<P: Composite> {
     rank: usize,
-    table: Arc<Mutex<Table<P>>>,
+    state: Arc<Mutex<GroupState<P>>>,
     spare: Option<Image<P>>,
     /// Frames composited so far.
     frames: u64,
@@ -45,17 +45,19 @@ pub struct Seat<P: Composite> {
 }
 
 /// A table for `ranks` ranks; hand each seat to the thread of that rank.
-pub fn seats<P: Composite>(ranks: usize) -> Vec<Seat<P>> {
-    let laid = (0..ranks).map(|_| None).collect();
-    let table = Table { laid, spare: None, begun: 0, image: None, nan_depths: Vec::new() };
-    let table = Arc::new(Mutex::new(table));
+pub fn shared_memory_group<P: Composite>(ranks: usize) -> Vec<SharedMemoryRank<P>> {
+    let published_frames = (0..ranks).map(|_| None).collect();
+    let state =
+        GroupState { published_frames, spare: None, merges_begun: 0, image: None, nan_depths: Vec::new() };
+    let state = Arc::new(Mutex::new(state));
     // To ask costs reading files on some systems.
     let processors = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
-    let seat = |rank| Seat { rank, table: Arc::clone(&table), spare: None, frames: 0, processors };
-    (0..ranks).map(seat).collect()
+    let shared_rank =
+        |rank| SharedMemoryRank { rank, state: Arc::clone(&state), spare: None, frames: 0, processors };
+    (0..ranks).map(shared_rank).collect()
 }
 
-impl<P: Composite> Seat<P> {
+impl<P: Composite> SharedMemoryRank<P> {
     /// Composites the images of all ranks of the table, of which this rank drew `bounds` of `image`. Every rank calls this once a frame, with
     /// a communicator of the same ranks. The bits are those of [`composite_serial`](crate::composite_serial) in the order of `options`.
     ///
@@ -68,10 +70,10 @@ impl<P: Composite> Seat<P> {
         image: &Arc<Image<P>>,
         bounds: Rect,
         options: &Options,
-    ) -> Result<Composited<P>, CompositeError> {
+    ) -> Result<CompositeOutput<P>, CompositeError> {
         let result = self.composite_or_fail(comm, image, bounds, options);
         if let Err(error) = &result {
-            give_up(comm, error);
+            abort_group(comm, error);
         }
         result
     }
@@ -81,8 +83,8 @@ impl<P: Composite> Seat<P> {
         self.spare = Some(image);
     }
 
-    fn table(&self) -> MutexGuard<'_, Table<P>> {
-        self.table.lock().unwrap_or_else(PoisonError::into_inner)
+    fn state(&self) -> MutexGuard<'_, GroupState<P>> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn composite_or_fail(
@@ -91,9 +93,9 @@ impl<P: Composite> Seat<P> {
         image: &Arc<Image<P>>,
         bounds: Rect,
         options: &Options,
-    ) -> Result<Composited<P>, CompositeError> {
+    ) -> Result<CompositeOutput<P>, CompositeError> {
         let begin = comm.now();
-        let ranks = self.table().laid.len();
+        let ranks = self.state().published_frames.len();
         let root = match options.destination {
             Destination::Rank(root) if root < ranks && comm.size() == ranks => root,
             _ => {
@@ -103,45 +105,46 @@ impl<P: Composite> Seat<P> {
                 )));
             }
         };
-        let places = Places::new(comm, options)?;
+        let order = CompositingOrder::new(comm, options)?;
         // Images of other sizes are named with both.
-        let agreed = fingerprint::<P>((0, 0), options, &places, None);
-        let order = places.order;
+        let own_fingerprint = fingerprint::<P>((0, 0), options, &order, None);
+        let order = order.ranks;
         Rect::of_size(image.width_px, image.height_px).must_contain(&bounds)?;
 
         // Lay it down and wait for the others.
         let spare = if self.rank == root { self.spare.take() } else { None };
         {
-            let mut table = self.table();
-            table.laid[self.rank] = Some((Arc::clone(image), bounds, agreed));
+            let mut state = self.state();
+            state.published_frames[self.rank] = Some((Arc::clone(image), bounds, own_fingerprint));
             if spare.is_some() {
-                table.spare = spare;
+                state.spare = spare;
             }
         }
         comm.barrier(options.timeout)?;
-        let published = comm.now();
+        let published_secs = comm.now();
 
         // The first to go on, who has come last, merges.
         let frame = self.frames;
         self.frames += 1;
         let work = {
-            let mut table = self.table();
-            (table.begun == frame).then(|| {
-                table.begun += 1;
-                let laid: Vec<Laid<P>> = order.iter().filter_map(|&rank| table.laid[rank].take()).collect();
-                (laid, table.spare.take())
+            let mut state = self.state();
+            (state.merges_begun == frame).then(|| {
+                state.merges_begun += 1;
+                let published_frames: Vec<PublishedFrame<P>> =
+                    order.iter().filter_map(|&rank| state.published_frames[rank].take()).collect();
+                (published_frames, state.spare.take())
             })
         };
-        if let Some((laid, spare)) = work {
-            for (&from, (.., theirs)) in order.iter().zip(&laid) {
-                if *theirs != agreed {
-                    let reason = WireError::Fingerprint;
+        if let Some((published_frames, spare)) = work {
+            for (&from, (.., theirs)) in order.iter().zip(&published_frames) {
+                if *theirs != own_fingerprint {
+                    let reason = MessageError::Fingerprint;
                     return Err(CompositeError::Message { rank: self.rank, from, reason });
                 }
             }
-            let frames: Vec<Frame<'_, P>> = laid
+            let frames: Vec<Frame<'_, P>> = published_frames
                 .iter()
-                .map(|(image, bounds, _)| Frame::of_image(image).bounded(*bounds))
+                .map(|(image, bounds, _)| Frame::of_image(image).with_bounds(*bounds))
                 .collect::<Result<_, _>>()?;
             // Where others work too, a new thread may begin later than one would have been done.
             let bytes: usize = frames.iter().map(|frame| frame.bounds().pixels() * P::BYTES).sum();
@@ -149,35 +152,35 @@ impl<P: Composite> Seat<P> {
             let merged = merge(&frames, threads, options.depth, spare, Kernels::new(options.simd))?;
             // Images are let go before their ranks draw the next ones.
             drop(frames);
-            drop(laid);
-            let mut table = self.table();
-            table.image = Some(merged.image);
-            table.nan_depths.resize(ranks, 0);
+            drop(published_frames);
+            let mut state = self.state();
+            state.image = Some(merged.image);
+            state.nan_depths.resize(ranks, 0);
             for (&rank, nan) in order.iter().zip(&merged.nan_depths) {
-                table.nan_depths[rank] = *nan;
+                state.nan_depths[rank] = *nan;
             }
         }
-        let merged = comm.now();
+        let merged_secs = comm.now();
 
         // Nobody lays down the next frame before all have come here, and nobody merges it before this one has been taken.
         comm.barrier(options.timeout)?;
-        let mut table = self.table();
-        let nan_depths = table.nan_depths.get(self.rank).copied().unwrap_or(0);
-        let image = if self.rank == root { table.image.take() } else { None };
-        drop(table);
+        let mut state = self.state();
+        let nan_depths = state.nan_depths.get(self.rank).copied().unwrap_or(0);
+        let image = if self.rank == root { state.image.take() } else { None };
+        drop(state);
         if self.rank == root && image.is_none() {
-            let reason = "the ranks of this table have left a frame before its end: make new seats";
+            let reason = "the ranks of this table have left a frame before its end: make a new group with shared_memory_group";
             return Err(CompositeError::Options(reason.to_string()));
         }
         let report = Report {
-            exchange_secs: published - begin,
-            blend_secs: merged - published,
-            collect_secs: comm.now() - merged,
+            exchange_secs: published_secs - begin,
+            blend_secs: merged_secs - published_secs,
+            collect_secs: comm.now() - merged_secs,
             total_secs: comm.now() - begin,
             nan_depths,
             in_memory: true,
             ..Report::default()
         };
-        Ok(Composited { image, piece: None, report })
+        Ok(CompositeOutput { image, piece: None, report })
     }
 }

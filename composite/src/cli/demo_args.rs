@@ -1,0 +1,47 @@
+//! Arguments of `composite demo`.
+use super::ranks::RankArgs;
+use crate::workload::Workload;
+use std::path::PathBuf;
+
+/// Arguments of `composite demo`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    composite demo -n 8\n  \
+    composite demo -n 5 --data mixing-layer --view RMI --headlight\n  \
+    composite demo -n 4 --mpi --data part.vtp --grey\n  \
+    composite demo -n 8 --scene discs\n  \
+    composite demo -n 8 --mpi --size 2048 --out frames")]
+pub(super) struct DemoArgs {
+    #[command(flatten)]
+    pub(super) ranks: RankArgs,
+    /// The data set: one of the catalogue of `datasets`, or a file with surfaces (VTK, OBJ, glTF, PLY, STL)
+    #[arg(long, default_value = "wavelet", value_name = "NAME")]
+    pub(super) data: String,
+    /// Its size; the smallest if not given
+    #[arg(long, value_name = "SIZE")]
+    pub(super) data_size: Option<String>,
+    /// One of its views; the first if not given
+    #[arg(long, value_name = "VIEW")]
+    pub(super) view: Option<String>,
+    /// A headlight in place of a lamp with shadows and ambient occlusion
+    #[arg(long)]
+    pub(super) headlight: bool,
+    /// One grey for all parts in place of a colour for each rank
+    #[arg(long)]
+    pub(super) grey: bool,
+    /// Parts of the same work for this view in place of the same number of triangles
+    #[arg(long)]
+    pub(super) cut_by_view: bool,
+    /// Width and height of the image, in pixels
+    #[arg(long, default_value_t = 1024, value_name = "PIXELS")]
+    pub(super) size: u32,
+    /// In place of a data set: frames made without a renderer
+    #[arg(long, value_name = "discs|dense|frag", conflicts_with_all = ["data", "data_size", "view", "headlight", "grey", "cut_by_view"])]
+    pub(super) scene: Option<Workload>,
+    /// Frames; the last is shown
+    #[arg(long, default_value_t = 5, value_name = "N")]
+    pub(super) frames: u64,
+    /// Folder for picture and plot
+    #[arg(long, default_value = ".", value_name = "FOLDER")]
+    pub(super) out: PathBuf,
+}

@@ -1,0 +1,185 @@
+//! Signs of life: whoever waits long for a rank asks whether it is at work, and counts its timeout from the last answer.
+//!
+//! A rank counts its steps: messages it sent, messages it got, and calls of [`alive`](crate::Communicator::alive). Asked, it tells
+//! its count if it has grown since it last told that rank. A rank that itself waits makes no steps, but hands on what it hears from
+//! those it waits for; each count of each rank counts once, so two ranks that wait for each other do not keep each other alive.
+//! Nothing is sent unless somebody waits for a quarter of its timeout.
+use std::time::{Duration, Instant};
+
+/// Asks in a timeout.
+const REQUESTS_PER_TIMEOUT: u32 = 4;
+
+/// The steps of a rank, as far as is known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Heartbeat {
+    /// Whose steps.
+    pub(super) origin: usize,
+    pub(super) steps: u64,
+}
+
+/// What is known of signs on this rank.
+pub(super) struct Heartbeats {
+    rank: usize,
+    steps: u64,
+    /// Of each rank the most steps it is known to have made; new ones are signs of life.
+    newest: Vec<u64>,
+    /// Ranks that want a sign of this one.
+    requesters: Vec<usize>,
+    /// Own steps that each rank has been told of.
+    reported_steps: Vec<u64>,
+    /// Signs that have come, with the rank that gave them.
+    unread: Vec<(usize, Heartbeat)>,
+}
+
+impl Heartbeats {
+    pub(super) fn new(rank: usize, size: usize) -> Self {
+        Self {
+            rank,
+            steps: 0,
+            newest: vec![0; size],
+            requesters: Vec::new(),
+            reported_steps: vec![0; size],
+            unread: Vec::new(),
+        }
+    }
+
+    /// This rank has done something.
+    pub(super) fn step(&mut self) {
+        self.steps += 1;
+    }
+
+    pub(super) fn requested_by(&mut self, rank: usize) {
+        if rank < self.reported_steps.len() && !self.requesters.contains(&rank) {
+            self.requesters.push(rank);
+        }
+    }
+
+    pub(super) fn record(&mut self, from: usize, heartbeat: Heartbeat) {
+        if heartbeat.origin < self.newest.len() && heartbeat.origin != self.rank {
+            self.unread.push((from, heartbeat));
+        }
+    }
+
+    /// Signs of this rank's own steps, for those who asked and do not know of them.
+    pub(super) fn take_replies(&mut self) -> Vec<(usize, Heartbeat)> {
+        let heartbeat = Heartbeat { origin: self.rank, steps: self.steps };
+        let reported_steps = &mut self.reported_steps;
+        let mut out = Vec::new();
+        self.requesters.retain(|&requester| {
+            if reported_steps[requester] == heartbeat.steps {
+                return true;
+            }
+            reported_steps[requester] = heartbeat.steps;
+            out.push((requester, heartbeat));
+            false
+        });
+        out
+    }
+
+    /// Of what has come, whether anything is a new sign of one of those waited for; and those signs, for the ranks that wait for this
+    /// one.
+    pub(super) fn take_new(&mut self, waited_for: impl Fn(usize) -> bool) -> (bool, Vec<(usize, Heartbeat)>) {
+        let mut new = Vec::new();
+        for (from, heartbeat) in std::mem::take(&mut self.unread) {
+            if waited_for(from) && heartbeat.steps > self.newest[heartbeat.origin] {
+                self.newest[heartbeat.origin] = heartbeat.steps;
+                new.push(heartbeat);
+            }
+        }
+        if new.is_empty() {
+            return (false, Vec::new());
+        }
+        let requesters = std::mem::take(&mut self.requesters);
+        let to_all = |heartbeat: &Heartbeat| {
+            let heartbeat = *heartbeat;
+            requesters
+                .iter()
+                .filter(move |&&requester| requester != heartbeat.origin)
+                .map(move |&requester| (requester, heartbeat))
+        };
+        (true, new.iter().flat_map(to_all).collect())
+    }
+}
+
+/// How long a rank goes on waiting.
+pub(super) struct HeartbeatTimeout {
+    timeout: Duration,
+    /// When the wait began or a sign of life came.
+    since: Instant,
+    asked: Instant,
+}
+
+impl HeartbeatTimeout {
+    pub(super) fn new(timeout: Duration, begin: Instant) -> Self {
+        Self { timeout, since: begin, asked: begin }
+    }
+
+    pub(super) fn is_over(&self, now: Instant) -> bool {
+        now.duration_since(self.since) >= self.timeout
+    }
+
+    /// Whether those waited for are to be asked now.
+    pub(super) fn is_request_due(&mut self, now: Instant) -> bool {
+        let asks = now.duration_since(self.asked) >= self.timeout / REQUESTS_PER_TIMEOUT;
+        if asks {
+            self.asked = now;
+        }
+        asks
+    }
+
+    pub(super) fn renew(&mut self, now: Instant) {
+        self.since = now;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rank_that_asked_is_told_of_new_steps_once() {
+        let mut heartbeats = Heartbeats::new(2, 3);
+        heartbeats.requested_by(0);
+        heartbeats.requested_by(0);
+        assert_eq!(heartbeats.take_replies(), []);
+        heartbeats.step();
+        assert_eq!(heartbeats.take_replies(), [(0, Heartbeat { origin: 2, steps: 1 })]);
+        heartbeats.step();
+        assert_eq!(heartbeats.take_replies(), [], "nobody has asked again");
+        heartbeats.requested_by(1);
+        heartbeats.requested_by(7);
+        assert_eq!(heartbeats.take_replies(), [(1, Heartbeat { origin: 2, steps: 2 })]);
+    }
+
+    #[test]
+    fn who_waits_hands_on_each_sign_once_so_that_a_ring_of_waiting_ranks_falls_silent() {
+        // Rank 0 waits for 1, which waits for 2 and 0; 2 is at work, and then no more.
+        let mut heartbeats = [Heartbeats::new(0, 3), Heartbeats::new(1, 3), Heartbeats::new(2, 3)];
+        heartbeats[2].step();
+        heartbeats[2].requested_by(1);
+        heartbeats[1].requested_by(0);
+        heartbeats[0].requested_by(1);
+        let [(to, heartbeat)] = heartbeats[2].take_replies()[..] else { panic!("one sign") };
+        heartbeats[to].record(2, heartbeat);
+        assert_eq!(heartbeats[1].take_new(|from| from != 1), (true, vec![(0, heartbeat)]));
+        heartbeats[0].record(1, heartbeat);
+        assert_eq!(heartbeats[0].take_new(|from| from == 1), (true, vec![(1, heartbeat)]));
+        heartbeats[0].requested_by(1);
+        heartbeats[1].requested_by(0);
+        heartbeats[1].record(0, heartbeat);
+        assert_eq!(heartbeats[1].take_new(|from| from != 1), (false, vec![]));
+        assert!(heartbeats.iter_mut().all(|heartbeats| heartbeats.take_replies().is_empty()));
+    }
+
+    #[test]
+    fn patience_counts_from_the_last_sign_and_asks_a_few_times() {
+        let begin = Instant::now();
+        let at = |secs| begin + Duration::from_secs(secs);
+        let mut patience = HeartbeatTimeout::new(Duration::from_secs(8), begin);
+        let asked: Vec<u64> = (0..8).filter(|&secs| patience.is_request_due(at(secs))).collect();
+        assert_eq!(asked, [2, 4, 6]);
+        assert!(!patience.is_over(at(7)) && patience.is_over(at(8)));
+        patience.renew(at(7));
+        assert!(!patience.is_over(at(14)) && patience.is_over(at(15)));
+    }
+}

@@ -1,0 +1,66 @@
+//! Why a demo has nothing to show.
+use super::FrameError;
+use datasets::catalogue::CatalogueError;
+use datasets::model::ModelError;
+use datasets::read::ReadError;
+use rt_core::camera::CameraError;
+use rt_core::scene::SceneError;
+use rt_core::shapes::ShapeError;
+
+/// Why there is nothing to show.
+#[derive(Debug, thiserror::Error)]
+pub enum DemoError {
+    /// No such data set or size, or it cannot be made.
+    #[error(transparent)]
+    Data(#[from] CatalogueError),
+    /// It has no such view.
+    #[error("{data} has no view `{view}`; it has: {known}")]
+    View {
+        /// The data set.
+        data: String,
+        /// The view asked for.
+        view: String,
+        /// All its views.
+        known: String,
+    },
+    /// A file that cannot be read.
+    #[error(transparent)]
+    File(#[from] ReadError),
+    /// A file whose data have no surface.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// A file without a triangle.
+    #[error("{file} has no surface to show: it holds no triangle")]
+    NoSurface {
+        /// The file.
+        file: String,
+    },
+    /// What looks like a file's name, and is none.
+    #[error("there is no file {file}, and {unknown}")]
+    NoFile {
+        /// The name.
+        file: String,
+        /// What the catalogue says of it.
+        unknown: CatalogueError,
+    },
+    /// A file has one size.
+    #[error("{file} is a file and has no size `{size}`: leave the size out")]
+    SizeOfFile {
+        /// The file.
+        file: String,
+        /// The size asked for.
+        size: String,
+    },
+    /// Tubes.
+    #[error(transparent)]
+    Shape(#[from] ShapeError),
+    /// The camera.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// The scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The frame.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+}

@@ -1,0 +1,54 @@
+//! What camera rays meet in a tile.
+use rt_core::distributed::ShadingHit;
+
+/// Slots of a tile.
+pub(super) const SLOTS: usize = 1024;
+
+/// The nearest hit of a pixel so far.
+#[derive(Clone, Copy)]
+pub(super) struct Nearest {
+    pub(super) t: f32,
+    pub(super) instance: u32,
+    pub(super) primitive: u32,
+    pub(super) rank: u32,
+    pub(super) color: [f32; 4],
+}
+
+impl Nearest {
+    pub(super) const NOTHING: Nearest = Nearest {
+        t: f32::INFINITY,
+        instance: u32::MAX,
+        primitive: u32::MAX,
+        rank: u32::MAX,
+        color: [0.0; 4],
+    };
+
+    pub(super) fn is_before(&self, other: &Nearest) -> bool {
+        let key = |n: &Nearest| (n.instance, n.primitive);
+        // Nothing has t infinite and the highest numbers: every hit comes before it.
+        self.t < other.t || (self.t == other.t && key(self) < key(other))
+    }
+}
+
+/// What the camera rays of one owned tile meet.
+pub(super) struct TileHits {
+    pub(super) nearest: Vec<Nearest>,
+    /// Everything about the hits, where it was asked for.
+    pub(super) hits: Vec<Option<ShadingHit>>,
+}
+
+impl TileHits {
+    pub(super) fn new() -> TileHits {
+        TileHits { nearest: vec![Nearest::NOTHING; SLOTS], hits: Vec::new() }
+    }
+
+    /// Colours of the nearest hits.
+    pub(super) fn colors(&self) -> Vec<Option<[f32; 4]>> {
+        self.nearest.iter().map(|n| (n.rank != u32::MAX).then_some(n.color)).collect()
+    }
+
+    /// The rank whose hit is the nearest, of each slot; `u32::MAX` for none.
+    pub(super) fn winner(&self, slot: usize) -> u32 {
+        self.nearest[slot].rank
+    }
+}
