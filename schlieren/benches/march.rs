@@ -7,7 +7,7 @@ use glam::DVec3;
 use schlieren::field::Field;
 use schlieren::interpolate::Interpolant;
 use schlieren::march::{BlankCells, Deviational, LineOfSight, Options};
-use schlieren::path::{Exit, LightPaths, Start, Wanted};
+use schlieren::path::{Exit, LightPaths, PathQuantities, Start};
 use schlieren::view::{Axis, View};
 use std::time::Duration;
 
@@ -48,7 +48,7 @@ fn speed(c: &mut Criterion) {
                     &field,
                     view,
                     interpolant,
-                    Options { wanted: Wanted { opd }, ..Options::default() },
+                    Options { wanted: PathQuantities { opd }, ..Options::default() },
                 );
                 paths.trace(&rays, &mut exits);
                 group.throughput(Throughput::Elements(paths.counters().ray_steps));
@@ -71,8 +71,13 @@ fn speed(c: &mut Criterion) {
         let mut group = c.benchmark_group(format!("line of sight 256^3, {name}"));
         group.sample_size(10);
         group.throughput(Throughput::Elements(photons.len() as u64));
-        let paths =
-            LineOfSight::new(&field, view, Interpolant::BSpline, Wanted { opd: true }, BlankCells::Opaque);
+        let paths = LineOfSight::new(
+            &field,
+            view,
+            Interpolant::BSpline,
+            PathQuantities { opd: true },
+            BlankCells::Opaque,
+        );
         group.bench_function("photons", |b| {
             b.iter_custom(|times| {
                 let begin = thread_cpu();

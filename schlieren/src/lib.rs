@@ -45,6 +45,7 @@
 pub mod analytic;
 pub mod cli;
 pub mod cutoff;
+mod derivative_bounds;
 pub mod field;
 pub mod film;
 pub mod filter;
@@ -62,7 +63,6 @@ pub mod output;
 pub mod path;
 pub mod plan;
 pub mod render;
-mod roughness;
 pub mod scene;
 #[cfg(feature = "serve")]
 pub mod serve;

@@ -7,7 +7,7 @@
 //! half the largest of its line (four fifths for bands, whose flanks are long), and in it the centre, to parts of a pixel.
 
 use crate::film::Framing;
-use crate::render::Rendered;
+use crate::render::RenderOutput;
 
 /// A picture to measure in.
 #[derive(Debug, Clone)]
@@ -58,7 +58,7 @@ pub struct Line {
 
 impl Photograph {
     /// Of a picture that was rendered with [`crate::render::Layers::map`], which tells bodies from dark shocks. `None` without.
-    pub fn of(rendered: &Rendered) -> Option<Photograph> {
+    pub fn of(rendered: &RenderOutput) -> Option<Photograph> {
         let map = rendered.map.as_ref()?;
         Some(Photograph {
             framing: rendered.framing,

@@ -1,6 +1,6 @@
 //! Pictures into files: PNG for eyes, OpenEXR with every layer and every parameter, NumPy for the deflection map.
 
-use crate::render::Rendered;
+use crate::render::RenderOutput;
 use crate::scene::{Scene, SceneError};
 use datasets::image_io::{self, ImageError, Metadata, Picture, PngDepth, PngReport, keys};
 use std::io::Write;
@@ -29,7 +29,7 @@ pub enum OutputError {
 }
 
 /// Writes the picture, 8 bits a channel, sRGB.
-pub fn write_png(path: &Path, rendered: &Rendered) -> Result<PngReport, OutputError> {
+pub fn write_png(path: &Path, rendered: &RenderOutput) -> Result<PngReport, OutputError> {
     let mut p = Picture::new(rendered.framing.width, rendered.framing.height);
     add_pixels(&mut p, rendered)?;
     Ok(image_io::write_png(path, &p, PngDepth::Eight)?)
@@ -54,7 +54,7 @@ pub fn write_png(path: &Path, rendered: &Rendered) -> Result<PngReport, OutputEr
 /// and as metadata every value of the effective scene under its TOML path, the scene as a whole, and what was done.
 pub fn write_exr(
     path: &Path,
-    rendered: &Rendered,
+    rendered: &RenderOutput,
     scene: &Scene,
     elapsed_secs: f64,
 ) -> Result<(), OutputError> {
@@ -64,7 +64,7 @@ pub fn write_exr(
 }
 
 /// All layers as planes.
-pub fn picture(rendered: &Rendered) -> Result<Picture, OutputError> {
+pub fn picture(rendered: &RenderOutput) -> Result<Picture, OutputError> {
     let mut p = Picture::new(rendered.framing.width, rendered.framing.height);
     add_pixels(&mut p, rendered)?;
     if let Some(m) = &rendered.map {
@@ -101,7 +101,7 @@ pub fn picture(rendered: &Rendered) -> Result<Picture, OutputError> {
     Ok(p)
 }
 
-fn add_pixels(p: &mut Picture, rendered: &Rendered) -> Result<(), OutputError> {
+fn add_pixels(p: &mut Picture, rendered: &RenderOutput) -> Result<(), OutputError> {
     let channel = |c: usize| rendered.pixels.iter().map(|v| v[c]).collect();
     if rendered.colored {
         for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
@@ -114,7 +114,7 @@ fn add_pixels(p: &mut Picture, rendered: &Rendered) -> Result<(), OutputError> {
 }
 
 /// Every parameter and what was done.
-pub fn metadata(rendered: &Rendered, scene: &Scene, elapsed_secs: f64) -> Result<Metadata, OutputError> {
+pub fn metadata(rendered: &RenderOutput, scene: &Scene, elapsed_secs: f64) -> Result<Metadata, OutputError> {
     let mut m = image_io::metadata_of_this_run("schlieren", env!("CARGO_PKG_VERSION"));
     // OpenEXR's own attribute of that name is not for free use.
     if let Some(program) = m.remove(keys::SOFTWARE) {
@@ -164,7 +164,7 @@ fn flatten(path: &str, value: &toml::Value, out: &mut Metadata) {
 }
 
 /// Writes the deflection map as a NumPy array of shape (height, width, 2), little-endian f32, in rad along the picture's right and up; row 0 is the top.
-pub fn write_npy(path: &Path, rendered: &Rendered) -> Result<(), OutputError> {
+pub fn write_npy(path: &Path, rendered: &RenderOutput) -> Result<(), OutputError> {
     let map = rendered.map.as_ref().ok_or(OutputError::NoMap)?;
     let shape = format!("({}, {}, 2)", rendered.framing.height, rendered.framing.width);
     let bytes = npy(&shape, map.deflection_rad.as_flattened());

@@ -75,14 +75,14 @@ pub struct Jacobian {
 
 /// What the caller wants to be computed along the paths. Deflection and displacement always are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct Wanted {
+pub struct PathQuantities {
     /// The optical path difference ([`Exit::opd_m`]).
     pub opd: bool,
 }
 
 /// What leaving out even gas came to; see [`crate::skip`].
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct LeftOut {
+pub struct SkipReport {
     /// Part of the steps that took no sample, 0 to 1.
     pub steps_part: f64,
     /// Bound on what that changed any ray's deflection by.
@@ -103,7 +103,7 @@ impl<T: LightPaths + Send + ?Sized> LightPaths for std::sync::Arc<T> {
         (**self).view()
     }
 
-    fn wanted(&self) -> Wanted {
+    fn wanted(&self) -> PathQuantities {
         (**self).wanted()
     }
 
@@ -111,12 +111,12 @@ impl<T: LightPaths + Send + ?Sized> LightPaths for std::sync::Arc<T> {
         (**self).difference_step_m()
     }
 
-    fn trouble(&self) -> Option<String> {
-        (**self).trouble()
+    fn device_warning(&self) -> Option<String> {
+        (**self).device_warning()
     }
 
-    fn left_out(&self) -> Option<LeftOut> {
-        (**self).left_out()
+    fn skip_report(&self) -> Option<SkipReport> {
+        (**self).skip_report()
     }
 
     fn trace_with_jacobians(&self, starts: &[Start], exits: &mut [Exit], jacobians: &mut [Jacobian]) {
@@ -141,18 +141,18 @@ pub trait LightPaths: Sync {
     fn view(&self) -> &View;
 
     /// What [`Exit`] will hold.
-    fn wanted(&self) -> Wanted;
+    fn wanted(&self) -> PathQuantities;
 
     /// The distance over which [`LightPaths::trace_with_jacobians`] may take differences: half a voxel or so.
     fn difference_step_m(&self) -> f64;
 
     /// What failed on the way and was made up for, with its cause, for who looks at the result.
-    fn trouble(&self) -> Option<String> {
+    fn device_warning(&self) -> Option<String> {
         None
     }
 
     /// What leaving out even gas came to so far; `None` where nothing is to be left out.
-    fn left_out(&self) -> Option<LeftOut> {
+    fn skip_report(&self) -> Option<SkipReport> {
         None
     }
 

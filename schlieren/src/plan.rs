@@ -1,7 +1,7 @@
 //! From a tolerance in radians to a march: mode, interpolant and step, with the bound that chose them and the error that was measured.
 //!
 //! The errors add up. What follows bounds each from the lattice alone, in one pass over it
-//! ([`Roughness`]), with G the largest gradient, H the largest second derivative, T the largest
+//! ([`DerivativeBounds`]), with G the largest gradient, H the largest second derivative, T the largest
 //! third and F the largest fourth along an axis (all per metre, mixed ones too), L the longest way
 //! through the field, h the spacing, theta = G L the largest deflection:
 //!
@@ -27,14 +27,16 @@
 
 use crate::field::Field;
 use crate::interpolate::{BSpline, Interpolant, Interpolate};
-use crate::march::{BlankCells, Deviational, Full, FullOptions, Kept, Options, Pefrl, Projection, Scheme};
-use crate::path::{Exit, LightPaths, Start, Status, Wanted};
+use crate::march::{
+    BlankCells, Deviational, FieldCache, Full, FullOptions, Options, Pefrl, Projection, Scheme,
+};
+use crate::path::{Exit, LightPaths, PathQuantities, Start, Status};
 use crate::view::View;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-pub use crate::roughness::Roughness;
+pub use crate::derivative_bounds::DerivativeBounds;
 
 /// How light is taken through the field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -64,7 +66,7 @@ pub struct Request {
     /// What to compute beside deflection and displacement. The optical path, if wanted, may be off
     /// by the tolerance times the longest way through the field: where its slope is a deflection,
     /// that is the same.
-    pub wanted: Wanted,
+    pub wanted: PathQuantities,
     /// What becomes of light in cells without data.
     pub blank: BlankCells,
     /// [`Options::skip_rad`], for [`Mode::Paraxial`].
@@ -111,12 +113,12 @@ pub struct Plan {
     /// Bounds of its errors, before anything was traced.
     pub bounds: Bounds,
     /// What was found in the field.
-    pub roughness: Roughness,
+    pub derivative_bounds: DerivativeBounds,
 }
 
 /// Error of a plan, measured by tracing some rays with everything refined.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Achieved {
+pub struct MeasuredError {
     /// Largest error of deflection: the step, the mode and the arithmetic.
     pub max_rad: f64,
     /// Its root mean square.
@@ -135,15 +137,19 @@ const SHORTEST_STEP: f64 = 0.125;
 impl Plan {
     /// Chooses the cheapest march whose bounds are within the tolerance; if none is, the most accurate.
     pub fn new(field: &Field, request: Request) -> Plan {
-        let roughness = Roughness::of(field);
-        Self::from_roughness(field, request, roughness)
+        let derivative_bounds = DerivativeBounds::of(field);
+        Self::from_derivative_bounds(field, request, derivative_bounds)
     }
 
     /// [`Plan::new`] for a field whose roughness is known.
-    pub fn from_roughness(field: &Field, request: Request, roughness: Roughness) -> Plan {
-        let way = Way::new(field, request.direction);
-        let (length_m, h_m) = (way.longest_m, DVec3::from(field.spacing_m()).max_element());
-        let r = roughness;
+    pub fn from_derivative_bounds(
+        field: &Field,
+        request: Request,
+        derivative_bounds: DerivativeBounds,
+    ) -> Plan {
+        let box_path = BoxPath::new(field, request.direction);
+        let (length_m, h_m) = (box_path.longest_m, DVec3::from(field.spacing_m()).max_element());
+        let r = derivative_bounds;
         let tolerance = request.tolerance_rad.max(0.0);
         let deflection_rad = r.gradient * length_m;
         // Beyond e^50 it is infinite for all purposes, and still a number.
@@ -151,7 +157,7 @@ impl Plan {
 
         let bending_rad = r.second * r.gradient * length_m.powi(3) / 6.0 + deflection_rad.powi(3) / 2.0;
         let bending_path_m = deflection_rad.powi(2) * length_m / 3.0;
-        let edges_rad = r.gradient_on_faces * way.edges_m(h_m);
+        let edges_rad = r.gradient_on_faces * box_path.edges_m(h_m);
         let steps_rad = |voxels: f64| {
             growth * length_m * (voxels * h_m).powi(2) / 24.0 * (r.third + r.second * r.gradient)
         };
@@ -171,7 +177,7 @@ impl Plan {
         // Strong index: deflections for which "paraxial" is a courtesy, or an index far from the reference's.
         let strong = r.eps > 0.05 || deflection_rad > 0.5 && r.eps > 0.01;
         // What projections have instead of steps.
-        let projected_rad = if way.oblique { steps_rad(1.0) } else { 0.0 };
+        let projected_rad = if box_path.oblique { steps_rad(1.0) } else { 0.0 };
         let spline = request.interpolant.unwrap_or(Interpolant::BSpline);
         let straight_is_enough = bending_rad + edges_rad <= 0.5 * tolerance
             && projected_rad <= share(spline)
@@ -204,7 +210,7 @@ impl Plan {
         // the ray.
         let path_of_step_m = |voxels: f64| match mode {
             Mode::LineOfSight => {
-                if way.oblique {
+                if box_path.oblique {
                     length_m * h_m.powi(2) / 24.0 * r.second
                 } else {
                     0.0
@@ -229,27 +235,33 @@ impl Plan {
         let bounds = Bounds {
             bending_rad: if straight { bending_rad } else { 0.0 },
             // Oblique projections are interpolated once more, as maps.
-            interpolation_rad: of_interpolant(interpolant) * if straight && way.oblique { 2.0 } else { 1.0 },
+            interpolation_rad: of_interpolant(interpolant)
+                * if straight && box_path.oblique { 2.0 } else { 1.0 },
             step_rad: of_step(step_voxels),
             edges_rad: if straight { edges_rad } else { 0.0 },
             path_m: path_of_step_m(step_voxels) + if straight { bending_path_m } else { 0.0 },
             deflection_rad,
         };
-        Plan { request, mode, interpolant, step_voxels, bounds, roughness }
+        Plan { request, mode, interpolant, step_voxels, bounds, derivative_bounds }
     }
 
     /// The march as planned.
     pub fn paths<'a>(&self, field: &'a Field, view: View) -> Box<dyn LightPaths + 'a> {
-        self.paths_with(field, view, &Kept::default())
+        self.paths_with(field, view, &FieldCache::default())
     }
 
     /// [`Plan::paths`] with what was prepared for this field before.
-    pub fn paths_with<'a>(&self, field: &'a Field, view: View, kept: &Kept) -> Box<dyn LightPaths + 'a> {
+    pub fn paths_with<'a>(
+        &self,
+        field: &'a Field,
+        view: View,
+        cache: &FieldCache,
+    ) -> Box<dyn LightPaths + 'a> {
         let (wanted, blank) = (self.request.wanted, self.request.blank);
         match self.mode {
             Mode::LineOfSight => {
                 let projection = Projection { view, interpolant: self.interpolant, wanted, blank };
-                Box::new(kept.line_of_sight(field, projection))
+                Box::new(cache.line_of_sight(field, projection))
             }
             Mode::Paraxial => {
                 let options = Options {
@@ -260,27 +272,27 @@ impl Plan {
                     skip_rad: self.request.skip_rad,
                     skip_opd_m: self.request.skip_opd_m,
                 };
-                Box::new(Deviational::with_kept(field, view, self.interpolant, options, kept))
+                Box::new(Deviational::with_cache(field, view, self.interpolant, options, cache))
             }
             Mode::Full => {
                 let options =
                     FullOptions { step_voxels: self.step_voxels, wanted, blank, ..FullOptions::default() };
-                Box::new(FullSpline { field, spline: kept.spline(field), view, options })
+                Box::new(FullSpline { field, spline: cache.spline(field), view, options })
             }
         }
     }
 
     /// Traces about `rays` rays of a view as planned and once more with everything refined (quarter steps, splines, bending, nothing
     /// left out), and compares.
-    pub fn measure(&self, field: &Field, view: View, rays: usize) -> Achieved {
-        self.measure_with(field, view, rays, &Kept::default())
+    pub fn measure(&self, field: &Field, view: View, rays: usize) -> MeasuredError {
+        self.measure_with(field, view, rays, &FieldCache::default())
     }
 
     /// [`Plan::measure`] with what was prepared for this field before.
-    pub fn measure_with(&self, field: &Field, view: View, rays: usize, kept: &Kept) -> Achieved {
+    pub fn measure_with(&self, field: &Field, view: View, rays: usize, cache: &FieldCache) -> MeasuredError {
         let starts = sample_starts(field, &view, rays.max(1));
         let mut planned = vec![Exit::UNDISTURBED; starts.len()];
-        self.paths_with(field, view, kept).trace_parallel(&starts, &mut planned);
+        self.paths_with(field, view, cache).trace_parallel(&starts, &mut planned);
         let mut refined = planned.clone();
         let fine = Plan {
             mode: if self.mode == Mode::Full { Mode::Full } else { Mode::Paraxial },
@@ -289,21 +301,21 @@ impl Plan {
             request: Request { skip_rad: 0.0, ..self.request },
             ..*self
         };
-        fine.paths_with(field, view, kept).trace_parallel(&starts, &mut refined);
+        fine.paths_with(field, view, cache).trace_parallel(&starts, &mut refined);
         let (max_rad, rms_rad, rays) = compare(&planned, &refined);
         let through = |lattice: &Field| {
             let mut exits = planned.clone();
             fine.paths(lattice, view).trace_parallel(&starts, &mut exits);
             exits
         };
-        let resolution_rad = coarsened(field, &|| kept.spline(field)).map_or(f64::INFINITY, |coarse| {
+        let resolution_rad = coarsened(field, &|| cache.spline(field)).map_or(f64::INFINITY, |coarse| {
             let of_coarse = through(&coarse);
             let change = compare(&of_coarse, &refined).0;
             let coarser = coarsened(&coarse, &|| Arc::new(BSpline::new(&coarse)));
             let before = coarser.map(|c| compare(&through(&c), &of_coarse).0);
-            left_open(change, before)
+            extrapolated_error(change, before)
         });
-        Achieved { max_rad, rms_rad, resolution_rad, rays }
+        MeasuredError { max_rad, rms_rad, resolution_rad, rays }
     }
 }
 
@@ -340,7 +352,7 @@ fn sample_starts(field: &Field, view: &View, rays: usize) -> Vec<Start> {
 /// nodes did, `before` what leaving out half of those did. Of order p the two have a ratio of 2^p.
 /// Splines' derivatives are of third order where the field is resolved; where it is not, errors do
 /// not shrink as fast.
-fn left_open(change: f64, before: Option<f64>) -> f64 {
+fn extrapolated_error(change: f64, before: Option<f64>) -> f64 {
     const RESOLVED: f64 = 8.0;
     // Structures at the limit: half the change of a halving is left.
     const UNRESOLVED: f64 = 2.0;
@@ -387,7 +399,7 @@ fn coarsened(field: &Field, spline: &dyn Fn() -> Arc<BSpline>) -> Option<Field> 
 }
 
 /// The way of light through a field's box.
-struct Way {
+struct BoxPath {
     /// The longest.
     longest_m: f64,
     /// Not along an axis of the lattice, or not known.
@@ -397,19 +409,19 @@ struct Way {
     slope: f64,
 }
 
-impl Way {
-    fn new(field: &Field, direction: Option<DVec3>) -> Way {
+impl BoxPath {
+    fn new(field: &Field, direction: Option<DVec3>) -> BoxPath {
         let size = field.size_m();
         let d = direction.map(|d| d.normalize_or_zero().abs()).filter(|d| d.max_element() > 0.0);
         let Some(d) = d else {
-            return Way { longest_m: size.length(), oblique: true, slope: f64::INFINITY };
+            return BoxPath { longest_m: size.length(), oblique: true, slope: f64::INFINITY };
         };
         let oblique = d.max_element() < 1.0;
         // Between faces that the light meets under the angle with cosine c, ways change by √(1 -
         // c²)/c per metre; those along the light have no edge.
         let slope = d.to_array().into_iter().filter(|c| *c > 0.0).map(|c| (1.0 - c * c).sqrt() / c);
         let slope = if oblique { slope.sum() } else { 0.0 };
-        Way { longest_m: (size / d).min_element().min(size.length()), oblique, slope }
+        BoxPath { longest_m: (size / d).min_element().min(size.length()), oblique, slope }
     }
 
     /// Metres of gas by which a cubic spline over nodes `h_m` apart is off at an edge: a quarter of
@@ -436,7 +448,7 @@ impl LightPaths for FullSpline<'_> {
         &self.view
     }
 
-    fn wanted(&self) -> Wanted {
+    fn wanted(&self) -> PathQuantities {
         self.options.wanted
     }
 

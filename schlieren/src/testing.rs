@@ -3,7 +3,7 @@
 use crate::film::beams::expose_beams;
 use crate::film::photons::{Exposure, expose};
 use crate::film::{Film, Framing};
-use crate::path::{Exit, LightPaths, Start, Wanted};
+use crate::path::{Exit, LightPaths, PathQuantities, Start};
 use crate::technique::Technique;
 use crate::view::{Axis, View};
 use std::sync::atomic::AtomicBool;
@@ -76,8 +76,8 @@ impl LightPaths for ClosedForm {
     fn view(&self) -> &View {
         &self.view
     }
-    fn wanted(&self) -> Wanted {
-        Wanted { opd: true }
+    fn wanted(&self) -> PathQuantities {
+        PathQuantities { opd: true }
     }
     fn difference_step_m(&self) -> f64 {
         1e-4

@@ -7,7 +7,9 @@ use glam::DVec3;
 use schlieren::analytic::{Gaussian, Luneburg};
 use schlieren::field::Field;
 use schlieren::interpolate::{BSpline, Interpolate, Trilinear, TrilinearGradient};
-use schlieren::march::{CellExact, DormandPrince, Integrator, Interpolated, Medium, Points, Ray, Sight};
+use schlieren::march::{
+    CellExact, DormandPrince, Integrator, InterpolatedMedium, LineIntegrals, Medium, Points, Ray,
+};
 use std::f64::consts::FRAC_PI_2;
 
 /// A lattice for steps to be split on; what it holds does not matter.
@@ -36,7 +38,7 @@ fn lines() -> Vec<(DVec3, DVec3, f64)> {
     ]
 }
 
-fn all_points(cells: &CellExact, medium: &impl Medium, line: (DVec3, DVec3, f64)) -> [Sight; 3] {
+fn all_points(cells: &CellExact, medium: &impl Medium, line: (DVec3, DVec3, f64)) -> [LineIntegrals; 3] {
     [Points::Two, Points::Three, Points::Five].map(|p| cells.line_of_sight(medium, line.0, line.1, line.2, p))
 }
 
@@ -47,7 +49,7 @@ fn two_points_integrate_trilinear_cells_to_rounding() {
     let cells = CellExact::new(&field);
     let (eps, gradients) = (Trilinear::new(&field), TrilinearGradient::new(&field));
     for line in lines() {
-        let medium = Interpolated::new(&field, &eps);
+        let medium = InterpolatedMedium::new(&field, &eps);
         let [two, three, five] = all_points(&cells, &medium, line);
         let scale = 1e-5 * 13.0;
         for other in [three, five] {
@@ -59,7 +61,7 @@ fn two_points_integrate_trilinear_cells_to_rounding() {
         let gained = medium.sample(end).0 - medium.sample(line.0).0;
         assert!((two.slope.dot(line.1) - gained).abs() < 1e-14 * scale, "{} {gained}", two.slope.dot(line.1));
 
-        let medium = Interpolated::new(&field, &gradients);
+        let medium = InterpolatedMedium::new(&field, &gradients);
         let [two, _, five] = all_points(&cells, &medium, line);
         assert!((two.slope - five.slope).length() < 1e-14 * scale, "{two:?} {five:?}");
     }
@@ -70,11 +72,11 @@ fn two_points_integrate_trilinear_cells_to_rounding() {
 fn five_points_integrate_splines_to_rounding() {
     let field = noise([13, 9, 11]);
     let (cells, spline) = (CellExact::new(&field), BSpline::new(&field));
-    let medium = Interpolated::new(&field, &spline);
+    let medium = InterpolatedMedium::new(&field, &spline);
     for line in lines() {
         let [two, three, five] = all_points(&cells, &medium, line);
         let gained = medium.sample(line.0 + line.1 * line.2).0 - medium.sample(line.0).0;
-        let off = |s: &Sight| (s.slope.dot(line.1) - gained).abs() / (13.0 * 1e-5);
+        let off = |s: &LineIntegrals| (s.slope.dot(line.1) - gained).abs() / (13.0 * 1e-5);
         assert!(off(&five) < 1e-14, "{:e}", off(&five));
         // Along an axis it is a cubic polynomial, along other lines not.
         if line.1.abs().max_element() < 0.99 {
@@ -103,7 +105,13 @@ fn straight_lines_through_a_gaussian_are_the_closed_form() {
     // Through the spline of it the interpolant's own error is left (`interpolation_errors_are_those_on_record`: 7.5e-6 for ten voxels' sigma, and 14 here).
     let field = blob(121, g.amplitude, g.sigma_m);
     let (cells, spline) = (CellExact::new(&field), BSpline::new(&field));
-    let s = cells.line_of_sight(&Interpolated::new(&field, &spline), from, DVec3::Z, length_m, Points::Three);
+    let s = cells.line_of_sight(
+        &InterpolatedMedium::new(&field, &spline),
+        from,
+        DVec3::Z,
+        length_m,
+        Points::Three,
+    );
     assert!(
         (s.slope - slope).length() < 1e-5 * slope.length(),
         "{:e}",
@@ -143,7 +151,7 @@ struct Both {
 }
 
 fn both<I: Interpolate>(field: &Field, i: &I, tolerance: f64, longest_step_m: f64, steps: u32) -> Vec<Both> {
-    let medium = Interpolated::new(field, i);
+    let medium = InterpolatedMedium::new(field, i);
     let cells = CellExact::new(field);
     let view = oblique();
     let adaptive = DormandPrince { tolerance, longest_step_m };
@@ -196,7 +204,7 @@ fn a_ray_on_a_ridge_does_not_stand_still() {
     for strength in [1e-5, 0.05] {
         let field = cube(9, |p| -strength * (p.x.abs() + p.y.abs()));
         let trilinear = Trilinear::new(&field);
-        let medium = Interpolated::new(&field, &trilinear);
+        let medium = InterpolatedMedium::new(&field, &trilinear);
         let begin = Ray::inside(&medium, DVec3::new(0.0, 0.0, -0.5), DVec3::Z);
         let end = CellExact::new(&field).step(&medium, &begin, 0.25);
         assert_eq!(end.tau_m, 0.25);
@@ -208,7 +216,7 @@ fn a_ray_on_a_ridge_does_not_stand_still() {
 fn steps_that_are_no_steps_do_no_harm() {
     let field = cube(5, lopsided);
     let trilinear = Trilinear::new(&field);
-    let medium = Interpolated::new(&field, &trilinear);
+    let medium = InterpolatedMedium::new(&field, &trilinear);
     let begin = Ray::inside(&medium, DVec3::ZERO, DVec3::X);
     for step in [0.0, -1.0, f64::NAN] {
         assert_eq!(CellExact::new(&field).step(&medium, &begin, step), begin);

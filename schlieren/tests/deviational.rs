@@ -9,10 +9,10 @@ use schlieren::analytic::{Gaussian, abel};
 use schlieren::field::Field;
 use schlieren::interpolate::{BSpline, Interpolant, Interpolate, Trilinear, TrilinearGradient};
 use schlieren::march::{Deviational, Euler, Full, FullOptions, Integrator, Options, Pefrl, Scheme, Verlet};
-use schlieren::path::{LightPaths, Wanted};
+use schlieren::path::{LightPaths, PathQuantities};
 use schlieren::view::{Axis, View};
 
-const OPD: Wanted = Wanted { opd: true };
+const OPD: PathQuantities = PathQuantities { opd: true };
 const INTERPOLANTS: [Interpolant; 3] =
     [Interpolant::BSpline, Interpolant::Trilinear, Interpolant::TrilinearGradient];
 
@@ -43,7 +43,7 @@ fn f32_keeps_its_digits_at_any_amplitude_in_an_oblique_view() {
         let spline = BSpline::new(&field);
         let wanted = trace(&reference(&field, &spline, Verlet, oblique(), 1.0), &starts);
         for opd in [false, true] {
-            let options = Options { wanted: Wanted { opd }, ..Default::default() };
+            let options = Options { wanted: PathQuantities { opd }, ..Default::default() };
             let got = trace(&Deviational::new(&field, oblique(), Interpolant::BSpline, options), &starts);
             let (rms, max) = difference(&got, &wanted);
             assert!(rms < 1e-7 && max < 5e-7, "amplitude {amplitude}: rms {rms:.1e}, max {max:.1e}");

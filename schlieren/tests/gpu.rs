@@ -11,8 +11,8 @@ use schlieren::field::{Field, Node};
 use schlieren::gpu::{Gpu, GpuError, GpuOptions, GpuPaths};
 use schlieren::interpolate::Interpolant;
 use schlieren::march::{BlankCells, Deviational, Options};
-use schlieren::path::{Exit, LightPaths, Start, Status, Wanted};
-use schlieren::render::{Control, Layers, RenderError, Rendered, TestSection, render};
+use schlieren::path::{Exit, LightPaths, PathQuantities, Start, Status};
+use schlieren::render::{Control, Layers, RenderError, RenderOutput, TestSection, render};
 use schlieren::scene::Scene;
 use schlieren::view::{Axis, View};
 use std::io::Write as _;
@@ -68,7 +68,7 @@ fn relative(a: &[Exit], b: &[Exit], value: impl Fn(&Exit) -> f32) -> f64 {
 fn deflection_displacement_and_opd_agree_with_the_cpu() {
     let Some(gpu) = gpu() else { return };
     let field = cube(33, lopsided);
-    let wanted = Wanted { opd: true };
+    let wanted = PathQuantities { opd: true };
     for view in [View::along(Axis::X, DVec3::ZERO), View::along(Axis::Z, DVec3::ZERO), oblique()] {
         let options = GpuOptions { wanted, ..GpuOptions::default() };
         let starts = grid(15, 0.9);
@@ -95,7 +95,7 @@ fn trilinear_agrees_but_for_samples_on_a_face() {
     let Some(gpu) = gpu() else { return };
     let field = cube(33, lopsided);
     for view in [View::along(Axis::Y, DVec3::ZERO), oblique()] {
-        let wanted = Wanted { opd: true };
+        let wanted = PathQuantities { opd: true };
         let options = GpuOptions { wanted, ..GpuOptions::default() };
         let [a, b] = both(gpu.clone(), &field, view, Interpolant::Trilinear, options, &grid(15, 0.9));
         let scale = largest(&b);
@@ -121,8 +121,11 @@ fn odd_sizes() {
     for interpolant in [Interpolant::BSpline, Interpolant::Trilinear] {
         for count in [0, 1, 31, 65, 997] {
             let starts = &grid(32, 1.3)[..count];
-            let options =
-                GpuOptions { step_voxels: 0.37, wanted: Wanted { opd: true }, ..GpuOptions::default() };
+            let options = GpuOptions {
+                step_voxels: 0.37,
+                wanted: PathQuantities { opd: true },
+                ..GpuOptions::default()
+            };
             let [a, b] = both(gpu.clone(), &field, view, interpolant, options, starts);
             assert_eq!(a.len(), count);
             if count < 65 {
@@ -156,8 +159,11 @@ fn weak_gases_keep_their_digits_at_oblique_views() {
 fn compilers_keep_the_compensation_of_sums() {
     let Some(gpu) = gpu() else { return };
     let field = blob(33, 1e-4, 0.12);
-    let options =
-        GpuOptions { step_voxels: 1.0 / 128.0, wanted: Wanted { opd: true }, ..GpuOptions::default() };
+    let options = GpuOptions {
+        step_voxels: 1.0 / 128.0,
+        wanted: PathQuantities { opd: true },
+        ..GpuOptions::default()
+    };
     let view = View::along(Axis::Z, DVec3::ZERO);
     let [a, b] = both(gpu, &field, view, Interpolant::BSpline, options, &grid(5, 0.5));
     let (_, max) = difference(&a, &b);
@@ -230,7 +236,7 @@ fn a_field_larger_than_a_binding_is_the_same_field() {
     let field = cube(21, lopsided);
     for interpolant in [Interpolant::BSpline, Interpolant::Trilinear] {
         let starts = grid(11, 0.9);
-        let options = GpuOptions { wanted: Wanted { opd: true }, ..GpuOptions::default() };
+        let options = GpuOptions { wanted: PathQuantities { opd: true }, ..GpuOptions::default() };
         let view = oblique();
         let one = GpuPaths::new(whole.clone(), &field, view, interpolant, options).unwrap();
         assert_eq!(one.slabs(), 1);
@@ -272,7 +278,7 @@ fn an_interpolant_without_a_kernel_is_refused_by_name() {
 fn several_batches_have_the_bits_of_one() {
     let Some(gpu) = gpu() else { return };
     let field = with_body(17);
-    let options = GpuOptions { wanted: Wanted { opd: true }, ..GpuOptions::default() };
+    let options = GpuOptions { wanted: PathQuantities { opd: true }, ..GpuOptions::default() };
     let starts = &grid(40, 1.1)[..1597];
     for interpolant in [Interpolant::BSpline, Interpolant::Trilinear] {
         let paths = |batch| {
@@ -336,7 +342,7 @@ fn batches_of_several_threads_do_not_mix() {
 }
 
 /// A scene of `field` drawn on a device.
-fn drawn(field: &Field, device: &str, rest: &str) -> Result<Rendered, Box<RenderError>> {
+fn drawn(field: &Field, device: &str, rest: &str) -> Result<RenderOutput, Box<RenderError>> {
     // Shadowgraphs are seen far behind the flow: contrast needs a lever.
     let focus = if rest.contains("shadowgraph") { "focus_m = 30.0\n" } else { "" };
     let toml = format!(

@@ -10,7 +10,7 @@ use schlieren::gpu::{Gpu, GpuOptions, GpuPaths};
 use schlieren::interpolate::Interpolant;
 use schlieren::march::{Deviational, Options};
 use schlieren::path::LightPaths;
-use schlieren::render::{Control, Layers, Rendered, TestSection, render};
+use schlieren::render::{Control, Layers, RenderOutput, TestSection, render};
 use schlieren::scene::Scene;
 use std::io::Write as _;
 use std::sync::Arc;
@@ -32,7 +32,7 @@ fn gpu() -> Option<Arc<Gpu>> {
 }
 
 /// A scene of `field` drawn on the GPU.
-fn drawn(field: &Field) -> Rendered {
+fn drawn(field: &Field) -> RenderOutput {
     let toml = "[flow]\nfile = \"\"\ndensity = \"-\"\n[film]\nsize = [40, 30]\n[march]\ndevice = \"gpu\"\nmethod = \"verlet\"";
     let scene = Scene::from_toml(toml).unwrap();
     let section = TestSection::of_fields(&scene, vec![field.clone()], None).unwrap();
@@ -52,7 +52,7 @@ fn a_lost_device_is_opened_again_and_no_ray_is_left_to_the_cpu() {
             .unwrap()
             .with_batch(100);
         let expected = format!("{:?}", trace(&paths, &starts));
-        assert_eq!(paths.trouble(), None);
+        assert_eq!(paths.device_warning(), None);
         own.lose();
         assert_eq!(format!("{:?}", trace(&paths, &starts)), expected, "{interpolant:?}");
         let c = paths.counters();
@@ -60,7 +60,7 @@ fn a_lost_device_is_opened_again_and_no_ray_is_left_to_the_cpu() {
         assert!(
             !Arc::ptr_eq(&paths.gpu(), &own) && own.failure().is_some() && paths.gpu().failure().is_none()
         );
-        let told = paths.trouble().unwrap();
+        let told = paths.device_warning().unwrap();
         assert!(told.contains("lost") && told.contains("opened again") && !told.contains("CPU"), "{told}");
 
         // Under way, with the work of four threads on it.
@@ -122,6 +122,6 @@ fn a_device_that_is_lost_again_and_again_is_given_up_by_name() {
         let c = paths.counters();
         assert_eq!(c.rays_on_cpu > 0, lost > 3, "lost {lost} times: {c:?}");
     }
-    let told = paths.trouble().unwrap();
+    let told = paths.device_warning().unwrap();
     assert!(told.contains("opened again 3 times") && told.contains("on the CPU"), "{told}");
 }

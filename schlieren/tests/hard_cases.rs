@@ -10,10 +10,10 @@ use schlieren::interpolate::{BSpline, Interpolant, Trilinear, TrilinearGradient}
 use schlieren::march::{
     BlankCells, Deviational, Full, FullOptions, LineOfSight, Medium, Options, Pefrl, Scheme, Sharma, Verlet,
 };
-use schlieren::path::{Exit, LightPaths, Start, Status, Wanted};
+use schlieren::path::{Exit, LightPaths, PathQuantities, Start, Status};
 use schlieren::view::{Axis, View};
 
-const OPD: Wanted = Wanted { opd: true };
+const OPD: PathQuantities = PathQuantities { opd: true };
 const INTERPOLANTS: [Interpolant; 3] =
     [Interpolant::BSpline, Interpolant::Trilinear, Interpolant::TrilinearGradient];
 
@@ -210,7 +210,7 @@ fn what_skipping_leaves_out_is_within_its_bound_and_counted() {
         let worst = difference(&got, &wanted).1 * largest(&wanted);
         let c = paths.counters();
         assert!(worst <= tolerance, "{worst:.1e} > {tolerance:.1e}");
-        assert!(c.left_out_femtorad as f64 <= tolerance * 1e15 * 1.001);
+        assert!(c.skipped_femtorad as f64 <= tolerance * 1e15 * 1.001);
         assert!(c.ray_steps_skipped > c.ray_steps, "{c:?}");
         assert_eq!((c.rays, c.rays_in_field), (1600, 1600));
         let opd = got.iter().zip(&wanted).map(|(a, b)| (a.opd_m - b.opd_m).abs()).fold(0.0, f32::max);

@@ -10,10 +10,10 @@ use schlieren::field::{Field, Node};
 use schlieren::input::{self, from_dataset};
 use schlieren::interpolate::{BSpline, Interpolant, Interpolate, Trilinear, TrilinearGradient};
 use schlieren::march::{
-    BlankCells, CellExact, Deviational, Full, FullOptions, Integrator, Interpolated, LineOfSight, Medium,
-    Options, Pefrl, Ray, RungeKutta4, Scheme, Verlet,
+    BlankCells, CellExact, Deviational, Full, FullOptions, Integrator, InterpolatedMedium, LineOfSight,
+    Medium, Options, Pefrl, Ray, RungeKutta4, Scheme, Verlet,
 };
-use schlieren::path::{Exit, LightPaths, Start, Status, Wanted};
+use schlieren::path::{Exit, LightPaths, PathQuantities, Start, Status};
 use schlieren::skip::Bricks;
 use schlieren::view::{Axis, View};
 
@@ -125,7 +125,7 @@ fn trace_back_returns_to_the_start_through_a_lattice() {
     let field = cube(33, |p| 300.0 * lopsided(p));
     let (spline, trilinear) = (BSpline::new(&field), Trilinear::new(&field));
     fn home<I: Interpolate>(field: &Field, i: &I, march: &impl Integrator, steps: u32) -> f64 {
-        let medium = Interpolated::new(field, i);
+        let medium = InterpolatedMedium::new(field, i);
         let direction = oblique().forward;
         let begin = Ray::inside(&medium, DVec3::new(0.05, -0.08, 0.02) - 0.4 * direction, direction);
         let there = march.run(&medium, &begin, 0.8, steps);
@@ -268,7 +268,7 @@ fn solid_bodies_stop_rays_in_every_march() {
                     &field,
                     view,
                     Interpolant::BSpline,
-                    Wanted::default(),
+                    PathQuantities::default(),
                     BlankCells::Opaque,
                 )),
             ),
@@ -359,7 +359,7 @@ fn gradients_are_per_metre_at_any_spacing() {
     })
     .unwrap();
     fn gradient<I: Interpolate>(field: &Field, i: &I) -> DVec3 {
-        Interpolated::new(field, i).sample(DVec3::new(1.37, 2.051, 8.2)).1
+        InterpolatedMedium::new(field, i).sample(DVec3::new(1.37, 2.051, 8.2)).1
     }
     let [a, b, c] = [
         gradient(&field, &BSpline::new(&field)),

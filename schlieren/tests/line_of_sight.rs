@@ -8,10 +8,10 @@ use schlieren::analytic::Gaussian;
 use schlieren::field::{Field, Node};
 use schlieren::interpolate::Interpolant;
 use schlieren::march::{BlankCells, Deviational, LineOfSight, Options};
-use schlieren::path::{Exit, Jacobian, LightPaths, Status, Wanted};
+use schlieren::path::{Exit, Jacobian, LightPaths, PathQuantities, Status};
 use schlieren::view::{Axis, View};
 
-const OPD: Wanted = Wanted { opd: true };
+const OPD: PathQuantities = PathQuantities { opd: true };
 
 fn sight(field: &Field, view: View) -> LineOfSight {
     LineOfSight::new(field, view, Interpolant::BSpline, OPD, BlankCells::Opaque)

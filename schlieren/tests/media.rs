@@ -5,7 +5,7 @@ use schlieren::analytic::erf;
 use schlieren::field::{Field, Node};
 use schlieren::interpolate::{BSpline, Interpolant};
 use schlieren::march::{BlankCells, Deviational, Full, FullOptions, Options, Pefrl};
-use schlieren::media::{Bend, Collected, Media, Property, ThroughMedia, Volume, Walk};
+use schlieren::media::{AttenuatedPaths, Bend, Media, MediaIntegrals, MediaIntegrator, Property, Volume};
 use schlieren::path::{Exit, LightPaths, Start, Status};
 use schlieren::view::{Axis, View};
 use std::sync::Arc;
@@ -22,8 +22,8 @@ fn start(x: f64, y: f64) -> Start {
     Start { position_m: [x as f32, y as f32], tilt_rad: [0.0; 2] }
 }
 
-fn along(walk: &Walk<'_>, starts: &[Start]) -> Vec<Collected> {
-    let mut out = vec![Collected::default(); starts.len()];
+fn along(walk: &MediaIntegrator<'_>, starts: &[Start]) -> Vec<MediaIntegrals> {
+    let mut out = vec![MediaIntegrals::default(); starts.len()];
     walk.collect(starts, None, &mut out);
     let mut parallel = out.clone();
     walk.collect_parallel(starts, None, &mut parallel);
@@ -31,8 +31,8 @@ fn along(walk: &Walk<'_>, starts: &[Start]) -> Vec<Collected> {
     out
 }
 
-fn walk<'a>(field: &'a Field, view: View, media: &'a Media, bend: Bend) -> Walk<'a> {
-    Walk::new(field, view, media, &Property::ALL, bend, 1.0, BlankCells::Opaque)
+fn walk<'a>(field: &'a Field, view: View, media: &'a Media, bend: Bend) -> MediaIntegrator<'a> {
+    MediaIntegrator::new(field, view, media, &Property::ALL, bend, 1.0, BlankCells::Opaque)
 }
 
 #[test]
@@ -59,21 +59,21 @@ fn an_even_slab_absorbs_emits_and_turns_by_its_closed_forms() {
                 assert!((f64::from(c.rotation_rad) / (rho * depth) - 1.0).abs() < 1e-6, "{bend:?} {c:?}");
             }
             // Beside the field there is nothing.
-            assert_eq!(along(&w, &[start(0.5, 0.0)]), [Collected::default()]);
+            assert_eq!(along(&w, &[start(0.5, 0.0)]), [MediaIntegrals::default()]);
         }
     }
 }
 
 #[test]
 fn malus_passes_half_at_45_degrees_and_nothing_crossed() {
-    let c = |rotation_rad| Collected { rotation_rad, ..Collected::default() };
-    let at = |c: Collected, deg: f64| c.transmission(Some(deg.to_radians()));
+    let c = |rotation_rad| MediaIntegrals { rotation_rad, ..MediaIntegrals::default() };
+    let at = |c: MediaIntegrals, deg: f64| c.transmission(Some(deg.to_radians()));
     assert!((at(c(0.0), 45.0) - 0.5).abs() < 1e-15);
     assert!(at(c(0.0), 90.0) < 1e-30 && (at(c(0.0), 180.0) - 1.0).abs() < 1e-15);
     // Turned towards the analyser, and away from it.
     assert!((at(c(0.3), 45.0) - (45f64.to_radians() - f64::from(0.3f32)).cos().powi(2)).abs() < 1e-15);
     assert!(at(c(0.3), 45.0) > at(c(-0.3), 45.0));
-    let foggy = Collected { optical_depth: 2.0, ..c(0.0) };
+    let foggy = MediaIntegrals { optical_depth: 2.0, ..c(0.0) };
     assert!((at(foggy, 60.0) - 0.25 * (-2f64).exp()).abs() < 1e-15);
 }
 
@@ -193,10 +193,10 @@ fn walks_end_at_bodies_and_where_they_are_told() {
         // The body's nearest nodes begin half a step before node 10; a step is all or nothing.
         let c = along(&walk(&walled, view, &media, bend), &[start(0.0, 0.0)])[0];
         assert!((c.optical_depth - 2.0 * 0.095).abs() < 2.0 * 0.0051, "{bend:?} {c:?}");
-        let mut out = [Collected::default(); 2];
+        let mut out = [MediaIntegrals::default(); 2];
         walk(&open, view, &media, bend).collect(&[start(0.0, 0.0); 2], Some(&[-0.063, -0.4]), &mut out);
         assert!((out[0].optical_depth - 2.0 * 0.037).abs() < 1e-6, "{bend:?} {out:?}");
-        assert_eq!(out[1], Collected::default());
+        assert_eq!(out[1], MediaIntegrals::default());
     }
 }
 
@@ -253,7 +253,7 @@ fn in_strong_index_the_way_is_the_bent_one() {
     }
     assert!(path > 1.02 * length, "the test must tell bent from straight: {path}");
     let collect = |bend| {
-        let w = Walk::new(&rod, view, &media, &Property::ALL, bend, 0.5, BlankCells::Opaque);
+        let w = MediaIntegrator::new(&rod, view, &media, &Property::ALL, bend, 0.5, BlankCells::Opaque);
         along(&w, &[start(x0, 0.0)])[0]
     };
     let full = collect(Bend::Full);
@@ -288,9 +288,16 @@ fn the_walk_goes_where_the_march_goes() {
         Volume::from_fn([3, 3, 801], [half, half, 2.0 * half / 800.0], DVec3::splat(-half), at_end).unwrap();
     let media = Media::default().with(Property::Rotation, v);
     let place = |bend| {
-        let w = Walk::new(&field, view, &media, &Property::ALL, bend, 1.0, BlankCells::Opaque);
-        let reference =
-            Walk::new(&field, view, &media, &Property::ALL, Bend::Straight, 1.0, BlankCells::Opaque);
+        let w = MediaIntegrator::new(&field, view, &media, &Property::ALL, bend, 1.0, BlankCells::Opaque);
+        let reference = MediaIntegrator::new(
+            &field,
+            view,
+            &media,
+            &Property::ALL,
+            Bend::Straight,
+            1.0,
+            BlankCells::Opaque,
+        );
         let [bent, straight] = [&w, &reference].map(|w| f64::from(along(w, &[s])[0].rotation_rad));
         0.015 * bent / straight
     };
@@ -321,7 +328,7 @@ fn paths_keep_all_but_the_transmission_bit_by_bit() {
     march().trace(&starts, &mut plain);
     let rays = Arc::default();
     let w = walk(&field, view, &media, Bend::Paraxial);
-    let through = ThroughMedia::new(march(), w, None, rays);
+    let through = AttenuatedPaths::new(march(), w, None, rays);
     through.trace(&starts, &mut dimmed);
     assert_eq!(through.rays(), starts.len() as u64);
     let mut dark = 0;

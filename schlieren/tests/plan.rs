@@ -5,7 +5,7 @@ mod common;
 use common::{blob, cube, grid, lopsided, oblique};
 use glam::DVec3;
 use schlieren::interpolate::Interpolant;
-use schlieren::path::{Exit, LightPaths, Start, Wanted};
+use schlieren::path::{Exit, LightPaths, PathQuantities, Start};
 use schlieren::plan::{Mode, Plan, Request};
 use schlieren::render::TestSection;
 use schlieren::scene::Scene;
@@ -191,7 +191,7 @@ fn the_tolerance_asked_for_is_got_or_a_warning_names_why_not() {
                     mode: Some(Mode::Full),
                     interpolant: Some(Interpolant::BSpline),
                     step_voxels: Some(0.25),
-                    wanted: Wanted { opd },
+                    wanted: PathQuantities { opd },
                     ..ask(0.0)
                 };
                 let of_lattice = errors(&*Plan::new(&field, finest).paths(&field, view), &starts, &truths);
@@ -200,7 +200,7 @@ fn the_tolerance_asked_for_is_got_or_a_warning_names_why_not() {
                     scene.march.tolerance_rad = tolerance;
                     let mut section = TestSection::of_fields(&scene, vec![field.clone()], None).unwrap();
                     section.view = view;
-                    let planned = section.paths(&scene, 0, Wanted { opd }, false, true).unwrap();
+                    let planned = section.paths(&scene, 0, PathQuantities { opd }, false, true).unwrap();
                     let [angle, path] = errors(&*planned.paths, &starts, &truths);
                     let what = format!(
                         "{name} along {axis}, {tolerance:e} asked: {angle:.1e} rad, {path:.1e} m got by {}; the lattice's {:.1e} rad, {:.1e} m; {:?}",
@@ -241,7 +241,11 @@ fn a_saddle_is_not_free_of_curvature() {
     let field = cube(NODES, FLOWS[0].1);
     let plan = Plan::new(&field, Request { direction: Some(DVec3::Z), ..ask(1e-9) });
     assert_eq!(plan.mode, Mode::Paraxial, "{plan:?}");
-    assert!((plan.roughness.second / (1e-3 * 2f64.sqrt()) - 1.0).abs() < 1e-3, "{:?}", plan.roughness);
+    assert!(
+        (plan.derivative_bounds.second / (1e-3 * 2f64.sqrt()) - 1.0).abs() < 1e-3,
+        "{:?}",
+        plan.derivative_bounds
+    );
 }
 
 /// Steps shorter than what the lattice can tell are wasted.

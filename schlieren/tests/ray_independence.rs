@@ -9,7 +9,7 @@ use schlieren::interpolate::{BSpline, Interpolant};
 use schlieren::march::{
     BlankCells, Deviational, Full, FullOptions, LineOfSight, Options, Pefrl, Scheme, Verlet,
 };
-use schlieren::path::{Exit, LightPaths, Start, Status, Wanted};
+use schlieren::path::{Exit, LightPaths, PathQuantities, Start, Status};
 use schlieren::view::{Axis, View};
 
 const INTERPOLANTS: [Interpolant; 3] =
@@ -99,7 +99,7 @@ fn gas_alone_is_independent_of_neighbours_and_threads() {
     for view in [View::along(Axis::Z, DVec3::ZERO), oblique()] {
         for interpolant in INTERPOLANTS {
             for (scheme, opd) in [(Scheme::Verlet, false), (Scheme::Verlet, true), (Scheme::Euler, true)] {
-                let options = Options { scheme, wanted: Wanted { opd }, ..Options::default() };
+                let options = Options { scheme, wanted: PathQuantities { opd }, ..Options::default() };
                 let paths = Deviational::new(&field, view, interpolant, options);
                 assert_independent(&paths, &starts, &format!("{interpolant:?} {scheme:?} {opd}"));
             }
@@ -116,7 +116,7 @@ fn masked_and_blocked_are_independent_of_neighbours_and_threads() {
             for interpolant in INTERPOLANTS {
                 for scheme in [Scheme::Verlet, Scheme::Euler] {
                     let options =
-                        Options { scheme, blank, wanted: Wanted { opd: true }, ..Options::default() };
+                        Options { scheme, blank, wanted: PathQuantities { opd: true }, ..Options::default() };
                     let paths = Deviational::new(&field, view, interpolant, options);
                     assert_independent(&paths, &starts, &format!("{interpolant:?} {scheme:?} {blank:?}"));
                 }
@@ -132,7 +132,7 @@ fn straight_and_full_marches_are_independent_of_neighbours_and_threads() {
     let starts: Vec<Start> = rays().into_iter().step_by(3).collect();
     for view in [View::along(Axis::Z, DVec3::ZERO), oblique()] {
         for blank in [BlankCells::Opaque, BlankCells::Continued] {
-            let wanted = Wanted { opd: true };
+            let wanted = PathQuantities { opd: true };
             let sight = LineOfSight::new(&field, view, Interpolant::BSpline, wanted, blank);
             assert_independent(&sight, &starts, "line of sight");
             let options = FullOptions { blank, wanted, ..FullOptions::default() };

@@ -4,7 +4,7 @@
 use datasets::resample::Resolution;
 use glam::DVec3;
 use schlieren::field::Node;
-use schlieren::input::{Depth, Loaded, Medium, Options, Quantity, Role, load};
+use schlieren::input::{Depth, LoadedField, Medium, Options, Quantity, Role, load};
 use schlieren::measure::{From, Mark, Photograph};
 use schlieren::render::{Control, Layers, TestSection, render};
 use schlieren::scene::Scene;
@@ -47,7 +47,7 @@ fn blunt_fin_has_its_bow_shock_where_theory_puts_it() {
         outside: Role::Solid,
         ..Options::new(medium)
     };
-    let Loaded { field, report } = load(&path, &options).unwrap();
+    let LoadedField { field, report } = load(&path, &options).unwrap();
     let back = report.resampling.unwrap().back;
     assert!(back.rms < 0.006 * back.range, "{back:?}");
     let nodes = field.nodes().unwrap();
@@ -134,7 +134,7 @@ fn blunt_fin_stand_off_is_measured_in_our_schlieren_picture() {
 #[test]
 fn combustor_is_read_and_resampled() {
     let Some(path) = flow("combxyz.bin") else { return };
-    let Loaded { field, report } = load(&path, &Options::new(Medium::density("Density"))).unwrap();
+    let LoadedField { field, report } = load(&path, &Options::new(Medium::density("Density"))).unwrap();
     let r = report.resampling.unwrap();
     // Two of its cells are folded indeed.
     assert_eq!((r.cells, r.folded_cells), (56 * 32 * 24, 2));
@@ -151,7 +151,7 @@ fn ladenburgs_jet_is_revolved() {
     let Some(path) = flow("ladenburg_jet_60psi.csv") else { return };
     let medium = Medium::temperature_pressure(Quantity::array("T_K"), Quantity::array("p_Pa"));
     let options = Options { depth: Some(Depth::Revolve), ..Options::new(medium) };
-    let Loaded { field, report } = load(&path, &options).unwrap();
+    let LoadedField { field, report } = load(&path, &options).unwrap();
     let r = report.resampling.unwrap();
     // The jet is as cold as 130 K: beyond Ciddor's range, which is said.
     assert_eq!(report.formula, "gladstone-dale");

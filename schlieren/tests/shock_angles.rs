@@ -10,14 +10,14 @@ use glam::UVec3;
 use schlieren::index::Gas;
 use schlieren::input::{Medium, Options, from_dataset};
 use schlieren::measure::{From, Line, Mark, Photograph, fitted_line};
-use schlieren::render::{Control, Layers, Rendered, TestSection, render};
+use schlieren::render::{Control, Layers, RenderOutput, TestSection, render};
 use schlieren::scene::Scene;
 
 /// What a fit may be off, in degrees.
 const TOLERANCE_DEG: f64 = 0.3;
 
 /// A picture 300 pixels wide of a flow, by the customary bench at the customary tolerance.
-fn photographed(flow: Flow, toml: &str, layers: Layers) -> Rendered {
+fn photographed(flow: Flow, toml: &str, layers: Layers) -> RenderOutput {
     let (w, h) = (flow.high_m().x - flow.origin_m.x, flow.high_m().y - flow.origin_m.y);
     let rows = (300.0 * h / w).round();
     let scene = format!("[flow]\nfile = \"\"\ndensity = \"-\"\n[film]\nsize = [300, {rows}]\n{toml}");

@@ -8,7 +8,7 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use schlieren::field::Field;
-use schlieren::path::{Exit, LightPaths, Start, Wanted};
+use schlieren::path::{Exit, LightPaths, PathQuantities, Start};
 use schlieren::view::View;
 
 /// The march, ready for a field and a view.
@@ -134,8 +134,8 @@ impl LightPaths for ThesisMarch {
     fn view(&self) -> &View {
         &self.view
     }
-    fn wanted(&self) -> Wanted {
-        Wanted { opd: false }
+    fn wanted(&self) -> PathQuantities {
+        PathQuantities { opd: false }
     }
     fn difference_step_m(&self) -> f64 {
         0.5 * self.spacing_m.min_element()

@@ -18,7 +18,7 @@ use schlieren::march::{
     BlankCells, CellExact, Deviational, DormandPrince, Euler, Full, FullOptions, Integrator, LineOfSight,
     Options, Pefrl, Ray, RungeKutta4, Scheme, Sharma, Verlet,
 };
-use schlieren::path::{LightPaths, Start, Wanted};
+use schlieren::path::{LightPaths, PathQuantities, Start};
 use schlieren::plan::{Mode, Plan, Request};
 use schlieren::view::View;
 use std::f64::consts::FRAC_PI_2;
@@ -129,7 +129,8 @@ fn lattice(context: &mut Context<'_>, record: &mut Record, amplitude: f64) -> an
     let gradients = TrilinearGradient::new(&field);
     let mut named: Vec<(&str, &str, &str, Option<f64>)> = vec![];
     let mut cases: Vec<MarchCase<'_>> = vec![];
-    let los = LineOfSight::new(&field, view, Interpolant::BSpline, Wanted::default(), BlankCells::Opaque);
+    let los =
+        LineOfSight::new(&field, view, Interpolant::BSpline, PathQuantities::default(), BlankCells::Opaque);
     named.push(("line of sight", "b-spline", "f32", None));
     cases.push(fast.march_case(Box::new(los)));
     for (name, interpolant) in INTERPOLANTS {

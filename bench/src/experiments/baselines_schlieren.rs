@@ -16,7 +16,7 @@ use glam::DVec3;
 use schlieren::field::Field;
 use schlieren::interpolate::Interpolant;
 use schlieren::march::{BlankCells, Deviational, LineOfSight, Options, Scheme};
-use schlieren::path::{Exit, LightPaths, Start, Wanted};
+use schlieren::path::{Exit, LightPaths, PathQuantities, Start};
 use schlieren::view::{Axis as ViewAxis, View};
 use std::cell::RefCell;
 
@@ -99,7 +99,8 @@ fn compare(
     let n = field.dims()[0];
     let mut traced_ours = ours(field, view);
     trial(&mut traced_ours, starts, truth)?;
-    let los = || LineOfSight::new(field, view, Interpolant::BSpline, Wanted::default(), BlankCells::Opaque);
+    let los =
+        || LineOfSight::new(field, view, Interpolant::BSpline, PathQuantities::default(), BlankCells::Opaque);
     let projected = los();
     let (los_error, _) = error_of(&traced(&projected, starts), truth);
     let base = || Row::new().with("nodes", n).with("view", view_name);

@@ -11,7 +11,7 @@ use schlieren::field::Field;
 use schlieren::film::Film;
 use schlieren::film::photons::{Exposure, expose};
 use schlieren::media::{Media, Property, Volume};
-use schlieren::path::{LightPaths, Wanted};
+use schlieren::path::{LightPaths, PathQuantities};
 use schlieren::render::{TestSection, framing, technique};
 use schlieren::scene::Scene;
 use schlieren::technique::Technique;
@@ -106,7 +106,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             scene.march.method = Some(method.into());
             scene.march.interpolant = Some("b-spline".into());
             scene.march.step_voxels = Some(1.0).filter(|_| march == TRACED);
-            let planned = section.paths(&scene, 0, Wanted { opd: b.needs.1 }, b.needs.0, false)?;
+            let planned = section.paths(&scene, 0, PathQuantities { opd: b.needs.1 }, b.needs.0, false)?;
             shared.push((b.needs, planned.paths));
         }
         let mut variants: Vec<Variant<'_>> = vec![];

@@ -8,7 +8,7 @@ use schlieren::field::Field;
 use schlieren::film::Framing;
 use schlieren::interpolate::Interpolant;
 use schlieren::march::{BlankCells, Deviational, LineOfSight, Options};
-use schlieren::path::{Exit, LightPaths, Wanted};
+use schlieren::path::{Exit, LightPaths, PathQuantities};
 use schlieren::render::TestSection;
 use schlieren::view::{Axis as ViewAxis, View};
 
@@ -113,7 +113,7 @@ fn difference(field: &Field, pixels: u32) -> Difference {
     let size = field.size_m();
     // A little inside, so that no ray runs along a face.
     let starts = Framing::fitted(pixels, pixels, [0.98 * size.x, 0.98 * size.y]).pixel_centers();
-    let wanted = Wanted { opd: true };
+    let wanted = PathQuantities { opd: true };
     let mut straight = vec![Exit::UNDISTURBED; starts.len()];
     let mut traced = straight.clone();
     LineOfSight::new(field, view, Interpolant::BSpline, wanted, BlankCells::Opaque)

@@ -5,7 +5,7 @@ use super::Context;
 use super::test_section::{check_cancelled, flow, picture, render_picture, scene};
 use crate::plot::{Axis, Plot, Series};
 use crate::record::{Record, Row};
-use schlieren::render::{Rendered, TestSection};
+use schlieren::render::{RenderOutput, TestSection};
 use schlieren::scene::{FilterSpec, Jitter, SamplingSpec, Scene};
 
 /// Filters by name, in sizes for one photon per pixel.
@@ -63,7 +63,7 @@ impl NoiseCase {
         samples: u32,
         seed: u64,
         filter: FilterSpec,
-    ) -> anyhow::Result<(Rendered, f64)> {
+    ) -> anyhow::Result<(RenderOutput, f64)> {
         let sampling = Some(SamplingSpec::Photons { samples, jitter, seed, filter });
         let scene = Scene { sampling, ..self.scene.clone() };
         let start = std::time::Instant::now();
@@ -72,13 +72,13 @@ impl NoiseCase {
     }
 
     /// The picture without visible noise.
-    pub(super) fn reference(&self, context: &Context<'_>) -> anyhow::Result<(Rendered, f64)> {
+    pub(super) fn reference(&self, context: &Context<'_>) -> anyhow::Result<(RenderOutput, f64)> {
         self.picture(context, Jitter::Sobol, self.reference_samples, REFERENCE_SEED, FilterSpec::None {})
     }
 }
 
 /// Root mean square difference of two pictures, in percent of white.
-pub(super) fn rms_difference(a: &Rendered, b: &Rendered) -> f64 {
+pub(super) fn rms_difference(a: &RenderOutput, b: &RenderOutput) -> f64 {
     let squares: f64 = a.pixels.iter().zip(&b.pixels).map(|(a, b)| f64::from(a[0] - b[0]).powi(2)).sum();
     100.0 * (squares / a.pixels.len().max(1) as f64).sqrt()
 }

@@ -11,7 +11,7 @@ use datasets::generate::oblique_shock::Wedge;
 use glam::UVec3;
 use schlieren::input::{Medium, Options, from_dataset};
 use schlieren::measure::{From, Line, Mark, Photograph, fitted_line};
-use schlieren::render::{Layers, Rendered, TestSection};
+use schlieren::render::{Layers, RenderOutput, TestSection};
 
 /// Air drawn from the room into a vacuum vessel.
 const RESERVOIR: (f64, f64) = (1e5, 300.0);
@@ -104,7 +104,7 @@ fn flow(body: &str, mach: f64, half_deg: f64, nodes: u32) -> anyhow::Result<(Flo
     Ok((cone.flow(UVec3::new(nodes, across, across), Fields::Density)?, exact_rad))
 }
 
-fn photographed(context: &Context<'_>, flow: Flow, width: u32) -> anyhow::Result<Rendered> {
+fn photographed(context: &Context<'_>, flow: Flow, width: u32) -> anyhow::Result<RenderOutput> {
     let sides = flow.high_m() - flow.origin_m;
     let rows = (f64::from(width) * sides.y / sides.x).round();
     let scene = scene(&format!(
@@ -117,7 +117,7 @@ fn photographed(context: &Context<'_>, flow: Flow, width: u32) -> anyhow::Result
 }
 
 /// The shock above the body, without the third of the picture around the tip.
-fn shock(rendered: &Rendered) -> Option<Line> {
+fn shock(rendered: &RenderOutput) -> Option<Line> {
     let photograph = Photograph::of(rendered)?;
     let width = f64::from(photograph.framing.width);
     let [left, right] = [0.35, 0.98].map(|p| photograph.framing.plane_from_pixel(p * width, 0.0)[0]);
@@ -127,7 +127,7 @@ fn shock(rendered: &Rendered) -> Option<Line> {
 }
 
 /// The picture with the fitted line drawn into it.
-fn marked(mut rendered: Rendered, line: &Line) -> Rendered {
+fn marked(mut rendered: RenderOutput, line: &Line) -> RenderOutput {
     let framing = rendered.framing;
     let (width, height) = (framing.width as usize, framing.height as usize);
     for i in width / 4..width {

@@ -14,7 +14,7 @@ use schlieren::film::Film;
 use schlieren::film::photons::{Exposure, expose};
 use schlieren::interpolate::Interpolant;
 use schlieren::march::{BlankCells, Deviational, LineOfSight, Options};
-use schlieren::path::{Exit, LightPaths, Start, Wanted};
+use schlieren::path::{Exit, LightPaths, PathQuantities, Start};
 use schlieren::render::{TestSection, framing, technique};
 use schlieren::view::{Axis as ViewAxis, View};
 use std::cell::RefCell;
@@ -75,7 +75,7 @@ fn marches(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
     let blob = |p: DVec3| 1e-5 * (-p.length_squared() / (2.0 * 0.0144)).exp();
     let field = Field::from_fn([n; 3], [1.0 / (n - 1) as f64; 3], DVec3::splat(-0.5), 1.0, blob)?;
     let views = [("along an axis", View::along(ViewAxis::Z, DVec3::ZERO)), ("at 0.6 rad", oblique()?)];
-    let wanted = Wanted { opd: false };
+    let wanted = PathQuantities { opd: false };
     for (view_name, view) in views {
         let rays = tiles(if context.quick { 192 } else { 256 }, 0.9);
         let photons = tiles(if context.quick { 1024 } else { 2048 }, 0.9);
@@ -130,8 +130,9 @@ fn jet(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     let (field, view) = (&section.fields[0], section.view);
     let framing = framing(&scene, &section);
     let technique = technique(&scene, 0, &framing, field.n0(), false)?;
-    let los =
-        |f: &Field| LineOfSight::new(f, view, Interpolant::BSpline, Wanted::default(), BlankCells::Opaque);
+    let los = |f: &Field| {
+        LineOfSight::new(f, view, Interpolant::BSpline, PathQuantities::default(), BlankCells::Opaque)
+    };
     let held = los(field);
     let never = AtomicBool::new(false);
     let frame = |paths: &LineOfSight| {

@@ -10,7 +10,7 @@ use schlieren::field::Field;
 use schlieren::film::{Film, Framing};
 use schlieren::interpolate::Interpolant;
 use schlieren::march::{BlankCells, Deviational, LineOfSight, Options};
-use schlieren::path::Wanted;
+use schlieren::path::PathQuantities;
 use schlieren::view::{Axis as ViewAxis, View};
 
 /// Data sets of the table, and its megabytes.
@@ -97,7 +97,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             let film = film_bytes();
             let (march_bytes, bricks, row, build_secs, after) = match interpolant {
                 None => {
-                    let wanted = Wanted::default();
+                    let wanted = PathQuantities::default();
                     let los =
                         LineOfSight::new(&field, view, Interpolant::BSpline, wanted, BlankCells::Opaque);
                     (los.memory_bytes(), 0, row, start.elapsed().as_secs_f64(), resident_bytes())

@@ -11,7 +11,7 @@ use schlieren::field::Field;
 use schlieren::input::{Medium, Options, Quantity, from_dataset};
 use schlieren::march::{DormandPrince, Ray};
 use schlieren::path::{Exit, LightPaths, Start};
-use schlieren::render::{Control, Layers, RenderError, Rendered, TestSection, render};
+use schlieren::render::{Control, Layers, RenderError, RenderOutput, TestSection, render};
 use schlieren::scene::Scene;
 use schlieren::view::View;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -44,7 +44,7 @@ pub(super) fn render_picture(
     context: &Context<'_>,
     scene: &Scene,
     section: &TestSection,
-) -> anyhow::Result<Rendered> {
+) -> anyhow::Result<RenderOutput> {
     render_picture_with(context, scene, section, Layers::NONE)
 }
 
@@ -54,7 +54,7 @@ pub(super) fn render_picture_with(
     scene: &Scene,
     section: &TestSection,
     layers: Layers,
-) -> anyhow::Result<Rendered> {
+) -> anyhow::Result<RenderOutput> {
     let never = AtomicBool::new(false);
     let control = Control { cancel: context.cancel.as_deref().unwrap_or(&never), progress: &|_| {} };
     match render(scene, section, layers, &control) {
@@ -72,7 +72,7 @@ pub(super) fn check_cancelled(context: &Context<'_>) -> anyhow::Result<()> {
 }
 
 /// The picture as it goes into a record.
-pub(super) fn picture(name: &str, caption: String, rendered: &Rendered) -> anyhow::Result<Picture> {
+pub(super) fn picture(name: &str, caption: String, rendered: &RenderOutput) -> anyhow::Result<Picture> {
     let dir = tempfile::tempdir()?;
     let path = dir.path().join("picture.png");
     schlieren::output::write_png(&path, rendered)?;

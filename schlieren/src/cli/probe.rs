@@ -2,7 +2,7 @@
 
 use super::scene_args::SceneArgs;
 use super::units;
-use crate::path::{Exit, Start, Status, Wanted};
+use crate::path::{Exit, PathQuantities, Start, Status};
 use crate::render::{TestSection, framing, technique};
 use crate::technique::{Photon, Technique};
 use clap::Args;
@@ -34,7 +34,8 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
     let section = TestSection::open(&scene, |what| common.note(0, what))?;
     let framing = framing(&scene, &section);
     let t = technique(&scene, 0, &framing, section.fields[0].n0(), false)?;
-    let planned = section.paths(&scene, 0, Wanted { opd: true }, matches!(t, Technique::Bos(_)), true)?;
+    let planned =
+        section.paths(&scene, 0, PathQuantities { opd: true }, matches!(t, Technique::Bos(_)), true)?;
     let [x, y] = args.pixel;
     let position_m = framing.plane_from_pixel(x, y);
     let start = Start { position_m: position_m.map(|c| c as f32), tilt_rad: [0.0; 2] };
@@ -42,9 +43,10 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
     planned.paths.trace(&[start], &mut exit);
     let [exit] = exit;
 
-    let left_out = planned.paths.left_out();
-    let trouble = planned.paths.trouble();
-    let warnings: Vec<&String> = section.warnings.iter().chain(&planned.warnings).chain(&trouble).collect();
+    let skip_report = planned.paths.skip_report();
+    let device_warning = planned.paths.device_warning();
+    let warnings: Vec<&String> =
+        section.warnings.iter().chain(&planned.warnings).chain(&device_warning).collect();
     for w in &warnings {
         common.warn(w);
     }
@@ -83,7 +85,7 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
         "energy": energy,
         "march": planned.description,
         "deflection_error_rad": planned.error_rad,
-        "left_out": left_out,
+        "left_out": skip_report,
         "warnings": warnings,
     });
     let mut of_medium = String::new();
@@ -104,7 +106,7 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
     }
     common.result(&object, || {
         let [dx, dy] = exit.deflection_rad;
-        let skipped = left_out.map_or(String::new(), |l| {
+        let skipped = skip_report.map_or(String::new(), |l| {
             format!(
                 "\nleft out         {:.0} % of the steps, at most {:.1e} rad",
                 100.0 * l.steps_part,

@@ -2,7 +2,7 @@
 
 use super::scene_args::SceneArgs;
 use crate::output;
-use crate::render::{Control, Layers, RenderError, Rendered, TestSection};
+use crate::render::{Control, Layers, RenderError, RenderOutput, TestSection};
 use crate::scene::{Scene, TechniqueSpec};
 use clap::Args;
 use datasets::cli::{Cancel, CommonArgs, Interrupted, UsageError};
@@ -88,7 +88,7 @@ impl<'a> Outputs<'a> {
 }
 
 /// A picture that was written, in words and as JSON.
-pub(super) struct Drawn {
+pub(super) struct RenderSummary {
     pub(super) json: Value,
     pub(super) text: String,
 }
@@ -99,7 +99,7 @@ pub(super) fn draw(
     cancel: Cancel,
     scene: &Scene,
     outputs: &Outputs<'_>,
-) -> anyhow::Result<Drawn> {
+) -> anyhow::Result<RenderSummary> {
     let start = Instant::now();
     let section = TestSection::open(scene, |what| common.note(0, what))?;
     let read_secs = start.elapsed().as_secs_f64();
@@ -140,7 +140,7 @@ pub(super) fn draw(
         "tolerance_rad": scene.march.tolerance_rad,
         "deflection_error_rad": r.deflection_error_rad,
         "resolution_error_rad": r.resolution_error_rad,
-        "left_out": r.left_out,
+        "left_out": r.skip_report,
         "largest_deflection_rad": r.largest_deflection_rad,
         "levels": r.levels,
         "effects": r.effects,
@@ -162,7 +162,7 @@ pub(super) fn draw(
         described(scene),
         r.counters.rays + r.counters.map_rays,
     );
-    Ok(Drawn { json, text })
+    Ok(RenderSummary { json, text })
 }
 
 fn described(scene: &Scene) -> String {
@@ -172,7 +172,12 @@ fn described(scene: &Scene) -> String {
     }
 }
 
-fn write(outputs: &Outputs<'_>, scene: &Scene, rendered: &Rendered, elapsed_secs: f64) -> anyhow::Result<()> {
+fn write(
+    outputs: &Outputs<'_>,
+    scene: &Scene,
+    rendered: &RenderOutput,
+    elapsed_secs: f64,
+) -> anyhow::Result<()> {
     if let Some(path) = outputs.png {
         output::write_png(path, rendered)?;
     }

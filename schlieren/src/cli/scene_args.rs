@@ -166,7 +166,7 @@ fn filter(text: &str) -> Result<FilterSpec, String> {
     }
 }
 
-fn in_vain(flag: &str, what: &str, name: &str, belongs: &str) -> UsageError {
+fn no_effect(flag: &str, what: &str, name: &str, belongs: &str) -> UsageError {
     UsageError(format!("{flag} changes nothing with {what} `{name}`; leave it out, or take {belongs}"))
 }
 
@@ -222,7 +222,9 @@ impl OpticsArgs {
         let uses = s.technique.uses_source();
         for (flag, value) in [("--focal-length", self.focal_length), ("--collimator", self.collimator)] {
             if value.is_some() && !uses {
-                return Err(in_vain(flag, "technique", s.technique.name(), "schlieren or shadowgraph").into());
+                return Err(
+                    no_effect(flag, "technique", s.technique.name(), "schlieren or shadowgraph").into()
+                );
             }
         }
         s.lenses.schlieren_m = self.focal_length.unwrap_or(s.lenses.schlieren_m);
@@ -241,7 +243,7 @@ impl OpticsArgs {
         ];
         let TechniqueSpec::Schlieren { cutoff } = &mut s.technique else {
             return match flags.iter().find(|f| f.1) {
-                Some((flag, _)) => Err(in_vain(flag, "technique", name, "schlieren").into()),
+                Some((flag, _)) => Err(no_effect(flag, "technique", name, "schlieren").into()),
                 None => Ok(()),
             };
         };
@@ -270,19 +272,19 @@ impl OpticsArgs {
             match cutoff {
                 CutoffSpec::Knife { angle_deg, .. } => *angle_deg = angle,
                 CutoffSpec::Color { red_deg, .. } => *red_deg = angle,
-                _ => return Err(in_vain("--cutoff-angle", "cut-off", kind, "knife or color").into()),
+                _ => return Err(no_effect("--cutoff-angle", "cut-off", kind, "knife or color").into()),
             }
         }
         if let Some(part) = self.cutoff_open {
             match cutoff {
                 CutoffSpec::Knife { open, .. } => *open = part,
-                _ => return Err(in_vain("--cutoff-open", "cut-off", kind, "knife").into()),
+                _ => return Err(no_effect("--cutoff-open", "cut-off", kind, "knife").into()),
             }
         }
         if let Some(height) = self.cutoff_height {
             match cutoff {
                 CutoffSpec::Knife { open_m, .. } => *open_m = Some(height),
-                _ => return Err(in_vain("--cutoff-height", "cut-off", kind, "knife").into()),
+                _ => return Err(no_effect("--cutoff-height", "cut-off", kind, "knife").into()),
             }
         }
         if let Some(radius) = self.cutoff_radius {
@@ -291,7 +293,7 @@ impl OpticsArgs {
                 | CutoffSpec::ComplementedCircle { radius_m, .. }
                 | CutoffSpec::Color { radius_m, .. } => *radius_m = radius,
                 CutoffSpec::Image { width_m, .. } => *width_m = 2.0 * radius,
-                _ => return Err(in_vain("--cutoff-radius", "cut-off", kind, "another cut-off").into()),
+                _ => return Err(no_effect("--cutoff-radius", "cut-off", kind, "another cut-off").into()),
             }
         }
         Ok(())
@@ -309,7 +311,7 @@ impl OpticsArgs {
             ("--slice-depth", self.slice_depth.is_some(), &["slice"]),
         ] {
             if present && !belongs.contains(&name) {
-                return Err(in_vain(flag, "technique", name, &belongs.join(" or ")).into());
+                return Err(no_effect(flag, "technique", name, &belongs.join(" or ")).into());
             }
         }
         match &mut s.technique {

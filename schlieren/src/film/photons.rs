@@ -38,7 +38,7 @@ pub struct Exposure<'a> {
 
 /// A photon on the film, kept for filters that look for neighbours.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Landed<const C: usize> {
+pub struct LandedPhoton<const C: usize> {
     /// In pixels from the picture's upper left corner; may lie beside the picture.
     pub at_px: [f32; 2],
     /// 1 for an undisturbed photon without a cut-off.
@@ -47,11 +47,11 @@ pub struct Landed<const C: usize> {
 
 /// What [`expose`] did.
 #[derive(Debug, Default)]
-pub struct Exposed<const C: usize> {
+pub struct ExposedFilm<const C: usize> {
     /// Photons by fate.
     pub tally: Tally,
     /// All landed photons, when they were to be kept, in an order that does not depend on threads.
-    pub landed: Vec<Landed<C>>,
+    pub landed: Vec<LandedPhoton<C>>,
 }
 
 /// Sends passes `passes`, one photon per pixel and pass; pass i goes to film `i % films.len()` (two films tell the noise: their difference). Every tile
@@ -63,17 +63,17 @@ pub fn expose<const C: usize>(
     keep: bool,
     cancel: &AtomicBool,
     progress: &(dyn Fn(u64) + Sync),
-) -> Option<Exposed<C>> {
+) -> Option<ExposedFilm<C>> {
     let framing = *films.first()?.framing();
     let margin = i64::from(exposure.margin_px);
     let along = |n: u32| (-margin..i64::from(n) + margin).step_by(TILE as usize);
     let corners: Vec<[i64; 2]> =
         along(framing.height).flat_map(|y| along(framing.width).map(move |x| [x, y])).collect();
     let limit = [i64::from(framing.width) + margin, i64::from(framing.height) + margin];
-    let tiles: Vec<Exposed<C>> = corners
+    let tiles: Vec<ExposedFilm<C>> = corners
         .par_iter()
         .map(|&corner| {
-            let mut done = Exposed::default();
+            let mut done = ExposedFilm::default();
             if !cancel.load(Ordering::Relaxed) {
                 let end = [0, 1].map(|i| (corner[i] + i64::from(TILE)).min(limit[i]));
                 expose_tile(exposure, films, [corner, end], passes.clone(), keep, &mut done);
@@ -85,7 +85,7 @@ pub fn expose<const C: usize>(
     if cancel.load(Ordering::Relaxed) {
         return None;
     }
-    let mut all = Exposed::default();
+    let mut all = ExposedFilm::default();
     for mut tile in tiles {
         all.tally.add(&tile.tally);
         all.landed.append(&mut tile.landed);
@@ -99,7 +99,7 @@ fn expose_tile<const C: usize>(
     [corner, end]: [[i64; 2]; 2],
     passes: Range<u32>,
     keep: bool,
-    done: &mut Exposed<C>,
+    done: &mut ExposedFilm<C>,
 ) {
     let framing = *films[0].framing();
     let (technique, optics) = (exposure.technique, exposure.technique.optics());
@@ -173,7 +173,7 @@ fn expose_tile<const C: usize>(
             done.tally.landed += 1;
             done.tally.on_film += u64::from(tile.deposit(at_px, energy));
             if keep {
-                done.landed.push(Landed { at_px, energy });
+                done.landed.push(LandedPhoton { at_px, energy });
             }
         }
     }

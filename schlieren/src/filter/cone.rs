@@ -5,7 +5,7 @@
 //! photons that are spread evenly: of the k - 1 inside, each has the mean weight 1/3, and (k-1)/(π r²) is unbiased for their density.
 
 use crate::film::Framing;
-use crate::film::photons::Landed;
+use crate::film::photons::LandedPhoton;
 use rayon::prelude::*;
 
 /// Largest number of photons that are kept for this filter: about 2 GB of them.
@@ -13,7 +13,7 @@ pub const MAX_PHOTONS: u64 = 1 << 27;
 
 /// Energy at each pixel's centre, in photons per pixel over `per_pixel`. With fewer than two photons in all, the picture is black.
 pub fn cone<const C: usize>(
-    photons: &[Landed<C>],
+    photons: &[LandedPhoton<C>],
     framing: &Framing,
     nearest: u32,
     per_pixel: f64,
@@ -56,7 +56,7 @@ struct Buckets {
 }
 
 impl Buckets {
-    fn new<const C: usize>(photons: &[Landed<C>], framing: &Framing) -> Buckets {
+    fn new<const C: usize>(photons: &[LandedPhoton<C>], framing: &Framing) -> Buckets {
         const BORDER: i64 = 8;
         let low = [-BORDER, -BORDER];
         let size = [i64::from(framing.width) + 2 * BORDER, i64::from(framing.height) + 2 * BORDER];
@@ -87,7 +87,7 @@ impl Buckets {
     /// The k photons nearest to `at` as squared distances and numbers, nearest first; ties by number. Returns the k-th squared distance.
     fn nearest<const C: usize>(
         &self,
-        photons: &[Landed<C>],
+        photons: &[LandedPhoton<C>],
         at: [f32; 2],
         k: usize,
         found: &mut Vec<(f32, u32)>,
@@ -137,12 +137,12 @@ mod tests {
     const FRAMING: Framing = Framing { width: 24, height: 16, pixel_m: 1.0, center_m: [0.0; 2] };
 
     /// Random photons, a few pixels beyond the picture as well.
-    fn photons(per_pixel: u32) -> Vec<Landed<1>> {
+    fn photons(per_pixel: u32) -> Vec<LandedPhoton<1>> {
         let area = (24 + 16) * (16 + 16) * per_pixel;
         let at = |i| Sampler::new(Sampling::Random, 3, 0, 0, i).square(0);
         (0..area)
             .map(at)
-            .map(|p| Landed { at_px: [p[0] * 40.0 - 8.0, p[1] * 32.0 - 8.0], energy: [1.0] })
+            .map(|p| LandedPhoton { at_px: [p[0] * 40.0 - 8.0, p[1] * 32.0 - 8.0], energy: [1.0] })
             .collect()
     }
 

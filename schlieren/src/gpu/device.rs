@@ -26,12 +26,12 @@ pub struct Gpu {
     proven: AtomicBool,
     /// How often the GPU was opened again before this, in a row.
     reopened: u32,
-    succession: Mutex<Succession>,
+    replacement: Mutex<Replacement>,
 }
 
 /// What took the place of a device that failed.
 #[derive(Default)]
-struct Succession {
+struct Replacement {
     attempts: u32,
     successor: Option<Arc<Gpu>>,
 }
@@ -90,7 +90,7 @@ impl Gpu {
             pipelines: Mutex::default(),
             proven: AtomicBool::new(false),
             reopened: 0,
-            succession: Mutex::default(),
+            replacement: Mutex::default(),
         })
     }
 
@@ -122,14 +122,14 @@ impl Gpu {
     pub(super) fn working(self: &Arc<Gpu>) -> Result<Arc<Gpu>, GpuError> {
         let mut gpu = Arc::clone(self);
         while let Some(reason) = gpu.failure() {
-            let mut s = gpu.succession.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut s = gpu.replacement.lock().unwrap_or_else(PoisonError::into_inner);
             let successor = match &s.successor {
                 Some(successor) => Arc::clone(successor),
                 None => {
                     let before = if gpu.proven.load(Ordering::Relaxed) { 0 } else { gpu.reopened };
                     let times = before + s.attempts;
                     if times >= MAX_REOPENINGS {
-                        return Err(gpu.given_up(times, reason));
+                        return Err(gpu.give_up_error(times, reason));
                     }
                     s.attempts += 1;
                     let opened = Gpu { reopened: before + s.attempts, ..Gpu::open()? };
@@ -196,7 +196,7 @@ impl Gpu {
         self.failure.get().map(String::as_str)
     }
 
-    pub(super) fn given_up(&self, times: u32, reason: &str) -> GpuError {
+    pub(super) fn give_up_error(&self, times: u32, reason: &str) -> GpuError {
         GpuError::GivenUp { adapter: self.info.name.clone(), times, reason: reason.into() }
     }
 

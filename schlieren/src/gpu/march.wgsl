@@ -19,7 +19,7 @@ struct Ray {
     unused_1: u32,
 }
 
-struct Left {
+struct KernelOutput {
     v: vec3f,
     opd: f32,
     xi: vec3f,
@@ -49,7 +49,7 @@ struct Params {
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> rays: array<Ray>;
-@group(0) @binding(2) var<storage, read_write> lefts: array<Left>;
+@group(0) @binding(2) var<storage, read_write> outputs: array<KernelOutput>;
 
 struct Place {
     cell: vec3u,
@@ -86,7 +86,7 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
     var opd_rest = 0.0;
     var met = 0u;
     if ray.steps == 0u {
-        lefts[i] = Left(v, opd, vec3f(0.0), met);
+        outputs[i] = KernelOutput(v, opd, vec3f(0.0), met);
         return;
     }
     // Step numbers are counted from the middle of the way: exact in f32.
@@ -155,5 +155,5 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
             xi = fma(vec3f(0.5 * dt), v, xi);
         }
     }
-    lefts[i] = Left(v, opd, xi, met);
+    outputs[i] = KernelOutput(v, opd, xi, met);
 }

@@ -16,8 +16,8 @@
 //! What has no kernel here is refused by name ([`GpuError::Unsupported`]): line of sight and full marches, and gradients that are interpolated
 //! themselves.
 
+mod cpu_fallback;
 mod device;
-mod fall_back;
 mod kernel;
 mod paths;
 mod volume;
@@ -88,15 +88,17 @@ pub enum GpuError {
 }
 
 /// A failure, told with the picture that was drawn all the same.
-pub(crate) fn made_up_for(failure: &GpuError) -> String {
+pub(crate) fn fallback_message(failure: &GpuError) -> String {
     match failure {
-        GpuError::Failed { .. } => format!("{}; what it left was computed on the CPU", failed(failure)),
+        GpuError::Failed { .. } => {
+            format!("{}; what it left was computed on the CPU", failure_message(failure))
+        }
         other => format!("computed on the CPU: {other}"),
     }
 }
 
 /// A failure, without what can be done about it.
-pub(crate) fn failed(failure: &GpuError) -> String {
+pub(crate) fn failure_message(failure: &GpuError) -> String {
     match failure {
         GpuError::Failed { adapter, reason } => format!("the GPU `{adapter}` failed ({reason})"),
         other => other.to_string(),

@@ -1,14 +1,14 @@
 //! Starts in, exits out, in batches.
 
+use super::cpu_fallback::{BatchTracer, CpuFallback, Failure};
 use super::device::MAX_REOPENINGS;
-use super::fall_back::{Batches, Failure, FallBack};
 use super::kernel::{FIRST_SLAB, Kernel};
 use super::volume::Volume;
 use super::{Gpu, GpuError};
 use crate::field::Field;
 use crate::interpolate::{BSpline, Interpolant};
-use crate::march::{BlankCells, Frame, Left, Options, Prepared};
-use crate::path::{Exit, LightPaths, Start, Wanted};
+use crate::march::{BlankCells, Frame, KernelOutput, KernelRay, Options};
+use crate::path::{Exit, LightPaths, PathQuantities, Start};
 use crate::view::View;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
@@ -29,14 +29,14 @@ pub struct GpuOptions {
     /// Longest step, in lattice steps.
     pub step_voxels: f64,
     /// What to compute beside deflection and displacement.
-    pub wanted: Wanted,
+    pub wanted: PathQuantities,
     /// What becomes of light in cells without data.
     pub blank: BlankCells,
 }
 
 impl Default for GpuOptions {
     fn default() -> Self {
-        GpuOptions { step_voxels: 1.0, wanted: Wanted::default(), blank: BlankCells::Opaque }
+        GpuOptions { step_voxels: 1.0, wanted: PathQuantities::default(), blank: BlankCells::Opaque }
     }
 }
 
@@ -60,7 +60,7 @@ pub struct GpuCounters {
 ///
 /// When the device fails on the way, it is opened again, a few times at most, and what it lost is
 /// traced once more ([`GpuCounters::rays_repeated`]). What is left then is traced on the CPU
-/// ([`GpuCounters::rays_on_cpu`]). [`LightPaths::trouble`] names the cause and what was done.
+/// ([`GpuCounters::rays_on_cpu`]). [`LightPaths::device_warning`] names the cause and what was done.
 ///
 /// Of a ray that is stopped, `status` tells what stopped it, and deflection and displacement are those where it was stopped.
 pub struct GpuPaths<'a> {
@@ -70,16 +70,16 @@ pub struct GpuPaths<'a> {
     options: GpuOptions,
     /// Rays of one dispatch.
     batch: usize,
-    current: Mutex<Current>,
+    current: Mutex<CurrentDevice>,
     /// Takes over when the device fails.
-    fall_back: FallBack<'a>,
+    cpu_fallback_paths: CpuFallback<'a>,
     rays: AtomicU64,
     ray_steps: AtomicU64,
     dispatches: AtomicU64,
 }
 
 /// The field and the kernel on one device.
-struct OnDevice {
+struct DeviceState {
     gpu: Arc<Gpu>,
     /// How many were there before.
     number: u32,
@@ -90,13 +90,13 @@ struct OnDevice {
 }
 
 /// Who traces now.
-struct Current {
-    on_device: Arc<OnDevice>,
+struct CurrentDevice {
+    on_device: Arc<DeviceState>,
     /// How often another was looked for.
     attempts: u32,
 }
 
-impl OnDevice {
+impl DeviceState {
     fn new(
         gpu: Arc<Gpu>,
         number: u32,
@@ -104,7 +104,7 @@ impl OnDevice {
         spline: Option<&BSpline>,
         interpolant: Interpolant,
         options: GpuOptions,
-    ) -> Result<OnDevice, GpuError> {
+    ) -> Result<DeviceState, GpuError> {
         let volume = Volume::new(&gpu, field, spline)?;
         let pipeline = gpu.pipeline(&Kernel {
             interpolant,
@@ -112,7 +112,7 @@ impl OnDevice {
             nodes: volume.kinds.is_some(),
             slabs: volume.slabs.len() as u32,
         })?;
-        Ok(OnDevice { gpu, number, pipeline, volume, idle: Mutex::default() })
+        Ok(DeviceState { gpu, number, pipeline, volume, idle: Mutex::default() })
     }
 
     fn failure(&self, error: GpuError) -> Failure {
@@ -138,10 +138,10 @@ impl OnDevice {
             };
             let params = buffer(size_of::<Params>(), BufferUsages::UNIFORM | BufferUsages::COPY_DST);
             let rays = buffer(capacity * size_of::<Ray>(), BufferUsages::STORAGE | BufferUsages::COPY_DST);
-            let left_bytes = capacity * size_of::<RawLeft>();
-            let lefts = buffer(left_bytes, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
-            let readback = buffer(left_bytes, BufferUsages::MAP_READ | BufferUsages::COPY_DST);
-            let mut bound = vec![(0, &params), (1, &rays), (2, &lefts)];
+            let output_bytes = capacity * size_of::<RawKernelOutput>();
+            let outputs = buffer(output_bytes, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
+            let readback = buffer(output_bytes, BufferUsages::MAP_READ | BufferUsages::COPY_DST);
+            let mut bound = vec![(0, &params), (1, &rays), (2, &outputs)];
             bound.extend(self.volume.kinds.as_ref().map(|k| (3, k)));
             bound.extend((FIRST_SLAB..).zip(&self.volume.slabs));
             let entries: Vec<_> = bound
@@ -156,7 +156,7 @@ impl OnDevice {
                 layout: &self.pipeline.get_bind_group_layout(0),
                 entries: &entries,
             });
-            Scratch { capacity, params, rays, lefts, readback, bindings }
+            Scratch { capacity, params, rays, outputs, readback, bindings }
         })
     }
 }
@@ -175,10 +175,10 @@ struct Ray {
     unused_1: u32,
 }
 
-/// `Left` of march.wgsl.
+/// `KernelOutput` of march.wgsl.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-struct RawLeft {
+struct RawKernelOutput {
     v: [f32; 3],
     opd: f32,
     xi: [f32; 3],
@@ -208,16 +208,16 @@ struct Scratch {
     capacity: usize,
     params: wgpu::Buffer,
     rays: wgpu::Buffer,
-    lefts: wgpu::Buffer,
+    outputs: wgpu::Buffer,
     readback: wgpu::Buffer,
     bindings: wgpu::BindGroup,
 }
 
 /// A batch on its way.
 pub(super) struct Pending {
-    on_device: Arc<OnDevice>,
+    on_device: Arc<DeviceState>,
     scratch: Scratch,
-    prepared: Vec<Prepared>,
+    prepared: Vec<KernelRay>,
     index: wgpu::SubmissionIndex,
     mapped: mpsc::Receiver<Result<(), wgpu::BufferAsyncError>>,
 }
@@ -241,7 +241,7 @@ impl<'a> GpuPaths<'a> {
             });
         }
         let spline = (interpolant == Interpolant::BSpline).then(|| BSpline::new(field));
-        let on_device = OnDevice::new(gpu, 0, field, spline.as_ref(), interpolant, options)?;
+        let on_device = DeviceState::new(gpu, 0, field, spline.as_ref(), interpolant, options)?;
         let GpuOptions { step_voxels, wanted, blank } = options;
         let on_cpu = Options { step_voxels, wanted, blank, ..Options::default() };
         Ok(GpuPaths {
@@ -250,8 +250,8 @@ impl<'a> GpuPaths<'a> {
             interpolant,
             options,
             batch: BATCH,
-            current: Mutex::new(Current { on_device: Arc::new(on_device), attempts: 0 }),
-            fall_back: FallBack::of_march(field, view, interpolant, on_cpu),
+            current: Mutex::new(CurrentDevice { on_device: Arc::new(on_device), attempts: 0 }),
+            cpu_fallback_paths: CpuFallback::of_march(field, view, interpolant, on_cpu),
             rays: AtomicU64::new(0),
             ray_steps: AtomicU64::new(0),
             dispatches: AtomicU64::new(0),
@@ -265,8 +265,8 @@ impl<'a> GpuPaths<'a> {
             rays: read(&self.rays),
             ray_steps: read(&self.ray_steps),
             dispatches: read(&self.dispatches),
-            rays_repeated: self.fall_back.repeated(),
-            rays_on_cpu: self.fall_back.rays(),
+            rays_repeated: self.cpu_fallback_paths.repeated(),
+            rays_on_cpu: self.cpu_fallback_paths.rays(),
         }
     }
 
@@ -282,7 +282,7 @@ impl<'a> GpuPaths<'a> {
         Arc::clone(&self.on_device().gpu)
     }
 
-    fn on_device(&self) -> Arc<OnDevice> {
+    fn on_device(&self) -> Arc<DeviceState> {
         Arc::clone(&self.current.lock().unwrap_or_else(PoisonError::into_inner).on_device)
     }
 
@@ -319,10 +319,10 @@ impl<'a> GpuPaths<'a> {
     }
 
     /// Rays as the kernel gets them; those that miss the field stay zero.
-    fn prepare(&self, starts: &[Start], prepared: &mut [Prepared], rays: &mut [Ray]) {
+    fn prepare(&self, starts: &[Start], prepared: &mut [KernelRay], rays: &mut [Ray]) {
         let mut known = None;
         for ((start, p), ray) in starts.iter().zip(prepared).zip(rays) {
-            *p = Prepared::new(&self.frame, start, &mut known);
+            *p = KernelRay::new(&self.frame, start, &mut known);
             let steps = p.steps(self.options.step_voxels);
             if steps > 0 {
                 let e = p.entry(&self.frame, steps);
@@ -341,7 +341,7 @@ impl<'a> GpuPaths<'a> {
     }
 }
 
-impl Batches for GpuPaths<'_> {
+impl BatchTracer for GpuPaths<'_> {
     type Pending = Pending;
 
     fn submit(&self, starts: &[Start], parallel: bool) -> Result<Pending, Failure> {
@@ -350,7 +350,7 @@ impl Batches for GpuPaths<'_> {
         if let Some(e) = gpu.failure() {
             return Err(on_device.failure(gpu.failed(e)));
         }
-        let mut prepared = vec![Prepared::default(); starts.len()];
+        let mut prepared = vec![KernelRay::default(); starts.len()];
         let mut rays = vec![Ray::zeroed(); starts.len()];
         if parallel {
             const CHUNK: usize = 1024;
@@ -377,8 +377,8 @@ impl Batches for GpuPaths<'_> {
             pass.set_bind_group(0, &scratch.bindings, &[]);
             pass.dispatch_workgroups(starts.len().div_ceil(WORKGROUP) as u32, 1, 1);
         }
-        let bytes = (starts.len() * size_of::<RawLeft>()) as u64;
-        commands.copy_buffer_to_buffer(&scratch.lefts, 0, &scratch.readback, 0, bytes);
+        let bytes = (starts.len() * size_of::<RawKernelOutput>()) as u64;
+        commands.copy_buffer_to_buffer(&scratch.outputs, 0, &scratch.readback, 0, bytes);
         let index = queue.submit([commands.finish()]);
         let (tell, mapped) = mpsc::channel();
         scratch.readback.map_async(wgpu::MapMode::Read, ..bytes, move |r| {
@@ -413,21 +413,21 @@ impl Batches for GpuPaths<'_> {
         if let Some(e) = gpu.failure() {
             return Err(on_device.failure(gpu.failed(e)));
         }
-        let bytes = (exits.len() * size_of::<RawLeft>()) as u64;
+        let bytes = (exits.len() * size_of::<RawKernelOutput>()) as u64;
         {
             let range = pending.scratch.readback.get_mapped_range(..bytes).map_err(|e| failed(&e))?;
-            let lefts: &[RawLeft] = bytemuck::cast_slice(&range);
-            let read = |((exit, p), raw): ((&mut Exit, &Prepared), &RawLeft)| {
+            let outputs: &[RawKernelOutput] = bytemuck::cast_slice(&range);
+            let read = |((exit, p), raw): ((&mut Exit, &KernelRay), &RawKernelOutput)| {
                 let opd = self.options.wanted.opd.then_some(raw.opd);
-                let left = Left { v: raw.v, xi: raw.xi, opd, met: raw.met as u8 };
-                *exit = p.exit(&self.frame, self.field.n0(), self.options.blank, &left);
+                let output = KernelOutput { v: raw.v, xi: raw.xi, opd, met: raw.met as u8 };
+                *exit = p.exit(&self.frame, self.field.n0(), self.options.blank, &output);
             };
             if parallel {
                 const LEAST: usize = 1024;
-                let all = exits.par_iter_mut().zip(&pending.prepared).zip(lefts);
+                let all = exits.par_iter_mut().zip(&pending.prepared).zip(outputs);
                 all.with_min_len(LEAST).for_each(read);
             } else {
-                exits.iter_mut().zip(&pending.prepared).zip(lefts).for_each(read);
+                exits.iter_mut().zip(&pending.prepared).zip(outputs).for_each(read);
             }
         }
         pending.scratch.readback.unmap();
@@ -449,7 +449,7 @@ impl Batches for GpuPaths<'_> {
             return Err(failed.error.clone());
         };
         if current.attempts >= MAX_REOPENINGS {
-            return Err(gpu.given_up(current.attempts, reason));
+            return Err(gpu.give_up_error(current.attempts, reason));
         }
         let gpu = Arc::clone(gpu);
         current.attempts += 1;
@@ -457,7 +457,7 @@ impl Batches for GpuPaths<'_> {
         let spline = (self.interpolant == Interpolant::BSpline).then(|| BSpline::on_this_thread(self.field));
         let number = failed.device + 1;
         let made =
-            OnDevice::new(working, number, self.field, spline.as_ref(), self.interpolant, self.options)?;
+            DeviceState::new(working, number, self.field, spline.as_ref(), self.interpolant, self.options)?;
         current.on_device = Arc::new(made);
         Ok(())
     }
@@ -466,14 +466,14 @@ impl Batches for GpuPaths<'_> {
 impl LightPaths for GpuPaths<'_> {
     fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
         self.rays.fetch_add(starts.len() as u64, Ordering::Relaxed);
-        self.fall_back.trace(self, self.batch, starts, exits, false);
+        self.cpu_fallback_paths.trace(self, self.batch, starts, exits, false);
     }
 
     fn view(&self) -> &View {
         &self.frame.view
     }
 
-    fn wanted(&self) -> Wanted {
+    fn wanted(&self) -> PathQuantities {
         self.options.wanted
     }
 
@@ -481,12 +481,12 @@ impl LightPaths for GpuPaths<'_> {
         0.5 * DVec3::min_element(self.frame.spacing_m)
     }
 
-    fn trouble(&self) -> Option<String> {
-        self.fall_back.trouble()
+    fn device_warning(&self) -> Option<String> {
+        self.cpu_fallback_paths.device_warning()
     }
 
     fn trace_parallel(&self, starts: &[Start], exits: &mut [Exit]) {
         self.rays.fetch_add(starts.len() as u64, Ordering::Relaxed);
-        self.fall_back.trace(self, self.batch, starts, exits, true);
+        self.cpu_fallback_paths.trace(self, self.batch, starts, exits, true);
     }
 }

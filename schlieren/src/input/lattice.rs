@@ -21,7 +21,7 @@ pub(super) enum Places {
 }
 
 /// Values on a lattice.
-pub(super) struct OnLattice {
+pub(super) struct LatticeValues {
     pub(super) lattice: Lattice,
     pub(super) values: Vec<f32>,
     pub(super) marks: Vec<Mark>,
@@ -102,13 +102,17 @@ impl Places {
     }
 
     /// Values at the places as values on a lattice.
-    pub(super) fn to_lattice(&self, values: Vec<f64>, options: &Options) -> Result<OnLattice, InputError> {
+    pub(super) fn to_lattice(
+        &self,
+        values: Vec<f64>,
+        options: &Options,
+    ) -> Result<LatticeValues, InputError> {
         match self {
             Places::Uniform { lattice, .. } => {
                 let values: Vec<f32> = values.into_iter().map(|v| v as f32).collect();
                 let mark = |v: &f32| if v.is_finite() { Mark::Inside } else { Mark::NotFinite };
                 let marks = values.iter().map(mark).collect();
-                Ok(OnLattice { lattice: *lattice, values, marks, report: None })
+                Ok(LatticeValues { lattice: *lattice, values, marks, report: None })
             }
             Places::Mesh { mesh, per_point, own } => {
                 let lattice = target(mesh, own.as_ref(), options)?;
@@ -118,7 +122,7 @@ impl Places {
                     Some(Depth::Revolve) => revolve(mesh, samples, &lattice, &how)?,
                     _ => resample_mesh(mesh, samples, &lattice, &how)?,
                 };
-                Ok(OnLattice { lattice, values: r.values, marks: r.marks, report: Some(r.report) })
+                Ok(LatticeValues { lattice, values: r.values, marks: r.marks, report: Some(r.report) })
             }
         }
     }

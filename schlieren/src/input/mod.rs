@@ -166,7 +166,7 @@ pub struct Report {
 
 /// A field and how it came about.
 #[derive(Debug, Clone)]
-pub struct Loaded {
+pub struct LoadedField {
     /// The field.
     pub field: Field,
     /// How it came about.
@@ -174,7 +174,7 @@ pub struct Loaded {
 }
 
 /// Reads a file and makes a field of it. Of a time series this is the first time; see [`series`] for the others.
-pub fn load(path: &Path, options: &Options) -> Result<Loaded, InputError> {
+pub fn load(path: &Path, options: &Options) -> Result<LoadedField, InputError> {
     let (mut loaded, warnings) = with_data(path, |data| from_dataset(data, options))?;
     loaded.report.warnings.splice(0..0, warnings);
     Ok(loaded)
@@ -216,7 +216,7 @@ fn with_data<T>(
 /// assert!((loaded.field.eps()[62] - 1.362e-4).abs() < 1e-7);
 /// # Ok::<(), schlieren::input::InputError>(())
 /// ```
-pub fn from_dataset(data: &Dataset, options: &Options) -> Result<Loaded, InputError> {
+pub fn from_dataset(data: &Dataset, options: &Options) -> Result<LoadedField, InputError> {
     if !(options.length_unit_m > 0.0 && options.length_unit_m.is_finite()) {
         return Err(InputError::Option {
             what: format!("length unit {} m", options.length_unit_m),
@@ -256,12 +256,12 @@ pub fn from_dataset(data: &Dataset, options: &Options) -> Result<Loaded, InputEr
     report.reference_n_minus_1 = background + d0;
     let eps = on.values.iter().map(|&d| ((f64::from(d) - d0) / n0) as f32).collect();
     let nodes = nodes_of(&on.marks, options, &mut report);
-    let lattice::OnLattice { lattice, .. } = on;
+    let lattice::LatticeValues { lattice, .. } = on;
     let unit = options.length_unit_m;
     let spacing_m = (lattice.spacing * unit).to_array();
     let eps = reference::continued(eps, lattice.dims, &on.marks, options);
     let field = Field::new(lattice.dims, spacing_m, lattice.origin * unit, eps, n0, nodes)?;
-    Ok(Loaded { field, report })
+    Ok(LoadedField { field, report })
 }
 
 /// What the nodes are to light.

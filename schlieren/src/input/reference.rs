@@ -1,6 +1,6 @@
 //! The medium that light comes from and goes to: n0.
 
-use super::lattice::OnLattice;
+use super::lattice::LatticeValues;
 use super::{InputError, Options, Report, Role};
 use datasets::resample::Mark;
 
@@ -34,7 +34,7 @@ impl Reference {
     /// The reference relative to the background that was subtracted from the values.
     pub(super) fn choose(
         &self,
-        on: &OnLattice,
+        on: &LatticeValues,
         background: f64,
         report: &mut Report,
     ) -> Result<f64, InputError> {

@@ -29,7 +29,7 @@ fn close(a: f64, b: f64, relative: f64) -> bool {
 fn uniform_data_keeps_its_lattice_in_metres() {
     let data = image([4, 3, 2], vec![("rho", true, ramp(24, 1.2, 0.01))]);
     let options = Options { length_unit_m: 1e-3, ..Options::new(Medium::density("rho")) };
-    let Loaded { field, report } = from_dataset(&data, &options).unwrap();
+    let LoadedField { field, report } = from_dataset(&data, &options).unwrap();
     assert_eq!((field.dims(), field.origin_m()), ([4, 3, 2], DVec3::new(1e-3, 2e-3, 3e-3)));
     assert!(close(field.spacing_m()[2], 3e-4, 1e-12));
     assert!(
@@ -76,7 +76,7 @@ fn axes_that_run_backwards_and_cell_arrays() {
 fn temperature_and_pressure_choose_the_formula() {
     let cold = image([3, 3, 3], vec![("T", true, ramp(27, 290.0, 0.1)), ("p", true, vec![101_325.0; 27])]);
     let medium = || Medium::temperature_pressure(Quantity::array("T"), Quantity::array("p"));
-    let Loaded { field, report } = from_dataset(&cold, &Options::new(medium())).unwrap();
+    let LoadedField { field, report } = from_dataset(&cold, &Options::new(medium())).unwrap();
     assert_eq!((report.formula, report.warnings.len()), ("ciddor", 0));
     let at = |t: f64| {
         let air = MoistAir { temperature_c: t - 273.15, ..Default::default() };
@@ -163,7 +163,7 @@ fn nan_places_are_blank_and_negative_densities_too() {
     let mut rho = ramp(27, 1.1, 0.01);
     rho[3] = f64::NAN;
     rho[4] = -0.5;
-    let Loaded { field, report } =
+    let LoadedField { field, report } =
         from_dataset(&image([3, 3, 3], vec![("rho", true, rho)]), &Options::new(Medium::density("rho")))
             .unwrap();
     assert_eq!(field.count(Node::Blank), 2);
@@ -207,7 +207,7 @@ fn curvilinear_data_is_resampled_with_mask_and_error() {
         reference: Reference::Given { n_minus_1: K_AIR },
         ..Options::new(Medium::density("rho"))
     };
-    let Loaded { field, report } = from_dataset(&annulus(), &options).unwrap();
+    let LoadedField { field, report } = from_dataset(&annulus(), &options).unwrap();
     let r = report.resampling.unwrap();
     assert_eq!(field.dims()[0], 64);
     assert!(r.outside > 0 && field.count(Node::Blank) == r.outside && r.hidden == 0, "{r:?}");
@@ -336,7 +336,7 @@ fn blocks_without_the_array_are_blank() {
         Block { name: "b".into(), data: Dataset::ImageData(other) },
     ];
     let options = Options { resolution: Resolution::Dims([9, 5, 5]), ..Options::new(Medium::density("rho")) };
-    let Loaded { field, report } = from_dataset(&Dataset::MultiBlock(blocks), &options).unwrap();
+    let LoadedField { field, report } = from_dataset(&Dataset::MultiBlock(blocks), &options).unwrap();
     assert_eq!(field.count(Node::Blank), 4 * 25);
     assert!(report.warnings.iter().any(|w| w.contains("no finite index")), "{:?}", report.warnings);
 }

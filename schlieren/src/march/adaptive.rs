@@ -15,7 +15,7 @@ pub struct DormandPrince {
 
 /// Where an adaptive run ended and what it took.
 #[derive(Debug, Clone, Copy)]
-pub struct Run {
+pub struct AdaptiveRay {
     /// The ray at the end.
     pub ray: Ray,
     /// Samples of the medium.
@@ -38,12 +38,12 @@ const E: [f64; 7] =
 
 impl DormandPrince {
     /// The ray after `tau_m`. `None` when the steps become too short to move the ray: the medium is singular there.
-    pub fn run(&self, medium: &impl Medium, ray: &Ray, tau_m: f64) -> Option<Run> {
+    pub fn run(&self, medium: &impl Medium, ray: &Ray, tau_m: f64) -> Option<AdaptiveRay> {
         let mut r = *ray;
         let end = ray.tau_m + tau_m;
         let mut h = (0.01 * tau_m).min(self.longest_step_m);
         let mut k = [r.rate(medium); 7];
-        let mut out = Run { ray: r, samples: 1, error: 0.0 };
+        let mut out = AdaptiveRay { ray: r, samples: 1, error: 0.0 };
         while r.tau_m < end {
             // A step that nearly reaches the end goes there.
             let last = r.tau_m + 1.000_001 * h >= end;

@@ -22,12 +22,12 @@ use glam::DVec3;
 /// use glam::DVec3;
 /// use schlieren::field::Field;
 /// use schlieren::interpolate::Trilinear;
-/// use schlieren::march::{CellExact, Interpolated, Points};
+/// use schlieren::march::{CellExact, InterpolatedMedium, Points};
 ///
 /// // eps = 1e-5 x y z is trilinear: the interpolant is the function itself.
 /// let field = Field::from_fn([5; 3], [1.0; 3], DVec3::ZERO, 1.0, |p| 1e-5 * p.x * p.y * p.z)?;
 /// let trilinear = Trilinear::new(&field);
-/// let medium = Interpolated::new(&field, &trilinear);
+/// let medium = InterpolatedMedium::new(&field, &trilinear);
 /// let diagonal = DVec3::ONE.normalize();
 /// let s = CellExact::new(&field).line_of_sight(&medium, DVec3::ZERO, diagonal, 48f64.sqrt(), Points::Two);
 /// // From corner to corner, x = y = z = s/√3.
@@ -76,7 +76,7 @@ impl Points {
 
 /// Integrals along a straight line.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sight {
+pub struct LineIntegrals {
     /// Integral of the gradient of eps: across the line it is the deflection to first order, in rad.
     pub slope: DVec3,
     /// Integral of eps: the optical path difference to first order, divided by n0.
@@ -123,7 +123,7 @@ impl CellExact {
         direction: DVec3,
         length_m: f64,
         points: Points,
-    ) -> Sight {
+    ) -> LineIntegrals {
         // Distances to all faces, each from its own number: nothing is accumulated.
         let (from, rate) = (self.lattice(start_m), direction / self.spacing_m);
         let mut ends = vec![0.0, length_m];
@@ -138,7 +138,7 @@ impl CellExact {
         }
         ends.retain(|s| (0.0..=length_m).contains(s));
         ends.sort_unstable_by(f64::total_cmp);
-        let mut out = Sight { slope: DVec3::ZERO, path_m: 0.0, pieces: 0 };
+        let mut out = LineIntegrals { slope: DVec3::ZERO, path_m: 0.0, pieces: 0 };
         for pair in ends.windows(2) {
             let piece_m = pair[1] - pair[0];
             if piece_m <= 0.0 {
@@ -173,13 +173,13 @@ impl CellExact {
 
 /// A medium as one cell has it: beyond its faces the values on them. Without this the stages of a step that is still too long would see the next cell, and where the
 /// two pull apart the equations would have no solution at all.
-struct Within<'a, M> {
+struct ClampedMedium<'a, M> {
     medium: &'a M,
     low_m: DVec3,
     high_m: DVec3,
 }
 
-impl<M: Medium> Medium for Within<'_, M> {
+impl<M: Medium> Medium for ClampedMedium<'_, M> {
     fn sample(&self, at_m: DVec3) -> (f64, DVec3) {
         // Not `clamp`, which panics where a bound is no number.
         self.medium.sample(at_m.max(self.low_m).min(self.high_m))
@@ -233,7 +233,7 @@ impl Integrator for CellExact {
             }
             let (at, rate) = (self.lattice(r.position_m()), r.w() / self.spacing_m);
             let cell = self.cell(at, rate);
-            let inside = Within {
+            let inside = ClampedMedium {
                 medium,
                 low_m: self.origin_m + (cell[0] + BEYOND) * self.spacing_m,
                 high_m: self.origin_m + (cell[1] - BEYOND) * self.spacing_m,

@@ -1,15 +1,15 @@
 //! Marching deviations in `f32`, sixteen rays at a time: Verlet for gases, Euler to compare with the dissertation.
 
+use super::field_cache::FieldCache;
 use super::frame::{BlankCells, Frame};
-use super::kept::Kept;
-use super::packet::{Common, Effects, Nodes, Packet, Skip, Steps, With, Work, march};
-use super::prepared::{Left, Prepared};
+use super::kernel_ray::{KernelOutput, KernelRay};
+use super::packet::{FeatureSet, KernelFeatures, Nodes, Packet, PacketConstants, Skip, Steps, Work, march};
 use crate::at_level;
 use crate::field::Field;
 use crate::interpolate::{
     BSpline, Interpolant, Interpolate, Interpolate16, LANES, Trilinear, TrilinearGradient,
 };
-use crate::path::{Exit, LeftOut, LightPaths, Start, Wanted};
+use crate::path::{Exit, LightPaths, PathQuantities, SkipReport, Start};
 use crate::skip::Bricks;
 use crate::view::View;
 use fearless_simd::{Level, Simd};
@@ -34,7 +34,7 @@ pub struct Options {
     /// Longest step, in lattice steps. 1 is right for nearly all fields: below it, the interpolant decides the error.
     pub step_voxels: f64,
     /// What to compute beside deflection and displacement.
-    pub wanted: Wanted,
+    pub wanted: PathQuantities,
     /// What becomes of light in cells without data.
     pub blank: BlankCells,
     /// Leave out bricks as long as the bounds of what that leaves out of a ray's deflection add up to less than this. Zero: leave out nothing, and no
@@ -50,7 +50,7 @@ impl Default for Options {
         Options {
             scheme: Scheme::Verlet,
             step_voxels: 1.0,
-            wanted: Wanted::default(),
+            wanted: PathQuantities::default(),
             blank: BlankCells::Opaque,
             skip_rad: 0.0,
             skip_opd_m: 0.0,
@@ -70,10 +70,10 @@ pub struct Counters {
     /// Ray-steps that were left out.
     pub ray_steps_skipped: u64,
     /// The largest bound on what skipping left out of any ray's deflection, in 1e-15 rad, rounded up.
-    pub left_out_femtorad: u64,
+    pub skipped_femtorad: u64,
 }
 
-enum Interpolated<'a> {
+enum FieldInterpolant<'a> {
     BSpline(Arc<BSpline>),
     Trilinear(Trilinear<'a>),
     TrilinearGradient(TrilinearGradient),
@@ -84,14 +84,14 @@ pub struct Deviational<'a> {
     field: &'a Field,
     frame: Frame,
     options: Options,
-    interpolated: Interpolated<'a>,
+    field_interpolant: FieldInterpolant<'a>,
     bricks: Option<Bricks>,
     level: Level,
     rays: AtomicU64,
     rays_in_field: AtomicU64,
     sampled: AtomicU64,
     skipped: AtomicU64,
-    left_out_femtorad: AtomicU64,
+    skipped_femtorad: AtomicU64,
 }
 
 impl<'a> Deviational<'a> {
@@ -108,18 +108,18 @@ impl<'a> Deviational<'a> {
         options: Options,
         level: Level,
     ) -> Deviational<'a> {
-        Self::made(field, view, interpolant, options, level, &|| Arc::new(BSpline::new(field)))
+        Self::build(field, view, interpolant, options, level, &|| Arc::new(BSpline::new(field)))
     }
 
     /// [`Deviational::new`] with a spline through this field that is at hand.
-    pub fn with_kept(
+    pub fn with_cache(
         field: &'a Field,
         view: View,
         interpolant: Interpolant,
         options: Options,
-        kept: &Kept,
+        cache: &FieldCache,
     ) -> Deviational<'a> {
-        Self::made(field, view, interpolant, options, Level::new(), &|| kept.spline(field))
+        Self::build(field, view, interpolant, options, Level::new(), &|| cache.spline(field))
     }
 
     /// [`Deviational::new`] on the calling thread alone: it waits for no other.
@@ -135,10 +135,10 @@ impl<'a> Deviational<'a> {
             "bricks and gradients are made by all threads"
         );
         let spline = || Arc::new(BSpline::on_this_thread(field));
-        Self::made(field, view, interpolant, options, Level::new(), &spline)
+        Self::build(field, view, interpolant, options, Level::new(), &spline)
     }
 
-    fn made(
+    fn build(
         field: &'a Field,
         view: View,
         interpolant: Interpolant,
@@ -146,14 +146,14 @@ impl<'a> Deviational<'a> {
         level: Level,
         spline: &dyn Fn() -> Arc<BSpline>,
     ) -> Deviational<'a> {
-        let (interpolated, of_bricks) = match interpolant {
+        let (field_interpolant, of_bricks) = match interpolant {
             Interpolant::BSpline => {
                 let s = spline();
-                (Interpolated::BSpline(s.clone()), Some(s))
+                (FieldInterpolant::BSpline(s.clone()), Some(s))
             }
-            Interpolant::Trilinear => (Interpolated::Trilinear(Trilinear::new(field)), None),
+            Interpolant::Trilinear => (FieldInterpolant::Trilinear(Trilinear::new(field)), None),
             Interpolant::TrilinearGradient => {
-                (Interpolated::TrilinearGradient(TrilinearGradient::new(field)), None)
+                (FieldInterpolant::TrilinearGradient(TrilinearGradient::new(field)), None)
             }
         };
         let bricks = (options.skip_rad > 0.0).then(|| Bricks::new(field, &of_bricks.unwrap_or_else(spline)));
@@ -161,14 +161,14 @@ impl<'a> Deviational<'a> {
             field,
             frame: Frame::new(field, view),
             options,
-            interpolated,
+            field_interpolant,
             bricks,
             level,
             rays: AtomicU64::new(0),
             rays_in_field: AtomicU64::new(0),
             sampled: AtomicU64::new(0),
             skipped: AtomicU64::new(0),
-            left_out_femtorad: AtomicU64::new(0),
+            skipped_femtorad: AtomicU64::new(0),
         }
     }
 
@@ -180,7 +180,7 @@ impl<'a> Deviational<'a> {
             rays_in_field: read(&self.rays_in_field),
             ray_steps: read(&self.sampled) * LANES as u64,
             ray_steps_skipped: read(&self.skipped) * LANES as u64,
-            left_out_femtorad: read(&self.left_out_femtorad),
+            skipped_femtorad: read(&self.skipped_femtorad),
         }
     }
 
@@ -191,20 +191,20 @@ impl<'a> Deviational<'a> {
 
     /// Bytes held beside the field.
     pub fn memory_bytes(&self) -> usize {
-        let interpolant = match &self.interpolated {
-            Interpolated::BSpline(s) => s.memory_bytes(),
-            Interpolated::Trilinear(s) => s.memory_bytes(),
-            Interpolated::TrilinearGradient(s) => s.memory_bytes(),
+        let interpolant = match &self.field_interpolant {
+            FieldInterpolant::BSpline(s) => s.memory_bytes(),
+            FieldInterpolant::Trilinear(s) => s.memory_bytes(),
+            FieldInterpolant::TrilinearGradient(s) => s.memory_bytes(),
         };
         interpolant + self.bricks.as_ref().map_or(0, Bricks::memory_bytes)
     }
 
     /// The interpolant as the reference sees it.
     pub fn interpolate(&self) -> &dyn Interpolate {
-        match &self.interpolated {
-            Interpolated::BSpline(s) => &**s,
-            Interpolated::Trilinear(s) => s,
-            Interpolated::TrilinearGradient(s) => s,
+        match &self.field_interpolant {
+            FieldInterpolant::BSpline(s) => &**s,
+            FieldInterpolant::Trilinear(s) => s,
+            FieldInterpolant::TrilinearGradient(s) => s,
         }
     }
 
@@ -214,20 +214,22 @@ impl<'a> Deviational<'a> {
         let plain = self.field.nodes().is_none() && self.bricks.is_none();
         match (self.options.scheme, plain) {
             (Scheme::Verlet, true) if self.options.wanted.opd => {
-                self.all(simd, field, starts, exits, With::<true, false, false, false>);
+                self.all(simd, field, starts, exits, FeatureSet::<true, false, false, false>);
             }
             (Scheme::Verlet, true) => {
-                self.all(simd, field, starts, exits, With::<false, false, false, false>)
+                self.all(simd, field, starts, exits, FeatureSet::<false, false, false, false>)
             }
             // Three kernels an interpolant and instruction set, not twelve: each is a second of compiling. The path costs a tenth of a step.
-            (Scheme::Verlet, false) => self.all(simd, field, starts, exits, With::<true, true, true, false>),
-            (Scheme::Euler, _) => self.all(simd, field, starts, exits, With::<true, true, false, true>),
+            (Scheme::Verlet, false) => {
+                self.all(simd, field, starts, exits, FeatureSet::<true, true, true, false>)
+            }
+            (Scheme::Euler, _) => self.all(simd, field, starts, exits, FeatureSet::<true, true, false, true>),
         }
     }
 
     /// All rays, in groups of packets that are in flight together.
     #[inline(always)]
-    fn all<S: Simd, I: Interpolate16, E: Effects>(
+    fn all<S: Simd, I: Interpolate16, E: KernelFeatures>(
         &self,
         simd: S,
         field: I,
@@ -237,7 +239,7 @@ impl<'a> Deviational<'a> {
     ) {
         const IN_FLIGHT: usize = 2;
         let h = (self.frame.spacing_m / self.frame.unit_m).to_array();
-        let common = Common {
+        let constants = PacketConstants {
             h2: h.map(|h| (h * h) as f32),
             rcp_h2: h.map(|h| (1.0 / (h * h)) as f32),
             nodes: self.field.nodes().map(|kinds| Nodes { kinds, dims: self.field.dims() }),
@@ -259,12 +261,12 @@ impl<'a> Deviational<'a> {
         let mut known = None;
         let mut work = Work::default();
         let mut in_field = 0;
-        let mut left_out = 0.0f32;
+        let mut skipped_rad = 0.0f32;
         for (starts, exits) in starts.chunks(IN_FLIGHT * LANES).zip(exits.chunks_mut(IN_FLIGHT * LANES)) {
             let mut packets = [const { Packet::EMPTY }; IN_FLIGHT];
-            let mut rays = [Prepared::default(); IN_FLIGHT * LANES];
+            let mut rays = [KernelRay::default(); IN_FLIGHT * LANES];
             for (ray, start) in rays.iter_mut().zip(starts) {
-                *ray = Prepared::new(&self.frame, start, &mut known);
+                *ray = KernelRay::new(&self.frame, start, &mut known);
             }
             let mut steps = Steps { shortest: u32::MAX, longest: 0 };
             for (i, ray) in rays.iter_mut().enumerate().filter(|(_, r)| r.meets_field()) {
@@ -284,43 +286,43 @@ impl<'a> Deviational<'a> {
                 p.dt[l] = entry.dt;
             }
             if steps.longest > 0 {
-                let done = march(simd, field, &common, &mut packets, steps, effects);
+                let done = march(simd, field, &constants, &mut packets, steps, effects);
                 work.sampled += done.sampled;
                 work.skipped += done.skipped;
             }
             for (i, exit) in exits.iter_mut().enumerate() {
                 let (p, l) = (&packets[i / LANES], i % LANES);
-                left_out = left_out.max(p.left_out[l]);
-                let left = Left {
+                skipped_rad = skipped_rad.max(p.skipped_rad[l]);
+                let output = KernelOutput {
                     v: [0, 1, 2].map(|c| p.v[c][l]),
                     xi: [0, 1, 2].map(|c| p.xi[c][l]),
                     opd: self.options.wanted.opd.then_some(p.opd[l]),
                     met: p.met[l],
                 };
-                *exit = rays[i].exit(&self.frame, self.field.n0(), self.options.blank, &left);
+                *exit = rays[i].exit(&self.frame, self.field.n0(), self.options.blank, &output);
             }
         }
         self.rays.fetch_add(starts.len() as u64, Ordering::Relaxed);
         self.rays_in_field.fetch_add(in_field, Ordering::Relaxed);
         self.sampled.fetch_add(work.sampled, Ordering::Relaxed);
         self.skipped.fetch_add(work.skipped, Ordering::Relaxed);
-        self.left_out_femtorad.fetch_max((f64::from(left_out) * 1e15).ceil() as u64, Ordering::Relaxed);
+        self.skipped_femtorad.fetch_max((f64::from(skipped_rad) * 1e15).ceil() as u64, Ordering::Relaxed);
     }
 }
 
 impl LightPaths for Deviational<'_> {
     fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
         assert_eq!(starts.len(), exits.len(), "one exit per start");
-        match &self.interpolated {
-            Interpolated::BSpline(s) => {
+        match &self.field_interpolant {
+            FieldInterpolant::BSpline(s) => {
                 let rows = s.rows();
                 at_level!(self.level, simd => self.run(simd, rows, starts, exits));
             }
-            Interpolated::Trilinear(s) => {
+            FieldInterpolant::Trilinear(s) => {
                 let rows = s.rows();
                 at_level!(self.level, simd => self.run(simd, rows, starts, exits));
             }
-            Interpolated::TrilinearGradient(s) => {
+            FieldInterpolant::TrilinearGradient(s) => {
                 let rows = s.rows();
                 at_level!(self.level, simd => self.run(simd, rows, starts, exits));
             }
@@ -331,7 +333,7 @@ impl LightPaths for Deviational<'_> {
         &self.frame.view
     }
 
-    fn wanted(&self) -> Wanted {
+    fn wanted(&self) -> PathQuantities {
         self.options.wanted
     }
 
@@ -339,12 +341,12 @@ impl LightPaths for Deviational<'_> {
         0.5 * self.frame.spacing_m.min_element()
     }
 
-    fn left_out(&self) -> Option<LeftOut> {
+    fn skip_report(&self) -> Option<SkipReport> {
         let bricks = self.bricks.as_ref()?;
         let c = self.counters();
-        Some(LeftOut {
+        Some(SkipReport {
             steps_part: c.ray_steps_skipped as f64 / (c.ray_steps + c.ray_steps_skipped).max(1) as f64,
-            bound_rad: c.left_out_femtorad as f64 * 1e-15,
+            bound_rad: c.skipped_femtorad as f64 * 1e-15,
             bricks_bytes: bricks.memory_bytes(),
             bricks_secs: bricks.build_time().as_secs_f64(),
         })

@@ -17,7 +17,7 @@ pub enum BlankCells {
 
 impl BlankCells {
     /// Transmission and status of a ray by the worst node it met.
-    pub(crate) fn fate(self, met: u8) -> (f32, Status) {
+    pub(crate) fn outcome(self, met: u8) -> (f32, Status) {
         match (met, self) {
             (m, _) if m == Node::Gas as u8 => (1.0, Status::Free),
             (m, _) if m == Node::Solid as u8 => (0.0, Status::Blocked),
@@ -41,7 +41,7 @@ pub(crate) struct Frame {
 
 /// One undisturbed ray.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Undisturbed {
+pub(crate) struct UndisturbedRay {
     /// Right, up and direction of its beam.
     pub(crate) beam: [DVec3; 3],
     /// Where it crosses the centre plane, in lattice coordinates.
@@ -70,7 +70,7 @@ impl Frame {
         &self,
         start: &Start,
         known: &mut Option<([f32; 2], [DVec3; 3])>,
-    ) -> Undisturbed {
+    ) -> UndisturbedRay {
         let beam = match known {
             Some((tilt, beam)) if *tilt == start.tilt_rad => *beam,
             _ => {
@@ -82,7 +82,7 @@ impl Frame {
         let [x, y] = start.position_m.map(f64::from);
         let at = self.centre + (self.view.right * x + self.view.up * y) / self.spacing_m;
         let direction = beam[2] / self.spacing_m;
-        Undisturbed { beam, at, direction, range_m: clip(at, direction, self.last) }
+        UndisturbedRay { beam, at, direction, range_m: clip(at, direction, self.last) }
     }
 
     /// Lattice steps per metre along a direction.

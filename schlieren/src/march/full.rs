@@ -1,10 +1,10 @@
 //! Strong index: any integrator in `f64`, rays that turn, total reflection.
 
 use super::frame::{BlankCells, Frame};
-use super::integrator::{Integrator, Interpolated, Ray};
+use super::integrator::{Integrator, InterpolatedMedium, Ray};
 use crate::field::{Field, Node};
 use crate::interpolate::Interpolate;
-use crate::path::{Exit, LightPaths, Start, Status, Wanted};
+use crate::path::{Exit, LightPaths, PathQuantities, Start, Status};
 use crate::view::View;
 use glam::DVec3;
 
@@ -14,7 +14,7 @@ pub struct FullOptions {
     /// Length of a step, in lattice steps of the undisturbed ray.
     pub step_voxels: f64,
     /// What to compute beside deflection and displacement.
-    pub wanted: Wanted,
+    pub wanted: PathQuantities,
     /// What becomes of light in cells without data.
     pub blank: BlankCells,
     /// A ray that is still inside after this many times the steps that the undisturbed ray needs is given up as [`Status::Turned`].
@@ -23,7 +23,12 @@ pub struct FullOptions {
 
 impl Default for FullOptions {
     fn default() -> Self {
-        FullOptions { step_voxels: 0.5, wanted: Wanted::default(), blank: BlankCells::Opaque, patience: 8 }
+        FullOptions {
+            step_voxels: 0.5,
+            wanted: PathQuantities::default(),
+            blank: BlankCells::Opaque,
+            patience: 8,
+        }
     }
 }
 
@@ -57,7 +62,7 @@ impl<'a, I: Interpolate, G: Integrator> Full<'a, I, G> {
         if near_m >= far_m {
             return Exit { opd_m: if self.options.wanted.opd { 0.0 } else { f32::NAN }, ..Exit::UNDISTURBED };
         }
-        let medium = Interpolated::new(self.field, self.interpolate);
+        let medium = InterpolatedMedium::new(self.field, self.interpolate);
         let [right, up, direction] = ray.beam;
         let lattice = |r: &Ray| (r.position_m() - self.field.origin_m()) / self.frame.spacing_m;
         let at_m = self.field.origin_m() + ray.at * self.frame.spacing_m;
@@ -101,7 +106,7 @@ impl<'a, I: Interpolate, G: Integrator> Full<'a, I, G> {
                 end
             }
         };
-        let (mut transmission, mut status) = self.options.blank.fate(met);
+        let (mut transmission, mut status) = self.options.blank.outcome(met);
         let Some(mut r) = end.filter(|r| r.position_m().is_finite()) else {
             return Exit {
                 exit_depth_m: far_m as f32,
@@ -150,7 +155,7 @@ impl<I: Interpolate, G: Integrator> LightPaths for Full<'_, I, G> {
         &self.frame.view
     }
 
-    fn wanted(&self) -> Wanted {
+    fn wanted(&self) -> PathQuantities {
         self.options.wanted
     }
 

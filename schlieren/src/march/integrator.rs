@@ -13,20 +13,24 @@ pub trait Medium: Sync {
 }
 
 /// An interpolated field as a medium. Outside the field it continues the values of the nearest point on its surface.
-pub struct Interpolated<'a, I: Interpolate + ?Sized> {
+pub struct InterpolatedMedium<'a, I: Interpolate + ?Sized> {
     interpolate: &'a I,
     origin_m: DVec3,
     spacing_m: DVec3,
 }
 
-impl<'a, I: Interpolate + ?Sized> Interpolated<'a, I> {
+impl<'a, I: Interpolate + ?Sized> InterpolatedMedium<'a, I> {
     /// The interpolant of `field`.
     pub fn new(field: &Field, interpolate: &'a I) -> Self {
-        Interpolated { interpolate, origin_m: field.origin_m(), spacing_m: DVec3::from(field.spacing_m()) }
+        InterpolatedMedium {
+            interpolate,
+            origin_m: field.origin_m(),
+            spacing_m: DVec3::from(field.spacing_m()),
+        }
     }
 }
 
-impl<I: Interpolate + ?Sized> Medium for Interpolated<'_, I> {
+impl<I: Interpolate + ?Sized> Medium for InterpolatedMedium<'_, I> {
     fn sample(&self, at_m: DVec3) -> (f64, DVec3) {
         let s = self.interpolate.sample(((at_m - self.origin_m) / self.spacing_m).to_array());
         (s.eps, DVec3::from(s.gradient) / self.spacing_m)

@@ -11,7 +11,7 @@ use crate::interpolate::{
     BSpline, Interpolant, Interpolate, Interpolate16, LANES, Row, Trilinear, bspline_weights,
     bspline_weights16, cell, prefilter_line, transpose,
 };
-use crate::path::{Exit, Jacobian, LightPaths, Start, Wanted};
+use crate::path::{Exit, Jacobian, LightPaths, PathQuantities, Start};
 use crate::view::View;
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, f32x4, f32x16, i32x16};
@@ -22,7 +22,7 @@ use rayon::prelude::*;
 pub struct LineOfSight {
     frame: Frame,
     map: Map,
-    wanted: Wanted,
+    wanted: PathQuantities,
     blank: BlankCells,
     n0: f64,
     level: Level,
@@ -54,7 +54,7 @@ impl LineOfSight {
         field: &Field,
         view: View,
         interpolant: Interpolant,
-        wanted: Wanted,
+        wanted: PathQuantities,
         blank: BlankCells,
     ) -> LineOfSight {
         Self::with_level(field, view, interpolant, wanted, blank, Level::new())
@@ -65,7 +65,7 @@ impl LineOfSight {
         field: &Field,
         view: View,
         interpolant: Interpolant,
-        wanted: Wanted,
+        wanted: PathQuantities,
         blank: BlankCells,
         level: Level,
     ) -> LineOfSight {
@@ -126,7 +126,7 @@ impl LineOfSight {
             let near = |c: usize| (map[c] + 0.5).clamp(0.0, (self.map.dims[c] - 1) as f32) as usize;
             k[near(0) + near(1) * self.map.dims[0]]
         });
-        let (transmission, status) = self.blank.fate(met);
+        let (transmission, status) = self.blank.outcome(met);
         Exit {
             deflection_rad: slope,
             displacement_m: slope.map(|u| u * depth_m as f32),
@@ -486,7 +486,7 @@ impl LightPaths for LineOfSight {
         &self.frame.view
     }
 
-    fn wanted(&self) -> Wanted {
+    fn wanted(&self) -> PathQuantities {
         self.wanted
     }
 

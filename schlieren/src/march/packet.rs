@@ -45,7 +45,7 @@ pub(super) struct Packet {
     /// The same for `opd`.
     pub(super) opd_rest: Row,
     /// Bound on the deflection that skipping left out.
-    pub(super) left_out: Row,
+    pub(super) skipped_rad: Row,
     /// The worst [`Node`] met.
     pub(super) met: [u8; LANES],
 }
@@ -63,14 +63,14 @@ impl Packet {
         v_rest: [[0.0; LANES]; 3],
         opd: [0.0; LANES],
         opd_rest: [0.0; LANES],
-        left_out: [0.0; LANES],
+        skipped_rad: [0.0; LANES],
         met: [0; LANES],
     };
 }
 
 /// What is the same for all packets.
 #[derive(Clone, Copy)]
-pub(super) struct Common<'a> {
+pub(super) struct PacketConstants<'a> {
     /// Spacing squared, and its reciprocal.
     pub(super) h2: [f32; 3],
     pub(super) rcp_h2: [f32; 3],
@@ -101,7 +101,7 @@ pub(super) struct Skip<'a> {
 }
 
 /// What a kernel is compiled for.
-pub(super) trait Effects: Copy {
+pub(super) trait KernelFeatures: Copy {
     /// The optical path difference.
     const OPD: bool;
     /// Blank or solid nodes.
@@ -112,12 +112,12 @@ pub(super) trait Effects: Copy {
     const EULER: bool;
 }
 
-/// The only implementation of [`Effects`].
+/// The only implementation of [`KernelFeatures`].
 #[derive(Clone, Copy)]
-pub(super) struct With<const OPD: bool, const NODES: bool, const SKIP: bool, const EULER: bool>;
+pub(super) struct FeatureSet<const OPD: bool, const NODES: bool, const SKIP: bool, const EULER: bool>;
 
-impl<const OPD: bool, const NODES: bool, const SKIP: bool, const EULER: bool> Effects
-    for With<OPD, NODES, SKIP, EULER>
+impl<const OPD: bool, const NODES: bool, const SKIP: bool, const EULER: bool> KernelFeatures
+    for FeatureSet<OPD, NODES, SKIP, EULER>
 {
     const OPD: bool = OPD;
     const NODES: bool = NODES;
@@ -137,25 +137,25 @@ const STRIDE: u32 = 8;
 
 /// Takes all packets from entry to exit, in flight together.
 #[inline(never)]
-pub(super) fn march<S: Simd, I: Interpolate16, E: Effects, const P: usize>(
+pub(super) fn march<S: Simd, I: Interpolate16, E: KernelFeatures, const P: usize>(
     simd: S,
     field: I,
-    common: &Common<'_>,
+    constants: &PacketConstants<'_>,
     packets: &mut [Packet; P],
     steps: Steps,
     _: E,
 ) -> Work {
     simd.vectorize(
         #[inline(always)]
-        || march_body::<S, I, E, P>(simd, field, common, packets, steps),
+        || march_body::<S, I, E, P>(simd, field, constants, packets, steps),
     )
 }
 
 #[inline(always)]
-fn march_body<S: Simd, I: Interpolate16, E: Effects, const P: usize>(
+fn march_body<S: Simd, I: Interpolate16, E: KernelFeatures, const P: usize>(
     simd: S,
     field: I,
-    common: &Common<'_>,
+    constants: &PacketConstants<'_>,
     packets: &mut [Packet; P],
     steps: Steps,
 ) -> Work {
@@ -170,7 +170,7 @@ fn march_body<S: Simd, I: Interpolate16, E: Effects, const P: usize>(
             && !entering
             && k % STRIDE == 0
             && k + STRIDE <= steps.shortest
-            && leave_out::<S, I, E, P>(simd, common, packets, k as f32)
+            && skip_steps::<S, I, E, P>(simd, constants, packets, k as f32)
         {
             k += STRIDE;
             work.skipped += u64::from(STRIDE) * P as u64;
@@ -196,13 +196,13 @@ fn march_body<S: Simd, I: Interpolate16, E: Effects, const P: usize>(
                 s.dt = now.select(last.dt, s.dt);
                 arriving = Some(now);
             }
-            let eps = step::<S, I, E>(simd, field, common, p, s);
+            let eps = step::<S, I, E>(simd, field, constants, p, s);
             if entering {
                 eps.store_slice(&mut p.eps_at_entry);
                 (dt / (eps + f32x16::splat(simd, 1.0))).store_slice(&mut p.dt);
                 if E::NODES {
                     // The line above gave those that enter through a body a step again.
-                    rest_where_stopped(common, p);
+                    rest_where_stopped(constants, p);
                 }
             } else if let Some(now) = arriving {
                 // Not of rays that were stopped in this last step.
@@ -246,9 +246,9 @@ fn rest(p: &mut Packet, l: usize) {
 }
 
 #[inline(always)]
-fn rest_where_stopped(common: &Common<'_>, p: &mut Packet) {
+fn rest_where_stopped(constants: &PacketConstants<'_>, p: &mut Packet) {
     for l in 0..LANES {
-        if p.met[l] > common.survives {
+        if p.met[l] > constants.survives {
             rest(p, l);
         }
     }
@@ -278,10 +278,10 @@ struct Step<S: Simd> {
 /// One step. Verlet's positions arrive at the middle of the last step and drift to the middle of this one (in the first step there is
 /// nothing to drift yet); Euler's arrive at the start of the step and drift to its end after the sample.
 #[inline(always)]
-fn step<S: Simd, I: Interpolate16, E: Effects>(
+fn step<S: Simd, I: Interpolate16, E: KernelFeatures>(
     simd: S,
     field: I,
-    common: &Common<'_>,
+    constants: &PacketConstants<'_>,
     p: &mut Packet,
     mut s: Step<S>,
 ) -> f32x16<S> {
@@ -296,19 +296,19 @@ fn step<S: Simd, I: Interpolate16, E: Effects>(
         at[c] = straight + if E::EULER { xi } else { moved };
     }
     if E::NODES {
-        meet(simd, common, p, &at);
+        look_up_nodes(simd, constants, p, &at);
         let going = f32x16::from_slice(simd, &p.dt).simd_gt(0.0);
         s.dt = going.select(s.dt, s.dt * 0.0);
     }
     let here = field.sample16(simd, &at);
-    kick::<S, I, E>(simd, common, p, &here, s.dt);
+    kick::<S, I, E>(simd, constants, p, &here, s.dt);
     here.eps
 }
 
 /// tau is not depth: a ray that gained `zeta` in depth has passed its exit plane by as much. One step back brings it there; half of its drift is left to
 /// the caller.
 #[inline(always)]
-fn last_step<S: Simd, E: Effects>(simd: S, p: &Packet, middle: f32x16<S>) -> Step<S> {
+fn last_step<S: Simd, E: KernelFeatures>(simd: S, p: &Packet, middle: f32x16<S>) -> Step<S> {
     let whole = f32x16::from_slice(simd, &p.dt);
     // Verlet's positions still miss the second half of the last step.
     let missing = if E::EULER { whole * 0.0 } else { whole * 0.5 };
@@ -329,9 +329,9 @@ fn last_step<S: Simd, E: Effects>(simd: S, p: &Packet, middle: f32x16<S>) -> Ste
 
 /// v += dt (1 + eps) g / h^2, and the optical path with the mean of v before and after.
 #[inline(always)]
-fn kick<S: Simd, I: Interpolate16, E: Effects>(
+fn kick<S: Simd, I: Interpolate16, E: KernelFeatures>(
     simd: S,
-    common: &Common<'_>,
+    constants: &PacketConstants<'_>,
     p: &mut Packet,
     here: &Samples<S>,
     dt: f32x16<S>,
@@ -341,7 +341,7 @@ fn kick<S: Simd, I: Interpolate16, E: Effects>(
     let mut middle = [eps; 3];
     for c in 0..3 {
         let v = f32x16::from_slice(simd, &p.v[c]);
-        let push = push * common.rcp_h2[c];
+        let push = push * constants.rcp_h2[c];
         if E::OPD {
             middle[c] = if E::EULER { v } else { (push * 0.5).mul_add(here.gradient[c], v) };
         }
@@ -359,7 +359,7 @@ fn kick<S: Simd, I: Interpolate16, E: Effects>(
         let mut square = middle[0] * 0.0;
         let mut u_z = square;
         for c in 0..3 {
-            square = (middle[c] * common.h2[c]).mul_add(middle[c], square);
+            square = (middle[c] * constants.h2[c]).mul_add(middle[c], square);
             u_z = middle[c].mul_add(f32x16::from_slice(simd, &p.along[c]), u_z);
         }
         let transverse = square - u_z * u_z;
@@ -376,8 +376,8 @@ fn kick<S: Simd, I: Interpolate16, E: Effects>(
 
 /// The nearest nodes' kinds, for the rays that are on their way; those that may not go on rest.
 #[inline(always)]
-fn meet<S: Simd>(simd: S, common: &Common<'_>, p: &mut Packet, at: &[f32x16<S>; 3]) {
-    let Some(nodes) = common.nodes else { return };
+fn look_up_nodes<S: Simd>(simd: S, constants: &PacketConstants<'_>, p: &mut Packet, at: &[f32x16<S>; 3]) {
+    let Some(nodes) = constants.nodes else { return };
     let mut near = [i32x16::splat(simd, 0); 3];
     for c in 0..3 {
         let last = f32x16::splat(simd, (nodes.dims[c] - 1) as f32);
@@ -392,18 +392,18 @@ fn meet<S: Simd>(simd: S, common: &Common<'_>, p: &mut Packet, at: &[f32x16<S>; 
             p.met[l] = p.met[l].max(nodes.kinds[o[l] as u32 as usize] as u8);
         }
     }
-    rest_where_stopped(common, p);
+    rest_where_stopped(constants, p);
 }
 
 /// Moves all packets over [`STRIDE`] steps without a sample, if the bricks there bound what that leaves out.
 #[inline(always)]
-fn leave_out<S: Simd, I: Interpolate16, E: Effects, const P: usize>(
+fn skip_steps<S: Simd, I: Interpolate16, E: KernelFeatures, const P: usize>(
     simd: S,
-    common: &Common<'_>,
+    constants: &PacketConstants<'_>,
     packets: &mut [Packet; P],
     first: f32,
 ) -> bool {
-    let Some(skip) = common.skip else { return false };
+    let Some(skip) = constants.skip else { return false };
     let number = f32x16::splat(simd, first + 0.5 * STRIDE as f32);
     let mut bounds = [([0.0f32; LANES], [0.0f32; LANES]); P];
     for (p, (angle, mean)) in packets.iter().zip(&mut bounds) {
@@ -417,7 +417,7 @@ fn leave_out<S: Simd, I: Interpolate16, E: Effects, const P: usize>(
         for l in 0..LANES {
             let brick = skip.bricks.around([at[0][l], at[1][l], at[2][l]]);
             let chord_m = p.dt[l] * (STRIDE as f32 * skip.unit_m);
-            angle[l] = p.left_out[l] + brick.max_gradient_per_m * chord_m;
+            angle[l] = p.skipped_rad[l] + brick.max_gradient_per_m * chord_m;
             mean[l] = brick.mean_eps;
             // A ray at rest is not in that brick any more.
             let stops = E::NODES && brick.has_nodes && p.dt[l] > 0.0;
@@ -428,12 +428,12 @@ fn leave_out<S: Simd, I: Interpolate16, E: Effects, const P: usize>(
         }
     }
     for (p, (angle, mean)) in packets.iter_mut().zip(&bounds) {
-        p.left_out = *angle;
+        p.skipped_rad = *angle;
         let dt = f32x16::from_slice(simd, &p.dt) * STRIDE as f32;
         drift(simd, p, dt);
         if E::OPD {
             let here = Samples { eps: f32x16::from_slice(simd, mean), gradient: [dt * 0.0; 3] };
-            kick::<S, I, E>(simd, common, p, &here, dt);
+            kick::<S, I, E>(simd, constants, p, &here, dt);
         }
     }
     true

@@ -1,37 +1,37 @@
 //! One ray at a time in `f64`, bent as [`crate::march::Full`] bends it.
 
-use super::Collected;
-use super::walk::{Sums, Walk};
+use super::MediaIntegrals;
+use super::integrator::{MediaIntegrator, Sums};
 use crate::interpolate::BSpline;
-use crate::march::{FullOptions, Integrator, Interpolated, Pefrl, Ray};
+use crate::march::{FullOptions, Integrator, InterpolatedMedium, Pefrl, Ray};
 use crate::path::Start;
 use glam::DVec3;
 
 /// Walks along one ray. Each step is a cubic through its ends (Hermite): its middle is where properties are sampled, and its length is
 /// Simpson's sum of |w|. Both are of fourth order, as the march is.
 pub(super) fn collect(
-    walk: &Walk<'_>,
+    integrator: &MediaIntegrator<'_>,
     spline: &BSpline,
     start: &Start,
     end_m: f64,
     known: &mut Option<([f32; 2], [DVec3; 3])>,
-) -> Collected {
-    let (field, frame) = (walk.field, &walk.frame);
+) -> MediaIntegrals {
+    let (field, frame) = (integrator.field, &integrator.frame);
     let ray = frame.undisturbed(start, known);
     let [near_m, far_m] = ray.range_m;
     let length_m = far_m.min(end_m) - near_m;
     // Written so that NaN is no way.
     if !(far_m > near_m && length_m > 0.0) {
-        return Collected::default();
+        return MediaIntegrals::default();
     }
-    let medium = Interpolated::new(field, spline);
+    let medium = InterpolatedMedium::new(field, spline);
     let direction = ray.beam[2];
     let lattice = |at_m: DVec3| (at_m - field.origin_m()) / frame.spacing_m;
     let at_m = field.origin_m() + ray.at * frame.spacing_m;
     let mut before = Ray::inside(&medium, at_m + direction * near_m, direction);
     // The march's steps, wherever the walk ends.
     let speed = frame.lattice_speed_per_m(direction);
-    let steps = ((far_m - near_m) * speed / walk.step_voxels).ceil().max(1.0);
+    let steps = ((far_m - near_m) * speed / integrator.step_voxels).ceil().max(1.0);
     let dtau_m = (far_m - near_m) / steps;
 
     // As the march: to the end's plane, or a voxel beyond a face.
@@ -45,7 +45,7 @@ pub(super) fn collect(
         field.nodes().is_some_and(|kinds| {
             let d = field.dims();
             let p = lattice(at_m).clamp(DVec3::ZERO, frame.last).round().as_usizevec3();
-            walk.stops(kinds[p.x + (p.y + p.z * d[1]) * d[0]] as u8)
+            integrator.stops(kinds[p.x + (p.y + p.z * d[1]) * d[0]] as u8)
         })
     };
     let mut sums = Sums::default();
@@ -64,7 +64,7 @@ pub(super) fn collect(
         }
         let middle_w = (b - a) * (1.5 / taken_m) - (before.w() + after.w()) * 0.25;
         let speed = (before.w().length() + 4.0 * middle_w.length() + after.w().length()) / 6.0;
-        let values = walk.wanted.map(|v| v.map_or(0.0, |v| v.sample(middle_m) as f32));
+        let values = integrator.wanted.map(|v| v.map_or(0.0, |v| v.sample(middle_m) as f32));
         sums.add(values, speed * taken_m);
         if last {
             break;

@@ -1,6 +1,6 @@
 //! What a medium does to light beside bending it: it absorbs, glows, and turns the plane of polarisation.
 //!
-//! Along the path of a ray, s its length in metres ([`Collected`]):
+//! Along the path of a ray, s its length in metres ([`MediaIntegrals`]):
 //!
 //! | property | given | collected | reference |
 //! |---|---|---|---|
@@ -8,7 +8,7 @@
 //! | [`Property::Emission`] | j(x), 1/m, see below | L = ∫ j exp(-τ') ds, τ' the optical depth between x and the eye | Chandrasekhar, *Radiative Transfer* (1950), chapter I, without scattering |
 //! | [`Property::Rotation`] | ρ(x), rad/m | φ = ∫ ρ ds; an analyser at the angle θ to the polariser passes cos²(θ - φ) | Faraday, Malus |
 //!
-//! Nothing of it bends light, so it is collected in a walk of its own beside the march ([`Walk`]), and a scene without such properties runs none of this code.
+//! Nothing of it bends light, so it is collected in a walk of its own beside the march ([`MediaIntegrator`]), and a scene without such properties runs none of this code.
 //! The walk bends as the march does ([`Bend`]): straight for line of sight, in `f32` by the trilinear gradient of eps for gases (a displacement within some per cent, and
 //! the displacement itself is below a voxel there), in `f64` by the spline for strong index.
 //!
@@ -26,7 +26,7 @@
 //! ```
 //! use glam::DVec3;
 //! use schlieren::field::Field;
-//! use schlieren::media::{Bend, Collected, Media, Property, Volume, Walk};
+//! use schlieren::media::{Bend, MediaIntegrals, Media, Property, Volume, MediaIntegrator};
 //! use schlieren::path::Start;
 //! use schlieren::view::{Axis, View};
 //!
@@ -36,23 +36,24 @@
 //!     .with(Property::Absorption, Volume::uniform(3.0, &air)?)
 //!     .with(Property::Emission, Volume::uniform(0.5, &air)?);
 //! let view = View::along(Axis::Z, air.centre_m());
-//! let walk = Walk::new(&air, view, &media, &Property::ALL, Bend::Straight, 1.0, Default::default());
-//! let mut along = [Collected::default()];
-//! walk.collect(&[Start::default()], None, &mut along);
+//! let integrator = MediaIntegrator::new(&air, view, &media, &Property::ALL, Bend::Straight, 1.0, Default::default());
+//! let mut along = [MediaIntegrals::default()];
+//! integrator.collect(&[Start::default()], None, &mut along);
 //! assert!((along[0].optical_depth - 0.3).abs() < 1e-6);
 //! assert!((along[0].emission - 0.5 / 3.0 * (1.0 - (-0.3f32).exp())).abs() < 1e-6);
 //! # Ok::<(), schlieren::field::FieldError>(())
 //! ```
 
+mod collect;
 mod full;
+mod integrator;
 mod paraxial;
 mod paths;
 mod volume;
-mod walk;
 
-pub use paths::ThroughMedia;
+pub use integrator::{Bend, MediaIntegrator};
+pub use paths::AttenuatedPaths;
 pub use volume::{Repairs, Volume};
-pub use walk::{Bend, Walk};
 
 /// Something that a medium has at every point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -146,7 +147,7 @@ impl Media {
 
 /// What was collected along a ray. A property that is not known or was not wanted leaves its zero.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Collected {
+pub struct MediaIntegrals {
     /// τ.
     pub optical_depth: f32,
     /// L, as seen by an eye where the walk begins, looking along it.
@@ -155,7 +156,7 @@ pub struct Collected {
     pub rotation_rad: f32,
 }
 
-impl Collected {
+impl MediaIntegrals {
     /// The part of polarised light that is left, behind an analyser at an angle to the polariser when there is one.
     pub fn transmission(&self, analyser_rad: Option<f64>) -> f64 {
         let left = (-f64::from(self.optical_depth)).exp();

@@ -4,10 +4,10 @@
 //! derivatives by z: `s' = (1 + s²) (∇ₜ eps - s ∂eps/∂z) / (1 + eps)`, the ray equation without approximation, and a step of path is
 //! `√(1 + s²) dz`. In the lattice's axes nothing has to be rotated: see [`crate::march`]'s packets, which this follows.
 
-use super::walk::{Sums, Walk};
+use super::integrator::{MediaIntegrator, Sums};
 use crate::field::Node;
 use crate::interpolate::{Interpolate16, LANES, Row, TrilinearRows};
-use crate::march::{Frame, Prepared};
+use crate::march::{Frame, KernelRay};
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, i32x16};
 
@@ -50,7 +50,7 @@ impl Packet {
     }
 
     /// A ray that meets the field.
-    pub(super) fn set(&mut self, l: usize, ray: &mut Prepared, frame: &Frame, steps: u32, end_m: f64) {
+    pub(super) fn set(&mut self, l: usize, ray: &mut KernelRay, frame: &Frame, steps: u32, end_m: f64) {
         let [near_m, far_m] = ray.range_m();
         let entry = ray.entry(frame, steps);
         self.steps[l] = steps as f32;
@@ -69,38 +69,41 @@ impl Packet {
 }
 
 /// A property, and its lattice coordinates: those of the field times `scale` plus `offset`.
-struct OnOwnLattice<'a> {
+struct PropertyOnLattice<'a> {
     rows: TrilinearRows<'a>,
     scale: [f32; 3],
     offset: [f32; 3],
 }
 
 /// What is sampled on the way, the same for all packets.
-pub(super) struct Sampled<'a> {
+pub(super) struct SampledProperties<'a> {
     /// eps; `None` for straight rays.
     eps: Option<TrilinearRows<'a>>,
     /// Absorption, emission, rotation.
-    properties: [Option<OnOwnLattice<'a>>; 3],
+    properties: [Option<PropertyOnLattice<'a>>; 3],
     /// Kinds of the field's nodes, its dimensions, and which kinds end a walk.
     nodes: Option<(&'a [Node], [usize; 3], [bool; 3])>,
     h2: [f32; 3],
     rcp_h2: [f32; 3],
 }
 
-impl<'a> Sampled<'a> {
-    pub(super) fn new(walk: &'a Walk<'_>, eps: Option<TrilinearRows<'a>>) -> Sampled<'a> {
-        let field = walk.field;
-        let spacing_m = walk.frame.spacing_m;
-        let h = (spacing_m / walk.frame.unit_m).to_array();
-        let properties = walk.wanted.map(|v| {
+impl<'a> SampledProperties<'a> {
+    pub(super) fn new(
+        integrator: &'a MediaIntegrator<'_>,
+        eps: Option<TrilinearRows<'a>>,
+    ) -> SampledProperties<'a> {
+        let field = integrator.field;
+        let spacing_m = integrator.frame.spacing_m;
+        let h = (spacing_m / integrator.frame.unit_m).to_array();
+        let properties = integrator.wanted.map(|v| {
             v.map(|v| {
                 let scale = (spacing_m / v.spacing_m).as_vec3().to_array();
                 let offset = ((field.origin_m() - v.origin_m) / v.spacing_m).as_vec3().to_array();
-                OnOwnLattice { rows: v.values.rows(), scale, offset }
+                PropertyOnLattice { rows: v.values.rows(), scale, offset }
             })
         });
-        let stops = [Node::Gas, Node::Blank, Node::Solid].map(|n| walk.stops(n as u8));
-        Sampled {
+        let stops = [Node::Gas, Node::Blank, Node::Solid].map(|n| integrator.stops(n as u8));
+        SampledProperties {
             eps,
             properties,
             nodes: field.nodes().map(|kinds| (kinds, field.dims(), stops)),
@@ -112,7 +115,7 @@ impl<'a> Sampled<'a> {
 
 /// Takes a packet from entry to exit.
 #[inline(never)]
-pub(super) fn walk16<S: Simd>(simd: S, sampled: &Sampled<'_>, p: &mut Packet) {
+pub(super) fn integrate16<S: Simd>(simd: S, sampled: &SampledProperties<'_>, p: &mut Packet) {
     simd.vectorize(
         #[inline(always)]
         || {
@@ -142,7 +145,7 @@ pub(super) fn walk16<S: Simd>(simd: S, sampled: &Sampled<'_>, p: &mut Packet) {
 fn bend<S: Simd>(
     simd: S,
     eps: &TrilinearRows<'_>,
-    sampled: &Sampled<'_>,
+    sampled: &SampledProperties<'_>,
     p: &mut Packet,
     at: &mut [f32x16<S>; 3],
 ) -> Row {
@@ -183,7 +186,7 @@ fn bend<S: Simd>(
 #[inline(always)]
 fn gather<S: Simd>(
     simd: S,
-    sampled: &Sampled<'_>,
+    sampled: &SampledProperties<'_>,
     p: &mut Packet,
     at: &[f32x16<S>; 3],
     step: f64,
@@ -204,7 +207,7 @@ fn gather<S: Simd>(
     }
     let mut values: [Row; 3] = [[0.0; LANES]; 3];
     for (row, property) in values.iter_mut().zip(&sampled.properties) {
-        if let Some(OnOwnLattice { rows, scale, offset }) = property {
+        if let Some(PropertyOnLattice { rows, scale, offset }) = property {
             let mut there = *at;
             for c in 0..3 {
                 there[c] = at[c].mul_add(f32x16::splat(simd, scale[c]), f32x16::splat(simd, offset[c]));

@@ -1,30 +1,30 @@
 //! Light paths of any march, and what the medium leaves of their light.
 
-use super::{Collected, Walk};
-use crate::path::{Exit, Jacobian, LeftOut, LightPaths, Start, Wanted};
+use super::{MediaIntegrals, MediaIntegrator};
+use crate::path::{Exit, Jacobian, LightPaths, PathQuantities, SkipReport, Start};
 use crate::view::View;
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Paths whose [`Exit::transmission`] has what absorption and an analyser leave. Whatever else is in the exits is left as the march computed it, bit by bit.
-pub struct ThroughMedia<'a> {
+pub struct AttenuatedPaths<'a> {
     paths: Box<dyn LightPaths + 'a>,
-    walk: Walk<'a>,
+    integrator: MediaIntegrator<'a>,
     analyser_rad: Option<f64>,
     rays: Arc<AtomicU64>,
 }
 
-impl<'a> ThroughMedia<'a> {
-    /// `paths` and `walk` must be of the same field and view. The angle of the analyser is to the polariser, counter-clockwise in the picture; `rays` counts the rays that were
+impl<'a> AttenuatedPaths<'a> {
+    /// `paths` and `integrator` must be of the same field and view. The angle of the analyser is to the polariser, counter-clockwise in the picture; `rays` counts the rays that were
     /// walked.
     pub fn new(
         paths: Box<dyn LightPaths + 'a>,
-        walk: Walk<'a>,
+        integrator: MediaIntegrator<'a>,
         analyser_rad: Option<f64>,
         rays: Arc<AtomicU64>,
-    ) -> ThroughMedia<'a> {
-        ThroughMedia { paths, walk, analyser_rad, rays }
+    ) -> AttenuatedPaths<'a> {
+        AttenuatedPaths { paths, integrator, analyser_rad, rays }
     }
 
     /// Rays that were walked so far.
@@ -33,8 +33,8 @@ impl<'a> ThroughMedia<'a> {
     }
 
     fn dim(&self, starts: &[Start], exits: &mut [Exit]) {
-        let mut collected = vec![Collected::default(); starts.len()];
-        self.walk.collect(starts, None, &mut collected);
+        let mut collected = vec![MediaIntegrals::default(); starts.len()];
+        self.integrator.collect(starts, None, &mut collected);
         for (exit, c) in exits.iter_mut().zip(&collected) {
             // 0 stays for what is blocked: light that is absorbed, however much, still tells where it went.
             if exit.transmission > 0.0 {
@@ -46,7 +46,7 @@ impl<'a> ThroughMedia<'a> {
     }
 }
 
-impl LightPaths for ThroughMedia<'_> {
+impl LightPaths for AttenuatedPaths<'_> {
     fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
         self.paths.trace(starts, exits);
         self.dim(starts, exits);
@@ -56,7 +56,7 @@ impl LightPaths for ThroughMedia<'_> {
         self.paths.view()
     }
 
-    fn wanted(&self) -> Wanted {
+    fn wanted(&self) -> PathQuantities {
         self.paths.wanted()
     }
 
@@ -64,12 +64,12 @@ impl LightPaths for ThroughMedia<'_> {
         self.paths.difference_step_m()
     }
 
-    fn trouble(&self) -> Option<String> {
-        self.paths.trouble()
+    fn device_warning(&self) -> Option<String> {
+        self.paths.device_warning()
     }
 
-    fn left_out(&self) -> Option<LeftOut> {
-        self.paths.left_out()
+    fn skip_report(&self) -> Option<SkipReport> {
+        self.paths.skip_report()
     }
 
     fn trace_with_jacobians(&self, starts: &[Start], exits: &mut [Exit], jacobians: &mut [Jacobian]) {

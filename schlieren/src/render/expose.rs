@@ -1,12 +1,12 @@
 //! Sends light of every line of the spectrum through the test section onto a film, and takes the noise out.
 
-use super::{Control, Layers, Planned, RenderError, Rendered, Report, TestSection, technique};
+use super::{Control, Layers, PlannedPaths, RenderError, RenderOutput, Report, TestSection, technique};
 use crate::film::beams::expose_beams;
-use crate::film::photons::{Exposure, Landed, expose};
+use crate::film::photons::{Exposure, LandedPhoton, expose};
 use crate::film::{Film, Framing};
 use crate::filter::Filter;
 use crate::optics::{Optics, SourceImage};
-use crate::path::{Exit, LightPaths, Start, Wanted};
+use crate::path::{Exit, LightPaths, PathQuantities, Start};
 use crate::scene::{BeamsSpec, Jitter, SamplingSpec, Scene, TechniqueSpec};
 use crate::spectrum::film_colors;
 use rt_core::sampler::Sampling;
@@ -32,8 +32,8 @@ pub(super) fn expose_lines<'a>(
     section: &'a TestSection,
     layers: Layers,
     control: &Control<'_>,
-    r: &mut Rendered,
-) -> Result<Option<Planned<'a>>, RenderError> {
+    r: &mut RenderOutput,
+) -> Result<Option<PlannedPaths<'a>>, RenderError> {
     let (framing, optics) = (r.framing, scene.optics());
     let lines = scene.lines();
     let spread_px = beam_spread_px(scene, section, &optics, &framing);
@@ -62,7 +62,7 @@ pub(super) fn expose_lines<'a>(
         let planned = section.paths(
             scene,
             line,
-            Wanted { opd: t.needs_opd() },
+            PathQuantities { opd: t.needs_opd() },
             against_light,
             layers.map && line == 0,
         )?;
@@ -105,7 +105,7 @@ pub(super) fn expose_lines<'a>(
         }
         r.report.add_traced(&*planned.paths);
         if line == 0 {
-            r.report.left_out = planned.paths.left_out();
+            r.report.skip_report = planned.paths.skip_report();
         }
         let counters = &mut r.report.counters;
         let rays = counters.rays - before;
@@ -126,7 +126,7 @@ fn expose_line<const C: usize>(
     layers: Layers,
     cancel: &AtomicBool,
     progress: &(dyn Fn(f64) + Sync),
-    r: &mut Rendered,
+    r: &mut RenderOutput,
 ) -> Result<Vec<[f32; C]>, RenderError> {
     let done = AtomicU64::new(0);
     let side = |n: u32| u64::from(n) + 2 * u64::from(setup.margin_px);
@@ -182,7 +182,7 @@ fn expose_line<const C: usize>(
 /// Takes the noise out of a film.
 fn filtered<const C: usize>(
     film: &[[f32; C]],
-    landed: &[Landed<C>],
+    landed: &[LandedPhoton<C>],
     framing: &Framing,
     filter: Filter,
     samples: u32,

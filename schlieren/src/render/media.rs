@@ -1,19 +1,19 @@
 //! The medium in pictures: paths that lose light, the light that the medium adds, and layers of both.
 //!
-//! Light from the source is dimmed photon by photon ([`crate::media::ThroughMedia`]). Light that the medium emits is no photon's: each pixel's camera ray, parallel to the axis, is
+//! Light from the source is dimmed photon by photon ([`crate::media::AttenuatedPaths`]). Light that the medium emits is no photon's: each pixel's camera ray, parallel to the axis, is
 //! walked back through the flow, and what was collected on it is added to the exposed film, after all filters, for it has no noise. On its way to the film it
 //! meets the same bench: it fills the stop in the cut-off plane evenly, so a cut-off passes its mean over the stop wherever the light came from
 //! ([`Technique::passes_evenly`]), and half of it gets through an analyser.
 
-use super::paths::Planned;
-use super::{Layers, RenderError, Rendered, TestSection, technique};
+use super::planned::PlannedPaths;
+use super::{Layers, RenderError, RenderOutput, TestSection, technique};
 use crate::march::BlankCells;
-use crate::media::{Collected, Media, Property, ThroughMedia, Walk};
+use crate::media::{AttenuatedPaths, Media, MediaIntegrals, MediaIntegrator, Property};
 use crate::path::Start;
 use crate::scene::{Scene, TechniqueSpec};
 use crate::spectrum::film_colors;
 use crate::technique::Technique;
-use crate::technique::bos::Reversed;
+use crate::technique::bos::ReversedPaths;
 use crate::view::View;
 use std::sync::Arc;
 
@@ -47,31 +47,39 @@ impl TestSection {
     }
 
     /// Planned paths with what the medium leaves of their light.
-    pub(super) fn dimmed<'a>(
+    pub(super) fn attenuated<'a>(
         &'a self,
         scene: &Scene,
         line: usize,
         view: View,
-        mut planned: Planned<'a>,
-    ) -> Result<Planned<'a>, RenderError> {
+        mut planned: PlannedPaths<'a>,
+    ) -> Result<PlannedPaths<'a>, RenderError> {
         let wanted = scene.media.dims_light();
         let Some(media) = self.media_of(scene)?.filter(|_| !wanted.is_empty()) else { return Ok(planned) };
-        let walk = self.walk(media, line, view, &planned, &wanted);
+        let integrator = self.media_integrator(media, line, view, &planned, &wanted);
         let (analyser, rays) = (scene.media.analyser_rad(), Arc::clone(&planned.media_rays));
-        planned.paths = Box::new(ThroughMedia::new(planned.paths, walk, analyser, rays));
+        planned.paths = Box::new(AttenuatedPaths::new(planned.paths, integrator, analyser, rays));
         Ok(planned)
     }
 
-    fn walk<'a>(
+    fn media_integrator<'a>(
         &'a self,
         media: &'a Media,
         line: usize,
         view: View,
-        planned: &Planned<'_>,
+        planned: &PlannedPaths<'_>,
         wanted: &[Property],
-    ) -> Walk<'a> {
+    ) -> MediaIntegrator<'a> {
         let field = &self.fields[line];
-        Walk::new(field, view, media, wanted, planned.bend, planned.step_voxels, BlankCells::default())
+        MediaIntegrator::new(
+            field,
+            view,
+            media,
+            wanted,
+            planned.bend,
+            planned.step_voxels,
+            BlankCells::default(),
+        )
     }
 
     /// What the picture's light collects from these starts: by the light's own way, or the camera's with techniques that look from the film. Emission is left out: see
@@ -79,18 +87,20 @@ impl TestSection {
     pub fn collected(
         &self,
         scene: &Scene,
-        planned: &Planned<'_>,
+        planned: &PlannedPaths<'_>,
         starts: &[Start],
-    ) -> Result<Option<Vec<Collected>>, RenderError> {
+    ) -> Result<Option<Vec<MediaIntegrals>>, RenderError> {
         let Some(media) = self.media_of(scene)? else { return Ok(None) };
         let wanted = [Property::Absorption, Property::Rotation];
         let against_light = matches!(scene.technique, TechniqueSpec::Bos { .. });
-        let mut out = vec![Collected::default(); starts.len()];
+        let mut out = vec![MediaIntegrals::default(); starts.len()];
         if against_light {
-            let walk = self.walk(media, 0, Reversed::view(&self.view), planned, &wanted);
-            walk.collect_parallel(&Reversed::starts(starts), None, &mut out);
+            let integrator =
+                self.media_integrator(media, 0, ReversedPaths::view(&self.view), planned, &wanted);
+            integrator.collect_parallel(&ReversedPaths::starts(starts), None, &mut out);
         } else {
-            self.walk(media, 0, self.view, planned, &wanted).collect_parallel(starts, None, &mut out);
+            self.media_integrator(media, 0, self.view, planned, &wanted)
+                .collect_parallel(starts, None, &mut out);
         }
         Ok(Some(out))
     }
@@ -99,21 +109,21 @@ impl TestSection {
     pub fn emitted(
         &self,
         scene: &Scene,
-        planned: &Planned<'_>,
+        planned: &PlannedPaths<'_>,
         starts: &[Start],
     ) -> Result<Option<Vec<f32>>, RenderError> {
         let emission = scene.media.emission.is_some();
         let Some(media) = self.media_of(scene)?.filter(|_| emission) else { return Ok(None) };
-        let view = Reversed::view(&self.view);
+        let view = ReversedPaths::view(&self.view);
         let wanted = [Property::Absorption, Property::Emission];
-        let walk = self.walk(media, 0, view, planned, &wanted);
-        let starts = Reversed::starts(starts);
+        let integrator = self.media_integrator(media, 0, view, planned, &wanted);
+        let starts = ReversedPaths::starts(starts);
         let ends: Option<Vec<f64>> = self
             .solids
             .as_ref()
             .map(|solids| starts.iter().map(|s| solids.depth_m(&view, s).unwrap_or(f64::INFINITY)).collect());
-        let mut out = vec![Collected::default(); starts.len()];
-        walk.collect_parallel(&starts, ends.as_deref(), &mut out);
+        let mut out = vec![MediaIntegrals::default(); starts.len()];
+        integrator.collect_parallel(&starts, ends.as_deref(), &mut out);
         Ok(Some(out.into_iter().map(|c| c.emission).collect()))
     }
 }
@@ -122,9 +132,9 @@ impl TestSection {
 pub(super) fn add_emission(
     scene: &Scene,
     section: &TestSection,
-    planned: &Planned<'_>,
+    planned: &PlannedPaths<'_>,
     layers: Layers,
-    r: &mut Rendered,
+    r: &mut RenderOutput,
 ) -> Result<(), RenderError> {
     if scene.media.emission.is_none() {
         return Ok(());
@@ -157,8 +167,8 @@ pub(super) fn add_emission(
 pub(super) fn add_map(
     scene: &Scene,
     section: &TestSection,
-    planned: &Planned<'_>,
-    r: &mut Rendered,
+    planned: &PlannedPaths<'_>,
+    r: &mut RenderOutput,
 ) -> Result<(), RenderError> {
     let counters = &mut r.report.counters;
     counters.media_rays += planned.take_media_rays();
@@ -169,7 +179,7 @@ pub(super) fn add_map(
     let Some(all) = section.collected(scene, planned, &r.framing.pixel_centers())? else { return Ok(()) };
     counters.media_rays += all.len() as u64;
     let lit = |i: usize| r.map.as_ref().is_none_or(|m| m.transmission[i] > 0.0);
-    let layer = |wanted: bool, of: fn(&Collected) -> f32| -> Vec<f32> {
+    let layer = |wanted: bool, of: fn(&MediaIntegrals) -> f32| -> Vec<f32> {
         let all = if wanted { &all[..] } else { &[] };
         all.iter().enumerate().map(|(i, c)| if lit(i) { of(c) } else { 0.0 }).collect()
     };

@@ -28,7 +28,7 @@ fn section(s: &Scene, values: &[(Property, f64)], solids: Option<Solids>) -> Tes
 }
 
 /// A picture through even media; the scene names arrays for what is given.
-fn drawn(rest: &str, media: &str, values: &[(Property, f64)], layers: Layers) -> Rendered {
+fn drawn(rest: &str, media: &str, values: &[(Property, f64)], layers: Layers) -> RenderOutput {
     let media = if media.is_empty() { String::new() } else { format!("[media]\n{media}\n") };
     let s = scene(&format!("{media}{rest}"));
     render(&s, &section(&s, values, None), layers, &Control::default()).unwrap()
@@ -49,7 +49,7 @@ const TECHNIQUES: [&str; 6] = [
     "[technique]\nkind = \"schlieren\"\n[march]\nmethod = \"pefrl\"\n[sampling]\nmethod = \"photons\"\nsamples = 1\n",
 ];
 
-fn bits(r: &Rendered) -> Vec<u32> {
+fn bits(r: &RenderOutput) -> Vec<u32> {
     r.pixels.iter().flatten().map(|v| v.to_bits()).collect()
 }
 
@@ -102,7 +102,7 @@ fn even_smoke_dims_every_technique_by_beer_and_lambert() {
 #[test]
 fn an_interferogram_loses_contrast_before_light() {
     let fringes = "[technique]\nkind = \"interferogram\"\nfringe_spacing_m = 0.02\n[sampling]\nmethod = \"photons\"\nsamples = 64\n";
-    let of = |r: Rendered| {
+    let of = |r: RenderOutput| {
         let row: Vec<f32> = r.pixels[ROW + 2..ROW + 22].iter().map(|p| p[0]).collect();
         let [low, high] = row.iter().fold([f32::MAX, 0.0], |[l, h]: [f32; 2], v| [l.min(*v), h.max(*v)]);
         [low, high]

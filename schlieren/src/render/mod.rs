@@ -27,6 +27,7 @@ mod media;
 mod media_tests;
 mod on_gpu;
 mod paths;
+mod planned;
 mod section;
 #[cfg(test)]
 mod tests;
@@ -34,12 +35,13 @@ mod tests;
 pub use map::Map;
 pub use media::MediaMap;
 pub use on_gpu::check_gpu;
-pub use paths::{INTERPOLANTS, MARCHES, Planned};
+pub use paths::{INTERPOLANTS, MARCHES};
+pub use planned::PlannedPaths;
 pub use section::TestSection;
 
 use crate::cutoff::Rgb;
 use crate::film::{Framing, Tally};
-use crate::path::{LeftOut, LightPaths, Start, Wanted};
+use crate::path::{LightPaths, PathQuantities, SkipReport, Start};
 use crate::scene::{Counters, Effects, Scene, SceneError, TechniqueSpec};
 use crate::spectrum::filter_band;
 use crate::technique::volume::ComparisonError;
@@ -148,7 +150,7 @@ impl Layers {
 
 /// A picture and what belongs to it. All are row by row from the top.
 #[derive(Debug, Clone)]
-pub struct Rendered {
+pub struct RenderOutput {
     /// Where its pixels lie in the test section.
     pub framing: Framing,
     /// Linear brightness, 1 is white: energy times exposure. Grey pictures have three equal channels.
@@ -188,7 +190,8 @@ pub struct Report {
     /// By how much bodies' silhouettes can be off because bodies see straight rays, when there are bodies and a map.
     pub silhouette_error_px: Option<f64>,
     /// What leaving out even gas came to (`march.skip_rad`), in the light of the first wavelength or, without light, the map.
-    pub left_out: Option<LeftOut>,
+    #[serde(rename = "left_out")]
+    pub skip_report: Option<SkipReport>,
     /// Darkest and brightest channel of the picture.
     pub levels: [f32; 2],
     /// Pixels around the picture that sent light as well.
@@ -202,11 +205,11 @@ pub struct Report {
 impl Report {
     /// What tracing ran into.
     fn add_traced(&mut self, paths: &dyn LightPaths) {
-        let new = paths.trouble().filter(|t| !self.warnings.contains(t));
+        let new = paths.device_warning().filter(|t| !self.warnings.contains(t));
         self.warnings.extend(new);
     }
 
-    fn add_plan(&mut self, planned: &Planned<'_>) {
+    fn add_plan(&mut self, planned: &PlannedPaths<'_>) {
         self.march.clone_from(&planned.description);
         self.deflection_error_rad = planned.error_rad;
         self.resolution_error_rad = planned.resolution_error_rad;
@@ -220,11 +223,11 @@ pub fn render(
     section: &TestSection,
     layers: Layers,
     control: &Control<'_>,
-) -> Result<Rendered, RenderError> {
+) -> Result<RenderOutput, RenderError> {
     scene.check()?;
     let framing = framing(scene, section);
     let exposure = scene.exposure();
-    let mut r = Rendered {
+    let mut r = RenderOutput {
         framing,
         pixels: Vec::new(),
         colored: false,
@@ -271,7 +274,9 @@ pub fn render(
         // The picture's own paths serve when they tell what is wanted; the optical path is not computed for photons that do not need it.
         let planned = match first.filter(|p| p.paths.wanted().opd || !layers.phase) {
             Some(planned) => planned,
-            None => section.paths(scene, 0, Wanted { opd: layers.phase }, against_light, !measured)?,
+            None => {
+                section.paths(scene, 0, PathQuantities { opd: layers.phase }, against_light, !measured)?
+            }
         };
         add_map(scene, section, &planned, &mut r);
         media::add_map(scene, section, &planned, &mut r)?;
@@ -340,7 +345,7 @@ pub fn technique(
     })
 }
 
-fn add_map(scene: &Scene, section: &TestSection, planned: &Planned<'_>, r: &mut Rendered) {
+fn add_map(scene: &Scene, section: &TestSection, planned: &PlannedPaths<'_>, r: &mut RenderOutput) {
     let blocked = |s: &Start| section.solids.as_ref().is_some_and(|b| b.block(&section.view, s));
     let wavelength_m = scene.light.wavelengths_nm[0] * 1e-9;
     let n0 = section.fields[0].n0();
@@ -349,7 +354,7 @@ fn add_map(scene: &Scene, section: &TestSection, planned: &Planned<'_>, r: &mut 
     if report.march.is_empty() {
         report.add_plan(planned);
     }
-    report.left_out = report.left_out.or(planned.paths.left_out());
+    report.skip_report = report.skip_report.or(planned.paths.skip_report());
     report.add_traced(&*planned.paths);
     report.counters.map_rays += m.transmission.len() as u64;
     report.counters.phase_rays += m.waves.len() as u64;

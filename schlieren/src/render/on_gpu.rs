@@ -1,9 +1,9 @@
 //! What the GPU takes over, and why not when it does not.
 
 use super::RenderError;
-use super::paths::Planned;
+use super::planned::{PlannedPaths, described};
 use crate::field::Field;
-use crate::march::Kept;
+use crate::march::FieldCache;
 use crate::plan::Request;
 use crate::scene::{Device, MarchSpec};
 use crate::view::View;
@@ -42,13 +42,13 @@ fn refused(march: &MarchSpec) -> Option<crate::gpu::GpuError> {
 /// Why the CPU stands in for a GPU that cannot do it. Who asked for one gets an error for what can be known before anything is drawn; a device that is lost or
 /// out of memory spoils no picture.
 #[cfg(feature = "gpu")]
-fn stands_in(asked: Device, error: crate::gpu::GpuError) -> Result<String, RenderError> {
+fn fallback_reason(asked: Device, error: crate::gpu::GpuError) -> Result<String, RenderError> {
     match error {
         crate::gpu::GpuError::Failed { .. } | crate::gpu::GpuError::GivenUp { .. } => {
-            Ok(crate::gpu::made_up_for(&error))
+            Ok(crate::gpu::fallback_message(&error))
         }
         e if asked == Device::Gpu => Err(RenderError::Gpu(e)),
-        e => Ok(crate::gpu::made_up_for(&e)),
+        e => Ok(crate::gpu::fallback_message(&e)),
     }
 }
 
@@ -60,8 +60,8 @@ pub(super) fn on_gpu<'a>(
     view: View,
     request: Request,
     measured_rays: Option<usize>,
-    kept: &Kept,
-) -> Result<Result<Planned<'a>, Option<String>>, RenderError> {
+    cache: &FieldCache,
+) -> Result<Result<PlannedPaths<'a>, Option<String>>, RenderError> {
     use crate::gpu::{Gpu, GpuError, GpuOptions, GpuPaths};
     use crate::plan::{Mode, Plan};
     use std::sync::Arc;
@@ -69,13 +69,17 @@ pub(super) fn on_gpu<'a>(
     if march.device == Device::Cpu {
         return Ok(Err(None));
     }
-    let mut plan = Plan::from_roughness(field, request, kept.roughness(field));
+    let mut plan = Plan::from_derivative_bounds(field, request, cache.derivative_bounds(field));
     if plan.mode == Mode::LineOfSight && request.mode.is_none() {
         if march.device == Device::Auto {
             return Ok(Err(None));
         }
         // Asked for the GPU: what line of sight leaves out, Verlet has.
-        plan = Plan::from_roughness(field, Request { mode: Some(Mode::Paraxial), ..request }, plan.roughness);
+        plan = Plan::from_derivative_bounds(
+            field,
+            Request { mode: Some(Mode::Paraxial), ..request },
+            plan.derivative_bounds,
+        );
     }
     let made = (|| {
         if let Some(e) = refused(march) {
@@ -102,7 +106,7 @@ pub(super) fn on_gpu<'a>(
         let paths = loop {
             match GpuPaths::new(Arc::clone(&gpu), field, view, plan.interpolant, options) {
                 Err(e @ GpuError::Failed { .. }) if gpu.failure().is_some() => {
-                    told.get_or_insert(format!("{}; it was opened again", crate::gpu::failed(&e)));
+                    told.get_or_insert(format!("{}; it was opened again", crate::gpu::failure_message(&e)));
                     gpu = Gpu::shared()?;
                 }
                 made => break made?,
@@ -113,11 +117,11 @@ pub(super) fn on_gpu<'a>(
     match made {
         Ok((paths, gpu, told)) => {
             // The CPU's march stands in: the same within roundings.
-            let achieved = measured_rays.map(|rays| plan.measure_with(field, view, rays, kept));
-            let described = super::paths::described("verlet", plan.interpolant, plan.step_voxels);
-            let mut planned = Planned::new(
+            let achieved = measured_rays.map(|rays| plan.measure_with(field, view, rays, cache));
+            let description = described("verlet", plan.interpolant, plan.step_voxels);
+            let mut planned = PlannedPaths::new(
                 Box::new(paths),
-                format!("{described}, on {}", gpu.name()),
+                format!("{description}, on {}", gpu.name()),
                 achieved,
                 march.tolerance_rad,
                 (Mode::Paraxial.into(), plan.step_voxels),
@@ -125,7 +129,7 @@ pub(super) fn on_gpu<'a>(
             planned.warnings.extend(told);
             Ok(Ok(planned))
         }
-        Err(e) => stands_in(march.device, e).map(|why| Err(Some(why))),
+        Err(e) => fallback_reason(march.device, e).map(|why| Err(Some(why))),
     }
 }
 
@@ -137,8 +141,8 @@ pub(super) fn on_gpu<'a>(
     _: View,
     _: Request,
     _: Option<usize>,
-    _: &Kept,
-) -> Result<Result<Planned<'a>, Option<String>>, RenderError> {
+    _: &FieldCache,
+) -> Result<Result<PlannedPaths<'a>, Option<String>>, RenderError> {
     match march.device {
         Device::Cpu => Ok(Err(None)),
         Device::Auto => {
@@ -156,18 +160,18 @@ mod tests {
     #[test]
     fn a_device_that_fails_spoils_no_picture_and_one_that_cannot_is_refused() {
         let lost = GpuError::Failed { adapter: "Lamp 9".into(), reason: "the device is lost".into() };
-        let given_up =
+        let give_up_error =
             GpuError::GivenUp { adapter: "Lamp 9".into(), times: 3, reason: "the device is lost".into() };
         for asked in [Device::Gpu, Device::Auto] {
-            for e in [&lost, &given_up] {
-                let told = stands_in(asked, e.clone()).unwrap();
+            for e in [&lost, &give_up_error] {
+                let told = fallback_reason(asked, e.clone()).unwrap();
                 for word in ["Lamp 9", "the device is lost", "on the CPU"] {
                     assert!(told.contains(word), "{word}: {told}");
                 }
             }
         }
         let none = GpuError::NoAdapter("Vulkan finds no device".into());
-        assert!(matches!(stands_in(Device::Gpu, none.clone()), Err(RenderError::Gpu(_))));
-        assert!(stands_in(Device::Auto, none).unwrap().contains("computed on the CPU: no GPU"));
+        assert!(matches!(fallback_reason(Device::Gpu, none.clone()), Err(RenderError::Gpu(_))));
+        assert!(fallback_reason(Device::Auto, none).unwrap().contains("computed on the CPU: no GPU"));
     }
 }

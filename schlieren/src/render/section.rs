@@ -3,7 +3,7 @@
 use super::RenderError;
 use crate::field::Field;
 use crate::input;
-use crate::march::Kept;
+use crate::march::FieldCache;
 use crate::media::Media;
 use crate::scene::Scene;
 use crate::solids::Solids;
@@ -24,7 +24,7 @@ pub struct TestSection {
     /// What was repaired or left out, a sentence each.
     pub warnings: Vec<String>,
     /// What marches prepared of each field, when that is to be kept.
-    pub(super) kept: Vec<Kept>,
+    pub(super) caches: Vec<FieldCache>,
 }
 
 impl TestSection {
@@ -69,15 +69,15 @@ impl TestSection {
             return Err(RenderError::Fields { wanted: lines, found: fields.len() });
         };
         let view = scene.view.direction.view(first.centre_m())?;
-        let (input, warnings, kept) = (None, Vec::new(), Vec::new());
-        Ok(TestSection { fields, view, solids, media: None, input, warnings, kept })
+        let (input, warnings, caches) = (None, Vec::new(), Vec::new());
+        Ok(TestSection { fields, view, solids, media: None, input, warnings, caches })
     }
 
     /// Keeps what marches prepare of the fields (splines, projections) for further pictures: takes as much memory as the fields again, and the time of the second
     /// picture is that of its light alone. Fields must not be replaced after this.
     #[must_use]
-    pub fn keeping(mut self) -> TestSection {
-        self.kept = self.fields.iter().map(|_| Kept::default()).collect();
+    pub fn with_caches(mut self) -> TestSection {
+        self.caches = self.fields.iter().map(|_| FieldCache::default()).collect();
         self
     }
 

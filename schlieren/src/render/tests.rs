@@ -19,7 +19,7 @@ fn scene(rest: &str) -> Scene {
     Scene::from_toml(&format!("[flow]\nfile = \"-\"\ndensity = \"-\"\n{rest}")).unwrap()
 }
 
-fn drawn(rest: &str, layers: Layers) -> Rendered {
+fn drawn(rest: &str, layers: Layers) -> RenderOutput {
     let s = scene(rest);
     let fields = s.lines().iter().map(|_| blob()).collect();
     let section = TestSection::of_fields(&s, fields, None).unwrap();
@@ -203,13 +203,13 @@ impl LightPaths for Failed<'_> {
     fn view(&self) -> &crate::view::View {
         self.0.view()
     }
-    fn wanted(&self) -> Wanted {
+    fn wanted(&self) -> PathQuantities {
         self.0.wanted()
     }
     fn difference_step_m(&self) -> f64 {
         self.0.difference_step_m()
     }
-    fn trouble(&self) -> Option<String> {
+    fn device_warning(&self) -> Option<String> {
         Some("the GPU `Lamp 9` failed (out of memory); what it left was computed on the CPU".into())
     }
 }
@@ -220,8 +220,8 @@ fn a_device_that_failed_on_the_way_is_a_warning_of_the_picture_told_once() {
         let s = scene(&format!("{SMALL}[technique]\nkind = \"{technique}\""));
         let section = TestSection::of_fields(&s, vec![blob()], None).unwrap();
         let against_light = technique == "bos";
-        let planned = section.paths(&s, 0, Wanted::default(), against_light, false).unwrap();
-        let planned = Planned { paths: Box::new(Failed(planned.paths)), ..planned };
+        let planned = section.paths(&s, 0, PathQuantities::default(), against_light, false).unwrap();
+        let planned = PlannedPaths { paths: Box::new(Failed(planned.paths)), ..planned };
         let mut r = drawn(&format!("{SMALL}[technique]\nkind = \"{technique}\""), Layers::NONE);
         for _ in 0..2 {
             add_map(&s, &section, &planned, &mut r);
@@ -233,7 +233,7 @@ fn a_device_that_failed_on_the_way_is_a_warning_of_the_picture_told_once() {
     // Paths that look against the light pass it on.
     let s = scene(&format!("{SMALL}[technique]\nkind = \"bos\""));
     let section = TestSection::of_fields(&s, vec![blob()], None).unwrap();
-    let planned = section.paths(&s, 0, Wanted::default(), false, false).unwrap();
-    let reversed = crate::technique::bos::Reversed::new(Box::new(Failed(planned.paths)));
-    assert!(reversed.trouble().is_some_and(|t| t.contains("Lamp 9")));
+    let planned = section.paths(&s, 0, PathQuantities::default(), false, false).unwrap();
+    let reversed = crate::technique::bos::ReversedPaths::new(Box::new(Failed(planned.paths)));
+    assert!(reversed.device_warning().is_some_and(|t| t.contains("Lamp 9")));
 }

@@ -2,7 +2,7 @@
 
 use super::filter_plane::{FilterPlane, PIXELS};
 use crate::film::Framing;
-use crate::render::{Map, Rendered};
+use crate::render::{Map, RenderOutput};
 use rayon::prelude::*;
 use rt_core::colormap::linear_to_srgb;
 use serde::Serialize;
@@ -62,7 +62,7 @@ pub struct FrameInfo {
 }
 
 /// The deflections that belong to a view, for following pixels to the filter.
-pub(super) struct Traced {
+pub(super) struct DeflectionMap {
     pub(super) map: Map,
     pub(super) framing: Framing,
 }
@@ -73,16 +73,16 @@ pub struct Frame {
     pub info: FrameInfo,
     /// Head and pixels, as sent: length of the JSON as u32, the JSON, the picture's sRGB bytes, the filter's, the light on the filter as f32; little-endian.
     pub bytes: Vec<u8>,
-    pub(super) traced: Option<Arc<Traced>>,
+    pub(super) traced: Option<Arc<DeflectionMap>>,
 }
 
 impl Frame {
     /// Packs a frame; `None` for what could not be drawn.
     pub(super) fn new(
         mut info: FrameInfo,
-        rendered: Option<&Rendered>,
+        rendered: Option<&RenderOutput>,
         filter: Option<&FilterPlane>,
-        traced: Option<Arc<Traced>>,
+        traced: Option<Arc<DeflectionMap>>,
     ) -> Frame {
         let mut pixels = Vec::new();
         if let Some(r) = rendered {

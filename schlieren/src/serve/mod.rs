@@ -15,7 +15,9 @@ mod worker;
 
 pub use flow::ArrayInfo;
 pub use frame::{Frame, FrameInfo};
-pub use session::{Canvas, MAX_POINTS, MAX_SAMPLES, MAX_SIDE, MAX_STROKES, Paint, Painted, Refused, Session};
+pub use session::{
+    Canvas, MAX_POINTS, MAX_SAMPLES, MAX_SIDE, MAX_STROKES, Paint, PaintOutcome, RefusedChange, Session,
+};
 
 use crate::input::Step;
 use crate::render::RenderError;
@@ -34,7 +36,7 @@ pub enum ServeError {
     Render(Box<RenderError>),
     /// The page does not draw such scenes.
     #[error(transparent)]
-    Refused(#[from] Refused),
+    Refused(#[from] RefusedChange),
     /// Nothing can listen there.
     #[error("cannot listen on {address}; give another address or port (port 0 takes a free one)")]
     Listen {

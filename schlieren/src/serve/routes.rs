@@ -10,7 +10,7 @@
 //! | `POST /trace` | where a place of the picture lies on the filter |
 //! | `GET /save/png`, `/save/exr`, `/save/toml` | files |
 
-use super::session::{Paint, Refused, SaveKind, Session};
+use super::session::{Paint, RefusedChange, SaveKind, Session};
 use axum::Router;
 use axum::body::Bytes;
 use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
@@ -96,7 +96,7 @@ fn same(a: &str, b: &str) -> bool {
     a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |d, (x, y)| d | (x ^ y)) == 0
 }
 
-impl IntoResponse for Refused {
+impl IntoResponse for RefusedChange {
     fn into_response(self) -> Response {
         error(StatusCode::UNPROCESSABLE_ENTITY, &self.0)
     }
@@ -128,12 +128,12 @@ async fn state(State(app): State<App>) -> Response {
 }
 
 #[derive(Deserialize)]
-struct After {
+struct FrameQuery {
     #[serde(default)]
     after: u64,
 }
 
-async fn frame(State(app): State<App>, Query(After { after }): Query<After>) -> Response {
+async fn frame(State(app): State<App>, Query(FrameQuery { after }): Query<FrameQuery>) -> Response {
     let mut frames = app.session.frames.subscribe();
     let other = frames.wait_for(|serial| *serial != after && *serial > 0);
     match tokio::time::timeout(PATIENCE, other).await {
@@ -174,12 +174,12 @@ async fn paint(State(app): State<App>, body: Bytes) -> Response {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Place {
+struct TraceQuery {
     at: [f64; 2],
 }
 
 async fn trace(State(app): State<App>, body: Bytes) -> Response {
-    let place: Place = match json(&body) {
+    let place: TraceQuery = match json(&body) {
         Ok(place) => place,
         Err(response) => return *response,
     };
@@ -213,7 +213,7 @@ async fn save(State(app): State<App>, Path((_, kind)): Path<(String, String)>) -
             let _guard = StopsWhenDropped(cancel.clone());
             let receiver = match app.session.save(kind, cancel) {
                 Ok(receiver) => receiver,
-                Err(Refused(text)) => return error(StatusCode::SERVICE_UNAVAILABLE, &text),
+                Err(RefusedChange(text)) => return error(StatusCode::SERVICE_UNAVAILABLE, &text),
             };
             let (content, name) = match kind {
                 SaveKind::Png => ("image/png", "schlieren.png"),

@@ -4,7 +4,7 @@
 
 use super::filter_plane::{as_painting, half_side_m, traced};
 use super::flow::ArrayInfo;
-use super::frame::{Frame, Traced};
+use super::frame::{DeflectionMap, Frame};
 use crate::cutoff::Rgb;
 use crate::cutoff::painted::Stroke;
 use crate::input::Step;
@@ -33,10 +33,10 @@ const PAGE_SECTIONS: [&str; 8] =
 /// Why a request was refused; the text goes to the page.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
-pub struct Refused(pub String);
+pub struct RefusedChange(pub String);
 
-fn refused(text: impl Into<String>) -> Refused {
-    Refused(text.into())
+fn refused(text: impl Into<String>) -> RefusedChange {
+    RefusedChange(text.into())
 }
 
 /// A file to make.
@@ -59,7 +59,7 @@ pub(super) enum SaveKind {
 
 /// Values that belong to a technique, kept for when it is chosen again.
 #[derive(Clone)]
-struct Kept {
+struct TechniqueSettings {
     technique: TechniqueSpec,
     light: LightSpec,
     lenses: LensSpec,
@@ -74,7 +74,7 @@ pub(super) struct Shared {
     pub(super) saves: VecDeque<Save>,
     pub(super) frame: Option<Arc<Frame>>,
     pub(super) stop: bool,
-    kept: BTreeMap<&'static str, Kept>,
+    settings: BTreeMap<&'static str, TechniqueSettings>,
     /// n0 - 1 that all steps are drawn with, and the scene's flow for which that was found.
     pub(super) reference: Option<(FlowSpec, f64)>,
 }
@@ -121,7 +121,7 @@ pub enum Canvas {
 
 /// What painting did.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Painted {
+pub struct PaintOutcome {
     /// The scene's number now.
     pub generation: u64,
     /// Strokes that were added.
@@ -134,7 +134,11 @@ pub struct Painted {
 
 impl Session {
     /// A session that starts with this scene.
-    pub(super) fn new(scene: Scene, arrays: Vec<ArrayInfo>, steps: Vec<Step>) -> Result<Session, Refused> {
+    pub(super) fn new(
+        scene: Scene,
+        arrays: Vec<ArrayInfo>,
+        steps: Vec<Step>,
+    ) -> Result<Session, RefusedChange> {
         check_limits(&scene)?;
         let image = match &scene.technique {
             TechniqueSpec::Schlieren { cutoff: cutoff @ CutoffSpec::Image { .. } } => Some(cutoff.clone()),
@@ -146,7 +150,7 @@ impl Session {
             saves: VecDeque::new(),
             frame: None,
             stop: false,
-            kept: BTreeMap::new(),
+            settings: BTreeMap::new(),
             reference: None,
         };
         Ok(Session {
@@ -185,7 +189,7 @@ impl Session {
     }
 
     /// The scene in effect as TOML.
-    pub fn toml(&self) -> Result<String, Refused> {
+    pub fn toml(&self) -> Result<String, RefusedChange> {
         let shared = self.lock();
         let mut scene = shared.scene.effective();
         if self.is_later(&scene) {
@@ -212,10 +216,10 @@ impl Session {
 
     /// Changes the scene by a JSON merge patch (RFC 7396); objects with a `kind` or `method` are replaced whole, `null` is the technique's custom. A technique of
     /// another kind brings its own bench back. Returns the new generation.
-    pub fn edit(&self, patch: &Value) -> Result<u64, Refused> {
+    pub fn edit(&self, patch: &Value) -> Result<u64, RefusedChange> {
         let mut shared = self.lock();
         let before = shared.scene.clone();
-        let mut kept = None;
+        let mut previous = None;
         let mut base = before.clone();
 
         // Another technique: the bench as it was with it, or its custom.
@@ -227,13 +231,13 @@ impl Session {
                     TechniqueSpec::NAMES.join(", ")
                 )));
             };
-            kept = Some(Kept::of(&before));
-            let again = shared.kept.get(custom.name()).cloned();
-            Kept::bring_back(again, custom, &mut base);
+            previous = Some(TechniqueSettings::of(&before));
+            let again = shared.settings.get(custom.name()).cloned();
+            TechniqueSettings::restore(again, custom, &mut base);
         }
         let mut patch = patch.clone();
         let step = patch.as_object_mut().and_then(|p| p.remove("step"));
-        if kept.is_some()
+        if previous.is_some()
             && patch.pointer("/technique").and_then(Value::as_object).is_some_and(|t| t.len() == 1)
         {
             patch["technique"] = serde_json::to_value(&base.technique).map_err(|e| refused(e.to_string()))?;
@@ -259,8 +263,8 @@ impl Session {
         merge(&mut value, patch);
         let scene: Scene = serde_json::from_value(value).map_err(|e| refused(format!("not a scene: {e}")))?;
         self.check_scene(&scene)?;
-        if let Some(k) = kept {
-            shared.kept.insert(k.technique.name(), k);
+        if let Some(k) = previous {
+            shared.settings.insert(k.technique.name(), k);
         }
         if scene != before {
             shared.scene = scene;
@@ -269,7 +273,7 @@ impl Session {
         Ok(shared.generation)
     }
 
-    fn step(&self, number: &Value) -> Result<&Step, Refused> {
+    fn step(&self, number: &Value) -> Result<&Step, RefusedChange> {
         let step = number.as_u64().and_then(|n| self.steps.get(usize::try_from(n).ok()?));
         step.ok_or_else(|| match self.steps.len() {
             0 => refused("`step`: the flow has one time; start the program with a time series (.pvd, or several files)"),
@@ -283,7 +287,7 @@ impl Session {
             && self.steps.first().is_some_and(|s| s.path != scene.flow.file)
     }
 
-    fn check_patch(&self, patch: &Value) -> Result<(), Refused> {
+    fn check_patch(&self, patch: &Value) -> Result<(), RefusedChange> {
         let Some(sections) = patch.as_object() else {
             return Err(refused("a change is an object such as {\"view\": {\"direction\": \"30,15\"}}"));
         };
@@ -302,7 +306,7 @@ impl Session {
         }
     }
 
-    fn with_curves(&self, curves: Value) -> Result<FlowSpec, Refused> {
+    fn with_curves(&self, curves: Value) -> Result<FlowSpec, RefusedChange> {
         if self.arrays.len() < 2 {
             return Err(refused("the flow has fewer than two arrays; transfer functions are for several"));
         }
@@ -318,7 +322,7 @@ impl Session {
         Ok(flow)
     }
 
-    fn check_scene(&self, scene: &Scene) -> Result<(), Refused> {
+    fn check_scene(&self, scene: &Scene) -> Result<(), RefusedChange> {
         check_limits(scene)?;
         // Pages must not make the program read any file.
         if let TechniqueSpec::Schlieren { cutoff: cutoff @ CutoffSpec::Image { file, .. } } = &scene.technique
@@ -339,7 +343,7 @@ impl Session {
     }
 
     /// Paints on the filter. The first stroke turns the cut-off into a painting.
-    pub fn paint(&self, paint: &Paint) -> Result<Painted, Refused> {
+    pub fn paint(&self, paint: &Paint) -> Result<PaintOutcome, RefusedChange> {
         let finite = paint.points.iter().flatten().all(|c| c.is_finite() && c.abs() < 1e3);
         let brush = paint.radius_m > 0.0 && paint.radius_m < 1e3;
         if !(finite && brush) {
@@ -400,16 +404,16 @@ impl Session {
         let note = (!same && added > 0).then(|| {
             format!("a {} filter cannot be painted over; the painting starts on black", cutoff.name())
         });
-        Ok(Painted { generation: shared.generation, added, dark, note })
+        Ok(PaintOutcome { generation: shared.generation, added, dark, note })
     }
 
     /// Where the light of a place of the picture goes: deflection, and point on the filter; `None` without light.
-    pub fn trace(&self, at: [f64; 2]) -> Result<Option<(Across, Across)>, Refused> {
+    pub fn trace(&self, at: [f64; 2]) -> Result<Option<(Across, Across)>, RefusedChange> {
         if !at.iter().all(|c| (0.0..=1.0).contains(c)) {
             return Err(refused("places of the picture are 0 to 1 from its upper left corner"));
         }
         let shared = self.lock();
-        let view: Option<Arc<Traced>> = shared.frame.as_ref().and_then(|f| f.traced.clone());
+        let view: Option<Arc<DeflectionMap>> = shared.frame.as_ref().and_then(|f| f.traced.clone());
         let view = view.ok_or_else(|| refused("the picture is not drawn yet"))?;
         let f2 = shared.scene.optics().schlieren_focal_length_m;
         Ok(traced(&view.map, &view.framing, f2, at))
@@ -420,7 +424,7 @@ impl Session {
         &self,
         kind: SaveKind,
         cancel: Arc<AtomicBool>,
-    ) -> Result<tokio::sync::oneshot::Receiver<Result<Vec<u8>, String>>, Refused> {
+    ) -> Result<tokio::sync::oneshot::Receiver<Result<Vec<u8>, String>>, RefusedChange> {
         const QUEUE: usize = 4;
         let mut shared = self.lock();
         if shared.saves.len() >= QUEUE {
@@ -482,9 +486,9 @@ fn strokes(places: &[[f64; 2]], paint: &Paint) -> Vec<Stroke> {
     strokes
 }
 
-impl Kept {
-    fn of(scene: &Scene) -> Kept {
-        Kept {
+impl TechniqueSettings {
+    fn of(scene: &Scene) -> TechniqueSettings {
+        TechniqueSettings {
             technique: scene.technique.clone(),
             light: scene.light.clone(),
             lenses: scene.lenses,
@@ -494,35 +498,36 @@ impl Kept {
     }
 
     /// What belongs to a technique as it was, or its custom. Framing and colours belong to all.
-    fn bring_back(kept: Option<Kept>, custom: TechniqueSpec, scene: &mut Scene) {
+    fn restore(previous: Option<TechniqueSettings>, custom: TechniqueSpec, scene: &mut Scene) {
         let light = LightSpec {
             wavelengths_nm: scene.light.wavelengths_nm.clone(),
             weights: scene.light.weights.clone(),
             ..LightSpec::default()
         };
-        let kept = kept.unwrap_or(Kept {
+        let previous = previous.unwrap_or(TechniqueSettings {
             technique: custom,
             light,
             lenses: LensSpec::default(),
             film: FilmSpec::default(),
             sampling: None,
         });
-        scene.light.source = kept.light.source;
-        scene.light.beams = if kept.technique.uses_source() { kept.light.beams } else { BeamsSpec::Auto };
-        scene.lenses = kept.lenses;
-        scene.film.focus_m = kept.film.focus_m;
-        scene.film.exposure = kept.film.exposure;
-        scene.sampling = kept.sampling;
-        if !kept.technique.follows_light() {
+        scene.light.source = previous.light.source;
+        scene.light.beams =
+            if previous.technique.uses_source() { previous.light.beams } else { BeamsSpec::Auto };
+        scene.lenses = previous.lenses;
+        scene.film.focus_m = previous.film.focus_m;
+        scene.film.exposure = previous.film.exposure;
+        scene.sampling = previous.sampling;
+        if !previous.technique.follows_light() {
             // They take one wavelength.
             scene.light.wavelengths_nm.truncate(1);
             scene.light.weights.clear();
         }
-        scene.technique = kept.technique;
+        scene.technique = previous.technique;
     }
 }
 
-fn check_limits(scene: &Scene) -> Result<(), Refused> {
+fn check_limits(scene: &Scene) -> Result<(), RefusedChange> {
     let [w, h] = scene.film.size;
     if w > MAX_SIDE || h > MAX_SIDE {
         return Err(refused(format!(

@@ -11,11 +11,11 @@
 
 use super::filter_plane::FilterPlane;
 use super::flow::{Flow, coarse};
-use super::frame::{Frame, FrameInfo, Traced};
+use super::frame::{DeflectionMap, Frame, FrameInfo};
 use super::session::{Save, SaveKind, Session, chain};
 use crate::output;
-use crate::path::Wanted;
-use crate::render::{self, Control, Layers, Map, RenderError, Rendered, TestSection, framing};
+use crate::path::PathQuantities;
+use crate::render::{self, Control, Layers, Map, RenderError, RenderOutput, TestSection, framing};
 use crate::scene::{FlowSpec, MarchSpec, SamplingSpec, Scene, TechniqueSpec, ViewSpec};
 use crate::solids::Solids;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -74,7 +74,7 @@ pub(super) struct Worker {
     /// The section for a flow and wavelengths, and a thinned one.
     section: Option<Section>,
     solids: Option<Solids>,
-    traced: Option<(Geometry, Arc<Traced>)>,
+    traced: Option<(Geometry, Arc<DeflectionMap>)>,
     errors: Option<(Geometry, Errors)>,
     serial: u64,
     moving_side: u32,
@@ -237,10 +237,10 @@ impl Worker {
             let mut of_series = scene.clone();
             of_series.flow.reference_n_minus_1 = self.reference_n_minus_1(scene)?;
             // Bodies are kept where a failure cannot lose them.
-            let mut full = self.flow.section(&of_series, None)?.keeping();
+            let mut full = self.flow.section(&of_series, None)?.with_caches();
             let thin_fields: Option<Vec<_>> = full.fields.iter().map(coarse).collect();
             let thin = match thin_fields {
-                Some(fields) => Some(TestSection::of_fields(scene, fields, None)?.keeping()),
+                Some(fields) => Some(TestSection::of_fields(scene, fields, None)?.with_caches()),
                 None => None,
             };
             full.solids = self.solids.take();
@@ -293,7 +293,7 @@ impl Worker {
         }
     }
 
-    fn render(&mut self, level: &Level) -> Result<Rendered, RenderError> {
+    fn render(&mut self, level: &Level) -> Result<RenderOutput, RenderError> {
         static NEVER: AtomicBool = AtomicBool::new(false);
         let session = self.session.clone();
         let control =
@@ -303,7 +303,7 @@ impl Worker {
     }
 
     /// Deflections of the scene itself where they are known, else of this level.
-    fn traced(&mut self, level: &Level, geometry: &Geometry) -> Result<Arc<Traced>, RenderError> {
+    fn traced(&mut self, level: &Level, geometry: &Geometry) -> Result<Arc<DeflectionMap>, RenderError> {
         if let Some((g, t)) = &self.traced
             && g == geometry
         {
@@ -311,7 +311,7 @@ impl Worker {
         }
         let scene = &level.scene;
         let traced = self.with_section(level.thin, |section| {
-            let planned = section.paths(scene, 0, Wanted { opd: false }, false, false)?;
+            let planned = section.paths(scene, 0, PathQuantities { opd: false }, false, false)?;
             let framing = framing(scene, section);
             let blocked =
                 |s: &crate::path::Start| section.solids.as_ref().is_some_and(|b| b.block(&section.view, s));
@@ -319,7 +319,7 @@ impl Worker {
             let n0 = section.fields[0].n0();
             let map: Map =
                 render::map::map(&*planned.paths, &scene.optics(), &framing, wavelength_m, n0, blocked);
-            Ok::<_, RenderError>(Arc::new(Traced { map, framing }))
+            Ok::<_, RenderError>(Arc::new(DeflectionMap { map, framing }))
         })??;
         if !level.draft {
             self.traced = Some((geometry.clone(), traced.clone()));
@@ -333,7 +333,7 @@ impl Worker {
 
     fn measure(&mut self, scene: &Scene, geometry: &Geometry) -> Result<(), RenderError> {
         let errors = self.with_section(false, |section| {
-            let planned = section.paths(scene, 0, Wanted { opd: false }, false, true)?;
+            let planned = section.paths(scene, 0, PathQuantities { opd: false }, false, true)?;
             Ok::<_, RenderError>(Errors {
                 march_rad: planned.error_rad,
                 resolution_rad: planned.resolution_error_rad,
@@ -347,8 +347,8 @@ impl Worker {
         &mut self,
         scene: &Scene,
         info: FrameInfo,
-        rendered: &Rendered,
-        traced: &Arc<Traced>,
+        rendered: &RenderOutput,
+        traced: &Arc<DeflectionMap>,
     ) -> Result<(), RenderError> {
         let filter = FilterPlane::new(scene, Some(&traced.map))?;
         self.serial += 1;

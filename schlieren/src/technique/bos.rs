@@ -3,13 +3,13 @@
 //! Rays are sent from the camera (far away: a parallel beam) through the flow to the background, which stands at `Optics::focus_m` behind the flow
 //! as the camera sees it; the camera is focused on it. A ray that leaves with the deflection ε at the depth z hits it displaced by
 //! `ξ + ε (focus - z)`: the displacement that correlating the picture with the undisturbed one yields. The paths must be traced against the light
-//! ([`Reversed`]).
+//! ([`ReversedPaths`]).
 //!
 //! The pattern is random dots: one dot per cell of a square lattice, jittered by a hash of the cell, the same at any resolution.
 
 use super::Photon;
 use crate::optics::{Across, Optics};
-use crate::path::{Exit, LeftOut, LightPaths, Start, Wanted};
+use crate::path::{Exit, LightPaths, PathQuantities, SkipReport, Start};
 use crate::view::View;
 
 /// A dotted background seen through the flow.
@@ -81,19 +81,19 @@ fn mix(x: u64) -> u64 {
 
 /// Paths traced against the light, in the frame of the picture.
 ///
-/// `paths` look along the reversed view ([`Reversed::view`]), whose right is the picture's left; this exchanges the signs on the way in and out. Light paths
+/// `paths` look along the reversed view ([`ReversedPaths::view`]), whose right is the picture's left; this exchanges the signs on the way in and out. Light paths
 /// can be reversed, so rays from the camera are the light that reaches it.
-pub struct Reversed<'a> {
+pub struct ReversedPaths<'a> {
     paths: Box<dyn LightPaths + 'a>,
     /// The frame of starts and exits: left-handed, because it is the picture's with the light's direction turned round.
     view: View,
 }
 
-impl<'a> Reversed<'a> {
-    /// `paths` must have been made for [`Reversed::view`] of the picture's view.
-    pub fn new(paths: Box<dyn LightPaths + 'a>) -> Reversed<'a> {
+impl<'a> ReversedPaths<'a> {
+    /// `paths` must have been made for [`ReversedPaths::view`] of the picture's view.
+    pub fn new(paths: Box<dyn LightPaths + 'a>) -> ReversedPaths<'a> {
         let inner = *paths.view();
-        Reversed { paths, view: View { right: -inner.right, ..inner } }
+        ReversedPaths { paths, view: View { right: -inner.right, ..inner } }
     }
 
     /// The view against the light: right and forward negated, up kept, right-handed as before.
@@ -101,7 +101,7 @@ impl<'a> Reversed<'a> {
         View { right: -view.right, forward: -view.forward, ..*view }
     }
 
-    /// Starts of the picture in the frame of [`Reversed::view`].
+    /// Starts of the picture in the frame of [`ReversedPaths::view`].
     pub fn starts(starts: &[Start]) -> Vec<Start> {
         let mirror = |s: &Start| Start { position_m: mirrored(s.position_m), tilt_rad: mirrored(s.tilt_rad) };
         starts.iter().map(mirror).collect()
@@ -112,9 +112,9 @@ fn mirrored([x, y]: Across) -> Across {
     [-x, y]
 }
 
-impl LightPaths for Reversed<'_> {
+impl LightPaths for ReversedPaths<'_> {
     fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
-        self.paths.trace(&Reversed::starts(starts), exits);
+        self.paths.trace(&ReversedPaths::starts(starts), exits);
         for e in exits {
             e.deflection_rad = mirrored(e.deflection_rad);
             e.displacement_m = mirrored(e.displacement_m);
@@ -125,7 +125,7 @@ impl LightPaths for Reversed<'_> {
         &self.view
     }
 
-    fn wanted(&self) -> Wanted {
+    fn wanted(&self) -> PathQuantities {
         self.paths.wanted()
     }
 
@@ -133,12 +133,12 @@ impl LightPaths for Reversed<'_> {
         self.paths.difference_step_m()
     }
 
-    fn trouble(&self) -> Option<String> {
-        self.paths.trouble()
+    fn device_warning(&self) -> Option<String> {
+        self.paths.device_warning()
     }
 
-    fn left_out(&self) -> Option<LeftOut> {
-        self.paths.left_out()
+    fn skip_report(&self) -> Option<SkipReport> {
+        self.paths.skip_report()
     }
 }
 
@@ -184,10 +184,10 @@ mod tests {
     #[test]
     fn against_the_light_left_is_right() {
         let v = View::along(crate::view::Axis::Z, glam::DVec3::ZERO);
-        let r = Reversed::view(&v);
+        let r = ReversedPaths::view(&v);
         assert_eq!((r.right.cross(r.up), r.forward), (-v.forward, -v.forward));
         // A prism that deflects towards the reversed frame's right deflects to the picture's left.
-        let reversed = Reversed::new(Box::new(ClosedForm::prism([1e-3, 2e-3])));
+        let reversed = ReversedPaths::new(Box::new(ClosedForm::prism([1e-3, 2e-3])));
         let mut exit = [Exit::UNDISTURBED];
         reversed.trace(&[Start::default()], &mut exit);
         assert_eq!(exit[0].deflection_rad, [-1e-3, 2e-3]);

@@ -68,7 +68,7 @@ fn refusals_say_why_and_change_nothing() {
         (json!({"flow": {"multifield": {"fields": {"u": {"knots": [[0, 0]]}}}}}), "there is no array `u`"),
         (json!({"flow": {"multifield": {"fields": {"T": {"knots": [[1, 0], [0, 0]]}}}}}), "multifield `T`"),
     ] {
-        let Refused(text) = s.edit(&patch).unwrap_err();
+        let RefusedChange(text) = s.edit(&patch).unwrap_err();
         assert!(text.contains(word), "{patch}: {text}");
     }
     assert_eq!(scene(&s), before);

@@ -20,7 +20,7 @@ pub(super) struct Failure {
 }
 
 /// Something that traces batches of rays while its caller prepares the next, and may fail.
-pub(super) trait Batches {
+pub(super) trait BatchTracer {
     /// A batch on its way.
     type Pending;
 
@@ -40,26 +40,26 @@ pub(super) trait Batches {
 }
 
 /// The march that stands in, and why it had to.
-pub(super) struct FallBack<'a> {
+pub(super) struct CpuFallback<'a> {
     make: Box<dyn Fn() -> Box<dyn LightPaths + Send + 'a> + Send + Sync + 'a>,
     made: OnceLock<Box<dyn LightPaths + Send + 'a>>,
     /// The first failure.
     cause: OnceLock<GpuError>,
     /// Why no other device took its place.
-    no_other: OnceLock<GpuError>,
+    reopen_error: OnceLock<GpuError>,
     repeated: AtomicU64,
     rays: AtomicU64,
 }
 
-impl<'a> FallBack<'a> {
+impl<'a> CpuFallback<'a> {
     /// `make` is called once, if ever, with rayon's workers waiting for it: it must not wait for
     /// rayon, where a worker that waits takes other jobs, whose batches fail as well.
-    fn new(make: impl Fn() -> Box<dyn LightPaths + Send + 'a> + Send + Sync + 'a) -> FallBack<'a> {
-        FallBack {
+    fn new(make: impl Fn() -> Box<dyn LightPaths + Send + 'a> + Send + Sync + 'a) -> CpuFallback<'a> {
+        CpuFallback {
             make: Box::new(make),
             made: OnceLock::new(),
             cause: OnceLock::new(),
-            no_other: OnceLock::new(),
+            reopen_error: OnceLock::new(),
             repeated: AtomicU64::new(0),
             rays: AtomicU64::new(0),
         }
@@ -71,8 +71,8 @@ impl<'a> FallBack<'a> {
         view: View,
         interpolant: Interpolant,
         options: Options,
-    ) -> FallBack<'a> {
-        FallBack::new(move || Box::new(Deviational::on_this_thread(field, view, interpolant, options)))
+    ) -> CpuFallback<'a> {
+        CpuFallback::new(move || Box::new(Deviational::on_this_thread(field, view, interpolant, options)))
     }
 
     /// Rays that it traced.
@@ -86,22 +86,25 @@ impl<'a> FallBack<'a> {
     }
 
     /// The first failure and what was done, for who looks at the result.
-    pub(super) fn trouble(&self) -> Option<String> {
+    pub(super) fn device_warning(&self) -> Option<String> {
         let cause = self.cause.get()?;
         let again = self.repeated() > 0;
-        let no_other = self.no_other.get().filter(|e| *e != cause);
+        let reopen_error = self.reopen_error.get().filter(|e| *e != cause);
         Some(match (again, self.rays() > 0) {
-            (false, _) => match no_other {
-                None => super::made_up_for(cause),
-                Some(e) => format!("{} ({e})", super::made_up_for(cause)),
+            (false, _) => match reopen_error {
+                None => super::fallback_message(cause),
+                Some(e) => format!("{} ({e})", super::fallback_message(cause)),
             },
             (true, false) => {
-                format!("{}; it was opened again and traced once more what it had lost", super::failed(cause))
+                format!(
+                    "{}; it was opened again and traced once more what it had lost",
+                    super::failure_message(cause)
+                )
             }
             (true, true) => format!(
                 "{}; it was opened again and traced once more what it had lost, until {}; what it left then was computed on the CPU",
-                super::failed(cause),
-                no_other.unwrap_or(cause)
+                super::failure_message(cause),
+                reopen_error.unwrap_or(cause)
             ),
         })
     }
@@ -109,7 +112,7 @@ impl<'a> FallBack<'a> {
     /// Traces all rays in batches, one being prepared while the device works on the one before.
     pub(super) fn trace(
         &self,
-        device: &impl Batches,
+        device: &impl BatchTracer,
         batch: usize,
         starts: &[Start],
         exits: &mut [Exit],
@@ -132,7 +135,7 @@ impl<'a> FallBack<'a> {
         }
     }
 
-    fn finish<D: Batches>(
+    fn finish<D: BatchTracer>(
         &self,
         device: &D,
         pending: D::Pending,
@@ -149,7 +152,7 @@ impl<'a> FallBack<'a> {
     /// the CPU.
     fn repeat(
         &self,
-        device: &impl Batches,
+        device: &impl BatchTracer,
         mut failure: Failure,
         starts: &[Start],
         exits: &mut [Exit],
@@ -159,8 +162,8 @@ impl<'a> FallBack<'a> {
         let _ = self.cause.set(failure.error.clone());
         loop {
             if let Err(why) = device.replace(&failure) {
-                let _ = self.no_other.set(why);
-                return self.stand_in(starts, exits, parallel);
+                let _ = self.reopen_error.set(why);
+                return self.cpu_fallback(starts, exits, parallel);
             }
             let pending = device.submit(starts, parallel);
             match pending.and_then(|pending| device.finish(pending, exits, parallel)) {
@@ -173,7 +176,7 @@ impl<'a> FallBack<'a> {
         }
     }
 
-    fn stand_in(&self, starts: &[Start], exits: &mut [Exit], parallel: bool) {
+    fn cpu_fallback(&self, starts: &[Start], exits: &mut [Exit], parallel: bool) {
         self.rays.fetch_add(starts.len() as u64, Ordering::Relaxed);
         let cpu = self.made.get_or_init(|| (self.make)());
         if parallel {
@@ -187,7 +190,7 @@ impl<'a> FallBack<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::path::Wanted;
+    use crate::path::PathQuantities;
     use crate::testing::{with_late_jobs, within};
     use glam::DVec3;
     use std::sync::Arc;
@@ -206,8 +209,8 @@ mod tests {
         fn view(&self) -> &View {
             &self.0
         }
-        fn wanted(&self) -> Wanted {
-            Wanted::default()
+        fn wanted(&self) -> PathQuantities {
+            PathQuantities::default()
         }
         fn difference_step_m(&self) -> f64 {
             1e-3
@@ -249,7 +252,7 @@ mod tests {
         }
     }
 
-    impl Batches for Fails {
+    impl BatchTracer for Fails {
         type Pending = Vec<Start>;
         fn submit(&self, starts: &[Start], _: bool) -> Result<Vec<Start>, Failure> {
             self.call(true).map(|()| starts.to_vec())
@@ -284,16 +287,16 @@ mod tests {
         {
             for parallel in [false, true] {
                 let device = Fails::new(in_submit, at, 0);
-                let fall_back = FallBack::new(|| Box::new(bends(1.0)));
+                let cpu_fallback_paths = CpuFallback::new(|| Box::new(bends(1.0)));
                 let mut exits = vec![Exit { deflection_rad: [f32::NAN; 2], ..Exit::UNDISTURBED }; 95];
-                fall_back.trace(&device, 10, &starts, &mut exits, parallel);
+                cpu_fallback_paths.trace(&device, 10, &starts, &mut exits, parallel);
                 let by_device = (10 * at as usize).min(95);
                 for (i, (s, e)) in starts.iter().zip(&exits).enumerate() {
                     let by = if i < by_device { 2.0 } else { 1.0 };
                     assert_eq!(e.deflection_rad, s.position_m.map(|p| p * by), "ray {i}, failing at {at}");
                 }
-                assert_eq!(fall_back.rays(), 95 - by_device as u64);
-                match fall_back.trouble() {
+                assert_eq!(cpu_fallback_paths.rays(), 95 - by_device as u64);
+                match cpu_fallback_paths.device_warning() {
                     None => assert_eq!(by_device, 95),
                     Some(told) => {
                         let cause = format!("out of memory, call {}", at + 1);
@@ -313,14 +316,18 @@ mod tests {
         for in_submit in [true, false] {
             for at in [1, 2, 5, 9] {
                 let device = Fails::new(in_submit, at, 100);
-                let fall_back = FallBack::new(|| Box::new(bends(1.0)));
+                let cpu_fallback_paths = CpuFallback::new(|| Box::new(bends(1.0)));
                 let mut exits = vec![Exit { deflection_rad: [f32::NAN; 2], ..Exit::UNDISTURBED }; 95];
-                fall_back.trace(&device, 10, &starts, &mut exits, false);
+                cpu_fallback_paths.trace(&device, 10, &starts, &mut exits, false);
                 for (i, (s, e)) in starts.iter().zip(&exits).enumerate() {
                     assert_eq!(e.deflection_rad, s.position_m.map(|p| p * 2.0), "ray {i}, failing at {at}");
                 }
-                assert!(fall_back.rays() == 0 && fall_back.repeated() >= 5, "{}", fall_back.repeated());
-                let told = fall_back.trouble().unwrap();
+                assert!(
+                    cpu_fallback_paths.rays() == 0 && cpu_fallback_paths.repeated() >= 5,
+                    "{}",
+                    cpu_fallback_paths.repeated()
+                );
+                let told = cpu_fallback_paths.device_warning().unwrap();
                 for word in ["Lamp 9", &format!("out of memory, call {}", at + 1), "opened again"] {
                     assert!(told.contains(word), "{word}: {told}");
                 }
@@ -336,16 +343,16 @@ mod tests {
             (0..95).map(|i| Start { position_m: [i as f32, -1.0], ..Start::default() }).collect();
         for (in_submit, at) in [(true, 0), (true, 1), (false, 0), (false, 2)] {
             let device = Fails::new(in_submit, at, 3);
-            let fall_back = FallBack::new(|| Box::new(bends(1.0)));
+            let cpu_fallback_paths = CpuFallback::new(|| Box::new(bends(1.0)));
             let mut exits = vec![Exit { deflection_rad: [f32::NAN; 2], ..Exit::UNDISTURBED }; 95];
-            fall_back.trace(&device, 10, &starts, &mut exits, false);
+            cpu_fallback_paths.trace(&device, 10, &starts, &mut exits, false);
             let on_cpu =
                 starts.iter().zip(&exits).filter(|(s, e)| e.deflection_rad == s.position_m).count() as u64;
             assert!(exits.iter().all(|e| !e.deflection_rad[0].is_nan()));
-            assert_eq!(fall_back.rays(), on_cpu);
+            assert_eq!(cpu_fallback_paths.rays(), on_cpu);
             assert_eq!(device.present.load(Ordering::Relaxed), 3);
-            assert!(on_cpu > 0 && (at > 0) == (fall_back.repeated() > 0), "{on_cpu}");
-            let told = fall_back.trouble().unwrap();
+            assert!(on_cpu > 0 && (at > 0) == (cpu_fallback_paths.repeated() > 0), "{on_cpu}");
+            let told = cpu_fallback_paths.device_warning().unwrap();
             for word in ["Lamp 9", "opened again 3 times", "on the CPU"] {
                 assert!(told.contains(word), "{word}: {told}");
             }
@@ -376,12 +383,13 @@ mod tests {
             within(Duration::from_secs(120), &format!("{threads} threads"), move || {
                 with_late_jobs(threads, || {
                     let device = Fails::new(true, 0, 0);
-                    let fall_back = FallBack::of_march(field, view, Interpolant::BSpline, Options::default());
+                    let cpu_fallback_paths =
+                        CpuFallback::of_march(field, view, Interpolant::BSpline, Options::default());
                     let shared = shared.clone();
                     move |tile| {
                         let of_tile = 64 * tile..64 * (tile + 1);
                         let mut exits = vec![Exit::UNDISTURBED; 64];
-                        fall_back.trace(&device, 16, &shared.0[of_tile.clone()], &mut exits, false);
+                        cpu_fallback_paths.trace(&device, 16, &shared.0[of_tile.clone()], &mut exits, false);
                         // By words: optical paths that were not asked for are NaN.
                         assert_eq!(format!("{exits:?}"), format!("{:?}", &shared.1[of_tile]));
                     }

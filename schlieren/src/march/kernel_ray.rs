@@ -6,7 +6,7 @@ use glam::DVec3;
 
 /// A ray on its way into a kernel.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Prepared {
+pub(crate) struct KernelRay {
     beam: [DVec3; 3],
     exit_depth_m: f64,
     length_m: f64,
@@ -22,7 +22,7 @@ pub(crate) struct Prepared {
 
 /// What a kernel gets of a ray. Lengths are in units of [`Frame::unit_m`].
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Entry {
+pub(crate) struct KernelInput {
     /// The middle of the undisturbed ray's way through the field, in lattice coordinates. Positions are counted from there because that halves
     /// the largest product, and with it the rounding.
     pub(crate) middle: [f32; 3],
@@ -38,7 +38,7 @@ pub(crate) struct Entry {
 
 /// What a kernel gives back.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Left {
+pub(crate) struct KernelOutput {
     /// Rate of the deviation along the lattice's axes.
     pub(crate) v: [f32; 3],
     /// The deviation, in lattice steps.
@@ -49,12 +49,12 @@ pub(crate) struct Left {
     pub(crate) met: u8,
 }
 
-impl Prepared {
+impl KernelRay {
     /// The undisturbed ray of a start. `known` is as for [`Frame::undisturbed`].
-    pub(crate) fn new(frame: &Frame, start: &Start, known: &mut Option<([f32; 2], [DVec3; 3])>) -> Prepared {
+    pub(crate) fn new(frame: &Frame, start: &Start, known: &mut Option<([f32; 2], [DVec3; 3])>) -> KernelRay {
         let ray = frame.undisturbed(start, known);
         let length_m = ray.range_m[1] - ray.range_m[0];
-        Prepared {
+        KernelRay {
             beam: ray.beam,
             exit_depth_m: ray.range_m[1],
             length_m,
@@ -81,9 +81,9 @@ impl Prepared {
     }
 
     /// What the kernel gets of a ray that meets the field and takes this many steps.
-    pub(crate) fn entry(&mut self, frame: &Frame, steps: u32) -> Entry {
+    pub(crate) fn entry(&mut self, frame: &Frame, steps: u32) -> KernelInput {
         let h = frame.spacing_m / frame.unit_m;
-        let mut e = Entry::default();
+        let mut e = KernelInput::default();
         for c in 0..3 {
             e.middle[c] = self.middle[c] as f32;
             self.rest[c] = self.middle[c] - f64::from(e.middle[c]);
@@ -98,23 +98,23 @@ impl Prepared {
     }
 
     /// What the kernel left, as an exit.
-    pub(crate) fn exit(&self, frame: &Frame, n0: f64, blank: BlankCells, left: &Left) -> Exit {
+    pub(crate) fn exit(&self, frame: &Frame, n0: f64, blank: BlankCells, output: &KernelOutput) -> Exit {
         let [right, up, _] = self.beam;
         let h = frame.spacing_m / frame.unit_m;
-        let u = DVec3::from([0, 1, 2].map(|c| f64::from(left.v[c]) * h[c])) * self.scale;
+        let u = DVec3::from([0, 1, 2].map(|c| f64::from(output.v[c]) * h[c])) * self.scale;
         let xi = if self.meets_field() {
-            let xi = [0, 1, 2].map(|c| (f64::from(left.xi[c]) - f64::from(self.rest[c] as f32)) * h[c]);
+            let xi = [0, 1, 2].map(|c| (f64::from(output.xi[c]) - f64::from(self.rest[c] as f32)) * h[c]);
             DVec3::from(xi) * (self.scale * self.scale * frame.unit_m)
         } else {
             DVec3::ZERO
         };
-        let (transmission, status) = blank.fate(left.met);
+        let (transmission, status) = blank.outcome(output.met);
         let opd_m = |opd: f32| (f64::from(opd) * self.scale * frame.unit_m * n0) as f32;
         Exit {
             deflection_rad: [u.dot(right) as f32, u.dot(up) as f32],
             displacement_m: [xi.dot(right) as f32, xi.dot(up) as f32],
             exit_depth_m: self.exit_depth_m as f32,
-            opd_m: left.opd.map_or(f32::NAN, opd_m),
+            opd_m: output.opd.map_or(f32::NAN, opd_m),
             transmission,
             status,
         }

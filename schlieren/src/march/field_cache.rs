@@ -3,8 +3,8 @@
 use super::{BlankCells, LineOfSight};
 use crate::field::Field;
 use crate::interpolate::{BSpline, Interpolant};
-use crate::path::Wanted;
-use crate::plan::Roughness;
+use crate::path::PathQuantities;
+use crate::plan::DerivativeBounds;
 use crate::view::View;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -14,8 +14,8 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 /// rayon may take another job that asks for the same. Who asks at the same time as another makes it
 /// twice, and all keep the first.
 #[derive(Default)]
-pub struct Kept {
-    roughness: OnceLock<Roughness>,
+pub struct FieldCache {
+    derivative_bounds: OnceLock<DerivativeBounds>,
     spline: OnceLock<Arc<BSpline>>,
     /// The newest last.
     projections: Mutex<Vec<(Projection, Arc<LineOfSight>)>>,
@@ -29,7 +29,7 @@ pub struct Projection {
     /// For oblique views.
     pub interpolant: Interpolant,
     /// What exits hold.
-    pub wanted: Wanted,
+    pub wanted: PathQuantities,
     /// What becomes of light in cells without data.
     pub blank: BlankCells,
 }
@@ -37,15 +37,15 @@ pub struct Projection {
 /// A picture and its map can differ in what they want, and in the direction of the rays.
 const PROJECTIONS: usize = 2;
 
-impl Kept {
+impl FieldCache {
     /// The field's largest derivatives.
-    pub fn roughness(&self, field: &Field) -> Roughness {
-        kept(&self.roughness, || Roughness::of(field))
+    pub fn derivative_bounds(&self, field: &Field) -> DerivativeBounds {
+        get_or_make(&self.derivative_bounds, || DerivativeBounds::of(field))
     }
 
     /// The spline through the field.
     pub fn spline(&self, field: &Field) -> Arc<BSpline> {
-        kept(&self.spline, || Arc::new(BSpline::new(field)))
+        get_or_make(&self.spline, || Arc::new(BSpline::new(field)))
     }
 
     /// The field projected along a view.
@@ -71,7 +71,7 @@ impl Kept {
 }
 
 /// What is in the cell; made outside of it when nothing is.
-fn kept<T: Clone>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> T {
+fn get_or_make<T: Clone>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> T {
     if let Some(made) = cell.get() {
         return made.clone();
     }
@@ -101,16 +101,16 @@ mod tests {
                 let name = format!("preparation {what} on {threads} threads");
                 within(Duration::from_secs(120), &name, move || {
                     with_late_jobs(threads, || {
-                        let (field, kept) = (field.clone(), Kept::default());
+                        let (field, cache) = (field.clone(), FieldCache::default());
                         move |_| match what {
-                            0 => drop(kept.spline(&field)),
-                            1 => assert!(kept.roughness(&field).gradient > 0.0),
-                            _ => drop(kept.line_of_sight(
+                            0 => drop(cache.spline(&field)),
+                            1 => assert!(cache.derivative_bounds(&field).gradient > 0.0),
+                            _ => drop(cache.line_of_sight(
                                 &field,
                                 Projection {
                                     view: view[what - 2],
                                     interpolant: Interpolant::Trilinear,
-                                    wanted: Wanted::default(),
+                                    wanted: PathQuantities::default(),
                                     blank: BlankCells::Opaque,
                                 },
                             )),
@@ -124,21 +124,21 @@ mod tests {
     #[test]
     fn what_is_kept_is_made_once_and_projections_are_few() {
         let field = Field::from_fn([8; 3], [0.1; 3], DVec3::ZERO, 1.0, |p| 1e-4 * p.x * p.y).unwrap();
-        let kept = Kept::default();
+        let cache = FieldCache::default();
         let of = |axis| Projection {
             view: View::along(axis, field.centre_m()),
             interpolant: Interpolant::BSpline,
-            wanted: Wanted::default(),
+            wanted: PathQuantities::default(),
             blank: BlankCells::Opaque,
         };
-        assert!(Arc::ptr_eq(&kept.spline(&field), &kept.spline(&field)));
-        let x = kept.line_of_sight(&field, of(Axis::X));
+        assert!(Arc::ptr_eq(&cache.spline(&field), &cache.spline(&field)));
+        let x = cache.line_of_sight(&field, of(Axis::X));
         for axis in [Axis::Y, Axis::X] {
-            kept.line_of_sight(&field, of(axis));
+            cache.line_of_sight(&field, of(axis));
         }
-        assert!(Arc::ptr_eq(&x, &kept.line_of_sight(&field, of(Axis::X))));
-        kept.line_of_sight(&field, of(Axis::Z));
-        assert_eq!(kept.projections.lock().unwrap().len(), PROJECTIONS);
-        assert!(!Arc::ptr_eq(&x, &kept.line_of_sight(&field, of(Axis::X))), "the oldest goes first");
+        assert!(Arc::ptr_eq(&x, &cache.line_of_sight(&field, of(Axis::X))));
+        cache.line_of_sight(&field, of(Axis::Z));
+        assert_eq!(cache.projections.lock().unwrap().len(), PROJECTIONS);
+        assert!(!Arc::ptr_eq(&x, &cache.line_of_sight(&field, of(Axis::X))), "the oldest goes first");
     }
 }

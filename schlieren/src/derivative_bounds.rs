@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 /// Largest values in a field, per metre.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Roughness {
+pub struct DerivativeBounds {
     /// |grad eps|.
     pub gradient: f64,
     /// The same on the field's faces, where oblique views see edges.
@@ -74,18 +74,18 @@ struct Row {
 
 const ALONG_AXES: usize = 4;
 
-impl Roughness {
+impl DerivativeBounds {
     /// One pass over the lattice, in parallel.
-    pub fn of(field: &Field) -> Roughness {
+    pub fn of(field: &Field) -> DerivativeBounds {
         let [nx, ny, nz] = field.dims();
         (0..ny * nz)
             .into_par_iter()
             .map_init(Row::default, |row, r| row.of(field, r % ny, r / ny, nx))
-            .reduce(Roughness::default, Roughness::larger)
+            .reduce(DerivativeBounds::default, DerivativeBounds::larger)
     }
 
-    fn larger(self, other: Roughness) -> Roughness {
-        Roughness {
+    fn larger(self, other: DerivativeBounds) -> DerivativeBounds {
+        DerivativeBounds {
             gradient: self.gradient.max(other.gradient),
             gradient_on_faces: self.gradient_on_faces.max(other.gradient_on_faces),
             second: self.second.max(other.second),
@@ -101,7 +101,7 @@ impl Row {
     /// The largest values of the row of nodes at (j, k). Differences that would reach beyond the
     /// last node are those of the last nodes, so that every node has all that the lattice has room
     /// for.
-    fn of(&mut self, field: &Field, j: usize, k: usize, nx: usize) -> Roughness {
+    fn of(&mut self, field: &Field, j: usize, k: usize, nx: usize) -> DerivativeBounds {
         let (eps, dims) = (field.eps(), field.dims());
         let per_m = field.spacing_m().map(|h| 1.0 / h);
         for s in &mut self.squares {
@@ -139,7 +139,7 @@ impl Row {
         let on_face = j == 0 || j + 1 == dims[1] || k == 0 || k + 1 == dims[2];
         let ends = self.squares[0][0].max(self.squares[0][nx - 1]).sqrt();
         let nodes = &eps[(k * dims[1] + j) * nx..][..nx];
-        Roughness {
+        DerivativeBounds {
             gradient,
             gradient_on_faces: if on_face { gradient } else { ends },
             second: largest(&self.squares[1]),
@@ -193,7 +193,7 @@ mod tests {
         let of = |f: fn(DVec3) -> f64| {
             let (dims, spacing) = ([9, 8, 7], [0.25, 0.5, 0.125]);
             // Powers of two: f32 holds the values exactly.
-            Roughness::of(&Field::from_fn(dims, spacing, DVec3::ZERO, 1.0, |p| f(p) / 4096.0).unwrap())
+            DerivativeBounds::of(&Field::from_fn(dims, spacing, DVec3::ZERO, 1.0, |p| f(p) / 4096.0).unwrap())
         };
         let near = |a: f64, b: f64| (a * 4096.0 - b).abs() < 1e-6 * b.max(1.0);
         let r = of(|p| p.x * p.y);
@@ -218,7 +218,7 @@ mod tests {
     fn lattices_of_two_nodes_along_an_axis_have_no_more_than_a_slope_there() {
         for dims in [[2, 9, 9], [9, 2, 9], [9, 9, 2], [2, 2, 2]] {
             let f = Field::from_fn(dims, [1.0; 3], DVec3::ZERO, 1.0, |p| (p.x + p.y * p.z) / 4096.0).unwrap();
-            let r = Roughness::of(&f);
+            let r = DerivativeBounds::of(&f);
             assert!(r.gradient >= 1.0 / 4096.0 && (r.second * 4096.0 - 2f64.sqrt()).abs() < 1e-6, "{r:?}");
             assert!(r.third * 4096.0 < 1e-6, "{r:?}");
         }

@@ -1,0 +1,115 @@
+//! A walk along rays that collects what the medium does to light on the way.
+
+use super::{Media, MediaIntegrals, Property, Volume};
+use crate::field::{Field, Node};
+use crate::interpolate::{BSpline, Trilinear};
+use crate::march::{BlankCells, Frame};
+use crate::plan::Mode;
+use crate::view::View;
+use fearless_simd::Level;
+
+/// How the walk's rays bend.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Bend {
+    /// Not at all, as line of sight.
+    Straight,
+    /// As light in gases: `f32`, sixteen rays at a time, by the trilinear gradient of eps.
+    Paraxial,
+    /// As light in lenses and liquids: `f64`, PEFRL, by the gradient of the spline.
+    Full,
+}
+
+impl From<Mode> for Bend {
+    fn from(mode: Mode) -> Bend {
+        match mode {
+            Mode::LineOfSight => Bend::Straight,
+            Mode::Paraxial => Bend::Paraxial,
+            Mode::Full => Bend::Full,
+        }
+    }
+}
+
+pub(super) enum BendField<'a> {
+    Straight,
+    Paraxial(Trilinear<'a>),
+    Full(BSpline),
+}
+
+/// Collects [`MediaIntegrals`] along rays of a view.
+pub struct MediaIntegrator<'a> {
+    pub(super) field: &'a Field,
+    pub(super) frame: Frame,
+    pub(super) wanted: [Option<&'a Volume>; 3],
+    pub(super) blank: BlankCells,
+    pub(super) step_voxels: f64,
+    pub(super) bend_field: BendField<'a>,
+    pub(super) level: Level,
+}
+
+impl<'a> MediaIntegrator<'a> {
+    /// Through `field` with `media`, as far as they are `wanted`. `step_voxels` is the march's step; it is shortened where a property's lattice is finer than
+    /// the field's.
+    pub fn new(
+        field: &'a Field,
+        view: View,
+        media: &'a Media,
+        wanted: &[Property],
+        bend: Bend,
+        step_voxels: f64,
+        blank: BlankCells,
+    ) -> MediaIntegrator<'a> {
+        let frame = Frame::new(field, view);
+        let wanted = Property::ALL.map(|p| media.get(p).filter(|_| wanted.contains(&p)));
+        let finest = wanted.iter().flatten().map(|v| (v.spacing_m / frame.spacing_m).min_element());
+        let step_voxels = step_voxels * finest.fold(1.0, f64::min);
+        let bend_field = match bend {
+            Bend::Straight => BendField::Straight,
+            Bend::Paraxial => BendField::Paraxial(Trilinear::new(field)),
+            Bend::Full => BendField::Full(BSpline::new(field)),
+        };
+        let step_voxels = if bend == Bend::Full { step_voxels } else { step_voxels.min(1.0) };
+        MediaIntegrator { field, frame, wanted, blank, step_voxels, bend_field, level: Level::new() }
+    }
+
+    /// The view in whose frame starts are given.
+    pub fn view(&self) -> &View {
+        &self.frame.view
+    }
+
+    /// Whether a node of this kind is where the walk ends.
+    pub(super) fn stops(&self, kind: u8) -> bool {
+        kind == Node::Solid as u8 || (kind != Node::Gas as u8 && self.blank == BlankCells::Opaque)
+    }
+}
+
+/// Sums of one ray, in `f64`: hundreds of small terms.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Sums {
+    optical_depth: f64,
+    emission: f64,
+    rotation_rad: f64,
+}
+
+impl Sums {
+    /// A piece of path of `length_m` with even values of the properties, in the order of [`Property::ALL`].
+    #[inline(always)]
+    pub(super) fn add(&mut self, values: [f32; 3], length_m: f64) {
+        let [absorption, emission, rotation] = values.map(f64::from);
+        let depth = absorption * length_m;
+        if emission != 0.0 {
+            // Of the light that the piece emits, (1 - exp(-a))/a leaves it, and exp(-τ) of that reaches the eye.
+            let leaves = if depth == 0.0 { 1.0 } else { -(-depth).exp_m1() / depth };
+            self.emission += emission * length_m * leaves * (-self.optical_depth).exp();
+        }
+        self.optical_depth += depth;
+        self.rotation_rad += rotation * length_m;
+    }
+
+    pub(super) fn rounded(self) -> MediaIntegrals {
+        MediaIntegrals {
+            optical_depth: self.optical_depth as f32,
+            emission: self.emission as f32,
+            rotation_rad: self.rotation_rad as f32,
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! Light paths with what is known of their accuracy.
+use crate::interpolate::Interpolant;
+use crate::media::Bend;
+use crate::path::LightPaths;
+use crate::plan::MeasuredError;
+use crate::technique::bos::ReversedPaths;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Paths of light through one of the fields, and what is known of their accuracy.
+pub struct PlannedPaths<'a> {
+    /// The paths.
+    pub paths: Box<dyn LightPaths + 'a>,
+    /// The march, the interpolant and the step, in words.
+    pub description: String,
+    /// Measured error of a deflection by march, interpolant and step; `None` when it was not to be measured, or the march is one for comparison.
+    pub error_rad: Option<f64>,
+    /// Estimate of what the flow's own lattice leaves open.
+    pub resolution_error_rad: Option<f64>,
+    /// What should be known, a sentence each.
+    pub warnings: Vec<String>,
+    /// How the paths bend, and their step: for what goes the same way beside them.
+    pub(super) bend: Bend,
+    pub(super) step_voxels: f64,
+    /// Rays that were walked for what the medium does to their light.
+    pub(super) media_rays: Arc<AtomicU64>,
+}
+
+impl<'a> PlannedPaths<'a> {
+    pub(super) fn new(
+        paths: Box<dyn LightPaths + 'a>,
+        description: String,
+        achieved: Option<MeasuredError>,
+        tolerance_rad: f64,
+        (bend, step_voxels): (Bend, f64),
+    ) -> PlannedPaths<'a> {
+        let mut warnings = Vec::new();
+        if let Some(a) = achieved.filter(|a| a.max_rad > tolerance_rad) {
+            warnings.push(format!(
+                "deflections are off by up to {:.1e} rad, above the tolerance of {tolerance_rad:.1e} rad; the flow has structures that its lattice does not resolve: smooth shocks (flow.smoothing_nodes) or take a finer lattice",
+                a.max_rad
+            ));
+        }
+        if let Some(a) = achieved.filter(|a| a.resolution_rad.is_finite() && a.resolution_rad > tolerance_rad)
+        {
+            warnings.push(format!(
+                "the flow's own lattice leaves deflections open by about {:.1e} rad, above the tolerance of {tolerance_rad:.1e} rad, whatever march is taken: take a finer lattice, smooth shocks (flow.smoothing_nodes), or ask for less (march.tolerance_rad)",
+                a.resolution_rad
+            ));
+        }
+        PlannedPaths {
+            paths,
+            description,
+            error_rad: achieved.map(|a| a.max_rad),
+            resolution_error_rad: achieved.map(|a| a.resolution_rad).filter(|r| r.is_finite()),
+            warnings,
+            bend,
+            step_voxels,
+            media_rays: Arc::default(),
+        }
+    }
+
+    /// Rays that were walked through media since this was last asked.
+    pub(super) fn take_media_rays(&self) -> u64 {
+        self.media_rays.swap(0, Ordering::Relaxed)
+    }
+
+    /// The same, seen from the film when `against_light`.
+    pub(super) fn seen(self, against_light: bool) -> PlannedPaths<'a> {
+        let paths = self.paths;
+        let paths =
+            if against_light { Box::new(ReversedPaths::new(paths)) as Box<dyn LightPaths> } else { paths };
+        PlannedPaths { paths, ..self }
+    }
+}
+
+pub(super) fn described(name: &str, interpolant: Interpolant, step_voxels: f64) -> String {
+    let interpolant = match interpolant {
+        Interpolant::BSpline => "b-spline",
+        Interpolant::Trilinear => "trilinear",
+        Interpolant::TrilinearGradient => "trilinear-gradient",
+    };
+    match name {
+        "line-of-sight" => format!("line-of-sight, {interpolant}"),
+        _ => format!("{name}, {interpolant}, steps of {step_voxels} voxel"),
+    }
+}
