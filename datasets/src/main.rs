@@ -1,0 +1,10 @@
+//! The program `datasets`: names, generates, describes and converts data sets.
+#![forbid(unsafe_code)]
+
+mod program;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    program::main()
+}

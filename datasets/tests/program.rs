@@ -1,0 +1,126 @@
+//! The program `datasets` as its users start it: what it prints, what it writes, how it ends.
+#![cfg(feature = "program")]
+
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn datasets(dir: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_datasets"))
+        .current_dir(dir)
+        .args(args)
+        .output()
+        .expect("the program starts")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// The JSON that a successful run prints.
+fn json(dir: &Path, args: &[&str]) -> Value {
+    let out = datasets(dir, &[&["--json", "--quiet"], args].concat());
+    assert_eq!(out.status.code(), Some(0), "{args:?}: {}", text(&out.stderr));
+    serde_json::from_slice(&out.stdout).unwrap_or_else(|e| panic!("{args:?}: {e}: {}", text(&out.stdout)))
+}
+
+fn arrays(info: &Value) -> Vec<&str> {
+    let arrays = info["parts"][0]["arrays"].as_array().expect("arrays");
+    arrays.iter().map(|a| a["name"].as_str().expect("a name")).collect()
+}
+
+#[test]
+fn list_names_meshes_lines_and_flows_with_their_sizes() {
+    let dir = tempfile::tempdir().unwrap();
+    let list = json(dir.path(), &["list"]);
+    let find = |name: &str| list.as_array().unwrap().iter().find(|e| e["name"] == name).cloned();
+    for (name, kind) in [("wavelet", "mesh"), ("star", "lines"), ("wedge", "flow")] {
+        let entry = find(name).unwrap_or_else(|| panic!("{name} is missing from {list}"));
+        assert_eq!(entry["kind"], kind, "{name}");
+        assert!(entry["sizes"][0]["elements"].as_u64() > Some(0), "{name}");
+    }
+    let lines = text(&datasets(dir.path(), &["list"]).stdout);
+    assert!(lines.lines().any(|l| l.starts_with("wavelet ") && l.contains("mesh")), "{lines}");
+}
+
+#[test]
+fn a_mesh_is_made_described_and_converted_without_losing_a_triangle() {
+    let dir = tempfile::tempdir().unwrap();
+    let made = json(dir.path(), &["make", "icosphere", "--size", "small", "-o", "ball.vtp"]);
+    assert_eq!((&made["kind"], made["cells"].as_u64()), (&"PolyData".into(), Some(1280)));
+    let mut last = "ball.vtp";
+    for next in ["ball.ply", "ball.obj", "ball.glb", "again.vtp"] {
+        json(dir.path(), &["convert", last, next]);
+        let info = json(dir.path(), &["info", next]);
+        assert_eq!(info["cells"].as_u64(), Some(1280), "{last} to {next}: {info}");
+        last = next;
+    }
+}
+
+#[test]
+fn a_flow_keeps_its_fields_and_has_an_isosurface() {
+    let dir = tempfile::tempdir().unwrap();
+    let made = json(dir.path(), &["make", "wedge", "-o", "wedge.vti", "--compress"]);
+    assert_eq!((&made["size"], &made["kind"]), (&"tiny".into(), &"ImageData".into()));
+    let info = json(dir.path(), &["info", "wedge.vti"]);
+    assert!(arrays(&info).contains(&"density"), "{info}");
+    let density = &info["parts"][0]["arrays"][0];
+    let [low, high] = [0, 1].map(|i| density["range"][i].as_f64().unwrap());
+    let middle = format!("{}", 0.5 * (low + high));
+    let shock =
+        json(dir.path(), &["convert", "wedge.vti", "shock.ply", "--isovalue", &middle, "--array", "density"]);
+    assert!(shock["cells"].as_u64() > Some(0), "{shock}");
+    let outside = format!("{}", high + 1.0);
+    let out = datasets(dir.path(), &["convert", "wedge.vti", "none.ply", "--isovalue", &outside]);
+    assert_eq!(out.status.code(), Some(1));
+    assert!(text(&out.stderr).contains("cure: "), "{}", text(&out.stderr));
+    assert!(!dir.path().join("none.ply").exists());
+}
+
+#[test]
+fn lines_keep_their_radius() {
+    let dir = tempfile::tempdir().unwrap();
+    json(dir.path(), &["make", "star"]);
+    let file = std::fs::read_dir(dir.path()).unwrap().next().expect("a file").unwrap().path();
+    let info = json(dir.path(), &["info", file.to_str().unwrap()]);
+    assert_eq!(arrays(&info), ["scalars", "radius"]);
+}
+
+#[test]
+fn wrong_usage_ends_with_2_and_names_what_is_right() {
+    let dir = tempfile::tempdir().unwrap();
+    for (args, named) in [
+        (&["make", "teapot"][..], "icosphere"),
+        (&["make", "icosphere", "--size", "huge"], "small"),
+        (&["make", "wedge", "--normals"], "flow"),
+        (&["convert", "a.vtp", "a.png"], ".glb"),
+        (&["dance"], "Usage"),
+    ] {
+        let out = datasets(dir.path(), args);
+        let message = text(&out.stderr);
+        assert_eq!(out.status.code(), Some(2), "{args:?}: {message}");
+        assert!(message.contains(named), "{args:?}: {message}");
+        assert!(out.stdout.is_empty(), "{args:?}");
+    }
+    assert!(std::fs::read_dir(dir.path()).unwrap().next().is_none(), "nothing was written");
+}
+
+#[test]
+fn a_missing_file_ends_with_1_and_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = datasets(dir.path(), &["info", "nowhere.vti"]);
+    assert_eq!(out.status.code(), Some(1));
+    assert!(text(&out.stderr).contains("nowhere.vti"), "{}", text(&out.stderr));
+}
+
+#[test]
+fn help_has_examples_and_completions_are_printed() {
+    let dir = tempfile::tempdir().unwrap();
+    for args in [&["--help"][..], &["make", "--help"], &["info", "--help"], &["convert", "--help"]] {
+        let out = datasets(dir.path(), args);
+        assert_eq!(out.status.code(), Some(0), "{args:?}");
+        assert!(text(&out.stdout).contains("Examples:"), "{args:?}");
+    }
+    let out = datasets(dir.path(), &["completions", "bash"]);
+    assert!(out.status.success() && text(&out.stdout).contains("datasets"), "{}", text(&out.stdout));
+}
